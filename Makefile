@@ -6,6 +6,7 @@
 # make faults 100 kills at random moments while a batch runs; KILLS=… and SEED=… for others
 # make fuzz   10,000 malformed files and hostile words for all verbs; CASES=… and SEED=… for others
 # make docs   the documentation as a site, in ./site
+# make plugin the QGIS plugin as a zip, in ./dist
 # make bench  the main figures of docs/figures.md
 # Each installs what it lacks: PostgreSQL with PostGIS by apt, and a virtual environment in .venv.
 
@@ -14,7 +15,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find tunneldb sql migrations -type f -not -name '*.py[co]' -not -name '*.nb[ic]') pyproject.toml README.md LICENSE
 
-.PHONY: install demo demo-structure demo-canal quick test tests faults fuzz docs bench lint clean
+.PHONY: install demo demo-structure demo-canal quick test tests faults fuzz docs plugin bench lint clean
 .DELETE_ON_ERROR:
 
 install: $(VENV)/wheel
@@ -80,6 +81,9 @@ fuzz: install $(VENV)/tests $(VENV)/compiled
 
 docs: $(VENV)/dependencies
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+plugin:
+	$(PYTHON) scripts/package_plugin.py dist
 
 bench: install
 	$(BIN)/python -m benchmarks.run

@@ -17,3 +17,8 @@ UInt16 = NDArray[np.uint16]
 UInt32 = NDArray[np.uint32]
 UInt64 = NDArray[np.uint64]
 Whole = Int32 | Int64
+
+
+def known(value: float) -> float | None:
+    """Return a number as Python's own, None where it is not finite: NaN in an array is NULL in the database."""
+    return float(value) if np.isfinite(value) else None

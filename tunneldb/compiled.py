@@ -9,6 +9,9 @@ from __future__ import annotations
 from numba import njit
 
 from tunneldb.arrays import Int64
+from tunneldb.compiled_cache import require_own_cache
+
+require_own_cache()
 
 kernel = njit(cache=True, nogil=True)
 """Decorator of a compiled function that Python calls."""

@@ -127,8 +127,8 @@ def run(scene: Scene, folder: Path, dsn: str) -> float:
 def outcome(conn: psycopg.Connection[Any], scene: Scene, folder: Path, seconds: float) -> Outcome:
     """Read what was found, and carry the truth over to the unrolled plane; where the scene was refused nothing was found."""
     survey = get_survey(conn, scene.name)
-    true, properties = _layer(conn, survey, folder / "truth.geojson")
-    other, marks = _layer(conn, survey, folder / "other.geojson")
+    true, properties = layer(conn, survey, folder / "truth.geojson")
+    other, marks = layer(conn, survey, folder / "other.geojson")
     rows = conn.execute(
         "SELECT public.ST_AsBinary(unrolled), coalesce(judged, kind), coalesce(confidence, 0.0), reasons"
         " FROM tunnel.anomaly WHERE survey_id = %s AND detected ORDER BY id",
@@ -148,7 +148,7 @@ def outcome(conn: psycopg.Connection[Any], scene: Scene, folder: Path, seconds: 
     return made.classed(conn, read_coverage(conn, survey.id))
 
 
-def _layer(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> tuple[list[BaseGeometry], list[dict[str, Any]]]:
+def layer(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> tuple[list[BaseGeometry], list[dict[str, Any]]]:
     """Polygons of a file, in the unrolled plane, and their properties; none where there is no file.
 
     Outlines that cross themselves are mended: what is drawn on a curved lining may.

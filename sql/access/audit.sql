@@ -2,7 +2,8 @@
 -- new rows only, and is written by the triggers of views/edit.sql. What stages do is in the ledger (tunnel_api.run).
 
 CREATE OR REPLACE VIEW tunnel_api.audit AS
-SELECT e.id, e.at, e.who, e.survey, e.view, e.row_id, e.action, e.before, e.after, e.undoes, e.part_of, e.kept
+SELECT e.id, e.at, e.who, e.survey, e.view, e.row_id, e.action, e.before, e.after, e.undoes, e.part_of, e.kept,
+       e.imported_by, e.imported_at
   FROM tunnel_audit.entry e;
 COMMENT ON VIEW tunnel_api.audit IS
     'What people changed through the views: who, when, before and after; it outlives what it speaks of. No role changes it, but for operators by a trigger or a function of their own on a table, which tunneldb check reports';
@@ -17,6 +18,8 @@ COMMENT ON COLUMN tunnel_api.audit.after IS 'The same columns as they became, ge
 COMMENT ON COLUMN tunnel_api.audit.undoes IS 'Entry that this one takes back (finding_undo)';
 COMMENT ON COLUMN tunnel_api.audit.part_of IS 'Entry of the step that this one is a part of: a split, a merge, a delete';
 COMMENT ON COLUMN tunnel_api.audit.kept IS 'What had been measured of a finding before its outline changed';
+COMMENT ON COLUMN tunnel_api.audit.imported_by IS 'Who brought it in with an archive (survey import): then at and who are what the archive says; NULL of what was done here';
+COMMENT ON COLUMN tunnel_api.audit.imported_at IS 'When it was brought in';
 
 -- Notes an edit: of what was and is, the columns that differ; nothing when none does. Without before it is an insert, without
 -- after a delete. Only the triggers, which run with the owner's rights, get through to the table. Returns the entry's id.

@@ -35,3 +35,22 @@ END
 $$;
 COMMENT ON FUNCTION tunnel_api.chainage_parse(text) IS
 'Chainage in m of its text: 12+345.678 -> 12345.678; plain metres are taken as they are.';
+
+
+-- What functions of a stretch or of kilometres begin with: one that runs backwards would be an empty one, with no leak in it.
+CREATE OR REPLACE FUNCTION tunnel_api.in_order(first float8, last float8, unit text DEFAULT 'm')
+RETURNS boolean
+LANGUAGE plpgsql IMMUTABLE STRICT PARALLEL SAFE
+SET search_path = pg_catalog, pg_temp
+AS $$
+BEGIN
+    IF first <= last AND last < 'NaN' THEN
+        RETURN true;
+    END IF;
+    RAISE EXCEPTION '%', CASE WHEN 'NaN' IN (first, last) THEN format('from %s to %s %s is no stretch', first, last, unit)
+        ELSE format('from %s to %s %s runs backwards: give the smaller one first', first, last, unit) END
+        USING ERRCODE = 'invalid_parameter_value';
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.in_order(float8, float8, text) IS
+'True; an error where the end of a stretch (m) or of kilometres comes before its beginning.';

@@ -92,19 +92,21 @@ AS $$
             max(c.length) - min(c.length) AS length
         FROM tunnel_api.coverage_at(s.id, r.ends) c
         HAVING max(c.length) > min(c.length)) d ON true
-    WHERE e.chainage_from IS NOT NULL AND r.ends[1] < r.ends[2]
+    WHERE e.chainage_from IS NOT NULL AND r.ends[1] < r.ends[2] AND tunnel_api.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.coverage(text, float8, float8) IS
 'Lining of a survey between two chainages (m) where it was searched for leaks, what the last detection saw of it, and the pixels that it found wet, after the median filter (m²); seen_share of the lining of the whole stretch, in which kilometres without detection count as unseen, as in leak_statistics; wet_pixel_share of what was seen, as Xu et al. (2018) state it. Steps of chainage that an end cuts count by their share.';
 
 
 -- Of an area on the lining (m²) whose outline lies in the unrolled plane, the part between two chainages (m). The planner puts
--- the body in the place of a call; one that is not cut is not clipped.
+-- the body in the place of a call; one that is not cut is not clipped. Callers ask with what of a stretch lies in a survey: of none,
+-- which runs backwards then, there is no part.
 CREATE OR REPLACE FUNCTION tunnel_api.area_between(outline geometry, area float8, chainage_from float8, chainage_to float8)
 RETURNS float8
 LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT
 AS $$
     SELECT CASE WHEN public.ST_XMin($1) >= $3 AND public.ST_XMax($1) <= $4 THEN $2
+        WHEN $3 >= $4 THEN 0
         ELSE $2 / nullif(public.ST_Area($1), 0) * public.ST_Area(public.ST_ClipByBox2D($1, public.ST_MakeBox2D(
             public.ST_MakePoint(greatest($3, -1e9), -1e4), public.ST_MakePoint(least($4, 1e9), 1e4)))) END
 $$;

@@ -22,6 +22,7 @@ DECLARE
     least_share constant float8 := 0.5;  -- of the lining seen
     least_length constant float8 := 5;  -- over which it was not, m
 BEGIN
+    PERFORM tunnel_api.in_order(first_place, last_place);
     RETURN QUERY
     WITH scanned AS (  -- along the given axis
         SELECT k.km, min(greatest(f.chainage_from, k.km * 1000)) AS low, max(least(f.chainage_to, (k.km + 1) * 1000)) AS high

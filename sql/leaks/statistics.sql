@@ -255,7 +255,7 @@ AS $$
     CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
     CROSS JOIN LATERAL (SELECT greatest($2, e.chainage_from) AS low, least($3, e.chainage_to) AS high) r
     CROSS JOIN LATERAL tunnel_api.stretch_statistics(s.id, ARRAY[r.low], ARRAY[r.high]) t
-    WHERE e.chainage_from IS NOT NULL AND r.low < r.high
+    WHERE e.chainage_from IS NOT NULL AND r.low < r.high AND tunnel_api.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.leak_statistics(text, float8, float8) IS
 'Leaks of a survey between two chainages (m), as far as it reaches; of kind leak, found last and not rejected. wet_ratio is wet_area of the lining seen; lining_area and seen_area are those of the part that was searched for leaks, which makes up searched_share of the length; seen_share is that of the lining of the whole stretch, in which what was not searched counts as unseen. patches and wet_area are NULL where nothing was searched and nothing is known. A leak that an end cuts counts by its part in wet_area and as one patch; largest_area and largest_leak take leaks whole. window_patches: most patches in any 100 m² of lining, here between window_from and window_to, and which; window_wet_area: greatest wet area in any 100 m² (m²). class: best class of GB 50108-2008 that the seen lining keeps, NULL if nothing was seen.';
@@ -340,6 +340,7 @@ DECLARE
     first_whole float8;
     last_whole float8;
 BEGIN
+    PERFORM tunnel_api.in_order(stretch_from, stretch_to);
     IF NOT (ring_length >= 0.1 AND ring_length < 'Infinity') THEN
         RAISE EXCEPTION 'a ring must be at least 0.1 m long, not % m', ring_length USING ERRCODE = 'invalid_parameter_value';
     END IF;

@@ -18,7 +18,7 @@ AS $$
     SELECT '(' || coalesce(string_agg(format('SELECT * FROM tunnel.%I', n.name), ' UNION ALL ' ORDER BY k),
         'SELECT * FROM tunnel.point WHERE false') || ')'
     FROM generate_series(km_from, km_to) AS k, tunnel_api.partition_name(survey_id, k) AS n (name)
-    WHERE to_regclass('tunnel.' || quote_ident(n.name)) IS NOT NULL
+    WHERE to_regclass('tunnel.' || quote_ident(n.name)) IS NOT NULL AND tunnel_api.in_order(km_from, km_to, 'km')
 $$;
 COMMENT ON FUNCTION tunnel_api.partition_source(int, int, int) IS
 'What to read in FROM for the points of a survey''s kilometres km_from to km_to: their partitions by name, without a lock on the table that holds them.';

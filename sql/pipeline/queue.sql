@@ -39,6 +39,7 @@ AS $$
          CROSS JOIN LATERAL unnest(CASE w.way WHEN 0 THEN s.here ELSE s.beside END) AS n (source)
     ), span AS MATERIALIZED (
         SELECT $2 - count(*)::integer AS first, $3 + count(*)::integer AS last FROM stage
+         WHERE tunnel_api.in_order($2, $3, 'km')
     ), goal AS (
         SELECT g.km, s.step AS target, g.parameters, g.retry_after
           FROM tunnel.goal g CROSS JOIN span p JOIN stage s ON s.name = g.stage

@@ -169,6 +169,7 @@ AS $$
           FROM tunnel_api.deviation_section d
          CROSS JOIN LATERAL (SELECT least(d.chainage_to, $4) - greatest(d.chainage_from, $3) AS long) p
          WHERE d.survey_id = s.id AND d.layer = $2 AND d.chainage_from > $3 - 1.001 AND d.chainage_from < $4 AND p.long > 0
+           AND tunnel_api.in_order($3, $4)
         HAVING count(*) > 0) d
 $$;
 COMMENT ON FUNCTION tunnel_api.deviation_volume(text, text, float8, float8, float8) IS
@@ -202,22 +203,3 @@ AS $$
 $$;
 COMMENT ON FUNCTION tunnel_api.deviation_stretches(text, text, float8, float8) IS
 'deviation_volume of each stretch of so many metres, 1 or more, that a survey has, from whole multiples of them on: m³ by 100 m, by default';
-
-CREATE OR REPLACE FUNCTION tunnel_api.deviation_thickness(
-    survey_before text, survey_after text, layer text, chainage_from float8 DEFAULT '-infinity',
-    chainage_to float8 DEFAULT 'infinity')
-RETURNS TABLE (section_from float8, section_to float8, label text, thickness float8, thickness_least float8, compared_share float8)
-LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 1000
-AS $$
-    SELECT b.chainage_from, b.chainage_to, b.label, t.mean, t.low, t.share
-      FROM tunnel_api.deviation_section b
-      JOIN tunnel_api.deviation_section a ON a.survey_id = tunnel_api.survey_id($2) AND a.layer = b.layer
-       AND a.chainage_from = b.chainage_from AND cardinality(a.deviation) = cardinality(b.deviation)
-     CROSS JOIN LATERAL (
-        SELECT avg(c.new - c.old) AS mean, min(c.new - c.old) AS low, count(*)::float8 / cardinality(b.deviation) AS share
-          FROM unnest(b.deviation, a.deviation) AS c (old, new)
-         WHERE c.old <> 'NaN' AND c.new <> 'NaN') t
-     WHERE b.survey_id = tunnel_api.survey_id($1) AND b.layer = $3 AND b.chainage_from >= $4 AND b.chainage_from < $5 AND t.share > 0
-$$;
-COMMENT ON FUNCTION tunnel_api.deviation_thickness(text, text, text, float8, float8) IS
-'What was put on between two surveys of one tunnel, by section that begins between two chainages (m), by default all: mean and least thickness (m) at right angles to the profile, of the cells that both saw (compared_share of the profile). Both surveys must have been held against the same profiles';

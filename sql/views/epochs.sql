@@ -96,7 +96,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
     SELECT md5(string_agg(concat_ws(' ', a.id, coalesce(a.judged, a.kind), a.wet, a.area, a.chainage_from, a.chainage_to), ';' ORDER BY a.id))
       FROM tunnel.anomaly a
      WHERE a.survey_id = $1 AND a.chainage_to > $2 AND a.chainage_from < $3 AND a.detected AND a.review <> 'rejected'
-       AND NOT a.aside AND (a.wet OR a.kind IN ('leak', 'joint', 'dark'))
+       AND NOT a.aside AND (a.wet OR a.kind IN ('leak', 'joint', 'dark')) AND tunnel_api.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.leaks_checksum(int, float8, float8) IS
     'Checksum of the leaks, joints and dark spots that count between two chainages (m): another as soon as one is judged, drawn or found anew; NULL without any';

@@ -72,7 +72,7 @@ AS $$
         SELECT r.file, r.stage, r.km, r.remark
           FROM tunnel_api.remark r
           LEFT JOIN tunnel.scan_file f ON f.survey_id = r.survey_id AND f.name = r.file
-         WHERE r.survey_id = $1
+         WHERE r.survey_id = $1 AND tunnel_api.in_order($2, $3)
            AND coalesce(r.km * 1000, f.chainage_from, '-Infinity') < $3
            AND coalesce((r.km + 1) * 1000, f.chainage_to, 'Infinity') > $2
     ), part AS (  -- kilometres in a row

@@ -77,7 +77,8 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
         SELECT n.number * 50::float8 AS chainage_from, (n.number + 1) * 50::float8 AS chainage_to,
                floor(n.number / 20.0)::integer AS km) b
  CROSS JOIN LATERAL (  -- as far as the survey reaches
-        SELECT greatest(b.chainage_from, e.chainage_from) AS chainage_from, least(b.chainage_to, e.chainage_to) AS chainage_to) r
+        SELECT f.chainage_from, greatest(least(b.chainage_to, e.chainage_to), f.chainage_from) AS chainage_to
+          FROM (SELECT least(greatest(b.chainage_from, e.chainage_from), b.chainage_to) AS chainage_from) f) r
   LEFT JOIN LATERAL (
         SELECT array_agg(regexp_replace(t.label, '\.0+$', '') ORDER BY i) AS labels
           FROM generate_series(0, 5) AS i

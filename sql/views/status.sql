@@ -58,7 +58,7 @@ AS $$
         SELECT r.km, s.step, r.id, r.outcome, r.started_at, r.finished_at, r.message, r.parameters, r.backend_pid, r.backend_start,
                r.counts ->> 'kept' = '0' AS void, (r.counts ->> 'learned')::integer AS learned
           FROM tunnel.run r JOIN stage s ON s.name = r.stage
-         WHERE r.survey_id = $1 AND r.km BETWEEN $2 AND $3
+         WHERE r.survey_id = $1 AND r.km BETWEEN $2 AND $3 AND tunnel_api.in_order($2, $3, 'km')
     ), last AS (
         SELECT DISTINCT ON (a.km, a.step) a.* FROM attempt a ORDER BY a.km, a.step, a.started_at DESC, a.id DESC
     ), success AS MATERIALIZED (

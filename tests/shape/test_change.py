@@ -10,7 +10,7 @@ from support.curved_lining import made
 from tunneldb.anomalies.change import Leak, groups, state_of, wet_area
 from tunneldb.pipeline.change import Change, measure_change, rings_apart, section_figures
 from tunneldb.shape.change import change_regions, significant
-from tunneldb.shape.epoch_cells import CellGrid, Cells, CellSums, rounding_variance
+from tunneldb.shape.epoch_cells import CellGrid, Cells, CellSums, rounding_variance, with_hollows, without_edges
 
 RADIUS, LENGTH, PIXEL, NOISE = 4.0, 60.0, 0.02, 0.003
 GRID = CellGrid(0.1, 60.0, -9.0, 600, 180)
@@ -63,6 +63,26 @@ def test_an_unchanged_lining_whose_pose_is_off_is_unchanged_and_its_level_of_det
     assert np.abs(motions - [0.02, -0.01]).max() < 2e-4
     assert np.mean(np.abs(motions - [0.02, -0.01]) < 1.96 * errors) > 0.85
     assert all(np.isnan(motion.values[3]) for _, motion in found.sections)  # a round lining does not show its roll
+
+
+@pytest.mark.parametrize("filled", [False, True])
+def test_a_hollow_deeper_than_lining_stands_back_is_a_region_and_a_niche_is_none(filled: bool) -> None:
+    chainage, arc = places()
+    spall = (chainage > 80.0) & (chainage < 80.6) & (arc > 2.0) & (arc < 2.5)
+    niche = (chainage > 100.0) & (chainage < 102.0) & (arc > 3.0) & (arc < 5.0)
+    epochs = []
+    for seed, hollow in ((1, spall & filled), (2, spall & (not filled))):
+        offset = np.random.default_rng(seed).normal(0.0, NOISE, len(arc)) - 0.05 * hollow - 0.4 * niche
+        epochs.append(CellSums(GRID, PIXEL))
+        epochs[-1].add(chainage, arc, np.round(offset, 3), ~(hollow | niche))
+    surface, _ = made(RADIUS, 200.0, 0.0, 0.0)
+    found = measure_change(surface, GRID, *(without_edges(cells) for cells in with_hollows(*epochs)), 1.5)
+    (region,) = change_regions(found.difference, found.variance, found.removed_error, found.scatter)
+    sign = 1.0 if filled else -1.0
+    assert region.greatest == pytest.approx(sign * 0.05, abs=0.001)
+    assert region.mean * len(region.rows) * GRID.cell**2 == pytest.approx(sign * 0.05 * 0.6 * 0.5, rel=0.03)
+    inside = np.ix_((GRID.arc > 3.0) & (GRID.arc < 5.0), (GRID.chainage > 100.0) & (GRID.chainage < 102.0))
+    assert np.isnan(found.difference[inside]).all()
 
 
 @pytest.mark.parametrize(("kind", "mean", "area"), [("bulge", 0.003, 1.0), ("wall", 0.005, 30.0 * 4.0), ("ring", 0.002, None)])

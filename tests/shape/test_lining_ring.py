@@ -10,6 +10,7 @@ from tunneldb.shape.lining_ring import measure_ring
 from tunneldb.shape.patches import Patches, average
 from tunneldb.shape.ring_joint_steps import joint_steps
 from tunneldb.shape.ring_joints import NoRingsError, column_signals, follow, peaks, ring_length, strength
+from tunneldb.shape.rings import fit_ring
 
 RADIUS, CENTRE, SIDE, NOISE = 2.9, (0.02, -0.03), 0.06, 0.0006
 JOINT, LENGTH = 101.5, 1.5
@@ -43,6 +44,22 @@ def test_shape_chord_and_seen_share_are_those_of_the_ellipse() -> None:
     assert np.isnan(unseen.length)
 
 
+@pytest.mark.parametrize("third", [0.0, 0.002])
+def test_standard_errors_hold_with_three_tenths_of_the_ring_unseen(third: float) -> None:
+    """Also of a ring that is not quite an ellipse, which an ellipse alone would follow by millimetres."""
+    random = np.random.default_rng(7)
+    turn = np.radians(np.linspace(-180.0, 180.0, 300, endpoint=False))
+    turn = turn[np.abs(turn) < np.radians(126.0)]
+    ratio = []
+    for _ in range(80):
+        radius = RADIUS + 0.008 * np.cos(2.0 * (turn - random.uniform(0.0, 3.0)))
+        radius += third * np.cos(3.0 * (turn - random.uniform(0.0, 2.0))) + random.normal(0.0, NOISE, len(turn))
+        ellipse = fit_ring(radius[:, None] * np.column_stack([np.sin(turn), np.cos(turn)])).adjustment.ellipse
+        off = [ellipse.radius - RADIUS, ellipse.flattening - 0.008]
+        ratio.append(off / np.array([np.sqrt(ellipse.covariance[2, 2]), ellipse.flattening_se]))
+    assert (np.abs(ratio) < 1.96).mean() == pytest.approx(0.95, abs=0.05)
+
+
 def test_a_box_has_chords_and_no_radius() -> None:
     shown = patches()
     right, up = shown.right - CENTRE[0], shown.up - CENTRE[1]
@@ -52,6 +69,14 @@ def test_a_box_has_chords_and_no_radius() -> None:
     assert found.ring is None
     assert found.remark.startswith("not round")
     assert found.chords[0].length == pytest.approx(5.0, abs=0.02)
+
+
+def test_standard_errors_of_steps_hold() -> None:
+    """Of the biweight's planes, too, which give what lies far off less weight."""
+    off = [joint_steps(patches(seed=seed), JOINT, LENGTH, LENGTH) for seed in range(12)]
+    ratio = np.concatenate([(one.step / one.se)[np.isfinite(one.step)] for one in off])
+    assert len(ratio) > 400
+    assert np.sqrt(np.mean(ratio**2)) == pytest.approx(1.0, abs=0.07)
 
 
 @pytest.mark.parametrize("kind", ["inwards", "shifted"])
@@ -88,6 +113,15 @@ def test_lips_between_segments_are_found_where_they_are() -> None:
     assert lip is not None
     assert min(abs(lip.arc - 2.0), abs(lip.arc - 4.5)) < 2 * SIDE
     assert lip.size == pytest.approx(0.004 if abs(lip.arc - 2.0) < 1.0 else -0.004, abs=0.001)
+
+
+def test_a_ring_askew_to_the_axis_has_no_lip_beside_what_hides_a_part_of_it() -> None:
+    """Rows that are seen at one end of the ring only lie where that end is."""
+    shown = patches()
+    askew = Patches(shown.chainage, shown.arc, shown.right + 0.008 * (shown.chainage - 100.75)[:, None], shown.up)
+    hidden = (shown.chainage < 101.1)[:, None] & (np.abs(shown.arc - 4.8) < 0.3)
+    right, up = (np.where(hidden, np.nan, part) for part in (askew.right, askew.up))
+    assert measure_ring(Patches(shown.chainage, shown.arc, right, up), 100.0, JOINT, 18.2).lip is None
 
 
 def test_patches_are_means_at_whole_multiples() -> None:

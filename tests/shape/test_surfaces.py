@@ -119,7 +119,7 @@ def test_thickness_is_what_was_put_on(surveys: tuple[str, str], conn: psycopg.Co
     found = {row[0] for row in conn.execute("SELECT reason FROM tunnel_api.thickness_status")}
     assert found == {"deviation of the earlier survey is stale: design profiles changed since"}
     done = CliRunner().invoke(main, ["thickness", "after", "after"])
-    assert (done.exit_code, "named twice" in done.output) == (2, True)
+    assert (done.exit_code, "given twice" in done.output) == (2, True)
 
 
 def test_gaps_beneath_a_straightedge_over_the_end_of_a_kilometre(surveys: tuple[str, str], conn: psycopg.Connection) -> None:

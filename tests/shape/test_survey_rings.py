@@ -8,7 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import psycopg
+import pyogrio
+import pyogrio.raw
 import pytest
+import shapely
 from click.testing import CliRunner, Result
 from support.straight_survey import FIRST, LAST, RADIUS, Scene, make_survey
 
@@ -91,6 +94,25 @@ def test_rings_are_measured_over_the_end_of_a_kilometre(survey: str, conn: psyco
         assert len(list(csv.DictReader(file))) == len(rows)
     run("rings", survey, "-o", tmp_path / "r.xlsx")
     assert (tmp_path / "r.xlsx").stat().st_size > 5000
+    run("rings", survey, "-o", tmp_path / "r.gpkg")
+    assert [tuple(layer) for layer in pyogrio.list_layers(tmp_path / "r.gpkg")] == [
+        ("ring_map", "Polygon"), ("ring_unrolled", "Polygon"), ("ring_step", "Point")
+    ]  # fmt: skip
+    unrolled = pyogrio.raw.read(tmp_path / "r.gpkg", layer="ring_unrolled")
+    fields = dict(zip(unrolled[0]["fields"], unrolled[3], strict=True))
+    bounds = shapely.bounds(shapely.from_wkb(unrolled[2]))
+    np.testing.assert_allclose(bounds[:, [0, 2]], np.column_stack([fields["chainage_from"], fields["chainage_to"]]), atol=1e-9)
+    np.testing.assert_allclose(bounds[:, [1, 3]], [[-np.pi * RADIUS, np.pi * RADIUS]] * len(rows), atol=0.05)
+    for name in ("number", "radius", "ovality_se", "step_greatest", "chord_270_90"):
+        wanted = [np.nan if row[name] is None else row[name] for row in rows]
+        np.testing.assert_allclose(fields[name], wanted, atol=1e-6)
+    assert [len(text.split()) for text in fields["harmonic"]] == [5] * len(rows)
+    drawn = pyogrio.raw.read(tmp_path / "r.gpkg", layer="ring_map")
+    assert len(drawn[2]) == len(rows)
+    assert drawn[0]["crs"]
+    known = conn.execute("SELECT count(*) FROM tunnel_api.ring_step").fetchone()
+    assert known is not None
+    assert known[0] == len(pyogrio.raw.read(tmp_path / "r.gpkg", layer="ring_step")[2])
 
 
 def test_rings_are_stale_after_what_they_rest_on(survey: str, conn: psycopg.Connection, tmp_path: Path) -> None:

@@ -114,6 +114,8 @@ def test_every_view_begins_with_a_stable_integer_key(
     add_change(conn, "demo-2024")
     add_change_run(conn, "demo-2024")
     add_surfaces(conn, one(conn, "SELECT id FROM tunnel.survey WHERE name = %s", example))
+    conn.execute("INSERT INTO tunnel.station SELECT survey_id, n, geom FROM tunnel.axis_vertex")
+    conn.execute("INSERT INTO tunnel.pose SELECT survey_id, n, geom FROM tunnel.axis_vertex")
     conn.execute(  # the earlier survey saw kilometre 12, too
         "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) SELECT s.id, i.km, i.kind, i.block, i.tiff"
         " FROM tunnel.image i, tunnel.survey s WHERE i.kind = 'offset' AND s.name = 'demo-2023'"

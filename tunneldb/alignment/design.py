@@ -13,6 +13,7 @@ from tunneldb.errors import UserError
 CHORD_ERROR = 0.0005  # m; half of what is promised, for lines that bend in plan and in profile at once
 LONGEST_STEP = 1.0  # m; the spline through the vertices needs even steps where a line meets an arc
 GAP = 0.01  # m between the end of an element and the beginning of the next; files are rounded to millimetres
+LEAST_RADIUS = 1.0  # m; no tunnel bends so, in plan or profile
 SHORT_END = 0.1  # m by which a profile may be shorter than the plan before the alignment ends with it
 
 
@@ -85,9 +86,18 @@ class Design:
                     f"{low.kind} {number} of the profile does not meet {high.kind} {number + 1} "
                     f"at {self.start + high.distance:.3f} m: {gap:.3f} m apart, a step of {step:.3f} m"
                 )
+        if not self._bending() <= 1.0 / LEAST_RADIUS:
+            raise UserError(
+                f"plan or profile has an arc of less than {LEAST_RADIUS:g} m: the file is damaged, or not in its unit"
+            )
         low_end, high_end = self.reach
         if high_end - low_end < LONGEST_STEP:
             raise UserError("plan and profile have no stretch in common: is the profile that of another alignment?")
+
+    def _bending(self) -> float:
+        """Greatest curvature of the plan and of the profile together, 1/m."""
+        bend = max(max(abs(e.curvature_from), abs(e.curvature_to)) for e in self.plan)
+        return bend + max(abs(e.grade_to - e.grade_from) / e.length for e in self.profile)
 
     def position(self, distance: Float) -> Float:
         """Points (n, 3) at distances (n,) in plan from the beginning, m; beyond the ends on the continuation."""
@@ -120,9 +130,7 @@ class Design:
         The step is at most a metre: a spline through vertices far apart on a straight would swing where the arc begins.
         """
         low, high = self.reach
-        bend = max(max(abs(e.curvature_from), abs(e.curvature_to)) for e in self.plan)
-        sag = max(abs(e.grade_to - e.grade_from) / e.length for e in self.profile)
-        step = min(LONGEST_STEP, np.sqrt(8.0 * CHORD_ERROR / max(bend + sag, 1e-9)))
+        step = min(LONGEST_STEP, np.sqrt(8.0 * CHORD_ERROR / max(self._bending(), 1e-9)))
         return self.position(np.linspace(low, high, int(np.ceil((high - low) / step)) + 1))
 
     def renumbered(self, start: float | None) -> Design:

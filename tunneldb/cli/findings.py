@@ -127,9 +127,8 @@ def list_findings(
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
         if unknown := set(kinds) - {code for (code,) in conn.execute("SELECT code FROM tunnel_api.finding_kind")}:
-            raise UserError(
-                f"there is no kind {', '.join(sorted(unknown))} of findings: SELECT code FROM tunnel_api.finding_kind"
-            )
+            names = ", ".join(map(repr, sorted(unknown)))
+            raise UserError(f"there is no kind {names} of findings: SELECT code FROM tunnel_api.finding_kind")
         if count:
             _print_counts(conn, found, kinds, origins)
             return

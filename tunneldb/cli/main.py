@@ -10,7 +10,7 @@ import click
 
 from tunneldb import __version__
 from tunneldb.cli.output import AS_JSON, AT_FAULT, DONE, JSON, run_as_json, write_lines
-from tunneldb.errors import UserError
+from tunneldb.errors import UserError, did_you_mean
 
 
 @dataclass(frozen=True)
@@ -132,6 +132,12 @@ class LazyGroup(click.Group):
         command = getattr(importlib.import_module(module), attribute)
         assert isinstance(command, click.Command)
         return command
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the verb; of one that is mistyped ask for the nearest."""
+        if args[0] not in COMMANDS and (meant := did_you_mean(args[0], COMMANDS)):
+            ctx.fail(f"No such command {args[0]!r}.{meant}")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the verbs from COMMANDS, without importing them."""

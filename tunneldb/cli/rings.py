@@ -27,6 +27,7 @@ _CHORD = re.compile(f"{_END}-{_END}")
     examples=[
         "tunneldb rings demo-2024 --find",
         "tunneldb rings demo-2024 --length 1.5 --diameter 8 --chord 9:00-3:00 -o rings.csv",
+        "tunneldb rings demo-2024 -o rings.gpkg",
         "tunneldb rings demo-2024 --from 12+310.000 --to 12+340.000 --json",
         "tunneldb rings --points points.csv --axis axis.csv --diameter 5.8 -o rings.csv",
         "tunneldb rings --points points.csv --axis axis.csv --diameter 5.8 --chord 9:00-3:00 --chord 300-60 -o rings.csv",
@@ -80,7 +81,10 @@ _CHORD = re.compile(f"{_END}-{_END}")
     help="Chord between two clock positions, in degrees or as on a clock: 300-60, 9:00-3:00. May be repeated.",
 )
 @click.option(
-    "-o", "--output", type=FilePath(dir_okay=False), help="File to write, .csv, of a survey .xlsx, too; else standard output."
+    "-o",
+    "--output",
+    type=FilePath(dir_okay=False),
+    help="File to write, .csv, of a survey also .xlsx, or .gpkg with maps; else standard output.",
 )
 @click.pass_obj
 @click.pass_context

@@ -123,6 +123,17 @@ _GROUPS: dict[str, list[_Option]] = {
         ),
         _Option("ring", "M", "Length of the blocks of cast and of the rings of segments [10, 1.5]."),
         _Option("ring_step", "M", "Standard deviation of the radius from ring to ring or block to block."),
+        _Option(
+            "ring_shift", "M", "Standard deviation of the centre from ring to ring, to the right and up; circular section."
+        ),
+        _Option("segment_step", "M", "Standard deviation of how far segments stand in or out of their ring."),
+        _Option(
+            "ovality",
+            "MIN MAX",
+            "Ovality of rings, largest less smallest diameter, %; the largest is level within 20°; circular section.",
+            FINITE,
+            2,
+        ),
         _Option("radius_step", "M", "How much wider the section is over the second half."),
         _Option("soot", "DB", "Darkening of the crown."),
         _Option("grime", "DB", "Darkening beneath cables and trays."),
@@ -276,6 +287,9 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
                              stripe, soot, grime, halo, chamfer, shade); layer bright, if any: what is brighter
                              (salts, fringe, patch, paint, stripe, shade), its drop negative; layer deformation,
                              of a later scan: what moved (wall, ring, bulge), m inwards
+    OUT/NAME.rings.csv       number,chainage_from,chainage_to of rings or blocks, if any, their centre from the axis
+                             (right, up), radius, ovality (share of the diameter), largest_clock, and the greatest
+                             step_greatest at its beginning and lip between segments, positive inwards, with their arc
     OUT/NAME.spheres.csv     id,x,y,z,radius,kind of the target spheres, if any; id is their number among the things
     OUT/NAME.json            all parameters, appendages, niches, things that stand free
 

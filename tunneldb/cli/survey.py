@@ -12,6 +12,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, records, tell
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
+from tunneldb.cli.survey_archive import export, import_
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
@@ -22,7 +23,11 @@ FILE = FilePath()
 
 @click.group(cls=VerbGroup)
 def survey() -> None:
-    """Add, list, set or remove the scanning campaigns of a tunnel, and withdraw files."""
+    """Add, list, set, archive or remove the scanning campaigns of a tunnel, and withdraw files."""
+
+
+survey.add_command(export)
+survey.add_command(import_)
 
 
 class Day(click.DateTime):

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from tunneldb.export.tables.survey_rings import Row
 
-_FILES = (".csv", ".xlsx")
+_FILES = (".csv", ".gpkg", ".xlsx")
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def survey_rings(
 
     definition.require_one()
     if output is not None and output.suffix.lower() not in _FILES:
-        raise UserError(f"{output}: rings of a survey are written as {' or '.join(_FILES)}")
+        raise UserError(f"{output}: rings of a survey are written as {', '.join(_FILES[:-1])} or {_FILES[-1]}")
     options = RingOptions(diameter, chords) if diameter is not None or chords else None
     with connect(settings.dsn) as conn:
         survey = get_survey(conn, name)
@@ -78,7 +78,12 @@ def survey_rings(
             tell(rows=rows)
         else:
             with replacing(output) as temporary:
-                write_rings(rows, temporary, output.suffix.lower(), f"Rings of {name}")
+                if output.suffix.lower() == ".gpkg":
+                    from tunneldb.export.exchange.rings_gpkg import write_rings_gpkg
+
+                    write_rings_gpkg(conn, survey, rows, temporary)
+                else:
+                    write_rings(rows, temporary, output.suffix.lower(), f"Rings of {name}")
     _print(rows, output)
 
 

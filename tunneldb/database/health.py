@@ -25,6 +25,10 @@ from tunneldb.errors import UserError
 
 ROLES = ("tunnel_viewer", "tunnel_inspector", "tunnel_operator")
 LITTLE_SPACE = 5 * 1024**3  # bytes; a kilometre at survey density takes some 0.5 GB with its rewrite
+LOCKS_PER_TABLE = 6
+"""Locks that dropping a kilometre takes at most: its table, the one of long values, and indexes."""
+LOCKS_OF_A_SESSION = 16
+"""Locks that another session holds meanwhile, about."""
 GIB = 1024**3
 
 
@@ -75,6 +79,7 @@ def examine(dsn: str | None) -> Iterator[Finding]:
         yield _audit(connection)
         yield from _foreign(connection)
         yield from _settings(connection, embedded=dsn is None)
+        yield _locks(connection)
         yield from _work(connection)
         yield from _queue(connection)
         yield from _stale(connection)
@@ -204,6 +209,35 @@ def _settings(connection: psycopg.Connection[Any], *, embedded: bool) -> Iterato
         yield Finding("note", "settings", f"{name} is small for scans", mend)
     if not small:
         yield Finding("ok", "settings", "memory and WAL are big enough")
+
+
+def _locks(connection: psycopg.Connection[Any]) -> Finding:
+    """Whether the server has locks for what takes most at once: a dump of all tables, or the removal of the longest survey."""
+    row = connection.execute(
+        """
+        SELECT current_setting('max_locks_per_transaction')::bigint * c.places, c.places, d.dump, d.removal
+          FROM (SELECT current_setting('max_connections')::bigint
+                         + current_setting('max_prepared_transactions')::bigint) c (places)
+         CROSS JOIN (
+               SELECT sum(s.tables)::bigint AS dump, %s * max(s.tables) FILTER (WHERE s.survey IS NOT NULL) AS removal
+                 FROM (SELECT substring(r.relname FROM '^point_s([0-9]+)') AS survey, count(*) AS tables
+                         FROM pg_class r
+                        WHERE r.relnamespace = 'tunnel'::regnamespace AND r.relkind IN ('r', 'p') GROUP BY 1) s) d
+        """,
+        [LOCKS_PER_TABLE],
+    ).fetchone()
+    assert row is not None
+    there, places, dump, removal = row
+    wanted = max(dump, removal or 0)
+    text = f"{there} for {dump} tables, one a kilometre"
+    if wanted + places * LOCKS_OF_A_SESSION <= there:
+        return Finding("ok", "locks", text)
+    least = 64 * -(-(2 * wanted + places * LOCKS_OF_A_SESSION) // (64 * places))
+    what = "to dump them all" if dump >= (removal or 0) else "to remove the longest survey"
+    return Finding(
+        "note", "locks", f"{text}: too few {what}",
+        f"as a superuser: ALTER SYSTEM SET max_locks_per_transaction = {least}; then restart the server",
+    )  # fmt: skip
 
 
 def _work(connection: psycopg.Connection[Any]) -> Iterator[Finding]:

@@ -33,7 +33,7 @@ def settings(socket_dir: Path) -> dict[str, str]:
     """Return the settings of an embedded server on this machine.
 
     One user, few connections, big scans: a quarter of the memory for shared buffers, generous work_mem. Locks for
-    surveys of thousands of kilometres: one that is loaded or removed takes six a kilometre in a transaction.
+    tens of thousands of kilometres: a dump takes one for each, a survey that is removed six for each of its own.
     ``wal_level=minimal`` lets COPY into a table of the same transaction skip the WAL; jit costs more than it
     gains on the short functions of tunnel_api.
     """
@@ -45,7 +45,7 @@ def settings(socket_dir: Path) -> dict[str, str]:
         "unix_socket_permissions": "0700",
         "port": "5432",
         "max_connections": "100",
-        "max_locks_per_transaction": "256",
+        "max_locks_per_transaction": "1024",
         "shared_buffers": _mib(memory // 4, 128, 4096),
         "effective_cache_size": _mib(memory // 2, 256, 1024 * 1024),
         "work_mem": _mib(memory // 64, 16, 256),

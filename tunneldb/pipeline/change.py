@@ -21,10 +21,11 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.deviation import lining_by_class
+from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_different_tunnels, refuse_stale
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.pixel_state import PixelState, shows_lining
 from tunneldb.shape import change as shape_change
-from tunneldb.shape.epoch_cells import LEAST_SIDE, SEEN_SHARE, CellGrid, Cells, CellSums, without_edges
+from tunneldb.shape.epoch_cells import LEAST_SIDE, SEEN_SHARE, CellGrid, Cells, CellSums, with_hollows, without_edges
 from tunneldb.shape.rigid_motion import Motion, motion_columns, rigid_motion
 from tunneldb.store.change import (
     Section,
@@ -41,7 +42,6 @@ from tunneldb.store.change import (
     stale_kilometres,
 )
 from tunneldb.store.images import image_blocks, load_block
-from tunneldb.store.ledger import stage_run
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
@@ -93,7 +93,7 @@ def compare(
     high: float,
     cell: float,
     length: float,
-    begin: Callable[[str, float], Callable[[float], None]],
+    begin: Begin,
 ) -> list[int]:
     """Bring the change of the kilometres of a stretch up to date, each in a transaction of its own; return which were.
 
@@ -108,38 +108,26 @@ def compare(
     cell, length : float
         Side of a cell, and length of a section, m.
     begin : callable
-        Called with a text and the number of kilometres; returns what takes those that are done.
+        See `tunneldb.pipeline.on_demand.Begin`.
 
     Raises
     ------
     UserError
         If they are of two tunnels or one and the same, if they have no kilometre in common, or one is out of date.
     """
-    if old.tunnel_id != new.tunnel_id:
-        raise UserError(
-            f"{old.name} is a survey of tunnel {old.tunnel}, {new.name} of {new.tunnel}: there is nothing to compare"
-        )
-    if old.id == new.id:
-        raise UserError(f"{old.name} is given twice: compare takes two surveys of one tunnel")
+    refuse_different_tunnels(old, new, "compare")
     there = stale_kilometres(conn, old, new, low, high)
     conn.rollback()
     if not there:
         raise UserError(
             f"{old.name} and {new.name} have no kilometre with offset images in common there: tunneldb run makes them"
         )
-    blocked = [(km, why) for km, (why, _, _) in there.items() if why is not None and " is stale: " in why]
-    if blocked:
-        km, why = blocked[0]
-        raise UserError(f"kilometre {km}: {why}; tunneldb run --stale that survey, then compare")
-    wanted = [km for km, (why, *made) in there.items() if why is not None or made != [cell, length]]
-    advance = begin(f"change from {old.name} to {new.name}", len(wanted))
-    for km in wanted:
-        inputs = {**change_inputs(conn, old, new, km), "cell": cell, "length": length}
-        conn.rollback()
-        with stage_run(conn, new.id, km, "compare", inputs) as run:
-            run.counts.update(_kilometre(conn, old, new, km, cell, length))
-        advance(1)
-    return wanted
+    refuse_stale({km: why for km, (why, _, _) in there.items()}, "SURVEY", "compare")
+    return measure_kilometres(
+        conn, new, "compare", [km for km, (why, *made) in there.items() if why is not None or made != [cell, length]],
+        lambda km: {**change_inputs(conn, old, new, km), "cell": cell, "length": length},
+        lambda km: _kilometre(conn, old, new, km, cell, length), f"change from {old.name} to {new.name}", begin,
+    )  # fmt: skip
 
 
 def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int, cell: float, length: float) -> dict[str, Any]:
@@ -149,8 +137,8 @@ def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int,
     sums = _old_sums(conn, old, km, surface, cell)
     if sums is None:  # it was there when it was asked for
         return {"sections": 0}
-    first = without_edges(sums.cells())
-    second = without_edges(_new_sums(conn, new, km, other, surface, sums.grid, sums.pixel).cells())
+    newer = _new_sums(conn, new, km, other, surface, sums.grid, sums.pixel)
+    first, second = (without_edges(cells) for cells in with_hollows(sums, newer))
     found = measure_change(surface, sums.grid, first, second, length)
     grid = found.grid
     transform = Affine(cell, 0.0, grid.west, 0.0, -cell, grid.south + grid.rows * cell)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
+from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_stale
 from tunneldb.pipeline.run import nothing_yet
 from tunneldb.shape.clearance import PASSING, STEP, Clearance, Grouping, clearance, clock
 from tunneldb.shape.gauge import Widening, halved, terms, widened
@@ -37,7 +37,6 @@ from tunneldb.store.clearance import (
     made_of,
     save_clearance,
 )
-from tunneldb.store.ledger import stage_run
 from tunneldb.store.surface import load_alignment, load_surface, survey_ends
 from tunneldb.store.survey import Survey
 
@@ -129,7 +128,7 @@ def read_track(path: Path, axis: Alignment) -> Tracks:
 
 def measure_clearance(
     conn: psycopg.Connection[Any], survey: Survey, tracks: Tracks, track: str, gauge: str, outline: Outline, options: Options,
-    low: float, high: float, begin: Callable[[str, float], Callable[[float], None]],
+    low: float, high: float, begin: Begin,
 ) -> list[int]:  # fmt: skip
     """Bring the clearance of the kilometres of a stretch up to date, each in a transaction of its own; return which were.
 
@@ -142,22 +141,18 @@ def measure_clearance(
     there = [km for km in classed_kilometres(conn, survey) if (km + 1) * KILOMETRE > low and km * KILOMETRE < high]
     if not there:
         raise nothing_yet(conn, survey, "has no classes of points there")
-    wanted = []
-    for km in there:
-        if (why := ground_reason(conn, survey, km)) is not None:
-            raise UserError(f"kilometre {km}: ground is stale: {why}; tunneldb run {survey.name} --stale, then clearance")
-        inputs = clearance_inputs(conn, survey, km, gauge) | {"track": track, "axis": tracks.source} | asdict(options)
-        if made_of(conn, survey, km, gauge, track) != inputs:
-            wanted.append((km, inputs))
-    conn.rollback()
-    advance = begin(f"clearance of {survey.name}", len(wanted))
+    reasons = {km: ground_reason(conn, survey, km) for km in there}
+    refuse_stale({km: why and f"ground is stale: {why}" for km, why in reasons.items()}, survey.name, "clearance")
+
+    def inputs(km: int) -> dict[str, Any]:
+        return clearance_inputs(conn, survey, km, gauge) | {"track": track, "axis": tracks.source} | asdict(options)
+
     axis = load_alignment(conn, survey, _STATIONS)
-    conn.rollback()
-    for km, inputs in wanted:
-        with stage_run(conn, survey.id, km, "clearance", inputs) as run:
-            run.counts.update(measure_kilometre(conn, survey, km, axis, tracks, track, gauge, outline, options, ends))
-        advance(1)
-    return [km for km, _ in wanted]
+    return measure_kilometres(
+        conn, survey, "clearance", [km for km in there if made_of(conn, survey, km, gauge, track) != inputs(km)], inputs,
+        lambda km: measure_kilometre(conn, survey, km, axis, tracks, track, gauge, outline, options, ends),
+        f"clearance of {survey.name}", begin,
+    )  # fmt: skip
 
 
 def measure_kilometre(

@@ -12,17 +12,16 @@ import psycopg
 
 from tunneldb.arrays import Bool, Float
 from tunneldb.classification.classes import PointClass
-from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
+from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_stale
 from tunneldb.pipeline.run import nothing_yet
 from tunneldb.raster.geotiff import Raster
 from tunneldb.shape.overbreak import section_deviation
 from tunneldb.shape.profile import Deviation, Stretch, deviation
 from tunneldb.store.design import load_design
 from tunneldb.store.deviation import STEP, Step, deviation_inputs, load_offsets, replace_image, save_steps, stale_kilometres
-from tunneldb.store.ledger import stage_run
 from tunneldb.store.scene import load_scene
 from tunneldb.store.surface import load_alignment, load_surface, survey_ends
 from tunneldb.store.survey import Survey
@@ -77,7 +76,7 @@ def measure_deviation(
     layer: str,
     low: float,
     high: float,
-    begin: Callable[[str, float], Callable[[float], None]],
+    begin: Begin,
 ) -> list[int]:
     """Bring the deviation of the kilometres of a stretch up to date, each in a transaction of its own; return which were.
 
@@ -90,7 +89,7 @@ def measure_deviation(
     low, high : float
         Chainage, m.
     begin : callable
-        Called with a text and the number of kilometres; returns what takes those that are done.
+        See `tunneldb.pipeline.on_demand.Begin`.
 
     Raises
     ------
@@ -102,27 +101,22 @@ def measure_deviation(
     conn.rollback()
     if not there:
         raise nothing_yet(conn, survey, f"has no offset image where layer {layer} has a profile")
-    blocked = {km: why for km, why in there.items() if why is not None and why.startswith("detect is stale")}
-    if blocked:
-        km, why = next(iter(blocked.items()))
-        raise UserError(f"kilometre {km}: {why}; tunneldb run {survey.name} --stale, then deviation")
-    wanted = [km for km, why in there.items() if why is not None]
-    advance = begin(f"deviation of {survey.name}", len(wanted))
-    for km in wanted:
-        inputs = deviation_inputs(conn, survey, km, layer)
-        conn.rollback()
-        with stage_run(conn, survey.id, km, "deviation", inputs) as run:
-            steps, note = _kilometre(conn, survey, km, layer)
-            save_steps(conn, survey, km, layer, steps)
-            run.counts.update(
-                steps=len(steps),
-                overbreak=sum(step.figures.overbreak * (step.high - step.low) for step in steps),
-                underbreak=sum(step.figures.underbreak * (step.high - step.low) for step in steps),
-            )
-            if note:
-                run.counts["note"] = note
-        advance(1)
-    return wanted
+    refuse_stale(there, survey.name, "deviation")
+
+    def measure(km: int) -> dict[str, Any]:
+        steps, note = _kilometre(conn, survey, km, layer)
+        save_steps(conn, survey, km, layer, steps)
+        sums = {
+            "steps": len(steps),
+            "overbreak": sum(step.figures.overbreak * (step.high - step.low) for step in steps),
+            "underbreak": sum(step.figures.underbreak * (step.high - step.low) for step in steps),
+        }
+        return {**sums, "note": note} if note else sums
+
+    return measure_kilometres(
+        conn, survey, "deviation", [km for km, why in there.items() if why is not None],
+        lambda km: deviation_inputs(conn, survey, km, layer), measure, f"deviation of {survey.name}", begin,
+    )  # fmt: skip
 
 
 def load_design_of(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> Design:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ from tunneldb.arrays import Single
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.deviation import measure_deviation
+from tunneldb.pipeline.on_demand import Begin, measure_kilometres
 from tunneldb.raster.geotiff import DEVIATION_KINDS, laid
 from tunneldb.raster.grid import BLOCK
 from tunneldb.shape.evenness import ALONG, AROUND, Evenness, evenness, step_evenness, uneven_areas
@@ -31,7 +32,6 @@ from tunneldb.store.evenness import (
     save_evenness,
 )
 from tunneldb.store.images import image_blocks, load_block
-from tunneldb.store.ledger import stage_run
 from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
@@ -64,7 +64,7 @@ def measure_evenness(
     limit: float,
     low: float,
     high: float,
-    begin: Callable[[str, float], Callable[[float], None]],
+    begin: Begin,
 ) -> list[int]:
     """Bring the evenness of a stretch up to date, each kilometre in a transaction of its own; return which were.
 
@@ -79,7 +79,7 @@ def measure_evenness(
     low, high : float
         Chainage, m.
     begin : callable
-        Called with a text and the number of kilometres; returns what takes those that are done.
+        See `tunneldb.pipeline.on_demand.Begin`.
 
     Raises
     ------
@@ -90,26 +90,24 @@ def measure_evenness(
     measure_deviation(conn, survey, layer, low - length, high + length, begin)
     there = evenness_kilometres(conn, survey, layer, length, limit, low, high)
     conn.rollback()
-    wanted = [km for km, why in there.items() if why is not None]
-    advance = begin(f"evenness of {survey.name}", len(wanted))
-    for km in wanted:
-        inputs = {**evenness_inputs(conn, survey, km, layer), "length": length, "limit": limit}
-        conn.rollback()
-        with stage_run(conn, survey.id, km, "evenness", inputs) as run:
-            grid = load_cells(conn, survey, km, layer)
-            steps, areas = [], []
-            if grid is not None:
-                if length < 4.0 * grid.cell:
-                    raise UserError(
-                        f"--length {length:g} is less than four cells of {grid.cell:g} m, which is what pixels allow"
-                    )
-                found = evenness(grid.cells, length, grid.cell)
-                steps = list(steps_of(grid, found, km, limit, survey_ends(conn, survey) or (-np.inf, np.inf)))
-                areas = list(polygons_of(grid, found, km, limit))
-            save_evenness(conn, survey, km, layer, (length, limit), steps, areas)
-            run.counts.update(steps=len(steps), areas=len(areas))
-        advance(1)
-    return wanted
+
+    def measure(km: int) -> dict[str, int]:
+        grid = load_cells(conn, survey, km, layer)
+        steps, areas = [], []
+        if grid is not None:
+            if length < 4.0 * grid.cell:
+                raise UserError(f"--length {length:g} is less than four cells of {grid.cell:g} m, which is what pixels allow")
+            found = evenness(grid.cells, length, grid.cell)
+            steps = list(steps_of(grid, found, km, limit, survey_ends(conn, survey) or (-np.inf, np.inf)))
+            areas = list(polygons_of(grid, found, km, limit))
+        save_evenness(conn, survey, km, layer, (length, limit), steps, areas)
+        return {"steps": len(steps), "areas": len(areas)}
+
+    return measure_kilometres(
+        conn, survey, "evenness", [km for km, why in there.items() if why is not None],
+        lambda km: {**evenness_inputs(conn, survey, km, layer), "length": length, "limit": limit},
+        measure, f"evenness of {survey.name}", begin,
+    )  # fmt: skip
 
 
 def cells_in(pixel: float) -> int:

@@ -293,11 +293,7 @@ def _empty(value: Any) -> bool:
 def _view(path: Path, given: str | None, survey: Survey) -> str:
     """Which coordinates a layer is in: the unrolled plane, which has no system, or the tunnel's."""
     crs = None if given is None else CRS(given)
-    if (
-        crs is None
-        or is_local(crs)
-        or (path.suffix.lower() in (".geojson", ".json") and '"crs"' not in path.read_text("utf-8"))
-    ):
+    if crs is None or is_local(crs) or (path.suffix.lower() in (".geojson", ".json") and b'"crs"' not in path.read_bytes()):
         return "unrolled"
     if fits_srid(crs, survey.srid):
         return "3d"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from tunneldb.errors import UserError
+from tunneldb.errors import UserError, did_you_mean
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,9 @@ def settings(assignments: Iterable[str] = ()) -> dict[str, float]:
     for assignment in assignments:
         name, equals, text = assignment.partition("=")
         if name not in PARAMETERS:
-            raise UserError(f"there is no parameter {name!r}; there are {', '.join(PARAMETERS)}")
+            raise UserError(
+                f"there is no parameter {name!r}; there are {', '.join(PARAMETERS)}.{did_you_mean(name, PARAMETERS)}"
+            )
         values[name] = _value(name, text if equals else "")
     check_together(values)
     return values

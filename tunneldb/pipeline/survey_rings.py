@@ -16,6 +16,7 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.deviation import STATIONS
 from tunneldb.pipeline.lining_patches import LiningPatches, load_images
+from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_stale
 from tunneldb.pipeline.run import nothing_yet
 from tunneldb.raster.pixel_state import shows_lining
 from tunneldb.shape.circle import taubin
@@ -25,7 +26,6 @@ from tunneldb.shape.ring_joint_steps import MARGIN, REACH, Steps, joint_steps
 from tunneldb.shape.ring_joints import Joints, NoRingsError, column_signals, follow, peaks, ring_length, strength
 from tunneldb.store.design import load_profiles
 from tunneldb.store.images import survey_blocks
-from tunneldb.store.ledger import stage_run
 from tunneldb.store.rings import (
     MeasuredRing,
     RingBounds,
@@ -44,8 +44,6 @@ LEAST_LENGTH, MOST_LENGTH = 0.3, 20.0
 """Limits of a ring's length, m."""
 
 _ROUND = 0.002  # m: so near to one circle lies each point of a profile that is one
-
-Begin = Callable[[str, float], Callable[[float], None]]
 
 
 @dataclass(frozen=True)
@@ -170,35 +168,29 @@ def measure_survey_rings(
     options : RingOptions or None
         None: those by which rings were measured last.
     begin : callable
-        Called with a text and the number of kilometres; returns what takes those that are done.
+        See `tunneldb.pipeline.on_demand.Begin`.
     """
     state, last = ring_state(conn, survey), last_options(conn, survey)
     profiles = load_profiles(conn, survey.tunnel_id, "lining")
     axis = load_alignment(conn, survey, STATIONS)
     conn.rollback()
     there = {km: why for km, why in state.items() if (km + 1) * KILOMETRE > low and km * KILOMETRE < high}
-    blocked = next(((km, why) for km, why in there.items() if why and why.startswith("detect is stale")), None)
-    if blocked:
-        raise UserError(f"kilometre {blocked[0]}: {blocked[1]}; tunneldb run {survey.name} --stale, then rings")
+    refuse_stale(there, survey.name, "rings")
     usual = last[max(last)] if last else RingOptions().plain
-    wanted = []
-    for km, why in there.items():
-        plain = last.get(km, usual) if options is None else options.plain
-        if why is not None or plain != last.get(km):
-            wanted.append((km, plain))
-    advance = begin(f"rings of {survey.name}", len(wanted))
-    for km, plain in wanted:
-        inputs = ring_inputs(conn, survey, km)
-        conn.rollback()
-        with stage_run(conn, survey.id, km, "rings", {**inputs, "options": plain}) as run:
-            rings = load_bounds(conn, survey, km)
-            source = LiningPatches(conn, survey, km, axis)
-            before = length_before(conn, survey, rings[0].low) if rings else 0.0
-            measured = [_measured(source, ring, rings[k - 1] if k else before, plain, profiles) for k, ring in enumerate(rings)]
-            save_rings(conn, survey, measured)
-            run.counts.update(rings=len(rings), fitted=sum(one.ring.ring is not None for one in measured))
-        advance(1)
-    return [km for km, _ in wanted]
+    plain = {km: last.get(km, usual) if options is None else options.plain for km in there}
+
+    def measure(km: int) -> dict[str, int]:
+        rings = load_bounds(conn, survey, km)
+        source = LiningPatches(conn, survey, km, axis)
+        before = length_before(conn, survey, rings[0].low) if rings else 0.0
+        measured = [_measured(source, ring, rings[k - 1] if k else before, plain[km], profiles) for k, ring in enumerate(rings)]
+        save_rings(conn, survey, measured)
+        return {"rings": len(rings), "fitted": sum(one.ring.ring is not None for one in measured)}
+
+    return measure_kilometres(
+        conn, survey, "rings", [km for km, why in there.items() if why is not None or plain[km] != last.get(km)],
+        lambda km: {**ring_inputs(conn, survey, km), "options": plain[km]}, measure, f"rings of {survey.name}", begin,
+    )  # fmt: skip
 
 
 def _measured(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,11 +10,11 @@ import psycopg
 
 from tunneldb.errors import UserError
 from tunneldb.pipeline.deviation import measure_deviation
+from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_different_tunnels
 from tunneldb.shape.profile import Stretch
 from tunneldb.shape.thickness import section_thickness
 from tunneldb.store.design import load_design
 from tunneldb.store.deviation import STEP
-from tunneldb.store.ledger import stage_run
 from tunneldb.store.survey import Survey
 from tunneldb.store.thickness import (
     DeviationCells,
@@ -33,7 +33,7 @@ def measure_thickness(
     layer: str,
     low: float,
     high: float,
-    begin: Callable[[str, float], Callable[[float], None]],
+    begin: Begin,
 ) -> list[int]:
     """Bring what lies between two surveys up to date, each kilometre in a transaction of its own; return which were.
 
@@ -48,20 +48,14 @@ def measure_thickness(
     low, high : float
         Chainage, m.
     begin : callable
-        Called with a text and the number of kilometres; returns what takes those that are done.
+        See `tunneldb.pipeline.on_demand.Begin`.
 
     Raises
     ------
     UserError
         If they are of two tunnels, or one, or have no kilometre in common there.
     """
-    if before.id == after.id:
-        raise UserError(f"survey {before.name} is named twice: thickness is that between two surveys")
-    if before.tunnel_id != after.tunnel_id:
-        raise UserError(
-            f"survey {before.name} is of tunnel {before.tunnel}, survey {after.name} of {after.tunnel}: thickness is that"
-            " between two surveys of one tunnel"
-        )
+    refuse_different_tunnels(before, after, "thickness")
     for survey in (before, after):
         measure_deviation(conn, survey, layer, low, high, begin)
     stretches = load_design(conn, after.tunnel_id, after.tunnel, layer)
@@ -69,18 +63,18 @@ def measure_thickness(
     conn.rollback()
     if not there:
         raise UserError(f"surveys {before.name} and {after.name} have no kilometre in common there")
-    wanted = [km for km, why in there.items() if why is not None]
-    advance = begin(f"thickness from {before.name} to {after.name}", len(wanted))
-    for km in wanted:
-        inputs = thickness_inputs(conn, before, after, km, layer)
-        conn.rollback()
-        with stage_run(conn, after.id, km, "thickness", inputs) as run:
-            old, new = load_cells(conn, before, km, layer), load_cells(conn, after, km, layer)
-            steps = list(compared_steps(stretches, old, new))
-            save_thickness(conn, before, after, km, layer, steps)
-            run.counts.update(steps=len(steps), volume=sum(step.figures.area * (step.high - step.low) for step in steps))
-        advance(1)
-    return wanted
+
+    def measure(km: int) -> dict[str, Any]:
+        old, new = load_cells(conn, before, km, layer), load_cells(conn, after, km, layer)
+        steps = list(compared_steps(stretches, old, new))
+        save_thickness(conn, before, after, km, layer, steps)
+        return {"steps": len(steps), "volume": sum(step.figures.area * (step.high - step.low) for step in steps)}
+
+    return measure_kilometres(
+        conn, after, "thickness", [km for km, why in there.items() if why is not None],
+        lambda km: thickness_inputs(conn, before, after, km, layer),
+        measure, f"thickness from {before.name} to {after.name}", begin,
+    )  # fmt: skip
 
 
 def compared_steps(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2, norm
@@ -25,6 +25,10 @@ neither circle nor ellipse is magnified alike.
 BESIDE = (3,)
 """Orders of harmonics that are fitted with an ellipse to many points. Left out, they shift it where a part is unseen; with a
 fourth one a ring without its floor determines no ellipse."""
+
+BESIDE_HOPELESS = 25.0
+"""They are left out where the worst standard error is then so many times that of as many points all around: dense points over
+more than half a ring reach 18, points in a few places any number."""
 
 _SETTLING = 8
 _LEAST_SCALE = 1e-6  # m
@@ -51,7 +55,8 @@ class Adjustment:
     freedom : int
         Points used less parameters.
     inflation : float
-        How many times greater the worst standard error is than that of as many points evenly around the ring.
+        How many times greater the worst standard error is than that of as many points evenly around the ring; of an ellipse by
+        itself, without the harmonics.
     """
 
     ellipse: Ellipse
@@ -138,12 +143,12 @@ def _scale(own: float, freedom: int, sigma: float | None) -> float:
 
 
 def _many(xy: Float, start: Float, free: int) -> Adjustment:
-    """Adjust to many points; an ellipse together with what rings are beside it, if the points tell both."""
-    if free == ELLIPSE:
-        together = _weighted(xy, start, free, _beside(xy, start))
-        if together.inflation <= HOPELESS[ELLIPSE]:
-            return together
-    return _weighted(xy, start, free, np.empty((len(xy), 0)))
+    """Adjust to many points; an ellipse together with what rings are beside it, so that its errors hold what that costs."""
+    alone = _weighted(xy, start, free, np.empty((len(xy), 0)))
+    if free != ELLIPSE or alone.inflation > HOPELESS[ELLIPSE]:
+        return alone
+    together = _weighted(xy, start, free, _beside(xy, start))
+    return replace(together, inflation=alone.inflation) if together.inflation <= BESIDE_HOPELESS else alone
 
 
 def _beside(xy: Float, start: Float) -> Float:

@@ -21,7 +21,7 @@ LEAST_SIDE = 3
 EDGE = 2
 """Cells so near to a wide stretch of what is not seen are not compared."""
 
-_SUMS = 11
+_SUMS = 10
 _LEAST = 8  # pixels
 _SPREAD = 0.2  # of the pixels in a cell, against that of a full one (1/12 of its side squared): else the plane hangs in the air
 
@@ -81,21 +81,22 @@ class CellSums:
 
     grid: CellGrid
     pixel: float
-    sums: Single = field(init=False)
+    lining: Single = field(init=False)
+    recess: Single = field(init=False)
 
     def __post_init__(self) -> None:
-        self.sums = np.zeros((_SUMS, self.grid.rows * self.grid.columns), np.float32)
+        self.lining, self.recess = (np.zeros((_SUMS, self.grid.rows * self.grid.columns), np.float32) for _ in range(2))
 
     def add(self, chainage: Float, arc: Float, offset: Float, lining: Bool) -> None:
-        """Add pixels (n,): chainage, arc and offset in the plane of the cells, m, and which are lining, to be compared.
+        """Add pixels (n,): chainage, arc and offset in the plane of the cells, m, and which are lining.
 
-        What else is seen, the back of a niche, counts in the share of the cell that was seen; NaN is passed over.
+        What else is seen is recessed behind it: the back of a niche, a hollow. NaN is passed over.
         """
         grid = self.grid
         x, y = (chainage - grid.west) / grid.cell, (arc - grid.south) / grid.cell
         with np.errstate(invalid="ignore"):
             held = (x >= 0) & (x < grid.columns) & (y >= 0) & (y < grid.rows) & np.isfinite(offset)
-        x, y, z, one = x[held], y[held], offset[held], lining[held].astype(np.float64)
+        x, y, z, shown = x[held], y[held], offset[held], lining[held]
         column, row = x.astype(np.int64), y.astype(np.int64)
         if not len(column):
             return
@@ -103,14 +104,18 @@ class CellSums:
         width = last - first
         place = row * width + column - first
         u, v = x - column - 0.5, y - row - 0.5
-        part = self.sums.reshape(_SUMS, grid.rows, grid.columns)[:, :, first:last]
-        for k, weight in enumerate((None, 1.0, u, v, u * u, u * v, v * v, z, u * z, v * z, z * z)):
-            count = np.bincount(place, None if weight is None else weight * one, minlength=grid.rows * width)
-            part[k] += count.reshape(grid.rows, width)
+        for sums, of in ((self.lining, shown), (self.recess, ~shown)):
+            if not of.any():
+                continue
+            part = sums.reshape(_SUMS, grid.rows, grid.columns)[:, :, first:last]
+            for k, weight in enumerate((None, u, v, u * u, u * v, v * v, z, u * z, v * z, z * z)):
+                count = np.bincount(place[of], None if weight is None else weight[of], minlength=grid.rows * width)
+                part[k] += count.reshape(grid.rows, width)
 
-    def cells(self) -> Cells:
-        """Planes of the cells that were seen."""
-        looked, n, u, v, uu, uv, vv, z, uz, vz, zz = self.sums.astype(np.float64)
+    def cells(self, recesses: bool = False) -> Cells:
+        """Planes of the cells that were seen, by their lining, or by their recesses, too."""
+        looked = self.lining[0] + self.recess[0].astype(np.float64)
+        n, u, v, uu, uv, vv, z, uz, vz, zz = (self.lining + self.recess if recesses else self.lining).astype(np.float64)
         pixels = (self.grid.cell / self.pixel) ** 2
         with np.errstate(divide="ignore", invalid="ignore"):
             u, v, z = u / n, v / n, z / n
@@ -121,6 +126,7 @@ class CellSums:
             scatter = np.maximum(zz - along * uz - across * vz, 0.0) * n / np.maximum(n - 3.0, 1.0)
             lever = 1.0 / n * (1.0 + (vv * u * u - 2.0 * uv * u * v + uu * v * v) / determinant)
             offset = z - along * u - across * v
+            variance = scatter * lever + rounding_variance(scatter)
         seen = (
             (n >= _LEAST)
             & (n >= SEEN_SHARE * pixels)
@@ -132,8 +138,24 @@ class CellSums:
         def shown(values: Float) -> Single:
             return np.where(seen, values, np.nan).astype(np.float32).reshape(shape)
 
-        variance = scatter * lever + rounding_variance(scatter)
         return Cells(shown(offset), shown(variance), np.minimum(looked / pixels, 1.0).astype(np.float32).reshape(shape))
+
+
+def with_hollows(old: CellSums, new: CellSums) -> tuple[Cells, Cells]:
+    """Cells of two epochs by their lining, and by all that they show where a hollow came or was filled.
+
+    A spall deeper than lining may stand back is no lining any more. Where only one epoch shows lining, over 3 by 3 cells and
+    more, and the other a recess, both are taken with their recesses, lest the mean of a part is held against that of another.
+    """
+    cells, deep = ([sums.cells(recesses) for sums in (old, new)] for recesses in (False, True))
+    one = np.isnan(cells[0].offset) != np.isnan(cells[1].offset)
+    both = np.isfinite(deep[0].offset) & np.isfinite(deep[1].offset)
+    hollow = ndimage.binary_opening(one & both, np.ones((3, 3)))
+    first, second = (
+        Cells(np.where(hollow, d.offset, c.offset), np.where(hollow, d.variance, c.variance), c.share)
+        for c, d in zip(cells, deep, strict=True)
+    )
+    return first, second
 
 
 def without_edges(cells: Cells) -> Cells:

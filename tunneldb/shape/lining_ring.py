@@ -10,7 +10,7 @@ import numpy as np
 from tunneldb.arrays import Float
 from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.shape.departures import clock_of
-from tunneldb.shape.patches import Patches, row_medians
+from tunneldb.shape.patches import Patches, row_medians, straightened
 from tunneldb.shape.ring_joint_steps import MARGIN, Lip, greatest_lip
 from tunneldb.shape.rings import LEAST_POINTS, Ring, RingRefusedError, fit_ring
 
@@ -79,7 +79,7 @@ def measure_ring(
         Harmonics of the radius.
     """
     own = patches.between(low + MARGIN, high - MARGIN)
-    places = row_medians(own) if len(own.chainage) else np.full((len(own.arc), 2), np.nan)
+    places = row_medians(straightened(own)) if len(own.chainage) else np.full((len(own.arc), 2), np.nan)
     seen = np.isfinite(places[:, 0])
     side = float(np.median(np.diff(own.arc))) if len(own.arc) > 1 else 0.0
     share = min(float(seen.sum()) * side / girth, 1.0) if girth > 0.0 else 0.0

@@ -8,12 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunneldb.arrays import Float, Int64, Single
+from tunneldb.robust import MAD_TO_SIGMA
+from tunneldb.shape.tukey import CUT, weights
 
 PATCH = 0.06
 """Side of a patch, in whole pixels, m: 3 mm of noise become less than 1 mm, and what bends within is less."""
 
 LEAST_SEEN = 0.3
 """Share of its pixels that a patch needs."""
+
+
+_LEAST_ROWS = 10
+_ROUNDS = 5
+_LEAST_SCALE = 1e-5  # m
 
 
 @dataclass(frozen=True)
@@ -110,6 +117,35 @@ def row_medians(patches: Patches, least: float = 0.25) -> Float:
         across = np.arange(len(held))
         out[held, k] = 0.5 * (ordered[low, across] + ordered[high, across])
     return out
+
+
+def straightened(patches: Patches) -> Patches:
+    """Patches of a ring less how it goes off the axis along its length, to the right and up, evenly.
+
+    Where a row of arc is seen over a part of the ring only, its place is else that of this part: beside what hangs on the wall
+    the lining seems to step by what the ring, or the given axis, runs askew. Found by Tukey's biweight, of each row about
+    its own middle.
+    """
+    normals = inward_normals(row_medians(patches))
+    inward = patches.right * normals[:, 0] + patches.up * normals[:, 1]
+    along = np.where(np.isfinite(inward), patches.chainage[:, None], np.nan)
+    count = np.isfinite(inward).sum(axis=0)
+    held = count > 1
+    if held.sum() < _LEAST_ROWS:
+        return patches
+    away = (along[:, held] - np.nanmean(along[:, held], axis=0)).ravel()
+    off = (inward[:, held] - np.nanmedian(inward[:, held], axis=0)).ravel()
+    seen = np.isfinite(off)
+    design = away[seen, None] * np.tile(normals[held], (len(patches.chainage), 1))[seen]
+    off, run = off[seen], np.zeros(2)
+    for _ in range(_ROUNDS):
+        left = off - design @ run
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(left))), _LEAST_SCALE)
+        weight = weights(left / (CUT * scale))[:, None]
+        run = np.linalg.lstsq(design.T @ (weight * design), (weight * design).T @ off, rcond=1e-9)[0]
+    middle = 0.5 * (patches.chainage[0] + patches.chainage[-1])
+    shift = (patches.chainage - middle)[:, None] * run
+    return Patches(patches.chainage, patches.arc, patches.right - shift[:, :1], patches.up - shift[:, 1:])
 
 
 def inward_normals(places: Float) -> Float:

@@ -15,7 +15,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from tunneldb.arrays import Bool, Float
 from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.shape.patches import Patches, inward_normals, row_medians
-from tunneldb.shape.tukey import CUT, weights
+from tunneldb.shape.tukey import CUT, rate, weights
 
 MARGIN = 0.05
 """What is nearer to a joint than that is not looked at: chamfer, sealing, mortar, m."""
@@ -142,11 +142,14 @@ def _planes(values: Float, seen: Bool, design: Float) -> tuple[Float, Float]:
         spread = np.nanmedian(np.where(seen, np.abs(off), np.nan), axis=1)
         scale = np.maximum(MAD_TO_SIGMA * spread, _LEAST_SCALE)[:, None]
         weight = np.where(seen, weights(off / (CUT * scale)), 0.0)
-    left = np.where(seen & (weight > 0.0), off, 0.0)
-    freedom = np.maximum(weight.sum(axis=1) - 3.0, 1.0)
-    sigma2 = (weight * left**2).sum(axis=1) / freedom
-    inner = (weight @ outer).reshape(-1, 3, 3) + 1e-12 * np.eye(3)
-    return solved[:, 0] + base[:, 0], np.linalg.inv(inner)[:, 0, 0] * sigma2
+    # Variance of robust estimates (Huber, 1981, section 7.6): the influence of each residual, and how fast it changes.
+    used = seen & (weight > 0.0)
+    influence = np.where(used, weight * off, 0.0)
+    sigma2 = (influence**2).sum(axis=1) / np.maximum(used.sum(axis=1) - 3.0, 1.0)
+    slope = np.where(seen, rate(off / (CUT * scale)), 0.0)
+    inverse = np.linalg.pinv((slope @ outer).reshape(-1, 3, 3))
+    inner = (used.astype(np.float64) @ outer).reshape(-1, 3, 3)
+    return solved[:, 0] + base[:, 0], (inverse @ inner @ inverse)[:, 0, 0] * sigma2
 
 
 def greatest_lip(places: Float, arc: Float) -> Lip | None:

@@ -44,12 +44,18 @@ BY_CHANCE = 1e-3
 AS_GOOD = 0.6
 """A longer length is the ring's if it repeats at least so well: half the length repeats as well as the whole."""
 
+STRAY = 3.5
+"""A joint is another peak if it lies so many standard deviations of all joints off where its neighbours have it."""
+
 _USUAL = 2.0  # m over which the usual strength of columns is taken
 _TOLERANCE = 0.012  # m, standard deviation of a ring's length about what those beside it have
 _OTHER = 9.0  # squared deviations: a ring of other length costs as much as one of three
 _OTHER_COST = 2.0 * STRONG
 _GAP = 4.0  # cost of each joint that is not seen
 _MOST_GAPS = 6
+_NEIGHBOURS = 3  # joints on either side that tell where one lies
+_STRAY_ROUNDS = 20
+_LEAST_SCALE = 0.002  # m
 
 
 class NoRingsError(ValueError):
@@ -222,6 +228,7 @@ def follow(places: Float, weight: Float, pitch: float) -> Joints:
         each = median_filter(gaps / rings, min(21, len(gaps) // 2 * 2 - 1), mode="nearest")
         local = np.interp(places, places[chain[1:]], each)
         chain = _chain(places, weight, local)
+    chain = chain[_in_row(places[chain], local[chain])]
     return _filled(places[chain], local[chain], pitch)
 
 
@@ -249,6 +256,34 @@ def _chain(places: Float, weight: Float, local: Float) -> Int64:
     while back[chain[-1]] >= 0:
         chain.append(int(back[chain[-1]]))
     return np.array(chain[::-1])
+
+
+def _in_row(seen: Float, local: Float) -> Bool:
+    """Which joints lie where those before them, or those behind them, have them, (n,).
+
+    What is off from both is another peak, next to a joint that is not seen: a ring of other length moves all joints behind it.
+    """
+    kept = np.ones(len(seen), np.bool_)
+    for _ in range(_STRAY_ROUNDS):
+        at, length = seen[kept], local[kept]
+        if len(at) < 2 * _NEIGHBOURS + 2:
+            break
+        rings = np.cumsum(np.maximum(np.rint(np.diff(at, prepend=at[0]) / length), 0.0))
+        off = np.full((2, _NEIGHBOURS, len(at)), np.nan)
+        for k in range(1, _NEIGHBOURS + 1):
+            gap = at[k:] - at[:-k] - (rings[k:] - rings[:-k]) * length[k:]
+            off[0, k - 1, k:], off[1, k - 1, :-k] = gap, -gap
+        off[0, :, 0], off[1, :, -1] = np.inf, np.inf  # the ends have one side only
+        away = np.abs(np.nanmedian(off, axis=1))
+        scale = MAD_TO_SIGMA * float(np.median(away[np.isfinite(away)]))
+        least = away.min(axis=0)
+        stray = least > STRAY * max(scale, _LEAST_SCALE)
+        if not stray.any():
+            break
+        near = np.pad(least, _NEIGHBOURS)
+        highest = np.array([near[k : k + len(least)] for k in range(2 * _NEIGHBOURS + 1)]).max(axis=0)
+        kept[np.flatnonzero(kept)[stray & (least == highest)]] = False
+    return kept
 
 
 def _filled(seen: Float, local: Float, pitch: float) -> Joints:

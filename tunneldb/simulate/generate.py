@@ -22,6 +22,7 @@ from tunneldb.simulate.lining.marks import Mark, chamfers, place_marks
 from tunneldb.simulate.lining.masonry import Masonry, lay_courses
 from tunneldb.simulate.lining.reflectance import Reflectance, lining_reflectance
 from tunneldb.simulate.lining.relief import lining_relief
+from tunneldb.simulate.lining.ring_shape import RingShape, shape
 from tunneldb.simulate.lining.rings import build
 from tunneldb.simulate.lining.seepage import joint_leaks, niche_leaks, with_drips
 from tunneldb.simulate.objects.fixtures import APPENDAGE, FLOOR, RAIL, Appendage, Niche, furnish, refuges
@@ -99,9 +100,11 @@ class Simulation:
     appendages, niches, leaks, marks, blotches : list
         What is in it.
     rings : Rings
-    ring_steps : (n,) float array
-        How far each ring of the lining stands out, m.
         How the lining is put together.
+    ring_steps : (n,) float array
+        How far each ring of the lining stands in, m.
+    ring_shape : RingShape
+        How each departs from the section besides.
     masonry : Masonry
         Its bricks or stones.
     reflectance : Reflectance or None
@@ -122,10 +125,10 @@ class Simulation:
         self.parameters = parameters
         self.tunnel: Tunnel = parameters.tunnel()
         # Later streams come behind, so that a seed keeps its points.
-        streams = np.random.SeedSequence(parameters.seed).spawn(21)
+        streams = np.random.SeedSequence(parameters.seed).spawn(22)
         furniture, wet, reference, self._seed, free, loose, built = streams[:7]
         marked, coated, joints, refuge, drips, moved, hung = streams[7:14]
-        covered, coursed, sited, blotched, chamfered, meshed, electric = streams[14:]
+        covered, coursed, sited, blotched, chamfered, meshed, electric, shaped = streams[14:]
         self.appendages: list[Appendage] = (
             furnish(self.tunnel, np.random.default_rng(furniture)) if parameters.appendages else []
         )
@@ -137,6 +140,7 @@ class Simulation:
         along = [a for a in self.appendages if a.is_run or a.klass != APPENDAGE]
         fixed = [a.footprint() for a in self.appendages if a not in along]
         self.rings = build(parameters, self.tunnel, built, chamfered)
+        self.ring_shape: RingShape = shape(parameters, self.rings, shaped)
         self.masonry: Masonry = lay_courses(parameters, coursed)
         room = Room(self.tunnel, fixed + openings, [a.footprint() for a in along])
         self.leaks: list[Leak] = self._leaks(room, wet, joints, refuge, drips, sited)
@@ -147,7 +151,7 @@ class Simulation:
         self.reflectance: Reflectance | None = lining_reflectance(
             parameters, self.tunnel, self.rings, self.masonry, self.appendages, self.marks, self.blotches, coated
         )
-        self._relief = lining_relief(parameters, self.tunnel, self.rings, self.masonry, moved)
+        self._relief = lining_relief(parameters, self.tunnel, self.rings, self.ring_shape, self.masonry, moved)
         self.ring_steps = np.zeros(self.rings.level.size) if self._relief is None else self._relief.step
         self._mesh = hang_mesh(parameters, self._relief.high if self._relief is not None else 0.0, meshed)
         self._radiometry = parameters.radiometry()

@@ -21,6 +21,7 @@ import tunneldb
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.simulate.generate import Cloud, Simulation
+from tunneldb.simulate.ring_truth import write_ring_truth
 from tunneldb.simulate.truth import leaks_as_built, write_truth
 
 # Resolution of the stored coordinates, m; as scanner makers export.
@@ -53,6 +54,7 @@ class Files:
     leaks: Path = Path()
     lining: Path = Path()
     parameters: Path = Path()
+    rings: Path | None = None
     spheres: Path | None = None
     points: int = 0
 
@@ -71,6 +73,7 @@ class Files:
             leaks=to(self.leaks),
             lining=to(self.lining),
             parameters=to(self.parameters),
+            rings=None if self.rings is None else to(self.rings),
             spheres=None if self.spheres is None else to(self.spheres),
             points=self.points,
         )
@@ -186,6 +189,7 @@ def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
     files.leaks.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
     files.lining = Path(f"{base}.truth.gpkg")
     write_truth(simulation, files.lining)
+    files.rings = write_ring_truth(simulation, Path(f"{base}.rings.csv"))
     files.spheres = _spheres(simulation, Path(f"{base}.spheres.csv"))
     section = simulation.tunnel.section
     record = {

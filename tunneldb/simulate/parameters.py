@@ -38,6 +38,8 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "beam": (0.0, 10.0, "mrad"),
     "ring": (0.5, 50.0, "m"),
     "ring_step": (0.0, 0.02, "m"),
+    "ring_shift": (0.0, 0.02, "m"),
+    "segment_step": (0.0, 0.01, "m"),
     "radius_step": (0.0, 0.2, "m"),
     "soot": (0.0, 10.0, "dB"),
     "grime": (0.0, 10.0, "dB"),
@@ -105,8 +107,9 @@ CHOICES: dict[str, tuple[str, ...]] = {
 }
 # Usual lengths of the blocks of cast lining and of rings of segments, m.
 RINGS = {"cast": 10.0, "segments": 1.5}
+MOST_OVALITY = 5.0  # %
 # Pairs of growing numbers, and the least that they may be.
-PAIRS = {"leak_area": 1e-3, "leak_drop": 0.1, "drip_gap": 0.01, "patch_level": -15.0, "stripe_width": 0.01}
+PAIRS = {"ovality": 0.0, "leak_area": 1e-3, "leak_drop": 0.1, "drip_gap": 0.01, "patch_level": -15.0, "stripe_width": 0.01}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,6 +183,9 @@ class Parameters:
     lining: Literal["plain", "cast", "segments", "shotcrete", "tiles", "brick", "stone", "rock", "rough_shotcrete"] = "plain"
     ring: float | None = None
     ring_step: float = 0.0
+    ring_shift: float = 0.0
+    segment_step: float = 0.0
+    ovality: tuple[float, float] = (0.0, 0.0)
     radius_step: float = 0.0
     soot: float = 0.0
     grime: float = 0.0
@@ -257,13 +263,22 @@ class Parameters:
             low, high = getattr(self, name)
             if not floor <= low <= high:
                 raise UserError(f"{name.replace('_', ' ')} is {low:g} to {high:g}: give two growing numbers from {floor:g}")
-        needs = {"joint_leaks": "need joints", "ring_step": "needs rings", "chamfers": "need joints"}
+        needs = {
+            "joint_leaks": "need joints", "ring_step": "needs rings", "ring_shift": "needs rings", "ovality": "needs rings",
+            "chamfers": "need joints",
+        }  # fmt: skip
         for name, what in needs.items():
-            if getattr(self, name) and not self.ring_length():
+            if getattr(self, name) not in (0, (0.0, 0.0)) and not self.ring_length():
                 text = f"{name.replace('_', ' ')} {what}, and lining {self.lining} has none"
                 raise UserError(f"{text}: use lining cast or segments")
         if self.pocket_leaks and self.lining != "segments":
             raise UserError(f"pocket leaks need bolt pockets, and lining {self.lining} has none: use lining segments")
+        if self.segment_step and self.lining != "segments":
+            raise UserError(f"segment step needs segments, and lining {self.lining} has none: use lining segments")
+        if self.ovality[1] > MOST_OVALITY:
+            raise UserError(f"ovality is {self.ovality[0]:g} to {self.ovality[1]:g}: give 0 to {MOST_OVALITY:g} %")
+        if (self.ovality[1] or self.ring_shift) and self.section != "circular":
+            raise UserError(f"ovality and ring shift are of round rings, and the section is a {self.section}: use circular")
         later = ("grown_leaks", "dried_leaks", "new_leaks", "moved_wall", "squeezed_ring", "bulges", "pose_error", "pose_turn")
         if not self.epoch and (asked := next((name for name in later if getattr(self, name)), None)):
             raise UserError(f"--{asked.replace('_', '-')} is of a later scan of the same tunnel: give --epoch 1, too")

@@ -125,6 +125,13 @@ def _require_metres(connection: psycopg.Connection[Any], srid: int) -> None:
         raise UserError(f"SRID {srid} ({crs.name}) is in {', '.join(sorted(units))}, not metres")
 
 
+def require_new_survey(connection: psycopg.Connection[Any], name: str) -> None:
+    """Raise UserError for a survey's name that is taken or won't do."""
+    _require_name(name)
+    if connection.execute("SELECT FROM tunnel.survey WHERE name = %s", [name]).fetchone() is not None:
+        raise UserError(f"there is a survey {name!r} already: tunneldb survey list")
+
+
 def add_survey(
     connection: psycopg.Connection[Any],
     name: str,

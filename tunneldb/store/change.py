@@ -14,7 +14,7 @@ from psycopg import sql
 
 from tunneldb.anomalies.change import Leak
 from tunneldb.anomalies.geometries import Geometries
-from tunneldb.arrays import Float, Single
+from tunneldb.arrays import Float, Single, known
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.raster.geotiff import Raster, decode, encode
 from tunneldb.raster.grid import BLOCK
@@ -151,7 +151,7 @@ def save_sections(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: i
     with conn.cursor() as cursor, cursor.copy(query) as copy:
         for one in sections:
             motion = np.column_stack([one.motion.values, one.motion.errors]).ravel()
-            figures = (_null(value) for value in (*motion, one.rms, one.least, one.greatest, one.lod))
+            figures = (known(value) for value in (*motion, one.rms, one.least, one.greatest, one.lod))
             copy.write_row(
                 (new.id, old.id, km, one.low, one.high, one.seen_old, one.seen_new, one.seen_both, *figures, one.cell,
                  one.arc_from, one.change.tolist())
@@ -215,7 +215,3 @@ def save_leaks(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int,
                 for one in found
             ],
         )  # fmt: skip
-
-
-def _null(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

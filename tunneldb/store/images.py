@@ -13,7 +13,7 @@ from shapely.geometry import Polygon
 from tunneldb.anomalies.background.level_map import BackgroundMap
 from tunneldb.anomalies.coverage import Coverage
 from tunneldb.anomalies.detect import Detection
-from tunneldb.arrays import Bool, Single, UInt8
+from tunneldb.arrays import Bool, Single, UInt8, known
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.radiometry.range_curve import RangeCurve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
@@ -171,8 +171,8 @@ def save_radiometry(
             survey.id,
             km,
             roughness.sigma if roughness.determined else None,
-            *(_null(v) for v in (dry.mean, dry.spread, dry.mean - 3.0 * dry.spread)),
-            *(_null(s.sigma) for s in sigma),
+            *(known(v) for v in (dry.mean, dry.spread, dry.mean - 3.0 * dry.spread)),
+            *(known(s.sigma) for s in sigma),
             roughness.regions,
             found.pixels,
             found.wet_pixels,
@@ -197,10 +197,6 @@ def drop_coverage(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Non
 def drop_radiometry(conn: psycopg.Connection[Any], survey: Survey, km: int) -> None:
     """Take away the radiometry of a kilometre."""
     conn.execute("DELETE FROM tunnel.radiometry WHERE survey_id = %s AND km = %s", (survey.id, km))
-
-
-def _null(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def save_range_curve(conn: psycopg.Connection[Any], survey: Survey, km: int, found: RangeCurve | None) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 import psycopg
 from psycopg import sql
 
+from tunneldb.arrays import known
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.shape.lining_ring import LiningRing
 from tunneldb.shape.ring_joint_steps import Steps
@@ -137,7 +137,7 @@ def save_rings(conn: psycopg.Connection[Any], survey: Survey, rings: Sequence[Me
         for chord in measured.ring.chords:
             conn.execute(
                 "INSERT INTO tunnel.ring_chord (ring_id, clock_from, clock_to, length, length_se) VALUES (%s, %s, %s, %s, %s)",
-                [row[0], chord.clock_from, chord.clock_to, _plain(chord.length), _plain(chord.se)],
+                [row[0], chord.clock_from, chord.clock_to, known(chord.length), known(chord.se)],
             )
 
 
@@ -194,7 +194,7 @@ def _shape_columns(measured: MeasuredRing) -> dict[str, Any]:
 def _plain(value: Any) -> Any:
     """A value as psycopg takes it; None of a number that is none."""
     if isinstance(value, (float, np.floating)):
-        return float(value) if math.isfinite(value) else None
+        return known(float(value))
     return value
 
 

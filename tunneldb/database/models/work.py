@@ -124,3 +124,5 @@ class Audit(Base):
     kept: Mapped[dict[str, Any] | None] = mapped_column(
         comment="What had been measured of a finding before its outline changed"
     )
+    imported_by: Mapped[str | None] = mapped_column(comment="Who brought it in with an archive of the survey")
+    imported_at: Mapped[dt.datetime | None] = mapped_column(comment="When; who and at are then what the archive says")

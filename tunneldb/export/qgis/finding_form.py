@@ -7,9 +7,13 @@ from collections.abc import Mapping
 
 from tunneldb.export.qgis.catalogue import SHAPES, Catalogue
 from tunneldb.export.qgis.finding_style import options
+from tunneldb.export.qgis.sheet_tables import CLOCK
 
 KIND_LIST, SEVERITIES, PHOTOS = "finding_kind", "severity", "finding_photo"
 """Views that forms take their lists and photos from, each a table of the project."""
+
+CLOCK_TEXT = "clock_text"
+"""Field of a layer, not of its view: the clock position as it is said. The styles of leaks and changes have it too."""
 
 _ALIASES = {
     "id": "Number", "survey_id": "Survey key", "survey": "Survey", "km": "Kilometre", "segment": "Segment",
@@ -24,7 +28,7 @@ _ALIASES = {
     "drawn_at": "Drawn at", "detected": "Found by the last detection", "created_at": "First found or drawn",
     "detected_at": "Last detected", "also_detected": "Also detected", "detected_as": "Detected as", "parent_id": "Split off",
     "merged_into": "Merged into", "merged": "Merged into this", "same_as": "The same as", "dry_region_id": "In dry region",
-    "counted": "Counted in sums", "state": "State", "photos": "Photos",
+    "counted": "Counted in sums", "state": "State", "photos": "Photos", CLOCK_TEXT: "Clock position",
 }  # fmt: skip
 _PHOTO_ALIASES = {
     "id": "Photo", "finding_id": "Of finding", "survey_id": "Survey key", "survey": "Survey", "path": "File or URL",
@@ -40,7 +44,7 @@ _SAVED = '"label" IS NOT NULL'
 
 _REVIEWS = {"Open": "open", "Confirmed": "confirmed", "Rejected": "rejected"}
 _FACTS = (
-    "id", "label", "clock", "state", "area", "length", "origin", "drawn_by", "drawn_at", "reviewed_by", "reviewed_at",
+    "id", "label", CLOCK_TEXT, "state", "area", "length", "origin", "drawn_by", "drawn_at", "reviewed_by", "reviewed_at",
     "measured",
     "drop_mean", "drop_max", "image_share", "found", "confidence", "reasons", "also_detected", "merged", "merged_into",
     "same_as",
@@ -104,6 +108,7 @@ def finding_form(catalogue: Catalogue, geometry: str, layer: str, tables: Mappin
     kinds = catalogue.drawn_as(shape)
     begins = {"survey": survey, "review": "confirmed"} | ({"kind": kinds[0].code} if kinds else {})
     return [
+        _clock_text(),
         *_fields(_ALIASES, widgets, (*asked, "survey")),
         defaults(begins),
         _constraints(required="kind"),
@@ -160,6 +165,16 @@ def demanded(column: str, expression: str, why: str) -> list[ET.Element]:
     )
     ET.SubElement(said, "constraint", field=column, exp=expression, desc=why)
     return [constraints, said]
+
+
+def _clock_text() -> ET.Element:
+    """Return the element ``expressionfields``, by which a layer has its clock position as text."""
+    fields = ET.Element("expressionfields")
+    ET.SubElement(
+        fields, "field", name=CLOCK_TEXT, expression=CLOCK, type="10", typeName="string", subType="0", length="0",
+        precision="0", comment="",
+    )  # fmt: skip
+    return fields
 
 
 def _constraints(required: str) -> ET.Element:

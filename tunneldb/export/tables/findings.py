@@ -20,6 +20,7 @@ from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
 from tunneldb.csvfile import write_csv
+from tunneldb.export.tables.cell import DECIMALS, plain
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
 from tunneldb.export.tables.leaks import Geometry
 from tunneldb.geometry.crs import LOCAL
@@ -27,8 +28,6 @@ from tunneldb.store.survey import Survey
 
 State = Literal["open", "confirmed", "rejected", "gone", "dry", "same", "merged"]
 COUNTED: tuple[State, ...] = ("open", "confirmed")
-DECIMALS = 4
-"""Decimals of numbers in text."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +160,7 @@ def as_csv(findings: Sequence[Finding]) -> str:
     return write_csv(
         [*COLUMNS, "geometry"],
         (
-            [*(_plain(getattr(one, name)) for name in COLUMNS), shapely.to_wkt(one.geometry, rounding_precision=DECIMALS)]
+            [*(plain(getattr(one, name)) for name in COLUMNS), shapely.to_wkt(one.geometry, rounding_precision=DECIMALS)]
             for one in findings
         ),
     )
@@ -177,7 +176,7 @@ def as_geojson(findings: Sequence[Finding], geometry: Geometry, srid: int) -> st
             "type": "Feature",
             "id": finding.id,
             "geometry": mapping(shapely.set_precision(finding.geometry, 10.0**-DECIMALS, mode="pointwise")),
-            "properties": {name: _plain(getattr(finding, name)) for name in COLUMNS},
+            "properties": {name: plain(getattr(finding, name)) for name in COLUMNS},
         }
         for finding in findings
     ]
@@ -224,9 +223,3 @@ _TYPE: dict[str, Any] = {
         np.float64,
     ),
 }
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return round(value, DECIMALS)
-    return value.isoformat() if isinstance(value, dt.datetime) else value

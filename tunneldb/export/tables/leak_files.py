@@ -17,12 +17,10 @@ from numpy.typing import NDArray
 from shapely.geometry import mapping
 
 from tunneldb.csvfile import write_csv
+from tunneldb.export.tables.cell import DECIMALS, plain
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN, write_gaps, write_remarks
 from tunneldb.export.tables.leaks import COLUMNS, Anomaly, Geometry, Kind, LeakList
 from tunneldb.geometry.crs import LOCAL
-
-DECIMALS = 4
-"""Decimals of coordinates in text, m."""
 
 
 def as_csv(leaks: LeakList) -> str:
@@ -33,12 +31,12 @@ def as_csv(leaks: LeakList) -> str:
     """
     rows: list[dict[str, Any]] = []
     for gap in leaks.coverage.gaps:
-        place = {"chainage_from": _plain(gap.chainage_from), "chainage_to": _plain(gap.chainage_to), "label": gap.label_from}
+        place = {"chainage_from": plain(gap.chainage_from), "chainage_to": plain(gap.chainage_to), "label": gap.label_from}
         rows.append({**place, "kind": gap.state, "reasons": gap.reason, "counted": False})
     rows += [{"kind": "remark", "reasons": remark.said, "counted": False} for remark in leaks.remarks]
     for leak in leaks.rows:
         wkt = shapely.to_wkt(leak.geometry, rounding_precision=DECIMALS)
-        rows.append({**{name: _plain(getattr(leak, name)) for name in COLUMNS}, "geometry": wkt})
+        rows.append({**{name: plain(getattr(leak, name)) for name in COLUMNS}, "geometry": wkt})
     names = [*COLUMNS, "geometry"]
     return write_csv(names, ([row.get(name) for name in names] for row in rows))
 
@@ -62,7 +60,7 @@ def as_geojson(leaks: LeakList, geometry: Geometry, srid: int) -> str:
             "type": "Feature",
             "id": leak.id,
             "geometry": _rounded(mapping(leak.geometry)),
-            "properties": {name: _plain(getattr(leak, name)) for name in COLUMNS},
+            "properties": {name: plain(getattr(leak, name)) for name in COLUMNS},
         }
         for leak in leaks.rows
     ]
@@ -77,7 +75,7 @@ def write_gpkg(path: Path, leaks: LeakList, geometry: Geometry, srid: int) -> No
     """
     rows = leaks.rows
     data = [np.array([getattr(leak, name) for leak in rows], dtype=_GPKG_TYPE.get(name, object)) for name in COLUMNS]
-    data[COLUMNS.index("reasons")] = np.array([_plain(leak.reasons) for leak in rows], dtype=object)
+    data[COLUMNS.index("reasons")] = np.array([plain(leak.reasons) for leak in rows], dtype=object)
     moments = [leak.reviewed_at for leak in rows]
     data[COLUMNS.index("reviewed_at")] = np.array(
         [np.datetime64("NaT") if m is None else _utc(m) for m in moments], dtype="datetime64[ms]"
@@ -142,14 +140,6 @@ def layer_name(geometry: Geometry, kind: Kind) -> str:
 def _utc(moment: dt.datetime) -> dt.datetime:
     """Drop the zone, which NumPy doesn't know, after turning to UTC."""
     return moment.astimezone(dt.UTC).replace(tzinfo=None)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return round(value, DECIMALS)
-    if isinstance(value, list):
-        return ", ".join(value)
-    return value.isoformat() if isinstance(value, dt.datetime) else value
 
 
 def _rounded(shape: dict[str, Any]) -> dict[str, Any]:

@@ -17,8 +17,8 @@ from psycopg import sql
 from shapely.geometry import Polygon, mapping
 
 from tunneldb.csvfile import write_csv
+from tunneldb.export.tables.cell import DECIMALS, plain
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
-from tunneldb.export.tables.leak_files import DECIMALS
 from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.survey import Survey
 
@@ -201,7 +201,7 @@ def as_csv(spots: SpotList) -> str:
         rows.append({"kind": "unseen", "remark": spots.statement, "counted": False})
     for spot in spots.rows:
         wkt = shapely.to_wkt(spot.geometry, rounding_precision=DECIMALS)
-        rows.append({**{name: _plain(getattr(spot, name)) for name in COLUMNS}, "geometry": wkt})
+        rows.append({**{name: plain(getattr(spot, name)) for name in COLUMNS}, "geometry": wkt})
     names = [*COLUMNS, "geometry"]
     return write_csv(names, ([row.get(name) for name in names] for row in rows))
 
@@ -217,7 +217,7 @@ def as_geojson(spots: SpotList, geometry: Geometry, srid: int) -> str:
             "type": "Feature",
             "id": spot.id,
             "geometry": mapping(shapely.set_precision(spot.geometry, 10.0**-DECIMALS)),
-            "properties": {name: _plain(getattr(spot, name)) for name in COLUMNS},
+            "properties": {name: plain(getattr(spot, name)) for name in COLUMNS},
         }
         for spot in spots.rows
     ]
@@ -253,12 +253,4 @@ def _column(spots: SpotList, name: str) -> np.ndarray[Any, Any]:
         return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
     if name in ("detected", "counted"):
         return np.array(values, dtype=np.bool_)
-    return np.array([_plain(value) for value in values], dtype=object)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return round(value, DECIMALS)
-    if isinstance(value, list):
-        return ", ".join(map(str, value))
-    return value.isoformat() if isinstance(value, dt.datetime) else value
+    return np.array([plain(value) for value in values], dtype=object)

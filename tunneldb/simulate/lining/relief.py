@@ -14,6 +14,7 @@ import numpy as np
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.compiled import inner, kernel
 from tunneldb.simulate.lining.masonry import Masonry, unit_height
+from tunneldb.simulate.lining.ring_shape import RingShape, departure
 from tunneldb.simulate.lining.rings import CHAMFER_DEPTH, Rings, chamfer_depth, pocket_drop, ring_of
 from tunneldb.simulate.noise_field import mix, value_noise
 from tunneldb.simulate.parameters import Parameters
@@ -51,6 +52,8 @@ class LiningRelief(NamedTuple):
     rings : Rings
     step : (n,)
         Height of each ring, m.
+    shape : RingShape
+        How rings depart from the section besides.
     wider : (2,)
         Chainage from which the section is wider, and by how much, m.
     rough : (k, 2)
@@ -68,6 +71,7 @@ class LiningRelief(NamedTuple):
 
     rings: Rings
     step: Float
+    shape: RingShape
     wider: Float
     rough: Float
     facets: Float
@@ -85,11 +89,16 @@ def wider_from(tunnel: Tunnel) -> float:
 
 
 def lining_relief(
-    parameters: Parameters, tunnel: Tunnel, rings: Rings, masonry: Masonry, seed: np.random.SeedSequence
+    parameters: Parameters,
+    tunnel: Tunnel,
+    rings: Rings,
+    shape: RingShape,
+    masonry: Masonry,
+    seed: np.random.SeedSequence,
 ) -> LiningRelief | None:
     """Relief as asked; None: the surface is the nominal one."""
     p = parameters
-    if not (p.lining in ROUGH or rings.pocket_depth or p.chamfers or p.ring_step or p.radius_step):
+    if not (p.lining in ROUGH or rings.pocket_depth or p.chamfers or p.ring_step or p.radius_step) and shape.plain:
         return None
     rng = np.random.default_rng(seed)
     step = np.clip(rng.standard_normal(rings.level.size), -3.0, 3.0) * p.ring_step
@@ -97,17 +106,20 @@ def lining_relief(
     rough = np.array(ROUGH.get(p.lining, ())).reshape(-1, 2) * scale
     facets = np.array(FACETS.get(p.lining, ())).reshape(-1, 2) * scale
     most = ROUGH_MOST * float(rough[:, 1].sum()) + float(facets[:, 1].sum()) + masonry.face
+    reach = np.hypot(*shape.ellipse[:, :2].T) + np.hypot(*shape.ellipse[:, 2:].T)
+    away = float((reach + np.abs(shape.stand).max(axis=1, initial=0.0)).max(initial=0.0))
     grooves = masonry.depth + (CHAMFER_DEPTH if p.chamfers else 0.0)
     return LiningRelief(
         rings,
         step,
+        shape,
         np.array([wider_from(tunnel), p.radius_step]),
         rough,
         facets,
         masonry,
         int(seed.generate_state(1)[0]),
-        min(0.0, float(step.min(initial=0.0))) - rings.pocket_depth - p.radius_step - most - grooves,
-        max(0.0, float(step.max(initial=0.0))) + most,
+        min(0.0, float(step.min(initial=0.0))) - rings.pocket_depth - p.radius_step - most - grooves - away,
+        max(0.0, float(step.max(initial=0.0))) + most + away,
         tunnel.section.floor_arc,
         tunnel.section.floor,
     )
@@ -154,7 +166,8 @@ def height(relief: LiningRelief, s: float, arc: float) -> float:
         return 0.0
     total = -relief.wider[1] if s > relief.wider[0] else 0.0
     if relief.rings.length > 0.0:
-        total += relief.step[ring_of(relief.rings, s)]
+        i = ring_of(relief.rings, s)
+        total += relief.step[i] + departure(relief.rings, relief.shape, i, arc)
         if pocket_drop(relief.rings, s, arc) > 0.0:
             total -= relief.rings.pocket_depth
     if relief.masonry.length > 0.0:

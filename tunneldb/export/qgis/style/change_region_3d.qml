@@ -260,6 +260,9 @@
       </editWidget>
     </field>
   </fieldConfiguration>
+  <expressionfields>
+    <field name="clock_text" expression="with_variable('minutes', round(&quot;clock&quot; * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0'))" type="10" typeName="string" subType="0" length="0" precision="0" comment=""/>
+  </expressionfields>
   <aliases>
     <alias index="0" field="id" name="Region key"/>
     <alias index="1" field="survey_id" name="Survey key"/>
@@ -272,11 +275,12 @@
     <alias index="8" field="label" name="Station"/>
     <alias index="9" field="arc_from" name="Arc from (m)"/>
     <alias index="10" field="arc_to" name="Arc to (m)"/>
-    <alias index="11" field="clock" name="Clock (h)"/>
+    <alias index="11" field="clock" name="Clock position (h)"/>
     <alias index="12" field="area" name="Area (m²)"/>
     <alias index="13" field="change_mean" name="Mean change, positive inwards (m)"/>
     <alias index="14" field="lod" name="Detected from (m)"/>
     <alias index="15" field="change_extreme" name="Greatest change (m)"/>
+    <alias index="16" field="clock_text" name="Clock position"/>
   </aliases>
   <previewExpression>"label"</previewExpression>
   <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock, [% format_number("area", 2) %] m²&lt;br&gt;[% if("change_mean" &gt; 0, 'inwards', 'outwards') %] by [% format_number(1000 * abs("change_mean"), 1) %] mm since [% "old_survey" %]; greatest [% format_number(1000 * abs("change_extreme"), 1) %] mm; detected from [% format_number(1000 * "lod", 1) %] mm</mapTip>

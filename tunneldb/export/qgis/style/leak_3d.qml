@@ -390,6 +390,9 @@
       </editWidget>
     </field>
   </fieldConfiguration>
+  <expressionfields>
+    <field name="clock_text" expression="with_variable('minutes', round(&quot;clock&quot; * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0'))" type="10" typeName="string" subType="0" length="0" precision="0" comment=""/>
+  </expressionfields>
   <aliases>
     <alias index="0" field="id" name="Leak"/>
     <alias index="1" field="survey_id" name="Survey key"/>
@@ -423,6 +426,7 @@
     <alias index="29" field="model" name="Judged by model"/>
     <alias index="30" field="wet" name="Wet"/>
     <alias index="31" field="origin" name="Origin of the outline"/>
+    <alias index="32" field="clock_text" name="Clock position"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -471,7 +475,7 @@
       <attributeEditorField name="id" index="0" showLabel="1"/>
       <attributeEditorField name="label" index="7" showLabel="1"/>
       <attributeEditorField name="segment" index="4" showLabel="1"/>
-      <attributeEditorField name="clock" index="10" showLabel="1"/>
+      <attributeEditorField name="clock_text" index="32" showLabel="1"/>
       <attributeEditorField name="area" index="16" showLabel="1"/>
       <attributeEditorField name="image_share" index="19" showLabel="1"/>
       <attributeEditorField name="found" index="12" showLabel="1"/>

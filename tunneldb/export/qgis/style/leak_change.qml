@@ -387,6 +387,9 @@
       </editWidget>
     </field>
   </fieldConfiguration>
+  <expressionfields>
+    <field name="clock_text" expression="with_variable('minutes', round(&quot;clock&quot; * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0'))" type="10" typeName="string" subType="0" length="0" precision="0" comment=""/>
+  </expressionfields>
   <aliases>
     <alias index="0" field="id" name="Key"/>
     <alias index="1" field="survey_id" name="Survey key"/>
@@ -398,7 +401,7 @@
     <alias index="7" field="chainage_from" name="Chainage from (m)"/>
     <alias index="8" field="chainage_to" name="Chainage to (m)"/>
     <alias index="9" field="label" name="Station"/>
-    <alias index="10" field="clock" name="Clock (h)"/>
+    <alias index="10" field="clock" name="Clock position (h)"/>
     <alias index="11" field="area_old" name="Area before (m²)"/>
     <alias index="12" field="area_old_se" name="± before (m²)"/>
     <alias index="13" field="area_new" name="Area after (m²)"/>
@@ -411,6 +414,7 @@
     <alias index="20" field="new_kinds" name="Kinds after"/>
     <alias index="21" field="old_ids" name="Findings before"/>
     <alias index="22" field="new_ids" name="Findings after"/>
+    <alias index="23" field="clock_text" name="Clock position"/>
   </aliases>
   <previewExpression>"label"</previewExpression>
   <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock: [% map_get(map('new', 'new', 'grown', 'grown', 'same', 'the same', 'shrunk', 'shrunk', 'dry', 'dry again', 'kind', 'of another kind', 'unseen', 'unseen'), "state") %]&lt;br&gt;[% format_number("area_old", 3) %] ± [% format_number("area_old_se", 3) %] m² in [% "old_survey" %], [% format_number("area_new", 3) %] ± [% format_number("area_new_se", 3) %] m² in [% "survey" %]&lt;br&gt;seen [% round(100 * "seen_old") %] % and [% round(100 * "seen_new") %] %</mapTip>

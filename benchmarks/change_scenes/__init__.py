@@ -1,0 +1,1 @@
+"""Pairs of synthetic laser scans of one tunnel at two dates, with truth."""

@@ -1,0 +1,103 @@
+"""What is told of a finding, and what a person says of it."""
+
+from __future__ import annotations
+
+from typing import Any, Dict, List, Tuple
+
+from qgis.PyQt.QtCore import Qt, pyqtSignal
+from qgis.PyQt.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLabel, QLineEdit, QPushButton, QVBoxLayout, QWidget
+
+_BADGE = {"open": "#e67e22", "confirmed": "#1f6fd6", "rejected": "#757575"}
+
+
+class FactsPanel(QWidget):
+    """Facts, kind, remark, and the buttons of a verdict."""
+
+    kind_chosen = pyqtSignal(str)
+    remarked = pyqtSignal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.head, self.facts = QLabel(), QLabel()
+        self.head.setObjectName("head")
+        self.facts.setObjectName("facts")
+        self.facts.setWordWrap(True)
+        self.facts.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.kind = QComboBox()
+        self.kind.setObjectName("kind")
+        self.remark = QLineEdit()
+        self.remark.setObjectName("remark")
+        self.remark.setPlaceholderText("Remark (M), Enter writes it")
+        self.buttons = {
+            "confirm": QPushButton("&Confirm (C)"), "reject": QPushButton("&Reject (R)"), "reopen": QPushButton("&Open (O)"),
+            "previous": QPushButton("◀ (P)"), "next": QPushButton("▶ (N)"), "undo": QPushButton("&Undo (Z)"),
+        }  # fmt: skip
+        self._arrange()
+        self.kind.activated.connect(lambda _: self.kind_chosen.emit(str(self.kind.currentData())))
+        self.remark.returnPressed.connect(lambda: self.remarked.emit(self.remark.text()))
+
+    def offer(self, kinds: List[Tuple[str, str]]) -> None:
+        """Offer kinds; the first nine have keys."""
+        self.kind.clear()
+        for n, (code, label) in enumerate(kinds, 1):
+            self.kind.addItem(f"{label} ({n})" if n <= 9 else label, code)
+
+    def show_finding(self, facts: Dict[str, Any] | None, probability: float | None) -> None:
+        """Tell of a finding, or that there is none."""
+        self.setEnabled(facts is not None)
+        if facts is None:
+            self.head.setText("<b>No finding</b>")
+            self.facts.setText("Nothing is left that is asked for.")
+            self.remark.clear()
+            return
+        badge = f"<span style='color:{_BADGE.get(facts['review'], '#000')}'>{facts['review']}</span>"
+        self.head.setText(f"<b>{facts['label'] or ''}</b> &nbsp; no. {facts['id']} &nbsp; <b>{badge}</b>")
+        self.facts.setText("<br>".join(_lines(facts, probability)))
+        self.kind.setCurrentIndex(self.kind.findData(facts["kind"]))
+        self.remark.setText(facts["remark"] or "")
+
+    def _arrange(self) -> None:
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        column.addWidget(self.head)
+        column.addWidget(self.facts, 1)
+        column.addWidget(self.kind)
+        column.addWidget(self.remark)
+        verdict, steps = QHBoxLayout(), QGridLayout()
+        for name in ("confirm", "reject"):
+            verdict.addWidget(self.buttons[name])
+        for n, name in enumerate(("previous", "next", "reopen", "undo")):
+            steps.addWidget(self.buttons[name], 0, n)
+        for name, button in self.buttons.items():
+            button.setObjectName(name)
+        column.addLayout(verdict)
+        column.addLayout(steps)
+
+
+def _lines(facts: Dict[str, Any], probability: float | None) -> List[str]:
+    """Facts in words, a line each."""
+    lines = []
+    if probability is not None and facts["confidence"] is not None:
+        lines.append(f"leak with probability <b>{probability:.2f}</b> (found as {facts['found']})")
+    else:
+        lines.append(f"{facts['origin']} by hand")
+    size = f"{facts['area']:.2f} m²"
+    if facts["clock"] is not None:
+        minutes = round(float(facts["clock"]) * 60) % 720
+        size += f", at {minutes // 60 or 12}:{minutes % 60:02d}"
+    lines.append(size + f", arc {facts['arc_from']:+.2f} to {facts['arc_to']:+.2f} m")
+    if facts["drop_mean"] is not None:
+        darker = f"{facts['drop_mean']:.1f} dB darker, at most {facts['drop_max']:.1f}"
+        if facts["contrast"] is not None:
+            darker += f"; contrast {facts['contrast']:.0f}"
+        if facts["image_share"] is not None:
+            darker += f"; seen {100 * facts['image_share']:.0f} %"
+        lines.append(darker)
+    if facts["evidence"]:
+        lines.append(f"for (+) and against (-): {facts['evidence']}")
+    if facts["reviewed_by"]:
+        lines.append(f"reviewed by {facts['reviewed_by']}, {facts['reviewed_at']}")
+    if facts["photos"]:
+        lines.append(f"{facts['photos']} photos")
+    return lines

@@ -1,0 +1,77 @@
+"""What the plugin asks of schema ``tunnel_api``.
+
+What is put into a text is a whole number, never a word; reviews are written by QGIS's provider, which quotes its values itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Dict, Sequence
+
+VIEW = "finding_unrolled"
+"""View through which reviews are written: inspectors may update the columns of WRITTEN in it."""
+
+WRITTEN = ("review", "remark", "kind")
+
+SURVEYS = (
+    "SELECT s.id, s.name, s.tunnel, s.date::text FROM tunnel_api.survey s"
+    " WHERE EXISTS (SELECT FROM tunnel_api.tunnel t WHERE t.id = s.tunnel_id AND NOT t.site) ORDER BY s.tunnel, s.date, s.name"
+)
+KINDS = "SELECT k.code, k.label FROM tunnel_api.finding_kind k WHERE k.active ORDER BY k.position, k.code"
+PERSON = (
+    "SELECT session_user::text, has_column_privilege('tunnel_api.finding_unrolled', 'review', 'UPDATE'),"
+    " has_function_privilege('tunnel_api.finding_undo(bigint)', 'EXECUTE')"
+)
+
+_LISTED = (
+    "id", "km", "chainage_from", "chainage_to", "arc_from", "arc_to", "kind", "found", "confidence", "area", "review", "counted"
+)  # fmt: skip
+# dates and lists as text, so that what is read does not depend on how QGIS turns types into Python's
+_FACTS = {
+    **{name: f"f.{name}" for name in (*_LISTED, "label", "clock", "kind_label", "origin", "state", "remark", "reviewed_by")},
+    **{name: f"f.{name}" for name in ("drop_mean", "drop_max", "contrast", "image_share", "photos")},
+    "reviewed_at": "to_char(f.reviewed_at, 'YYYY-MM-DD HH24:MI')",
+    "reasons": "array_to_string(f.reasons, ', ')",
+    "evidence": "(SELECT a.evidence FROM tunnel_api.anomaly a WHERE a.id = f.id)",
+    "outline": "public.ST_AsText(f.unrolled, 3)",
+    "map_west": "public.ST_XMin(f.map)", "map_south": "public.ST_YMin(f.map)",
+    "map_east": "public.ST_XMax(f.map)", "map_north": "public.ST_YMax(f.map)",
+}  # fmt: skip
+
+
+def findings(survey_id: int) -> str:
+    """Return the query of what there is to review in a survey; columns as :func:`listed` names them."""
+    columns = ", ".join(f"f.{name}" for name in _LISTED)
+    return (
+        f"SELECT {columns} FROM tunnel_api.lining_finding f WHERE f.survey_id = {int(survey_id)}"
+        " AND f.state IN ('open', 'confirmed', 'rejected', 'gone')"
+    )
+
+
+def facts(finding_id: int) -> str:
+    """Return the query of all that the dock tells of a finding; columns as :func:`told` names them."""
+    return f"SELECT {', '.join(_FACTS.values())} FROM tunnel_api.lining_finding f WHERE f.id = {int(finding_id)}"
+
+
+def undo(finding_id: int) -> str:
+    """Return the query that takes the last change of a finding back."""
+    return f"SELECT tunnel_api.finding_undo({int(finding_id)})"
+
+
+def listed(row: Sequence[Any]) -> Dict[str, Any]:
+    """Return a row of :func:`findings` by its columns."""
+    return dict(zip(_LISTED, row))
+
+
+def told(row: Sequence[Any]) -> Dict[str, Any]:
+    """Return a row of :func:`facts` by its columns."""
+    return dict(zip(_FACTS, row))
+
+
+def error_line(message: str) -> str:
+    """Return the one line of what the server or QGIS said that tells what is wrong."""
+    lines = [line.strip() for line in str(message).splitlines() if line.strip()]
+    for mark in ("ERROR:", "FATAL:"):
+        for line in lines:
+            if mark in line:
+                return line.split(mark)[-1].strip()
+    return lines[0] if lines else "the database said nothing"

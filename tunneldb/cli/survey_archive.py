@@ -1,0 +1,82 @@
+"""`tunneldb survey export` and `tunneldb survey import`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.param_types import FilePath
+from tunneldb.cli.progress import bar, step
+from tunneldb.database import connect
+from tunneldb.files import told_to_end
+from tunneldb.store.survey import get_survey
+
+
+@verb("export", examples=["tunneldb survey export ringo-2024 -o ringo-2024.tdb"])
+@click.argument("name", metavar="SURVEY")
+@click.option("--output", "-o", type=FilePath(), required=True, help="File to write, such as ringo-2024.tdb.")
+@click.pass_obj
+def export(settings: Settings, name: str, output: Path) -> None:
+    """Write SURVEY with all that belongs to it into one file, from which survey import restores it.
+
+    The file holds the survey's rows of all tables, points and images among them, its tunnel, and its part of the audit; scan
+    files and photos stay where they lie. No stage may be at work on the survey meanwhile; reviews go on, and are not in it.
+    """
+    from tunneldb.export.archive.save import save_survey
+
+    with told_to_end(), connect(settings.dsn) as connection, bar("bytes") as progress:
+        saved = save_survey(connection, get_survey(connection, name, site=True), output, step(progress))
+    tell(survey=name, file=output, bytes=saved.bytes, kilometres=saved.kilometres, rows=saved.rows)
+    click.echo(
+        f"{name}: {sum(saved.rows.values())} rows of {sum(map(bool, saved.rows.values()))} tables, {saved.rows.get('point', 0)}"
+        f" of them points in {len(saved.kilometres)} kilometres: {output}, {saved.bytes / 1e6:.1f} MB",
+        err=True,
+    )
+    click.echo(f"{name}: to free its room in the database: tunneldb survey remove {name}", err=True)
+
+
+@verb(
+    "import",
+    examples=[
+        "tunneldb survey import ringo-2024.tdb",
+        "tunneldb survey import ringo-2024.tdb --name ringo-2024-archived",
+    ],
+)
+@click.argument("file", type=FilePath())
+@click.option("--name", help="What the survey is to be called here; its own name without.")
+@click.pass_obj
+def import_(settings: Settings, file: Path, name: str | None) -> None:
+    """Bring the survey of FILE, which survey export wrote, into the database, whole or not at all.
+
+    Its tunnel is added, or the one of that name used if the axis is the same. In the database that it came from all rows have
+    the numbers that they had; in another they get new ones. If it is cut off, nothing was imported; call it again.
+    """
+    from tunneldb.export.archive.load import load_survey
+
+    with told_to_end(), connect(settings.dsn) as connection, bar("bytes") as progress:
+        loaded = load_survey(connection, file, name, step(progress))
+    notes = list(loaded.notes)
+    if loaded.left_out:
+        listed = ", ".join(f"{count} of {table}" for table, count in sorted(loaded.left_out.items()))
+        notes.append(f"left out are comparisons with surveys that are not in this database: {listed}")
+    tell(
+        survey=loaded.survey,
+        tunnel=loaded.tunnel,
+        new_tunnel=loaded.new_tunnel,
+        kept_numbers=loaded.kept,
+        kilometres=loaded.kilometres,
+        rows=loaded.rows,
+        left_out=loaded.left_out,
+        notes=notes,
+    )
+    numbers = "the numbers that they had" if loaded.kept else "new numbers"
+    click.echo(
+        f"{loaded.survey}: {sum(loaded.rows.values())} rows, {loaded.rows.get('point', 0)} of them points in"
+        f" {len(loaded.kilometres)} kilometres of {loaded.tunnel}; rows have {numbers}",
+        err=True,
+    )
+    for note in notes:
+        click.echo(f"{loaded.survey}: {note}", err=True)

@@ -1,0 +1,1 @@
+"""A whole survey as one file, and back."""

@@ -1,0 +1,76 @@
+"""A survey into an archive."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import psycopg
+
+from tunneldb import __version__
+from tunneldb.database.schema import HEAD
+from tunneldb.export.archive.container import FORMAT, ArchiveWriter, Manifest
+from tunneldb.files import replacing
+from tunneldb.store.archive.out import Rows, still, streams
+from tunneldb.store.survey import Survey
+
+Begin = Callable[[str, float | None], Callable[[float], None]]
+
+
+@dataclass(frozen=True)
+class Saved:
+    """What an archive holds: its bytes, rows of each table, and the kilometres of which it has points."""
+
+    bytes: int
+    rows: dict[str, int]
+    kilometres: list[int]
+
+
+def save_survey(conn: psycopg.Connection[Any], survey: Survey, path: Path, begin: Begin) -> Saved:
+    """Write a survey with all that belongs to it into one file, as it is at one moment.
+
+    Parameters
+    ----------
+    conn : Connection
+        Idle.
+    survey : Survey
+    path : Path
+        There whole when this returns, or not at all.
+    begin : callable
+        Told of each member that begins; returns what is told of its bytes.
+
+    Raises
+    ------
+    BusyError
+        When a stage is at work on it.
+    UserError
+        When points wait to be loaded, or the file cannot be written.
+    """
+    conn.rollback()
+    rows: dict[str, int] = {}
+    kms: list[int] = []
+    with replacing(path) as temporary, still(conn, survey), ArchiveWriter(temporary) as archive:
+        for stream in streams(conn, survey):
+            held = Rows(conn, stream)
+            columns = [(column.name, column.type) for column in stream.columns]
+            archive.add(stream.member, columns, _told(held, begin(stream.member, None)))
+            archive.counted(stream.member, held.count)
+            rows[stream.table] = rows.get(stream.table, 0) + held.count
+            if stream.table == "point" and stream.km is not None:
+                kms.append(stream.km)
+        archive.finish(
+            Manifest(
+                FORMAT, __version__, HEAD, dt.datetime.now(dt.UTC).isoformat(timespec="seconds"), survey.name, survey.id,
+                survey.tunnel, survey.tunnel_id, survey.srid, {},
+            )
+        )  # fmt: skip
+    return Saved(path.stat().st_size, rows, kms)
+
+
+def _told(rows: Rows, progress: Callable[[float], None]) -> Iterator[bytes | bytearray | memoryview]:
+    for chunk in rows:
+        progress(len(chunk))
+        yield chunk
