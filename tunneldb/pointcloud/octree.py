@@ -258,14 +258,22 @@ def _middles(key: Int64) -> Intp:
     return (starts + np.append(starts[1:], len(key))[: len(starts)]) // 2
 
 
+# Shifts that leave two free bits before each of 21, with the masks of what belongs there after them.
+_SPREAD = (
+    (32, 0x1F00000000FFFF),
+    (16, 0x1F0000FF0000FF),
+    (8, 0x100F00F00F00F00F),
+    (4, 0x10C30C30C30C30C3),
+    (2, 0x1249249249249249),
+)
+
+
 def _morton(cell: Int64) -> Int64:
     """Bits of x, y and z (n, 3) taken in turn; what lies together in a cube has the same first bits."""
     code = np.zeros(len(cell), np.int64)
     for column in range(3):
         bits = cell[:, column].copy()
-        for shift, mask in (
-            (32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F), (4, 0x10C30C30C30C30C3), (2, 0x1249249249249249),
-        ):  # fmt: skip
+        for shift, mask in _SPREAD:
             bits = (bits | bits << shift) & mask
         code |= bits << (2 - column)
     return code

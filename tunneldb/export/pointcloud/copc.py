@@ -33,7 +33,7 @@ from tunneldb.pointcloud.formats.las_header import Head
 from tunneldb.pointcloud.formats.las_merge import Placement, merge_heads
 from tunneldb.pointcloud.formats.las_records import coordinates, fields
 from tunneldb.pointcloud.octree import GRID, CellCounts, Nodes, Tiling
-from tunneldb.pointcloud.rewrite import records_of
+from tunneldb.pointcloud.rewrite import read_coordinates, records_of
 from tunneldb.store.scene import load_scene
 from tunneldb.store.sources import unchanged_file
 from tunneldb.store.surface import load_alignment
@@ -110,11 +110,18 @@ class _Divide:
 
 
 class _Source:
-    """A scan file that is to be read again and again."""
+    """A scan file that is read once for all its kilometres, and then for each of them where its points are.
+
+    Attributes
+    ----------
+    chunks : dict of int to list of int
+        By kilometre, numbers of the chunks with points of it.
+    """
 
     def __init__(self, file: ScanFile, number: int, of: int) -> None:
         self.file, self.name = file, f"[{number}|{of}] {file.name}"
         self.head = records_of(self.path).head
+        self.chunks: dict[int, list[int]] = {km: [] for km in file.kilometres}
         if self.head.point_format not in FORMATS:
             raise UserError(f"{file.path}: its points have waveforms, which a COPC can't hold: export without --copc")
 
@@ -132,16 +139,18 @@ class _Source:
         """
         progress = begin(f"{self.name}: cells", self.file.points)
         forms = [(group, group.placement(self)) for group in groups]
-        for records in records_of(self.path).chunks:
-            xyz = coordinates(records, self.head.scales, self.head.offsets)
+        for number, xyz in enumerate(read_coordinates(self.path)):
             km = divide.kilometre(xyz, self.file.kilometres)
             for group, placement in forms:
+                own = xyz[km == group.km]
+                if not len(own):
+                    continue
                 try:
-                    own = placement.records(records[km == group.km])
-                    group.add(coordinates(own, group.head.scales, group.head.offsets))
+                    group.add(placement.coordinates(own))
                 except ValueError as error:
                     raise UserError(f"{self.file.path}: {error}; mend the file") from None
-            progress(len(records))
+                self.chunks[group.km].append(number)
+            progress(len(xyz))
 
 
 class _Group:
@@ -215,15 +224,14 @@ def _sort(
     place = np.concatenate([[0], np.cumsum([tile.points for tile in tiling.tiles])])[:-1]
     for source in group.sources:
         kilometres = source.file.kilometres
+        near = [km for km in kilometres if abs(km - group.km) <= 1]
         with snapshot(conn):
-            require_ground(conn, survey, kilometres)
-            scene = load_scene(conn, survey, min(kilometres), max(kilometres))
+            require_ground(conn, survey, near)
+            scene = load_scene(conn, survey, min(near), max(near))
         placement = group.placement(source)
-        for records in records_of(source.path).chunks:
+        for records in records_of(source.path, only=source.chunks[group.km]).chunks:
             xyz = coordinates(records, source.head.scales, source.head.offsets)
             own = divide.kilometre(xyz, kilometres) == group.km
-            if not own.any():
-                continue
             found = scene.classes(xyz[own])
             out = placement.records(records[own])
             fields(out, head.point_format)["classification"] = found

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tunneldb.arrays import UInt8
+from tunneldb.arrays import Float, UInt8
 from tunneldb.pointcloud.formats.las_header import EXTRA_BYTES, WKT, Head, Record, size_of
 from tunneldb.pointcloud.formats.las_records import coordinates, fields, record_size
 
@@ -38,7 +38,7 @@ class Placement:
     extras: tuple[tuple[int, int, int], ...]
 
     def records(self, records: UInt8) -> UInt8:
-        """Bring records (n, size) of the file into the form of the whole.
+        """Bring records (n, size) of the file into the form of the whole; the same array where that is their own.
 
         Coordinates move by half a step at most, and not at all where scales and offsets are those of the whole.
 
@@ -47,21 +47,46 @@ class Placement:
         ValueError
             If a coordinate is too far from the offsets of the whole.
         """
+        if self._keeps_coordinates and self.source.point_format == self.target.point_format and self._keeps_extras:
+            return records
         out = np.zeros((len(records), self.target.record_size), np.uint8)
         before, after = fields(records, self.source.point_format), fields(out, self.target.point_format)
         for name in before.dtype.names or ():
             after[name] = before[name]
         for place, target, size in self.extras:
             out[:, target : target + size] = records[:, place : place + size]
-        form = (self.target.scales, self.target.offsets)
-        if form != (self.source.scales, self.source.offsets):
-            xyz = coordinates(records, self.source.scales, self.source.offsets)
-            stored = np.rint((xyz - np.array(form[1])) / np.array(form[0]))
-            if len(stored) and np.abs(stored).max() >= 2**31:
-                raise ValueError("its points lie too far from those of the other files for the digits they are given in")
+        if not self._keeps_coordinates:
+            stored = self._stored(coordinates(records, self.source.scales, self.source.offsets))
             for column, axis in enumerate("XYZ"):
                 after[axis] = stored[:, column]
         return out
+
+    def coordinates(self, xyz: Float) -> Float:
+        """Coordinates (n, 3) of the file as the whole holds them, m.
+
+        Raises
+        ------
+        ValueError
+            As of `records`.
+        """
+        if self._keeps_coordinates:
+            return xyz
+        return self._stored(xyz) * np.array(self.target.scales) + np.array(self.target.offsets)
+
+    @property
+    def _keeps_coordinates(self) -> bool:
+        return (self.source.scales, self.source.offsets) == (self.target.scales, self.target.offsets)
+
+    @property
+    def _keeps_extras(self) -> bool:
+        same = all(place == target for place, target, _ in self.extras)
+        return same and self.source.record_size == self.target.record_size
+
+    def _stored(self, xyz: Float) -> Float:
+        stored = np.rint((xyz - np.array(self.target.offsets)) / np.array(self.target.scales))
+        if len(stored) and np.abs(stored).max() >= 2**31:
+            raise ValueError("its points lie too far from those of the other files for the digits they are given in")
+        return stored
 
 
 def merge_heads(heads: Sequence[Head]) -> tuple[Head, list[Placement]]:
