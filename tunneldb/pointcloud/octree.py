@@ -136,7 +136,8 @@ class Tiling:
         corner = cells.min(axis=0)
         relative = cells - corner
         depth = int(relative.max()).bit_length()
-        tile_of, found = np.empty(len(cells), np.intp), []
+        tile_of = np.empty(len(cells), np.intp)
+        found: list[Tile] = []
         rest = np.arange(len(cells))
         for level in range(depth + 1):
             places, inverse = np.unique(relative[rest] >> (depth - level), axis=0, return_inverse=True)
