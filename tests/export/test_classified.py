@@ -181,7 +181,8 @@ def test_kilometres_as_copc_hold_the_same_points(tmp_path: Path) -> None:
             points = reader.query()
             levels = [len(reader.query(level=level)) for level in range(20)]
             low, high = reader.header.mins, reader.header.maxs
-            half = (low + high) / 2 + 1e-4  # no point has it
+            step = reader.header.scales
+            half = low + (np.rint((high - low) / 2 / step) + 0.2) * step  # which no point has
             part = reader.query(bounds=laspy.copc.Bounds(low, half))
             assert reader.header.parse_crs().to_epsg() == 25830
             centre, edge = reader.copc_info.center, reader.copc_info.halfsize

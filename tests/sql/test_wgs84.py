@@ -15,9 +15,6 @@ from support.example_survey import SRID
 ROOT = Path(__file__).parents[2]
 VIEWS = "SELECT f_table_name FROM geometry_columns WHERE f_table_schema = 'tunnel_api' AND {} ORDER BY 1"
 
-WRITES = ("UPDATE tunnel_api.{} SET id = id", "DELETE FROM tunnel_api.{}", "INSERT INTO tunnel_api.{} DEFAULT VALUES")
-REFUSALS = (psycopg.errors.InsufficientPrivilege, psycopg.errors.ObjectNotInPrerequisiteState)  # no right, or no way at all
-
 
 @pytest.fixture(scope="session")
 def template(example_template: str) -> str:
@@ -80,6 +77,10 @@ def test_viewers_read_each_and_write_none(conn: psycopg.Connection[Any]) -> None
     for view in names(conn, "srid = 4326"):
         name = sql.Identifier(view)
         conn.execute(sql.SQL("SELECT ST_AsMVT(t) FROM tunnel_api.{} t").format(name))
-        for statement in WRITES:
-            with pytest.raises(REFUSALS), conn.transaction():
-                conn.execute(sql.SQL(statement).format(name))
+        assert conn.execute(
+            "SELECT has_table_privilege(current_user, %(v)s, 'INSERT, UPDATE, DELETE, TRUNCATE, TRIGGER'),"
+            " has_any_column_privilege(current_user, %(v)s, 'INSERT, UPDATE')",
+            {"v": f"tunnel_api.{view}"},
+        ).fetchone() == (False, False)
+    with pytest.raises(psycopg.errors.InsufficientPrivilege):
+        conn.execute("UPDATE tunnel_api.leak_wgs84 SET review = 'confirmed'")
