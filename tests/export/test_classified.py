@@ -12,6 +12,7 @@ import numpy as np
 import psycopg
 import pytest
 from click.testing import CliRunner
+from pyproj import Transformer
 from support.databases import Copies
 
 from tunneldb.classification.classes import PointClass
@@ -198,8 +199,10 @@ def test_kilometres_as_copc_hold_the_same_points(tmp_path: Path) -> None:
         assert statistics["Classification"]["maximum"] == points.classification.max()
         assert item["assets"]["data"]["href"] == f"./{name}"
         west, south, _, east, north, _ = item["bbox"]
-        assert -4.0 < west < east < 0.0
-        assert 42.0 < south < north < 44.0
+        degrees = Transformer.from_crs(25830, 4326, always_xy=True).transform(*xyz[:, :2].T)
+        for (least, greatest), values in zip(((west, east), (south, north)), degrees, strict=True):
+            assert least - 1e-9 <= values.min() < least + 1e-4
+            assert greatest - 1e-4 < values.max() <= greatest + 1e-9
         total += len(points)
         found.append(points)
     assert total == len(array)
