@@ -53,9 +53,8 @@ def pixels(url, name, layer):
     return sum(image.pixelColor(x, y) != QColor("white") for x in range(600) for y in range(400))
 
 
-def main(url):
-    application = QgsApplication([], False)
-    application.initQgis()
+def found(url):
+    """What there is of each collection."""
     with urlopen(f"{url}/collections?f=json&limit=100") as answer:
         names = [collection["id"] for collection in json.load(answer)["collections"]]
     collections = {}
@@ -63,9 +62,11 @@ def main(url):
         layer, collections[name] = features(url, name)
         if collections[name]["rows"] and "leak" in name:
             collections[name]["pixels"] = pixels(url, name, layer)
-    print(json.dumps({"version": Qgis.QGIS_VERSION, "collections": collections}))
-    application.exitQgis()
+    return {"version": Qgis.QGIS_VERSION, "collections": collections}
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    application = QgsApplication([], False)  # must outlive all layers
+    application.initQgis()
+    print(json.dumps(found(sys.argv[1])), flush=True)
+    application.exitQgis()
