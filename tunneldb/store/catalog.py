@@ -28,6 +28,7 @@ from tunneldb.store.scanner import (
     save_positions,
     save_reference,
 )
+from tunneldb.store.unknown import unknown_survey, unknown_tunnel
 
 
 @dataclass(frozen=True)
@@ -243,7 +244,7 @@ def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyCha
         [name],
     ).fetchone()
     if row is None:
-        raise UserError(f"there is no survey {name!r}: tunneldb survey list")
+        raise unknown_survey(connection, name)
     key, tunnel, old_kind, old_dimension, reference, platform = row
     kind = change.kind or old_kind
     dimension = None if kind == "none" else change.dimension or old_dimension
@@ -296,7 +297,7 @@ def _alignment(connection: psycopg.Connection[Any], tunnel: str) -> tuple[int, i
         "SELECT id, srid, start_chainage, spacing, ST_AsBinary(alignment) FROM tunnel.tunnel WHERE name = %s", [tunnel]
     ).fetchone()
     if row is None:
-        raise _unknown(connection, tunnel)
+        raise unknown_tunnel(connection, tunnel)
     key, srid, start, spacing, wkb = row
     if wkb is None:
         return key, srid, None
@@ -314,19 +315,14 @@ def get_tunnel(connection: psycopg.Connection[Any], name: str) -> int:
     """
     row = connection.execute("SELECT id FROM tunnel.tunnel WHERE name = %s", [name]).fetchone()
     if row is None:
-        raise _unknown(connection, name)
+        raise unknown_tunnel(connection, name)
     return int(row[0])
-
-
-def _unknown(connection: psycopg.Connection[Any], tunnel: str) -> UserError:
-    known = ", ".join(row[0] for row in connection.execute("SELECT name FROM tunnel.tunnel ORDER BY name"))
-    return UserError(f"there is no tunnel {tunnel!r}; the database has {known or 'none: tunneldb tunnel add'}")
 
 
 def remove_survey(connection: psycopg.Connection[Any], name: str) -> None:
     """Remove a survey with all that was made of it."""
     if connection.execute("DELETE FROM tunnel.survey WHERE name = %s", [name]).rowcount == 0:
-        raise UserError(f"there is no survey {name!r}: tunneldb survey list")
+        raise unknown_survey(connection, name)
 
 
 def remove_tunnel(connection: psycopg.Connection[Any], name: str) -> None:
@@ -339,7 +335,7 @@ def remove_tunnel(connection: psycopg.Connection[Any], name: str) -> None:
         names = ", ".join(row[0] for row in surveys)
         raise UserError(f"the tunnel {name!r} has surveys: {names}; remove them first (tunneldb survey remove)")
     if connection.execute("DELETE FROM tunnel.tunnel WHERE name = %s", [name]).rowcount == 0:
-        raise UserError(f"there is no tunnel {name!r}: tunneldb tunnel list")
+        raise unknown_tunnel(connection, name)
 
 
 def crs_text(conn: psycopg.Connection[Any], srid: int) -> str:
