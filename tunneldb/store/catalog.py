@@ -76,6 +76,7 @@ def add_tunnel(
     assert row is not None
     if axis.design is not None:
         save_design(connection, row[0], axis.design)
+    make_layers(connection)
     return alignment
 
 
@@ -92,6 +93,7 @@ def add_site(connection: psycopg.Connection[Any], name: str, srid: int) -> None:
         connection.execute("INSERT INTO tunnel.tunnel (name, srid) VALUES (%s, %s)", [name, srid])
     except psycopg.errors.UniqueViolation:
         raise _taken(name) from None
+    make_layers(connection)
 
 
 def require_new_tunnel(connection: psycopg.Connection[Any], name: str, srid: int) -> None:
@@ -336,6 +338,12 @@ def remove_tunnel(connection: psycopg.Connection[Any], name: str) -> None:
         raise UserError(f"the tunnel {name!r} has surveys: {names}; remove them first (tunneldb survey remove)")
     if connection.execute("DELETE FROM tunnel.tunnel WHERE name = %s", [name]).rowcount == 0:
         raise unknown_tunnel(connection, name)
+    make_layers(connection)
+
+
+def make_layers(connection: psycopg.Connection[Any]) -> None:
+    """Give each coordinate system that tunnels are in its schema of typed layers; drop those of others."""
+    connection.execute("CALL tunnel_api.make_layers()")
 
 
 def crs_text(conn: psycopg.Connection[Any], srid: int) -> str:
