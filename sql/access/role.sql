@@ -133,3 +133,6 @@ BEGIN
     END LOOP;
 END
 $$;
+
+-- With the rights that were granted here.
+CALL tunnel_api.make_layers();

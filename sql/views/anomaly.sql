@@ -1,7 +1,8 @@
 -- Views of what is darker than dry lining. A leak on a vertical wall has no area in plan, so there are three geometries,
 -- each with a view of its own for QGIS: unrolled (chainage, arc; SRID 0), on the map beside the axis, and in space.
 -- Views named leak hold the wet ones: of kind leak, and drips that people drew. What is merged into another, the same as what a
--- person drew, or taken away by a dry region is in views/finding.sql alone. Needs stationing (geometry/stationing.sql).
+-- person drew, or taken away by a dry region is in views/finding.sql alone. Needs stationing
+-- (geometry/stationing.sql) and make_geometry_views (views/geometry.sql).
 
 -- What each reason adds to the logarithm of the odds of a leak, the strongest first, as "faint +2.3, rectangular -1.2".
 CREATE OR REPLACE FUNCTION tunnel_api.evidence_text(evidence jsonb) RETURNS text
@@ -52,31 +53,11 @@ COMMENT ON COLUMN tunnel_api.anomaly_evidence.anomaly_id IS 'Its id in the view 
 COMMENT ON COLUMN tunnel_api.anomaly_evidence.reason IS 'What was measured: faint, thin, rectangular, …';
 COMMENT ON COLUMN tunnel_api.anomaly_evidence.log_odds IS 'What it adds to the logarithm of the odds of a leak; negative: against one';
 
--- The views of one geometry, and the comments on the columns of all eight.
+-- The comments on the columns of both, and their views of one geometry.
 DO $$
 DECLARE
-    base text;
-    shown record;
     comment record;
-    others text;
 BEGIN
-    FOREACH base IN ARRAY ARRAY['anomaly', 'leak'] LOOP
-        SELECT string_agg(quote_ident(attname), ', ' ORDER BY attnum) INTO others
-          FROM pg_attribute
-         WHERE attrelid = format('tunnel_api.%I', base)::regclass AND attnum > 0
-           AND attname NOT IN ('unrolled', 'map', 'surface');
-        FOR shown IN SELECT * FROM (VALUES
-            ('unrolled', 'unrolled', 'in the unrolled plane (chainage, arc), SRID 0'),
-            ('map', 'map', 'on the map strip beside the axis, in the tunnel''s SRID'),
-            ('3d', 'surface', 'on the lining in space, in the tunnel''s SRID')) AS g (suffix, geometry, text)
-        LOOP
-            EXECUTE format('CREATE OR REPLACE VIEW tunnel_api.%I AS SELECT %s, %I AS geom FROM tunnel_api.%I',
-                           base || '_' || shown.suffix, others, shown.geometry, base);
-            EXECUTE format('COMMENT ON VIEW tunnel_api.%I IS %L', base || '_' || shown.suffix,
-                           CASE base WHEN 'leak' THEN 'Leaks ' ELSE 'Anomalies ' END || shown.text
-                           || '; review, remark and kind can be updated');
-        END LOOP;
-    END LOOP;
     FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
         ('segment', 'Number of the segment that holds its middle'),
         ('label', 'Station of its middle, as 12+345.678'),
@@ -106,9 +87,12 @@ BEGIN
         ('model', 'Version of the model of evidence that judged it; NULL from before')) AS t (name, text)
       JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
       JOIN pg_class c ON c.oid = a.attrelid
-     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname ~ '^(anomaly|leak)(_unrolled|_map|_3d)?$'
+     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname IN ('anomaly', 'leak')
     LOOP
         EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', comment.view, comment."column", comment.text);
     END LOOP;
 END
 $$;
+
+CALL tunnel_api.make_geometry_views('anomaly', 'anomaly', 'Anomalies', '; review, remark and kind can be updated');
+CALL tunnel_api.make_geometry_views('leak', 'leak', 'Leaks', '; review, remark and kind can be updated');

@@ -20,7 +20,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.km, c.gauge, c.track, c.chainage_f
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (c.chainage_from + c.chainage_to) / 2) l) AS label,
        c.margin, c.margin_se, c.clock, tunnel_api.class_name(c.class) AS class, c.cluster_id, c.seen_share, c.points, c.inside,
        c.stray, c.passing, c.ground, c.track_right, c.track_up, c.cant, 1 / nullif(c.curvature, 0) AS radius, c.widened_left,
-       c.widened_right, c.roll, c.margins, c.outline, c.geom
+       c.widened_right, c.roll, c.margins, c.outline, c.geom::public.geometry AS geom
   FROM tunnel.clearance_section c JOIN tunnel.survey s ON s.id = c.survey_id;
 COMMENT ON VIEW tunnel_api.clearance_section IS
     'Least distance of what stands in the tunnel from an outline about a track, by metre; where seen_share is below 1, what was not seen may stand nearer';
@@ -52,7 +52,7 @@ COMMENT ON COLUMN tunnel_api.clearance_section.geom IS 'The point with the least
 CREATE OR REPLACE VIEW tunnel_api.clearance_infringement AS
 SELECT i.id, i.survey_id, s.name AS survey, i.km, i.gauge, i.track, i.chainage_from, i.chainage_to,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (i.chainage_from + i.chainage_to) / 2) l) AS label, i.depth, i.clock, tunnel_api.class_name(i.class) AS class,
-       i.counts, i.cluster_id, i.points, i.unrolled, i.geom
+       i.counts, i.cluster_id, i.points, i.unrolled, i.geom::public.geometry AS geom
   FROM tunnel.clearance_infringement i JOIN tunnel.survey s ON s.id = i.survey_id;
 COMMENT ON VIEW tunnel_api.clearance_infringement IS 'Groups of points inside an outline about a track, in pieces of 10 m at most';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.gauge IS 'Name of the outline';

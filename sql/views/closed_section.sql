@@ -56,7 +56,7 @@ COMMENT ON COLUMN tunnel_api.closed_section.geom IS 'Closed line in space, tunne
 CREATE OR REPLACE VIEW tunnel_api.section_part AS
 SELECT min(r.id) AS id, r.survey_id, s.name AS survey, r.km, r.section_id, c.chainage, r.part, sum(r.length) AS length,
        public.ST_MakeLine(array_agg(r.here ORDER BY r.n) || (array_agg(r.next ORDER BY r.n DESC))[1])
-           ::public.geometry(LineStringZ) AS geom
+           ::public.geometry AS geom
   FROM (SELECT q.*, q.n - row_number() OVER (PARTITION BY q.section_id, q.part ORDER BY q.n) AS run
           FROM tunnel_api.section_piece q) r
   JOIN tunnel.section c ON c.id = r.section_id
@@ -73,7 +73,7 @@ COMMENT ON COLUMN tunnel_api.section_part.geom IS 'Line in space, tunnel''s SRID
 -- Where sections meet the water, joined from section to section; a line ends where a segment has no section.
 CREATE OR REPLACE VIEW tunnel_api.waterline AS
 SELECT min(p.id) AS id, p.survey_id, s.name AS survey, p.side, min(p.chainage) AS chainage_from, max(p.chainage) AS chainage_to,
-       p.height, public.ST_MakeLine(p.geom ORDER BY p.chainage)::public.geometry(LineStringZ) AS geom
+       p.height, public.ST_MakeLine(p.geom ORDER BY p.chainage)::public.geometry AS geom
   FROM (SELECT c.id * 2 + (q.n > 180)::int AS id, c.survey_id, c.chainage, w.height,
                CASE WHEN q.n > 180 THEN 'right' ELSE 'left' END AS side,
                c.segment - dense_rank() OVER (PARTITION BY c.survey_id ORDER BY c.segment) AS piece,

@@ -9,7 +9,7 @@ DECLARE
     bare record;
 BEGIN
     FOR bare IN
-        SELECT v.oid::regclass AS view, a.attname AS name, coalesce(w.text, m.text, col_description(t.oid, b.attnum), g.text) AS text
+        SELECT v.oid::regclass AS view, a.attname AS name, coalesce(w.text, m.text, col_description(t.oid, b.attnum)) AS text
           FROM pg_class v
           JOIN pg_attribute a ON a.attrelid = v.oid AND a.attnum > 0
           LEFT JOIN (VALUES
@@ -45,11 +45,6 @@ BEGIN
                 ('detected_at', 'When it was last detected'),
                 ('drawn_by', 'Who drew it last, set by the database'),
                 ('drawn_at', 'When it was drawn last, set by the database')) AS m (name, text) ON m.name = a.attname
-          LEFT JOIN (VALUES
-                ('_unrolled', 'In the unrolled plane'),
-                ('_map', 'On the map strip beside the axis, tunnel''s SRID'),
-                ('_3d', 'On the lining in space, tunnel''s SRID')) AS g (place, text)
-                 ON a.attname = 'geom' AND v.relname ~ ('^(leak|anomaly|change_region|leak_change)' || g.place || '$')
           LEFT JOIN pg_class t
                  ON t.oid = to_regclass(CASE WHEN v.relname = 'file' THEN 'tunnel.scan_file'
                                              WHEN v.relname = 'stage_status' THEN 'tunnel.run'

@@ -46,9 +46,7 @@ COMMENT ON COLUMN tunnel_api.leak_change.area_change_se IS 'Its standard error b
 DO $$
 DECLARE
     base text;
-    shown record;
     bare record;
-    others text;
 BEGIN
     FOREACH base IN ARRAY ARRAY['change_region', 'leak_change'] LOOP
         FOR bare IN
@@ -62,34 +60,16 @@ BEGIN
         LOOP
             EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', base, bare.name, bare.text);
         END LOOP;
-        SELECT string_agg(quote_ident(attname), ', ' ORDER BY attnum) INTO others
-          FROM pg_attribute
-         WHERE attrelid = format('tunnel_api.%I', base)::regclass AND attnum > 0
-           AND attname NOT IN ('unrolled', 'map', 'surface');
-        FOR shown IN SELECT * FROM (VALUES
-            ('unrolled', 'unrolled', 'in the unrolled plane (chainage, arc) of the older survey, SRID 0'),
-            ('map', 'map', 'on the map strip beside the axis, in the tunnel''s SRID'),
-            ('3d', 'surface', 'on the lining in space, in the tunnel''s SRID')) AS g (suffix, geometry, text)
-        LOOP
-            EXECUTE format('CREATE OR REPLACE VIEW tunnel_api.%I AS SELECT %s, %I AS geom FROM tunnel_api.%I',
-                           base || '_' || shown.suffix, others, shown.geometry, base);
-            EXECUTE format('COMMENT ON VIEW tunnel_api.%I IS %L', base || '_' || shown.suffix,
-                           CASE base WHEN 'change_region' THEN 'Lining that changed significantly, ' ELSE 'What became of leaks, ' END
-                           || shown.text);
-            FOR bare IN
-                SELECT a.attname AS name, t.text FROM (VALUES
-                    ('old_survey', 'Name of the survey that it is compared with'),
-                    ('area_change', 'Wet area in the newer survey less that in the older, m²'),
-                    ('area_change_se', 'Its standard error by resolution and threshold, m²')) AS t (name, text)
-                  JOIN pg_attribute a ON a.attname = t.name
-                   AND a.attrelid = format('tunnel_api.%I', base || '_' || shown.suffix)::regclass
-            LOOP
-                EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', base || '_' || shown.suffix, bare.name, bare.text);
-            END LOOP;
-        END LOOP;
     END LOOP;
 END
 $$;
+
+CALL tunnel_api.make_geometry_views(
+    'change_region', 'change_region', 'Lining that changed significantly,',
+    plane_text => 'in the unrolled plane (chainage, arc) of the older survey, SRID 0');
+CALL tunnel_api.make_geometry_views(
+    'leak_change', 'leak_change', 'What became of leaks,',
+    plane_text => 'in the unrolled plane (chainage, arc) of the older survey, SRID 0');
 
 CREATE OR REPLACE FUNCTION tunnel_api.leaks_checksum(survey_id int, chainage_from float8, chainage_to float8) RETURNS text
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$

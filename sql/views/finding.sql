@@ -56,27 +56,11 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
 COMMENT ON VIEW tunnel_api.lining_finding IS
     'Findings on the lining, detected and drawn, of all kinds and states, with their three geometries: polygons, lines and points as they are. To be edited through finding_unrolled, finding_map and finding_3d';
 
--- The views of one geometry, and the comments on the columns of all four.
+-- The comments on its columns, and its views of one geometry.
 DO $$
 DECLARE
-    shown record;
     comment record;
-    others text;
 BEGIN
-    SELECT string_agg(quote_ident(attname), ', ' ORDER BY attnum) INTO others
-      FROM pg_attribute
-     WHERE attrelid = 'tunnel_api.lining_finding'::regclass AND attnum > 0 AND attname NOT IN ('unrolled', 'map', 'surface');
-    FOR shown IN SELECT * FROM (VALUES
-        ('unrolled', 'unrolled', 'in the unrolled plane (chainage, arc), SRID 0'),
-        ('map', 'map', 'on the map strip beside the axis, in the tunnel''s SRID'),
-        ('3d', 'surface', 'on the lining in space, in the tunnel''s SRID')) AS g (suffix, geometry, text)
-    LOOP
-        EXECUTE format('CREATE OR REPLACE VIEW tunnel_api.%I AS SELECT %s, %I AS geom FROM tunnel_api.lining_finding',
-                       'finding_' || shown.suffix, others, shown.geometry);
-        EXECUTE format('COMMENT ON VIEW tunnel_api.%I IS %L', 'finding_' || shown.suffix,
-                       'Findings ' || shown.text || ': polygons, lines and points are drawn, redrawn and reviewed here, and what was '
-                       'drawn is deleted');
-    END LOOP;
     FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
         ('segment', 'Number of the segment that holds its middle'),
         ('label', 'Station of its middle, as 12+345.678'),
@@ -126,16 +110,15 @@ BEGIN
         ('surface', 'On the lining in space, tunnel''s SRID')) AS t (name, text)
       JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
       JOIN pg_class c ON c.oid = a.attrelid
-     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v'
-       AND c.relname IN ('lining_finding', 'finding_unrolled', 'finding_map', 'finding_3d')
+     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname = 'lining_finding'
     LOOP
         EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', comment.view, comment."column", comment.text);
     END LOOP;
 END
 $$;
-COMMENT ON COLUMN tunnel_api.finding_unrolled.geom IS 'In the unrolled plane (chainage, arc), m';
-COMMENT ON COLUMN tunnel_api.finding_map.geom IS 'On the map strip beside the axis, tunnel''s SRID';
-COMMENT ON COLUMN tunnel_api.finding_3d.geom IS 'On the lining in space, tunnel''s SRID';
+CALL tunnel_api.make_geometry_views(
+    'lining_finding', 'finding', 'Findings',
+    ': polygons, lines and points are drawn, redrawn and reviewed here, and what was drawn is deleted');
 
 CREATE OR REPLACE VIEW tunnel_api.finding_photo AS
 SELECT p.id, p.anomaly_id AS finding_id, a.survey_id, s.name AS survey, p.path, p.caption, p.added_by, p.added_at

@@ -169,7 +169,7 @@ COMMENT ON COLUMN tunnel_api.ring_unrolled.geom IS 'Chainage and arc, m';
 CREATE OR REPLACE VIEW tunnel_api.ring_map AS
 SELECT r.id, r.survey_id, r.survey, r.km, r.number, r.label, r.chainage_from, r.chainage_to, r.joint, r.seen_share, r.radius,
        r.ovality, r.ovality_se, r.centre_right, r.centre_up, r.step_greatest, r.lip, r.remark,
-       public.st_makepolygon(public.st_makeline(ARRAY[c.a, c.b, c.c, c.d, c.a]))::public.geometry(Polygon) AS geom
+       public.st_makepolygon(public.st_makeline(ARRAY[c.a, c.b, c.c, c.d, c.a]))::public.geometry AS geom
   FROM tunnel_api.ring_unrolled r
  CROSS JOIN LATERAL (SELECT public.st_ymin(r.geom) AS low, public.st_ymax(r.geom) AS high) e
  CROSS JOIN LATERAL (

@@ -5,7 +5,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.name, c.up, c.water_level, c.state
        c.translation, c.scale, c.covariance, sqrt(c.covariance[25]) AS sigma_x, sqrt(c.covariance[33]) AS sigma_y,
        sqrt(c.covariance[41]) AS sigma_z, c.registered_at,
        public.ST_SetSRID(public.ST_MakePoint(c.translation[1], c.translation[2], c.translation[3]), t.srid)
-           ::public.geometry(PointZ) AS geom
+           ::public.geometry AS geom
   FROM tunnel.sonar_scan c
   JOIN tunnel.survey s ON s.id = c.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id;
@@ -22,7 +22,7 @@ CREATE OR REPLACE VIEW tunnel_api.sonar_ellipse AS
 SELECT c.id, c.survey_id, c.survey, c.name, c.state, 100 AS exaggeration, e.half_major, e.half_minor,
        public.ST_SetSRID(public.ST_Translate(public.ST_Rotate(public.ST_Scale(
            public.ST_Buffer(public.ST_MakePoint(0, 0), 1, 16), 100 * e.half_major, 100 * e.half_minor), e.turn),
-           c.translation[1], c.translation[2]), public.ST_SRID(c.geom))::public.geometry(Polygon) AS geom
+           c.translation[1], c.translation[2]), public.ST_SRID(c.geom))::public.geometry AS geom
   FROM tunnel_api.sonar_scan c
  CROSS JOIN LATERAL (
     SELECT (c.covariance[25] + c.covariance[33]) / 2 AS mean, c.covariance[26] AS xy,
@@ -51,7 +51,7 @@ COMMENT ON COLUMN tunnel_api.registration_residual.scan IS 'Name of the sonar sc
 
 CREATE OR REPLACE VIEW tunnel_api.ladder AS
 SELECT l.id, l.survey_id, s.name AS survey, l.name, l.origin, l.axes, l.rms, l.rungs, l.scans,
-       public.ST_SetSRID(public.ST_MakePoint(l.origin[1], l.origin[2], l.origin[3]), t.srid)::public.geometry(PointZ) AS geom
+       public.ST_SetSRID(public.ST_MakePoint(l.origin[1], l.origin[2], l.origin[3]), t.srid)::public.geometry AS geom
   FROM tunnel.ladder l
   JOIN tunnel.survey s ON s.id = l.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id;
@@ -60,7 +60,7 @@ COMMENT ON COLUMN tunnel_api.ladder.geom IS 'Its origin, in the tunnel''s SRID';
 
 CREATE OR REPLACE VIEW tunnel_api.sonar_point AS
 SELECT p.id, p.survey_id, p.km, p.scan_id, c.name AS scan, p.chainage, p.across, p.classification,
-       public.ST_Z(p.geom) - c.water_level AS over_water, p.geom::public.geometry(PointZ) AS geom
+       public.ST_Z(p.geom) - c.water_level AS over_water, p.geom::public.geometry AS geom
   FROM tunnel.sonar_point p
   JOIN tunnel.sonar_scan c ON c.id = p.scan_id;
 COMMENT ON VIEW tunnel_api.sonar_point IS 'Points of sonar scans in the tunnel, thinned and without false echoes';

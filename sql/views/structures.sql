@@ -264,36 +264,26 @@ COMMENT ON COLUMN tunnel_api.face_sheet.seen_share IS 'Share of it that could be
 COMMENT ON COLUMN tunnel_api.face_sheet.bimodal IS 'Whether more than half of it differs, so that nobody knows which half is its own';
 COMMENT ON COLUMN tunnel_api.face_sheet.geom IS 'Its outline where it is drawn; SRID 0, m';
 
--- The views of one geometry, and the comments on the columns of all five.
+-- Where face_sheet draws its face.
 DO $$
-DECLARE
-    shown record;
-    comment record;
-    others text;
 BEGIN
-    SELECT string_agg(quote_ident(attname), ', ' ORDER BY attnum) INTO others
-      FROM pg_attribute
-     WHERE attrelid = 'tunnel_api.spot'::regclass AND attnum > 0 AND attname NOT IN ('outline', 'map', 'surface');
-    FOR shown IN SELECT * FROM (VALUES
-        ('spot_face', 'outline', 'in their face''s own plane, SRID 0'),
-        ('spot_map', 'map', 'on the map, in the tunnel''s SRID'),
-        ('spot_3d', 'surface', 'in space, in the tunnel''s SRID')) AS g (view, geometry, text)
-    LOOP
-        EXECUTE format('CREATE OR REPLACE VIEW tunnel_api.%I AS SELECT %s, %I AS geom FROM tunnel_api.spot',
-                       shown.view, others, shown.geometry);
-        EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.geom IS %L', shown.view, initcap(left(shown.text, 1)) || substr(shown.text, 2));
-        EXECUTE format('COMMENT ON VIEW tunnel_api.%I IS %L', shown.view,
-                       'Spots ' || shown.text || '; review and remark can be updated');
-    END LOOP;
     EXECUTE format('CREATE OR REPLACE VIEW tunnel_api.spot_sheet AS SELECT %s, public.st_affine(q.outline, f.xx, f.xy, f.yx, f.yy, f.x,'
                    ' f.y)::public.geometry(Polygon, 0) AS geom'
                    ' FROM tunnel_api.spot q JOIN tunnel.spot r ON r.id = q.id'
                    ' JOIN tunnel_api.face_placement f ON f.id = r.face_id AND f.survey = q.survey AND f.survey_id = q.survey_id',
                    (SELECT string_agg('q.' || quote_ident(attname), ', ' ORDER BY attnum) FROM pg_attribute
                      WHERE attrelid = 'tunnel_api.spot'::regclass AND attnum > 0 AND attname NOT IN ('outline', 'map', 'surface')));
-    COMMENT ON VIEW tunnel_api.spot_sheet IS
-        'Spots on the faces unrolled, member below member, where face_sheet draws these; review and remark can be updated';
-    COMMENT ON COLUMN tunnel_api.spot_sheet.geom IS 'Its outline where it is drawn; SRID 0, m';
+END
+$$;
+COMMENT ON VIEW tunnel_api.spot_sheet IS
+    'Spots on the faces unrolled, member below member, where face_sheet draws these; review and remark can be updated';
+COMMENT ON COLUMN tunnel_api.spot_sheet.geom IS 'Its outline where it is drawn; SRID 0, m';
+
+-- The comments on its columns, and its views of one geometry.
+DO $$
+DECLARE
+    comment record;
+BEGIN
     FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
         ('number', 'Its number in the tunnel or site: the same in the next survey'),
         ('member', 'Number of the member that it is on; NULL where the last run found it no more'),
@@ -318,13 +308,16 @@ BEGIN
         ('rgb', 'Mean colour of its points: red, green, blue, 0 to 255; NULL where the scan files have none')) AS t (name, text)
       JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
       JOIN pg_class c ON c.oid = a.attrelid
-     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v'
-       AND c.relname IN ('spot', 'spot_face', 'spot_map', 'spot_3d', 'spot_sheet')
+     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname IN ('spot', 'spot_sheet')
     LOOP
         EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', comment.view, comment."column", comment.text);
     END LOOP;
 END
 $$;
+
+CALL tunnel_api.make_geometry_views(
+    'spot', 'spot', 'Spots', '; review and remark can be updated', 'outline', 'face', 'in their face''s own plane, SRID 0',
+    'on the map, in the tunnel''s SRID', 'in space, in the tunnel''s SRID');
 
 CREATE OR REPLACE VIEW tunnel_api.finding AS
 SELECT 2 * l.id AS id, 'leak' AS finding, l.id AS row_id, l.survey_id, l.survey, l.id AS number, l.kind,

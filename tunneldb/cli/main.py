@@ -76,6 +76,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "qgis": ("tunneldb.cli.qgis:qgis", "Write a QGIS project with styled layers."),
     "status": ("tunneldb.cli.status:status", "Show what is loaded and how far each kilometre has come."),
     "check": ("tunneldb.cli.check:check", "Check the server and the database, and say how to mend them."),
+    "prune": ("tunneldb.cli.prune:prune", "Show or delete old runs and jobs that nothing goes by any more."),
+    "vacuum": ("tunneldb.cli.vacuum:vacuum", "Show or free the room of deleted rows."),
     "psql": ("tunneldb.cli.psql:psql", "Open psql on the database."),
     "server": ("tunneldb.cli.server:server", "Start, stop or look at the embedded server."),
     "simulate": ("tunneldb.cli.simulate:simulate", "Make a simulated scan of a tunnel, with its truth."),

@@ -120,7 +120,7 @@ def _fill_stages(connection: psycopg.Connection[Any], stages: Sequence[StageRow]
 
 
 def install_api(connection: psycopg.Connection[Any]) -> None:
-    """Drop schema tunnel_api and install it from the SQL files, in the connection's transaction.
+    """Drop schema tunnel_api and those of typed layers, and install it from the SQL files, in the connection's transaction.
 
     Raises
     ------
@@ -128,7 +128,8 @@ def install_api(connection: psycopg.Connection[Any]) -> None:
         When something outside of the schema was built on it, which the drop would take along.
     """
     _refuse_dependents(connection)
-    connection.execute("DROP SCHEMA IF EXISTS tunnel_api CASCADE")
+    for schema in (*_layer_schemas(connection), "tunnel_api"):
+        connection.execute(sql.SQL("DROP SCHEMA IF EXISTS {} CASCADE").format(sql.Identifier(schema)))
     connection.execute("CREATE SCHEMA tunnel_api")
     for path in sql_files():
         try:
@@ -262,26 +263,37 @@ def _require_postgis(connection: psycopg.Connection[Any], *, create: bool) -> No
         )
 
 
+def _layer_schemas(connection: psycopg.Connection[Any]) -> list[str]:
+    """Return the schemas of typed layers (sql/access/layers.sql)."""
+    made = connection.execute("SELECT to_regprocedure('tunnel_api.layer_schemas()') IS NOT NULL").fetchone()
+    if made is None or not made[0]:
+        return []
+    return [row[0] for row in connection.execute("SELECT schema FROM tunnel_api.layer_schemas()")]
+
+
 def _refuse_dependents(connection: psycopg.Connection[Any]) -> None:
-    """Refuse to drop tunnel_api while views or columns outside of it rest on it."""
+    """Refuse to drop tunnel_api and its schemas of typed layers while views or columns outside of them rest on them."""
     rows = connection.execute(
         """
-        WITH api AS (
-            SELECT 'pg_class'::regclass AS catalog, oid FROM pg_class WHERE relnamespace = to_regnamespace('tunnel_api')
+        WITH own AS (
+            SELECT to_regnamespace(name)::oid AS oid FROM unnest(%s::text[]) name
+        ), api AS (
+            SELECT 'pg_class'::regclass AS catalog, oid FROM pg_class WHERE relnamespace IN (SELECT oid FROM own)
             UNION ALL
-            SELECT 'pg_proc'::regclass, oid FROM pg_proc WHERE pronamespace = to_regnamespace('tunnel_api')
+            SELECT 'pg_proc'::regclass, oid FROM pg_proc WHERE pronamespace IN (SELECT oid FROM own)
             UNION ALL
-            SELECT 'pg_type'::regclass, oid FROM pg_type WHERE typnamespace = to_regnamespace('tunnel_api')
+            SELECT 'pg_type'::regclass, oid FROM pg_type WHERE typnamespace IN (SELECT oid FROM own)
         )
         SELECT DISTINCT coalesce(r.ev_class, CASE d.classid WHEN 'pg_class'::regclass THEN d.objid END)::regclass::text
           FROM pg_depend d
           JOIN api ON api.catalog = d.refclassid AND api.oid = d.refobjid
           LEFT JOIN pg_rewrite r ON d.classid = 'pg_rewrite'::regclass AND r.oid = d.objid
           JOIN pg_class c ON c.oid = coalesce(r.ev_class, CASE d.classid WHEN 'pg_class'::regclass THEN d.objid END)
-         WHERE c.relnamespace <> to_regnamespace('tunnel_api') AND c.relkind <> 'S'
+         WHERE c.relnamespace NOT IN (SELECT oid FROM own WHERE oid IS NOT NULL) AND c.relkind <> 'S'
            AND d.deptype IN ('n', 'a')
          ORDER BY 1
-        """
+        """,
+        [["tunnel_api", *_layer_schemas(connection)]],
     ).fetchall()
     if rows:
         names = ", ".join(row[0] for row in rows)

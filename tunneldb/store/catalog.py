@@ -28,6 +28,7 @@ from tunneldb.store.scanner import (
     save_positions,
     save_reference,
 )
+from tunneldb.store.unknown import unknown_survey, unknown_tunnel
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,7 @@ def add_tunnel(
     assert row is not None
     if axis.design is not None:
         save_design(connection, row[0], axis.design)
+    make_layers(connection)
     return alignment
 
 
@@ -91,6 +93,7 @@ def add_site(connection: psycopg.Connection[Any], name: str, srid: int) -> None:
         connection.execute("INSERT INTO tunnel.tunnel (name, srid) VALUES (%s, %s)", [name, srid])
     except psycopg.errors.UniqueViolation:
         raise _taken(name) from None
+    make_layers(connection)
 
 
 def require_new_tunnel(connection: psycopg.Connection[Any], name: str, srid: int) -> None:
@@ -243,7 +246,7 @@ def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyCha
         [name],
     ).fetchone()
     if row is None:
-        raise UserError(f"there is no survey {name!r}: tunneldb survey list")
+        raise unknown_survey(connection, name)
     key, tunnel, old_kind, old_dimension, reference, platform = row
     kind = change.kind or old_kind
     dimension = None if kind == "none" else change.dimension or old_dimension
@@ -296,7 +299,7 @@ def _alignment(connection: psycopg.Connection[Any], tunnel: str) -> tuple[int, i
         "SELECT id, srid, start_chainage, spacing, ST_AsBinary(alignment) FROM tunnel.tunnel WHERE name = %s", [tunnel]
     ).fetchone()
     if row is None:
-        raise _unknown(connection, tunnel)
+        raise unknown_tunnel(connection, tunnel)
     key, srid, start, spacing, wkb = row
     if wkb is None:
         return key, srid, None
@@ -314,19 +317,14 @@ def get_tunnel(connection: psycopg.Connection[Any], name: str) -> int:
     """
     row = connection.execute("SELECT id FROM tunnel.tunnel WHERE name = %s", [name]).fetchone()
     if row is None:
-        raise _unknown(connection, name)
+        raise unknown_tunnel(connection, name)
     return int(row[0])
-
-
-def _unknown(connection: psycopg.Connection[Any], tunnel: str) -> UserError:
-    known = ", ".join(row[0] for row in connection.execute("SELECT name FROM tunnel.tunnel ORDER BY name"))
-    return UserError(f"there is no tunnel {tunnel!r}; the database has {known or 'none: tunneldb tunnel add'}")
 
 
 def remove_survey(connection: psycopg.Connection[Any], name: str) -> None:
     """Remove a survey with all that was made of it."""
     if connection.execute("DELETE FROM tunnel.survey WHERE name = %s", [name]).rowcount == 0:
-        raise UserError(f"there is no survey {name!r}: tunneldb survey list")
+        raise unknown_survey(connection, name)
 
 
 def remove_tunnel(connection: psycopg.Connection[Any], name: str) -> None:
@@ -339,7 +337,13 @@ def remove_tunnel(connection: psycopg.Connection[Any], name: str) -> None:
         names = ", ".join(row[0] for row in surveys)
         raise UserError(f"the tunnel {name!r} has surveys: {names}; remove them first (tunneldb survey remove)")
     if connection.execute("DELETE FROM tunnel.tunnel WHERE name = %s", [name]).rowcount == 0:
-        raise UserError(f"there is no tunnel {name!r}: tunneldb tunnel list")
+        raise unknown_tunnel(connection, name)
+    make_layers(connection)
+
+
+def make_layers(connection: psycopg.Connection[Any]) -> None:
+    """Give each coordinate system that tunnels are in its schema of typed layers; drop those of others."""
+    connection.execute("CALL tunnel_api.make_layers()")
 
 
 def crs_text(conn: psycopg.Connection[Any], srid: int) -> str:

@@ -10,6 +10,7 @@ import psycopg
 from psycopg.rows import class_row
 
 from tunneldb.errors import UserError
+from tunneldb.store.unknown import unknown_survey
 
 UNPOSED = (
     "where the scanner was is not known: intensity is taken as the maker gives it, incidence is not corrected, and lining seen"
@@ -68,11 +69,6 @@ class Survey:
         return UNPOSED if self.platform == "unknown" and self.intensity_kind != "none" else None
 
 
-_OF_TUNNEL = (
-    "SELECT s.name FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE t.name = %s ORDER BY s.date, s.name"
-)
-
-
 def get_survey(conn: psycopg.Connection[Any], name: str, *, site: bool = False) -> Survey:
     """Return the survey of that name.
 
@@ -84,7 +80,7 @@ def get_survey(conn: psycopg.Connection[Any], name: str, *, site: bool = False) 
     Raises
     ------
     UserError
-        When there is none, the message lists those that exist; or when it is of a site and may not be.
+        When there is none, the message lists those that exist and asks for the nearest; or when it is of a site and may not be.
     """
     with conn.cursor(row_factory=class_row(Survey)) as cursor:
         survey = cursor.execute(
@@ -97,12 +93,7 @@ def get_survey(conn: psycopg.Connection[Any], name: str, *, site: bool = False) 
             [name],
         ).fetchone()
     if survey is None:
-        known = [row[0] for row in conn.execute("SELECT name FROM tunnel.survey ORDER BY name")]
-        own = [row[0] for row in conn.execute(_OF_TUNNEL, [name])]
-        if own:
-            raise UserError(f"{name!r} is a tunnel; say which of its surveys: {', '.join(own)}")
-        there = f"the database has {', '.join(known)}" if known else "the database has none: tunneldb survey add"
-        raise UserError(f"there is no survey {name!r}; {there}")
+        raise unknown_survey(conn, name)
     if survey.site and not site:
         raise UserError(
             f"survey {name} is of the site {survey.tunnel!r}, which has no axis, and this needs one; structures are found"

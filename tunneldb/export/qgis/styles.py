@@ -42,6 +42,8 @@ def require_table(conn: psycopg.Connection, name: str) -> None:
 def store_styles(conn: psycopg.Connection) -> int:
     """Put each layer's style into ``public.layer_styles`` as its default; a rerun replaces ours and no other's.
 
+    The schemas of typed layers (``tunnel_api.layer_schemas``) get those of their layers as well.
+
     Parameters
     ----------
     conn : psycopg.Connection
@@ -50,7 +52,7 @@ def store_styles(conn: psycopg.Connection) -> int:
     Returns
     -------
     int
-        Number of styles stored.
+        Number of styles stored for tunnel_api.
 
     Raises
     ------
@@ -58,27 +60,36 @@ def store_styles(conn: psycopg.Connection) -> int:
         The table is missing.
     """
     require_table(conn, "public.layer_styles")
+    schemas = [row[0] for row in conn.execute("SELECT schema FROM tunnel_api.layer_schemas()")]
+    layers = {row[0] for row in conn.execute("SELECT layer FROM tunnel_api.layer_types()")}
     for view, column, style, title in styled_columns():
-        place = {"view": view, "column": column, "name": STYLE_NAME}
-        conn.execute(
-            "DELETE FROM public.layer_styles WHERE f_table_catalog = current_database() "
-            "AND f_table_schema = 'tunnel_api' AND f_table_name = %(view)s AND f_geometry_column = %(column)s "
-            "AND stylename = %(name)s",
-            place,
-        )
-        conn.execute(
-            "UPDATE public.layer_styles SET useasdefault = false WHERE f_table_catalog = current_database() "
-            "AND f_table_schema = 'tunnel_api' AND f_table_name = %(view)s AND f_geometry_column = %(column)s",
-            place,
-        )
-        conn.execute(
-            "INSERT INTO public.layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geometry_column, "
-            "stylename, styleqml, useasdefault, description, owner) "
-            "VALUES (current_database(), 'tunnel_api', %(view)s, %(column)s, %(name)s, "
-            "xmlparse(DOCUMENT %(qml)s), true, %(title)s, current_user)",
-            {**place, "qml": style_text(style), "title": title},
-        )
+        text = style_text(style)
+        for schema in ("tunnel_api", *(schemas if column == "geom" and view in layers else ())):
+            _store_style(
+                conn, {"schema": schema, "view": view, "column": column, "name": STYLE_NAME, "qml": text, "title": title}
+            )
     return len(styled_columns())
+
+
+def _store_style(conn: psycopg.Connection, style: dict[str, str]) -> None:
+    conn.execute(
+        "DELETE FROM public.layer_styles WHERE f_table_catalog = current_database() "
+        "AND f_table_schema = %(schema)s AND f_table_name = %(view)s AND f_geometry_column = %(column)s "
+        "AND stylename = %(name)s",
+        style,
+    )
+    conn.execute(
+        "UPDATE public.layer_styles SET useasdefault = false WHERE f_table_catalog = current_database() "
+        "AND f_table_schema = %(schema)s AND f_table_name = %(view)s AND f_geometry_column = %(column)s",
+        style,
+    )
+    conn.execute(
+        "INSERT INTO public.layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geometry_column, "
+        "stylename, styleqml, useasdefault, description, owner) "
+        "VALUES (current_database(), %(schema)s, %(view)s, %(column)s, %(name)s, "
+        "xmlparse(DOCUMENT %(qml)s), true, %(title)s, current_user)",
+        style,
+    )
 
 
 def styled_columns() -> list[tuple[str, str, str, str]]:
