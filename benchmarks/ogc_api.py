@@ -1,10 +1,10 @@
 """What a server of OGC API Features gives of a database, held against SQL: by HTTP, and in QGIS.
 
-    python -m benchmarks.ogc_api URL             # tipg runs there, on the database at hand (docs/howto-ogc-api.md)
-    python -m benchmarks.ogc_api URL --no-qgis
+    python -m benchmarks.ogc_api URL SRID             # tipg runs there, on the database at hand (docs/howto-ogc-api.md)
+    python -m benchmarks.ogc_api URL SRID --no-qgis
 
-Each view in WGS 84 must be a collection with as many features as it has rows, and nothing else may be one; whatever would write
-must be refused. What is not as it should be is printed, and the exit code is 1.
+Each layer that ``docker-compose.yml`` names must be a collection with as many features as it has rows, and nothing else may be
+one; whatever would write must be refused. What is not as it should be is printed, and the exit code is 1.
 """
 
 from __future__ import annotations
@@ -19,27 +19,28 @@ from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
 from psycopg import sql
+from ruamel.yaml import YAML
 
 from benchmarks.common import print_table
 from tunneldb.database import connect, resolve_dsn
 
 SCRIPT = Path(__file__).with_name("ogc_api_in_qgis.py")
+COMPOSE = Path(__file__).parents[1] / "docker-compose.yml"
 PYTHON = "/usr/bin/python3"  # that which QGIS is built for
 REFUSED = {404, 405}
-HIDDEN = ("tunnel_api.leak_unrolled", "tunnel_api.audit", "tunnel.anomaly", "tunnel_api.leak_statistics", "public.layer_styles")
-"""A view of the unrolled plane, one without a place, a table, a function, a table of another schema."""
+HIDDEN = ("tunnel_api.leak_map", "tunnel_api.audit", "tunnel.anomaly", "tunnel_api.leak_statistics", "public.layer_styles")
+"""A view that states no coordinate system, one without a place, a table, a function, a table of another schema."""
 
 
-def rows_of_views() -> dict[str, int]:
-    """Rows of each view in WGS 84, by the name of its collection."""
+def rows_of_layers(srid: int) -> dict[str, int]:
+    """Rows of each layer that is to be served, by the name of its collection."""
+    environment = YAML(typ="safe").load(COMPOSE)["services"]["ogc-api"]["environment"]
     found = {}
     with connect(resolve_dsn(None)) as conn:
-        names = conn.execute(
-            "SELECT f_table_name FROM geometry_columns WHERE f_table_schema = 'tunnel_api' AND srid = 4326 ORDER BY 1"
-        ).fetchall()
-        for (name,) in names:
-            row = conn.execute(sql.SQL("SELECT count(*) FROM tunnel_api.{}").format(sql.Identifier(name))).fetchone()
-            found[f"tunnel_api.{name}"] = int(row[0]) if row else 0
+        for name in json.loads(environment["TIPG_DB_TABLES"].replace("${OGC_SRID:-0}", str(srid))):
+            query = sql.SQL("SELECT count(*) FROM {}").format(sql.Identifier(*name.split(".")))
+            row = conn.execute(query).fetchone()
+            found[name] = int(row[0]) if row else 0
     return found
 
 
@@ -72,7 +73,7 @@ def by_http(url: str, expected: dict[str, int]) -> list[str]:
             wrong.append(f"{name}: {len(set(ids))} features, {expected[name]} rows")
     wrong += [
         f"{method} of {name} is answered by {found}"
-        for name in ("tunnel_api.leak_wgs84", "tunnel_api.region")
+        for name in (next(name for name in expected if name.endswith(".leak_map")), "tunnel_api.leak_map")
         for method in ("POST", "PUT", "PATCH", "DELETE")
         if (found := status(f"{url}/collections/{name}/items", method)) not in REFUSED
     ]
@@ -108,10 +109,11 @@ def in_qgis(url: str, expected: dict[str, int]) -> tuple[str, list[str]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("url", metavar="URL")
+    parser.add_argument("srid", metavar="SRID", type=int)
     parser.add_argument("--no-qgis", action="store_true")
     options = parser.parse_args()
     url = options.url.rstrip("/")
-    expected = rows_of_views()
+    expected = rows_of_layers(options.srid)
     wrong = by_http(url, expected)
     version = "not asked"
     if not options.no_qgis:

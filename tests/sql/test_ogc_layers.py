@@ -1,4 +1,4 @@
-"""What docker-compose.yml has served by OGC API: layers that state their coordinate system, all of the map, read and never written."""
+"""What docker-compose.yml has served by OGC API: layers of the map that state their coordinate system, for reading alone."""
 
 from __future__ import annotations
 
