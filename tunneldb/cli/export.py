@@ -134,7 +134,7 @@ def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Pat
     from tunneldb.export.pointcloud.survey import export_classified
 
     if output.exists() and not output.is_dir():
-        raise UserError(f"{output}: --classified writes a file for each scan file: name a folder")
+        raise UserError(f"{output}: --classified writes several files: name a folder")
     total = np.zeros(256, np.int64)
     there = loaded_kilometres(conn, survey)
     if not there:

@@ -23,7 +23,7 @@ from tunneldb.export.pointcloud.survey import (
     require_no_scans,
     survey_files,
 )
-from tunneldb.export.pointcloud.vpc import Cloud, write_vpc
+from tunneldb.export.pointcloud.vpc import Cloud, listed_clouds, write_vpc
 from tunneldb.files import replacing
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.crs import LOCAL
@@ -61,12 +61,15 @@ def export_copc(
     Raises
     ------
     UserError
-        As of `export_classified`; if a file's points have waveforms, or the files of a kilometre can't be brought together.
+        As of `export_classified`; if a file's points have waveforms, or the files of a kilometre can't be brought together; if
+        there is something else in the place of the virtual point cloud.
     """
     files = [file for file in survey_files(conn, survey) if set(file.kilometres) & set(kilometres)]
     wanted = sorted(set(kilometres) & {km for file in files for km in file.kilometres})
     targets = [folder / f"{survey.name}-km{km:03d}.copc.laz" for km in wanted]
     require_no_scans(conn, targets)
+    virtual = folder / f"{survey.name}.vpc"
+    listed_clouds(virtual)
     require_ground(conn, survey, {km for file in files for km in file.kilometres})
     divide = _Divide(load_alignment(conn, survey))
     conn.rollback()
@@ -74,7 +77,6 @@ def export_copc(
     groups = {km: _Group(survey, km, [source for source in sources if km in source.file.kilometres]) for km in wanted}
     for source in sources:
         source.count([group for group in groups.values() if source in group.sources], divide, begin)
-    clouds = []
     for number, (group, target) in enumerate(zip(groups.values(), targets, strict=True), start=1):
         started = perf_counter()
         if not group.points:
@@ -82,11 +84,9 @@ def export_copc(
         progress = begin(f"[{number}|{len(wanted)}] {target.name}", 2 * group.points)
         with replacing(target) as temporary:
             cloud, counts = _write(conn, survey, group, divide, temporary, progress)
-        clouds.append(cloud)
+        with replacing(virtual) as temporary:
+            write_vpc(temporary, cloud, survey.date, folder)
         yield Written(target, counts, perf_counter() - started)
-    virtual = folder / f"{survey.name}.vpc"
-    with replacing(virtual) as temporary:
-        write_vpc(temporary, clouds, survey.date, folder)
 
 
 class _Divide:

@@ -53,36 +53,36 @@ class Cloud:
     crs: CRS | None
 
 
-def write_vpc(path: Path, clouds: Sequence[Cloud], date: dt.date, folder: Path) -> int:
-    """Write a virtual point cloud, with paths relative to its folder.
+def write_vpc(path: Path, cloud: Cloud, date: dt.date, folder: Path) -> None:
+    """Write a virtual point cloud that names a point cloud, with paths relative to its folder.
 
-    Point clouds of the folder that one of that name has listed stay in it, if they are still there.
+    Other point clouds of the folder that one of that name has listed stay in it, if they are still there.
 
     Parameters
     ----------
     path : Path
         File to write.
-    clouds : sequence of Cloud
+    cloud : Cloud
         In that folder.
     date : date
-        When they were scanned.
+        When it was scanned.
     folder : Path
         Where the file is going to be.
-
-    Returns
-    -------
-    int
-        How many point clouds it lists.
     """
-    new = {cloud.name: _item(cloud, date) for cloud in clouds}
-    kept = {name: item for name, item in _listed(folder / path.name).items() if name not in new and (folder / name).is_file()}
-    items = [item for _, item in sorted({**kept, **new}.items())]
+    listed = {name: item for name, item in listed_clouds(folder / path.name).items() if (folder / name).is_file()}
+    listed[cloud.name] = _item(cloud, date)
+    items = [item for _, item in sorted(listed.items())]
     path.write_text(json.dumps({"type": "FeatureCollection", "features": items}, indent=1, ensure_ascii=False), "utf-8")
-    return len(items)
 
 
-def _listed(path: Path) -> dict[str, dict[str, Any]]:
-    """Items of a virtual point cloud that is there, by the names of their files."""
+def listed_clouds(path: Path) -> dict[str, dict[str, Any]]:
+    """Items of a virtual point cloud by the names of their files; none if there is none.
+
+    Raises
+    ------
+    UserError
+        If something else is there.
+    """
     if not path.is_file():
         return {}
     try:
