@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import click
@@ -151,7 +152,12 @@ class LazyGroup(click.Group):
         if strange := next((word for word in args if any("\ud800" <= c <= "\udfff" for c in word)), None):
             ctx.fail(f"{strange!a} has bytes that are no UTF-8.")
         ctx.meta[AS_JSON] = JSON in args and next((word for word in args if word in COMMANDS), None) != "psql"
-        return super().parse_args(ctx, args)
+        try:
+            return super().parse_args(ctx, args)
+        except click.UsageError as error:
+            if not ctx.meta[AS_JSON]:
+                raise
+            ctx.exit(run_as_json(ctx, partial(_raise, error), _describe))
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a verb; turn the user's errors and the server's into one line and exit code 2."""
@@ -172,6 +178,10 @@ class LazyGroup(click.Group):
             with formatter.section(title):
                 formatter.write_dl(rows)
         write_lines(formatter, "Examples", EXAMPLES)
+
+
+def _raise(error: Exception) -> None:
+    raise error
 
 
 def _describe(error: Exception) -> str | None:
