@@ -154,11 +154,11 @@ class LazyGroup(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Run a verb; turn the user's errors and the server's into one line and exit code 2."""
         if ctx.meta[AS_JSON]:
-            return ctx.exit(run_as_json(ctx, lambda: click.Group.invoke(self, ctx), _describe))
+            return ctx.exit(run_as_json(ctx, lambda: click.Group.invoke(self, ctx), lambda error: _describe(ctx, error)))
         try:
             return super().invoke(ctx)
         except Exception as error:
-            message = _describe(error)
+            message = _describe(ctx, error)
             if message is None:
                 raise
         click.echo(f"tunneldb: {message}", err=True)
@@ -172,7 +172,7 @@ class LazyGroup(click.Group):
         write_lines(formatter, "Examples", EXAMPLES)
 
 
-def _describe(error: Exception) -> str | None:
+def _describe(ctx: click.Context, error: Exception) -> str | None:
     """Return one line for what is no bug, None for one."""
     if isinstance(error, RuntimeError) and "no locator available" in str(error):  # Numba, as a module is imported
         return (
@@ -181,9 +181,15 @@ def _describe(error: Exception) -> str | None:
         )
     if isinstance(error, UserError):
         return str(error)
-    from tunneldb.database.failures import describe_failure
+    from tunneldb.database.failures import connection_lost, describe_failure
 
-    return describe_failure(error)
+    message = describe_failure(error)
+    if message is not None and connection_lost(error) and ctx.params.get("dsn") is None:
+        from tunneldb.database.server import Server
+
+        crash = Server().crash()
+        return message if crash is None else f"{message}; the server went down: {crash}"
+    return message
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})

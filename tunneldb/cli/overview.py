@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -12,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tunneldb.pipeline.stages import STAGE_NAMES
+from tunneldb.queue.causes import cause_of
 from tunneldb.queue.progress import TO_DO, Cell, File, Overview, Worker
 
 STYLES = {
@@ -31,11 +33,17 @@ _VERDICTS = {"failed": "failed", "interrupted": "was cut off", "stale": "out of 
 
 @dataclass(frozen=True)
 class Advice:
-    """Something that does not get done by itself: where, what is wrong, and what to type."""
+    """Something that does not get done by itself: where, what is wrong, what to type, and what has to be done before."""
 
     kilometres: tuple[int, ...]
     what: str
     command: str
+    first: str = ""
+
+    def line(self) -> str:
+        """All of it in one line."""
+        where = f"km {spans(self.kilometres)}: " if self.kilometres else ""
+        return f"{where}{self.what}: {f'first {self.first}, then: ' if self.first else ''}{self.command}"
 
 
 def render(seen: Overview) -> RenderableType:
@@ -159,17 +167,20 @@ def _to_do(advices: Iterable[Advice]) -> Group:
     for advice in advices:
         where = f"km {spans(advice.kilometres)}: " if advice.kilometres else ""
         lines.append(Text(f"{where}{advice.what}"))
+        if advice.first:
+            lines.append(Padding(Text(f"first {advice.first}, then"), (0, 0, 0, 4), expand=False))
         lines.append(Padding(Text(advice.command, "cyan"), (0, 0, 0, 4), expand=False))
     return Group(*lines)
 
 
 def advise(seen: Overview) -> list[Advice]:
-    """Return what does not get done by itself, each with the command that mends it."""
-    found: dict[tuple[str, str], list[int]] = {}
+    """Return what does not get done by itself, each with the command that mends it, and what that alone would not mend."""
+    found: dict[tuple[str, str, str], list[int]] = {}
     for file in seen.files:
         if file.state == "failed":
             what = _line(Cell("failed", file.message or f"{file.path} could not be read"), seen.files)
-            key = (what if file.name in what else f"{file.name}: {what}", f"tunneldb batch {seen.survey} {file.path}")
+            command = f"tunneldb batch {seen.survey} {shlex.quote(file.path)}"
+            key = (what if file.name in what else f"{file.name}: {what}", command, cause_of(file.message).first)
             found[key] = _range(file)
     read = {file.message for file in seen.files}
     for km, cells in seen.kilometres.items():
@@ -180,8 +191,9 @@ def advise(seen: Overview) -> list[Advice]:
             continue
         stage, cell = entry
         what = f"{stage}: {_VERDICTS[cell.state]}" + (f": {_line(cell, seen.files)}" if cell.reason else "")
-        found.setdefault((what, _command(seen.survey, cell)), []).append(km)
-    advices = [Advice(tuple(kms), what, command) for (what, command), kms in found.items()]
+        first = cause_of(cell.reason).first if cell.state == "failed" else ""
+        found.setdefault((what, _command(seen.survey, cell), first), []).append(km)
+    advices = [Advice(tuple(kms), what, command, first) for (what, command, first), kms in found.items()]
     if seen.active and not seen.live:
         advices.insert(0, Advice((), "no worker serves the queue", "tunneldb worker"))
     return advices
