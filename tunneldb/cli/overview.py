@@ -12,6 +12,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from tunneldb.cli.output import printable
 from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.queue.causes import cause_of
 from tunneldb.queue.progress import TO_DO, Cell, File, Overview, Worker
@@ -110,7 +111,7 @@ def _line(cell: Cell, files: Sequence[File]) -> str:
     text = (cell.reason or "").splitlines()[0]
     for file in files:
         text = text.replace(file.path, file.name)
-    return text
+    return printable(text)
 
 
 def _files(files: Sequence[File]) -> Text | None:
@@ -126,7 +127,7 @@ def _files(files: Sequence[File]) -> Text | None:
         said.append(f"{len(waiting)} wait to be read: {_first_and_last(waiting)}")
     if failed:
         said.append(f"{len(failed)} failed: {_first_and_last(failed)}")
-    return Text("files: " + "; ".join(said))
+    return Text(printable("files: " + "; ".join(said)))
 
 
 def _first_and_last(names: Sequence[str]) -> str:
@@ -180,7 +181,11 @@ def advise(seen: Overview) -> list[Advice]:
         if file.state == "failed":
             what = _line(Cell("failed", file.message or f"{file.path} could not be read"), seen.files)
             command = f"tunneldb batch {seen.survey} {shlex.quote(file.path)}"
-            key = (what if file.name in what else f"{file.name}: {what}", command, cause_of(file.message).first)
+            key = (
+                what if file.name in what else f"{printable(file.name)}: {what}",
+                printable(command),
+                cause_of(file.message).first,
+            )
             found[key] = _range(file)
     read = {file.message for file in seen.files}
     for km, cells in seen.kilometres.items():
