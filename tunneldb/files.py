@@ -129,6 +129,32 @@ def made_folder(path: Path) -> Iterator[None]:
         raise
 
 
+def vector_source(path: Path) -> str:
+    """Return what GDAL is to open for a file of shapes, as the format that its first bytes are of.
+
+    GDAL goes by the content, whatever a file is called: in a.geojson there may be a VRT, or a pipeline of GDAL's own, which reads
+    other files, and what lies on the web.
+
+    Raises
+    ------
+    UserError
+        If it cannot be read, or is none of GeoPackage, GeoJSON, Shapefile and FlatGeobuf.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+    if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{"):
+        return f"GeoJSON:{path}"
+    if not head.startswith((b"SQLite format 3\0", b"fgb\x03", b"\0\0\x27\x0a")):
+        raise UserError(f"{path}: cannot be read: by its content it is no GeoPackage, GeoJSON, Shapefile or FlatGeobuf")
+    return str(path)
+
+
+_HEAD = 1024
+
+
 def by_kilometre(path: Path, kilometres: Sequence[int]) -> list[Path]:
     """Names of files that there is one of for each kilometre: the path itself for a single one, else with its number."""
     if len(kilometres) == 1:
