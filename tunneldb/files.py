@@ -132,8 +132,8 @@ def made_folder(path: Path) -> Iterator[None]:
 def vector_source(path: Path) -> str:
     """Return what GDAL is to open for a file of shapes, as the format that its first bytes are of.
 
-    GDAL goes by the content, whatever a file is called: in a.geojson there may be a VRT, or a pipeline of GDAL's own, which reads
-    other files, and what lies on the web.
+    GDAL goes by the content, whatever a file is called: in a.geojson there may be a VRT, or a pipeline of GDAL's own, which
+    reads other files, and what lies on the web.
 
     Raises
     ------
