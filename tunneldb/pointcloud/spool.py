@@ -173,7 +173,7 @@ class Spool:
             if error.errno not in (errno.ENOSPC, errno.EDQUOT):
                 raise
             raise UserError(
-                f"no space left for temporary files in {tempfile.gettempdir()}, nothing was changed; "
+                f"no space left for temporary files in {tempfile.gettempdir()}, what was under way is undone; "
                 "free some or set TMPDIR to a folder on a larger disk"
             ) from error
         run.offset, run.rows = self._spilt, None
