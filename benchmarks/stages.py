@@ -5,7 +5,7 @@
 
 decode     laspy reads the file's points, and takes coordinates, time and intensity out of them
 COPY       a binary COPY of the rows that are kept, packed already, into a table without index, in the transaction that makes it
-load       the command `tunneldb load`, its stage by the ledger
+load       the command `tunneldb load --density all`, its stage by the ledger: the points are at survey density already
 axis, …    the command `tunneldb run --from axis --to sections`, its stages by the ledger
 start-up   what the two commands take beside their stages: imports, connecting, ending
 
@@ -182,11 +182,11 @@ def bare_copy(server: Server, dsn: str, survey: str) -> Spent:
     return spent
 
 
-def once(server: Server, dsn: str, scene: Scene, survey: str) -> dict[str, Spent]:
+def once(server: Server, dsn: str, scene: Scene, survey: str, density: str) -> dict[str, Spent]:
     """All parts one after the other, on a survey that is made for it and taken out again."""
     long.register(dsn, scene, survey)
     spent = {"decode": timed(server, lambda: decode(scene.scans, "Amplitude"))}
-    loaded, stages = command(server, dsn, survey, "load", survey, *scene.scans)
+    loaded, stages = command(server, dsn, survey, "load", survey, "--density", density, *scene.scans)
     spent["COPY"] = bare_copy(server, dsn, survey)
     ran, others = command(server, dsn, survey, "run", survey, "--from", "axis", "--to", "sections")
     spent |= stages | others
@@ -216,6 +216,7 @@ def ratios(run: dict[str, Spent]) -> dict[str, float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--km", type=int, default=1, help="length of the tunnel, km")
+    parser.add_argument("--density", default="all", help="points per m² to keep, or all")
     parser.add_argument("--repeat", type=int, default=5)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--folder", type=Path, help="where the simulated files stay for the next time; default: nowhere")
@@ -233,7 +234,7 @@ def main() -> None:
         server, runs = Server(dsn), []
         for number in range(arguments.repeat):
             progress(f"run {number + 1} of {arguments.repeat}")
-            runs.append(once(server, dsn, scene, f"run{number + 1}"))
+            runs.append(once(server, dsn, scene, f"run{number + 1}", arguments.density))
         points = decode(scene.scans, "Amplitude")
     figures = report(runs, points)
     print(f"\n{save('stages', figures | {'load_average_before': load})}")
