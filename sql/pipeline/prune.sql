@@ -5,7 +5,7 @@
 -- The names of the parameters by which a run says which runs it was made from, and then of those that tell the rest of it:
 -- checksums of what people edit. See the functions tunnel_api.…_inputs.
 CREATE OR REPLACE FUNCTION tunnel_api.run_input_names(stage text, runs boolean) RETURNS text[]
-LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
+LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT  -- not STRICT: then it is not called for each run, but put in its place
 AS $$
     SELECT CASE WHEN $2 THEN
                 CASE $1 WHEN 'compare' THEN ARRAY['detect_old', 'detect_new']
@@ -41,7 +41,7 @@ COMMENT ON FUNCTION tunnel_api.run_inputs(text, jsonb) IS 'Runs that a run was m
 -- The stages of a kilometre but load have one result each, whatever the parameters; so have rings. What is loaded or read goes by
 -- the files, what is made on demand by what was asked for, such as the layer, the outline, or the survey compared with.
 CREATE OR REPLACE FUNCTION tunnel_api.run_options(stage text, parameters jsonb) RETURNS jsonb
-LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
+LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT  -- as above
 AS $$
     SELECT CASE WHEN $1 IN ('axis', 'segments', 'sections', 'ground', 'detect', 'rings') THEN '{}'
                 ELSE $2 - tunnel_api.run_input_names($1, true) - tunnel_api.run_input_names($1, false) END
@@ -55,7 +55,8 @@ LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000 SET se
 AS $$
     WITH RECURSIVE ledger AS MATERIALIZED (
         SELECT r.id, r.survey_id, r.km, r.stage, r.outcome, r.started_at, r.job_id, r.finished_at, r.backend_pid, r.backend_start,
-               pg_column_size(r.*) AS bytes, tunnel_api.run_inputs(r.stage, r.parameters) AS inputs,
+               pg_column_size(r.*) AS bytes,
+               CASE WHEN tunnel_api.run_input_names(r.stage, true) <> '{}' THEN tunnel_api.run_inputs(r.stage, r.parameters) END AS inputs,
                tunnel_api.run_options(r.stage, r.parameters) AS options
           FROM tunnel.run r
     ), ranked AS MATERIALIZED (
@@ -73,7 +74,7 @@ AS $$
          WHERE l.attempt = 1 OR l.stage = 'import' OR l.started_at >= $1
             OR l.outcome = 'done' AND (l.latest = 1 OR l.finished = 1 OR l.id = l.highest)
             OR l.outcome = 'running' AND tunnel_api.session_lives(l.backend_pid, l.backend_start)
-            OR EXISTS (SELECT FROM tunnel_queue.procrastinate_jobs j WHERE j.id = l.job_id AND j.status IN ('todo', 'doing'))
+            OR l.job_id IN (SELECT j.id FROM tunnel_queue.procrastinate_jobs j WHERE j.status IN ('todo', 'doing'))
          UNION
         SELECT l.id, l.inputs
           FROM keep k
@@ -82,7 +83,8 @@ AS $$
     )
     SELECT l.id, l.survey_id, l.km, l.stage, l.outcome, l.started_at, l.bytes
       FROM ledger l
-     WHERE NOT EXISTS (SELECT FROM keep k WHERE k.id = l.id)
+     WHERE NOT EXISTS (  -- by way of an array: the planner takes what recurs for billions of rows, and would hash them in as many files
+           SELECT FROM unnest((SELECT array_agg(k.id) FROM keep k)) AS k (id) WHERE k.id = l.id)
 $$;
 COMMENT ON FUNCTION tunnel_api.superseded_runs(timestamptz) IS
     'Runs of the ledger that began before a moment and that nothing goes by any more: neither state nor result, nor whether it is stale; bytes: of the row';

@@ -88,7 +88,7 @@ def test_dead_rows_are_shown_first_and_gone_afterwards(example: str, conn: psyco
     assert not {row["table"] for row in told("vacuum")["tables"]} & {"section", "image_s1"}
 
 
-def test_operators_vacuum_their_tables_and_others_are_told_in_a_line(
+def test_operators_vacuum_their_tables_and_prune_and_others_are_told_in_a_line(
     people: None, example: str, conn: psycopg.Connection, dsn: str
 ) -> None:
     conn.execute("DELETE FROM tunnel.section")
@@ -97,14 +97,17 @@ def test_operators_vacuum_their_tables_and_others_are_told_in_a_line(
     conn.commit()
     conn.execute("SELECT pg_stat_force_next_flush()")
     conn.rollback()
-    refused = run("--dsn", make_conninfo(dsn, user="ines"), "vacuum", "--yes")
-    assert refused.exit_code == 2
-    assert "ask its owner for the role tunnel_operator" in refused.stderr
-    assert refused.stderr.count("\n") == 1
+    for verb in ("vacuum", "prune"):
+        refused = run("--dsn", make_conninfo(dsn, user="ines"), verb, "--yes")
+        assert refused.exit_code == 2
+        assert "ask its owner for the role tunnel_operator" in refused.stderr
+        assert refused.stderr.count("\n") == 1
     with conn.transaction():
         conn.execute("LOCK TABLE tunnel.axis_vertex IN SHARE MODE")
         done = run("--dsn", make_conninfo(dsn, user="otto"), "vacuum", "--yes")
     assert done.exit_code == 0, done.stderr
     assert "left out, for others are at work on them: tunnel.axis_vertex" in done.stderr
     assert "not yours to vacuum, as tunnel_queue." in done.stderr
+    pruned = run("--dsn", make_conninfo(dsn, user="otto"), "prune", "--yes")
+    assert (pruned.exit_code, "deleted: 0 runs and 1 jobs" in pruned.stderr) == (0, True), pruned.stderr
     assert conn.execute(DEAD).fetchone() == (0,)

@@ -28,7 +28,7 @@ from support.system import missing
 from tunneldb.classification.classes import PointClass
 from tunneldb.cli.main import main
 from tunneldb.export.images.palette import COLOURS, PALETTES, hexadecimal
-from tunneldb.export.qgis.layer import CHANGE_LAYERS, STRUCTURE_LAYERS, UNDERWATER_LAYERS
+from tunneldb.export.qgis.layer import CHANGE_LAYERS, SCANNER_LAYERS, STRUCTURE_LAYERS, UNDERWATER_LAYERS
 from tunneldb.export.tables.leaks import clock_label
 
 ON_MAP = {
@@ -671,7 +671,8 @@ def test_styles_have_one_default_a_layer_and_are_replaced(conn: psycopg.Connecti
     assert {(row[0], row[1]) for row in first} == {
         *((name, "geom") for name in STYLED), ("leak", "unrolled"), ("leak", "map"), ("leak", "surface"),
         ("anomaly", "unrolled"), ("anomaly", "map"), ("spot", "map"), ("spot", "surface"),
-        *((layer.view, "geom") for layer in (*STRUCTURE_LAYERS, *UNDERWATER_LAYERS, *CHANGE_LAYERS)), ("spot_face", "geom"),
+        *((layer.view, "geom") for layer in (*SCANNER_LAYERS, *STRUCTURE_LAYERS, *UNDERWATER_LAYERS, *CHANGE_LAYERS)),
+        ("spot_face", "geom"),
     }  # fmt: skip
     assert all(row[2:] == (1, 1, True) for row in first)
     conn.execute(

@@ -41,11 +41,11 @@ def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
     assert "more than half differs of member 2" in command("qgis", "hall-1", "-o", project)
     seen = act(project, "describe")
     assert {name: (layer["wkb"], layer["features"]) for name, layer in seen["layers"].items()} == LAYERS | {
-        "remark": ("NoGeometry", 0)
-    }
+        "remark": ("NoGeometry", 0), "scan_station": ("PointZ", 1),
+    }  # fmt: skip
     assert all(layer["valid"] and not layer["error"] for layer in seen["layers"].values())
     assert {name: set(layers) for name, layers in seen["themes"].items()} == {
-        "Map": {"spot_map", "member", "face"}, "3D": {"spot_3d", "face_3d"},
+        "Map": {"scan_station", "spot_map", "member", "face"}, "3D": {"scan_station", "spot_3d", "face_3d"},
         "Faces": {"spot_sheet", "member_sheet", "face_sheet"},
     }  # fmt: skip
     for name in ("spot_map", "spot_3d", "spot_sheet"):
@@ -86,7 +86,7 @@ def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
     drawn = act(
         project, "space", str(picture), before=(screen, "-a", "-s", "-screen 0 1280x1024x24 +extension GLX"), **software
     )
-    assert set(drawn["layers"]) == {"spot_3d", "face_3d"}
+    assert set(drawn["layers"]) == {"scan_station", "spot_3d", "face_3d"}
     if drawn["drawn"] is not True:
         missing(drawn["drawn"])
     with warnings.catch_warnings():

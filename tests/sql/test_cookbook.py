@@ -16,6 +16,7 @@ import shapely
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from psycopg.rows import dict_row
+from support import cookbook_network as network
 from support import example_change
 from support.cookbook_survey import CONFIRMED, GONE, MOVED, NICHE, OLD, POINTS, SPARSE, draw_findings, prepare
 from support.example_clearance import TIGHT
@@ -106,11 +107,12 @@ def asked(server_dsn: str, example_template: str) -> Iterator[Asked]:
         )
     with connect(make_conninfo(server_dsn, dbname=database)) as conn:
         prepare(conn, NAME)
+        network.add_network(conn, NAME)
         conn.commit()
         answers = {title: put(conn, query) for title, query in QUESTIONS.items() if title not in OF_FINDINGS}
         rows = conn.execute(
             "SELECT id, kind, detected, review, area, confidence, ST_AsBinary(unrolled), ST_AsBinary(map), ST_AsBinary(surface)"
-            " FROM tunnel.anomaly ORDER BY chainage_from"
+            " FROM tunnel.anomaly WHERE survey_id = 1 ORDER BY chainage_from"
         ).fetchall()
         anomalies = [Leak(*row[:6], *(shapely.from_wkb(bytes(wkb)) for wkb in row[6:])) for row in rows]
         drawn = draw_findings(conn, NAME)
@@ -426,6 +428,59 @@ def spheres(rows: Rows, a: Asked) -> None:
         close(row, 1, apart_mm=0.2 * np.sqrt(3))
 
 
+def adit(a: Asked) -> list[Leak]:
+    """Leaks of the other tunnel's newer survey, as the example's of which they are copies."""
+    return [leak for leak in a.anomalies if leak.kind == "leak" and leak.area >= network.LEAST]
+
+
+def all_by_class(rows: Rows, a: Asked) -> None:
+    """Of the example's tunnel the survey of 2024 stands for it: that of 2026 was not searched."""
+    counted = [leak for leak in adit(a) if leak.detected and leak.review != "rejected"]
+    by_tunnel = {row["tunnel"]: row for row in rows}
+    assert {name: row["survey"] for name, row in by_tunnel.items()} == {"demo": NAME, network.TUNNEL: network.NEWER}
+    assert [row["leaks_per_km"] for row in rows] == sorted((row["leaks_per_km"] for row in rows), reverse=True)
+    for name, leaks in (("demo", a.wet), (network.TUNNEL, counted)):
+        row = by_tunnel[name]
+        assert (row["kilometres"], row["leaks"], row["class"]) == (1, len(leaks), 4)
+        close(row, 1, leaks_per_km=len(leaks) / 0.2)
+        close(row, wet_m2=sum(leak.area for leak in leaks))
+
+
+def wetter(rows: Rows, a: Asked) -> None:
+    """Three that changed in one, two in the other; what stayed the same and what was not seen is left out."""
+    demo, other = sorted(rows, key=lambda row: str(row["tunnel"]), reverse=True)
+    changes = [after - before for state, (before, after) in example_change.LEAKS.items() if state != "same"]
+    assert (demo["since"], demo["survey"], demo["new"], demo["grown"], demo["dry"]) == (NAME, "demo-2026", 1, 1, 1)
+    close(demo, wet_more_m2=sum(changes), wet_more_se=0.05 * np.sqrt(len(changes)))
+    seen = [after - before for state, before, after in network.WORSE if state != "unseen"]
+    assert (other["since"], other["survey"], other["new"], other["grown"]) == (network.OLDER, network.NEWER, 1, 1)
+    close(other, wet_more_m2=sum(seen), wet_more_se=0.05 * np.sqrt(len(seen)))
+    assert rows == [demo, other]
+
+
+def open_of_all(rows: Rows, a: Asked) -> None:
+    wanted = [(NAME, leak) for leak in a.leaks if leak.review == "open"]
+    wanted += [(network.NEWER, leak) for leak in adit(a) if leak.detected and leak.review == "open"]
+    assert [row["survey"] for row in rows].count(network.NEWER) > 1
+    expected = sorted(((survey, round(leak.area, 2)) for survey, leak in wanted), key=lambda one: (-one[1], one[0]))
+    assert sorted(((row["survey"], float(row["area_m2"])) for row in rows), key=lambda one: (-one[1], one[0])) == expected
+    areas = [row["area_m2"] for row in rows]
+    assert areas == sorted(areas, reverse=True)
+
+
+def review_of_all(rows: Rows, a: Asked) -> None:
+    assert [row["survey"] for row in rows] == [network.NEWER, network.OLDER, NAME]
+    leaks = [leak for leak in a.anomalies if leak.kind == "leak"]
+    for row, there in zip(rows, (adit(a), leaks, leaks), strict=True):
+        count = {
+            "open": sum(leak.review == "open" and leak.detected for leak in there),
+            "confirmed": sum(leak.review == "confirmed" and leak.detected for leak in there),
+            "rejected": sum(leak.review == "rejected" for leak in there),
+        }
+        assert {state: row[state] for state in count} == count
+        close(row, 0, open_percent=100 * count["open"] / sum(count.values()))
+
+
 def kinds(rows: Rows, a: Asked) -> None:
     found = {(row["kind"], row["origin"]): row for row in rows}
     cracks = found["crack", "drawn"]
@@ -689,6 +744,10 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which ten sections moved most, and which changed their shape most?": moved_sections,
     "How much of the lining changed, per 100 m?": changed_area,
     "What did the newer survey not see?": not_seen,
+    "How many leaks per km do all tunnels have, by class of waterproofing?": all_by_class,
+    "Which tunnels became wetter since their last survey?": wetter,
+    "Which leaks of all tunnels are not reviewed yet?": open_of_all,
+    "How far is the review of each survey of all tunnels?": review_of_all,
     "How many findings of each kind are there, and how did they come about?": kinds,
     "Which cracks are longer than a metre, the most severe first?": cracks,
     "Which severe findings have no photo?": without_photo,

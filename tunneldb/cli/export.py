@@ -18,7 +18,7 @@ from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.cli.tables import print_classes
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import make_folder, replacing, told_to_end
+from tunneldb.files import made_folder, replacing, told_to_end
 from tunneldb.pipeline.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
@@ -141,10 +141,9 @@ def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Pat
         raise UserError(f"survey {survey.name} holds no points yet: tunneldb load {survey.name} FILE...")
     wanted = parse_km(km, there)
     conn.rollback()
-    make_folder(output)
     files: list[dict[str, Any]] = []
     tell(survey=survey.name, files=files)
-    with told_to_end(), bar("points") as progress:
+    with told_to_end(), made_folder(output), bar("points") as progress:
         for file in (export_copc if copc else export_classified)(conn, survey, output, wanted, step(progress)):
             points = int(file.counts.sum())
             rate = points / file.seconds / 1e6

@@ -12,8 +12,9 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import redirect_stdout
+import unicodedata
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +27,20 @@ AT_FAULT = "the input, the server or the command line is at fault: one line says
 AS_JSON = "tunneldb.json"
 """Key in the context's meta: whether JSON is asked for."""
 
+_STDOUT = 1
+"""Descriptor of standard output, which programs that are started inherit."""
+
 _TOLD = "tunneldb.told"
 _VERB = "tunneldb.verb"
+
+
+def printable(text: str) -> str:
+    """Return text of others, a remark or a name in a file, as a terminal may have it: what would command it, by its code."""
+    return "".join(c if c in "\n\t" or _is_shown(c) else c.encode("unicode_escape").decode() for c in text)
+
+
+def _is_shown(character: str) -> bool:
+    return character.isprintable() or unicodedata.category(character) == "Zs"  # such as the narrow space between thousands
 
 
 def tell(**values: Any) -> None:
@@ -74,10 +87,10 @@ class Verb(click.Command):
         help_ = "Print one JSON object: what was done, counts, seconds; also when it fails."
         self.params.append(click.Option([JSON], is_flag=True, expose_value=False, help=help_))
 
-    def invoke(self, ctx: click.Context) -> Any:
-        """Run the verb, and note which it is."""
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Note which verb it is, before what stands after it can be wrong."""
         ctx.meta[_VERB] = ctx.command_path.partition(" ")[2]
-        return super().invoke(ctx)
+        return super().parse_args(ctx, args)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write what the verb appends, then examples and exit codes."""
@@ -121,7 +134,7 @@ def run_as_json(ctx: click.Context, run: Callable[[], Any], describe: Callable[[
     """
     began, code, error = time.monotonic(), 0, None
     try:
-        with Path(os.devnull).open("w", encoding="utf-8") as nowhere, redirect_stdout(nowhere):
+        with _quiet():
             run()
     except (SystemExit, click.exceptions.Exit) as ended:
         code = _exit_code(ended)
@@ -134,7 +147,7 @@ def run_as_json(ctx: click.Context, run: Callable[[], Any], describe: Callable[[
         error = describe(wrong)
         if error is None:
             raise
-        click.echo(f"tunneldb: {error}", err=True)
+        click.echo(f"tunneldb: {printable(error)}", err=True)
         code = 2
     said = {"error": error} if error is not None else {}
     told = ctx.meta.get(_TOLD, {})
@@ -143,6 +156,23 @@ def run_as_json(ctx: click.Context, run: Callable[[], Any], describe: Callable[[
     result = {"verb": name, "ok": code == 0, "exit_code": code, "seconds": seconds} | said | told
     click.echo(json.dumps(plain(result), ensure_ascii=False, indent=1, allow_nan=False))
     return code
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Let nothing of this process, of libraries or of programs that it starts, come to standard output."""
+    with Path(os.devnull).open("w", encoding="utf-8") as nowhere, redirect_stdout(nowhere):
+        try:
+            kept = os.dup(_STDOUT)
+        except OSError:  # closed by who started it
+            yield
+            return
+        try:
+            os.dup2(nowhere.fileno(), _STDOUT)
+            yield
+        finally:
+            os.dup2(kept, _STDOUT)
+            os.close(kept)
 
 
 def _exit_code(ended: BaseException) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -99,14 +100,17 @@ class _Shown:
         self.task = self.progress.add_task("", total=total)
         self.total = total
         self.stages: list[dict[str, Any]] = []
+        self.began = time.monotonic()
 
     def begin(self, stage: Stage, km: int) -> Callable[[float], None]:
         done = len(self.stages)
+        self.began = time.monotonic()
         self.progress.update(self.task, description=f"[{done + 1}/{self.total}] {stage.name} km {km}")
         return lambda share: self.progress.update(self.task, completed=done + share)
 
     def end(self, stage: Stage, km: int, run: Run) -> None:
-        self.stages.append({"stage": stage.name, "km": km, "counts": run.counts})
+        seconds = round(time.monotonic() - self.began, 3)
+        self.stages.append({"stage": stage.name, "km": km, "seconds": seconds, "counts": run.counts})
         done = len(self.stages)
         self.progress.update(self.task, completed=done)
         counts = dict(run.counts)

@@ -87,7 +87,8 @@ class WorkerPool:
         process = subprocess.Popen(
             [sys.executable, "-m", "tunneldb.queue.worker", told],
             stdin=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
             env=environment,
             start_new_session=True,
         )
@@ -97,8 +98,8 @@ class WorkerPool:
 
 def _pass_on(process: subprocess.Popen[bytes]) -> None:
     """Say what a worker says, by this process' own stderr, which a table on the terminal gives way to."""
-    assert process.stderr is not None
-    for line in process.stderr:
+    assert process.stdout is not None
+    for line in process.stdout:
         print(line.decode(errors="replace"), end="", file=sys.stderr, flush=True)
 
 

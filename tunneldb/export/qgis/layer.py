@@ -170,6 +170,12 @@ LAYERS = (
     VectorLayer("ground", "Ground", "ground", "LineStringZ", "ground", SPACE, (SPACE,)),
 )  # fmt: skip
 
+SCANNER_LAYERS = (
+    VectorLayer("scan_station", "Where the scanner stood", "scan_station", "PointZ", "scan_station", MAP, (MAP, SPACE)),
+    VectorLayer("trajectory", "The scanner's way", "trajectory", "LineStringZ", "trajectory", MAP, ()),
+)
+"""The same of a survey of which it is known where the scanner was. The way is off at first: each view of it reads all of it."""
+
 STRUCTURE_LAYERS = (
     VectorLayer("spot_map", "Spots on the map (review)", "spot_map", "Polygon", "spot", STRUCTURES, (MAP,), True),
     VectorLayer("member", "Members", "member", "LineStringZ", "member", STRUCTURES, (MAP,)),

@@ -55,6 +55,7 @@ from tunneldb.export.qgis.layer import (
     LISTS,
     MAP,
     RING_LAYERS,
+    SCANNER_LAYERS,
     SHEET_FINDING,
     SHEETS,
     SPACE,
@@ -190,6 +191,7 @@ def _project(
     structures = survey.site or cells is not None
     designed = layers_held(conn, survey)[:1]
     layers = (
+        *(layer for layer in SCANNER_LAYERS if has_rows(conn, survey.name, layer)),
         *(() if survey.site else LAYERS),
         *(replace(layer, where=f"\"layer\" = '{held}'") for held in designed for layer in DEVIATION_LAYERS),
         *(STRUCTURE_LAYERS if structures else ()),

@@ -15,6 +15,7 @@ from tunneldb.export.qgis.layer import (
     DEVIATION_LAYERS,
     LAYERS,
     RING_LAYERS,
+    SCANNER_LAYERS,
     STRUCTURE_LAYERS,
     UNDERWATER_LAYERS,
 )
@@ -100,7 +101,14 @@ def styled_columns() -> list[tuple[str, str, str, str]]:
     return [
         (layer.view, layer.column, layer.style, layer.title)
         for layer in chain(
-            LAYERS, STRUCTURE_LAYERS, UNDERWATER_LAYERS, CLEARANCE_LAYERS, RING_LAYERS, DEVIATION_LAYERS, CHANGE_LAYERS
+            LAYERS,
+            SCANNER_LAYERS,
+            STRUCTURE_LAYERS,
+            UNDERWATER_LAYERS,
+            CLEARANCE_LAYERS,
+            RING_LAYERS,
+            DEVIATION_LAYERS,
+            CHANGE_LAYERS,
         )
         if layer.id == layer.view
     ] + [
