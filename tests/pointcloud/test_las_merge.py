@@ -88,7 +88,7 @@ def test_points_too_far_for_the_digits_are_refused(tmp_path: Path) -> None:
     scan(tmp_path / "b.las", 1e-6, 1000.0, [])
     _, placements = merge_heads([read_head(tmp_path / name) for name in ("a.las", "b.las")])
     with pytest.raises(ValueError, match="too far"):
-        placements[1].coordinates(np.array([[1e6, 0.0, 0.0]]))
+        placements[0].coordinates(np.array([[1e6, 0.0, 0.0]]))
 
 
 def test_only_the_chunks_that_are_wanted_are_read(tmp_path: Path) -> None:
