@@ -4,7 +4,7 @@
 # make quick  those of the tests that need no server and are over soon
 # make test   lint, types and all tests, against the wheel as a user would install it
 # make faults 100 kills at random moments while a batch runs; KILLS=… and SEED=… for others
-# make fuzz   10,000 malformed files and hostile words for all verbs; CASES=… and SEED=… for others
+# make fuzz   10,000 malformed files and hostile words for all verbs; CASES=…, FIRST=… and SEED=… for others
 # make docs   the documentation as a site, in ./site
 # make plugin the QGIS plugin as a zip, in ./dist
 # make bench  the main figures of docs/figures.md
@@ -77,7 +77,7 @@ faults: install $(VENV)/tests $(VENV)/compiled
 	KILLS=$${KILLS:-100} $(BIN)/pytest -n 0 -s tests/faults/test_kills.py
 
 fuzz: install $(VENV)/tests $(VENV)/compiled
-	CASES=$${CASES:-10000} SECONDS=inf $(BIN)/pytest -n 0 -s tests/cli/test_fuzz.py
+	CASES=$(or $(CASES),10000) RIGHT=$(or $(RIGHT),1000) SECONDS=$(or $(SECONDS),inf) $(BIN)/pytest -n 0 -s tests/cli/test_fuzz.py
 
 docs: $(VENV)/dependencies
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict

@@ -82,12 +82,18 @@ def server_dsn(_own_home: Path) -> str:
 
 
 @pytest.fixture(scope="session")
-def template(server_dsn: str) -> str:
-    """Name of the database that is migrated and installed, to be copied."""
+def installed(server_dsn: str) -> str:
+    """Name of the database that is migrated and installed, and holds nothing else."""
     create_database(server_dsn, TEMPLATE)
     with open_connection(make_conninfo(server_dsn, dbname=TEMPLATE)) as connection:
         install(connection, STAGES)
     return TEMPLATE
+
+
+@pytest.fixture(scope="session")
+def template(installed: str) -> str:
+    """Name of the database of which tests get copies; modules have others."""
+    return installed
 
 
 @pytest.fixture(scope="session")

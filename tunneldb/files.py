@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import signal
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
@@ -47,12 +48,48 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     require_regular(path)
     try:
-        with tempfile.TemporaryDirectory(prefix=f".{path.stem}-", dir=path.parent) as folder:
+        with tempfile.TemporaryDirectory(prefix=f".{path.stem[:60]}-", dir=path.parent) as folder, room_told(Path(folder)):
             temporary = Path(folder) / path.name
             yield temporary
             os.replace(temporary, path)  # noqa: PTH105 - the point is that it is atomic
     except OSError as error:
         raise UserError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+@contextmanager
+def room_told(folder: Path) -> Iterator[None]:
+    """Raise the system's own error where a library that writes into a folder fails because its disk is full.
+
+    GDAL and SQLite have words of their own for it, and it depends on the format and the moment which.
+
+    Raises
+    ------
+    OSError
+        ENOSPC or EDQUOT.
+    """
+    try:
+        yield
+    except Exception as error:
+        nameless = isinstance(error, OSError) and error.errno is None  # as NumPy's, of bytes that were not written
+        if nameless or type(error).__module__.split(".", 1)[0] in _WRITERS:
+            if any(word in str(error) for word in _FULL):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder)) from error
+            _require_room(folder)
+        raise
+
+
+_WRITERS = {"lazrs", "pyogrio", "rasterio", "sqlite3"}
+_FULL = ("disk is full", "No space left")
+_ROOM = 1 << 20
+"""Bytes for which there is no room where a file could not be written for want of it."""
+
+
+def _require_room(folder: Path) -> None:
+    """Write what is taken away again, for a disk, and a quota, too, show only so whether they are full."""
+    with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
+        block = memoryview(bytes(_ROOM))
+        while block:
+            block = block[file.write(block) :]
 
 
 @contextmanager
@@ -69,18 +106,53 @@ def told_to_end() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-def make_folder(path: Path) -> None:
-    """Make a folder and those above it, if they are not there.
+@contextmanager
+def made_folder(path: Path) -> Iterator[None]:
+    """Make a folder and those above it, if they are not there; take those away again that are empty when the block fails.
 
     Raises
     ------
     UserError
         If it can't be made.
     """
+    made = [folder for folder in (path, *path.parents) if not folder.exists()]
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"{path}: the folder cannot be made: {error.strerror}") from error
+    try:
+        yield
+    except BaseException:
+        with suppress(OSError):  # it holds what was whole by then
+            for folder in made:
+                folder.rmdir()
+        raise
+
+
+def vector_source(path: Path) -> str:
+    """Return what GDAL is to open for a file of shapes, as the format that its first bytes are of.
+
+    GDAL goes by the content, whatever a file is called: in a.geojson there may be a VRT, or a pipeline of GDAL's own, which
+    reads other files, and what lies on the web.
+
+    Raises
+    ------
+    UserError
+        If it cannot be read, or is none of GeoPackage, GeoJSON, Shapefile and FlatGeobuf.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+    if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{"):
+        return f"GeoJSON:{path}"
+    if not head.startswith((b"SQLite format 3\0", b"fgb\x03", b"\0\0\x27\x0a")):
+        raise UserError(f"{path}: cannot be read: by its content it is no GeoPackage, GeoJSON, Shapefile or FlatGeobuf")
+    return str(path)
+
+
+_HEAD = 1024
 
 
 def by_kilometre(path: Path, kilometres: Sequence[int]) -> list[Path]:

@@ -49,6 +49,69 @@ COMMENT ON FUNCTION tunnel_api.axis_frame(int[], float8[], float8[], float8[]) I
 'Vertices of an axis with unit tangent (t), right (u) and up (w) vectors, in the tunnel''s SRID. Neighbours are vertices whose numbers differ by one. Source: Gonçalves et al. (2012), fig. 5.';
 
 
+-- The points that may lie at most half_width (m) from the planes of vertices n, by their chainage, as text for FROM: number of
+-- the vertex and coordinates.
+CREATE OR REPLACE FUNCTION tunnel_api.axis_source(survey_id int, n int[], half_width float8)
+RETURNS text
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
+AS $$
+    SELECT format($query$
+        SELECT round(p.chainage / %1$s)::int AS n, public.ST_X(p.geom) AS x, public.ST_Y(p.geom) AS y, public.ST_Z(p.geom) AS z,
+            clock_timestamp()  -- a fence that lets the scan be parallel: the coordinates are taken out once
+        FROM %5$s p
+        WHERE p.chainage BETWEEN %2$s AND %3$s
+          -- chainage is good to a metre or so until the axis rests; the plane decides
+          AND abs(p.chainage - round(p.chainage / %1$s) * %1$s) <= %4$s + 1.5
+    $query$, t.spacing, e.low, e.high, $3,
+        tunnel_api.partition_source($1, floor(e.low / 1000)::int, floor(e.high / 1000)::int))
+    FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+    CROSS JOIN LATERAL (SELECT (min(i) - 0.5) * t.spacing AS low, (max(i) + 0.5) * t.spacing AS high FROM unnest($2) i) e
+    WHERE s.id = $1
+$$;
+COMMENT ON FUNCTION tunnel_api.axis_source(int, int[], float8) IS
+'What to read in FROM for the points near the planes of axis vertices n, by chainage: n, x, y, z (m).';
+
+
+-- Sets the points near the planes of vertices aside in a table, in the place of an older one, for the passes of axis_refine:
+-- those within half a metre more than half_width of their plane, and those 30 m and more from their vertex.
+CREATE OR REPLACE FUNCTION tunnel_api.axis_near(
+    near text, survey_id int, n int[], x float8[], y float8[], z float8[], half_width float8)
+RETURNS void
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
+AS $$
+BEGIN
+    EXECUTE format('DROP TABLE IF EXISTS tunnel.%I', near);
+    EXECUTE format($query$
+        CREATE TABLE tunnel.%I AS
+        SELECT p.n, p.x, p.y, p.z
+        FROM (%s) p
+        JOIN tunnel_api.axis_frame($2, $3, $4, $5) f ON f.n = p.n
+        CROSS JOIN LATERAL (SELECT p.x - f.x AS x, p.y - f.y AS y, p.z - f.z AS z) d
+        WHERE abs(d.x * f.tx + d.y * f.ty + d.z * f.tz) <= $1 + 0.5 OR d.x * d.x + d.y * d.y + d.z * d.z > 900
+    $query$, near, tunnel_api.axis_source(axis_near.survey_id, axis_near.n, axis_near.half_width))
+    USING axis_near.half_width, axis_near.n, axis_near.x, axis_near.y, axis_near.z;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.axis_near(text, int, int[], float8[], float8[], float8[], float8) IS
+'Sets the points near the planes of axis vertices aside in the table near of schema tunnel: n, x, y, z (m).';
+
+
+-- Whether the planes of vertices have moved since points were set aside, so far that one within half_width of its plane may be
+-- missing: by half a metre within 30 m of the vertex. ox, oy, oz: where the vertices were then.
+CREATE OR REPLACE FUNCTION tunnel_api.axis_astray(
+    n int[], x float8[], y float8[], z float8[], ox float8[], oy float8[], oz float8[])
+RETURNS boolean
+LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
+AS $$
+    SELECT coalesce(bool_or(abs((f.x - o.x) * f.tx + (f.y - o.y) * f.ty + (f.z - o.z) * f.tz)
+        + 30.0 * sqrt((f.tx - o.tx) ^ 2 + (f.ty - o.ty) ^ 2 + (f.tz - o.tz) ^ 2) > 0.499), false)
+    FROM tunnel_api.axis_frame($1, $2, $3, $4) f
+    JOIN tunnel_api.axis_frame($1, $5, $6, $7) o ON o.n = f.n
+$$;
+COMMENT ON FUNCTION tunnel_api.axis_astray(int[], float8[], float8[], float8[], float8[], float8[], float8[]) IS
+'Whether planes of axis vertices have moved by half a metre within 30 m of their vertex, since these were at ox, oy, oz.';
+
+
 -- Where the tunnel's centre lies, seen from given vertices: the shift of each, right and up in its plane, m.
 --
 -- The points in the slab of the vertex (at most half_width from its plane) are averaged by angular class, so that a dense
@@ -60,38 +123,26 @@ COMMENT ON FUNCTION tunnel_api.axis_frame(int[], float8[], float8[], float8[]) I
 -- stands before a wall; a vertex without any is left out. So is one with a floor and no roof, where others have one: in an open
 -- cut the walls' tops and the slopes say nothing of the tunnel's centre. Where fewer than three pairs of classes are filled it is the plain
 -- mean of the points, as the paper has it. A vertex whose slab holds fewer than min_points points is left out.
+-- near: what axis_near has set aside of the points; without it all are looked at.
 CREATE OR REPLACE FUNCTION tunnel_api.axis_shift(
     survey_id int, n int[], x float8[], y float8[], z float8[],
-    half_width float8 DEFAULT 1.0, angle_step float8 DEFAULT 5.0, min_points int DEFAULT 100)
+    half_width float8 DEFAULT 1.0, angle_step float8 DEFAULT 5.0, min_points int DEFAULT 100, near regclass DEFAULT '-')
 RETURNS TABLE (vertex int, "right" float8, up float8, points bigint)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 100
 SET enable_nestloop = off  -- the planner expects few classes and would compare each with every other
 AS $$
-DECLARE
-    spacing float8;
-    low float8;
-    high float8;
 BEGIN
-    SELECT t.spacing INTO STRICT spacing
-    FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = axis_shift.survey_id;
-    SELECT (min(i) - 0.5) * spacing, (max(i) + 0.5) * spacing INTO low, high FROM unnest(axis_shift.n) i;
-
     RETURN QUERY EXECUTE format($query$
         WITH profile AS (
             SELECT f.n, q.u, q.w
-            FROM (SELECT round(p.chainage / $3)::int AS n, public.ST_X(p.geom) AS x, public.ST_Y(p.geom) AS y, public.ST_Z(p.geom) AS z,
-                      clock_timestamp()  -- a fence that lets the scan be parallel: the coordinates are taken out once
-                  FROM %s p
-                  WHERE p.chainage BETWEEN $1 AND $2
-                    -- chainage is good to a metre or so until the axis rests; the plane decides
-                    AND abs(p.chainage - round(p.chainage / $3) * $3) <= $4 + 1.5) p
-            JOIN tunnel_api.axis_frame($7, $8, $9, $10) f ON f.n = p.n
+            FROM (SELECT p.n, p.x, p.y, p.z FROM %s p) p
+            JOIN tunnel_api.axis_frame($4, $5, $6, $7) f ON f.n = p.n
             CROSS JOIN LATERAL (SELECT p.x - f.x AS dx, p.y - f.y AS dy, p.z - f.z AS dz) d
             CROSS JOIN LATERAL (SELECT d.dx * f.ux + d.dy * f.uy AS u, d.dx * f.wx + d.dy * f.wy + d.dz * f.wz AS w) q
-            WHERE abs(d.dx * f.tx + d.dy * f.ty + d.dz * f.tz) <= $4
+            WHERE abs(d.dx * f.tx + d.dy * f.ty + d.dz * f.tz) <= $1
         ), class AS MATERIALIZED (
-            SELECT p.n, (floor(degrees(atan2(p.u, p.w)) / $5) + 0.5) * $5 AS angle,
+            SELECT p.n, (floor(degrees(atan2(p.u, p.w)) / $2) + 0.5) * $2 AS angle,
                 avg(sqrt(p.u * p.u + p.w * p.w)) AS radius, sum(p.u) AS u, sum(p.w) AS w, count(*) AS points
             FROM profile p
             GROUP BY 1, 2
@@ -130,8 +181,8 @@ BEGIN
             GROUP BY p.n, l.is_low
             HAVING count(*) >= 3
         ), roofed AS (  -- as section_roofed says it
-            SELECT c.n, count(*) FILTER (WHERE abs(c.angle) < 45) * 3 * $5 >= 90 AS has_roof,
-                count(*) FILTER (WHERE abs(c.angle) > 135) * 3 * $5 >= 90 AS has_floor
+            SELECT c.n, count(*) FILTER (WHERE abs(c.angle) < 45) * 3 * $2 >= 90 AS has_roof,
+                count(*) FILTER (WHERE abs(c.angle) > 135) * 3 * $2 >= 90 AS has_floor
             FROM class c
             GROUP BY c.n
         ), total AS (
@@ -144,14 +195,15 @@ BEGIN
         LEFT JOIN sideward s ON s.n = t.n
         LEFT JOIN upward u ON u.n = t.n
         JOIN roofed r ON r.n = t.n
-        WHERE (r.has_roof OR NOT r.has_floor OR NOT (SELECT bool_or(o.has_roof) FROM roofed o)) AND t.points >= $6 AND (s.shift IS NOT NULL OR s.is_low IS NOT TRUE)
+        WHERE (r.has_roof OR NOT r.has_floor OR NOT (SELECT bool_or(o.has_roof) FROM roofed o)) AND t.points >= $3 AND (s.shift IS NOT NULL OR s.is_low IS NOT TRUE)
         ORDER BY t.n
-    $query$, tunnel_api.partition_source(axis_shift.survey_id, floor(low / 1000)::int, floor(high / 1000)::int))
-    USING low, high, spacing, axis_shift.half_width, axis_shift.angle_step, axis_shift.min_points,
+    $query$, CASE WHEN near = 0 THEN '(' || tunnel_api.axis_source(axis_shift.survey_id, axis_shift.n, axis_shift.half_width) || ')'
+                  ELSE near::text END)
+    USING axis_shift.half_width, axis_shift.angle_step, axis_shift.min_points,
         axis_shift.n, axis_shift.x, axis_shift.y, axis_shift.z;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.axis_shift(int, int[], float8[], float8[], float8[], float8, float8, int) IS
+COMMENT ON FUNCTION tunnel_api.axis_shift(int, int[], float8[], float8[], float8[], float8, float8, int, regclass) IS
 'One pass of stage 1: how far each vertex lies from the tunnel''s centre, to the right and up in its plane, m, from the points within half_width of the plane, averaged by angular class. After Gonçalves et al. (2012), stage 1.';
 
 
@@ -218,6 +270,8 @@ DECLARE
     rejected int := 0;
     since int := 0;  -- pass in which the last one was
     worse text[];
+    near constant text := tunnel_api.partition_name(survey_id, km) || '_axis';
+    ox float8[]; oy float8[]; oz float8[];  -- the vertices when the points near them were set aside
 BEGIN
     SELECT t.spacing INTO STRICT spacing
     FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = axis_refine.survey_id;
@@ -239,6 +293,10 @@ BEGIN
     FOR pass IN 1 .. axis_refine.max_iterations * cardinality(vn) LOOP
         -- a few millimetres may go to and fro for ever as points enter and leave the slab: later passes go a part of the way
         share := least(1.0, 5.0 / pass);
+        IF ox IS NULL OR tunnel_api.axis_astray(vn, vx, vy, vz, ox, oy, oz) THEN
+            PERFORM tunnel_api.axis_near(near, axis_refine.survey_id, vn, vx, vy, vz, axis_refine.half_width);
+            ox := vx; oy := vy; oz := vz;
+        END IF;
         WITH frame AS (
             SELECT f.*, g.gx, g.gy, g.gz, g.fixed, g.why
             FROM tunnel_api.axis_frame(vn, vx, vy, vz) f
@@ -251,7 +309,8 @@ BEGIN
                 f.z + share * s.up * f.wz AS sz
             FROM frame f
             LEFT JOIN tunnel_api.axis_shift(axis_refine.survey_id, vn, vx, vy, vz,
-                axis_refine.half_width, axis_refine.angle_step, axis_refine.min_points) s
+                axis_refine.half_width, axis_refine.angle_step, axis_refine.min_points,
+                to_regclass('tunnel.' || quote_ident(near))) s
                 ON s.vertex = f.n AND NOT f.fixed AND f.why IS NULL
         ), bounded AS (
             SELECT f.*,
@@ -312,6 +371,7 @@ BEGIN
         since := pass;
         EXIT WHEN rejected > greatest(1, axis_refine.max_rejected * measured);
     END LOOP;
+    EXECUTE format('DROP TABLE tunnel.%I', near);
 
     UPDATE tunnel.axis_vertex v
     SET geom = public.ST_SetSRID(public.ST_MakePoint(p.x, p.y, p.z), public.ST_SRID(v.given)),

@@ -19,11 +19,12 @@ COMMENT ON FUNCTION tunnel_api.section_plane(int, int) IS
 'Planes of the cross-sections of one kilometre, at 25 % and 75 % of each segment, within what was scanned: chainage (m) and frame (origin, tangent, right, up; 12 numbers). Source: Gonçalves et al. (2012), stage 4.';
 
 
--- The points of a slab: those at most half_width (in chainage, m) from a plane, in the plane's own frame, right and up, m. Where
+-- The points of a slab: those at most half_width (in chainage, m) from a plane, in the plane's own frame, right and up, and how
+-- far from it they are in chainage, m. Where
 -- sonar scans were loaded, those on the bed and on the submerged lining belong to it; what the laser has below 0.1 m above
 -- the water there are images mirrored by it, or the water itself.
 CREATE OR REPLACE FUNCTION tunnel_api.section_slab(survey_id int, chainage float8, frame float8[], half_width float8)
-RETURNS TABLE (u float8, w float8)
+RETURNS TABLE (u float8, w float8, away float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 1000
 AS $$
@@ -34,24 +35,22 @@ DECLARE
     km_to constant int := floor((section_slab.chainage + half_width + 1) / 1000);
     water constant float8 := (SELECT max(l.height) FROM tunnel.water_level l
                               WHERE l.survey_id = section_slab.survey_id AND l.km BETWEEN km_from AND km_to);
+    from_origin constant text := 'SELECT public.ST_X(p.geom) - $1[1] AS x, public.ST_Y(p.geom) - $1[2] AS y,'
+        ' public.ST_Z(p.geom) - $1[3] AS z, abs(p.chainage - $2) AS away';
 BEGIN
     RETURN QUERY EXECUTE format($query$
-        SELECT d.x * $1[7] + d.y * $1[8], d.x * $1[10] + d.y * $1[11] + d.z * $1[12]
-        FROM %s p
-        CROSS JOIN LATERAL (SELECT public.ST_X(p.geom) - $1[1] AS x, public.ST_Y(p.geom) - $1[2] AS y, public.ST_Z(p.geom) - $1[3] AS z) d
-        WHERE p.chainage BETWEEN $2 AND $3%s
-    $query$, tunnel_api.partition_source(section_slab.survey_id, km_from, km_to), CASE WHEN water IS NOT NULL THEN
-        ' AND public.ST_Z(p.geom) >= $4 + 0.1'
-        ' UNION ALL '
-        'SELECT d.x * $1[7] + d.y * $1[8], d.x * $1[10] + d.y * $1[11] + d.z * $1[12]'
-        ' FROM tunnel.sonar_point p'
-        ' CROSS JOIN LATERAL (SELECT public.ST_X(p.geom) - $1[1] AS x, public.ST_Y(p.geom) - $1[2] AS y, public.ST_Z(p.geom) - $1[3] AS z) d'
-        ' WHERE p.survey_id = $5 AND p.classification IN (40, 42) AND p.chainage BETWEEN $2 AND $3' END)
-    USING frame, section_slab.chainage - half_width, section_slab.chainage + half_width, water, section_slab.survey_id;
+        SELECT d.x * $1[7] + d.y * $1[8], d.x * $1[10] + d.y * $1[11] + d.z * $1[12], d.away
+        FROM (%s FROM %s p WHERE p.chainage BETWEEN $3 AND $4 %s
+              OFFSET 0) d  -- a fence: the coordinates are taken out once
+    $query$, from_origin, tunnel_api.partition_source(section_slab.survey_id, km_from, km_to), CASE WHEN water IS NOT NULL THEN
+        'AND public.ST_Z(p.geom) >= $5 + 0.1 UNION ALL ' || from_origin || ' FROM tunnel.sonar_point p'
+        ' WHERE p.survey_id = $6 AND p.classification IN (40, 42) AND p.chainage BETWEEN $3 AND $4' END)
+    USING frame, section_slab.chainage, section_slab.chainage - half_width, section_slab.chainage + half_width, water,
+        section_slab.survey_id;
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.section_slab(int, float8, float8[], float8) IS
-'Points at most half_width (m of chainage) from the plane of a section, those of sonar scans on the bed and the submerged lining included, in its frame: right and up of the axis, m. Source: Gonçalves et al. (2012), stage 4.';
+'Points at most half_width (m of chainage) from the plane of a section, those of sonar scans on the bed and the submerged lining included, in its frame: right and up of the axis, and how far from the plane in chainage, m. Source: Gonçalves et al. (2012), stage 4.';
 
 
 -- Angular classes of the sections of a kilometre.
@@ -70,53 +69,66 @@ RETURNS TABLE (
     segment int, half int2, class int, radius float8, slope float8, sigma float8, spread float8, points bigint)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 ROWS 10000
-SET enable_nestloop = off  -- the planner expects few classes and would compare each with every other
+-- the planner expects few classes, and would compare each with every other or sort all points again
+SET enable_nestloop = off
+SET enable_mergejoin = off
 AS $$
-    WITH polar AS (
-        SELECT p.segment, p.half, sqrt(q.u * q.u + q.w * q.w) AS r, degrees(atan2(q.u, q.w)) + 180 AS angle
+    -- OFFSET 0 is a fence: each step is reckoned once, not in each place where it is used.
+    WITH plane AS MATERIALIZED (
+        SELECT p.segment, p.half, p.chainage, p.frame, row_number() OVER (ORDER BY p.segment, p.half)::int AS i
         FROM tunnel_api.section_plane(section_classes.survey_id, section_classes.km) p
+        WHERE p.segment * 100 + p.half = ANY (section_classes."only")
+    ), polar AS (
+        SELECT p.i, sqrt(q.u * q.u + q.w * q.w) AS r, degrees(atan2(q.u, q.w)) + 180 AS angle
+        FROM plane p
         CROSS JOIN LATERAL tunnel_api.section_slab(
             section_classes.survey_id, p.chainage, p.frame, section_classes.half_width) q
-        WHERE p.segment * 100 + p.half = ANY (section_classes."only")
+        OFFSET 0
     ), classed AS (
-        SELECT p.segment, p.half, p.r, p.angle,
+        SELECT p.i, p.r, p.angle,
             least(floor(p.angle / section_classes.angle_step), 360 / section_classes.angle_step - 1)::int AS class
         FROM polar p
+        OFFSET 0
     ), local AS MATERIALIZED (
-        SELECT c.segment, c.half, c.class, c.r,
-            c.r * sind(c.angle - (c.class + 0.5) * section_classes.angle_step) AS x,
-            c.r * cosd(c.angle - (c.class + 0.5) * section_classes.angle_step) AS y
+        -- one number for section and class, and in its order: sorted and compared fast, and not sorted again by what follows
+        SELECT c.i * 360 + c.class AS number, c.r,
+            c.r * sin(radians(c.angle - (c.class + 0.5) * section_classes.angle_step)) AS x,
+            c.r * cos(radians(c.angle - (c.class + 0.5) * section_classes.angle_step)) AS y
         FROM classed c
+        ORDER BY 1
     ), middle AS (
-        SELECT l.segment, l.half, l.class, percentile_cont(0.5) WITHIN GROUP (ORDER BY l.r) AS radius
+        SELECT l.number, percentile_cont(0.5) WITHIN GROUP (ORDER BY l.r) AS radius
         FROM local l
-        GROUP BY l.segment, l.half, l.class
+        GROUP BY l.number
     ), rough AS (
-        SELECT m.segment, m.half, m.class, m.radius,
+        SELECT m.number, m.radius,
             coalesce((lead(m.radius) OVER beside - lag(m.radius) OVER beside)
-                / (radians(section_classes.angle_step) * (lead(m.class) OVER beside - lag(m.class) OVER beside) * m.radius),
+                / (radians(section_classes.angle_step) * (lead(m.number) OVER beside - lag(m.number) OVER beside) * m.radius),
                 0) AS slope
         FROM middle m
-        WINDOW beside AS (PARTITION BY m.segment, m.half ORDER BY m.class)
+        WINDOW beside AS (PARTITION BY m.number / 360 ORDER BY m.number)
     ), residual AS MATERIALIZED (
-        SELECT l.segment, l.half, l.class, l.x, l.y, abs(l.y - r.radius - r.slope * l.x) AS distance
+        SELECT l.number, l.x, l.y, abs(l.y - r.radius - r.slope * l.x) AS distance
         FROM local l
-        JOIN rough r ON r.segment = l.segment AND r.half = l.half AND r.class = l.class
+        JOIN rough r ON r.number = l.number
     ), bound AS (
         -- 1.4826 × the median distance is the standard deviation of a normal distribution
-        SELECT r.segment, r.half, r.class,
-            2 * greatest(1.4826 * percentile_cont(0.5) WITHIN GROUP (ORDER BY r.distance), 0.001) AS tolerance
+        SELECT r.number, 2 * greatest(1.4826 * percentile_cont(0.5) WITHIN GROUP (ORDER BY r.distance), 0.001) AS tolerance
         FROM residual r
-        GROUP BY r.segment, r.half, r.class
+        GROUP BY r.number
+    ), fitted AS (
+        SELECT r.number, coalesce(regr_intercept(r.y, r.x), avg(r.y)) AS radius, regr_slope(r.y, r.x) AS slope,
+            sqrt(greatest(coalesce(regr_syy(r.y, r.x) - regr_sxy(r.y, r.x) ^ 2 / nullif(regr_sxx(r.y, r.x), 0), 0), 0)
+                / count(*)) AS sigma,
+            coalesce(regr_sxx(r.y, r.x) / count(*), 0) AS spread, count(*) AS points
+        FROM residual r
+        JOIN bound b ON b.number = r.number
+        WHERE r.distance <= b.tolerance
+        GROUP BY r.number
     )
-    SELECT r.segment, r.half, r.class,
-        coalesce(regr_intercept(r.y, r.x), avg(r.y)), regr_slope(r.y, r.x),
-        sqrt(greatest(coalesce(regr_syy(r.y, r.x) - regr_sxy(r.y, r.x) ^ 2 / nullif(regr_sxx(r.y, r.x), 0), 0), 0) / count(*)),
-        coalesce(regr_sxx(r.y, r.x) / count(*), 0), count(*)
-    FROM residual r
-    JOIN bound b ON b.segment = r.segment AND b.half = r.half AND b.class = r.class
-    WHERE r.distance <= b.tolerance
-    GROUP BY r.segment, r.half, r.class
+    SELECT p.segment, p.half, f.number % 360, f.radius, f.slope, f.sigma, f.spread, f.points
+    FROM fitted f
+    JOIN plane p ON p.i = f.number / 360
     ORDER BY 1, 2, 3
 $$;
 COMMENT ON FUNCTION tunnel_api.section_classes(int, int, float8, float8, int[]) IS

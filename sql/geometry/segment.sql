@@ -152,8 +152,9 @@ COMMENT ON FUNCTION tunnel_api.segment_build(int, int) IS
 -- Segment and chainage of every point of a kilometre: the partition is rewritten with both, in chainage order, and swapped in.
 --
 -- A point's fraction of the way through a segment is its distance from the first plane over the sum of its distances from
--- both, so it is 0 and 1 on the planes. The segment is first looked up by the chainage known so far, then corrected by the
--- planes. Points before the first or after the last plane of the tunnel keep their chainage and have no segment.
+-- both, so it is 0 and 1 on the planes. The segment is first looked up by the chainage known so far; a point that lies before
+-- its first plane or beyond its second one belongs to the segment beside. Points before the first or after the last plane of
+-- the tunnel keep their chainage and have no segment.
 CREATE OR REPLACE FUNCTION tunnel_api.segment_tag(survey_id int, km int)
 RETURNS bigint
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
@@ -173,6 +174,7 @@ BEGIN
     SELECT t.spacing INTO STRICT spacing
     FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = segment_tag.survey_id;
 
+    -- both planes of each segment: normal and how far along it
     SELECT array_agg(p.n), array_agg(p.chainage_from), array_agg(p.chainage_to),
         array_agg(p.line[7]), array_agg(p.line[8]), array_agg(p.line[9]),
         array_agg(p.line[1] * p.line[7] + p.line[2] * p.line[8] + p.line[3] * p.line[9]),
@@ -182,30 +184,37 @@ BEGIN
     FROM generate_series(segment_tag.km - 1, segment_tag.km + 1) AS k, tunnel_api.segment_plan(segment_tag.survey_id, k) p;
 
     EXECUTE format('DROP TABLE IF EXISTS tunnel.%I', building);
+    -- clock_timestamp() is a fence that lets the scan be parallel: what stands beside it is reckoned once.
+    -- The segments beside share a plane: a point lies as far before theirs as beyond one's own.
     EXECUTE format($query$
         CREATE TABLE tunnel.%I AS
         SELECT c.survey_id, c.km,
-            coalesce(s.a + (s.b - s.a) * m.before / nullif(m.before + m.after, 0), c.chainage) AS chainage,
-            c.gps_time, c.geom, s.n AS segment, c.scan_id, c.file_id, c.intensity, c.classification, c."class"
-        FROM (SELECT p.*, s.n + CASE
-                  WHEN p.x * s.px + p.y * s.py + p.z * s.pz < s.pl THEN -1
-                  WHEN p.x * s.qx + p.y * s.qy + p.z * s.qz >= s.ql THEN 1
-                  ELSE 0 END AS number
-              FROM (SELECT p.*, public.ST_X(p.geom) AS x, public.ST_Y(p.geom) AS y, public.ST_Z(p.geom) AS z,
-                        clock_timestamp()  -- a fence that lets the scan be parallel: the coordinates are taken out once
+            coalesce(CASE
+                WHEN c.before < 0 THEN c.previous[1] + (c.previous[2] - c.previous[1]) * m.before / nullif(m.before - c.before, 0)
+                WHEN c.after <= 0 THEN c.next[1] - (c.next[2] - c.next[1]) * c.after / nullif(m.after - c.after, 0)
+                ELSE c.a + (c.b - c.a) * c.before / nullif(c.before + c.after, 0) END, c.chainage) AS chainage,
+            c.gps_time, c.geom,
+            CASE WHEN c.before < 0 THEN c.previous_n WHEN c.after <= 0 THEN c.next_n ELSE c.n END AS segment,
+            c.scan_id, c.file_id, c.intensity, c.classification, c."class"
+        FROM (SELECT p.*, s.n, s.a, s.b, s.previous_n, s.previous, s.next_n, s.next,
+                  p.x * s.px + p.y * s.py + p.z * s.pz - s.pl AS before,
+                  s.ql - (p.x * s.qx + p.y * s.qy + p.z * s.qz) AS after, clock_timestamp()
+              FROM (SELECT p.*, public.ST_X(p.geom) AS x, public.ST_Y(p.geom) AS y, public.ST_Z(p.geom) AS z, clock_timestamp()
                     -- the partition by its name: no lock on its parent, whose partitions others may be swapping
-                    FROM tunnel.%I p
-                    WHERE p.survey_id = $1 AND p.km = $2) p
-              LEFT JOIN unnest($4, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, px, py, pz, pl, qx, qy, qz, ql)
-                  ON s.n = floor(p.chainage / $3)::int) c
-        LEFT JOIN unnest($4, $13, $14, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, a, b, px, py, pz, pl, qx, qy, qz, ql)
-            ON s.n = c.number
+                    FROM tunnel.%I p) p
+              LEFT JOIN (
+                  SELECT s.*, q.n AS previous_n, ARRAY[q.a, q.b, q.px, q.py, q.pz, q.pl] AS previous,
+                      r.n AS next_n, ARRAY[r.a, r.b, r.qx, r.qy, r.qz, r.ql] AS next
+                  FROM unnest($2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, a, b, px, py, pz, pl, qx, qy, qz, ql)
+                  LEFT JOIN unnest($2, $3, $4, $5, $6, $7, $8) AS q (n, a, b, px, py, pz, pl) ON q.n = s.n - 1
+                  LEFT JOIN unnest($2, $3, $4, $9, $10, $11, $12) AS r (n, a, b, qx, qy, qz, ql) ON r.n = s.n + 1) s
+                  ON s.n = floor(p.chainage / $1)::int) c
         CROSS JOIN LATERAL (
-            SELECT c.x * s.px + c.y * s.py + c.z * s.pz - s.pl AS before,
-                s.ql - (c.x * s.qx + c.y * s.qy + c.z * s.qz) AS after) m
+            SELECT c.x * c.previous[3] + c.y * c.previous[4] + c.z * c.previous[5] - c.previous[6] AS before,
+                c.next[6] - (c.x * c.next[3] + c.y * c.next[4] + c.z * c.next[5]) AS after) m
         ORDER BY 3
     $query$, building, tunnel_api.partition_name(survey_id, km))
-    USING survey_id, km, spacing, n, px, py, pz, pl, qx, qy, qz, ql, a, b;
+    USING spacing, n, a, b, px, py, pz, pl, qx, qy, qz, ql;
 
     EXECUTE format($query$
         SELECT array_agg(c.segment), array_agg(c.points), coalesce(sum(c.points), 0)

@@ -105,20 +105,18 @@ DECLARE
     parent constant text := 'point_s' || survey_id;
     owner constant regrole := (SELECT c.relowner FROM pg_class c WHERE c.oid = 'tunnel.point'::regclass);
 BEGIN
-    -- It is written once and analysed here: autovacuum has nothing to do on it.
+    -- It is written once and analysed here: autovacuum has nothing to do on it. The check spares ATTACH a scan while others wait.
+    -- Loading makes it with the table, when it costs nothing; else one scan serves it and NOT NULL.
     EXECUTE format($ddl$
         ALTER TABLE tunnel.%I
             ALTER survey_id SET NOT NULL, ALTER km SET NOT NULL, ALTER chainage SET NOT NULL, ALTER gps_time SET NOT NULL,
             ALTER geom SET NOT NULL, ALTER scan_id SET NOT NULL, ALTER file_id SET NOT NULL,
             ALTER intensity SET NOT NULL, ALTER classification SET NOT NULL,
-            SET (autovacuum_enabled = off)
-    $ddl$, name || '_new');
-    -- The check spares ATTACH a scan while others wait. Loading makes it with the table, when it costs nothing.
-    IF NOT EXISTS (SELECT FROM pg_constraint c
-                    WHERE c.conrelid = to_regclass('tunnel.' || quote_ident(name || '_new')) AND c.conname = 'part') THEN
-        EXECUTE format('ALTER TABLE tunnel.%I ADD CONSTRAINT part CHECK (survey_id = %s AND km = %s)',
-            name || '_new', survey_id, km);
-    END IF;
+            SET (autovacuum_enabled = off)%s
+    $ddl$, name || '_new', CASE WHEN NOT EXISTS (
+        SELECT FROM pg_constraint c
+        WHERE c.conrelid = to_regclass('tunnel.' || quote_ident(name || '_new')) AND c.conname = 'part')
+        THEN format(', ADD CONSTRAINT part CHECK (survey_id = %s AND km = %s)', survey_id, km) END);
     EXECUTE format('CREATE INDEX ON tunnel.%I USING brin (chainage) WITH (pages_per_range = 16)', name || '_new');
     -- geometry is never searched by its box here: its statistics would cost more than the index
     EXECUTE format('ANALYZE tunnel.%I (survey_id, km, chainage, segment)', name || '_new');

@@ -47,6 +47,7 @@ def test_every_verb_can_be_imported_and_has_help() -> None:
             result = run(name, "--help")
             assert result.exit_code == 0, name
             assert result.output.startswith("Usage: ")
+            assert "<=None" not in result.output, name
 
 
 def test_help_imports_no_verb() -> None:

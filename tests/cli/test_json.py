@@ -191,6 +191,18 @@ def test_scans_that_cannot_be_registered_are_told(example: str, tmp_path: Path) 
     assert "holds no ladder" in said["error"]
 
 
+def test_what_is_pruned_and_vacuumed_is_told_in_rows_and_bytes(example: str, conn: psycopg.Connection) -> None:
+    conn.execute("UPDATE tunnel.run SET stage = 'axis', parameters = '{}'")  # six runs of one stage: the last one stays
+    conn.commit()
+    length = "SELECT count(*), sum(pg_column_size(r.*))::int FROM tunnel.run r WHERE id < (SELECT max(id) FROM tunnel.run)"
+    shown = told(0, "prune", example)
+    assert [(shown["rows"], pytest.approx(shown["bytes"], rel=0.05))] == rows(conn, length)
+    assert told(0, "prune", example, "--yes")["deleted"] == {"runs": 5, "jobs": 0}
+    dead = told(0, "vacuum")
+    assert dead["dead_bytes"] == sum(table["dead_bytes"] for table in dead["tables"])
+    assert not dead["done"]
+
+
 def test_no_verb_was_left_out() -> None:
     text = Path(__file__).read_text("utf-8")
     assert [name for name in COMMANDS if name != "psql" and f'"{name}"' not in text] == []

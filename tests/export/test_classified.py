@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
 import laspy
+import laspy.copc
 import numpy as np
 import psycopg
 import pytest
 from click.testing import CliRunner
+from pyproj import Transformer
 from support.databases import Copies
 
 from tunneldb.classification.classes import PointClass
@@ -161,3 +164,56 @@ def test_a_file_that_was_changed_is_refused(scans: tuple[Path, dict[str, np.ndar
     finally:
         path.write_bytes(data)
     assert [path.name for path in (tmp_path / "out").iterdir()] in ([], ["a.laz"])
+
+
+@pytest.mark.usefixtures("conn")
+def test_kilometres_as_copc_hold_the_same_points(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    export(out)
+    export(tmp_path / "copc", "--copc")
+    names = [f"{NAME}-km000.copc.laz", f"{NAME}-km001.copc.laz", f"{NAME}.vpc"]
+    assert sorted(path.name for path in (tmp_path / "copc").iterdir()) == names
+    whole = [laspy.read(out / name).points for name in ("a.laz", "b.laz")]
+    array = np.concatenate([points.array for points in whole])
+    virtual = json.loads((tmp_path / "copc" / names[2]).read_text())
+    total, found = 0, []
+    for name, item in zip(names, virtual["features"], strict=False):
+        with laspy.CopcReader.open(tmp_path / "copc" / name) as reader:
+            points = reader.query()
+            levels = [len(reader.query(level=level)) for level in range(20)]
+            low, high = reader.header.mins, reader.header.maxs
+            step = reader.header.scales
+            half = low + (np.rint((high - low) / 2 / step) + 0.2) * step  # which no point has
+            part = reader.query(bounds=laspy.copc.Bounds(low, half))
+            assert reader.header.parse_crs().to_epsg() == 25830
+            centre, edge = reader.copc_info.center, reader.copc_info.halfsize
+        xyz = np.column_stack([points.x, points.y, points.z])
+        assert sum(levels) == len(points) == item["properties"]["pc:count"]
+        assert len(part) == np.count_nonzero((xyz <= half).all(axis=1))
+        np.testing.assert_allclose(xyz.min(axis=0), low)
+        np.testing.assert_allclose(xyz.max(axis=0), high)
+        np.testing.assert_allclose(item["properties"]["proj:bbox"], [*low, *high])
+        assert (np.abs(xyz - centre) <= edge).all()
+        statistics = {entry["name"]: entry for entry in item["properties"]["pc:statistics"]}
+        assert statistics["Amplitude"]["average"] == pytest.approx(float(np.mean(points["Amplitude"], dtype=float)))
+        assert statistics["Classification"]["maximum"] == points.classification.max()
+        assert item["assets"]["data"]["href"] == f"./{name}"
+        west, south, _, east, north, _ = item["bbox"]
+        degrees = Transformer.from_crs(25830, 4326, always_xy=True).transform(*xyz[:, :2].T)
+        for (least, greatest), values in zip(((west, east), (south, north)), degrees, strict=True):
+            assert least - 1e-9 <= values.min() < least + 1e-4
+            assert greatest - 1e-4 < values.max() <= greatest + 1e-9
+        total += len(points)
+        found.append(points)
+    assert total == len(array)
+    both = np.concatenate([points.array for points in found])
+    order = ["gps_time", "X", "Y", "Z"]
+    np.testing.assert_array_equal(np.sort(both, order=order), np.sort(array, order=order))
+
+    again = (tmp_path / "copc" / names[0]).read_bytes()
+    export(tmp_path / "copc", "--copc", "--km", 1)
+    assert (tmp_path / "copc" / names[0]).read_bytes() == again
+    assert json.loads((tmp_path / "copc" / names[2]).read_text())["features"] == virtual["features"]
+    (tmp_path / "copc" / names[2]).write_text("[]")
+    assert "is no virtual point cloud" in export(tmp_path / "copc", "--copc", "--km", 1, code=2)
+    assert "--copc goes with --classified" in command("export", NAME, "-o", tmp_path / "x", "--copc", code=2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import psycopg
 import pytest
 from click.testing import CliRunner, Result
 from support.canal_scene import DEPTH, LEVEL, Canal, Sonar
+from support.databases import Copies
 
 from tunneldb.cli.main import main
 
@@ -35,10 +37,18 @@ def command(*arguments: object, code: int = 0) -> Result:
     return result
 
 
-def load(folder: Path) -> None:
-    command("tunnel", "add", NAME, "--srid", 25832, "--axis", folder / "axis.csv")
-    command("survey", "add", NAME, "--tunnel", NAME, "--date", "2026-05-04", "--no-poses", "--intensity-kind", "none")
-    command("load", NAME, folder / "laser.laz", "--noise-points", 1)
+@pytest.fixture(scope="module")
+def template(copies: Copies, template: str, canal: tuple[Path, list[Sonar]]) -> Iterator[str]:
+    """A database in which the laser's points are loaded, to be copied."""
+    folder, _ = canal
+
+    def fill() -> None:
+        command("tunnel", "add", NAME, "--srid", 25832, "--axis", folder / "axis.csv")
+        command("survey", "add", NAME, "--tunnel", NAME, "--date", "2026-05-04", "--no-poses", "--intensity-kind", "none")
+        command("load", NAME, folder / "laser.laz", "--noise-points", 1)
+
+    with copies.prepared(template, fill) as name:
+        yield name
 
 
 def register(folder: Path, *more: object, code: int = 0, up: str = "+z", level: float = LEVEL) -> Result:
@@ -49,7 +59,6 @@ def register(folder: Path, *more: object, code: int = 0, up: str = "+z", level: 
 
 def test_poses_are_told_stored_and_shown(canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path) -> None:
     folder, scans = canal
-    load(folder)
     before = conn.execute("SELECT count(*), sum(ST_Z(geom)) FROM tunnel.point").fetchone()
     conn.rollback()
     told = json.loads(register(folder, "--json", "--report", tmp_path / "report.md").stdout)
@@ -90,7 +99,6 @@ def test_points_are_loaded_with_their_poses_and_the_bed_is_where_it_is(
     canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path
 ) -> None:
     folder, _ = canal
-    load(folder)
     files = [folder / "s0.xyz", folder / "s1.xyz"]
     before = conn.execute("SELECT count(*), sum(ST_Z(geom)), sum(chainage) FROM tunnel.point").fetchone()
     conn.rollback()
@@ -143,7 +151,6 @@ def test_what_cannot_be_registered_is_refused_and_nothing_stored(
     canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path
 ) -> None:
     folder, _ = canal
-    load(folder)
     assert "is --up right?" in register(folder, code=2, up="-z").stderr
     assert "0.28 m below the water's level" in register(folder, code=2, level=LEVEL + 0.28).stderr
     assert "no laser point lies within" in register(folder, code=2, level=LEVEL + 20.0).stderr
@@ -168,7 +175,6 @@ def test_speed_of_sound_and_place_may_be_told(
     canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path
 ) -> None:
     folder, scans = canal
-    load(folder)
     slow = tmp_path / "slow.xyz"
     np.savetxt(slow, scans[0].points / 1.05, "%.4f")
     how = ["--ladders", folder / "ladders.csv", "--up", "+z", "--water-level", LEVEL]
@@ -203,7 +209,6 @@ def test_soundings_in_the_tunnels_system_need_no_pose(
     canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path
 ) -> None:
     folder, scans = canal
-    load(folder)
     soundings = tmp_path / "soundings.xyz"
     points = np.vstack([scan.to_tunnel(scan.points[np.linalg.norm(scan.points, axis=1) < 10.0]) for scan in scans])
     np.savetxt(soundings, points, "%.4f")

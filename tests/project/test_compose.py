@@ -39,9 +39,9 @@ def test_the_file_is_valid_compose() -> None:
 )
 def test_the_validator_finds_mistakes(tmp_path: Path, right: str, wrong: str) -> None:
     text = COMPOSE.read_text("utf-8")
-    assert text.count(right) == 1
+    assert right in text
     copy = tmp_path / "docker-compose.yml"
-    copy.write_text(text.replace(right, wrong))
+    copy.write_text(text.replace(right, wrong, 1))
     assert problems(copy)
 
 

@@ -134,8 +134,12 @@ def test_the_reason_stands_beside_and_what_to_type_below(batch: str) -> None:
     assert table["6"].endswith("load: km-6.laz is damaged after point 1000 of 2000: copy it again")
     below = lines[lines.index("what to do") :]
     assert "km 6: km-6.laz is damaged after point 1000 of 2000: copy it again" in below
-    assert below[below.index("km 2: axis: failed: too few points") + 1].strip() == f"tunneldb batch {batch} --retry-failed"
-    assert below[below.index("notes.laz is no LAS, LAZ or E57 file") + 1].strip() == f"tunneldb batch {batch} /scans/notes.laz"
+    place = below.index("km 2: axis: failed: too few points") + 1
+    assert below[place].startswith("    first see to the cause: another file")
+    assert below[place + 1].strip() == f"tunneldb batch {batch} --retry-failed"
+    place = below.index("notes.laz is no LAS, LAZ or E57 file") + 1
+    assert below[place].strip() == "first copy the file again, or export it anew, then"
+    assert below[place + 1].strip() == f"tunneldb batch {batch} /scans/notes.laz"
 
 
 def test_equal_kilometres_share_a_row(conn: psycopg.Connection, example: str) -> None:

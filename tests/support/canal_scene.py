@@ -54,6 +54,13 @@ class TrueLadder:
         for one, other in ends:
             yield self.origin + np.array([*one, 0.0]) @ self.axes, self.origin + np.array([*other, 0.0]) @ self.axes
 
+    def towards(self, station: Float, rays: Float) -> Int64:
+        """Which rays, unit vectors (n, 3), pass through a ball about all bars: the others meet none."""
+        ends = np.array(list(self.bars())).reshape(-1, 3)
+        away = ends.mean(axis=0) - station
+        radius = np.linalg.norm(ends - ends.mean(axis=0), axis=1).max() + DIAMETER
+        return np.flatnonzero(away @ away - (rays @ away) ** 2 < radius**2)
+
     def measured(self) -> Ladder:
         return Ladder(self.name, tuple(range(1, len(self.height) + 1)), self.height, STILES, DIAMETER)
 
@@ -189,8 +196,11 @@ class Canal:
                 height = (station + np.where(np.isfinite(reach), reach, 0.0)[:, None] * rays)[:, 2]
                 reach[(height < 0.0) | (height > 1.5)] = np.inf
         for ladder in self.ladders:
+            near = ladder.towards(station, rays)
+            found = np.full(len(rays), np.inf)
             for begin, end in ladder.bars():
-                meet(_cylinder(station, rays, begin, end), 2)
+                found[near] = np.minimum(found[near], _cylinder(station, rays[near], begin, end))
+            meet(found, 2)
         return reach, surface
 
     def write_laser(self, path: Path, points: Float) -> None:

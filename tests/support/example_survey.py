@@ -12,15 +12,15 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 from shapely.geometry import Polygon, box
 
+from support.databases import create_database
 from support.example_clearance import add_clearance
 from support.example_deviation import add_deviation
 from support.example_objects import CORNER, HALF_FLOOR, SPHERES, THINGS, beside, boxed, relief
 from support.example_rings import add_rings
 from tunneldb.anomalies.geometries import anomaly_geometries
-from tunneldb.database import install, open_connection
+from tunneldb.database import open_connection
 from tunneldb.geometry.frame import frames_at, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
-from tunneldb.pipeline.stages import STAGES
 from tunneldb.raster.geotiff import KINDS, Raster, decode, encode
 from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.pixel_state import PixelState
@@ -81,15 +81,13 @@ def person(request: pytest.FixtureRequest, people: None, dsn: str) -> Iterator[p
 
 
 @pytest.fixture(scope="session")
-def example_template(server_dsn: str) -> str:
+def example_template(server_dsn: str, installed: str) -> str:
     """Name of a database with a survey that has every kind of row which the views and QGIS show, to be copied.
 
     A test module that gives this as its `template` finds the survey in its `conn`.
     """
-    with psycopg.connect(server_dsn, autocommit=True) as connection:
-        connection.execute(sql.SQL("CREATE DATABASE {} TEMPLATE template0").format(sql.Identifier(DATABASE)))
+    create_database(server_dsn, DATABASE, installed)
     with open_connection(make_conninfo(server_dsn, dbname=DATABASE)) as connection:
-        install(connection, STAGES)
         _fill(connection)
     return DATABASE
 

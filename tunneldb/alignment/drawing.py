@@ -13,6 +13,7 @@ from pyproj.exceptions import CRSError
 from tunneldb.alignment.joining import join_pieces
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
+from tunneldb.files import vector_source
 from tunneldb.geometry.crs import LOCAL, describe_crs, describe_srid, fits_srid, is_local
 
 CHORD_ERROR = 0.0005  # m, of arcs and splines
@@ -123,11 +124,12 @@ def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
     import pyogrio
     import shapely
 
+    source = vector_source(path)
     try:
-        layers = [(str(name), str(kind)) for name, kind in pyogrio.list_layers(path) if kind is not None]
+        layers = [(str(name), str(kind)) for name, kind in pyogrio.list_layers(source) if kind is not None]
         linear = [name for name, kind in layers if not any(other in kind for other in ("Point", "Polygon", "Surface"))]
         chosen = choose_layer(path, linear, layer, [name for name, _ in layers])
-        meta, _, wkb, _ = pyogrio.raw.read(path, layer=chosen, columns=[])
+        meta, _, wkb, _ = pyogrio.raw.read(source, layer=chosen, columns=[])
     except pyogrio.errors.DataSourceError as error:
         raise UserError(f"{path} cannot be read: {str(error).strip().splitlines()[0]}") from None
     notes = _check_crs(path, meta["crs"], srid)

@@ -10,10 +10,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import scipy  # its parts when they are used: they take long to import
 
 from tunneldb.arrays import Bool, Float, Int64
 
@@ -112,12 +109,12 @@ def spacing_of_rays(reach: Float) -> Float:
 
 def spacing_of_soundings(points: Float) -> Float:
     """The same of soundings (n, 3) whose sonar's places are not known: twice as far as these usually lie."""
-    distance, _ = cKDTree(points).query(points, k=[LEAST_NEIGHBOURS + 1])
+    distance, _ = scipy.spatial.cKDTree(points).query(points, k=[LEAST_NEIGHBOURS + 1])
     return np.full(len(points), 2.0 * float(np.median(distance)))
 
 
 def _has_neighbours(points: Float, spacing: Float) -> Bool:
-    distance, _ = cKDTree(points).query(points, k=[LEAST_NEIGHBOURS + 1])
+    distance, _ = scipy.spatial.cKDTree(points).query(points, k=[LEAST_NEIGHBOURS + 1])
     return np.asarray(distance[:, 0] < np.maximum(ALONE, spacing))
 
 
@@ -163,7 +160,7 @@ def _smoothed(cells: _Cells) -> _Cells:
     smooth[known] = np.nanmedian(about[:, known], axis=0)
     away: Float
     nearest: Int64
-    away, nearest = distance_transform_edt(~known, return_indices=True)
+    away, nearest = scipy.ndimage.distance_transform_edt(~known, return_indices=True)
     return _Cells(np.where(away <= FARTHEST_FILL, smooth[tuple(nearest)], np.nan), cells.low)
 
 
@@ -176,8 +173,8 @@ def _connected(cells: _Cells) -> _Cells:
         joined = np.abs(value[one] - value[other]) < STEEPEST * SQUARE
         pairs.append((number[one][joined], number[other][joined]))
     rows, columns = (np.concatenate(part) for part in zip(*pairs, strict=True))
-    links = coo_array((np.ones(len(rows)), (rows, columns)), (value.size, value.size))
-    _, label = connected_components(links, directed=False)
+    links = scipy.sparse.coo_array((np.ones(len(rows)), (rows, columns)), (value.size, value.size))
+    _, label = scipy.sparse.csgraph.connected_components(links, directed=False)
     known = np.isfinite(value).ravel()
     if not known.any():
         return cells

@@ -132,7 +132,7 @@ def _busy(conn: psycopg.Connection[Any], survey: Survey) -> tuple[bool, dt.datet
 
 def _summary(conn: psycopg.Connection[Any], survey: Survey, watch: Watch, seconds: float, since: dt.datetime) -> int:
     """Say what became of it; returns the exit code."""
-    from tunneldb.cli.overview import advise, duration, number, spans
+    from tunneldb.cli.overview import advise, duration, number
     from tunneldb.queue.batch import failed_files, notes_of_files, results
 
     found = results(conn, survey)
@@ -152,6 +152,5 @@ def _summary(conn: psycopg.Connection[Any], survey: Survey, watch: Watch, second
     click.echo(f"{done} of {len(found)} kilometres done; {duration(seconds)}{speed}")
     if watch.live is None and watch.seen is not None:  # on a terminal it stands there already
         for advice in advise(watch.seen):
-            where = f"km {spans(advice.kilometres)}: " if advice.kilometres else ""
-            click.echo(f"{where}{advice.what}: {advice.command}")
+            click.echo(advice.line())
     return 0 if done == len(found) and not files else 1

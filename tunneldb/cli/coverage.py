@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import click
 from rich.console import Console
 
-from tunneldb.cli.output import tell
+from tunneldb.cli.output import printable, tell
 from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.coverage import Coverage
 from tunneldb.store.remarks import Remark
@@ -21,7 +21,7 @@ def say_remarks(remarks: Sequence[Remark], survey: Survey) -> None:
     """Say on stderr what is to be known of the results, and tell it to ``--json``."""
     tell(remarks=remarks)
     for remark in remarks[:MOST_REMARKS]:
-        click.echo(remark.said, err=True)
+        click.echo(printable(remark.said), err=True)
     if len(remarks) > MOST_REMARKS:
         click.echo(f"and {len(remarks) - MOST_REMARKS} remarks more: tunneldb status {survey.name}", err=True)
 

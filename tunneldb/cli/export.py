@@ -18,7 +18,7 @@ from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.cli.tables import print_classes
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import make_folder, replacing, told_to_end
+from tunneldb.files import made_folder, replacing, told_to_end
 from tunneldb.pipeline.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
@@ -32,6 +32,7 @@ _PLAIN = (".gpkg", ".dxf")
         "tunneldb export ringo-2024 -o ringo.gpkg",
         "tunneldb export ringo-2024 -o ringo.dxf --from 511+700 --to 511+800",
         "tunneldb export ringo-2024 --classified -o classed --km 511",
+        "tunneldb export ringo-2024 --classified --copc -o clouds",
     ]
 )
 @click.argument("survey")
@@ -44,10 +45,18 @@ _PLAIN = (".gpkg", ".dxf")
 )
 @stretch_options
 @click.option("--classified", is_flag=True, help="Scan files at full density, each point with its class.")
+@click.option("--copc", is_flag=True, help="With --classified: a Cloud Optimized Point Cloud for each kilometre.")
 @click.option("--km", metavar="A-B", help="With --classified: only files that touch these kilometres, 12 or 12-14.")
 @click.pass_obj
 def export(
-    settings: Settings, survey: str, output: Path, start: str | None, end: str | None, classified: bool, km: str | None
+    settings: Settings,
+    survey: str,
+    output: Path,
+    start: str | None,
+    end: str | None,
+    classified: bool,
+    copc: bool,
+    km: str | None,
 ) -> None:
     """Write SURVEY for programs that don't reach the database: as GeoPackage, as DXF drawing, or its classed scan files.
 
@@ -69,7 +78,14 @@ def export(
     niche, 66 appendage, 67 rail, 68 object, 69 target sphere, 70 noise, 1 outside of the surveyed tunnel. All else stays as
     it is in the files. A file is written whole and once, also where it touches several kilometres; it appears when it is
     complete, and is never written over a file of the survey.
+
+    With --classified --copc the same points are written by kilometres, each as SURVEY-kmNNN.copc.laz, a Cloud Optimized
+    Point Cloud (LAZ 1.4 in the order of an octree, which programs read by area and detail), and SURVEY.vpc names them all, a
+    virtual point cloud for QGIS 3.32 and later and PDAL. With --km only these kilometres are written; those that lie in the
+    folder stay in SURVEY.vpc.
     """
+    if copc and not classified:
+        raise UserError("--copc goes with --classified: it writes the points of the scan files with their classes")
     if classified and (start is not None or end is not None):
         raise UserError("--classified writes whole scan files: choose them by --km, not by --from and --to")
     if not classified and km is not None:
@@ -79,7 +95,7 @@ def export(
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
         if classified:
-            _write_classified(conn, found, output, km)
+            _write_classified(conn, found, output, km, copc)
         else:
             _write_plain(conn, found, output, parse_stretch(conn, found, start, end))
 
@@ -113,22 +129,22 @@ def _say_left_out(conn: psycopg.Connection[Any], survey: Survey, output: Path, s
         )
 
 
-def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Path, km: str | None) -> None:
+def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Path, km: str | None, copc: bool) -> None:
+    from tunneldb.export.pointcloud.copc import export_copc
     from tunneldb.export.pointcloud.survey import export_classified
 
     if output.exists() and not output.is_dir():
-        raise UserError(f"{output}: --classified writes a file for each scan file: name a folder")
+        raise UserError(f"{output}: --classified writes several files: name a folder")
     total = np.zeros(256, np.int64)
     there = loaded_kilometres(conn, survey)
     if not there:
         raise UserError(f"survey {survey.name} holds no points yet: tunneldb load {survey.name} FILE...")
     wanted = parse_km(km, there)
     conn.rollback()
-    make_folder(output)
     files: list[dict[str, Any]] = []
     tell(survey=survey.name, files=files)
-    with told_to_end(), bar("points") as progress:
-        for file in export_classified(conn, survey, output, wanted, step(progress)):
+    with told_to_end(), made_folder(output), bar("points") as progress:
+        for file in (export_copc if copc else export_classified)(conn, survey, output, wanted, step(progress)):
             points = int(file.counts.sum())
             rate = points / file.seconds / 1e6
             say(f"{file.path}: {points} points, {rate:.1f} million/s", err=True)

@@ -12,7 +12,7 @@ from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.database import connect
 from tunneldb.export.images.image import export_kilometre, image_kilometres
-from tunneldb.files import make_folder
+from tunneldb.files import made_folder
 from tunneldb.pipeline.run import nothing_yet, parse_km
 from tunneldb.store.survey import get_survey
 
@@ -43,10 +43,9 @@ def image(settings: Settings, survey: str, output: Path, km: str | None) -> None
             raise nothing_yet(conn, found, "has no images")
         wanted = parse_km(km, there)
         conn.rollback()
-        make_folder(output)
         files: list[Path] = []
         tell(survey=survey, files=files)
-        with bar("km") as progress:
+        with made_folder(output), bar("km") as progress:
             advance = step(progress)("images", len(wanted))
             for number, kilometre in enumerate(wanted, start=1):
                 for path in export_kilometre(conn, found, kilometre, output):

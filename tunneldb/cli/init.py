@@ -10,6 +10,9 @@ from tunneldb.database import open_connection
 from tunneldb.database.schema import install, schema_revision
 from tunneldb.pipeline.stages import STAGES
 
+_ENDINGS = ("57P01", "57P02")
+"""Warnings with which the server ends a session: the error that follows says it."""
+
 
 @verb(examples=["tunneldb init", 'tunneldb --dsn "host=gis.example.org dbname=tunnels user=anna" init'])
 @click.pass_obj
@@ -25,7 +28,7 @@ def init(settings: Settings) -> None:
         connection.add_notice_handler(
             lambda notice: (
                 click.echo(f"tunneldb: {notice.message_primary}", err=True)
-                if notice.severity_nonlocalized == "WARNING"
+                if notice.severity_nonlocalized == "WARNING" and notice.sqlstate not in _ENDINGS
                 else None
             )
         )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import printable, tell, verb
 from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -178,7 +178,7 @@ def say_notes(notes: Iterable[tuple[str, str]]) -> None:
     for name, note in notes:
         noted.setdefault(note, []).append(name)
     for note, names in noted.items():
-        click.echo(f"{_some(names)}: {note}", err=True)
+        click.echo(printable(f"{_some(names)}: {note}"), err=True)
 
 
 def _some(names: list[str]) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from tunneldb import __version__
-from tunneldb.cli.output import AS_JSON, AT_FAULT, DONE, JSON, run_as_json, write_lines
+from tunneldb.cli.output import AS_JSON, AT_FAULT, DONE, JSON, printable, run_as_json, write_lines
 from tunneldb.errors import UserError, did_you_mean
 
 
@@ -77,6 +77,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "qgis": ("tunneldb.cli.qgis:qgis", "Write a QGIS project with styled layers."),
     "status": ("tunneldb.cli.status:status", "Show what is loaded and how far each kilometre has come."),
     "check": ("tunneldb.cli.check:check", "Check the server and the database, and say how to mend them."),
+    "prune": ("tunneldb.cli.prune:prune", "Show or delete old runs and jobs that nothing goes by any more."),
+    "vacuum": ("tunneldb.cli.vacuum:vacuum", "Show or free the room of deleted rows."),
     "psql": ("tunneldb.cli.psql:psql", "Open psql on the database."),
     "server": ("tunneldb.cli.server:server", "Start, stop or look at the embedded server."),
     "simulate": ("tunneldb.cli.simulate:simulate", "Make a simulated scan of a tunnel, with its truth."),
@@ -155,19 +157,19 @@ class LazyGroup(click.Group):
         except click.UsageError as error:
             if not ctx.meta[AS_JSON]:
                 raise
-            ctx.exit(run_as_json(ctx, partial(_raise, error), _describe))
+            ctx.exit(run_as_json(ctx, partial(_raise, error), partial(_describe, ctx)))
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a verb; turn the user's errors and the server's into one line and exit code 2."""
         if ctx.meta[AS_JSON]:
-            return ctx.exit(run_as_json(ctx, lambda: click.Group.invoke(self, ctx), _describe))
+            return ctx.exit(run_as_json(ctx, lambda: click.Group.invoke(self, ctx), partial(_describe, ctx)))
         try:
             return super().invoke(ctx)
         except Exception as error:
-            message = _describe(error)
+            message = _describe(ctx, error)
             if message is None:
                 raise
-        click.echo(f"tunneldb: {message}", err=True)
+        click.echo(f"tunneldb: {printable(message)}", err=True)
         return ctx.exit(2)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -182,7 +184,7 @@ def _raise(error: Exception) -> None:
     raise error
 
 
-def _describe(error: Exception) -> str | None:
+def _describe(ctx: click.Context, error: Exception) -> str | None:
     """Return one line for what is no bug, None for one."""
     if isinstance(error, RuntimeError) and "no locator available" in str(error):  # Numba, as a module is imported
         return (
@@ -191,9 +193,15 @@ def _describe(error: Exception) -> str | None:
         )
     if isinstance(error, UserError):
         return str(error)
-    from tunneldb.database.failures import describe_failure
+    from tunneldb.database.failures import connection_lost, describe_failure
 
-    return describe_failure(error)
+    message = describe_failure(error)
+    if message is not None and connection_lost(error) and ctx.params.get("dsn") is None:
+        from tunneldb.database.server import Server
+
+        crash = Server().crash()
+        return message if crash is None else f"{message}; the server went down: {crash}"
+    return message
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})

@@ -12,6 +12,7 @@ import json
 import math
 import os
 import time
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
@@ -31,6 +32,15 @@ _STDOUT = 1
 
 _TOLD = "tunneldb.told"
 _VERB = "tunneldb.verb"
+
+
+def printable(text: str) -> str:
+    """Return text of others, a remark or a name in a file, as a terminal may have it: what would command it, by its code."""
+    return "".join(c if c in "\n\t" or _is_shown(c) else c.encode("unicode_escape").decode() for c in text)
+
+
+def _is_shown(character: str) -> bool:
+    return character.isprintable() or unicodedata.category(character) == "Zs"  # such as the narrow space between thousands
 
 
 def tell(**values: Any) -> None:
@@ -137,7 +147,7 @@ def run_as_json(ctx: click.Context, run: Callable[[], Any], describe: Callable[[
         error = describe(wrong)
         if error is None:
             raise
-        click.echo(f"tunneldb: {error}", err=True)
+        click.echo(f"tunneldb: {printable(error)}", err=True)
         code = 2
     said = {"error": error} if error is not None else {}
     told = ctx.meta.get(_TOLD, {})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -11,7 +12,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from tunneldb.cli.output import printable
 from tunneldb.pipeline.stages import STAGE_NAMES
+from tunneldb.queue.causes import cause_of
 from tunneldb.queue.progress import TO_DO, Cell, File, Overview, Worker
 
 STYLES = {
@@ -31,11 +34,17 @@ _VERDICTS = {"failed": "failed", "interrupted": "was cut off", "stale": "out of 
 
 @dataclass(frozen=True)
 class Advice:
-    """Something that does not get done by itself: where, what is wrong, and what to type."""
+    """Something that does not get done by itself: where, what is wrong, what to type, and what has to be done before."""
 
     kilometres: tuple[int, ...]
     what: str
     command: str
+    first: str = ""
+
+    def line(self) -> str:
+        """All of it in one line."""
+        where = f"km {spans(self.kilometres)}: " if self.kilometres else ""
+        return f"{where}{self.what}: {f'first {self.first}, then: ' if self.first else ''}{self.command}"
 
 
 def render(seen: Overview) -> RenderableType:
@@ -102,7 +111,7 @@ def _line(cell: Cell, files: Sequence[File]) -> str:
     text = (cell.reason or "").splitlines()[0]
     for file in files:
         text = text.replace(file.path, file.name)
-    return text
+    return printable(text)
 
 
 def _files(files: Sequence[File]) -> Text | None:
@@ -118,7 +127,7 @@ def _files(files: Sequence[File]) -> Text | None:
         said.append(f"{len(waiting)} wait to be read: {_first_and_last(waiting)}")
     if failed:
         said.append(f"{len(failed)} failed: {_first_and_last(failed)}")
-    return Text("files: " + "; ".join(said))
+    return Text(printable("files: " + "; ".join(said)))
 
 
 def _first_and_last(names: Sequence[str]) -> str:
@@ -159,17 +168,24 @@ def _to_do(advices: Iterable[Advice]) -> Group:
     for advice in advices:
         where = f"km {spans(advice.kilometres)}: " if advice.kilometres else ""
         lines.append(Text(f"{where}{advice.what}"))
+        if advice.first:
+            lines.append(Padding(Text(f"first {advice.first}, then"), (0, 0, 0, 4), expand=False))
         lines.append(Padding(Text(advice.command, "cyan"), (0, 0, 0, 4), expand=False))
     return Group(*lines)
 
 
 def advise(seen: Overview) -> list[Advice]:
-    """Return what does not get done by itself, each with the command that mends it."""
-    found: dict[tuple[str, str], list[int]] = {}
+    """Return what does not get done by itself, each with the command that mends it, and what that alone would not mend."""
+    found: dict[tuple[str, str, str], list[int]] = {}
     for file in seen.files:
         if file.state == "failed":
             what = _line(Cell("failed", file.message or f"{file.path} could not be read"), seen.files)
-            key = (what if file.name in what else f"{file.name}: {what}", f"tunneldb batch {seen.survey} {file.path}")
+            command = f"tunneldb batch {seen.survey} {shlex.quote(file.path)}"
+            key = (
+                what if file.name in what else f"{printable(file.name)}: {what}",
+                printable(command),
+                cause_of(file.message).first,
+            )
             found[key] = _range(file)
     read = {file.message for file in seen.files}
     for km, cells in seen.kilometres.items():
@@ -180,8 +196,9 @@ def advise(seen: Overview) -> list[Advice]:
             continue
         stage, cell = entry
         what = f"{stage}: {_VERDICTS[cell.state]}" + (f": {_line(cell, seen.files)}" if cell.reason else "")
-        found.setdefault((what, _command(seen.survey, cell)), []).append(km)
-    advices = [Advice(tuple(kms), what, command) for (what, command), kms in found.items()]
+        first = cause_of(cell.reason).first if cell.state == "failed" else ""
+        found.setdefault((what, _command(seen.survey, cell), first), []).append(km)
+    advices = [Advice(tuple(kms), what, command, first) for (what, command, first), kms in found.items()]
     if seen.active and not seen.live:
         advices.insert(0, Advice((), "no worker serves the queue", "tunneldb worker"))
     return advices

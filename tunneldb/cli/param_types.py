@@ -36,6 +36,21 @@ class FilePath(click.Path):
         return path
 
 
+def _finite(number: float, value: Any, param: click.Parameter | None) -> float:
+    if not math.isfinite(number) or abs(number) > LARGEST:
+        name = "" if param is None else f"{param.opts[0]} "
+        raise UserError(f"{name}{value}: that is no number which can be meant")
+    return number
+
+
+class Finite(click.types.FloatParamType):
+    """A number; neither infinite nor NaN."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number."""
+        return _finite(float(super().convert(value, param, ctx)), value, param)
+
+
 class FiniteRange(click.FloatRange):
     """A number in a range; neither infinite nor NaN, which is in every range."""
 
@@ -43,11 +58,7 @@ class FiniteRange(click.FloatRange):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return the number."""
-        number = float(super().convert(value, param, ctx))
-        if not math.isfinite(number) or abs(number) > LARGEST:
-            name = "" if param is None else f"{param.opts[0]} "
-            raise UserError(f"{name}{value}: that is no number which can be meant")
-        return number
+        return _finite(float(super().convert(value, param, ctx)), value, param)
 
 
-FINITE = FiniteRange()
+FINITE = Finite()

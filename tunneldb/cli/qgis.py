@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import click
@@ -18,7 +19,7 @@ from tunneldb.export.images.change import export_change
 from tunneldb.export.images.image import export_filled, export_kilometre, image_kilometres
 from tunneldb.export.qgis import store_project, store_styles, write_project
 from tunneldb.export.tables.spots import read_spots
-from tunneldb.files import make_folder
+from tunneldb.files import made_folder
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
@@ -97,10 +98,8 @@ def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> li
     """Write the images of all kilometres and return the GeoTIFFs, with what is looked at also without gaps."""
     kilometres = image_kilometres(conn, survey)
     conn.rollback()
-    if kilometres:
-        make_folder(folder)
     written: list[Path] = []
-    with bar("km") as progress:
+    with made_folder(folder) if kilometres else nullcontext(), bar("km") as progress:
         advance = step(progress)("images", len(kilometres))
         for km in kilometres:
             written += export_kilometre(conn, survey, km, folder)

@@ -11,7 +11,7 @@ import psycopg
 
 from tunneldb.cli.coverage import say_coverage
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import printable, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
@@ -109,7 +109,7 @@ def report(
     tell(missing_photos=missing)
     say_coverage(coverage, found)
     for photo in written.missing:
-        click.echo(f"finding {photo.photo.finding_id}: photo {photo.photo.path}: {photo.trouble}", err=True)
+        click.echo(printable(f"finding {photo.photo.finding_id}: photo {photo.photo.path}: {photo.trouble}"), err=True)
     sought = leaks or coverage.searched_share
     click.echo(f"{output}: {leaks} leaks" if sought else f"{output}: leaks were not searched for", err=True)
 

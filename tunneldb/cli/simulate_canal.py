@@ -10,7 +10,7 @@ import click
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import say
-from tunneldb.files import make_folder
+from tunneldb.files import made_folder
 from tunneldb.simulate.canal import CanalParameters, simulate, write
 
 
@@ -74,9 +74,9 @@ def simulate_canal(out: Path, **given: Any) -> None:
     Lengths are in metres, angles in degrees.
     """  # noqa: D301 - \b is click's mark for lines to be kept
     parameters = CanalParameters(**{name: value for name, value in given.items() if value is not None})
-    make_folder(out)  # that it cannot be written is known before minutes are spent
-    scene = simulate(parameters, lambda what: say(f"scanned: {what}", err=True))
-    files = write(scene, out)
+    with made_folder(out):  # that it cannot be written is known before minutes are spent
+        scene = simulate(parameters, lambda what: say(f"scanned: {what}", err=True))
+        files = write(scene, out)
     below = sum(len(scan.points) for scan in scene.sonar)
     tell(points=len(scene.laser), sonar_points=below, files=files)
     click.echo(f"{len(scene.laser):,} points above the water, {below:,} below it in {len(scene.sonar)} scans: {files.laser}")

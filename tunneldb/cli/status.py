@@ -11,7 +11,7 @@ import psycopg
 from rich.console import Console
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import records, tell, verb, wants_json
+from tunneldb.cli.output import printable, records, tell, verb, wants_json
 from tunneldb.cli.param_types import FiniteRange
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -120,4 +120,4 @@ def _one(connection: psycopg.Connection[Any], survey: str) -> None:
     if remarks:
         click.echo()
     for remark in remarks:
-        click.echo(remark.said)
+        click.echo(printable(remark.said))

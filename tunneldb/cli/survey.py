@@ -12,6 +12,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, records, tell
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
+from tunneldb.cli.sizes import sizes
 from tunneldb.cli.survey_archive import export, import_
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -23,11 +24,12 @@ FILE = FilePath()
 
 @click.group(cls=VerbGroup)
 def survey() -> None:
-    """Add, list, set, archive or remove the scanning campaigns of a tunnel, and withdraw files."""
+    """Add, list, measure, set, archive or remove the scanning campaigns of a tunnel, and withdraw files."""
 
 
 survey.add_command(export)
 survey.add_command(import_)
+survey.add_command(sizes)
 
 
 class Day(click.DateTime):

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from tunneldb.arrays import Int64
 from tunneldb.classification.classes import PointClass
-from tunneldb.cli.output import tell
+from tunneldb.cli.output import printable, tell
 from tunneldb.errors import UserError
 
 _BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg", ".xlsx": "xlsx"}
@@ -53,7 +53,8 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[Any]], right: Seq
     for index, name in enumerate(header):
         table.add_column(name, justify="right" if index in right else "left", no_wrap=True)
     for row in rows:
-        table.add_row(*("" if cell is None else cell if isinstance(cell, Text) else str(cell) for cell in row))
+        # as Text, for rich takes [red] in a plain string for markup
+        table.add_row(*("" if cell is None else cell if isinstance(cell, Text) else Text(printable(str(cell))) for cell in row))
     Console(width=1000).print(table, soft_wrap=True)  # nothing is cut: a terminal folds what is too wide
 
 

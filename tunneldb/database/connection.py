@@ -42,7 +42,8 @@ def open_connection(dsn: str | None) -> psycopg.Connection[Any]:
     except psycopg.ProgrammingError as error:
         raise UserError(f"the DSN is not one that libpq understands: {first_line(error)}") from None
     except psycopg.OperationalError as error:
-        raise UserError(f"cannot connect to the database: {first_line(error)}") from None
+        full = "; its disk is full" if "could not write init file" in str(error) else ""
+        raise UserError(f"cannot connect to the database: {first_line(error)}{full}") from None
     major = connection.info.server_version // 10000
     if major < MINIMUM_POSTGRESQL:
         connection.close()

@@ -1,8 +1,13 @@
-"""What may befall a healthy program's connection, in one line."""
+"""What may befall a healthy program, its connection or its disk, in one line."""
 
 from __future__ import annotations
 
+import errno
+
 import psycopg
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
+"""A disk that is full, or a quota that is used up."""
 
 
 def describe_failure(error: Exception) -> str | None:
@@ -11,7 +16,8 @@ def describe_failure(error: Exception) -> str | None:
     Parameters
     ----------
     error : Exception
-        Of the database, or any other. Where one is described, its transaction was rolled back, and none of those before.
+        Of the database, the disk, or any other. Where one is described, its transaction was rolled back, and none of those
+        before.
     """
     said = first_line(error)
     match error:
@@ -28,7 +34,15 @@ def describe_failure(error: Exception) -> str | None:
             return f"another program was at the same rows, what was under way is undone: {said}; run it again"
         case psycopg.OperationalError():
             return f"the connection to the database broke, what was under way is undone: {said}"
+        case OSError() if error.errno in NO_ROOM:
+            where = f"{error.filename}: " if error.filename else ""
+            return f"{where}{error.strerror}; what was under way is undone: make room, and run it again"
     return None
+
+
+def connection_lost(error: Exception) -> bool:
+    """Whether an error is none that the server has answered: its side of the connection is gone."""
+    return isinstance(error, psycopg.OperationalError) and (error.sqlstate is None or error.sqlstate in ("57P01", "57P02"))
 
 
 def first_line(error: BaseException) -> str:

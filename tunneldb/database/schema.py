@@ -62,10 +62,10 @@ def install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> 
 
     try:
         _install(connection, stages)
-    except (psycopg.errors.LockNotAvailable, sqlalchemy.exc.OperationalError) as error:
-        cause = error.orig if isinstance(error, sqlalchemy.exc.OperationalError) else error
+    except (psycopg.errors.LockNotAvailable, sqlalchemy.exc.DBAPIError) as error:
+        cause = error.orig if isinstance(error, sqlalchemy.exc.DBAPIError) and error.orig is not None else error
         if not isinstance(cause, psycopg.errors.LockNotAvailable):
-            raise
+            raise cause from None
         raise UserError(
             f"other programs have used the database for {_PATIENCE}; close QGIS and let runs end, then tunneldb init again"
         ) from None

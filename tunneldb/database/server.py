@@ -25,6 +25,7 @@ from tunneldb.database import machine
 from tunneldb.database.binaries import Binaries, find_binaries
 from tunneldb.database.home import Home, execute, home_folder, prepare_home
 from tunneldb.errors import UserError
+from tunneldb.files import replacing
 
 DATABASE = "tunneldb"
 _SUPERUSER = "postgres"
@@ -86,12 +87,31 @@ class Server:
         """Return the server's folders, made if need be."""
         return prepare_home(self.folder)
 
+    def crash(self) -> str | None:
+        """Return what the server last said before it went down of itself, if that was just now, as of a disk without room."""
+        log = (self.folder / "cluster").resolve().parent / "server.log"  # beside the data, which may lie elsewhere
+        try:
+            if time.time() - log.stat().st_mtime > _JUST_NOW:
+                return None
+            with log.open("rb") as file:
+                file.seek(max(0, log.stat().st_size - _TAIL))
+                lines = file.read().decode(errors="replace").splitlines()
+        except OSError:
+            return None
+        return next((line.split(_PANIC, 1)[1].strip() for line in reversed(lines) if _PANIC in line), None)
+
     def _write_settings(self, home: Home) -> None:
         lines = ["# Written anew at each start, from the machine's size. Your own settings: postgresql.conf"]
         lines += [f"{name} = {value}" for name, value in (machine.settings(home.run) | self._extra).items()]
         path = home.cluster / _SETTINGS_FILE
-        path.write_text("\n".join(lines) + "\n")
-        _give(path, home)
+        with replacing(path) as temporary:
+            temporary.write_text("\n".join(lines) + "\n")
+            _give(temporary, home)
+
+
+_PANIC = "PANIC:"
+_JUST_NOW = 60.0  # seconds
+_TAIL = 1 << 16  # bytes of the log that are looked at
 
 
 def _give(path: Path, home: Home) -> None:
@@ -142,9 +162,13 @@ def _initialise(home: Home) -> Binaries:
     result = execute(command, home.user)
     if result.returncode:
         _empty(home.cluster)
-        raise UserError(f"initdb failed in {home.cluster}: {_last_line(result.stderr)}")
-    with (home.cluster / "postgresql.conf").open("a") as settings:
-        settings.write(f"\ninclude '{_SETTINGS_FILE}'\n# Your own settings below win over those of tunneldb:\n")
+        raise UserError(f"initdb failed in {home.cluster}: {_reason(result.stderr)}")
+    try:
+        with (home.cluster / "postgresql.conf").open("a") as settings:
+            settings.write(f"\ninclude '{_SETTINGS_FILE}'\n# Your own settings below win over those of tunneldb:\n")
+    except OSError as error:  # a cluster without that line would be started with settings that are not ours
+        _empty(home.cluster)
+        raise UserError(f"{home.cluster}: cannot be written: {error.strerror}") from error
     return binaries
 
 
@@ -179,8 +203,8 @@ def _launch(home: Home, binaries: Binaries) -> None:
 
 
 def _reason(log: str) -> str:
-    """Return why the server says that it does not start; of a wrong setting, which."""
-    marks = ("invalid value for parameter", "unrecognized configuration parameter", "FATAL:", "PANIC:")
+    """Return why the server, or initdb, says that it does not start; of a wrong setting, which."""
+    marks = ("invalid value for parameter", "unrecognized configuration parameter", "FATAL:", "PANIC:", "error:")
     lines = log.splitlines()
     found = (line for mark in marks for line in lines if mark in line)
     return next(found, _last_line(log)).split(":  ", 1)[-1].strip()

@@ -19,6 +19,7 @@ from pyproj.exceptions import CRSError
 from shapely.geometry import MultiPolygon, Polygon
 
 from tunneldb.errors import UserError
+from tunneldb.files import vector_source
 from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.survey import Survey
 
@@ -110,7 +111,7 @@ def read_polygons(path: Path, survey: Survey, layer: str | None, noun: str) -> P
     chosen = _layer(path, layer, noun)
     where = f"{path}, layer {chosen}"
     try:
-        meta, _, wkb, columns = pyogrio.raw.read(str(path), layer=chosen)
+        meta, _, wkb, columns = pyogrio.raw.read(vector_source(path), layer=chosen)
     except (DataSourceError, DataLayerError, RuntimeError) as error:
         raise UserError(f"{where}: cannot be read: {_line(error)}") from None
     if wkb is None or not len(wkb):
@@ -123,8 +124,9 @@ def _layer(path: Path, wanted: str | None, noun: str) -> str:
     """Layer of a file that is to be read."""
     if not path.is_file():
         raise UserError(f"{path}: there is no such file")
+    source = vector_source(path)
     try:
-        there = [str(name) for name, kind in pyogrio.list_layers(str(path)) if kind is not None]  # a table is no layer
+        there = [str(name) for name, kind in pyogrio.list_layers(source) if kind is not None]  # a table is no layer
     except DataSourceError:
         raise UserError(f"{path} is neither GeoPackage nor GeoJSON: write the truth as one of these") from None
     listed = ", ".join(there) or "none"

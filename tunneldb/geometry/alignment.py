@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy  # its parts when they are used: they take long to import
 
 from tunneldb.arrays import Float, Int32, Int64
 from tunneldb.compiled import point_kernel
@@ -160,10 +161,10 @@ class Alignment:
         return on_axis, along / np.linalg.norm(along, axis=1)[:, None]
 
 
-def _curve(xyz: Float, chord: Float) -> tuple[Float, Float, CubicSpline]:
+def _curve(xyz: Float, chord: Float) -> tuple[Float, Float, Callable[..., Float]]:
     """Spline over the chord length, with a table of its parameter against its length in plan."""
     knots = np.concatenate([[0.0], np.cumsum(chord)])
-    position = CubicSpline(knots, xyz)
+    position = scipy.interpolate.CubicSpline(knots, xyz)
     # A design alignment has a vertex a metre, between which the curve hardly bends.
     steps = np.where(chord > DENSE, 64, 4)
     within = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy  # its parts when they are used: they take long to import
 
 from tunneldb.arrays import Float
 
@@ -22,7 +22,7 @@ def explain_misplacement(xyz: Float, vertices: Float, reach: float) -> str | Non
     reach : float
         How near is near, in plan, m; no less than the distance of the vertices.
     """
-    tree = cKDTree(vertices[:, :2])
+    tree = scipy.spatial.cKDTree(vertices[:, :2])
     tried = (
         (xyz[:, [1, 0]], "with x and y swapped"),
         (xyz[:, :2] / 1000.0, "as millimetres"),

@@ -96,12 +96,7 @@ def measure_deviation(
     UserError
         If the layer has no profile, or the survey no offset image where it has one.
     """
-    load_design(conn, survey.tunnel_id, survey.tunnel, layer)
-    there = stale_kilometres(conn, survey, layer, low, high)
-    conn.rollback()
-    if not there:
-        raise nothing_yet(conn, survey, f"has no offset image where layer {layer} has a profile")
-    refuse_stale(there, survey.name, "deviation")
+    there = measurable_kilometres(conn, survey, layer, low, high)
 
     def measure(km: int) -> dict[str, Any]:
         steps, note = _kilometre(conn, survey, km, layer)
@@ -117,6 +112,25 @@ def measure_deviation(
         conn, survey, "deviation", [km for km, why in there.items() if why is not None],
         lambda km: deviation_inputs(conn, survey, km, layer), measure, f"deviation of {survey.name}", begin,
     )  # fmt: skip
+
+
+def measurable_kilometres(
+    conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float
+) -> dict[int, str | None]:
+    """Kilometres of a stretch that can be held against a layer, and why each has to be; None of those that are up to date.
+
+    Raises
+    ------
+    UserError
+        As `measure_deviation` does.
+    """
+    load_design(conn, survey.tunnel_id, survey.tunnel, layer)
+    there = stale_kilometres(conn, survey, layer, low, high)
+    conn.rollback()
+    if not there:
+        raise nothing_yet(conn, survey, f"has no offset image where layer {layer} has a profile")
+    refuse_stale(there, survey.name, "deviation")
+    return there
 
 
 def load_design_of(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> Design:

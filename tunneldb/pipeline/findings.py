@@ -22,6 +22,7 @@ from shapely.geometry.base import BaseGeometry
 
 from tunneldb.csvfile import read_header, read_texts
 from tunneldb.errors import UserError
+from tunneldb.files import vector_source
 from tunneldb.geometry.crs import fits_srid, is_local, srid_name
 from tunneldb.store.alignment import station_chainages
 from tunneldb.store.survey import Survey
@@ -264,13 +265,14 @@ def _read_layer(path: Path, survey: Survey, columns: Mapping[str, str], layer: s
         raise UserError(f"{path}: findings are imported from {', '.join((*_TEXT, *_LAYERED))}; save a workbook as CSV")
     if not path.is_file():
         raise UserError(f"{path}: there is no such file")
+    source = vector_source(path)
     try:
-        there = [name for name, geometry in pyogrio.list_layers(path).tolist() if geometry is not None]
+        there = [name for name, geometry in pyogrio.list_layers(source).tolist() if geometry is not None]
         if layer is None and len(there) > 1:
             raise UserError(f"{path} has {len(there)} layers: say which by --layer: {', '.join(there)}")
         if layer is None and there:
             layer = there[0]
-        meta, _, shapes, found = pyogrio.raw.read(str(path), layer=layer)
+        meta, _, shapes, found = pyogrio.raw.read(source, layer=layer)
     except (DataSourceError, DataLayerError, RuntimeError, ValueError) as error:
         raise UserError(f"{path}: cannot be read: {str(error).strip().splitlines()[0]}") from None
     view = _view(path, meta["crs"], survey)

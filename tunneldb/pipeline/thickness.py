@@ -9,7 +9,7 @@ import numpy as np
 import psycopg
 
 from tunneldb.errors import UserError
-from tunneldb.pipeline.deviation import measure_deviation
+from tunneldb.pipeline.deviation import measurable_kilometres, measure_deviation
 from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_different_tunnels
 from tunneldb.shape.profile import Stretch
 from tunneldb.shape.thickness import section_thickness
@@ -56,6 +56,8 @@ def measure_thickness(
         If they are of two tunnels, or one, or have no kilometre in common there.
     """
     refuse_different_tunnels(before, after, "thickness")
+    for survey in (before, after):  # both, before anything is measured
+        measurable_kilometres(conn, survey, layer, low, high)
     for survey in (before, after):
         measure_deviation(conn, survey, layer, low, high, begin)
     stretches = load_design(conn, after.tunnel_id, after.tunnel, layer)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tunneldb.arrays import Float, Int32, Int64, Intp
+from tunneldb.arrays import Float, Int32, Int64, Intp, Single, UInt8
+from tunneldb.compiled import kernel
 from tunneldb.geometry.alignment import Alignment, locate_points
 from tunneldb.geometry.frame import segment_rows, tangents
 from tunneldb.geometry.stationing import KILOMETRE
@@ -91,13 +92,11 @@ class ChainageLookup:
             part, chosen = rows[begin : begin + _BLOCK], picked[begin : begin + _BLOCK]
             xyz = points.xyz.take(chosen, axis=0)
             chainage, _, _ = self._located(xyz, self.segment.take(cell.take(chosen)), False)
-            part["x"], part["y"], part["z"] = xyz.T
-            part["chainage"] = np.clip(chainage, self.alignment.start, self.alignment.end)
-            part["time"] = points.time.take(chosen)
-            part["intensity"] = points.intensity.take(chosen)
-            part["scan_id"] = points.scan_id.take(chosen)
-            part["tag"] = tag[begin : begin + _BLOCK]
-            part["classification"] = points.classification.take(chosen)
+            fields = [part[name] for name in _FIELDS]
+            _fill(
+                xyz, chainage, self.alignment.start, self.alignment.end, chosen, points.time, points.intensity, points.scan_id,
+                points.classification, tag[begin : begin + _BLOCK], *fields,
+            )  # fmt: skip
         return rows
 
     def _located(self, xyz: Float, start: Int32, distances: bool) -> tuple[Float, Float, Int32]:
@@ -106,3 +105,22 @@ class ChainageLookup:
         a = self.alignment
         locate_points(self.segments, a.number, float(a.spacing), xyz, start, chainage, distance, segment)
         return chainage, distance, segment
+
+
+_FIELDS = ("x", "y", "z", "chainage", "time", "intensity", "scan_id", "classification", "tag")
+
+
+@kernel
+def _fill(
+    xyz: Float, along: Float, low: float, high: float, chosen: Int32,
+    times: Float, intensities: Single, scan_ids: Int32, classifications: UInt8, tags: Int32,
+    x: Float, y: Float, z: Float, chainage: Float, time: Float, intensity: Single, scan_id: Int32, classification: UInt8,
+    tag: Int32,
+) -> None:  # pragma: no cover - compiled  # fmt: skip
+    """Write the fields of rows: what was worked out of each, and what the chosen points have."""
+    for i in range(chosen.shape[0]):
+        k = chosen[i]
+        x[i], y[i], z[i] = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+        chainage[i] = min(max(along[i], low), high)
+        time[i], intensity[i], scan_id[i] = times[k], intensities[k], scan_ids[k]
+        classification[i], tag[i] = classifications[k], tags[i]

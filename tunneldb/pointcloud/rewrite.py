@@ -7,7 +7,7 @@ the same takes its place.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,8 +37,8 @@ _EVERYTHING = DecompressionSelection.all()
 
 
 @dataclass(frozen=True)
-class _Source:
-    """What is to be written: what surrounds the points, the points, and what of the header is known only afterwards."""
+class Source:
+    """What is to be written: what surrounds the points, the points in chunks, what of the header is known only afterwards."""
 
     head: Head
     chunks: Iterator[UInt8]
@@ -83,7 +83,7 @@ def rewrite(
     OSError
         If the target cannot be written.
     """
-    what = _of_las(source, size) if format_of(source).is_las else _of_others(source, size)
+    what = records_of(source, size)
     head = what.head.with_classes(names)
     counts = np.zeros(256, np.int64)
     with writing(target, head) as writer:
@@ -123,7 +123,7 @@ def rewrite_with_numbers(
     OSError
         If the target cannot be written.
     """
-    what = _of_las(source, size) if format_of(source).is_las else _of_others(source, size)
+    what = records_of(source, size)
     try:
         head = what.head.with_numbers(names, record_size(what.head.point_format))
     except ValueError as error:
@@ -154,6 +154,25 @@ class _Pieces:
         return taken
 
 
+def records_of(path: Path, size: int = CHUNK, only: Collection[int] | None = None) -> Source:
+    """Points of a scan file as records of LAS with room for classes, to be read once.
+
+    Parameters
+    ----------
+    path : Path
+    size : int
+        Greatest number of points of a chunk.
+    only : collection of int
+        Numbers of the chunks that are wanted, from 0; those of LAS between them are not read.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, or holds waveforms; while it is read, if it is cut off.
+    """
+    return _of_las(path, size, only) if format_of(path).is_las else _of_others(path, size, only)
+
+
 def read_coordinates(path: Path, size: int = CHUNK) -> Iterator[Float]:
     """Read the coordinates (n, 3) of a scan file's points, m, chunk by chunk, and nothing else of them.
 
@@ -174,7 +193,7 @@ def read_coordinates(path: Path, size: int = CHUNK) -> Iterator[Float]:
         yield coordinates(records, head.scales, head.offsets)
 
 
-def _of_las(path: Path, size: int) -> _Source:
+def _of_las(path: Path, size: int, only: Collection[int] | None) -> Source:
     header = read_las_header(path)
     with decoding(path, KIND):
         head = read_head(path)
@@ -185,21 +204,34 @@ def _of_las(path: Path, size: int) -> _Source:
     before = head.point_format
     after = FORMAT_OF[before]
     head = head.with_points(after, record_size(after) + head.record_size - record_size(before)).with_crs(header.crs)
-    return _Source(head, (upgraded(records, before) for records in _read(path, header.points, size)), lambda: None)
+    chunks = _read(path, header.points, size, only=only)
+    return Source(head, (upgraded(records, before) for records in chunks), lambda: None)
 
 
-def _read(path: Path, count: int, size: int, selection: DecompressionSelection = _EVERYTHING) -> Iterator[UInt8]:
+def _read(
+    path: Path,
+    count: int,
+    size: int,
+    selection: DecompressionSelection = _EVERYTHING,
+    only: Collection[int] | None = None,
+) -> Iterator[UInt8]:
     backends = (LazBackend.Lazrs,) if threads() == 1 else (LazBackend.LazrsParallel, LazBackend.Lazrs)
     with decoding(path, KIND):
         las = laspy.open(path, laz_backend=backends, read_evlrs=False, decompression_selection=selection)
     with las:
-        done = 0
+        done = at = 0
         while done < count:
+            if only is not None and done // size not in only:
+                done += size
+                continue
             with decoding(path, KIND):
+                if at != done:
+                    las.seek(done)
                 array = las.read_points(size).array
             if len(array) == 0:
                 raise UserError(f"{path}: truncated: {done} points read of the {count} that its header announces")
             done += len(array)
+            at = done
             yield array.view(np.uint8).reshape(len(array), -1)
 
 
@@ -207,6 +239,7 @@ def _records(path: Path) -> E57Records | RawRecords:
     return E57Records(path) if is_e57(path) else RawRecords(path)
 
 
-def _of_others(path: Path, size: int) -> _Source:
+def _of_others(path: Path, size: int, only: Collection[int] | None) -> Source:
     source = _records(path)
-    return _Source(source.head, source.read(size), source.patches)
+    chunks = (records for number, records in enumerate(source.read(size)) if only is None or number in only)
+    return Source(source.head, chunks, source.patches)

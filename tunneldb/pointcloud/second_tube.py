@@ -8,12 +8,14 @@ vault, a cross passage is shorter along the tunnel, and beside an open cut there
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from tunneldb.arrays import Bool, Float
+from tunneldb.arrays import Bool, Float, Int32, Int64
+from tunneldb.compiled import kernel
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.frame import tangents
 from tunneldb.geometry.stationing import KILOMETRE, chainage_label
@@ -21,6 +23,8 @@ from tunneldb.pointcloud.spool import Rows
 
 STRETCH = 5.0
 """m of chainage looked at together."""
+
+_STRETCHES = round(KILOMETRE / STRETCH)
 
 CELL = 0.25
 """m across the axis."""
@@ -69,7 +73,8 @@ class SecondTubes:
 
     def own(self, rows: Rows, alignment: Alignment) -> Bool:
         """Which rows are the tunnel's own."""
-        away, stretch = _away(rows, alignment), _stretch(rows, self.km)
+        away, stretch = np.empty(len(rows)), np.empty(len(rows), np.int32)
+        _place(rows["x"], rows["y"], rows["chainage"], *_axis(alignment), self.km * KILOMETRE, away, stretch)
         return np.asarray((away >= self.limits[0, stretch]) & (away <= self.limits[1, stretch]))
 
     def note(self, points: int) -> str:
@@ -94,15 +99,13 @@ def find_second_tubes(parts: Iterable[Rows], alignment: Alignment, km: int) -> S
         The given axis.
     km : int
     """
-    shape = round(KILOMETRE / STRETCH), round(2 * REACH / CELL)
+    shape = _STRETCHES, round(2 * REACH / CELL)
     count, low, high = np.zeros(shape, np.int64), np.full(shape, np.inf), np.full(shape, -np.inf)
+    axis = _axis(alignment)
     for rows in parts:
-        cell = np.floor((_away(rows, alignment) + REACH) / CELL).astype(np.int64)
-        within = (cell >= 0) & (cell < shape[1])
-        at = _stretch(rows, km)[within], cell[within]
-        np.add.at(count, at, 1)
-        np.minimum.at(low, at, rows["z"][within])
-        np.maximum.at(high, at, rows["z"][within])
+        away, which = np.empty(len(rows)), np.empty(len(rows), np.int32)
+        _place(rows["x"], rows["y"], rows["chainage"], *axis, km * KILOMETRE, away, which)
+        _sort_in(rows["z"], away, which, count, low, high)
     limits = np.full((2, shape[0]), np.nan)
     for stretch in np.flatnonzero(count.any(axis=1)):
         held = count[stretch] > max(1.0, FAINT * float(np.median(count[stretch][count[stretch] > 0])))
@@ -143,17 +146,38 @@ def _bridge(limits: Float) -> None:
             limits[within] = np.interp(within, run, limits[run])
 
 
-def _stretch(rows: Rows, km: int) -> np.ndarray:
-    last = round(KILOMETRE / STRETCH) - 1
-    return np.clip((rows["chainage"] - km * KILOMETRE) // STRETCH, 0, last).astype(np.int64)
+def _axis(alignment: Alignment) -> tuple[Float, float, float]:
+    """Place and direction of each vertex in plan, (n, 4), the number of the first, and their spacing, m."""
+    along = np.column_stack([alignment.vertices[:, :2], tangents(alignment.vertices)[:, :2]])
+    return along, float(alignment.number[0]), float(alignment.spacing)
 
 
-def _away(rows: Rows, alignment: Alignment) -> Float:
-    """How far right of the axis points lie, in plan, m."""
-    tangent, place = tangents(alignment.vertices), rows["chainage"] / alignment.spacing - alignment.number[0]
-    after = np.clip(np.floor(place).astype(np.int64) + 1, 1, len(tangent) - 1)
-    share = place - (after - 1)
-    x, y, ahead_x, ahead_y = (
-        values[after - 1] * (1.0 - share) + values[after] * share for values in (*alignment.vertices.T[:2], *tangent.T[:2])
-    )
-    return np.asarray(((rows["x"] - x) * ahead_y - (rows["y"] - y) * ahead_x) / np.hypot(ahead_x, ahead_y))
+@kernel
+def _place(
+    x: Float, y: Float, chainage: Float, axis: Float, first: float, spacing: float, start: float, away: Float, stretch: Int32
+) -> None:  # pragma: no cover - compiled
+    """Write how far right of the axis points lie, in plan, m, and in which stretch of the kilometre that begins at start."""
+    last = axis.shape[0] - 1
+    for i in range(away.shape[0]):
+        along = chainage[i] / spacing - first
+        after = min(max(math.floor(along) + 1, 1), last)
+        share = along - (after - 1)
+        a, b = axis[after - 1], axis[after]
+        ox, oy = a[0] * (1.0 - share) + b[0] * share, a[1] * (1.0 - share) + b[1] * share
+        tx, ty = a[2] * (1.0 - share) + b[2] * share, a[3] * (1.0 - share) + b[3] * share
+        away[i] = ((x[i] - ox) * ty - (y[i] - oy) * tx) / math.sqrt(tx * tx + ty * ty)
+        stretch[i] = min(max(math.floor((chainage[i] - start) / STRETCH), 0), _STRETCHES - 1)
+
+
+@kernel
+def _sort_in(
+    z: Float, away: Float, stretch: Int32, count: Int64, low: Float, high: Float
+) -> None:  # pragma: no cover - compiled
+    """Count points, and note the lowest and highest, in cells of stretch and distance right of the axis."""
+    for i in range(away.shape[0]):
+        cell = math.floor((away[i] + REACH) / CELL)
+        if 0 <= cell < count.shape[1]:
+            s = stretch[i]
+            count[s, cell] += 1
+            low[s, cell] = min(low[s, cell], z[i])
+            high[s, cell] = max(high[s, cell], z[i])

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy  # its parts when they are used: they take long to import
 
 from tunneldb.arrays import Bool, Float, Int32, Int64, Intp, Single
 from tunneldb.errors import UserError
@@ -243,7 +243,7 @@ class _Filter:
                 if counts.outside and counts.outside + counts.invalid == counts.points:
                     vertices = self.places.alignment.vertices
                     some = points.xyz[np.isfinite(points.xyz).all(axis=1)][::100]
-                    nearest = min(nearest, float(cKDTree(vertices).query(some)[0].min(initial=math.inf)))
+                    nearest = min(nearest, float(scipy.spatial.cKDTree(vertices).query(some)[0].min(initial=math.inf)))
                     if guess is None and len(some):
                         guess = explain_misplacement(some, vertices, self.settings.max_distance)
                 progress(len(points))

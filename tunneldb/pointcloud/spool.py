@@ -146,8 +146,10 @@ class Spool:
         return dict(zip(kms.tolist(), held.tolist(), strict=True))
 
     def read(self, low: int, high: int) -> Rows:
-        """Rows of the bins low ≤ bin < high; runs in order of `add`, each in order of bins."""
+        """Rows of the bins low ≤ bin < high; runs in order of `add`, each in order of bins. They may be the spool's own."""
         parts = [part for run in self._runs if len(part := self._slice(run, low, high))]
+        if len(parts) == 1:
+            return parts[0]
         return np.concatenate(parts) if parts else np.empty(0, self.dtype)
 
     def _slice(self, run: _Run, low: int, high: int) -> Rows:
@@ -173,7 +175,7 @@ class Spool:
             if error.errno not in (errno.ENOSPC, errno.EDQUOT):
                 raise
             raise UserError(
-                f"no space left for temporary files in {tempfile.gettempdir()}, nothing was changed; "
+                f"no space left for temporary files in {tempfile.gettempdir()}, what was under way is undone; "
                 "free some or set TMPDIR to a folder on a larger disk"
             ) from error
         run.offset, run.rows = self._spilt, None

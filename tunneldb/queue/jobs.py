@@ -15,6 +15,7 @@ from procrastinate.jobs import Job as QueueJob
 from procrastinate.jobs import Status
 from procrastinate.manager import JobManager
 
+from tunneldb.database.failures import describe_failure
 from tunneldb.database.session import CONNECT, SETTINGS, worker_session
 from tunneldb.errors import UserError
 from tunneldb.pipeline.parameters import of_stage, settings
@@ -112,7 +113,7 @@ def _run(dsn: str | None, context: JobContext, work: Callable[[psycopg.Connectio
     except LostError as error:
         log.warning("%s: %s", what, error)
     except Exception as error:
-        bug = not isinstance(error, (UserError, GoneError, psycopg.OperationalError))
+        bug = not isinstance(error, (UserError, GoneError)) and describe_failure(error) is None
         log.warning("%s: %s", what, describe(error), exc_info=bug)
         end_job(dsn, job, error)
 

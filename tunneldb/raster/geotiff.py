@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from affine import Affine
-from rasterio.errors import NotGeoreferencedWarning
+from rasterio.errors import NotGeoreferencedWarning, RasterioIOError
 from rasterio.io import MemoryFile
 
 from tunneldb.arrays import Float, Int16, Single
 from tunneldb.compiled import kernel
+from tunneldb.errors import UserError
 
 KINDS = ("raw", "corrected", "offset")
 """What the images of a kilometre show: raw and corrected intensity (dB), offset from the surface (m)."""
@@ -100,13 +103,29 @@ def encode(raster: Raster, kind: str) -> bytes:
 
 
 def decode(tiff: bytes) -> Raster:
-    """Read an image that :func:`encode` wrote."""
-    with warnings.catch_warnings():
+    """Read an image that :func:`encode` wrote.
+
+    Bytes of another origin, as of an archive, are taken as GeoTIFF alone: a VRT would have GDAL read other files.
+
+    Raises
+    ------
+    UserError
+        If it is none.
+    """
+    with warnings.catch_warnings(), _told():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)
-        with MemoryFile(tiff) as memory, memory.open() as image:
+        with MemoryFile(tiff) as memory, memory.open(driver="GTiff") as image:
             steps = image.read(1)
             values = np.where(steps == image.nodata, np.nan, steps * image.scales[0]).astype(np.float32)
             return Raster(values, image.transform)
+
+
+@contextmanager
+def _told() -> Iterator[None]:
+    try:
+        yield
+    except RasterioIOError as error:
+        raise UserError(f"an image in the database is no GeoTIFF, run stage detect again: {error}") from error
 
 
 def laid(raster: Raster, like: Raster) -> Single:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import signal
@@ -81,6 +82,8 @@ def print_pdf(browser: str, page: Path, pdf: Path, waiting: Callable[[float], No
     ------
     UserError
         If the browser makes no PDF.
+    OSError
+        If it makes one that is cut off, for want of room.
     """
     with tempfile.TemporaryDirectory(prefix="tunneldb-browser-", ignore_cleanup_errors=True) as profile:
         command = [
@@ -100,6 +103,15 @@ def print_pdf(browser: str, page: Path, pdf: Path, waiting: Callable[[float], No
     if code != 0 or not pdf.exists():
         said = output.strip().splitlines()
         raise UserError(f"{browser} did not print the report: {said[-1] if said else f'exit code {code}'}")
+    if not _is_whole(pdf):  # of a disk that is full a browser says nothing
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(pdf))
+
+
+def _is_whole(pdf: Path) -> bool:
+    """Whether a PDF has its end, by ISO 32000-1, 7.5.5."""
+    with pdf.open("rb") as file:
+        file.seek(max(0, pdf.stat().st_size - 1024))
+        return b"%%EOF" in file.read()
 
 
 def _run(command: Sequence[str], folder: str, waiting: Callable[[float], None]) -> tuple[int, str]:

@@ -20,6 +20,7 @@ from shapely.geometry import mapping
 import tunneldb
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
+from tunneldb.files import made_folder, room_told
 from tunneldb.simulate.generate import Cloud, Simulation
 from tunneldb.simulate.ring_truth import write_ring_truth
 from tunneldb.simulate.truth import leaks_as_built, write_truth
@@ -278,8 +279,11 @@ def write(
         The folder cannot be written, or the disk is full.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(dir=folder, prefix=".simulate-") as scratch:
+        with (
+            made_folder(folder),
+            TemporaryDirectory(dir=folder, prefix=".simulate-") as scratch,
+            room_told(Path(scratch)),
+        ):
             files = _scan(simulation, Path(scratch), truth, progress)
             _sidecars(simulation, Path(scratch), files)
             return files.moved(folder)

@@ -224,10 +224,8 @@ def retry_at(error: BaseException, attempts: int) -> dt.timedelta | None:
 
 def describe(error: BaseException) -> str:
     """One line: the message of what the user can mend; of anything else also its type."""
-    if isinstance(error, psycopg.Error):
-        known = describe_failure(error)
-        if known is not None:
-            return known
+    if isinstance(error, Exception) and (known := describe_failure(error)) is not None:
+        return known
     text = " ".join((first_line(error) if isinstance(error, psycopg.Error) else str(error)).split())
     if isinstance(error, UserError):
         return text

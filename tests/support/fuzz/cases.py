@@ -9,49 +9,107 @@ from pathlib import Path
 import click
 
 from support.fuzz.mutations import mutate
-from tunneldb.cli.main import COMMANDS, main
+from tunneldb.cli.main import main
 
-# {new} is a name that is not taken, {stretch} a centimetre of the tunnel that has no profile yet, {out} a path in a folder of
-# the case's own, {file} the file.
+# {new} is a name that is not taken, {stretch} where a profile is to hold, {out} a path in a folder of the case's own, {file}
+# the file, {seeds} the folder of the right ones.
 OF_FILES: tuple[tuple[str, str], ...] = (
     ("axis.csv", "tunnel add {new} --srid 25830 --axis {file}"),
+    ("equations.csv", "tunnel add {new} --srid 25830 --axis {seeds}/axis.csv --start-chainage 12300 --stationing {file}"),
     ("j-landxml.xml", "tunnel add {new} --srid 6677 --axis {file}"),
     ("indot-twin-branch.xml", "tunnel add {new} --srid 25830 --axis {file} --axis-unit meter"),
     ("aplitop-3.ifc", "tunnel add {new} --srid 25830 --axis {file}"),
     ("indot-twin-branch.ifc", "tunnel add {new} --srid 25830 --axis {file}"),
     ("axis.dxf", "tunnel add {new} --srid 25830 --axis {file} --axis-unit meter"),
+    ("cloud.las", "tunnel add {new} {file} --srid 25830 --axis {seeds}/axis.csv"),
+    ("cloud.las", "tunnel find-axis {file} -o {out}.csv"),
     ("equations.csv", "tunnel stationing demo {file}"),
     ("trajectory.csv", "survey add {new} --tunnel demo --date 2024-05-04 --trajectory {file} --intensity-kind none"),
     ("stations.csv", "survey add {new} --tunnel demo --date 2024-05-04 --stations {file} --intensity-kind none"),
     ("cloud.ptx", "survey add {new} --tunnel demo --date 2024-05-04 --stations {file} --intensity-kind none"),
+    ("stations.csv", "survey set scan-2024 --stations {file}"),
+    ("trajectory.csv", "survey set walk-2024 --trajectory {file}"),
     ("reference.csv", "survey set scan-2024 --reference {file}"),
+    ("survey.tdb", "survey import {file} --name {new}"),
+    ("cloud.las", "survey remove-file demo-2024 {file} --yes"),
     ("cloud.las", "load scan-2024 {file}"),
+    ("cloud.las", "batch scan-2024 {file} --preview"),
     ("cloud.las", "inspect {file}"),
     ("cloud.laz", "inspect {file}"),
+    ("cloud.e57", "inspect {file}"),
     ("cloud.ply", "inspect {file}"),
     ("cloud.ptx", "inspect {file}"),
     ("points.csv", "inspect {file}"),
+    ("cloud.las", "ground {file} -o {out}.laz"),
     ("points.csv", "unroll demo-2024 {file} -o {out}.csv"),
     ("profile.csv", "profile add demo {new} {file} {stretch}"),
     ("profile.txt", "profile add demo {new} {file} --unit m {stretch} --layer shotcrete"),
     ("profile.dxf", "profile add demo {new} {file} {stretch}"),
     ("rings-points.csv", "rings --points {file} --axis {seeds}/rings-axis.csv --diameter 5.8 -o {out}.csv"),
     ("rings-axis.csv", "rings --points {seeds}/rings-points.csv --axis {file} --diameter 5.8 -o {out}.csv"),
+    ("rings.csv", "rings demo-2024 --rings {file}"),
+    ("profile.csv", "clearance demo-2024 --gauge {file} --track single"),
+    ("trajectory.csv", "clearance demo-2024 --gauge {seeds}/profile.csv --track-axis {file}"),
     ("findings.csv", "findings import demo-2024 {file}"),
     ("truth.geojson", "findings import demo-2024 {file}"),
+    ("truth.geojson", "evaluate demo-2024 {file}"),
     ("control.csv", "spheres scan-2024 --radius 0.07 --control {file} --report {out}.md"),
+    ("ladders.csv", "register scan-2024 {seeds}/points.csv --ladders {file} --up +z --water-level 600"),
+    ("points.csv", "register scan-2024 {file} --ladders {seeds}/ladders.csv --up +z --water-level 600"),
+    (
+        "start.csv",
+        "register scan-2024 {seeds}/points.csv --ladders {seeds}/ladders.csv --start {file} --up +z --water-level 600",
+    ),
+    ("cloud.las", "members {file} --stations {seeds}/stations.csv --intensity intensity --intensity-kind linear -o {out}.gpkg"),
+    ("stations.csv", "members {seeds}/cloud.las --stations {file} --intensity intensity --intensity-kind linear -o {out}.gpkg"),
     ("template.toml", "report demo-2024 --template {file} -o {out}.html"),
 )
-"""Files, and what reads them."""
+"""Files, and what reads them: each verb and option that takes a file is among them."""
 
 OF_WORDS: tuple[str, ...] = (
-    "leaks demo-2024", "leaks demo-2024 -o {out}.csv", "findings demo-2024", "findings demo-2024 -o {out}.gpkg",
-    "deviation demo-2024 -o {out}.csv", "image demo-2024 -o {out}", "status demo-2024",
-    "axis demo-2024 -o {out}.csv", "tunnel add {new} --srid 25830 --axis {seeds}/axis.csv", "qgis demo-2024 -o {out}.qgz",
-    "export demo-2024 -o {out}.gpkg", "spheres scan-2024 --radius 0.07", "profile add demo {new} {seeds}/profile.csv {stretch}",
-    "rings --points {seeds}/rings-points.csv --axis {seeds}/rings-axis.csv --diameter 5.8 -o {out}.csv",
+    "tunnel list", "tunnel add {new} --srid 25830 --axis {seeds}/axis.csv", "tunnel stationing demo --show",
+    "tunnel remove {new}",
+    "survey list", "survey add {new} --tunnel demo --date 2024-05-04 --stations {seeds}/stations.csv --intensity-kind none",
+    "survey set scan-2024 --date 2024-05-05", "survey remove scan-2024 --yes", "survey export demo-2024 -o {out}.tdb",
+    "survey import {seeds}/survey.tdb --name {new}", "load scan-2024 {seeds}/cloud.las", "run demo-2024",
+    "batch scan-2024 {seeds}/cloud.las --preview", "stop", "status demo-2024", "check",
+    "leaks demo-2024", "leaks demo-2024 -o {out}.csv", "findings list demo-2024", "findings list demo-2024 -o {out}.gpkg",
+    "findings undo 1", "learn demo-2024", "learn demo-2024 --list", "evaluate demo-2024 {seeds}/truth.geojson",
+    "spots demo-2024",
+    "members demo-2024", "spheres scan-2024 --radius 0.07", "axis demo-2024 -o {out}.csv",
+    "rings --points {seeds}/rings-points.csv --axis {seeds}/rings-axis.csv --diameter 5.8 -o {out}.csv", "rings demo-2024",
+    "profile add demo {new} {seeds}/profile.csv {stretch}", "profile list demo", "profile remove demo {new}",
+    "deviation demo-2024 -o {out}.csv", "thickness demo-2024 scan-2024", "evenness demo-2024", "compare demo-2024 scan-2024",
+    "clearance demo-2024 --gauge {seeds}/profile.csv --track single", "unroll demo-2024 {seeds}/points.csv",
+    "ground {seeds}/cloud.las -o {out}.laz", "intensity demo-2024 -o {out}.png", "image demo-2024 -o {out}",
+    "export demo-2024 -o {out}.gpkg", "export demo-2024 -o {out}.dxf", "qgis demo-2024 -o {out}.qgz",
+    "report demo-2024 -o {out}.html --from 12310 --to 12320",
+    "register scan-2024 {seeds}/points.csv --ladders {seeds}/ladders.csv --up +z --water-level 600",
+    "simulate {out}.d --length 10 --density 5", "simulate-structure {out}.d --stations 1 --angular-step 1",
+    "simulate-canal {out}.d --length 10 --laser-stations 1 --sonar-stations 1 --laser-step 1 --sonar-step 1",
 )  # fmt: skip
-"""Commands to which options with hostile values are added."""
+"""Commands to which options with hostile values are added: each verb is among them or in OF_FILES."""
+
+UNTRIED = {
+    "init": "has no options",
+    "inspect": "has no options",
+    "findings import": "what goes wrong lies in its file",
+    "survey remove-file": "has no options but the file",
+    "tunnel find-axis": "what goes wrong lies in its file",
+    "worker": "works until it is told to leave",
+    "psql": "hands its words on to another program",
+    "server start": "has no options",
+    "server status": "has no options",
+    "server stop": "has no options, and stops the tests' own server",
+}
+"""Verbs that are in none of OF_WORDS, and why."""
+
+REFUSED = (
+    "clearance", "compare", "evaluate", "findings undo", "ground", "intensity", "learn demo-2024", "members demo",
+    "profile remove", "register", "run", "spheres", "survey remove-file", "thickness", "tunnel add {new} {file}",
+    "tunnel find-axis", "tunnel remove",
+)  # fmt: skip
+"""What right commands begin with that the survey made by hand has no rows for: they are to say so in one line."""
 
 VALUES = (
     "nan", "inf", "-inf", "1e308", "-1", "0", "", "x", "1,5", "0x1F", "\udcff", "a\nb", "'; DROP TABLE tunnel.tunnel; --", "%s",
@@ -72,17 +130,25 @@ def make_case(seed: int, number: int, seeds: Path, folder: Path) -> Case:
     """Return a case, and write its file into its folder."""
     chance = random.Random(seed * 1_000_003 + number)
     names = _names(number, seeds, folder)
-    if chance.random() < 0.75:
+    if chance.random() < 0.65:
         name, command = chance.choice(OF_FILES)
-        text = Path(name).suffix not in {".las", ".laz"}
+        text = Path(name).suffix not in {".las", ".laz", ".e57", ".tdb"}
         data, wrong = mutate(chance, (seeds / name).read_bytes(), text=text)
         path = folder / name
         path.write_bytes(data)
         return Case(_words(command, file=str(path), **names), f"{name}: {wrong}", Path(name).suffix)
     words = _words(chance.choice(OF_WORDS), **names)
-    command = _command(words)
-    options = [o for o in command.params if isinstance(o, click.Option) and not o.is_flag and o.opts[0] != "--help"]
+    wrong = _hostile_option(chance, words) if chance.random() < 0.9 else _hostile_word(chance, words)
+    return Case(words, wrong, "words")
+
+
+def _hostile_option(chance: random.Random, words: list[str]) -> str:
+    """Give a hostile value to an option, or put a flag where it may not fit; return what was done."""
+    options = [o for o in command_of(words).params if isinstance(o, click.Option) and o.opts[0] != "--help"]
     option, value = chance.choice(options), chance.choice(VALUES)
+    if option.is_flag:
+        words.append(option.opts[0])
+        return option.opts[0]
     place = next((n + 1 for n, word in enumerate(words) if word in option.opts), None)
     if place is not None:
         words[place] = value
@@ -90,20 +156,32 @@ def make_case(seed: int, number: int, seeds: Path, folder: Path) -> Case:
         words += [option.opts[0], value]
     else:
         words += [option.opts[0], *chance.choices(VALUES, k=option.nargs)]
-    return Case(words, f"{option.opts[0]} {value[:20]!r}", "words")
+    return f"{option.opts[0]} {value[:20]!r}"
+
+
+def _hostile_word(chance: random.Random, words: list[str]) -> str:
+    """Put a hostile value in the place of a word that is no verb."""
+    first = len(verb_of(words).split())
+    place, value = chance.randrange(first, len(words) + 1), chance.choice(VALUES)
+    words[place : place + 1] = [value]
+    return f"word {place} {value[:20]!r}"
 
 
 def right_cases(seeds: Path, folder: Path) -> list[Case]:
-    """Return each command with the right file, to be done."""
+    """Return each command with the right file: to be done, or refused in one line where it stands in REFUSED."""
     commands = (*OF_FILES, *(("", command) for command in OF_WORDS))
     return [
-        Case(_words(command, file=str(seeds / name), **_names(10_000 + number, seeds, folder)), name, "right")
+        Case(
+            _words(command, file=str(seeds / name), **_names(number, seeds, folder)),
+            name,
+            "refused" if command.startswith(REFUSED) and "--list" not in command else "right",
+        )
         for number, (name, command) in enumerate(commands)
     ]
 
 
 def _names(number: int, seeds: Path, folder: Path) -> dict[str, str]:
-    stretch = f"--layer excavation --from {12_310 + 0.015 * number:.3f} --to {12_310.01 + 0.015 * number:.3f}"
+    stretch = "--layer excavation --from 12310 --to 12311"
     return {"new": f"n{number}", "stretch": stretch, "out": str(folder / f"out{number}"), "seeds": str(seeds)}
 
 
@@ -111,11 +189,20 @@ def _words(command: str, **names: str) -> list[str]:
     return command.format(**names).split()
 
 
-def _command(words: list[str]) -> click.Command:
-    assert words[0] in COMMANDS
-    context = click.Context(main)
-    command = main.get_command(context, words[0])
+def verb_of(words: list[str]) -> str:
+    """Words that name the verb, as ``tunnel add``."""
+    return " ".join(words[:2] if isinstance(_first(words), click.Group) else words[:1])
+
+
+def command_of(words: list[str]) -> click.Command:
+    """Return the command that words begin with."""
+    command = _first(words)
     if isinstance(command, click.Group):
-        command = command.get_command(context, words[1]) or command
-    assert command is not None
+        command = command.get_command(click.Context(main), words[1]) or command
+    return command
+
+
+def _first(words: list[str]) -> click.Command:
+    command = main.get_command(click.Context(main), words[0])
+    assert command is not None, words[0]
     return command

@@ -12,6 +12,7 @@ import importlib
 import json
 import os
 import pkgutil
+import random
 import resource
 import signal
 import sys
@@ -19,25 +20,35 @@ import tempfile
 import time
 import traceback
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import psycopg
 from click.testing import CliRunner
 from psycopg import sql
+from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
 import tunneldb
-from support.fuzz.cases import Case, make_case, right_cases
+from support.fuzz.cases import Case, make_case, right_cases, verb_of
 from tunneldb.cli.main import main
 
 PATIENCE = 30
-"""Seconds that a case may take: small files are read in one or two."""
+"""Seconds of computing that a case may take: small files are read in one or two."""
+
+WAITING = 300
+"""Seconds that it may take on a machine that others are busy on, or waiting for what never comes."""
 
 MEMORY = 4 * 1024**3
 """Bytes that a case may take beyond what the process has."""
 
 USAGE = 3
 """Lines of click's own complaint: usage, where help is, what is wrong."""
+
+NOTED = {"tunnel.run"}
+"""Tables that may change although a command is refused: the ledger notes what failed."""
+
+Rows = dict[str, tuple[object, ...]]
 
 
 @dataclass(frozen=True)
@@ -46,6 +57,7 @@ class Outcome:
 
     number: int
     command: str
+    verb: str
     wrong: str
     kind: str
     code: int | None
@@ -54,49 +66,85 @@ class Outcome:
     seconds: float
 
 
-def run_cases(seed: int, count: int, seconds: float, seeds: Path, dsn: str) -> list[Outcome]:
-    """Run cases until so many, or so many seconds, are over."""
-    done: list[Outcome] = []
+class Fresh:
+    """A copy of a database, made anew when asked, so that no case meets what one before it did."""
+
+    def __init__(self, dsn: str) -> None:
+        self._template = str(conninfo_to_dict(dsn)["dbname"])
+        self._server = make_conninfo(dsn, dbname="postgres")
+        self._name = f"{self._template}_case"
+        self.dsn = make_conninfo(dsn, dbname=self._name)
+
+    def __enter__(self) -> Fresh:
+        """Return the copy."""
+        self.renew()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Drop it."""
+        self._execute("DROP DATABASE IF EXISTS {name} WITH (FORCE)")
+
+    def renew(self) -> None:
+        """Drop the copy and make another."""
+        self._execute("DROP DATABASE IF EXISTS {name} WITH (FORCE)", "CREATE DATABASE {name} TEMPLATE {template}")
+
+    def _execute(self, *commands: str) -> None:
+        with psycopg.connect(self._server, autocommit=True) as conn:
+            for command in commands:
+                names = {"name": sql.Identifier(self._name), "template": sql.Identifier(self._template)}
+                conn.execute(sql.SQL(command).format(**{k: v for k, v in names.items() if f"{{{k}}}" in command}))
+
+
+def run_cases(seed: int, numbers: Iterable[int], seconds: float, seeds: Path, fresh: Fresh) -> list[Outcome]:
+    """Run cases until they, or so many seconds, are over; each begins with the database as it was given."""
     began = time.monotonic()
-    with psycopg.connect(dsn, autocommit=True) as conn:
-        before = _rows(conn)
-        for number in range(count):
-            if time.monotonic() - began > seconds:
-                break
-            with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
-                folder = Path(name)
-                case = make_case(seed, number, seeds, folder)
-                given = set(folder.rglob("*"))
-                start = time.monotonic()
-                code, said, fault = _run(case, folder)
-                after = _rows(conn)
-                fault = fault or _fault(code, said)
-                if not fault and code == 2 and after != before:
-                    fault = "rows changed: " + ", ".join(sorted(name for name in after if after[name] != before.get(name)))
-                left = [path.name for path in folder.rglob("*") if path not in given]
-                if not fault and code == 2 and left:
-                    fault = f"left {', '.join(left)}"
-                before = after
-                done.append(
-                    Outcome(number, " ".join(case.words), case.wrong, case.kind, code, said, fault, time.monotonic() - start)
-                )
+    before = _rows(fresh.dsn)
+    done: list[Outcome] = []
+    for number in numbers:
+        if time.monotonic() - began > seconds:
+            break
+        with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
+            done.append(_judged(number, make_case(seed, number, seeds, Path(name)), Path(name), fresh, before))
     return done
 
 
-def run_right(seeds: Path) -> list[Outcome]:
-    """Run each command with the right file: it is to be done."""
+def run_right(seed: int, most: int, seeds: Path, fresh: Fresh) -> list[Outcome]:
+    """Run each command, or the most of them, with the right file: it is to be done, or refused as it ought to be."""
+    before = _rows(fresh.dsn)
     with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
-        cases = right_cases(seeds, Path(name))
-        return [Outcome(-1, " ".join(case.words), "", case.kind, *_run(case, Path(name)), 0.0) for case in cases]
+        folder = Path(name)
+        cases = right_cases(seeds, folder)
+        chosen = random.Random(seed).sample(cases, min(most, len(cases)))
+        return [_judged(-1, case, folder, fresh, before) for case in chosen]
 
 
-def _run(case: Case, folder: Path) -> tuple[int | None, str, str]:
+def _judged(number: int, case: Case, folder: Path, fresh: Fresh, before: Rows) -> Outcome:
+    """Run a case, judge it, and put the database back if it changed."""
+    given = set(folder.rglob("*"))
+    start = time.monotonic()
+    code, said, fault = _run(case, folder, fresh.dsn)
+    took = time.monotonic() - start
+    after = _rows(fresh.dsn)
+    changed = sorted(name for name in {*before, *after} if after.get(name) != before.get(name))
+    fault = fault or _fault(code, said)
+    if not fault and code == 2 and set(changed) - NOTED:
+        fault = "rows changed: " + ", ".join(changed)
+    left = [path.name for path in folder.rglob("*") if path not in given]
+    if not fault and code == 2 and left:
+        fault = f"left {', '.join(left)}"
+    if changed or fault:
+        fresh.renew()
+    return Outcome(number, " ".join(case.words), verb_of(case.words), case.wrong, case.kind, code, said, fault, took)
+
+
+def _run(case: Case, folder: Path, dsn: str) -> tuple[int | None, str, str]:
     """Exit code, standard error and fault of a case that is run in a child."""
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
         os.close(reader)
         os.chdir(folder)
+        os.environ["TUNNELDB_DSN"] = dsn
         with os.fdopen(writer, "w") as pipe:
             json.dump(_invoke(case), pipe)
         os._exit(0)
@@ -105,14 +153,16 @@ def _run(case: Case, folder: Path) -> tuple[int | None, str, str]:
         text = pipe.read()
     _, status = os.waitpid(child, 0)
     if not text:
-        how = "too long" if os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGALRM else "died"
+        late = {signal.SIGPROF: f"computed for {PATIENCE} s", signal.SIGALRM: f"not done in {WAITING} s"}
+        how = late.get(signal.Signals(os.WTERMSIG(status)), "died") if os.WIFSIGNALED(status) else "died"
         return None, "", f"{how}: status {status}"
     code, said, fault = json.loads(text)
     return code, said, fault
 
 
 def _invoke(case: Case) -> tuple[int, str, str]:
-    signal.alarm(PATIENCE)
+    signal.setitimer(signal.ITIMER_PROF, PATIENCE)
+    signal.alarm(WAITING)
     held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (held + MEMORY, held + MEMORY))
     result = CliRunner().invoke(main, case.words)
@@ -137,46 +187,43 @@ def _fault(code: int | None, said: str) -> str:
     return "more than one line" if len(errors) > 1 or lines[-1] != errors[0] else ""
 
 
-def _rows(conn: psycopg.Connection) -> dict[str, tuple[object, ...]]:
+def _rows(dsn: str) -> Rows:
     """What any change of a table's rows changes: their number, and the transactions that made them."""
-    tables = "SELECT tablename FROM pg_tables WHERE schemaname = 'tunnel' AND tablename <> 'run'"  # which notes what failed
-    names = [name for (name,) in conn.execute(tables)]
-    one = sql.SQL("SELECT {}, count(*), sum(xmin::text::bigint), max(ctid::text) FROM tunnel.{}")
-    query = sql.SQL(" UNION ALL ").join(one.format(sql.Literal(name), sql.Identifier(name)) for name in names)
-    return {name: tuple(rest) for name, *rest in conn.execute(query).fetchall()}
+    tables = "SELECT schemaname, tablename FROM pg_tables WHERE schemaname IN ('tunnel', 'tunnel_audit', 'tunnel_queue')"
+    one = sql.SQL("SELECT {}, count(*), sum(xmin::text::bigint), max(ctid::text) FROM {}")
+    with psycopg.connect(dsn, autocommit=True) as conn:
+        names = conn.execute(tables).fetchall()
+        query = sql.SQL(" UNION ALL ").join(one.format(sql.Literal(".".join(name)), sql.Identifier(*name)) for name in names)
+        return {name: tuple(rest) for name, *rest in conn.execute(query).fetchall()}
 
 
-def table(outcomes: list[Outcome]) -> str:
-    """Outcomes by kind of file, as Markdown."""
-    lines = ["| file | cases | done | refused in one line | faults |", "|---|---|---|---|---|"]
-    kinds = Counter(one.kind for one in outcomes)
-    for kind, count in sorted(kinds.items()):
-        of = [one for one in outcomes if one.kind == kind]
+def table(outcomes: list[Outcome], by: str) -> str:
+    """Outcomes by an attribute of them, as Markdown."""
+    lines = [f"| {by} | cases | done | refused in one line | faults |", "|---|---|---|---|---|"]
+    for value, count in sorted(Counter(getattr(one, by) for one in outcomes).items()):
+        of = [one for one in outcomes if getattr(one, by) == value]
         done = sum(one.code in (0, 1) and not one.fault for one in of)
         refused = sum(one.code == 2 and not one.fault for one in of)
-        lines.append(f"| {kind} | {count} | {done} | {refused} | {sum(bool(one.fault) for one in of)} |")
+        lines.append(f"| {value} | {count} | {done} | {refused} | {sum(bool(one.fault) for one in of)} |")
     return "\n".join(lines)
 
 
 def _main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--cases", type=int, default=1000)
+    parser.add_argument("--first", type=int, default=0, help="number of the first case")
+    parser.add_argument("--right", type=int, default=1000, help="how many of the right commands are run, too")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=float("inf"))
     parser.add_argument("--seeds", type=Path, required=True)
-    parser.add_argument("--json", action="store_true")
     given = parser.parse_args()
     for module in pkgutil.walk_packages(tunneldb.__path__, "tunneldb."):  # else each child would import what it needs
         importlib.import_module(module.name)
-    outcomes = run_cases(given.seed, given.cases, given.seconds, given.seeds, os.environ["TUNNELDB_DSN"])
-    outcomes += run_right(given.seeds)
-    if given.json:
-        json.dump([asdict(one) for one in outcomes], sys.stdout)
-        return
-    print(table(outcomes))
-    for one in outcomes:
-        if one.fault:
-            print(f"{one.number}: {one.command} ({one.wrong}): {one.fault}")
+    with Fresh(os.environ["TUNNELDB_DSN"]) as fresh:
+        numbers = range(given.first, given.first + given.cases)
+        outcomes = run_right(given.seed, given.right, given.seeds, fresh)
+        outcomes += run_cases(given.seed, numbers, given.seconds, given.seeds, fresh)
+    json.dump([asdict(one) for one in outcomes], sys.stdout)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import ezdxf
 import laspy
 import numpy as np
 
+from support.e57_files import Scan, write
 from tunneldb.geometry.surface import Surface
 
 DATA = Path(__file__).parents[2] / "data"
@@ -54,6 +55,12 @@ def write_seeds(folder: Path, axis: np.ndarray, surface: Surface) -> None:
         folder / "findings.csv",
         "kind,chainage,arc,remark\nobstruction,12330.5,1.25,wet\nother,12350,-2.5,\nobstruction,12360.25,0,old",
     )
+    _write(folder / "rings.csv", "number,chainage_from,chainage_to\n1,12320,12321.5\n2,12321.5,12323")
+    _write(
+        folder / "ladders.csv",
+        "ladder,rung,height,stile_gap,diameter\n" + "\n".join(f"A,{n},{599 + 0.3 * n:.2f},0.4,0.03" for n in range(6)),
+    )
+    _write(folder / "start.csv", f"file,x,y,within\npoints.csv,{axis[5][0]:.1f},{axis[5][1]:.1f},3")
     _write(folder / "template.toml", 'client = "Owner"\nlanguage = "de"\n\n[headings]\n"Leak" = "Wasserzutritt"\n')
     for name in ("points", "axis"):
         lines = (DATA / "wriggle" / f"{name}.csv").read_text().splitlines()[: 60 if name == "points" else None]
@@ -65,6 +72,7 @@ def write_seeds(folder: Path, axis: np.ndarray, surface: Surface) -> None:
     _write(folder / "cloud.ply", _ply(points))
     _las(folder / "cloud.las", points)
     _las(folder / "cloud.laz", points)
+    _e57(folder / "cloud.e57", points)
     _drawing(folder / "axis.dxf", axis)
     _outline(folder / "profile.dxf")
     _truth(folder / "truth.geojson")
@@ -102,6 +110,11 @@ def _las(path: Path, points: np.ndarray) -> None:
     cloud.intensity = np.arange(len(points)) % 5000
     cloud.gps_time = np.linspace(0, 40, len(points))
     cloud.write(path)
+
+
+def _e57(path: Path, points: np.ndarray) -> None:
+    fields = {f"cartesian{axis}": points[:, k] - points[0, k] for k, axis in enumerate("XYZ")}
+    write(path, [Scan(fields | {"intensity": np.linspace(0, 1, len(points))}, translation=points[0].tolist())])
 
 
 def _drawing(path: Path, axis: np.ndarray) -> None:

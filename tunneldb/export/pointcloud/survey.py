@@ -85,16 +85,16 @@ def export_classified(
         If a kilometre that a file touches has no ground, or one that is out of date; if a file is gone or was changed; if
         one would be written over a file of the survey; if one cannot be written.
     """
-    every = _files(conn, survey)
+    every = survey_files(conn, survey)
     wanted = [file for file in every if set(file.kilometres) & set(kilometres)]
     targets = _targets(conn, wanted, every, folder)
-    _require_ground(conn, survey, {km for file in wanted for km in file.kilometres})
+    require_ground(conn, survey, {km for file in wanted for km in file.kilometres})
     conn.rollback()
     for number, (file, target) in enumerate(zip(wanted, targets, strict=True), start=1):
         started = perf_counter()
         source = unchanged_file(file.path, file.bytes, file.checksum)
         with snapshot(conn):
-            _require_ground(conn, survey, file.kilometres)
+            require_ground(conn, survey, file.kilometres)
             scene = load_scene(conn, survey, min(file.kilometres), max(file.kilometres))
         progress = begin(f"[{number}|{len(wanted)}] {file.name}", file.points)
         with replacing(target) as temporary:
@@ -102,7 +102,7 @@ def export_classified(
         yield Written(target, counts, perf_counter() - started)
 
 
-def _files(conn: psycopg.Connection[Any], survey: Survey) -> list[ScanFile]:
+def survey_files(conn: psycopg.Connection[Any], survey: Survey) -> list[ScanFile]:
     """Files of a survey in the order of chainage."""
     there = set(loaded_kilometres(conn, survey))
     rows = conn.execute(
@@ -120,16 +120,21 @@ def _files(conn: psycopg.Connection[Any], survey: Survey) -> list[ScanFile]:
 def _targets(conn: psycopg.Connection[Any], files: Sequence[ScanFile], every: Sequence[ScanFile], folder: Path) -> list[Path]:
     """Where the files go; those that differ in their endings alone keep them."""
     stems = Counter(Path(file.name).stem for file in every)
-    rows = conn.execute("SELECT DISTINCT path FROM tunnel.scan_file").fetchall()
-    scans = {_identity(Path(path)) for (path,) in rows} - {None}
     targets = []
     for file in files:
         stem = Path(file.name).stem
-        target = folder / f"{stem if stems[stem] == 1 else file.name}.laz"
+        targets.append(folder / f"{stem if stems[stem] == 1 else file.name}.laz")
+    require_no_scans(conn, targets)
+    return targets
+
+
+def require_no_scans(conn: psycopg.Connection[Any], targets: Sequence[Path]) -> None:
+    """Refuse to write over a scan file of any survey."""
+    rows = conn.execute("SELECT DISTINCT path FROM tunnel.scan_file").fetchall()
+    scans = {_identity(Path(path)) for (path,) in rows} - {None}
+    for target in targets:
         if _identity(target) in scans:
             raise UserError(f"{target} is a scan file that was loaded, never to be written over: choose another folder with -o")
-        targets.append(target)
-    return targets
 
 
 def _identity(path: Path) -> tuple[int, int] | None:
@@ -146,7 +151,7 @@ def same_file(one: Path, other: Path) -> bool:
     return _identity(one) is not None and _identity(one) == _identity(other)
 
 
-def _require_ground(conn: psycopg.Connection[Any], survey: Survey, kilometres: Collection[int]) -> None:
+def require_ground(conn: psycopg.Connection[Any], survey: Survey, kilometres: Collection[int]) -> None:
     """Refuse kilometres whose ground never was found, or is out of date: its models don't fit what is there now."""
     rows = conn.execute(
         "SELECT s.km, s.stage, s.done_at IS NULL, s.reason FROM tunnel_api.stage_status s"
@@ -160,10 +165,10 @@ def _require_ground(conn: psycopg.Connection[Any], survey: Survey, kilometres: C
         return
     missing = sorted({km for km, stage, never, _ in rows if never and stage == _STAGE})
     stale = sorted({km for km, *_ in rows} - set(missing))
-    parts = [f"{_kilometres(missing)} without ground" if missing else ""]
+    parts = [f"{_named_kilometres(missing)} without ground" if missing else ""]
     if stale:
         reason = next(reason for km, _, _, reason in rows if km in stale)
-        parts.append(f"{_kilometres(stale)} with one that is out of date ({reason})")
+        parts.append(f"{_named_kilometres(stale)} with one that is out of date ({reason})")
     first, last = min(missing + stale), max(missing + stale)
     stages = [stage for _, stage, _, _ in rows if stage != "load"]
     begin = stages[0] if stages else _STAGE
@@ -173,6 +178,6 @@ def _require_ground(conn: psycopg.Connection[Any], survey: Survey, kilometres: C
     )
 
 
-def _kilometres(numbers: Sequence[int]) -> str:
+def _named_kilometres(numbers: Sequence[int]) -> str:
     word = "kilometre" if len(numbers) == 1 else "kilometres"
     return f"{word} {', '.join(map(str, numbers))}"

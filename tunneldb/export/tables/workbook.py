@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -56,7 +57,9 @@ def write_workbook(path: Path, sheets: Sequence[Sheet], title: str) -> None:
                 f"{path.name}: {len(sheet.rows)} rows, and a sheet of Excel has {MOST_ROWS}: write .csv, or less of the tunnel"
             )
     options = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
-    with xlsxwriter.Workbook(str(path), options) as book:
+    # whole in memory first: on a full disk the library would leave a file half open, and complain when it is collected
+    packed = io.BytesIO()
+    with xlsxwriter.Workbook(packed, options | {"in_memory": True}) as book:
         book.set_properties({"title": title, "comments": f"tunneldb {__version__}"})
         forms = {form: book.add_format({"num_format": form}) for form in _forms(sheets)}
         head = book.add_format({"bold": True, "bottom": 1, "text_wrap": True, "valign": "top"})
@@ -64,6 +67,7 @@ def write_workbook(path: Path, sheets: Sequence[Sheet], title: str) -> None:
         moment = book.add_format({"num_format": "yyyy-mm-dd hh:mm"})
         for sheet in sheets:
             _write_sheet(book.add_worksheet(sheet.name), sheet, forms, head, plain, moment)
+    path.write_bytes(packed.getbuffer())
 
 
 def _forms(sheets: Sequence[Sheet]) -> set[str]:

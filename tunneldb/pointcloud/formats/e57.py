@@ -22,6 +22,7 @@ from pyproj.exceptions import CRSError
 
 from tunneldb.arrays import Bool, Float, UInt16
 from tunneldb.errors import UserError
+from tunneldb.pointcloud.formats.e57_xml import require_bounded_xml
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_dimension
 from tunneldb.pointcloud.formats.scans import scan_number
 from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
@@ -327,6 +328,7 @@ def open_e57(path: Path) -> Iterator[Any]:
         with path.open("rb") as file:
             if file.read(8) != b"ASTM-E57":
                 raise ValueError("it does not begin with ASTM-E57")
+        require_bounded_xml(path)
         image = libe57.ImageFile(str(path), "r")
     try:
         yield image

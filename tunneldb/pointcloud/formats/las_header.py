@@ -24,8 +24,8 @@ _WKT_FLAG = 1 << 4
 _INTERNAL_WAVEFORMS = 1 << 1
 _LASZIP = (b"laszip encoded", 22204)
 _LOOKUP = (b"LASF_Spec", 0)
-_WKT = (b"LASF_Projection", 2112)
-_EXTRA_BYTES = (b"LASF_Spec", 4)
+WKT = (b"LASF_Projection", 2112)
+EXTRA_BYTES = (b"LASF_Spec", 4)
 _EXTRA = struct.Struct("<2sBB32s4s24s24s24s24s24s32s")  # table 26: 192 bytes
 _UINT32 = 5
 _SIZE_OF = (0, 1, 1, 2, 2, 4, 4, 8, 8, 4, 8)  # bytes of the data types of extra bytes
@@ -104,6 +104,17 @@ class Head:
         """Whether packets of waveforms lie in the file itself, behind the points."""
         return bool(struct.unpack_from("<H", self.header, 6)[0] & _INTERNAL_WAVEFORMS)
 
+    @property
+    def crs(self) -> CRS | None:
+        """Coordinate system that its WKT tells; None if it has none that can be read."""
+        for record in self.records + self.extended:
+            if record.key == WKT:
+                try:
+                    return CRS.from_wkt(record.data.rstrip(b"\0").decode())
+                except (CRSError, UnicodeDecodeError):
+                    return None
+        return None
+
     def with_points(self, point_format: int, record_size: int) -> Head:
         """With points of this format and size."""
         header = bytearray(self.header)
@@ -112,13 +123,13 @@ class Head:
 
     def with_crs(self, crs: CRS | None) -> Head:
         """With the coordinate system as WKT, which formats 6 and later ask for, if it has none and one is known."""
-        has = any(record.key == _WKT for record in self.records + self.extended)
+        has = any(record.key == WKT for record in self.records + self.extended)
         text = None if has or crs is None else _wkt(crs)
         if not has and text is None:
             return self
         header = bytearray(self.header)
         header[6] |= _WKT_FLAG
-        added = () if text is None else (Record(_WKT[0], _WKT[1], b"OGC WKT", text.encode() + b"\0"),)
+        added = () if text is None else (Record(WKT[0], WKT[1], b"OGC WKT", text.encode() + b"\0"),)
         return replace(self, header=bytes(header), records=(*self.records, *added))
 
     def with_classes(self, names: Mapping[int, str]) -> Head:
@@ -142,17 +153,12 @@ class Head:
         ValueError
             If a dimension is of one of these names already; it is what the error says.
         """
-        described = b"".join(record.data for record in self.records if record.key == _EXTRA_BYTES)
+        described = b"".join(record.data for record in self.records if record.key == EXTRA_BYTES)
         entries = [_EXTRA.unpack_from(described, at) for at in range(0, len(described) - _EXTRA.size + 1, _EXTRA.size)]
         for entry in entries:
             if (name := entry[3].rstrip(b"\0").decode("latin-1")) in names:
                 raise ValueError(name)
-        # Those of 11 to 30 are two or three values of 1 to 10.
-        told = sum(
-            entry[2] if kind == 0 else _SIZE_OF[(kind - 1) % 10 + 1] * ((kind - 1) // 10 + 1)
-            for entry in entries
-            for kind in (entry[1],)
-        )
+        told = sum(size_of(entry[1], entry[2]) for entry in entries)
         blank = [b""] * 5
         extra = self.record_size - before
         unsaid = b"".join(
@@ -162,8 +168,8 @@ class Head:
         added = b"".join(
             _EXTRA.pack(b"", _UINT32, 0, name.encode(), b"", *blank, text.encode()) for name, text in names.items()
         )
-        kept = tuple(record for record in self.records if record.key != _EXTRA_BYTES)
-        record = Record(_EXTRA_BYTES[0], _EXTRA_BYTES[1], b"Extra bytes", described + unsaid + added)
+        kept = tuple(record for record in self.records if record.key != EXTRA_BYTES)
+        record = Record(EXTRA_BYTES[0], EXTRA_BYTES[1], b"Extra bytes", described + unsaid + added)
         return replace(self, records=(*kept, record)).with_points(self.point_format, self.record_size + 4 * len(names))
 
     def before_points(self, laszip: bytes) -> bytes:
@@ -178,6 +184,12 @@ class Head:
     def place_of_extended(self, place: int) -> tuple[int, bytes]:
         """Where in the header the place and number of the extended records stand, and what is to stand there."""
         return 235, struct.pack("<QI", place if self.extended else 0, len(self.extended))
+
+
+def size_of(kind: int, options: int) -> int:
+    """Bytes of a dimension of extra bytes, by its type and options."""
+    # Types 11 to 30 are two or three values of 1 to 10.
+    return options if kind == 0 else _SIZE_OF[(kind - 1) % 10 + 1] * ((kind - 1) // 10 + 1)
 
 
 def read_head(path: Path) -> Head:

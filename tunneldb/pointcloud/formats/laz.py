@@ -59,12 +59,24 @@ def writing(path: Path, head: Head) -> Iterator[LazWriter]:
     OSError
         If the disk is full, or fails.
     """
-    with path.open("xb") as plain:
-        file = _Told(plain)
-        try:
-            yield LazWriter(file, head)  # type: ignore[arg-type]  # all that is needed of a file
-        except lazrs.LazrsError as error:
-            raise file.error or error from error
+    with path.open("xb") as plain, told(plain) as file:
+        yield LazWriter(file, head)
+
+
+@contextmanager
+def told(plain: BinaryIO) -> Iterator[BinaryIO]:
+    """Give a file to compress into; what the block raises is why it could not be written to.
+
+    Raises
+    ------
+    OSError
+        If the disk is full, or fails.
+    """
+    file = _Told(plain)
+    try:
+        yield file  # type: ignore[misc]  # all that is needed of a file
+    except lazrs.LazrsError as error:
+        raise file.error or error from error
 
 
 class _Told:
@@ -73,7 +85,7 @@ class _Told:
     def __init__(self, file: BinaryIO) -> None:
         self.file = file
         self.error: OSError | None = None
-        self.seek, self.tell = file.seek, file.tell
+        self.seek, self.tell, self.read = file.seek, file.tell, file.read
 
     def write(self, data: bytes) -> int:
         try:

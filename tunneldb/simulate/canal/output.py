@@ -13,6 +13,7 @@ import numpy as np
 
 import tunneldb
 from tunneldb.errors import UserError
+from tunneldb.files import made_folder, room_told
 from tunneldb.simulate.canal.generate import CanalScene
 from tunneldb.simulate.canal.layout import TrueLadder
 from tunneldb.simulate.canal.section import KINDS
@@ -42,8 +43,11 @@ def write(scene: CanalScene, folder: Path) -> CanalFiles:
     """
     name = scene.parameters.name
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(dir=folder, prefix=".simulate-") as scratch:
+        with (
+            made_folder(folder),
+            TemporaryDirectory(dir=folder, prefix=".simulate-") as scratch,
+            room_told(Path(scratch)),
+        ):
             _write(scene, Path(scratch), name)
             for path in sorted(Path(scratch).iterdir()):
                 path.replace(folder / path.name)

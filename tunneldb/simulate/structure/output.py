@@ -16,6 +16,7 @@ from shapely.geometry import Polygon
 import tunneldb
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
+from tunneldb.files import made_folder, room_told
 from tunneldb.simulate.output import CREATED, SCALE
 from tunneldb.simulate.radiometry import reference_curve
 from tunneldb.simulate.structure.anomalies import Anomaly
@@ -81,8 +82,11 @@ def write_structure(scan: StructureScan, folder: Path, progress: Callable[[int],
     """
     name = scan.parameters.name
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(dir=folder, prefix=".simulate-") as scratch:
+        with (
+            made_folder(folder),
+            TemporaryDirectory(dir=folder, prefix=".simulate-") as scratch,
+            room_told(Path(scratch)),
+        ):
             made = _write(scan, Path(scratch), name, progress)
             return made.moved(folder)
     except OSError as error:

@@ -1,0 +1,100 @@
+"""Files that would take forever, or all memory, by how they are nested: E57's XML, IFC, DXF. LandXML: tests/alignment."""
+
+from __future__ import annotations
+
+import struct
+import time
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+import pytest
+from support.e57_files import Scan, write
+
+from tunneldb.alignment.drawing import read_dxf
+from tunneldb.alignment.ifc import Ifc
+from tunneldb.errors import UserError
+from tunneldb.pointcloud.formats.e57_xml import require_bounded_xml
+from tunneldb.pointcloud.reader import read_header
+
+DATA = Path(__file__).parents[1] / "data"
+LAUGHS = '<!ENTITY l0 "lol">' + "".join(f'<!ENTITY l{n} "{f"&l{n - 1};" * 10}">' for n in range(1, 10))
+XML = {
+    "document type": (f"<!DOCTYPE e57Root [{LAUGHS}]>" + "<e57Root>&l9;</e57Root>", "declares a document type"),
+    "external entity": (
+        '<!DOCTYPE e57Root [<!ENTITY a SYSTEM "file:///etc/passwd">]><e57Root>&a;</e57Root>',
+        "declares a document type",
+    ),
+    "deep": ("<e57Root>" + '<a type="Structure">' * 100_000, "nested more than 50 deep"),
+    "wide": ("<e57Root>" + "".join(f'<a{n} type="Integer"/>' for n in range(100_000)), "more than 1000 children"),
+}
+
+
+def _e57(path: Path, xml: str) -> Path:
+    """An E57 file of nothing but XML; its pages have no checksums, which nobody comes to look at."""
+    data = xml.encode()
+    pages = -(-(48 + len(data)) // 1020)
+    head = struct.pack("<8sIIQQQQ", b"ASTM-E57", 1, 0, pages * 1024, 48, len(data), 1024)
+    whole = (head + data).ljust(pages * 1020, b"\0")
+    path.write_bytes(b"".join(whole[n * 1020 : (n + 1) * 1020] + b"\0" * 4 for n in range(pages)))
+    return path
+
+
+@pytest.mark.parametrize("attack", XML)
+def test_the_xml_of_an_e57_is_bounded(tmp_path: Path, attack: str) -> None:
+    xml, said = XML[attack]
+    path = _e57(tmp_path / "a.e57", xml)
+    began = time.process_time()
+    with pytest.raises(UserError, match=rf"a\.e57: truncated, corrupt or not an E57 file: .*{said}"):
+        read_header(path)
+    assert time.process_time() - began < 2
+
+
+def test_a_right_e57_is_within_bounds(tmp_path: Path) -> None:
+    points = {f"cartesian{axis}": np.arange(3.0) for axis in "XYZ"}
+    path = write(tmp_path / "a.e57", [Scan(points, translation=(1, 2, 3), guid=f"{{{n}}}") for n in range(40)])
+    require_bounded_xml(path)
+    assert read_header(path).points == 120
+
+
+def test_blocks_of_a_drawing_are_not_multiplied(tmp_path: Path) -> None:
+    """Ten blocks, each of which holds the one before ten times: 10¹⁰ lines, none of them in the drawing's own space."""
+    document = ezdxf.new(units=6)
+    document.blocks.new("B0").add_line((0, 0), (1, 1))
+    for n in range(1, 11):
+        block = document.blocks.new(f"B{n}")
+        for _ in range(10):
+            block.add_blockref(f"B{n - 1}", (0, 0))
+    document.blocks.get("B0").add_blockref("B10", (0, 0))  # and without end
+    document.modelspace().add_blockref("B10", (0, 0))
+    document.modelspace().add_polyline3d([(0, 0, 0), (100, 0, 1)])
+    path = tmp_path / "axis.dxf"
+    document.saveas(path)
+    began = time.process_time()
+    assert len(read_dxf(path, None, 1.0).lines) == 1
+    assert time.process_time() - began < 5
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        (r"IFCCARTESIANPOINT((", r"IFCCARTESIANPOINT((" + "(" * 200_000),
+        (r"IFCLOCALPLACEMENT($", r"IFCLOCALPLACEMENT(#{own}"),
+    ],
+    ids=["lists in lists", "a placement in itself"],
+)
+def test_ifc_that_is_nested_without_end(tmp_path: Path, wrong: str, right: str) -> None:
+    pytest.importorskip("ifcopenshell")
+    lines = (DATA / "indot-twin-branch.ifc").read_text(encoding="latin-1").splitlines()
+    number = next(n for n, line in enumerate(lines) if wrong in line)
+    lines[number] = lines[number].replace(wrong, right.replace("{own}", lines[number].split("=")[0].strip().lstrip("#")))
+    path = tmp_path / "axis.ifc"
+    path.write_text("\n".join(lines), encoding="latin-1")
+    began = time.process_time()
+    said = ""
+    try:
+        Ifc(path).design(1, 1)
+    except UserError as error:
+        said = str(error)
+    assert "\n" not in said
+    assert time.process_time() - began < 10

@@ -1,0 +1,100 @@
+"""`tunneldb prune`."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Sequence
+
+import click
+import psycopg
+from rich.filesize import decimal
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.progress import bar, step
+from tunneldb.cli.survey import DAY
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect
+from tunneldb.errors import UserError
+from tunneldb.store.prune import Superseded, busy, superseded
+from tunneldb.store.prune import prune as delete
+from tunneldb.store.survey import get_survey
+
+
+@verb(
+    examples=[
+        "tunneldb prune",
+        "tunneldb prune ringo-2024 --before 2024-01-01",
+        "tunneldb prune --yes",
+    ]
+)
+@click.argument("name", required=False, metavar="[SURVEY]")
+@click.option("--before", type=DAY, metavar="YYYY-MM-DD", help="Only what began before that day.")
+@click.option("--yes", is_flag=True, help="Delete it; without, it is only shown.")
+@click.pass_obj
+def prune(settings: Settings, name: str | None, before: dt.datetime | None, yes: bool) -> None:
+    """Show which old runs of the ledger and finished jobs of the queue nothing goes by any more; with --yes delete them.
+
+    Of all surveys, or of SURVEY. Of each stage of each kilometre, and each layer, outline or pair of surveys, stay the last
+    attempt, the last success and the success with the highest number, what these were made from, and every import. So nothing
+    is stale afterwards that was not before. Results, findings and the audit are not touched. Surveys on which a
+    batch is at work are left out, and told. The room is free for new rows after tunneldb vacuum.
+    """
+    with connect(settings.dsn) as connection:
+        survey = None if name is None else get_survey(connection, name, site=True)
+        day = None if before is None else before.date()
+        found = superseded(connection, survey, day)
+        working = {s for s in {row.survey_id for row in found} if s is not None and busy(connection, s)}
+        connection.rollback()
+        left_out = sorted({row.survey or "" for row in found if row.survey_id in working})
+        if survey is not None and left_out:
+            raise UserError(f"a batch is at work on {name}: wait until it has finished (tunneldb status {name})")
+        found = [row for row in found if row.survey_id not in working]
+        _show(found)
+        runs, jobs = _delete(connection, found, day) if yes else (0, 0)
+    freed = sum(row.bytes for row in found)
+    tell(
+        superseded=found,
+        rows=sum(row.rows for row in found),
+        bytes=freed,
+        left_out=left_out,
+        deleted={"runs": runs, "jobs": jobs},
+    )
+    for other in left_out:
+        click.echo(f"{other}: left out, a batch is at work on it", err=True)
+    if not found:
+        click.echo("nothing to prune", err=True)
+    elif yes:
+        click.echo(f"deleted: {runs} runs and {jobs} jobs; for the room: tunneldb vacuum --yes", err=True)
+    else:
+        again = " ".join(
+            ["tunneldb prune", *([name] if name else []), *([f"--before {before:%Y-%m-%d}"] if before else []), "--yes"]
+        )
+        click.echo(f"{sum(row.rows for row in found)} rows, {decimal(freed)}, would go: {again}", err=True)
+
+
+def _delete(connection: psycopg.Connection, found: Sequence[Superseded], before: dt.date | None) -> tuple[int, int]:
+    """Delete survey by survey, each in a transaction, and return how many runs and jobs went."""
+    surveys = dict.fromkeys(row.survey_id for row in found)
+    runs = jobs = 0
+    with bar("surveys") as progress:
+        advance = step(progress)("pruning", len(surveys))
+        for survey_id in surveys:
+            of_survey = delete(connection, survey_id, before)
+            runs, jobs = runs + of_survey[0], jobs + of_survey[1]
+            advance(1)
+    return runs, jobs
+
+
+def _show(found: Sequence[Superseded]) -> None:
+    if not found:
+        return
+    rows = [
+        (
+            row.survey or "(surveys that are gone)", row.stage or row.what, row.count, decimal(row.bytes),
+            "" if row.since is None else f"{row.since.astimezone():%Y-%m-%d}",
+            "" if row.until is None else f"{row.until.astimezone():%Y-%m-%d}",
+        )
+        for row in found
+    ]  # fmt: skip
+    print_table(["survey", "runs of", "count", "bytes", "from", "to"], rows, right=(2, 3))

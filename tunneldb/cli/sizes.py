@@ -1,0 +1,61 @@
+"""`tunneldb survey sizes`."""
+
+from __future__ import annotations
+
+import click
+from rich.filesize import decimal
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.output import records, tell, verb
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect
+from tunneldb.store.survey import get_survey
+
+KINDS = ("points", "images", "sections", "results", "runs", "inputs")
+
+
+@verb("sizes", examples=["tunneldb survey sizes", "tunneldb survey sizes ringo-2024 --json"])
+@click.argument("name", required=False, metavar="[SURVEY]")
+@click.pass_obj
+def sizes(settings: Settings, name: str | None) -> None:
+    """Tell what each survey, or SURVEY by itself, takes of the database.
+
+    Points and images have tables of each survey. What stands behind a ≈ is the survey's share of tables that all have in
+    common, by the statistics of the last ANALYZE; nothing is counted for it. inputs: files, scanner positions, what is wanted.
+    """
+    with connect(settings.dsn) as connection:
+        survey_id = None if name is None else get_survey(connection, name, site=True).id
+        rows = connection.execute(
+            "SELECT s.name, z.kind, z.rows, z.bytes, z.estimated FROM tunnel_api.survey_size z"
+            " LEFT JOIN tunnel.survey s ON s.id = z.survey_id WHERE %(survey)s::int IS NULL OR z.survey_id = %(survey)s"
+            " ORDER BY s.name NULLS LAST, z.id",
+            {"survey": survey_id},
+        ).fetchall()
+        database = connection.execute("SELECT pg_database_size(current_database())").fetchone()
+    assert database is not None
+    names = ("survey", "kind", "rows", "bytes", "estimated")
+    tell(sizes=records(names, rows), database_bytes=database[0])
+    table: dict[str | None, dict[str, tuple[int, bool]]] = {}
+    for survey, kind, _, size, estimated in rows:
+        there, about = table.setdefault(survey, {}).get(kind, (0, False))
+        table[survey][kind] = (there + size, about or estimated)
+    print_table(
+        ["survey", *KINDS, "total"],
+        [
+            ["(not told apart)" if survey is None else survey, *(_cell(found.get(kind)) for kind in KINDS), _total(found)]
+            for survey, found in table.items()
+        ],
+        right=range(1, len(KINDS) + 2),
+    )
+    if name is None:
+        click.echo(f"database: {decimal(database[0])}")
+    if None in table:
+        click.echo("not told apart: tables that were never analyzed; tunneldb vacuum --yes analyzes them", err=True)
+
+
+def _cell(found: tuple[int, bool] | None) -> str:
+    return "" if found is None else ("≈ " if found[1] and found[0] else "") + decimal(found[0])
+
+
+def _total(found: dict[str, tuple[int, bool]]) -> str:
+    return _cell((sum(size for size, _ in found.values()), any(about for _, about in found.values())))

@@ -1,0 +1,69 @@
+"""`tunneldb vacuum`."""
+
+from __future__ import annotations
+
+import click
+from rich.filesize import decimal
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.output import tell, verb
+from tunneldb.cli.progress import bar, step
+from tunneldb.cli.tables import print_table
+from tunneldb.database import connect
+
+SHOWN = 20
+"""Tables that are listed; the rest, which take less, are summed: there is one of each kilometre."""
+
+
+@verb(examples=["tunneldb vacuum", "tunneldb vacuum --yes"])
+@click.option("--yes", is_flag=True, help="Do it; without, it is only shown.")
+@click.pass_obj
+def vacuum(settings: Settings, yes: bool) -> None:
+    """Show what deleted and replaced rows take, of the schema's tables; with --yes VACUUM (ANALYZE) those.
+
+    What is freed is used for new rows; PostgreSQL gives back to the disk only what lies at a table's end. The numbers are
+    estimates of the server's statistics. Points of a kilometre that is replaced, and surveys that are removed, leave nothing.
+    Tables that somebody is changing at the moment are left out, and told. For operators.
+    """
+    from tunneldb.database.vacuum import tables_to_vacuum
+    from tunneldb.database.vacuum import vacuum as run
+
+    with connect(settings.dsn) as connection:
+        tables = tables_to_vacuum(connection)
+        connection.rollback()
+        _show([(f"{t.schema}.{t.table}", t.dead, t.dead_bytes, t.bytes, t.analyzed) for t in tables])
+        busy = []
+        if yes:
+            with bar("bytes") as progress:
+                busy = run(connection, tables, step(progress))
+    others = [f"{t.schema}.{t.table}" for t in tables if not t.allowed]
+    waiting = [f"{t.schema}.{t.table}" for t in busy]
+    freed = sum(t.dead_bytes for t in tables)
+    tell(tables=tables, dead=sum(t.dead for t in tables), dead_bytes=freed, done=yes, locked=waiting, not_owned=others)
+    if not tables:
+        click.echo("nothing to vacuum", err=True)
+    elif not yes:
+        click.echo(
+            f"{sum(t.dead for t in tables)} dead rows, {decimal(freed)}, in {len(tables)} tables: tunneldb vacuum --yes",
+            err=True,
+        )
+    else:
+        click.echo(f"vacuumed {len(tables) - len(others) - len(busy)} tables", err=True)
+    if waiting:
+        click.echo(
+            f"left out, for others are at work on them: {', '.join(waiting)}; again later: tunneldb vacuum --yes", err=True
+        )
+    if others:
+        click.echo(f"{len(others)} tables are not yours to vacuum, as {others[0]}: ask their owner or the database's", err=True)
+
+
+def _show(tables: list[tuple[str, int, int, int, bool]]) -> None:
+    if not tables:
+        return
+    rows = [
+        (name, dead, decimal(gone), decimal(size), "" if known else "never") for name, dead, gone, size, known in tables[:SHOWN]
+    ]
+    if rest := tables[SHOWN:]:
+        dead, gone, size = (sum(column) for column in zip(*((row[1], row[2], row[3]) for row in rest), strict=True))
+        rows.append((f"{len(rest)} others", dead, decimal(gone), decimal(size), ""))
+    print_table(["table", "dead rows", "in them", "of", "analyzed"], rows, right=(1, 2, 3))

@@ -1,0 +1,111 @@
+"""Room that deleted and replaced rows take until a VACUUM, and the VACUUM."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import psycopg
+from psycopg import sql
+from psycopg.rows import class_row
+
+from tunneldb.errors import UserError
+
+_MAINTAIN = 170000  # version of PostgreSQL from which on somebody else than the owner may be given the right
+
+
+@dataclass(frozen=True)
+class DeadRows:
+    """A table with rows that nobody can see any more, or without statistics.
+
+    Attributes
+    ----------
+    schema, table : str
+    live, dead : int
+        Rows, as the server's statistics have them; dead ones with those of long values.
+    dead_bytes : int
+        What the dead rows take, at the mean length of the table's rows.
+    bytes : int
+        The whole table on disk, with indexes and long values.
+    analyzed : bool
+        Whether it has statistics for the planner.
+    allowed : bool
+        Whether who is connected may vacuum it.
+    """
+
+    schema: str
+    table: str
+    live: int
+    dead: int
+    dead_bytes: int
+    bytes: int
+    analyzed: bool
+    allowed: bool
+
+
+def tables_to_vacuum(conn: psycopg.Connection[Any]) -> list[DeadRows]:
+    """Tables of the schemas with dead rows, or never analyzed though not empty; those that take most first."""
+    maintain = " OR has_table_privilege(c.oid, 'MAINTAIN')" if conn.info.server_version >= _MAINTAIN else ""
+    query = sql.SQL(
+        """
+        SELECT n.nspname AS schema, c.relname AS table, s.live, s.dead + s.dead_long AS dead,
+               (pg_relation_size(c.oid) * (s.dead / greatest(s.live + s.dead, 1)::float8)
+                + CASE WHEN s.dead_long > 0
+                       THEN pg_relation_size(c.reltoastrelid) * (s.dead_long / (s.live_long + s.dead_long)::float8)
+                       ELSE 0 END)::bigint AS dead_bytes,
+               pg_total_relation_size(c.oid) AS bytes, c.reltuples >= 0 AS analyzed,
+               pg_has_role(c.relowner, 'USAGE') OR pg_has_role(d.datdba, 'USAGE'){maintain} AS allowed
+          FROM pg_class c
+          JOIN pg_namespace n ON n.oid = c.relnamespace
+          JOIN pg_database d ON d.datname = current_database()
+         CROSS JOIN LATERAL (
+                SELECT pg_stat_get_live_tuples(c.oid) AS live, pg_stat_get_dead_tuples(c.oid) AS dead,
+                       coalesce(pg_stat_get_live_tuples(nullif(c.reltoastrelid, 0)), 0) AS live_long,
+                       coalesce(pg_stat_get_dead_tuples(nullif(c.reltoastrelid, 0)), 0) AS dead_long) s
+         WHERE n.nspname IN ('tunnel', 'tunnel_queue') AND c.relkind = 'r' AND c.relpersistence = 'p'
+           AND (s.dead + s.dead_long > 0 OR c.reltuples < 0 AND pg_relation_size(c.oid) > 0)
+         ORDER BY dead_bytes DESC, n.nspname, c.relname
+        """
+    ).format(maintain=sql.SQL(maintain))
+    with conn.cursor(row_factory=class_row(DeadRows)) as cursor:
+        return cursor.execute(query).fetchall()
+
+
+def vacuum(
+    conn: psycopg.Connection[Any], tables: Sequence[DeadRows], begin: Callable[[str, float | None], Callable[[float], None]]
+) -> list[DeadRows]:
+    """VACUUM (ANALYZE) tables one by one; return those that others had locked, which are left as they are.
+
+    Parameters
+    ----------
+    conn : Connection
+        Idle; VACUUM runs in no transaction, so the connection commits each by itself from now on.
+    tables : sequence of DeadRows
+        Those that are not allowed are left out.
+    begin : callable
+        Takes a text and the bytes of all tables, and returns what is given the bytes of each when it is done.
+
+    Raises
+    ------
+    UserError
+        If none of them may be vacuumed.
+    """
+    own = [table for table in tables if table.allowed]
+    if tables and not own:
+        raise UserError(
+            f"{conn.info.user} owns none of the {len(tables)} tables, and only owners may vacuum: ask the database's owner, or"
+            " for the role tunnel_operator"
+        )
+    conn.autocommit = True
+    said: list[str] = []
+    skipped = []
+    conn.add_notice_handler(lambda notice: said.append(notice.message_primary or ""))
+    advance = begin("vacuum", float(sum(table.bytes for table in own)))
+    for table in own:
+        said.clear()
+        conn.execute(sql.SQL("VACUUM (ANALYZE, SKIP_LOCKED) {}").format(sql.Identifier(table.schema, table.table)))
+        if any(text.startswith("skipping") for text in said):
+            skipped.append(table)
+        advance(float(table.bytes))
+    return skipped

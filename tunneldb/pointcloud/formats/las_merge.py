@@ -1,0 +1,175 @@
+"""Points of several LAS files in one: a point format, scales and extra bytes that hold what all of them do.
+
+Source: ASPRS LAS 1.4 R15, tables 3 (header), 15 to 17 (formats 6 to 8), 26 (extra bytes).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tunneldb.arrays import Float, UInt8
+from tunneldb.pointcloud.formats.las_header import EXTRA_BYTES, WKT, Head, Record, size_of
+from tunneldb.pointcloud.formats.las_records import coordinates, fields, record_size
+
+_ENTRY = 192  # bytes that describe a dimension of extra bytes
+_NAME = slice(4, 36)
+_HAS_LIMITS = 0b110
+_GEOTIFF = (34735, 34736, 34737)  # what a coordinate system was said by before WKT
+_STANDARD_TIME = 1
+
+
+@dataclass(frozen=True)
+class Placement:
+    """How the points of one of the files become those of the whole.
+
+    Attributes
+    ----------
+    source, target : Head
+    extras : tuple of (int, int, int)
+        Where in a record each dimension of extra bytes lies in the file, and in the whole, and how many bytes it has.
+    """
+
+    source: Head
+    target: Head
+    extras: tuple[tuple[int, int, int], ...]
+
+    def records(self, records: UInt8) -> UInt8:
+        """Bring records (n, size) of the file into the form of the whole; the same array where that is their own.
+
+        Coordinates move by half a step at most, and not at all where scales and offsets are those of the whole.
+
+        Raises
+        ------
+        ValueError
+            If a coordinate is too far from the offsets of the whole.
+        """
+        if self._keeps_coordinates and self.source.point_format == self.target.point_format and self._keeps_extras:
+            return records
+        out = np.zeros((len(records), self.target.record_size), np.uint8)
+        before, after = fields(records, self.source.point_format), fields(out, self.target.point_format)
+        for name in before.dtype.names or ():
+            after[name] = before[name]
+        for place, target, size in self.extras:
+            out[:, target : target + size] = records[:, place : place + size]
+        if not self._keeps_coordinates:
+            stored = self._stored(coordinates(records, self.source.scales, self.source.offsets))
+            for column, axis in enumerate("XYZ"):
+                after[axis] = stored[:, column]
+        return out
+
+    def coordinates(self, xyz: Float) -> Float:
+        """Coordinates (n, 3) of the file as the whole holds them, m.
+
+        Raises
+        ------
+        ValueError
+            As of `records`.
+        """
+        if self._keeps_coordinates:
+            return xyz
+        return self._stored(xyz) * np.array(self.target.scales) + np.array(self.target.offsets)
+
+    @property
+    def _keeps_coordinates(self) -> bool:
+        return (self.source.scales, self.source.offsets) == (self.target.scales, self.target.offsets)
+
+    @property
+    def _keeps_extras(self) -> bool:
+        same = all(place == target for place, target, _ in self.extras)
+        return same and self.source.record_size == self.target.record_size
+
+    def _stored(self, xyz: Float) -> Float:
+        stored = np.rint((xyz - np.array(self.target.offsets)) / np.array(self.target.scales))
+        if len(stored) and np.abs(stored).max() >= 2**31:
+            raise ValueError("its points lie too far from those of the other files for the digits they are given in")
+        return stored
+
+
+def merge_heads(heads: Sequence[Head]) -> tuple[Head, list[Placement]]:
+    """Find what holds the points of all files, whose formats are 6, 7 or 8.
+
+    Header and coordinate system are those of the first file, scales the finest; dimensions of extra bytes are the same where
+    name, type, scale and offset are, and get a number after their names where only the names are; other records are kept once.
+
+    Raises
+    ------
+    ValueError
+        If the files count GPS time in different ways.
+    """
+    first = heads[0]
+    if len({head.header[6] & _STANDARD_TIME for head in heads}) > 1:
+        raise ValueError("some of its files count GPS time by weeks, others don't")
+    records: list[Record] = []
+    for head in heads:
+        for record in (*head.records, *head.extended):
+            same = (kept.key == record.key and (record.key == WKT or kept.data == record.data) for kept in records)
+            if record.key != EXTRA_BYTES and not _is_geotiff(record, head) and not any(same):
+                records.append(record)
+    point_format = max(head.point_format for head in heads)
+    entries: list[bytes] = []
+    placements = []
+    size = record_size(point_format)
+    described: dict[bytes, int] = {}
+    for head in heads:
+        extras = []
+        for entry, place, length in _dimensions(head):
+            key = entry if len(heads) == 1 else _without_limits(entry)
+            if key not in described:
+                described[key] = size
+                entries.append(_renamed(key, [other[_NAME] for other in entries]))
+                size += length
+            extras.append((place, described[key], length))
+        placements.append(tuple(extras))
+    if entries:
+        records.append(Record(EXTRA_BYTES[0], EXTRA_BYTES[1], b"Extra bytes", b"".join(entries)))
+    header = bytearray(first.header)
+    struct.pack_into("<3d", header, 131, *np.min([head.scales for head in heads], axis=0))
+    small = tuple(record for record in records if len(record.data) < 2**16)
+    large = tuple(record for record in records if len(record.data) >= 2**16)
+    merged = replace(first, header=bytes(header), records=small, padding=b"", extended=large)
+    merged = merged.with_points(point_format, size)
+    return merged, [Placement(head, merged, extras) for head, extras in zip(heads, placements, strict=True)]
+
+
+def _is_geotiff(record: Record, head: Head) -> bool:
+    """Whether a record tells the coordinate system that a record of WKT of the same file tells, too."""
+    if record.key[0] != WKT[0] or record.number not in _GEOTIFF:
+        return False
+    return any(other.key == WKT for other in (*head.records, *head.extended))
+
+
+def _dimensions(head: Head) -> list[tuple[bytes, int, int]]:
+    """Description, place in a record, and bytes of each dimension of extra bytes; those that are not described under names."""
+    data = b"".join(record.data for record in (*head.records, *head.extended) if record.key == EXTRA_BYTES)
+    place, found = record_size(head.point_format), []
+    for at in range(0, len(data) - _ENTRY + 1, _ENTRY):
+        length = size_of(data[at + 2], data[at + 3])
+        if place + length > head.record_size:
+            break
+        found.append((data[at : at + _ENTRY], place, length))
+        place += length
+    while place < head.record_size:
+        length = min(head.record_size - place, 255)
+        entry = struct.pack("<2sBB32s156s", b"", 0, length, f"unsaid{place}".encode(), b"")
+        found.append((entry, place, length))
+        place += length
+    return found
+
+
+def _without_limits(entry: bytes) -> bytes:
+    if entry[2] == 0:
+        return entry
+    return entry[:3] + bytes([entry[3] & ~_HAS_LIMITS]) + entry[4:64] + bytes(48) + entry[112:]
+
+
+def _renamed(entry: bytes, taken: Sequence[bytes]) -> bytes:
+    name, number = entry[_NAME], 1
+    while name in taken:
+        number += 1
+        plain = entry[_NAME].rstrip(b"\0")[:29]
+        name = (plain + f"_{number}".encode()).ljust(32, b"\0")
+    return entry[:4] + name + entry[36:]
