@@ -130,3 +130,17 @@ def test_a_report_runs_nothing_of_theirs(hostile: str, tmp_path: Path) -> None:
     assert "49" not in re.findall(r"\{\{.*?\}\}", text)
     assert "<script>document" not in text
     assert "<img src=x" not in text
+
+
+def test_a_shape_nested_without_end_is_refused(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    """GEOS goes down with the program when it reads 100,000 collections in each other; 6000 are what a cell of CSV holds."""
+    path = tmp_path / "deep.csv"
+    deep = "GEOMETRYCOLLECTION(" * 6000 + "POINT(12330 1)" + ")" * 6000
+    path.write_text(f'kind,wkt\ncrack,"{deep}"\ncrack,"LINESTRING(12330 1, 12331 1)"\n')
+    result = CliRunner().invoke(main, ["findings", "import", example, str(path)])
+    assert result.exit_code == 2
+    assert "row 2: wkt is nested more than 20 deep" in result.stderr
+    template = tmp_path / "deep.toml"
+    template.write_text("client = " + "[" * 100_000)
+    result = CliRunner().invoke(main, ["report", example, "--template", str(template), "-o", str(tmp_path / "a.html")])
+    assert (result.exit_code, result.stderr) == (2, f"tunneldb: {template}: its lists are nested too deep\n")
