@@ -18,7 +18,19 @@ class DatabaseError(Exception):
 
 
 class ConnectionLostError(DatabaseError):
-    """The server cannot be reached; what was asked of it is not done."""
+    """The server cannot be reached; what was asked of it is not done.
+
+    Parameters
+    ----------
+    said : str
+        What that means to the user.
+    reason : str
+        What the server or QGIS says of it.
+    """
+
+    def __init__(self, said: str, reason: str) -> None:
+        super().__init__(said)
+        self.reason = reason
 
 
 class ChangedMeanwhileError(DatabaseError):
@@ -56,7 +68,10 @@ class Database:
         self.connection = connection
         self._uri = _uri(connection)
         self._server = QgsProviderRegistry.instance().providerMetadata("postgres").createConnection(self._uri.uri(False), {})
-        ((self.person, self.may_review, self.may_undo),) = self.rows(sql.PERSON)
+        try:
+            ((self.person, self.may_review, self.may_undo),) = self.rows(sql.PERSON)
+        except ConnectionLostError as error:
+            raise DatabaseError(f"{error.reason}: is the server there, and does it let you in?") from None
 
     def rows(self, query: str) -> List[List[Any]]:
         """Return the rows of a query of :mod:`.sql`, with None for NULL.
@@ -67,7 +82,7 @@ class Database:
             rows = self._server.executeSql(query)
         except (QgsProviderConnectionException, QgsException) as error:  # the second where it cannot connect
             if sql.is_lost(str(error)):
-                raise ConnectionLostError(LOST) from None
+                raise ConnectionLostError(LOST, sql.error_line(str(error))) from None
             raise DatabaseError(_explained(sql.error_line(str(error)))) from None
         return [[_plain(value) for value in row] for row in rows]
 
@@ -95,8 +110,8 @@ class Database:
             if self.rows(sql.review(finding_id, seen, values)):
                 return
             rows = self.rows(sql.facts(finding_id))
-        except ConnectionLostError:
-            raise ConnectionLostError(NOT_WRITTEN) from None
+        except ConnectionLostError as error:
+            raise ConnectionLostError(NOT_WRITTEN, error.reason) from None
         if not rows:
             raise DatabaseError(f"finding {finding_id} is gone")
         now = sql.told(rows[0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Callable, Dict, Iterable, List
 
 from qgis.gui import QgsMapCanvas
-from qgis.PyQt.QtCore import Qt, pyqtSignal
+from qgis.PyQt.QtCore import Qt, QTimer, pyqtSignal
 from qgis.PyQt.QtGui import QKeySequence
 from qgis.PyQt.QtWidgets import QCheckBox, QDockWidget, QHBoxLayout, QLabel, QProgressBar, QShortcut, QVBoxLayout, QWidget
 
@@ -24,6 +24,9 @@ AHEAD = 2
 """Findings whose pictures are drawn before they are asked for."""
 
 NO_IMAGE = "No image: open the project of the survey, or name a folder of images in Connect."
+
+LINGER = 300
+"""Milliseconds that one stays at a finding before the map follows: it takes longer to draw than a verdict to say."""
 
 _ZOOM, _ZOOMS = 1.5, (0.1, 8.0)
 
@@ -51,6 +54,10 @@ class ReviewDock(QDockWidget):
         self.session: Session | None = None
         self.source, self.maker, self.followers = ImageSource(), CutoutMaker(self), Followers()
         self.own_keys = OwnKeys(self.take_keys, self)
+        self.lingering, self.changed = QTimer(self), False
+        self.lingering.setSingleShot(True)
+        self.lingering.setInterval(LINGER)
+        self.lingering.timeout.connect(self._move_map)
         self.zoom = 1.0
         self.filters, self.panel = FilterBar(), FactsPanel()
         self.views = {kind: CutoutView(title) for kind, title in KINDS.items()}
@@ -82,6 +89,7 @@ class ReviewDock(QDockWidget):
     def end(self) -> None:
         """Forget the database."""
         self.session = None
+        self.lingering.stop()
         self.maker.stop()
         self.followers.clear()
         self._refresh()
@@ -197,8 +205,7 @@ class ReviewDock(QDockWidget):
                 self.panel.remark.setText(begun)
                 self.panel.remark.setModified(True)
             return False
-        if repaint:
-            self.followers.repaint(self.canvases())
+        self.changed |= repaint
         self._refresh()
         return True
 
@@ -227,7 +234,19 @@ class ReviewDock(QDockWidget):
         self.progress.setValue(session.work.reviewed if session is not None else 0)
         self.told.setText(session.progress() if session is not None else "not connected")
         self._show_pictures()
-        if move and facts is not None and self.follow.isChecked():
+        if move and session is not None:
+            self.lingering.start()
+
+    def _move_map(self) -> None:
+        """Let the map follow, when the pictures are there."""
+        if not self.settled():
+            self.lingering.start()
+            return
+        if self.changed:
+            self.followers.repaint(self.canvases())
+            self.changed = False
+        facts = self.session.facts if self.session is not None else None
+        if facts is not None and self.follow.isChecked():
             self.followers.go(self.canvases(), facts)
 
     def _show_pictures(self) -> None:

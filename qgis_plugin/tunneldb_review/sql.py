@@ -83,7 +83,7 @@ def told(row: Sequence[Any]) -> Dict[str, Any]:
 
 
 _LOST = (
-    "server closed the connection", "could not connect", "connection to server", "Connection to database failed",
+    "server closed the connection", "could not connect", "connection to server", "Connection failed:",
     "terminating connection", "no connection to the server", "is not currently accepting connections",
     "could not receive data", "could not send data",
 )  # fmt: skip
