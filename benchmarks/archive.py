@@ -1,17 +1,19 @@
 """A survey into an archive and back: time, memory, and bytes beside those of the database and of the scan files.
 
     python -m benchmarks.archive ringo-2024 demo-2024    # surveys of the database; they are only read
-    python -m benchmarks.archive --length 1000           # and a kilometre of a simulated tunnel at survey density
+    python -m benchmarks.archive --kilometres 1          # and rows of so many kilometres, 2.4 million points each, made in SQL
 
 Each is exported, imported into a scratch database on the same server and, under another name, once more, where its rows get new
-numbers. Seconds by the clock and of the CPU, and the peak of memory, are those of the command's own process, as the kernel
-counts them; the server's are not in them. Bytes of the database are those of the view survey_size, after ANALYZE.
+numbers; of rows made here, which are in that database, only the latter. Seconds by the clock and of the CPU, and the peak of
+memory, are those of the command's own process, as the kernel counts them; the server's are not in them. Bytes of the database
+are those of the view survey_size, after ANALYZE.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import subprocess
 import sys
@@ -21,17 +23,20 @@ from typing import Any
 
 import psycopg
 
-from benchmarks import pipeline
 from benchmarks.common import COMMAND, print_table, progress, save, scratch_database
 from benchmarks.memory import WATCH
-from tunneldb.database import resolve_dsn
+from benchmarks.synthetic import Size, make
+from tunneldb.database import connect, resolve_dsn
+
+POINTS, LEAKS = 2_400_000, 4_000
+"""Of a kilometre of rows."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("surveys", nargs="*", help="surveys of the database to be archived")
     parser.add_argument("--dsn", help="database with the surveys, on whose server the scratch database is made")
-    parser.add_argument("--length", type=float, default=0.0, help="length of a simulated tunnel, m; 0: none")
+    parser.add_argument("--kilometres", type=int, default=0, help="of a survey made in SQL, without scans and images; 0: none")
     arguments = parser.parse_args()
     source = resolve_dsn(arguments.dsn)
     figures: dict[str, Any] = {}
@@ -40,13 +45,12 @@ def main() -> None:
         for survey in arguments.surveys:
             progress(survey)
             figures[survey] = measure(source, scratch, survey, folder)
-        if arguments.length:
-            progress(f"simulating {arguments.length:g} m at survey density, and running all its stages")
-            scene = pipeline.survey_density(folder, arguments.length, 1)
-            scene.register(scratch)
-            scene.load(scratch)
-            scene.run(scratch)
-            figures[f"{arguments.length:g} m"] = measure(scratch, scratch, scene.name, folder)
+        if kilometres := arguments.kilometres:
+            size = Size(kilometres, LEAKS * kilometres, POINTS * kilometres, 300 * kilometres, 800 * kilometres)
+            with connect(scratch) as connection:
+                make(connection, "long-2024", size)
+            rows = measure(scratch, scratch, "long-2024", folder)
+            figures[f"{kilometres} km"] = rows | {"scan_bytes": None}  # its files are names
     report(figures)
     print(f"\n{save('archive', figures)}")
 
@@ -99,8 +103,9 @@ def report(figures: dict[str, Any]) -> None:
     print_table("Archives", ["survey", "command", "seconds", "CPU", "peak, MB"], steps)
     sizes = [
         (
-            survey, found["points"], found["scan_bytes"] / 1e6, found["database_bytes"] / 1e6, found["archive_bytes"] / 1e6,
-            found["archive_bytes"] / found["database_bytes"], found["archive_bytes"] / found["scan_bytes"],
+            survey, found["points"], (found["scan_bytes"] or math.nan) / 1e6, found["database_bytes"] / 1e6,
+            found["archive_bytes"] / 1e6, found["archive_bytes"] / found["database_bytes"],
+            found["archive_bytes"] / (found["scan_bytes"] or math.nan),
         )
         for survey, found in figures.items()
     ]  # fmt: skip

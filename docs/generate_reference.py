@@ -18,6 +18,7 @@ import click
 import psycopg
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
+from view_diagram import view_diagram
 
 from tunneldb.cli.main import COMMANDS, main
 from tunneldb.cli.output import JSON, Verb
@@ -153,6 +154,12 @@ def database(conn: psycopg.Connection[Any]) -> str:
         "unrolled and map views of leaks and anomalies. They may call `finding_split`, `finding_merge` and `finding_undo`, "
         "too.",
     ]
+    parts += [
+        "By topic; what is after an arrow is the view that a key of the first leads to. Endings after a comma are views of the "
+        "same rows with one geometry: in the unrolled plane, on the map, in space, in the plane of a face, on a sheet. Nearly "
+        "all have `survey_id` and `survey`, the name, and lead to `survey`, and that to `tunnel`.",
+        f"```mermaid\n{view_diagram(conn)}```",
+    ]
     parts += _views(conn)
     parts += [
         "## Functions",
@@ -185,7 +192,9 @@ def _functions(conn: psycopg.Connection[Any]) -> Iterator[str]:
     made = [
         (path, name)
         for path in sql_files()
-        for name in re.findall(r"^CREATE OR REPLACE FUNCTION tunnel_api\.(\w+)", path.read_text("utf-8"), re.MULTILINE)
+        for name in re.findall(
+            r"^CREATE OR REPLACE (?:FUNCTION|PROCEDURE) tunnel_api\.(\w+)", path.read_text("utf-8"), re.MULTILINE
+        )
     ]
     found = conn.execute(
         """
@@ -203,7 +212,8 @@ def _functions(conn: psycopg.Connection[Any]) -> Iterator[str]:
         if path != before:
             yield f"### {_first_sentence(path)}"
             before = path
-        text = f"{name}({arguments})\n    → {result}".replace(" DEFAULT ", " = ").replace("double precision", "float8")
+        called = f"{name}({arguments})\n    → {result}" if result else f"CALL {name}({arguments})"
+        text = called.replace(" DEFAULT ", " = ").replace("double precision", "float8")
         yield f"```text\n{text}\n```"
         notes = ["Changes data."] * (volatility == "v") + ["Runs with its owner's rights."] * definer
         yield " ".join([_sentence(comment), *notes])

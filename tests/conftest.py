@@ -15,6 +15,7 @@ from pathlib import Path
 import psycopg
 import pytest
 from psycopg.conninfo import make_conninfo
+from support import blas  # noqa: F401
 from support.databases import SETTINGS as DATABASES
 from support.databases import Copies, create_database
 from support.system import missing

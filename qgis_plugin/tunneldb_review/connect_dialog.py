@@ -96,6 +96,7 @@ class ConnectDialog(QDialog):
         hint.setWordWrap(True)
         test = QPushButton("Try it")
         test.clicked.connect(self._try)
+        test.setAutoDefault(False)  # Enter accepts, also after a try
         box = QDialogButtonBox(QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel)
         box.addButton(test, QDialogButtonBox.ButtonRole.ActionRole)
         box.accepted.connect(self.accept)
@@ -105,3 +106,7 @@ class ConnectDialog(QDialog):
         column.addWidget(hint)
         column.addWidget(self.told)
         column.addWidget(box)
+        for way, fields in ((SERVICE, (self.service, self.authcfg)), (HOME, (self.home,))):
+            for each in fields:
+                each.setEnabled(self.ways[way].isChecked())
+                self.ways[way].toggled.connect(each.setEnabled)

@@ -2,25 +2,53 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, List
+from typing import Any, List, Mapping
 
-from qgis.core import (
-    NULL,
-    QgsDataSourceUri,
-    QgsException,
-    QgsFeatureRequest,
-    QgsProviderConnectionException,
-    QgsProviderRegistry,
-    QgsVectorDataProvider,
-    QgsVectorLayer,
-)
+from qgis.core import NULL, QgsDataSourceUri, QgsException, QgsProviderConnectionException, QgsProviderRegistry
 
 from . import sql
 from .connection import Connection
 
+LOST = "No connection to the database. Nothing is lost: the same key tries again."
+NOT_WRITTEN = "No connection to the database. This is not written yet: say it again when the server is back."
+
 
 class DatabaseError(Exception):
     """What the database or QGIS refused, in one line."""
+
+
+class ConnectionLostError(DatabaseError):
+    """The server cannot be reached; what was asked of it is not done.
+
+    Parameters
+    ----------
+    said : str
+        What that means to the user.
+    reason : str
+        What the server or QGIS says of it.
+    """
+
+    def __init__(self, said: str, reason: str) -> None:
+        super().__init__(said)
+        self.reason = reason
+
+
+class ChangedMeanwhileError(DatabaseError):
+    """Somebody else has changed a finding since it was read.
+
+    Parameters
+    ----------
+    finding_id : int
+    now : mapping
+        Facts of it as they are now.
+    """
+
+    def __init__(self, finding_id: int, now: Mapping[str, Any]) -> None:
+        remark = f", remark “{now['remark']}”" if now["remark"] else ""
+        super().__init__(
+            f"{now['reviewed_by'] or 'Somebody'} has changed finding {finding_id} meanwhile: it is {now['review']},"
+            f" {now['kind_label'] or now['kind']}{remark}. Nothing was written; say again what it is."
+        )
 
 
 class Database:
@@ -40,70 +68,59 @@ class Database:
         self.connection = connection
         self._uri = _uri(connection)
         self._server = QgsProviderRegistry.instance().providerMetadata("postgres").createConnection(self._uri.uri(False), {})
-        self._layer: QgsVectorLayer | None = None
-        ((self.person, self.may_review, self.may_undo),) = self.rows(sql.PERSON)
+        try:
+            ((self.person, self.may_review, self.may_undo),) = self.rows(sql.PERSON)
+        except ConnectionLostError as error:
+            raise DatabaseError(f"{error.reason}: is the server there, and does it let you in?") from None
 
     def rows(self, query: str) -> List[List[Any]]:
-        """Return the rows of a query of :mod:`.sql`, with None for NULL."""
+        """Return the rows of a query of :mod:`.sql`, with None for NULL.
+
+        QGIS connects anew by itself where the connection was cut, so that only a server that is away is an error.
+        """
         try:
             rows = self._server.executeSql(query)
         except (QgsProviderConnectionException, QgsException) as error:  # the second where it cannot connect
+            if sql.is_lost(str(error)):
+                raise ConnectionLostError(LOST, sql.error_line(str(error))) from None
             raise DatabaseError(_explained(sql.error_line(str(error)))) from None
         return [[_plain(value) for value in row] for row in rows]
 
-    def review(self, finding_id: int, seen: Dict[str, Any], values: Dict[str, Any]) -> None:
+    def review(self, finding_id: int, seen: Mapping[str, Any], values: Mapping[str, Any]) -> None:
         """Write the review, the kind or the remark of a finding.
 
         Parameters
         ----------
         finding_id : int
-        seen : dict
-            What the person saw of these columns.
-        values : dict
-            What they are to be; all in one step, which :meth:`undo` takes back as one.
+        seen : mapping
+            What the person saw of all three.
+        values : mapping
+            What some are to be; all in one step, which :meth:`undo` takes back as one.
 
         Raises
         ------
+        ChangedMeanwhileError
+            Somebody else has changed one of the three since: nothing is written.
         DatabaseError
-            It is gone, somebody else has changed it meanwhile, or the database refuses.
+            It is gone, the person may not, or the database refuses.
         """
-        layer = self._reviews()
-        provider = layer.dataProvider()
-        request = QgsFeatureRequest().setFilterExpression(f'"id" = {int(finding_id)}')
-        request.setFlags(QgsFeatureRequest.NoGeometry)
-        feature = next(layer.getFeatures(request), None)
-        if feature is None:
+        if not self.may_review:
+            raise DatabaseError(f"{self.person} may look, but not review: an operator grants tunnel_inspector")
+        try:
+            if self.rows(sql.review(finding_id, seen, values)):
+                return
+            rows = self.rows(sql.facts(finding_id))
+        except ConnectionLostError as error:
+            raise ConnectionLostError(NOT_WRITTEN, error.reason) from None
+        if not rows:
             raise DatabaseError(f"finding {finding_id} is gone")
-        for name, value in values.items():
-            now = _plain(feature[name])
-            if now not in (seen[name], value):
-                raise DatabaseError(
-                    f"finding {finding_id} was changed meanwhile: its {name} is {now or 'empty'}; look at it again"
-                )
-        fields = layer.fields()
-        provider.clearErrors()
-        changes = {fields.indexOf(name): NULL if value is None else value for name, value in values.items()}
-        if not provider.changeAttributeValues({feature.id(): changes}):
-            raise DatabaseError(sql.error_line("\n".join(provider.errors())))
+        now = sql.told(rows[0])
+        if any(now[name] != value for name, value in values.items()):
+            raise ChangedMeanwhileError(finding_id, now)
 
     def undo(self, finding_id: int) -> str:
         """Take back the last change of a finding, and return what that was, as "reviewed"."""
         return str(self.rows(sql.undo(finding_id))[0][0])
-
-    def _reviews(self) -> QgsVectorLayer:
-        """The view through which reviews are written, as a layer of its own that no project holds."""
-        if self._layer is None:
-            uri = QgsDataSourceUri(self._uri)
-            uri.setDataSource("tunnel_api", sql.VIEW, "", "", "id")
-            uri.setUseEstimatedMetadata(True)
-            uri.setParam("checkPrimaryKeyUnicity", "0")
-            layer = QgsVectorLayer(uri.uri(False), sql.VIEW, "postgres")
-            if not layer.isValid():
-                raise DatabaseError(sql.error_line(layer.error().summary()))
-            if not layer.dataProvider().capabilities() & QgsVectorDataProvider.ChangeAttributeValues:
-                raise DatabaseError(f"{self.person} may look, but not review: an operator grants tunnel_inspector")
-            self._layer = layer
-        return self._layer
 
 
 def _uri(connection: Connection) -> QgsDataSourceUri:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Callable, Dict, Iterable, List
 
 from qgis.gui import QgsMapCanvas
-from qgis.PyQt.QtCore import Qt, pyqtSignal
+from qgis.PyQt.QtCore import Qt, QTimer, pyqtSignal
 from qgis.PyQt.QtGui import QKeySequence
 from qgis.PyQt.QtWidgets import QCheckBox, QDockWidget, QHBoxLayout, QLabel, QProgressBar, QShortcut, QVBoxLayout, QWidget
 
@@ -13,9 +13,10 @@ from .canvas import Followers
 from .cutout_view import CutoutView
 from .cutouts import CutoutMaker, ImageSource, Picture
 from .database import DatabaseError
-from .facts_panel import FactsPanel
+from .facts_panel import FactsPanel, keys_of
 from .filter_bar import FilterBar
 from .images import KINDS, window
+from .own_keys import OwnKeys
 from .session import Session
 from .worklist import CONFIRMED, OPEN, REJECTED, Finding
 
@@ -23,6 +24,9 @@ AHEAD = 2
 """Findings whose pictures are drawn before they are asked for."""
 
 NO_IMAGE = "No image: open the project of the survey, or name a folder of images in Connect."
+
+LINGER = 300
+"""Milliseconds that one stays at a finding before the map follows: it takes longer to draw than a verdict to say."""
 
 _ZOOM, _ZOOMS = 1.5, (0.1, 8.0)
 
@@ -49,6 +53,11 @@ class ReviewDock(QDockWidget):
         self.canvases = canvases
         self.session: Session | None = None
         self.source, self.maker, self.followers = ImageSource(), CutoutMaker(self), Followers()
+        self.own_keys = OwnKeys(self.take_keys, self)
+        self.lingering, self.changed = QTimer(self), False
+        self.lingering.setSingleShot(True)
+        self.lingering.setInterval(LINGER)
+        self.lingering.timeout.connect(self._move_map)
         self.zoom = 1.0
         self.filters, self.panel = FilterBar(), FactsPanel()
         self.views = {kind: CutoutView(title) for kind, title in KINDS.items()}
@@ -80,6 +89,7 @@ class ReviewDock(QDockWidget):
     def end(self) -> None:
         """Forget the database."""
         self.session = None
+        self.lingering.stop()
         self.maker.stop()
         self.followers.clear()
         self._refresh()
@@ -111,14 +121,14 @@ class ReviewDock(QDockWidget):
         self._do(lambda session: session.write(kind=code), repaint=True)
 
     def set_remark(self, text: str) -> None:
-        """Write the remark, and give the keys back to the dock."""
-        self._do(lambda session: session.write(remark=text.strip() or None))
-        self.take_keys()
+        """Write the remark, and give the keys back to the dock; one that cannot be written stays there to be entered again."""
+        if self._do(lambda session: session.write(remark=text.strip() or None)):
+            self.take_keys()
 
     def undo(self) -> None:
         """Take the last step back, and go to where it was."""
         told: List[str] = []
-        if self._do(lambda session: told.append(session.undo()), repaint=True):
+        if self._do(lambda session: told.append(session.undo()), repaint=True, remark=False):
             self._say(told[0])
 
     def next(self) -> None:
@@ -133,11 +143,13 @@ class ReviewDock(QDockWidget):
         """Let keys go to the dock."""
         self.widget().setFocus()
 
-    def images_changed(self) -> None:
-        """Draw the pictures anew, of images that were read again."""
+    def read_again(self) -> None:
+        """Read the findings again, and draw the pictures anew, of images that were read again."""
         self.source.forget()
         self.maker.clear()
-        self._refresh(move=False)
+        if self.session is None or not self.session.survey:
+            return
+        self._do(lambda session: session.again(self.filters.filter, str(self.filters.order.currentData())))
 
     def settled(self) -> bool:
         """Whether the pictures of the finding are all there."""
@@ -145,36 +157,66 @@ class ReviewDock(QDockWidget):
 
     def _judge(self, review: str) -> None:
         def judge(session: Session) -> None:
-            session.write(review=review)
-            if self.go_on.isChecked() and not session.next():
+            session.write(review=review, **self._remark_begun())
+            self.panel.remark.setModified(False)
+            if self.go_on.isChecked() and session.next():
+                return
+            if self.go_on.isChecked():
                 self._say("That was the last that is asked for.")
-                session.look()
+            session.look()
 
         self.message.clear()
-        self._do(judge, repaint=True, keep=True)
+        self._do(judge, repaint=True, keep=True, remark=False)
 
     def _step(self, step: Callable[[Session], bool], end: str) -> None:
         went: List[bool] = []
         if self._do(lambda session: went.append(step(session))) and not went[0]:
             self._say(end)
 
-    def _do(self, act: Callable[[Session], Any], *, repaint: bool = False, keep: bool = False) -> bool:
-        """Act on the session and show what came of it; an error is told in a line."""
+    def _do(self, act: Callable[[Session], Any], *, repaint: bool = False, keep: bool = False, remark: bool = True) -> bool:
+        """Act on the session and show what came of it; an error is told in a line.
+
+        Parameters
+        ----------
+        act : callable
+        repaint : bool
+            Whether layers show something else afterwards.
+        keep : bool
+            Whether what was said last stays.
+        remark : bool
+            Whether a remark that was typed, and not entered, is written first.
+        """
         if self.session is None:
             self._say("Connect to a database first.", wrong=True)
             return False
         if not keep:
             self.message.clear()
+        typed = self._remark_begun()
         try:
+            if typed and remark:
+                self.session.write(**typed)
+                self.panel.remark.setModified(False)
             act(self.session)
         except DatabaseError as error:
             self._say(str(error), wrong=True)
+            begun = self.panel.remark.text() if self.panel.remark.isModified() else None
             self._refresh(move=False)
+            if begun is not None:
+                self.panel.remark.setText(begun)
+                self.panel.remark.setModified(True)
             return False
-        if repaint:
-            self.followers.repaint(self.canvases())
+        self.changed |= repaint
         self._refresh()
         return True
+
+    def _remark_begun(self) -> Dict[str, Any]:
+        """The remark that was typed and not entered, if there is one."""
+        box = self.panel.remark
+        return (
+            {"remark": box.text().strip() or None}
+            if box.isModified() and self.session is not None and self.session.facts
+            else {}
+        )
 
     def _say(self, text: str, *, wrong: bool = False) -> None:
         self.message.setStyleSheet("color: #b00020" if wrong else "")
@@ -192,7 +234,19 @@ class ReviewDock(QDockWidget):
         self.progress.setValue(session.work.reviewed if session is not None else 0)
         self.told.setText(session.progress() if session is not None else "not connected")
         self._show_pictures()
-        if move and facts is not None and self.follow.isChecked():
+        if move and session is not None:
+            self.lingering.start()
+
+    def _move_map(self) -> None:
+        """Let the map follow, when the pictures are there."""
+        if not self.settled():
+            self.lingering.start()
+            return
+        if self.changed:
+            self.followers.repaint(self.canvases())
+            self.changed = False
+        facts = self.session.facts if self.session is not None else None
+        if facts is not None and self.follow.isChecked():
             self.followers.go(self.canvases(), facts)
 
     def _show_pictures(self) -> None:
@@ -255,9 +309,10 @@ class ReviewDock(QDockWidget):
         if self.session is not None and self.session.survey:
             self._do(lambda session: session.ask(self.filters.filter, str(self.filters.order.currentData())))
 
-    def _key_kind(self, place: int) -> None:
-        if self.session is not None and place < len(self.session.kinds):
-            self.set_kind(self.session.kinds[place][0])
+    def _key_kind(self, key: str) -> None:
+        code = keys_of(self.session.kinds).get(key) if self.session is not None else None
+        if code is not None:
+            self.set_kind(code)
 
     def _edit_remark(self) -> None:
         self.panel.remark.setFocus()
@@ -309,12 +364,14 @@ class ReviewDock(QDockWidget):
             "C": self.confirm, "R": self.reject, "O": self.reopen, "N": self.next, "P": self.previous, "Right": self.next,
             "Left": self.previous, "Z": self.undo, "Ctrl+Z": self.undo, "M": self._edit_remark, "H": self._toggle_outlines,
             "+": lambda: self._zoomed(_ZOOM), "-": lambda: self._zoomed(1 / _ZOOM), "F5": self.reload_wanted.emit,
-            **{str(n + 1): (lambda n=n: self._key_kind(n)) for n in range(9)},
+            **{key: (lambda key=key: self._key_kind(key)) for key in ("1", "2", "3", "4", "5", "6", "7", "8", "9", "J", "D")},
         }  # fmt: skip
         for key, act in keys.items():
             shortcut = QShortcut(QKeySequence(key), self.widget())
             shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             shortcut.activated.connect(act)
+        for box in (self.filters.survey, self.filters.order, self.filters.kinds, self.panel.kind):
+            self.own_keys.keep(box)
         leave = QShortcut(QKeySequence("Escape"), self.panel.remark)
         leave.setContext(Qt.ShortcutContext.WidgetShortcut)
         leave.activated.connect(self._leave_remark)

@@ -7,6 +7,9 @@ from typing import Any, Dict, List, Tuple
 from qgis.PyQt.QtCore import Qt, pyqtSignal
 from qgis.PyQt.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLabel, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
+_LETTERS = {"joint": "J", "dark": "D"}
+"""Kinds that detection finds beside leaks: always at hand, whatever their place in the list."""
+
 _BADGE = {"open": "#e67e22", "confirmed": "#1f6fd6", "rejected": "#757575"}
 
 
@@ -37,10 +40,11 @@ class FactsPanel(QWidget):
         self.remark.returnPressed.connect(lambda: self.remarked.emit(self.remark.text()))
 
     def offer(self, kinds: List[Tuple[str, str]]) -> None:
-        """Offer kinds; the first nine have keys."""
+        """Offer kinds, each with its key if it has one."""
         self.kind.clear()
-        for n, (code, label) in enumerate(kinds, 1):
-            self.kind.addItem(f"{label} ({n})" if n <= 9 else label, code)
+        keys = {code: key for key, code in keys_of(kinds).items()}
+        for code, label in kinds:
+            self.kind.addItem(f"{label} ({keys[code]})" if code in keys else label, code)
 
     def show_finding(self, facts: Dict[str, Any] | None, probability: float | None) -> None:
         """Tell of a finding, or that there is none."""
@@ -75,6 +79,13 @@ class FactsPanel(QWidget):
         column.addLayout(steps)
 
 
+def keys_of(kinds: List[Tuple[str, str]]) -> Dict[str, str]:
+    """Return the keys of kinds: numbers of the first nine, letters of those that detection finds."""
+    lettered = {_LETTERS[code]: code for code, _ in kinds if code in _LETTERS}
+    others = [code for code, _ in kinds if code not in _LETTERS]
+    return {**{str(n): code for n, code in enumerate(others[:9], 1)}, **lettered}
+
+
 def _lines(facts: Dict[str, Any], probability: float | None) -> List[str]:
     """Facts in words, a line each."""
     lines = []
@@ -82,7 +93,7 @@ def _lines(facts: Dict[str, Any], probability: float | None) -> List[str]:
         lines.append(f"leak with probability <b>{probability:.2f}</b> (found as {facts['found']})")
     else:
         lines.append(f"{facts['origin']} by hand")
-    size = f"{facts['area']:.2f} m²"
+    size = f"{facts['area']:.2f}\u00a0m²"
     if facts["clock"] is not None:
         minutes = round(float(facts["clock"]) * 60) % 720
         size += f", at {minutes // 60 or 12}:{minutes % 60:02d}"
@@ -92,7 +103,7 @@ def _lines(facts: Dict[str, Any], probability: float | None) -> List[str]:
         if facts["contrast"] is not None:
             darker += f"; contrast {facts['contrast']:.0f}"
         if facts["image_share"] is not None:
-            darker += f"; seen {100 * facts['image_share']:.0f} %"
+            darker += f"; seen\u00a0{100 * facts['image_share']:.0f}\u00a0%"
         lines.append(darker)
     if facts["evidence"]:
         lines.append(f"for (+) and against (-): {facts['evidence']}")

@@ -47,13 +47,13 @@ class ReviewPlugin:
         self.initProcessing()
         self.reloader = ImageReloader()
         self.dock = ReviewDock(lambda: self.iface.mapCanvases(), self.iface.mainWindow())
-        self.dock.hide()
         self.iface.addDockWidget(Qt.DockWidgetArea.BottomDockWidgetArea, self.dock)
+        self.dock.hide()  # QGIS shows what it adds
         self.dock.survey_changed.connect(self._keep_survey)
         self.dock.reload_wanted.connect(self.reload)
         self._add("Review leaks", self.review, QIcon(ICON), "Ctrl+Alt+L")
         self._add("Connect…", self.connect)
-        self._add("Reload images that changed", self.reload)
+        self._add("Read images and findings again", self.reload)
 
     def unload(self) -> None:
         """Take everything away again."""
@@ -114,10 +114,11 @@ class ReviewPlugin:
         self.dock.begin(session, settings.survey)
 
     def reload(self) -> None:
-        """Read image layers again whose files have changed, and what layers show of the database."""
+        """Read image layers again whose files have changed, what layers show of the database, and what the dock lists."""
         names = self.reloader.reload()
-        self.dock.images_changed()
-        self._say(f"{len(names)} images had changed and were read again." if names else "No image has changed.", Qgis.Info)
+        self.dock.read_again()
+        changed = f"{len(names)} images had changed and were read again" if names else "No image has changed"
+        self._say(f"{changed}; findings are those of the database.", Qgis.Info)
 
     def _keep_survey(self, survey: str) -> None:
         settings = Settings.read()

@@ -6,7 +6,7 @@ import time
 from typing import Any, Callable, Dict, List, Optional
 
 from . import sql
-from .database import Database, DatabaseError
+from .database import ChangedMeanwhileError, Database, DatabaseError
 from .worklist import OPEN, Filter, Finding, Pace, WorkList, progress_text
 
 REFUSED = "taken back"
@@ -46,44 +46,65 @@ class Session:
             self.steps, self.pace = [], Pace()
         self.survey, self.survey_id = survey, key
         self.findings = {finding.id: finding for finding in (Finding(**sql.listed(row)) for row in rows)}
+        self.work, self.facts = WorkList(), None  # what cannot be read is not shown
         self.ask(asked, order)
 
-    def ask(self, asked: Filter, order: str) -> None:
-        """Put those in order that are asked for, and go to the first."""
-        self.work = WorkList.of(self.findings.values(), asked, order)
-        self.look()
+    def again(self, asked: Filter, order: str) -> None:
+        """Read the survey again, after a rerun of detect say, and stay at the finding that is shown if it is still there."""
+        here = self.work.current
+        self.load(self.survey, asked, order)
+        if here is not None and self.work.go(here.id):
+            self.look()
 
-    def look(self) -> None:
-        """Read all that is told of the current finding."""
-        current = self.work.current
-        rows = self.database.rows(sql.facts(current.id)) if current is not None else []
-        self.facts = sql.told(rows[0]) if rows else None
-        if current is not None and self.facts is None:
-            raise DatabaseError(f"finding {current.id} is gone: read the survey again")
+    def ask(self, asked: Filter, order: str) -> None:
+        """Put those in order that are asked for, and go to the first that is wanted."""
+        was = self.work, self.facts
+        self.work, self.facts = WorkList.of(self.findings.values(), asked, order), None
+        try:
+            self.next()
+        except DatabaseError:
+            self.work, self.facts = was
+            raise
 
     def next(self) -> bool:
         """Go to the next; False where there is none."""
-        return self._went(self.work.next())
+        return self._go(self.work.next)
 
     def previous(self) -> bool:
         """Go to the one before; False where there is none."""
-        return self._went(self.work.previous())
+        return self._go(self.work.previous)
 
     def write(self, **values: Any) -> bool:
-        """Write review, kind or remark of the current finding; False where it is so already."""
+        """Write review, kind or remark of the finding that is shown; False where it is so already.
+
+        Raises
+        ------
+        ChangedMeanwhileError
+            Somebody else has changed it: nothing is written, and facts are those that hold now.
+        """
         if self.facts is None:
             raise DatabaseError("there is no finding to review")
         wanted = {name: value for name, value in values.items() if self.facts[name] != value}
         if not wanted:
             return False
         key = int(self.facts["id"])
-        self.database.review(key, self.facts, wanted)
+        try:
+            self.database.review(key, self.facts, wanted)
+        except ChangedMeanwhileError:
+            self._read(key)
+            raise
         self.steps.append(key)
         self.facts.update(wanted)
         self._note(key, {name: value for name, value in wanted.items() if name != "remark"})
         if wanted.get("review", OPEN) != OPEN:
             self.pace.count(self.clock())
         return True
+
+    def look(self) -> None:
+        """Read again all that is told of the finding that is shown."""
+        current = self.work.current
+        if current is not None and not self._read(current.id):
+            raise DatabaseError(f"finding {current.id} is gone: read the survey again")
 
     def undo(self) -> str:
         """Take back the last step of this session, and go to its finding; returns a sentence.
@@ -119,7 +140,40 @@ class Session:
         if place is not None:
             self.findings[key] = place
 
-    def _went(self, went: bool) -> bool:
-        if went:
-            self.look()
-        return went
+    def _go(self, step: Callable[[], bool]) -> bool:
+        """Step until there is a finding that is asked for; what cannot be read leaves all as it is.
+
+        What is gone leaves the list; what others have reviewed meanwhile is passed over where only open ones are wanted.
+        """
+        was, kept = self.work.current, self.facts
+        try:
+            while step():
+                current = self.work.current
+                assert current is not None
+                if not self._read(current.id):
+                    self.findings.pop(current.id, None)
+                    self._stay(was)
+                    self.work.drop(current.id)
+                elif not self.work.asked.open_only or (self.facts or {}).get("review") == OPEN:
+                    return True
+        except DatabaseError:
+            self._stay(was)
+            self.facts = kept
+            raise
+        self._stay(was)
+        self.facts = kept
+        return False
+
+    def _stay(self, finding: Optional[Finding]) -> None:
+        """Go back to where one was."""
+        if finding is None or not self.work.go(finding.id):
+            self.work.at = -1
+
+    def _read(self, key: int) -> bool:
+        """Read what is told of a finding into facts and list; whether it is there."""
+        rows = self.database.rows(sql.facts(key))
+        if not rows:
+            return False
+        self.facts = sql.told(rows[0])
+        self._note(key, {name: self.facts[name] for name in ("review", "kind")})
+        return True

@@ -1,16 +1,15 @@
 """What the plugin asks of schema ``tunnel_api``.
 
-What is put into a text is a whole number, never a word; reviews are written by QGIS's provider, which quotes its values itself.
+QGIS's connections take no parameters: what is put into a text is a whole number, a name of a column written here, or a value as
+hexadecimal digits, never the words of a person.
 """
 
 from __future__ import annotations
 
-from typing import Any, Dict, Sequence
-
-VIEW = "finding_unrolled"
-"""View through which reviews are written: inspectors may update the columns of WRITTEN in it."""
+from typing import Any, Dict, Mapping, Optional, Sequence
 
 WRITTEN = ("review", "remark", "kind")
+"""Columns of the view finding_unrolled that inspectors may update."""
 
 SURVEYS = (
     "SELECT s.id, s.name, s.tunnel, s.date::text FROM tunnel_api.survey s"
@@ -52,6 +51,22 @@ def facts(finding_id: int) -> str:
     return f"SELECT {', '.join(_FACTS.values())} FROM tunnel_api.lining_finding f WHERE f.id = {int(finding_id)}"
 
 
+def review(finding_id: int, seen: Mapping[str, Any], values: Mapping[str, Any]) -> str:
+    """Return the statement that writes columns of WRITTEN, if all of these are still as seen; it returns the id if so.
+
+    Who changes the finding in the same moment is found out by the view's trigger, which locks the row.
+    """
+    if not set(values) <= set(WRITTEN):
+        raise ValueError(f"only {', '.join(WRITTEN)} are written")
+    changes = ", ".join(f"{name} = {_text(value)}" for name, value in values.items())
+    same = " AND ".join(f"f.{name} IS NOT DISTINCT FROM {_text(seen[name])}" for name in WRITTEN)
+    return f"UPDATE tunnel_api.finding_unrolled f SET {changes} WHERE f.id = {int(finding_id)} AND {same} RETURNING f.id"
+
+
+def _text(value: Optional[str]) -> str:
+    return "NULL" if value is None else f"convert_from(decode('{value.encode().hex()}', 'hex'), 'UTF8')"
+
+
 def undo(finding_id: int) -> str:
     """Return the query that takes the last change of a finding back."""
     return f"SELECT tunnel_api.finding_undo({int(finding_id)})"
@@ -65,6 +80,18 @@ def listed(row: Sequence[Any]) -> Dict[str, Any]:
 def told(row: Sequence[Any]) -> Dict[str, Any]:
     """Return a row of :func:`facts` by its columns."""
     return dict(zip(_FACTS, row))
+
+
+_LOST = (
+    "server closed the connection", "could not connect", "connection to server", "Connection failed:",
+    "terminating connection", "no connection to the server", "is not currently accepting connections",
+    "could not receive data", "could not send data",
+)  # fmt: skip
+
+
+def is_lost(message: str) -> bool:
+    """Whether the server or QGIS says that there is no connection."""
+    return any(mark in message for mark in _LOST)
 
 
 def error_line(message: str) -> str:

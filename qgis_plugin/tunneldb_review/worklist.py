@@ -94,10 +94,8 @@ class WorkList:
 
     @classmethod
     def of(cls, findings: Iterable[Finding], asked: Filter, order: str) -> WorkList:
-        """Return the list of those asked for, at its beginning: the first that is not reviewed, if only these are wanted."""
-        made = cls(sorted(filter(asked.takes, findings), key=ORDERS[order][1]), asked)
-        made.next()
-        return made
+        """Return the list of those asked for, before its first."""
+        return cls(sorted(filter(asked.takes, findings), key=ORDERS[order][1]), asked)
 
     @property
     def current(self) -> Optional[Finding]:
@@ -122,6 +120,12 @@ class WorkList:
         if place is not None:
             self.at = place
         return place is not None
+
+    def drop(self, finding_id: int) -> None:
+        """Take one out of the list that is there no more, and stay where one is; at its beginning, if that is where one was."""
+        here = self.current
+        self.findings = [finding for finding in self.findings if finding.id != finding_id]
+        self.at = next((n for n, finding in enumerate(self.findings) if here is not None and finding.id == here.id), -1)
 
     def change(self, finding_id: int, **values: str) -> None:
         """Note what was written of a finding."""

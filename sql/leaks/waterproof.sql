@@ -13,7 +13,7 @@ SELECT s.id::bigint * 1000000 + 500000 + k.km AS id, s.id AS survey_id, s.name A
        k.chainage_from, k.chainage_to, t.lining_area, t.seen_share, t.wet_area, t.wet_ratio, t.patches, t.largest_area,
        t.largest_leak, t.window_patches, t.window_from, t.window_to, t.window_wet_area, t.class
   FROM tunnel.survey s
-  JOIN tunnel_api.km_ends k ON k.survey_id = s.id
+  CROSS JOIN LATERAL (SELECT e.* FROM tunnel_api.km_ends e WHERE e.survey_id = s.id OFFSET 0) k  -- of this survey, not of all
   LEFT JOIN tunnel.waterproof w ON w.survey_id = k.survey_id AND w.km = k.km
        AND w.chainage_from = k.chainage_from AND w.chainage_to = k.chainage_to
        AND NOT EXISTS (SELECT FROM tunnel.waterproof o
@@ -102,10 +102,20 @@ DROP TRIGGER IF EXISTS keep ON tunnel.waterproof;
 CREATE CONSTRAINT TRIGGER keep AFTER INSERT ON tunnel.waterproof DEFERRABLE INITIALLY DEFERRED
     FOR EACH ROW WHEN (NEW.chainage_from IS NULL) EXECUTE FUNCTION tunnel_api.keep_at_commit();
 
--- What an earlier version kept may be of other limits. Nobody is at it: making the trigger has waited for all.
-DO $$
-BEGIN
-    DELETE FROM tunnel.waterproof;
-    PERFORM tunnel_api.keep_waterproof(k.survey_id, k.km) FROM tunnel_api.km_ends k;
-END
+-- Kilometres of a survey of which nothing is kept that holds: tunneldb init works them out, each in a transaction of its own.
+-- What is not to be kept (NaN) stays so until something changes there.
+CREATE OR REPLACE FUNCTION tunnel_api.waterproof_unkept(survey_id int) RETURNS SETOF int
+LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 25 SET search_path = pg_catalog, pg_temp
+AS $$
+    SELECT k.km
+      FROM tunnel_api.km_ends k
+     CROSS JOIN LATERAL (
+            SELECT count(*) AS rows, min(w.chainage_from) AS chainage_from, min(w.chainage_to) AS chainage_to
+              FROM tunnel.waterproof w WHERE w.survey_id = $1 AND w.km = k.km) w
+     WHERE k.survey_id = $1
+       AND (w.rows <> 1 OR w.chainage_from IS NULL
+            OR w.chainage_from <> 'NaN' AND (w.chainage_from <> k.chainage_from OR w.chainage_to <> k.chainage_to))
+     ORDER BY k.km
 $$;
+COMMENT ON FUNCTION tunnel_api.waterproof_unkept(int) IS
+'Kilometres of a survey whose statistics are not kept, or not as they are now: the view km_waterproof works them out each time it is asked. tunneldb init keeps them.';

@@ -71,8 +71,9 @@ COMMENT ON COLUMN tunnel_api.clearance_infringement.geom IS 'Its points, at most
 CREATE OR REPLACE FUNCTION tunnel_api.clearance_inputs(survey_id int, km int, gauge text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
-               'ground', (SELECT max(r.id) FROM tunnel.run r WHERE r.survey_id = $1 AND r.km BETWEEN $2 - 1 AND $2 + 1
-                             AND r.stage = 'ground' AND r.outcome = 'done'),
+               'ground', (SELECT max((SELECT r.id FROM tunnel.run r
+                 WHERE r.survey_id = $1 AND r.stage = 'ground' AND r.km = k AND r.subject = '' AND r.outcome = 'done'
+                 ORDER BY r.started_at DESC, r.id DESC LIMIT 1)) FROM generate_series($2 - 1, $2 + 1) k),
                'gauge', $3,
                'outline', (SELECT g.checksum FROM tunnel.gauge g WHERE g.tunnel_id = s.tunnel_id AND g.name = $3))
       FROM tunnel.survey s WHERE s.id = $1
@@ -84,10 +85,8 @@ CREATE OR REPLACE FUNCTION tunnel_api.clearance_state(survey_id int)
 RETURNS TABLE (run_id bigint, km int, gauge text, track text, done_at timestamptz, reason text)
 LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
     WITH last AS (
-        SELECT DISTINCT ON (r.km, r.parameters ->> 'gauge', r.parameters ->> 'track')
-               r.id, r.km, r.parameters ->> 'gauge' AS gauge, r.parameters ->> 'track' AS track, r.finished_at, r.parameters
-          FROM tunnel.run r WHERE r.survey_id = $1 AND r.stage = 'clearance' AND r.outcome = 'done'
-         ORDER BY r.km, r.parameters ->> 'gauge', r.parameters ->> 'track', r.started_at DESC, r.id DESC
+        SELECT r.id, r.km, r.parameters ->> 'gauge' AS gauge, r.parameters ->> 'track' AS track, r.finished_at, r.parameters
+          FROM tunnel_api.last_runs($1, 'clearance') r
     ), ground AS MATERIALIZED (
         SELECT t.km, t.reason FROM tunnel_api.stage_state($1) t WHERE t.stage = 'ground'
     )

@@ -80,8 +80,9 @@ COMMENT ON COLUMN tunnel_api.deviation_section.deviation IS 'Mean deviation of c
 CREATE OR REPLACE FUNCTION tunnel_api.deviation_inputs(survey_id int, km int, layer text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
-               'detect', (SELECT max(r.id) FROM tunnel.run r
-                           WHERE r.survey_id = $1 AND r.km = $2 AND r.stage = 'detect' AND r.outcome = 'done'),
+               'detect', (SELECT r.id FROM tunnel.run r
+                 WHERE r.survey_id = $1 AND r.stage = 'detect' AND r.km = $2 AND r.subject = '' AND r.outcome = 'done'
+                 ORDER BY r.started_at DESC, r.id DESC LIMIT 1),
                'profiles', (
                    SELECT md5(string_agg(concat_ws(' ', p.name, p.chainage_from, p.chainage_to, p.outline), ';' ORDER BY p.chainage_from))
                      FROM tunnel.design_profile p
@@ -107,14 +108,13 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
     ), detect AS MATERIALIZED (
         SELECT t.km, t.reason FROM tunnel_api.stage_state($1) t WHERE t.stage = 'detect'
     ), last AS (
-        SELECT DISTINCT ON (r.km, r.parameters ->> 'layer') r.km, r.parameters ->> 'layer' AS layer, r.finished_at, r.parameters
-          FROM tunnel.run r WHERE r.survey_id = $1 AND r.stage = 'deviation' AND r.outcome = 'done'
-         ORDER BY r.km, r.parameters ->> 'layer', r.started_at DESC, r.id DESC
+        SELECT r.km, r.subject AS layer, r.finished_at, r.parameters FROM tunnel_api.last_runs($1, 'deviation') r
     ), place AS (  -- where there is a design, or there was one and what was made by it is still there
         SELECT k.km, d.layer FROM seen k JOIN design d ON d.low < (k.km + 1) * 1000 AND d.high > k.km * 1000
          UNION
         SELECT l.km, l.layer FROM last l
-         WHERE EXISTS (SELECT FROM tunnel.deviation_section o WHERE o.survey_id = $1 AND o.layer = l.layer AND o.km = l.km)
+         WHERE EXISTS (SELECT FROM tunnel.deviation_section o WHERE o.survey_id = $1 AND o.layer = l.layer AND o.km = l.km
+                          AND o.chainage_from >= l.km * 1000 - 1 AND o.chainage_from < (l.km + 1) * 1000)
     )
     SELECT k.km, d.layer, l.finished_at,
            CASE WHEN t.reason IS NOT NULL THEN 'detect is stale: ' || t.reason
@@ -124,7 +124,8 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
                 WHEN NOT EXISTS (SELECT FROM tunnel.image i
                                   WHERE i.survey_id = $1 AND i.km = k.km AND i.kind = 'deviation_' || d.layer) AND EXISTS (
                      SELECT FROM tunnel.deviation_section o
-                      WHERE o.survey_id = $1 AND o.km = k.km AND o.layer = d.layer AND o.seen_length > 0)
+                      WHERE o.survey_id = $1 AND o.km = k.km AND o.layer = d.layer AND o.seen_length > 0
+                        AND o.chainage_from >= k.km * 1000 - 1 AND o.chainage_from < (k.km + 1) * 1000)
                     THEN 'its image is not stored'
            END
       FROM seen k

@@ -29,21 +29,22 @@ COMMENT ON COLUMN tunnel_api.deviation_bar.seen_share IS 'What of the profile wa
 COMMENT ON COLUMN tunnel_api.deviation_bar.geom IS 'In the unrolled plane (chainage, arc), m';
 
 CREATE OR REPLACE VIEW tunnel_api.deviation_map AS
-SELECT g.id * 10 + CASE w.layer WHEN 'lining' THEN 1 WHEN 'shotcrete' THEN 2 ELSE 3 END AS id, g.survey_id, s.name AS survey, g.km,
-       w.layer, g.chainage_from, g.chainage_to,
+SELECT g.id * 10 + v.place AS id, g.survey_id, s.name AS survey, g.km,
+       v.layer, g.chainage_from, g.chainage_to,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, g.chainage_from) l) AS label_from,
        w.overbreak, w.underbreak, w.seen_share, w.greatest, public.st_force2d(g.geom) AS geom
   FROM tunnel.segment g
   JOIN tunnel.survey s ON s.id = g.survey_id
- CROSS JOIN LATERAL (
-    SELECT d.layer, sum(p.long * d.overbreak) / sum(p.long) AS overbreak, sum(p.long * d.underbreak) / sum(p.long) AS underbreak,
+ CROSS JOIN (VALUES ('lining', 1), ('shotcrete', 2), ('excavation', 3)) AS v (layer, place)
+ CROSS JOIN LATERAL (  -- of one layer each, so that the index is gone into at the segment's beginning
+    SELECT sum(p.long * d.overbreak) / sum(p.long) AS overbreak, sum(p.long * d.underbreak) / sum(p.long) AS underbreak,
            sum(p.long * d.seen_length) / sum(p.long * d.design_length) AS seen_share,
            max(greatest(d.deviation_greatest, -d.deviation_least)) AS greatest
       FROM tunnel.deviation_section d
      CROSS JOIN LATERAL (SELECT d.chainage_to - d.chainage_from AS long) p
-     WHERE d.survey_id = g.survey_id AND d.layer IN ('lining', 'shotcrete', 'excavation')
+     WHERE d.survey_id = g.survey_id AND d.layer = v.layer
        AND d.chainage_from >= g.chainage_from - 0.5 AND d.chainage_from < g.chainage_to - 0.5
-     GROUP BY d.layer) w;
+    HAVING count(*) > 0) w;
 COMMENT ON VIEW tunnel_api.deviation_map IS
     'Over- and underbreak by segment, on the axis: means of the sections that have their middle in it';
 COMMENT ON COLUMN tunnel_api.deviation_map.layer IS 'Layer of the profile';

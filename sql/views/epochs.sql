@@ -85,10 +85,12 @@ COMMENT ON FUNCTION tunnel_api.leaks_checksum(int, float8, float8) IS
 CREATE OR REPLACE FUNCTION tunnel_api.change_inputs(survey_id int, old_survey_id int, km int) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
-               'detect_old', (SELECT max(r.id) FROM tunnel.run r
-                               WHERE r.survey_id = $2 AND r.km = $3 AND r.stage = 'detect' AND r.outcome = 'done'),
-               'detect_new', (SELECT max(r.id) FROM tunnel.run r
-                               WHERE r.survey_id = $1 AND r.km = $3 AND r.stage = 'detect' AND r.outcome = 'done'),
+               'detect_old', (SELECT r.id FROM tunnel.run r
+                 WHERE r.survey_id = $2 AND r.stage = 'detect' AND r.km = $3 AND r.subject = '' AND r.outcome = 'done'
+                 ORDER BY r.started_at DESC, r.id DESC LIMIT 1),
+               'detect_new', (SELECT r.id FROM tunnel.run r
+                 WHERE r.survey_id = $1 AND r.stage = 'detect' AND r.km = $3 AND r.subject = '' AND r.outcome = 'done'
+                 ORDER BY r.started_at DESC, r.id DESC LIMIT 1),
                'leaks_old', tunnel_api.leaks_checksum($2, $3 * 1000 - 100, ($3 + 1) * 1000 + 100),
                'leaks_new', tunnel_api.leaks_checksum($1, $3 * 1000 - 100, ($3 + 1) * 1000 + 100))
 $$;
@@ -99,10 +101,7 @@ CREATE OR REPLACE FUNCTION tunnel_api.change_state(survey_id int, old_survey_id 
 RETURNS TABLE (km int, done_at timestamptz, reason text, cell float8, length float8)
 LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
     WITH last AS (
-        SELECT DISTINCT ON (r.km) r.km, r.finished_at, r.parameters
-          FROM tunnel.run r
-         WHERE r.survey_id = $1 AND r.stage = 'compare' AND r.outcome = 'done' AND (r.parameters ->> 'old')::int = $2
-         ORDER BY r.km, r.started_at DESC, r.id DESC
+        SELECT r.km, r.finished_at, r.parameters FROM tunnel_api.last_runs($1, 'compare') r WHERE r.subject = $2::text
     ), seen AS (
         SELECT i.km FROM tunnel.image i WHERE i.survey_id = $1 AND i.kind = 'offset' GROUP BY i.km
         INTERSECT
@@ -138,13 +137,13 @@ COMMENT ON FUNCTION tunnel_api.change_state(int, int) IS
     'How far the comparison of a survey with an older one has come: of each kilometre that both saw, when it was last made, with what cells and sections (m), and why it is out of date, if it is';
 
 CREATE OR REPLACE VIEW tunnel_api.change_status AS
-SELECT ((p.survey_id::bigint * 100000 + p.old_survey_id) * 1000000) + 500000 + t.km AS id, p.survey_id, s.name AS survey,
+SELECT ((s.id::bigint * 100000 + p.old_survey_id) * 1000000) + 500000 + t.km AS id, s.id AS survey_id, s.name AS survey,
        p.old_survey_id, o.name AS old_survey, t.km, t.done_at, t.reason IS NOT NULL AS stale, t.reason, t.cell, t.length
-  FROM (SELECT DISTINCT r.survey_id, (r.parameters ->> 'old')::int AS old_survey_id
-          FROM tunnel.run r WHERE r.stage = 'compare' AND r.outcome = 'done') p
-  JOIN tunnel.survey s ON s.id = p.survey_id
+  FROM tunnel.survey s
+ CROSS JOIN LATERAL (
+        SELECT DISTINCT r.subject::int AS old_survey_id FROM tunnel_api.last_runs(s.id, 'compare') r) p
   JOIN tunnel.survey o ON o.id = p.old_survey_id
- CROSS JOIN LATERAL tunnel_api.change_state(p.survey_id, p.old_survey_id) t;
+ CROSS JOIN LATERAL tunnel_api.change_state(s.id, p.old_survey_id) t;
 COMMENT ON VIEW tunnel_api.change_status IS 'Whether what is stored of the change between two surveys is up to date, by kilometre, of those that were compared';
 COMMENT ON COLUMN tunnel_api.change_status.old_survey_id IS 'Key of the survey that it is compared with';
 COMMENT ON COLUMN tunnel_api.change_status.old_survey IS 'Its name';

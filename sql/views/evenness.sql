@@ -49,10 +49,10 @@ COMMENT ON COLUMN tunnel_api.evenness_area.geom IS 'In the unrolled plane (chain
 
 CREATE OR REPLACE FUNCTION tunnel_api.evenness_inputs(survey_id int, km int, layer text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
-    SELECT jsonb_build_object('layer', $3, 'deviation', jsonb_agg((
-               SELECT max(r.id) FROM tunnel.run r
-                WHERE r.survey_id = $1 AND r.km = $2 + k AND r.stage = 'deviation' AND r.outcome = 'done'
-                  AND r.parameters ->> 'layer' = $3) ORDER BY k))
+    SELECT jsonb_build_object('layer', $3, 'deviation', jsonb_agg((SELECT r.id FROM tunnel.run r
+                 WHERE r.survey_id = $1 AND r.stage = 'deviation' AND r.km = $2 + k AND r.subject = $3 AND r.outcome = 'done'
+                 ORDER BY r.started_at DESC, r.id DESC LIMIT 1)
+               ORDER BY k))
       FROM generate_series(-1, 1) k
 $$;
 COMMENT ON FUNCTION tunnel_api.evenness_inputs(int, int, text) IS
@@ -69,11 +69,7 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
            END,
            (l.parameters ->> 'length')::float8, (l.parameters ->> 'limit')::float8
       FROM tunnel_api.deviation_state($1) d
-      LEFT JOIN LATERAL (
-        SELECT r.finished_at, r.parameters FROM tunnel.run r
-         WHERE r.survey_id = $1 AND r.km = d.km AND r.stage = 'evenness' AND r.outcome = 'done'
-           AND r.parameters ->> 'layer' = d.layer
-         ORDER BY r.started_at DESC, r.id DESC LIMIT 1) l ON true
+      LEFT JOIN tunnel_api.last_runs($1, 'evenness') l ON l.km = d.km AND l.subject = d.layer
 $$;
 COMMENT ON FUNCTION tunnel_api.evenness_state(int) IS
     'How far the evenness of a survey has come: of each kilometre and layer that it can be held against, when it was last made, with which straightedge and limit (m), and why it is out of date, if it is';

@@ -24,13 +24,17 @@ COMMENT ON COLUMN tunnel_api.incoming.km_from IS 'First kilometre that it may to
 COMMENT ON COLUMN tunnel_api.incoming.state IS 'waiting to be read, or failed';
 COMMENT ON COLUMN tunnel_api.incoming.message IS 'Why it failed, and what to do';
 
+-- Apart by their state, for which jobs that wait or run have indexes: who asks for these is not to look at those that are done.
 CREATE OR REPLACE VIEW tunnel_api.job AS
 SELECT j.id, (j.args->>'survey_id')::integer AS survey_id, s.name AS survey, (j.args->>'km')::integer AS km,
-       j.args->>'file' AS file, coalesce(j.args->>'stage', j.task_name) AS stage,
-       CASE j.status WHEN 'todo' THEN 'queued' WHEN 'doing' THEN 'running' WHEN 'succeeded' THEN 'done'
-                     ELSE j.status::text END AS state,
+       j.args->>'file' AS file, coalesce(j.args->>'stage', j.task_name) AS stage, j.state,
        j.attempts, j.worker_id, w.host || '/' || w.pid AS worker, e.at AS since, r.message
-  FROM tunnel_queue.procrastinate_jobs j
+  FROM (SELECT q.*, 'queued' AS state FROM tunnel_queue.procrastinate_jobs q WHERE q.status = 'todo'
+         UNION ALL
+        SELECT q.*, 'running' FROM tunnel_queue.procrastinate_jobs q WHERE q.status = 'doing'
+         UNION ALL
+        SELECT q.*, CASE q.status WHEN 'succeeded' THEN 'done' ELSE q.status::text END
+          FROM tunnel_queue.procrastinate_jobs q WHERE q.status NOT IN ('todo', 'doing')) j
   LEFT JOIN tunnel.survey s ON s.id = (j.args->>'survey_id')::integer
   LEFT JOIN tunnel.worker w ON w.id = j.worker_id
   LEFT JOIN LATERAL (SELECT max(v.at) AS at FROM tunnel_queue.procrastinate_events v WHERE v.job_id = j.id) e ON true

@@ -5,13 +5,11 @@
 -- strike nothing (dust, edges, people), which are a few percent. Of points beyond the ends of the given axis one in a hundred is
 -- told: a scan sees some of what lies before a portal, but a tunnel that goes on is to be looked at.
 CREATE OR REPLACE VIEW tunnel_api.remark AS
-SELECT 16 * r.id AS id, r.survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file,
+SELECT 16 * r.id AS id, s.id AS survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file,
        concat_ws('; ', r.counts ->> 'note', r.counts ->> 'place') AS remark
-  FROM (SELECT DISTINCT ON (d.survey_id, d.km, d.stage) d.*
-          FROM tunnel.run d
-         WHERE d.outcome = 'done' AND d.km IS NOT NULL
-         ORDER BY d.survey_id, d.km, d.stage, d.started_at DESC, d.id DESC) r
-  JOIN tunnel.survey s ON s.id = r.survey_id
+  FROM tunnel.survey s
+ CROSS JOIN LATERAL tunnel_api.stages_run(s.id) g (stage)
+ CROSS JOIN LATERAL tunnel_api.last_runs(s.id, g.stage) r
  WHERE r.counts ?| ARRAY['note', 'place']
  UNION ALL
 SELECT 16 * f.id::bigint + w.k, f.survey_id, s.name, NULL, 'load', f.name, format('%s points (%s %%) left out: %s', w.points,
@@ -69,7 +67,7 @@ ROWS 5
 SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
     WITH here AS (
-        SELECT r.file, r.stage, r.km, r.remark
+        SELECT DISTINCT r.file, r.stage, r.km, r.remark
           FROM tunnel_api.remark r
           LEFT JOIN tunnel.scan_file f ON f.survey_id = r.survey_id AND f.name = r.file
          WHERE r.survey_id = $1 AND tunnel_api.in_order($2, $3)

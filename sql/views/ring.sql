@@ -89,10 +89,10 @@ COMMENT ON COLUMN tunnel_api.ring_chord.length_se IS 'Standard error, m';
 CREATE OR REPLACE FUNCTION tunnel_api.ring_inputs(survey_id int, km int) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
-               'detect', (SELECT jsonb_agg(l.id ORDER BY l.km) FROM (
-                    SELECT r.km, max(r.id) AS id FROM tunnel.run r
-                     WHERE r.survey_id = $1 AND r.km BETWEEN $2 - 1 AND $2 + 1 AND r.stage = 'detect' AND r.outcome = 'done'
-                     GROUP BY r.km) l),
+               'detect', (SELECT jsonb_agg(l.id ORDER BY k) FROM generate_series($2 - 1, $2 + 1) k CROSS JOIN LATERAL (
+                    SELECT r.id FROM tunnel.run r
+                     WHERE r.survey_id = $1 AND r.stage = 'detect' AND r.km = k AND r.subject = '' AND r.outcome = 'done'
+                     ORDER BY r.started_at DESC, r.id DESC LIMIT 1) l),
                'rings', (SELECT md5(string_agg(concat_ws(' ', g.number, g.chainage_from, g.chainage_to), ';' ORDER BY g.number))
                            FROM tunnel.ring g WHERE g.survey_id = $1 AND g.km = $2))
 $$;
@@ -105,9 +105,7 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
     WITH detect AS MATERIALIZED (
         SELECT t.km, t.reason FROM tunnel_api.stage_state($1) t WHERE t.stage = 'detect'
     ), last AS (
-        SELECT DISTINCT ON (r.km) r.km, r.finished_at, r.parameters
-          FROM tunnel.run r WHERE r.survey_id = $1 AND r.stage = 'rings' AND r.outcome = 'done'
-         ORDER BY r.km, r.started_at DESC, r.id DESC
+        SELECT r.km, r.finished_at, r.parameters FROM tunnel_api.last_runs($1, 'rings') r
     )
     SELECT g.km, g.rings, l.finished_at,
            CASE WHEN t.reason IS NOT NULL THEN 'detect is stale: ' || t.reason

@@ -110,8 +110,19 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
                    AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(b.chainage_from, -1e4, b.chainage_to, 1e4)
                    AND x.chainage_to > b.chainage_from AND x.chainage_from < b.chainage_to
                  GROUP BY q.state, q.listed) t) f ON true
- CROSS JOIN LATERAL (SELECT tunnel_api.coverage_statement(s.id, r.chainage_from, r.chainage_to) AS said) g
- CROSS JOIN LATERAL (SELECT tunnel_api.remark_statement(s.id, r.chainage_from, r.chainage_to) AS said) m
+  LEFT JOIN LATERAL (  -- once a survey, so that sheets of which there is nothing to be said are not asked about
+        SELECT array_agg(q.chainage_from) AS starts, array_agg(q.chainage_to) AS ends
+          FROM tunnel_api.coverage_gaps(s.id) q) w ON true
+  LEFT JOIN LATERAL (
+        SELECT array_agg(q.km) AS kilometres, bool_or(q.km IS NULL) AS anywhere
+          FROM tunnel_api.remark q WHERE q.survey_id = s.id) y ON true
+ CROSS JOIN LATERAL (
+        SELECT CASE WHEN EXISTS (SELECT FROM unnest(w.starts, w.ends) AS u (low, high)
+                                  WHERE u.low < r.chainage_to + 1 AND u.high > r.chainage_from - 1)
+                    THEN tunnel_api.coverage_statement(s.id, r.chainage_from, r.chainage_to) END AS said) g
+ CROSS JOIN LATERAL (
+        SELECT CASE WHEN y.anywhere OR b.km = ANY (y.kilometres)
+                    THEN tunnel_api.remark_statement(s.id, r.chainage_from, r.chainage_to) END AS said) m
  WHERE a.arc_from IS NOT NULL;
 COMMENT ON VIEW tunnel_api.sheet IS
     'Sheets of 50 m on which a survey is drawn and printed: rectangles of the unrolled plane (chainage, arc), SRID 0';

@@ -54,23 +54,27 @@ AS $$
         SELECT s.step, w.way, n.source
           FROM stage s CROSS JOIN (VALUES (-1), (0), (1)) AS w (way)
          CROSS JOIN LATERAL unnest(CASE w.way WHEN 0 THEN s.here ELSE s.beside END) AS n (source)
-    ), attempt AS MATERIALIZED (
+    ), last AS MATERIALIZED (
         SELECT r.km, s.step, r.id, r.outcome, r.started_at, r.finished_at, r.message, r.parameters, r.backend_pid, r.backend_start,
                r.counts ->> 'kept' = '0' AS void, (r.counts ->> 'learned')::integer AS learned
-          FROM tunnel.run r JOIN stage s ON s.name = r.stage
-         WHERE r.survey_id = $1 AND r.km BETWEEN $2 AND $3 AND tunnel_api.in_order($2, $3, 'km')
-    ), last AS (
-        SELECT DISTINCT ON (a.km, a.step) a.* FROM attempt a ORDER BY a.km, a.step, a.started_at DESC, a.id DESC
-    ), success AS MATERIALIZED (
-        SELECT DISTINCT ON (a.km, a.step) a.* FROM attempt a WHERE a.outcome = 'done'
-         ORDER BY a.km, a.step, a.started_at DESC, a.id DESC
+          FROM stage s CROSS JOIN LATERAL tunnel_api.last_runs($1, s.name, false, $2, $3) r
+         WHERE tunnel_api.in_order($2, $3, 'km')
+    ), success AS MATERIALIZED (  -- mostly the last one; where that is not, the ledger is asked again
+        SELECT l.* FROM last l WHERE l.outcome = 'done'
+         UNION ALL
+        SELECT r.km, l.step, r.id, r.outcome, r.started_at, r.finished_at, r.message, r.parameters, r.backend_pid, r.backend_start,
+               r.counts ->> 'kept' = '0', (r.counts ->> 'learned')::integer
+          FROM last l
+          JOIN stage s ON s.step = l.step
+         CROSS JOIN LATERAL tunnel_api.last_runs($1, s.name, true, l.km, l.km) r
+         WHERE l.outcome <> 'done'
     ), pending AS (
         SELECT k.km, max(k.read_at) AS read_at, (array_agg(f.name ORDER BY k.read_at DESC, f.name))[1] AS name
           FROM tunnel.file_km k JOIN tunnel.scan_file f ON f.id = k.file_id
          WHERE f.survey_id = $1 AND k.km BETWEEN $2 AND $3 AND k.loaded_at IS NULL
          GROUP BY k.km
     ), kilometre AS (
-        SELECT a.km FROM attempt a
+        SELECT l.km FROM last l
          UNION SELECT p.km FROM pending p
          UNION SELECT g.km FROM tunnel.goal g WHERE g.survey_id = $1 AND g.km BETWEEN $2 AND $3
     ), edit AS (
@@ -143,7 +147,7 @@ AS $$
     ), void AS (  -- emptied, with nothing left of it and nothing wanted: only its neighbours are to know
         SELECT d.km FROM success d
          WHERE d.step = 1 AND d.void
-           AND NOT EXISTS (SELECT FROM attempt a WHERE a.km = d.km AND (a.step > 1 OR a.started_at > d.started_at))
+           AND NOT EXISTS (SELECT FROM last l WHERE l.km = d.km AND (l.step > 1 OR l.started_at > d.started_at))
         EXCEPT SELECT p.km FROM pending p
         EXCEPT SELECT g.km FROM tunnel.goal g WHERE g.survey_id = $1
     ), stale AS MATERIALIZED (

@@ -31,10 +31,10 @@ COMMENT ON COLUMN tunnel_api.thickness_section.thickness IS 'Thickness of cells 
 
 CREATE OR REPLACE FUNCTION tunnel_api.thickness_inputs(before_id int, survey_id int, km int, layer text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
-    SELECT jsonb_build_object('layer', $4, 'before', $1) || jsonb_object_agg(v.part, (
-               SELECT max(r.id) FROM tunnel.run r
-                WHERE r.survey_id = v.id AND r.km = $3 AND r.stage = 'deviation' AND r.outcome = 'done'
-                  AND r.parameters ->> 'layer' = $4))
+    SELECT jsonb_build_object('layer', $4, 'before', $1) || jsonb_object_agg(v.part,
+               (SELECT r.id FROM tunnel.run r
+                 WHERE r.survey_id = v.id AND r.stage = 'deviation' AND r.km = $3 AND r.subject = $4 AND r.outcome = 'done'
+                 ORDER BY r.started_at DESC, r.id DESC LIMIT 1))
       FROM (VALUES ('old', $1), ('new', $2)) v (part, id)
 $$;
 COMMENT ON FUNCTION tunnel_api.thickness_inputs(int, int, int, text) IS
@@ -51,24 +51,20 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 25 SET sear
            END
       FROM tunnel_api.deviation_state($2) n
       JOIN tunnel_api.deviation_state($1) o ON o.km = n.km AND o.layer = n.layer
-      LEFT JOIN LATERAL (
-        SELECT r.finished_at, r.parameters FROM tunnel.run r
-         WHERE r.survey_id = $2 AND r.km = n.km AND r.stage = 'thickness' AND r.outcome = 'done'
-           AND r.parameters ->> 'layer' = $3 AND r.parameters -> 'before' = to_jsonb($1)
-         ORDER BY r.started_at DESC, r.id DESC LIMIT 1) l ON true
+      LEFT JOIN tunnel_api.last_runs($2, 'thickness') l ON l.km = n.km AND l.subject = $1 || ' ' || $3
      WHERE n.layer = $3
 $$;
 COMMENT ON FUNCTION tunnel_api.thickness_state(int, int, text) IS
     'How far the thickness between two surveys has come, along a layer''s profiles: of each kilometre that both have, when it was last made, and why it is out of date, if it is';
 
 CREATE OR REPLACE VIEW tunnel_api.thickness_status AS
-SELECT ((p.survey_id::bigint * 100000 + p.before_id) * 1000000 + 500000 + t.km) * 10
+SELECT ((a.id::bigint * 100000 + p.before_id) * 1000000 + 500000 + t.km) * 10
            + CASE p.layer WHEN 'lining' THEN 1 WHEN 'shotcrete' THEN 2 ELSE 3 END AS id,
-       p.survey_id, a.name AS survey, p.before_id, b.name AS before, t.km, p.layer, t.done_at, t.reason IS NOT NULL AS stale, t.reason
-  FROM (SELECT DISTINCT survey_id, before_id, layer FROM tunnel.thickness_section) p
-  JOIN tunnel.survey a ON a.id = p.survey_id
+       a.id AS survey_id, a.name AS survey, p.before_id, b.name AS before, t.km, p.layer, t.done_at, t.reason IS NOT NULL AS stale, t.reason
+  FROM tunnel.survey a
+ CROSS JOIN LATERAL (SELECT DISTINCT d.before_id, d.layer FROM tunnel.thickness_section d WHERE d.survey_id = a.id) p
   JOIN tunnel.survey b ON b.id = p.before_id
- CROSS JOIN LATERAL tunnel_api.thickness_state(p.before_id, p.survey_id, p.layer) t;
+ CROSS JOIN LATERAL tunnel_api.thickness_state(p.before_id, a.id, p.layer) t;
 COMMENT ON VIEW tunnel_api.thickness_status IS
     'Whether the thickness between surveys is up to date: one row per kilometre of each pair of surveys and layer of which some was made';
 COMMENT ON COLUMN tunnel_api.thickness_status.survey_id IS 'Key of the later survey';

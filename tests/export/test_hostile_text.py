@@ -76,6 +76,10 @@ def test_an_error_is_one_line_without_commands(hostile: str, tmp_path: Path) -> 
     result = CliRunner().invoke(main, ["findings", "import", hostile, str(path)])
     assert result.exit_code == 2
     assert not [c for c in result.stderr if c != "\n" and not c.isprintable()]
+    path.with_name("b.geojson").write_text('{"type": "FeatureCollection", "features": []}')
+    result = CliRunner().invoke(main, ["evaluate", hostile, str(path.with_name("b.geojson")), "--layer", "a\nb"])
+    assert result.exit_code == 2
+    assert len(result.stderr.splitlines()) == 1
 
 
 def test_a_drawing_has_what_it_had(hostile: str, tmp_path: Path) -> None:
@@ -110,7 +114,10 @@ def test_a_project_has_no_expression_of_theirs(hostile: str, tmp_path: Path) -> 
     with zipfile.ZipFile(tmp_path / "a.qgz") as packed:
         (name,) = (name for name in packed.namelist() if name.endswith(".qgs"))
         text = packed.read(name).decode()
-    ElementTree.fromstring(text)
+    tips = [tip.text or "" for tip in ElementTree.fromstring(text).iter("mapTip")]
+    for column in ("remark", "reason", "caption"):  # a map tip is HTML
+        assert sum(tip.count(f'"{column}"') for tip in tips) == sum(tip.count(f'replace("{column}", map(') for tip in tips)
+    assert sum("replace(" in tip for tip in tips) >= 3
     assert not [theirs for theirs in HOSTILE.values() if theirs in text]
     assert "owned" not in text
 
@@ -123,3 +130,17 @@ def test_a_report_runs_nothing_of_theirs(hostile: str, tmp_path: Path) -> None:
     assert "49" not in re.findall(r"\{\{.*?\}\}", text)
     assert "<script>document" not in text
     assert "<img src=x" not in text
+
+
+def test_a_shape_nested_without_end_is_refused(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
+    """GEOS goes down with the program when it reads 100,000 collections in each other; 6000 are what a cell of CSV holds."""
+    path = tmp_path / "deep.csv"
+    deep = "GEOMETRYCOLLECTION(" * 6000 + "POINT(12330 1)" + ")" * 6000
+    path.write_text(f'kind,wkt\ncrack,"{deep}"\ncrack,"LINESTRING(12330 1, 12331 1)"\n')
+    result = CliRunner().invoke(main, ["findings", "import", example, str(path)])
+    assert result.exit_code == 2
+    assert "row 2: wkt is nested more than 20 deep" in result.stderr
+    template = tmp_path / "deep.toml"
+    template.write_text("client = " + "[" * 100_000)
+    result = CliRunner().invoke(main, ["report", example, "--template", str(template), "-o", str(tmp_path / "a.html")])
+    assert (result.exit_code, result.stderr) == (2, f"tunneldb: {template}: its lists are nested too deep\n")

@@ -23,7 +23,8 @@ pytestmark = pytest.mark.xdist_group("canal")
 
 @pytest.fixture(scope="module")
 def scene() -> CanalScene:
-    return simulate(CanalParameters(seed=21, length=30.0, laser_step=0.5, sonar_stations=2, sonar_step=1.0, batter=1.0))
+    coarse = CanalParameters(seed=21, length=30.0, laser_step=0.5, sonar_stations=2, sonar_step=1.0, sub_rays=7, batter=1.0)
+    return simulate(coarse)
 
 
 @pytest.fixture(scope="module")

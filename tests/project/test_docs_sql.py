@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import re
 from pathlib import Path
@@ -42,13 +43,27 @@ def test_every_query_runs(conn: psycopg.Connection, example: str) -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_reference_pages_are_up_to_date(conn: psycopg.Connection) -> None:
+def test_reference_pages_are_up_to_date(conn: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
     script = generator()
     old = [page for page, write in script.PAGES.items() if (ROOT / "docs" / page).read_text("utf-8") != write(conn)]
     assert not old, "python docs/generate_reference.py writes them anew"
 
 
+def test_the_diagram_shows_every_view_once(conn: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    code = importlib.import_module("view_diagram").view_diagram(conn)
+    shown = []
+    for line in code.splitlines():
+        names = re.findall(r"\w+", line.strip('`"]').partition(" → ")[0])
+        if re.match(r"^\w+(, \w+)*( → .*)?[`\]\"]*$", line) and not line.startswith("flowchart"):
+            shown += [name if not name.startswith("_") else names[0] + name for name in names]
+    views = conn.execute("SELECT viewname FROM pg_views WHERE schemaname = 'tunnel_api'").fetchall()
+    assert sorted([*shown, "tunnel", "survey"]) == sorted(name for (name,) in views)
+
+
 def generator() -> ModuleType:
+    """The script, which imports others beside it."""
     spec = importlib.util.spec_from_file_location("generate_reference", ROOT / "docs" / "generate_reference.py")
     assert spec is not None
     assert spec.loader is not None

@@ -21,6 +21,7 @@ from qgis.core import (
     QgsProcessingFeedback,
     QgsProject,
     QgsRasterLayer,
+    QgsRectangle,
     QgsSettings,
 )
 from qgis.gui import QgsGui, QgsMapCanvas, QgsMessageBar
@@ -95,7 +96,7 @@ def wait(dock: Any) -> None:
     canvas = qgis.utils.iface.canvas
     until = time.monotonic() + 20
     QCoreApplication.processEvents()
-    while (not dock.settled() or canvas.isDrawing()) and time.monotonic() < until:
+    while (not dock.settled() or dock.lingering.isActive() or canvas.isDrawing()) and time.monotonic() < until:
         QCoreApplication.processEvents()
 
 
@@ -110,7 +111,9 @@ def review(dock: Any) -> dict[str, Any]:
     window = qgis.utils.iface.window
     seen: dict[str, Any] = {"order": [finding.id for finding in dock.session.work.findings], "first": at(dock)}
     seen["pictures"] = {kind: view.image is not None and not view.missing for kind, view in dock.views.items()}
-    seen["extent"] = qgis.utils.iface.canvas.extent().toString(3)
+    box = dock.session.work.current
+    box = QgsRectangle(box.chainage_from, box.arc_from, box.chainage_to, box.arc_to)
+    seen["followed"] = qgis.utils.iface.canvas.extent().contains(box) and qgis.utils.iface.canvas.extent().width() < 100
     press(dock, Qt.Key_N)
     seen["next"] = at(dock)
     press(dock, Qt.Key_P)

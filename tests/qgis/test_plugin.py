@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import configparser
 import json
 import re
 import subprocess
@@ -24,7 +25,6 @@ from tunneldb.cli.main import main
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "qgis_plugin" / "tunneldb_review"
-SCRIPT = Path(__file__).with_name("review_in_qgis.py")
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +46,35 @@ def test_the_zip_holds_the_plugin_and_its_licence_in_one_folder(unpacked: Path) 
     held = {path.name for path in folder.iterdir()}
     assert held == {path.name for path in SOURCE.glob("*.py")} | {"metadata.txt", "icon.svg", "LICENSE"}
     assert f"\nversion={tunneldb.__version__}\n" in (folder / "metadata.txt").read_text("utf-8")
+
+
+def test_what_is_published_keeps_the_rules_of_plugins_qgis_org(tmp_path: Path) -> None:
+    """Rules of its validator that need no network; the pages must be reachable, too."""
+    told = {
+        "email": "a@example.org", "homepage": "https://example.org/tunneldb", "repository": "https://example.org/tunneldb/code",
+        "tracker": "https://example.org/tunneldb/issues",
+    }  # fmt: skip
+    script = [sys.executable, str(ROOT / "scripts" / "package_plugin.py"), str(tmp_path)]
+    some = subprocess.run([*script, "--email", told["email"]], capture_output=True, text=True, check=False)
+    assert some.returncode == 2
+    assert "--homepage, --repository, --tracker" in some.stderr
+    words = [word for name, value in told.items() for word in (f"--{name}", value)]
+    archive = Path(subprocess.run([*script, *words], capture_output=True, text=True, check=True).stdout.strip())
+    assert archive.stat().st_size < 20_000_000
+    with zipfile.ZipFile(archive) as held:
+        names = held.namelist()
+        parser = configparser.ConfigParser()
+        parser.optionxform = str  # type: ignore[assignment,method-assign]
+        parser.read_string(held.read("tunneldb_review/metadata.txt").decode())
+    metadata = dict(parser["general"])
+    assert {"tunneldb_review/__init__.py", "tunneldb_review/LICENSE", f"tunneldb_review/{metadata['icon']}"} <= set(names)
+    assert not [name for name in names if ".." in name or ".pyc" in name or "__pycache__" in name or name.startswith("/")]
+    assert {"name", "description", "version", "qgisMinimumVersion", "author", "about", *told} <= set(metadata)
+    assert told.items() <= metadata.items()
+    assert "/" not in metadata["author"]
+    assert "plugin" not in metadata["name"].lower()
+    assert all(metadata[key] in ("True", "False") for key in ("experimental", "deprecated"))
+    assert tuple(map(int, metadata["qgisMinimumVersion"].split("."))) <= (3, 22)
 
 
 def test_it_is_python_of_3_9_and_imports_nothing_that_qgis_lacks() -> None:
@@ -97,7 +126,7 @@ def test_calls_are_put_together_and_lines_are_read(unpacked: Path, monkeypatch: 
     assert dsn(of_source(source).words) == "dbname='a b' host=/run/x port=5432 user=ines"
 
 
-def in_qgis(unpacked: Path, folder: Path, dsn: str, person: str) -> dict[str, Any]:
+def in_qgis(unpacked: Path, folder: Path, dsn: str, person: str, script: str = "review_in_qgis.py") -> dict[str, Any]:
     """What real QGIS does with the plugin as a person, in a project whose service names that person."""
     if not has_qgis():
         missing("QGIS")
@@ -115,8 +144,9 @@ def in_qgis(unpacked: Path, folder: Path, dsn: str, person: str) -> dict[str, An
     )
     command.chmod(0o755)
     environment = ENVIRONMENT | {"HOME": str(folder), "PGSERVICEFILE": str(folder / "pg_service.conf")}
+    arguments = [project, unpacked, command, folder, *(["look"] if person == "vera" else [])]
     done = subprocess.run(
-        [PYTHON, str(SCRIPT), str(project), str(unpacked), str(command), str(folder), *(["look"] if person == "vera" else [])],
+        [PYTHON, str(Path(__file__).with_name(script)), *map(str, arguments)],
         env=environment, capture_output=True, text=True, timeout=120, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -132,6 +162,7 @@ def test_an_inspector_reviews_by_keys(
     assert {"tunneldb:run", "tunneldb:batch", "tunneldb:evaluate", "tunneldb:report"} <= set(seen["loaded"]["algorithms"])
     did = seen["review"]
     assert did["pictures"] == {"raw": True, "corrected": True, "offset": True}
+    assert did["followed"]
     assert did["first"] == did["previous"] != did["next"] == did["after_confirm"] == did["rejected"]
     assert did["focus_back"]
     assert did["after_undo"] == did["undone"]
@@ -168,3 +199,48 @@ def test_a_viewer_is_told_that_she_may_not(
     seen = in_qgis(unpacked, tmp_path, dsn, "vera")
     assert "may look, but not review" in seen["refused"]
     assert conn.execute("SELECT count(*) FROM tunnel_api.audit WHERE who = 'vera'").fetchone() == (0,)
+
+
+def test_what_comes_between_loses_nothing_and_overwrites_nothing(
+    unpacked: Path, tmp_path: Path, conn: psycopg.Connection, dsn: str, example: str, people: None
+) -> None:
+    """The server goes away, another reviews the same, letters are typed in lists, a verb is cancelled in a stage."""
+    conn.close()  # the database is closed to all for a while
+    seen = in_qgis(unpacked, tmp_path, dsn, "ines", "interrupted_in_qgis.py")
+    assert seen["lists"] == {"reviewed": 0, "order": "By chainage", "keys": True}
+
+    lost, two = seen["lost"], seen["two"]
+    assert lost["cut_said"] == ""
+    assert lost["lost"] != lost["cut"]
+    for said, listed, shown, review in lost["away"]:
+        assert said.startswith("No connection to the database")
+        assert (listed, shown, review) == (lost["lost"], lost["lost"], "open")
+    assert "not written yet" in lost["remark_kept"][0]
+    assert lost["remark_kept"][1:] == ["wet again", True]
+    with psycopg.connect(dsn) as connection:
+        rows = {
+            key: rest
+            for key, *rest in connection.execute("SELECT id, review, remark, reviewed_by FROM tunnel_api.lining_finding")
+        }
+        assert rows[lost["cut"]] == ["confirmed", None, "ines"]
+        assert rows[lost["lost"]] == ["confirmed", "wet again", "ines"]
+        assert rows[two["first"]] == ["confirmed", "no soot", "ines"]
+        audit = connection.execute(
+            "SELECT before ->> 'review', before ->> 'remark', after ->> 'review', after ->> 'remark' FROM tunnel_api.audit"
+            " WHERE view = 'anomaly' AND row_id = %s ORDER BY id", [two["first"]],
+        ).fetchall()  # fmt: skip
+        assert audit == [
+            ("open", None, "rejected", "soot"), (None, "soot", None, "no soot"), ("rejected", None, "confirmed", None),
+        ]  # fmt: skip
+
+    changed = rf"\w+ has changed finding {two['first']} meanwhile: it is rejected, .+, remark “soot”\. Nothing was written"
+    assert re.match(changed, two["said"])
+    assert (two["stays"], two["shown"], two["kept"]) == (two["first"], ["rejected", "soot", True], "rejected|soot")
+    assert (two["came"], two["listed"]) == (two["wanted"], False)
+
+    assert seen["rerun"] == {"stays": True, "new": True}
+
+    cancelled = seen["cancel"]
+    assert (cancelled["children"], cancelled["left"], cancelled["backends"]) == (1, 0, 0)
+    assert cancelled["after"] == cancelled["before"]
+    assert "Cancelled" in cancelled["log"]

@@ -472,6 +472,20 @@ def test_pdf(shared: str, leaks: list[dict[str, Any]], tmp_path: Path, chromium:
     assert [entry["/Title"] for entry in reader.outline if not isinstance(entry, list)], "bookmarks"
 
 
+def test_of_too_many_leaks_the_largest_are_listed_and_all_counted(
+    shared: str, leaks: list[dict[str, Any]], tmp_path: Path
+) -> None:
+    for name, listed in (("all", 1000), ("few", 2)):
+        run("--dsn", shared, "report", SURVEY, "-o", tmp_path / f"{name}.html", "--list", listed)
+    whole, few = Reading(tmp_path / "all.html"), Reading(tmp_path / "few.html")
+    largest = sorted(leaks, key=lambda leak: (leak["review"] == "rejected", -leak["area"]))[:2]
+    assert {row["id"] for row in few.rows} == {leak["id"] for leak in largest}
+    assert f"Listed and drawn are the 2 largest leaks, those rejected last. {len(leaks) - 2} more are not listed" in few.text
+    assert (len(whole.rows), "Listed and drawn" in whole.text) == (len(leaks), False)
+    digests = [re.findall(r"digest ([0-9a-f]{16})", reading.text) for reading in (whole, few)]
+    assert digests[0] == digests[1] != [], "it is of all leaks"
+
+
 def test_thousands_of_leaks_come_by_pages(example: str, conn: psycopg.Connection, browser: Browser, tmp_path: Path) -> None:
     rows = conn.execute(
         "SELECT attname FROM pg_attribute"

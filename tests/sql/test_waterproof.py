@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import psycopg
 import pytest
@@ -10,6 +12,7 @@ from shapely.geometry import box
 from tests.sql.test_statistics import add_coverage, add_leak, add_survey, ask
 from tunneldb.database import connect, install
 from tunneldb.pipeline.stages import STAGES
+from tunneldb.store.waterproof import keep_missing
 
 NAMES = (
     "chainage_from", "chainage_to", "lining_area", "seen_share", "wet_area", "wet_ratio", "patches", "largest_area",
@@ -283,5 +286,27 @@ def test_an_upgrade_keeps_what_was_not(conn: psycopg.Connection, survey: int) ->
     assert differences(conn) == []
     conn.commit()
     install(conn, STAGES)
-    assert kept(conn) == [3, 4, 5]
-    assert differences(conn) == []
+    conn.rollback()
+    assert (kept(conn), differences(conn)) == ([], []), "right without, and slower"
+    conn.rollback()
+
+    def cut_off(_text: str, _total: float | None) -> Callable[[float], None]:
+        def advance(_done: float) -> None:
+            raise KeyboardInterrupt
+
+        return advance
+
+    with pytest.raises(KeyboardInterrupt):
+        keep_missing(conn, cut_off)
+    conn.rollback()
+    assert kept(conn) == [3], "each kilometre is committed by itself"
+    told: list[float | None] = []
+
+    def begin(_text: str, total: float | None) -> Callable[[float], None]:
+        told.append(total)
+        return lambda _done: None
+
+    assert (keep_missing(conn, begin), told) == (2, [2]), "it goes on with the rest"
+    assert (kept(conn), differences(conn)) == ([3, 4, 5], [])
+    conn.rollback()
+    assert keep_missing(conn, begin) == 0

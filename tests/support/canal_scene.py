@@ -180,17 +180,25 @@ class Canal:
             for side, batter, rough in zip((-1.0, 1.0), self.batter, self.rough, strict=True):
                 gap = WIDTH / 2.0 + batter * station[2] - side * station[1]
                 closing = side * rays[:, 1] - batter * rays[:, 2]
+                met = np.full(len(rays), np.inf)
+                ahead = np.flatnonzero(closing > 0.0)
+                ray, closing = rays[ahead], closing[ahead]
                 found = gap / closing
                 for _ in range(2):
-                    hit = np.nan_to_num(station + found[:, None] * rays)
+                    hit = np.nan_to_num(station + found[:, None] * ray)
                     found = (gap + rough.at(hit[:, 0], hit[:, 2])) / closing
-                meet(np.nan_to_num(found, nan=np.inf), 1)
+                met[ahead] = np.nan_to_num(found, nan=np.inf)
+                meet(met, 1)
             if water:
-                found = (-DEPTH - station[2]) / rays[:, 2]
+                met = np.full(len(rays), np.inf)
+                down = np.flatnonzero(rays[:, 2] < 0.0)
+                ray = rays[down]
+                found = (-DEPTH - station[2]) / ray[:, 2]
                 for _ in range(3):
-                    hit = np.nan_to_num(station + found[:, None] * rays)
-                    found = (-DEPTH + self.bed.at(hit[:, 0], hit[:, 1]) - station[2]) / rays[:, 2]
-                meet(np.nan_to_num(found, nan=np.inf), 0)
+                    hit = np.nan_to_num(station + found[:, None] * ray)
+                    found = (-DEPTH + self.bed.at(hit[:, 0], hit[:, 1]) - station[2]) / ray[:, 2]
+                met[down] = np.nan_to_num(found, nan=np.inf)
+                meet(met, 0)
                 meet(np.where(rays[:, 2] > 0.0, -station[2] / rays[:, 2], np.inf), 3)
             else:
                 height = (station + np.where(np.isfinite(reach), reach, 0.0)[:, None] * rays)[:, 2]

@@ -6,9 +6,11 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
+from tunneldb.cli.progress import bar, step
 from tunneldb.database import open_connection
 from tunneldb.database.schema import install, schema_revision
 from tunneldb.pipeline.stages import STAGES
+from tunneldb.store.waterproof import keep_missing
 
 _ENDINGS = ("57P01", "57P02")
 """Warnings with which the server ends a session: the error that follows says it."""
@@ -21,6 +23,9 @@ def init(settings: Settings) -> None:
 
     Data stay; schema tunnel_api is made anew. Run it once for a new database, and again after each upgrade of
     tunneldb.
+
+    After an upgrade, waterproofing is then worked out kilometre by kilometre, each committed, while others work. It may be
+    cut off: views are right without, and slower, and the next init goes on with the rest.
     """
     with open_connection(settings.dsn) as connection:
         before = schema_revision(connection)
@@ -34,7 +39,12 @@ def init(settings: Settings) -> None:
         )
         install(connection, STAGES)
         after = schema_revision(connection)
-    change = "created" if before is None else "is up to date" if before == after else f"upgraded from {before}"
-    tell(before=before, revision=after)
-    where = "the embedded server" if settings.dsn is None else "the database"
-    click.echo(f"{where}: schema tunnel {change} ({after}), tunnel_api installed", err=True)
+        connection.rollback()
+        change = "created" if before is None else "is up to date" if before == after else f"upgraded from {before}"
+        where = "the embedded server" if settings.dsn is None else "the database"
+        click.echo(f"{where}: schema tunnel {change} ({after}), tunnel_api installed", err=True)
+        with bar("km") as shown:
+            kept = keep_missing(connection, step(shown))
+    tell(before=before, revision=after, waterproofing=kept)
+    if kept:
+        click.echo(f"waterproofing of {kept} kilometres worked out", err=True)

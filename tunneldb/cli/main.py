@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from tunneldb import __version__
-from tunneldb.cli.output import AS_JSON, AT_FAULT, DONE, JSON, printable, run_as_json, write_lines
+from tunneldb.cli.output import AS_JSON, AT_FAULT, DONE, JSON, error_line, run_as_json, write_lines
 from tunneldb.errors import UserError, did_you_mean
 
 
@@ -169,7 +169,7 @@ class LazyGroup(click.Group):
             message = _describe(ctx, error)
             if message is None:
                 raise
-        click.echo(f"tunneldb: {printable(message)}", err=True)
+        click.echo(error_line(message), err=True)
         return ctx.exit(2)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -39,6 +39,11 @@ def printable(text: str) -> str:
     return "".join(c if c in "\n\t" or _is_shown(c) else c.encode("unicode_escape").decode() for c in text)
 
 
+def error_line(message: str) -> str:
+    """Return the line by which an error is told, whatever names are in it."""
+    return "tunneldb: " + printable(message).replace("\n", "\\n")
+
+
 def _is_shown(character: str) -> bool:
     return character.isprintable() or unicodedata.category(character) == "Zs"  # such as the narrow space between thousands
 
@@ -147,7 +152,7 @@ def run_as_json(ctx: click.Context, run: Callable[[], Any], describe: Callable[[
         error = describe(wrong)
         if error is None:
             raise
-        click.echo(f"tunneldb: {printable(error)}", err=True)
+        click.echo(error_line(error), err=True)
         code = 2
     said = {"error": error} if error is not None else {}
     told = ctx.meta.get(_TOLD, {})

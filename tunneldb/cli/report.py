@@ -19,7 +19,7 @@ from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import replacing, told_to_end
 from tunneldb.report.owner import Owner, read_owner
-from tunneldb.report.page import CARDS, Written, write_html, write_site_html
+from tunneldb.report.page import CARDS, LISTED, Written, write_html, write_site_html
 from tunneldb.report.pdf import find_browser, print_pdf
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.survey import Survey, get_survey
@@ -56,6 +56,15 @@ _PRINTING = 1.2  # time in which it prints a page as a multiple of that in which
     metavar="FOLDER",
     help="Where relative paths of photos begin. Default: the current folder.",
 )
+@click.option(
+    "--list",
+    "listed",
+    type=click.IntRange(1, 1_000_000),
+    default=LISTED,
+    show_default=True,
+    metavar="N",
+    help="Leaks that are listed and drawn at most, the largest, those rejected last. The others are in all sums.",
+)
 @click.pass_obj
 def report(
     settings: Settings,
@@ -65,6 +74,7 @@ def report(
     end: str | None,
     template: Path | None,
     photos: Path | None,
+    listed: int,
 ) -> None:
     """Write the inspection report of SURVEY, to be handed over and signed.
 
@@ -97,11 +107,11 @@ def report(
         conn.rollback()
         with told_to_end(), replacing(output) as temporary, bar("strips") as shown:
             if browser is None:
-                written = _write(conn, found, stretch, temporary, shown, owner, photos, paper=False)
+                written = _write(conn, found, stretch, temporary, shown, owner, photos, listed, paper=False)
             else:
                 with tempfile.TemporaryDirectory(prefix="tunneldb-report-") as folder:
                     page = Path(folder) / "report.html"
-                    written = _write(conn, found, stretch, page, shown, owner, photos, paper=True)
+                    written = _write(conn, found, stretch, page, shown, owner, photos, listed, paper=True)
                     conn.close()  # a browser may take minutes
                     _print(browser, page, temporary, shown)
     leaks, missing = written.leaks, [photo.photo.path for photo in written.missing]
@@ -143,6 +153,7 @@ def _write(
     shown: Progress,
     owner: Owner,
     photos: Path | None,
+    listed: int,
     *,
     paper: bool,
 ) -> Written:
@@ -152,6 +163,7 @@ def _write(
         conn, survey, page, stretch.low, stretch.high,
         progress=lambda done, count: shown.update(task, completed=done, total=count),
         pictures=CARDS if paper else None, form="JPEG" if paper else "WEBP", owner=owner, photos=photos,
+        listed=listed,
     )  # fmt: skip
 
 

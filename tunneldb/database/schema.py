@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import sqlalchemy
     from alembic.config import Config
 
-HEAD = "0029"
+HEAD = "0030"
 """The newest migration. Known here so that a command whose database is up to date need not import Alembic."""
 
 _LOCK = 7088630451  # any number: two installations of one database wait for each other
@@ -122,12 +122,16 @@ def _fill_stages(connection: psycopg.Connection[Any], stages: Sequence[StageRow]
 def install_api(connection: psycopg.Connection[Any]) -> None:
     """Drop schema tunnel_api and those of typed layers, and install it from the SQL files, in the connection's transaction.
 
+    What another version kept of kilometres (`tunnel.waterproof`) may be of other limits, and is forgotten. Nobody is at it:
+    making the trigger of that table has waited for all.
+
     Raises
     ------
     UserError
         When something outside of the schema was built on it, which the drop would take along.
     """
     _refuse_dependents(connection)
+    before, version = installed_api_version(connection), api_version()
     for schema in (*_layer_schemas(connection), "tunnel_api"):
         connection.execute(sql.SQL("DROP SCHEMA IF EXISTS {} CASCADE").format(sql.Identifier(schema)))
     connection.execute("CREATE SCHEMA tunnel_api")
@@ -137,7 +141,9 @@ def install_api(connection: psycopg.Connection[Any]) -> None:
         except psycopg.Error as error:
             error.add_note(f"in {path}{_line_of(error, path)}")
             raise
-    connection.execute(sql.SQL("COMMENT ON SCHEMA tunnel_api IS {}").format(sql.Literal(api_version())))
+    if before != version:
+        connection.execute("DELETE FROM tunnel.waterproof")
+    connection.execute(sql.SQL("COMMENT ON SCHEMA tunnel_api IS {}").format(sql.Literal(version)))
 
 
 def sql_files() -> list[Path]:

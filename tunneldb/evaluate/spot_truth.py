@@ -58,7 +58,10 @@ def read_spot_truth(survey: Survey, path: Path, layer: str | None = None) -> Spo
     """
     simulated = _simulated(path)
     if simulated is not None:
-        return _of_simulation(survey, path, simulated)
+        try:
+            return _of_simulation(survey, path, simulated)
+        except (LookupError, TypeError, ValueError, AttributeError, shapely.errors.ShapelyError) as error:
+            raise UserError(f"{path} is no truth of simulate-structure: {error!r}") from error
     given = read_polygons(path, survey, layer, "spot")
     if not given.in_space and survey.srid != LOCAL:
         raise UserError(f"{given.where} has no coordinate system: polygons of spots must be 3D, in {srid_name(survey.srid)}")
@@ -74,7 +77,7 @@ def _simulated(path: Path) -> dict[str, Any] | None:
         return None
     try:
         content = json.loads(path.read_text("utf-8"))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise UserError(f"{path} is no JSON: {error}") from None
     return content if isinstance(content, dict) and "anomalies" in content and "parameters" in content else None
 

@@ -189,7 +189,7 @@ def _bare_geojson(path: Path) -> bool:
         return False
     try:
         content = json.loads(path.read_text("utf-8"))
-    except ValueError:
+    except (ValueError, RecursionError):
         return False
     return isinstance(content, dict) and content.get("crs") is None
 

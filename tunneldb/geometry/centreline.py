@@ -39,7 +39,7 @@ def centreline_through(points: ArrayLike) -> PlanLine:
     Raises
     ------
     ValueError
-        No points.
+        No points, or points that lie far apart.
     """
     vertices = centreline(np.asarray(points, dtype=np.float64))
     steps = np.hypot(*np.diff(vertices, axis=0).T)
@@ -61,7 +61,7 @@ def centreline(points: Float) -> Float:
     Raises
     ------
     ValueError
-        No points.
+        No points, or points that lie far apart.
     """
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
@@ -133,6 +133,8 @@ def _end_of_cells(cells: Float, at: Float, unit: Float) -> Float:
 def ends_by_projection(local: Float) -> Float:
     """Both ends of a short piece: along the direction in which its points fill the fewest cells of the projection."""
     local = local[np.abs(local - np.median(local, axis=0)).max(axis=1) < SHORT]
+    if not len(local):
+        raise ValueError(f"no points lie within {SHORT:g} m of their middle: they are no piece of a tunnel")
     sample = local[:: max(1, len(local) // _SAMPLE)]
     sample = sample - sample.mean(axis=0)
     best, step = 0.0, np.pi / 90

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import psycopg
 import pyogrio
 import pyogrio.raw
@@ -221,6 +222,8 @@ def _shape(
         lacking = ", ".join(name for name in begun if name not in values)
         raise ValueError(f"it has no place: {lacking} is empty" if lacking else "it has no place: all columns of it are empty")
     if len(way) == 1:
+        if _depth(values[way[0]]) > _DEEPEST:  # by which GEOS, that reads it, would go down
+            raise ValueError(f"{way[0]} is nested more than {_DEEPEST} deep")
         try:
             return shapely.from_wkt(values[way[0]])
         except shapely.errors.GEOSException as error:
@@ -231,6 +234,16 @@ def _shape(
         for name in way
     ]
     return shapely.box(place[0], place[2], place[1], place[3]) if len(place) == 4 else shapely.Point(place)
+
+
+_DEEPEST = 20
+"""Levels of parentheses of WKT: a collection of polygons has four."""
+
+
+def _depth(text: str) -> int:
+    """How deep parentheses are nested."""
+    letters = np.frombuffer(text.encode("utf-32-le"), np.uint32)
+    return int(np.cumsum((letters == ord("(")).astype(np.int64) - (letters == ord(")"))).max(initial=0))
 
 
 def _float(name: str, text: str, said: str = "a number") -> float:

@@ -22,7 +22,7 @@ from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.pointcloud.formats.las_bounds import header_box
 from tunneldb.pointcloud.formats.table import format_of
 from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
-from tunneldb.store.sources import load_poses
+from tunneldb.store.sources import is_mobile
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
@@ -169,7 +169,7 @@ def _present_density(conn: psycopg.Connection[Any], survey: Survey) -> dict[str,
 def _headers(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path], reach: float) -> list[Incoming]:
     if not paths:
         return []
-    alignment, poses = load_alignment(conn, survey), load_poses(conn, survey)
+    alignment, mobile = load_alignment(conn, survey), is_mobile(conn, survey)
     read = {
         row[0]: row[1:]
         for row in conn.execute(
@@ -183,7 +183,7 @@ def _headers(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path
         try:
             header = read_header(path)
             points = header.points
-            check_header(header, survey.intensity_dimension, survey.srid, needs_time=poses.mobile)
+            check_header(header, survey.intensity_dimension, survey.srid, needs_time=mobile)
         except UserError as error:
             touched = _damaged_kilometres(path, alignment, reach)
             first, last = (touched[0], touched[-1]) if touched else (None, None)

@@ -210,9 +210,9 @@ def _known(conn: psycopg.Connection[Any], survey: str, files: tuple[File, ...]) 
     ).fetchall()
     plans = conn.execute("SELECT km, stage, state, message FROM tunnel_api.queue_state(%s)", of_survey).fetchall()
     runs = conn.execute(
-        "SELECT km, stage, worker, started_at FROM tunnel_api.run"
-        " WHERE survey_id = %s AND outcome = 'running' AND km IS NOT NULL ORDER BY started_at",
-        of_survey,
+        "SELECT r.km, r.stage, r.worker, r.started_at FROM unnest(%s::text[]) AS s (stage)"
+        " CROSS JOIN LATERAL tunnel_api.last_runs(%s, s.stage, false) r WHERE r.outcome = 'running'",
+        [list(STAGE_NAMES), *of_survey],
     ).fetchall()
     return _Known(
         {(km, stage): _Status(*rest) for km, stage, *rest in statuses},

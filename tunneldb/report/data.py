@@ -137,17 +137,32 @@ def find_stretch(conn: psycopg.Connection[Any], survey: Survey, low: float, high
     return start, end
 
 
+REPORTED = sql.SQL(
+    "FROM tunnel_api.leak WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed') AND chainage_to > %(low)s"
+    " AND chainage_from < %(high)s"
+)
+"""Leaks of a stretch that a report states: found last, or confirmed although found no more; also the rejected."""
+
 _LEAK = sql.SQL(
     "SELECT {columns}, tunnel_api.area_between(unrolled, area, %(low)s, %(high)s) AS inside,"
-    " public.ST_AsBinary(unrolled) AS outline FROM tunnel_api.leak"
-    " WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed') AND chainage_to > %(low)s"
-    " AND chainage_from < %(high)s ORDER BY chainage_from + chainage_to, arc_from, id"
-).format(columns=sql.SQL(", ").join(sql.Identifier(f.name) for f in fields(Leak) if f.name not in ("inside", "outline")))
+    " public.ST_AsBinary(unrolled) AS outline FROM tunnel_api.leak WHERE id IN ("
+    "SELECT id {reported} ORDER BY review = 'rejected', detected, area DESC, id LIMIT %(most)s)"
+    " ORDER BY chainage_from + chainage_to, arc_from, id"
+).format(
+    columns=sql.SQL(", ").join(sql.Identifier(f.name) for f in fields(Leak) if f.name not in ("inside", "outline")),
+    reported=REPORTED,
+)
 
 
-def read_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Leak]:
-    """Read the leaks of a stretch in order of chainage: found last, or confirmed although found no more; also the rejected."""
-    rows = _rows(conn, _LEAK, {"survey": survey.id, "low": low, "high": high})
+def read_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float, most: int) -> list[Leak]:
+    """Read leaks of a stretch, REPORTED, in order of chainage.
+
+    Parameters
+    ----------
+    most : int
+        So many at most: those not found again first, then the largest, those rejected last.
+    """
+    rows = _rows(conn, _LEAK, {"survey": survey.id, "low": low, "high": high, "most": most})
     return [Leak(**{**row, "outline": shapely.from_wkb(bytes(row["outline"]))}) for row in rows]
 
 

@@ -109,18 +109,26 @@ def without_detection(coverage: CoverageBins, low: float, high: float) -> list[t
     return [(a, b) for a, b in ends if b > a]
 
 
-def wet_bins(leaks: Sequence[Leak], edges: Float) -> Float:
-    """Wet area in bins of chainage, m²: that of each leak in the stretch spread evenly over its length there."""
-    total = np.zeros(len(edges) - 1)
-    for leak in leaks:
-        if not leak.counts:
-            continue
-        first = int(np.clip(np.searchsorted(edges, leak.chainage_from, side="right") - 1, 0, len(total) - 1))
-        last = int(np.clip(np.searchsorted(edges, leak.chainage_to, side="left") - 1, first, len(total) - 1))
-        length = min(leak.chainage_to, edges[-1]) - max(leak.chainage_from, edges[0])
-        for n in range(first, last + 1):
-            inside = min(edges[n + 1], leak.chainage_to) - max(edges[n], leak.chainage_from)
-            total[n] += leak.inside * max(inside, 0.0) / max(length, 1e-9)
+def wet_bins(low: Float, high: Float, area: Float, edges: Float) -> Float:
+    """Wet area in bins of chainage (n,), m²: that of each leak in the stretch spread evenly over its length there.
+
+    Parameters
+    ----------
+    low, high, area : (k,) float64 arrays
+        Where leaks begin and end, m, and their area in the stretch, m².
+    edges : (n + 1,) float64 array
+        Of the bins, m.
+    """
+    count = len(edges) - 1
+    total = np.zeros(count)
+    first = np.clip(np.searchsorted(edges, low, side="right") - 1, 0, count - 1)
+    last = np.clip(np.searchsorted(edges, high, side="left") - 1, first, count - 1)
+    length = np.minimum(high, edges[-1]) - np.maximum(low, edges[0])
+    for further in range(int((last - first).max(initial=-1)) + 1):
+        at = np.flatnonzero(first + further <= last)
+        n = first[at] + further
+        inside = np.minimum(edges[n + 1], high[at]) - np.maximum(edges[n], low[at])
+        np.add.at(total, n, area[at] * np.maximum(inside, 0.0) / np.maximum(length[at], 1e-9))
     return total
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import hashlib
-from collections import defaultdict
+from bisect import insort
+from collections import Counter, defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +19,13 @@ from tunneldb.export.tables.finding_counts import (
     STATES,
     UNCOUNTED,
     KindCount,
-    count_findings,
+    KindTally,
+    in_order,
     read_kinds,
     read_severities,
     read_wet_kinds,
 )
-from tunneldb.export.tables.findings import Chosen, Finding, read_findings
+from tunneldb.export.tables.findings import Chosen, Finding, stream_findings
 from tunneldb.report.drawing import line_path, outline_path
 from tunneldb.report.photos import Thumbnail, make_thumbnails, read_photos
 from tunneldb.store.survey import Survey
@@ -52,19 +55,19 @@ class KindChapter:
         What there is of it.
     groups : list of (str, list of Finding)
         Those listed by their state, in order of chainage: confirmed, open, and what no sum counts.
+    tabled : int
+        How many stand here without a row, for all that is to be said of them is in the table of leaks.
     plain : int
         How many stand here without a row: detected, and nobody has said anything of them.
-    tabled : bool
-        Whether these are in the table of leaks.
-    beyond : list of Finding
-        Those for which there is no row, as there are too many.
+    beyond : list of (int, bytes)
+        Those for which there is no row, as there are too many: their ids, and a digest of what was noted of each.
     """
 
     count: KindCount
     groups: list[tuple[str, list[Finding]]]
+    tabled: int
     plain: int
-    tabled: bool
-    beyond: list[Finding]
+    beyond: list[tuple[int, bytes]]
 
 
 @dataclass(frozen=True)
@@ -80,9 +83,13 @@ class FindingsChapter:
     photos : dict of int to list of Thumbnail
         Photos of findings, by their id.
     by_id : dict of int to Finding
-        All of them.
+        Those in the table of leaks.
+    total : int
+        How many findings there are.
+    people : list of dict
+        Who reviewed how many of them, and when first and last.
     leaks : frozenset of int
-        Ids of those that are reported as leaks.
+        Ids of those in the table of leaks.
     merged : dict of int to list of int
         Ids of those that are merged into one, by its id.
     wet : frozenset of str
@@ -93,6 +100,8 @@ class FindingsChapter:
     severities: dict[int, str]
     photos: dict[int, list[Thumbnail]]
     by_id: dict[int, Finding]
+    total: int
+    people: list[dict[str, Any]]
     leaks: frozenset[int]
     merged: dict[int, list[int]]
     wet: frozenset[str]
@@ -115,7 +124,7 @@ class FindingsChapter:
     @property
     def uncounted(self) -> int:
         """How many no sum counts."""
-        return len(self.by_id) - self.counted
+        return self.total - self.counted
 
     @property
     def listed(self) -> list[Finding]:
@@ -167,68 +176,117 @@ def read_findings_chapter(
     stretch : (float, float)
         Only those that reach between these chainages, m.
     leaks : frozenset of int
-        Ids of those that are reported as leaks.
+        Ids of those that are listed as leaks.
     photos : Path
         Folder in which relative paths of photos begin.
     table : bool
         Whether the report has a table of the leaks.
     """
-    found = read_findings(conn, survey, chosen=Chosen(states=(), low=stretch[0], high=stretch[1]))
-    if not found:
+    order = read_kinds(conn)
+    kinds: defaultdict[str, _Gathered] = defaultdict(_Gathered)
+    people: defaultdict[str, _Reviews] = defaultdict(_Reviews)
+    by_id: dict[int, Finding] = {}
+    merged: defaultdict[int, list[int]] = defaultdict(list)
+    total = 0
+    for finding in stream_findings(conn, survey, chosen=Chosen(states=(), low=stretch[0], high=stretch[1])):
+        total += 1
+        kinds[finding.kind].add(finding, tabled=table and finding.id in leaks)
+        if finding.id in leaks:
+            by_id[finding.id] = finding
+        if finding.merged_into is not None:
+            insort(merged[finding.merged_into], finding.id)
+        if finding.reviewed_by and finding.reviewed_at:
+            people[finding.reviewed_by].add(finding.review, finding.reviewed_at)
+    if not total:
         return None
-    kinds: defaultdict[str, list[Finding]] = defaultdict(list)
-    for finding in found:
-        kinds[finding.kind].append(finding)
-    counts = count_findings(found, read_kinds(conn))
-    chapters = [_chapter(count, kinds[count.kind], leaks if table else frozenset()) for count in counts]
+    chapters = [kinds[kind].chapter(kind) for kind in in_order(kinds, order)]
     taken = [finding.id for chapter in chapters for _, rows in chapter.groups for finding in rows if finding.photos]
     pictures: defaultdict[int, list[Thumbnail]] = defaultdict(list)
     for photo in make_thumbnails(read_photos(conn, survey, taken), photos):
         pictures[photo.photo.finding_id].append(photo)
-    merged: defaultdict[int, list[int]] = defaultdict(list)
-    for finding in sorted(found, key=lambda finding: finding.id):
-        if finding.merged_into is not None:
-            merged[finding.merged_into].append(finding.id)
-    by_id = {finding.id: finding for finding in found}
-    return FindingsChapter(chapters, read_severities(conn), dict(pictures), by_id, leaks, dict(merged), read_wet_kinds(conn))
-
-
-def _chapter(count: KindCount, findings: Sequence[Finding], tabled: frozenset[int]) -> KindChapter:
-    noted = [finding for finding in findings if not _is_plain(finding, tabled)]
-    first = sorted(noted, key=lambda one: (not one.counted, -(one.severity or 0), -one.area, -(one.length or 0.0), one.id))
-    shown = {finding.id for finding in first[:MOST]}
-    groups = [
-        (state, [finding for finding in noted if finding.state == state and finding.id in shown])
-        for state in ("confirmed", "open", *UNCOUNTED)
-    ]
-    return KindChapter(
-        count,
-        [(state, rows) for state, rows in groups if rows],
-        len(findings) - len(noted),
-        any(finding.id in tabled for finding in findings),
-        first[MOST:],
+    reviews = [people[name].person(name) for name in sorted(people)]
+    return FindingsChapter(
+        chapters, read_severities(conn), dict(pictures), by_id, total, reviews, leaks, dict(merged), read_wet_kinds(conn)
     )
 
 
-def _is_plain(finding: Finding, tabled: frozenset[int]) -> bool:
+@dataclass
+class _Reviews:
+    """What somebody has reviewed."""
+
+    first: dt.datetime | None = None
+    last: dt.datetime | None = None
+    states: Counter[str] = field(default_factory=Counter)
+
+    def add(self, review: str, moment: dt.datetime) -> None:
+        self.first = moment if self.first is None else min(self.first, moment)
+        self.last = moment if self.last is None else max(self.last, moment)
+        self.states[review] += 1
+
+    def person(self, name: str) -> dict[str, Any]:
+        counts = {state: self.states[state] for state in ("open", "confirmed", "rejected")}
+        return {"name": name, "first": self.first, "last": self.last, **counts}
+
+
+@dataclass
+class _Gathered:
+    """Findings of a kind while they are read: counted, and those kept that get a row; of too many those that weigh most."""
+
+    tally: KindTally = field(default_factory=KindTally)
+    noted: list[Finding] = field(default_factory=list)
+    beyond: list[tuple[int, bytes]] = field(default_factory=list)
+    tabled: int = 0
+    plain: int = 0
+
+    def add(self, finding: Finding, *, tabled: bool) -> None:
+        """Add a finding that is in the table of leaks or not."""
+        self.tally.add(finding)
+        if not _is_plain(finding, tabled=tabled):
+            self.noted.append(finding)
+            if len(self.noted) >= 2 * MOST + 1000:
+                self._leave_beyond()
+        elif tabled:
+            self.tabled += 1
+        else:
+            self.plain += 1
+
+    def _leave_beyond(self) -> None:
+        """Of too many keep those that weigh most, in order of chainage, and of the others a digest."""
+        ranked = sorted(self.noted, key=_weight)
+        shown = {finding.id for finding in ranked[:MOST]}
+        self.beyond += [(one.id, hashlib.sha256(repr(_stated(one, [])).encode()).digest()) for one in ranked[MOST:]]
+        self.noted = [finding for finding in self.noted if finding.id in shown]
+
+    def chapter(self, kind: str) -> KindChapter:
+        """Return the chapter on the kind."""
+        self._leave_beyond()
+        groups = [
+            (state, [finding for finding in self.noted if finding.state == state])
+            for state in ("confirmed", "open", *UNCOUNTED)
+        ]
+        return KindChapter(
+            self.tally.count(kind), [(state, rows) for state, rows in groups if rows], self.tabled, self.plain, self.beyond
+        )
+
+
+def _weight(finding: Finding) -> tuple[Any, ...]:
+    """Return what findings are put in order by, those that weigh most first."""
+    return not finding.counted, -(finding.severity or 0), -finding.area, -(finding.length or 0.0), finding.id
+
+
+def _is_plain(finding: Finding, *, tabled: bool) -> bool:
     """Whether a finding needs no row: as detected, and what was said of it is in the table of leaks, or nothing was said."""
     if finding.origin != "detected" or finding.severity or finding.photos or finding.also_detected:
         return False
-    if finding.id in tabled:
-        return True
-    return finding.state == "open" and not finding.remark and not finding.reviewed_by
+    return tabled or (finding.state == "open" and not finding.remark and not finding.reviewed_by)
 
 
 def digest_findings(digest: hashlib._Hash, found: FindingsChapter | None, regions: Sequence[DryRegion]) -> None:
     """Add what is reported of findings that somebody noted, their photos, and of all dry regions."""
-    beyond = [finding for kind in found.kinds for finding in kind.beyond] if found else []
-    for finding in [*(found.listed if found else []), *sorted(beyond, key=lambda finding: finding.id)]:
-        stated = (
-            finding.id, finding.kind, finding.origin, finding.state, finding.severity, finding.drawn_by, finding.reviewed_by,
-            finding.remark, f"{finding.area:.4f}", f"{finding.length or 0:.4f}", finding.width, finding.geometry.wkb_hex,
-            [(photo.photo.path, photo.photo.caption) for photo in (found.photos.get(finding.id, []) if found else [])],
-        )  # fmt: skip
-        digest.update(repr(stated).encode())
+    for finding in found.listed if found else []:
+        digest.update(repr(_stated(finding, found.photos.get(finding.id, []) if found else [])).encode())
+    for _, part in sorted(beyond for kind in found.kinds for beyond in kind.beyond) if found else []:
+        digest.update(part)
     for region in regions:
         place = [f"{end:.4f}" for end in (region.chainage_from, region.chainage_to, region.arc_from, region.arc_to)]
         stated_of_region = (
@@ -236,6 +294,15 @@ def digest_findings(digest: hashlib._Hash, found: FindingsChapter | None, region
             region.leak_ids,
         )  # fmt: skip
         digest.update(repr(stated_of_region).encode())
+
+
+def _stated(finding: Finding, photos: Sequence[Thumbnail]) -> tuple[Any, ...]:
+    """Return what is reported of a finding that somebody noted."""
+    return (
+        finding.id, finding.kind, finding.origin, finding.state, finding.severity, finding.drawn_by, finding.reviewed_by,
+        finding.remark, f"{finding.area:.4f}", f"{finding.length or 0:.4f}", finding.width, finding.geometry.wkb_hex,
+        [(photo.photo.path, photo.photo.caption) for photo in photos],
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -108,6 +108,8 @@ def _load(path: Path) -> dict[str, Any]:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise UserError(f"{path}: is not TOML: {error}") from error
+    except RecursionError:
+        raise UserError(f"{path}: its lists are nested too deep") from None
 
 
 @dataclass(frozen=True)

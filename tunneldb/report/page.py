@@ -24,8 +24,9 @@ from tunneldb.report import data, text
 from tunneldb.report.change import CHANGE_WORDS, read_change
 from tunneldb.report.clearance import read_clearance
 from tunneldb.report.deviation import read_deviation
-from tunneldb.report.drawing import share_path, step_for, ticks, wet_bins, without_detection
+from tunneldb.report.drawing import share_path, step_for, ticks, without_detection
 from tunneldb.report.findings import STATE_WORDS, digest_findings, read_findings_chapter
+from tunneldb.report.leak_sums import sum_leaks
 from tunneldb.report.lining import Form
 from tunneldb.report.owner import CHAPTERS, Owner
 from tunneldb.report.photos import Thumbnail
@@ -37,6 +38,9 @@ from tunneldb.store.catalog import crs_text
 from tunneldb.store.coverage import Coverage, read_coverage
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey
+
+LISTED = 10_000
+"""Leaks that a report lists and draws, if nothing else is asked for: the largest; the others it counts."""
 
 CARDS = 400
 """Leaks of which a printed report shows picture and section at most, the largest first; the HTML file shows those of all."""
@@ -73,6 +77,7 @@ def write_html(
     form: Form = "WEBP",
     owner: Owner | None = None,
     photos: Path | None = None,
+    listed: int = LISTED,
 ) -> Written:
     """Write the report of a survey, or of the stretch between two chainages, m, as an HTML file; the connection must be idle.
 
@@ -90,16 +95,19 @@ def write_html(
         What the owner wants of it.
     photos : Path, optional
         Folder in which relative paths of photos begin; else the current one.
+    listed : int
+        Only so many leaks, the largest, are listed and drawn; those rejected last. Sums and digest are of all.
     """
     wanted = Owner() if owner is None else owner
     with snapshot(conn):
         search = read_coverage(conn, survey, low, high)
         ends = data.find_stretch(conn, survey, low, high)
-        report = _Report(conn, survey, *ends, search, progress, pictures, form, wanted, Path() if photos is None else photos)
+        folder = Path() if photos is None else photos
+        report = _Report(conn, survey, *ends, search, progress, pictures, form, wanted, folder, listed)
         with path.open("w", encoding="utf-8") as file:
             file.writelines(_template("report.html", wanted).generate(report.context()))
         found = report.findings
-        return Written(sum(leak.counts for leak in report.leaks), found.counted if found else 0, found.missing if found else [])
+        return Written(report.sums.counted, found.counted if found else 0, found.missing if found else [])
 
 
 def write_site_html(conn: psycopg.Connection[Any], survey: Survey, path: Path, owner: Owner | None = None) -> int:
@@ -171,7 +179,7 @@ class _Report:
 
     Parameters
     ----------
-    conn, survey, low, high, progress, pictures, form, owner, photos
+    conn, survey, low, high, progress, pictures, form, owner, photos, listed
         As in :func:`write_html`; the stretch as far as the survey reaches.
     search : Coverage
         What can be said of the stretch asked for, also where the survey does not reach.
@@ -189,10 +197,14 @@ class _Report:
         form: Form,
         owner: Owner,
         photos: Path,
+        listed: int,
     ) -> None:
         self.owner = owner
         self.conn, self.survey, self.low, self.high, self.search = conn, survey, low, high, search
-        self.leaks = data.read_leaks(conn, survey, low, high)
+        self.leaks = data.read_leaks(conn, survey, low, high, listed)
+        self.bin_length = step_for(high - low, 150)
+        edges = np.unique([low, *ticks(low, high, self.bin_length), high])
+        self.sums = sum_leaks(conn, survey, low, high, edges, hashlib.sha256(f"{survey.name} {low:.3f} {high:.3f}".encode()))
         self.coverage = data.read_bins(conn, survey, low, high)
         by_size = sorted(self.leaks, key=lambda leak: (leak.review == "rejected", -leak.area))
         pictured = {leak.id for leak in by_size[:pictures]}
@@ -206,7 +218,9 @@ class _Report:
         self.deviation = read_deviation(conn, survey, low, high, form) if "deviation" in owner.chapters else []
         self.regions = read_dry_regions(conn, survey, low, high)
         marks = self.findings.marks if self.findings else []
-        self.strips = Strips(conn, survey, low, high, self.leaks, marks, self.coverage, pictured, form, progress, owner.words)
+        self.strips = Strips(
+            conn, survey, low, high, self.leaks, marks, self.coverage, pictured, form, progress, owner.words, self.sums.reach
+        )
         self.place = data.place_name(conn, survey)
         self.cards = min(CARDS, len(pictured))
         self.part = (low, high) != data.find_stretch(conn, survey, -np.inf, np.inf)
@@ -219,7 +233,6 @@ class _Report:
         classes = data.read_classes(conn, survey, low, high)
         total = data.read_statistics(conn, survey, [low], [high])[0]
         runs = data.read_runs(conn, survey, low, high)
-        counted = [leak for leak in self.leaks if leak.counts]
         edits_in_all, edits = data.read_edits(conn, survey)
         numbers = {spot.id: spot.number for spot in self.structures.spots.rows} if self.structures else {}
         return {
@@ -239,10 +252,10 @@ class _Report:
             "high_label": self._labels([high])[0],
             "total": total,
             "classes": classes,
-            "leaks": self.leaks,
-            "counted": counted,
+            "unlisted": self.sums.leaks - len(self.leaks),
+            "listed": len(self.leaks),
             "by_state": self.findings.wet_states if self.findings else dict.fromkeys(STATES, 0),
-            "lost": [leak for leak in self.leaks if not leak.detected],
+            "lost": self.sums.lost,
             "others": data.read_others(conn, survey, low, high),
             "search": self.search,
             "gaps": sorted(self.search.gaps, key=lambda gap: (gap.searched, gap.chainage_from - gap.chainage_to)),
@@ -255,7 +268,7 @@ class _Report:
             "runs": runs,
             "versions": text.versions(runs),
             "radiometry": data.read_radiometry(conn, survey, low, high),
-            "people": text.reviewers(self.findings.by_id.values() if self.findings else []),
+            "people": self.findings.people if self.findings else [],
             "structures": self.structures,
             "underwater": self.underwater,
             "clearance": self.clearance,
@@ -269,8 +282,8 @@ class _Report:
             "sought": survey.intensity_kind != "none",
             "unposed": survey.note,
             "crs": text.crs(crs_text(conn, survey.srid)),
-            "clock": text.by_clock(counted),
-            "sizes": text.by_size(counted),
+            "clock": self.sums.clock_bars,
+            "sizes": self.sums.size_bars,
             "glance": self._glance(),
             "strips": self.strips,
             "strip_length": self.strips.length,
@@ -307,11 +320,7 @@ class _Report:
 
     def _digest(self) -> str:
         """SHA-256 of what is reported of the leaks: two reports of the same leaks and reviews have the same."""
-        digest = hashlib.sha256(f"{self.survey.name} {self.low:.3f} {self.high:.3f}".encode())
-        for leak in sorted(self.leaks, key=lambda leak: leak.id):
-            wkb = leak.outline.wkb_hex
-            stated = (leak.id, leak.review, leak.detected, leak.reviewed_by, leak.remark, f"{leak.area:.4f}", wkb)
-            digest.update(repr(stated).encode())
+        digest = self.sums.digest.copy()
         digest_findings(digest, self.findings, self.regions)
         if self.structures:
             _digest_spots(digest, self.structures)
@@ -321,9 +330,7 @@ class _Report:
         """The whole stretch in one drawing, 1000 wide: share seen, wet area in bins, ticks."""
         length = self.high - self.low
         scale = 1000.0 / length
-        bin_length = step_for(length, 150)
-        edges = np.unique([self.low, *ticks(self.low, self.high, bin_length), self.high])
-        wet = wet_bins(self.leaks, edges)
+        bin_length, edges, wet = self.bin_length, self.sums.edges, self.sums.wet
         places = ticks(self.low, self.high, step_for(length, 10))
         most = float(wet.max(initial=0.0))
         bars = [

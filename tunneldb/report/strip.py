@@ -116,6 +116,8 @@ class Strips:
         Told after each strip.
     words : Words
         The language in which they are captioned.
+    reach : float
+        Greatest chainage of a leak, m.
 
     Attributes
     ----------
@@ -140,6 +142,7 @@ class Strips:
         form: Form,
         progress: Progress,
         words: Words,
+        reach: float,
     ) -> None:
         self.conn, self.survey, self.low, self.high = conn, survey, low, high
         self.leaks, self.findings, self.coverage, self.progress, self.words = leaks, findings, coverage, progress, words
@@ -154,7 +157,7 @@ class Strips:
         ).fetchone()
         assert row is not None
         first, last = np.floor(low / self.length), np.ceil((high - SLIVER) / self.length)
-        if any(leak.chainage_to > last * self.length for leak in leaks):
+        if reach > last * self.length:
             last = np.ceil(high / self.length)
         self.starts = (np.arange(first, max(last, first + 1)) * self.length).tolist()
         self.south, self.north = (-9.0, 9.0) if row[0] is None else (float(row[0]), float(row[1]))
@@ -198,7 +201,7 @@ class Strips:
             rows=1 + max((sign.row for sign in signs), default=0),
             ribbon=share_path(self.coverage, low, high, 0.0, 0.8 * self.length / LETTERS),
             blank=without_detection(self.coverage, low, high) if sought else [],
-            summary=_summary(stated, len(wet) - len(signs), self.words) if sought else "",
+            summary=_summary(stated, len(signs), self.words) if sought else "",
             details=text.script_json(self._details(lining, [leak for leak in leaks if self.of(leak) == int(start)])),
         )
 
@@ -236,11 +239,12 @@ class Strips:
         return [(chainage, Section.of(radius, arc)) for chainage, radius, arc in rows]
 
 
-def _summary(stated: Row, unnumbered: int, words: Words) -> str:
-    """How many leaks there are on a strip and how much of the lining was seen; so many leaks have no number beside it."""
+def _summary(stated: Row, numbered: int, words: Words) -> str:
+    """How many leaks there are on a strip and how much of the lining was seen; so many leaks have a number beside it."""
     if stated["patches"] is None:
         return words("leaks were not searched for")
     count = stated["patches"]
     leaks = words("1 leak") if count == 1 else words("{count} leaks", count=count)
+    unnumbered = max(count - numbered, 0)
     without = words(", the {count} smallest without a number here", count=unnumbered) if unnumbered else ""
     return leaks + without + words(", {share} of the lining seen", share=text.percent(stated["seen_share"]))

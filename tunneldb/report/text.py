@@ -7,15 +7,14 @@ import json
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import groupby, pairwise
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 import shapely
 from markupsafe import Markup
 
-from tunneldb.export.tables.findings import Finding
-from tunneldb.report.data import Edit, Leak, Row
+from tunneldb.report.data import Edit, Row
 
 DASH = "–"
 SPACE = "\u202f"
@@ -138,54 +137,6 @@ def script_json(value: Any) -> Markup:
     """JSON that may stand in a script element."""
     plain = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     return Markup(plain.replace("<", "\\u003c"))
-
-
-def by_clock(leaks: Sequence[Leak]) -> list[dict[str, Any]]:
-    """Return number of leaks, and their area in the stretch, by hour: up the left wall, down the right one, and below."""
-    hours = [7, 8, 9, 10, 11, 12, 1, 2, 3, 4, 5, 6]
-    tally = {hour: {"name": str(hour), "count": 0, "area": 0.0} for hour in hours}
-    for leak in leaks:
-        bar = tally[round(leak.clock) % 12 or 12]
-        bar["count"] += 1  # type: ignore[operator]
-        bar["area"] += leak.inside  # type: ignore[operator]
-    return _scaled([tally[hour] for hour in hours])
-
-
-SIZES = (0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0)
-"""Limits of the classes of size, m²; 0.2 and 0.3 are limits of GB 50108-2008."""
-
-
-def by_size(leaks: Sequence[Leak]) -> list[dict[str, Any]]:
-    """Return number of leaks, and their area in the stretch, by their size."""
-    names = [f"≤ {SIZES[0]:g}", *(f"{a:g}{DASH}{b:g}" for a, b in pairwise(SIZES)), f"> {SIZES[-1]:g}"]
-    bars: list[dict[str, Any]] = [{"name": name, "count": 0, "area": 0.0} for name in names]
-    for leak in leaks:
-        bar = bars[sum(leak.area > limit for limit in SIZES)]
-        bar["count"] += 1
-        bar["area"] += leak.inside
-    return _scaled(bars)
-
-
-def _scaled(bars: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Add to each bar its number in per cent of the greatest."""
-    most = max((bar["count"] for bar in bars), default=0) or 1
-    return [bar | {"width": round(100 * bar["count"] / most, 1)} for bar in bars]
-
-
-def reviewers(findings: Iterable[Finding]) -> list[dict[str, Any]]:
-    """Return who reviewed how many findings, and when first and last."""
-    by: defaultdict[str, list[Finding]] = defaultdict(list)
-    for finding in findings:
-        if finding.reviewed_by and finding.reviewed_at:
-            by[finding.reviewed_by].append(finding)
-    people = []
-    for name, theirs in sorted(by.items()):
-        moments = [finding.reviewed_at for finding in theirs if finding.reviewed_at]
-        people.append(
-            {"name": name, "first": min(moments), "last": max(moments)}
-            | {state: sum(finding.review == state for finding in theirs) for state in ("open", "confirmed", "rejected")}
-        )
-    return people
 
 
 _WHAT = {"anomaly": "finding", "axis_vertex": "axis vertex", "region": "region", "spot": "spot", "photo": "photo"}

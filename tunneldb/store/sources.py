@@ -107,6 +107,28 @@ def sample(conn: psycopg.Connection[Any], survey: Survey, km: int, count: int = 
     )
 
 
+def is_mobile(conn: psycopg.Connection[Any], survey: Survey) -> bool:
+    """Whether a survey's scanner positions come from a trajectory; says so where it has none of its kind.
+
+    Raises
+    ------
+    UserError
+        If it is to have a trajectory or stations, and has none.
+    """
+    if survey.platform == "unknown":
+        return False
+    table = sql.Identifier("tunnel", "pose" if survey.platform == "mobile" else "station")
+    query = sql.SQL("SELECT FROM {} WHERE survey_id = %s LIMIT 1").format(table)
+    if conn.execute(query, [survey.id]).fetchone() is None:
+        raise _no_positions(survey)
+    return survey.platform == "mobile"
+
+
+def _no_positions(survey: Survey) -> UserError:
+    kind = "trajectory" if survey.platform == "mobile" else "stations"
+    return UserError(f"survey {survey.name} has no {kind}: add the survey again with --{kind}")
+
+
 def load_poses(conn: psycopg.Connection[Any], survey: Survey) -> PoseModel:
     """Read the trajectory of a mobile survey, or the stations of a static one; nothing of one without.
 
@@ -123,8 +145,7 @@ def load_poses(conn: psycopg.Connection[Any], survey: Survey) -> PoseModel:
     source = sql.SQL("FROM {} WHERE survey_id = %(survey)s").format(sql.Identifier("tunnel", table))
     rows = fetch_array(conn, fields, source, {"survey": survey.id})
     if len(rows) == 0:
-        kind = "trajectory" if survey.platform == "mobile" else "stations"
-        raise UserError(f"survey {survey.name} has no {kind}: add the survey again with --{kind}")
+        raise _no_positions(survey)
     xyz = np.column_stack([rows["x"], rows["y"], rows["z"]])
     if survey.platform == "mobile":
         return PoseModel.from_trajectory(rows["time"], xyz)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from typing import Any
 
-from sqlalchemy import ARRAY, BigInteger, Identity, Index, Text, text
+from sqlalchemy import ARRAY, BigInteger, Computed, Identity, Index, Text, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from tunneldb.database.models.base import AUDIT_SCHEMA, CLOCK, KM, SURVEY, Base, one_of, parent
@@ -57,13 +57,22 @@ class Worker(Base):
     )
 
 
+SUBJECT = """coalesce(CASE stage
+    WHEN 'deviation' THEN parameters ->> 'layer'
+    WHEN 'evenness' THEN parameters ->> 'layer'
+    WHEN 'thickness' THEN (parameters ->> 'before') || ' ' || (parameters ->> 'layer')
+    WHEN 'clearance' THEN (parameters ->> 'track') || ' ' || (parameters ->> 'gauge')
+    WHEN 'compare' THEN parameters ->> 'old'
+END, '')"""
+
+
 class Run(Base):
     """One run of a stage."""
 
     __tablename__ = "run"
     __table_args__ = (
         one_of("outcome", "running", "done", "failed"),
-        Index(None, "survey_id", "stage", "km"),
+        Index(None, "survey_id", "stage", "km", "subject", "started_at", "id"),
         Index(None, "job_id"),
         {"comment": "Ledger of every stage that was run"},
     )
@@ -90,6 +99,11 @@ class Run(Base):
     message: Mapped[str | None] = mapped_column(comment="Why it failed")
     worker: Mapped[str | None] = mapped_column(comment="Machine and process that it ran on")
     job_id: Mapped[int | None] = mapped_column(BigInteger, comment="Job of the queue that it was, if it was one")
+    subject: Mapped[str] = mapped_column(
+        Computed(SUBJECT, persisted=True),
+        comment="What tells apart results of a stage that are there side by side, by its parameters: layer of profiles, "
+        "older survey, track and outline; empty where there is one of a kilometre",
+    )
 
 
 class Audit(Base):

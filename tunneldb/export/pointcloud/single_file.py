@@ -109,6 +109,9 @@ def find_scene_of(source: Path, values: Mapping[str, float], progress: Callable[
         progress(len(xyz))
     thinned, spread = voxels.centroids(), voxels.spread()
     del voxels  # room for the models
-    line = centreline_through(thinned)
+    try:
+        line = centreline_through(thinned)
+    except ValueError as error:
+        raise UserError(f"{source}: {error}; is its header's scale right?") from error
     ground = find_ground(thinned, line, settings, spread=spread)
     return find_bare_scene(thinned, line, ground, ClusterSettings.of(values)), origin

@@ -119,9 +119,14 @@ def finding_form(catalogue: Catalogue, geometry: str, layer: str, tables: Mappin
             "mapTip",
             '<b>[% "id" %] [% "kind_label" %]</b>, [% "label" %]<br>'
             '[% coalesce("severity_label", \'no severity\') %], [% "state" %]'
-            "[% coalesce('<br>' || \"remark\", '') %]",
+            f"[% coalesce('<br>' || {as_html('remark')}, '') %]",
         ),
     ]
+
+
+def as_html(column: str) -> str:
+    """Expression of a column's text as a map tip shows it, which is HTML: what somebody wrote is none."""
+    return f"replace(\"{column}\", map('&', '&amp;', '<', '&lt;'))"
 
 
 def photo_form() -> list[ET.Element]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from typing import Any, get_args
 
 import psycopg
@@ -52,38 +52,63 @@ class KindCount:
     length: float
 
 
-def count_findings(findings: Sequence[Finding], order: Sequence[str] = ()) -> list[KindCount]:
+@dataclass
+class KindTally:
+    """What there is of a kind, while it is counted: a finding after the other."""
+
+    label: str = ""
+    states: Counter[str] = field(default_factory=Counter)
+    origins: Counter[str] = field(default_factory=Counter)
+    severities: Counter[int] = field(default_factory=Counter)
+    counted: int = 0
+    area: float = 0.0
+    length: float = 0.0
+
+    def add(self, finding: Finding) -> None:
+        """Count a finding."""
+        self.label = self.label or finding.kind_label
+        self.states[finding.state] += 1
+        if finding.counted:
+            self.origins[finding.origin] += 1
+            self.severities[finding.severity or 0] += 1
+            self.counted += 1
+            self.area += finding.share * finding.area
+            self.length += finding.share * (finding.length or 0.0)
+
+    def count(self, kind: str) -> KindCount:
+        """Return what was counted."""
+        return KindCount(
+            kind,
+            self.label,
+            {state: self.states[state] for state in STATES},
+            {origin: self.origins[origin] for origin in ORIGINS},
+            {severity: self.severities[severity] for severity in SEVERITIES},
+            self.counted,
+            self.area,
+            self.length,
+        )
+
+
+def count_findings(findings: Iterable[Finding], order: Sequence[str] = ()) -> list[KindCount]:
     """Count findings by kind, those that count and the others apart.
 
     Parameters
     ----------
-    findings : sequence of Finding
+    findings : iterable of Finding
         As they were read, of whatever states.
     order : sequence of str
         Codes of kinds in the order in which they are wanted; others follow by their code.
     """
-    kinds: defaultdict[str, list[Finding]] = defaultdict(list)
+    kinds: defaultdict[str, KindTally] = defaultdict(KindTally)
     for finding in findings:
-        kinds[finding.kind].append(finding)
+        kinds[finding.kind].add(finding)
+    return [kinds[kind].count(kind) for kind in in_order(kinds, order)]
+
+
+def in_order(kinds: Iterable[str], order: Sequence[str]) -> list[str]:
+    """Put codes of kinds in an order; others follow by their code."""
     place = {kind: n for n, kind in enumerate(order)}
-    return [_count(kinds[kind]) for kind in sorted(kinds, key=lambda kind: (place.get(kind, len(place)), kind))]
-
-
-def _count(findings: Sequence[Finding]) -> KindCount:
-    counted = [finding for finding in findings if finding.counted]
-    states = Counter[str](finding.state for finding in findings)
-    origins = Counter(finding.origin for finding in counted)
-    severities = Counter(finding.severity or 0 for finding in counted)
-    return KindCount(
-        findings[0].kind,
-        findings[0].kind_label,
-        {state: states[state] for state in STATES},
-        {origin: origins[origin] for origin in ORIGINS},
-        {severity: severities[severity] for severity in SEVERITIES},
-        len(counted),
-        sum(finding.share * finding.area for finding in counted),
-        sum(finding.share * (finding.length or 0.0) for finding in counted),
-    )
+    return sorted(kinds, key=lambda kind: (place.get(kind, len(place)), kind))
 
 
 def read_kinds(conn: psycopg.Connection[Any]) -> list[str]:

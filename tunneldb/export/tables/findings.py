@@ -6,7 +6,7 @@ import datetime as dt
 import json
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
@@ -123,10 +123,21 @@ _SHARE = sql.SQL(
 )
 
 
+BLOCK = 20_000
+"""Findings that are read at a time."""
+
+
 def read_findings(
     conn: psycopg.Connection[Any], survey: Survey, geometry: Geometry = "unrolled", chosen: Chosen | None = None
 ) -> list[Finding]:
     """Read findings of a survey, in order of chainage."""
+    return list(stream_findings(conn, survey, geometry, chosen))
+
+
+def stream_findings(
+    conn: psycopg.Connection[Any], survey: Survey, geometry: Geometry = "unrolled", chosen: Chosen | None = None
+) -> Iterator[Finding]:
+    """Yield findings of a survey in order of chainage, of which only BLOCK are in memory; until the transaction ends."""
     wanted = Chosen() if chosen is None else chosen
     query = sql.SQL(
         "SELECT {}, coalesce({}, 1), public.ST_AsBinary({}) FROM tunnel_api.lining_finding WHERE survey_id = %(survey)s"
@@ -137,22 +148,23 @@ def read_findings(
         " AND (%(clock)s::float8[] IS NULL OR tunnel_api.clock_between(clock, (%(clock)s)[1], (%(clock)s)[2]))"
         " ORDER BY chainage_from + chainage_to, arc_from, id"
     ).format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)), _SHARE, sql.Identifier(_PLACE[geometry]))
-    rows = conn.execute(
-        query,
-        {
-            "survey": survey.id,
-            "kinds": list(wanted.kinds),
-            "origins": list(wanted.origins),
-            "states": list(wanted.states),
-            "low": wanted.low,
-            "high": wanted.high,
-            "clock": None if wanted.clock is None else list(wanted.clock),
-            "min_area": wanted.min_area,
-            "min_severity": wanted.min_severity,
-        },
-    ).fetchall()
+    values = {
+        "survey": survey.id,
+        "kinds": list(wanted.kinds),
+        "origins": list(wanted.origins),
+        "states": list(wanted.states),
+        "low": wanted.low,
+        "high": wanted.high,
+        "clock": None if wanted.clock is None else list(wanted.clock),
+        "min_area": wanted.min_area,
+        "min_severity": wanted.min_severity,
+    }
     names = (*COLUMNS, "share", "geometry")
-    return [Finding(**dict(zip(names, (*row[:-1], shapely.from_wkb(bytes(row[-1]))), strict=True))) for row in rows]
+    with conn.transaction(), conn.cursor(name="findings") as cursor:
+        cursor.execute(query, values)
+        while rows := cursor.fetchmany(BLOCK):
+            for row in rows:
+                yield Finding(**dict(zip(names, (*row[:-1], shapely.from_wkb(bytes(row[-1]))), strict=True)))
 
 
 def as_csv(findings: Sequence[Finding]) -> str:

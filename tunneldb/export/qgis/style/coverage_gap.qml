@@ -145,6 +145,6 @@
     <alias index="10" field="seen_share" name="Share seen"/>
   </aliases>
   <previewExpression>"label_from"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label_from" %] – [% "label_to" %]&lt;/b&gt;: [% "state" %]&lt;br&gt;[% "reason" %]</mapTip>
+  <mapTip>&lt;b&gt;[% "label_from" %] – [% "label_to" %]&lt;/b&gt;: [% "state" %]&lt;br&gt;[% replace("reason", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

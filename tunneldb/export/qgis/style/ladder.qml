@@ -118,6 +118,6 @@
     <field name="scans" editable="0"/>
   </editable>
   <previewExpression>"name"</previewExpression>
-  <mapTip>&lt;b&gt;Ladder [% "name" %]&lt;/b&gt;&lt;br&gt;[% format_number(1000 * "rms", 1) %] mm</mapTip>
+  <mapTip>&lt;b&gt;Ladder [% replace("name", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;&lt;br&gt;[% format_number(1000 * "rms", 1) %] mm</mapTip>
   <layerGeometryType>0</layerGeometryType>
 </qgis>

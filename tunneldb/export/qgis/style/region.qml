@@ -185,6 +185,6 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"kind"</previewExpression>
-  <mapTip>&lt;b&gt;[% "kind" %]&lt;/b&gt;&lt;br&gt;drawn by [% "drawn_by" %][% if("waits", ', waits for an operator', '') %][% coalesce('&lt;br&gt;' || "reason", '') %]</mapTip>
+  <mapTip>&lt;b&gt;[% "kind" %]&lt;/b&gt;&lt;br&gt;drawn by [% "drawn_by" %][% if("waits", ', waits for an operator', '') %][% coalesce('&lt;br&gt;' || replace("reason", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -95,6 +95,6 @@
     <field name="half_minor" editable="0"/>
   </editable>
   <previewExpression>"name"</previewExpression>
-  <mapTip>&lt;b&gt;[% "name" %]&lt;/b&gt;, 95 %: [% format_number(1000 * "half_major", 0) %] × [% format_number(1000 * "half_minor", 0) %] mm</mapTip>
+  <mapTip>&lt;b&gt;[% replace("name", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;, 95 %: [% format_number(1000 * "half_major", 0) %] × [% format_number(1000 * "half_minor", 0) %] mm</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

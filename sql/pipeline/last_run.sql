@@ -1,0 +1,57 @@
+-- The last runs of stages: what the views of status, remarks and all that asks how up to date a result is go by. The ledger keeps
+-- all runs; the last ones are found from place to place in its index (survey_id, stage, km, subject, started_at, id), and cost
+-- what there is of places, not of runs. Runs are put in order by the time of their beginning, as everywhere.
+
+CREATE OR REPLACE FUNCTION tunnel_api.last_runs(
+    survey_id int, stage text, succeeded boolean DEFAULT true, km_from int DEFAULT -1000000, km_to int DEFAULT 1000000)
+RETURNS SETOF tunnel.run
+LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 25
+SET search_path = pg_catalog, pg_temp
+SET jit = off
+SET enable_seqscan = off
+SET enable_bitmapscan = off
+SET enable_nestloop = on
+AS $$
+    WITH RECURSIVE place AS (
+        (SELECT r.km, r.subject FROM tunnel.run r
+          WHERE r.survey_id = $1 AND r.stage = $2 AND r.km >= $4 AND r.km <= $5 ORDER BY r.km, r.subject LIMIT 1)
+         UNION ALL
+        SELECT n.km, n.subject
+          FROM place p
+         CROSS JOIN LATERAL (
+                SELECT r.km, r.subject FROM tunnel.run r
+                 WHERE r.survey_id = $1 AND r.stage = $2 AND (r.km, r.subject) > (p.km, p.subject) AND r.km <= $5
+                 ORDER BY r.km, r.subject LIMIT 1) n
+    )
+    SELECT l.*
+      FROM place p
+     CROSS JOIN LATERAL (
+            SELECT r.* FROM tunnel.run r
+             WHERE r.survey_id = $1 AND r.stage = $2 AND r.km = p.km AND r.subject = p.subject
+               AND (r.outcome = 'done' OR NOT $3)
+             ORDER BY r.started_at DESC, r.id DESC LIMIT 1) l
+$$;
+COMMENT ON FUNCTION tunnel_api.last_runs(int, text, boolean, int, int) IS
+'The last run of a stage in each kilometre of a survey, of those from km_from to km_to, and of each subject (layer, older survey, track and outline) that has results of its own: the last that succeeded, or with false the last that began';
+
+
+-- Stages that ran in kilometres of a survey, from one to the next in the same index.
+CREATE OR REPLACE FUNCTION tunnel_api.stages_run(survey_id int) RETURNS SETOF text
+LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 10
+SET search_path = pg_catalog, pg_temp
+SET jit = off
+SET enable_seqscan = off
+SET enable_bitmapscan = off
+SET enable_nestloop = on
+AS $$
+    WITH RECURSIVE part AS (
+        (SELECT r.stage FROM tunnel.run r WHERE r.survey_id = $1 ORDER BY r.stage LIMIT 1)
+         UNION ALL
+        SELECT n.stage
+          FROM part p
+         CROSS JOIN LATERAL (
+                SELECT r.stage FROM tunnel.run r WHERE r.survey_id = $1 AND r.stage > p.stage ORDER BY r.stage LIMIT 1) n
+    )
+    SELECT p.stage FROM part p
+$$;
+COMMENT ON FUNCTION tunnel_api.stages_run(int) IS 'Stages that the ledger has runs of in a survey, in order of their names';

@@ -1,0 +1,51 @@
+"""Statistics of waterproofing that are kept of each kilometre (tunnel.waterproof): worked out where they are missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import psycopg
+
+Begin = Callable[[str, float | None], Callable[[float], None]]
+"""Takes a text and a total, and returns what takes the counts."""
+
+
+def keep_missing(conn: psycopg.Connection[Any], begin: Begin) -> int:
+    """Work out and keep the statistics of all kilometres that have none; each is committed by itself.
+
+    Views are right without them, and slower. Who is cut off has kept what was done: the next call goes on with the rest.
+
+    Parameters
+    ----------
+    conn : Connection
+        Idle; as the owner of schema `tunnel_api`.
+    begin : callable
+        Told of each survey that begins, and of how many kilometres.
+
+    Returns
+    -------
+    int
+        Number of kilometres that were worked out.
+    """
+    missing = conn.execute(
+        "SELECT s.id, s.name, array_agg(u.km ORDER BY u.km) FROM tunnel.survey s"
+        " CROSS JOIN LATERAL tunnel_api.waterproof_unkept(s.id) AS u (km) GROUP BY s.id, s.name ORDER BY s.id"
+    ).fetchall()
+    conn.commit()
+    done = 0
+    for survey_id, name, kilometres in missing:
+        done += _keep(conn, survey_id, kilometres, begin(f"waterproofing of {name}", len(kilometres)))
+    return done
+
+
+def _keep(conn: psycopg.Connection[Any], survey_id: int, kilometres: Sequence[int], advance: Callable[[float], None]) -> int:
+    for done, km in enumerate(kilometres):
+        try:
+            conn.execute("SELECT tunnel_api.keep_waterproof(%s, %s)", [survey_id, km])
+            conn.commit()
+        except psycopg.errors.ForeignKeyViolation:  # the survey was removed meanwhile
+            conn.rollback()
+            return done
+        advance(1.0)
+    return len(kilometres)
