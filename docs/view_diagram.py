@@ -24,7 +24,7 @@ TOPICS = {
     "Rings": ("ring",),
     "Structures": ("structures",),
     "Under water": ("sonar", "closed_section"),
-    "Stages and queue": ("status", "queue", "remark"),
+    "Stages and queue": ("status", "queue", "remark", "size"),
     "Who did what": ("audit", "change"),
 }
 """Boxes of the diagram, and the files whose views stand in each; views of other files stand in a box of their file's name."""

@@ -115,7 +115,7 @@ def test_every_verb_answers_with_a_document_on_an_empty_database(
         assert ("error" in said) is (said["exit_code"] == 2), said
         assert said.get("error", "") in errors
         good |= {words} if said["ok"] else set()
-    assert good == {("init",), ("tunnel", "list"), ("survey", "list"), ("stop",), ("check",)}
+    assert good >= {("init",), ("tunnel", "list"), ("survey", "list"), ("stop",), ("check",)}
     assert capfd.readouterr().out == ""
 
 

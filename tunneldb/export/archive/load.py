@@ -35,7 +35,7 @@ from tunneldb.store.archive.numbers import (
 from tunneldb.store.archive.out import AUDIT, OTHERS, member_name, without_survey
 from tunneldb.store.archive.tables import BULK, Column, Table, archive_tables
 from tunneldb.store.archive.tunnels import existing_tunnel, use_tunnel
-from tunneldb.store.catalog import require_new_survey, require_new_tunnel
+from tunneldb.store.catalog import make_layers, require_new_survey, require_new_tunnel
 from tunneldb.store.ledger import stage_run
 
 _MISFITS = (
@@ -258,3 +258,5 @@ class _Loading:
             " FROM (SELECT DISTINCT km FROM tunnel.waterproof WHERE survey_id = %s) w",
             [self.loaded.survey_id, self.loaded.survey_id],
         )
+        if self.loaded.new_tunnel:
+            make_layers(self.conn)
