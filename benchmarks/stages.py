@@ -190,8 +190,9 @@ def once(server: Server, dsn: str, scene: Scene, survey: str, density: str) -> d
     spent["COPY"] = bare_copy(server, dsn, survey)
     ran, others = command(server, dsn, survey, "run", survey, "--from", "axis", "--to", "sections")
     spent |= stages | others
-    spent["commands"] = Spent(*np.sum([loaded, ran], axis=0))
-    spent["start-up"] = Spent(*(np.array(spent["commands"]) - np.sum([spent[stage] for stage in STAGES], axis=0)))
+    spent["commands"] = Spent(*np.sum([loaded, ran], axis=0).tolist())
+    beside = np.array(spent["commands"]) - np.sum([spent[stage] for stage in STAGES], axis=0)
+    spent["start-up"] = Spent(*beside.tolist())
     tunneldb("survey", "remove", survey, "--yes", dsn=dsn)
     return spent
 
