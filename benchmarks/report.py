@@ -68,10 +68,11 @@ def images(conn: psycopg.Connection[Any], survey_id: int, kilometres: int, pixel
         conn.commit()
 
 
-def written(dsn: str, path: Path) -> dict[str, float]:
+def written(dsn: str, path: Path, listed: int) -> dict[str, float]:
     """Write a report as its user would; seconds, MB of the file, and MB that its greatest process took."""
     start = time.perf_counter()
-    with subprocess.Popen([*COMMAND, "--dsn", dsn, "report", SURVEY, "-o", str(path)], stderr=subprocess.DEVNULL) as process:
+    command = [*COMMAND, "--dsn", dsn, "report", SURVEY, "-o", str(path), "--list", str(listed)]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as process:
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
@@ -128,11 +129,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--dsn", help="server to use; default: the embedded one")
     parser.add_argument("--km", type=int, default=25, help="length of the tunnel")
     parser.add_argument("--leaks", type=int, default=5000)
+    parser.add_argument("--list", type=int, default=10_000, help="leaks that are listed at most")
     parser.add_argument("--pixel", type=float, default=0.02, help="of the images, m")
     parser.add_argument("--keep", type=Path, help="folder in which the reports stay")
     parser.add_argument("--no-pdf", action="store_true")
     asked = parser.parse_args(arguments)
-    figures: dict[str, Any] = {"km": asked.km, "leaks": asked.leaks, "pixel": asked.pixel}
+    figures: dict[str, Any] = {"km": asked.km, "leaks": asked.leaks, "list": asked.list, "pixel": asked.pixel}
     with tempfile.TemporaryDirectory() as temporary, scratch_database(asked.dsn) as dsn:
         folder = asked.keep or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
@@ -140,12 +142,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
             survey_id = make(conn, SURVEY, Size(asked.km, asked.leaks, 0, asked.leaks // 10))
             images(conn, survey_id, asked.km, asked.pixel)
         progress("report.html")
-        figures["html"] = written(dsn, folder / "report.html")
+        figures["html"] = written(dsn, folder / "report.html", asked.list)
         progress("the browser")
         figures["browser"] = browsed(folder / "report.html")
         if not asked.no_pdf:
             progress("report.pdf")
-            figures["pdf"] = written(dsn, folder / "report.pdf")
+            figures["pdf"] = written(dsn, folder / "report.pdf", asked.list)
     for part in ("html", "pdf", "browser"):
         if part in figures:
             print_table(part, ("figure", "value"), [(name, float(value)) for name, value in figures[part].items()])

@@ -86,3 +86,22 @@ AS $$
 $$;
 COMMENT ON FUNCTION tunnel_api.image_value(int, text, float8, float8) IS
 'What an unrolled image (raw, corrected, offset, state, deviation_lining, …) holds at one place (chainage, arc; m), as image_values, which is to be asked for many: a block of 50 m is read for each call.';
+
+
+-- Images lie in a partition for each survey. A plan for all surveys would open them all, each time: this one is made for the survey
+-- that is asked for.
+CREATE OR REPLACE FUNCTION tunnel_api.image_kilometres(survey_id int, kind text) RETURNS SETOF int
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 25
+SET search_path = pg_catalog, pg_temp
+SET plan_cache_mode = force_custom_plan
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    wanted constant text := kind;
+BEGIN
+    RETURN QUERY SELECT i.km FROM tunnel.image i WHERE i.survey_id = survey_key AND i.kind = wanted GROUP BY i.km;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.image_kilometres(int, text) IS
+    'Kilometres of a survey that have images of a kind: raw, corrected, offset, state, deviation_lining and so on';

@@ -14,10 +14,11 @@ SELECT s.id::bigint * 1000000 + 500000 + k.km AS id, s.id AS survey_id, s.name A
        t.largest_leak, t.window_patches, t.window_from, t.window_to, t.window_wet_area, t.class
   FROM tunnel.survey s
   CROSS JOIN LATERAL (SELECT e.* FROM tunnel_api.km_ends e WHERE e.survey_id = s.id OFFSET 0) k  -- of this survey, not of all
-  LEFT JOIN tunnel.waterproof w ON w.survey_id = k.survey_id AND w.km = k.km
-       AND w.chainage_from = k.chainage_from AND w.chainage_to = k.chainage_to
-       AND NOT EXISTS (SELECT FROM tunnel.waterproof o
-                        WHERE o.survey_id = w.survey_id AND o.km = w.km AND o.id <> w.id)
+  LEFT JOIN LATERAL (
+        SELECT p.* FROM tunnel.waterproof p
+         WHERE p.survey_id = s.id AND p.km = k.km AND p.chainage_from = k.chainage_from AND p.chainage_to = k.chainage_to
+           AND NOT EXISTS (SELECT FROM tunnel.waterproof o WHERE o.survey_id = s.id AND o.km = k.km AND o.id <> p.id)
+         LIMIT 1) w ON true
  CROSS JOIN LATERAL (
         SELECT w.lining_area, w.seen_share, w.wet_area, w.wet_ratio, w.patches, w.largest_area, w.largest_leak,
                w.window_patches, w.window_from, w.window_to, w.window_wet_area, w.class

@@ -104,7 +104,11 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
           FROM tunnel.survey s JOIN tunnel.design_profile p ON p.tunnel_id = s.tunnel_id
          WHERE s.id = $1 GROUP BY p.layer
     ), seen AS (
-        SELECT i.km FROM tunnel.image i WHERE i.survey_id = $1 AND i.kind = 'offset' GROUP BY i.km
+        SELECT i.km FROM tunnel_api.image_kilometres($1, 'offset') i (km)
+    ), pictured AS MATERIALIZED (
+        SELECT l.layer, i.km
+          FROM (VALUES ('lining'), ('shotcrete'), ('excavation')) l (layer)
+         CROSS JOIN LATERAL tunnel_api.image_kilometres($1, 'deviation_' || l.layer) i (km)
     ), detect AS MATERIALIZED (
         SELECT t.km, t.reason FROM tunnel_api.stage_state($1) t WHERE t.stage = 'detect'
     ), last AS (
@@ -121,8 +125,7 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
                 WHEN l.km IS NULL THEN 'never ran'
                 WHEN l.parameters -> 'detect' IS DISTINCT FROM n.inputs -> 'detect' THEN 'detect ran since'
                 WHEN l.parameters -> 'profiles' IS DISTINCT FROM n.inputs -> 'profiles' THEN 'design profiles changed since'
-                WHEN NOT EXISTS (SELECT FROM tunnel.image i
-                                  WHERE i.survey_id = $1 AND i.km = k.km AND i.kind = 'deviation_' || d.layer) AND EXISTS (
+                WHEN NOT EXISTS (SELECT FROM pictured i WHERE i.km = k.km AND i.layer = d.layer) AND EXISTS (
                      SELECT FROM tunnel.deviation_section o
                       WHERE o.survey_id = $1 AND o.km = k.km AND o.layer = d.layer AND o.seen_length > 0
                         AND o.chainage_from >= k.km * 1000 - 1 AND o.chainage_from < (k.km + 1) * 1000)

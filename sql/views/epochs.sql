@@ -103,9 +103,9 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
     WITH last AS (
         SELECT r.km, r.finished_at, r.parameters FROM tunnel_api.last_runs($1, 'compare') r WHERE r.subject = $2::text
     ), seen AS (
-        SELECT i.km FROM tunnel.image i WHERE i.survey_id = $1 AND i.kind = 'offset' GROUP BY i.km
+        SELECT i.km FROM tunnel_api.image_kilometres($1, 'offset') i (km)
         INTERSECT
-        SELECT i.km FROM tunnel.image i WHERE i.survey_id = $2 AND i.kind = 'offset' GROUP BY i.km
+        SELECT i.km FROM tunnel_api.image_kilometres($2, 'offset') i (km)
     ), place AS (  -- where both saw something, or what was made of it is still there
         SELECT k.km, true AS there FROM seen k
          UNION ALL

@@ -254,6 +254,13 @@ def test_points_of_a_survey_by_name_are_read_from_their_kilometre(conn: psycopg.
     assert len(locked(conn)) == len(SURVEYS)
 
 
+def test_points_asked_for_by_name_look_at_no_other_survey(conn: psycopg.Connection) -> None:
+    survey = survey_id(conn, "short")
+    found = conn.execute("SELECT count(*), min(chainage), max(chainage) FROM tunnel_api.points('short', 5100, 5120)").fetchone()
+    assert found == (20, 5100, 5119)
+    assert locked(conn) == tables(survey, KM)
+
+
 @pytest.mark.parametrize(
     ("view", "table", "condition"),
     [

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from itertools import groupby
+from operator import itemgetter
+from typing import Any, Literal, LiteralString
 
 import psycopg
 
@@ -80,9 +82,10 @@ def examine(dsn: str | None) -> Iterator[Finding]:
         yield from _foreign(connection)
         yield from _settings(connection, embedded=dsn is None)
         yield _locks(connection)
-        yield from _work(connection)
+        state = connection.execute(_STATE).fetchall()
+        yield from _work(state)
         yield from _queue(connection)
-        yield from _stale(connection)
+        yield from _stale(state)
         yield from _remarks(connection)
         if dsn is None:
             yield _space()
@@ -240,15 +243,16 @@ def _locks(connection: psycopg.Connection[Any]) -> Finding:
     )  # fmt: skip
 
 
-def _work(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
+_STATE: LiteralString = """
+SELECT survey, km, stage, outcome, message, stale FROM tunnel_api.stage_status
+ WHERE outcome IN ('interrupted', 'failed') OR stale ORDER BY survey, km, step
+"""
+
+
+def _work(state: Sequence[tuple[Any, ...]]) -> Iterator[Finding]:
     """Stages that were cut off or failed."""
-    rows = connection.execute(
-        """
-        SELECT survey, km, stage, outcome, message FROM tunnel_api.stage_status
-         WHERE outcome IN ('interrupted', 'failed') ORDER BY survey, km, step
-        """
-    ).fetchall()
-    for survey, km, stage, outcome, message in rows:
+    rows = [row for row in state if row[3] in ("interrupted", "failed")]
+    for survey, km, stage, outcome, message, _ in rows:
         why = f": {message.splitlines()[0]}" if message else ""
         mend = f"tunneldb run {survey} --km {km} --from {stage}" if stage != "load" else f"tunneldb load {survey} FILES"
         yield Finding("note", "work", f"{survey} km {km}, {stage} {outcome}{why}", mend)
@@ -284,12 +288,11 @@ def _remarks(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
         yield Finding("note", "results", f"{survey}, {said}")
 
 
-def _stale(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
+def _stale(state: Sequence[tuple[Any, ...]]) -> Iterator[Finding]:
     """Results that are out of date, a line a survey."""
-    for survey, stages, kilometres in connection.execute(
-        "SELECT survey, count(*), count(DISTINCT km) FROM tunnel_api.stage_status WHERE stale GROUP BY survey ORDER BY survey"
-    ).fetchall():
-        text = f"{survey}: {stages} stages of {kilometres} kilometres are out of date"
+    for survey, rows in groupby((row for row in state if row[5]), key=itemgetter(0)):
+        kilometres = [row[1] for row in rows]
+        text = f"{survey}: {len(kilometres)} stages of {len(set(kilometres))} kilometres are out of date"
         yield Finding("note", "work", text, f"tunneldb run {survey} --stale")
 
 
