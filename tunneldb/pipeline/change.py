@@ -26,7 +26,8 @@ from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.pixel_state import PixelState, shows_lining
 from tunneldb.shape import change as shape_change
 from tunneldb.shape.epoch_cells import LEAST_SIDE, SEEN_SHARE, CellGrid, Cells, CellSums, with_hollows, without_edges
-from tunneldb.shape.rigid_motion import Motion, motion_columns, rigid_motion
+from tunneldb.shape.rigid_motion import Motion, SectionCells, bending_error, motion_columns, rigid_motion
+from tunneldb.shape.tied_motion import tied_motions
 from tunneldb.store.change import (
     Section,
     StoredGroup,
@@ -170,22 +171,29 @@ def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, len
     removed_error = np.where(np.isfinite(difference), np.float32(0.0), np.float32(np.nan))
     number = np.floor((grid.chainage - grid.cell / 2.0) / length + 1e-9).astype(np.int64)
     edges = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), grid.columns]
-    sections = []
+    parts, cells = [], []
     for begin, end in pairwise(edges):
         row, column = np.nonzero(np.isfinite(difference[:, begin:end]))
         shown = _columns(surface, grid, (row, column + begin), old)
         known = np.isfinite(shown).all(axis=1)  # beyond the last plane there is no surface
         difference[row[~known], column[~known] + begin] = np.nan
         at = row[known], column[known] + begin
-        motion = rigid_motion(
-            difference[at].astype(np.float64),
-            variance[at].astype(np.float64) * noise**2,
-            shown[known],
-            np.floor(grid.arc[at[0]] / GROUP).astype(np.int64),
+        parts.append((slice(begin, end), at))
+        cells.append(
+            SectionCells(
+                difference[at].astype(np.float64),
+                variance[at].astype(np.float64) * noise**2,
+                shown[known],
+                np.floor(grid.arc[at[0]] / GROUP).astype(np.int64),
+                at[1] - begin,
+            )
         )
+    motions = tied_motions(cells, number[edges[:-1]], [rigid_motion(one) for one in cells])
+    for k, ((_, at), motion) in enumerate(zip(parts, motions, strict=True)):
         difference[at] -= motion.removed.astype(np.float32)
-        removed_error[at] = motion.removed_error.astype(np.float32)
-        sections.append((slice(begin, end), motion))
+        bent = _bent(surface, grid, float(np.median(grid.chainage[at[1]]))) if len(at[0]) else np.zeros(grid.rows)
+        removed_error[at] = motion.removed_error + bending_error(motion, cells[k].columns, bent[at[0]])
+    sections = [(columns, motion) for (columns, _), motion in zip(parts, motions, strict=True)]
     scatter = shape_change.measure_scatter(difference, variance)
     lod = shape_change.detection_level(variance, removed_error, scatter)
     return Change(grid, old, new, difference, variance, removed_error, lod, scatter, sections)
@@ -200,6 +208,19 @@ def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells) 
     normals[held] = surface.unroll(points[held]).normal
     middle = float(np.median(chainage)) if len(chainage) else np.nan
     return motion_columns(points, normals, surface.frames(np.array([middle]))[0])
+
+
+def _bent(surface: Surface, grid: CellGrid, chainage: float) -> Float:
+    """Curvature (rows,) of a section over two cells about each row, 1/m; 0 where it is not known."""
+    normals = []
+    for beside in (-grid.cell, grid.cell):
+        points = surface.to_space(np.full(grid.rows, chainage), grid.arc + beside, np.zeros(grid.rows))
+        normal = np.full_like(points, np.nan)
+        held = np.isfinite(points[:, 0])
+        normal[held] = surface.unroll(points[held]).normal
+        normals.append(normal)
+    turn = np.arccos(np.clip(np.einsum("ij,ij->i", *normals), -1.0, 1.0))
+    return np.nan_to_num(turn / (2.0 * grid.cell))
 
 
 def section_figures(found: Change) -> list[Section]:

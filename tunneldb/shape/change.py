@@ -18,6 +18,9 @@ CONFIDENT = 1.96
 FALSE_SHARE = 0.05
 """Share of false windows among those taken for change in a kilometre, at most on average (Benjamini & Hochberg, 1995)."""
 
+FAMILY_SHARE = 0.05
+"""Share of unchanged kilometres in which a region is reported."""
+
 WINDOW = 3
 """Side of the windows that are tested, in cells."""
 
@@ -137,15 +140,22 @@ def change_regions(difference: Single, variance: Single, removed_error: Single, 
 
     Each window of 3 by 3 cells is tested by its mean; of all windows those are taken for change among which the share of
     false ones is FALSE_SHARE at most on average. Neighbours that changed the same way make a region, which must be no
-    smaller than a window, and on average differ by more than its own level of detection.
+    smaller than a window, and on average differ by more than its own level of detection. A share of false windows is no share
+    of false regions: where a wall moved, many may be false. So a region needs a window that chance alone shows in FAMILY_SHARE
+    of all kilometres, by whichever two of its three rows or columns show it least.
     """
     mean, expected, number = window_means(difference, variance, removed_error, scatter)
     with np.errstate(invalid="ignore"):
         ratio = np.where(number >= LEAST, mean / expected, np.nan)
-    taken = significant(2.0 * norm.sf(np.abs(ratio)))
-    taken &= np.isfinite(difference)
-    return [region for sign in (1.0, -1.0) for region in _regions(taken & (mean * sign > 0.0), mean, difference, variance,
-                                                                  removed_error, scatter)]  # fmt: skip
+    taken = significant(2.0 * norm.sf(np.abs(ratio))) & np.isfinite(difference)
+    ratio = window_ratios(difference, variance, removed_error, scatter)
+    peak = family_level(float(np.isfinite(ratio).sum()))
+    return [
+        region
+        for sign in (1.0, -1.0)
+        for region in _regions(taken & (mean * sign > 0.0), mean, difference, variance, removed_error, scatter)
+        if np.nanmax(sign * ratio[region.rows, region.columns]) > peak
+    ]
 
 
 def significant(probability: Float) -> Bool:
@@ -172,6 +182,46 @@ def window_means(difference: Single, variance: Single, removed_error: Single, sc
         noise = np.sqrt(np.maximum(total(variance), 0.0)) / number * scatter.at(WINDOW**2)
         registered = total(removed_error) / number
     return mean, np.hypot(noise, registered), number
+
+
+def family_level(windows: float) -> float:
+    """Standard deviations that the greatest of so many windows exceeds in FAMILY_SHARE of unchanged linings at most (Šidák).
+
+    Windows overlap, so that it is exceeded less often.
+    """
+    return float(norm.isf(-np.expm1(np.log1p(-FAMILY_SHARE) / max(windows, 1.0)) / 2.0))
+
+
+def window_ratios(difference: Single, variance: Single, removed_error: Single, scatter: Scatter) -> Float:
+    """Least mean of each window without one of its rows or columns, in standard deviations; NaN with too few cells.
+
+    A groove that is narrower than a cell is hit by other pixels in each epoch, and alike in all cells along it: a line of cells
+    is one error, and no change if it stands alone. 0 where what is left without a line has the other sign.
+    """
+    seen = np.isfinite(difference)
+    rows, columns = difference.shape
+    lines: list[list[Float]] = []
+    for values in (difference, variance, removed_error, np.ones_like(difference)):
+        padded = np.pad(np.where(seen, values, 0.0).astype(np.float64), 1)
+        across, along = (sum_of_three(padded, axis) for axis in (1, 0))
+        lines.append([across[k : k + rows] for k in range(WINDOW)] + [along[:, k : k + columns] for k in range(WINDOW)])
+    totals = [of[0] + of[1] + of[2] for of in lines]
+    least, greatest = np.full(difference.shape, np.inf), np.full(difference.shape, -np.inf)
+    factor = float(scatter.at(WINDOW**2))
+    for line in zip(*lines, strict=True):
+        change, squared, registered, number = (total - one for total, one in zip(totals, line, strict=True))
+        expected = np.hypot(np.sqrt(np.maximum(squared, 0.0)) * factor, registered)
+        ratio = np.divide(change, expected, out=np.zeros_like(change), where=(number > 0.5) & (expected > 0.0))
+        np.minimum(least, ratio, out=least)
+        np.maximum(greatest, ratio, out=greatest)
+    value = np.where(least > 0.0, least, np.minimum(greatest, 0.0))
+    return np.where(totals[3] >= LEAST, value, np.nan)
+
+
+def sum_of_three(values: Float, axis: int) -> Float:
+    """Sums of neighbouring threes along an axis, two fewer than values."""
+    count = values.shape[axis]
+    return np.asarray(sum(np.take(values, range(k, count - 2 + k), axis=axis) for k in range(WINDOW)))
 
 
 def _regions(
