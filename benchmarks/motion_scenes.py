@@ -99,19 +99,20 @@ def oval(low: float, high: float, change: float, turned: float = 0.0, ring: floa
     def of(s: Float, right: Float, up: Float) -> Float:
         place = (np.floor((s - low) / ring) + 0.5) * ring / (high - low)
         most = np.where((s >= low) & (s < high), np.sin(np.pi * np.clip(place, 0.0, 1.0)), 0.0)
-        return -change * most * np.cos(2.0 * (np.arctan2(right, up) - np.radians(turned)))
+        return np.asarray(-change * most * np.cos(2.0 * (np.arctan2(right, up) - np.radians(turned))), dtype=np.float64)
 
     return of
 
 
 def crown(low: float, high: float, change: float) -> Change:
     """The upper third of an arch."""
-    return lambda s, right, up: (
-        change
-        * ramp(s, low, high, 1.0)
-        * np.clip(np.cos(3.0 * np.arctan2(right, up) / 2.0), 0.0, 1.0)
-        * (np.abs(np.arctan2(right, up)) < np.pi / 3.0)
-    )
+
+    def of(s: Float, right: Float, up: Float) -> Float:
+        angle = np.arctan2(right, up)
+        most = np.clip(np.cos(1.5 * angle), 0.0, 1.0) * (np.abs(angle) < np.pi / 3.0)
+        return np.asarray(change * ramp(s, low, high, 1.0) * most, dtype=np.float64)
+
+    return of
 
 
 def whole(low: float, high: float, change: float) -> Change:
@@ -177,7 +178,8 @@ def surface_about(outline: Float) -> Surface:
 def places(surface: Surface, arc: Float) -> tuple[Float, Float]:
     """Right and up of arcs."""
     angle = np.radians(np.arange(361) - 180.0)
-    return tuple(np.interp(arc, surface.arcs[0], surface.radius[0] * f(angle)) for f in (np.sin, np.cos))
+    right, up = (np.interp(arc, surface.arcs[0], surface.radius[0] * f(angle)) for f in (np.sin, np.cos))
+    return right, up
 
 
 def alike(rng: np.random.Generator, shape: tuple[int, ...], sigma: float, reach: float, step: float) -> Float:

@@ -13,7 +13,7 @@ from tunneldb.shape.tied_motion import tied_motions
 
 RADIUS, NOISE, COUNT = 3.0, 0.0008, 24
 FRAME = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-EVEN = Scatter(np.array([1.0]), np.array([1.0]))
+EVEN = Scatter(np.array([1.0]), np.array([1.0]), 1.0)
 
 
 def sections(change: dict[int, float], jump: float = 0.0, at: float = 12.0, box: bool = False) -> list[SectionCells]:

@@ -25,7 +25,7 @@ from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_differ
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.pixel_state import PixelState, shows_lining
 from tunneldb.shape import change as shape_change
-from tunneldb.shape.epoch_cells import LEAST_SIDE, SEEN_SHARE, CellGrid, Cells, CellSums, with_hollows, without_edges
+from tunneldb.shape.epoch_cells import LEAST_SIDE, SEEN_SHARE, CellGrid, Cells, CellSums, slopes, with_hollows, without_edges
 from tunneldb.shape.rigid_motion import Motion, SectionCells, bending_error, motion_columns, rigid_motion
 from tunneldb.shape.tied_motion import tied_motions
 from tunneldb.store.change import (
@@ -51,6 +51,9 @@ BESIDE = 5.0
 
 GROUP = 1.0
 """Length of the stretches of arc, m, of whose residuals the standard errors of motions are made."""
+
+BENT_STEP = 10.0
+"""Corners of the section are looked for once in so many metres."""
 
 HALO = 100.0
 """Leaks so far beyond the ends of a kilometre are matched with it, m, so that a group is the same seen from both sides."""
@@ -171,10 +174,11 @@ def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, len
     removed_error = np.where(np.isfinite(difference), np.float32(0.0), np.float32(np.nan))
     number = np.floor((grid.chainage - grid.cell / 2.0) / length + 1e-9).astype(np.int64)
     edges = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), grid.columns]
+    relief = slopes(old, grid.cell)
     parts, cells = [], []
     for begin, end in pairwise(edges):
         row, column = np.nonzero(np.isfinite(difference[:, begin:end]))
-        shown = _columns(surface, grid, (row, column + begin), old)
+        shown = _columns(surface, grid, (row, column + begin), old, relief)
         known = np.isfinite(shown).all(axis=1)  # beyond the last plane there is no surface
         difference[row[~known], column[~known] + begin] = np.nan
         at = row[known], column[known] + begin
@@ -189,25 +193,36 @@ def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, len
             )
         )
     motions = tied_motions(cells, number[edges[:-1]], [rigid_motion(one) for one in cells])
+    bent: dict[int, Float] = {}
     for k, ((_, at), motion) in enumerate(zip(parts, motions, strict=True)):
+        if not len(at[0]):
+            continue
+        place = int(grid.chainage[at[1][0]] / BENT_STEP)
+        if place not in bent:
+            bent[place] = _bent(surface, grid, float(np.median(grid.chainage[at[1]])))
         difference[at] -= motion.removed.astype(np.float32)
-        bent = _bent(surface, grid, float(np.median(grid.chainage[at[1]]))) if len(at[0]) else np.zeros(grid.rows)
-        removed_error[at] = motion.removed_error + bending_error(motion, cells[k].columns, bent[at[0]])
+        removed_error[at] = motion.removed_error + bending_error(motion, cells[k].columns, bent[place][at[0]])
     sections = [(columns, motion) for (columns, _), motion in zip(parts, motions, strict=True)]
     scatter = shape_change.measure_scatter(difference, variance)
     lod = shape_change.detection_level(variance, removed_error, scatter)
     return Change(grid, old, new, difference, variance, removed_error, lod, scatter, sections)
 
 
-def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells) -> Float:
-    """What the motions of a section do to its cells, (n, 6), about its middle: the middle of what is seen of it."""
+def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells, relief: tuple[Float, Float]) -> Float:
+    """What the motions of a section do to its cells, (n, 6), about its middle: the middle of what is seen of it.
+
+    A lining with relief changes its offset where it moves along itself, too, and so tells how far it did.
+    """
     chainage, arc = grid.chainage[at[1]], grid.arc[at[0]]
     points = surface.to_space(chainage, arc, old.offset[at].astype(np.float64))
     normals = np.full_like(points, np.nan)
     held = np.isfinite(points[:, 0])
     normals[held] = surface.unroll(points[held]).normal
     middle = float(np.median(chainage)) if len(chainage) else np.nan
-    return motion_columns(points, normals, surface.frames(np.array([middle]))[0])
+    frame = surface.frames(np.array([middle]))[0]
+    along, around = (slope[at][:, None] for slope in relief)
+    normals = normals - along * frame[1] - around * np.cross(normals, frame[1])
+    return motion_columns(points, normals, frame)
 
 
 def _bent(surface: Surface, grid: CellGrid, chainage: float) -> Float:

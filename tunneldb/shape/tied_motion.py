@@ -64,12 +64,12 @@ def tied_motions(sections: Sequence[SectionCells], number: Int64, motions: Seque
     if np.isfinite(left).sum() < LEAST_SECTIONS:
         return list(motions)
     usual = float(np.nanmedian(left))
-    kept, changed = left - usual < MOVED, np.flatnonzero(left - usual >= MOVED)
-    if kept.sum() < LEAST_SECTIONS or not len(changed):
+    kept, changed = left - usual < MOVED, np.flatnonzero(left - usual >= MOVED).tolist()
+    if kept.sum() < LEAST_SECTIONS or not changed:
         return list(motions)
     used = np.mean([m.used for m in motions if m.used.any()], axis=0) > COMMON
     values, variances = np.full((2, len(motions), len(MOTIONS)), np.nan)
-    for k in np.flatnonzero(kept):
+    for k in np.flatnonzero(kept).tolist():
         # A roll that is found here and not there would be in the shift to the right there.
         own = motions[k] if (motions[k].used == used).all() else motion_from(sections[k], motions[k].values, used)
         if own is not None and (own.used == used).all():
@@ -81,7 +81,7 @@ def tied_motions(sections: Sequence[SectionCells], number: Int64, motions: Seque
             sections[k],
             motions[k],
             removed_by(sections[k], even.values[k], np.sqrt(even.variances[k]), used),
-            _broken(sections[k], values, number, int(k), used),
+            _broken(sections[k], values, number, k, used),
             usual,
         )
     return result
@@ -101,7 +101,7 @@ def _chosen(cells: SectionCells, own: Motion, tied: Motion | None, broken: Motio
 
 
 def _with_changed(
-    sections: Sequence[SectionCells], number: Int64, values: Float, variances: Float, used: Bool, changed: Int64
+    sections: Sequence[SectionCells], number: Int64, values: Float, variances: Float, used: Bool, changed: list[int]
 ) -> _Even:
     """Even motions of the sections that kept their shape, and of what the others share with them."""
     values, variances = values.copy(), variances.copy()
@@ -134,13 +134,14 @@ def _broken(cells: SectionCells, values: Float, number: Int64, k: int, used: Boo
     before, behind = (loss(cells, cells.difference - cells.columns[:, used] @ start[used]) for start in starts)
     left = np.concatenate([[0.0], np.cumsum(np.bincount(cells.column, before - behind))])
     first = cells.column < int(left.argmin())
-    parts = [motion_from(cells.part(held), start, used) for held, start in zip((first, ~first), starts, strict=True)]
-    if parts[0] is None or parts[1] is None:
+    one = motion_from(cells.part(first), starts[0], used)
+    other = motion_from(cells.part(~first), starts[1], used)
+    if one is None or other is None:
         return None
     removed, error = np.empty(len(first)), np.empty(len(first))
-    for held, part in zip((first, ~first), parts, strict=True):
+    for held, part in ((first, one), (~first, other)):
         removed[held], error[held] = part.removed, part.removed_error
-    larger = parts[0] if 2 * first.sum() > len(first) else parts[1]
+    larger = one if 2 * first.sum() > len(first) else other
     return Motion(larger.values, larger.errors, removed, error, len(first))
 
 
