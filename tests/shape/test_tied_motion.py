@@ -39,7 +39,7 @@ def sections(change: dict[int, float], jump: float = 0.0, at: float = 12.0, box:
         difference = columns[:, 0] * shift + columns[:, 1] * 0.01 + change.get(n, 0.0) * np.tile(shape, 15)
         group = np.floor(np.tile(np.arange(130) / 10.0, 15)).astype(np.int64)
         difference = difference + rng.normal(0.0, NOISE, len(column))
-        found.append(SectionCells(difference, np.full(len(column), NOISE**2), columns, group, column))
+        found.append(SectionCells(difference, np.full(len(column), NOISE**2), columns.astype(np.float32), group, column))
     return found
 
 

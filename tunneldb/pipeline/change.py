@@ -143,8 +143,9 @@ def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int,
         return {"sections": 0}
     newer = _new_sums(conn, new, km, other, surface, sums.grid, sums.pixel)
     first, second = (without_edges(cells) for cells in with_hollows(sums, newer))
-    found = measure_change(surface, sums.grid, first, second, length)
-    grid = found.grid
+    grid, pixel = sums.grid, sums.pixel
+    del sums, newer  # a third of the memory that is needed
+    found = measure_change(surface, grid, first, second, length)
     transform = Affine(cell, 0.0, grid.west, 0.0, -cell, grid.south + grid.rows * cell)
     save_sections(conn, old, new, km, section_figures(found))
     save_images(
@@ -156,7 +157,7 @@ def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int,
         for stored in _stored_region(region, grid, surface)
     ]
     save_regions(conn, old, new, km, regions)
-    leaks = _leaks(conn, (old, new), km, (surface, other), found, sums.pixel)
+    leaks = _leaks(conn, (old, new), km, (surface, other), found, pixel)
     save_leaks(conn, old, new, km, leaks)
     both = np.isfinite(found.difference)
     return {
@@ -187,7 +188,7 @@ def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, len
             SectionCells(
                 difference[at].astype(np.float64),
                 variance[at].astype(np.float64) * noise**2,
-                shown[known],
+                shown[known].astype(np.float32),  # all sections of a kilometre are held
                 np.floor(grid.arc[at[0]] / GROUP).astype(np.int64),
                 at[1] - begin,
             )
@@ -208,7 +209,7 @@ def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, len
     return Change(grid, old, new, difference, variance, removed_error, lod, scatter, sections)
 
 
-def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells, relief: tuple[Float, Float]) -> Float:
+def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells, relief: tuple[Single, Single]) -> Float:
     """What the motions of a section do to its cells, (n, 6), about its middle: the middle of what is seen of it.
 
     A lining with relief changes its offset where it moves along itself, too, and so tells how far it did.

@@ -173,7 +173,7 @@ def without_edges(cells: Cells) -> Cells:
     return Cells(offset, variance, cells.share)
 
 
-def slopes(cells: Cells, cell: float) -> tuple[Float, Float]:
+def slopes(cells: Cells, cell: float) -> tuple[Single, Single]:
     """Slope of the lining's relief along the tunnel and around it, (rows, columns), over two cells.
 
     0 where one of them is not seen, and where it is no more than SLOPE times its noise: a smooth lining has none.
@@ -190,7 +190,7 @@ def slopes(cells: Cells, cell: float) -> tuple[Float, Float]:
         slope = (np.take(offset, ahead, axis) - np.take(offset, behind, axis)) / (2.0 * cell)
         noise = np.sqrt(np.take(variance, ahead, axis) + np.take(variance, behind, axis)) / (2.0 * cell)
         with np.errstate(invalid="ignore"):
-            found.append(np.where(np.abs(slope) > SLOPE * noise, slope, 0.0))
+            found.append(np.where(np.abs(slope) > SLOPE * noise, slope, 0.0).astype(np.float32))
     return found[0], found[1]
 
 

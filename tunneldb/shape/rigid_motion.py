@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.arrays import Bool, Float, Int64, Single
 from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.shape.tukey import CUT, weights
 
@@ -42,7 +42,7 @@ class SectionCells:
     ----------
     difference, variance : (n,) float arrays
         New less old offset, m, and its variance, m².
-    columns : (n, 6) float array
+    columns : (n, 6) float32 array
         Of :func:`motion_columns` for these.
     group : (n,) int array
         Stretch of the arc that each lies in: residuals within one are taken to be alike, those of several to be independent,
@@ -53,7 +53,7 @@ class SectionCells:
 
     difference: Float
     variance: Float
-    columns: Float
+    columns: Single
     group: Int64
     column: Int64
 
@@ -108,7 +108,7 @@ def motion_columns(points: Float, normals: Float, frame: Float) -> Float:
 
 def rigid_motion(cells: SectionCells) -> Motion:
     """Fit the motion of a section by Tukey's biweight, from the least sum of absolute residuals on."""
-    difference, variance, columns = cells.difference, cells.variance, cells.columns
+    difference, variance, columns = cells.difference, cells.variance, cells.columns.astype(np.float64)
     spread = np.sqrt(np.mean(columns**2, axis=0)) if len(columns) else np.zeros(len(MOTIONS))
     used = _determined(columns, variance, spread)
     if len(difference) < LEAST_CELLS or not used.any():
@@ -124,7 +124,7 @@ def motion_from(cells: SectionCells, start: Float, used: Bool) -> Motion | None:
     used = used & np.isfinite(start)
     if not used.any() or len(cells.difference) < LEAST_CELLS:
         return None
-    design, sigma = cells.columns[:, used], np.sqrt(cells.variance)
+    design, sigma = cells.columns[:, used].astype(np.float64), np.sqrt(cells.variance)
     values = np.asarray(start[used], dtype=np.float64)
     residual = cells.difference - design @ values
     for _ in range(_ROUNDS):
@@ -160,7 +160,7 @@ def loss(cells: SectionCells, residual: Float) -> Float:
     return np.asarray(1.0 - np.clip(1.0 - u**2, 0.0, None) ** 3)
 
 
-def bending_error(motion: Motion, columns: Float, curvature: Float) -> Float:
+def bending_error(motion: Motion, columns: Single, curvature: Float) -> Float:
     """By how much a shift along a sharply bent wall changes its offset (n,), m, which motions are not made of.
 
     With a shift t along a wall of curvature κ that is t² κ / 2: 2 mm in the corner of a box that is off by 20 mm.
@@ -178,7 +178,7 @@ def bending_error(motion: Motion, columns: Float, curvature: Float) -> Float:
 
 
 def _motion(cells: SectionCells, used: Bool, values: Float, covariance: Float) -> Motion:
-    design = cells.columns[:, used]
+    design = cells.columns[:, used].astype(np.float64)
     found, errors = np.full(len(MOTIONS), np.nan), np.full(len(MOTIONS), np.nan)
     found[used], errors[used] = values, np.sqrt(np.diag(covariance))
     error = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", design, covariance, design), 0.0))
