@@ -9,9 +9,11 @@ from __future__ import annotations
 import argparse
 import csv
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from benchmarks.common import print_table, save
 from tunneldb.arrays import Float
@@ -73,6 +75,50 @@ def against_published() -> tuple[list[tuple[object, ...]], list[tuple[object, ..
     return table, each
 
 
+def as_published() -> list[tuple[object, ...]]:
+    """How far the published centres lie from circles of least squares through all eight points, in vertical planes, mm."""
+    theirs = published()
+    off = []
+    for name, points in surveyed().items():
+        middle = points.mean(axis=0)
+        away = points - middle
+        along = np.linalg.eigh(away[:, :2].T @ away[:, :2])[1][:, 1]
+        flat = np.column_stack([away[:, :2] @ along, away[:, 2]])
+        found = least_squares(
+            lambda x, flat=flat: np.hypot(flat[:, 0] - x[0], flat[:, 1] - x[1]) - x[2], [0.0, 0.0, RADIUS],
+            xtol=1e-14, ftol=1e-14, gtol=1e-14,
+        ).x  # fmt: skip
+        centre = np.array([*(middle[:2] + found[0] * along), middle[2] + found[1]])
+        off.append(1e3 * float(np.linalg.norm(centre - theirs[name][:3])))
+    return [(*np.percentile(off, [50, 95, 100]).round(4).tolist(), f"{sum(one <= 1.0 for one in off)} of {len(off)}")]
+
+
+def alone(names: Sequence[str]) -> list[tuple[object, ...]]:
+    """Of rings, the point that stands farthest off the plane of the seven others: by how much, and how far these do, mm."""
+    rows: list[tuple[object, ...]] = []
+    for name, points in surveyed().items():
+        if name not in names:
+            continue
+        apart = []
+        for k in range(len(points)):
+            others = np.delete(points, k, axis=0)
+            middle = others.mean(axis=0)
+            _, values, axes = np.linalg.svd(others - middle)
+            apart.append((abs(float((points[k] - middle) @ axes[2])), float(values[2] / np.sqrt(len(others) - 3.0)), k + 1))
+        distance, scatter, point = max(apart, key=lambda one: one[0] / one[1])
+        rows.append((name, point, round(1e3 * distance, 1), round(1e3 * scatter, 1)))
+    return rows
+
+
+def surveyed() -> dict[str, Float]:
+    """Points (8, 3) of each ring."""
+    points: dict[str, list[list[float]]] = {}
+    with (DATA / "points.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            points.setdefault(row["ring"], []).append([float(row[axis]) for axis in "xyz"])
+    return {name: np.array(of) for name, of in points.items()}
+
+
 def simulated(
     rng: np.random.Generator, count: int, flattening: float = 0.0, third: float = 0.0, gap: float = 0.0, cables: float = 0.0
 ) -> Float:
@@ -114,10 +160,15 @@ def main() -> None:
     print_table(
         "rings that differ by more: ours less theirs, mm", ("ring", "chainage", "right", "up", "radius", "remark"), each
     )
+    again = as_published()
+    circles = ("median mm", "95 % below", "greatest", "within 1 mm")
+    print_table("circles of least squares through all eight points, in vertical planes, against the published", circles, again)
+    apart = alone([str(row[0]) for row in each])
+    print_table("of these rings: the point off the plane of the others", ("ring", "point", "off by mm", "others mm"), apart)
     truth = against_truth(options.rings, options.points)
     titles = ("95 % of errors below", "radius mm", "ovality %", "centre mm", "ms a ring")
     print_table(f"simulated rings of {options.points} points, {1e3 * NOISE:g} mm noise", titles, truth)
-    save("rings", {"published": table, "larger": each, "simulated": truth})
+    save("rings", {"published": table, "larger": each, "as_published": again, "alone": apart, "simulated": truth})
 
 
 if __name__ == "__main__":

@@ -58,7 +58,7 @@ DECLARE
     slab float8 := least(half_width, max_half_width);
     pending int[];  -- sections, segment * 100 + half
     widths float8[];  -- where each begins
-    finished int[] := '{}';
+    finished int[] := '{}'::int[];
 BEGIN
     SELECT array_agg(l.section), array_agg(least(l.width, max_half_width)) INTO pending, widths
     FROM tunnel_api.section_least_width(

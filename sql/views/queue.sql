@@ -31,9 +31,9 @@ SELECT j.id, (j.args->>'survey_id')::integer AS survey_id, s.name AS survey, (j.
        j.attempts, j.worker_id, w.host || '/' || w.pid AS worker, e.at AS since, r.message
   FROM (SELECT q.*, 'queued' AS state FROM tunnel_queue.procrastinate_jobs q WHERE q.status = 'todo'
          UNION ALL
-        SELECT q.*, 'running' FROM tunnel_queue.procrastinate_jobs q WHERE q.status = 'doing'
+        SELECT q.*, 'running' AS state FROM tunnel_queue.procrastinate_jobs q WHERE q.status = 'doing'
          UNION ALL
-        SELECT q.*, CASE q.status WHEN 'succeeded' THEN 'done' ELSE q.status::text END
+        SELECT q.*, CASE q.status WHEN 'succeeded' THEN 'done' ELSE q.status::text END AS state
           FROM tunnel_queue.procrastinate_jobs q WHERE q.status NOT IN ('todo', 'doing')) j
   LEFT JOIN tunnel.survey s ON s.id = (j.args->>'survey_id')::integer
   LEFT JOIN tunnel.worker w ON w.id = j.worker_id

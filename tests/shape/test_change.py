@@ -65,6 +65,22 @@ def test_an_unchanged_lining_whose_pose_is_off_is_unchanged_and_its_level_of_det
     assert all(np.isnan(motion.values[3]) for _, motion in found.sections)  # a round lining does not show its roll
 
 
+def test_a_lining_with_relief_whose_pose_is_off_along_itself_is_unchanged() -> None:
+    def relief(chainage: np.ndarray, arc: np.ndarray) -> np.ndarray:
+        return 0.012 * np.sin(2.0 * np.pi * chainage / 1.4) * np.sin(2.0 * np.pi * arc / 1.2)
+
+    chainage, arc = places()
+    surface, _ = made(RADIUS, 200.0, 0.0, 0.0)
+    found = measure_change(
+        surface, GRID, epoch(1, relief(chainage, arc)), epoch(2, relief(chainage - 0.02, arc - 0.01), (0.01, 0.01)), 1.5
+    )
+    held = np.abs(found.difference) <= found.lod
+    assert 0.93 < held[np.isfinite(found.difference)].mean() < 0.97
+    assert change_regions(found.difference, found.variance, found.removed_error, found.scatter) == []
+    along = np.array([motion.values[2] for _, motion in found.sections])
+    assert np.median(along) == pytest.approx(0.02, abs=2e-3)
+
+
 @pytest.mark.parametrize("filled", [False, True])
 def test_a_hollow_deeper_than_lining_stands_back_is_a_region_and_a_niche_is_none(filled: bool) -> None:
     chainage, arc = places()
@@ -134,6 +150,8 @@ def leak(number: int, west: float, east: float, kind: str = "leak") -> Leak:
         ([], [leak(1, 0, 1)], (0.2, 1.0), "unseen"),
         ([], [leak(1, 0, 1)], (0.9, 1.0), "new"),
         ([leak(1, 0, 1)], [leak(2, 0, 1, "dark")], (1.0, 1.0), "kind"),
+        ([leak(1, 0, 1)], [leak(2, 0, 1, "dark")], (1.0, 0.3), "unseen"),
+        ([leak(1, 0, 1)], [leak(2, 0.9, 3, "dark")], (1.0, 1.0), "dry"),
     ],
 )
 def test_what_became_of_a_leak(old: list[Leak], new: list[Leak], seen: tuple[float, float], state: str) -> None:

@@ -18,6 +18,9 @@ not show, may be off."""
 SEEN = 0.5
 """A place of which a survey saw less is not told: neither new nor dry."""
 
+NAMED = 0.5
+"""Of a leak so much must be a joint or a dark spot in the other survey, for it to be of another kind there."""
+
 EDGE = 4.0
 """Width of the edge of a leak in the image, in pixels: with half of it, two of 15 leaks that had not changed between two scans
 would be said to have shrunk (docs/figures.md)."""
@@ -112,8 +115,16 @@ def state_of(group: Group, old: tuple[float, float], new: tuple[float, float], s
             return "same"
         hidden = float(group.outline.area) * (1.0 - (seen_old if change > 0.0 else seen_new))
         return "unseen" if abs(change) <= doubt + hidden else "grown" if change > 0.0 else "shrunk"
-    if group.old and group.new:
-        return "kind"
     if (seen_new if was else seen_old) < SEEN:
         return "unseen"
+    if _named_otherwise(group, was):
+        return "kind"
     return "dry" if was else "new"
+
+
+def _named_otherwise(group: Group, was: bool) -> bool:
+    """Whether half of what is wet in one survey is something else in the other: a dark spot beside it says nothing on it."""
+    there, beside = (group.old, group.new) if was else (group.new, group.old)
+    wet = shapely.union_all([leak.outline for leak in there if leak.wet])
+    other = shapely.union_all([leak.outline for leak in beside])
+    return bool(shapely.intersection(wet, other).area >= NAMED * wet.area)

@@ -25,8 +25,9 @@ from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_differ
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.pixel_state import PixelState, shows_lining
 from tunneldb.shape import change as shape_change
-from tunneldb.shape.epoch_cells import LEAST_SIDE, SEEN_SHARE, CellGrid, Cells, CellSums, with_hollows, without_edges
-from tunneldb.shape.rigid_motion import Motion, motion_columns, rigid_motion
+from tunneldb.shape.epoch_cells import LEAST_SIDE, SEEN_SHARE, CellGrid, Cells, CellSums, slopes, with_hollows, without_edges
+from tunneldb.shape.rigid_motion import Motion, SectionCells, bending_error, motion_columns, rigid_motion
+from tunneldb.shape.tied_motion import tied_motions
 from tunneldb.store.change import (
     Section,
     StoredGroup,
@@ -50,6 +51,9 @@ BESIDE = 5.0
 
 GROUP = 1.0
 """Length of the stretches of arc, m, of whose residuals the standard errors of motions are made."""
+
+BENT_STEP = 10.0
+"""Corners of the section are looked for once in so many metres."""
 
 HALO = 100.0
 """Leaks so far beyond the ends of a kilometre are matched with it, m, so that a group is the same seen from both sides."""
@@ -139,8 +143,9 @@ def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int,
         return {"sections": 0}
     newer = _new_sums(conn, new, km, other, surface, sums.grid, sums.pixel)
     first, second = (without_edges(cells) for cells in with_hollows(sums, newer))
-    found = measure_change(surface, sums.grid, first, second, length)
-    grid = found.grid
+    grid, pixel = sums.grid, sums.pixel
+    del sums, newer  # a third of the memory that is needed
+    found = measure_change(surface, grid, first, second, length)
     transform = Affine(cell, 0.0, grid.west, 0.0, -cell, grid.south + grid.rows * cell)
     save_sections(conn, old, new, km, section_figures(found))
     save_images(
@@ -152,7 +157,7 @@ def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int,
         for stored in _stored_region(region, grid, surface)
     ]
     save_regions(conn, old, new, km, regions)
-    leaks = _leaks(conn, (old, new), km, (surface, other), found, sums.pixel)
+    leaks = _leaks(conn, (old, new), km, (surface, other), found, pixel)
     save_leaks(conn, old, new, km, leaks)
     both = np.isfinite(found.difference)
     return {
@@ -170,36 +175,68 @@ def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, len
     removed_error = np.where(np.isfinite(difference), np.float32(0.0), np.float32(np.nan))
     number = np.floor((grid.chainage - grid.cell / 2.0) / length + 1e-9).astype(np.int64)
     edges = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), grid.columns]
-    sections = []
+    relief = slopes(old, grid.cell)
+    parts, cells = [], []
     for begin, end in pairwise(edges):
         row, column = np.nonzero(np.isfinite(difference[:, begin:end]))
-        shown = _columns(surface, grid, (row, column + begin), old)
+        shown = _columns(surface, grid, (row, column + begin), old, relief)
         known = np.isfinite(shown).all(axis=1)  # beyond the last plane there is no surface
         difference[row[~known], column[~known] + begin] = np.nan
         at = row[known], column[known] + begin
-        motion = rigid_motion(
-            difference[at].astype(np.float64),
-            variance[at].astype(np.float64) * noise**2,
-            shown[known],
-            np.floor(grid.arc[at[0]] / GROUP).astype(np.int64),
+        parts.append((slice(begin, end), at))
+        cells.append(
+            SectionCells(
+                difference[at].astype(np.float64),
+                variance[at].astype(np.float64) * noise**2,
+                shown[known].astype(np.float32),  # all sections of a kilometre are held
+                np.floor(grid.arc[at[0]] / GROUP).astype(np.int64),
+                at[1] - begin,
+            )
         )
+    motions = tied_motions(cells, number[edges[:-1]], [rigid_motion(one) for one in cells])
+    bent: dict[int, Float] = {}
+    for k, ((_, at), motion) in enumerate(zip(parts, motions, strict=True)):
+        if not len(at[0]):
+            continue
+        place = int(grid.chainage[at[1][0]] / BENT_STEP)
+        if place not in bent:
+            bent[place] = _bent(surface, grid, float(np.median(grid.chainage[at[1]])))
         difference[at] -= motion.removed.astype(np.float32)
-        removed_error[at] = motion.removed_error.astype(np.float32)
-        sections.append((slice(begin, end), motion))
+        removed_error[at] = motion.removed_error + bending_error(motion, cells[k].columns, bent[place][at[0]])
+    sections = [(columns, motion) for (columns, _), motion in zip(parts, motions, strict=True)]
     scatter = shape_change.measure_scatter(difference, variance)
     lod = shape_change.detection_level(variance, removed_error, scatter)
     return Change(grid, old, new, difference, variance, removed_error, lod, scatter, sections)
 
 
-def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells) -> Float:
-    """What the motions of a section do to its cells, (n, 6), about its middle: the middle of what is seen of it."""
+def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells, relief: tuple[Single, Single]) -> Float:
+    """What the motions of a section do to its cells, (n, 6), about its middle: the middle of what is seen of it.
+
+    A lining with relief changes its offset where it moves along itself, too, and so tells how far it did.
+    """
     chainage, arc = grid.chainage[at[1]], grid.arc[at[0]]
     points = surface.to_space(chainage, arc, old.offset[at].astype(np.float64))
     normals = np.full_like(points, np.nan)
     held = np.isfinite(points[:, 0])
     normals[held] = surface.unroll(points[held]).normal
     middle = float(np.median(chainage)) if len(chainage) else np.nan
-    return motion_columns(points, normals, surface.frames(np.array([middle]))[0])
+    frame = surface.frames(np.array([middle]))[0]
+    along, around = (slope[at][:, None] for slope in relief)
+    normals = normals - along * frame[1] - around * np.cross(normals, frame[1])
+    return motion_columns(points, normals, frame)
+
+
+def _bent(surface: Surface, grid: CellGrid, chainage: float) -> Float:
+    """Curvature (rows,) of a section over two cells about each row, 1/m; 0 where it is not known."""
+    normals = []
+    for beside in (-grid.cell, grid.cell):
+        points = surface.to_space(np.full(grid.rows, chainage), grid.arc + beside, np.zeros(grid.rows))
+        normal = np.full_like(points, np.nan)
+        held = np.isfinite(points[:, 0])
+        normal[held] = surface.unroll(points[held]).normal
+        normals.append(normal)
+    turn = np.arccos(np.clip(np.einsum("ij,ij->i", *normals), -1.0, 1.0))
+    return np.nan_to_num(turn / (2.0 * grid.cell))
 
 
 def section_figures(found: Change) -> list[Section]:

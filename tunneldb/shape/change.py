@@ -18,6 +18,9 @@ CONFIDENT = 1.96
 FALSE_SHARE = 0.05
 """Share of false windows among those taken for change in a kilometre, at most on average (Benjamini & Hochberg, 1995)."""
 
+FAMILY_SHARE = 0.05
+"""Share of unchanged kilometres in which a region is reported."""
+
 WINDOW = 3
 """Side of the windows that are tested, in cells."""
 
@@ -40,10 +43,13 @@ class Scatter:
         Of the squares, in cells.
     factors : (k,) float array
         On the standard deviation of the mean, growing.
+    tail : float
+        On that of single cells, so that the normal distribution holds for the 95 % that a level of detection is of.
     """
 
     sides: Float
     factors: Float
+    tail: float
 
     def at(self, cells: Float | float) -> Float:
         """Factor for a mean of so many cells; linear in the logarithm of the side."""
@@ -82,7 +88,7 @@ def measure_scatter(difference: Single, variance: Single) -> Scatter:
     difference, variance : (rows, columns) float32 arrays
         Change of cells, m, and its variance as if all pixels were independent, m²; NaN unseen.
     """
-    sides, factors = [1.0], [1.0]
+    sides, factors, tail = [1.0], [1.0], 1.0
     for side in SCALES:
         mean, expected = _squares(difference, variance, side)
         apart = []
@@ -97,10 +103,11 @@ def measure_scatter(difference: Single, variance: Single) -> Scatter:
         factor = MAD_TO_SIGMA * float(np.median(np.abs(ratio)))
         if side == 1:
             factors[0] = factor
+            tail = float(np.quantile(np.abs(ratio), 0.95)) / CONFIDENT
         else:
             sides.append(float(side))
             factors.append(max(factor, factors[-1]))
-    return Scatter(np.array(sides), np.array(factors))
+    return Scatter(np.array(sides), np.array(factors), tail)
 
 
 def _squares(difference: Single, variance: Single, side: int) -> tuple[Float, Float]:
@@ -129,7 +136,7 @@ def detection_level(variance: Single, removed_error: Single, scatter: Scatter) -
     scatter : Scatter
         What the data say of the first.
     """
-    return np.asarray(CONFIDENT * (np.sqrt(variance) * scatter.factors[0] + removed_error), dtype=np.float32)
+    return np.asarray(CONFIDENT * (np.sqrt(variance) * scatter.tail + removed_error), dtype=np.float32)
 
 
 def change_regions(difference: Single, variance: Single, removed_error: Single, scatter: Scatter) -> list[Region]:
@@ -137,15 +144,49 @@ def change_regions(difference: Single, variance: Single, removed_error: Single, 
 
     Each window of 3 by 3 cells is tested by its mean; of all windows those are taken for change among which the share of
     false ones is FALSE_SHARE at most on average. Neighbours that changed the same way make a region, which must be no
-    smaller than a window, and on average differ by more than its own level of detection.
+    smaller than a window, and on average differ by more than its own level of detection. A share of false windows is no share
+    of false regions: where a wall moved, many may be false. So a region needs a window that chance alone shows in FAMILY_SHARE
+    of all kilometres, by whichever two of its three rows or columns show it least, or be as unlikely whole, without a line.
     """
     mean, expected, number = window_means(difference, variance, removed_error, scatter)
     with np.errstate(invalid="ignore"):
         ratio = np.where(number >= LEAST, mean / expected, np.nan)
-    taken = significant(2.0 * norm.sf(np.abs(ratio)))
-    taken &= np.isfinite(difference)
-    return [region for sign in (1.0, -1.0) for region in _regions(taken & (mean * sign > 0.0), mean, difference, variance,
-                                                                  removed_error, scatter)]  # fmt: skip
+    taken = significant(2.0 * norm.sf(np.abs(ratio))) & np.isfinite(difference)
+    peak = family_level(float(np.isfinite(ratio).sum()))
+    return [
+        region
+        for sign in (1.0, -1.0)
+        for region in _regions(taken & (mean * sign > 0.0), mean, difference, variance, removed_error, scatter)
+        if max(
+            _greatest_ratio(region, difference, variance, removed_error, scatter),
+            _ratio_without_line(region, difference, variance, removed_error, scatter),
+        )
+        > peak
+    ]
+
+
+def _greatest_ratio(region: Region, difference: Single, variance: Single, removed_error: Single, scatter: Scatter) -> float:
+    """Greatest of :func:`window_ratios` in a region, along its mean."""
+    at = region.rows.astype(np.int64), region.columns.astype(np.int64)
+    first = [max(int(place.min()) - 1, 0) for place in at]
+    cut = slice(first[0], int(at[0].max()) + 2), slice(first[1], int(at[1].max()) + 2)
+    ratios = window_ratios(difference[cut], variance[cut], removed_error[cut], scatter)
+    return float(np.nanmax(np.sign(region.mean) * ratios[at[0] - first[0], at[1] - first[1]], initial=0.0))
+
+
+def _ratio_without_line(region: Region, difference: Single, variance: Single, removed_error: Single, scatter: Scatter) -> float:
+    """Mean of a region without the row or column of cells that adds most to it, in standard deviations, along its mean."""
+    at = region.rows, region.columns
+    change, squared, registered = (values[at].astype(np.float64) for values in (difference, variance, removed_error))
+    lines = [place - place.min() for place in at]
+    sums = [np.bincount(line, change * np.sign(region.mean)) for line in lines]
+    which = int(sums[1].max() > sums[0].max())
+    kept = lines[which] != sums[which].argmax()
+    cells = int(kept.sum())
+    if cells < LEAST:
+        return 0.0
+    noise = np.sqrt(squared[kept].sum()) / cells * float(scatter.at(cells))
+    return float(np.sign(region.mean) * change[kept].mean() / np.hypot(noise, registered[kept].mean()))
 
 
 def significant(probability: Float) -> Bool:
@@ -172,6 +213,46 @@ def window_means(difference: Single, variance: Single, removed_error: Single, sc
         noise = np.sqrt(np.maximum(total(variance), 0.0)) / number * scatter.at(WINDOW**2)
         registered = total(removed_error) / number
     return mean, np.hypot(noise, registered), number
+
+
+def family_level(windows: float) -> float:
+    """Standard deviations that the greatest of so many windows exceeds in FAMILY_SHARE of unchanged linings at most (Šidák).
+
+    Windows overlap, so that it is exceeded less often.
+    """
+    return float(norm.isf(-np.expm1(np.log1p(-FAMILY_SHARE) / max(windows, 1.0)) / 2.0))
+
+
+def window_ratios(difference: Single, variance: Single, removed_error: Single, scatter: Scatter) -> Float:
+    """Least mean of each window without one of its rows or columns, in standard deviations; NaN with too few cells.
+
+    A groove that is narrower than a cell is hit by other pixels in each epoch, and alike in all cells along it: a line of cells
+    is one error, and no change if it stands alone. 0 where what is left without a line has the other sign.
+    """
+    seen = np.isfinite(difference)
+    rows, columns = difference.shape
+    lines: list[list[Float]] = []
+    for values in (difference, variance, removed_error, np.ones_like(difference)):
+        padded = np.pad(np.where(seen, values, 0.0).astype(np.float64), 1)
+        across, along = (sum_of_three(padded, axis) for axis in (1, 0))
+        lines.append([across[k : k + rows] for k in range(WINDOW)] + [along[:, k : k + columns] for k in range(WINDOW)])
+    totals = [of[0] + of[1] + of[2] for of in lines]
+    least, greatest = np.full(difference.shape, np.inf), np.full(difference.shape, -np.inf)
+    factor = float(scatter.at(WINDOW**2))
+    for line in zip(*lines, strict=True):
+        change, squared, registered, number = (total - one for total, one in zip(totals, line, strict=True))
+        expected = np.hypot(np.sqrt(np.maximum(squared, 0.0)) * factor, registered)
+        ratio = np.divide(change, expected, out=np.zeros_like(change), where=(number > 0.5) & (expected > 0.0))
+        np.minimum(least, ratio, out=least)
+        np.maximum(greatest, ratio, out=greatest)
+    value = np.where(least > 0.0, least, np.minimum(greatest, 0.0))
+    return np.where(totals[3] >= LEAST, value, np.nan)
+
+
+def sum_of_three(values: Float, axis: int) -> Float:
+    """Sums of neighbouring threes along an axis, two fewer than values."""
+    count = values.shape[axis]
+    return np.asarray(sum(np.take(values, range(k, count - 2 + k), axis=axis) for k in range(WINDOW)))
 
 
 def _regions(

@@ -18,6 +18,9 @@ SEEN_SHARE = 1.0 / 3.0
 LEAST_SIDE = 3
 """Side of a cell, in pixels, at least: a plane takes three pixels, and a scatter by few says little."""
 
+SLOPE = 3.0
+"""Slopes are of relief from so many standard deviations on."""
+
 EDGE = 2
 """Cells so near to a wide stretch of what is not seen are not compared."""
 
@@ -168,6 +171,27 @@ def without_edges(cells: Cells) -> Cells:
     beside = ndimage.binary_dilation(unseen, np.ones((3, 3)), iterations=EDGE)
     offset, variance = (np.where(beside, np.float32(np.nan), values) for values in (cells.offset, cells.variance))
     return Cells(offset, variance, cells.share)
+
+
+def slopes(cells: Cells, cell: float) -> tuple[Single, Single]:
+    """Slope of the lining's relief along the tunnel and around it, (rows, columns), over two cells.
+
+    0 where one of them is not seen, and where it is no more than SLOPE times its noise: a smooth lining has none.
+    """
+    found = []
+    for axis in (1, 0):
+        padding = [(0, 0), (0, 0)]
+        padding[axis] = (1, 1)
+        count = cells.offset.shape[axis]
+        ahead, behind = (np.arange(count) + shift for shift in (2, 0))
+        offset, variance = (
+            np.pad(values.astype(np.float64), padding, constant_values=np.nan) for values in (cells.offset, cells.variance)
+        )
+        slope = (np.take(offset, ahead, axis) - np.take(offset, behind, axis)) / (2.0 * cell)
+        noise = np.sqrt(np.take(variance, ahead, axis) + np.take(variance, behind, axis)) / (2.0 * cell)
+        with np.errstate(invalid="ignore"):
+            found.append(np.where(np.abs(slope) > SLOPE * noise, slope, 0.0).astype(np.float32))
+    return found[0], found[1]
 
 
 def rounding_variance(scatter: Float) -> Float:

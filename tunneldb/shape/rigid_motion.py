@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.arrays import Bool, Float, Int64, Single
 from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.shape.tukey import CUT, weights
 
@@ -23,9 +23,43 @@ DETERMINED = 1e-3
 LEAST_CELLS = 50
 """A section of which fewer cells were seen by both is compared with no motion removed, which is stated."""
 
+BENT = 2.0
+"""A wall of a larger curvature is a corner, 1/m."""
+
+LEAST_SHARE = 0.15
+"""Where a smaller share of a section's cells made the motion that its neighbours made, none of them says anything on it."""
+
 _KEPT = 0.6  # of the cells
 _ROUNDS = 50
 _STILL = 1e-7  # m: a round that changes no residual by more ends the search
+
+
+@dataclass(frozen=True)
+class SectionCells:
+    """Cells of a section that both epochs saw.
+
+    Attributes
+    ----------
+    difference, variance : (n,) float arrays
+        New less old offset, m, and its variance, m².
+    columns : (n, 6) float32 array
+        Of :func:`motion_columns` for these.
+    group : (n,) int array
+        Stretch of the arc that each lies in: residuals within one are taken to be alike, those of several to be independent,
+        so that an oval section, or noise that goes over many cells, is in the standard errors (Liang & Zeger, 1986).
+    column : (n,) int array
+        Of cells along the section, from 0.
+    """
+
+    difference: Float
+    variance: Float
+    columns: Single
+    group: Int64
+    column: Int64
+
+    def part(self, held: Bool) -> SectionCells:
+        """Some of the cells."""
+        return SectionCells(self.difference[held], self.variance[held], self.columns[held], self.group[held], self.column[held])
 
 
 @dataclass(frozen=True)
@@ -50,6 +84,11 @@ class Motion:
     removed_error: Float
     cells: int
 
+    @property
+    def used(self) -> Bool:
+        """Which motions are determined."""
+        return np.asarray(np.isfinite(self.values))
+
 
 def motion_columns(points: Float, normals: Float, frame: Float) -> Float:
     """By how much a unit of each motion changes the offsets of cells, (n, 6).
@@ -67,19 +106,9 @@ def motion_columns(points: Float, normals: Float, frame: Float) -> Float:
     return np.column_stack([normals @ right, normals @ up, normals @ tangent, *turns])
 
 
-def rigid_motion(difference: Float, variance: Float, columns: Float, group: Int64) -> Motion:
-    """Fit the motion to differences of offset by Tukey's biweight, from the least sum of absolute residuals on.
-
-    Parameters
-    ----------
-    difference, variance : (n,) float arrays
-        New less old offset of the cells that both epochs saw, m, and its variance, m².
-    columns : (n, 6) float array
-        Of :func:`motion_columns` for these.
-    group : (n,) int array
-        Stretch of the arc that each lies in: residuals within one are taken to be alike, those of several to be independent,
-        so that an oval section, or noise that goes over many cells, is in the standard errors (Liang & Zeger, 1986).
-    """
+def rigid_motion(cells: SectionCells) -> Motion:
+    """Fit the motion of a section by Tukey's biweight, from the least sum of absolute residuals on."""
+    difference, variance, columns = cells.difference, cells.variance, cells.columns.astype(np.float64)
     spread = np.sqrt(np.mean(columns**2, axis=0)) if len(columns) else np.zeros(len(MOTIONS))
     used = _determined(columns, variance, spread)
     if len(difference) < LEAST_CELLS or not used.any():
@@ -87,11 +116,73 @@ def rigid_motion(difference: Float, variance: Float, columns: Float, group: Int6
         return Motion(nothing, nothing.copy(), np.zeros(len(difference)), np.zeros(len(difference)), len(difference))
     design = columns[:, used]
     values, weight, residual = _fit(design, difference, np.sqrt(variance))
-    covariance = _covariance(design, weight, residual, variance, group)
-    found, errors = np.full(6, np.nan), np.full(6, np.nan)
+    return _motion(cells, used, values, _covariance(design, weight, residual, variance, cells.group))
+
+
+def motion_from(cells: SectionCells, start: Float, used: Bool) -> Motion | None:
+    """The motion that is nearest to a given one (6,), by Tukey's biweight; None where too few cells share one."""
+    used = used & np.isfinite(start)
+    if not used.any() or len(cells.difference) < LEAST_CELLS:
+        return None
+    design, sigma = cells.columns[:, used].astype(np.float64), np.sqrt(cells.variance)
+    values = np.asarray(start[used], dtype=np.float64)
+    residual = cells.difference - design @ values
+    for _ in range(_ROUNDS):
+        weight = weights(residual / (CUT * float(np.median(sigma))))
+        if float(weight.mean()) < LEAST_SHARE:
+            return None
+        weighted = weight[:, None] * design
+        values = np.asarray(np.linalg.lstsq(weighted.T @ design, weighted.T @ cells.difference, rcond=None)[0], np.float64)
+        before, residual = residual, cells.difference - design @ values
+        if float(np.abs(residual - before).max()) < _STILL:
+            break
+    try:
+        return _motion(cells, used, values, _covariance(design, weight, residual, cells.variance, cells.group))
+    except np.linalg.LinAlgError:
+        return None
+
+
+def removed_by(cells: SectionCells, values: Float, errors: Float, used: Bool) -> Motion | None:
+    """A motion (6,) with standard errors that is given; None where a part of it that counts is not known."""
+    if not used.any() or not np.isfinite(values[used]).all():
+        return None
+    return _motion(cells, used, values[used], np.diag(errors[used] ** 2))
+
+
+def unexplained(cells: SectionCells, residual: Float) -> float:
+    """Share of cells that residuals (n,) leave, by Tukey's loss: 0 where they are none, 1 where all lie beyond its limit."""
+    return float(np.mean(loss(cells, residual))) if len(residual) >= LEAST_CELLS else float("nan")
+
+
+def loss(cells: SectionCells, residual: Float) -> Float:
+    """Tukey's loss (n,) of residuals (n,), 1 beyond its limit."""
+    u = residual / (CUT * np.sqrt(cells.variance))
+    return np.asarray(1.0 - np.clip(1.0 - u**2, 0.0, None) ** 3)
+
+
+def bending_error(motion: Motion, columns: Single, curvature: Float) -> Float:
+    """By how much a shift along a sharply bent wall changes its offset (n,), m, which motions are not made of.
+
+    With a shift t along a wall of curvature κ that is t² κ / 2: 2 mm in the corner of a box that is off by 20 mm.
+
+    Parameters
+    ----------
+    columns : (n, 6) float array
+        Of :func:`motion_columns`.
+    curvature : (n,) float array
+        Of the section, 1/m.
+    """
+    shift = np.nan_to_num(motion.values[:2])
+    along = np.maximum(shift @ shift - (columns[:, :2] @ shift) ** 2, 0.0)
+    return np.asarray(np.where(curvature > BENT, 0.5 * along * curvature, 0.0))
+
+
+def _motion(cells: SectionCells, used: Bool, values: Float, covariance: Float) -> Motion:
+    design = cells.columns[:, used].astype(np.float64)
+    found, errors = np.full(len(MOTIONS), np.nan), np.full(len(MOTIONS), np.nan)
     found[used], errors[used] = values, np.sqrt(np.diag(covariance))
     error = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", design, covariance, design), 0.0))
-    return Motion(found, errors, design @ values, error, len(difference))
+    return Motion(found, errors, design @ values, error, len(cells.difference))
 
 
 def _determined(columns: Float, variance: Float, spread: Float) -> Bool:
