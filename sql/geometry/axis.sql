@@ -53,20 +53,24 @@ COMMENT ON FUNCTION tunnel_api.axis_frame(int[], float8[], float8[], float8[]) I
 -- the vertex and coordinates.
 CREATE OR REPLACE FUNCTION tunnel_api.axis_source(survey_id int, n int[], half_width float8)
 RETURNS text
-LANGUAGE sql STABLE PARALLEL SAFE STRICT
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 AS $$
-    SELECT format($query$
+DECLARE
+    spacing float8 := (SELECT t.spacing FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+                       WHERE s.id = axis_source.survey_id);
+    low float8 := (SELECT (min(i) - 0.5) * spacing FROM unnest(n) i);
+    high float8 := (SELECT (max(i) + 0.5) * spacing FROM unnest(n) i);
+BEGIN
+    RETURN format($query$
         SELECT round(p.chainage / %1$s)::int AS n, public.ST_X(p.geom) AS x, public.ST_Y(p.geom) AS y, public.ST_Z(p.geom) AS z,
             clock_timestamp()  -- a fence that lets the scan be parallel: the coordinates are taken out once
         FROM %5$s p
         WHERE p.chainage BETWEEN %2$s AND %3$s
           -- chainage is good to a metre or so until the axis rests; the plane decides
           AND abs(p.chainage - round(p.chainage / %1$s) * %1$s) <= %4$s + 1.5
-    $query$, t.spacing, e.low, e.high, $3,
-        tunnel_api.partition_source($1, floor(e.low / 1000)::int, floor(e.high / 1000)::int))
-    FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
-    CROSS JOIN LATERAL (SELECT (min(i) - 0.5) * t.spacing AS low, (max(i) + 0.5) * t.spacing AS high FROM unnest($2) i) e
-    WHERE s.id = $1
+    $query$, spacing, low, high, half_width,
+        tunnel_api.partition_source(survey_id, floor(low / 1000)::int, floor(high / 1000)::int));
+END
 $$;
 COMMENT ON FUNCTION tunnel_api.axis_source(int, int[], float8) IS
 'What to read in FROM for the points near the planes of axis vertices n, by chainage: n, x, y, z (m).';
