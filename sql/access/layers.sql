@@ -80,6 +80,7 @@ LANGUAGE sql STABLE PARALLEL SAFE ROWS 3 SET search_path = pg_catalog, pg_temp A
     SELECT n.nspname::text, coalesce(nullif(substr(n.nspname, 8), 'local')::int, 0)
       FROM pg_namespace n
      WHERE n.nspname ~ '^tunnel_([0-9]{1,9}|local)$' AND obj_description(n.oid, 'pg_namespace') LIKE 'tunneldb: layers of %'
+       AND n.nspowner = (SELECT a.nspowner FROM pg_namespace a WHERE a.nspname = 'tunnel_api')
      ORDER BY 1
 $$;
 COMMENT ON FUNCTION tunnel_api.layer_schemas() IS
@@ -93,12 +94,13 @@ DECLARE
     unused record;
     view record;
 BEGIN
-    PERFORM pg_advisory_xact_lock(7088630452);  -- any number: two at a time wait for each other
+    PERFORM pg_advisory_xact_lock(7088630452);  -- any number, known to database/schema.py: two at a time wait for each other
     FOR unused IN
         SELECT l.schema FROM tunnel_api.layer_schemas() l WHERE NOT EXISTS (SELECT FROM tunnel.tunnel t WHERE t.srid = l.srid)
     LOOP
         BEGIN
-            FOR view IN SELECT c.oid::regclass AS name FROM pg_class c WHERE c.relnamespace = to_regnamespace(unused.schema) LOOP
+            FOR view IN SELECT c.oid::regclass AS name FROM pg_class c JOIN tunnel_api.layer_types() t ON t.layer = c.relname
+                         WHERE c.relnamespace = to_regnamespace(unused.schema) AND c.relkind = 'v' LOOP
                 EXECUTE format('DROP VIEW %s', view.name);
             END LOOP;
             EXECUTE format('DROP SCHEMA %I', unused.schema);

@@ -76,17 +76,31 @@ COMMENT ON FUNCTION tunnel_api.axis_source(int, int[], float8) IS
 'What to read in FROM for the points near the planes of axis vertices n, by chainage: n, x, y, z (m).';
 
 
+-- The table in which axis_near sets points of a kilometre aside.
+CREATE OR REPLACE FUNCTION tunnel_api.axis_near_name(survey_id int, km int)
+RETURNS text
+LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
+AS $$
+    SELECT tunnel_api.partition_name($1, $2) || '_axis'
+$$;
+COMMENT ON FUNCTION tunnel_api.axis_near_name(int, int) IS
+'Name of the table of schema tunnel that stage axis has while it works on a kilometre.';
+
+
 -- Sets the points near the planes of vertices aside in a table, in the place of an older one, for the passes of axis_refine:
--- those within half a metre more than half_width of their plane, and those 30 m and more from their vertex.
+-- those within half a metre more than half_width of their plane, and those 30 m and more from their vertex. Not a temporary
+-- table, which no parallel worker could read; it is there until the transaction ends.
 CREATE OR REPLACE FUNCTION tunnel_api.axis_near(
-    near text, survey_id int, n int[], x float8[], y float8[], z float8[], half_width float8)
+    survey_id int, km int, n int[], x float8[], y float8[], z float8[], half_width float8)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
 AS $$
+DECLARE
+    near constant text := tunnel_api.axis_near_name(survey_id, km);
 BEGIN
     EXECUTE format('DROP TABLE IF EXISTS tunnel.%I', near);
     EXECUTE format($query$
-        CREATE TABLE tunnel.%I AS
+        CREATE UNLOGGED TABLE tunnel.%I AS
         SELECT p.n, p.x, p.y, p.z
         FROM (%s) p
         JOIN tunnel_api.axis_frame($2, $3, $4, $5) f ON f.n = p.n
@@ -96,8 +110,8 @@ BEGIN
     USING axis_near.half_width, axis_near.n, axis_near.x, axis_near.y, axis_near.z;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.axis_near(text, int, int[], float8[], float8[], float8[], float8) IS
-'Sets the points near the planes of axis vertices aside in the table near of schema tunnel: n, x, y, z (m).';
+COMMENT ON FUNCTION tunnel_api.axis_near(int, int, int[], float8[], float8[], float8[], float8) IS
+'Sets the points near the planes of axis vertices of a kilometre aside, in the table that axis_near_name names: n, x, y, z (m).';
 
 
 -- Whether the planes of vertices have moved since points were set aside, so far that one within half_width of its plane may be
@@ -274,7 +288,7 @@ DECLARE
     rejected int := 0;
     since int := 0;  -- pass in which the last one was
     worse text[];
-    near constant text := tunnel_api.partition_name(survey_id, km) || '_axis';
+    near constant text := tunnel_api.axis_near_name(survey_id, km);
     ox float8[]; oy float8[]; oz float8[];  -- the vertices when the points near them were set aside
 BEGIN
     SELECT t.spacing INTO STRICT spacing
@@ -298,7 +312,7 @@ BEGIN
         -- a few millimetres may go to and fro for ever as points enter and leave the slab: later passes go a part of the way
         share := least(1.0, 5.0 / pass);
         IF ox IS NULL OR tunnel_api.axis_astray(vn, vx, vy, vz, ox, oy, oz) THEN
-            PERFORM tunnel_api.axis_near(near, axis_refine.survey_id, vn, vx, vy, vz, axis_refine.half_width);
+            PERFORM tunnel_api.axis_near(axis_refine.survey_id, axis_refine.km, vn, vx, vy, vz, axis_refine.half_width);
             ox := vx; oy := vy; oz := vz;
         END IF;
         WITH frame AS (

@@ -14,7 +14,8 @@ SET enable_nestloop = on
 AS $$
     WITH RECURSIVE place AS (
         (SELECT r.km, r.subject FROM tunnel.run r
-          WHERE r.survey_id = $1 AND r.stage = $2 AND r.km >= $4 AND r.km <= $5 ORDER BY r.km, r.subject LIMIT 1)
+          WHERE r.survey_id = $1 AND r.stage = $2 AND r.km >= $4 AND r.km <= $5 AND tunnel_api.in_order($4, $5, 'km')
+          ORDER BY r.km, r.subject LIMIT 1)
          UNION ALL
         SELECT n.km, n.subject
           FROM place p

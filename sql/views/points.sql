@@ -12,7 +12,8 @@ BEGIN
     RETURN QUERY EXECUTE
         'SELECT p.* FROM tunnel_api.point p WHERE p.survey_id = $1 AND p.km BETWEEN $2 AND $3'
         ' AND p.chainage >= $4 AND p.chainage < $5'
-        USING tunnel_api.survey_id(survey), floor((chainage_from - 50) / 1000)::int, floor((chainage_to + 50) / 1000)::int,
+        USING tunnel_api.survey_id(survey), greatest(floor((chainage_from - 50) / 1000), -1e6)::int,
+              least(floor((chainage_to + 50) / 1000), 1e6)::int,
               chainage_from, chainage_to;
 END
 $$;

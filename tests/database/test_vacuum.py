@@ -13,6 +13,7 @@ from support.example_change import EARLIER, add_earlier
 from support.queue_rows import add_job
 
 from tunneldb.cli.main import main
+from tunneldb.database.vacuum import tables_to_vacuum, vacuum
 
 DEAD = "SELECT coalesce(sum(pg_stat_get_dead_tuples(oid)), 0) FROM pg_class WHERE relname IN ('anomaly_part', 'section')"
 
@@ -86,6 +87,16 @@ def test_dead_rows_are_shown_first_and_gone_afterwards(example: str, conn: psyco
     assert (done["done"], done["locked"], done["not_owned"]) == (True, [], [])
     assert conn.execute(DEAD).fetchone() == (0,)
     assert not {row["table"] for row in told("vacuum")["tables"]} & {"section", "image_s1"}
+
+
+def test_a_table_that_is_dropped_meanwhile_is_passed_over(example: str, conn: psycopg.Connection) -> None:
+    conn.execute("CREATE TABLE tunnel.image_s99 AS SELECT 1 AS id")
+    conn.commit()
+    tables = [table for table in tables_to_vacuum(conn) if table.table == "image_s99"]
+    conn.execute("DROP TABLE tunnel.image_s99")
+    conn.commit()
+    assert len(tables) == 1
+    assert vacuum(conn, tables, lambda _, __: lambda ___: None) == []
 
 
 def test_operators_vacuum_their_tables_and_prune_and_others_are_told_in_a_line(

@@ -193,7 +193,7 @@ class Full:
 
     def __init__(self, file, room=200_000):
         self.file, self.room = file, room
-        self.seek, self.tell, self.flush = file.seek, file.tell, file.flush
+        self.seek, self.tell, self.flush, self.read = file.seek, file.tell, file.flush, file.read
 
     def write(self, data):
         self.room -= len(data)

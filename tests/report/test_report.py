@@ -486,6 +486,24 @@ def test_of_too_many_leaks_the_largest_are_listed_and_all_counted(
     assert digests[0] == digests[1] != [], "it is of all leaks"
 
 
+def test_the_digest_is_of_leaks_listed_or_not(example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
+    survey = get_survey(conn, example)
+    conn.rollback()
+
+    def digest(listed: int) -> str:
+        write_html(conn, survey, tmp_path / "d.html", pictures=0, listed=listed)
+        (found,) = set(re.findall(r"digest ([0-9a-f]{16})", Reading(tmp_path / "d.html").text))
+        return str(found)
+
+    before = digest(1000)
+    conn.execute(
+        "UPDATE tunnel_api.leak SET review = 'rejected', remark = 'a sign'"
+        " WHERE id = (SELECT id FROM tunnel_api.leak ORDER BY area LIMIT 1)"
+    )
+    conn.commit()
+    assert digest(2) == digest(1000) != before
+
+
 def test_thousands_of_leaks_come_by_pages(example: str, conn: psycopg.Connection, browser: Browser, tmp_path: Path) -> None:
     rows = conn.execute(
         "SELECT attname FROM pg_attribute"

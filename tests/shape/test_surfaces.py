@@ -60,7 +60,7 @@ def copied(conn: psycopg.Connection, survey: int, name: str) -> int:
     for table in tables:
         names = conn.execute(
             "SELECT attname FROM pg_attribute WHERE attrelid = %s::regclass AND attnum > 0 AND NOT attisdropped"
-            " AND attidentity = '' AND attname <> 'survey_id'",
+            " AND attgenerated = '' AND attidentity = '' AND attname <> 'survey_id'",
             (f"tunnel.{table}",),
         ).fetchall()
         columns = sql.SQL(", ").join(sql.Identifier(column) for (column,) in names)

@@ -9,7 +9,13 @@ import pytest
 from psycopg import sql
 
 VALUES = {"survey_before": "'demo-2024'", "survey": "'demo-2024'", "survey_after": "'demo-2024'", "layer": "'lining'"}
-OTHERS = {"integer": "1", "double precision": "1.0", "text": "'x'", "geometry": "'POLYGON((12300 0,12500 0,12400 1,12300 0))'"}
+OTHERS = {
+    "integer": "1",
+    "double precision": "1.0",
+    "text": "'x'",
+    "boolean": "true",
+    "geometry": "'POLYGON((12300 0,12500 0,12400 1,12300 0))'",
+}
 
 
 @pytest.fixture(scope="session")

@@ -170,6 +170,12 @@ def test_schemas_come_and_go_with_tunnels(conn: psycopg.Connection, dsn: str, mo
         install(conn, STAGES)
     conn.rollback()
     conn.execute("DROP VIEW public.mine")
+    conn.execute(sql.SQL("CREATE TABLE {} AS SELECT 1 AS a").format(sql.Identifier(SCHEMA, "kept")))
+    conn.commit()
+    with pytest.raises(UserError, match=rf"{SCHEMA}.kept lie in a schema of typed layers"):
+        install(conn, STAGES)
+    conn.rollback()
+    conn.execute(sql.SQL("DROP TABLE {}").format(sql.Identifier(SCHEMA, "kept")))
     conn.commit()
     install(conn, STAGES)
     assert schemas(conn) == [SCHEMA]

@@ -14,6 +14,7 @@ from support.queue_rows import add_goal, add_job
 
 from tunneldb.cli.main import main
 from tunneldb.pipeline.stages import STAGE_NAMES
+from tunneldb.store.archive.numbers import PARAMETERS
 
 HISTORIES = {"run", "change", "job", "survey_size"}
 """Views that list runs and jobs, or what they take: the only ones that may be different."""
@@ -143,8 +144,8 @@ def test_pruning_a_long_history_changes_no_view_and_nothing_that_status_or_check
 
 
 def test_the_inputs_of_runs_are_all_known(example: str, conn: psycopg.Connection) -> None:
-    """Parameters that the functions …_inputs give, but for those that were asked for, are no options of a result."""
-    asked = {"layer", "before", "gauge"}
+    """What the functions …_inputs give are runs that `run_inputs` knows, checksums, or what was asked for."""
+    others = {"layer", "before", "gauge", "profiles", "rings", "outline", "leaks_old", "leaks_new", "files", "settings_at"}
     stages = {"change": "compare", "ring": "rings"}
     functions = conn.execute(
         "SELECT p.oid::regprocedure::text, substring(p.proname FROM '(.*)_inputs$'), p.proargtypes::regtype[]::text[]"
@@ -159,11 +160,11 @@ def test_the_inputs_of_runs_are_all_known(example: str, conn: psycopg.Connection
         call = f"SELECT tunnel_api.{subject}_inputs({', '.join(arguments)})"
         given = conn.execute(call.encode()).fetchone()
         assert given is not None, signature
-        options = conn.execute(
-            "SELECT tunnel_api.run_options(%s, %s)", [stages.get(subject, subject), Jsonb(given[0])]
-        ).fetchone()
-        assert options is not None
-        assert set(options[0]) <= asked, signature
+        stage = stages.get(subject, subject)
+        runs = {name for name in given[0] if PARAMETERS.get((stage, name)) == "run"}
+        assert set(given[0]) - runs <= others, signature
+        known = conn.execute("SELECT tunnel_api.run_inputs(%s, %s)", [stage, Jsonb(dict.fromkeys(runs, 7))]).fetchone()
+        assert known == ([7] * len(runs) or None,), signature
 
 
 def test_what_runs_or_waits_is_left_alone(example: str, conn: psycopg.Connection) -> None:

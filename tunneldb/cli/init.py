@@ -6,14 +6,11 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.progress import bar, step
+from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.database import open_connection
 from tunneldb.database.schema import install, schema_revision
 from tunneldb.pipeline.stages import STAGES
 from tunneldb.store.waterproof import keep_missing
-
-_ENDINGS = ("57P01", "57P02")
-"""Warnings with which the server ends a session: the error that follows says it."""
 
 
 @verb(examples=["tunneldb init", 'tunneldb --dsn "host=gis.example.org dbname=tunnels user=anna" init'])
@@ -30,13 +27,7 @@ def init(settings: Settings) -> None:
     with open_connection(settings.dsn) as connection:
         before = schema_revision(connection)
         connection.rollback()
-        connection.add_notice_handler(
-            lambda notice: (
-                click.echo(f"tunneldb: {notice.message_primary}", err=True)
-                if notice.severity_nonlocalized == "WARNING" and notice.sqlstate not in _ENDINGS
-                else None
-            )
-        )
+        tell_warnings(connection)
         install(connection, STAGES)
         after = schema_revision(connection)
         connection.rollback()

@@ -5,11 +5,12 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
+    import psycopg
     from rich.console import RenderableType
     from rich.progress import Progress
 
@@ -126,6 +127,21 @@ def step(progress: Progress) -> Callable[[str, float | None], Callable[[float], 
 def say(text: str, *, err: bool = False) -> None:
     """Print a line while a bar is shown: above it. By itself click goes past what rich has put before the terminal."""
     click.echo(text, file=sys.stderr if err else sys.stdout)
+
+
+_ENDINGS = ("57P01", "57P02")
+"""Warnings with which the server ends a session: the error that follows says it."""
+
+
+def tell_warnings(connection: psycopg.Connection[Any]) -> None:
+    """Say from now on what the database's functions warn of."""
+    connection.add_notice_handler(
+        lambda notice: (
+            say(f"tunneldb: {notice.message_primary}", err=True)
+            if notice.severity_nonlocalized == "WARNING" and notice.sqlstate not in _ENDINGS
+            else None
+        )
+    )
 
 
 def rate(speed: float | None, unit: str) -> str:

@@ -16,6 +16,7 @@ from tunneldb.cli.survey import DAY
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.store.ledger import BusyError
 from tunneldb.store.prune import Superseded, busy, superseded
 from tunneldb.store.prune import prune as delete
 from tunneldb.store.survey import get_survey
@@ -36,8 +37,8 @@ def prune(settings: Settings, name: str | None, before: dt.datetime | None, yes:
     """Show which old runs of the ledger and finished jobs of the queue nothing goes by any more; with --yes delete them.
 
     Of all surveys, or of SURVEY. Of each stage of each kilometre, and each layer, outline or pair of surveys, stay the last
-    attempt, the last success and the success with the highest number, what these were made from, and every import. So nothing
-    is stale afterwards that was not before. Results, findings and the audit are not touched. Surveys on which a
+    attempt, the last success and the success that ended last, what these were made from, and every import. So nothing is
+    stale afterwards that was not before. Results, findings and the audit are not touched. Surveys on which a
     batch is at work are left out, and told. The room is free for new rows after tunneldb vacuum.
     """
     with connect(settings.dsn) as connection:
@@ -51,7 +52,13 @@ def prune(settings: Settings, name: str | None, before: dt.datetime | None, yes:
             raise UserError(f"a batch is at work on {name}: wait until it has finished (tunneldb status {name})")
         found = [row for row in found if row.survey_id not in working]
         _show(found)
-        runs, jobs = _delete(connection, found, day) if yes else (0, 0)
+        runs, jobs = 0, 0
+        if yes:
+            runs, jobs, began = _delete(connection, found, day)
+            if survey is not None and began:
+                raise UserError(f"a batch is at work on {name}: wait until it has finished (tunneldb status {name})")
+            left_out += began
+            found = [row for row in found if row.survey not in began]
     freed = sum(row.bytes for row in found)
     tell(
         superseded=found,
@@ -73,17 +80,21 @@ def prune(settings: Settings, name: str | None, before: dt.datetime | None, yes:
         click.echo(f"{sum(row.rows for row in found)} rows, {decimal(freed)}, would go: {again}", err=True)
 
 
-def _delete(connection: psycopg.Connection, found: Sequence[Superseded], before: dt.date | None) -> tuple[int, int]:
-    """Delete survey by survey, each in a transaction, and return how many runs and jobs went."""
-    surveys = dict.fromkeys(row.survey_id for row in found)
+def _delete(connection: psycopg.Connection, found: Sequence[Superseded], before: dt.date | None) -> tuple[int, int, list[str]]:
+    """Delete survey by survey, each in a transaction; how many runs and jobs went, and on which surveys a batch has begun."""
+    surveys = {row.survey_id: row.survey or "" for row in found}
     runs = jobs = 0
+    began = []
     with bar("surveys") as progress:
         advance = step(progress)("pruning", len(surveys))
-        for survey_id in surveys:
-            of_survey = delete(connection, survey_id, before)
-            runs, jobs = runs + of_survey[0], jobs + of_survey[1]
+        for survey_id, name in surveys.items():
+            try:
+                of_survey = delete(connection, survey_id, before)
+                runs, jobs = runs + of_survey[0], jobs + of_survey[1]
+            except BusyError:
+                began.append(name)
             advance(1)
-    return runs, jobs
+    return runs, jobs, began
 
 
 def _show(found: Sequence[Superseded]) -> None:

@@ -9,7 +9,7 @@ import click
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.param_types import FilePath
-from tunneldb.cli.progress import bar, step
+from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.database import connect
 from tunneldb.files import told_to_end
 from tunneldb.store.survey import get_survey
@@ -57,6 +57,7 @@ def import_(settings: Settings, file: Path, name: str | None) -> None:
     from tunneldb.export.archive.load import load_survey
 
     with told_to_end(), connect(settings.dsn) as connection, bar("bytes") as progress:
+        tell_warnings(connection)
         loaded = load_survey(connection, file, name, step(progress))
     notes = list(loaded.notes)
     if loaded.left_out:

@@ -11,7 +11,7 @@ from tunneldb.alignment.units import UNITS
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, records, tell
 from tunneldb.cli.param_types import FINITE, FilePath
-from tunneldb.cli.progress import bar, step
+from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
@@ -175,6 +175,7 @@ def add(
     if found is None and axis_out is not None:
         raise UserError("--axis-out is for an axis that is found in SCAN files")
     with connect(settings.dsn) as connection:
+        tell_warnings(connection)
         line = add_tunnel(connection, name, srid, given, spacing)
         if own is not None:
             save_equations(connection, get_tunnel(connection, name), own)
@@ -210,6 +211,7 @@ def _add_site(settings: Settings, name: str, srid: int, given: set[Any]) -> None
     if given - {None}:
         raise UserError("a --site has no axis: what is about one can't be given with it")
     with connect(settings.dsn) as connection:
+        tell_warnings(connection)
         add_site(connection, name, srid)
     tell(tunnel=name, srid=srid, site=True)
     click.echo(f"{name}: a site, without an axis", err=True)
@@ -336,5 +338,6 @@ def remove(settings: Settings, name: str) -> None:
     from tunneldb.store.catalog import remove_tunnel
 
     with connect(settings.dsn) as connection:
+        tell_warnings(connection)
         remove_tunnel(connection, name)
     tell(tunnel=name)

@@ -24,6 +24,7 @@ HEAD = "0030"
 """The newest migration. Known here so that a command whose database is up to date need not import Alembic."""
 
 _LOCK = 7088630451  # any number: two installations of one database wait for each other
+_LAYERS_LOCK = 7088630452  # the one of tunnel_api.make_layers
 _PATIENCE = "30s"  # how long to wait for others that use what is to be changed
 
 
@@ -130,7 +131,9 @@ def install_api(connection: psycopg.Connection[Any]) -> None:
     UserError
         When something outside of the schema was built on it, which the drop would take along.
     """
+    connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LAYERS_LOCK])
     _refuse_dependents(connection)
+    _refuse_guests(connection)
     before, version = installed_api_version(connection), api_version()
     for schema in (*_layer_schemas(connection), "tunnel_api"):
         connection.execute(sql.SQL("DROP SCHEMA IF EXISTS {} CASCADE").format(sql.Identifier(schema)))
@@ -270,11 +273,34 @@ def _require_postgis(connection: psycopg.Connection[Any], *, create: bool) -> No
 
 
 def _layer_schemas(connection: psycopg.Connection[Any]) -> list[str]:
-    """Return the schemas of typed layers (sql/access/layers.sql)."""
-    made = connection.execute("SELECT to_regprocedure('tunnel_api.layer_schemas()') IS NOT NULL").fetchone()
-    if made is None or not made[0]:
-        return []
-    return [row[0] for row in connection.execute("SELECT schema FROM tunnel_api.layer_schemas()")]
+    """Return the schemas of typed layers: `tunnel_api.layer_schemas`, which may not be there (yet, or any more)."""
+    rows = connection.execute(
+        "SELECT n.nspname FROM pg_namespace n"
+        " WHERE n.nspname ~ '^tunnel_([0-9]{1,9}|local)$'"
+        " AND obj_description(n.oid, 'pg_namespace') LIKE 'tunneldb: layers of %'"
+        " AND n.nspowner = coalesce((SELECT a.nspowner FROM pg_namespace a WHERE a.nspname = 'tunnel_api'),"
+        " current_user::regrole) ORDER BY 1"
+    )
+    return [row[0] for row in rows]
+
+
+def _refuse_guests(connection: psycopg.Connection[Any]) -> None:
+    """Refuse to drop schemas of typed layers in which somebody keeps something else."""
+    listed = connection.execute("SELECT to_regprocedure('tunnel_api.layer_types()') IS NOT NULL").fetchone()
+    types = "SELECT layer FROM tunnel_api.layer_types()" if listed is not None and listed[0] else "SELECT c.relname"
+    rows = connection.execute(
+        sql.SQL(
+            "SELECT c.oid::regclass::text FROM pg_class c JOIN pg_namespace n ON n.oid = c.relnamespace"
+            " WHERE n.nspname = ANY (%s) AND c.relkind <> 'i'"
+            " AND (c.relkind <> 'v' OR c.relname NOT IN ({types}))"
+            " UNION ALL SELECT p.oid::regprocedure::text FROM pg_proc p JOIN pg_namespace n ON n.oid = p.pronamespace"
+            " WHERE n.nspname = ANY (%s) ORDER BY 1"
+        ).format(types=sql.SQL(types)),
+        [schemas := _layer_schemas(connection), schemas],
+    ).fetchall()
+    if rows:
+        names = ", ".join(row[0] for row in rows)
+        raise UserError(f"{names} lie in a schema of typed layers, which is made anew: move them to another schema")
 
 
 def _refuse_dependents(connection: psycopg.Connection[Any]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from psycopg.rows import class_row
 
 from tunneldb.errors import UserError
 
+_LOCKED = psycopg.errors.LockNotAvailable.sqlstate
 _MAINTAIN = 170000  # version of PostgreSQL from which on somebody else than the owner may be given the right
 
 
@@ -64,6 +66,7 @@ def tables_to_vacuum(conn: psycopg.Connection[Any]) -> list[DeadRows]:
                        coalesce(pg_stat_get_live_tuples(nullif(c.reltoastrelid, 0)), 0) AS live_long,
                        coalesce(pg_stat_get_dead_tuples(nullif(c.reltoastrelid, 0)), 0) AS dead_long) s
          WHERE n.nspname IN ('tunnel', 'tunnel_queue') AND c.relkind = 'r' AND c.relpersistence = 'p'
+           AND c.relname !~ '^fragment_s'  -- waits to be loaded, and is dropped then
            AND (s.dead + s.dead_long > 0 OR c.reltuples < 0 AND pg_relation_size(c.oid) > 0)
          ORDER BY dead_bytes DESC, n.nspname, c.relname
         """
@@ -98,14 +101,15 @@ def vacuum(
             " for the role tunnel_operator"
         )
     conn.autocommit = True
-    said: list[str] = []
+    said: list[str | None] = []
     skipped = []
-    conn.add_notice_handler(lambda notice: said.append(notice.message_primary or ""))
+    conn.add_notice_handler(lambda notice: said.append(notice.sqlstate))
     advance = begin("vacuum", float(sum(table.bytes for table in own)))
     for table in own:
         said.clear()
-        conn.execute(sql.SQL("VACUUM (ANALYZE, SKIP_LOCKED) {}").format(sql.Identifier(table.schema, table.table)))
-        if any(text.startswith("skipping") for text in said):
+        with suppress(psycopg.errors.UndefinedTable):  # dropped since
+            conn.execute(sql.SQL("VACUUM (ANALYZE, SKIP_LOCKED) {}").format(sql.Identifier(table.schema, table.table)))
+        if _LOCKED in said:
             skipped.append(table)
         advance(float(table.bytes))
     return skipped

@@ -11,9 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import psycopg
 import shapely
 
+from tunneldb.arrays import Int64
 from tunneldb.export.tables.dry_regions import DryRegion
 from tunneldb.export.tables.finding_counts import (
     STATES,
@@ -61,6 +63,8 @@ class KindChapter:
         How many stand here without a row: detected, and nobody has said anything of them.
     beyond : list of (int, bytes)
         Those for which there is no row, as there are too many: their ids, and a digest of what was noted of each.
+    digested : set of int
+        Ids of those with a row of which the digest of leaks has all.
     """
 
     count: KindCount
@@ -68,6 +72,7 @@ class KindChapter:
     tabled: int
     plain: int
     beyond: list[tuple[int, bytes]]
+    digested: set[int]
 
 
 @dataclass(frozen=True)
@@ -163,6 +168,7 @@ def read_findings_chapter(
     survey: Survey,
     stretch: tuple[float, float],
     leaks: frozenset[int],
+    reported: Int64,
     photos: Path,
     *,
     table: bool,
@@ -177,6 +183,8 @@ def read_findings_chapter(
         Only those that reach between these chainages, m.
     leaks : frozenset of int
         Ids of those that are listed as leaks.
+    reported : (n,) int64 array
+        Growing ids of all leaks that are in the report's sums and digest, listed or not.
     photos : Path
         Folder in which relative paths of photos begin.
     table : bool
@@ -190,7 +198,9 @@ def read_findings_chapter(
     total = 0
     for finding in stream_findings(conn, survey, chosen=Chosen(states=(), low=stretch[0], high=stretch[1])):
         total += 1
-        kinds[finding.kind].add(finding, tabled=table and finding.id in leaks)
+        place = int(np.searchsorted(reported, finding.id))
+        digested = place < len(reported) and reported[place] == finding.id and _is_plain(finding, tabled=True)
+        kinds[finding.kind].add(finding, tabled=table and finding.id in leaks, digested=digested)
         if finding.id in leaks:
             by_id[finding.id] = finding
         if finding.merged_into is not None:
@@ -234,15 +244,18 @@ class _Gathered:
 
     tally: KindTally = field(default_factory=KindTally)
     noted: list[Finding] = field(default_factory=list)
+    digested: set[int] = field(default_factory=set)
     beyond: list[tuple[int, bytes]] = field(default_factory=list)
     tabled: int = 0
     plain: int = 0
 
-    def add(self, finding: Finding, *, tabled: bool) -> None:
-        """Add a finding that is in the table of leaks or not."""
+    def add(self, finding: Finding, *, tabled: bool, digested: bool) -> None:
+        """Add a finding that is in the table of leaks or not, and of which the digest of leaks has all or not."""
         self.tally.add(finding)
         if not _is_plain(finding, tabled=tabled):
             self.noted.append(finding)
+            if digested:
+                self.digested.add(finding.id)
             if len(self.noted) >= 2 * MOST + 1000:
                 self._leave_beyond()
         elif tabled:
@@ -254,7 +267,10 @@ class _Gathered:
         """Of too many keep those that weigh most, in order of chainage, and of the others a digest."""
         ranked = sorted(self.noted, key=_weight)
         shown = {finding.id for finding in ranked[:MOST]}
-        self.beyond += [(one.id, hashlib.sha256(repr(_stated(one, [])).encode()).digest()) for one in ranked[MOST:]]
+        for one in ranked[MOST:]:
+            noted = b"" if one.id in self.digested else hashlib.sha256(repr(_stated(one, [])).encode()).digest()
+            self.beyond.append((one.id, noted))
+        self.digested &= shown
         self.noted = [finding for finding in self.noted if finding.id in shown]
 
     def chapter(self, kind: str) -> KindChapter:
@@ -265,7 +281,12 @@ class _Gathered:
             for state in ("confirmed", "open", *UNCOUNTED)
         ]
         return KindChapter(
-            self.tally.count(kind), [(state, rows) for state, rows in groups if rows], self.tabled, self.plain, self.beyond
+            self.tally.count(kind),
+            [(state, rows) for state, rows in groups if rows],
+            self.tabled,
+            self.plain,
+            self.beyond,
+            self.digested,
         )
 
 
@@ -283,7 +304,10 @@ def _is_plain(finding: Finding, *, tabled: bool) -> bool:
 
 def digest_findings(digest: hashlib._Hash, found: FindingsChapter | None, regions: Sequence[DryRegion]) -> None:
     """Add what is reported of findings that somebody noted, their photos, and of all dry regions."""
+    known = {key for kind in found.kinds for key in kind.digested} if found else set()
     for finding in found.listed if found else []:
+        if finding.id in known:
+            continue
         digest.update(repr(_stated(finding, found.photos.get(finding.id, []) if found else [])).encode())
     for _, part in sorted(beyond for kind in found.kinds for beyond in kind.beyond) if found else []:
         digest.update(part)

@@ -12,7 +12,7 @@ import numpy as np
 import psycopg
 from psycopg import sql
 
-from tunneldb.arrays import Bool, Float
+from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.report.data import REPORTED
 from tunneldb.report.drawing import wet_bins
 from tunneldb.report.text import DASH
@@ -45,6 +45,8 @@ class LeakSums:
         Gets what is reported of each leak, in the order of their ids.
     leaks, counted, lost : int
         How many there are; those that sums count, found last and not rejected; those confirmed that were not found again.
+    ids : (leaks,) int64 array
+        Their ids, growing.
     reach : float
         Greatest chainage, m.
     wet : (n,) float64 array
@@ -58,6 +60,7 @@ class LeakSums:
     leaks: int = 0
     counted: int = 0
     lost: int = 0
+    ids: Int64 = field(default_factory=lambda: np.empty(0, np.int64))
     reach: float = -np.inf
     wet: Float = field(init=False)
     by_hour: Float = field(default_factory=lambda: np.zeros((12, 2)))
@@ -75,6 +78,7 @@ class LeakSums:
         counts: Bool = detected & np.array([row[1] != "rejected" for row in rows], np.bool_)
         area, low, high, clock, inside = np.array([(row[5], *row[7:]) for row in rows], float).T
         self.leaks += len(rows)
+        self.ids = np.concatenate([self.ids, np.array([row[0] for row in rows], np.int64)])
         self.lost += int(np.count_nonzero(~detected))
         self.counted += int(np.count_nonzero(counts))
         self.reach = max(self.reach, float(high.max(initial=-np.inf)))

@@ -210,7 +210,7 @@ class _Report:
         pictured = {leak.id for leak in by_size[:pictures]}
         ids = frozenset(leak.id for leak in self.leaks)
         table = "leaks" in owner.chapters and survey.intensity_kind != "none"
-        self.findings = read_findings_chapter(conn, survey, (low, high), ids, photos, table=table)
+        self.findings = read_findings_chapter(conn, survey, (low, high), ids, self.sums.ids, photos, table=table)
         self.underwater = read_underwater(conn, survey, low, high)
         self.clearance = read_clearance(conn, survey, low, high)
         self.rings = read_rings(conn, survey, low, high)

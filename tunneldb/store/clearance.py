@@ -118,8 +118,8 @@ def made_of(conn: psycopg.Connection[Any], survey: Survey, km: int, gauge: str, 
     """Inputs and options of the last run of a kilometre; None if it never ran."""
     row = conn.execute(
         "SELECT parameters FROM tunnel.run WHERE survey_id = %s AND km = %s AND stage = 'clearance' AND outcome = 'done'"
-        " AND parameters ->> 'gauge' = %s AND parameters ->> 'track' = %s ORDER BY started_at DESC, id DESC LIMIT 1",
-        [survey.id, km, gauge, track],
+        " AND subject = %s ORDER BY started_at DESC, id DESC LIMIT 1",
+        [survey.id, km, f"{track} {gauge}"],
     ).fetchone()
     return None if row is None else dict(row[0])
 

@@ -60,12 +60,12 @@ def superseded(conn: psycopg.Connection[Any], survey: Survey | None, before: dt.
             ), run AS (
                 SELECT r.survey_id, 'runs' AS what, r.stage, count(*) AS count, count(*) AS rows, sum(r.bytes)::bigint AS bytes,
                        min(r.started_at) AS since, max(r.started_at) AS until
-                  FROM moment m CROSS JOIN LATERAL tunnel_api.superseded_runs(m.before) r
+                  FROM moment m CROSS JOIN LATERAL tunnel_api.superseded_runs(%(survey)s, m.before) r
                  GROUP BY r.survey_id, r.stage
             ), job AS (
                 SELECT e.id AS survey_id, 'jobs' AS what, NULL AS stage, count(*) AS count, sum(j.rows)::bigint AS rows,
                        sum(j.bytes)::bigint AS bytes, min(j.ended_at) AS since, max(j.ended_at) AS until
-                  FROM moment m CROSS JOIN LATERAL tunnel_api.superseded_jobs(m.before) j
+                  FROM moment m CROSS JOIN LATERAL tunnel_api.superseded_jobs(%(survey)s, m.before) j
                   LEFT JOIN tunnel.survey e ON e.id = j.survey_id
                  GROUP BY e.id
             )
@@ -73,7 +73,6 @@ def superseded(conn: psycopg.Connection[Any], survey: Survey | None, before: dt.
               FROM (SELECT * FROM run UNION ALL SELECT * FROM job) u
               LEFT JOIN tunnel.survey s ON s.id = u.survey_id
               LEFT JOIN tunnel.stage t ON t.name = u.stage
-             WHERE %(survey)s::int IS NULL OR u.survey_id = %(survey)s
              ORDER BY s.name NULLS LAST, u.what DESC, t.step NULLS LAST, u.stage
             """,
             {"before": before, "survey": None if survey is None else survey.id},
@@ -100,7 +99,7 @@ def prune(conn: psycopg.Connection[Any], survey_id: int | None, before: dt.date 
         if survey_id is None:
             jobs = conn.execute(
                 "DELETE FROM tunnel_queue.procrastinate_jobs WHERE id IN"
-                " (SELECT j.id FROM tunnel_api.superseded_jobs(coalesce(%s::date::timestamptz, 'infinity')) j"
+                " (SELECT j.id FROM tunnel_api.superseded_jobs(NULL, coalesce(%s::date::timestamptz, 'infinity')) j"
                 " WHERE NOT EXISTS (SELECT FROM tunnel.survey s WHERE s.id = j.survey_id))",
                 [before],
             )
@@ -110,14 +109,12 @@ def prune(conn: psycopg.Connection[Any], survey_id: int | None, before: dt.date 
             raise BusyError("a batch is at work on the survey: wait until it has finished (tunneldb status)")
         jobs = conn.execute(  # first, for they go by the runs
             "DELETE FROM tunnel_queue.procrastinate_jobs WHERE id IN"
-            " (SELECT j.id FROM tunnel_api.superseded_jobs(coalesce(%(before)s::date::timestamptz, 'infinity')) j"
-            " WHERE j.survey_id = %(survey)s)",
+            " (SELECT j.id FROM tunnel_api.superseded_jobs(%(survey)s, coalesce(%(before)s::date::timestamptz, 'infinity')) j)",
             {"before": before, "survey": survey_id},
         )
         runs = conn.execute(
             "DELETE FROM tunnel.run WHERE id IN"
-            " (SELECT r.id FROM tunnel_api.superseded_runs(coalesce(%(before)s::date::timestamptz, 'infinity')) r"
-            " WHERE r.survey_id = %(survey)s)",
+            " (SELECT r.id FROM tunnel_api.superseded_runs(%(survey)s, coalesce(%(before)s::date::timestamptz, 'infinity')) r)",
             {"before": before, "survey": survey_id},
         )
         return runs.rowcount, jobs.rowcount

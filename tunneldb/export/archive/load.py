@@ -161,6 +161,8 @@ class _Loading:
         attach_images(self.conn, self.loaded.survey_id, images)
         self._settle()
         attach_points(self.conn, self.loaded.survey_id, self.loaded.kilometres)
+        if self.loaded.new_tunnel:
+            make_layers(self.conn)  # last, for others who add a tunnel wait for it
         return self.loaded
 
     def _members(self) -> list[tuple[str, int]]:
@@ -258,5 +260,3 @@ class _Loading:
             " FROM (SELECT DISTINCT km FROM tunnel.waterproof WHERE survey_id = %s) w",
             [self.loaded.survey_id, self.loaded.survey_id],
         )
-        if self.loaded.new_tunnel:
-            make_layers(self.conn)
