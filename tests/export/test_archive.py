@@ -285,6 +285,13 @@ def test_damaged_and_hostile_files_are_refused_in_one_line(example: str, conn: p
             load_survey(conn, file, "other", silent)
         assert "\n" not in str(told.value)
 
+    with zipfile.ZipFile(path) as archive:  # the manifest is the one member that the archive itself packs
+        manifest = archive.getinfo("manifest.json")
+    spoilt = bytearray(held)
+    middle = manifest.header_offset + 30 + len("manifest.json") + manifest.compress_size // 2
+    spoilt[middle : middle + 40] = bytes(255 - byte for byte in held[middle : middle + 40])
+    (tmp_path / "spoilt.tdb").write_bytes(spoilt)
+    refused(tmp_path / "spoilt.tdb", "manifest cannot be read")
     refused(cut, "is no archive")
     refused(none, "is no archive")
     refused(tmp_path / "missing.tdb", "there is no such file")

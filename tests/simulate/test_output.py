@@ -237,6 +237,7 @@ def test_full_disk_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         ({"section_radius": 50.0}, "radius of the section"),
         ({"ballast": 0.2}, "ballast is 0.2: give 0 to 0.05 m"),
         ({"spheres": -1}, "spheres is -1"),
+        ({"people": 10**400}, "people is 100000000000…: give 0 to"),
         ({"sphere_radius": 0.0}, "sphere radius is 0: give 0.02 to 0.5 m"),
         ({"scanner_offset": 3.8}, "less than 0.5 m from the lining"),
     ],

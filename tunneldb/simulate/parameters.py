@@ -242,7 +242,8 @@ class Parameters:
         for name, (low, high, unit) in LIMITS.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
-                raise UserError(f"{name.replace('_', ' ')} is {value:g}: give {low:g} to {high:g} {unit}")
+                shown = f"{value:g}" if abs(value) < 1e15 else f"{str(value)[:12]}…"  # whole numbers may have any length
+                raise UserError(f"{name.replace('_', ' ')} is {shown}: give {low:g} to {high:g} {unit}")
         if not self.name or any(c in self.name for c in "/\\\0") or self.name.startswith("."):
             raise UserError(f"name {self.name!r} does not make a file name: use letters, digits, - and _")
         for name, names in CHOICES.items():

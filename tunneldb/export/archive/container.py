@@ -10,6 +10,7 @@ import hashlib
 import json
 import math
 import zipfile
+import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -128,7 +129,7 @@ class ArchiveReader:
             self._zip = zipfile.ZipFile(path)
         except FileNotFoundError:
             raise UserError(f"{path}: there is no such file") from None
-        except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
+        except (zipfile.BadZipFile, zlib.error, OSError, ValueError, NotImplementedError) as error:
             raise UserError(f"{path} is no archive of a survey, or is cut off: {error}") from None
         try:
             self.manifest = self._manifest()
@@ -166,7 +167,15 @@ class ArchiveReader:
                         raise self.wrong(f"{name} holds more than the manifest says")
                     digest.update(chunk)
                     yield chunk
-        except (zstandard.ZstdError, zipfile.BadZipFile, EOFError, OSError, NotImplementedError, RuntimeError) as error:
+        except (
+            zstandard.ZstdError,
+            zipfile.BadZipFile,
+            zlib.error,
+            EOFError,
+            OSError,
+            NotImplementedError,
+            RuntimeError,
+        ) as error:
             raise self.wrong(f"{name} cannot be read: {error}") from None
         if size != member.bytes or digest.hexdigest() != member.sha256:
             raise self.wrong(f"the checksum of {name} is not that of the manifest")
@@ -192,7 +201,16 @@ class ArchiveReader:
             _require_types(manifest)
         except KeyError as error:
             raise UserError(f"{self.path} is no archive of a survey: {error.args[0]} is missing") from None
-        except (zipfile.BadZipFile, OSError, ValueError, TypeError, AttributeError, RecursionError, RuntimeError) as error:
+        except (
+            zipfile.BadZipFile,
+            zlib.error,
+            OSError,
+            ValueError,
+            TypeError,
+            AttributeError,
+            RecursionError,
+            RuntimeError,
+        ) as error:
             raise self.wrong(f"its manifest cannot be read: {error}") from None
         return manifest
 
