@@ -47,10 +47,10 @@ def export_copc(
 ) -> Iterator[Written]:
     """Write each kilometre as ``SURVEY-kmNNN.copc.laz`` into a folder, and beside them ``SURVEY.vpc``, which names all.
 
-    Each point of a file is in one of the kilometres that the file touches, that in which its chainage is or the nearest, whether
-    that is in the database, and so written, or not yet; it has the class that `export_classified` gives it. A file appears when
-    it is complete. Memory doesn't grow with the points, except that those of a single cell of 1 m³ are held whole. A kilometre
-    takes as much room in the folder besides, for a time, as its points do uncompressed.
+    Each point of a file is in one of the kilometres that the file touches, that in which its chainage is or the nearest; it
+    has the class that `export_classified` gives it. Those of a kilometre that is not in the database yet are left to it. A file
+    appears when it is complete. Memory doesn't grow with the points, except that those of a single cell of 1 m³ are held whole.
+    A kilometre takes as much room in the folder besides, for a time, as its points do uncompressed.
 
     Parameters
     ----------
