@@ -74,7 +74,9 @@ def test_layers_are_served_of_a_coordinate_system_that_is_named(services: dict[s
     *shell, script = service["command"]
     script = script.replace("$$", "$").replace("exec uvicorn", "exec echo uvicorn")
     for srid, refused in (("", True), ("25830", False)):
-        done = subprocess.run([*shell, script], env=os.environ | {"OGC_SRID": srid}, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [*shell, script], env=os.environ | {"OGC_SRID": srid}, capture_output=True, text=True, check=False
+        )
         assert (done.returncode != 0) == refused
         assert ("OGC_SRID: set it to the EPSG code" in done.stderr) == refused
         assert ("uvicorn" in done.stdout) != refused
