@@ -63,7 +63,8 @@ def bar(unit: str) -> Progress:
             yield from super().get_renderables()
 
     columns = (
-        SpinnerColumn("line"), TextColumn("{task.description}", markup=False), BarColumn(bar_width=24), TaskProgressColumn(), Rate(), Left(),
+        SpinnerColumn("line"), TextColumn("{task.description}", markup=False), BarColumn(bar_width=24), TaskProgressColumn(),
+        Rate(), Left(),
     )  # fmt: skip
     console = Console(stderr=True)
     notice = _Notice(console.print)
