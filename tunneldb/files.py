@@ -115,16 +115,16 @@ def made_folder(path: Path) -> Iterator[None]:
     UserError
         If it can't be made.
     """
-    made = [folder for folder in (path, *path.parents) if not folder.exists()]
+    made = [folder for folder in (path, *path.parents) if not os.path.exists(folder)]  # noqa: PTH110 - fails for no name
     try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"{path}: the folder cannot be made: {error.strerror}") from error
-    try:
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UserError(f"{path}: the folder cannot be made: {error.strerror}") from error
         yield
     except BaseException:
-        with suppress(OSError):  # it holds what was whole by then
-            for folder in made:
+        for folder in made:
+            with suppress(OSError):  # it was not made, or holds what was whole by then
                 folder.rmdir()
         raise
 

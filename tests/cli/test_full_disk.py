@@ -148,3 +148,9 @@ def test_folders_made_for_nothing_are_taken_away(tmp_path: Path) -> None:
         (tmp_path / "a" / "b" / "whole.tif").touch()
         raise KeyError
     assert (tmp_path / "a" / "b" / "whole.tif").exists()
+    with (
+        pytest.raises(UserError, match="the folder cannot be made: File name too long"),
+        made_folder(tmp_path / "c" / ("d" * 256)),
+    ):
+        raise AssertionError
+    assert not (tmp_path / "c").exists()

@@ -149,3 +149,17 @@ def test_that_it_compiles_is_said_once(first: bool) -> None:
 def test_a_pipe_does_not_hear_that_it_compiles() -> None:
     done = subprocess.run([sys.executable, "-c", COMPILES.format(first=True)], capture_output=True, text=True, check=True)
     assert done.stdout + done.stderr == ""
+
+
+NAMED = """
+from tunneldb.cli.progress import bar, step
+with bar("points") as shown:
+    step(shown)("[red]a\\x1b]0;owned\\x07\\n.laz", 1)(1)
+    shown.refresh()
+"""
+
+
+def test_a_name_is_shown_as_it_is() -> None:
+    shown, _ = on_a_terminal(program=[sys.executable, "-c", NAMED])
+    assert r"[red]a\x1b]0;owned\x07\n.laz" in shown
+    assert "\x07" not in shown

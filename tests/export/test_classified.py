@@ -166,8 +166,7 @@ def test_a_file_that_was_changed_is_refused(scans: tuple[Path, dict[str, np.ndar
     assert [path.name for path in (tmp_path / "out").iterdir()] in ([], ["a.laz"])
 
 
-@pytest.mark.usefixtures("conn")
-def test_kilometres_as_copc_hold_the_same_points(tmp_path: Path) -> None:
+def test_kilometres_as_copc_hold_the_same_points(conn: psycopg.Connection, tmp_path: Path) -> None:
     out = tmp_path / "out"
     export(out)
     export(tmp_path / "copc", "--copc")
@@ -217,3 +216,11 @@ def test_kilometres_as_copc_hold_the_same_points(tmp_path: Path) -> None:
     (tmp_path / "copc" / names[2]).write_text("[]")
     assert "is no virtual point cloud" in export(tmp_path / "copc", "--copc", "--km", 1, code=2)
     assert "--copc goes with --classified" in command("export", NAME, "-o", tmp_path / "x", "--copc", code=2)
+
+    # Where the other kilometre isn't loaded, its points wait for it.
+    conn.execute(f"DROP TABLE tunnel.point_s{get_survey(conn, NAME).id}_km1")
+    conn.commit()
+    export(tmp_path / "alone", "--copc")
+    assert sorted(path.name for path in (tmp_path / "alone").iterdir()) == [names[0], names[2]]
+    with laspy.CopcReader.open(tmp_path / "alone" / names[0]) as reader:
+        assert len(reader.query()) == len(found[0])

@@ -127,7 +127,6 @@ def test_a_report_runs_nothing_of_theirs(hostile: str, tmp_path: Path) -> None:
     _run("report", hostile, "--from", "12310", "--to", "12330", "-o", str(path))
     text = path.read_text(encoding="utf-8")
     assert "7 * 7" in text
-    assert "49" not in re.findall(r"\{\{.*?\}\}", text)
     assert "<script>document" not in text
     assert "<img src=x" not in text
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import laspy
@@ -99,3 +100,20 @@ def test_only_the_chunks_that_are_wanted_are_read(tmp_path: Path) -> None:
         assert [len(chunk) for chunk in found] == [300, 100]
         np.testing.assert_array_equal(found[0], chunks[1])
         np.testing.assert_array_equal(found[1], chunks[3])
+
+
+@pytest.mark.parametrize("standard", [0, 1])
+@pytest.mark.parametrize("first", [True, False])
+def test_a_file_without_times_takes_no_part_in_how_they_are_counted(tmp_path: Path, standard: int, first: bool) -> None:
+    scan(tmp_path / "a.las", 0.001, 1000.0, [])
+    head = read_head(tmp_path / "a.las")
+    timed = replace(head, header=head.header[:6] + bytes([head.header[6] & ~1 | standard]) + head.header[7:])
+    for point_format in (0, 2):
+        las = laspy.LasData(laspy.LasHeader(point_format=point_format, version="1.2"))
+        las.xyz = np.full((3, 3), 1000.0)
+        las.header.global_encoding.gps_time_type = laspy.header.GpsTimeType(1 - standard)
+        las.write(tmp_path / "b.las")
+        timeless = records_of(tmp_path / "b.las").head
+        assert timeless.header[6] & 1 == 1 - standard
+        whole, _ = merge_heads([timed, timeless] if first else [timeless, timed])
+        assert whole.header[6] & 1 == standard

@@ -80,7 +80,8 @@ def test_a_sample_covers_what_lies_below_it(monkeypatch: pytest.MonkeyPatch, tun
     np.testing.assert_array_equal(root, everywhere)
 
 
-def test_points_thousands_of_kilometres_apart_are_refused() -> None:
+def test_points_too_far_apart_are_refused_by_what_they_are() -> None:
     counts = CellCounts(np.zeros(3))
-    with pytest.raises(ValueError, match="kilometres apart"):
-        counts.add(np.array([[2e7, 0.0, 0.0]]))
+    for place in ([0.0, 0.0, 16_400.0], [9e6, 0.0, 0.0]):
+        with pytest.raises(ValueError, match="16 km apart in height, or thousands of kilometres in plan"):
+            counts.add(np.array([place]))

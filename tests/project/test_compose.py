@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -65,6 +66,20 @@ def test_no_password_is_in_the_file(services: dict[str, Any]) -> None:
             if "PASSWORD" in name:
                 assert value.startswith("${POSTGRES_PASSWORD:?")
     assert "password" not in services["worker"]["environment"]["TUNNELDB_DSN"]
+
+
+def test_layers_are_served_of_a_coordinate_system_that_is_named(services: dict[str, Any]) -> None:
+    service = services["ogc-api"]
+    assert service["environment"]["OGC_SRID"] == "${OGC_SRID:-}"
+    *shell, script = service["command"]
+    script = script.replace("$$", "$").replace("exec uvicorn", "exec echo uvicorn")
+    for srid, refused in (("", True), ("25830", False)):
+        done = subprocess.run(
+            [*shell, script], env=os.environ | {"OGC_SRID": srid}, capture_output=True, text=True, check=False
+        )
+        assert (done.returncode != 0) == refused
+        assert ("OGC_SRID: set it to the EPSG code" in done.stderr) == refused
+        assert ("uvicorn" in done.stdout) != refused
 
 
 def test_the_image_is_built_from_all_that_the_wheel_needs() -> None:

@@ -95,6 +95,20 @@ def test_the_program_s_own_message_has_its_kind(name: str, fail: Callable[[Path]
     assert cause_of(message).name == name, message
 
 
+@pytest.mark.parametrize(("name", "says"), [
+    ("data", "{path}: too few points"),
+    ("file missing", "{path}: no such file"),
+    ("coordinate system", "{path}: its coordinate system is EPSG:25829"),
+    ("file of another tunnel", "kilometre 3 rests on {name}: {path}: 70 % of the points lie off the given axis"),
+    ("file damaged", "{path}: truncated or corrupt: end of file"),
+])  # fmt: skip
+def test_how_a_file_is_called_says_nothing(name: str, says: str) -> None:
+    path = "/data/is a folder/not  damaged/truncated, cannot be read/no such file.laz"
+    message = describe(UserError(says.format(path=path, name=path.rsplit("/", 1)[1])))
+    assert cause_of(message, [path]).name == name
+    assert cause_of("/data/damaged.laz, line 3: 4 values, but 3 are named").name == "data"
+
+
 def test_only_what_passes_is_tried_again_as_it_is() -> None:
     assert [cause.name for cause in (*CAUSES, DATA, PROGRAM) if not cause.first] == [PASSING.name]
     assert Advice((2,), "load: failed: a", "tunneldb batch s --retry-failed").line() == (

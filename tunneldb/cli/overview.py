@@ -184,7 +184,7 @@ def advise(seen: Overview) -> list[Advice]:
             key = (
                 what if file.name in what else f"{printable(file.name)}: {what}",
                 printable(command),
-                cause_of(file.message).first,
+                cause_of(file.message, [file.path]).first,
             )
             found[key] = _range(file)
     read = {file.message for file in seen.files}
@@ -196,7 +196,7 @@ def advise(seen: Overview) -> list[Advice]:
             continue
         stage, cell = entry
         what = f"{stage}: {_VERDICTS[cell.state]}" + (f": {_line(cell, seen.files)}" if cell.reason else "")
-        first = cause_of(cell.reason).first if cell.state == "failed" else ""
+        first = cause_of(cell.reason, [file.path for file in seen.files]).first if cell.state == "failed" else ""
         found.setdefault((what, _command(seen.survey, cell), first), []).append(km)
     advices = [Advice(tuple(kms), what, command, first) for (what, command, first), kms in found.items()]
     if seen.active and not seen.live:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tunneldb.cli.output import printable
+
 if TYPE_CHECKING:
     import psycopg
     from rich.console import RenderableType
@@ -62,7 +64,8 @@ def bar(unit: str) -> Progress:
             yield from super().get_renderables()
 
     columns = (
-        SpinnerColumn("line"), TextColumn("{task.description}"), BarColumn(bar_width=24), TaskProgressColumn(), Rate(), Left(),
+        SpinnerColumn("line"), TextColumn("{task.description}", markup=False), BarColumn(bar_width=24), TaskProgressColumn(),
+        Rate(), Left(),
     )  # fmt: skip
     console = Console(stderr=True)
     notice = _Notice(console.print)
@@ -118,7 +121,7 @@ def step(progress: Progress) -> Callable[[str, float | None], Callable[[float], 
         progress.refresh()  # else the end of a short step would never be seen
         for task in progress.task_ids:
             progress.remove_task(task)
-        task = progress.add_task(text, total=total)
+        task = progress.add_task(printable(text).replace("\n", "\\n"), total=total)
         return lambda count: progress.advance(task, count)
 
     return begin
@@ -126,7 +129,7 @@ def step(progress: Progress) -> Callable[[str, float | None], Callable[[float], 
 
 def say(text: str, *, err: bool = False) -> None:
     """Print a line while a bar is shown: above it. By itself click goes past what rich has put before the terminal."""
-    click.echo(text, file=sys.stderr if err else sys.stdout)
+    click.echo(printable(text), file=sys.stderr if err else sys.stdout)
 
 
 _ENDINGS = ("57P01", "57P02")

@@ -59,7 +59,7 @@ class CellCounts:
         Raises
         ------
         ValueError
-            If one lies thousands of kilometres from the origin.
+            If one lies so far from the origin that its cell has no number: 8388 km in plan, 16 km in height.
         """
         found, counts = np.unique(self.number(xyz), return_counts=True)
         numbers, inverse = np.unique(np.concatenate([self.numbers, found]), return_inverse=True)
@@ -72,7 +72,7 @@ class CellCounts:
         half = np.array([1 << (_LONG - 1), 1 << (_LONG - 1), 1 << (_SHORT - 1)])
         cell += half
         if len(cell) and (cell.min() < 0 or (cell >= 2 * half).any()):
-            raise ValueError("its points lie thousands of kilometres apart")
+            raise ValueError("its points lie more than 16 km apart in height, or thousands of kilometres in plan")
         return (cell[:, 0] << (_LONG + _SHORT)) | (cell[:, 1] << _SHORT) | cell[:, 2]
 
     def cells(self) -> Int64:

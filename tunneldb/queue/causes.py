@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 
@@ -96,8 +97,21 @@ _TYPED = re.compile(r"[A-Z]\w*(Error|Exception): ")
 DATA = Cause("data", (), "see to the cause: another file, a vertex of the axis, or a parameter (--set NAME=VALUE)")
 
 
-def cause_of(message: str | None) -> Cause:
-    """Return the kind of a failure by its message, as the ledger keeps it."""
+_LEADING = re.compile(r"/.*?(?=: |, line )")
+"""The path that a message begins with."""
+
+
+def cause_of(message: str | None, paths: Iterable[str] = ()) -> Cause:
+    """Return the kind of a failure by its message, as the ledger keeps it.
+
+    Files can be called anything, ``damaged.laz`` too: what kind it is is not looked for in the path that a message begins with,
+    nor in these, wherever they or their names stand.
+    """
     said = message or ""
+    for path in paths:
+        line = " ".join(path.split())  # as messages have it
+        for name in (line, line.rsplit("/", 1)[-1]):
+            said = re.sub(rf"(?<!\w){re.escape(name)}(?!\w)", "", said) if name else said
+    said = _LEADING.sub("", said, count=1) if said.startswith("/") else said
     unknown = PROGRAM if _TYPED.match(said) else DATA
     return next((cause for cause in CAUSES if any(mark in said for mark in cause.marks)), unknown)

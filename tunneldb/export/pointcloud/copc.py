@@ -48,8 +48,9 @@ def export_copc(
     """Write each kilometre as ``SURVEY-kmNNN.copc.laz`` into a folder, and beside them ``SURVEY.vpc``, which names all.
 
     Each point of a file is in one of the kilometres that the file touches, that in which its chainage is or the nearest; it
-    has the class that `export_classified` gives it. A file appears when it is complete. Memory doesn't grow with the
-    points; a kilometre takes as much room in the folder besides, for a time, as its points do uncompressed.
+    has the class that `export_classified` gives it. Those of a kilometre that is not in the database yet are left to it. A file
+    appears when it is complete. Memory doesn't grow with the points, except that those of a single cell of 1 m³ are held whole.
+    A kilometre takes as much room in the folder besides, for a time, as its points do uncompressed.
 
     Parameters
     ----------
@@ -64,8 +65,8 @@ def export_copc(
         As of `export_classified`; if a file's points have waveforms, or the files of a kilometre can't be brought together; if
         there is something else in the place of the virtual point cloud.
     """
-    files = [file for file in survey_files(conn, survey) if set(file.kilometres) & set(kilometres)]
-    wanted = sorted(set(kilometres) & {km for file in files for km in file.kilometres})
+    files = [file for file in survey_files(conn, survey) if set(file.kilometres) & set(file.touched) & set(kilometres)]
+    wanted = sorted(set(kilometres) & {km for file in files for km in set(file.kilometres) & set(file.touched)})
     targets = [folder / f"{survey.name}-km{km:03d}.copc.laz" for km in wanted]
     require_no_scans(conn, targets)
     virtual = folder / f"{survey.name}.vpc"
@@ -74,7 +75,7 @@ def export_copc(
     divide = _Divide(load_alignment(conn, survey))
     conn.rollback()
     sources = [_Source(file, number, len(files)) for number, file in enumerate(files, start=1)]
-    groups = {km: _Group(survey, km, [source for source in sources if km in source.file.kilometres]) for km in wanted}
+    groups = {km: _Group(survey, km, [source for source in sources if km in source.file.touched]) for km in wanted}
     for source in sources:
         source.count([group for group in groups.values() if source in group.sources], divide, begin)
     for number, (group, target) in enumerate(zip(groups.values(), targets, strict=True), start=1):
@@ -121,7 +122,7 @@ class _Source:
     def __init__(self, file: ScanFile, number: int, of: int) -> None:
         self.file, self.name = file, f"[{number}|{of}] {file.name}"
         self.head = records_of(self.path).head
-        self.chunks: dict[int, list[int]] = {km: [] for km in file.kilometres}
+        self.chunks: dict[int, list[int]] = {km: [] for km in file.touched}
         if self.head.point_format not in FORMATS:
             raise UserError(f"{file.path}: its points have waveforms, which a COPC can't hold: export without --copc")
 
@@ -140,7 +141,7 @@ class _Source:
         progress = begin(f"{self.name}: cells", self.file.points)
         forms = [(group, group.placement(self)) for group in groups]
         for number, xyz in enumerate(read_coordinates(self.path)):
-            km = divide.kilometre(xyz, self.file.kilometres)
+            km = divide.kilometre(xyz, self.file.touched)
             for group, placement in forms:
                 own = xyz[km == group.km]
                 if not len(own):
@@ -223,15 +224,14 @@ def _sort(
     head, counts = group.head, np.zeros(256, np.int64)
     place = np.concatenate([[0], np.cumsum([tile.points for tile in tiling.tiles])])[:-1]
     for source in group.sources:
-        kilometres = source.file.kilometres
-        near = [km for km in kilometres if abs(km - group.km) <= 1]
+        near = [km for km in source.file.kilometres if abs(km - group.km) <= 1]
         with snapshot(conn):
             require_ground(conn, survey, near)
             scene = load_scene(conn, survey, min(near), max(near))
         placement = group.placement(source)
         for records in records_of(source.path, only=source.chunks[group.km]).chunks:
             xyz = coordinates(records, source.head.scales, source.head.offsets)
-            own = divide.kilometre(xyz, kilometres) == group.km
+            own = divide.kilometre(xyz, source.file.touched) == group.km
             found = scene.classes(xyz[own])
             out = placement.records(records[own])
             fields(out, head.point_format)["classification"] = found

@@ -72,12 +72,18 @@ class Dimension:
         values = values[np.isfinite(values)]
         if not len(values):
             return
-        mean, count = float(values.mean()), self.count + len(values)
-        step = mean - self.average  # Chan, Golub & LeVeque 1983, equation 1.5
-        self.squares += float(np.square(values - mean).sum()) + step * step * self.count * len(values) / count
+        with np.errstate(over="ignore", invalid="ignore"):  # of values that are nearly the greatest there are
+            mean, count = float(values.mean()), self.count + len(values)
+            step = mean - self.average  # Chan, Golub & LeVeque 1983, equation 1.5
+            self.squares += float(np.square(values - mean).sum()) + step * step * self.count * len(values) / count
         self.average += step * len(values) / count
         self.count = count
         self.least, self.greatest = min(self.least, float(values.min())), max(self.greatest, float(values.max()))
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether the statistics are numbers: their sums can be greater than any number."""
+        return bool(np.isfinite([self.average, self.variance]).all())
 
     @property
     def variance(self) -> float:

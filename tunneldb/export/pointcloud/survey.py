@@ -39,6 +39,8 @@ class ScanFile:
         As they were loaded.
     kilometres : tuple of int
         Those with points of it that are in the database.
+    touched : tuple of int
+        Those with points of it, noise aside, whether they are in the database or not yet.
     """
 
     name: str
@@ -47,6 +49,7 @@ class ScanFile:
     bytes: int
     points: int
     kilometres: tuple[int, ...]
+    touched: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -107,13 +110,14 @@ def survey_files(conn: psycopg.Connection[Any], survey: Survey) -> list[ScanFile
     there = set(loaded_kilometres(conn, survey))
     rows = conn.execute(
         "SELECT f.name, f.path, f.checksum, f.bytes, f.points,"
-        " array(SELECT k.km FROM tunnel.file_km k WHERE k.file_id = f.id AND NOT isempty(k.points) ORDER BY k.km)"
+        " array(SELECT k.km FROM tunnel.file_km k WHERE k.file_id = f.id AND NOT isempty(k.points) ORDER BY k.km),"
+        " array(SELECT k.km FROM tunnel.file_km k WHERE k.file_id = f.id AND k.rows > 0 ORDER BY k.km)"
         " FROM tunnel.scan_file f WHERE f.survey_id = %s ORDER BY f.chainage_from, f.name",
         [survey.id],
     ).fetchall()
     return [
-        ScanFile(name, path, checksum, size, points, tuple(km for km in touched if km in there))
-        for name, path, checksum, size, points, touched in rows
+        ScanFile(name, path, checksum, size, points, tuple(km for km in near if km in there), tuple(touched))
+        for name, path, checksum, size, points, near, touched in rows
     ]
 
 

@@ -72,7 +72,9 @@ def write_vpc(path: Path, cloud: Cloud, date: dt.date, folder: Path) -> None:
     listed = {name: item for name, item in listed_clouds(folder / path.name).items() if (folder / name).is_file()}
     listed[cloud.name] = _item(cloud, date)
     items = [item for _, item in sorted(listed.items())]
-    path.write_text(json.dumps({"type": "FeatureCollection", "features": items}, indent=1, ensure_ascii=False), "utf-8")
+    path.write_text(
+        json.dumps({"type": "FeatureCollection", "features": items}, indent=1, ensure_ascii=False, allow_nan=False), "utf-8"
+    )
 
 
 def listed_clouds(path: Path) -> dict[str, dict[str, Any]]:
@@ -99,7 +101,7 @@ def _item(cloud: Cloud, date: dt.date) -> dict[str, Any]:
         "type": "Feature",
         "stac_version": "1.0.0",
         "stac_extensions": _EXTENSIONS,
-        "id": cloud.name.split(".", 1)[0],
+        "id": cloud.name.removesuffix(".copc.laz"),
         "geometry": None if degrees is None else _rectangle(degrees),
         "properties": {
             "datetime": f"{date.isoformat()}T00:00:00Z",
@@ -119,7 +121,7 @@ def _item(cloud: Cloud, date: dt.date) -> dict[str, Any]:
                     "variance": d.variance,
                 }
                 for position, d in enumerate(cloud.dimensions)
-                if d.count
+                if d.count and d.is_finite
             ],
             "proj:wkt2": "" if cloud.crs is None else cloud.crs.to_wkt("WKT2_2019"),
             "proj:geometry": _rectangle(box),

@@ -77,7 +77,8 @@ class E57Records:
         date = _GPS_EPOCH + dt.timedelta(seconds=created) if created else None
         timed = any(scan.has_time for scan in scans)
         records = (extra_bytes(self.extras, "E57"),) if self.extras else ()
-        self.head = Head(new_header(self.scale, self.offsets, date, FORMAT, size, timed), records).with_crs(header.crs)
+        start = new_header(self.scale, self.offsets, date, FORMAT, size, timed)
+        self.head = Head(start, records, timed=timed).with_crs(header.crs)
         self.count = 0
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.returns = np.zeros(15, np.uint64)

@@ -22,6 +22,7 @@ _SIZES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375, 5: 393}
 SIGNATURE = b"LASF"
 _WKT_FLAG = 1 << 4
 _INTERNAL_WAVEFORMS = 1 << 1
+_TIMELESS = (0, 2)  # point formats
 _LASZIP = (b"laszip encoded", 22204)
 _LOOKUP = (b"LASF_Spec", 0)
 WKT = (b"LASF_Projection", 2112)
@@ -67,12 +68,15 @@ class Head:
         Between them and the points.
     extended : tuple of Record
         Behind the points.
+    timed : bool
+        Whether the points were given with times; the later formats have a place for one in any case.
     """
 
     header: bytes
     records: tuple[Record, ...]
     padding: bytes = b""
     extended: tuple[Record, ...] = ()
+    timed: bool = True
 
     @property
     def point_format(self) -> int:
@@ -219,7 +223,8 @@ def read_head(path: Path) -> Head:
             if number:
                 file.seek(place)
                 extended = _read_records(file, number, extended=True)
-    return Head(_of_version_4(header), _kept(records), padding, _kept(extended))
+    timed = header[104] & 0x3F not in _TIMELESS
+    return Head(_of_version_4(header), _kept(records), padding, _kept(extended), timed)
 
 
 def _read_records(file: BinaryIO, count: int, *, extended: bool = False) -> tuple[Record, ...]:

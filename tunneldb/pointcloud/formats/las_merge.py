@@ -94,6 +94,7 @@ def merge_heads(heads: Sequence[Head]) -> tuple[Head, list[Placement]]:
 
     Header and coordinate system are those of the first file, scales the finest; dimensions of extra bytes are the same where
     name, type, scale and offset are, and get a number after their names where only the names are; other records are kept once.
+    GPS time is counted as in the files that have it.
 
     Raises
     ------
@@ -101,7 +102,8 @@ def merge_heads(heads: Sequence[Head]) -> tuple[Head, list[Placement]]:
         If the files count GPS time in different ways.
     """
     first = heads[0]
-    if len({head.header[6] & _STANDARD_TIME for head in heads}) > 1:
+    kinds = {head.header[6] & _STANDARD_TIME for head in heads if head.timed}
+    if len(kinds) > 1:
         raise ValueError("some of its files count GPS time by weeks, others don't")
     records: list[Record] = []
     for head in heads:
@@ -127,10 +129,13 @@ def merge_heads(heads: Sequence[Head]) -> tuple[Head, list[Placement]]:
     if entries:
         records.append(Record(EXTRA_BYTES[0], EXTRA_BYTES[1], b"Extra bytes", b"".join(entries)))
     header = bytearray(first.header)
+    header[6] = header[6] & ~_STANDARD_TIME | (kinds.pop() if kinds else 0)
     struct.pack_into("<3d", header, 131, *np.min([head.scales for head in heads], axis=0))
     small = tuple(record for record in records if len(record.data) < 2**16)
     large = tuple(record for record in records if len(record.data) >= 2**16)
-    merged = replace(first, header=bytes(header), records=small, padding=b"", extended=large)
+    merged = replace(
+        first, header=bytes(header), records=small, padding=b"", extended=large, timed=any(head.timed for head in heads)
+    )
     merged = merged.with_points(point_format, size)
     return merged, [Placement(head, merged, extras) for head, extras in zip(heads, placements, strict=True)]
 

@@ -58,7 +58,7 @@ class RawRecords:
         size = record_size(self.format) + 8 * len(self.extras)
         records = (extra_bytes(described, format_of(path).name),) if described else ()
         start = new_header(self.scale, self.offsets, None, self.format, size, timed=False)
-        self.head = Head(start, records).with_crs(header.crs)
+        self.head = Head(start, records, timed=False).with_crs(header.crs)
         self.scans: dict[int, int] = {}
         self.count = 0
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
