@@ -86,8 +86,8 @@ class Database:
             raise DatabaseError(_explained(sql.error_line(str(error)))) from None
         return [[_plain(value) for value in row] for row in rows]
 
-    def review(self, finding_id: int, seen: Mapping[str, Any], values: Mapping[str, Any]) -> None:
-        """Write the review, the kind or the remark of a finding.
+    def review(self, finding_id: int, seen: Mapping[str, Any], values: Mapping[str, Any]) -> bool:
+        """Write the review, the kind or the remark of a finding; False, and nothing is written, where it is so already.
 
         Parameters
         ----------
@@ -108,7 +108,7 @@ class Database:
             raise DatabaseError(f"{self.person} may look, but not review: an operator grants tunnel_inspector")
         try:
             if self.rows(sql.review(finding_id, seen, values)):
-                return
+                return True
             rows = self.rows(sql.facts(finding_id))
         except ConnectionLostError as error:
             raise ConnectionLostError(NOT_WRITTEN, error.reason) from None
@@ -117,6 +117,7 @@ class Database:
         now = sql.told(rows[0])
         if any(now[name] != value for name, value in values.items()):
             raise ChangedMeanwhileError(finding_id, now)
+        return False
 
     def undo(self, finding_id: int) -> str:
         """Take back the last change of a finding, and return what that was, as "reviewed"."""

@@ -77,6 +77,9 @@ class Session:
     def write(self, **values: Any) -> bool:
         """Write review, kind or remark of the finding that is shown; False where it is so already.
 
+        What somebody else wrote alike since it was read is no step of this session; what this person wrote is one, as its
+        answer may have been lost with the connection.
+
         Raises
         ------
         ChangedMeanwhileError
@@ -89,13 +92,16 @@ class Session:
             return False
         key = int(self.facts["id"])
         try:
-            self.database.review(key, self.facts, wanted)
+            wrote = self.database.review(key, self.facts, wanted)
         except ChangedMeanwhileError:
             self._read(key)
             raise
+        if wrote:
+            self.facts.update(wanted)
+            self._note(key, {name: value for name, value in wanted.items() if name != "remark"})
+        elif not self._read(key) or self.facts["reviewed_by"] != self.database.person:
+            return False
         self.steps.append(key)
-        self.facts.update(wanted)
-        self._note(key, {name: value for name, value in wanted.items() if name != "remark"})
         if wanted.get("review", OPEN) != OPEN:
             self.pace.count(self.clock())
         return True

@@ -52,15 +52,19 @@ def facts(finding_id: int) -> str:
 
 
 def review(finding_id: int, seen: Mapping[str, Any], values: Mapping[str, Any]) -> str:
-    """Return the statement that writes columns of WRITTEN, if all of these are still as seen; it returns the id if so.
+    """Return the statement that writes columns of WRITTEN, if all of these are still as seen; it returns the id if it did.
 
-    Who changes the finding in the same moment is found out by the view's trigger, which locks the row.
+    Who changes the finding in the same moment is found out by the view's trigger, which locks the row. Where that one
+    writes the same, the trigger writes nothing and returns the row as it was, with its former time of review.
     """
     if not set(values) <= set(WRITTEN):
         raise ValueError(f"only {', '.join(WRITTEN)} are written")
     changes = ", ".join(f"{name} = {_text(value)}" for name, value in values.items())
     same = " AND ".join(f"f.{name} IS NOT DISTINCT FROM {_text(seen[name])}" for name in WRITTEN)
-    return f"UPDATE tunnel_api.finding_unrolled f SET {changes} WHERE f.id = {int(finding_id)} AND {same} RETURNING f.id"
+    return (
+        f"WITH done AS (UPDATE tunnel_api.finding_unrolled f SET {changes} WHERE f.id = {int(finding_id)} AND {same}"
+        " RETURNING f.id, f.reviewed_at) SELECT d.id FROM done d WHERE d.reviewed_at >= statement_timestamp()"
+    )
 
 
 def _text(value: Optional[str]) -> str:

@@ -31,6 +31,9 @@ STATE = (
 _OTHERS = "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND application_name LIKE 'tunneldb%'"
 WAITING, BACKENDS = f"{_OTHERS} AND wait_event_type = 'Lock'", _OTHERS
 
+begun: list[QgsApplication] = []
+"""The application, which ends where nobody holds it."""
+
 
 def ask(query: str, database: str = "") -> str:
     """Ask the database as its owner."""
@@ -153,9 +156,10 @@ def children() -> set[int]:
     return set(map(int, Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()))
 
 
-def main() -> None:
-    """Do all of it."""
+def begin() -> Any:
+    """Open the project in QGIS with the plugin and its dock; returns the plugin."""
     application = QgsApplication([], True)
+    begun.append(application)
     application.initQgis()
     QgsGui.editorWidgetRegistry().initEditors()
     QCoreApplication.setOrganizationName("tunneldb-test")
@@ -170,7 +174,12 @@ def main() -> None:
     assert QTest.qWaitForWindowActive(window)
     plugin.review()
     wait(plugin.dock)
-    dock = plugin.dock
+    return plugin
+
+
+def main() -> None:
+    """Do all of it."""
+    dock = begin().dock
     seen: dict[str, Any] = {"lists": typed_in_lists(dock), "lost": lost(dock), "two": two(dock), "rerun": rerun(dock)}
     QgsSettings().setValue("tunneldb_review/way", "service")
     QgsSettings().setValue("tunneldb_review/service", "owner")

@@ -244,3 +244,21 @@ def test_what_comes_between_loses_nothing_and_overwrites_nothing(
     assert (cancelled["children"], cancelled["left"], cancelled["backends"]) == (1, 0, 0)
     assert cancelled["after"] == cancelled["before"]
     assert "Cancelled" in cancelled["log"]
+
+
+def test_what_another_wrote_alike_is_no_step_of_the_dock(
+    unpacked: Path, tmp_path: Path, conn: psycopg.Connection, dsn: str, example: str, people: None
+) -> None:
+    """An operator, who may take back what others did, says of a finding what an inspector has just said."""
+    seen = in_qgis(unpacked, tmp_path, dsn, "otto", "together_in_qgis.py")
+    rows = {key: rest for key, *rest in conn.execute("SELECT id, review, reviewed_by FROM tunnel_api.lining_finding")}
+    assert seen["at_once"]["waited"]
+    for how in ("ines", "at_once"):
+        confirmed, undone = seen[how]["confirmed"], seen[how]["undone"]
+        assert [confirmed[name] for name in ("went_on", "steps", "counted", "said")] == [True, 0, 0, ""], how
+        assert "nothing was reviewed here" in undone["said"], how
+        assert rows[confirmed["finding"]] == ["confirmed", "ines"], how
+    confirmed, undone = seen["otto"]["confirmed"], seen["otto"]["undone"]  # as if the answer had been lost
+    assert (confirmed["steps"], confirmed["counted"], undone["steps"]) == (1, 1, -1)
+    assert "is taken back" in undone["said"]
+    assert rows[confirmed["finding"]] == ["open", None]
