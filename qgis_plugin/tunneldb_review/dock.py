@@ -143,13 +143,13 @@ class ReviewDock(QDockWidget):
         """Let keys go to the dock."""
         self.widget().setFocus()
 
-    def read_again(self) -> None:
-        """Read the findings again, and draw the pictures anew, of images that were read again."""
+    def read_again(self) -> bool:
+        """Read the findings again, and draw the pictures anew, of images that were read again; whether findings were read."""
         self.source.forget()
         self.maker.clear()
         if self.session is None or not self.session.survey:
-            return
-        self._do(lambda session: session.again(self.filters.filter, str(self.filters.order.currentData())))
+            return False
+        return self._do(lambda session: session.again(self.filters.filter, str(self.filters.order.currentData())))
 
     def settled(self) -> bool:
         """Whether the pictures of the finding are all there."""

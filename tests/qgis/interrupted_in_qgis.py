@@ -65,6 +65,8 @@ def lost(dock: Any) -> dict[str, Any]:
     for key in (Qt.Key_C, Qt.Key_N):
         press(dock, key)
         seen["away"].append([dock.message.text(), at(dock), dock.session.facts["id"], dock.session.facts["review"]])
+    press(dock, Qt.Key_F5)
+    seen["read_again"] = bar()
     press(dock, Qt.Key_M)
     QTest.keyClicks(dock.panel.remark, "wet again")
     QTest.keyClick(dock.panel.remark, Qt.Key_Return)
@@ -103,7 +105,21 @@ def rerun(dock: Any) -> dict[str, Any]:
         f" public.ST_PointOnSurface(geom) FROM tunnel_api.finding_unrolled WHERE id = {here} RETURNING id"
     )
     press(dock, Qt.Key_F5)
-    return {"stays": at(dock) == here, "new": int(new) in [finding.id for finding in dock.session.work.findings]}
+    return {"stays": at(dock) == here, "new": int(new) in [finding.id for finding in dock.session.work.findings], "said": bar()}
+
+
+def ended(dock: Any) -> str:
+    """All is read again while the dock is connected to nothing."""
+    dock.end()
+    qgis.utils.plugins[NAME].reload()
+    return bar()
+
+
+def bar() -> str:
+    """What the message bar of QGIS says, which is put away."""
+    said = str(qgis.utils.iface.bar.currentItem().text())
+    qgis.utils.iface.bar.clearWidgets()
+    return said
 
 
 def typed_in_lists(dock: Any) -> dict[str, Any]:
@@ -181,6 +197,7 @@ def main() -> None:
     """Do all of it."""
     dock = begin().dock
     seen: dict[str, Any] = {"lists": typed_in_lists(dock), "lost": lost(dock), "two": two(dock), "rerun": rerun(dock)}
+    seen["ended"] = ended(dock)
     QgsSettings().setValue("tunneldb_review/way", "service")
     QgsSettings().setValue("tunneldb_review/service", "owner")
     seen["cancel"] = cancel()
