@@ -108,6 +108,39 @@ def rerun(dock: Any) -> dict[str, Any]:
     return {"stays": at(dock) == here, "new": int(new) in [finding.id for finding in dock.session.work.findings], "said": bar()}
 
 
+def not_entered(dock: Any) -> dict[str, Any]:
+    """A step is taken back while a remark is typed, at the finding of that step and at the next one."""
+    dock.go_on.setChecked(False)
+    here, line = at(dock), dock.panel.remark
+    press(dock, Qt.Key_C)
+    seen: dict[str, Any] = {"before": [line.text(), remarked(here)]}
+    line.clear()
+    QTest.keyClicks(line, "drips")
+    seen["same"] = [undone(dock) == here, line.text(), remarked(here)]
+    press(dock, Qt.Key_C)
+    seen["with"] = remarked(here)
+    press(dock, Qt.Key_N)
+    other = at(dock)
+    line.clear()
+    QTest.keyClicks(line, "old stain")
+    seen["other"] = [other != here, undone(dock) == here, line.text(), remarked(here), remarked(other)]
+    seen["then"] = [undone(dock) == other, line.text(), remarked(other)]
+    dock.go_on.setChecked(True)
+    return seen
+
+
+def undone(dock: Any) -> int | None:
+    """Where one is after the button was pressed that takes a step back."""
+    QTest.mouseClick(dock.panel.buttons["undo"], Qt.LeftButton)
+    wait(dock)
+    return at(dock)
+
+
+def remarked(finding: int | None) -> str:
+    """Review and remark of a finding in the database."""
+    return ask(f"SELECT review, remark FROM tunnel_api.lining_finding WHERE id = {finding}")
+
+
 def ended(dock: Any) -> str:
     """All is read again while the dock is connected to nothing."""
     dock.end()
@@ -196,7 +229,8 @@ def begin() -> Any:
 def main() -> None:
     """Do all of it."""
     dock = begin().dock
-    seen: dict[str, Any] = {"lists": typed_in_lists(dock), "lost": lost(dock), "two": two(dock), "rerun": rerun(dock)}
+    seen: dict[str, Any] = {"not_entered": not_entered(dock), "lists": typed_in_lists(dock)}
+    seen |= {"lost": lost(dock), "two": two(dock), "rerun": rerun(dock)}
     seen["ended"] = ended(dock)
     QgsSettings().setValue("tunneldb_review/way", "service")
     QgsSettings().setValue("tunneldb_review/service", "owner")
