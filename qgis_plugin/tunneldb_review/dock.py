@@ -126,9 +126,15 @@ class ReviewDock(QDockWidget):
             self.take_keys()
 
     def undo(self) -> None:
-        """Take the last step back, and go to where it was."""
+        """Take the last step back, and go to where it was.
+
+        A remark that was typed, and not entered, is written if that is elsewhere, else it stays in its line.
+        """
         told: List[str] = []
-        if self._do(lambda session: told.append(session.undo()), repaint=True, remark=False):
+        typed = self._remark_begun()
+        begun = self.panel.remark.text() if typed and self.session is not None and self.session.undoes_shown else None
+        if self._do(lambda session: told.append(session.undo(**typed)), repaint=True, remark=False):
+            self._keep_remark(begun)
             self._say(told[0])
 
     def next(self) -> None:
@@ -143,13 +149,13 @@ class ReviewDock(QDockWidget):
         """Let keys go to the dock."""
         self.widget().setFocus()
 
-    def read_again(self) -> None:
-        """Read the findings again, and draw the pictures anew, of images that were read again."""
+    def read_again(self) -> bool:
+        """Read the findings again, and draw the pictures anew, of images that were read again; whether findings were read."""
         self.source.forget()
         self.maker.clear()
         if self.session is None or not self.session.survey:
-            return
-        self._do(lambda session: session.again(self.filters.filter, str(self.filters.order.currentData())))
+            return False
+        return self._do(lambda session: session.again(self.filters.filter, str(self.filters.order.currentData())))
 
     def settled(self) -> bool:
         """Whether the pictures of the finding are all there."""
@@ -201,9 +207,7 @@ class ReviewDock(QDockWidget):
             self._say(str(error), wrong=True)
             begun = self.panel.remark.text() if self.panel.remark.isModified() else None
             self._refresh(move=False)
-            if begun is not None:
-                self.panel.remark.setText(begun)
-                self.panel.remark.setModified(True)
+            self._keep_remark(begun)
             return False
         self.changed |= repaint
         self._refresh()
@@ -217,6 +221,12 @@ class ReviewDock(QDockWidget):
             if box.isModified() and self.session is not None and self.session.facts
             else {}
         )
+
+    def _keep_remark(self, begun: str | None) -> None:
+        """Leave a remark that was typed, and not entered, in its line."""
+        if begun is not None:
+            self.panel.remark.setText(begun)
+            self.panel.remark.setModified(True)
 
     def _say(self, text: str, *, wrong: bool = False) -> None:
         self.message.setStyleSheet("color: #b00020" if wrong else "")

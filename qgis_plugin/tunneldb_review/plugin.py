@@ -116,9 +116,10 @@ class ReviewPlugin:
     def reload(self) -> None:
         """Read image layers again whose files have changed, what layers show of the database, and what the dock lists."""
         names = self.reloader.reload()
-        self.dock.read_again()
+        read = self.dock.read_again()
         changed = f"{len(names)} images had changed and were read again" if names else "No image has changed"
-        self._say(f"{changed}; findings are those of the database.", Qgis.Info)
+        findings = "findings are those of the database" if read else "findings of the dock were not read again"
+        self._say(f"{changed}; {findings}.", Qgis.Info if read else Qgis.Warning)
 
     def _keep_survey(self, survey: str) -> None:
         settings = Settings.read()

@@ -112,14 +112,22 @@ class Session:
         if current is not None and not self._read(current.id):
             raise DatabaseError(f"finding {current.id} is gone: read the survey again")
 
-    def undo(self) -> str:
+    def undo(self, **begun: Any) -> str:
         """Take back the last step of this session, and go to its finding; returns a sentence.
 
         What the database refuses to take back is not tried again.
+
+        Parameters
+        ----------
+        begun : str or None
+            What of the finding that is shown was not entered yet, as for :meth:`write`: written before one
+            goes to another.
         """
         if not self.steps:
             raise DatabaseError("nothing was reviewed here that could be taken back")
         key = self.steps[-1]
+        if begun and not self.undoes_shown and self.write(**begun):
+            self.steps[-2:] = [self.steps[-1], key]
         try:
             what = self.database.undo(key)
         except DatabaseError as error:
@@ -135,6 +143,11 @@ class Session:
                 self.facts = told
                 return f"Finding {key}: what was {what} is taken back."
         return f"Finding {key}: what was {what} is taken back; it is not in the list that is asked for."
+
+    @property
+    def undoes_shown(self) -> bool:
+        """Whether the last step was one of the finding that is shown."""
+        return self.facts is not None and self.steps[-1:] == [self.facts["id"]]
 
     def progress(self) -> str:
         """Return how far one is, and how fast."""

@@ -65,6 +65,8 @@ def lost(dock: Any) -> dict[str, Any]:
     for key in (Qt.Key_C, Qt.Key_N):
         press(dock, key)
         seen["away"].append([dock.message.text(), at(dock), dock.session.facts["id"], dock.session.facts["review"]])
+    press(dock, Qt.Key_F5)
+    seen["read_again"] = bar()
     press(dock, Qt.Key_M)
     QTest.keyClicks(dock.panel.remark, "wet again")
     QTest.keyClick(dock.panel.remark, Qt.Key_Return)
@@ -103,7 +105,54 @@ def rerun(dock: Any) -> dict[str, Any]:
         f" public.ST_PointOnSurface(geom) FROM tunnel_api.finding_unrolled WHERE id = {here} RETURNING id"
     )
     press(dock, Qt.Key_F5)
-    return {"stays": at(dock) == here, "new": int(new) in [finding.id for finding in dock.session.work.findings]}
+    return {"stays": at(dock) == here, "new": int(new) in [finding.id for finding in dock.session.work.findings], "said": bar()}
+
+
+def not_entered(dock: Any) -> dict[str, Any]:
+    """A step is taken back while a remark is typed, at the finding of that step and at the next one."""
+    dock.go_on.setChecked(False)
+    here, line = at(dock), dock.panel.remark
+    press(dock, Qt.Key_C)
+    seen: dict[str, Any] = {"before": [line.text(), remarked(here)]}
+    line.clear()
+    QTest.keyClicks(line, "drips")
+    seen["same"] = [undone(dock) == here, line.text(), remarked(here)]
+    press(dock, Qt.Key_C)
+    seen["with"] = remarked(here)
+    press(dock, Qt.Key_N)
+    other = at(dock)
+    line.clear()
+    QTest.keyClicks(line, "old stain")
+    seen["other"] = [other != here, undone(dock) == here, line.text(), remarked(here), remarked(other)]
+    seen["then"] = [undone(dock) == other, line.text(), remarked(other)]
+    dock.go_on.setChecked(True)
+    return seen
+
+
+def undone(dock: Any) -> int | None:
+    """Where one is after the button was pressed that takes a step back."""
+    QTest.mouseClick(dock.panel.buttons["undo"], Qt.LeftButton)
+    wait(dock)
+    return at(dock)
+
+
+def remarked(finding: int | None) -> str:
+    """Review and remark of a finding in the database."""
+    return ask(f"SELECT review, remark FROM tunnel_api.lining_finding WHERE id = {finding}")
+
+
+def ended(dock: Any) -> str:
+    """All is read again while the dock is connected to nothing."""
+    dock.end()
+    qgis.utils.plugins[NAME].reload()
+    return bar()
+
+
+def bar() -> str:
+    """What the message bar of QGIS says, which is put away."""
+    said = str(qgis.utils.iface.bar.currentItem().text())
+    qgis.utils.iface.bar.clearWidgets()
+    return said
 
 
 def typed_in_lists(dock: Any) -> dict[str, Any]:
@@ -180,7 +229,9 @@ def begin() -> Any:
 def main() -> None:
     """Do all of it."""
     dock = begin().dock
-    seen: dict[str, Any] = {"lists": typed_in_lists(dock), "lost": lost(dock), "two": two(dock), "rerun": rerun(dock)}
+    seen: dict[str, Any] = {"not_entered": not_entered(dock), "lists": typed_in_lists(dock)}
+    seen |= {"lost": lost(dock), "two": two(dock), "rerun": rerun(dock)}
+    seen["ended"] = ended(dock)
     QgsSettings().setValue("tunneldb_review/way", "service")
     QgsSettings().setValue("tunneldb_review/service", "owner")
     seen["cancel"] = cancel()

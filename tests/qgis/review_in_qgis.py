@@ -36,7 +36,8 @@ class Desktop:
     """As much of QGIS's window as a plugin takes hold of."""
 
     def __init__(self) -> None:
-        self.window, self.canvas, self.bar = QMainWindow(), QgsMapCanvas(), QgsMessageBar()
+        self.window, self.canvas = QMainWindow(), QgsMapCanvas()
+        self.bar = QgsMessageBar(self.window)  # a window of its own would take the keys
         self.window.setCentralWidget(self.canvas)
         self.window.resize(1400, 900)
         self.actions: list[str] = []

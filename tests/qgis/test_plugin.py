@@ -238,7 +238,15 @@ def test_what_comes_between_loses_nothing_and_overwrites_nothing(
     assert (two["stays"], two["shown"], two["kept"]) == (two["first"], ["rejected", "soot", True], "rejected|soot")
     assert (two["came"], two["listed"]) == (two["wanted"], False)
 
+    assert seen["rerun"].pop("said").endswith("; findings are those of the database.")
     assert seen["rerun"] == {"stays": True, "new": True}
+    for said in (lost["read_again"], seen["ended"]):
+        assert said.endswith("; findings of the dock were not read again."), (lost["read_again"], seen["ended"])
+
+    assert seen["not_entered"] == {
+        "before": ["", "confirmed|"], "same": [True, "drips", "open|"], "with": "confirmed|drips",
+        "other": [True, True, "", "open|", "open|old stain"], "then": [True, "", "open|"],
+    }  # fmt: skip
 
     cancelled = seen["cancel"]
     assert (cancelled["children"], cancelled["left"], cancelled["backends"]) == (1, 0, 0)
