@@ -14,6 +14,7 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import openpyxl
 import psycopg
 import pypdf
@@ -36,6 +37,8 @@ from tunneldb.report.owner import CHAPTERS, Owner, read_owner
 from tunneldb.report.photos import Photo, make_thumbnails
 from tunneldb.report.words import languages, read_language
 from tunneldb.store.survey import get_survey
+
+NONE = np.empty(0, np.int64)
 
 DRAWN = """
     INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width, review, remark, geom) VALUES
@@ -265,7 +268,7 @@ def test_digest_tells_another_finding(drawn: str, tmp_path: Path) -> None:
         survey = get_survey(conn, NAME)
         for change in ("SELECT", "SELECT", "UPDATE tunnel_api.finding_unrolled SET severity = 4 WHERE severity = 3"):
             conn.execute(change)
-            chapter = findings.read_findings_chapter(conn, survey, (0.0, 1e5), frozenset(), tmp_path, table=True)
+            chapter = findings.read_findings_chapter(conn, survey, (0.0, 1e5), frozenset(), NONE, tmp_path, table=True)
             digest = hashlib.sha256()
             findings.digest_findings(digest, chapter, [])
             digests.append(digest.hexdigest())
@@ -286,7 +289,7 @@ def test_digest_tells_another_dry_region_and_another_width(example: str, conn: p
         "SELECT tunnel_api.dry_region_approve(id) FROM tunnel_api.region WHERE reason = 'soot'",
     ):
         conn.execute(change)
-        chapter = findings.read_findings_chapter(conn, survey, (0.0, 1e5), frozenset(), tmp_path, table=True)
+        chapter = findings.read_findings_chapter(conn, survey, (0.0, 1e5), frozenset(), NONE, tmp_path, table=True)
         digest = hashlib.sha256()
         findings.digest_findings(digest, chapter, read_dry_regions(conn, survey))
         digests.append(digest.hexdigest())
@@ -296,7 +299,9 @@ def test_digest_tells_another_dry_region_and_another_width(example: str, conn: p
 def test_of_too_many_the_gravest_have_rows(drawn: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(findings, "MOST", 2)
     with connect(drawn) as conn:
-        chapter = findings.read_findings_chapter(conn, get_survey(conn, NAME), (0.0, 1e5), frozenset(), tmp_path, table=True)
+        chapter = findings.read_findings_chapter(
+            conn, get_survey(conn, NAME), (0.0, 1e5), frozenset(), NONE, tmp_path, table=True
+        )
     (cracks,) = [kind for kind in chapter.kinds if kind.count.kind == "crack"]
     assert [row.severity for _, rows in cracks.groups for row in rows] == [3, 2]
     assert len(cracks.beyond) == 1, "that of severity 1, rejected"
