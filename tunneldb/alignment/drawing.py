@@ -130,7 +130,7 @@ def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
         linear = [name for name, kind in layers if not any(other in kind for other in ("Point", "Polygon", "Surface"))]
         chosen = choose_layer(path, linear, layer, [name for name, _ in layers])
         meta, _, wkb, _ = pyogrio.raw.read(source, layer=chosen, columns=[])
-    except pyogrio.errors.DataSourceError as error:
+    except (pyogrio.errors.DataSourceError, UnicodeDecodeError) as error:
         raise UserError(f"{path} cannot be read: {str(error).strip().splitlines()[0]}") from None
     notes = _check_crs(path, meta["crs"], srid)
     try:

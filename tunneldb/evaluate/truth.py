@@ -112,7 +112,7 @@ def read_polygons(path: Path, survey: Survey, layer: str | None, noun: str) -> P
     where = f"{path}, layer {chosen}"
     try:
         meta, _, wkb, columns = pyogrio.raw.read(vector_source(path), layer=chosen)
-    except (DataSourceError, DataLayerError, RuntimeError) as error:
+    except (DataSourceError, DataLayerError, RuntimeError, UnicodeDecodeError) as error:
         raise UserError(f"{where}: cannot be read: {_line(error)}") from None
     if wkb is None or not len(wkb):
         raise UserError(f"{where} is empty: there must be at least one polygon; what has no {noun} has nothing to compare with")
@@ -127,6 +127,8 @@ def _layer(path: Path, wanted: str | None, noun: str) -> str:
     source = vector_source(path)
     try:
         there = [str(name) for name, kind in pyogrio.list_layers(source) if kind is not None]  # a table is no layer
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path}: the name of a layer is no UTF-8: {_line(error)}") from None
     except DataSourceError:
         raise UserError(f"{path} is neither GeoPackage nor GeoJSON: write the truth as one of these") from None
     listed = ", ".join(there) or "none"
