@@ -138,6 +138,7 @@ def test_rings_are_stale_after_what_they_rest_on(survey: str, conn: psycopg.Conn
 def test_what_cannot_be_done_is_one_line(survey: str, tmp_path: Path) -> None:
     path = tmp_path / "rings.csv"
     path.write_text("number,chainage_from,chainage_to\n1,950,952\n2,951,953\n")
+    (tmp_path / "large.csv").write_text("number,chainage_from,chainage_to\n999999999999,950,952\n")
     for words, said in (
         (["rings"], "rings of what"),
         (["rings", survey], "has no rings there"),
@@ -146,6 +147,7 @@ def test_what_cannot_be_done_is_one_line(survey: str, tmp_path: Path) -> None:
         (["rings", survey, "--start", "2"], "--length"),
         (["rings", survey, "--sigma", "0.002"], "--points"),
         (["rings", survey, "--rings", path], "begins within"),
+        (["rings", survey, "--rings", tmp_path / "large.csv"], "nine digits at most"),
         (["rings", survey, "--length", "2", "-o", tmp_path / "r.pdf"], ".csv"),
     ):
         done = invoke(*words)

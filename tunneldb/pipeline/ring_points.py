@@ -122,6 +122,12 @@ def read_axis(path: Path) -> DesignAxis:
             f"{path}: where chainage grows by 1 m, the axis is {usual:.4g} long in plan{_unit(usual)}; all must be metres, "
             "chainage in plan"
         )
+    far = np.flatnonzero(length > (1.0 + _STRETCH) * np.diff(chainage) + 1.0)
+    if len(far):
+        raise table.error(
+            int(far[0]) + 1,
+            f"{length[far[0]]:.3f} m from the point before in plan, where chainage grows by {np.diff(chainage)[far[0]]:.3f} m",
+        )
     return DesignAxis(xyz, chainage)
 
 

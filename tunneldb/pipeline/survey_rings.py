@@ -83,8 +83,8 @@ def rings_of_file(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> 
     for row, (begin, end) in enumerate(table.columns(("chainage_from", "chainage_to")).tolist()):
         if not LEAST_LENGTH <= end - begin <= MOST_LENGTH:
             raise table.error(row, f"a ring is {LEAST_LENGTH:g} to {MOST_LENGTH:g} m long, not {end - begin:g}")
-        if numbers[row] != round(numbers[row]):
-            raise table.error(row, f"a ring has a whole number, not {numbers[row]:g}")
+        if numbers[row] != round(numbers[row]) or abs(numbers[row]) > np.iinfo(np.int32).max:
+            raise table.error(row, f"a ring has a whole number, of nine digits at most, not {numbers[row]:g}")
     order = np.argsort(table["chainage_from"], kind="stable")
     over = np.flatnonzero(table["chainage_from"][order[1:]] < table["chainage_to"][order[:-1]] - 1e-6)
     if len(over):
