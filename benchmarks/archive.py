@@ -12,19 +12,15 @@ are those of the view survey_size, after ANALYZE.
 from __future__ import annotations
 
 import argparse
-import json
 import math
-import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import psycopg
 
-from benchmarks.common import COMMAND, print_table, progress, save, scratch_database
-from benchmarks.memory import WATCH
+from benchmarks.common import print_table, progress, save, scratch_database
+from benchmarks.files import watched
 from benchmarks.synthetic import Size, make
 from tunneldb.database import connect, resolve_dsn
 
@@ -58,10 +54,10 @@ def main() -> None:
 def measure(source: str, scratch: str, survey: str, folder: Path) -> dict[str, Any]:
     """Export a survey of one database and import it into another, by its own name if it is not there, and by another."""
     file = folder / f"{survey}.tdb"
-    figures: dict[str, Any] = {"export": watch(source, "survey", "export", survey, "-o", file)}
+    figures: dict[str, Any] = {"export": watched(("survey", "export", survey, "-o", file), source)}
     if source != scratch:
-        figures["import"] = watch(scratch, "survey", "import", file)
-    figures["import, new numbers"] = watch(scratch, "survey", "import", file, "--name", f"{survey}-copy")
+        figures["import"] = watched(("survey", "import", file), scratch)
+    figures["import, new numbers"] = watched(("survey", "import", file, "--name", f"{survey}-copy"), scratch)
     with psycopg.connect(source, autocommit=True) as connection:
         connection.execute("ANALYZE")
         row = connection.execute(
@@ -75,21 +71,6 @@ def measure(source: str, scratch: str, survey: str, folder: Path) -> dict[str, A
     assert row is not None
     sizes = dict(zip(("points", "database_bytes", "scan_bytes"), row, strict=True))
     return figures | sizes | {"archive_bytes": file.stat().st_size}
-
-
-def watch(dsn: str, *words: object) -> dict[str, float]:
-    """Run a command; seconds, of the CPU and by the clock, and the most memory that it held, bytes."""
-    done = subprocess.run(
-        [sys.executable, "-c", WATCH, *COMMAND, *map(str, words)],
-        env=dict(os.environ) | {"TUNNELDB_DSN": dsn},
-        stdout=subprocess.PIPE,
-        text=True,
-        check=True,
-    )
-    watched: dict[str, float] = json.loads(done.stdout)
-    if watched.pop("status") != 0:
-        raise SystemExit(f"tunneldb {' '.join(map(str, words))} failed")
-    return watched
 
 
 def report(figures: dict[str, Any]) -> None:
