@@ -36,6 +36,18 @@ COMMENT ON FUNCTION tunnel_api.last_runs(int, text, boolean, int, int) IS
 'The last run of a stage in each kilometre of a survey, of those from km_from to km_to, and of each subject (layer, older survey, track and outline) that has results of its own: the last that succeeded, or with false the last that began';
 
 
+CREATE OR REPLACE FUNCTION tunnel_api.last_run(survey_id int, stage text, km int, subject text DEFAULT '') RETURNS bigint
+LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER
+SET search_path = pg_catalog, pg_temp
+AS $$
+    SELECT r.id FROM tunnel.run r
+     WHERE r.survey_id = $1 AND r.stage = $2 AND r.km = $3 AND r.subject = $4 AND r.outcome = 'done'
+     ORDER BY r.started_at DESC, r.id DESC LIMIT 1
+$$;
+COMMENT ON FUNCTION tunnel_api.last_run(int, text, int, text) IS
+'The last run of a stage that succeeded in one kilometre of a survey, of one subject; NULL where there is none';
+
+
 -- Stages that ran in kilometres of a survey, from one to the next in the same index.
 CREATE OR REPLACE FUNCTION tunnel_api.stages_run(survey_id int) RETURNS SETOF text
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 10

@@ -71,9 +71,7 @@ COMMENT ON COLUMN tunnel_api.clearance_infringement.geom IS 'Its points, at most
 CREATE OR REPLACE FUNCTION tunnel_api.clearance_inputs(survey_id int, km int, gauge text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
-               'ground', (SELECT max((SELECT r.id FROM tunnel.run r
-                 WHERE r.survey_id = $1 AND r.stage = 'ground' AND r.km = k AND r.subject = '' AND r.outcome = 'done'
-                 ORDER BY r.started_at DESC, r.id DESC LIMIT 1)) FROM generate_series($2 - 1, $2 + 1) k),
+               'ground', (SELECT max(tunnel_api.last_run($1, 'ground', k)) FROM generate_series($2 - 1, $2 + 1) k),
                'gauge', $3,
                'outline', (SELECT g.checksum FROM tunnel.gauge g WHERE g.tunnel_id = s.tunnel_id AND g.name = $3))
       FROM tunnel.survey s WHERE s.id = $1

@@ -80,9 +80,7 @@ COMMENT ON COLUMN tunnel_api.deviation_section.deviation IS 'Mean deviation of c
 CREATE OR REPLACE FUNCTION tunnel_api.deviation_inputs(survey_id int, km int, layer text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
-               'detect', (SELECT r.id FROM tunnel.run r
-                 WHERE r.survey_id = $1 AND r.stage = 'detect' AND r.km = $2 AND r.subject = '' AND r.outcome = 'done'
-                 ORDER BY r.started_at DESC, r.id DESC LIMIT 1),
+               'detect', tunnel_api.last_run($1, 'detect', $2),
                'profiles', (
                    SELECT md5(string_agg(concat_ws(' ', p.name, p.chainage_from, p.chainage_to, p.outline), ';' ORDER BY p.chainage_from))
                      FROM tunnel.design_profile p

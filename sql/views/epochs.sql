@@ -85,12 +85,8 @@ COMMENT ON FUNCTION tunnel_api.leaks_checksum(int, float8, float8) IS
 CREATE OR REPLACE FUNCTION tunnel_api.change_inputs(survey_id int, old_survey_id int, km int) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
-               'detect_old', (SELECT r.id FROM tunnel.run r
-                 WHERE r.survey_id = $2 AND r.stage = 'detect' AND r.km = $3 AND r.subject = '' AND r.outcome = 'done'
-                 ORDER BY r.started_at DESC, r.id DESC LIMIT 1),
-               'detect_new', (SELECT r.id FROM tunnel.run r
-                 WHERE r.survey_id = $1 AND r.stage = 'detect' AND r.km = $3 AND r.subject = '' AND r.outcome = 'done'
-                 ORDER BY r.started_at DESC, r.id DESC LIMIT 1),
+               'detect_old', tunnel_api.last_run($2, 'detect', $3),
+               'detect_new', tunnel_api.last_run($1, 'detect', $3),
                'leaks_old', tunnel_api.leaks_checksum($2, $3 * 1000 - 100, ($3 + 1) * 1000 + 100),
                'leaks_new', tunnel_api.leaks_checksum($1, $3 * 1000 - 100, ($3 + 1) * 1000 + 100))
 $$;

@@ -49,9 +49,7 @@ COMMENT ON COLUMN tunnel_api.evenness_area.geom IS 'In the unrolled plane (chain
 
 CREATE OR REPLACE FUNCTION tunnel_api.evenness_inputs(survey_id int, km int, layer text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
-    SELECT jsonb_build_object('layer', $3, 'deviation', jsonb_agg((SELECT r.id FROM tunnel.run r
-                 WHERE r.survey_id = $1 AND r.stage = 'deviation' AND r.km = $2 + k AND r.subject = $3 AND r.outcome = 'done'
-                 ORDER BY r.started_at DESC, r.id DESC LIMIT 1)
+    SELECT jsonb_build_object('layer', $3, 'deviation', jsonb_agg(tunnel_api.last_run($1, 'deviation', $2 + k, $3)
                ORDER BY k))
       FROM generate_series(-1, 1) k
 $$;

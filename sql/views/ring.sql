@@ -89,10 +89,8 @@ COMMENT ON COLUMN tunnel_api.ring_chord.length_se IS 'Standard error, m';
 CREATE OR REPLACE FUNCTION tunnel_api.ring_inputs(survey_id int, km int) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
-               'detect', (SELECT jsonb_agg(l.id ORDER BY k) FROM generate_series($2 - 1, $2 + 1) k CROSS JOIN LATERAL (
-                    SELECT r.id FROM tunnel.run r
-                     WHERE r.survey_id = $1 AND r.stage = 'detect' AND r.km = k AND r.subject = '' AND r.outcome = 'done'
-                     ORDER BY r.started_at DESC, r.id DESC LIMIT 1) l),
+               'detect', (SELECT jsonb_agg(l.id ORDER BY k) FROM generate_series($2 - 1, $2 + 1) k
+                           CROSS JOIN LATERAL (SELECT tunnel_api.last_run($1, 'detect', k) AS id) l WHERE l.id IS NOT NULL),
                'rings', (SELECT md5(string_agg(concat_ws(' ', g.number, g.chainage_from, g.chainage_to), ';' ORDER BY g.number))
                            FROM tunnel.ring g WHERE g.survey_id = $1 AND g.km = $2))
 $$;

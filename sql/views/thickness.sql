@@ -32,9 +32,7 @@ COMMENT ON COLUMN tunnel_api.thickness_section.thickness IS 'Thickness of cells 
 CREATE OR REPLACE FUNCTION tunnel_api.thickness_inputs(before_id int, survey_id int, km int, layer text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object('layer', $4, 'before', $1) || jsonb_object_agg(v.part,
-               (SELECT r.id FROM tunnel.run r
-                 WHERE r.survey_id = v.id AND r.stage = 'deviation' AND r.km = $3 AND r.subject = $4 AND r.outcome = 'done'
-                 ORDER BY r.started_at DESC, r.id DESC LIMIT 1))
+               tunnel_api.last_run(v.id, 'deviation', $3, $4))
       FROM (VALUES ('old', $1), ('new', $2)) v (part, id)
 $$;
 COMMENT ON FUNCTION tunnel_api.thickness_inputs(int, int, int, text) IS
