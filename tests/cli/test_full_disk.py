@@ -105,9 +105,9 @@ def test_the_embedded_server_says_so_and_is_whole_with_room(disk: SmallDisk, mon
         assert "initdb failed" in (said := init())
         assert "No space left on device" in said
         disk.resize(50 * 1024)
-        said = init()  # where the room ends depends on how much WAL the server keeps ready
-        assert "the server went down" in said or "the embedded server does not start" in said
-        assert "No space left on device" in said
+        said = init()  # whether WAL or a table meets the end of the room depends on how much WAL the server keeps ready
+        down = "the server went down" in said or "the embedded server does not start" in said
+        assert (down and "No space left on device" in said) or "the database's disk is full" in said
         disk.resize(300 * 1024)
         assert CliRunner().invoke(main, ["init"]).exit_code == 0
         axis = disk.folder / "axis.csv"

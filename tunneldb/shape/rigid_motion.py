@@ -68,8 +68,10 @@ class Motion:
 
     Attributes
     ----------
-    values, errors : (6,) float arrays
-        By :data:`MOTIONS`, with standard errors; NaN where not determined and so not removed.
+    values : (6,) float array
+        By :data:`MOTIONS`; NaN where not determined and so not removed.
+    covariance : (6, 6) float array
+        Of these. In a round lining a roll is much like a shift to the right, of which together far more is known than of each.
     removed : (n,) float array
         What it does to the offset of each cell, m.
     removed_error : (n,) float array
@@ -79,10 +81,15 @@ class Motion:
     """
 
     values: Float
-    errors: Float
+    covariance: Float
     removed: Float
     removed_error: Float
     cells: int
+
+    @property
+    def errors(self) -> Float:
+        """Standard errors (6,) of the motions."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
     def used(self) -> Bool:
@@ -112,8 +119,8 @@ def rigid_motion(cells: SectionCells) -> Motion:
     spread = np.sqrt(np.mean(columns**2, axis=0)) if len(columns) else np.zeros(len(MOTIONS))
     used = _determined(columns, variance, spread)
     if len(difference) < LEAST_CELLS or not used.any():
-        nothing = np.full(len(MOTIONS), np.nan)
-        return Motion(nothing, nothing.copy(), np.zeros(len(difference)), np.zeros(len(difference)), len(difference))
+        nothing = np.full((len(MOTIONS), len(MOTIONS)), np.nan)
+        return Motion(nothing[0].copy(), nothing, np.zeros(len(difference)), np.zeros(len(difference)), len(difference))
     design = columns[:, used]
     values, weight, residual = _fit(design, difference, np.sqrt(variance))
     return _motion(cells, used, values, _covariance(design, weight, residual, variance, cells.group))
@@ -142,11 +149,9 @@ def motion_from(cells: SectionCells, start: Float, used: Bool) -> Motion | None:
         return None
 
 
-def removed_by(cells: SectionCells, values: Float, errors: Float, used: Bool) -> Motion | None:
-    """A motion (6,) with standard errors that is given; None where a part of it that counts is not known."""
-    if not used.any() or not np.isfinite(values[used]).all():
-        return None
-    return _motion(cells, used, values[used], np.diag(errors[used] ** 2))
+def removed_by(cells: SectionCells, values: Float, covariance: Float, used: Bool) -> Motion:
+    """The motion with determined values (m,) and their covariance (m, m), for a section."""
+    return _motion(cells, used, values, covariance)
 
 
 def unexplained(cells: SectionCells, residual: Float) -> float:
@@ -179,10 +184,10 @@ def bending_error(motion: Motion, columns: Single, curvature: Float) -> Float:
 
 def _motion(cells: SectionCells, used: Bool, values: Float, covariance: Float) -> Motion:
     design = cells.columns[:, used].astype(np.float64)
-    found, errors = np.full(len(MOTIONS), np.nan), np.full(len(MOTIONS), np.nan)
-    found[used], errors[used] = values, np.sqrt(np.diag(covariance))
+    found, known = np.full(len(MOTIONS), np.nan), np.full((len(MOTIONS), len(MOTIONS)), np.nan)
+    found[used], known[np.ix_(used, used)] = values, covariance
     error = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", design, covariance, design), 0.0))
-    return Motion(found, errors, design @ values, error, len(cells.difference))
+    return Motion(found, known, design @ values, error, len(cells.difference))
 
 
 def _determined(columns: Float, variance: Float, spread: Float) -> Bool:
