@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 import psycopg
 import shapely
-from psycopg import sql
 
 from benchmarks.common import progress
 from tunneldb.classification.classes import PointClass
 from tunneldb.database import PointZ, connect, copy_binary, pack, resolve_dsn
+from tunneldb.store.partition import partition
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey, get_survey
 
@@ -138,8 +138,7 @@ def _points(connection: Connection, survey: Survey, km: int, count: int) -> None
     girth = np.ptp(surface.arcs[0]) - 1e-3
     name = f"km-{km}.laz"
     file_id = _one(connection, "SELECT id FROM tunnel.scan_file WHERE survey_id = %s AND name = %s", (survey.id, name))
-    table = sql.Identifier("tunnel", f"point_s{survey.id}_km{km}_new")
-    connection.execute(sql.SQL("CREATE TABLE {} (LIKE tunnel.point)").format(table))
+    connection.execute("SELECT tunnel_api.partition_new(%s, %s)", (survey.id, km))
 
     def chunks() -> Iterator[bytes]:
         for first in range(0, count, CHUNK):
@@ -156,7 +155,7 @@ def _points(connection: Connection, survey: Survey, km: int, count: int) -> None
                 np.where(np.abs(arc) < CORNER, PointClass.LINING, PointClass.GROUND).astype(np.int16),
             ])  # fmt: skip
 
-    copy_binary(connection, table, COLUMNS, chunks(), fresh=True)
+    copy_binary(connection, partition(survey, km, "_new"), COLUMNS, chunks(), fresh=True)
     connection.execute("SELECT tunnel_api.partition_swap(%s, %s)", (survey.id, km))
     connection.commit()
 

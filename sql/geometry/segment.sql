@@ -149,7 +149,9 @@ COMMENT ON FUNCTION tunnel_api.segment_build(int, int) IS
 'Stage 3 for one kilometre: rewrites tunnel.segment from the axis vertices; returns the number of segments. Source: Gonçalves et al. (2012), stage 3.';
 
 
--- Segment and chainage of every point of a kilometre: the partition is rewritten with both, in chainage order, and swapped in.
+-- Segment and chainage of every point of a kilometre: the partition is rewritten with both and swapped in. Rows keep their
+-- order, that of the chainage known so far, which is nearly that of the new one: near enough for a BRIN index, and not sorting
+-- them spares a fifth.
 --
 -- A point's fraction of the way through a segment is its distance from the first plane over the sum of its distances from
 -- both, so it is 0 and 1 on the planes. The segment is first looked up by the chainage known so far; a point that lies before
@@ -158,7 +160,7 @@ COMMENT ON FUNCTION tunnel_api.segment_build(int, int) IS
 CREATE OR REPLACE FUNCTION tunnel_api.segment_tag(survey_id int, km int)
 RETURNS bigint
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
-SET work_mem = '256MB'  -- a kilometre at survey density is sorted in memory
+SET synchronize_seqscans = off  -- rows keep their order
 SET enable_mergejoin = off  -- it would sort all points by their segment first, though the segments fit a small hash
 SET plan_cache_mode = force_custom_plan  -- a generic plan is made for, and locks, every partition of every survey
 AS $$
@@ -183,11 +185,11 @@ BEGIN
     INTO n, a, b, px, py, pz, pl, qx, qy, qz, ql
     FROM generate_series(segment_tag.km - 1, segment_tag.km + 1) AS k, tunnel_api.segment_plan(segment_tag.survey_id, k) p;
 
-    EXECUTE format('DROP TABLE IF EXISTS tunnel.%I', building);
-    -- clock_timestamp() is a fence that lets the scan be parallel: what stands beside it is reckoned once.
+    PERFORM tunnel_api.partition_new(segment_tag.survey_id, segment_tag.km);
+    -- OFFSET 0: what stands before it is reckoned once.
     -- The segments beside share a plane: a point lies as far before theirs as beyond one's own.
     EXECUTE format($query$
-        CREATE TABLE tunnel.%I AS
+        INSERT INTO tunnel.%I (survey_id, km, chainage, gps_time, geom, segment, scan_id, file_id, intensity, classification, "class")
         SELECT c.survey_id, c.km,
             coalesce(CASE
                 WHEN c.before < 0 THEN c.previous[1] + (c.previous[2] - c.previous[1]) * m.before / nullif(m.before - c.before, 0)
@@ -198,21 +200,21 @@ BEGIN
             c.scan_id, c.file_id, c.intensity, c.classification, c."class"
         FROM (SELECT p.*, s.n, s.a, s.b, s.previous_n, s.previous, s.next_n, s.next,
                   p.x * s.px + p.y * s.py + p.z * s.pz - s.pl AS before,
-                  s.ql - (p.x * s.qx + p.y * s.qy + p.z * s.qz) AS after, clock_timestamp()
-              FROM (SELECT p.*, public.ST_X(p.geom) AS x, public.ST_Y(p.geom) AS y, public.ST_Z(p.geom) AS z, clock_timestamp()
+                  s.ql - (p.x * s.qx + p.y * s.qy + p.z * s.qz) AS after
+              FROM (SELECT p.*, public.ST_X(p.geom) AS x, public.ST_Y(p.geom) AS y, public.ST_Z(p.geom) AS z
                     -- the partition by its name: no lock on its parent, whose partitions others may be swapping
-                    FROM tunnel.%I p) p
+                    FROM tunnel.%I p OFFSET 0) p
               LEFT JOIN (
                   SELECT s.*, q.n AS previous_n, ARRAY[q.a, q.b, q.px, q.py, q.pz, q.pl] AS previous,
                       r.n AS next_n, ARRAY[r.a, r.b, r.qx, r.qy, r.qz, r.ql] AS next
                   FROM unnest($2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12) AS s (n, a, b, px, py, pz, pl, qx, qy, qz, ql)
                   LEFT JOIN unnest($2, $3, $4, $5, $6, $7, $8) AS q (n, a, b, px, py, pz, pl) ON q.n = s.n - 1
                   LEFT JOIN unnest($2, $3, $4, $9, $10, $11, $12) AS r (n, a, b, qx, qy, qz, ql) ON r.n = s.n + 1) s
-                  ON s.n = floor(p.chainage / $1)::int) c
+                  ON s.n = floor(p.chainage / $1)::int
+              OFFSET 0) c
         CROSS JOIN LATERAL (
             SELECT c.x * c.previous[3] + c.y * c.previous[4] + c.z * c.previous[5] - c.previous[6] AS before,
                 c.next[6] - (c.x * c.next[3] + c.y * c.next[4] + c.z * c.next[5]) AS after) m
-        ORDER BY 3
     $query$, building, tunnel_api.partition_name(survey_id, km))
     USING spacing, n, a, b, px, py, pz, pl, qx, qy, qz, ql;
 

@@ -15,9 +15,7 @@ DECLARE
     name constant text := tunnel_api.partition_name(survey_id, km);
     written bigint;
 BEGIN
-    EXECUTE format('DROP TABLE IF EXISTS tunnel.%I', name || '_new');
-    EXECUTE format('CREATE TABLE tunnel.%I (LIKE tunnel.point, CONSTRAINT part CHECK (survey_id = %s AND km = %s))',
-        name || '_new', survey_id, km);
+    PERFORM tunnel_api.partition_new(survey_id, km);
     EXECUTE format($query$
         INSERT INTO tunnel.%I (survey_id, km, chainage, gps_time, geom, segment, scan_id, file_id, intensity, classification, "class")
         SELECT p.survey_id, p.km, p.chainage, p.gps_time, p.geom, p.segment, p.scan_id, p.file_id, p.intensity, p.classification,

@@ -93,9 +93,29 @@ COMMENT ON FUNCTION tunnel_api.partition_parent(int) IS
 'Makes the table that holds the partitions of a survey''s kilometres, if there is none.';
 
 
--- Puts the table <partition>_new, built aside with the columns of tunnel.point and rows in chainage order, in the place of a
--- survey's kilometre: constraints, BRIN index and statistics are made first, then the old partition is dropped and the new one
--- attached, all in the caller's transaction. Those who read see the old kilometre until it ends, then the new one.
+-- Makes the empty table <partition>_new, in which a survey's kilometre is built aside. Its check spares ATTACH a scan while others
+-- wait, and costs least while rows are written.
+CREATE OR REPLACE FUNCTION tunnel_api.partition_new(survey_id int, km int)
+RETURNS void
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
+AS $$
+DECLARE
+    name constant text := tunnel_api.partition_name(survey_id, km) || '_new';
+BEGIN
+    IF to_regclass('tunnel.' || quote_ident(name)) IS NOT NULL THEN
+        EXECUTE format('DROP TABLE tunnel.%I', name);
+    END IF;
+    EXECUTE format('CREATE TABLE tunnel.%I (LIKE tunnel.point, CONSTRAINT part CHECK (survey_id = %s AND km = %s))',
+        name, survey_id, km);
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.partition_new(int, int) IS
+'Makes the empty table <partition>_new, in which a survey''s kilometre of tunnel.point is built aside for partition_swap.';
+
+
+-- Puts the table <partition>_new, made by partition_new and filled in about the order of chainage, in the place of a survey's
+-- kilometre: BRIN index and statistics are made first, then the old partition is dropped and the new one attached, all in the
+-- caller's transaction. Those who read see the old kilometre until it ends, then the new one.
 CREATE OR REPLACE FUNCTION tunnel_api.partition_swap(survey_id int, km int)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
@@ -105,18 +125,8 @@ DECLARE
     parent constant text := 'point_s' || survey_id;
     owner constant regrole := (SELECT c.relowner FROM pg_class c WHERE c.oid = 'tunnel.point'::regclass);
 BEGIN
-    -- It is written once and analysed here: autovacuum has nothing to do on it. The check spares ATTACH a scan while others wait.
-    -- Loading makes it with the table, when it costs nothing; else one scan serves it and NOT NULL.
-    EXECUTE format($ddl$
-        ALTER TABLE tunnel.%I
-            ALTER survey_id SET NOT NULL, ALTER km SET NOT NULL, ALTER chainage SET NOT NULL, ALTER gps_time SET NOT NULL,
-            ALTER geom SET NOT NULL, ALTER scan_id SET NOT NULL, ALTER file_id SET NOT NULL,
-            ALTER intensity SET NOT NULL, ALTER classification SET NOT NULL,
-            SET (autovacuum_enabled = off)%s
-    $ddl$, name || '_new', CASE WHEN NOT EXISTS (
-        SELECT FROM pg_constraint c
-        WHERE c.conrelid = to_regclass('tunnel.' || quote_ident(name || '_new')) AND c.conname = 'part')
-        THEN format(', ADD CONSTRAINT part CHECK (survey_id = %s AND km = %s)', survey_id, km) END);
+    -- it is written once and analysed here: autovacuum has nothing to do on it
+    EXECUTE format('ALTER TABLE tunnel.%I SET (autovacuum_enabled = off)', name || '_new');
     EXECUTE format('CREATE INDEX ON tunnel.%I USING brin (chainage) WITH (pages_per_range = 16)', name || '_new');
     -- geometry is never searched by its box here: its statistics would cost more than the index
     EXECUTE format('ANALYZE tunnel.%I (survey_id, km, chainage, segment)', name || '_new');

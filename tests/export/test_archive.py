@@ -75,7 +75,7 @@ def add_points(conn: psycopg.Connection) -> None:
     ).fetchone()
     assert name is not None
     new = sql.Identifier("tunnel", name[1])
-    conn.execute(sql.SQL("CREATE TABLE {} (LIKE tunnel.point)").format(new))
+    conn.execute("SELECT tunnel_api.partition_new(%s, %s)", [name[0], KM])
     conn.execute(
         sql.SQL(
             "INSERT INTO {} SELECT f.survey_id, %s, 12300 + n / 7.0, n / 3.0,"

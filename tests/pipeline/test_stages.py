@@ -352,11 +352,7 @@ def loaded_curve(conn: psycopg.Connection) -> psycopg.Connection:
         " SELECT id, name, '2024-05-04', 'none', 'mobile' FROM tunnel.tunnel RETURNING id"
     ).fetchone()[0]
     for km in (0, 1):
-        conn.execute(
-            psycopg.sql.SQL("CREATE TABLE tunnel.{} (LIKE tunnel.point)").format(
-                psycopg.sql.Identifier(f"point_s{survey}_km{km}_new")
-            )
-        )
+        conn.execute("SELECT tunnel_api.partition_new(%s, %s)", [survey, km])
         conn.execute("SELECT tunnel_api.partition_swap(%s, %s)", [survey, km])
     conn.commit()
     return conn

@@ -56,7 +56,7 @@ def survey(conn: psycopg.Connection) -> str:
         here = np.flatnonzero(np.floor(s / KILOMETRE) == km)
         here = here[np.argsort(s[here])]
         table = sql.Identifier("tunnel", f"point_s{found.id}_km{km}_new")
-        conn.execute(sql.SQL("CREATE TABLE {} (LIKE tunnel.point)").format(table))
+        conn.execute("SELECT tunnel_api.partition_new(%s, %s)", (found.id, km))
         whole = np.ones(len(here), np.int32)
         packed = pack([
             found.id * whole, km * whole, s[here], s[here], PointZ(xyz[here], found.srid), whole, whole, file_id * whole,

@@ -39,7 +39,7 @@ def session(survey: psycopg.Connection, dsn: str) -> Iterator[Callable[[], psyco
 
 
 def build(conn: psycopg.Connection, km: int = 1) -> None:
-    conn.execute(f"CREATE TABLE tunnel.point_s1_km{km}_new (LIKE tunnel.point)")
+    conn.execute("SELECT tunnel_api.partition_new(1, %s)", [km])
     conn.execute(f"INSERT INTO tunnel.point_s1_km{km}_new SELECT * FROM tunnel.point_s1_km{km} ORDER BY chainage LIMIT 100")
 
 
@@ -126,7 +126,7 @@ def test_first_kilometres_of_a_survey_at_once(survey: psycopg.Connection, sessio
     reader, one, two = session(), session(), session()
     reader.execute("SELECT count(*) FROM tunnel.point")
     for worker, km in ((one, 0), (two, 1)):
-        worker.execute(f"CREATE TABLE tunnel.point_s{number}_km{km}_new (LIKE tunnel.point)")
+        worker.execute("SELECT tunnel_api.partition_new(%s, %s)", [number, km])
     one.execute("SET LOCAL lock_timeout = '500ms'")
     one.execute("SELECT tunnel_api.partition_swap(%s, 0)", [number])
     swap = threading.Thread(target=two.execute, args=("SELECT tunnel_api.partition_swap(%s, 1)", [number]))

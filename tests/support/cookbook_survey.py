@@ -67,7 +67,7 @@ def prepare(conn: psycopg.Connection, survey: str) -> None:
 
 
 def _points(conn: psycopg.Connection, survey_id: int) -> None:
-    conn.execute("CREATE TABLE tunnel.point_s1_km12_new (LIKE tunnel.point)")
+    conn.execute("SELECT tunnel_api.partition_new(%s, 12)", (survey_id,))
     assert survey_id == 1
     classes = np.repeat([int(klass) for klass in POINTS], list(POINTS.values())).tolist()
     for start in (12340.001, 12345.001):

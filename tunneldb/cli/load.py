@@ -106,9 +106,9 @@ def load(
     (--medium water), as a boat's multibeam sonar makes them, without a pose.
     """
     from tunneldb.pipeline.load import load_files
-    from tunneldb.pipeline.load_sonar import load_sonar, record_soundings, sonar_among
     from tunneldb.pipeline.site_files import register_files
     from tunneldb.pointcloud.selection import FilterSettings
+    from tunneldb.store.scan_files import sonar_among
 
     if (medium == "water") != (water_level is not None):
         raise UserError("--medium water and --water-level M belong together: give both or none")
@@ -123,16 +123,19 @@ def load(
                 if water_level is not None:
                     if found.site:
                         raise UserError(f"survey {survey} is of a site, which has no axis: soundings are of tunnels")
+                    from tunneldb.pipeline.load_sonar import record_soundings
+
                     record_soundings(connection, found, files, water_level)
                 if found.site:
                     loaded = register_files(connection, found, files, chosen.max_left_out, step(progress))
                 else:
                     sonar = sonar_among(connection, found, files)
                     laser = [path for path in files if path not in sonar]
-                    loaded = chain(
-                        load_files(connection, found, laser, chosen, step(progress)) if laser else (),
-                        load_sonar(connection, found, sonar, step(progress)) if sonar else (),
-                    )
+                    loaded = load_files(connection, found, laser, chosen, step(progress)) if laser else iter(())
+                    if sonar:
+                        from tunneldb.pipeline.load_sonar import load_sonar
+
+                        loaded = chain(loaded, load_sonar(connection, found, sonar, step(progress)))
                 for file in loaded:
                     done.append(file)  # noqa: PERF402 - those before a failure are in the summary too
         finally:

@@ -27,12 +27,6 @@ FARTHEST = 15.0  # m from the sonar: beyond, its rays graze bed and walls, and l
 VOXEL = 0.05  # of which one point is kept, m: a beam is as wide a few metres off
 
 
-def sonar_among(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path]) -> list[Path]:
-    """Those of some files that were registered as sonar scans of the survey, by their names."""
-    known = stored_scans(conn, survey)
-    return [path for path in paths if path.name in known]
-
-
 def record_soundings(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path], water_level: float) -> None:
     """Record files of soundings that lie in the tunnel's system, for `load_sonar`; those that are recorded so stay.
 

@@ -145,15 +145,9 @@ def write_partition(
             yield pack_rows(survey, km, rows, file_ids).data
             progress(int(counts[low - begin : high - begin].sum()))
 
-    new = partition(survey, km, "_new")
-    conn.execute(sql.SQL("DROP TABLE IF EXISTS {}").format(new))
-    conn.execute(
-        sql.SQL("CREATE TABLE {} (LIKE tunnel.point, CONSTRAINT part CHECK (survey_id = {} AND km = {}))").format(
-            new, sql.Literal(survey.id), sql.Literal(km)
-        )
-    )
+    conn.execute("SELECT tunnel_api.partition_new(%s, %s)", [survey.id, km])
     with closing(prefetch(chunks())) as packed:
-        copy_binary(conn, new, COLUMNS, packed, fresh=True)
+        copy_binary(conn, partition(survey, km, "_new"), COLUMNS, packed, fresh=True)
     return written, left_out
 
 

@@ -104,6 +104,12 @@ def recorded_files(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, R
     return {row[1]: Recorded(*row) for row in rows}
 
 
+def sonar_among(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path]) -> list[Path]:
+    """Those of some files that were registered as sonar scans of the survey, by their names."""
+    known = conn.execute("SELECT name FROM tunnel.sonar_scan WHERE survey_id = %s", [survey.id]).fetchall()
+    return [path for path in paths if (path.name,) in known]
+
+
 def unchanged(conn: psycopg.Connection[Any], path: Path, recorded: Recorded | None) -> Loaded | None:
     """Leave a file of the same content as it is, but note where it lies now, for what reads it at full density."""
     if recorded is None or path.stat().st_size != recorded.bytes or checksum(path) != recorded.checksum:

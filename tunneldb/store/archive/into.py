@@ -102,11 +102,7 @@ def load_points(
     """Write a kilometre's points into a table of their own, which `attach_points` puts into place; return how many."""
     count = stage_rows(conn, "point", columns, chunks)
     new = sql.Identifier("tunnel", f"point_s{survey}_km{km}_new")
-    conn.execute(
-        sql.SQL("CREATE TABLE {} (LIKE tunnel.point, CONSTRAINT part CHECK (survey_id = {} AND km = {}))").format(
-            new, sql.Literal(survey), sql.Literal(km)
-        )
-    )
+    conn.execute("SELECT tunnel_api.partition_new(%s, %s)", [survey, km])
     row = conn.execute(
         "SELECT array_agg(old::int ORDER BY old), array_agg(new::int ORDER BY old) FROM pg_temp.map_scan_file"
     ).fetchone()
