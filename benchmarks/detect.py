@@ -111,7 +111,7 @@ def parts(dsn: str, path: Path, count: int) -> dict[str, float]:
     from tunneldb.raster.observation import Observer, Radiometer
     from tunneldb.raster.rasterize import CHUNK, Projector
     from tunneldb.store.images import load_reference
-    from tunneldb.store.sources import load_poses
+    from tunneldb.store.poses import load_poses
     from tunneldb.store.surface import load_surface
     from tunneldb.store.survey import get_survey
 

@@ -44,18 +44,19 @@ class Run:
 
 def ask_verbs(dsn: str, survey: str, folder: Path, only: str = "") -> list[Run]:
     """Run each verb some times, or those whose names hold one of some words, parted by commas; the least counts."""
-    postmaster = _postmaster(dsn)
+    postmaster = postmaster_of(dsn)
     found = []
     for name, verb in VERBS.items():
         if not any(word in name for word in only.split(",")):
             continue
         arguments = [word.format(survey=survey, folder=folder) for word in verb]
-        runs = [_run(dsn, arguments, postmaster) for _ in range(REPEATS)]
+        runs = [cpu_times(dsn, arguments, postmaster) for _ in range(REPEATS)]
         found.append(Run(name, min(run[0] for run in runs), min(run[1] for run in runs)))
     return found
 
 
-def _run(dsn: str, arguments: list[str], postmaster: int) -> tuple[float, float]:
+def cpu_times(dsn: str, arguments: list[str], postmaster: int) -> tuple[float, float]:
+    """CPU time of a verb, of the program and of its backends, s."""
     before = _ended(postmaster)
     with subprocess.Popen(
         [*COMMAND, "--dsn", dsn, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
@@ -70,7 +71,8 @@ def _run(dsn: str, arguments: list[str], postmaster: int) -> tuple[float, float]
     return usage.ru_utime + usage.ru_stime, _ended(postmaster) - before
 
 
-def _postmaster(dsn: str) -> int:
+def postmaster_of(dsn: str) -> int:
+    """Process of the server that a database is on, which runs on this machine."""
     with psycopg.connect(dsn) as connection:
         row = connection.execute("SELECT current_setting('data_directory')").fetchone()
     assert row is not None

@@ -30,7 +30,7 @@ COMMENT ON COLUMN tunnel_api.scan_station.height IS 'Of the scanner, m';
 COMMENT ON COLUMN tunnel_api.scan_station.geom IS 'The scanner''s place, tunnel''s SRID';
 
 -- A vertex a second is enough for a map, and a line a minute for its times. Of a minute the line goes on to where the next one
--- begins. It ends where a gap does: as PoseModel has it (tunneldb/pointcloud/poses.py), longer than 1 s and than 10 of the median interval.
+-- begins. It ends where a gap does: an interval longer than survey.longest_interval.
 CREATE OR REPLACE VIEW tunnel_api.trajectory AS
 SELECT (s.id::bigint << 38) | ((m.minute & 4294967295) << 6) | m.part AS id, s.id AS survey_id, s.name AS survey, s.date,
        m.time_from, m.time_to, least(a.chainage, b.chainage) AS chainage_from, greatest(a.chainage, b.chainage) AS chainage_to,
@@ -50,12 +50,9 @@ SELECT (s.id::bigint << 38) | ((m.minute & 4294967295) << 6) | m.part AS id, s.i
                   FROM (SELECT q.second, q.piece, min(q.time) AS time, count(*) AS poses,
                                (array_agg(q.geom ORDER BY q.time))[1] AS geom
                           FROM (SELECT p.time, p.geom, floor(p.time)::bigint AS second,
-                                       count(*) FILTER (WHERE p.apart > p.longest) OVER (ORDER BY p.time) AS piece
-                                  FROM (SELECT o.time, o.geom, o.time - lag(o.time) OVER (ORDER BY o.time) AS apart, i.longest
+                                       count(*) FILTER (WHERE p.apart > s.longest_interval) OVER (ORDER BY p.time) AS piece
+                                  FROM (SELECT o.time, o.geom, o.time - lag(o.time) OVER (ORDER BY o.time) AS apart
                                           FROM tunnel.pose o
-                                         CROSS JOIN (SELECT greatest(1, 10 * percentile_cont(0.5) WITHIN GROUP (ORDER BY d.apart)) AS longest
-                                                       FROM (SELECT e.time - lag(e.time) OVER (ORDER BY e.time) AS apart
-                                                               FROM tunnel.pose e WHERE e.survey_id = s.id) d) i
                                          WHERE o.survey_id = s.id) p) q
                          GROUP BY q.piece, q.second) v
                 WINDOW w AS (PARTITION BY v.piece ORDER BY v.time)) g

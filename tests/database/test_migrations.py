@@ -8,6 +8,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+import numpy as np
 import psycopg
 import pytest
 from alembic import command
@@ -23,6 +24,7 @@ from tunneldb.database.schema import HEAD, alembic_config, install_api, sql_file
 from tunneldb.database.server import Server
 from tunneldb.errors import UserError
 from tunneldb.pipeline.stages import STAGES
+from tunneldb.pointcloud.poses import PoseModel
 
 
 def dump(dsn: str, *options: str) -> str:
@@ -383,6 +385,41 @@ def test_images_of_before_are_kept_and_deviation_is_a_kind_of_them(empty_dsn: st
         assert kinds == [("deviation_lining",), ("offset",)]
         with pytest.raises(psycopg.errors.CheckViolation):
             connection.execute(add, ["deviation_rock"])
+
+
+def test_trajectories_from_before_have_their_gaps(empty_dsn: str) -> None:
+    """As the program has them, to the bit; a static survey has none."""
+    steady, uneven = np.cumsum(np.full(100, 0.1)), np.cumsum(np.random.default_rng(1).uniform(0.3, 0.7, 100))
+    times = {
+        1: np.delete(steady, np.s_[40:60]),
+        2: np.concatenate([uneven, uneven[-1:] + 20.0]),  # 100 intervals: the median is the mean of two
+        3: steady[:1],
+    }
+    with sqlalchemy_engine(empty_dsn).begin() as session:
+        session.exec_driver_sql("CREATE EXTENSION postgis")
+        command.upgrade(alembic_config(session), "0030")
+        session.exec_driver_sql(
+            """
+            INSERT INTO tunnel.tunnel (name, srid, alignment) VALUES ('t', 25830, 'SRID=25830;LINESTRINGZ(0 0 0, 0 9 0)');
+            INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)
+            SELECT t.id, n, '2024-05-04', 'none', 'mobile' FROM tunnel.tunnel t, generate_series(1, 4) n;
+            """
+        )
+        for survey, time in times.items():
+            session.exec_driver_sql(
+                "INSERT INTO tunnel.pose SELECT s.id, t, 'SRID=25830;POINTZ(0 0 0)' FROM tunnel.survey s, unnest(%s) t"
+                " WHERE s.name = %s",
+                (time.tolist(), str(survey)),
+            )
+    with open_connection(empty_dsn) as connection:
+        install(connection, STAGES)
+        found = connection.execute("SELECT name, longest_interval, trajectory_gaps FROM tunnel.survey ORDER BY name").fetchall()
+    assert found[3] == ("4", None, None)
+    for name, longest, gaps in found[:3]:
+        expected = PoseModel.from_trajectory(times[int(name)], np.zeros((len(times[int(name)]), 3)))
+        assert longest == expected.longest
+        assert gaps == expected.gaps.ravel().tolist()
+    assert [len(gaps) for _, _, gaps in found[:3]] == [2, 2, 0]
 
 
 def test_a_newer_database_is_refused(conn: psycopg.Connection, dsn: str) -> None:

@@ -2,7 +2,8 @@ import re
 
 import numpy as np
 
-from tunneldb.pointcloud.poses import PoseFaults, PoseModel
+from tunneldb.pointcloud.pose_coverage import PoseFaults
+from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import Points
 
 
@@ -35,11 +36,11 @@ def test_stations_by_scan() -> None:
 
 def test_times_outside_say_how_much_and_how_many() -> None:
     outside = points([7.5, 9.0, 15.0, 50.0, np.nan])
-    faults = TRACK.faults(outside)
+    faults = TRACK.coverage.faults(outside)
     assert re.search(r"gps_time of 4 points .* 2\.500 s before .* 10\.000 s after", faults.text())
     assert faults.points == 4
-    assert TRACK.known(outside).tolist() == [False, False, True, False, False]
-    np.testing.assert_array_equal(np.isnan(TRACK.positions(outside)).all(axis=1), ~TRACK.known(outside))
+    assert TRACK.coverage.known(outside).tolist() == [False, False, True, False, False]
+    np.testing.assert_array_equal(np.isnan(TRACK.positions(outside)).all(axis=1), ~TRACK.coverage.known(outside))
 
 
 def test_nothing_is_interpolated_over_a_gap() -> None:
@@ -47,9 +48,9 @@ def test_nothing_is_interpolated_over_a_gap() -> None:
     model = PoseModel.from_trajectory(time, np.column_stack([time, time, time]))
     np.testing.assert_allclose(model.gaps, [[4.9, 9.0]])
     within = points([4.85, 4.9, 5.0, 8.9, 9.0, 11.0])
-    assert model.known(within).tolist() == [True, True, False, False, True, True]
-    assert (model.faults(within).gap, model.faults(within).outside) == (2, 0)
-    assert "2 points were measured in gaps" in model.faults(within).text()
+    assert model.coverage.known(within).tolist() == [True, True, False, False, True, True]
+    assert (model.coverage.faults(within).gap, model.coverage.faults(within).outside) == (2, 0)
+    assert "2 points were measured in gaps" in model.coverage.faults(within).text()
     # a trajectory of a pose each two seconds has no gap of four
     slow = PoseModel.from_trajectory(np.array([0.0, 2, 4, 6, 10, 12]), np.zeros((6, 3)))
     assert len(slow.gaps) == 0
@@ -61,18 +62,18 @@ def test_rounding_of_times_is_borne() -> None:
 
 def test_unknown_scan_is_named() -> None:
     unknown = points([0] * 4, [9, 3, 4, 9])
-    assert "no station for scan_id 4 (1 points), 9 (2 points)" in STATIONS.faults(unknown).text()
+    assert "no station for scan_id 4 (1 points), 9 (2 points)" in STATIONS.coverage.faults(unknown).text()
     assert np.isnan(STATIONS.positions(unknown)[:, 0]).tolist() == [True, False, True, True]
 
 
 def test_scan_numbers_far_apart() -> None:
-    faults = STATIONS.faults(points([0, 0, 0], [-2_000_000_000, 3, 2_000_000_000]))
+    faults = STATIONS.coverage.faults(points([0, 0, 0], [-2_000_000_000, 3, 2_000_000_000]))
     assert faults.unknown == {-2_000_000_000: 1, 2_000_000_000: 1}
 
 
 def test_faults_of_chunks_add_up() -> None:
-    total = sum((STATIONS.faults(points([0, 0], scans)) for scans in ([1, 3], [1, 2])), PoseFaults())
+    total = sum((STATIONS.coverage.faults(points([0, 0], scans)) for scans in ([1, 3], [1, 2])), PoseFaults())
     assert total.unknown == {1: 2, 2: 1}
-    total = sum((TRACK.faults(points(times)) for times in ([9.0, 11.0], [8.0, 41.0], [])), PoseFaults())
+    total = sum((TRACK.coverage.faults(points(times)) for times in ([9.0, 11.0], [8.0, 41.0], [])), PoseFaults())
     assert (total.outside, total.before, total.after) == (3, 2.0, 1.0)
-    assert not TRACK.faults(points([12.0]))
+    assert not TRACK.coverage.faults(points([12.0]))

@@ -99,7 +99,7 @@ def axis() -> Alignment:
 def filtered(
     path: Path, memory: int = 1 << 28, chunk: int = 1_000_000, density: float | None = None
 ) -> tuple[FilterCounts, Rows]:
-    poses = PoseModel.from_stations(np.array([0]), ORIGIN[None])
+    poses = PoseModel.from_stations(np.array([0]), ORIGIN[None]).coverage
     with Spool(1 << 28) as survivors:
         counts = filter_file(path, None, axis(), poses, FilterSettings(density), survivors, 3, memory=memory, chunk=chunk)
         first, bins = survivors.counts()
@@ -157,7 +157,7 @@ def test_results_come_in_order(count: int) -> None:
 
 def test_progress_adds_up_to_twice_the_points(scan: tuple[Path, np.ndarray]) -> None:
     path, xyz = scan
-    poses, told = PoseModel.from_stations(np.array([0]), ORIGIN[None]), []
+    poses, told = PoseModel.from_stations(np.array([0]), ORIGIN[None]).coverage, []
     with Spool(1 << 28) as survivors:
         filter_file(path, None, axis(), poses, FilterSettings(), survivors, 0, told.append)
     assert sum(told) == 2 * len(xyz)

@@ -9,6 +9,8 @@ import psycopg
 import pytest
 from support.example_survey import SRID, example_surface
 
+from tunneldb.store.scanner import Positions, save_positions
+
 RATE, SPEED = 10, 2.0  # poses a second; m/s
 GAP = (30.0, 35.0)  # s
 BEGIN = 999_980.0  # s: 40 s before a whole minute
@@ -56,9 +58,7 @@ def test_a_trajectory_is_a_line_a_minute_without_its_gaps(conn: psycopg.Connecti
     time = np.arange(0, 80 * RATE + 1) / RATE
     time = time[(time <= GAP[0]) | (time >= GAP[1])]
     xyz = places(12490.0 - SPEED * time)
-    with conn.cursor() as cursor, cursor.copy("COPY tunnel.pose (survey_id, time, geom) FROM STDIN") as copy:
-        for t, (x, y, z) in zip(BEGIN + time, xyz, strict=True):
-            copy.write_row((survey_id, t, f"SRID={SRID};POINT({x} {y} {z})"))
+    save_positions(conn, survey_id, Positions(True, BEGIN + time, xyz), SRID)
     conn.execute("SET LOCAL ROLE tunnel_viewer")
     rows = conn.execute(
         "SELECT time_from, time_to, chainage_from, chainage_to, upwards, poses, speed, ST_NPoints(geom), label_from"

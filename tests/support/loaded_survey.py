@@ -12,6 +12,7 @@ import psycopg
 from tunneldb.pipeline.load import load_files
 from tunneldb.pointcloud.selection import FilterSettings
 from tunneldb.store.scan_files import Loaded
+from tunneldb.store.scanner import Positions, save_positions
 from tunneldb.store.survey import get_survey
 
 START = 970.0  # chainage of the axis' beginning: the kilometre changes in the middle
@@ -59,12 +60,9 @@ def add_survey(conn: psycopg.Connection, platform: str = "static", kind: str = "
         "VALUES (%s, %s, '2024-05-04', %s, %s, %s) RETURNING id",
         (tunnel, SURVEY, None if kind == "none" else "Amplitude", kind, platform),
     ).fetchone()[0]
-    table = "pose (survey_id, time, geom)" if platform == "mobile" else "station (survey_id, scan_id, geom)"
-    for key, x in ((0, 0.0), (1, LENGTH), (2, LENGTH)) if platform == "static" else ((0, 0.0), (60, LENGTH)):
-        conn.execute(
-            f"INSERT INTO tunnel.{table} VALUES (%s, %s, ST_SetSRID(ST_MakePoint(%s, %s, %s), 25830))",
-            (survey, key, ORIGIN[0] + x, *ORIGIN[1:].tolist()),
-        )
+    mobile = platform == "mobile"
+    keys, x = (np.array([0.0, 60.0]), [0.0, LENGTH]) if mobile else (np.arange(3, dtype=np.int32), [0.0, LENGTH, LENGTH])
+    save_positions(conn, survey, Positions(mobile, keys, ORIGIN + np.outer(x, [1.0, 0.0, 0.0])), 25830)
     conn.commit()
 
 

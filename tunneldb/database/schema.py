@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import sqlalchemy
     from alembic.config import Config
 
-HEAD = "0030"
+HEAD = "0031"
 """The newest migration. Known here so that a command whose database is up to date need not import Alembic."""
 
 _LOCK = 7088630451  # any number: two installations of one database wait for each other

@@ -20,7 +20,7 @@ from tunneldb.evaluate.spot_truth import read_spot_truth
 from tunneldb.evaluate.surfaces import FoundFace, Laid, lay_on_face, lay_on_faces, on_one_plane, place_of
 from tunneldb.evaluate.survey import distance_from_scanner
 from tunneldb.export.tables.spots import ListedSpot, read_spots
-from tunneldb.store.sources import load_poses
+from tunneldb.store.poses import load_poses
 from tunneldb.store.survey import Survey
 
 

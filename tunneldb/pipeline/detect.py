@@ -48,9 +48,10 @@ from tunneldb.store.images import (
     save_range_curve,
 )
 from tunneldb.store.learned import InForce, model_in_force
+from tunneldb.store.poses import load_poses
 from tunneldb.store.scene import load_arcs
 from tunneldb.store.sonar import water_level
-from tunneldb.store.sources import load_poses, sample, sources
+from tunneldb.store.sources import sample, sources
 from tunneldb.store.surface import load_surface, survey_ends
 from tunneldb.store.survey import Survey
 
@@ -178,7 +179,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
     surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
     grid = kilometre_grid(surface, km, values["image.pixel"])
     files = sources(conn, survey, km)
-    radiometer = load_radiometer(conn, survey, values)
+    radiometer = load_radiometer(conn, survey, km, values)
     beyond = grid.halo * grid.pixel
     depth = values["lining.tolerance"], values["lining.recess"]
     ends = survey_ends(conn, survey) or (-np.inf, np.inf)
@@ -294,8 +295,8 @@ def _save(
     }
 
 
-def load_radiometer(conn: psycopg.Connection[Any], survey: Survey, values: Mapping[str, float]) -> Radiometer | None:
-    """Read what a survey's intensity is corrected with, by the stages' parameters; None when it has none.
+def load_radiometer(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float]) -> Radiometer | None:
+    """Read what the intensity of a kilometre is corrected with, by the stages' parameters; None when it has none.
 
     A range curve that is to be found on the lining is UNKNOWN at first: see :func:`tunneldb.pipeline.calibration.calibrate`.
     """
@@ -312,7 +313,7 @@ def load_radiometer(conn: psycopg.Connection[Any], survey: Survey, values: Mappi
             " found on the lining, or take a reflectance dimension"
         )
     limits = (values[f"intensity.{name}"] for name in ("max_incidence", "max_range", "max_outside"))
-    return Radiometer(kind, load_poses(conn, survey), reference, *limits)
+    return Radiometer(kind, load_poses(conn, survey, km), reference, *limits)
 
 
 def load_floor(conn: psycopg.Connection[Any], survey: Survey, surface: Surface, km: int, halo: float) -> Floor:

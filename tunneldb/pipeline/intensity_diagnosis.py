@@ -109,7 +109,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
     measured = load_reference(conn, survey) if needs_reference(kind) else None
     surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
     # Without a curve the lining itself is asked, whether or not detection is to go by it.
-    radiometer = load_radiometer(conn, survey if measured else replace(survey, reference="auto"), values)
+    radiometer = load_radiometer(conn, survey if measured else replace(survey, reference="auto"), km, values)
     depth = values["lining.tolerance"], values["lining.recess"]
     observer = Observer.of(surface, km, depth, radiometer, load_floor(conn, survey, surface, km, 0.0))
     view = observe_sample(sample(conn, survey, km), observer)

@@ -257,7 +257,7 @@ def _read(inputs: Inputs, values: _Values | None, progress: Callable[[float], No
 
 def _refuse_unknown(inputs: Inputs, points: Points, values: _Values) -> None:
     if values.unknown > max(UNKNOWN * values.count, 1000):
-        raise UserError(f"{inputs.name}: {inputs.poses.faults(points).text() or 'points without a scanner position'}")
+        raise UserError(f"{inputs.name}: {inputs.poses.coverage.faults(points).text() or 'points without a scanner position'}")
 
 
 def read_all(

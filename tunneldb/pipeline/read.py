@@ -20,12 +20,13 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import require_same_density
 from tunneldb.pipeline.parameters import PARAMETERS
 from tunneldb.pointcloud.formats.faults import require_dimension
-from tunneldb.pointcloud.poses import PoseModel
+from tunneldb.pointcloud.pose_coverage import PoseCoverage
 from tunneldb.pointcloud.reader import ScanHeader, check_header, crs_note, read_header
 from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
 from tunneldb.pointcloud.spool import Spool
 from tunneldb.radiometry.intensity_kind import contradiction, doubt
 from tunneldb.store.partition import drop_fragments, write_fragments
+from tunneldb.store.poses import load_pose_coverage
 from tunneldb.store.scan_files import (
     Content,
     Recorded,
@@ -36,7 +37,6 @@ from tunneldb.store.scan_files import (
     recorded_files,
     unchanged,
 )
-from tunneldb.store.sources import load_poses
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
@@ -172,15 +172,15 @@ class Reading:
     survey: Survey
     settings: FilterSettings
     alignment: Alignment
-    poses: PoseModel
+    poses: PoseCoverage
     memory: int
     held: dict[int, Spool] | None = None
     share: int = 1
 
     @classmethod
     def of(cls, conn: psycopg.Connection[Any], survey: Survey, settings: FilterSettings, memory: int = MEMORY) -> Reading:
-        """Read axis and scanner positions of the survey."""
-        return cls(conn, survey, settings, load_alignment(conn, survey), load_poses(conn, survey), memory)
+        """Read the axis of the survey, and what scanner positions it has."""
+        return cls(conn, survey, settings, load_alignment(conn, survey), load_pose_coverage(conn, survey), memory)
 
     def check(self, header: ScanHeader) -> None:
         """Check a file against its survey."""
@@ -261,7 +261,7 @@ class Reading:
             left = [] if former is None else self.leave(former)
             content = Content(path, digest, path.stat().st_size, stated, doubtful, counts)
             file_id = record_file(self.conn, self.survey, content)
-            record_kilometres(self.conn, file_id, survivors.kilometres(), counts.ranges, left)
+            record_kilometres(self.conn, file_id, survivors.kilometres(), counts, left)
             if self.held is None:
                 write_fragments(self.conn, self.survey, file_id, survivors)
             else:

@@ -17,11 +17,12 @@ from tunneldb.geometry.crs import outside_area
 from tunneldb.pipeline.read import Begin, read_headers, require_kind, silent
 from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.points import Points
-from tunneldb.pointcloud.poses import PoseFaults, PoseModel
+from tunneldb.pointcloud.pose_coverage import PoseCoverage, PoseFaults
 from tunneldb.pointcloud.reader import CHUNK, ScanHeader, check_header, crs_note
 from tunneldb.pointcloud.selection import SAMPLED, FilterCounts
 from tunneldb.radiometry.intensity_kind import doubt
 from tunneldb.store.ledger import stage_run
+from tunneldb.store.poses import load_pose_coverage
 from tunneldb.store.scan_files import (
     COUNTED,
     Content,
@@ -33,7 +34,6 @@ from tunneldb.store.scan_files import (
     recorded_files,
     unchanged,
 )
-from tunneldb.store.sources import load_poses
 from tunneldb.store.survey import Survey
 
 
@@ -72,7 +72,7 @@ def register_files(
     UserError
         For a file that is unreadable or does not fit the survey. The headers of all are looked at before the first is read.
     """
-    poses = load_poses(conn, survey)
+    poses = load_pose_coverage(conn, survey)
     headers = read_headers(paths)
     for header in headers:
         check_header(header, survey.intensity_dimension, survey.srid, needs_time=poses.mobile)
@@ -101,7 +101,7 @@ def _register(
     conn: psycopg.Connection[Any],
     survey: Survey,
     header: ScanHeader,
-    poses: PoseModel,
+    poses: PoseCoverage,
     max_left_out: float,
     begin: Begin,
     *,
@@ -122,7 +122,7 @@ def _register(
     return loaded
 
 
-def _look_through(survey: Survey, header: ScanHeader, poses: PoseModel, max_left_out: float, begin: Begin) -> FilterCounts:
+def _look_through(survey: Survey, header: ScanHeader, poses: PoseCoverage, max_left_out: float, begin: Begin) -> FilterCounts:
     """Count what of a file can't be used, and its extent; refuse it where that is too much."""
     counts, faults = FilterCounts(), PoseFaults()
     low, high = counts.extent[:3], counts.extent[3:]

@@ -14,7 +14,8 @@ from tunneldb.pipeline.spot_colours import find_coloured_members
 from tunneldb.radiometry.correction import Kind
 from tunneldb.store.images import load_reference
 from tunneldb.store.ledger import stage_run
-from tunneldb.store.sources import load_poses, unchanged_file
+from tunneldb.store.poses import load_poses
+from tunneldb.store.sources import unchanged_file
 from tunneldb.store.structures import SavedSpots, save_structures
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey

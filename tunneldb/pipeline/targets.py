@@ -23,8 +23,9 @@ from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import CHUNK, Points, ScanSource, read_chunks
 from tunneldb.pointcloud.spool import BINS_PER_METRE, Spool, bin_of, windows
 from tunneldb.store.ledger import stage_run
+from tunneldb.store.poses import load_poses
 from tunneldb.store.scene import line_of, load_ground, save_spheres
-from tunneldb.store.sources import load_poses, sources
+from tunneldb.store.sources import sources
 from tunneldb.store.surface import load_alignment, load_surface
 from tunneldb.store.survey import Survey
 

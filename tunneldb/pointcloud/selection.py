@@ -23,11 +23,12 @@ from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.misplacement import explain_misplacement
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pointcloud.beyond_ends import BeyondEnds
+from tunneldb.pointcloud.block_times import BlockTimes
 from tunneldb.pointcloud.chainage_lookup import STRETCHING, ChainageLookup
 from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.noise import DIAMETER, POINTS, is_noise, search_radii, typical_density
 from tunneldb.pointcloud.points import CHUNK, Points, on_earth
-from tunneldb.pointcloud.poses import PoseFaults, PoseModel
+from tunneldb.pointcloud.pose_coverage import PoseCoverage, PoseFaults
 from tunneldb.pointcloud.prefetch import in_order, prefetch
 from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, PLACE, Rows, Spool, bin_of, rows_xyz, windows
 from tunneldb.pointcloud.thinning import first_of_voxels, pick, voxel_edge
@@ -98,6 +99,8 @@ class FilterCounts:
         Raw intensities of some points near the axis.
     ranges : dict of int to list of (int, int)
         Where in the file the points of each kilometre and MARGIN beyond are: ranges of point numbers from 0.
+    seconds : dict of int to list of (int, int)
+        Between which whole seconds, half-open, all finite times of the points in these ranges lie.
     density : float
         Points per m² of surface about half of the points near the axis or more, noise included.
     """
@@ -111,6 +114,7 @@ class FilterCounts:
     chainage: tuple[float, float] = (math.inf, -math.inf)
     extent: Float = field(default_factory=lambda: np.array([np.inf] * 3 + [-np.inf] * 3))
     ranges: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
+    seconds: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
     beyond: tuple[int, int] = (0, 0)
     beyond_reach: tuple[float, float] = (0.0, 0.0)
     intensities: list[Single] = field(default_factory=list)
@@ -152,7 +156,7 @@ def filter_file(
     path: Path,
     dimension: str | None,
     alignment: Alignment,
-    poses: PoseModel,
+    poses: PoseCoverage,
     settings: FilterSettings,
     survivors: Spool,
     tag: int,
@@ -170,8 +174,8 @@ def filter_file(
         The file and its intensity dimension.
     alignment : Alignment
         The given axis, which gives the chainage.
-    poses : PoseModel
-        Scanner positions.
+    poses : PoseCoverage
+        What scanner positions there are.
     settings : FilterSettings
         Noise filter, thinning, and how far from the axis the tunnel reaches.
     survivors : Spool
@@ -215,7 +219,7 @@ class _Filter:
         path: Path,
         dimension: str | None,
         alignment: Alignment,
-        poses: PoseModel,
+        poses: PoseCoverage,
         settings: FilterSettings,
         memory: int,
     ) -> None:
@@ -225,6 +229,7 @@ class _Filter:
         self.faults, self.invalid = PoseFaults(), ""
         self.places = ChainageLookup(alignment, settings.max_distance, self.cells.edge)
         self.beyond = BeyondEnds(alignment, settings.max_distance)
+        self.times = BlockTimes(BLOCK)
         self.rows, self.cloud = Spool(memory // 2), Spool(memory // 2, PLACE)
 
     def __enter__(self) -> _Filter:
@@ -250,6 +255,7 @@ class _Filter:
         counts.beyond, counts.beyond_reach = self.beyond.points, self.beyond.reach
         for ranges in counts.ranges.values():
             ranges[-1] = (ranges[-1][0], min(ranges[-1][1], counts.points))
+        counts.seconds = {km: self.times.seconds(ranges) for km, ranges in counts.ranges.items()}
         if counts.outside and counts.outside + counts.invalid == counts.points:
             check = "check the axis, the file's coordinates and the tunnel's SRID"
             raise UserError(
@@ -272,6 +278,7 @@ class _Filter:
 
     def _set_aside(self, points: Points) -> None:
         """Set the points of a chunk aside that lie near the axis and whose scanner position is known."""
+        self.times.add(self.counts.points, points.time)
         number = np.arange(self.counts.points, self.counts.points + len(points))
         self.counts.points += len(points)
         finite = points.finite(time=self.poses.mobile, intensity=self.dimension is not None)

@@ -22,7 +22,7 @@ from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.pointcloud.formats.las_bounds import header_box
 from tunneldb.pointcloud.formats.table import format_of
 from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
-from tunneldb.store.sources import is_mobile
+from tunneldb.store.poses import is_mobile
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 

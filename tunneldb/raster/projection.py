@@ -16,7 +16,8 @@ import numpy as np
 from tunneldb.arrays import Bool, Float, Int32, Int64, Single
 from tunneldb.compiled import point_inner, point_kernel
 from tunneldb.geometry.unrolling import to_plane
-from tunneldb.pointcloud.poses import TIME_TOLERANCE, interval, position_at
+from tunneldb.pointcloud.pose_coverage import TIME_TOLERANCE
+from tunneldb.pointcloud.poses import interval, position_at
 from tunneldb.radiometry.correction import reference_at
 from tunneldb.radiometry.edge_normals import face_at, face_normal
 from tunneldb.threads import in_blocks

@@ -207,7 +207,7 @@ def record_kilometres(
     conn: psycopg.Connection[Any],
     file_id: int,
     held: Mapping[int, int],
-    ranges: Mapping[int, Sequence[tuple[int, int]]],
+    counts: FilterCounts,
     left: Iterable[int],
 ) -> None:
     """Enter which kilometres a file touches.
@@ -216,8 +216,8 @@ def record_kilometres(
     ----------
     held : mapping of int to int
         Rows that wait to be loaded, by kilometre.
-    ranges : mapping of int to sequence of (int, int)
-        Where in the file the points of each kilometre and a little beyond are.
+    counts : FilterCounts
+        Where in the file the points of each kilometre and a little beyond are, and when they were measured.
     left : iterable of int
         Kilometres that may hold rows of the file's former content, which have to go.
     """
@@ -225,24 +225,29 @@ def record_kilometres(
     left = set(left)
     with conn.cursor() as cursor:
         cursor.executemany(
-            "INSERT INTO tunnel.file_km (file_id, km, rows, points, loaded_at)"
-            " VALUES (%s, %s, %s, %s, CASE WHEN %s THEN NULL ELSE clock_timestamp() END)",
+            "INSERT INTO tunnel.file_km (file_id, km, rows, points, seconds, loaded_at)"
+            " VALUES (%s, %s, %s, %s, %s, CASE WHEN %s THEN NULL ELSE clock_timestamp() END)",
             [
                 (
                     file_id,
                     km,
                     held.get(km, 0),
-                    Multirange([Range(begin, end) for begin, end in ranges.get(km, ())]),
+                    _multirange(counts.ranges.get(km, ())),
+                    _multirange(counts.seconds.get(km, ())),
                     km in held or km in left,
                 )
-                for km in sorted({*held, *ranges, *left})
+                for km in sorted({*held, *counts.ranges, *left})
             ],
         )
 
 
+def _multirange(ranges: Sequence[tuple[int, int]]) -> Multirange[int]:
+    return Multirange([Range(begin, end) for begin, end in ranges])
+
+
 def withdraw_file(conn: psycopg.Connection[Any], file_id: int, left: Iterable[int]) -> None:
     """Note that a file is to leave the kilometres that may hold rows of it; one of no bytes has been withdrawn."""
-    record_kilometres(conn, file_id, {}, {}, left)
+    record_kilometres(conn, file_id, {}, FilterCounts(), left)
     conn.execute(
         "UPDATE tunnel.scan_file SET checksum = '', bytes = 0, points = 0, noise = 0, outside = 0, invalid = 0, unposed = 0,"
         " thinned = 0, kept = 0 WHERE id = %s",

@@ -125,7 +125,14 @@ def read_positions(
 def save_positions(connection: psycopg.Connection[Any], survey: int, positions: Positions, srid: int) -> None:
     """Write the positions of a survey, by its key, that has none, and what is to be known of them."""
     note = "; ".join(positions.notes) or None
-    connection.execute("UPDATE tunnel.survey SET positions_note = %s WHERE id = %s", [note, survey])
+    longest, gaps = None, None
+    if positions.mobile:
+        trajectory = PoseModel.from_trajectory(positions.keys, positions.xyz)
+        longest, gaps = trajectory.longest, trajectory.gaps.ravel().tolist()
+    connection.execute(
+        "UPDATE tunnel.survey SET positions_note = %s, longest_interval = %s, trajectory_gaps = %s WHERE id = %s",
+        [note, longest, gaps, survey],
+    )
     if not len(positions):
         return
     table, key = ("pose", "time") if positions.mobile else ("station", "scan_id")

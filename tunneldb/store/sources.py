@@ -1,4 +1,4 @@
-"""What a stage reads: the scan files of a kilometre, its points of survey density, and where the scanner was."""
+"""What a stage reads: the scan files of a kilometre, and its points of survey density."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from psycopg import sql
 from tunneldb.arrays import Float
 from tunneldb.database.fetch import fetch_array
 from tunneldb.errors import UserError
-from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import Points, ScanSource
 from tunneldb.store.partition import partition, partition_exists, rows_in
 from tunneldb.store.scan_files import checksum
@@ -105,51 +104,6 @@ def sample(conn: psycopg.Connection[Any], survey: Survey, km: int, count: int = 
         rows["intensity"],
         np.zeros(len(rows), np.uint8),
     )
-
-
-def is_mobile(conn: psycopg.Connection[Any], survey: Survey) -> bool:
-    """Whether a survey's scanner positions come from a trajectory; says so where it has none of its kind.
-
-    Raises
-    ------
-    UserError
-        If it is to have a trajectory or stations, and has none.
-    """
-    if survey.platform == "unknown":
-        return False
-    table = sql.Identifier("tunnel", "pose" if survey.platform == "mobile" else "station")
-    query = sql.SQL("SELECT FROM {} WHERE survey_id = %s LIMIT 1").format(table)
-    if conn.execute(query, [survey.id]).fetchone() is None:
-        raise _no_positions(survey)
-    return survey.platform == "mobile"
-
-
-def _no_positions(survey: Survey) -> UserError:
-    kind = "trajectory" if survey.platform == "mobile" else "stations"
-    return UserError(f"survey {survey.name} has no {kind}: add the survey again with --{kind}")
-
-
-def load_poses(conn: psycopg.Connection[Any], survey: Survey) -> PoseModel:
-    """Read the trajectory of a mobile survey, or the stations of a static one; nothing of one without.
-
-    Raises
-    ------
-    UserError
-        If the survey has none.
-    """
-    if survey.platform == "unknown":
-        return PoseModel.unknown()
-    table, key = ("pose", "time") if survey.platform == "mobile" else ("station", "scan_id")
-    fields: list[tuple[str, str, sql.Composable]] = [(key, "f8", sql.SQL("{}::float8").format(sql.Identifier(key)))]
-    fields += [("x", "f8", sql.SQL("ST_X(geom)")), ("y", "f8", sql.SQL("ST_Y(geom)")), ("z", "f8", sql.SQL("ST_Z(geom)"))]
-    source = sql.SQL("FROM {} WHERE survey_id = %(survey)s").format(sql.Identifier("tunnel", table))
-    rows = fetch_array(conn, fields, source, {"survey": survey.id})
-    if len(rows) == 0:
-        raise _no_positions(survey)
-    xyz = np.column_stack([rows["x"], rows["y"], rows["z"]])
-    if survey.platform == "mobile":
-        return PoseModel.from_trajectory(rows["time"], xyz)
-    return PoseModel.from_stations(rows["scan_id"].astype(np.int64), xyz)
 
 
 def load_points(conn: psycopg.Connection[Any], survey: Survey, km: int, begin: float, end: float) -> tuple[Float, int]:

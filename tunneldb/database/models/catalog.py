@@ -130,6 +130,12 @@ class Survey(Base):
     positions_note: Mapped[str | None] = mapped_column(
         comment="What is to be known of its scanner positions: poses left out, gaps"
     )
+    longest_interval: Mapped[float | None] = mapped_column(
+        comment="Longest interval of its trajectory that is interpolated over, s; NULL without a trajectory"
+    )
+    trajectory_gaps: Mapped[list[float] | None] = mapped_column(
+        comment="Longer intervals of its trajectory: times from and to, one after the other, s; NULL without a trajectory"
+    )
     settings_at: Mapped[dt.datetime | None] = mapped_column(
         comment="When scanner positions, reference or intensity were last set to others"
     )

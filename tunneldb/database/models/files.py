@@ -77,6 +77,10 @@ class FileKm(Base):
         INT8MULTIRANGE,
         comment="Where in the file the points of the kilometre and 10 m to both sides are: ranges of point numbers from 0",
     )
+    seconds: Mapped[Any | None] = mapped_column(
+        INT8MULTIRANGE,
+        comment="When these were measured: whole seconds between which their gps_time lies; NULL where not known",
+    )
     read_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When the file was read")
     loaded_at: Mapped[dt.datetime | None] = mapped_column(
         comment="When they were loaded into the kilometre; none while they wait"

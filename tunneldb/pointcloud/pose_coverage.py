@@ -1,0 +1,167 @@
+"""Of which points it is known where the scanner stood."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tunneldb.arrays import Bool, Float, Int32, Int64
+from tunneldb.pointcloud.points import Points
+
+# Times in a CSV are rounded; beyond the ends of the trajectory they may be off by this much, s.
+TIME_TOLERANCE = 0.001
+
+_WEEK = 604_800.0  # s
+_UNIX_TO_GPS = 315_964_800.0  # s from 1970 to the beginning of GPS time, without leap seconds
+
+
+@dataclass
+class PoseFaults:
+    """Points whose scanner position is unknown; add those of several chunks with `+`.
+
+    Attributes
+    ----------
+    outside : int
+        Number of points whose time lies outside the trajectory.
+    gap : int
+        Number of points in its gaps.
+    before, after : float
+        How far the worst of them lie before its start and after its end, s.
+    unknown : dict of int to int
+        Number of points of each scan_id that has no station.
+    guess : str
+        Why the times may differ.
+    """
+
+    outside: int = 0
+    gap: int = 0
+    before: float = 0.0
+    after: float = 0.0
+    unknown: dict[int, int] = field(default_factory=dict)
+    guess: str = ""
+
+    @property
+    def points(self) -> int:
+        """All of them."""
+        return self.outside + self.gap + sum(self.unknown.values())
+
+    def __bool__(self) -> bool:
+        return self.points > 0
+
+    def __add__(self, other: PoseFaults) -> PoseFaults:
+        unknown = dict(self.unknown)
+        for scan_id, count in other.unknown.items():
+            unknown[scan_id] = unknown.get(scan_id, 0) + count
+        return PoseFaults(
+            self.outside + other.outside,
+            self.gap + other.gap,
+            max(self.before, other.before),
+            max(self.after, other.after),
+            unknown,
+            self.guess or other.guess,
+        )
+
+    def text(self) -> str:
+        """What is wrong and what to do, for the user."""
+        if self.unknown:
+            scans = ", ".join(f"{scan} ({count} points)" for scan, count in sorted(self.unknown.items())[:10])
+            more = f" and {len(self.unknown) - 10} more" if len(self.unknown) > 10 else ""
+            return (
+                f"no station for scan_id {scans}{more}; add them to the stations of the survey "
+                "(scan_id is a LAS file's point_source_id; an E57 or PTX file brings its own: survey add … --stations FILE.e57)"
+            )
+        where = [
+            f"up to {seconds:.3f} s {side}"
+            for seconds, side in ((self.before, "before its start"), (self.after, "after its end"))
+            if seconds > 0
+        ]
+        lost = [f"gps_time of {self.outside} points is outside the trajectory, {' and '.join(where)}"] if self.outside else []
+        lost += [f"{self.gap} points were measured in gaps of the trajectory"] if self.gap else []
+        return f"{' and '.join(lost)}; {self.guess or 'give the whole trajectory, in the time that the file uses'}"
+
+
+@dataclass(frozen=True)
+class PoseCoverage:
+    """What scanner positions there are: those of some scans, or a trajectory from end to end but for its gaps; or none at all.
+
+    Attributes
+    ----------
+    scan_id : (k,) int64 array
+        Scans that have a station, growing; empty for a mobile scanner.
+    ends : (float, float) or None
+        Times at which the trajectory begins and ends, s; None for a static scanner.
+    gaps : (g, 2) float64 array
+        Times from and to, growing, s.
+    """
+
+    scan_id: Int64
+    ends: tuple[float, float] | None
+    gaps: Float
+
+    @property
+    def empty(self) -> bool:
+        """Whether it is known of no point where the scanner was, and so is nothing that any of them lacks."""
+        return not self.mobile and not len(self.scan_id)
+
+    @property
+    def mobile(self) -> bool:
+        """Whether positions come from a trajectory."""
+        return self.ends is not None
+
+    def faults(self, points: Points) -> PoseFaults:
+        """Count the points whose scanner position is unknown."""
+        if len(points) == 0 or self.empty:
+            return PoseFaults()
+        if self.ends is not None:
+            outside = points.time[~_covers(self.ends, points.time)]
+            gap = int(np.count_nonzero(_in_gap(self.gaps, points.time)))
+            before, after = (float(np.nanmax(off, initial=0.0)) for off in (self.ends[0] - outside, outside - self.ends[1]))
+            guess = _clocks(self.ends, outside) if len(outside) else ""
+            return PoseFaults(len(outside), gap, before, after, guess=guess)
+        scans, counts = _count_scans(points.scan_id)
+        known = np.isin(scans, self.scan_id)
+        return PoseFaults(unknown=dict(zip(scans[~known].tolist(), counts[~known].tolist(), strict=True)))
+
+    def known(self, points: Points) -> Bool:
+        """Which points' scanner position is known; all, where none is asked for."""
+        if self.empty:
+            return np.ones(len(points), np.bool_)
+        if self.ends is not None:
+            return _covers(self.ends, points.time) & ~_in_gap(self.gaps, points.time)
+        return np.isin(points.scan_id, self.scan_id)
+
+
+def _covers(ends: tuple[float, float], time: Float) -> Bool:
+    return (time >= ends[0] - TIME_TOLERANCE) & (time <= ends[1] + TIME_TOLERANCE)
+
+
+def _in_gap(gaps: Float, time: Float) -> Bool:
+    """Which times (n,) lie in gaps, of which there may be thousands."""
+    if not len(gaps):
+        return np.zeros(len(time), np.bool_)
+    last = np.searchsorted(gaps[:, 0] + TIME_TOLERANCE, time) - 1  # of those that begin before
+    return np.asarray((last >= 0) & (time < gaps[last, 1] - TIME_TOLERANCE))
+
+
+def _clocks(ends: tuple[float, float], points: Float) -> str:
+    """Which clocks a trajectory with these ends and points outside of it seem to have, where these are others; a guess."""
+    one, other = sum(ends) / 2.0, float(np.median(points))
+    in_week = [0.0 <= time <= _WEEK for time in (one, other)]
+    if in_week[0] != in_week[1]:
+        names = ("seconds of the GPS week", "time since an epoch")
+        return f"the trajectory seems to be in {names[in_week[1]]}, the file in {names[in_week[0]]}: bring them to one"
+    for seconds, names in ((1e9, ("adjusted GPS time", "GPS time")), (_UNIX_TO_GPS, ("GPS time", "Unix time"))):
+        if abs(abs(other - one) - seconds) < _WEEK:
+            return f"the trajectory seems to be in {names[one > other]}, the file in {names[other > one]}: bring them to one"
+    return ""
+
+
+def _count_scans(scan_id: Int32) -> tuple[Int64, Int64]:
+    low, high = int(scan_id.min()), int(scan_id.max())
+    if high - low > 1_000_000:
+        scans, counts = np.unique(scan_id, return_counts=True)
+        return scans.astype(np.int64), counts
+    counts = np.bincount(scan_id - low)
+    present = np.flatnonzero(counts)
+    return present + low, counts[present]
