@@ -62,3 +62,4 @@ class FiniteRange(click.FloatRange):
 
 
 FINITE = Finite()
+SEED = click.IntRange(0, 2**63 - 1)  # what random numbers start from, and formats keep

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import click
 
 from tunneldb.cli.output import Verb, tell, verb
-from tunneldb.cli.param_types import FINITE, FilePath
+from tunneldb.cli.param_types import FINITE, SEED, FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.simulate import PRESETS, Parameters, Simulation, write
 from tunneldb.simulate.parameters import CHOICES
@@ -194,7 +194,7 @@ _GROUPS: dict[str, list[_Option]] = {
     ],
     "Other": [
         _Option("name", "NAME", "First part of the file names.", str),
-        _Option("seed", "N", "Seed; the same seed gives the same points.", int),
+        _Option("seed", "N", "Seed; the same seed gives the same points.", SEED),
     ],
 }
 _FLAGS = {

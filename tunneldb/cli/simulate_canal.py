@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.param_types import FINITE, FilePath
+from tunneldb.cli.param_types import FINITE, SEED, FilePath
 from tunneldb.cli.progress import say
 from tunneldb.files import made_folder, told_to_end
 from tunneldb.simulate.canal import CanalParameters, simulate, write
@@ -55,7 +55,7 @@ def _option(name: str, metavar: str, text: str, kind: Any = FINITE) -> Any:
 @_option("false_share", "SHARE", "Of false echoes.")
 @_option("srid", "EPSG", "Coordinate system, projected in metres.", int)
 @_option("name", "NAME", "First part of the file names.", str)
-@_option("seed", "N", "Seed; the same seed gives the same points.", int)
+@_option("seed", "N", "Seed; the same seed gives the same points.", SEED)
 def simulate_canal(out: Path, **given: Any) -> None:
     """Make simulated scans of a canal tunnel, with their truth, in the folder OUT.
 

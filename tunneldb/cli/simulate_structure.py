@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.param_types import FINITE, FilePath
+from tunneldb.cli.param_types import FINITE, SEED, FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.simulate.structure import StructureParameters, StructureScan, write_structure
 
@@ -46,7 +46,7 @@ def _option(name: str, metavar: str, text: str, kind: Any = FINITE, nargs: int =
 @click.option("--night", is_flag=True, help="No colours, and other noise; structure and anomalies stay.")
 @_option("srid", "EPSG", "Coordinate system, projected in metres.", int)
 @_option("name", "NAME", "First part of the file names.", str)
-@_option("seed", "N", "Seed; the same seed gives the same points.", int)
+@_option("seed", "N", "Seed; the same seed gives the same points.", SEED)
 def simulate_structure(out: Path, **given: Any) -> None:
     """Make a simulated scan of a structure, with its truth, in the folder OUT.
 

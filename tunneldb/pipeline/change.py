@@ -21,7 +21,7 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.deviation import lining_by_class
-from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_different_tunnels, refuse_stale
+from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_beyond, refuse_different_tunnels, refuse_stale
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.pixel_state import PixelState, shows_lining
 from tunneldb.shape import change as shape_change
@@ -120,6 +120,8 @@ def compare(
         If they are of two tunnels or one and the same, if they have no kilometre in common, or one is out of date.
     """
     refuse_different_tunnels(old, new, "compare")
+    for survey in (old, new):
+        refuse_beyond(conn, survey, low, high)
     there = stale_kilometres(conn, old, new, low, high)
     conn.rollback()
     if not there:

@@ -19,7 +19,7 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
-from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_stale
+from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_beyond, refuse_stale
 from tunneldb.pipeline.run import nothing_yet
 from tunneldb.shape.clearance import PASSING, STEP, Clearance, Grouping, clearance, clock
 from tunneldb.shape.gauge import Widening, halved, terms, widened
@@ -137,6 +137,7 @@ def measure_clearance(
     UserError
         If a kilometre's ground is out of date, or there is none in the stretch.
     """
+    refuse_beyond(conn, survey, low, high)
     ends = survey_ends(conn, survey) or (-np.inf, np.inf)
     there = [km for km in classed_kilometres(conn, survey) if (km + 1) * KILOMETRE > low and km * KILOMETRE < high]
     if not there:

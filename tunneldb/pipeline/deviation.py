@@ -15,7 +15,7 @@ from tunneldb.classification.classes import PointClass
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
-from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_stale
+from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_beyond, refuse_stale
 from tunneldb.pipeline.run import nothing_yet
 from tunneldb.raster.geotiff import Raster
 from tunneldb.shape.overbreak import section_deviation
@@ -96,6 +96,7 @@ def measure_deviation(
     UserError
         If the layer has no profile, or the survey no offset image where it has one.
     """
+    refuse_beyond(conn, survey, low, high)
     there = measurable_kilometres(conn, survey, layer, low, high)
 
     def measure(km: int) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from tunneldb.arrays import Single
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.deviation import measure_deviation
-from tunneldb.pipeline.on_demand import Begin, measure_kilometres
+from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_beyond
 from tunneldb.raster.geotiff import DEVIATION_KINDS, laid
 from tunneldb.raster.grid import BLOCK
 from tunneldb.shape.evenness import ALONG, AROUND, Evenness, evenness, step_evenness, uneven_areas
@@ -86,6 +86,7 @@ def measure_evenness(
     UserError
         As :func:`measure_deviation` does, or if the straightedge is too short for the image's pixels.
     """
+    refuse_beyond(conn, survey, low, high)
     # The kilometres beside are part of what a straightedge near an end lies on.
     measure_deviation(conn, survey, layer, low - length, high + length, begin)
     there = evenness_kilometres(conn, survey, layer, length, limit, low, high)

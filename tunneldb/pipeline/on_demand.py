@@ -9,6 +9,7 @@ import psycopg
 
 from tunneldb.errors import UserError
 from tunneldb.store.ledger import stage_run
+from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
 Begin = Callable[[str, float], Callable[[float], None]]
@@ -64,6 +65,19 @@ def refuse_stale(reasons: Mapping[int, str | None], survey: str, verb: str) -> N
     for km, why in reasons.items():
         if why is not None and " is stale" in why:
             raise UserError(f"kilometre {km}: {why}; tunneldb run {survey} --stale, then {verb}")
+
+
+def refuse_beyond(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> None:
+    """Refuse a stretch that lies beyond the ends of a survey, before its kilometres are measured for nothing.
+
+    Raises
+    ------
+    UserError
+        If it does.
+    """
+    ends = survey_ends(conn, survey)
+    if ends is not None and (high <= ends[0] or low >= ends[1]):
+        raise UserError(f"survey {survey.name} has nothing there: it reaches from chainage {ends[0]:.3f} to {ends[1]:.3f} m")
 
 
 def refuse_different_tunnels(one: Survey, other: Survey, verb: str) -> None:

@@ -16,7 +16,7 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.deviation import STATIONS
 from tunneldb.pipeline.lining_patches import LiningPatches, load_images
-from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_stale
+from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_beyond, refuse_stale
 from tunneldb.pipeline.run import nothing_yet
 from tunneldb.raster.pixel_state import shows_lining
 from tunneldb.shape.circle import taubin
@@ -170,6 +170,7 @@ def measure_survey_rings(
     begin : callable
         See `tunneldb.pipeline.on_demand.Begin`.
     """
+    refuse_beyond(conn, survey, low, high)
     state, last = ring_state(conn, survey), last_options(conn, survey)
     profiles = load_profiles(conn, survey.tunnel_id, "lining")
     axis = load_alignment(conn, survey, STATIONS)

@@ -10,7 +10,7 @@ import psycopg
 
 from tunneldb.errors import UserError
 from tunneldb.pipeline.deviation import measurable_kilometres, measure_deviation
-from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_different_tunnels
+from tunneldb.pipeline.on_demand import Begin, measure_kilometres, refuse_beyond, refuse_different_tunnels
 from tunneldb.shape.profile import Stretch
 from tunneldb.shape.thickness import section_thickness
 from tunneldb.store.design import load_design
@@ -57,6 +57,7 @@ def measure_thickness(
     """
     refuse_different_tunnels(before, after, "thickness")
     for survey in (before, after):  # both, before anything is measured
+        refuse_beyond(conn, survey, low, high)
         measurable_kilometres(conn, survey, layer, low, high)
     for survey in (before, after):
         measure_deviation(conn, survey, layer, low, high, begin)
