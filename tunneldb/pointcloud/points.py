@@ -13,7 +13,7 @@ from pyproj import CRS
 
 from tunneldb.arrays import Bool, Float, Int32, Single, UInt8, UInt16
 
-CHUNK = 1_000_000
+CHUNK = 500_000
 
 Ranges = Sequence[tuple[int, int]]
 """Half-open ranges of point numbers, from 0, in the order in which they are to be read."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int32, Int64
-from tunneldb.compiled import kernel
+from tunneldb.compiled import kernel, point_kernel
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.frame import tangents
 from tunneldb.geometry.stationing import KILOMETRE, chainage_label
@@ -152,7 +152,7 @@ def _axis(alignment: Alignment) -> tuple[Float, float, float]:
     return along, float(alignment.number[0]), float(alignment.spacing)
 
 
-@kernel
+@point_kernel
 def _place(
     x: Float, y: Float, chainage: Float, axis: Float, first: float, spacing: float, start: float, away: Float, stretch: Int32
 ) -> None:  # pragma: no cover - compiled

@@ -38,7 +38,7 @@ from tunneldb.threads import threads
 Progress = Callable[[int], None]
 
 MEMORY = 192 << 20  # bytes of rows that each spool holds before it goes to disk
-WINDOW = 1_000_000  # points whose neighbourhoods are looked at at a time by each thread
+WINDOW = 500_000  # points whose neighbourhoods are looked at at a time by each thread
 CROWDED = 4_000_000  # from this many points in one window on, one thread, for the sake of memory
 BLOCK = 50_000  # points of a LAZ file that can be decoded by themselves
 MARGIN = 10.0  # m beyond its ends that a kilometre is looked up in a file for what happens at its end

@@ -14,7 +14,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tunneldb.arrays import Float, Int64, Intp, UInt8
+from tunneldb.arrays import Float, Int64, Intp
 from tunneldb.compiled import kernel
 from tunneldb.errors import UserError
 
@@ -235,17 +235,12 @@ def _sort_by_bin(rows: Rows, bins: Int64) -> tuple[Rows, int, Int64]:
     first = int(bins.min())
     start = np.zeros(int(bins.max()) - first + 3, np.int64)
     ordered = np.empty_like(rows)
-    _move_rows(_table(rows), np.ascontiguousarray(bins), first, start, _table(ordered))
+    _move_rows(np.ascontiguousarray(rows), np.ascontiguousarray(bins), first, start, ordered)
     return ordered, first, start[:-1]
 
 
-def _table(rows: Rows) -> UInt8:
-    """Bytes of rows, one after the other: (n, bytes of a row)."""
-    return np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), rows.dtype.itemsize)
-
-
 @kernel
-def _move_rows(rows: UInt8, bins: Int64, first: int, start: Int64, ordered: UInt8) -> None:  # pragma: no cover - compiled
+def _move_rows(rows: Rows, bins: Int64, first: int, start: Int64, ordered: Rows) -> None:  # pragma: no cover - compiled
     """Move rows to where their bins begin; of start, two longer than there are bins and 0, the first entry of each is made."""
     for i in range(bins.shape[0]):
         start[bins[i] - first + 2] += 1
@@ -254,7 +249,5 @@ def _move_rows(rows: UInt8, bins: Int64, first: int, start: Int64, ordered: UInt
     # Where the next row of bin b goes is start[b + 1], which in the end is where the bin after it begins.
     for i in range(bins.shape[0]):
         b = bins[i] - first + 1
-        at = start[b]
-        for k in range(rows.shape[1]):
-            ordered[at, k] = rows[i, k]
-        start[b] = at + 1
+        ordered[start[b]] = rows[i]
+        start[b] += 1

@@ -28,7 +28,8 @@ from tunneldb.pointcloud.thinning import first_of_voxels
 from tunneldb.store.point_rows import COLUMNS, pack_rows
 from tunneldb.store.survey import Survey
 
-WINDOW = 500_000  # rows read, thinned and packed at a time
+WINDOW = 250_000  # rows read and thinned at a time
+AHEAD = 32  # blocks packed ahead of those that are sent: what is packed while the next rows are read
 
 
 def partition(survey: Survey, km: int, suffix: str = "") -> sql.Identifier:
@@ -142,11 +143,11 @@ def write_partition(
                 bins = bin_of(rows["chainage"])
                 rows = rows[stays & (bins >= low) & (bins < high)]
             np.add(written, np.bincount(rows["tag"], minlength=len(written)), out=written)
-            yield pack_rows(survey, km, rows, file_ids).data
+            yield from (block.data for block in pack_rows(survey, km, rows, file_ids))
             progress(int(counts[low - begin : high - begin].sum()))
 
     conn.execute("SELECT tunnel_api.partition_new(%s, %s)", [survey.id, km])
-    with closing(prefetch(chunks())) as packed:
+    with closing(prefetch(chunks(), AHEAD)) as packed:
         copy_binary(conn, partition(survey, km, "_new"), COLUMNS, packed, fresh=True)
     return written, left_out
 

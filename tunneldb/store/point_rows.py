@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from tunneldb.arrays import Float, Int32, UInt8
 from tunneldb.compiled import kernel
-from tunneldb.database.copy import PointZ, pack
+from tunneldb.database.copy import Column, PointZ, pack
 from tunneldb.pointcloud.spool import ROW, Rows
 from tunneldb.store.survey import Survey
 
@@ -23,6 +25,8 @@ _FIELDS = {
     "classification": ">i2",
 }
 COLUMNS = tuple(_FIELDS)
+
+BLOCK = 8192  # rows packed at a time: a megabyte, which stays in the processor's cache until it is sent
 
 # A row of binary COPY: the number of its fields, and before each one its length.
 PACKED = np.dtype(
@@ -45,8 +49,8 @@ _FROM_X, _FROM_CHAINAGE, _FROM_TIME, _FROM_INTENSITY, _FROM_SCAN, _FROM_TAG, _FR
 )
 
 
-def pack_rows(survey: Survey, km: int, rows: Rows, file_ids: Int32) -> UInt8:
-    """Pack rows of a kilometre for `tunneldb.database.copy.copy_binary`, in the order of chainage.
+def pack_rows(survey: Survey, km: int, rows: Rows, file_ids: Int32) -> Iterator[UInt8]:
+    """Pack rows of a kilometre for `tunneldb.database.copy.copy_binary`, in the order of chainage, BLOCK at a time.
 
     Parameters
     ----------
@@ -55,30 +59,32 @@ def pack_rows(survey: Survey, km: int, rows: Rows, file_ids: Int32) -> UInt8:
     file_ids : (k,) int32 array
         scan_file.id for each tag.
 
-    Returns
-    -------
-    (n × PACKED.itemsize,) uint8 array
+    Yields
+    ------
+    (m × PACKED.itemsize,) uint8 array
         COLUMNS of each row.
     """
     no_row = np.zeros(1, ROW)
-    template = pack(
-        [
-            np.full(1, survey.id, np.int32),
-            np.full(1, km, np.int32),
-            no_row["chainage"],
-            no_row["time"],
-            PointZ(np.zeros((1, 3)), survey.srid),
-            no_row["scan_id"],
-            np.zeros(1, np.int32),
-            no_row["intensity"],
-            no_row["classification"].astype(np.int16),
-        ]
-    )
-    packed = np.empty((len(rows), _BYTES), np.uint8)
+    columns: list[Column] = [
+        np.full(1, survey.id, np.int32),
+        np.full(1, km, np.int32),
+        no_row["chainage"],
+        no_row["time"],
+        PointZ(np.zeros((1, 3)), survey.srid),
+        no_row["scan_id"],
+        np.zeros(1, np.int32),
+        no_row["intensity"],
+        no_row["classification"].astype(np.int16),
+    ]
+    template = np.frombuffer(pack(columns), np.uint8).copy()
     swapped = np.ascontiguousarray(file_ids.astype(">i4")).view(np.uint8).reshape(-1, 4)
     records = np.ascontiguousarray(rows).view(np.uint8).reshape(-1, ROW.itemsize)
-    _fill(packed, records, by_chainage(rows["chainage"]), np.frombuffer(template, np.uint8).copy(), swapped)
-    return packed.ravel()
+    order = by_chainage(rows["chainage"])
+    for begin in range(0, len(rows), BLOCK):
+        block = order[begin : begin + BLOCK]
+        packed = np.empty((len(block), _BYTES), np.uint8)
+        _fill(packed, records, block, template, swapped)
+        yield packed.ravel()
 
 
 def by_chainage(chainage: Float) -> Int32:
