@@ -91,8 +91,8 @@ def judge(significant: Bool, truth: Float, compared: Bool, holds: float, seconds
 def ours(surface: Surface, grid: CellGrid, old: Float, new: Float, truth: Float) -> tuple[tuple[object, ...], Change]:
     """What compare does."""
     begun = time.perf_counter()
-    found = measure_change(surface, grid, cells(surface, grid, old), cells(surface, grid, new), 1.5)
-    regions = change_regions(found.difference, found.variance, found.removed_error, found.scatter)
+    found = measure_change(surface, grid, cells(surface, grid, old), cells(surface, grid, new), 1.5, PIXEL)
+    regions = change_regions(found.difference, found.variance, found.removed_error, found.scatter, found.place_error)
     seconds = time.perf_counter() - begun
     compared = np.isfinite(found.difference)
     plain = compared & (truth == 0.0)

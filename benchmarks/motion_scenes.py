@@ -262,8 +262,8 @@ def judged(name: str, scene: Scene, seed: int) -> dict[str, object]:
     """What compare says of a scene."""
     surface, grid, old, new, parts = made(scene, seed)
     begun = time.process_time()
-    found = measure_change(surface, grid, old, new, 1.5)
-    regions = change_regions(found.difference, found.variance, found.removed_error, found.scatter)
+    found = measure_change(surface, grid, old, new, 1.5, PIXEL)
+    regions = change_regions(found.difference, found.variance, found.removed_error, found.scatter, found.place_error)
     seconds = time.process_time() - begun
     signed = np.zeros(found.difference.shape)
     for region in regions:

@@ -34,7 +34,7 @@ def epoch(seed: int, change: np.ndarray | float = 0.0, shift: tuple[float, float
 
 def changed(change: np.ndarray | float, shift: tuple[float, float]) -> Change:
     surface, _ = made(RADIUS, 200.0, 0.0, 0.0)
-    return measure_change(surface, GRID, epoch(1), epoch(2, change, shift), 1.5)
+    return measure_change(surface, GRID, epoch(1), epoch(2, change, shift), 1.5, PIXEL)
 
 
 def test_a_cell_is_a_plane_through_its_pixels_and_rounding_is_what_it_is() -> None:
@@ -57,7 +57,7 @@ def test_an_unchanged_lining_whose_pose_is_off_is_unchanged_and_its_level_of_det
     found = changed(0.0, (0.02, -0.01))
     held = np.abs(found.difference) <= found.lod
     assert 0.93 < held[np.isfinite(found.difference)].mean() < 0.97
-    assert change_regions(found.difference, found.variance, found.removed_error, found.scatter) == []
+    assert change_regions(found.difference, found.variance, found.removed_error, found.scatter, found.place_error) == []
     motions = np.array([motion.values[:2] for _, motion in found.sections])
     errors = np.array([motion.errors[:2] for _, motion in found.sections])
     assert np.abs(motions - [0.02, -0.01]).max() < 2e-4
@@ -72,13 +72,30 @@ def test_a_lining_with_relief_whose_pose_is_off_along_itself_is_unchanged() -> N
     chainage, arc = places()
     surface, _ = made(RADIUS, 200.0, 0.0, 0.0)
     found = measure_change(
-        surface, GRID, epoch(1, relief(chainage, arc)), epoch(2, relief(chainage - 0.02, arc - 0.01), (0.01, 0.01)), 1.5
+        surface, GRID, epoch(1, relief(chainage, arc)), epoch(2, relief(chainage - 0.02, arc - 0.01), (0.01, 0.01)), 1.5, PIXEL
     )
     held = np.abs(found.difference) <= found.lod
     assert 0.93 < held[np.isfinite(found.difference)].mean() < 0.97
-    assert change_regions(found.difference, found.variance, found.removed_error, found.scatter) == []
+    assert change_regions(found.difference, found.variance, found.removed_error, found.scatter, found.place_error) == []
     along = np.array([motion.values[2] for _, motion in found.sections])
     assert np.median(along) == pytest.approx(0.02, abs=2e-3)
+
+
+def test_pixels_whose_points_lie_to_one_side_are_no_change_of_relief_and_a_bulge_on_it_is() -> None:
+    def relief(chainage: np.ndarray, arc: np.ndarray) -> np.ndarray:
+        return 0.06 * np.sin(2.0 * np.pi * chainage / 1.2) * np.sin(2.0 * np.pi * arc / 1.6)
+
+    chainage, arc = places()
+    surface, _ = made(RADIUS, 200.0, 0.0, 0.0)
+    beside = np.zeros_like(chainage)
+    for place in (70.2, 85.2, 100.2):  # half a slope of the relief long
+        beside[(np.abs(chainage - place) < 0.3) & (np.abs(arc - 2.0) < 0.4)] = PIXEL / 2.0
+    bulge = (np.abs(chainage - 92.0) < 0.5) & (np.abs(arc + 2.0) < 0.5)
+    old, new = epoch(1, relief(chainage - beside, arc)), epoch(2, relief(chainage + beside, arc) + 0.003 * bulge)
+    found = measure_change(surface, GRID, old, new, 1.5, PIXEL)
+    (region,) = change_regions(found.difference, found.variance, found.removed_error, found.scatter, found.place_error)
+    assert region.mean == pytest.approx(0.003, abs=4e-4)
+    assert GRID.chainage[region.columns.astype(int)].mean() == pytest.approx(92.0, abs=0.1)
 
 
 @pytest.mark.parametrize("filled", [False, True])
@@ -92,8 +109,8 @@ def test_a_hollow_deeper_than_lining_stands_back_is_a_region_and_a_niche_is_none
         epochs.append(CellSums(GRID, PIXEL))
         epochs[-1].add(chainage, arc, np.round(offset, 3), ~(hollow | niche))
     surface, _ = made(RADIUS, 200.0, 0.0, 0.0)
-    found = measure_change(surface, GRID, *(without_edges(cells) for cells in with_hollows(*epochs)), 1.5)
-    (region,) = change_regions(found.difference, found.variance, found.removed_error, found.scatter)
+    found = measure_change(surface, GRID, *(without_edges(cells) for cells in with_hollows(*epochs)), 1.5, PIXEL)
+    (region,) = change_regions(found.difference, found.variance, found.removed_error, found.scatter, found.place_error)
     sign = 1.0 if filled else -1.0
     assert region.greatest == pytest.approx(sign * 0.05, abs=0.001)
     assert region.mean * len(region.rows) * GRID.cell**2 == pytest.approx(sign * 0.05 * 0.6 * 0.5, rel=0.03)
@@ -111,7 +128,7 @@ def test_what_moved_is_found_and_nothing_else(kind: str, mean: float, area: floa
     }[kind]
     change = where * (-mean * np.cos(2.0 * arc / RADIUS) if kind == "ring" else mean)
     found = changed(change, (0.01, 0.02))
-    regions = change_regions(found.difference, found.variance, found.removed_error, found.scatter)
+    regions = change_regions(found.difference, found.variance, found.removed_error, found.scatter, found.place_error)
     truth = np.zeros(found.difference.shape)
     np.add.at(truth, (((arc + 9.0) / 0.1).astype(int), ((chainage - 60.0) / 0.1).astype(int)), where / 25.0)
     assert regions

@@ -95,7 +95,7 @@ def test_a_line_of_cells_is_no_region_and_a_square_is() -> None:
     difference[40, 30:60] -= 0.006  # a groove that one epoch hit and the other did not
     difference[90:100, 100:110] += 0.003
     variance, error = np.full_like(difference, 1e-6), np.zeros_like(difference)
-    (region,) = change_regions(difference, variance, error, EVEN)
+    (region,) = change_regions(difference, variance, error, EVEN, np.stack([error, error]))
     assert region.mean == pytest.approx(0.003, abs=6e-4)
     assert 90 <= region.rows.mean() < 100
 
@@ -105,5 +105,6 @@ def test_chance_alone_makes_no_region_beside_a_wall_that_moved() -> None:
     for _ in range(5):
         difference = rng.normal(0.0, 0.001, (150, 400)).astype(np.float32)
         difference[:, :160] += 0.005
-        regions = change_regions(difference, np.full_like(difference, 1e-6), np.zeros_like(difference), EVEN)
+        variance, error = np.full_like(difference, 1e-6), np.zeros_like(difference)
+        regions = change_regions(difference, variance, error, EVEN, np.stack([error, error]))
         assert len(regions) == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -74,6 +75,8 @@ class Change:
         New less old offset without the rigid motions; NaN where one of them did not see.
     variance, removed_error, lod : m², m, m
     scatter : Scatter
+    place_error : m
+        Twofold, (2, rows, columns): see `tunneldb.shape.change.change_regions`.
     sections : list of (slice, Motion)
         Columns of each section, and its motion.
     """
@@ -86,6 +89,7 @@ class Change:
     removed_error: Single
     lod: Single
     scatter: shape_change.Scatter
+    place_error: Single
     sections: list[tuple[slice, Motion]]
 
 
@@ -147,7 +151,7 @@ def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int,
     first, second = (without_edges(cells) for cells in with_hollows(sums, newer))
     grid, pixel = sums.grid, sums.pixel
     del sums, newer  # a third of the memory that is needed
-    found = measure_change(surface, grid, first, second, length)
+    found = measure_change(surface, grid, first, second, length, pixel)
     transform = Affine(cell, 0.0, grid.west, 0.0, -cell, grid.south + grid.rows * cell)
     save_sections(conn, old, new, km, section_figures(found))
     save_images(
@@ -155,7 +159,9 @@ def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int,
     )
     regions = [
         stored
-        for region in shape_change.change_regions(found.difference, found.variance, found.removed_error, found.scatter)
+        for region in shape_change.change_regions(
+            found.difference, found.variance, found.removed_error, found.scatter, found.place_error
+        )
         for stored in _stored_region(region, grid, surface)
     ]
     save_regions(conn, old, new, km, regions)
@@ -170,8 +176,12 @@ def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int,
     }  # fmt: skip
 
 
-def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, length: float) -> Change:
-    """Take the rigid motion of each section out of the difference of two epochs, and state its level of detection."""
+def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, length: float, pixel: float) -> Change:
+    """Take the rigid motion of each section out of the difference of two epochs, and state its level of detection.
+
+    A pixel, of a side in m, stands for its points as if they lay in its middle. Where profiles are about a pixel apart, all of
+    a place lie to one side of it, and in the other epoch to another: uniform within the pixel, in both.
+    """
     difference, variance = new.offset - old.offset, old.variance + new.variance
     noise = shape_change.measure_scatter(difference, variance).factors[0]
     removed_error = np.where(np.isfinite(difference), np.float32(0.0), np.float32(np.nan))
@@ -208,7 +218,8 @@ def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, len
     sections = [(columns, motion) for (columns, _), motion in zip(parts, motions, strict=True)]
     scatter = shape_change.measure_scatter(difference, variance)
     lod = shape_change.detection_level(variance, removed_error, scatter)
-    return Change(grid, old, new, difference, variance, removed_error, lod, scatter, sections)
+    place_error = (np.stack(relief) * (pixel / math.sqrt(6.0))).astype(np.float32)
+    return Change(grid, old, new, difference, variance, removed_error, lod, scatter, place_error, sections)
 
 
 def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells, relief: tuple[Single, Single]) -> Float:

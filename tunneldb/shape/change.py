@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -139,7 +140,9 @@ def detection_level(variance: Single, removed_error: Single, scatter: Scatter) -
     return np.asarray(CONFIDENT * (np.sqrt(variance) * scatter.tail + removed_error), dtype=np.float32)
 
 
-def change_regions(difference: Single, variance: Single, removed_error: Single, scatter: Scatter) -> list[Region]:
+def change_regions(
+    difference: Single, variance: Single, removed_error: Single, scatter: Scatter, place_error: Single
+) -> list[Region]:
     """Regions of significant change.
 
     Each window of 3 by 3 cells is tested by its mean; of all windows those are taken for change among which the share of
@@ -147,6 +150,15 @@ def change_regions(difference: Single, variance: Single, removed_error: Single, 
     smaller than a window, and on average differ by more than its own level of detection. A share of false windows is no share
     of false regions: where a wall moved, many may be false. So a region needs a window that chance alone shows in FAMILY_SHARE
     of all kilometres, by whichever two of its three rows or columns show it least, or be as unlikely whole, without a line.
+    It must also be more than a shift of pixels along a slope of the relief makes; over a wide region slopes cancel.
+
+    Parameters
+    ----------
+    difference, variance, removed_error, scatter
+        As of :func:`detection_level`.
+    place_error : (2, rows, columns) float32 array
+        What one standard error of where pixels lie, along the tunnel and around it, does to the change of cells, m, with its
+        sign; it is alike for cells side by side.
     """
     mean, expected, number = window_means(difference, variance, removed_error, scatter)
     with np.errstate(invalid="ignore"):
@@ -156,25 +168,29 @@ def change_regions(difference: Single, variance: Single, removed_error: Single, 
     return [
         region
         for sign in (1.0, -1.0)
-        for region in _regions(taken & (mean * sign > 0.0), mean, difference, variance, removed_error, scatter)
+        for region in _regions(taken & (mean * sign > 0.0), mean, difference, variance, removed_error, scatter, place_error)
         if max(
-            _greatest_ratio(region, difference, variance, removed_error, scatter),
-            _ratio_without_line(region, difference, variance, removed_error, scatter),
+            _greatest_ratio(region, difference, variance, removed_error, scatter, place_error),
+            _ratio_without_line(region, difference, variance, removed_error, scatter, place_error),
         )
         > peak
     ]
 
 
-def _greatest_ratio(region: Region, difference: Single, variance: Single, removed_error: Single, scatter: Scatter) -> float:
+def _greatest_ratio(
+    region: Region, difference: Single, variance: Single, removed_error: Single, scatter: Scatter, place_error: Single
+) -> float:
     """Greatest of :func:`window_ratios` in a region, along its mean."""
     at = region.rows.astype(np.int64), region.columns.astype(np.int64)
     first = [max(int(place.min()) - 1, 0) for place in at]
     cut = slice(first[0], int(at[0].max()) + 2), slice(first[1], int(at[1].max()) + 2)
-    ratios = window_ratios(difference[cut], variance[cut], removed_error[cut], scatter)
+    ratios = window_ratios(difference[cut], variance[cut], removed_error[cut], scatter, place_error[:, *cut])
     return float(np.nanmax(np.sign(region.mean) * ratios[at[0] - first[0], at[1] - first[1]], initial=0.0))
 
 
-def _ratio_without_line(region: Region, difference: Single, variance: Single, removed_error: Single, scatter: Scatter) -> float:
+def _ratio_without_line(
+    region: Region, difference: Single, variance: Single, removed_error: Single, scatter: Scatter, place_error: Single
+) -> float:
     """Mean of a region without the row or column of cells that adds most to it, in standard deviations, along its mean."""
     at = region.rows, region.columns
     change, squared, registered = (values[at].astype(np.float64) for values in (difference, variance, removed_error))
@@ -186,7 +202,9 @@ def _ratio_without_line(region: Region, difference: Single, variance: Single, re
     if cells < LEAST:
         return 0.0
     noise = np.sqrt(squared[kept].sum()) / cells * float(scatter.at(cells))
-    return float(np.sign(region.mean) * change[kept].mean() / np.hypot(noise, registered[kept].mean()))
+    placed = place_error[:, *at][:, kept].mean(axis=1, dtype=np.float64)
+    expected = math.hypot(noise, registered[kept].mean(), *placed)
+    return float(np.sign(region.mean) * change[kept].mean() / expected)
 
 
 def significant(probability: Float) -> Bool:
@@ -223,7 +241,7 @@ def family_level(windows: float) -> float:
     return float(norm.isf(-np.expm1(np.log1p(-FAMILY_SHARE) / max(windows, 1.0)) / 2.0))
 
 
-def window_ratios(difference: Single, variance: Single, removed_error: Single, scatter: Scatter) -> Float:
+def window_ratios(difference: Single, variance: Single, removed_error: Single, scatter: Scatter, place_error: Single) -> Float:
     """Least mean of each window without one of its rows or columns, in standard deviations; NaN with too few cells.
 
     A groove that is narrower than a cell is hit by other pixels in each epoch, and alike in all cells along it: a line of cells
@@ -232,7 +250,7 @@ def window_ratios(difference: Single, variance: Single, removed_error: Single, s
     seen = np.isfinite(difference)
     rows, columns = difference.shape
     lines: list[list[Float]] = []
-    for values in (difference, variance, removed_error, np.ones_like(difference)):
+    for values in (difference, variance, removed_error, *place_error, np.ones_like(difference)):
         padded = np.pad(np.where(seen, values, 0.0).astype(np.float64), 1)
         across, along = (sum_of_three(padded, axis) for axis in (1, 0))
         lines.append([across[k : k + rows] for k in range(WINDOW)] + [along[:, k : k + columns] for k in range(WINDOW)])
@@ -240,13 +258,13 @@ def window_ratios(difference: Single, variance: Single, removed_error: Single, s
     least, greatest = np.full(difference.shape, np.inf), np.full(difference.shape, -np.inf)
     factor = float(scatter.at(WINDOW**2))
     for line in zip(*lines, strict=True):
-        change, squared, registered, number = (total - one for total, one in zip(totals, line, strict=True))
-        expected = np.hypot(np.sqrt(np.maximum(squared, 0.0)) * factor, registered)
+        change, squared, registered, along, around, number = (total - one for total, one in zip(totals, line, strict=True))
+        expected = np.sqrt(np.maximum(squared, 0.0) * factor**2 + registered**2 + along**2 + around**2)
         ratio = np.divide(change, expected, out=np.zeros_like(change), where=(number > 0.5) & (expected > 0.0))
         np.minimum(least, ratio, out=least)
         np.maximum(greatest, ratio, out=greatest)
     value = np.where(least > 0.0, least, np.minimum(greatest, 0.0))
-    return np.where(totals[3] >= LEAST, value, np.nan)
+    return np.where(totals[-1] >= LEAST, value, np.nan)
 
 
 def sum_of_three(values: Float, axis: int) -> Float:
@@ -256,7 +274,13 @@ def sum_of_three(values: Float, axis: int) -> Float:
 
 
 def _regions(
-    taken: Bool, mean: Float, difference: Single, variance: Single, removed_error: Single, scatter: Scatter
+    taken: Bool,
+    mean: Float,
+    difference: Single,
+    variance: Single,
+    removed_error: Single,
+    scatter: Scatter,
+    place_error: Single,
 ) -> Iterator[Region]:
     # A window half on a region has half of its change: there the region ends.
     labels, count = ndimage.label(taken)
@@ -273,7 +297,8 @@ def _regions(
         at = rows, columns
         pooled = float(difference[at].mean(dtype=np.float64))
         noise = float(np.sqrt(variance[at].sum(dtype=np.float64))) / cells * float(scatter.at(cells))
-        lod = CONFIDENT * (noise + float(removed_error[at].mean(dtype=np.float64)))
+        placed = place_error[:, *at].mean(axis=1, dtype=np.float64)
+        lod = CONFIDENT * (noise + math.hypot(removed_error[at].mean(dtype=np.float64), *placed))
         if abs(pooled) > lod:
             windows = mean[at]
             yield Region(rows, columns, pooled, lod, float(windows[np.abs(windows).argmax()]))
