@@ -6,13 +6,16 @@
 CREATE OR REPLACE FUNCTION tunnel_api.last_runs_of(
     survey_ids int[], stages text[], succeeded boolean DEFAULT true, km_from int DEFAULT -1000000, km_to int DEFAULT 1000000)
 RETURNS SETOF tunnel.run
-LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 25
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 25
 SET search_path = pg_catalog, pg_temp
 SET jit = off
 SET enable_seqscan = off
 SET enable_bitmapscan = off
 SET enable_nestloop = on
+SET plan_cache_mode = force_generic_plan  -- planning takes longer than a stage
 AS $$
+BEGIN
+    RETURN QUERY
     WITH RECURSIVE last AS (
         SELECT l.*
           FROM unnest($1) AS s (id)
@@ -31,7 +34,8 @@ AS $$
                    AND (r.outcome = 'done' OR NOT $3)
                  ORDER BY r.km DESC, r.subject DESC, r.started_at DESC, r.id DESC LIMIT 1) n
     )
-    SELECT l.* FROM last l
+    SELECT l.* FROM last l;
+END
 $$;
 COMMENT ON FUNCTION tunnel_api.last_runs_of(int[], text[], boolean, int, int) IS
 'The last run of each of some stages in each kilometre of some surveys, as last_runs has them of one';

@@ -38,15 +38,18 @@ CREATE OR REPLACE FUNCTION tunnel_api.stage_states(
     survey_ids integer[], km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
 RETURNS TABLE (survey_id integer, km integer, step integer, stage text, run_id bigint, outcome text, done_id bigint,
                input_at timestamptz, outdated boolean, reason text)
-LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000
+LANGUAGE plpgsql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000
 SET search_path = pg_catalog, pg_temp
 SET jit = off
 SET enable_nestloop = off  -- how few or many rows there are is not known when it is planned
 SET enable_mergejoin = off
-SET join_collapse_limit = 1  -- in the order that is written, or planning takes longer than a survey
+SET plan_cache_mode = force_generic_plan  -- planning takes longer than a survey
 SET enable_hashjoin = on  -- which stage_state has off
 SET enable_seqscan = on
 AS $$
+#variable_conflict use_column
+BEGIN
+    RETURN QUERY
     WITH RECURSIVE stage AS MATERIALIZED (  -- the stages that each rests on, by their numbers: here, and on both neighbours
         SELECT s.step, s.name, s.name = 'segments' AS of_segments, 'axis' = ANY (s.reads) AS of_axis,
                'survey' = ANY (s.reads) AS of_survey, 'sonar' = ANY (s.reads) AS of_sonar,
@@ -188,7 +191,8 @@ AS $$
       LEFT JOIN stale here ON here.survey_id = d.survey_id AND here.km = d.km
       LEFT JOIN stale before ON before.survey_id = d.survey_id AND before.km = d.km - 1
       LEFT JOIN stale after ON after.survey_id = d.survey_id AND after.km = d.km + 1
-     WHERE (d.survey_id, d.km) NOT IN (SELECT v.survey_id, v.km FROM void v)
+     WHERE (d.survey_id, d.km) NOT IN (SELECT v.survey_id, v.km FROM void v);
+END
 $$;
 COMMENT ON FUNCTION tunnel_api.stage_states(integer[], integer, integer) IS
     'How far kilometres of some surveys have come, as stage_state says of one; run_id and done_id: the last run and the last success (tunnel_api.run)';
