@@ -149,7 +149,8 @@ def test_what_is_to_be_said_of_sheets_is_asked_once_a_survey(conn: psycopg.Conne
     add_sections(conn, scanned)
     darken(conn, scanned)
     conn.execute("SET LOCAL track_functions = 'all'")
-    sheets = ask(conn, "SELECT chainage_from, chainage_to, gaps, remarks FROM tunnel_api.sheet WHERE survey = 's' ORDER BY number")
+    query = "SELECT chainage_from, chainage_to, gaps, remarks FROM tunnel_api.sheet WHERE survey = 's' ORDER BY number"
+    sheets = ask(conn, query)
     (asked,) = ask(
         conn,
         "SELECT coalesce(sum(calls) FILTER (WHERE funcname LIKE 'coverage_gaps%%'), 0) AS gaps,"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import psycopg
@@ -65,7 +66,7 @@ def test_last_runs_of_many_are_those_of_each(conn: psycopg.Connection) -> None:
         each = [
             ids(conn, SORTED, asked | {"survey": survey, "stage": stage}) for survey in surveys[1:] for stage in asked["stages"]
         ]
-        assert sorted(found) == sorted(sum(each, []))
+        assert sorted(found) == sorted(itertools.chain.from_iterable(each))
         assert len(found) > 20
 
 
