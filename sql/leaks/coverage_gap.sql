@@ -228,8 +228,9 @@ COMMENT ON FUNCTION tunnel_api.coverage_statement(int, float8, float8) IS
 'What coverage_gaps has to say of a survey between two chainages (m), in words, six stretches of each kind at most; NULL if there is nothing. What every document says before it counts leaks.';
 
 
+-- Numbered by name, too, so that a condition on it leaves the other surveys out.
 CREATE OR REPLACE VIEW tunnel_api.coverage_gap AS
-SELECT s.id::bigint * 1000000 + row_number() OVER (PARTITION BY s.id) AS id, s.id AS survey_id, s.name AS survey,
+SELECT s.id::bigint * 1000000 + row_number() OVER (PARTITION BY s.id, s.name) AS id, s.id AS survey_id, s.name AS survey,
        g.chainage_from, g.chainage_to, tunnel_api.station_label(s.tunnel_id, g.chainage_from) AS label_from,
        tunnel_api.station_label(s.tunnel_id, g.chainage_to) AS label_to, g.state, g.reason, g.searched, g.seen_share,
        public.st_makeenvelope(g.chainage_from, a.arc_from, g.chainage_to, a.arc_to, 0)::public.geometry(Polygon, 0) AS geom

@@ -166,3 +166,16 @@ def test_what_is_to_be_said_of_sheets_is_asked_once_a_survey(conn: psycopg.Conne
         )
         assert (sheet["gaps"], sheet["remarks"]) == (each["gaps"], each["remarks"])
     assert len({sheet["gaps"] for sheet in sheets}) > 2
+
+
+@pytest.mark.parametrize("condition", ["survey = 's'", "survey_id = (SELECT id FROM tunnel.survey WHERE name = 's')"])
+def test_gaps_of_one_survey_ask_of_no_other(conn: psycopg.Connection, scanned: int, condition: str) -> None:
+    conn.execute(
+        "INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)"
+        " SELECT tunnel_id, 'other' || n, date, 'none', 'static' FROM tunnel.survey, generate_series(1, 3) n WHERE id = %s",
+        [scanned],
+    )
+    conn.execute("SET LOCAL track_functions = 'all'")
+    assert ask(conn, f"SELECT * FROM tunnel_api.coverage_gap WHERE {condition}")
+    (asked,) = ask(conn, "SELECT sum(calls) AS calls FROM pg_stat_xact_user_functions WHERE funcname LIKE 'coverage_gaps%%'")
+    assert asked["calls"] == 1
