@@ -170,6 +170,7 @@ def test_what_is_to_be_said_of_sheets_is_asked_once_a_survey(conn: psycopg.Conne
 
 @pytest.mark.parametrize("condition", ["survey = 's'", "survey_id = (SELECT id FROM tunnel.survey WHERE name = 's')"])
 def test_gaps_of_one_survey_ask_of_no_other(conn: psycopg.Connection, scanned: int, condition: str) -> None:
+    darken(conn, scanned)
     conn.execute(
         "INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)"
         " SELECT tunnel_id, 'other' || n, date, 'none', 'static' FROM tunnel.survey, generate_series(1, 3) n WHERE id = %s",
