@@ -28,6 +28,9 @@ SURVEY = "demo-2024"
 SIZE = Size(leaks=2000, points=25_000, dry=1000, drawn=2000)
 """What the sample holds: little, so that what others cost shows."""
 
+Side = tuple[list[Asked], list[Run]]
+"""What one of the two databases took: views, and verbs."""
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -50,7 +53,12 @@ def main() -> None:
             with psycopg.connect(dsn) as connection:
                 surround(connection, sample, asked.surveys, SIZE.kilometres)
             sides = [alone, _measure(dsn, asked.only, folder)]
-    (views, verbs), (views_among, verbs_among) = sides
+        _tell(*sides)  # before the database is dropped, which takes minutes
+
+
+def _tell(alone: Side, among: Side) -> None:
+    """Print the tables and save them."""
+    (views, verbs), (views_among, verbs_among) = alone, among
     _print_views(views, views_among)
     _print_verbs(verbs, verbs_among)
     figures = {
@@ -60,7 +68,7 @@ def main() -> None:
     save("growth", figures)
 
 
-def _measure(dsn: str, only: str, folder: Path) -> tuple[list[Asked], list[Run]]:
+def _measure(dsn: str, only: str, folder: Path) -> Side:
     progress(f"views of {SURVEY}")
     views = ask_all(dsn, SURVEY, only)
     progress(f"verbs on {SURVEY}")

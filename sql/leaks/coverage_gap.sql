@@ -5,26 +5,30 @@
 -- A kilometre was searched when detection noted what it saw of the lining there (tunnel.coverage). That of a kilometre which was
 -- not, begins and ends with its segments, or else with the points of its files along the given axis: the two differ by
 -- centimetres, and what is shorter than a metre is left out for that. Lining is looked at by bins of a metre.
-CREATE OR REPLACE FUNCTION tunnel_api.coverage_gaps(
-    survey_id int, stretch_from float8 DEFAULT '-Infinity', stretch_to float8 DEFAULT 'Infinity')
-RETURNS TABLE (chainage_from float8, chainage_to float8, state text, reason text, searched boolean, seen_share float8)
+CREATE OR REPLACE FUNCTION tunnel_api.coverage_gaps_of(survey_id int, starts float8[], ends float8[])
+RETURNS TABLE (
+    n int, chainage_from float8, chainage_to float8, state text, reason text, searched boolean, seen_share float8)
 LANGUAGE plpgsql STABLE STRICT PARALLEL RESTRICTED
+COST 100000  -- once a survey, not once a stretch
 ROWS 10
 SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 SET jit = off
+SET plan_cache_mode = force_generic_plan  -- planning takes longer than a short stretch
 AS $$
 #variable_conflict use_column
 DECLARE
     survey_key constant int := survey_id;
-    first_place constant float8 := stretch_from;
-    last_place constant float8 := stretch_to;
+    first_place constant float8 := (SELECT min(p) FROM unnest(starts) p);
+    last_place constant float8 := (SELECT max(p) FROM unnest(ends) p);
     blind constant boolean := (SELECT s.intensity_kind = 'none' FROM tunnel.survey s WHERE s.id = survey_key);
     least_share constant float8 := 0.5;  -- of the lining seen
     least_length constant float8 := 5;  -- over which it was not, m
 BEGIN
-    PERFORM tunnel_api.in_order(first_place, last_place);
+    PERFORM tunnel_api.in_order(s.low, s.high) FROM unnest(starts, ends) AS s (low, high);
     RETURN QUERY
-    WITH scanned AS (  -- along the given axis
+    WITH stretch AS MATERIALIZED (
+        SELECT s.n::int, s.low, s.high FROM unnest(starts, ends) WITH ORDINALITY AS s (low, high, n)
+    ), scanned AS (  -- along the given axis
         SELECT k.km, min(greatest(f.chainage_from, k.km * 1000)) AS low, max(least(f.chainage_to, (k.km + 1) * 1000)) AS high
         FROM tunnel.scan_file f
         CROSS JOIN LATERAL generate_series(floor(f.chainage_from / 1000)::int, ceil(f.chainage_to / 1000)::int - 1) AS k (km)
@@ -73,114 +77,160 @@ BEGIN
         JOIN tunnel.survey s ON s.id = i.survey_id
         JOIN tunnel.tunnel t ON t.id = s.tunnel_id
         WHERE i.survey_id = survey_key
-    ), beyond AS (  -- between kilometres, and where the stretch asked for reaches farther than the survey
-        SELECT lag(k.high, 1, first_place) OVER (ORDER BY k.km) AS low, k.low AS high FROM kilometre k
+    ), beyond AS (  -- between kilometres, and where a stretch asked for reaches farther than the survey
+        SELECT s.n, b.low, b.high
+        FROM (SELECT lag(k.high) OVER (ORDER BY k.km) AS low, k.low AS high FROM kilometre k) b
+        JOIN stretch s ON b.low < s.high AND b.high > s.low
         UNION ALL
-        SELECT max(k.high), last_place FROM kilometre k HAVING count(*) > 0
+        SELECT s.n, s.low, f.low FROM stretch s CROSS JOIN (SELECT k.low FROM kilometre k ORDER BY k.km LIMIT 1) f
         UNION ALL
-        SELECT greatest(first_place, t.start_chainage), least(last_place, t.start_chainage + public.ST_Length(t.alignment))
-        FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
-        WHERE s.id = survey_key AND NOT EXISTS (SELECT FROM kilometre)
-    ), place AS (
-        SELECT array_agg(DISTINCT p.at) AS at
-        FROM kilometre k
-        CROSS JOIN LATERAL (SELECT greatest(k.low, first_place) AS low, least(k.high, last_place) AS high) c
-        CROSS JOIN LATERAL (
-            SELECT c.low AS at UNION ALL SELECT c.high UNION ALL SELECT generate_series(ceil(c.low)::int, floor(c.high)::int)) p
-        WHERE k.searched AND c.low < c.high
+        SELECT s.n, l.high, s.high FROM stretch s CROSS JOIN (SELECT max(k.high) AS high FROM kilometre k HAVING count(*) > 0) l
+        UNION ALL
+        SELECT s.n, greatest(s.low, t.start_chainage), least(s.high, t.start_chainage + public.ST_Length(t.alignment))
+        FROM stretch s CROSS JOIN tunnel.survey v JOIN tunnel.tunnel t ON t.id = v.tunnel_id
+        WHERE v.id = survey_key AND NOT EXISTS (SELECT FROM kilometre)
+    ), place AS MATERIALIZED (
+        SELECT array_agg(q.n) AS n, array_agg(q.at) AS at
+        FROM (
+            SELECT DISTINCT s.n, p.at
+            FROM kilometre k
+            JOIN stretch s ON k.low < s.high AND k.high > s.low
+            CROSS JOIN LATERAL (SELECT greatest(k.low, s.low) AS low, least(k.high, s.high) AS high) c
+            CROSS JOIN LATERAL (
+                SELECT c.low AS at UNION ALL SELECT c.high
+                UNION ALL SELECT generate_series(ceil(c.low)::int, floor(c.high)::int)) p
+            WHERE k.searched AND c.low < c.high
+            ORDER BY s.n, p.at) q
     ), bin AS (
-        SELECT c.chainage AS low, lead(c.chainage) OVER along AS high, lead(c.lining) OVER along - c.lining AS lining,
-            lead(c.seen) OVER along - c.seen AS seen
-        FROM tunnel_api.coverage_at(survey_key, (SELECT p.at FROM place p)) c
-        WINDOW along AS (ORDER BY c.chainage)
-    ), dim AS (  -- in parts of one state, and in wholes that lack nothing or something all along
-        SELECT b.low, b.high, b.lining, b.seen, b.state,
-            sum(CASE WHEN b.state IS NOT DISTINCT FROM b.before AND b.low = b.behind THEN 0 ELSE 1 END) OVER along AS part,
-            sum(CASE WHEN (b.state IS NULL) = (b.before IS NULL) AND b.low = b.behind THEN 0 ELSE 1 END) OVER along AS whole
+        SELECT b.*, CASE WHEN b.lining < 1e-6 THEN 'not scanned' WHEN b.seen < least_share * b.lining THEN 'unseen' END AS state
         FROM (
-            SELECT q.*, lag(q.state) OVER (ORDER BY q.low) AS before, lag(q.high) OVER (ORDER BY q.low) AS behind
-            FROM (SELECT b.*, CASE WHEN b.lining < 1e-6 THEN 'not scanned'
-                                   WHEN b.seen < least_share * b.lining THEN 'unseen' END AS state
-                  FROM bin b WHERE b.high < b.low + 1 + 1e-6) q) b
-        WINDOW along AS (ORDER BY b.low)
+            SELECT p.n, c.chainage AS low, lead(c.chainage) OVER along AS high, lead(c.lining) OVER along - c.lining AS lining,
+                lead(c.seen) OVER along - c.seen AS seen
+            FROM tunnel_api.coverage_at(survey_key, (SELECT p.at FROM place p)) c
+            JOIN unnest((SELECT p.n FROM place p)) WITH ORDINALITY AS p (n, place) ON p.place = c.n
+            WINDOW along AS (PARTITION BY p.n ORDER BY c.chainage)) b
+        WHERE b.high < b.low + 1 + 1e-6
+    ), dim AS (  -- what lacks something: in parts of one state, and in wholes that lack something all along
+        SELECT b.n, b.low, b.high, b.lining, b.seen, b.state,
+            sum(CASE WHEN b.state = b.before AND b.low = b.behind THEN 0 ELSE 1 END) OVER along AS part,
+            sum(CASE WHEN b.low = b.behind THEN 0 ELSE 1 END) OVER along AS whole
+        FROM (
+            SELECT b.*, lag(b.state) OVER along AS before, lag(b.high) OVER along AS behind
+            FROM bin b
+            WHERE b.state IS NOT NULL
+            WINDOW along AS (PARTITION BY b.n ORDER BY b.low)) b
+        WINDOW along AS (PARTITION BY b.n ORDER BY b.low)
     ), dark AS (  -- of a whole that is long enough, what is too short to be told by itself is unseen
-        SELECT d.*, sum(CASE WHEN d.said = d.before AND d.whole = d.whole_before THEN 0 ELSE 1 END) OVER (ORDER BY d.low) AS piece
+        SELECT d.*, sum(CASE WHEN d.said = d.before AND d.whole = d.whole_before THEN 0 ELSE 1 END) OVER (
+            PARTITION BY d.n ORDER BY d.low) AS piece
         FROM (
-            SELECT l.*, lag(l.said) OVER (ORDER BY l.low) AS before, lag(l.whole) OVER (ORDER BY l.low) AS whole_before
+            SELECT l.*, lag(l.said) OVER along AS before, lag(l.whole) OVER along AS whole_before
             FROM (
-                SELECT d.low, d.high, d.lining, d.seen, d.whole,
+                SELECT d.n, d.low, d.high, d.lining, d.seen, d.whole,
                     CASE WHEN d.state = 'not scanned' AND max(d.high) OVER of_part - min(d.low) OVER of_part >= least_length
                          THEN d.state ELSE 'unseen' END AS said,
                     max(d.high) OVER of_whole - min(d.low) OVER of_whole AS length
                 FROM dim d
-                WHERE d.state IS NOT NULL
-                WINDOW of_part AS (PARTITION BY d.part), of_whole AS (PARTITION BY d.whole)) l
-            WHERE l.length >= least_length) d
+                WINDOW of_part AS (PARTITION BY d.n, d.part), of_whole AS (PARTITION BY d.n, d.whole)) l
+            WHERE l.length >= least_length
+            WINDOW along AS (PARTITION BY l.n ORDER BY l.low)) d
     ), gap AS (
-        SELECT j.low, j.high, j.state, j.reason, j.searched, NULL::float8 AS seen FROM judged j WHERE j.state IS NOT NULL
+        SELECT s.n, j.low, j.high, j.state, j.reason, j.searched, NULL::float8 AS seen
+        FROM judged j JOIN stretch s ON j.low < s.high AND j.high > s.low
+        WHERE j.state IS NOT NULL
         UNION ALL
-        SELECT u.low, u.high, 'not loaded', u.reason, false, NULL FROM unread u
+        SELECT s.n, u.low, u.high, 'not loaded', u.reason, false, NULL
+        FROM unread u JOIN stretch s ON u.low < s.high AND u.high > s.low
         UNION ALL
-        SELECT b.low, b.high, 'not scanned', 'the survey has no points there', false, NULL FROM beyond b
+        SELECT b.n, b.low, b.high, 'not scanned', 'the survey has no points there', false, NULL FROM beyond b
         WHERE b.low > '-Infinity' AND b.high < 'Infinity' AND b.high - b.low >= 1
         UNION ALL
-        SELECT min(d.low), max(d.high), d.said,
+        SELECT d.n, min(d.low), max(d.high), d.said,
             CASE d.said WHEN 'unseen' THEN 'less than half of the lining was seen' ELSE 'no lining is known there' END, true,
             coalesce(sum(d.seen) / nullif(sum(d.lining), 0), 0)
         FROM dark d
-        GROUP BY d.piece, d.said
+        GROUP BY d.n, d.piece, d.said
     ), cut AS (
-        SELECT greatest(g.low, first_place) AS low, least(g.high, last_place) AS high, g.state, g.reason, g.searched, g.seen
+        SELECT s.n, greatest(g.low, s.low) AS low, least(g.high, s.high) AS high, g.state, g.reason, g.searched, g.seen
         FROM gap g
-        WHERE g.low < last_place AND g.high > first_place
+        JOIN stretch s ON s.n = g.n
+        WHERE g.low < s.high AND g.high > s.low
     ), joined AS (  -- of kilometres in a row of which the same is to be said
         SELECT c.*, sum(CASE WHEN c.low <= c.before + CASE c.state WHEN 'unseen' THEN 0 ELSE 1 END THEN 0 ELSE 1 END) OVER (
-            PARTITION BY c.state, c.reason, c.searched ORDER BY c.low) AS part
-        FROM (SELECT c.*, lag(c.high) OVER (PARTITION BY c.state, c.reason, c.searched ORDER BY c.low) AS before FROM cut c) c
+            PARTITION BY c.n, c.state, c.reason, c.searched ORDER BY c.low) AS part
+        FROM (SELECT c.*, lag(c.high) OVER (PARTITION BY c.n, c.state, c.reason, c.searched ORDER BY c.low) AS before FROM cut c) c
     )
-    SELECT min(j.low) AS low, max(j.high), j.state, j.reason, j.searched, max(j.seen)
+    SELECT j.n, min(j.low) AS low, max(j.high), j.state, j.reason, j.searched, max(j.seen)
     FROM joined j
-    GROUP BY j.state, j.reason, j.searched, j.part
-    ORDER BY 5, 1, 2 DESC, 3, 4;
+    GROUP BY j.n, j.state, j.reason, j.searched, j.part
+    ORDER BY 1, 6, 2, 3 DESC, 4, 5;
 END
+$$;
+COMMENT ON FUNCTION tunnel_api.coverage_gaps_of(int, float8[], float8[]) IS
+'What coverage_gaps has to say of each of some stretches of a survey, given by where they begin and end (m); n: the first is 1.';
+
+
+-- The planner puts the body in the place of a call.
+CREATE OR REPLACE FUNCTION tunnel_api.coverage_gaps(
+    survey_id int, stretch_from float8 DEFAULT '-Infinity', stretch_to float8 DEFAULT 'Infinity')
+RETURNS TABLE (chainage_from float8, chainage_to float8, state text, reason text, searched boolean, seen_share float8)
+LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL RESTRICTED
+ROWS 10
+AS $$
+    SELECT g.chainage_from, g.chainage_to, g.state, g.reason, g.searched, g.seen_share
+    FROM tunnel_api.coverage_gaps_of($1, ARRAY[$2], ARRAY[$3]) g
 $$;
 COMMENT ON FUNCTION tunnel_api.coverage_gaps(int, float8, float8) IS
 'Where a survey cannot vouch for its list of leaks between two chainages (m), or anywhere: one row a stretch, those that were not searched for leaks first, then from the least chainage on. state: not scanned (no points or no lining there), not loaded, not searched, failed, interrupted, stale (searched before something changed), unseen (5 m or more of which less than half of the lining was seen), no intensity. searched: whether the result of a search stands there. No rows: everything was searched, is up to date and was seen by more than half.';
+
+
+CREATE OR REPLACE FUNCTION tunnel_api.coverage_statements(survey_id int, starts float8[], ends float8[])
+RETURNS TABLE (n int, said text)
+LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
+COST 100000  -- once a survey, not once a stretch
+ROWS 10
+SECURITY DEFINER SET search_path = pg_catalog, pg_temp
+SET jit = off
+AS $$
+    SELECT k.stretch, string_agg(k.said, '; ' ORDER BY k.searched, k.n)
+    FROM (
+        SELECT w.stretch, w.searched, min(w.n) AS n,
+            CASE WHEN w.searched THEN 'Searched, but ' ELSE 'Not searched for leaks: ' END
+            || string_agg(CASE WHEN w.n <= 6 THEN w.said END, ', ' ORDER BY w.n)
+            || CASE WHEN max(w.n) > 6 THEN format(', and %s more', max(w.n) - 6) ELSE '' END AS said
+        FROM (
+            SELECT g.n AS stretch, g.searched, row_number() OVER (PARTITION BY g.n, g.searched ORDER BY g.chainage_from) AS n,
+                format(CASE WHEN g.searched THEN '%3$s %1$s–%2$s%4$s' ELSE '%1$s–%2$s %3$s%4$s' END,
+                    f.label, t.label, g.state, CASE g.state
+                        WHEN 'unseen' THEN format(' (%s %% of the lining seen)', round((100 * g.seen_share)::numeric))
+                        ELSE format(' (%s)', g.reason) END) AS said
+            FROM tunnel.survey s
+            CROSS JOIN LATERAL tunnel_api.coverage_gaps_of(s.id, $2, $3) g
+            CROSS JOIN LATERAL (SELECT regexp_replace(l.label, '\.0+$', '') AS label
+                                FROM tunnel_api.stationing(s.tunnel_id, g.chainage_from) l) f
+            CROSS JOIN LATERAL (SELECT regexp_replace(l.label, '\.0+$', '') AS label
+                                FROM tunnel_api.stationing(s.tunnel_id, g.chainage_to) l) t
+            WHERE s.id = $1) w
+        GROUP BY w.stretch, w.searched) k
+    GROUP BY k.stretch
+    ORDER BY k.stretch
+$$;
+COMMENT ON FUNCTION tunnel_api.coverage_statements(int, float8[], float8[]) IS
+'What coverage_statement has to say of each of some stretches of a survey, given by where they begin and end (m); n: the first is 1. No row for one of which there is nothing to say.';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.coverage_statement(
     survey_id int, chainage_from float8 DEFAULT '-Infinity', chainage_to float8 DEFAULT 'Infinity')
 RETURNS text
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
-SECURITY DEFINER SET search_path = pg_catalog, pg_temp
-AS $$
-    SELECT string_agg(k.said, '; ' ORDER BY k.searched, k.n)
-    FROM (
-        SELECT w.searched, min(w.n) AS n,
-            CASE WHEN w.searched THEN 'Searched, but ' ELSE 'Not searched for leaks: ' END
-            || string_agg(CASE WHEN w.n <= 6 THEN w.said END, ', ' ORDER BY w.n)
-            || CASE WHEN max(w.n) > 6 THEN format(', and %s more', max(w.n) - 6) ELSE '' END AS said
-        FROM (
-            SELECT g.searched, row_number() OVER (PARTITION BY g.searched ORDER BY g.chainage_from) AS n,
-                format(CASE WHEN g.searched THEN '%3$s %1$s–%2$s%4$s' ELSE '%1$s–%2$s %3$s%4$s' END,
-                    f.label, t.label, g.state, CASE g.state
-                        WHEN 'unseen' THEN format(' (%s %% of the lining seen)', round((100 * g.seen_share)::numeric))
-                        ELSE format(' (%s)', g.reason) END) AS said
-            FROM tunnel.survey s
-            CROSS JOIN LATERAL tunnel_api.coverage_gaps(s.id, $2, $3) g
-            CROSS JOIN LATERAL (SELECT regexp_replace(l.label, '\.0+$', '') AS label
-                                FROM tunnel_api.stationing(s.tunnel_id, g.chainage_from) l) f
-            CROSS JOIN LATERAL (SELECT regexp_replace(l.label, '\.0+$', '') AS label
-                                FROM tunnel_api.stationing(s.tunnel_id, g.chainage_to) l) t
-            WHERE s.id = $1) w
-        GROUP BY w.searched) k
-$$;
+AS $$ SELECT s.said FROM tunnel_api.coverage_statements($1, ARRAY[$2], ARRAY[$3]) s $$;
 COMMENT ON FUNCTION tunnel_api.coverage_statement(int, float8, float8) IS
 'What coverage_gaps has to say of a survey between two chainages (m), in words, six stretches of each kind at most; NULL if there is nothing. What every document says before it counts leaks.';
 
 
+-- Numbered by name, too, so that a condition on it leaves the other surveys out.
 CREATE OR REPLACE VIEW tunnel_api.coverage_gap AS
-SELECT s.id::bigint * 1000000 + row_number() OVER (PARTITION BY s.id) AS id, s.id AS survey_id, s.name AS survey,
+SELECT s.id::bigint * 1000000 + row_number() OVER (PARTITION BY s.id, s.name) AS id, s.id AS survey_id, s.name AS survey,
        g.chainage_from, g.chainage_to, tunnel_api.station_label(s.tunnel_id, g.chainage_from) AS label_from,
        tunnel_api.station_label(s.tunnel_id, g.chainage_to) AS label_to, g.state, g.reason, g.searched, g.seen_share,
        public.st_makeenvelope(g.chainage_from, a.arc_from, g.chainage_to, a.arc_to, 0)::public.geometry(Polygon, 0) AS geom

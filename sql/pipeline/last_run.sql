@@ -2,36 +2,51 @@
 -- all runs; the last ones are found from place to place in its index (survey_id, stage, km, subject, started_at, id), and cost
 -- what there is of places, not of runs. Runs are put in order by the time of their beginning, as everywhere.
 
-CREATE OR REPLACE FUNCTION tunnel_api.last_runs(
-    survey_id int, stage text, succeeded boolean DEFAULT true, km_from int DEFAULT -1000000, km_to int DEFAULT 1000000)
+-- From a run the index is read backwards to the first of the place before, which is the last run there.
+CREATE OR REPLACE FUNCTION tunnel_api.last_runs_of(
+    survey_ids int[], stages text[], succeeded boolean DEFAULT true, km_from int DEFAULT -1000000, km_to int DEFAULT 1000000)
 RETURNS SETOF tunnel.run
-LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 25
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 25
 SET search_path = pg_catalog, pg_temp
 SET jit = off
 SET enable_seqscan = off
 SET enable_bitmapscan = off
 SET enable_nestloop = on
+SET plan_cache_mode = force_generic_plan  -- planning takes longer than a stage
 AS $$
-    WITH RECURSIVE place AS (
-        (SELECT r.km, r.subject FROM tunnel.run r
-          WHERE r.survey_id = $1 AND r.stage = $2 AND r.km >= $4 AND r.km <= $5 AND tunnel_api.in_order($4, $5, 'km')
-          ORDER BY r.km, r.subject LIMIT 1)
-         UNION ALL
-        SELECT n.km, n.subject
-          FROM place p
+BEGIN
+    RETURN QUERY
+    WITH RECURSIVE last AS (
+        SELECT l.*
+          FROM unnest($1) AS s (id)
+         CROSS JOIN unnest($2) AS g (stage)
          CROSS JOIN LATERAL (
-                SELECT r.km, r.subject FROM tunnel.run r
-                 WHERE r.survey_id = $1 AND r.stage = $2 AND (r.km, r.subject) > (p.km, p.subject) AND r.km <= $5
-                 ORDER BY r.km, r.subject LIMIT 1) n
+                SELECT r.* FROM tunnel.run r
+                 WHERE r.survey_id = s.id AND r.stage = g.stage AND r.km >= $4 AND r.km <= $5 AND (r.outcome = 'done' OR NOT $3)
+                 ORDER BY r.km DESC, r.subject DESC, r.started_at DESC, r.id DESC LIMIT 1) l
+         WHERE tunnel_api.in_order($4, $5, 'km')
+         UNION ALL
+        SELECT n.*
+          FROM last l
+         CROSS JOIN LATERAL (
+                SELECT r.* FROM tunnel.run r
+                 WHERE r.survey_id = l.survey_id AND r.stage = l.stage AND (r.km, r.subject) < (l.km, l.subject) AND r.km >= $4
+                   AND (r.outcome = 'done' OR NOT $3)
+                 ORDER BY r.km DESC, r.subject DESC, r.started_at DESC, r.id DESC LIMIT 1) n
     )
-    SELECT l.*
-      FROM place p
-     CROSS JOIN LATERAL (
-            SELECT r.* FROM tunnel.run r
-             WHERE r.survey_id = $1 AND r.stage = $2 AND r.km = p.km AND r.subject = p.subject
-               AND (r.outcome = 'done' OR NOT $3)
-             ORDER BY r.started_at DESC, r.id DESC LIMIT 1) l
+    SELECT l.* FROM last l;
+END
 $$;
+COMMENT ON FUNCTION tunnel_api.last_runs_of(int[], text[], boolean, int, int) IS
+'The last run of each of some stages in each kilometre of some surveys, as last_runs has them of one';
+
+
+-- The planner puts the body in the place of a call.
+CREATE OR REPLACE FUNCTION tunnel_api.last_runs(
+    survey_id int, stage text, succeeded boolean DEFAULT true, km_from int DEFAULT -1000000, km_to int DEFAULT 1000000)
+RETURNS SETOF tunnel.run
+LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL SAFE ROWS 25
+AS $$ SELECT r.* FROM tunnel_api.last_runs_of(ARRAY[$1], ARRAY[$2], $3, $4, $5) r $$;
 COMMENT ON FUNCTION tunnel_api.last_runs(int, text, boolean, int, int) IS
 'The last run of a stage in each kilometre of a survey, of those from km_from to km_to, and of each subject (layer, older survey, track and outline) that has results of its own: the last that succeeded, or with false the last that began';
 

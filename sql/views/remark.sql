@@ -59,52 +59,89 @@ COMMENT ON COLUMN tunnel_api.remark.remark IS 'What is to be known';
 
 
 -- Files first, then by kilometre; what is the same in several kilometres is said once.
-CREATE OR REPLACE FUNCTION tunnel_api.remarks(
-    survey_id int, stretch_from float8 DEFAULT '-Infinity', stretch_to float8 DEFAULT 'Infinity')
-RETURNS TABLE (file text, stage text, kilometres int[], remark text, said text)
-LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
+CREATE OR REPLACE FUNCTION tunnel_api.remarks_of(survey_id int, starts float8[], ends float8[])
+RETURNS TABLE (n int, file text, stage text, kilometres int[], remark text, said text)
+LANGUAGE plpgsql STABLE STRICT PARALLEL RESTRICTED
+COST 100000  -- once a survey, not once a stretch
 ROWS 5
 SECURITY DEFINER SET search_path = pg_catalog, pg_temp
+SET jit = off
+SET plan_cache_mode = force_generic_plan  -- planning takes longer than a survey
 AS $$
-    WITH here AS (
-        SELECT DISTINCT r.file, r.stage, r.km, r.remark
+#variable_conflict use_column
+BEGIN
+    PERFORM tunnel_api.in_order(t.low, t.high) FROM unnest(starts, ends) AS t (low, high);
+    RETURN QUERY
+    WITH known AS (
+        SELECT DISTINCT r.file, r.stage, r.km, r.remark, coalesce(r.km * 1000, f.chainage_from, '-Infinity') AS low,
+               coalesce((r.km + 1) * 1000, f.chainage_to, 'Infinity') AS high
           FROM tunnel_api.remark r
           LEFT JOIN tunnel.scan_file f ON f.survey_id = r.survey_id AND f.name = r.file
-         WHERE r.survey_id = $1 AND tunnel_api.in_order($2, $3)
-           AND coalesce(r.km * 1000, f.chainage_from, '-Infinity') < $3
-           AND coalesce((r.km + 1) * 1000, f.chainage_to, 'Infinity') > $2
+         WHERE r.survey_id = $1
+    ), here AS (
+        SELECT t.n::int, k.file, k.stage, k.km, k.remark
+          FROM unnest(starts, ends) WITH ORDINALITY AS t (low, high, n)
+          JOIN known k ON k.low < t.high AND k.high > t.low
     ), part AS (  -- kilometres in a row
-        SELECT h.*, h.km - row_number() OVER (PARTITION BY h.file, h.stage, h.remark ORDER BY h.km) AS part FROM here h
+        SELECT h.*, h.km - row_number() OVER (PARTITION BY h.n, h.file, h.stage, h.remark ORDER BY h.km) AS part FROM here h
     ), span AS (
-        SELECT p.file, p.stage, p.remark, min(p.km) AS first,
+        SELECT p.n, p.file, p.stage, p.remark, min(p.km) AS first,
                concat_ws('–', min(p.km), nullif(max(p.km), min(p.km))) AS span
           FROM part p
-         GROUP BY p.file, p.stage, p.remark, p.part
+         GROUP BY p.n, p.file, p.stage, p.remark, p.part
     ), whole AS (
-        SELECT s.file, s.stage, s.remark, min(s.first) AS first, string_agg(s.span, ', ' ORDER BY s.first) AS spans
+        SELECT s.n, s.file, s.stage, s.remark, min(s.first) AS first, string_agg(s.span, ', ' ORDER BY s.first) AS spans
           FROM span s
-         GROUP BY s.file, s.stage, s.remark
+         GROUP BY s.n, s.file, s.stage, s.remark
+    ), listed AS (
+        SELECT h.n, h.stage, h.remark, array_agg(h.km ORDER BY h.km) AS kilometres
+          FROM here h
+         WHERE h.km IS NOT NULL
+         GROUP BY h.n, h.stage, h.remark
     )
-    SELECT w.file, w.stage,
-           ARRAY(SELECT h.km FROM here h
-                  WHERE h.km IS NOT NULL AND (h.stage, h.remark) = (w.stage, w.remark) AND w.file IS NULL ORDER BY h.km),
-           w.remark, 
+    SELECT w.n, w.file, w.stage, coalesce(l.kilometres, '{}'), w.remark,
            coalesce(w.file, CASE WHEN w.spans <> '' THEN format('km %s, %s', w.spans, w.stage) END, 'scanner positions')
                || ': ' || w.remark
       FROM whole w
-     ORDER BY w.file NULLS LAST, w.first, w.stage, w.remark
+      LEFT JOIN listed l ON l.n = w.n AND l.stage = w.stage AND l.remark = w.remark AND w.file IS NULL
+     ORDER BY w.n, w.file NULLS LAST, w.first, w.stage, w.remark;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.remarks_of(int, float8[], float8[]) IS
+'What remarks has to say of each of some stretches of a survey, given by where they begin and end (m); n: the first is 1.';
+
+
+-- The planner puts the body in the place of a call.
+CREATE OR REPLACE FUNCTION tunnel_api.remarks(
+    survey_id int, stretch_from float8 DEFAULT '-Infinity', stretch_to float8 DEFAULT 'Infinity')
+RETURNS TABLE (file text, stage text, kilometres int[], remark text, said text)
+LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL RESTRICTED
+ROWS 5
+AS $$
+    SELECT r.file, r.stage, r.kilometres, r.remark, r.said FROM tunnel_api.remarks_of($1, ARRAY[$2], ARRAY[$3]) r
 $$;
 COMMENT ON FUNCTION tunnel_api.remarks(int, float8, float8) IS
 'What is to be known of a survey''s results between two chainages (m), or anywhere, by the view remark: of its files there, then of its kilometres, the same in several of them once. said: the whole in words, as every document has it.';
+
+
+CREATE OR REPLACE FUNCTION tunnel_api.remark_statements(survey_id int, starts float8[], ends float8[])
+RETURNS TABLE (n int, said text)
+LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
+COST 100000  -- once a survey, not once a stretch
+ROWS 5
+AS $$
+    SELECT r.n, string_agg(r.said, '; ' ORDER BY r.place)
+      FROM tunnel_api.remarks_of($1, $2, $3) WITH ORDINALITY AS r (n, file, stage, kilometres, remark, said, place)
+     GROUP BY r.n
+$$;
+COMMENT ON FUNCTION tunnel_api.remark_statements(int, float8[], float8[]) IS
+'What remarks has to say of each of some stretches of a survey, given by where they begin and end (m), on one line; n: the first is 1. No row for one of which there is nothing to say.';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.remark_statement(
     survey_id int, stretch_from float8 DEFAULT '-Infinity', stretch_to float8 DEFAULT 'Infinity')
 RETURNS text
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
-AS $$
-    SELECT string_agg(r.said, '; ' ORDER BY r.n)
-      FROM tunnel_api.remarks($1, $2, $3) WITH ORDINALITY AS r (file, stage, kilometres, remark, said, n)
-$$;
+AS $$ SELECT r.said FROM tunnel_api.remark_statements($1, ARRAY[$2], ARRAY[$3]) r $$;
 COMMENT ON FUNCTION tunnel_api.remark_statement(int, float8, float8) IS
 'What remarks has to say of a survey between two chainages (m), on one line; NULL if there is nothing.';

@@ -36,12 +36,14 @@ COMMENT ON COLUMN tunnel_api.sheet_leak.geom IS 'In the unrolled plane (chainage
 
 -- All sheets of a survey are as high as its widest place, so that they have one scale. Each section is taken for the middle
 -- one of itself and its neighbours: a single one that went astray, say at a portal, must not blow up all sheets.
--- What is drawn needs no figures, and they are not reckoned then: they are joined so that the planner can leave them out.
+-- What is drawn needs no figures, and they are not reckoned then: they are joined so that the planner can leave them out. What is
+-- to be said of sheets is asked of all those of a survey together, before they are parted: it costs as much of one.
 CREATE OR REPLACE VIEW tunnel_api.sheet AS
-SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.name AS survey, n.number, b.km,
+SELECT s.id::bigint * 1000000 + 500000 + r.number AS id, s.id AS survey_id, s.name AS survey, r.number, b.km,
        b.chainage_from, b.chainage_to, k.labels[1] AS label_from, k.labels[6] AS label_to, k.labels AS ticks,
        c.lining AS lining_area, c.seen / nullif(c.lining, 0) AS seen_share, l.wet_area, l.leaks,
-       g.said AS gaps, m.said AS remarks, f.findings, f.left_out,
+       w.said[array_position(w.places, r.place::integer)] AS gaps,
+       y.said[array_position(y.places, r.place::integer)] AS remarks, f.findings, f.left_out,
        public.st_makeenvelope(b.chainage_from, a.arc_from, b.chainage_to, a.arc_to, 0)::public.geometry(Polygon, 0) AS geom
   FROM tunnel.survey s
  CROSS JOIN LATERAL (
@@ -55,30 +57,41 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
                        coalesce(lag(e.right_end) OVER w, lead(e.right_end) OVER w) AS right_before,
                        coalesce(lead(e.right_end) OVER w, lag(e.right_end) OVER w) AS right_after
                   FROM (SELECT t.chainage, t.arc[1] AS left_end, t.arc[361] AS right_end
-                          FROM tunnel.section t WHERE t.survey_id = s.id) e
+                          FROM (SELECT q.chainage, q.arc[:] AS arc  -- [:] takes it out of its storage once
+                                  FROM tunnel.section q WHERE q.survey_id = s.id OFFSET 0) t OFFSET 0) e
                 WINDOW w AS (ORDER BY e.chainage)) q) a
  CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
- CROSS JOIN LATERAL (  -- a survey that ends some centimetres into the next sheet has none for them, unless it leaks there
-        SELECT i AS number
-          FROM (SELECT q.chainage_from, q.chainage_to FROM tunnel.segment q WHERE q.survey_id = s.id
-                 UNION ALL  -- a kilometre without segments has empty ones, which say so
-                SELECT k.chainage_from, k.chainage_to FROM tunnel_api.km_ends k
-                 WHERE k.survey_id = s.id
-                   AND NOT EXISTS (SELECT FROM tunnel.segment q WHERE q.survey_id = k.survey_id AND q.km = k.km)) g
-         CROSS JOIN generate_series(floor(g.chainage_from / 50)::integer, ceil(g.chainage_to / 50)::integer - 1) AS i
-         GROUP BY i
-        HAVING sum(least(g.chainage_to, e.chainage_to, (i + 1) * 50) - greatest(g.chainage_from, e.chainage_from, i * 50)) >= 1
-            OR EXISTS (SELECT FROM tunnel.anomaly x
-                        WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND x.wet AND NOT x.aside
-                          AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(i * 50, -1e4, (i + 1) * 50, 1e4)
-                          AND x.chainage_to > greatest(e.chainage_from, i * 50)
-                          AND x.chainage_from < least(e.chainage_to, (i + 1) * 50))) n
  CROSS JOIN LATERAL (
-        SELECT n.number * 50::float8 AS chainage_from, (n.number + 1) * 50::float8 AS chainage_to,
-               floor(n.number / 20.0)::integer AS km) b
- CROSS JOIN LATERAL (  -- as far as the survey reaches
-        SELECT f.chainage_from, greatest(least(b.chainage_to, e.chainage_to), f.chainage_from) AS chainage_to
-          FROM (SELECT least(greatest(b.chainage_from, e.chainage_from), b.chainage_to) AS chainage_from) f) r
+        SELECT array_agg(q.number) AS numbers, array_agg(r.chainage_from) AS starts, array_agg(r.chainage_to) AS ends
+          FROM (  -- a survey that ends some centimetres into the next sheet has none for them, unless it leaks there
+                SELECT i AS number
+                  FROM (SELECT q.chainage_from, q.chainage_to FROM tunnel.segment q WHERE q.survey_id = s.id
+                         UNION ALL  -- a kilometre without segments has empty ones, which say so
+                        SELECT k.chainage_from, k.chainage_to FROM tunnel_api.km_ends k
+                         WHERE k.survey_id = s.id
+                           AND NOT EXISTS (SELECT FROM tunnel.segment q WHERE q.survey_id = k.survey_id AND q.km = k.km)) g
+                 CROSS JOIN generate_series(floor(g.chainage_from / 50)::integer, ceil(g.chainage_to / 50)::integer - 1) AS i
+                 GROUP BY i
+                HAVING sum(least(g.chainage_to, e.chainage_to, (i + 1) * 50) - greatest(g.chainage_from, e.chainage_from, i * 50))
+                           >= 1
+                    OR EXISTS (SELECT FROM tunnel.anomaly x
+                                WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND x.wet AND NOT x.aside
+                                  AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(i * 50, -1e4, (i + 1) * 50, 1e4)
+                                  AND x.chainage_to > greatest(e.chainage_from, i * 50)
+                                  AND x.chainage_from < least(e.chainage_to, (i + 1) * 50))) q
+         CROSS JOIN LATERAL (  -- as far as the survey reaches
+                SELECT f.chainage_from, greatest(least((q.number + 1) * 50, e.chainage_to), f.chainage_from) AS chainage_to
+                  FROM (SELECT least(greatest(q.number * 50, e.chainage_from), (q.number + 1) * 50) AS chainage_from) f) r) h
+  LEFT JOIN LATERAL (
+        SELECT array_agg(q.n) AS places, array_agg(q.said) AS said
+          FROM tunnel_api.coverage_statements(s.id, h.starts, h.ends) q) w ON true
+  LEFT JOIN LATERAL (
+        SELECT array_agg(q.n) AS places, array_agg(q.said) AS said
+          FROM tunnel_api.remark_statements(s.id, h.starts, h.ends) q) y ON true
+ CROSS JOIN LATERAL unnest(h.numbers, h.starts, h.ends) WITH ORDINALITY AS r (number, chainage_from, chainage_to, place)
+ CROSS JOIN LATERAL (
+        SELECT r.number * 50::float8 AS chainage_from, (r.number + 1) * 50::float8 AS chainage_to,
+               floor(r.number / 20.0)::integer AS km) b
   LEFT JOIN LATERAL (
         SELECT array_agg(regexp_replace(t.label, '\.0+$', '') ORDER BY i) AS labels
           FROM generate_series(0, 5) AS i
@@ -110,19 +123,6 @@ SELECT s.id::bigint * 1000000 + 500000 + n.number AS id, s.id AS survey_id, s.na
                    AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(b.chainage_from, -1e4, b.chainage_to, 1e4)
                    AND x.chainage_to > b.chainage_from AND x.chainage_from < b.chainage_to
                  GROUP BY q.state, q.listed) t) f ON true
-  LEFT JOIN LATERAL (  -- once a survey, so that sheets of which there is nothing to be said are not asked about
-        SELECT array_agg(q.chainage_from) AS starts, array_agg(q.chainage_to) AS ends
-          FROM tunnel_api.coverage_gaps(s.id) q) w ON true
-  LEFT JOIN LATERAL (
-        SELECT array_agg(q.km) AS kilometres, bool_or(q.km IS NULL) AS anywhere
-          FROM tunnel_api.remark q WHERE q.survey_id = s.id) y ON true
- CROSS JOIN LATERAL (
-        SELECT CASE WHEN EXISTS (SELECT FROM unnest(w.starts, w.ends) AS u (low, high)
-                                  WHERE u.low < r.chainage_to + 1 AND u.high > r.chainage_from - 1)
-                    THEN tunnel_api.coverage_statement(s.id, r.chainage_from, r.chainage_to) END AS said) g
- CROSS JOIN LATERAL (
-        SELECT CASE WHEN y.anywhere OR b.km = ANY (y.kilometres)
-                    THEN tunnel_api.remark_statement(s.id, r.chainage_from, r.chainage_to) END AS said) m
  WHERE a.arc_from IS NOT NULL;
 COMMENT ON VIEW tunnel_api.sheet IS
     'Sheets of 50 m on which a survey is drawn and printed: rectangles of the unrolled plane (chainage, arc), SRID 0';

@@ -24,7 +24,7 @@ COMMENT ON COLUMN tunnel_api.run.outcome IS 'running, done, failed, or interrupt
 COMMENT ON COLUMN tunnel_api.run.worker IS 'Machine and process that it ran on';
 COMMENT ON COLUMN tunnel_api.run.job_id IS 'Job of the queue that it was (tunnel_api.job); NULL when run by hand';
 
--- Last run of each stage on each kilometre of a survey that was ever loaded or worked on, waits to be loaded or is wanted,
+-- Last run of each stage on each kilometre of some surveys that was ever loaded or worked on, waits to be loaded or is wanted,
 -- and whether its result is out of date. Load rests on the files that touch the kilometre; what the others rest on, here and on
 -- both neighbours, is in tunnel.stage; what reads the survey rests on its positions, reference and intensity, what reads sonar on
 -- the points below the water, what judges on what was learned from reviews (leaks/learned.sql: which, and not when).
@@ -34,15 +34,22 @@ COMMENT ON COLUMN tunnel_api.run.job_id IS 'Job of the queue that it was (tunnel
 -- see bears an earlier time. An edit of a vertex takes no such lock; it shows in the segments, whose planes are not those
 -- of the axis any more (segment_moved), and what rests on them is stale with them. Only those that a vertex moved by hand
 -- can turn are looked at: what a run has moved, its time tells.
-CREATE OR REPLACE FUNCTION tunnel_api.stage_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
-RETURNS TABLE (km integer, step integer, stage text, run_id bigint, outcome text, started_at timestamptz,
-               finished_at timestamptz, message text, parameters jsonb, done_at timestamptz, done_parameters jsonb,
+CREATE OR REPLACE FUNCTION tunnel_api.stage_states(
+    survey_ids integer[], km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
+RETURNS TABLE (survey_id integer, km integer, step integer, stage text, run_id bigint, outcome text, done_id bigint,
                input_at timestamptz, outdated boolean, reason text)
-LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000
+LANGUAGE plpgsql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000
 SET search_path = pg_catalog, pg_temp
 SET jit = off
 SET enable_nestloop = off  -- how few or many rows there are is not known when it is planned
+SET enable_mergejoin = off
+SET plan_cache_mode = force_generic_plan  -- planning takes longer than a survey
+SET enable_hashjoin = on  -- which stage_state has off
+SET enable_seqscan = on
 AS $$
+#variable_conflict use_column
+BEGIN
+    RETURN QUERY
     WITH RECURSIVE stage AS MATERIALIZED (  -- the stages that each rests on, by their numbers: here, and on both neighbours
         SELECT s.step, s.name, s.name = 'segments' AS of_segments, 'axis' = ANY (s.reads) AS of_axis,
                'survey' = ANY (s.reads) AS of_survey, 'sonar' = ANY (s.reads) AS of_sonar,
@@ -54,62 +61,70 @@ AS $$
         SELECT s.step, w.way, n.source
           FROM stage s CROSS JOIN (VALUES (-1), (0), (1)) AS w (way)
          CROSS JOIN LATERAL unnest(CASE w.way WHEN 0 THEN s.here ELSE s.beside END) AS n (source)
+    ), survey AS MATERIALIZED (
+        SELECT s.id, s.settings_at, tunnel_api.learned_in_force(s.tunnel_id) AS learned
+          FROM tunnel.survey s WHERE s.id = ANY ($1)
     ), last AS MATERIALIZED (
-        SELECT r.km, s.step, r.id, r.outcome, r.started_at, r.finished_at, r.message, r.parameters, r.backend_pid, r.backend_start,
+        SELECT r.survey_id, r.km, s.step, r.id, r.outcome, r.started_at, r.finished_at, r.backend_pid, r.backend_start,
                r.counts ->> 'kept' = '0' AS void, (r.counts ->> 'learned')::integer AS learned
-          FROM stage s CROSS JOIN LATERAL tunnel_api.last_runs($1, s.name, false, $2, $3) r
-         WHERE tunnel_api.in_order($2, $3, 'km')
+          FROM tunnel_api.last_runs_of($1, ARRAY(SELECT s.name FROM stage s), false, $2, $3) r
+          JOIN stage s ON s.name = r.stage
     ), success AS MATERIALIZED (  -- mostly the last one; where that is not, the ledger is asked again
-        SELECT l.* FROM last l WHERE l.outcome = 'done'
+        SELECT l.survey_id, l.km, l.step, l.id, l.started_at, l.finished_at, l.void, l.learned FROM last l WHERE l.outcome = 'done'
          UNION ALL
-        SELECT r.km, l.step, r.id, r.outcome, r.started_at, r.finished_at, r.message, r.parameters, r.backend_pid, r.backend_start,
-               r.counts ->> 'kept' = '0', (r.counts ->> 'learned')::integer
+        SELECT r.survey_id, r.km, l.step, r.id, r.started_at, r.finished_at, r.counts ->> 'kept' = '0',
+               (r.counts ->> 'learned')::integer
           FROM last l
           JOIN stage s ON s.step = l.step
-         CROSS JOIN LATERAL tunnel_api.last_runs($1, s.name, true, l.km, l.km) r
+         CROSS JOIN LATERAL tunnel_api.last_runs(l.survey_id, s.name, true, l.km, l.km) r
          WHERE l.outcome <> 'done'
     ), pending AS (
-        SELECT k.km, max(k.read_at) AS read_at, (array_agg(f.name ORDER BY k.read_at DESC, f.name))[1] AS name
-          FROM tunnel.file_km k JOIN tunnel.scan_file f ON f.id = k.file_id
-         WHERE f.survey_id = $1 AND k.km BETWEEN $2 AND $3 AND k.loaded_at IS NULL
-         GROUP BY k.km
+        SELECT f.survey_id, k.km, max(k.read_at) AS read_at, (array_agg(f.name ORDER BY k.read_at DESC, f.name))[1] AS name
+          FROM tunnel.scan_file f
+         CROSS JOIN LATERAL (  -- by the file, not all of them
+                SELECT q.* FROM tunnel.file_km q
+                 WHERE q.file_id = f.id AND q.km BETWEEN $2 AND $3 AND q.loaded_at IS NULL OFFSET 0) k
+         WHERE f.survey_id = ANY ($1)
+         GROUP BY f.survey_id, k.km
     ), kilometre AS (
-        SELECT l.km FROM last l
-         UNION SELECT p.km FROM pending p
-         UNION SELECT g.km FROM tunnel.goal g WHERE g.survey_id = $1 AND g.km BETWEEN $2 AND $3
+        SELECT l.survey_id, l.km FROM last l
+         UNION SELECT p.survey_id, p.km FROM pending p
+         UNION SELECT g.survey_id, g.km FROM tunnel.goal g WHERE g.survey_id = ANY ($1) AND g.km BETWEEN $2 AND $3
+    ), edited AS MATERIALIZED (
+        SELECT v.survey_id, v.n, v.edited_at
+          FROM tunnel.axis_vertex v WHERE v.survey_id = ANY ($1) AND v.edited_at IS NOT NULL
     ), edit AS (
-        SELECT k.km, max(v.edited_at) AS edited_at
-          FROM tunnel.survey s
+        SELECT v.survey_id, k.km, max(v.edited_at) AS edited_at
+          FROM edited v
+          JOIN tunnel.survey s ON s.id = v.survey_id
           JOIN tunnel.tunnel t ON t.id = s.tunnel_id
-          JOIN tunnel.axis_vertex v ON v.survey_id = s.id AND v.edited_at IS NOT NULL
-          CROSS JOIN LATERAL generate_series(ceil((v.n - 2) * t.spacing / 1000)::integer - 1,
-                                             floor((v.n + 2) * t.spacing / 1000)::integer) AS k (km)
-         WHERE s.id = $1
-         GROUP BY k.km
+         CROSS JOIN LATERAL generate_series(ceil((v.n - 2) * t.spacing / 1000)::integer - 1,
+                                            floor((v.n + 2) * t.spacing / 1000)::integer) AS k (km)
+         GROUP BY v.survey_id, k.km
     ), near AS MATERIALIZED (
-        SELECT DISTINCT v.n + i AS n
-          FROM tunnel.axis_vertex v CROSS JOIN generate_series(-2, 1) AS i
-         WHERE v.survey_id = $1 AND v.edited_at IS NOT NULL
+        SELECT DISTINCT v.survey_id, v.n + i AS n FROM edited v CROSS JOIN generate_series(-2, 1) AS i
     ), turned AS MATERIALIZED (  -- apart from moved, lest the planner ask segment_moved of all segments first
-        SELECT g.km, g.n, g.vertex_from || g.vertex_to || g.tangent_from || g.tangent_to AS planes
-          FROM near JOIN tunnel.segment g ON g.survey_id = $1 AND g.n = near.n
-         WHERE g.km BETWEEN $2 AND $3
+        SELECT g.survey_id, g.km, g.n, g.vertex_from || g.vertex_to || g.tangent_from || g.tangent_to AS planes
+          FROM near
+         CROSS JOIN LATERAL (
+                SELECT q.* FROM tunnel.segment q
+                 WHERE q.survey_id = near.survey_id AND q.n = near.n AND q.km BETWEEN $2 AND $3 OFFSET 0) g
     ), moved AS (
-        SELECT DISTINCT t.km FROM turned t WHERE tunnel_api.segment_moved($1, t.n, t.planes)
+        SELECT DISTINCT t.survey_id, t.km FROM turned t WHERE tunnel_api.segment_moved(t.survey_id, t.n, t.planes)
     ), cell AS MATERIALIZED (
-        SELECT k.km, s.step, d.started_at, d.finished_at, d.learned
+        SELECT k.survey_id, k.km, s.step, d.started_at, d.finished_at, d.learned
           FROM kilometre k CROSS JOIN stage s
-          LEFT JOIN success d ON d.km = k.km AND d.step = s.step
+          LEFT JOIN success d ON d.survey_id = k.survey_id AND d.km = k.km AND d.step = s.step
     ), input AS (  -- the newest of what each rests on; as late, the first that came since or never ran: here, before, after
-        SELECT c.km, c.step, max(i.finished_at) AS finished_at,
+        SELECT c.survey_id, c.km, c.step, max(i.finished_at) AS finished_at,
                min(CASE WHEN i.finished_at > c.started_at THEN (3 * n.way * n.way + n.way) * 1000
                         WHEN i.finished_at IS NULL AND n.way = 0 AND n.source > 1 THEN 1000 END + n.source) AS late
           FROM cell c
           JOIN need n ON n.step = c.step
-          LEFT JOIN cell i ON i.km = c.km + n.way AND i.step = n.source
-         GROUP BY c.km, c.step
+          LEFT JOIN cell i ON i.survey_id = c.survey_id AND i.km = c.km + n.way AND i.step = n.source
+         GROUP BY c.survey_id, c.km, c.step
     ), direct AS MATERIALIZED (
-        SELECT c.km, c.step, c.started_at IS NOT NULL AS done,
+        SELECT c.survey_id, c.km, c.step, c.started_at IS NOT NULL AS done,
                CASE c.step WHEN 1 THEN p.read_at ELSE greatest(i.finished_at, CASE WHEN s.of_axis THEN e.edited_at END,
                                                              CASE WHEN s.of_survey THEN v.settings_at END,
                                                              CASE WHEN s.of_sonar THEN w.changed_at END) END AS input_at,
@@ -129,35 +144,34 @@ AS $$
                END AS reason
           FROM cell c
           JOIN stage s ON s.step = c.step
-          LEFT JOIN input i ON i.km = c.km AND i.step = c.step
+          JOIN survey v ON v.id = c.survey_id
+          LEFT JOIN input i ON i.survey_id = c.survey_id AND i.km = c.km AND i.step = c.step
           LEFT JOIN stage l ON l.step = i.late % 1000
-          LEFT JOIN pending p ON p.km = c.km
-          LEFT JOIN edit e ON e.km = c.km
-          LEFT JOIN moved m ON m.km = c.km
-          LEFT JOIN tunnel.water_level w ON w.survey_id = $1 AND w.km = c.km
-         CROSS JOIN (SELECT s.settings_at, tunnel_api.learned_in_force(s.tunnel_id) AS learned
-                       FROM tunnel.survey s WHERE s.id = $1) v
+          LEFT JOIN pending p ON p.survey_id = c.survey_id AND p.km = c.km
+          LEFT JOIN edit e ON e.survey_id = c.survey_id AND e.km = c.km
+          LEFT JOIN moved m ON m.survey_id = c.survey_id AND m.km = c.km
+          LEFT JOIN tunnel.water_level w ON w.survey_id = c.survey_id AND w.km = c.km
     ), ripple AS (  -- what is stale, and what rests on it
-        SELECT d.km, d.step FROM direct d WHERE d.reason IS NOT NULL
+        SELECT d.survey_id, d.km, d.step FROM direct d WHERE d.reason IS NOT NULL
          UNION
-        SELECT d.km, d.step
-          FROM ripple r
-          JOIN need n ON n.source = r.step
-          JOIN direct d ON d.km = r.km - n.way AND d.step = n.step AND d.done
+        SELECT d.survey_id, d.km, d.step
+          FROM (SELECT r.survey_id, r.km - n.way AS km, n.step FROM ripple r JOIN need n ON n.source = r.step
+                OFFSET 0) w  -- first what may rest on it: joined otherwise it would be each kilometre with all
+          JOIN direct d ON d.survey_id = w.survey_id AND d.km = w.km AND d.step = w.step AND d.done
     ), void AS (  -- emptied, with nothing left of it and nothing wanted: only its neighbours are to know
-        SELECT d.km FROM success d
+        SELECT d.survey_id, d.km FROM success d
          WHERE d.step = 1 AND d.void
-           AND NOT EXISTS (SELECT FROM last l WHERE l.km = d.km AND (l.step > 1 OR l.started_at > d.started_at))
-        EXCEPT SELECT p.km FROM pending p
-        EXCEPT SELECT g.km FROM tunnel.goal g WHERE g.survey_id = $1
+           AND NOT EXISTS (SELECT FROM last l WHERE l.survey_id = d.survey_id AND l.km = d.km
+                              AND (l.step > 1 OR l.started_at > d.started_at))
+        EXCEPT SELECT p.survey_id, p.km FROM pending p
+        EXCEPT SELECT g.survey_id, g.km FROM tunnel.goal g WHERE g.survey_id = ANY ($1)
     ), stale AS MATERIALIZED (
-        SELECT r.km, array_agg(r.step ORDER BY r.step) AS steps FROM ripple r GROUP BY r.km
+        SELECT r.survey_id, r.km, array_agg(r.step ORDER BY r.step) AS steps FROM ripple r GROUP BY r.survey_id, r.km
     )
-    SELECT d.km, d.step, s.name, l.id,
+    SELECT d.survey_id, d.km, d.step, s.name, l.id,
            CASE WHEN l.outcome = 'running' AND NOT tunnel_api.session_lives(l.backend_pid, l.backend_start)
                 THEN 'interrupted' ELSE coalesce(l.outcome, 'never') END,
-           l.started_at, l.finished_at, l.message, l.parameters, b.finished_at, b.parameters, d.input_at,
-           d.reason IS NOT NULL,
+           b.id, d.input_at, d.reason IS NOT NULL,
            CASE
                WHEN d.reason IS NOT NULL OR NOT d.done THEN d.reason
                WHEN here.steps && s.here THEN
@@ -172,12 +186,34 @@ AS $$
            END
       FROM direct d
       JOIN stage s ON s.step = d.step
-      LEFT JOIN last l ON l.km = d.km AND l.step = d.step
-      LEFT JOIN success b ON b.km = d.km AND b.step = d.step
-      LEFT JOIN stale here ON here.km = d.km
-      LEFT JOIN stale before ON before.km = d.km - 1
-      LEFT JOIN stale after ON after.km = d.km + 1
-     WHERE d.km NOT IN (SELECT v.km FROM void v)
+      LEFT JOIN last l ON l.survey_id = d.survey_id AND l.km = d.km AND l.step = d.step
+      LEFT JOIN success b ON b.survey_id = d.survey_id AND b.km = d.km AND b.step = d.step
+      LEFT JOIN stale here ON here.survey_id = d.survey_id AND here.km = d.km
+      LEFT JOIN stale before ON before.survey_id = d.survey_id AND before.km = d.km - 1
+      LEFT JOIN stale after ON after.survey_id = d.survey_id AND after.km = d.km + 1
+     WHERE (d.survey_id, d.km) NOT IN (SELECT v.survey_id, v.km FROM void v);
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.stage_states(integer[], integer, integer) IS
+    'How far kilometres of some surveys have come, as stage_state says of one; run_id and done_id: the last run and the last success (tunnel_api.run)';
+
+-- The same of one survey, with what the ledger has of the runs.
+CREATE OR REPLACE FUNCTION tunnel_api.stage_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
+RETURNS TABLE (km integer, step integer, stage text, run_id bigint, outcome text, started_at timestamptz,
+               finished_at timestamptz, message text, parameters jsonb, done_at timestamptz, done_parameters jsonb,
+               input_at timestamptz, outdated boolean, reason text)
+LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000
+SET search_path = pg_catalog, pg_temp
+SET jit = off
+SET enable_hashjoin = off  -- the runs are few in a ledger that may be long
+SET enable_mergejoin = off
+SET enable_seqscan = off
+AS $$
+    SELECT t.km, t.step, t.stage, t.run_id, t.outcome, l.started_at, l.finished_at, l.message, l.parameters, b.finished_at,
+           b.parameters, t.input_at, t.outdated, t.reason
+      FROM tunnel_api.stage_states(ARRAY[$1], $2, $3) t
+      LEFT JOIN tunnel.run l ON l.id = t.run_id
+      LEFT JOIN tunnel.run b ON b.id = t.done_id
 $$;
 COMMENT ON FUNCTION tunnel_api.stage_state(integer, integer, integer) IS
     'How far kilometres of a survey have come: for each stage the last run, the last success, and what has changed since. What lies beyond the range is not looked at';

@@ -11,6 +11,8 @@ from psycopg import sql
 VALUES = {"survey_before": "'demo-2024'", "survey": "'demo-2024'", "survey_after": "'demo-2024'", "layer": "'lining'"}
 OTHERS = {
     "integer": "1",
+    "integer[]": "'{1}'",
+    "text[]": "'{load}'",
     "double precision": "1.0",
     "text": "'x'",
     "boolean": "true",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import psycopg
@@ -54,7 +55,19 @@ def test_last_runs_are_those_that_sorting_the_ledger_finds(conn: psycopg.Connect
             for done in (True, False):
                 asked = {"survey": survey, "stage": stage, "done": done}
                 found = ids(conn, "SELECT id FROM tunnel_api.last_runs(%(survey)s, %(stage)s, %(done)s, 1, 4)", asked)
-                assert found == ids(conn, SORTED, asked)
+                assert sorted(found) == sorted(ids(conn, SORTED, asked))
+
+
+def test_last_runs_of_many_are_those_of_each(conn: psycopg.Connection) -> None:
+    surveys = fill(conn, 300)
+    for done in (True, False):
+        asked = {"surveys": surveys[1:], "stages": ["detect", "deviation"], "done": done}
+        found = ids(conn, "SELECT id FROM tunnel_api.last_runs_of(%(surveys)s, %(stages)s, %(done)s, 1, 4)", asked)
+        each = [
+            ids(conn, SORTED, asked | {"survey": survey, "stage": stage}) for survey in surveys[1:] for stage in asked["stages"]
+        ]
+        assert sorted(found) == sorted(itertools.chain.from_iterable(each))
+        assert len(found) > 20
 
 
 def test_subjects_are_those_that_have_results_side_by_side(conn: psycopg.Connection) -> None:

@@ -20,6 +20,9 @@ from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import get_survey
 
+AT_ONCE = 50
+"""Surveys whose stages are asked for together: of more, what is reckoned of them leaves the processor's cache."""
+
 
 @verb(examples=["tunneldb status", "tunneldb status pajares-2026 --watch", "tunneldb status pajares-2026 --json"])
 @click.argument("survey", required=False)
@@ -72,15 +75,18 @@ def _all(connection: psycopg.Connection[Any]) -> None:
         SELECT s.name, s.tunnel, s.date, s.files, s.points, tunnel_api.station_label(s.tunnel_id, s.chainage_from),
                tunnel_api.station_label(s.tunnel_id, s.chainage_to), k.kilometres, k.done
           FROM tunnel_api.survey s
-          LEFT JOIN LATERAL (
-               SELECT max(d.there) AS kilometres, array_agg(d.done ORDER BY d.step) AS done
-                 FROM (SELECT t.step, count(*) AS there, count(*) FILTER (WHERE t.outcome = 'done' AND NOT t.stale) AS done
-                         FROM tunnel_api.stage_status t
-                        WHERE t.survey_id = s.id AND t.stage = ANY (%s)
-                        GROUP BY t.step) d) k ON true
+          LEFT JOIN (
+               SELECT d.survey_id, max(d.there) AS kilometres, array_agg(d.done ORDER BY d.step) AS done
+                 FROM (SELECT t.survey_id, t.step, count(*) AS there,
+                              count(*) FILTER (WHERE t.outcome = 'done' AND t.reason IS NULL) AS done
+                         FROM (SELECT array_agg(a.id) AS ids FROM tunnel_api.survey a GROUP BY a.id / %s) p
+                        CROSS JOIN LATERAL tunnel_api.stage_states(p.ids) t
+                        WHERE t.stage = ANY (%s)
+                        GROUP BY t.survey_id, t.step) d
+                GROUP BY d.survey_id) k ON k.survey_id = s.id
          ORDER BY s.tunnel, s.date, s.name
         """,
-        [list(STAGE_NAMES)],
+        [AT_ONCE, list(STAGE_NAMES)],
     ).fetchall()
     names = ("name", "tunnel", "date", "files", "points", "label_from", "label_to", "kilometres", "done")
     tell(surveys=[row | {"done": dict(zip(STAGE_NAMES, row["done"] or (), strict=False))} for row in records(names, rows)])
