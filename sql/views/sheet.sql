@@ -21,7 +21,7 @@ COMMENT ON COLUMN tunnel_api.sheet_finding.geom IS 'In the unrolled plane (chain
 
 CREATE OR REPLACE VIEW tunnel_api.sheet_leak AS
 SELECT l.id, l.survey_id, l.survey, l.km, l.chainage_from, l.chainage_to, l.label, l.arc_from, l.arc_to, l.clock, l.kind,
-       l.area, l.drop_mean, l.confidence, l.review, l.remark, l.detected,
+       l.area, l.drop_mean, CASE WHEN l.kind = l.found THEN l.confidence END AS confidence, l.review, l.remark, l.detected,
        concat_ws('; ', nullif(concat_ws(', ', CASE WHEN l.kind <> 'leak' THEN k.label END, v.label), ''), nullif(l.remark, ''))
            AS note,
        l.geom

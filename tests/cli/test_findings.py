@@ -302,6 +302,13 @@ def test_what_was_drawn_is_in_the_list_of_leaks_and_in_the_report_without_figure
     conn.rollback()
     for name in ("leaks.gpkg", "leaks.geojson", "leaks.csv", "leaks.txt"):
         assert run("leaks", NAME, "-o", tmp_path / name).exit_code in (0, 1)
+    printed = run("leaks", NAME, "--format", "table").stdout
+    assert (tmp_path / "leaks.txt").read_text() == printed
+    assert printed.count("\n") > 5
+    for name in ("leaks.shp", "leaks"):
+        refused = run("leaks", NAME, "-o", tmp_path / name)
+        assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
+        assert "leaks are written as .csv, .geojson, .gpkg, .xlsx or .txt" in refused.stderr
     (drawn,) = [f for f in json.loads((tmp_path / "leaks.geojson").read_text())["features"] if f["id"] == key]
     assert (drawn["properties"]["drop_mean"], drawn["properties"]["counted"]) == (None, True)
     done = run("report", NAME, "-o", tmp_path / "report.html")

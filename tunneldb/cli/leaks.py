@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from io import StringIO
 from pathlib import Path
 from typing import cast
 
@@ -107,9 +108,9 @@ def leaks(
     interpolated, in doubt. The same is in every file; see tunnel_api.coverage_gap and tunnel_api.remark.
 
     In the table arc is counted from the crown, to the right looking up-chainage. clock is where the middle lies: 12:00 is the
-    crown, 3:00 right. conf. is how sure detection is of its kind, 0 to 1. drop is how much darker than dry lining it is in the
-    mean, max at the most, and contrast the mean drop in standard deviations of the dry lining about it. image is the share of
-    its area on which the image holds measurements.
+    crown, 3:00 right. conf. is how sure detection is of its kind, 0 to 1, where no inspector gave it another. drop is how much
+    darker than dry lining it is in the mean, max at the most, and contrast the mean drop in standard deviations of the dry
+    lining about it. image is the share of its area on which the image holds measurements.
 
     With --by-km a line for each kilometre, and one for all: wet area and number of leaks, the most in any 100 m² of lining, and
     the best class of GB 50108-2008 that the lining seen keeps, as far as a scan can tell. Any other stretch, and what breaks a
@@ -243,8 +244,9 @@ def _text(listed: LeakList, form: str, geometry: Geometry, survey: Survey) -> st
         return as_csv(listed)
     if form == "geojson":
         return as_geojson(listed, geometry, survey.srid)
-    console = Console(width=_WIDTH, record=True, quiet=True)
+    written = StringIO()
+    console = Console(width=_WIDTH, file=written)
     if listed.coverage.statement is not None:
         console.print(listed.coverage.statement, markup=False, highlight=False, soft_wrap=True)
     console.print(as_table(listed, survey.name))
-    return console.export_text()
+    return written.getvalue()

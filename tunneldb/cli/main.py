@@ -115,6 +115,8 @@ EXAMPLES = (
     "tunneldb simulate demo --preset demo",
     "tunneldb init",
     "tunneldb tunnel add demo --srid 25830 --axis demo/demo.axis.csv",
+    "tunneldb survey add demo-2024 --tunnel demo --date 2024-05-04 --trajectory demo/demo.trajectory.csv"
+    " --reference demo/demo.reference.csv --intensity Amplitude --intensity-kind amplitude",
     "tunneldb batch demo-2024 demo/*.laz",
     "tunneldb leaks demo-2024 --json | python -m json.tool",
 )

@@ -15,7 +15,7 @@ from tunneldb.classification.classes import PointClass
 from tunneldb.cli.output import printable, tell
 from tunneldb.errors import UserError
 
-_BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg", ".xlsx": "xlsx"}
+_BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg", ".xlsx": "xlsx", ".txt": "table"}
 _NEED_FILE = {"gpkg": "a GeoPackage", "xlsx": "an Excel workbook"}
 
 
@@ -36,11 +36,11 @@ def table_format(form: str | None, output: Path | None, what: str, files: Sequen
     UserError
         If a file's ending says none of them, or the format needs a file and there is none.
     """
-    form = form or (_BY_SUFFIX.get(output.suffix.lower(), "table") if output else "table")
+    form = form or (_BY_SUFFIX.get(output.suffix.lower()) if output else "table")
     if form in _NEED_FILE and output is None:
         raise UserError(f"{_NEED_FILE[form]} needs a file to be written to: add -o {what}.{form}")
-    if output is not None and form not in files:
-        endings = [f".{name}" for name in files if name != "table"]
+    if form is None or (output is not None and form not in files):
+        endings = [suffix for suffix, name in _BY_SUFFIX.items() if name in files and suffix != ".json"]
         raise UserError(
             f"{output}: {what} are written as {', '.join(endings[:-1])} or {endings[-1]}: let its name end so, or say --format"
         )

@@ -16,6 +16,7 @@ from shapely.geometry import Polygon
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
+from tunneldb.export.tables.leaks import listed_column
 from tunneldb.pipeline.run import nothing_yet
 from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.store.surface import survey_ends
@@ -149,7 +150,7 @@ _LEAK = sql.SQL(
     "SELECT id {reported} ORDER BY review = 'rejected', detected, area DESC, id LIMIT %(most)s)"
     " ORDER BY chainage_from + chainage_to, arc_from, id"
 ).format(
-    columns=sql.SQL(", ").join(sql.Identifier(f.name) for f in fields(Leak) if f.name not in ("inside", "outline")),
+    columns=sql.SQL(", ").join(listed_column(f.name) for f in fields(Leak) if f.name not in ("inside", "outline")),
     reported=REPORTED,
 )
 

@@ -167,11 +167,16 @@ class LeakList:
 
 _CHOSEN = sql.SQL(
     "FROM tunnel_api.anomaly WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed') AND area >= %(min_area)s"
-    " AND (%(min_confidence)s = 0 OR confidence >= %(min_confidence)s)"
+    " AND (%(min_confidence)s = 0 OR kind = found AND confidence >= %(min_confidence)s)"
     " AND CASE %(kind)s WHEN 'all' THEN true WHEN 'leak' THEN wet ELSE kind = %(kind)s END"
     " AND chainage_to > %(low)s AND chainage_from < %(high)s"
     " AND (%(clock)s::float8[] IS NULL OR tunnel_api.clock_between(clock, (%(clock)s)[1], (%(clock)s)[2]))"
 )
+
+
+def listed_column(name: str) -> sql.Composable:
+    """A column of the views of leaks as lists have it: beside a kind that an inspector gave stands no confidence in another."""
+    return sql.SQL("CASE WHEN kind = found THEN confidence END AS confidence") if name == "confidence" else sql.Identifier(name)
 
 
 def read_leaks(
@@ -199,7 +204,7 @@ def read_leaks(
         "high": min(chosen.high, ends[1]),
         "clock": None if chosen.clock is None else list(chosen.clock),
     }
-    columns = sql.SQL(", ").join(map(sql.Identifier, COLUMNS))
+    columns = sql.SQL(", ").join(map(listed_column, COLUMNS))
     query = sql.SQL("SELECT {}, public.ST_AsBinary({}) {} ORDER BY chainage_from + chainage_to, arc_from, id")
     rows = conn.execute(query.format(columns, sql.Identifier(_COLUMN[geometry]), _CHOSEN), asked).fetchall()
     names = [*COLUMNS, "geometry"]
