@@ -84,8 +84,8 @@ def test_functions_run_nothing_that_was_planted(conn: psycopg.Connection, person
 
     said = CliRunner().invoke(main, ["--dsn", dsn, "check"]).output
     assert "PUBLIC may create functions in it" in said
-    assert "function format(text,text) in schema public is not tunneldb's" in said
-    with pytest.raises(UserError, match=r"function .* in schema public .* DROP ROUTINE .* more: tunneldb check"):
+    assert "function public.format(text,text) is not tunneldb's" in said
+    with pytest.raises(UserError, match=r"function public\..* DROP ROUTINE public\..* more: tunneldb check"):
         install(conn, STAGES)
     conn.rollback()
     conn.execute(sql.SQL("DROP OWNED BY {}").format(sql.Identifier(person.info.user)))
@@ -95,3 +95,26 @@ def test_functions_run_nothing_that_was_planted(conn: psycopg.Connection, person
     with pytest.raises(psycopg.errors.InsufficientPrivilege):
         person.execute("CREATE FUNCTION public.format(a int, b int) RETURNS text LANGUAGE sql AS 'SELECT NULL'")
     assert "may create functions in it" not in CliRunner().invoke(main, ["--dsn", dsn, "check"]).output
+
+
+@pytest.mark.parametrize("person", ["otto"], indirect=True)
+@pytest.mark.parametrize("types", [("oid", "regnamespace"), ("oid", "regclass"), ("regclass", "oid"), ("name", "text")])
+def test_who_looks_for_what_was_planted_does_not_run_it(
+    conn: psycopg.Connection, person: psycopg.Connection, dsn: str, types: tuple[str, str]
+) -> None:
+    """An operator of types that PostgreSQL itself compares by casts would be run by the search, and could hide itself."""
+    conn.execute("GRANT CREATE ON SCHEMA public TO PUBLIC")
+    conn.execute("CREATE TABLE public.sprung (who text)")
+    conn.execute("GRANT SELECT, INSERT ON public.sprung TO PUBLIC")
+    conn.commit()
+    person.execute(
+        f"CREATE FUNCTION public.spy(a {types[0]}, b {types[1]}) RETURNS bool LANGUAGE plpgsql AS"
+        " $$ BEGIN INSERT INTO public.sprung VALUES (current_user); RETURN false; END $$"  # type: ignore[arg-type]
+    )
+    person.execute(f"CREATE OPERATOR public.= (leftarg = {types[0]}, rightarg = {types[1]}, function = public.spy)")  # type: ignore[arg-type]
+    for verb in ("check", "init"):
+        done = CliRunner().invoke(main, ["--dsn", dsn, verb])
+        assert done.exit_code in (1, 2)
+        assert f"operator public.=({types[0]},{types[1]}) is not tunneldb's" in done.output
+        conn.rollback()
+        assert conn.execute("SELECT who FROM public.sprung").fetchall() == []

@@ -8,6 +8,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.database import open_connection
+from tunneldb.database.foreign import catalogue_alone
 from tunneldb.database.schema import install, schema_revision
 from tunneldb.pipeline.stages import STAGES
 from tunneldb.store.waterproof import keep_missing
@@ -25,7 +26,8 @@ def init(settings: Settings) -> None:
     cut off: views are right without, and slower, and the next init goes on with the rest.
     """
     with open_connection(settings.dsn) as connection:
-        before = schema_revision(connection)
+        with catalogue_alone(connection):
+            before = schema_revision(connection)
         connection.rollback()
         tell_warnings(connection)
         install(connection, STAGES)

@@ -8,6 +8,7 @@ A function or an operator in schema public that fits a call better than that of 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import psycopg
@@ -152,13 +153,30 @@ given (name, catalog) AS (
     SELECT r.name, r.catalog FROM routine r
      WHERE r.namespace = 'pg_catalog'::regnamespace OR {_OF_EXTENSION.format("r.catalog", "r.oid")}
 )
-SELECT r.what || ' in schema public is not tunneldb''s: it runs in the place of what a call means,'
+SELECT r.what || ' is not tunneldb''s: it runs in the place of what a call means,'
        || ' with the rights of whoever calls', r.mend
   FROM routine r
  WHERE r.namespace = 'public'::regnamespace AND r.owner NOT IN (SELECT oid FROM trusted)
    AND NOT {_OF_EXTENSION.format("r.catalog", "r.oid")} AND (r.name, r.catalog) IN (SELECT g.name, g.catalog FROM given g)
  ORDER BY 1
 """
+
+
+@contextmanager
+def catalogue_alone(connection: psycopg.Connection[Any]) -> Iterator[None]:
+    """Let names and operators mean what PostgreSQL has, whatever was planted elsewhere: in a transaction, or a savepoint of it.
+
+    An operator of types that PostgreSQL compares by casts only, ``oid = regnamespace``, would otherwise be the one in public.
+    """
+    with connection.transaction():
+        before = connection.execute("SELECT pg_catalog.current_setting('search_path')").fetchone()
+        connection.execute(b"SET LOCAL " + PINNED)
+        yield
+        assert before is not None
+        connection.execute("SELECT pg_catalog.set_config('search_path', %s, true)", before)
+
+
+PINNED = b"search_path = pg_catalog, pg_temp"
 
 
 def foreign_objects(connection: psycopg.Connection[Any]) -> Iterator[tuple[str, str, str]]:
@@ -170,7 +188,7 @@ def foreign_objects(connection: psycopg.Connection[Any]) -> Iterator[tuple[str, 
         One of SUBJECTS; what is where, and with whose rights it runs; the statement that takes it away.
     """
     for subject, query in (("triggers", _TRIGGERS), ("expressions", _RULES), ("expressions", _EXPRESSIONS)):
-        for text, mend in connection.execute(query.encode()).fetchall():
+        for text, mend in _rows(connection, query):
             yield subject, f"{text} with the rights of whoever writes there", mend
     for text, mend in overloads(connection):
         yield "functions", text, mend
@@ -178,7 +196,7 @@ def foreign_objects(connection: psycopg.Connection[Any]) -> Iterator[tuple[str, 
 
 def overloads(connection: psycopg.Connection[Any]) -> list[tuple[str, str]]:
     """Return which functions and operators in schema public may run in the place of others, each with what takes it away."""
-    return connection.execute(_OVERLOADS.encode()).fetchall()
+    return _rows(connection, _OVERLOADS)
 
 
 def silent_triggers(connection: psycopg.Connection[Any]) -> list[tuple[str, str]]:
@@ -186,4 +204,9 @@ def silent_triggers(connection: psycopg.Connection[Any]) -> list[tuple[str, str]
 
     Without them partitions stay behind, or what is kept of a kilometre is believed although it has changed.
     """
-    return connection.execute(_SILENT.encode()).fetchall()
+    return _rows(connection, _SILENT)
+
+
+def _rows(connection: psycopg.Connection[Any], query: str) -> list[tuple[str, str]]:
+    with catalogue_alone(connection):
+        return connection.execute(query.encode()).fetchall()

@@ -12,7 +12,7 @@ from typing import Any, Literal, LiteralString
 import psycopg
 
 from tunneldb.database.connection import MINIMUM_POSTGIS, open_connection
-from tunneldb.database.foreign import SUBJECTS, foreign_objects, silent_triggers
+from tunneldb.database.foreign import PINNED, SUBJECTS, foreign_objects, overloads, silent_triggers
 from tunneldb.database.schema import (
     HEAD,
     api_version,
@@ -62,6 +62,7 @@ def examine(dsn: str | None) -> Iterator[Finding]:
         yield Finding("wrong", "server", str(error))
         return
     with connection:
+        connection.execute(b"SET " + PINNED)  # what was planted in public is looked for, and must not run
         info = connection.info
         where = "embedded" if dsn is None else f"{info.host or 'local'}, database {info.dbname}"
         yield Finding("ok", "server", f"PostgreSQL {info.parameter_status('server_version')} ({where})")
@@ -79,7 +80,11 @@ def examine(dsn: str | None) -> Iterator[Finding]:
         yield from _roles(connection)
         yield _public(connection)
         yield _audit(connection)
+        planted = bool(overloads(connection))
         yield from _foreign(connection)
+        if planted:
+            return
+        connection.execute("RESET search_path")
         yield from _settings(connection, embedded=dsn is None)
         yield _locks(connection)
         state = connection.execute(_STATE).fetchall()
@@ -148,13 +153,14 @@ def _public(connection: psycopg.Connection[Any]) -> Finding:
         """
         SELECT CASE a.grantee WHEN 0 THEN 'PUBLIC' ELSE quote_ident(pg_get_userbyid(a.grantee)) END
           FROM pg_namespace n CROSS JOIN LATERAL aclexplode(n.nspacl) a
-         WHERE n.nspname = 'public' AND a.privilege_type = 'CREATE'
-           AND (a.grantee = 0 OR pg_get_userbyid(a.grantee) = ANY(%s)) ORDER BY 1
-        """,
-        [list(ROLES)],
+         WHERE n.nspname = 'public' AND a.privilege_type = 'CREATE' AND a.grantee <> n.nspowner
+           AND NOT EXISTS (SELECT FROM pg_roles r, pg_database d
+                            WHERE r.oid = a.grantee AND d.datname = current_database() AND (r.rolsuper OR r.oid = d.datdba))
+         ORDER BY 1
+        """
     ).fetchall()
     if not rows:
-        return Finding("ok", "schema public", "only its owner may create in it")
+        return Finding("ok", "schema public", "only its owner and the database's may create in it")
     names = ", ".join(name for (name,) in rows)
     text = f"{names} may create functions in it, which run in the place of PostgreSQL's with the rights of whoever calls them"
     return Finding("wrong", "schema public", text, f"as a superuser: REVOKE CREATE ON SCHEMA public FROM {names};")

@@ -12,7 +12,7 @@ from psycopg import sql
 
 from tunneldb import __version__
 from tunneldb.database.connection import MINIMUM_POSTGIS, engine_on
-from tunneldb.database.foreign import overloads
+from tunneldb.database.foreign import catalogue_alone, overloads
 from tunneldb.database.resources import resource_dir
 from tunneldb.errors import UserError
 
@@ -77,9 +77,12 @@ def _install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) ->
 
     with engine_on(connection).begin() as session:
         connection.execute(sql.SQL("SET LOCAL lock_timeout = {}").format(_PATIENCE))
-        connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
-        _require_postgis(connection, create=True)
-        _close_public(connection)
+        with catalogue_alone(connection):
+            connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
+            _close_public(connection)
+            _refuse_planted(connection)
+            _require_postgis(connection, create=True)
+        _refuse_planted(connection)  # now also by the names that PostGIS has
         present = schema_revision(connection)
         if present is not None and present not in revisions():
             raise UserError(_newer(present))
@@ -89,16 +92,20 @@ def _install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) ->
 
 
 def _close_public(connection: psycopg.Connection[Any]) -> None:
-    """Let nobody but its owner create in the schema of PostGIS, and refuse to go on with what was planted there.
-
-    It is in everybody's search path: a function there that fits a call better than PostgreSQL's own of that name runs in its
-    place, with the rights of whoever calls. Before PostgreSQL 15 everybody might create there.
-    """
+    """Let nobody but its owner create in the schema of PostGIS. Before PostgreSQL 15 everybody might."""
     try:
         with connection.transaction():
             connection.execute("REVOKE CREATE ON SCHEMA public FROM PUBLIC")
     except psycopg.errors.InsufficientPrivilege:
         pass  # its owner's to do: tunneldb check says so
+
+
+def _refuse_planted(connection: psycopg.Connection[Any]) -> None:
+    """Refuse to go on with what was planted in the schema of PostGIS.
+
+    It is in everybody's search path: a function there that fits a call better than PostgreSQL's own of that name runs in its
+    place, with the rights of whoever calls.
+    """
     planted = overloads(connection)
     if planted:
         text, mend = planted[0]
@@ -247,7 +254,7 @@ def _require_postgis(connection: psycopg.Connection[Any], *, create: bool) -> No
     if version is None:
         try:
             with connection.transaction():
-                connection.execute("CREATE EXTENSION IF NOT EXISTS postgis")
+                connection.execute("CREATE EXTENSION IF NOT EXISTS postgis SCHEMA public")
         except psycopg.errors.InsufficientPrivilege:
             raise UserError(
                 "the database has no PostGIS and this user may not create it; a superuser can: CREATE EXTENSION postgis"
