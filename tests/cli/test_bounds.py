@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import psycopg
@@ -41,3 +42,30 @@ def test_a_stretch_that_begins_where_the_survey_ends(example: str, conn: psycopg
     conn.rollback()
     assert conn.execute(runs).fetchone() == before
     assert CliRunner().invoke(main, ["deviation", example, "--to", str(row[0] + 20.0)]).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("tunnel", "add", "new", "--srid", "25830", "--axis", "PIPE"), "is a pipe, not a file"),
+        (("tunnel", "add", "new", "--srid", "25830", "--axis", "/dev/zero"), "/dev/zero is a device, not a file"),
+        (
+            ("tunnel", "add", "new", "--srid", "25830", "--axis", "AXIS", "--spacing", "1e-8"),
+            "must divide 1000 m, from 0.1 m on",
+        ),
+        (("profile", "add", "demo", "lining", "PIPE"), "is a pipe, not a file"),
+        (("survey", "set", "demo-2024", "--reference", "PIPE"), "is a pipe, not a file"),
+        (("deviation", "demo-2024", "--axis-sigma", "1e-300"), "--axis-sigma 1e-300: that is no number which can be meant"),
+    ],
+)
+def test_what_is_no_file_or_no_number_is_refused_before_it_is_read(
+    example: str, tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    axis = tmp_path / "axis.csv"
+    axis.write_text("x,y,z\n272000,4765000,500\n272100,4765000,500\n")
+    given = {"PIPE": str(pipe), "AXIS": str(axis)}
+    result = CliRunner().invoke(main, [given.get(word, word) for word in words])
+    assert result.exit_code == 2
+    assert said in result.stderr

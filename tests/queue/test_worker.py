@@ -183,6 +183,20 @@ def test_a_kilometre_that_another_program_is_at_is_tried_again(conn: psycopg.Con
     assert jobs(conn)[km, stage] == "todo"
 
 
+def test_a_run_by_hand_that_finds_another_at_work_is_no_last_run_that_failed(
+    conn: psycopg.Connection, dsn: str, survey: int
+) -> None:
+    with (
+        psycopg.connect(dsn) as second,
+        stage_run(conn, 1, 11, "axis", {}) as first,
+        pytest.raises(BusyError),
+        stage_run(second, 1, 11, "axis", {}),
+    ):
+        pytest.fail("two are at work")
+    found = conn.execute("SELECT id, outcome FROM tunnel.run WHERE survey_id = 1 AND km = 11 AND stage = 'axis'").fetchall()
+    assert found == [(first.id, "done")]
+
+
 def test_a_worker_that_was_cut_off_and_comes_back_cannot_commit(conn: psycopg.Connection, dsn: str, survey: int) -> None:
     lost, other = worker(conn, silent=26), worker(conn)
     job, km, stage = take(conn, lost)

@@ -9,7 +9,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.param_types import FINITE, FilePath
+from tunneldb.cli.param_types import FINITE, FilePath, file_path
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -60,7 +60,7 @@ def intensity(
     if survey.lower().endswith(_FILES):
         if km is not None:
             raise UserError("--km is of a survey, not of a file")
-        look = _diagnose_file(Path(survey), intensity, intensity_kind, scanner)
+        look = _diagnose_file(file_path(survey), intensity, intensity_kind, scanner)
     else:
         if intensity is not None or intensity_kind is not None or scanner is not None:
             raise UserError(f"--intensity, --intensity-kind and --scanner are for a file; the survey {survey} has its own")

@@ -9,7 +9,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.param_types import FilePath
+from tunneldb.cli.param_types import FilePath, file_path
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -77,7 +77,7 @@ def members(
     from tunneldb.pointcloud.formats.table import scan_suffixes
 
     if survey.lower().endswith(scan_suffixes()):
-        _of_file(Path(survey), stations, intensity, intensity_kind, reference, output, geometry)
+        _of_file(file_path(survey), stations, intensity, intensity_kind, reference, output, geometry)
         return
     if stations or output is not None or {intensity, intensity_kind, reference, geometry} != {None}:
         raise UserError(f"these options are for a scan file by itself; the survey {survey} has its own: tunneldb survey set")
@@ -138,7 +138,7 @@ def _reference(given: str | None) -> ReferenceCurve | str | None:
 
     if given is None or given == AUTO:
         return given
-    table = read_csv(Path(given), ("range_m", "intensity_db"))
+    table = read_csv(file_path(given), ("range_m", "intensity_db"))
     try:
         return ReferenceCurve.from_rows(table["range_m"], table["intensity_db"])
     except UserError as error:

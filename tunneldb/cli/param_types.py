@@ -13,6 +13,9 @@ from tunneldb.csvfile import LARGEST
 from tunneldb.errors import UserError
 from tunneldb.files import require_regular
 
+SMALLEST = 1e-30
+"""Numbers nearer to 0, which are not 0, cannot be meant; their squares are none in a database."""
+
 
 class FilePath(click.Path):
     """A file or a folder, to be read or to be written, as a `Path`.
@@ -36,8 +39,13 @@ class FilePath(click.Path):
         return path
 
 
+def file_path(text: str) -> Path:
+    """Path of a file that is given where something else may be, too; refused as `FilePath` refuses it."""
+    return Path(os.fsdecode(FilePath().convert(text, None, None)))
+
+
 def _finite(number: float, value: Any, param: click.Parameter | None) -> float:
-    if not math.isfinite(number) or abs(number) > LARGEST:
+    if not math.isfinite(number) or abs(number) > LARGEST or 0.0 < abs(number) < SMALLEST:
         name = "" if param is None else f"{param.opts[0]} "
         raise UserError(f"{name}{value}: that is no number which can be meant")
     return number

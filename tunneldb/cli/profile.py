@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, records, tell
+from tunneldb.cli.param_types import file_path
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -60,7 +59,7 @@ def add(
 
     if len(words) not in (2, 3):
         raise UserError("profile add takes TUNNEL, perhaps a NAME, and a FILE")
-    tunnel, file = words[0], Path(words[-1])
+    tunnel, file = words[0], file_path(words[-1])
     name = words[1] if len(words) == 3 else file.stem
     read = read_profile(file, _origin(origin), unit, drawing_layer)
     with connect(settings.dsn) as conn:

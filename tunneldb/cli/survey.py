@@ -10,7 +10,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, records, tell
-from tunneldb.cli.param_types import FilePath
+from tunneldb.cli.param_types import FilePath, file_path
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.sizes import sizes
 from tunneldb.cli.survey_archive import export, import_
@@ -125,7 +125,7 @@ def add(
             None if no_poses else stations if trajectory is None else (trajectory,),
             mobile=trajectory is not None,
             backwards=backwards,
-            reference="auto" if reference == "auto" else None if reference is None else Path(reference),
+            reference="auto" if reference == "auto" else None if reference is None else file_path(reference),
             intensity=Intensity(intensity_kind, intensity),
         )
     notes = [*positions.notes, *([UNPOSED] if no_poses and intensity is not None else [])]
@@ -179,7 +179,7 @@ def set_(
         (trajectory,) if trajectory is not None else stations,
         trajectory is not None,
         backwards,
-        "auto" if reference == "auto" else None if reference is None else Path(reference),
+        "auto" if reference == "auto" else None if reference is None else file_path(reference),
         intensity_kind,
         intensity,
     )

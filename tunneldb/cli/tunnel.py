@@ -10,7 +10,7 @@ import click
 from tunneldb.alignment.units import UNITS
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, records, tell
-from tunneldb.cli.param_types import FINITE, FilePath
+from tunneldb.cli.param_types import FINITE, FilePath, file_path
 from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -160,7 +160,7 @@ def add(
             given, found = found_given(scans, srid, step(progress), start_chainage, reverse)
     else:
         given = read_given(
-            Path(axis), start_chainage, alignment, profile, layer=axis_layer, unit=axis_unit, srid=srid, reverse=reverse
+            file_path(axis), start_chainage, alignment, profile, layer=axis_layer, unit=axis_unit, srid=srid, reverse=reverse
         )
         if given.has_heights and scans:
             raise UserError(f"{axis} has heights; SCAN files go with --axis auto, or with a line that has none")

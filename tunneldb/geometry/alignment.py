@@ -20,6 +20,9 @@ BLOCK = 1 << 14
 """Points that are located at a time."""
 
 MILLIMETRE = 0.001
+CLOSEST = 0.1
+"""Axis vertices are no nearer to each other, m: points of a scan say no more."""
+
 DENSE = 2.0  # m between vertices
 
 
@@ -69,8 +72,8 @@ class Alignment:
         xyz = np.asarray(xyz, dtype=np.float64)
         if len(xyz) < 2:
             raise UserError(f"an axis needs at least 2 points, this one has {len(xyz)}")
-        if spacing <= 0 or abs(KILOMETRE / spacing - round(KILOMETRE / spacing)) > 1e-9:
-            raise UserError(f"the spacing of axis vertices must divide 1000 m: {spacing:g} m does not")
+        if spacing < CLOSEST or abs(KILOMETRE / spacing - round(KILOMETRE / spacing)) > 1e-9:
+            raise UserError(f"the spacing of axis vertices must divide 1000 m, from {CLOSEST} m on: {spacing:g} m does not")
         chord = np.hypot(*np.diff(xyz[:, :2], axis=0).T)
         if np.any(chord == 0):
             row = int(np.argmin(chord)) + 2

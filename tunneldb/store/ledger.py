@@ -69,7 +69,8 @@ def stage_run(
     """Record a stage, and do it in one transaction.
 
     That it runs is committed first. What is done inside is committed together with its end, or rolled back, and then
-    the failure is recorded. A run that is killed stays "running" with the backend that it ran in, which is gone.
+    the failure is recorded; nothing is of one that found another at work there, and is no job. A run that is killed stays
+    "running" with the backend that it ran in, which is gone.
     An advisory lock keeps two runs of the same survey and kilometre apart; files of a survey may be read side by side.
 
     The job that it is, if it is one, ends in the same transaction, and the jobs that follow from it come to be there. When
@@ -193,6 +194,9 @@ def _fail(conn: psycopg.Connection[Any], survey_id: int, run: Run, job: Job | No
             if job is not None and not isinstance(error, LostError):
                 _hold(conn, job)
             conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey_id])
+            if job is None and isinstance(error, BusyError):  # nothing was tried: what another does there is the last run
+                conn.execute("DELETE FROM tunnel.run WHERE id = %s", [run.id])
+                return
             conn.execute(
                 "UPDATE tunnel.run SET outcome = 'failed', finished_at = clock_timestamp(), counts = %s, message = %s"
                 " WHERE id = %s",
