@@ -307,6 +307,28 @@ def test_of_too_many_the_gravest_have_rows(drawn: str, tmp_path: Path, monkeypat
     assert len(cracks.beyond) == 1, "that of severity 1, rejected"
 
 
+def test_a_strip_shows_what_reaches_into_it_as_far_as_it_does(drawn: str, folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "r.html"
+    run(drawn, "report", NAME, "-o", path, "--photos", folder)
+    with connect(drawn) as conn:
+        cracks = dict(
+            conn.execute(
+                "SELECT severity, id FROM tunnel_api.lining_finding WHERE kind = 'crack' AND origin = 'drawn'"
+            ).fetchall()
+        )
+    strips = dict(re.findall(r'<figure class="strip" id="strip-(\d+)">(.*?)</figure>', path.read_text("utf-8"), re.DOTALL))
+    shown = {}
+    for start, strip in strips.items():
+        width, clipped, beyond = re.findall(
+            r'<clipPath.*?<rect width="([\d.]+)".*?<g clip-path=.*?>(.*?)</g>(.*)', strip, re.DOTALL
+        )[0]
+        assert "<path" not in re.sub(r"<g transform.*?</g>", "", beyond)
+        assert all(0.0 <= float(x) <= float(width) for x in re.findall(r'class="finding.*?<text x="([-\d.]+)"', beyond))
+        shown[int(start)] = {int(number) for number in re.findall(r'#finding-(\d+)"', clipped)}
+    assert [start for start, numbers in shown.items() if cracks[3] in numbers] == [12350], "it begins there"
+    assert [start for start, numbers in shown.items() if cracks[2] in numbers] == [12350, 12400], "it crosses the end"
+
+
 TEMPLATE = """
 language = "de"
 client = "Bahn & Söhne"

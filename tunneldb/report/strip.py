@@ -195,7 +195,7 @@ class Strips:
             marks=[
                 draw_mark(finding, low, self.north, self.length / 2000)
                 for finding in self.findings
-                if finding.chainage_to >= low and finding.chainage_from <= high
+                if _reaches_in(finding, low, high)
             ],
             signs=signs,
             rows=1 + max((sign.row for sign in signs), default=0),
@@ -237,6 +237,12 @@ class Strips:
             [self.survey.id, low - self.survey.spacing, high + self.survey.spacing],
         ).fetchall()
         return [(chainage, Section.of(radius, arc)) for chainage, radius, arc in rows]
+
+
+def _reaches_in(finding: Finding, low: float, high: float) -> bool:
+    """Whether a finding is to be seen between two chainages, m; one that begins at the second is not, but for a point."""
+    left, _, right, _ = finding.geometry.bounds
+    return (left < high and right > low) or low <= left == right <= high
 
 
 def _summary(stated: Row, numbered: int, words: Words) -> str:
