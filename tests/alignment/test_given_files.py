@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -261,3 +262,14 @@ def test_a_landxml_says_its_unit_or_is_asked(tmp_path: Path) -> None:
     assert read_given(path, unit="meter").notes[0].endswith("1 unit is 1 m, as told; the file says nothing")
     with pytest.raises(UserError, match="own direction"):
         read_given(path, unit="meter", reverse=True)
+
+
+def test_a_landxml_whose_height_lacks_its_decimal_point_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.xml"
+    bare = (Path(__file__).parents[1] / "data" / "j-landxml.xml").read_text()
+    straight = re.sub(r" *<ParaCurve.*</ParaCurve>\n", "", bare)
+    path.write_text(straight)
+    assert read_given(path).xyz[:, 2].max() < 91.0
+    path.write_text(straight.replace("995.94618316 75.38160000", "995.94618316 75381.60000"))
+    with pytest.raises(UserError, match=r"a\.xml: at chainage .* its profile rises .* is a decimal point missing"):
+        read_given(path)

@@ -174,7 +174,16 @@ def _given_design(
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
     source = f"{path.name}: {design.name}" if design.name else path.name
-    return GivenAxis(design.polyline(), design.chainages[0], design, source, design.notes)
+    xyz = design.polyline()
+    plan, rise = np.hypot(*np.diff(xyz[:, :2], axis=0).T), np.abs(np.diff(xyz[:, 2]))
+    if np.any(steep := rise > STEEPEST * plan + STEEPEST):
+        row = int(np.argmax(steep))
+        along = design.chainages[0] + float(plan[:row].sum())
+        raise UserError(
+            f"{path}: at chainage {along:.0f} its profile rises or falls by {rise[row]:.6g} m within {plan[row]:.6g} m;"
+            " is a decimal point missing?"
+        )
+    return GivenAxis(xyz, design.chainages[0], design, source, design.notes)
 
 
 def _read_design(path: Path, kind: Kind, alignment: str | None, profile: str | None, unit: str | None) -> Design:

@@ -60,9 +60,9 @@ def export(
 ) -> None:
     """Write SURVEY for programs that don't reach the database: as GeoPackage, as DXF drawing, or its classed scan files.
 
-    A GeoPackage holds what the QGIS project shows, in layers of the same names with their styles, and chainage ticks and
-    the lining laid flat besides. Layers of the unrolled plane (x is the chainage, y the arc, m) are in an undefined
-    Cartesian system there, all others in the tunnel's.
+    A GeoPackage holds what the QGIS project shows of axis, lining, leaks and ground, in layers of the same names with their
+    styles, and chainage ticks and the lining laid flat besides. Layers of the unrolled plane (x is the chainage, y the arc, m)
+    are in an undefined Cartesian system there, all others in the tunnel's.
 
     A DXF drawing (2010, metres) holds axis, sections and leaks in their true places, with chainage ticks; below the map
     the unrolled lining and, side by side, the profiles of the sections, with what leaks on them. What an inspector
