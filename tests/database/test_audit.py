@@ -367,3 +367,34 @@ def test_without_functions_check_looks_no_further(conn: psycopg.Connection) -> N
     assert result.exit_code == 1
     assert "schema tunnel_api: missing" in result.output
     assert "tunneldb init" in result.output
+
+
+@pytest.mark.parametrize("person", ["otto"], indirect=True)
+def test_a_table_that_goes_with_the_rows_of_another_is_reported(
+    person: psycopg.Connection, conn: psycopg.Connection, dsn: str
+) -> None:
+    """Its triggers run with the rights of whoever deletes there: the owner's, when he removes a survey."""
+    conn.execute("CREATE SCHEMA elsewhere; GRANT ALL ON SCHEMA elsewhere TO tunnel_operator")
+    conn.commit()
+    person.execute("""
+        CREATE TABLE elsewhere.sprung (who text);
+        GRANT INSERT ON elsewhere.sprung TO PUBLIC;
+        CREATE FUNCTION elsewhere.fire() RETURNS trigger LANGUAGE plpgsql AS
+            'BEGIN INSERT INTO elsewhere.sprung VALUES (current_user); RETURN NULL; END';
+        CREATE TABLE elsewhere.along (id int REFERENCES tunnel.survey (id) ON DELETE CASCADE);
+        CREATE TABLE elsewhere.still (id int REFERENCES tunnel.survey (id));
+        CREATE CONSTRAINT TRIGGER late AFTER DELETE ON elsewhere.along DEFERRABLE INITIALLY DEFERRED
+            FOR EACH ROW EXECUTE FUNCTION elsewhere.fire();
+        INSERT INTO elsewhere.along SELECT id FROM tunnel.survey;
+    """)
+    result = CliRunner().invoke(main, ["check"])
+    assert result.exit_code == 1
+    assert "foreign key along_id_fkey of elsewhere.along is not tunneldb's: it runs triggers there" in result.output
+    assert "elsewhere.still" not in result.output
+    (mend,) = [line.strip() for line in result.output.splitlines() if "DROP CONSTRAINT" in line]
+    conn.execute("DELETE FROM tunnel.survey")
+    conn.execute("SET CONSTRAINTS ALL IMMEDIATE")
+    assert conn.execute("SELECT who <> 'otto' FROM elsewhere.sprung").fetchall() == [(True,)]
+    conn.rollback()
+    person.execute(mend.encode())
+    assert "✓ triggers" in CliRunner().invoke(main, ["check"]).output

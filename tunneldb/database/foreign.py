@@ -1,7 +1,8 @@
 """What others than tunneldb have put on the tables of schema tunnel that runs with the rights of whoever writes there.
 
-Operators own the tables. A trigger, a rule, a policy, a view in a table's place, or a function in a check, a default, a
-generated column or an index runs with the rights of whoever writes: the database owner's behind the views and in his own runs.
+Operators own the tables. A trigger, also one of a table that refers to one of them, a rule, a policy, a view in a table's
+place, or a function in a check, a default, a generated column or an index runs with the rights of whoever writes: the
+database owner's behind the views and in his own runs.
 A function or an operator in schema public that fits a call better than that of PostgreSQL or PostGIS runs in its place.
 """
 
@@ -71,6 +72,17 @@ SELECT format('%s on tunnel.%s %s', o.trigger, o.held, CASE WHEN t.oid IS NULL T
   FROM (VALUES {_OURS}) AS o (held, trigger, namespace, function)
   LEFT JOIN pg_trigger t ON t.tgrelid = to_regclass('tunnel.' || o.held) AND t.tgname = o.trigger
  WHERE t.tgenabled IS NULL OR t.tgenabled NOT IN ('O', 'A')
+ ORDER BY 1
+"""
+
+# Foreign keys of tables elsewhere: what is deleted or renumbered here deletes or changes rows there, and runs their triggers.
+_REFERENCES = f"""
+WITH RECURSIVE held AS ({_HELD})
+SELECT format('foreign key %I of %s is not tunneldb''s: it runs triggers there', k.conname, k.conrelid::regclass),
+       format('ALTER TABLE %s DROP CONSTRAINT %I;', k.conrelid::regclass, k.conname)
+  FROM pg_constraint k JOIN held ON held.oid = k.confrelid
+ WHERE k.contype = 'f' AND k.conparentid = 0 AND k.conrelid NOT IN (SELECT oid FROM held)
+   AND (k.confdeltype NOT IN ('a', 'r') OR k.confupdtype NOT IN ('a', 'r'))
  ORDER BY 1
 """
 
@@ -187,7 +199,9 @@ def foreign_objects(connection: psycopg.Connection[Any]) -> Iterator[tuple[str, 
     (str, str, str)
         One of SUBJECTS; what is where, and with whose rights it runs; the statement that takes it away.
     """
-    for subject, query in (("triggers", _TRIGGERS), ("expressions", _RULES), ("expressions", _EXPRESSIONS)):
+    for subject, query in (
+        ("triggers", _TRIGGERS), ("triggers", _REFERENCES), ("expressions", _RULES), ("expressions", _EXPRESSIONS),
+    ):  # fmt: skip
         for text, mend in _rows(connection, query):
             yield subject, f"{text} with the rights of whoever writes there", mend
     for text, mend in overloads(connection):
