@@ -16,6 +16,7 @@ from support.example_survey import KM, NAME
 
 from tunneldb.database import connect, install, open_connection
 from tunneldb.errors import UserError
+from tunneldb.export.archive import load
 from tunneldb.export.archive.load import load_survey
 from tunneldb.export.archive.save import save_survey
 from tunneldb.pipeline.stages import STAGES
@@ -216,6 +217,15 @@ def test_a_tunnel_with_another_axis_and_a_name_that_is_taken_are_refused(
     conn.commit()
     with pytest.raises(UserError, match="another axis"):
         load_survey(conn, path, "other", silent)
+
+
+def test_a_name_that_another_took_meanwhile_is_no_damage(
+    example: str, conn: psycopg.Connection, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = save(conn, tmp_path / "demo.tdb")
+    monkeypatch.setattr(load, "require_new_survey", lambda conn, name: None)  # when it was looked for, it was not there
+    with pytest.raises(UserError, match="there is a survey 'demo-2024' already"):
+        load_survey(conn, path, None, silent)
 
 
 def test_what_is_cut_off_leaves_nothing(example: str, conn: psycopg.Connection, tmp_path: Path) -> None:

@@ -61,7 +61,9 @@ _LENGTH = FiniteRange(0.0)
 @click.option("--flexibility", type=_LENGTH, default=0.0, help="Roll of the vehicle over the angle of missing cant.")
 @click.option("--roll-height", type=FINITE, default=0.5, show_default=True, metavar="M", help="About which it rolls.")
 @click.option("--allowance", type=_LENGTH, default=0.0, metavar="M", help="For all else, to each side.")
-@click.option("--group-points", type=click.IntRange(1), default=3, show_default=True, help="Fewer points are no obstacle, …")
+@click.option(
+    "--group-points", type=click.IntRange(1, 10**9), default=3, show_default=True, help="Fewer points are no obstacle, …"
+)
 @click.option("--group-radius", type=_LENGTH, default=0.3, show_default=True, metavar="M", help="… within this radius.")
 @stretch_options
 @click.option("--every", type=FiniteRange(1.0), default=10.0, show_default=True, metavar="M", help="Of sections of a .dxf.")

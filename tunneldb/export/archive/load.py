@@ -110,6 +110,10 @@ def load_survey(conn: psycopg.Connection[Any], path: Path, name: str | None, beg
             with conn.transaction():
                 loaded = _Loading(conn, archive, name or archive.manifest.survey, begin).run()
         except _MISFITS as error:
+            if error.diag.constraint_name == "survey_name_key":  # another brought it in meanwhile
+                raise UserError(
+                    f"there is a survey {name or archive.manifest.survey!r} already: tunneldb survey list"
+                ) from None
             raise archive.wrong(f"its rows do not fit together: {first_line(error)}") from None
     conn.commit()
     _note(conn, loaded, archive)
