@@ -175,9 +175,8 @@ def _given_design(
         raise UserError(f"{path}: {error}") from None
     source = f"{path.name}: {design.name}" if design.name else path.name
     xyz = design.polyline()
-    plan, rise = np.hypot(*np.diff(xyz[:, :2], axis=0).T), np.abs(np.diff(xyz[:, 2]))
-    if np.any(steep := rise > STEEPEST * plan + STEEPEST):
-        row = int(np.argmax(steep))
+    row, plan, rise = _leap(xyz)
+    if row is not None:
         along = design.chainages[0] + float(plan[:row].sum())
         raise UserError(
             f"{path}: at chainage {along:.0f} its profile rises or falls by {rise[row]:.6g} m within {plan[row]:.6g} m;"
@@ -260,6 +259,13 @@ def _thinned(xyz: Float) -> np.ndarray:
     return np.array(rows)
 
 
+def _leap(xyz: Float) -> tuple[int | None, Float, Float]:
+    """Step (None: none) at which a line rises or falls as no tunnel does; length in plan and rise of each step, m."""
+    plan, rise = np.hypot(*np.diff(xyz[:, :2], axis=0).T), np.abs(np.diff(xyz[:, 2]))
+    steep = np.flatnonzero(rise > STEEPEST * plan + STEEPEST)
+    return int(steep[0]) if len(steep) else None, plan, rise
+
+
 def _require_forward(xyz: Float, error: Callable[[int, str], UserError]) -> None:
     """Raise the error of a row at which a line stands still or turns back in plan, or leaps as none does."""
     steps = np.diff(xyz[:, :2], axis=0)
@@ -270,10 +276,9 @@ def _require_forward(xyz: Float, error: Callable[[int, str], UserError]) -> None
     standing = np.flatnonzero(~steps.any(axis=1))
     if len(standing):
         raise error(int(standing[0]) + 1, "the same x,y as the point before; remove one of them")
-    rise = np.abs(np.diff(xyz[:, 2]))
-    if np.any(steep := rise > STEEPEST * plan + STEEPEST):
-        row = int(np.argmax(steep))
-        raise error(row + 1, f"{plan[row]:.6g} m on from the point before its z differs by {rise[row]:.6g} m; is it right?")
+    leap, _, rise = _leap(xyz)
+    if leap is not None:
+        raise error(leap + 1, f"{plan[leap]:.6g} m on from the point before its z differs by {rise[leap]:.6g} m; is it right?")
     turns = np.flatnonzero(np.einsum("ij,ij->i", steps[1:], steps[:-1]) <= 0)
     if len(turns):
         raise error(int(turns[0]) + 2, "the axis turns back here; its points must be in growing chainage")

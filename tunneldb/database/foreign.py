@@ -182,13 +182,10 @@ def catalogue_alone(connection: psycopg.Connection[Any]) -> Iterator[None]:
     """
     with connection.transaction():
         before = connection.execute("SELECT pg_catalog.current_setting('search_path')").fetchone()
-        connection.execute(b"SET LOCAL " + PINNED)
+        connection.execute("SET LOCAL search_path = pg_catalog, pg_temp")
         yield
         assert before is not None
         connection.execute("SELECT pg_catalog.set_config('search_path', %s, true)", before)
-
-
-PINNED = b"search_path = pg_catalog, pg_temp"
 
 
 def foreign_objects(connection: psycopg.Connection[Any]) -> Iterator[tuple[str, str, str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
@@ -12,7 +12,7 @@ from typing import Any, Literal, LiteralString
 import psycopg
 
 from tunneldb.database.connection import MINIMUM_POSTGIS, open_connection
-from tunneldb.database.foreign import PINNED, SUBJECTS, foreign_objects, overloads, silent_triggers
+from tunneldb.database.foreign import SUBJECTS, catalogue_alone, foreign_objects, silent_triggers
 from tunneldb.database.schema import (
     HEAD,
     api_version,
@@ -62,29 +62,10 @@ def examine(dsn: str | None) -> Iterator[Finding]:
         yield Finding("wrong", "server", str(error))
         return
     with connection:
-        connection.execute(b"SET " + PINNED)  # what was planted in public is looked for, and must not run
-        info = connection.info
-        where = "embedded" if dsn is None else f"{info.host or 'local'}, database {info.dbname}"
-        yield Finding("ok", "server", f"PostgreSQL {info.parameter_status('server_version')} ({where})")
-        postgis = _postgis(connection)
-        yield postgis
-        if postgis.level == "wrong":
+        with catalogue_alone(connection):  # what was planted in public is looked for, and must not run
+            sound = yield from _foundations(connection, embedded=dsn is None)
+        if not sound:
             return
-        schema = _schema(connection)
-        yield schema
-        if schema.level == "wrong":
-            return
-        yield _api(connection)
-        if installed_api_version(connection) is None:
-            return
-        yield from _roles(connection)
-        yield _public(connection)
-        yield _audit(connection)
-        planted = bool(overloads(connection))
-        yield from _foreign(connection)
-        if planted:
-            return
-        connection.execute("RESET search_path")
         yield from _settings(connection, embedded=dsn is None)
         yield _locks(connection)
         state = connection.execute(_STATE).fetchall()
@@ -94,6 +75,27 @@ def examine(dsn: str | None) -> Iterator[Finding]:
         yield from _remarks(connection)
         if dsn is None:
             yield _space()
+
+
+def _foundations(connection: psycopg.Connection[Any], *, embedded: bool) -> Generator[Finding, None, bool]:
+    """Look at what all else rests on; returns whether it can be looked at."""
+    info = connection.info
+    where = "embedded" if embedded else f"{info.host or 'local'}, database {info.dbname}"
+    yield Finding("ok", "server", f"PostgreSQL {info.parameter_status('server_version')} ({where})")
+    for look in (_postgis, _schema):
+        found = look(connection)
+        yield found
+        if found.level == "wrong":
+            return False
+    yield _api(connection)
+    if installed_api_version(connection) is None:
+        return False
+    yield from _roles(connection)
+    yield _public(connection)
+    yield _audit(connection)
+    foreign = list(_foreign(connection))
+    yield from foreign
+    return all(found.level != "wrong" or found.subject != "functions" for found in foreign)
 
 
 def _postgis(connection: psycopg.Connection[Any]) -> Finding:

@@ -128,11 +128,16 @@ def _require_metres(connection: psycopg.Connection[Any], srid: int) -> None:
         raise UserError(f"SRID {srid} ({crs.name}) is in {', '.join(sorted(units))}, not metres")
 
 
+def survey_exists(name: str) -> UserError:
+    """What is said of a survey's name that is taken."""
+    return UserError(f"there is a survey {name!r} already: tunneldb survey list")
+
+
 def require_new_survey(connection: psycopg.Connection[Any], name: str) -> None:
     """Raise UserError for a survey's name that is taken or won't do."""
     _require_name(name)
     if connection.execute("SELECT FROM tunnel.survey WHERE name = %s", [name]).fetchone() is not None:
-        raise UserError(f"there is a survey {name!r} already: tunneldb survey list")
+        raise survey_exists(name)
 
 
 def add_survey(
@@ -191,7 +196,7 @@ def add_survey(
             ],
         ).fetchone()
     except psycopg.errors.UniqueViolation:
-        raise UserError(f"there is a survey {name!r} already: tunneldb survey list") from None
+        raise survey_exists(name) from None
     assert row is not None
     save_positions(connection, row[0], positions, srid)
     if curve is not None:

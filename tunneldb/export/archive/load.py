@@ -35,7 +35,7 @@ from tunneldb.store.archive.numbers import (
 from tunneldb.store.archive.out import AUDIT, OTHERS, member_name, without_survey
 from tunneldb.store.archive.tables import BULK, Column, Table, archive_tables
 from tunneldb.store.archive.tunnels import existing_tunnel, use_tunnel
-from tunneldb.store.catalog import make_layers, require_new_survey, require_new_tunnel
+from tunneldb.store.catalog import make_layers, require_new_survey, require_new_tunnel, survey_exists
 from tunneldb.store.ledger import stage_run
 
 _MISFITS = (
@@ -111,9 +111,7 @@ def load_survey(conn: psycopg.Connection[Any], path: Path, name: str | None, beg
                 loaded = _Loading(conn, archive, name or archive.manifest.survey, begin).run()
         except _MISFITS as error:
             if error.diag.constraint_name == "survey_name_key":  # another brought it in meanwhile
-                raise UserError(
-                    f"there is a survey {name or archive.manifest.survey!r} already: tunneldb survey list"
-                ) from None
+                raise survey_exists(name or archive.manifest.survey) from None
             raise archive.wrong(f"its rows do not fit together: {first_line(error)}") from None
     conn.commit()
     _note(conn, loaded, archive)
