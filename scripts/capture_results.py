@@ -71,10 +71,10 @@ class Scene:
             (self.folder / "said" / said).write_text(done.stdout + rest)
         return done.stdout
 
-    def simulate(self, *words: object) -> None:
+    def simulate(self, *words: object, command: str = "simulate") -> None:
         """Make the scan in the folder ``scan``, or copy it from the other capture."""
         if self.former is None:
-            self.run("simulate", "scan", *words, said="simulate.txt")
+            self.run(command, "scan", *words, said="simulate.txt")
         else:
             shutil.copytree(self.former / "scan", self.folder / "scan", dirs_exist_ok=True)
             shutil.copyfile(self.former / "said" / "simulate.txt", self.folder / "said" / "simulate.txt")
@@ -216,6 +216,104 @@ def batch(scene: Scene) -> None:
     scene.run("leaks", "s", "--geometry", "3d", "-o", "out/leaks.gpkg")
     scene.run("image", "s", "--km", "1", "-o", "out/images")
     scene.run("export", "s", "-o", "out/s.gpkg")
+
+
+OUTLINE = "right,up\n-1.6,0.4\n-1.6,3.2\n-1.1,4.2\n1.1,4.2\n1.6,3.2\n1.6,0.4\n-1.6,0.4\n"
+"""Clearance outline about a lane, m."""
+
+PROFILE = "right,up\n" + "".join(
+    f"{4.05 * np.sin(angle):.4f},{4.05 * np.cos(angle):.4f}\n" for angle in np.radians(np.arange(-120, 121, 5))
+)
+"""Design profile of a round lining, m from the given axis."""
+
+MOVED_VERTEX = """
+UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0.03, -0.02, 0.04)
+ WHERE survey_id = (SELECT id FROM tunnel_api.survey WHERE name = 's') AND chainage BETWEEN 12325 AND 12335;
+"""
+
+
+def structure(scene: Scene) -> None:
+    """Take the scan of scripts/demo-structure.sh through its stages."""
+    scene.simulate("--name", "hall", "--width", 4, "--angular-step", 0.12, "--anomalies", 12, "--seed", 5,
+                   command="simulate-structure")  # fmt: skip
+    scene.run("init")
+    scene.run("tunnel", "add", "t", "--srid", 25830, "--site", said="tunnel-add.txt")
+    scene.run("survey", "add", "s", "--tunnel", "t", "--date", "2024-05-04", "--stations", "scan/hall.stations.csv",
+              "--reference", "scan/hall.reference.csv", "--intensity", "Amplitude",
+              "--intensity-kind", "amplitude")  # fmt: skip
+    scene.run("load", "s", *scene.scans(), "--json", said="load.json")
+    scene.run("members", "s", said="members.txt")
+    scene.run("spots", "s", said="spots.txt")
+    scene.run("spots", "s", "--geometry", "3d", "-o", "out/spots.gpkg")
+    scene.run("evaluate", "s", "scan/hall.truth.json", said="evaluate.txt")
+    scene.run("status", "s", said="status.txt")
+    scene.run("qgis", "s", "-o", "out/s.qgz", said="qgis.txt")
+    scene.run("report", "s", "-o", "out/report.html", said="report.txt")
+
+
+def canal(scene: Scene) -> None:
+    """Take the scans of scripts/demo-canal.sh through their stages."""
+    scene.simulate("--name", "canal", "--batter", 2, "--towpath", "right", "--objects", 4, "--niches", 2, "--seed", 5,
+                   command="simulate-canal")  # fmt: skip
+    sonar = sorted(str(path.relative_to(scene.folder)) for path in (scene.folder / "scan").glob("canal.sonar-*.xyz"))
+    scene.register(25832, 0, "--stations", "scan/canal.stations.csv", "--intensity-kind", "none")
+    scene.run("load", "s", *scene.scans(), "--json", said="load.json")
+    scene.run("register", "s", *sonar, "--ladders", "scan/canal.ladders.csv", "--up", "+z", "--water-level", 265.0,
+              "--report", "out/registration.md", said="register.txt")  # fmt: skip
+    scene.run("load", "s", *sonar, "--json", said="load-sonar.json")
+    scene.run("run", "s", said="run.txt")
+    scene.query("bed.txt", "SELECT * FROM tunnel_api.bed_volume('s', 10, 30, 262.5)")
+    scene.run("status", "s", said="status.txt")
+    scene.run("qgis", "s", "-o", "out/s.qgz", said="qgis.txt")
+    scene.run("report", "s", "-o", "out/report.html", said="report.txt")
+
+
+def epochs(scene: Scene) -> None:
+    """Take two epochs of a tunnel through all stages and all measures; change one, and run again what is stale."""
+    common = ("--preset", "demo", "--length", 60, "--lining", "segments", "--name")
+    scene.simulate(*common, "first")
+    scene.simulate(*common, "second", "--epoch", 1, "--grown-leaks", 2, "--dried-leaks", 2, "--new-leaks", 2,
+                   "--moved-wall", 0.005, "--squeezed-ring", 0.004, "--bulges", 3, "--pose-error", 0.02,
+                   "--pose-turn", 0.02)  # fmt: skip
+    scene.run("init")
+    scene.run("tunnel", "add", "t", "--srid", 25830, "--axis", "scan/first.axis.csv", "--start-chainage", 12300)
+    for survey, name, date in (("s", "first", "2024-05-04"), ("later", "second", "2026-05-04")):
+        scene.run("survey", "add", survey, "--tunnel", "t", "--date", date, "--trajectory", f"scan/{name}.trajectory.csv",
+                  "--reference", f"scan/{name}.reference.csv", "--intensity", "Amplitude",
+                  "--intensity-kind", "amplitude")  # fmt: skip
+        scene.run("load", survey, f"scan/{name}.laz", "--json", said=f"load-{name}.json")
+        scene.run("run", survey, said=f"run-{name}.txt")
+    for name, text in {"lane": OUTLINE, "design": PROFILE}.items():
+        (scene.folder / "scan" / f"{name}.csv").write_text(text)
+    (scene.folder / "scan" / "track.csv").write_text("chainage,right,up\n12300,0,-3.2\n12360,0,-3.2\n")
+    scene.run("profile", "add", "t", "scan/design.csv", said="profile.txt")
+    measures = {
+        "rings": ["rings", "s", "--find", "--diameter", 8, "--chord", "9:00-3:00"],
+        "deviation": ["deviation", "s", "--axis-sigma", 0.01, "--every", 20],
+        "evenness": ["evenness", "s"],
+        "thickness": ["thickness", "s", "later", "--layer", "lining", "--axis-sigma", 0.005],
+        "clearance": ["clearance", "s", "--gauge", "scan/lane.csv", "--track-axis", "scan/track.csv"],
+        "compare": ["compare", "s", "later"],
+    }
+    for name, words in measures.items():
+        scene.run(*words, "--json", said=f"{name}.json")
+        scene.run(*words, said=f"{name}.txt")
+        scene.run(*words, "-o", f"out/{name}.csv")
+    scene.run("compare", "s", "later", "-o", "out/change.gpkg")
+    scene.run("deviation", "s", "-o", "out/deviation.dxf")
+    scene.query("edits.txt", MOVED_VERTEX)
+    scene.run("status", "s", said="status-edited.txt")
+    scene.run("deviation", "s", said="deviation-stale.txt", codes=(0, 2))
+    scene.run("run", "s", "--stale", said="run-stale.txt")
+    for name, words in measures.items():
+        scene.run(*words, "--json", said=f"{name}-again.json")
+    scene.run("status", "s", "--json", said="status.json")
+    scene.run("export", "s", "-o", "out/s.gpkg", said="export.txt")
+    scene.run("image", "s", "-o", "out/images")
+    scene.run("qgis", "s", "-o", "out/s.qgz", said="qgis.txt")
+    scene.run("report", "later", "-o", "out/report.html", said="report.txt")
+    scene.run("survey", "export", "s", "-o", "out/s.tunneldb", said="archive.txt", codes=(0, 2))
+    scene.run("prune", said="prune.txt")
 
 
 def files(scene: Scene, real: Path | None) -> None:

@@ -1,12 +1,13 @@
 #!/usr/bin/env python
-"""Captures all results of the program on five scenes, and compares two captures: before and after a change of the code.
+"""Captures all results of the program on eight scenes, and compares two captures: before and after a change of the code.
 
     .venv/bin/python scripts/compare_results.py capture before --tunneldb .venv/bin/tunneldb --ringo scans
     .venv/bin/python scripts/compare_results.py compare before after
 
 Scenes: demo (as scripts/demo.sh), static (stations, dirt, target spheres, edits by hand, over the end of a kilometre), ringo (a
-real scan, where its folder is given), batch (three kilometres by two workers) and files (design alignments and real scan files
-by themselves). What a run of the same code changes by itself is named in VOLATILE, CHANGING and SAID.
+real scan, where its folder is given), batch (three kilometres by two workers), structure, canal, epochs (two surveys and all
+measures) and files (design alignments and real scan files by themselves). VOLATILE, CHANGING and SAID name what differs between
+two runs of the same code.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import sys
 import time
 import zipfile
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ from typing import Any
 import click
 import laspy
 import numpy as np
-from capture_results import Scene, batch, demo, dump, files, ringo, static
+from capture_results import Scene, batch, canal, demo, dump, epochs, files, ringo, static, structure
 from measure_results import (
     IDENTITIES,
     VOLATILE,
@@ -46,7 +47,10 @@ from measure_results import (
     read_table,
 )
 
-SCENES = ("demo", "static", "ringo", "batch", "files")
+SCENES = ("demo", "static", "ringo", "batch", "structure", "canal", "epochs", "files")
+
+RUNS = {"demo": demo, "static": static, "batch": batch, "structure": structure, "canal": canal, "epochs": epochs}
+"""Scenes that need nothing but the program."""
 
 Rules = tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]
 
@@ -223,8 +227,10 @@ class Capture:
         return clean
 
 
-def compare_files(findings: Findings, item: str, sides: Sequence[Capture], paths: Sequence[Path]) -> None:
-    """Compare two files by what they are."""
+def compare_files(
+    findings: Findings, item: str, sides: Sequence[Capture], paths: Sequence[Path], columns: Mapping[str, str]
+) -> None:
+    """Compare two files by their kind; columns of tables in the first have their new names."""
     clean = [side.cleaner(path, findings.scene) for side, path in zip(sides, paths, strict=True)]
     ending = paths[0].suffix.lower()
     if ending == ".npz":
@@ -232,12 +238,13 @@ def compare_files(findings: Findings, item: str, sides: Sequence[Capture], paths
     elif ending == ".laz":
         compare_scans(findings, item, *paths)
     elif ending in (".gz", ".csv"):
-        compare_tables(findings, item, *(read_table(path, rule) for path, rule in zip(paths, clean, strict=True)))
+        old, new = (read_table(path, rule) for path, rule in zip(paths, clean, strict=True))
+        compare_tables(findings, item, old.renamed(columns), new)
     elif ending == ".gpkg":
-        old, new = (dict(read_geopackage(path, rule)) for path, rule in zip(paths, clean, strict=True))
-        findings.same(item, "tables", sorted(old), sorted(new))
-        for name in old.keys() & new.keys():
-            compare_tables(findings, f"{item}: {name}", old[name], new[name])
+        before, after = (dict(read_geopackage(path, rule)) for path, rule in zip(paths, clean, strict=True))
+        findings.same(item, "tables", sorted(before), sorted(after))
+        for name in before.keys() & after.keys():
+            compare_tables(findings, f"{item}: {name}", before[name].renamed(columns), after[name])
     elif ending in (".tif", ".png", ".webp"):
         findings.values(item, gaps_of_images(*(path.read_bytes() for path in paths)))
     elif ending == ".qgz":
@@ -280,7 +287,7 @@ def capture(folder: Path, tunneldb: Path, real: Path | None, only: Sequence[str]
             elif name == "ringo" and real is not None:
                 ringo(scene, real)
             else:
-                {"demo": demo, "static": static, "batch": batch}[name](scene)
+                RUNS[name](scene)
             took = time.monotonic() - start
             dump(scene)
         finally:
@@ -297,8 +304,14 @@ def capture(folder: Path, tunneldb: Path, real: Path | None, only: Sequence[str]
 @click.argument("before", type=click.Path(path_type=Path, exists=True))
 @click.argument("after", type=click.Path(path_type=Path, exists=True))
 @click.option("--only", multiple=True, help="Only this scene.")
-def compare(before: Path, after: Path, only: Sequence[str]) -> None:
-    """Compare two captures; exit code 1 where anything differs."""
+@click.option("--renamed", type=click.Path(path_type=Path, exists=True), help="JSON file of renamed files and columns.")
+def compare(before: Path, after: Path, only: Sequence[str], renamed: Path | None) -> None:
+    """Compare two captures; exit code 1 where anything differs.
+
+    The file of --renamed has two objects: ``files`` (old name of a table or file to new name, "" if it was removed) and
+    ``columns`` (old name of a column to new name, in all tables).
+    """
+    names = {"files": {}, "columns": {}} | (json.loads(renamed.read_text()) if renamed else {})
     findings, sides = Findings(), (Capture(before), Capture(after))
     for scene in sorted(set().union(*(side.about["seconds"] for side in sides))):
         if only and scene not in only:
@@ -308,12 +321,14 @@ def compare(before: Path, after: Path, only: Sequence[str]) -> None:
             findings.say("differs", "all", "files", "the scene is in one capture only")
             continue
         captured = [side.files(scene) for side in sides]
+        captured[0] = {names["files"].get(item, item): path for item, path in captured[0].items()}
+        captured[0].pop("", None)
         for item in sorted(captured[0].keys() | captured[1].keys()):
             paths = [side[item] for side in captured if item in side]
             if len(paths) == 1:
                 findings.say("differs", item, "file", "only before" if item in captured[0] else "only after")
             elif paths[0].read_bytes() != paths[1].read_bytes():
-                compare_files(findings, item, sides, paths)
+                compare_files(findings, item, sides, paths, names["columns"])
         click.echo(f"{scene}: {len(captured[0])} files before, {len(captured[1])} after")
     click.echo(", ".join(f"{count} {what}" for what, count in findings.count.items()))
     sys.exit(findings.count["differs"] > 0)

@@ -153,6 +153,12 @@ class Table:
     kinds: dict[str, str]
     key: list[str]
 
+    def renamed(self, names: Mapping[str, str]) -> Table:
+        """Return the table with new names of its columns, unless it has a column of the new name already."""
+        new = {name: names[name] for name in self.columns if name in names and names[name] not in self.columns}
+        kinds = {new.get(name, name): kind for name, kind in self.kinds.items()}
+        return Table([new.get(n, n) for n in self.columns], self.rows, kinds, [new.get(n, n) for n in self.key])
+
 
 def clean_json(value: Any) -> Any:
     """Return a value of JSON without what is volatile."""
