@@ -23,12 +23,12 @@ from benchmarks.common import print_table, save, scratch_database
 from benchmarks.synthetic import Size, make
 from tunneldb.classification.classes import PointClass
 from tunneldb.database import connect
-from tunneldb.pipeline.clearance import Options, find_tracks, measure_kilometre, read_track
-from tunneldb.shape.clearance import clearance
-from tunneldb.shape.gauge import Widening, halved, overthrow, widened
-from tunneldb.shape.track import fit_track, follow, rail_pairs
+from tunneldb.measures.clearance.compute.clearance import clearance
+from tunneldb.measures.clearance.compute.gauge import Widening, halved, overthrow, widened
+from tunneldb.measures.clearance.compute.track import fit_track, follow, rail_pairs
+from tunneldb.measures.clearance.measure import Options, find_tracks, measure_kilometre, read_track
+from tunneldb.measures.clearance.rows import load_classed, save_gauge
 from tunneldb.simulate.parameters import Parameters
-from tunneldb.store.clearance import load_classed, save_gauge
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import get_survey
 

@@ -18,15 +18,15 @@ from affine import Affine
 
 from benchmarks.common import print_table, save
 from tunneldb.geometry.surface import Surface
-from tunneldb.pipeline.deviation import Design, block_steps
-from tunneldb.pipeline.evenness import CellGrid, polygons_of
+from tunneldb.measures.deviation.measure import Design, block_steps
+from tunneldb.measures.evenness.compute.evenness import evenness, step_evenness
+from tunneldb.measures.evenness.compute.straightedge import Cells, cell_means, gaps_beneath
+from tunneldb.measures.evenness.measure import CellGrid, polygons_of
+from tunneldb.measures.thickness.compute import section_thickness
 from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import BLOCK
-from tunneldb.shape.evenness import evenness, step_evenness
 from tunneldb.shape.outline import Outline
 from tunneldb.shape.profile import Profile, signed_distance, stretches
-from tunneldb.shape.straightedge import Cells, cell_means, gaps_beneath
-from tunneldb.shape.thickness import section_thickness
 
 sys.path.append(str(Path(__file__).parent.parent / "tests"))
 from support.curved_lining import arc, block, circle, made

@@ -23,9 +23,9 @@ from scipy import ndimage
 from benchmarks.common import print_table, save
 from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.surface import Surface
-from tunneldb.pipeline.change import Change, measure_change
-from tunneldb.shape.change import WINDOW, change_regions
-from tunneldb.shape.epoch_cells import CellGrid, Cells, CellSums, without_edges
+from tunneldb.measures.change.compute.cells import CellGrid, Cells, CellSums, without_edges
+from tunneldb.measures.change.compute.change import WINDOW, change_regions
+from tunneldb.measures.change.measure import Change, measure_change
 
 sys.path.append(str(Path(__file__).parent.parent / "tests"))
 from support.curved_lining import made

@@ -15,7 +15,7 @@ import shapely
 
 from benchmarks.common import print_table, progress, save
 from tunneldb.arrays import Float
-from tunneldb.shape.ring_joints import NoRingsError, column_signals, follow, peaks, ring_length, strength
+from tunneldb.measures.rings.compute.joints import NoRingsError, column_signals, follow, peaks, ring_length, strength
 from tunneldb.simulate.generate import Simulation
 from tunneldb.simulate.lining.reflectance import level
 from tunneldb.simulate.parameters import Parameters

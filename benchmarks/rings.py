@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 
 from benchmarks.common import print_table, save
 from tunneldb.arrays import Float
-from tunneldb.pipeline.rings import RingRow, measure_rings
+from tunneldb.measures.rings.surveyed import RingRow, measure_rings
 from tunneldb.shape.rings import fit_ring
 
 DATA = Path(__file__).parents[1] / "tests" / "data" / "wriggle"

@@ -25,8 +25,8 @@ from benchmarks.common import print_table, progress, save, scratch_database, tun
 from benchmarks.scene import Scene
 from tunneldb.arrays import Bool, Float
 from tunneldb.database import resolve_dsn
-from tunneldb.shape.patches import PATCH
-from tunneldb.shape.ring_joint_steps import CELL_ROWS
+from tunneldb.measures.rings.compute.joint_steps import CELL_ROWS
+from tunneldb.measures.rings.compute.patches import PATCH
 from tunneldb.simulate import Parameters, Simulation
 from tunneldb.simulate.ring_truth import lips, ring_heights
 

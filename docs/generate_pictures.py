@@ -32,9 +32,9 @@ from benchmarks.scene import Scene
 from tunneldb.anomalies.detect import Anomaly
 from tunneldb.database import connect
 from tunneldb.pipeline import detect as stage
-from tunneldb.pipeline.parameters import settings
 from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.pixel_state import PixelState
+from tunneldb.stages.parameters import settings
 from tunneldb.store.survey import get_survey
 
 IMAGE = Path(__file__).parent / "images" / "leak-steps.png"

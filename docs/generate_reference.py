@@ -24,8 +24,8 @@ from tunneldb.cli.main import COMMANDS, main
 from tunneldb.cli.output import JSON, Verb
 from tunneldb.database import install, open_connection, resolve_dsn
 from tunneldb.database.schema import sql_files
-from tunneldb.pipeline.parameters import PARAMETERS
-from tunneldb.pipeline.stages import STAGES
+from tunneldb.stages.parameters import PARAMETERS
+from tunneldb.stages.registry import STAGES
 
 FOLDER = Path(__file__).parent
 NOTE = "<!-- Written by generate_reference.py; edit what it reads, not this page. -->"

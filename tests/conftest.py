@@ -22,7 +22,7 @@ from support.system import missing
 
 from tunneldb.database import connect, install, open_connection
 from tunneldb.database.server import Server
-from tunneldb.pipeline.stages import STAGES
+from tunneldb.stages.registry import STAGES
 
 pytest_plugins = ["support.example_survey"]
 

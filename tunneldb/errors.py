@@ -14,6 +14,10 @@ class UserError(Exception):
     """
 
 
+class BusyError(UserError):
+    """Another process is at work on the same survey or kilometre."""
+
+
 def did_you_mean(word: str, words: Iterable[str]) -> str:
     """Ask for the one of some words that another is closest to, as `` Did you mean 'leaks'?``; empty where none is close."""
     close = difflib.get_close_matches(word, list(words), n=1)

@@ -1,5 +1,5 @@
 -- Where a survey cannot vouch for its list of leaks: what was not loaded, not searched, searched in vain or before something
--- changed, and lining that was hardly seen. Every document that states leaks asks here. Needs stage_state (views/status.sql),
+-- changed, and lining that was hardly seen. Every document that states leaks asks here. Needs stage_state (stages/status.sql),
 -- coverage_at and km_ends (leaks/coverage.sql).
 
 -- A kilometre was searched when detection noted what it saw of the lining there (tunnel.coverage). That of a kilometre which was

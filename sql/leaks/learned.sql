@@ -1,5 +1,5 @@
 -- What the model of evidence learned from the reviews of a tunnel: applied and taken back by operators, noted in the audit of each
--- survey of the tunnel. The last that was not taken back is in force; stage detect goes by it (views/status.sql: stale).
+-- survey of the tunnel. The last that was not taken back is in force; stage detect goes by it (stages/status.sql: stale).
 -- Needs note_edit (access/audit.sql).
 
 -- Number of what is in force for a tunnel; NULL where nothing was learned.

@@ -14,10 +14,10 @@ from tunneldb.classification.scene import Scene
 from tunneldb.compiled import kernel
 from tunneldb.geometry.centreline import centreline_through
 from tunneldb.geometry.plan_line import PlanLine
-from tunneldb.pipeline.parameters import settings
 from tunneldb.pointcloud.thinning import thin, voxel_edge
 from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.simulate.parameters import Parameters
+from tunneldb.stages.parameters import settings
 
 pytestmark = pytest.mark.slow
 

@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 from tunneldb.cli.main import main
 from tunneldb.errors import UserError
-from tunneldb.pipeline.parameters import settings
+from tunneldb.stages.parameters import settings
 
 
 @pytest.mark.parametrize(("typed", "meant"), [("leeks", "leaks"), ("simulate-strcture", "simulate-structure")])

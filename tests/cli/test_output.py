@@ -21,7 +21,7 @@ from tunneldb.cli.main import COMMANDS, EXAMPLES, main
 from tunneldb.cli.output import Verb, plain
 from tunneldb.cli.progress import rate
 from tunneldb.errors import UserError
-from tunneldb.pipeline.parameters import check_together, settings
+from tunneldb.stages.parameters import check_together, settings
 
 
 def verbs() -> Iterator[tuple[str, click.Command]]:

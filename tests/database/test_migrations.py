@@ -23,8 +23,8 @@ from tunneldb.database.health import examine
 from tunneldb.database.schema import HEAD, alembic_config, install_api, sql_files
 from tunneldb.database.server import Server
 from tunneldb.errors import UserError
-from tunneldb.pipeline.stages import STAGES
 from tunneldb.pointcloud.poses import PoseModel
+from tunneldb.stages.registry import STAGES
 
 
 def dump(dsn: str, *options: str) -> str:

@@ -11,7 +11,7 @@ from tests.database.test_roles import DRAW, MOVE, REVIEW
 from tunneldb.cli.main import main
 from tunneldb.database import install
 from tunneldb.errors import UserError
-from tunneldb.pipeline.stages import STAGES
+from tunneldb.stages.registry import STAGES
 
 # Each fits a call that tunnel_api makes better than PostgreSQL's own, which take "any", anyelement or another type.
 OVERLOADS = (

@@ -8,7 +8,7 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
 from tunneldb.database import install, open_connection
-from tunneldb.pipeline.stages import STAGES
+from tunneldb.stages.registry import STAGES
 
 REVIEW = "UPDATE tunnel_api.leak_unrolled SET review = 'confirmed'"
 JUDGE = "UPDATE tunnel_api.anomaly_map SET kind = 'leak' WHERE kind = 'joint'"

@@ -15,14 +15,14 @@ from psycopg.conninfo import make_conninfo
 from support.example_survey import KM, NAME
 
 from tunneldb.database import connect, install, open_connection
-from tunneldb.errors import UserError
+from tunneldb.errors import BusyError, UserError
 from tunneldb.export.archive import load
 from tunneldb.export.archive.load import load_survey
 from tunneldb.export.archive.save import save_survey
-from tunneldb.pipeline.stages import STAGES
+from tunneldb.stages.ledger import lock
+from tunneldb.stages.registry import STAGES
 from tunneldb.store.archive.tables import EXCLUDED, archive_tables, stored_tables
 from tunneldb.store.catalog import remove_survey
-from tunneldb.store.ledger import BusyError, lock
 from tunneldb.store.survey import get_survey
 
 NO_ROWS = {("run", "job_id"), ("point", "scan_id"), ("station", "scan_id"), ("target_sphere", "scan_id")}

@@ -18,9 +18,9 @@ from tunneldb.anomalies.features import NAMES
 from tunneldb.anomalies.learning import Adjustment
 from tunneldb.cli.main import main
 from tunneldb.pipeline import detect as job
-from tunneldb.pipeline.parameters import settings
 from tunneldb.simulate import Parameters, Simulation, generate, write
 from tunneldb.simulate.lining.leaks import Leak
+from tunneldb.stages.parameters import settings
 from tunneldb.store.learned import apply_learned
 from tunneldb.store.survey import get_survey
 

@@ -16,8 +16,8 @@ from support.databases import Copies
 from tests.pipeline.test_detect import NAME, command, parameters, prepare
 from tunneldb.classification.classes import PointClass
 from tunneldb.pipeline import ground as stage
-from tunneldb.pipeline.parameters import settings
 from tunneldb.simulate import Simulation, write
+from tunneldb.stages.parameters import settings
 from tunneldb.store.scene import load_ground, load_scene
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import get_survey

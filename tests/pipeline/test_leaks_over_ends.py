@@ -21,7 +21,6 @@ from tunneldb.anomalies.background.level_map import BackgroundMap, map_backgroun
 from tunneldb.anomalies.regions import Region, RegionProperties
 from tunneldb.pipeline import calibration as radiometry
 from tunneldb.pipeline import detect as job
-from tunneldb.pipeline.parameters import settings
 from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.floor import Floor
 from tunneldb.raster.grid import Grid
@@ -29,6 +28,7 @@ from tunneldb.raster.image import LiningImage
 from tunneldb.raster.observation import Observer
 from tunneldb.simulate import Simulation, generate, write
 from tunneldb.simulate.lining.leaks import Leak
+from tunneldb.stages.parameters import settings
 from tunneldb.store.anomaly_parts import replace_parts
 from tunneldb.store.scene import load_arcs
 from tunneldb.store.surface import load_surface

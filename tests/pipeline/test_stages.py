@@ -18,10 +18,10 @@ from support.databases import Copies
 
 from tunneldb.cli.main import main
 from tunneldb.errors import UserError
-from tunneldb.pipeline.parameters import PARAMETERS
-from tunneldb.pipeline.run import parse_km
-from tunneldb.pipeline.stages import STAGE_NAMES, STAGES
 from tunneldb.simulate import Parameters, Simulation, write
+from tunneldb.stages.parameters import PARAMETERS
+from tunneldb.stages.registry import STAGE_NAMES, STAGES
+from tunneldb.stages.run import parse_km
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey, get_survey
 
@@ -460,5 +460,5 @@ def test_each_parameter_is_of_one_stage() -> None:
 
 
 def test_showing_the_stages_imports_nothing_that_computes() -> None:
-    code = "import sys, tunneldb.pipeline.stages; sys.exit(any(name in sys.modules for name in ('numpy', 'numba', 'psycopg')))"
+    code = "import sys, tunneldb.stages.registry; sys.exit(any(name in sys.modules for name in ('numpy', 'numba', 'psycopg')))"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0

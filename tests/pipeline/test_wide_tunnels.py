@@ -10,8 +10,8 @@ import pytest
 from support.loaded_survey import LENGTH, ORIGIN, SURVEY, add_survey, load, write
 
 from tunneldb.pipeline.geometry import axis
-from tunneldb.pipeline.parameters import PARAMETERS
 from tunneldb.pointcloud.selection import FilterSettings
+from tunneldb.stages.parameters import PARAMETERS
 from tunneldb.store.survey import get_survey
 
 WIDTH, HEIGHT = 14.0, 5.0

@@ -11,7 +11,7 @@ import pytest
 
 from tunneldb.classification.classes import PointClass
 from tunneldb.cli.main import main
-from tunneldb.pipeline.parameters import PARAMETERS
+from tunneldb.stages.parameters import PARAMETERS
 
 ROOT = Path(__file__).parents[2]
 OUTSIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")

@@ -15,11 +15,11 @@ from pyproj import CRS
 
 from tunneldb.cli.overview import Advice
 from tunneldb.database.failures import describe_failure
-from tunneldb.errors import UserError
+from tunneldb.errors import BusyError, UserError
 from tunneldb.pointcloud.reader import check_header, read_header
 from tunneldb.pointcloud.spool import Spool
 from tunneldb.queue.causes import CAUSES, DATA, PASSING, PROGRAM, cause_of
-from tunneldb.store.ledger import BusyError, describe
+from tunneldb.stages.ledger import describe
 
 
 def _scan(path: Path) -> Path:

@@ -20,8 +20,8 @@ from support.queue_rows import add_file, add_goal, add_job, add_run, add_worker,
 from tunneldb.cli.main import main
 from tunneldb.cli.overview import render
 from tunneldb.cli.watch import Watch
-from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.queue.progress import Overview, overview
+from tunneldb.stages.registry import STAGE_NAMES
 
 TUNNELDB = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
 DAMAGED = "/scans/km-6.laz is damaged after point 1000 of 2000: copy it again"

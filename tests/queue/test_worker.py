@@ -17,9 +17,9 @@ from click.testing import CliRunner
 from support.databases import Copies
 
 from tunneldb.cli.main import main
-from tunneldb.errors import UserError
+from tunneldb.errors import BusyError, UserError
 from tunneldb.simulate import Parameters, Simulation, write
-from tunneldb.store.ledger import BusyError, Job, LostError, describe, retry_at, stage_run
+from tunneldb.stages.ledger import Job, LostError, describe, retry_at, stage_run
 
 pytestmark = pytest.mark.slow
 

@@ -15,8 +15,8 @@ from PIL import Image
 from support.example_deviation import OVER, THICK, THIN, UNDER, UNEVEN, add_surfaces
 
 from tunneldb.cli.main import main
+from tunneldb.measures.deviation.rows import replace_image
 from tunneldb.raster.geotiff import Raster
-from tunneldb.store.deviation import replace_image
 from tunneldb.store.survey import get_survey
 
 PIXEL = 0.05

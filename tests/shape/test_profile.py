@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import shapely
 
+from tunneldb.measures.deviation.compute import section_deviation
 from tunneldb.shape.outline import Outline
-from tunneldb.shape.overbreak import section_deviation
 from tunneldb.shape.profile import Deviation, Profile, Stretch, deviation, signed_distance, stretches, strip_area
 
 

@@ -23,7 +23,7 @@ from tunneldb.cli.main import main
 from tunneldb.database import connect, install
 from tunneldb.errors import UserError
 from tunneldb.export.qgis.styles import store_styles, styled_columns
-from tunneldb.pipeline.stages import STAGES
+from tunneldb.stages.registry import STAGES
 from tunneldb.store.catalog import add_site, make_layers, remove_tunnel
 
 SCHEMA = "tunnel_25830"

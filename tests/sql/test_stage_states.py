@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from tunneldb.cli.main import main
-from tunneldb.pipeline.stages import STAGE_NAMES
+from tunneldb.stages.registry import STAGE_NAMES
 
 SURVEYS = """
 INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)

@@ -11,7 +11,7 @@ from shapely.geometry import box
 
 from tests.sql.test_statistics import add_coverage, add_leak, add_survey, ask
 from tunneldb.database import connect, install
-from tunneldb.pipeline.stages import STAGES
+from tunneldb.stages.registry import STAGES
 from tunneldb.store.waterproof import keep_missing
 
 NAMES = (

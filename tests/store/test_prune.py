@@ -13,7 +13,7 @@ from support.example_change import EARLIER, add_earlier
 from support.queue_rows import add_goal, add_job
 
 from tunneldb.cli.main import main
-from tunneldb.pipeline.stages import STAGE_NAMES
+from tunneldb.stages.registry import STAGE_NAMES
 from tunneldb.store.archive.numbers import PARAMETERS
 
 HISTORIES = {"run", "change", "job", "survey_size"}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tunneldb.arrays import Float
+from tunneldb.measures.deviation.compute import section_deviation
 from tunneldb.shape.outline import Outline
-from tunneldb.shape.overbreak import section_deviation
 from tunneldb.shape.profile import Deviation, Stretch, deviation
 
 

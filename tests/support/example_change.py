@@ -6,8 +6,8 @@ import numpy as np
 import psycopg
 from affine import Affine
 
+from tunneldb.measures.change.rows import save_images
 from tunneldb.raster.geotiff import Raster
-from tunneldb.store.change import save_images
 from tunneldb.store.survey import get_survey
 
 LATER, EARLIER = "demo-2026", "demo-2022"

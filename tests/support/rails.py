@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from tunneldb.measures.clearance.compute.track import GAUGE, HEAD
 from tunneldb.shape.outline import Outline
-from tunneldb.shape.track import GAUGE, HEAD
 
 BOX = Outline.of(np.array([[-1.6, 0.3], [-1.6, 3.0], [-1.0, 4.3], [1.0, 4.3], [1.6, 3.0], [1.6, 0.3]]), np.zeros(6), True)
 

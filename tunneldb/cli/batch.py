@@ -18,7 +18,7 @@ from tunneldb.cli.output import tell, verb, wants_json
 from tunneldb.cli.param_types import FilePath
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.pipeline.parameters import PARAMETERS, settings
+from tunneldb.stages.parameters import PARAMETERS, settings
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
@@ -71,9 +71,9 @@ def batch(
 
     Ctrl-C ends the stages that are under way, and stops; a second one stops at once.
     """
-    from tunneldb.pipeline.run import km_range
-    from tunneldb.pipeline.stages import STAGE_NAMES
     from tunneldb.queue.batch import plan, register
+    from tunneldb.stages.registry import STAGE_NAMES
+    from tunneldb.stages.run import km_range
 
     if last is not None and last not in STAGE_NAMES:
         raise UserError(f"there is no stage {last!r}; the stages are {', '.join(STAGE_NAMES)}")

@@ -19,8 +19,8 @@ from tunneldb.files import replacing, told_to_end
 from tunneldb.store.survey import get_survey
 
 if TYPE_CHECKING:
-    from tunneldb.export.tables.clearance import Row
-    from tunneldb.shape.gauge import Widening
+    from tunneldb.measures.clearance.compute.gauge import Widening
+    from tunneldb.measures.clearance.tables import Row
 
 _FILES = (".csv", ".dxf", ".gpkg")
 _LENGTH = FiniteRange(0.0)
@@ -79,11 +79,11 @@ def clearance(settings: Settings, /, survey: str, outline: Path, name: str | Non
     and spheres, which may be gone, are stated and do not count. What was not seen is stated, and is never clear. No norm's
     outline or values come with tunneldb; docs/howto-clearance.md says how the outline is widened.
     """
-    from tunneldb.export.tables.clearance import infringement_rows, section_rows, sections_csv, summary
-    from tunneldb.pipeline.clearance import Options, find_tracks, measure_clearance, read_track
+    from tunneldb.measures.clearance.compute.gauge import closed
+    from tunneldb.measures.clearance.measure import Options, find_tracks, measure_clearance, read_track
+    from tunneldb.measures.clearance.rows import save_gauge
+    from tunneldb.measures.clearance.tables import infringement_rows, section_rows, sections_csv, summary
     from tunneldb.pipeline.profile_file import read_profile
-    from tunneldb.shape.gauge import closed
-    from tunneldb.store.clearance import save_gauge
     from tunneldb.store.surface import load_alignment
 
     if output is not None and output.suffix.lower() not in _FILES:
@@ -135,7 +135,7 @@ def clearance(settings: Settings, /, survey: str, outline: Path, name: str | Non
 
 
 def _widening(asked: dict[str, Any]) -> Widening:
-    from tunneldb.shape.gauge import Widening
+    from tunneldb.measures.clearance.compute.gauge import Widening
 
     inside, outside = asked["curve_widening"]
     vehicle = asked["bogie_distance"] > 0.0 or asked["overhang"] > 0.0

@@ -20,7 +20,7 @@ from tunneldb.files import by_kilometre, replacing, told_to_end
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
-    from tunneldb.export.tables.change import Row
+    from tunneldb.measures.change.tables import Row
 
 _FILES = (".csv", ".gpkg", ".xlsx", ".tif")
 _WORDS = {
@@ -70,8 +70,8 @@ def compare(
     What remains is stated with its level of detection, and where it is significant as regions. What one survey did not see is
     unseen: it is neither changed nor unchanged, and its leaks are neither new nor dry. docs/howto-compare.md says more.
     """
-    from tunneldb.export.tables.change import change_rows, summary
-    from tunneldb.pipeline.change import compare as bring_up_to_date
+    from tunneldb.measures.change.measure import compare as bring_up_to_date
+    from tunneldb.measures.change.tables import change_rows, summary
 
     if output is not None and output.suffix.lower() not in _FILES:
         raise UserError(f"{output}: compare is written as {', '.join(_FILES[:-1])} or {_FILES[-1]}")
@@ -100,14 +100,14 @@ def _write(
     conn: psycopg.Connection[Any], old: Survey, new: Survey, part: Stretch, rows: dict[str, list[Row]], output: Path
 ) -> list[Path]:
     if output.suffix.lower() == ".csv":
-        from tunneldb.export.tables.change import change_csv
+        from tunneldb.measures.change.tables import change_csv
 
         with replacing(output) as temporary:
             temporary.write_text(change_csv(rows["leak_change"], "leak_change"), encoding="utf-8")
         return [output]
     if output.suffix.lower() == ".tif":
         from tunneldb.export.images.change import write_change
-        from tunneldb.store.change import stale_kilometres
+        from tunneldb.measures.change.rows import stale_kilometres
 
         there = stale_kilometres(conn, old, new, part.low, part.high)
         paths = by_kilometre(output, list(there))

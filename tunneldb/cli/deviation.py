@@ -21,7 +21,7 @@ from tunneldb.files import by_kilometre, replacing, told_to_end
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
-    from tunneldb.export.tables.deviation import Row
+    from tunneldb.measures.deviation.tables import Row
 
 _FILES = (".csv", ".tif", ".dxf")
 
@@ -69,8 +69,8 @@ def deviation(
     what was seen; what was not is stated as unseen, and is in none of them. tunneldb profile add gives the profiles;
     docs/howto-shape.md says what the columns mean.
     """
-    from tunneldb.export.tables.deviation import COLUMNS, rows_csv, section_rows, stretch_rows, volume
-    from tunneldb.pipeline.deviation import measure_deviation
+    from tunneldb.measures.deviation.measure import measure_deviation
+    from tunneldb.measures.deviation.tables import COLUMNS, rows_csv, section_rows, stretch_rows, volume
 
     if output is not None and output.suffix.lower() not in _FILES:
         raise UserError(f"{output}: deviation is written as {', '.join(_FILES[:-1])} or {_FILES[-1]}")
@@ -110,7 +110,7 @@ def _write(conn: psycopg.Connection[Any], survey: Survey, layer: str, part: Stre
             write_sections(conn, survey, layer, part.low, part.high, every, temporary)
         return [output]
     from tunneldb.export.images.deviation import write_deviation
-    from tunneldb.store.deviation import stale_kilometres
+    from tunneldb.measures.deviation.rows import stale_kilometres
 
     there = stale_kilometres(conn, survey, layer, part.low, part.high)
     paths = by_kilometre(output, list(there))

@@ -58,9 +58,9 @@ def evenness(
     Each place of the lining has the greatest gap of all straightedges over it. Deviation is made first, where it is missing or
     out of date; docs/howto-shape.md says what the columns mean.
     """
-    from tunneldb.export.tables.deviation import rows_csv
-    from tunneldb.export.tables.evenness import COLUMNS, section_rows, stretch_rows
-    from tunneldb.pipeline.evenness import measure_evenness
+    from tunneldb.measures.deviation.tables import rows_csv
+    from tunneldb.measures.evenness.measure import measure_evenness
+    from tunneldb.measures.evenness.tables import COLUMNS, section_rows, stretch_rows
 
     if output is not None and output.suffix.lower() != ".csv":
         raise UserError(f"{output}: evenness is written as .csv")

@@ -19,7 +19,7 @@ from tunneldb.cli.tables import print_classes
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import made_folder, replacing, told_to_end
-from tunneldb.pipeline.run import loaded_kilometres, parse_km
+from tunneldb.stages.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey

@@ -13,7 +13,7 @@ from tunneldb.cli.run import parameter_table
 from tunneldb.cli.tables import print_classes
 from tunneldb.errors import UserError
 from tunneldb.files import told_to_end
-from tunneldb.pipeline.parameters import PARAMETERS, settings
+from tunneldb.stages.parameters import PARAMETERS, settings
 
 _PREFIXES = ("ground.", "cluster.")
 _NAMES = [name for name in PARAMETERS if name.startswith(_PREFIXES)]

@@ -13,7 +13,7 @@ from tunneldb.cli.progress import bar, say, step
 from tunneldb.database import connect
 from tunneldb.export.images.image import export_kilometre, image_kilometres
 from tunneldb.files import made_folder, told_to_end
-from tunneldb.pipeline.run import nothing_yet, parse_km
+from tunneldb.stages.run import nothing_yet, parse_km
 from tunneldb.store.survey import get_survey
 
 

@@ -10,7 +10,7 @@ from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.database import open_connection
 from tunneldb.database.foreign import catalogue_alone
 from tunneldb.database.schema import install, schema_revision
-from tunneldb.pipeline.stages import STAGES
+from tunneldb.stages.registry import STAGES
 from tunneldb.store.waterproof import keep_missing
 
 

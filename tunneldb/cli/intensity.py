@@ -87,8 +87,8 @@ def _diagnose_file(
 
 def _diagnose_survey(settings: Settings, name: str, km: str | None) -> Diagnosis:
     from tunneldb.pipeline.intensity_diagnosis import diagnose_survey
-    from tunneldb.pipeline.parameters import settings as defaults
-    from tunneldb.pipeline.run import loaded_kilometres, nothing_yet, parse_km
+    from tunneldb.stages.parameters import settings as defaults
+    from tunneldb.stages.run import loaded_kilometres, nothing_yet, parse_km
 
     with connect(settings.dsn) as conn:
         survey = get_survey(conn, name)

@@ -27,7 +27,7 @@ from tunneldb.export.tables.leaks import Geometry, Kind, LeakList, Selection, as
 from tunneldb.export.tables.workbooks import write_leaks
 from tunneldb.files import replacing
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.pipeline.run import loaded_kilometres, parse_km
+from tunneldb.stages.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey

@@ -13,9 +13,9 @@ from rich.table import Table
 from rich.text import Text
 
 from tunneldb.cli.output import printable
-from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.queue.causes import cause_of
 from tunneldb.queue.progress import TO_DO, Cell, File, Overview, Worker
+from tunneldb.stages.registry import STAGE_NAMES
 
 STYLES = {
     "done": "green",

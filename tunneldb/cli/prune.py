@@ -15,8 +15,7 @@ from tunneldb.cli.progress import bar, step
 from tunneldb.cli.survey import DAY
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
-from tunneldb.errors import UserError
-from tunneldb.store.ledger import BusyError
+from tunneldb.errors import BusyError, UserError
 from tunneldb.store.prune import Superseded, busy, superseded
 from tunneldb.store.prune import prune as delete
 from tunneldb.store.survey import get_survey

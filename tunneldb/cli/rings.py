@@ -17,7 +17,7 @@ from tunneldb.errors import UserError
 
 if TYPE_CHECKING:
     from tunneldb.export.tables.rings import Chord
-    from tunneldb.pipeline.rings import SurveyedRings
+    from tunneldb.measures.rings.surveyed import SurveyedRings
 
 _END = r"(\d{1,3}(?:\.\d+)?|\d{1,2}:\d\d)"
 _CHORD = re.compile(f"{_END}-{_END}")
@@ -130,7 +130,7 @@ def rings(
         raise UserError("rings of points need --points, --axis and --diameter; rings of a survey its name")
     from tunneldb.export.tables.rings import SUMMARY, ring_records, rings_csv, summary
     from tunneldb.files import replacing
-    from tunneldb.pipeline.rings import measure_rings
+    from tunneldb.measures.rings.surveyed import measure_rings
 
     if output is not None:
         _require_writable(output, (points, axis))

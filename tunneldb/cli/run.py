@@ -14,15 +14,15 @@ from tunneldb.cli.progress import bar, say
 from tunneldb.cli.stage_sentence import number, stage_sentence
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.pipeline.parameters import PARAMETERS, settings
+from tunneldb.stages.ledger import Run
+from tunneldb.stages.parameters import PARAMETERS, settings
 from tunneldb.store.coverage import sum_leaks
-from tunneldb.store.ledger import Run
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
     import psycopg
 
-    from tunneldb.pipeline.stages import Stage
+    from tunneldb.stages.stage import Stage
 
 
 def parameter_table(names: Iterable[str] = PARAMETERS) -> str:
@@ -66,7 +66,7 @@ def run(
     stopped at any moment and repeated. Axis vertices moved by hand and reviews of leaks stay. All that each stage has
     counted is in --json.
     """
-    from tunneldb.pipeline.run import choose_stages, loaded_kilometres, parse_km, run_tasks, stage_tasks, stale_tasks
+    from tunneldb.stages.run import choose_stages, loaded_kilometres, parse_km, run_tasks, stage_tasks, stale_tasks
 
     values = settings(assignments)
     stages = choose_stages(first, last)

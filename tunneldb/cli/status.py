@@ -16,7 +16,7 @@ from tunneldb.cli.param_types import FiniteRange
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.pipeline.stages import STAGE_NAMES
+from tunneldb.stages.registry import STAGE_NAMES
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import get_survey
 

@@ -56,7 +56,7 @@ def survey_rings(
 ) -> None:
     """Define the rings of a survey if that was said, measure what is out of date, and list them."""
     from tunneldb.export.tables.survey_rings import ring_rows, write_rings
-    from tunneldb.pipeline.survey_rings import RingOptions, measure_survey_rings
+    from tunneldb.measures.rings.measure import RingOptions, measure_survey_rings
 
     definition.require_one()
     if output is not None and output.suffix.lower() not in _FILES:
@@ -88,7 +88,7 @@ def survey_rings(
 
 
 def _define(conn: psycopg.Connection[Any], survey: Survey, definition: Definition, progress: Progress) -> None:
-    from tunneldb.pipeline.survey_rings import define_rings, find_rings, rings_by_length, rings_of_file
+    from tunneldb.measures.rings.measure import define_rings, find_rings, rings_by_length, rings_of_file
 
     if definition.find:
         rings, joints = find_rings(conn, survey, step(progress))

@@ -59,9 +59,9 @@ def thickness(
     its lines and arcs: thickness is measured at right angles to these. What is missing or out of date is made first. Only what
     both saw is in a volume or an area.
     """
-    from tunneldb.export.tables.deviation import rows_csv
-    from tunneldb.export.tables.thickness import COLUMNS, section_rows, stretch_rows
-    from tunneldb.pipeline.thickness import measure_thickness
+    from tunneldb.measures.deviation.tables import rows_csv
+    from tunneldb.measures.thickness.measure import measure_thickness
+    from tunneldb.measures.thickness.tables import COLUMNS, section_rows, stretch_rows
 
     if output is not None and output.suffix.lower() != ".csv":
         raise UserError(f"{output}: thickness is written as .csv")

@@ -52,7 +52,7 @@ def install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> 
     connection
         Idle connection as the database's owner.
     stages
-        The stages of a kilometre, in their order, which tunnel_api goes by: `tunneldb.pipeline.stages.STAGES`.
+        The stages of a kilometre, in their order, which tunnel_api goes by: `tunneldb.stages.registry.STAGES`.
 
     Raises
     ------

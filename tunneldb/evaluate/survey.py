@@ -16,8 +16,8 @@ from shapely.geometry.base import BaseGeometry
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.pipeline.run import loaded_kilometres, parse_km
 from tunneldb.pointcloud.poses import PoseModel
+from tunneldb.stages.run import loaded_kilometres, parse_km
 from tunneldb.store.poses import load_poses
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey

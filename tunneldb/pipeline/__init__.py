@@ -1,4 +1,4 @@
-"""Stages of the pipeline, the ledger that records them, and what runs them."""
+"""What is done with the files of a survey, and the stages of a kilometre."""
 
 import lazy_loader
 

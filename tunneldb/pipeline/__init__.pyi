@@ -1,12 +1,3 @@
 from .load import load_files as load_files
 from .load import load_kilometre as load_kilometre
-from .parameters import PARAMETERS as PARAMETERS
-from .parameters import Parameter as Parameter
-from .parameters import settings as settings
 from .read import read_file as read_file
-from .run import choose_stages as choose_stages
-from .run import run_tasks as run_tasks
-from .run import stage_tasks as stage_tasks
-from .run import stale_tasks as stale_tasks
-from .stages import STAGES as STAGES
-from .stages import Stage as Stage

@@ -9,7 +9,7 @@ import psycopg
 
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.pipeline.stages import Counts, Progress
+from tunneldb.stages.stage import Counts, Progress
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 

@@ -23,7 +23,7 @@ from tunneldb.pointcloud.reader import ScanHeader, crs_note
 from tunneldb.pointcloud.second_tube import find_second_tubes
 from tunneldb.pointcloud.selection import MEMORY, FilterSettings
 from tunneldb.pointcloud.spool import Spool
-from tunneldb.store.ledger import Run, lock, stage_run
+from tunneldb.stages.ledger import Run, lock, stage_run
 from tunneldb.store.partition import (
     drop_fragments,
     partition_exists,

@@ -17,7 +17,7 @@ from tunneldb.geometry.alignment import Alignment
 from tunneldb.pipeline.read import Begin, silent
 from tunneldb.pointcloud.sonar import read_sonar, read_soundings
 from tunneldb.registration.underwater import GIVEN, SonarPose
-from tunneldb.store.ledger import stage_run
+from tunneldb.stages.ledger import stage_run
 from tunneldb.store.scan_files import Loaded, checksum
 from tunneldb.store.sonar import SonarRows, StoredScan, save_bed, save_points, save_scans, stored_scans
 from tunneldb.store.surface import load_alignment

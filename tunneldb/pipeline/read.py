@@ -18,13 +18,13 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import require_same_density
-from tunneldb.pipeline.parameters import PARAMETERS
 from tunneldb.pointcloud.formats.faults import require_dimension
 from tunneldb.pointcloud.pose_coverage import PoseCoverage
 from tunneldb.pointcloud.reader import ScanHeader, check_header, crs_note, read_header
 from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
 from tunneldb.pointcloud.spool import Spool
 from tunneldb.radiometry.intensity_kind import contradiction, doubt
+from tunneldb.stages.parameters import PARAMETERS
 from tunneldb.store.partition import drop_fragments, write_fragments
 from tunneldb.store.poses import load_pose_coverage
 from tunneldb.store.scan_files import (

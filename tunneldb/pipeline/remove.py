@@ -15,8 +15,8 @@ from tunneldb.pipeline.load import load_kilometre
 from tunneldb.pipeline.load_settings import parameters_of, settings_of
 from tunneldb.pipeline.read import Begin, Reading, silent
 from tunneldb.pointcloud.selection import FilterSettings
+from tunneldb.stages.ledger import stage_run
 from tunneldb.store.clearing import Work, clear_kilometre, has_results, work_in
-from tunneldb.store.ledger import stage_run
 from tunneldb.store.partition import partition_exists
 from tunneldb.store.scan_files import Recorded, kilometres_of, recorded_files, withdraw_file
 from tunneldb.store.survey import Survey

@@ -21,7 +21,7 @@ from tunneldb.pointcloud.pose_coverage import PoseCoverage, PoseFaults
 from tunneldb.pointcloud.reader import CHUNK, ScanHeader, check_header, crs_note
 from tunneldb.pointcloud.selection import SAMPLED, FilterCounts
 from tunneldb.radiometry.intensity_kind import doubt
-from tunneldb.store.ledger import stage_run
+from tunneldb.stages.ledger import stage_run
 from tunneldb.store.poses import load_pose_coverage
 from tunneldb.store.scan_files import (
     COUNTED,

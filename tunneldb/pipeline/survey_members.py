@@ -12,8 +12,8 @@ from tunneldb.errors import UserError
 from tunneldb.pipeline.members import AUTO, Begin, FileMembers, Inputs
 from tunneldb.pipeline.spot_colours import find_coloured_members
 from tunneldb.radiometry.correction import Kind
+from tunneldb.stages.ledger import stage_run
 from tunneldb.store.images import load_reference
-from tunneldb.store.ledger import stage_run
 from tunneldb.store.poses import load_poses
 from tunneldb.store.sources import unchanged_file
 from tunneldb.store.structures import SavedSpots, save_structures

@@ -18,11 +18,11 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
-from tunneldb.pipeline.run import loaded_kilometres
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import CHUNK, Points, ScanSource, read_chunks
 from tunneldb.pointcloud.spool import BINS_PER_METRE, Spool, bin_of, windows
-from tunneldb.store.ledger import stage_run
+from tunneldb.stages.ledger import stage_run
+from tunneldb.stages.run import loaded_kilometres
 from tunneldb.store.poses import load_poses
 from tunneldb.store.scene import line_of, load_ground, save_spheres
 from tunneldb.store.sources import sources

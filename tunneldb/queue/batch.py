@@ -17,11 +17,11 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load import chainages_near, header_kilometres, parameters_of, settings_of
-from tunneldb.pipeline.run import loaded_kilometres
-from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.pointcloud.formats.las_bounds import header_box
 from tunneldb.pointcloud.formats.table import format_of
 from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
+from tunneldb.stages.registry import STAGE_NAMES
+from tunneldb.stages.run import loaded_kilometres
 from tunneldb.store.poses import is_mobile
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey

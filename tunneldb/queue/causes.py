@@ -90,7 +90,7 @@ CAUSES = (
 """Kinds of failures, the first that fits taken; a message that fits none is of the data or the parameters."""
 
 PROGRAM = Cause("program", (), "report this message: it is a fault of the program, which the same input will meet again")
-"""An error that has a type of Python's before it (tunneldb.store.ledger.describe)."""
+"""An error that has a type of Python's before it (tunneldb.stages.ledger.describe)."""
 
 _TYPED = re.compile(r"[A-Z]\w*(Error|Exception): ")
 

@@ -18,9 +18,9 @@ from procrastinate.manager import JobManager
 from tunneldb.database.failures import describe_failure
 from tunneldb.database.session import CONNECT, SETTINGS, worker_session
 from tunneldb.errors import UserError
-from tunneldb.pipeline.parameters import of_stage, settings
-from tunneldb.pipeline.stages import STAGES
-from tunneldb.store.ledger import Job, LostError, describe, stage_run
+from tunneldb.stages.ledger import Job, LostError, describe, stage_run
+from tunneldb.stages.parameters import of_stage, settings
+from tunneldb.stages.registry import STAGES
 from tunneldb.store.survey import Survey, get_survey
 
 QUEUE = "tunneldb"

@@ -17,10 +17,10 @@ import psycopg
 
 from tunneldb.database.server import Server
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.pipeline.parameters import PARAMETERS
-from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.pointcloud.reader import read_header
 from tunneldb.queue.batch import Plan, extent
+from tunneldb.stages.parameters import PARAMETERS
+from tunneldb.stages.registry import STAGE_NAMES
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import psycopg
 from psycopg.rows import class_row
 
-from tunneldb.pipeline.stages import STAGE_NAMES
 from tunneldb.queue.throughput import measure, points_per_second
 from tunneldb.queue.worker import STALLED
+from tunneldb.stages.registry import STAGE_NAMES
 
 TO_DO = ("queued", "waits", "running")
 """States of a step that is done without anybody typing anything, as long as there are workers."""

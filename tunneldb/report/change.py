@@ -8,11 +8,11 @@ from typing import Any
 import psycopg
 from psycopg.rows import dict_row
 
-from tunneldb.export.tables.change import Row, change_rows, summary
+from tunneldb.measures.change.rows import older_compared
+from tunneldb.measures.change.tables import Row, change_rows, summary
 from tunneldb.report.change_series import ovality_curve, wet_curve
 from tunneldb.report.drawing import step_for, ticks
 from tunneldb.report.rings import Curve
-from tunneldb.store.change import older_compared
 from tunneldb.store.survey import Survey
 
 WIDTH, HEIGHT = 1000.0, 120.0

@@ -10,7 +10,7 @@ import numpy as np
 import psycopg
 
 from tunneldb.arrays import Float
-from tunneldb.export.tables.change import Row
+from tunneldb.measures.change.tables import Row
 from tunneldb.report.rings import WIDTH, Curve, curve
 from tunneldb.store.survey import Survey
 

@@ -12,15 +12,15 @@ import shapely
 
 from tunneldb.arrays import Bool, Float
 from tunneldb.classification.classes import PointClass
-from tunneldb.export.tables.clearance import Row, infringement_rows, section_rows
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.measures.clearance.compute.clearance import PASSING, TRACK
+from tunneldb.measures.clearance.compute.track import metre_places
+from tunneldb.measures.clearance.rows import load_classed
+from tunneldb.measures.clearance.tables import Row, infringement_rows, section_rows
 from tunneldb.report.data import label_chainages
 from tunneldb.report.drawing import line_path, step_for, ticks
-from tunneldb.shape.clearance import PASSING, TRACK
 from tunneldb.shape.outline import Outline
-from tunneldb.shape.track import metre_places
-from tunneldb.store.clearance import load_classed
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 

@@ -16,6 +16,7 @@ from psycopg.rows import dict_row
 
 from tunneldb.arrays import Single, UInt8
 from tunneldb.export.images.preview import shrink
+from tunneldb.measures.deviation.rows import layers_held
 from tunneldb.raster.gap_fill import FILL, fill_gaps
 from tunneldb.raster.geotiff import DEVIATION_KINDS
 from tunneldb.raster.grid import BLOCK
@@ -24,7 +25,6 @@ from tunneldb.report.drawing import line_path, step_for, ticks
 from tunneldb.report.lining import QUALITY, Form
 from tunneldb.shape.profile import Stretch, stretches
 from tunneldb.store.design import load_profiles
-from tunneldb.store.deviation import layers_held
 from tunneldb.store.images import load_block
 from tunneldb.store.survey import Survey
 

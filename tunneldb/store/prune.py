@@ -9,7 +9,7 @@ from typing import Any
 import psycopg
 from psycopg.rows import class_row
 
-from tunneldb.store.ledger import BusyError
+from tunneldb.errors import BusyError
 from tunneldb.store.survey import Survey
 
 

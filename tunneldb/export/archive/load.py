@@ -15,6 +15,7 @@ from tunneldb.database.failures import first_line
 from tunneldb.database.schema import HEAD
 from tunneldb.errors import UserError
 from tunneldb.export.archive.container import ArchiveReader, Manifest
+from tunneldb.stages.ledger import stage_run
 from tunneldb.store.archive.into import (
     attach_images,
     attach_points,
@@ -36,7 +37,6 @@ from tunneldb.store.archive.out import AUDIT, OTHERS, member_name, without_surve
 from tunneldb.store.archive.tables import BULK, Column, Table, archive_tables
 from tunneldb.store.archive.tunnels import existing_tunnel, use_tunnel
 from tunneldb.store.catalog import make_layers, require_new_survey, require_new_tunnel, survey_exists
-from tunneldb.store.ledger import stage_run
 
 _MISFITS = (
     psycopg.DataError,

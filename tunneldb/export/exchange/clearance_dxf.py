@@ -12,8 +12,8 @@ from ezdxf.units import M
 
 from tunneldb.export.exchange.entity import write
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.shape.track import metre_places
-from tunneldb.store.clearance import load_classed
+from tunneldb.measures.clearance.compute.track import metre_places
+from tunneldb.measures.clearance.rows import load_classed
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 

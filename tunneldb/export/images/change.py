@@ -11,8 +11,8 @@ import psycopg
 from tunneldb.database import snapshot
 from tunneldb.export.images.cog import Extent, write_cog
 from tunneldb.files import replacing
+from tunneldb.measures.change.rows import load_images, older_compared
 from tunneldb.raster.geotiff import CHANGE
-from tunneldb.store.change import load_images, older_compared
 from tunneldb.store.survey import Survey
 
 

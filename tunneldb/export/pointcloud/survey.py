@@ -16,8 +16,8 @@ from tunneldb.classification.classes import PointClass
 from tunneldb.database import snapshot
 from tunneldb.errors import UserError
 from tunneldb.files import replacing
-from tunneldb.pipeline.run import loaded_kilometres
 from tunneldb.pointcloud.rewrite import rewrite
+from tunneldb.stages.run import loaded_kilometres
 from tunneldb.store.scene import load_scene
 from tunneldb.store.sources import unchanged_file
 from tunneldb.store.survey import Survey

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import psycopg
 
 from tunneldb.errors import UserError
-from tunneldb.pipeline.run import nothing_yet
+from tunneldb.stages.run import nothing_yet
 from tunneldb.store.survey import Survey
 
 MARGIN = 0.08

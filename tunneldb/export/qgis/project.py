@@ -75,13 +75,13 @@ from tunneldb.export.qgis.space import docks, filled_layers, has_rows, scene, si
 from tunneldb.export.qgis.styles import require_table, style_elements
 from tunneldb.export.tables.spots import read_spots
 from tunneldb.files import replacing
+from tunneldb.measures.change.rows import older_compared
+from tunneldb.measures.deviation.rows import layers_held
+from tunneldb.measures.rings.rows import has_rings
 from tunneldb.raster.geotiff import CHANGE as CHANGE_KIND
 from tunneldb.raster.geotiff import DEVIATION_KINDS
-from tunneldb.store.change import older_compared
 from tunneldb.store.coverage import read_coverage
-from tunneldb.store.deviation import layers_held
 from tunneldb.store.remarks import read_remarks
-from tunneldb.store.rings import has_rings
 from tunneldb.store.sonar import has_sonar
 from tunneldb.store.survey import Survey
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from tunneldb.csvfile import write_csv
-from tunneldb.pipeline.rings import RingRow, SurveyedRings
+from tunneldb.measures.rings.surveyed import RingRow, SurveyedRings
 
 Chord = tuple[str, float, float]
 """Name of a chord, and the clock positions of its ends, °."""

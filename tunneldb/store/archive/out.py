@@ -10,9 +10,8 @@ from typing import Any
 import psycopg
 from psycopg import sql
 
-from tunneldb.errors import UserError
+from tunneldb.errors import BusyError, UserError
 from tunneldb.store.archive.tables import BULK, Column, Table, archive_tables, belongs
-from tunneldb.store.ledger import BusyError
 from tunneldb.store.partition import partition, partition_exists
 from tunneldb.store.survey import Survey
 

@@ -1,0 +1,253 @@
+-- Change between two surveys of a tunnel: of the lining by section and region, and of its leaks; how up to date it is; series over
+-- any number of surveys. Needs stationing (geometry/stationing.sql), survey_id and stage_state (stages/status.sql).
+
+CREATE OR REPLACE VIEW tunnel_api.change_section AS
+SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_survey, c.km, c.chainage_from, c.chainage_to,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (c.chainage_from + c.chainage_to) / 2) l) AS label,
+       c.seen_old, c.seen_new, c.seen_both, c.seen_old - c.seen_both AS unseen,
+       c.shift, c.shift_right, c.shift_right_se, c.shift_up, c.shift_up_se,
+       c.shift_along, c.shift_along_se, c.roll, c.roll_se, c.yaw, c.yaw_se, c.pitch, c.pitch_se,
+       c.change_rms, c.change_least, c.change_greatest, c.lod, c.cell, c.arc_from, c.change
+  FROM tunnel.change_section c
+  JOIN tunnel.survey s ON s.id = c.survey_id
+  JOIN tunnel.survey o ON o.id = c.old_survey_id;
+COMMENT ON VIEW tunnel_api.change_section IS
+    'What sections of lining did between two surveys as a whole (the registration''s error or the tunnel''s movement: which, cannot be told without control points), and what remains';
+COMMENT ON COLUMN tunnel_api.change_section.label IS 'Station of its middle, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.change_section.old_survey IS 'Name of the survey that it is compared with';
+COMMENT ON COLUMN tunnel_api.change_section.unseen IS 'Lining that the older survey saw and the newer one did not, m²: nothing is known of its change';
+
+CREATE OR REPLACE VIEW tunnel_api.change_region AS
+SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_survey, c.km, c.chainage_from, c.chainage_to,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (c.chainage_from + c.chainage_to) / 2) l) AS label,
+       c.arc_from, c.arc_to, c.clock, c.area, c.change_mean, c.lod, c.change_extreme,
+       c.unrolled::public.geometry(Polygon, 0) AS unrolled, c.map::public.geometry AS map, c.surface::public.geometry AS surface
+  FROM tunnel.change_region c
+  JOIN tunnel.survey s ON s.id = c.survey_id
+  JOIN tunnel.survey o ON o.id = c.old_survey_id;
+COMMENT ON VIEW tunnel_api.change_region IS
+    'Lining that changed significantly between two surveys, without the rigid motion of its section, with three geometries';
+
+CREATE OR REPLACE VIEW tunnel_api.leak_change AS
+SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_survey, c.km, c.state, c.chainage_from, c.chainage_to,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (c.chainage_from + c.chainage_to) / 2) l) AS label,
+       c.clock, c.area_old, c.area_old_se, c.area_new, c.area_new_se, c.area_new - c.area_old AS area_change,
+       sqrt(c.area_old_se ^ 2 + c.area_new_se ^ 2) AS area_change_se, c.seen_old, c.seen_new, c.old_kinds, c.new_kinds,
+       c.old_ids, c.new_ids,
+       c.unrolled::public.geometry(MultiPolygon, 0) AS unrolled, c.map::public.geometry AS map, c.surface::public.geometry AS surface
+  FROM tunnel.leak_change c
+  JOIN tunnel.survey s ON s.id = c.survey_id
+  JOIN tunnel.survey o ON o.id = c.old_survey_id;
+COMMENT ON VIEW tunnel_api.leak_change IS
+    'What became of leaks between two surveys, with area before and after and three geometries; what one of them did not see is unseen, never new or dry';
+COMMENT ON COLUMN tunnel_api.leak_change.area_change IS 'Wet area in the newer survey less that in the older, m²';
+COMMENT ON COLUMN tunnel_api.leak_change.area_change_se IS 'Its standard error by resolution and threshold, m²';
+
+DO $$
+DECLARE
+    base text;
+    bare record;
+BEGIN
+    FOREACH base IN ARRAY ARRAY['change_region', 'leak_change'] LOOP
+        FOR bare IN
+            SELECT a.attname AS name, t.text FROM (VALUES
+                ('label', 'Station of its middle, as 12+345.678'),
+                ('old_survey', 'Name of the survey that it is compared with'),
+                ('unrolled', 'In the unrolled plane (chainage, arc) of the older survey, SRID 0'),
+                ('map', 'On the map strip beside the axis, tunnel''s SRID'),
+                ('surface', 'On the lining in space, tunnel''s SRID')) AS t (name, text)
+              JOIN pg_attribute a ON a.attname = t.name AND a.attrelid = format('tunnel_api.%I', base)::regclass
+        LOOP
+            EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', base, bare.name, bare.text);
+        END LOOP;
+    END LOOP;
+END
+$$;
+
+CALL tunnel_api.make_geometry_views(
+    'change_region', 'change_region', 'Lining that changed significantly,',
+    plane_text => 'in the unrolled plane (chainage, arc) of the older survey, SRID 0');
+CALL tunnel_api.make_geometry_views(
+    'leak_change', 'leak_change', 'What became of leaks,',
+    plane_text => 'in the unrolled plane (chainage, arc) of the older survey, SRID 0');
+
+CREATE OR REPLACE FUNCTION tunnel_api.leaks_checksum(survey_id int, chainage_from float8, chainage_to float8) RETURNS text
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+    SELECT md5(string_agg(concat_ws(' ', a.id, coalesce(a.judged, a.kind), a.wet, a.area, a.chainage_from, a.chainage_to), ';' ORDER BY a.id))
+      FROM tunnel.anomaly a
+     WHERE a.survey_id = $1 AND a.chainage_to > $2 AND a.chainage_from < $3 AND a.detected AND a.review <> 'rejected'
+       AND NOT a.aside AND (a.wet OR a.kind IN ('leak', 'joint', 'dark')) AND tunnel_api.in_order($2, $3)
+$$;
+COMMENT ON FUNCTION tunnel_api.leaks_checksum(int, float8, float8) IS
+    'Checksum of the leaks, joints and dark spots that count between two chainages (m): another as soon as one is judged, drawn or found anew; NULL without any';
+
+-- What the change of a kilometre is made from. It is up to date as long as this is the same as in its row of the ledger.
+CREATE OR REPLACE FUNCTION tunnel_api.change_inputs(survey_id int, old_survey_id int, km int) RETURNS jsonb
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+    SELECT jsonb_build_object(
+               'detect_old', tunnel_api.last_run($2, 'detect', $3),
+               'detect_new', tunnel_api.last_run($1, 'detect', $3),
+               'leaks_old', tunnel_api.leaks_checksum($2, $3 * 1000 - 100, ($3 + 1) * 1000 + 100),
+               'leaks_new', tunnel_api.leaks_checksum($1, $3 * 1000 - 100, ($3 + 1) * 1000 + 100))
+$$;
+COMMENT ON FUNCTION tunnel_api.change_inputs(int, int, int) IS
+    'What the change of a kilometre from an older survey to this one is made from: the runs of stage detect, and checksums of the leaks of both. The run of stage compare holds the same in its parameters';
+
+CREATE OR REPLACE FUNCTION tunnel_api.change_state(survey_id int, old_survey_id int)
+RETURNS TABLE (km int, done_at timestamptz, reason text, cell float8, length float8)
+LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
+    WITH last AS (
+        SELECT r.km, r.finished_at, r.parameters FROM tunnel_api.last_runs($1, 'compare') r WHERE r.subject = $2::text
+    ), seen AS (
+        SELECT i.km FROM tunnel_api.image_kilometres($1, 'offset') i (km)
+        INTERSECT
+        SELECT i.km FROM tunnel_api.image_kilometres($2, 'offset') i (km)
+    ), place AS (  -- where both saw something, or what was made of it is still there
+        SELECT k.km, true AS there FROM seen k
+         UNION ALL
+        SELECT DISTINCT c.km, false FROM tunnel.change_section c
+         WHERE c.survey_id = $1 AND c.old_survey_id = $2 AND NOT EXISTS (SELECT FROM seen k WHERE k.km = c.km)
+    ), detect_new AS MATERIALIZED (
+        SELECT t.km, t.reason FROM tunnel_api.stage_state($1) t WHERE t.stage = 'detect'
+    ), detect_old AS MATERIALIZED (
+        SELECT t.km, t.reason FROM tunnel_api.stage_state($2) t WHERE t.stage = 'detect'
+    )
+    SELECT k.km, l.finished_at,
+           CASE WHEN NOT k.there THEN 'one of the surveys has nothing there any more'
+                WHEN o.reason IS NOT NULL THEN 'detect of the older survey is stale: ' || o.reason
+                WHEN n.reason IS NOT NULL THEN 'detect of the newer survey is stale: ' || n.reason
+                WHEN l.km IS NULL THEN 'never ran'
+                WHEN l.parameters -> 'detect_old' IS DISTINCT FROM i.inputs -> 'detect_old' THEN 'detect of the older survey ran since'
+                WHEN l.parameters -> 'detect_new' IS DISTINCT FROM i.inputs -> 'detect_new' THEN 'detect of the newer survey ran since'
+                WHEN l.parameters -> 'leaks_old' IS DISTINCT FROM i.inputs -> 'leaks_old' THEN 'leaks of the older survey changed since'
+                WHEN l.parameters -> 'leaks_new' IS DISTINCT FROM i.inputs -> 'leaks_new' THEN 'leaks of the newer survey changed since'
+           END,
+           (l.parameters ->> 'cell')::float8, (l.parameters ->> 'length')::float8
+      FROM place k
+     CROSS JOIN LATERAL (SELECT tunnel_api.change_inputs($1, $2, k.km) AS inputs) i
+      LEFT JOIN last l ON l.km = k.km
+      LEFT JOIN detect_old o ON o.km = k.km
+      LEFT JOIN detect_new n ON n.km = k.km
+$$;
+COMMENT ON FUNCTION tunnel_api.change_state(int, int) IS
+    'How far the comparison of a survey with an older one has come: of each kilometre that both saw, when it was last made, with what cells and sections (m), and why it is out of date, if it is';
+
+CREATE OR REPLACE VIEW tunnel_api.change_status AS
+SELECT ((s.id::bigint * 100000 + p.old_survey_id) * 1000000) + 500000 + t.km AS id, s.id AS survey_id, s.name AS survey,
+       p.old_survey_id, o.name AS old_survey, t.km, t.done_at, t.reason IS NOT NULL AS stale, t.reason, t.cell, t.length
+  FROM tunnel.survey s
+ CROSS JOIN LATERAL (
+        SELECT DISTINCT r.subject::int AS old_survey_id FROM tunnel_api.last_runs(s.id, 'compare') r) p
+  JOIN tunnel.survey o ON o.id = p.old_survey_id
+ CROSS JOIN LATERAL tunnel_api.change_state(s.id, p.old_survey_id) t;
+COMMENT ON VIEW tunnel_api.change_status IS 'Whether what is stored of the change between two surveys is up to date, by kilometre, of those that were compared';
+COMMENT ON COLUMN tunnel_api.change_status.old_survey_id IS 'Key of the survey that it is compared with';
+COMMENT ON COLUMN tunnel_api.change_status.old_survey IS 'Its name';
+COMMENT ON COLUMN tunnel_api.change_status.done_at IS 'When it was last made; NULL: never';
+COMMENT ON COLUMN tunnel_api.change_status.stale IS 'True when it was never made, or what it rests on has changed since';
+COMMENT ON COLUMN tunnel_api.change_status.reason IS 'Why it is stale';
+COMMENT ON COLUMN tunnel_api.change_status.cell IS 'Side of its cells, m';
+COMMENT ON COLUMN tunnel_api.change_status.length IS 'Length of its sections, m';
+
+CREATE OR REPLACE FUNCTION tunnel_api.change_stretches(old_survey text, new_survey text, step float8 DEFAULT 100)
+RETURNS TABLE (chainage_from float8, chainage_to float8, label text, compared float8, unseen float8, changed float8,
+               inwards float8, outwards float8, regions bigint, shift float8, wet_old float8, wet_new float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 250 SECURITY DEFINER SET search_path = pg_catalog, pg_temp SET jit = off AS $$
+    WITH pair AS MATERIALIZED (
+        SELECT n.id AS new, o.id AS old, n.tunnel_id
+          FROM tunnel.survey n, tunnel.survey o
+         WHERE n.id = tunnel_api.survey_id($2) AND o.id = tunnel_api.survey_id($1) AND $3 > 0
+    ), section AS (  -- a section counts where its middle lies
+        SELECT floor((c.chainage_from + c.chainage_to) / 2 / $3) AS k, sum(c.seen_both) AS compared,
+               sum(c.seen_old - c.seen_both) AS unseen, max(c.shift) AS shift
+          FROM pair p JOIN tunnel.change_section c ON c.survey_id = p.new AND c.old_survey_id = p.old
+         GROUP BY 1
+    ), region AS (
+        SELECT floor((c.chainage_from + c.chainage_to) / 2 / $3) AS k, count(*) AS regions, sum(c.area) AS changed,
+               sum(c.area) FILTER (WHERE c.change_mean > 0) AS inwards, sum(c.area) FILTER (WHERE c.change_mean < 0) AS outwards
+          FROM pair p JOIN tunnel.change_region c ON c.survey_id = p.new AND c.old_survey_id = p.old
+         GROUP BY 1
+    ), leak AS (
+        SELECT floor((c.chainage_from + c.chainage_to) / 2 / $3) AS k, sum(c.area_old) AS wet_old, sum(c.area_new) AS wet_new
+          FROM pair p JOIN tunnel.leak_change c ON c.survey_id = p.new AND c.old_survey_id = p.old
+         GROUP BY 1
+    )
+    SELECT s.k * $3, (s.k + 1) * $3, tunnel_api.station_label(p.tunnel_id, s.k * $3), s.compared, s.unseen,
+           coalesce(r.changed, 0), coalesce(r.inwards, 0), coalesce(r.outwards, 0), coalesce(r.regions, 0), s.shift,
+           coalesce(l.wet_old, 0), coalesce(l.wet_new, 0)
+      FROM pair p CROSS JOIN section s LEFT JOIN region r ON r.k = s.k LEFT JOIN leak l ON l.k = s.k
+     ORDER BY s.k
+$$;
+COMMENT ON FUNCTION tunnel_api.change_stretches(text, text, float8) IS
+'Change between two surveys by stretches of so many metres: lining compared, and seen by the older but not by the newer (unseen), m²; area of significant change (changed), of it inwards and outwards, in so many regions; greatest shift of a section as a whole (m); wet area in each (m²). What is unseen is in none of the others';
+
+CREATE OR REPLACE FUNCTION tunnel_api.change_at(old_survey text, chainage float8, arc float8)
+RETURNS TABLE (survey text, date date, change float8, lod float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 10 SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+    SELECT s.name, s.date, nullif(c.change[floor(($3 - c.arc_from) / c.cell)::int + 1], 'NaN')::float8, c.lod
+      FROM tunnel.change_section c
+      JOIN tunnel.survey s ON s.id = c.survey_id
+     WHERE c.old_survey_id = tunnel_api.survey_id($1) AND c.chainage_from <= $2 AND c.chainage_to > $2
+     ORDER BY s.date, s.name
+$$;
+COMMENT ON FUNCTION tunnel_api.change_at(text, float8, float8) IS
+'Change of the lining at a place (chainage and arc of the older survey, m) in each survey that was compared with it, by date: mean over the length of the section, m, positive inwards, without the section''s rigid motion; NULL where unseen. lod: level of detection of a single cell there, m';
+
+-- Nodes of a section lie at each whole degree from -180 to 180.
+CREATE OR REPLACE FUNCTION tunnel_api.arc_at_clock(survey_id int, chainage float8, clock float8) RETURNS float8
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+    SELECT s.arc[floor(d.degree)::int + 181] + (d.degree - floor(d.degree))
+           * (s.arc[least(floor(d.degree)::int + 182, 361)] - s.arc[floor(d.degree)::int + 181])
+      FROM (SELECT ($3 * 30 + 180) - 360 * floor(($3 * 30 + 180) / 360) - 180 AS degree) d
+     CROSS JOIN LATERAL (SELECT c.arc FROM tunnel.section c
+                          WHERE c.survey_id = $1 AND c.chainage BETWEEN $2 - 10 AND $2 + 10
+                          ORDER BY abs(c.chainage - $2) LIMIT 1) s
+$$;
+COMMENT ON FUNCTION tunnel_api.arc_at_clock(int, float8, float8) IS
+'Arc (m from the crown) at a clock position (hours) of the section nearest to a chainage (m) of a survey; NULL where none lies within 10 m';
+
+CREATE OR REPLACE FUNCTION tunnel_api.convergence(old_survey text, chainage float8, clock_from float8 DEFAULT 9, clock_to float8 DEFAULT 3)
+RETURNS TABLE (survey text, date date, convergence float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 10 SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+    SELECT a.survey, a.date, -(a.change + b.change)
+      FROM (SELECT tunnel_api.arc_at_clock(tunnel_api.survey_id($1), $2, $3) AS first,
+                   tunnel_api.arc_at_clock(tunnel_api.survey_id($1), $2, $4) AS second) p
+     CROSS JOIN LATERAL tunnel_api.change_at($1, $2, p.first) a
+      JOIN LATERAL tunnel_api.change_at($1, $2, p.second) b ON b.survey = a.survey
+     ORDER BY a.date, a.survey
+$$;
+
+COMMENT ON FUNCTION tunnel_api.convergence(text, float8, float8, float8) IS
+'By how much the chord between two clock positions, by default 9 and 3, became longer since the older survey, m, in each survey that was compared with it, by date; negative where the walls approach each other. The clock positions must lie opposite to each other: then the changes along both normals are those along the chord';
+
+CREATE OR REPLACE FUNCTION tunnel_api.ring_series(tunnel text, chainage float8)
+RETURNS TABLE (survey text, date date, number int, label text, seen_share float8, radius float8, radius_se float8, ovality float8,
+               ovality_se float8, largest_clock float8, largest_clock_se float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 10 SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+    SELECT s.name, s.date, r.number, tunnel_api.station_label(s.tunnel_id, (r.chainage_from + r.chainage_to) / 2), r.seen_share,
+           r.radius, r.radius_se, r.ovality, r.ovality_se, r.largest_clock, r.largest_clock_se
+      FROM tunnel.tunnel t
+      JOIN tunnel.survey s ON s.tunnel_id = t.id
+     CROSS JOIN LATERAL (SELECT q.* FROM tunnel.ring q WHERE q.survey_id = s.id AND q.chainage_from <= $2
+                          ORDER BY q.chainage_from DESC LIMIT 1) r
+     WHERE t.name = $1 AND r.chainage_to > $2
+     ORDER BY s.date, s.name
+$$;
+COMMENT ON FUNCTION tunnel_api.ring_series(text, float8) IS
+'Shape of the ring at a chainage (m) in each survey of a tunnel whose rings are defined, by date: share of it that is seen, mean radius (m), ovality as a share of the design diameter, clock position of the largest diameter (degrees), each with its standard error; NULL where it was not measured or cannot be told. Rings are those of each survey: their numbers differ where they were found or counted otherwise';
+
+CREATE OR REPLACE FUNCTION tunnel_api.leak_area_series(tunnel text, step float8 DEFAULT 100)
+RETURNS TABLE (chainage_from float8, chainage_to float8, label text, survey text, date date, leaks bigint, area float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 1000 SECURITY DEFINER SET search_path = pg_catalog, pg_temp SET jit = off AS $$
+    SELECT q.k * $2, (q.k + 1) * $2, tunnel_api.station_label(q.tunnel_id, q.k * $2), q.name, q.date, q.leaks, q.area
+      FROM (SELECT s.tunnel_id, s.name, s.date, floor((a.chainage_from + a.chainage_to) / 2 / $2) AS k, count(*) AS leaks,
+                   sum(a.area) AS area
+              FROM tunnel.tunnel t
+              JOIN tunnel.survey s ON s.tunnel_id = t.id
+              JOIN tunnel.anomaly a ON a.survey_id = s.id AND a.detected AND a.review <> 'rejected' AND a.wet AND NOT a.aside
+             WHERE t.name = $1 AND $2 > 0
+             GROUP BY s.tunnel_id, s.id, s.name, s.date, 4) q
+     ORDER BY q.k, q.date, q.name
+$$;
+COMMENT ON FUNCTION tunnel_api.leak_area_series(text, float8) IS
+'Wet area (m²) of each survey of a tunnel by stretches of so many metres, by date: leaks that count, where their middle lies. A stretch without a row of a survey has no leak in it, or was not seen: tunnel_api.coverage_gaps tells which';

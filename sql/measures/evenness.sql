@@ -1,0 +1,106 @@
+-- How even the linings of surveys are. Needs deviation_state (measures/deviation.sql), station_label (geometry/stationing.sql),
+-- survey_id and map_strip (geometry/shape.sql).
+
+CREATE OR REPLACE VIEW tunnel_api.evenness_section AS
+SELECT d.id, d.survey_id, s.name AS survey, d.km, d.layer, d.straightedge, d.gap_limit, d.chainage_from, d.chainage_to,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (d.chainage_from + d.chainage_to) / 2) l) AS label,
+       d.arc_from, d.cell, d.lining_area, d.measured_area, d.over_area, greatest(d.gap_along, d.gap_around) AS gap, d.gap_along,
+       d.gap_along_at, d.gap_around, d.gap_around_at, d.waviness, d.sigma, d.along, d.around
+  FROM tunnel.evenness_section d
+  JOIN tunnel.survey s ON s.id = d.survey_id;
+COMMENT ON VIEW tunnel_api.evenness_section IS
+    'Gaps beneath a straightedge laid on the lining along and around it, the curvature of the design taken out, in steps of 1 m of chainage';
+COMMENT ON COLUMN tunnel_api.evenness_section.layer IS 'Layer whose profiles are the template';
+COMMENT ON COLUMN tunnel_api.evenness_section.straightedge IS 'Length of the straightedge, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.gap_limit IS 'Limit of the gap beneath it, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.label IS 'Station of its middle, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.evenness_section.arc_from IS 'Arc of the first cell''s edge, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.cell IS 'Side of a cell, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.lining_area IS 'Lining that was seen, m²';
+COMMENT ON COLUMN tunnel_api.evenness_section.measured_area IS 'What of that lay beneath a straightedge, m²; the rest is not measured';
+COMMENT ON COLUMN tunnel_api.evenness_section.over_area IS 'What of that has a greater gap than the limit, m²';
+COMMENT ON COLUMN tunnel_api.evenness_section.gap IS 'Greatest gap of both ways, m; NULL where no straightedge could be laid';
+COMMENT ON COLUMN tunnel_api.evenness_section.gap_along IS 'Greatest gap beneath one laid along the tunnel, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.gap_along_at IS 'Arc of that, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.gap_around IS 'Greatest gap beneath one laid around the section, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.gap_around_at IS 'Arc of that, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.waviness IS 'Greatest depth of a hollow that lies whole beneath the straightedge over the distance to its nearer rim';
+COMMENT ON COLUMN tunnel_api.evenness_section.sigma IS 'Standard deviation of a cell''s mean by the scatter of pixels, m: a gap of a few times that is noise';
+COMMENT ON COLUMN tunnel_api.evenness_section.along IS 'Greatest gap along, by cells of arc from arc_from up, m; NaN where none could be laid';
+COMMENT ON COLUMN tunnel_api.evenness_section.around IS 'Greatest gap around, by cells of arc from arc_from up, m; NaN where none could be laid';
+
+CREATE OR REPLACE VIEW tunnel_api.evenness_area AS
+SELECT d.id, d.survey_id, s.name AS survey, d.km, d.layer, public.st_xmin(d.geom) AS chainage_from, public.st_xmax(d.geom) AS chainage_to,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (public.st_xmin(d.geom) + public.st_xmax(d.geom)) / 2) l) AS label,
+       public.st_ymin(d.geom) AS arc_from, public.st_ymax(d.geom) AS arc_to, d.area, d.gap, d.direction,
+       d.geom::public.geometry(Polygon, 0) AS geom
+  FROM tunnel.evenness_area d
+  JOIN tunnel.survey s ON s.id = d.survey_id;
+COMMENT ON VIEW tunnel_api.evenness_area IS
+    'Where the gap beneath a straightedge laid on the lining is greater than the limit; one at the end of a kilometre is in two parts';
+COMMENT ON COLUMN tunnel_api.evenness_area.layer IS 'Layer whose profiles are the template';
+COMMENT ON COLUMN tunnel_api.evenness_area.label IS 'Station of its middle, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.evenness_area.arc_from IS 'Least arc, m';
+COMMENT ON COLUMN tunnel_api.evenness_area.arc_to IS 'Greatest arc, m';
+COMMENT ON COLUMN tunnel_api.evenness_area.area IS 'Its area, m²';
+COMMENT ON COLUMN tunnel_api.evenness_area.gap IS 'Greatest gap in it, m';
+COMMENT ON COLUMN tunnel_api.evenness_area.direction IS 'along or around: how the straightedge lay';
+COMMENT ON COLUMN tunnel_api.evenness_area.geom IS 'In the unrolled plane (chainage, arc), m';
+
+CREATE OR REPLACE FUNCTION tunnel_api.evenness_inputs(survey_id int, km int, layer text) RETURNS jsonb
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+    SELECT jsonb_build_object('layer', $3, 'deviation', jsonb_agg(tunnel_api.last_run($1, 'deviation', $2 + k, $3)
+               ORDER BY k))
+      FROM generate_series(-1, 1) k
+$$;
+COMMENT ON FUNCTION tunnel_api.evenness_inputs(int, int, text) IS
+    'What the evenness of a survey''s kilometre is made from: the runs of stage deviation in it and the kilometres beside. The run of stage evenness holds the same in its parameters, beside the length of the straightedge and the limit';
+
+CREATE OR REPLACE FUNCTION tunnel_api.evenness_state(survey_id int)
+RETURNS TABLE (km int, layer text, done_at timestamptz, reason text, straightedge float8, gap_limit float8)
+LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
+    SELECT d.km, d.layer, l.finished_at,
+           CASE WHEN d.reason IS NOT NULL THEN 'deviation is stale: ' || d.reason
+                WHEN l.finished_at IS NULL THEN 'never ran'
+                WHEN l.parameters -> 'deviation' IS DISTINCT FROM tunnel_api.evenness_inputs($1, d.km, d.layer) -> 'deviation'
+                THEN 'deviation ran since'
+           END,
+           (l.parameters ->> 'length')::float8, (l.parameters ->> 'limit')::float8
+      FROM tunnel_api.deviation_state($1) d
+      LEFT JOIN tunnel_api.last_runs($1, 'evenness') l ON l.km = d.km AND l.subject = d.layer
+$$;
+COMMENT ON FUNCTION tunnel_api.evenness_state(int) IS
+    'How far the evenness of a survey has come: of each kilometre and layer that it can be held against, when it was last made, with which straightedge and limit (m), and why it is out of date, if it is';
+
+CREATE OR REPLACE VIEW tunnel_api.evenness_status AS
+SELECT ((s.id::bigint * 1000000 + 500000 + t.km) * 10) + CASE t.layer WHEN 'lining' THEN 1 WHEN 'shotcrete' THEN 2 ELSE 3 END AS id,
+       s.id AS survey_id, s.name AS survey, t.km, t.layer, t.done_at, t.straightedge, t.gap_limit, t.reason IS NOT NULL AS stale, t.reason
+  FROM tunnel.survey s
+ CROSS JOIN LATERAL tunnel_api.evenness_state(s.id) t;
+COMMENT ON VIEW tunnel_api.evenness_status IS 'Whether the evenness of each kilometre is up to date: one row per layer';
+COMMENT ON COLUMN tunnel_api.evenness_status.layer IS 'Layer whose profiles are the template';
+COMMENT ON COLUMN tunnel_api.evenness_status.done_at IS 'When it was last made; NULL: never';
+COMMENT ON COLUMN tunnel_api.evenness_status.straightedge IS 'Length of the straightedge, m';
+COMMENT ON COLUMN tunnel_api.evenness_status.gap_limit IS 'Limit of the gap, m';
+COMMENT ON COLUMN tunnel_api.evenness_status.stale IS 'True when it was never made, or what it rests on has changed since';
+COMMENT ON COLUMN tunnel_api.evenness_status.reason IS 'Why it is stale';
+
+CREATE OR REPLACE FUNCTION tunnel_api.evenness_stretches(survey text, layer text, step float8 DEFAULT 100)
+RETURNS TABLE (chainage_from float8, chainage_to float8, label text, straightedge float8, gap_limit float8, lining_area float8,
+               measured_area float8, over_area float8, gap_along float8, gap_around float8, waviness float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 250
+SET jit = off
+AS $$
+    SELECT w.n * $3, (w.n + 1) * $3, tunnel_api.station_label(s.tunnel_id, w.n * $3), w.straightedge, w.gap_limit, w.lining,
+           w.measured, w.over, w.along, w.around, w.waviness
+      FROM (SELECT v.id, v.tunnel_id FROM tunnel_api.survey v WHERE v.id = tunnel_api.survey_id($1)) s
+     CROSS JOIN LATERAL (
+        SELECT floor((d.chainage_from + d.chainage_to) / 2 / $3) AS n, min(d.straightedge) AS straightedge,
+               min(d.gap_limit) AS gap_limit, sum(d.lining_area) AS lining, sum(d.measured_area) AS measured,
+               sum(d.over_area) AS over, max(d.gap_along) AS along, max(d.gap_around) AS around, max(d.waviness) AS waviness
+          FROM tunnel_api.evenness_section d
+         WHERE d.survey_id = s.id AND d.layer = $2 AND $3 >= 1
+         GROUP BY 1) w
+$$;
+COMMENT ON FUNCTION tunnel_api.evenness_stretches(text, text, float8) IS
+'Evenness of a survey''s lining by stretches of so many metres, 1 or more, from whole multiples of them on: area seen, beneath a straightedge and with a greater gap than the limit (m²), greatest gaps (m), greatest waviness. A section counts where its middle is';

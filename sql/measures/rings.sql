@@ -1,0 +1,190 @@
+-- Rings of the linings of surveys: shape, steps from ring to ring, chords. Needs stationing (geometry/stationing.sql) and
+-- stage_state (stages/status.sql).
+
+CREATE OR REPLACE VIEW tunnel_api.ring AS
+SELECT r.id, r.survey_id, s.name AS survey, r.km,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (r.chainage_from + r.chainage_to) / 2) l) AS label,
+       r.number, r.chainage_from, r.chainage_to, r.origin, r.joint, r.seen_share, r.shape, r.centre_right, r.centre_right_se,
+       r.centre_up, r.centre_up_se, r.radius, r.radius_se, r.diameter_largest, r.diameter_largest_se, r.diameter_smallest,
+       r.diameter_smallest_se, r.largest_clock, r.largest_clock_se, r.ovality, r.ovality_se, r.design_diameter,
+       r.diameter_from, r.harmonic, r.harmonic_se, r.harmonic_clock, r.inward, r.inward_se, r.inward_clock, r.outward,
+       r.outward_se, r.outward_clock, r.sigma, r.step_greatest, r.step_greatest_se, r.step_greatest_arc, r.lip, r.lip_se,
+       r.lip_arc, r.remark
+  FROM tunnel.ring r
+  JOIN tunnel.survey s ON s.id = r.survey_id;
+COMMENT ON VIEW tunnel_api.ring IS
+    'Rings of linings with their shape, each value with its standard error (_se); what was not measured, or cannot be told, is NULL';
+COMMENT ON COLUMN tunnel_api.ring.label IS 'Station of its middle, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.ring.number IS 'Number of the ring';
+COMMENT ON COLUMN tunnel_api.ring.origin IS 'How the rings were given: length, file, or found';
+COMMENT ON COLUMN tunnel_api.ring.joint IS 'Joint at its beginning: given, seen, or missing';
+COMMENT ON COLUMN tunnel_api.ring.seen_share IS 'Share of its circumference that is seen; NULL: not measured';
+COMMENT ON COLUMN tunnel_api.ring.shape IS 'What was fitted: ellipse, circle, or none';
+COMMENT ON COLUMN tunnel_api.ring.centre_right IS 'How far its centre lies right of the given axis, m';
+COMMENT ON COLUMN tunnel_api.ring.centre_right_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring.centre_up IS 'How far its centre lies above the given axis, m';
+COMMENT ON COLUMN tunnel_api.ring.centre_up_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring.radius IS 'Mean radius, m';
+COMMENT ON COLUMN tunnel_api.ring.radius_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring.diameter_largest IS 'Largest diameter of the ellipse, m';
+COMMENT ON COLUMN tunnel_api.ring.diameter_largest_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring.diameter_smallest IS 'Smallest diameter of the ellipse, m';
+COMMENT ON COLUMN tunnel_api.ring.diameter_smallest_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring.largest_clock IS 'Clock position of the largest diameter, degrees';
+COMMENT ON COLUMN tunnel_api.ring.largest_clock_se IS 'Standard error, degrees';
+COMMENT ON COLUMN tunnel_api.ring.ovality IS 'Largest less smallest diameter over the design diameter';
+COMMENT ON COLUMN tunnel_api.ring.ovality_se IS 'Standard error';
+COMMENT ON COLUMN tunnel_api.ring.design_diameter IS 'Diameter that ovality is a share of, m';
+COMMENT ON COLUMN tunnel_api.ring.diameter_from IS 'Where that is from: option, profile, or ring: its own mean';
+COMMENT ON COLUMN tunnel_api.ring.harmonic IS 'Amplitudes of the radius by order, from 2, m; NaN untold';
+COMMENT ON COLUMN tunnel_api.ring.harmonic_se IS 'Their standard errors, m';
+COMMENT ON COLUMN tunnel_api.ring.harmonic_clock IS 'First clock position where each is outwards most, degrees';
+COMMENT ON COLUMN tunnel_api.ring.inward IS 'Least departure from the circle of the mean radius, m, negative inside';
+COMMENT ON COLUMN tunnel_api.ring.inward_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring.inward_clock IS 'Its clock position, degrees';
+COMMENT ON COLUMN tunnel_api.ring.outward IS 'Greatest departure from that circle, m';
+COMMENT ON COLUMN tunnel_api.ring.outward_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring.outward_clock IS 'Its clock position, degrees';
+COMMENT ON COLUMN tunnel_api.ring.sigma IS 'Scatter of cells about what was fitted, m';
+COMMENT ON COLUMN tunnel_api.ring.step_greatest IS 'Greatest step either way, m, with its sign';
+COMMENT ON COLUMN tunnel_api.ring.step_greatest_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring.step_greatest_arc IS 'Arc of its place, m';
+COMMENT ON COLUMN tunnel_api.ring.lip IS 'Greatest step within the ring, between segments, m, positive where what follows clockwise stands in';
+COMMENT ON COLUMN tunnel_api.ring.lip_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring.lip_arc IS 'Arc of its place, m';
+COMMENT ON COLUMN tunnel_api.ring.remark IS 'What is to be known of it';
+
+-- In a cell of arc each; the joint is the one at the ring's beginning.
+CREATE OR REPLACE VIEW tunnel_api.ring_step AS
+SELECT r.id * 1000 + n AS id, r.id AS ring_id, r.survey_id, s.name AS survey, r.km, r.number, r.chainage_from AS chainage,
+       n::int AS cell, r.step_arc[n] AS arc, r.step[n] AS step, r.step_se[n] AS step_se
+  FROM tunnel.ring r
+  JOIN tunnel.survey s ON s.id = r.survey_id
+ CROSS JOIN LATERAL generate_subscripts(r.step, 1) AS n
+ WHERE r.step[n] <> 'NaN';
+COMMENT ON VIEW tunnel_api.ring_step IS
+    'Steps of the lining from each ring to the next, in cells of arc; cells in which none can be told are left out';
+COMMENT ON COLUMN tunnel_api.ring_step.ring_id IS 'Key of the ring behind the joint';
+COMMENT ON COLUMN tunnel_api.ring_step.number IS 'Number of the ring behind the joint';
+COMMENT ON COLUMN tunnel_api.ring_step.cell IS 'Number of the cell, from the lowest arc on, from 1';
+COMMENT ON COLUMN tunnel_api.ring_step.arc IS 'Arc of its middle from the crown, m, positive right';
+COMMENT ON COLUMN tunnel_api.ring_step.step IS 'How far the ring behind the joint stands in before the other, m';
+COMMENT ON COLUMN tunnel_api.ring_step.step_se IS 'Standard error, m';
+
+CREATE OR REPLACE VIEW tunnel_api.ring_chord AS
+SELECT c.id, c.ring_id, r.survey_id, s.name AS survey, r.km, r.number, r.chainage_from, r.chainage_to, c.clock_from,
+       c.clock_to, c.length, c.length_se
+  FROM tunnel.ring_chord c
+  JOIN tunnel.ring r ON r.id = c.ring_id
+  JOIN tunnel.survey s ON s.id = r.survey_id;
+COMMENT ON VIEW tunnel_api.ring_chord IS 'Chords of rings between two clock positions: how they change between surveys is convergence';
+COMMENT ON COLUMN tunnel_api.ring_chord.ring_id IS 'Key of the ring';
+COMMENT ON COLUMN tunnel_api.ring_chord.number IS 'Number of the ring';
+COMMENT ON COLUMN tunnel_api.ring_chord.clock_from IS 'Clock position of its one end, degrees from the crown to the right';
+COMMENT ON COLUMN tunnel_api.ring_chord.clock_to IS 'Clock position of its other end, degrees';
+COMMENT ON COLUMN tunnel_api.ring_chord.length IS 'Length, m; NULL where an end is not seen';
+COMMENT ON COLUMN tunnel_api.ring_chord.length_se IS 'Standard error, m';
+
+-- Rings of other kilometres whose end is next to this one belong to it, too: the step at its beginning goes by both.
+CREATE OR REPLACE FUNCTION tunnel_api.ring_inputs(survey_id int, km int) RETURNS jsonb
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+    SELECT jsonb_build_object(
+               'detect', (SELECT jsonb_agg(l.id ORDER BY k) FROM generate_series($2 - 1, $2 + 1) k
+                           CROSS JOIN LATERAL (SELECT tunnel_api.last_run($1, 'detect', k) AS id) l WHERE l.id IS NOT NULL),
+               'rings', (SELECT md5(string_agg(concat_ws(' ', g.number, g.chainage_from, g.chainage_to), ';' ORDER BY g.number))
+                           FROM tunnel.ring g WHERE g.survey_id = $1 AND g.km = $2))
+$$;
+COMMENT ON FUNCTION tunnel_api.ring_inputs(int, int) IS
+    'What the measures of a kilometre''s rings are made from: the runs of stage detect there and beside, and a checksum of the rings'' joints. The run of stage rings holds the same in its parameters';
+
+CREATE OR REPLACE FUNCTION tunnel_api.ring_state(survey_id int)
+RETURNS TABLE (km int, rings int, done_at timestamptz, reason text)
+LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
+    WITH detect AS MATERIALIZED (
+        SELECT t.km, t.reason FROM tunnel_api.stage_state($1) t WHERE t.stage = 'detect'
+    ), last AS (
+        SELECT r.km, r.finished_at, r.parameters FROM tunnel_api.last_runs($1, 'rings') r
+    )
+    SELECT g.km, g.rings, l.finished_at,
+           CASE WHEN t.reason IS NOT NULL THEN 'detect is stale: ' || t.reason
+                WHEN l.km IS NULL THEN 'never ran'
+                WHEN l.parameters -> 'detect' IS DISTINCT FROM n.inputs -> 'detect' THEN 'detect ran since'
+                WHEN l.parameters -> 'rings' IS DISTINCT FROM n.inputs -> 'rings' THEN 'rings changed since'
+                WHEN g.unmeasured THEN 'rings changed since'
+           END
+      FROM (SELECT o.km, count(*)::int AS rings, bool_or(o.shape IS NULL) AS unmeasured
+              FROM tunnel.ring o WHERE o.survey_id = $1 GROUP BY o.km) g
+     CROSS JOIN LATERAL (SELECT tunnel_api.ring_inputs($1, g.km) AS inputs) n
+      LEFT JOIN detect t ON t.km = g.km
+      LEFT JOIN last l ON l.km = g.km
+$$;
+COMMENT ON FUNCTION tunnel_api.ring_state(int) IS
+    'How far the rings of a survey have come: of each kilometre with rings, how many, when they were last measured, and why that is out of date, if it is';
+
+CREATE OR REPLACE VIEW tunnel_api.ring_status AS
+SELECT (s.id::bigint * 1000000 + 500000 + t.km) AS id, s.id AS survey_id, s.name AS survey, t.km, t.rings, t.done_at,
+       t.reason IS NOT NULL AS stale, t.reason
+  FROM tunnel.survey s
+ CROSS JOIN LATERAL tunnel_api.ring_state(s.id) t;
+COMMENT ON VIEW tunnel_api.ring_status IS 'Whether the measures of the rings of each kilometre are up to date';
+COMMENT ON COLUMN tunnel_api.ring_status.rings IS 'How many rings have their middle there';
+COMMENT ON COLUMN tunnel_api.ring_status.done_at IS 'When they were last measured; NULL: never';
+COMMENT ON COLUMN tunnel_api.ring_status.stale IS 'True when they were never measured, or what that rests on has changed since';
+COMMENT ON COLUMN tunnel_api.ring_status.reason IS 'Why it is stale';
+
+-- Between the ends of the section that is nearest behind the ring's beginning, or before it.
+CREATE OR REPLACE VIEW tunnel_api.ring_unrolled AS
+SELECT r.id, r.survey_id, r.survey, r.km, r.number, r.label, r.chainage_from, r.chainage_to, r.joint, r.seen_share, r.radius,
+       1000 * r.ovality AS ovality, 1000 * r.ovality_se AS ovality_se, 1000 * r.centre_right AS centre_right,
+       1000 * r.centre_up AS centre_up, 1000 * r.step_greatest AS step_greatest, 1000 * r.lip AS lip, r.remark,
+       public.st_makeenvelope(r.chainage_from, e.low, r.chainage_to, e.high, 0)::public.geometry(Polygon, 0) AS geom
+  FROM tunnel_api.ring r
+ CROSS JOIN LATERAL (
+        SELECT q.low, q.high
+          FROM ((SELECT t.chainage, t.arc[1] AS low, t.arc[361] AS high FROM tunnel.section t
+                  WHERE t.survey_id = r.survey_id AND t.chainage >= r.chainage_from ORDER BY t.chainage LIMIT 1)
+                 UNION ALL
+                (SELECT t.chainage, t.arc[1], t.arc[361] FROM tunnel.section t
+                  WHERE t.survey_id = r.survey_id AND t.chainage < r.chainage_from ORDER BY t.chainage DESC LIMIT 1)) q
+         ORDER BY abs(q.chainage - r.chainage_from) LIMIT 1) e;
+COMMENT ON VIEW tunnel_api.ring_unrolled IS 'Rings on the unrolled plane, with what QGIS shows of them';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.number IS 'Number of the ring';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.label IS 'Station of its middle, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.joint IS 'Joint at its beginning: given, seen, or missing';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.seen_share IS 'Share of its circumference that is seen; NULL: not measured';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.radius IS 'Mean radius, m';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.ovality IS 'Largest less smallest diameter over the design diameter, per mille';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.ovality_se IS 'Standard error, per mille';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.centre_right IS 'How far its centre lies right of the given axis, mm';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.centre_up IS 'How far its centre lies above the given axis, mm';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.step_greatest IS 'Greatest step at its beginning, mm, positive where it stands in';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.lip IS 'Greatest step between its segments, mm';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.remark IS 'What is to be known of it';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.geom IS 'Chainage and arc, m';
+
+CREATE OR REPLACE VIEW tunnel_api.ring_map AS
+SELECT r.id, r.survey_id, r.survey, r.km, r.number, r.label, r.chainage_from, r.chainage_to, r.joint, r.seen_share, r.radius,
+       r.ovality, r.ovality_se, r.centre_right, r.centre_up, r.step_greatest, r.lip, r.remark,
+       public.st_makepolygon(public.st_makeline(ARRAY[c.a, c.b, c.c, c.d, c.a]))::public.geometry AS geom
+  FROM tunnel_api.ring_unrolled r
+ CROSS JOIN LATERAL (SELECT public.st_ymin(r.geom) AS low, public.st_ymax(r.geom) AS high) e
+ CROSS JOIN LATERAL (
+        SELECT tunnel_api.map_point(r.survey_id, r.chainage_from, e.low) AS a,
+               tunnel_api.map_point(r.survey_id, r.chainage_to, e.low) AS b,
+               tunnel_api.map_point(r.survey_id, r.chainage_to, e.high) AS c,
+               tunnel_api.map_point(r.survey_id, r.chainage_from, e.high) AS d) c
+ WHERE c.a IS NOT NULL AND c.b IS NOT NULL;
+COMMENT ON VIEW tunnel_api.ring_map IS 'Rings laid on the map beside the axis, with what QGIS shows of them';
+COMMENT ON COLUMN tunnel_api.ring_map.number IS 'Number of the ring';
+COMMENT ON COLUMN tunnel_api.ring_map.label IS 'Station of its middle, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.ring_map.joint IS 'Joint at its beginning: given, seen, or missing';
+COMMENT ON COLUMN tunnel_api.ring_map.seen_share IS 'Share of its circumference that is seen; NULL: not measured';
+COMMENT ON COLUMN tunnel_api.ring_map.radius IS 'Mean radius, m';
+COMMENT ON COLUMN tunnel_api.ring_map.ovality IS 'Largest less smallest diameter over the design diameter, per mille';
+COMMENT ON COLUMN tunnel_api.ring_map.ovality_se IS 'Standard error, per mille';
+COMMENT ON COLUMN tunnel_api.ring_map.centre_right IS 'How far its centre lies right of the given axis, mm';
+COMMENT ON COLUMN tunnel_api.ring_map.centre_up IS 'How far its centre lies above the given axis, mm';
+COMMENT ON COLUMN tunnel_api.ring_map.step_greatest IS 'Greatest step at its beginning, mm, positive where it stands in';
+COMMENT ON COLUMN tunnel_api.ring_map.lip IS 'Greatest step between its segments, mm';
+COMMENT ON COLUMN tunnel_api.ring_map.remark IS 'What is to be known of it';
+COMMENT ON COLUMN tunnel_api.ring_map.geom IS 'On the map, tunnel''s SRID';

@@ -1,0 +1,105 @@
+-- What lies between the linings of two surveys that were held against one layer's profiles. Needs deviation_state
+-- (measures/deviation.sql), station_label (geometry/stationing.sql) and survey_id (geometry/shape.sql).
+
+CREATE OR REPLACE VIEW tunnel_api.thickness_section AS
+SELECT d.id, d.survey_id, s.name AS survey, d.before_id, b.name AS before, d.km, d.layer, d.chainage_from, d.chainage_to,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (d.chainage_from + d.chainage_to) / 2) l) AS label,
+       d.design_length, d.compared_length, d.compared_length / d.design_length AS compared_share, d.area, d.noise_area, d.by_right,
+       d.by_up, d.thickness_mean, d.thickness_least, d.least_at, d.thickness
+  FROM tunnel.thickness_section d
+  JOIN tunnel.survey s ON s.id = d.survey_id
+  JOIN tunnel.survey b ON b.id = d.before_id;
+COMMENT ON VIEW tunnel_api.thickness_section IS
+    'What lies between the linings of two surveys, at right angles to a layer''s design profile, in steps of 1 m of chainage; what either did not see is in no area';
+COMMENT ON COLUMN tunnel_api.thickness_section.survey_id IS 'Key of the later survey';
+COMMENT ON COLUMN tunnel_api.thickness_section.survey IS 'Its name';
+COMMENT ON COLUMN tunnel_api.thickness_section.before_id IS 'Key of the earlier survey';
+COMMENT ON COLUMN tunnel_api.thickness_section.before IS 'Its name';
+COMMENT ON COLUMN tunnel_api.thickness_section.layer IS 'Layer whose profiles both were held against';
+COMMENT ON COLUMN tunnel_api.thickness_section.label IS 'Station of its middle, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.thickness_section.design_length IS 'Length of the profile, m';
+COMMENT ON COLUMN tunnel_api.thickness_section.compared_length IS 'What of that both saw, m';
+COMMENT ON COLUMN tunnel_api.thickness_section.compared_share IS 'The same as a share, 0 to 1';
+COMMENT ON COLUMN tunnel_api.thickness_section.area IS 'Area between the two, of what both saw, m²; less where material went';
+COMMENT ON COLUMN tunnel_api.thickness_section.noise_area IS 'Standard deviation of the area by the scatter of pixels, m²';
+COMMENT ON COLUMN tunnel_api.thickness_section.by_right IS 'By how much the area grows when the later survey moves to the right, m² for 1 m';
+COMMENT ON COLUMN tunnel_api.thickness_section.by_up IS 'By how much the area grows when the later survey moves up, m² for 1 m';
+COMMENT ON COLUMN tunnel_api.thickness_section.thickness_mean IS 'Mean thickness of the cells that both saw, m; NULL without any';
+COMMENT ON COLUMN tunnel_api.thickness_section.thickness_least IS 'Least of a cell, m';
+COMMENT ON COLUMN tunnel_api.thickness_section.least_at IS 'How far along the profile that is, from its left foot or lowest place clockwise, m';
+COMMENT ON COLUMN tunnel_api.thickness_section.thickness IS 'Thickness of cells of equal length along the profile, m; NaN where either saw nothing';
+
+CREATE OR REPLACE FUNCTION tunnel_api.thickness_inputs(before_id int, survey_id int, km int, layer text) RETURNS jsonb
+LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+    SELECT jsonb_build_object('layer', $4, 'before', $1) || jsonb_object_agg(v.part,
+               tunnel_api.last_run(v.id, 'deviation', $3, $4))
+      FROM (VALUES ('old', $1), ('new', $2)) v (part, id)
+$$;
+COMMENT ON FUNCTION tunnel_api.thickness_inputs(int, int, int, text) IS
+    'What the thickness between two surveys in a kilometre is made from: the runs of stage deviation of both. The run of stage thickness holds the same in its parameters';
+
+CREATE OR REPLACE FUNCTION tunnel_api.thickness_state(before_id int, survey_id int, layer text)
+RETURNS TABLE (km int, done_at timestamptz, reason text)
+LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 25 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
+    SELECT n.km, l.finished_at,
+           CASE WHEN o.reason IS NOT NULL THEN 'deviation of the earlier survey is stale: ' || o.reason
+                WHEN n.reason IS NOT NULL THEN 'deviation of the later survey is stale: ' || n.reason
+                WHEN l.finished_at IS NULL THEN 'never ran'
+                WHEN l.parameters IS DISTINCT FROM tunnel_api.thickness_inputs($1, $2, n.km, $3) THEN 'deviation ran since'
+           END
+      FROM tunnel_api.deviation_state($2) n
+      JOIN tunnel_api.deviation_state($1) o ON o.km = n.km AND o.layer = n.layer
+      LEFT JOIN tunnel_api.last_runs($2, 'thickness') l ON l.km = n.km AND l.subject = $1 || ' ' || $3
+     WHERE n.layer = $3
+$$;
+COMMENT ON FUNCTION tunnel_api.thickness_state(int, int, text) IS
+    'How far the thickness between two surveys has come, along a layer''s profiles: of each kilometre that both have, when it was last made, and why it is out of date, if it is';
+
+CREATE OR REPLACE VIEW tunnel_api.thickness_status AS
+SELECT ((a.id::bigint * 100000 + p.before_id) * 1000000 + 500000 + t.km) * 10
+           + CASE p.layer WHEN 'lining' THEN 1 WHEN 'shotcrete' THEN 2 ELSE 3 END AS id,
+       a.id AS survey_id, a.name AS survey, p.before_id, b.name AS before, t.km, p.layer, t.done_at, t.reason IS NOT NULL AS stale, t.reason
+  FROM tunnel.survey a
+ CROSS JOIN LATERAL (SELECT DISTINCT d.before_id, d.layer FROM tunnel.thickness_section d WHERE d.survey_id = a.id) p
+  JOIN tunnel.survey b ON b.id = p.before_id
+ CROSS JOIN LATERAL tunnel_api.thickness_state(p.before_id, a.id, p.layer) t;
+COMMENT ON VIEW tunnel_api.thickness_status IS
+    'Whether the thickness between surveys is up to date: one row per kilometre of each pair of surveys and layer of which some was made';
+COMMENT ON COLUMN tunnel_api.thickness_status.survey_id IS 'Key of the later survey';
+COMMENT ON COLUMN tunnel_api.thickness_status.survey IS 'Its name';
+COMMENT ON COLUMN tunnel_api.thickness_status.before_id IS 'Key of the earlier survey';
+COMMENT ON COLUMN tunnel_api.thickness_status.before IS 'Its name';
+COMMENT ON COLUMN tunnel_api.thickness_status.layer IS 'Layer of the profiles';
+COMMENT ON COLUMN tunnel_api.thickness_status.done_at IS 'When it was last made; NULL: never';
+COMMENT ON COLUMN tunnel_api.thickness_status.stale IS 'True when it was never made, or what it rests on has changed since';
+COMMENT ON COLUMN tunnel_api.thickness_status.reason IS 'Why it is stale';
+
+-- A section lies in one stretch or two. Cells are only looked at of sections in which one is thinner than the minimum.
+CREATE OR REPLACE FUNCTION tunnel_api.thickness_stretches(
+    survey_before text, survey_after text, layer text, step float8 DEFAULT 100, minimum float8 DEFAULT 0, axis_sigma float8 DEFAULT 0)
+RETURNS TABLE (chainage_from float8, chainage_to float8, label text, length float8, design_area float8, compared_area float8,
+               volume float8, volume_sigma float8, thickness_mean float8, thickness_least float8, thin_area float8)
+LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 250
+SET jit = off
+AS $$
+    SELECT w.low, w.high, tunnel_api.station_label(s.tunnel_id, w.low), w.length, w.design_area, w.compared_area, w.volume,
+           sqrt(w.noise + ($6 * w.by_right) ^ 2 + ($6 * w.by_up) ^ 2), w.mean, w.least, w.thin
+      FROM (SELECT v.id, v.tunnel_id FROM tunnel_api.survey v WHERE v.id = tunnel_api.survey_id($2)) s
+     CROSS JOIN (SELECT tunnel_api.survey_id($1) AS id OFFSET 0) b  -- once, not once a section
+     CROSS JOIN LATERAL (
+        SELECT n * $4 AS low, (n + 1) * $4 AS high, sum(p.long) AS length, sum(p.long * d.design_length) AS design_area,
+               sum(p.long * d.compared_length) AS compared_area, sum(p.long * d.area) AS volume,
+               sum((p.long * d.noise_area) ^ 2) AS noise, sum(p.long * d.by_right) AS by_right, sum(p.long * d.by_up) AS by_up,
+               sum(p.long * d.compared_length * d.thickness_mean) / nullif(sum(p.long * d.compared_length), 0) AS mean,
+               min(d.thickness_least) AS least,
+               coalesce(sum(p.long * CASE WHEN d.thickness_least < $5 THEN d.design_length / cardinality(d.thickness) * (
+                   SELECT count(*) FROM unnest(d.thickness) c (thick) WHERE c.thick < $5) END), 0) AS thin
+          FROM tunnel_api.thickness_section d
+         CROSS JOIN (VALUES (0), (1)) AS k (further)
+         CROSS JOIN LATERAL (SELECT floor(d.chainage_from / $4) + k.further AS n) f
+         CROSS JOIN LATERAL (SELECT least(d.chainage_to, (n + 1) * $4) - greatest(d.chainage_from, n * $4) AS long) p
+         WHERE d.survey_id = s.id AND d.before_id = b.id AND d.layer = $3 AND $4 >= 1 AND p.long > 0
+         GROUP BY n) w
+$$;
+COMMENT ON FUNCTION tunnel_api.thickness_stretches(text, text, text, float8, float8, float8) IS
+'What lies between two surveys of a tunnel along a layer''s profiles, by stretches of so many metres, 1 or more, from whole multiples of them on: volume (m³) of what both saw (compared_area, of design_area, m²), mean and least thickness (m), thin_area (m²) of cells thinner than the minimum (m). volume_sigma: standard deviation by the scatter of pixels and by surveys that lie to each other only within axis_sigma (m), to the right and as much up, along the stretch alike.';

@@ -1,0 +1,1 @@
+"""Change of the lining and of its leaks between two surveys."""

@@ -1,0 +1,1 @@
+"""Computation of change; arrays only."""

@@ -1,0 +1,263 @@
+"""Motion of sections that changed their shape, by what sections beside them did.
+
+A section of which a whole wall moved, or which became oval, does not tell by itself which of its sides stayed. The error of a
+registration goes on from section to section evenly, but where a scanner's place or a pass ends; so what sections before and
+behind it did, and what part of it did the same, is taken for its motion, and the rest for a change of its shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solveh_banded
+
+from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.measures.change.compute.rigid_motion import (
+    MOTIONS,
+    Motion,
+    SectionCells,
+    loss,
+    motion_from,
+    removed_by,
+    unexplained,
+)
+from tunneldb.robust import MAD_TO_SIGMA
+
+MOVED = 0.04
+"""A section of which more cells than this share are not explained by its own motion changed its shape."""
+
+EXPLAINED = 0.75
+"""A section of which its own motion explains more than this share of what its neighbours' leaves moved as a whole."""
+
+LEAST_SECTIONS = 8
+"""With fewer sections that kept their shape nothing is known of how even the motion is."""
+
+COMMON = 0.5
+"""Motions that are determined in a larger share of the sections are tied."""
+
+_LAGS = (1, 2)  # sections: over more, breaks are in too many of them
+_EVEN = 1e-5  # m: second differences and errors are never taken to be smaller
+_BREAK = 3.0  # second differences beyond so many standard deviations are of breaks
+_ROUNDS = 8
+_STILL = 2e-5  # m
+_LARGE = 1e6  # variances are never larger than this, so that matrices can be solved
+
+
+@dataclass(frozen=True)
+class _Axes:
+    """Motions that sections determine independently of each other: the principal axes of what the determined ones do to cells.
+
+    About the tunnel's axis, a roll and a shift to the right of a round lining are much the same. Each by itself is known badly,
+    and wanders much from section to section; what they do together to the lining is known well.
+
+    Attributes
+    ----------
+    used : (6,) bool array
+        The determined motions, m of them.
+    turn : (m, m) float array
+        From motions along the axes, m, to these.
+    """
+
+    used: Bool
+    turn: Float
+
+    def along(self, motion: Motion) -> tuple[Float, Float]:
+        """Values (m,) and variances (m,) of a motion along the axes."""
+        back = np.linalg.inv(self.turn)
+        held = motion.covariance[np.ix_(self.used, self.used)]
+        return back @ motion.values[self.used], np.einsum("ij,jk,ik->i", back, held, back)
+
+    def values(self, along: Float) -> Float:
+        """Values (6,) of what is (m,) along the axes; NaN of motions that are not determined."""
+        found = np.full(len(MOTIONS), np.nan)
+        found[self.used] = self.turn @ along
+        return found
+
+    def removed(self, cells: SectionCells, along: Float, variance: Float) -> Motion:
+        """The motion of a section that is (m,) along the axes, with variances (m,)."""
+        return removed_by(cells, self.turn @ along, self.turn * variance @ self.turn.T, self.used)
+
+
+@dataclass(frozen=True)
+class _Even:
+    """Motions that go on evenly: values and variances along the axes, (sections, m).
+
+    And for each axis the weights of its second differences, (m, n), less where it breaks.
+    """
+
+    values: Float
+    variances: Float
+    ties: Float
+
+
+def tied_motions(sections: Sequence[SectionCells], number: Int64, motions: Sequence[Motion]) -> list[Motion]:
+    """Motions of sections, those replaced by what their neighbours say that changed their shape and do not tell.
+
+    Parameters
+    ----------
+    sections : sequence of SectionCells
+    number : (k,) int array
+        Of the sections along the tunnel, growing; equal steps are equal lengths.
+    motions : sequence of Motion
+        Of each by itself.
+    """
+    left = np.array([unexplained(s, s.difference - m.removed) for s, m in zip(sections, motions, strict=True)])
+    if np.isfinite(left).sum() < LEAST_SECTIONS:
+        return list(motions)
+    usual = float(np.nanmedian(left))
+    kept, changed = left - usual < MOVED, np.flatnonzero(left - usual >= MOVED).tolist()
+    if not changed:
+        return list(motions)
+    used = np.mean([m.used for m in motions if m.used.any()], axis=0) > COMMON
+    # A roll that is found here and not there would be in the shift to the right there.
+    alike = {k: _determined_so(sections[k], motions[k], used) for k in np.flatnonzero(kept).tolist()}
+    settled = {k: motion for k, motion in alike.items() if motion is not None}
+    if len(settled) < LEAST_SECTIONS:
+        return list(motions)
+    axes = _axes([sections[k] for k in settled], used)
+    values, variances = np.full((2, len(motions), int(used.sum())), np.nan)
+    for k, motion in settled.items():
+        values[k], variances[k] = axes.along(motion)
+    even = _with_changed(sections, number, values, variances, axes, changed)
+    result = list(motions)
+    for k in changed:
+        result[k] = _chosen(
+            sections[k],
+            motions[k],
+            axes.removed(sections[k], even.values[k], even.variances[k]),
+            _broken(sections[k], values, number, k, axes),
+            usual,
+        )
+    return result
+
+
+def _determined_so(cells: SectionCells, own: Motion, used: Bool) -> Motion | None:
+    """The motion of a section by those that are used; None where it does not determine them."""
+    motion = own if (own.used == used).all() else motion_from(cells, own.values, used)
+    return motion if motion is not None and (motion.used == used).all() else None
+
+
+def _axes(sections: Sequence[SectionCells], used: Bool) -> _Axes:
+    """Principal axes of what motions do to the cells of sections."""
+    normal, cells = np.zeros((int(used.sum()),) * 2), 0
+    for one in sections:
+        design = one.columns[:, used].astype(np.float64)
+        normal, cells = normal + design.T @ design, cells + len(design)
+    spread = np.sqrt(np.diag(normal) / cells)
+    _, vectors = np.linalg.eigh(normal / cells / np.outer(spread, spread))
+    return _Axes(used, vectors / spread[:, None])
+
+
+def _chosen(cells: SectionCells, own: Motion, tied: Motion, broken: Motion | None, usual: float) -> Motion:
+    """Which motion a section made: its own, its neighbours', or in one part that of those before and in one of those behind."""
+
+    def excess(motion: Motion) -> float:
+        return unexplained(cells, cells.difference - motion.removed) - usual
+
+    if broken is not None and excess(broken) < (1.0 - EXPLAINED) * excess(own):
+        return broken
+    return tied if excess(own) >= (1.0 - EXPLAINED) * excess(tied) else own
+
+
+def _with_changed(
+    sections: Sequence[SectionCells], number: Int64, values: Float, variances: Float, axes: _Axes, changed: list[int]
+) -> _Even:
+    """Even motions of the sections that kept their shape, and of what the others share with them."""
+    values, variances = values.copy(), variances.copy()
+    wander = _wander(number, values, variances)
+    even = _even(number, values, variances, wander)
+    for _ in range(_ROUNDS):
+        for k in changed:
+            own = motion_from(sections[k], axes.values(even.values[k]), axes.used)
+            values[k], variances[k] = np.nan, np.nan
+            if own is not None:
+                # What only some of its cells share counts the less, the farther it is from what its neighbours did.
+                found, variance = axes.along(own)
+                apart = (found - even.values[k]) ** 2 / (_BREAK**2 * (variance + even.variances[k]))
+                values[k], variances[k] = found, variance * (1.0 + apart) ** 2
+        before, even = even, _even(number, values, variances, wander, even.ties)
+        if float(np.abs(even.values - before.values).max()) < _STILL:
+            break
+    return even
+
+
+def _broken(cells: SectionCells, values: Float, number: Int64, k: int, axes: _Axes) -> Motion | None:
+    """Motion of a section in which one scanner's place ends and another begins: as before it, and from a cut on as behind it.
+
+    The cut is where both together leave least; None without two sections on either side that kept their shape.
+    """
+    if not 2 <= k < len(number) - 2 or number[k + 2] - number[k - 2] != 4:
+        return None
+    starts = [axes.values(2.0 * values[k + near] - values[k + far]) for near, far in ((-1, -2), (1, 2))]
+    used = axes.used
+    if not np.isfinite([start[used] for start in starts]).all():
+        return None
+    before, behind = (loss(cells, cells.difference - cells.columns[:, used] @ start[used]) for start in starts)
+    left = np.concatenate([[0.0], np.cumsum(np.bincount(cells.column, before - behind))])
+    first = cells.column < int(left.argmin())
+    one = motion_from(cells.part(first), starts[0], used)
+    other = motion_from(cells.part(~first), starts[1], used)
+    if one is None or other is None:
+        return None
+    removed, error = np.empty(len(first)), np.empty(len(first))
+    for held, part in ((first, one), (~first, other)):
+        removed[held], error[held] = part.removed, part.removed_error
+    larger = one if 2 * first.sum() > len(first) else other
+    return Motion(larger.values, larger.covariance, removed, error, len(first))
+
+
+def _wander(number: Int64, values: Float, variances: Float) -> Float:
+    """Variance (m,) of the second differences of the motions from section to section, without their own errors."""
+    place = {int(n): k for k, n in enumerate(number)}
+    found = np.full(values.shape[1], _EVEN**2)
+    for lag in _LAGS:
+        triples = [(place[n - lag], k, place[n + lag]) for n, k in place.items() if n - lag in place and n + lag in place]
+        if not triples:
+            continue
+        first, middle, last = np.array(triples).T
+        bent = values[first] - 2.0 * values[middle] + values[last]
+        shown = np.isfinite(bent[:, 0])
+        if shown.sum() < LEAST_SECTIONS // 2:
+            continue
+        noise = variances[first] + 4.0 * variances[middle] + variances[last]
+        spread = (MAD_TO_SIGMA * np.median(np.abs(bent[shown]), axis=0)) ** 2 - np.median(noise[shown], axis=0)
+        # Of a motion whose second differences are independent, those over a lag grow so.
+        found = np.maximum(found, spread / (lag * (2.0 * lag**2 + 1.0) / 3.0))
+    return found
+
+
+def _even(number: Int64, values: Float, variances: Float, wander: Float, ties: Float | None = None) -> _Even:
+    """The most probable motions of all sections, second differences being independent, and their variances."""
+    at = (number - number[0]).astype(np.int64)
+    count = int(at[-1]) + 1
+    shown = np.isfinite(values[:, 0])
+    result = np.empty((2, *values.shape))
+    found = np.empty((len(wander), count - 2)) if ties is None else ties
+    for c, spread in enumerate(wander):
+        weight, target = np.zeros(count), np.zeros(count)
+        weight[at[shown]] = 1.0 / np.maximum(variances[shown, c], _EVEN**2)
+        target[at[shown]] = weight[at[shown]] * values[shown, c]
+        if ties is None:
+            found[c] = 1.0 / spread
+        for _ in range(_ROUNDS if ties is None else 1):
+            smooth = solveh_banded(_bands(weight, found[c]), target)
+            if ties is None:
+                found[c] = 1.0 / (spread * (1.0 + (np.diff(smooth, 2) / _BREAK) ** 2 / spread))
+        result[0, :, c] = smooth[at]
+        result[1, :, c] = np.diag(solveh_banded(_bands(weight, found[c]), np.eye(count)))[at]
+    return _Even(result[0], result[1], found)
+
+
+def _bands(weight: Float, rows: Float) -> Float:
+    """Upper bands (3, n) of the normal matrix of data (n,) and second differences (n - 2,) with these weights."""
+    count = len(weight)
+    bands = np.zeros((3, count))
+    bands[2] = weight + 1.0 / _LARGE
+    for k, factor in enumerate((1.0, -2.0, 1.0)):
+        bands[2, k : count - 2 + k] += rows * factor**2
+    bands[1, 1 : count - 1] -= 2.0 * rows
+    bands[1, 2:] -= 2.0 * rows
+    bands[0, 2:] += rows
+    return bands

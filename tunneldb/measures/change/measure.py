@@ -1,0 +1,468 @@
+"""Change of the lining and its leaks between two surveys of a tunnel, kilometre by kilometre."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import psycopg
+import shapely
+from affine import Affine
+from rasterio import features
+from shapely.geometry import MultiPolygon, Polygon
+
+from tunneldb.anomalies.geometries import anomaly_geometries
+from tunneldb.arrays import Bool, Float, Single
+from tunneldb.errors import UserError
+from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.geometry.surface import Surface
+from tunneldb.measures.change.compute import change as shape_change
+from tunneldb.measures.change.compute.cells import (
+    LEAST_SIDE,
+    SEEN_SHARE,
+    CellGrid,
+    Cells,
+    CellSums,
+    slopes,
+    with_hollows,
+    without_edges,
+)
+from tunneldb.measures.change.compute.leaks import Group, Leak, groups, state_of, wet_area
+from tunneldb.measures.change.compute.rigid_motion import Motion, SectionCells, bending_error, motion_columns, rigid_motion
+from tunneldb.measures.change.compute.tied_motion import tied_motions
+from tunneldb.measures.change.rows import (
+    Section,
+    StoredGroup,
+    StoredRegion,
+    change_inputs,
+    clear_change,
+    load_blocks,
+    load_leaks,
+    save_images,
+    save_leaks,
+    save_regions,
+    save_sections,
+    stale_kilometres,
+)
+from tunneldb.measures.deviation.measure import lining_by_class
+from tunneldb.raster.geotiff import Raster
+from tunneldb.raster.pixel_state import PixelState, shows_lining
+from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond, refuse_different_tunnels, refuse_stale
+from tunneldb.store.images import image_blocks, load_block
+from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import Survey
+
+BESIDE = 5.0
+"""What of the newer survey lies so far beyond the ends of a kilometre, m, may lie in it by the older one's axis."""
+
+GROUP = 1.0
+"""Length of the stretches of arc, m, of whose residuals the standard errors of motions are made."""
+
+BENT_STEP = 10.0
+"""Corners of the section are looked for once in so many metres."""
+
+HALO = 100.0
+"""Leaks so far beyond the ends of a kilometre are matched with it, m, so that a group is the same seen from both sides."""
+
+_AT_A_TIME = 2_000_000  # pixels
+
+
+@dataclass(frozen=True)
+class Change:
+    """What a kilometre shows; (rows, columns) arrays of cells.
+
+    Attributes
+    ----------
+    grid : CellGrid
+    old, new : Cells
+        Of both epochs, in the plane of the older one.
+    difference : m
+        New less old offset without the rigid motions; NaN where one of them did not see.
+    variance, removed_error, lod : m², m, m
+    scatter : Scatter
+    place_error : m
+        Twofold, (2, rows, columns): see `tunneldb.measures.change.compute.change.change_regions`.
+    sections : list of (slice, Motion)
+        Columns of each section, and its motion.
+    """
+
+    grid: CellGrid
+    old: Cells
+    new: Cells
+    difference: Single
+    variance: Single
+    removed_error: Single
+    lod: Single
+    scatter: shape_change.Scatter
+    place_error: Single
+    sections: list[tuple[slice, Motion]]
+
+
+def compare(
+    conn: psycopg.Connection[Any],
+    old: Survey,
+    new: Survey,
+    low: float,
+    high: float,
+    cell: float,
+    length: float,
+    begin: Begin,
+) -> list[int]:
+    """Bring the change of the kilometres of a stretch up to date, each in a transaction of its own; return which were.
+
+    Parameters
+    ----------
+    conn : Connection
+        Idle.
+    old, new : Survey
+        Of one tunnel.
+    low, high : float
+        Chainage, m.
+    cell, length : float
+        Side of a cell, and length of a section, m.
+    begin : callable
+        See `tunneldb.stages.on_demand.Begin`.
+
+    Raises
+    ------
+    UserError
+        If they are of two tunnels or one and the same, if they have no kilometre in common, or one is out of date.
+    """
+    refuse_different_tunnels(old, new, "compare")
+    for survey in (old, new):
+        refuse_beyond(conn, survey, low, high)
+    there = stale_kilometres(conn, old, new, low, high)
+    conn.rollback()
+    if not there:
+        raise UserError(
+            f"{old.name} and {new.name} have no kilometre with offset images in common there: tunneldb run makes them"
+        )
+    refuse_stale({km: why for km, (why, _, _) in there.items()}, "SURVEY", "compare")
+    return measure_kilometres(
+        conn, new, "compare", [km for km, (why, *made) in there.items() if why is not None or made != [cell, length]],
+        lambda km: {**change_inputs(conn, old, new, km), "cell": cell, "length": length},
+        lambda km: _kilometre(conn, old, new, km, cell, length), f"change from {old.name} to {new.name}", begin,
+    )  # fmt: skip
+
+
+def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int, cell: float, length: float) -> dict[str, Any]:
+    clear_change(conn, old, new, km)
+    low, high = km * KILOMETRE, (km + 1) * KILOMETRE
+    surface, other = load_surface(conn, old, low, high), load_surface(conn, new, low - BESIDE, high + BESIDE)
+    sums = _old_sums(conn, old, km, surface, cell)
+    if sums is None:  # it was there when it was asked for
+        return {"sections": 0}
+    newer = _new_sums(conn, new, km, other, surface, sums.grid, sums.pixel)
+    first, second = (without_edges(cells) for cells in with_hollows(sums, newer))
+    grid, pixel = sums.grid, sums.pixel
+    del sums, newer  # a third of the memory that is needed
+    found = measure_change(surface, grid, first, second, length, pixel)
+    transform = Affine(cell, 0.0, grid.west, 0.0, -cell, grid.south + grid.rows * cell)
+    save_sections(conn, old, new, km, section_figures(found))
+    save_images(
+        conn, old, new, km, *(Raster(np.ascontiguousarray(values[::-1]), transform) for values in (found.difference, found.lod))
+    )
+    regions = [
+        stored
+        for region in shape_change.change_regions(
+            found.difference, found.variance, found.removed_error, found.scatter, found.place_error
+        )
+        for stored in _stored_region(region, grid, surface)
+    ]
+    save_regions(conn, old, new, km, regions)
+    leaks = _leaks(conn, (old, new), km, (surface, other), found, pixel)
+    save_leaks(conn, old, new, km, leaks)
+    both = np.isfinite(found.difference)
+    return {
+        "sections": len(found.sections), "regions": len(regions), "region_area": sum(region.area for region in regions),
+        "leaks": len(leaks), "compared_area": float(both.sum()) * cell**2,
+        "unseen_area": float((np.isfinite(first.offset) & ~both).sum()) * cell**2,
+        "scatter": found.scatter.factors.tolist(), "lod": lod if np.isfinite(lod := _median(found.lod)) else None,
+    }  # fmt: skip
+
+
+def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, length: float, pixel: float) -> Change:
+    """Take the rigid motion of each section out of the difference of two epochs, and state its level of detection.
+
+    A pixel, of a side in m, stands for its points as if they lay in its middle. Where profiles are about a pixel apart, all of
+    a place lie to one side of it, and in the other epoch to another: uniform within the pixel, in both.
+    """
+    difference, variance = new.offset - old.offset, old.variance + new.variance
+    noise = shape_change.measure_scatter(difference, variance).factors[0]
+    removed_error = np.where(np.isfinite(difference), np.float32(0.0), np.float32(np.nan))
+    number = np.floor((grid.chainage - grid.cell / 2.0) / length + 1e-9).astype(np.int64)
+    edges = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), grid.columns]
+    relief = slopes(old, grid.cell)
+    parts, cells = [], []
+    for begin, end in pairwise(edges):
+        row, column = np.nonzero(np.isfinite(difference[:, begin:end]))
+        shown = _columns(surface, grid, (row, column + begin), old, relief)
+        known = np.isfinite(shown).all(axis=1)  # beyond the last plane there is no surface
+        difference[row[~known], column[~known] + begin] = np.nan
+        at = row[known], column[known] + begin
+        parts.append((slice(begin, end), at))
+        cells.append(
+            SectionCells(
+                difference[at].astype(np.float64),
+                variance[at].astype(np.float64) * noise**2,
+                shown[known].astype(np.float32),  # all sections of a kilometre are held
+                np.floor(grid.arc[at[0]] / GROUP).astype(np.int64),
+                at[1] - begin,
+            )
+        )
+    motions = tied_motions(cells, number[edges[:-1]], [rigid_motion(one) for one in cells])
+    bent: dict[int, Float] = {}
+    for k, ((_, at), motion) in enumerate(zip(parts, motions, strict=True)):
+        if not len(at[0]):
+            continue
+        place = int(grid.chainage[at[1][0]] / BENT_STEP)
+        if place not in bent:
+            bent[place] = _bent(surface, grid, float(np.median(grid.chainage[at[1]])))
+        difference[at] -= motion.removed.astype(np.float32)
+        removed_error[at] = motion.removed_error + bending_error(motion, cells[k].columns, bent[place][at[0]])
+    sections = [(columns, motion) for (columns, _), motion in zip(parts, motions, strict=True)]
+    scatter = shape_change.measure_scatter(difference, variance)
+    lod = shape_change.detection_level(variance, removed_error, scatter)
+    place_error = (np.stack(relief) * (pixel / math.sqrt(6.0))).astype(np.float32)
+    return Change(grid, old, new, difference, variance, removed_error, lod, scatter, place_error, sections)
+
+
+def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells, relief: tuple[Single, Single]) -> Float:
+    """What the motions of a section do to its cells, (n, 6), about its middle: the middle of what is seen of it.
+
+    A lining with relief changes its offset where it moves along itself, too, and so tells how far it did.
+    """
+    chainage, arc = grid.chainage[at[1]], grid.arc[at[0]]
+    points = surface.to_space(chainage, arc, old.offset[at].astype(np.float64))
+    normals = np.full_like(points, np.nan)
+    held = np.isfinite(points[:, 0])
+    normals[held] = surface.unroll(points[held]).normal
+    middle = float(np.median(chainage)) if len(chainage) else np.nan
+    frame = surface.frames(np.array([middle]))[0]
+    along, around = (slope[at][:, None] for slope in relief)
+    normals = normals - along * frame[1] - around * np.cross(normals, frame[1])
+    return motion_columns(points, normals, frame)
+
+
+def _bent(surface: Surface, grid: CellGrid, chainage: float) -> Float:
+    """Curvature (rows,) of a section over two cells about each row, 1/m; 0 where it is not known."""
+    normals = []
+    for beside in (-grid.cell, grid.cell):
+        points = surface.to_space(np.full(grid.rows, chainage), grid.arc + beside, np.zeros(grid.rows))
+        normal = np.full_like(points, np.nan)
+        held = np.isfinite(points[:, 0])
+        normal[held] = surface.unroll(points[held]).normal
+        normals.append(normal)
+    turn = np.arccos(np.clip(np.einsum("ij,ij->i", *normals), -1.0, 1.0))
+    return np.nan_to_num(turn / (2.0 * grid.cell))
+
+
+def section_figures(found: Change) -> list[Section]:
+    """Figures of the sections that one of the epochs saw."""
+    grid, cell = found.grid, found.grid.cell
+    window, _, number = shape_change.window_means(found.difference, found.variance, found.removed_error, found.scatter)
+    both = np.isfinite(found.difference)
+    window = np.where(both & (number >= shape_change.LEAST), window, np.nan)
+    rows = []
+    for columns, motion in found.sections:
+        seen_old, seen_new = (float(np.isfinite(cells.offset[:, columns]).sum()) * cell**2 for cells in (found.old, found.new))
+        if seen_old == seen_new == 0.0:
+            continue
+        held = both[:, columns]
+        change = found.difference[:, columns][held].astype(np.float64)
+        noise = found.variance[:, columns][held].astype(np.float64) * found.scatter.factors[0] ** 2
+        means = window[:, columns][np.isfinite(window[:, columns])]
+        low, high = (grid.west + place * cell for place in (columns.start, columns.stop))
+        rows.append(
+            Section(
+                round(low, 6), round(high, 6), seen_old, seen_new, float(held.sum()) * cell**2, motion,
+                float(np.sqrt(max(np.mean(change**2 - noise), 0.0))) if len(change) else np.nan,
+                float(means.min()) if len(means) else np.nan, float(means.max()) if len(means) else np.nan,
+                _median(found.lod[:, columns]), cell, grid.south, _along(found.difference[:, columns]),
+            )
+        )  # fmt: skip
+    return rows
+
+
+def _along(change: Single) -> Float:
+    """Mean of each row (rows,) of the cells that were compared; NaN where none was."""
+    count = np.isfinite(change).sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.nansum(change, axis=1, dtype=np.float64) / count)
+
+
+def _old_sums(conn: psycopg.Connection[Any], old: Survey, km: int, surface: Surface, cell: float) -> CellSums | None:
+    """Sums of the older survey's kilometre; its grid covers the blocks that there are."""
+    ends = _extent(conn, old, km)
+    if ends is None:
+        return None
+    west, east, south, north, pixel = ends
+    if cell < LEAST_SIDE * pixel * (1.0 - 1e-9):
+        raise UserError(f"cells of {cell:g} m hold too few pixels of {pixel:g} m: give --cell {LEAST_SIDE * pixel:g} or more")
+    row = np.floor(south / cell), np.ceil(north / cell)
+    column = np.floor(west / cell + 1e-9), np.ceil(east / cell - 1e-9)
+    grid = CellGrid(cell, float(column[0] * cell), float(row[0] * cell), int(column[1] - column[0]), int(row[1] - row[0]))
+    sums = CellSums(grid, pixel)
+    classes = _Lining(conn, old, km, surface)
+    for raster, state in load_blocks(conn, old, km * KILOMETRE, (km + 1) * KILOMETRE - 1e-6):
+        seen, lining = classes.seen(raster, state)
+        for part in _parts(raster, seen):
+            chainage, arc, offset = _places(raster, part)
+            sums.add(chainage, arc, offset, lining[part])
+    return sums
+
+
+def _new_sums(
+    conn: psycopg.Connection[Any], new: Survey, km: int, surface: Surface, old: Surface, grid: CellGrid, pixel: float
+) -> CellSums:
+    """Sums of the newer survey in the cells of the older one's plane: each pixel is brought there through space."""
+    sums = CellSums(grid, pixel)
+    classes = _Lining(conn, new, km, surface)
+    for raster, state in load_blocks(conn, new, km * KILOMETRE - BESIDE, (km + 1) * KILOMETRE + BESIDE):
+        seen, lining = classes.seen(raster, state)
+        for part in _parts(raster, seen):
+            points = surface.to_space(*_places(raster, part))
+            held = np.isfinite(points[:, 0])
+            there = old.unroll(points[held])
+            sums.add(there.chainage, there.arc, there.offset, lining[part][held])
+    return sums
+
+
+class _Lining:
+    """What pixels of a survey show: by their stored states, or by the classes of stage ``ground`` where none are stored."""
+
+    def __init__(self, conn: psycopg.Connection[Any], survey: Survey, km: int, surface: Surface) -> None:
+        self._of = conn, survey, km, surface
+        self._classes: Callable[[Raster], Bool] | None = None
+
+    def seen(self, raster: Raster, state: Single | None) -> tuple[Bool, Bool]:
+        """Pixels that show lining or its recesses, and of these, lining."""
+        there = np.isfinite(raster.values)
+        if state is None:
+            self._classes = self._classes or lining_by_class(*self._of)
+            lining = self._classes(raster)
+            return lining, lining
+        lining = there & shows_lining(state)
+        return lining | (there & (state == PixelState.RECESS)), lining
+
+
+def _extent(conn: psycopg.Connection[Any], survey: Survey, km: int) -> tuple[float, float, float, float, float] | None:
+    """Chainage and arc from and to of a kilometre's offset image, and its pixel, m."""
+    blocks = image_blocks(conn, survey, km, "offset")
+    if not blocks:
+        return None
+    first = load_block(conn, survey, km, "offset", blocks[0])  # all blocks of a kilometre have its rows
+    place, (rows, columns) = first.transform, first.values.shape
+    east = place.c + (blocks[-1] - blocks[0] + 1) * columns * place.a
+    return place.c, east, place.f - rows * place.a, place.f, place.a
+
+
+def _parts(raster: Raster, seen: Bool) -> list[tuple[Any, Any]]:
+    row, column = np.nonzero(seen)
+    return [(row[k : k + _AT_A_TIME], column[k : k + _AT_A_TIME]) for k in range(0, len(row), _AT_A_TIME)]
+
+
+def _places(raster: Raster, part: tuple[Any, Any]) -> tuple[Float, Float, Float]:
+    """Chainage, arc and offset of pixels."""
+    place = raster.transform
+    return (
+        place.c + (part[1] + 0.5) * place.a,
+        place.f + (part[0] + 0.5) * place.e,
+        raster.values[part].astype(np.float64),
+    )
+
+
+def _stored_region(region: shape_change.Region, grid: CellGrid, surface: Surface) -> list[StoredRegion]:
+    """A region with its outline along the edges of its cells."""
+    row, column = int(region.rows.min()), int(region.columns.min())
+    mask = np.zeros((int(np.ptp(region.rows)) + 1, int(np.ptp(region.columns)) + 1), np.uint8)
+    mask[region.rows - row, region.columns - column] = 1
+    transform = Affine(grid.cell, 0.0, grid.west + column * grid.cell, 0.0, grid.cell, grid.south + row * grid.cell)
+    outlines = [shapely.geometry.shape(one) for one, value in features.shapes(mask, transform=transform) if value == 1]
+    return [
+        StoredRegion(
+            outline, anomaly_geometries(rings_apart(outline), surface), len(region.rows) * grid.cell**2, region.mean,
+            region.lod, region.greatest,
+        )
+        for outline in outlines
+    ]  # fmt: skip
+
+
+def rings_apart(outline: shapely.Polygon) -> shapely.Polygon:
+    """An outline of cells whose rings touch nowhere, drawn in by 1 mm: QGIS fills no other in space.
+
+    Cells that are connected share an edge, so that it stays in one piece.
+    """
+    return shapely.buffer(outline, -1e-3, join_style="mitre")
+
+
+def _leaks(
+    conn: psycopg.Connection[Any], surveys: tuple[Survey, Survey], km: int, surfaces: tuple[Surface, Surface], found: Change,
+    pixel: float,
+) -> list[StoredGroup]:  # fmt: skip
+    """Groups of leaks whose middle lies in the kilometre."""
+    low, high = km * KILOMETRE, (km + 1) * KILOMETRE
+    wide = [load_surface(conn, survey, low - HALO, high + HALO) for survey in surveys]
+    old = load_leaks(conn, surveys[0], low - HALO, high + HALO)
+    new = [_brought(leak, wide[1], wide[0]) for leak in load_leaks(conn, surveys[1], low - HALO, high + HALO)]
+    looked = [survey.intensity_kind != "none" for survey in surveys]
+    stored = []
+    for group in groups(old, [leak for leak in new if leak is not None]):
+        outline = group.outline
+        if group.wet and low <= (outline.bounds[0] + outline.bounds[2]) / 2.0 < high:
+            stored.append(_stored_group(group, outline, looked, wide[0], found, pixel))
+    return stored
+
+
+def _brought(leak: Leak, surface: Surface, old: Surface) -> Leak | None:
+    """A leak of the newer survey with its outline in the older one's plane; None where that has no surface."""
+
+    def through_space(unrolled: Float) -> Float:
+        there = old.unroll(surface.to_space(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled))))
+        return np.column_stack([there.chainage, there.arc])
+
+    outline = shapely.transform(leak.outline, through_space)
+    coordinates = shapely.get_coordinates(outline)
+    if not np.isfinite(coordinates).all():
+        return None
+    return Leak(leak.id, leak.kind, leak.wet, leak.area, leak.contrast, shapely.make_valid(outline))
+
+
+def _stored_group(
+    group: Group, outline: shapely.Geometry, looked: list[bool], surface: Surface, found: Change, pixel: float
+) -> StoredGroup:
+    seen = tuple(_seen_share(outline, cells, found.grid) if there else 0.0
+                 for cells, there in zip((found.old, found.new), looked, strict=True))  # fmt: skip
+    old, new = wet_area(group.old, pixel), wet_area(group.new, pixel)
+    parts = sorted((part for part in _polygons(outline) if part.area > 0.0), key=lambda part: -part.area)
+    shaped = [anomaly_geometries(part, surface) for part in parts]
+    return StoredGroup(
+        state_of(group, old, new, seen[0], seen[1]), group.old, group.new, (*old, *new), (seen[0], seen[1]), shaped[0].clock,
+        MultiPolygon(parts), MultiPolygon([one.map for one in shaped]), MultiPolygon([one.surface for one in shaped]),
+    )  # fmt: skip
+
+
+def _polygons(shape: shapely.Geometry) -> list[Polygon]:
+    return [part for part in shapely.get_parts(shape) if isinstance(part, Polygon)]
+
+
+def _seen_share(outline: shapely.Geometry, cells: Cells, grid: CellGrid) -> float:
+    """Share of a place that an epoch saw."""
+    west, south, east, north = outline.bounds
+    column = np.arange(max(int((west - grid.west) / grid.cell), 0), min(int((east - grid.west) / grid.cell) + 1, grid.columns))
+    row = np.arange(max(int((south - grid.south) / grid.cell), 0), min(int((north - grid.south) / grid.cell) + 1, grid.rows))
+    if not len(column) or not len(row):
+        return 0.0
+    chainage, arc = np.meshgrid(grid.chainage[column], grid.arc[row])
+    boxes = shapely.box(chainage - grid.cell / 2.0, arc - grid.cell / 2.0, chainage + grid.cell / 2.0, arc + grid.cell / 2.0)
+    shares = shapely.area(shapely.intersection(boxes, outline))
+    return float(np.sum(shares * (cells.share[np.ix_(row, column)] >= SEEN_SHARE)) / max(float(outline.area), 1e-9))
+
+
+def _median(values: Single) -> float:
+    held = values[np.isfinite(values)]
+    return float(np.median(held)) if len(held) else float("nan")

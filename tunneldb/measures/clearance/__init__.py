@@ -1,0 +1,1 @@
+"""Clearance of an outline about a track or lane."""

@@ -1,0 +1,1 @@
+"""Computation of clearance; arrays only."""

@@ -1,0 +1,1 @@
+"""Deviation of the lining from its design profiles, overbreak and underbreak."""

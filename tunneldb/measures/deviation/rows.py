@@ -1,0 +1,102 @@
+"""Deviation of a survey's lining from its design, to and from the database."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import psycopg
+
+from tunneldb.arrays import Bool
+from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.measures.deviation.compute import SectionDeviation
+from tunneldb.raster.geotiff import DEVIATION_KINDS, Raster, encode
+from tunneldb.raster.grid import BLOCK
+from tunneldb.raster.pixel_state import shows_lining
+from tunneldb.store.images import image_blocks, load_kinds
+from tunneldb.store.survey import Survey
+
+STEP = 1.0
+"""Length of a step of chainage, m; steps begin at whole metres."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of chainage with its figures."""
+
+    profile: str
+    low: float
+    high: float
+    figures: SectionDeviation
+
+
+def layers_held(conn: psycopg.Connection[Any], survey: Survey) -> list[str]:
+    """Layers that a survey was held against, from inside."""
+    query = (
+        "SELECT l FROM unnest(%s::text[]) WITH ORDINALITY AS u (l, n)"
+        " WHERE EXISTS (SELECT FROM tunnel.deviation_section d WHERE d.survey_id = %s AND d.layer = l) ORDER BY n"
+    )
+    return [layer for (layer,) in conn.execute(query, [list(DEVIATION_KINDS), survey.id])]
+
+
+def load_offsets(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Iterator[tuple[Raster, Bool | None]]:
+    """Blocks of a kilometre's offset image, in order, with which pixels (rows, columns) show lining; None if not stored."""
+    for block in image_blocks(conn, survey, km, "offset"):
+        images = load_kinds(conn, survey, km, block, ("offset", "state"))
+        yield images["offset"], shows_lining(images["state"].values) if "state" in images else None
+
+
+def replace_image(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str, blocks: Iterable[Raster]) -> None:
+    """Replace the image of a kilometre's deviation from a layer; blocks that show nothing are left out."""
+    kind = DEVIATION_KINDS[layer]
+    conn.execute("DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = %s", [survey.id, km, kind])
+    for raster in blocks:
+        if np.isfinite(raster.values).any():
+            conn.execute(
+                "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %b)",
+                (survey.id, km, kind, round(raster.transform.c / BLOCK), encode(raster, kind)),
+            )
+
+
+def stale_kilometres(
+    conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float
+) -> dict[int, str | None]:
+    """Kilometres of a stretch with an offset image in which the layer has a design, and why what is stored is out of date."""
+    rows = conn.execute(
+        "SELECT km, reason FROM tunnel_api.deviation_state(%s)"
+        " WHERE layer = %s AND (km + 1) * %s::float8 > %s AND km * %s::float8 < %s ORDER BY km",
+        [survey.id, layer, KILOMETRE, low, KILOMETRE, high],
+    ).fetchall()
+    return dict(rows)
+
+
+def deviation_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> dict[str, Any]:
+    """What the deviation of a kilometre is made from, as the ledger keeps it."""
+    row = conn.execute("SELECT tunnel_api.deviation_inputs(%s, %s, %s)", [survey.id, km, layer]).fetchone()
+    assert row is not None
+    return {"layer": layer, **row[0]}
+
+
+def save_steps(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str, steps: Sequence[Step]) -> None:
+    """Replace the steps of a layer in a kilometre."""
+    conn.execute("DELETE FROM tunnel.deviation_section WHERE survey_id = %s AND km = %s AND layer = %s", [survey.id, km, layer])
+    query = (
+        "COPY tunnel.deviation_section (survey_id, km, layer, profile, chainage_from, chainage_to, design_length, seen_length,"
+        " overbreak, underbreak, noise_area, over_right, over_up, under_right, under_up, sigma, shift_right, shift_up,"
+        " deviation_mean, deviation_least, least_at, deviation_greatest, greatest_at, deviation) FROM STDIN"
+    )
+    with conn.cursor() as cursor, cursor.copy(query) as copy:
+        for step in steps:
+            one = step.figures
+            copy.write_row(
+                (
+                    survey.id, km, layer, step.profile, step.low, step.high, one.design_length, one.seen_length, one.overbreak,
+                    one.underbreak, one.noise_area, *one.over_by.tolist(), *one.under_by.tolist(),
+                    *(float(value) if np.isfinite(value) else None for value in (
+                        one.sigma, *one.shift, one.mean, *one.extreme(-1.0), *one.extreme(1.0)
+                    )),
+                    one.deviation.tolist(),
+                )
+            )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Evenness of the lining beneath a virtual straightedge."""

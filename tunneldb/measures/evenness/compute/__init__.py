@@ -1,0 +1,1 @@
+"""Computation of evenness; arrays only."""

@@ -1,0 +1,84 @@
+"""The lining of a survey as patches about the given axis, block by block from the stored images."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import psycopg
+
+from tunneldb.arrays import Bool
+from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.measures.deviation.measure import Design, lining_by_class
+from tunneldb.measures.rings.compute.patches import PATCH, Patches, average, join
+from tunneldb.raster.geotiff import Raster
+from tunneldb.raster.grid import BLOCK
+from tunneldb.raster.pixel_state import shows_lining
+from tunneldb.store.images import load_kinds
+from tunneldb.store.surface import load_surface
+from tunneldb.store.survey import Survey
+
+_BESIDE = 100.0
+"""Rings reach over a kilometre's ends by less, m."""
+
+_KEPT = 4  # blocks
+
+
+class LiningPatches:
+    """Patches of a kilometre, and of what is next to it; few blocks are held at a time.
+
+    Parameters
+    ----------
+    conn, survey, km
+        Where.
+    axis : Alignment
+        The given one.
+    """
+
+    def __init__(self, conn: psycopg.Connection[Any], survey: Survey, km: int, axis: Alignment) -> None:
+        self.conn, self.survey = conn, survey
+        surface = load_surface(conn, survey, km * KILOMETRE - _BESIDE, (km + 1) * KILOMETRE + _BESIDE)
+        self.surface, self._design = surface, Design(surface, axis, ())
+        self._classes: dict[int, Callable[[Raster], Bool]] = {}
+        self._block = lru_cache(_KEPT)(self._load)
+
+    def between(self, low: float, high: float) -> Patches | None:
+        """Patches between two chainages, m; None where there is no image."""
+        blocks = range(int(np.floor(low / BLOCK)), int(np.floor(high / BLOCK)) + 1)
+        parts = [part.between(low, high) for part in map(self._block, blocks) if part is not None]
+        parts = [part for part in parts if len(part.chainage)]
+        return join(parts) if parts else None
+
+    def girth(self, chainage: float) -> float:
+        """Length of the section at a place, m; 0 where there is none."""
+        low, high = self.surface.arc_range(np.array([chainage]))
+        return float(np.nan_to_num(high[0] - low[0]))
+
+    def _load(self, block: int) -> Patches | None:
+        images = load_images(self.conn, self.survey, block, ("offset", "state"))
+        if "offset" not in images:
+            return None
+        offset = images["offset"]
+        lining = self._lining(block, images)
+        chainage, arc = offset.places()
+        side = max(round(PATCH / offset.transform.a), 1) * offset.transform.a
+        values = np.where(lining, offset.values, np.float32(np.nan))
+        at, along, mean = average(values, chainage, arc, side)
+        _, right, up = self._design.places(at, along, Raster(mean, offset.transform))
+        return Patches(at, along, right, up)
+
+    def _lining(self, block: int, images: dict[str, Raster]) -> Bool:
+        if "state" in images:
+            return shows_lining(images["state"].values)
+        km = int(block * BLOCK // KILOMETRE)
+        if km not in self._classes:
+            self._classes[km] = lining_by_class(self.conn, self.survey, km, self.surface)
+        return self._classes[km](images["offset"])
+
+
+def load_images(conn: psycopg.Connection[Any], survey: Survey, block: int, kinds: tuple[str, ...]) -> dict[str, Raster]:
+    """Images of a block by kind; those that are not stored are missing."""
+    return load_kinds(conn, survey, int(block * BLOCK // KILOMETRE), block, kinds)

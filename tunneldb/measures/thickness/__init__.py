@@ -1,0 +1,1 @@
+"""Thickness and volume between the linings of two surveys."""

@@ -1,0 +1,10 @@
+from .ledger import stage_run as stage_run
+from .parameters import PARAMETERS as PARAMETERS
+from .parameters import Parameter as Parameter
+from .parameters import settings as settings
+from .registry import STAGES as STAGES
+from .run import choose_stages as choose_stages
+from .run import run_tasks as run_tasks
+from .run import stage_tasks as stage_tasks
+from .run import stale_tasks as stale_tasks
+from .stage import Stage as Stage

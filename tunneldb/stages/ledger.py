@@ -1,0 +1,245 @@
+"""The ledger: a row of tunnel.run for every stage of every kilometre that was tried."""
+
+from __future__ import annotations
+
+import datetime as dt
+import os
+import platform
+import random
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import Any, LiteralString
+
+import psycopg
+from psycopg.types.json import Jsonb
+
+from tunneldb import __version__
+from tunneldb.database.failures import describe_failure, first_line
+from tunneldb.errors import BusyError, UserError
+
+_LIBRARIES = ("numpy", "scipy", "numba", "laspy", "lazrs", "shapely", "rasterio", "psycopg")
+
+
+_PASSING = (
+    psycopg.errors.DeadlockDetected,
+    psycopg.errors.SerializationFailure,
+    psycopg.errors.LockNotAvailable,
+    psycopg.errors.OutOfMemory,
+)
+_ATTEMPTS = 6
+
+
+class LostError(Exception):
+    """A job was taken from its worker, which was thought to be lost: what it did must not be committed."""
+
+
+@dataclass
+class Run:
+    """A run under way; what is put into ``counts`` is written with its end."""
+
+    id: int
+    started_at: dt.datetime
+    counts: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job of the queue that a worker is at; ``attempts`` counts how often it was begun before."""
+
+    id: int
+    worker: int
+    attempts: int = 0
+
+
+@contextmanager
+def stage_run(
+    conn: psycopg.Connection[Any],
+    survey_id: int,
+    km: int | None,
+    stage: str,
+    parameters: Mapping[str, Any],
+    job: Job | None = None,
+) -> Iterator[Run]:
+    """Record a stage, and do it in one transaction.
+
+    That it runs is committed first. What is done inside is committed together with its end, or rolled back, and then
+    the failure is recorded; nothing is of one that found another at work there, and is no job. A run that is killed stays
+    "running" with the backend that it ran in, which is gone.
+    An advisory lock keeps two runs of the same survey and kilometre apart; files of a survey may be read side by side.
+
+    The job that it is, if it is one, ends in the same transaction, and the jobs that follow from it come to be there. When
+    it fails, it is put back to be tried again if the error may pass by itself, and ends as failed if not.
+
+    Parameters
+    ----------
+    conn : Connection
+        Idle; no transaction may be open.
+    survey_id : int
+    km : int or None
+        The kilometre; None for a stage of the whole survey.
+    stage : str
+    parameters : mapping
+        What the stage depends on, as it will be recorded.
+    job : Job or None
+
+    Raises
+    ------
+    BusyError
+        When another process is at work on the same survey and kilometre.
+    LostError
+        When another worker has the job now.
+    """
+    run = _begin(conn, survey_id, km, stage, parameters, job)
+    try:
+        with conn.transaction():
+            lock(conn, survey_id, km, shared=job is not None)
+            yield run
+            _finish(conn, survey_id, run, job)
+    except BaseException as error:
+        _fail(conn, survey_id, run, job, error)
+        raise
+    conn.commit()
+
+
+def _begin(
+    conn: psycopg.Connection[Any],
+    survey_id: int,
+    km: int | None,
+    stage: str,
+    parameters: Mapping[str, Any],
+    job: Job | None,
+) -> Run:
+    if job is not None:
+        _hold(conn, job)
+    conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey_id])
+    row = conn.execute(
+        """
+        INSERT INTO tunnel.run (survey_id, km, stage, parameters, versions, counts, backend_pid, backend_start,
+                                started_at, outcome, worker, job_id)
+        SELECT %s, %s, %s, %s, %s, '{}', a.pid, a.backend_start, clock_timestamp(), 'running', %s, %s
+        FROM pg_stat_activity a WHERE a.pid = pg_backend_pid()
+        RETURNING id, started_at
+        """,
+        [
+            survey_id,
+            km,
+            stage,
+            Jsonb(dict(parameters)),
+            Jsonb(versions(conn)),
+            f"{platform.node()}/{os.getpid()}",
+            job.id if job else None,
+        ],
+    ).fetchone()
+    conn.commit()
+    assert row is not None
+    return Run(*row)
+
+
+def lock(conn: psycopg.Connection[Any], survey_id: int, km: int | None, *, shared: bool = False) -> None:
+    """Keep other runs off a survey's kilometre, or with None off its stages of the whole, until the transaction ends.
+
+    Parameters
+    ----------
+    shared : bool
+        Whether others that share the whole of the survey, too, may go on beside this one; a kilometre is never shared.
+
+    Raises
+    ------
+    BusyError
+        When another process is at work on it.
+    """
+    if km is None and shared:
+        query: LiteralString = "SELECT pg_try_advisory_xact_lock_shared(%s, %s)"
+    else:
+        query = "SELECT pg_try_advisory_xact_lock(%s, %s)"
+    taken = conn.execute(query, [survey_id, -1 if km is None else km]).fetchone()
+    if taken is None or not taken[0]:
+        where = "the survey" if km is None else f"kilometre {km}"
+        raise BusyError(f"another process is at work on {where}: wait until it has finished (tunneldb status)")
+
+
+def _hold(conn: psycopg.Connection[Any], job: Job) -> None:
+    held = conn.execute("SELECT tunnel_api.queue_hold(%s, %s)", [job.id, job.worker]).fetchone()
+    if held is None or not held[0]:
+        raise LostError(f"another worker has taken over job {job.id}")
+
+
+def _finish(conn: psycopg.Connection[Any], survey_id: int, run: Run, job: Job | None) -> None:
+    """Record the end, of what a load has entered for each of its kilometres, too, as the last thing before the commit."""
+    if job is not None:
+        _hold(conn, job)
+    conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey_id])
+    conn.execute(
+        "UPDATE tunnel.run SET outcome = 'done', finished_at = clock_timestamp() WHERE survey_id = %s AND started_at = %s"
+        " AND backend_pid = pg_backend_pid()",
+        [survey_id, run.started_at],
+    )
+    conn.execute("UPDATE tunnel.run SET counts = %s WHERE id = %s", [Jsonb(run.counts), run.id])
+    if job is not None:
+        conn.execute("SELECT tunnel_api.queue_done(%s, %s)", [job.id, run.started_at])
+
+
+def _fail(conn: psycopg.Connection[Any], survey_id: int, run: Run, job: Job | None, error: BaseException) -> None:
+    if conn.closed or conn.broken:
+        return
+    try:
+        conn.rollback()
+        with conn.transaction():
+            if job is not None and not isinstance(error, LostError):
+                _hold(conn, job)
+            conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey_id])
+            if job is None and isinstance(error, BusyError):  # nothing was tried: what another does there is the last run
+                conn.execute("DELETE FROM tunnel.run WHERE id = %s", [run.id])
+                return
+            conn.execute(
+                "UPDATE tunnel.run SET outcome = 'failed', finished_at = clock_timestamp(), counts = %s, message = %s"
+                " WHERE id = %s",
+                [Jsonb(run.counts), describe(error), run.id],
+            )
+            if job is not None and not isinstance(error, LostError):
+                _end_job(conn, job, error)
+    except (psycopg.OperationalError, LostError):
+        return  # the server went away, or the job is another's: the run stays "running" with a backend that is gone
+
+
+def _end_job(conn: psycopg.Connection[Any], job: Job, error: BaseException) -> None:
+    """Put a job back that may succeed another time; end it as failed if not."""
+    again = retry_at(error, job.attempts)
+    if again is None:
+        conn.execute("SELECT tunnel_api.queue_fail(%s, %s)", [job.id, describe(error)])
+    else:
+        conn.execute(
+            "SELECT tunnel_queue.procrastinate_retry_job_v2(%s, clock_timestamp() + %s, NULL, NULL, NULL)", [job.id, again]
+        )
+
+
+def retry_at(error: BaseException, attempts: int) -> dt.timedelta | None:
+    """How long to wait before another attempt: 1, 2, 4 s and so on, more or less; None if it would be in vain."""
+    if attempts + 1 >= _ATTEMPTS or not isinstance(error, (BusyError, *_PASSING)):
+        return None
+    return dt.timedelta(seconds=2.0**attempts * random.uniform(0.7, 1.3))
+
+
+def describe(error: BaseException) -> str:
+    """One line: the message of what the user can mend; of anything else also its type."""
+    if isinstance(error, Exception) and (known := describe_failure(error)) is not None:
+        return known
+    text = " ".join((first_line(error) if isinstance(error, psycopg.Error) else str(error)).split())
+    if isinstance(error, UserError):
+        return text
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def versions(conn: psycopg.Connection[Any]) -> dict[str, str]:
+    """Versions of the program, the server and the libraries that results depend on."""
+    row = conn.execute("SELECT current_setting('server_version'), PostGIS_Lib_Version()").fetchone()
+    assert row is not None
+    return {
+        "tunneldb": __version__,
+        "python": platform.python_version(),
+        "postgresql": row[0],
+        "postgis": row[1],
+        **{name: version(name) for name in _LIBRARIES},
+    }
