@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.common import scratch_database
 from benchmarks.scene import Scene
-from tunneldb.anomalies.detect import Anomaly
+from tunneldb.anomalies.records import Anomaly
 from tunneldb.database import connect
 from tunneldb.pipeline import detect as stage
 from tunneldb.raster.geotiff import NODATA, STEP

@@ -9,7 +9,8 @@ from scipy import ndimage
 from shapely.geometry import Polygon, box
 
 from tunneldb.anomalies.background.contrast import ContrastImage
-from tunneldb.anomalies.detect import Anomaly, Detection, find_anomalies
+from tunneldb.anomalies.detect import Detection, find_anomalies
+from tunneldb.anomalies.records import Anomaly
 from tunneldb.anomalies.regions import Region, RegionProperties
 from tunneldb.anomalies.verdict import classify
 from tunneldb.raster.geotiff import NODATA

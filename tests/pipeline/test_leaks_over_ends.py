@@ -18,6 +18,7 @@ from support.loaded_survey import SURVEY, add_survey
 from tests.pipeline.test_detect import APPENDAGE, FLOOR, NAME, command, counts, outlines, parameters, prepare, share_of
 from tunneldb.anomalies.background.level import BackgroundLevel
 from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
+from tunneldb.anomalies.reconcile import Boundary, gather_boundary
 from tunneldb.anomalies.regions import Region, RegionProperties
 from tunneldb.pipeline import calibration as radiometry
 from tunneldb.pipeline import detect as job
@@ -29,10 +30,10 @@ from tunneldb.raster.observation import Observer
 from tunneldb.simulate import Simulation, generate, write
 from tunneldb.simulate.lining.leaks import Leak
 from tunneldb.stages.parameters import settings
-from tunneldb.store.anomaly_parts import replace_parts
+from tunneldb.store.boundary_regions import load_boundary_regions, replace_boundary_regions
 from tunneldb.store.scene import load_arcs
 from tunneldb.store.surface import load_surface
-from tunneldb.store.survey import get_survey
+from tunneldb.store.survey import Survey, get_survey
 
 START, PLANE = 12_990.0, 13_000.0
 SHIFT = 480.0
@@ -224,6 +225,12 @@ def region(first: int, last: int, row: int = 0) -> Region:
     )
 
 
+def boundary(conn: psycopg.Connection, survey: Survey, km: int, regions: list[Region]) -> Boundary:
+    """Save the boundary regions of a kilometre, and gather what lies across its ends."""
+    replaced = replace_boundary_regions(conn, survey, km, regions)
+    return gather_boundary(km, lambda kms: load_boundary_regions(conn, survey, kms), replaced)
+
+
 THROUGH = {
     12: [region(25_990, 26_000), region(25_500, 26_000, row=9)],
     13: [region(26_000, 28_000), region(26_000, 26_007, row=20)],
@@ -237,13 +244,13 @@ def test_any_order_of_kilometres_puts_the_same_together(conn: psycopg.Connection
     add_survey(conn)
     survey = get_survey(conn, SURVEY)
     for km in order:
-        border = replace_parts(conn, survey, km, THROUGH[km])
+        border = boundary(conn, survey, km, THROUGH[km])
         # What lies at the far end of a neighbour is none of its business.
         assert all(any(abs(part.km - km) <= 1 for part in cluster.parts) for cluster in border.clusters)
         assert km in {part.km for cluster in border.clusters for part in cluster.parts}
     seen = {}
     for km in THROUGH:
-        for cluster in replace_parts(conn, survey, km, THROUGH[km]).clusters:
+        for cluster in boundary(conn, survey, km, THROUGH[km]).clusters:
             made = cluster.region
             box = (made.column, made.row, made.stop, made.row + len(made.mask))
             assert seen.setdefault(box, made).mask.tolist() == made.mask.tolist()
@@ -258,7 +265,7 @@ def test_what_a_kilometre_no_longer_shows_comes_apart(conn: psycopg.Connection) 
     add_survey(conn)
     survey = get_survey(conn, SURVEY)
     for km, parts in THROUGH.items():
-        replace_parts(conn, survey, km, parts)
-    border = replace_parts(conn, survey, 13, [])
+        boundary(conn, survey, km, parts)
+    border = boundary(conn, survey, 13, [])
     boxes = [(cluster.region.column, cluster.region.stop) for cluster in border.clusters]
     assert sorted(boxes) == [(25_500, 26_000), (25_990, 26_000), (28_000, 28_020), (28_000, 28_020)]

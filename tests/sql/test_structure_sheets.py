@@ -10,7 +10,7 @@ import pytest
 import shapely
 from support.example_structures import ORIGIN, RADIUS, add_example_site, example_structures, model, save_example_structures
 
-from tunneldb.store.structures import save_structures
+from tunneldb.pipeline.replace_structures import replace_structures
 from tunneldb.store.survey import get_survey
 from tunneldb.structures.models import normals_at, to_space, unroll
 from tunneldb.structures.results import Face, Member, Structures
@@ -91,7 +91,7 @@ def test_sides_of_a_profile_are_drawn_below_each_other_along_it(conn: psycopg.Co
         solid[number] = corners
     line = ORIGIN + np.array([np.zeros(3), 4.0 * along])
     beam = Member(1, "profile", (1, 2, 3), sum(face.area for face in faces), 4.0, line, False)
-    save_structures(conn, get_survey(conn, "hall-1", site=True), Structures([beam], faces, []), None)
+    replace_structures(conn, get_survey(conn, "hall-1", site=True), Structures([beam], faces, []), None)
     drawn = {}
     for number, xx, xy, yx, yy, x, y, cell in conn.execute(
         "SELECT f.number, p.xx, p.xy, p.yx, p.yy, p.x, p.y, public.ST_AsBinary(p.cell) FROM tunnel_api.face_placement p"

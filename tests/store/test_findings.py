@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 from shapely.geometry import Polygon, box
 from support.example_survey import KM, NAME, example_surface
 
-from tunneldb.anomalies.detect import Anomaly
 from tunneldb.anomalies.features import NAMES
+from tunneldb.anomalies.reconcile import Summary
+from tunneldb.anomalies.records import Anomaly
 from tunneldb.anomalies.verdict import Verdict
 from tunneldb.export.tables.finding_counts import STATES, count_findings
 from tunneldb.export.tables.findings import Chosen, read_findings
 from tunneldb.geometry.surface import Surface
-from tunneldb.store.anomalies import Matched, save_anomalies
+from tunneldb.pipeline.replace_findings import replace_findings
 from tunneldb.store.learned import load_measured
 from tunneldb.store.survey import get_survey
 
@@ -60,9 +61,10 @@ def outlines(conn: psycopg.Connection) -> list[Polygon]:
     return [shapely.from_wkb(bytes(wkb)) for (wkb,) in rows]
 
 
-def rerun(conn: psycopg.Connection, surface: Surface, leaks: list[Polygon]) -> Matched:
+def rerun(conn: psycopg.Connection, surface: Surface, leaks: list[Polygon]) -> Summary:
     """Detection finds these leaks."""
-    return save_anomalies(conn, get_survey(conn, NAME), KM, surface, [found(leak) for leak in leaks], [], 0.04)
+    summary, _ = replace_findings(conn, get_survey(conn, NAME), KM, surface, [found(leak) for leak in leaks], [], 0.04)
+    return summary
 
 
 def wet(conn: psycopg.Connection) -> tuple[int, float]:

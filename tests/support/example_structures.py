@@ -11,7 +11,7 @@ from shapely.geometry import MultiPolygon, Point, box
 
 from tunneldb.arrays import Float
 from tunneldb.cli.main import main
-from tunneldb.store.structures import save_structures
+from tunneldb.pipeline.replace_structures import replace_structures
 from tunneldb.store.survey import get_survey
 from tunneldb.structures.models import with_directions
 from tunneldb.structures.results import Face, Member, Spot, Structures
@@ -75,7 +75,7 @@ def example_structures() -> Structures:
 def save_example_structures(conn: psycopg.Connection, survey: str) -> None:
     """Save them as what stage members found in a survey, which is noted as done."""
     its = get_survey(conn, survey, site=True)
-    save_structures(conn, its, example_structures(), None)
+    replace_structures(conn, its, example_structures(), None)
     conn.execute(
         "INSERT INTO tunnel.run (survey_id, stage, outcome, parameters, started_at, finished_at)"
         " VALUES (%s, 'members', 'done', tunnel_api.members_inputs(%s), now(), now())",

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.background.level_map import BackgroundMap
@@ -16,9 +15,10 @@ from tunneldb.anomalies.features import measure_regions
 from tunneldb.anomalies.hidden import behind_strips
 from tunneldb.anomalies.joints import crossed_joints, find_joints
 from tunneldb.anomalies.levels import weaker_parts
+from tunneldb.anomalies.records import Anomaly
 from tunneldb.anomalies.regions import Region, find_regions
 from tunneldb.anomalies.threshold import dark_pixels, filter_size
-from tunneldb.anomalies.verdict import Verdict, classify
+from tunneldb.anomalies.verdict import classify
 from tunneldb.anomalies.windows import count_about, count_in_columns, on_lining, row_blocks
 from tunneldb.arrays import Bool, Float, Int64, UInt8
 from tunneldb.raster.grid import PixelGrid
@@ -33,51 +33,6 @@ SINGLE = 1.6
 
 MIN_JOINT = 0.5
 """Joints that are seen over less are left out, m."""
-
-
-@dataclass(frozen=True)
-class Anomaly:
-    """An anomaly in the unrolled plane.
-
-    Attributes
-    ----------
-    outline : Polygon
-        (chainage, arc), m.
-    drop_mean, drop_max : float
-        Mean and greatest drop below the background, dB.
-    contrast : float
-        Mean drop in standard deviations of the background about it.
-    image_share : float
-        Share of its pixels into which points fell, 0 to 1.
-    verdict : Verdict
-        What it is.
-    """
-
-    outline: Polygon
-    drop_mean: float
-    drop_max: float
-    contrast: float
-    image_share: float
-    verdict: Verdict
-
-    @classmethod
-    def of(
-        cls, region: Region, min_area: float, features: Float | None = None, model: EvidenceModel | None = None
-    ) -> Anomaly | None:
-        """Make an anomaly of a region, judged by its features and a model; None if it holds no point or is too small.
-
-        Leaks and dark spots must not be smaller than ``min_area``, m², joints no shorter than MIN_JOINT.
-        """
-        if not may_count(region, min_area):
-            return None
-        verdict = classify(region, features, model)
-        if verdict.kind == "joint":
-            if max(region.mask.shape) * region.pixel < MIN_JOINT:
-                return None
-        elif region.area < min_area * (1 - 1e-12):
-            return None
-        share = region.measured / np.count_nonzero(region.mask)
-        return cls(region.outline, region.drop_mean, region.drop_max, region.contrast, float(share), verdict)
 
 
 @dataclass(frozen=True)
@@ -156,12 +111,31 @@ def may_count(region: Region, min_area: float) -> bool:
     return bool(region.filled) and large
 
 
+def judge_region(
+    region: Region, min_area: float, features: Float | None = None, model: EvidenceModel | None = None
+) -> Anomaly | None:
+    """Classify a region by its features and a model; None if it holds no point or is too small.
+
+    Leaks and dark spots must not be smaller than ``min_area``, m², joints no shorter than MIN_JOINT.
+    """
+    if not may_count(region, min_area):
+        return None
+    verdict = classify(region, features, model)
+    if verdict.kind == "joint":
+        if max(region.mask.shape) * region.pixel < MIN_JOINT:
+            return None
+    elif region.area < min_area * (1 - 1e-12):
+        return None
+    share = region.measured / np.count_nonzero(region.mask)
+    return Anomaly(region.outline, region.drop_mean, region.drop_max, region.contrast, float(share), verdict)
+
+
 def _judged(regions: Sequence[Region], min_area: float, model: EvidenceModel | None) -> list[Anomaly | None]:
     """Judge the regions of a kilometre, each held against those about it; None for what is too small."""
     judged: list[Anomaly | None] = [None] * len(regions)
     counted = [k for k, region in enumerate(regions) if may_count(region, min_area)]
     for k, features in zip(counted, measure_regions([regions[k] for k in counted]), strict=True):
-        judged[k] = Anomaly.of(regions[k], min_area, features, model)
+        judged[k] = judge_region(regions[k], min_area, features, model)
     return judged
 
 

@@ -13,8 +13,8 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from tunneldb.arrays import Float
-from tunneldb.store.structures import NEAR
 from tunneldb.structures.models import RADIUS, to_space, unroll
+from tunneldb.structures.reconcile import NEAR
 
 BESIDE = 0.005
 """Of faces one behind the other it lies on the nearest, and on those that are no more than this farther off, m."""

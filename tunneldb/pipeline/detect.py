@@ -22,6 +22,7 @@ from tunneldb.geometry.section_outliers import MOST, SectionOutliers
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.calibration import UNKNOWN, Calibration, calibrate, dry_sigma
+from tunneldb.pipeline.replace_findings import replace_findings
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.reader import ScanSource
 from tunneldb.radiometry.correction import Kind, needs_reference
@@ -34,9 +35,8 @@ from tunneldb.raster.image import halo, halo_of_profiles, lining_image
 from tunneldb.raster.observation import Observer, Radiometer
 from tunneldb.raster.profiles import find_gaps
 from tunneldb.raster.rasterize import Counts, rasterize
-from tunneldb.store.anomalies import save_anomalies
 from tunneldb.store.coverage import seen_share
-from tunneldb.store.findings import Drawn, load_drawn, save_measured
+from tunneldb.store.drawn_findings import Drawn, load_drawn, save_measured
 from tunneldb.store.images import (
     ImageStore,
     drop_coverage,
@@ -155,7 +155,7 @@ def detect(
         drop_radiometry(conn, survey, km)
         drop_coverage(conn, survey, km)
         save_range_curve(conn, survey, km, None)
-        save_anomalies(conn, survey, km, inputs.observer.surface, [], [], 0.0)
+        replace_findings(conn, survey, km, inputs.observer.surface, [], [], 0.0)
         return {
             **counts,
             "learned": inputs.judge.id,
@@ -270,9 +270,11 @@ def _save(
     km, surface, found, roughness = inputs.grid.km, inputs.observer.surface, result.anomalies, result.calibration.roughness
     images.save_states(result.state, found.dark)
     save_range_curve(conn, survey, km, result.calibration.found)
-    save_radiometry(conn, survey, km, roughness, result.background, found, result.dry_levels)
+    save_radiometry(conn, survey, km, roughness, result.background, found.pixels, found.wet_pixels, result.dry_levels)
     save_coverage(conn, survey, km, result.coverage)
-    matched = save_anomalies(conn, survey, km, surface, found.anomalies, found.cut, min_area, inputs.judge.model)
+    matched, other_pixels = replace_findings(
+        conn, survey, km, surface, found.anomalies, found.cut, min_area, inputs.judge.model
+    )
     if result.background.count:
         save_measured(conn, inputs.drawn, result.drawn)
     return {
@@ -291,7 +293,7 @@ def _save(
         "leaks_again": matched.again,
         "leaks_kept_for_review": matched.kept,
         "leaks_gone": matched.gone,
-        **_report(result, [survey.note, inputs.judge.note], matched.other_pixels),
+        **_report(result, [survey.note, inputs.judge.note], other_pixels),
     }
 
 

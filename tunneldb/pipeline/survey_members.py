@@ -10,13 +10,14 @@ import psycopg
 from tunneldb.database import snapshot
 from tunneldb.errors import UserError
 from tunneldb.pipeline.members import AUTO, Begin, FileMembers, Inputs
+from tunneldb.pipeline.replace_structures import replace_structures
 from tunneldb.pipeline.spot_colours import find_coloured_members
 from tunneldb.radiometry.correction import Kind
 from tunneldb.stages.ledger import stage_run
 from tunneldb.store.images import load_reference
 from tunneldb.store.poses import load_poses
 from tunneldb.store.sources import unchanged_file
-from tunneldb.store.structures import SavedSpots, save_structures
+from tunneldb.store.structures import SavedSpots
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
@@ -60,7 +61,7 @@ def find_survey_members(conn: psycopg.Connection[Any], survey: Survey, begin: Be
     found = find_coloured_members(inputs, begin)
     structures = found.found.structures
     with stage_run(conn, survey.id, None, "members", made_from) as run:
-        saved = save_structures(conn, survey, structures, surface)
+        saved = replace_structures(conn, survey, structures, surface)
         run.counts.update(
             points=found.points,
             far=found.far,

@@ -1,4 +1,4 @@
-"""Tables of the database to arrays and back; nothing is computed here."""
+"""Tables of the database to arrays and back; nothing is computed or decided here (an import contract)."""
 
 import lazy_loader
 

@@ -12,7 +12,6 @@ from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.level_map import BackgroundMap
 from tunneldb.anomalies.coverage import Coverage
-from tunneldb.anomalies.detect import Detection
 from tunneldb.arrays import Bool, Single, UInt8, known
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.radiometry.range_curve import RangeCurve
@@ -144,7 +143,8 @@ def save_radiometry(
     km: int,
     roughness: Roughness,
     dry: BackgroundMap,
-    found: Detection,
+    pixels: int,
+    wet_pixels: int,
     sigma: tuple[DryLevel, DryLevel, DryLevel],
 ) -> None:
     """Replace the radiometry of a kilometre.
@@ -157,8 +157,8 @@ def save_radiometry(
         Stored as NULL where the incidence angles don't determine it.
     dry : BackgroundMap
         Dry lining: the medians of its level and standard deviation, with the threshold by them.
-    found : Detection
-        Pixel counts.
+    pixels, wet_pixels : int
+        Pixels that show lining, and those of them that leaks cover.
     sigma : three Dry
         Dry lining points raw, corrected by Lambert's law and by Oren–Nayar (Table 1 of Xu et al., 2018).
     """
@@ -174,8 +174,8 @@ def save_radiometry(
             *(known(v) for v in (dry.mean, dry.spread, dry.mean - 3.0 * dry.spread)),
             *(known(s.sigma) for s in sigma),
             roughness.regions,
-            found.pixels,
-            found.wet_pixels,
+            pixels,
+            wet_pixels,
         ),
     )
 

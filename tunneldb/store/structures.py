@@ -1,31 +1,23 @@
-"""Members, faces and spots of a survey into the database; spots matched with those of earlier runs and surveys."""
+"""Members, faces and spots of a survey to the database, and spots of earlier runs and surveys back."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import psycopg
 import shapely
-from numpy.typing import NDArray
-from shapely.geometry import Polygon
 
-from tunneldb.anomalies.matching import match
-from tunneldb.arrays import Float
-from tunneldb.geometry.surface import Surface
 from tunneldb.store.survey import Survey
-from tunneldb.structures.models import ACROSS, AXIS, POINT, SIDE, unroll
-from tunneldb.structures.results import Face, Member, Spot, Structures
-
-NEAR = 0.05
-"""An earlier spot lies on a face if no vertex of it is farther from it, m: registration of scans is better than that."""
+from tunneldb.structures.models import ACROSS, AXIS, POINT, SIDE
+from tunneldb.structures.records import EarlierSpot, PlacedFace, PlacedSpot, PlacedStructures, SpotReconciliation
+from tunneldb.structures.results import Face, Member, Spot
 
 
 @dataclass(frozen=True)
 class SavedSpots:
-    """What became of spots: found for the first time, found again, kept for their review, and taken away."""
+    """Numbers of spots: found for the first time, found again, kept for their review, and deleted."""
 
     new: int
     again: int
@@ -33,64 +25,48 @@ class SavedSpots:
     gone: int
 
 
-@dataclass(frozen=True)
-class _Earlier:
-    """A spot of an earlier run of the survey, or of another survey of the same structure; id is None for the latter."""
-
-    id: int | None
-    number: int
-    kind: Literal["dark", "bright"]
-    reviewed: bool
-    vertices: Float
-
-
-def save_structures(conn: psycopg.Connection[Any], survey: Survey, found: Structures, surface: Surface | None) -> SavedSpots:
-    """Replace the members, faces and spots of a survey; a spot that is found again keeps its id, number and review.
-
-    A spot is found again when it and an earlier one of its kind overlap best with each other on the same face, by at least
-    0.3 of their union. One that was found in another survey of the tunnel or site has that one's number. Of those not found
-    again the reviewed ones stay, marked as not detected and on no face.
+def save_structures(
+    conn: psycopg.Connection[Any], survey: Survey, placed: PlacedStructures, changes: SpotReconciliation
+) -> SavedSpots:
+    """Replace the members and faces of a survey, and write what becomes of its spots.
 
     Parameters
     ----------
     conn : Connection
         In a transaction.
     survey : Survey
-    found : Structures
-    surface : Surface or None
-        By which chainage is told; None of a site, or before stage sections.
+    placed : PlacedStructures
+        What was found, and where it lies.
+    changes : SpotReconciliation
+        Spots that are updated keep their number and their review; those that are kept are marked as not detected, and lie on
+        no face.
     """
-    own, others = _earlier(conn, survey)
     conn.execute("DELETE FROM tunnel.member WHERE survey_id = %s", [survey.id])
-    members = {member.number: _insert_member(conn, survey, member, surface) for member in found.members}
-    by_number = {face.number: face for face in found.faces}
-    faces = {face.number: _insert_face(conn, survey, face, members[face.member], surface) for face in found.faces}
-    again = _matches(found.spots, by_number, own)
-    known = _matches(found.spots, by_number, others)
-    # What another spot has already, this survey's own or another's, is nobody else's number.
-    taken = {one.number for one in own}
-    last = max((one.number for one in [*own, *others]), default=0)
-    for k, spot in enumerate(found.spots):
-        row = _spot_row(spot, by_number[spot.face], surface, survey) | {"face_id": faces[spot.face], "survey_id": survey.id}
-        if k in again:
-            conn.execute(_UPDATE, {**row, "id": own[again[k]].id})
-            continue
-        number = others[known[k]].number if k in known else None
-        if number is None or number in taken:
-            last += 1
-            number = last
-        taken.add(number)
-        conn.execute(_INSERT, {**row, "number": number})
-    lost = [one for k, one in enumerate(own) if k not in again.values()]
-    kept, gone = [one.id for one in lost if one.reviewed], [one.id for one in lost if not one.reviewed]
-    conn.execute("UPDATE tunnel.spot SET detected = false WHERE id = ANY (%s)", [kept])
-    conn.execute("DELETE FROM tunnel.spot WHERE id = ANY (%s)", [gone])
-    return SavedSpots(len(found.spots) - len(again), len(again), len(kept), len(gone))
+    found = placed.structures
+    members = {
+        member.number: _insert_member(conn, survey, member, chainage)
+        for member, chainage in zip(found.members, placed.members, strict=True)
+    }
+    faces = {
+        face.number: _insert_face(conn, survey, face, members[face.member], place)
+        for face, place in zip(found.faces, placed.faces, strict=True)
+    }
+    for k, (spot, place) in enumerate(zip(found.spots, placed.spots, strict=True)):
+        row = _spot_row(spot, place, survey) | {"face_id": faces[spot.face], "survey_id": survey.id}
+        if k in changes.update:
+            conn.execute(_UPDATE, {**row, "id": changes.update[k]})
+        else:
+            conn.execute(_INSERT, {**row, "number": changes.insert[k]})
+    conn.execute("UPDATE tunnel.spot SET detected = false WHERE id = ANY (%s)", [changes.keep])
+    conn.execute("DELETE FROM tunnel.spot WHERE id = ANY (%s)", [changes.delete])
+    return SavedSpots(len(changes.insert), len(changes.update), len(changes.keep), len(changes.delete))
 
 
-def _earlier(conn: psycopg.Connection[Any], survey: Survey) -> tuple[list[_Earlier], list[_Earlier]]:
-    """Spots of the survey itself, and of each number in its other surveys the latest, in the order of their numbers."""
-    # One at a time gives out numbers.
+def load_earlier_spots(conn: psycopg.Connection[Any], survey: Survey) -> tuple[list[EarlierSpot], list[EarlierSpot]]:
+    """Read the spots of the survey, and of each number in its other surveys the latest one, in the order of their numbers.
+
+    Until the transaction ends, no other one can give out numbers in the tunnel or site.
+    """
     conn.execute("SELECT FROM tunnel.tunnel WHERE id = %s FOR UPDATE", [survey.tunnel_id])
     rows = conn.execute(
         """
@@ -104,51 +80,15 @@ def _earlier(conn: psycopg.Connection[Any], survey: Survey) -> tuple[list[_Earli
         """,
         {"survey": survey.id, "tunnel": survey.tunnel_id},
     ).fetchall()
-    own: list[_Earlier] = []
-    others: list[_Earlier] = []
+    own: list[EarlierSpot] = []
+    others: list[EarlierSpot] = []
     for mine, key, number, kind, reviewed, wkb in rows:
         vertices = shapely.get_coordinates(shapely.from_wkb(bytes(wkb)), include_z=True)
-        (own if mine else others).append(_Earlier(key if mine else None, number, kind, reviewed, vertices))
+        (own if mine else others).append(EarlierSpot(key, number, kind, reviewed, vertices))
     return own, others
 
 
-def _matches(spots: Sequence[Spot], faces: dict[int, Face], earlier: Sequence[_Earlier]) -> dict[int, int]:
-    """Index of a spot → index of the earlier one that it is."""
-    found: dict[int, int] = {}
-    if not earlier:
-        return found
-    of_face: dict[tuple[int, str], list[int]] = {}
-    for k, spot in enumerate(spots):
-        of_face.setdefault((spot.face, spot.kind), []).append(k)
-    boxes = [(one.vertices.min(axis=0) - NEAR, one.vertices.max(axis=0) + NEAR) for one in earlier]
-    for (number, kind), of in of_face.items():
-        face = faces[number]
-        low, high = _box(face)
-        near = [
-            k for k, one in enumerate(earlier)
-            if one.kind == kind and k not in found.values() and (boxes[k][0] <= high).all() and (boxes[k][1] >= low).all()
-        ]  # fmt: skip
-        outlines = [(k, outline) for k in near if (outline := _on_face(face, earlier[k].vertices)) is not None]
-        pairs = match([outline for _, outline in outlines], [spots[k].outline for k in of])
-        found |= {of[now]: outlines[before][0] for now, before in pairs.items()}
-    return found
-
-
-def _box(face: Face) -> tuple[NDArray[Any], NDArray[Any]]:
-    at = shapely.get_coordinates(face.in_space(face.outline), include_z=True)
-    return at.min(axis=0), at.max(axis=0)
-
-
-def _on_face(face: Face, vertices: Float) -> Polygon | None:
-    """Outline in a face's unrolled coordinates of what has these vertices in space; None if it does not lie on it."""
-    u, v, off = unroll(face.model, vertices - face.origin)
-    if np.abs(off).max() > NEAR:
-        return None
-    outline = shapely.make_valid(Polygon(np.column_stack([u, v])))
-    return outline if outline.area > 0.0 else None
-
-
-def _insert_member(conn: psycopg.Connection[Any], survey: Survey, member: Member, surface: Surface | None) -> int:
+def _insert_member(conn: psycopg.Connection[Any], survey: Survey, member: Member, chainage: float | None) -> int:
     row = conn.execute(
         """
         INSERT INTO tunnel.member (survey_id, number, kind, length, area, bimodal, chainage, line)
@@ -156,15 +96,14 @@ def _insert_member(conn: psycopg.Connection[Any], survey: Survey, member: Member
         """,
         [
             survey.id, member.number, member.kind, member.length, member.area, member.bimodal,
-            _chainage(member.line.mean(axis=0), surface), shapely.to_wkb(shapely.LineString(member.line)), survey.srid,
+            chainage, shapely.to_wkb(shapely.LineString(member.line)), survey.srid,
         ],
     ).fetchone()  # fmt: skip
     assert row is not None
     return int(row[0])
 
 
-def _insert_face(conn: psycopg.Connection[Any], survey: Survey, face: Face, member: int, surface: Surface | None) -> int:
-    solid = face.in_space(face.outline)
+def _insert_face(conn: psycopg.Connection[Any], survey: Survey, face: Face, member: int, place: PlacedFace) -> int:
     row = conn.execute(
         """
         INSERT INTO tunnel.face (survey_id, member_id, number, side, kind, origin, axis, across, radius, inside, rms, points,
@@ -178,8 +117,8 @@ def _insert_face(conn: psycopg.Connection[Any], survey: Survey, face: Face, memb
             face.model[AXIS].tolist(), face.model[ACROSS].tolist(), face.radius or None, bool(face.model[SIDE] < 0.0), face.rms,
             face.points, face.area, face.seen_share, *map(_number, face.incidence), _number(face.level), _number(face.sigma),
             face.bimodal,
-            _chainage(shapely.get_coordinates(solid, include_z=True).mean(axis=0), surface),
-            shapely.to_wkb(face.outline), shapely.to_wkb(solid), survey.srid,
+            place.chainage,
+            shapely.to_wkb(face.outline), shapely.to_wkb(place.surface), survey.srid,
         ],
     ).fetchone()  # fmt: skip
     assert row is not None
@@ -204,8 +143,7 @@ _UPDATE = """
 """
 
 
-def _spot_row(spot: Spot, face: Face, surface: Surface | None, survey: Survey) -> dict[str, Any]:
-    solid = face.in_space(spot.outline)
+def _spot_row(spot: Spot, place: PlacedSpot, survey: Survey) -> dict[str, Any]:
     return {
         "kind": spot.kind,
         "reasons": list(spot.reasons),
@@ -216,16 +154,12 @@ def _spot_row(spot: Spot, face: Face, surface: Surface | None, survey: Survey) -
         "points": spot.points,
         "scans": spot.scans,
         "rgb": None if spot.rgb is None else list(spot.rgb),
-        "chainage": _chainage(shapely.get_coordinates(solid, include_z=True).mean(axis=0), surface),
+        "chainage": place.chainage,
         "outline": shapely.to_wkb(spot.outline),
-        "map": shapely.to_wkb(face.on_map(spot.outline)),
-        "surface": shapely.to_wkb(solid),
+        "map": shapely.to_wkb(place.map),
+        "surface": shapely.to_wkb(place.surface),
         "srid": survey.srid,
     }
-
-
-def _chainage(place: Float, surface: Surface | None) -> float | None:
-    return None if surface is None else _number(float(surface.unroll(place[None]).chainage[0]))
 
 
 def _number(value: float) -> float | None:
