@@ -4,9 +4,9 @@ from .background.level_map import BackgroundMap as BackgroundMap
 from .background.level_map import map_background as map_background
 from .coverage import Coverage as Coverage
 from .coverage import measure_coverage as measure_coverage
-from .detect import Anomaly as Anomaly
 from .detect import Detection as Detection
 from .detect import find_anomalies as find_anomalies
+from .records import Anomaly as Anomaly
 from .regions import Region as Region
 from .regions import RegionProperties as RegionProperties
 from .regions import find_regions as find_regions

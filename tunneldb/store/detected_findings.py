@@ -56,7 +56,9 @@ def load_earlier_findings(
         """,
         {"survey": survey.id, "km": km, "first": reach[0], "last": reach[1], "across": sorted(across)},
     ).fetchall()
-    return [EarlierFinding(*facts, shapely.from_wkb(bytes(wkb))) for *facts, wkb in rows]
+    return [
+        EarlierFinding(key, at, reviewed, wet, dry, shapely.from_wkb(bytes(wkb))) for key, at, reviewed, wet, dry, wkb in rows
+    ]
 
 
 _INSERT = """
