@@ -1,6 +1,6 @@
-"""The shape of the lining ring by ring: planes, circles, ellipses and harmonics, with standard errors.
+"""Shape of the lining, ring by ring: planes, circles, ellipses and harmonics, with standard errors.
 
-Knows arrays only: no database and no file.
+Works on arrays only: no database and no files.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""Adjusting an ellipse to points of which some are wrong: few points by testing each, many by Tukey's weights."""
+"""Robust adjustment of an ellipse or circle: few points are tested one by one, many are weighted after Tukey."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from tunneldb.shape.limits import BAD_SHARE, FEW, LEVEL_KNOWN, LEVEL_OWN, WORSE
 from tunneldb.shape.tukey import CUT, rate, weights
 
 HOPELESS = {CIRCLE: 10.0, ELLIPSE: 5.0}
-"""Nothing is stated of a circle or an ellipse whose worst standard error is so many times that of as many points all around.
+"""Limit of the inflation of the worst standard error: a circle or an ellipse beyond it is not reported.
 
-Of dense points a circle needs 90°, an ellipse 210° of a ring. An ellipse needs more than its noise demands: what of a ring is
-neither circle nor ellipse is magnified alike.
+The inflation compares with as many points evenly around the ring. With dense points a circle needs 90° of a ring, an ellipse
+210°. An ellipse needs more than its noise requires: shape that is neither circle nor ellipse is magnified in the same way.
 """
 
 BESIDE = (3,)
-"""Orders of harmonics that are fitted with an ellipse to many points. Left out, they shift it where a part is unseen; with a
-fourth one a ring without its floor determines no ellipse."""
+"""Orders of harmonics that are fitted to many points together with an ellipse. Without them the ellipse shifts where a part
+of the ring was not seen. With a fourth order, a ring without its floor determines no ellipse."""
 
 BESIDE_HOPELESS = 25.0
-"""They are left out where the worst standard error is then so many times that of as many points all around: dense points over
-more than half a ring reach 18, points in a few places any number."""
+"""Inflation of the worst standard error from which the extra harmonics are left out. Dense points over more than half a ring
+reach 18, points in a few places any number."""
 
 _SETTLING = 8
 _LEAST_SCALE = 1e-6  # m
@@ -36,27 +36,27 @@ _LEAST_SCALE = 1e-6  # m
 
 @dataclass(frozen=True)
 class Adjustment:
-    """An ellipse, or a circle, with what it rests on.
+    """Ellipse or circle with the points and the scale that it is based on.
 
     Attributes
     ----------
     ellipse : Ellipse
-        With the covariance.
+        Ellipse with its covariance.
     free : int
         CIRCLE or ELLIPSE.
     distance : (n,) float array
-        Of all points from it, outwards positive, m; of many points less the harmonics that were fitted with it.
+        Distance of all points from it, outwards positive, m; with many points less the harmonics that were fitted with it.
     used : (n,) bool array
-        Which have weight.
+        True for points with weight.
     sigma : float
-        Standard deviation of a point's distance, from the points that are used, m; NaN where none is left over.
+        Standard deviation of a point's distance, from the points used, m; NaN without redundancy.
     scale : float
-        What the standard errors rest on: sigma, or what was known of points before, m.
+        Scale of the standard errors: sigma, or the standard deviation known beforehand, m.
     freedom : int
-        Points used less parameters.
+        Points used minus parameters.
     inflation : float
-        How many times greater the worst standard error is than that of as many points evenly around the ring; of an ellipse by
-        itself, without the harmonics.
+        Ratio of the worst standard error to that of as many points evenly around the ring; for an ellipse computed without the
+        harmonics.
     """
 
     ellipse: Ellipse
@@ -70,7 +70,7 @@ class Adjustment:
 
 
 def begin(xy: Float) -> Float | None:
-    """Circle to begin with, as parameters (5,), m; None where points lie on a line."""
+    """Return the circle to start with, as parameters (5,), m; None if the points lie on a line."""
     found = taubin(xy) if len(xy) <= FEW else nearest_to_half(xy)
     return None if found is None else np.concatenate([found, [0.0, 0.0]])
 
@@ -83,11 +83,11 @@ def adjust(xy: Float, start: Float, free: int, sigma: float | None = None) -> Ad
     xy : (n, 2) float array
         Points, m, n at least ``free``.
     start : (5,) float array
-        Circle to begin with, as `begin` finds it.
+        Initial circle, from `begin`.
     free : int
         CIRCLE or ELLIPSE.
     sigma : float, optional
-        Standard deviation of a point's distance as it is known from elsewhere, m. Of few points it decides which is wrong.
+        Standard deviation of a point's distance, if known, m. With few points it decides which point is an outlier.
     """
     return _few(xy, start, free, sigma) if len(xy) <= FEW else _many(xy, start, free)
 
@@ -113,19 +113,19 @@ def _few(xy: Float, start: Float, free: int, sigma: float | None) -> Adjustment:
 
 
 def _worst(xy: Float, parameters: Float, free: int, sigma: float | None) -> int | None:
-    """Point that cannot belong to the others, if there is one (Baarda, 1968; by its own residuals after Pope, 1976).
+    """Return the worst outlier, or None (Baarda, 1968; with its own residuals, Pope, 1976).
 
-    Each is held against the ellipse through all others: its residual in units of that residual's standard deviation, which
-    is the smaller the more the point itself has drawn the ellipse to it.
+    Each point is compared with the ellipse through all others: its residual is divided by the residual's standard deviation,
+    which is smaller for a point that pulls the ellipse towards itself.
     """
     distance, slopes = distances(parameters, xy)
     slopes = slopes[:, :free]
     freedom = len(xy) - free - (sigma is None)
-    if freedom < 2:  # the residuals are all one and the same: which point is wrong cannot be told
+    if freedom < 2:  # all residuals are equal: the outlier cannot be identified
         return None
     share = 1.0 - np.einsum("ij,jk,ik->i", slopes, np.linalg.pinv(slopes.T @ slopes), slopes)
     with np.errstate(divide="ignore", invalid="ignore"):
-        lifted = np.where(share > 1e-6, distance**2 / share, 0.0)  # what the sum of squares loses with the point
+        lifted = np.where(share > 1e-6, distance**2 / share, 0.0)  # decrease of the sum of squares without the point
     worst = int(np.argmax(lifted))
     if sigma is not None:
         return worst if lifted[worst] > (sigma * norm.isf(LEVEL_KNOWN / (2 * len(xy)))) ** 2 else None
@@ -134,7 +134,7 @@ def _worst(xy: Float, parameters: Float, free: int, sigma: float | None) -> int 
 
 
 def _scale(own: float, freedom: int, sigma: float | None) -> float:
-    """Standard deviation of a point for the standard errors: the known one, unless the ring is clearly worse, m."""
+    """Return the standard deviation of a point for the standard errors, m: the known one, unless the ring is clearly worse."""
     if sigma is None:
         return float(own)
     if freedom > 0 and own**2 * freedom > sigma**2 * chi2.isf(WORSE, freedom):
@@ -143,7 +143,7 @@ def _scale(own: float, freedom: int, sigma: float | None) -> float:
 
 
 def _many(xy: Float, start: Float, free: int) -> Adjustment:
-    """Adjust to many points; an ellipse together with what rings are beside it, so that its errors hold what that costs."""
+    """Adjust to many points; an ellipse together with extra harmonics, so that its errors include their effect."""
     alone = _weighted(xy, start, free, np.empty((len(xy), 0)))
     if free != ELLIPSE or alone.inflation > HOPELESS[ELLIPSE]:
         return alone
@@ -152,7 +152,7 @@ def _many(xy: Float, start: Float, free: int) -> Adjustment:
 
 
 def _beside(xy: Float, start: Float) -> Float:
-    """Harmonics of the orders `BESIDE` by the points' directions from the centre of the beginning, columns (n, 2 each)."""
+    """Return the harmonics of the extra orders at the points' directions from the initial centre, (n, 2) per order."""
     angle = np.arctan2(*(xy - start[:2]).T)
     return np.column_stack([wave(order * angle) for order in BESIDE for wave in (np.cos, np.sin)])
 
@@ -172,7 +172,7 @@ def _weighted(xy: Float, start: Float, free: int, beside: Float) -> Adjustment:
     u = distance / (CUT * scale)
     used = np.abs(u) < 1.0
     freedom = int(used.sum()) - count
-    # Variance of robust estimates (Huber, 1981, section 7.6): the influence of each residual, and how fast it changes.
+    # Variance of robust estimates (Huber, 1981, section 7.6): influence of each residual, and its derivative.
     influence = weights(u) * distance
     outer = np.linalg.pinv(slopes.T @ (slopes * rate(u)[:, None]))
     inner = slopes[used].T @ slopes[used]
@@ -191,7 +191,7 @@ def _padded(covariance: Float) -> Float:
 
 
 def _inflation(inverse: Float, count: int) -> float:
-    """Worst standard error by that of as many points evenly around a circle: 1/√n of the radius, √(2/n) of all else."""
+    """Return the worst standard error relative to even points on a circle: 1/√n of the radius, √(2/n) of the others."""
     even = np.full(len(inverse), 2.0 / count)
     even[2] = 1.0 / count
     return float(np.sqrt((np.diag(inverse) / even).max()))

@@ -1,4 +1,4 @@
-"""The design axis that rings are held against, as the polyline that it is given by."""
+"""Design axis that rings are compared with, as a polyline."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from tunneldb.geometry.plan_line import PlanLine
 
 @dataclass(frozen=True)
 class DesignAxis:
-    """Polyline whose vertices have chainages.
+    """Polyline with chainages at its vertices.
 
     Attributes
     ----------
     vertices : (k, 3) float array
-        m, no two consecutive ones at the same place in plan.
+        m; no two consecutive vertices coincide in plan.
     chainage : (k,) float array
-        Growing, m.
+        Increasing, m.
     """
 
     vertices: Float
@@ -28,7 +28,7 @@ class DesignAxis:
 
     @cached_property
     def plan(self) -> PlanLine:
-        """The line in plan."""
+        """Line in plan."""
         return PlanLine.of(self.vertices, self.chainage)
 
     @cached_property
@@ -36,26 +36,26 @@ class DesignAxis:
         return np.gradient(self.vertices, self.chainage, axis=0)
 
     def place(self, xyz: Float) -> tuple[Float, Float, Float]:
-        """Chainage of points (n, 3), and where they lie to the right of the axis in plan and above it, each (n,), m.
+        """Return the chainage of points (n, 3), and their offsets to the right of the axis in plan and above it, each (n,), m.
 
-        Right is across the axis in plan, up is vertical, both at the point's chainage. Beyond the ends the chainage is
-        outside that of the vertices, and the height that of the end.
+        Right is across the axis in plan, up is vertical, both at the point's chainage. Beyond the ends the chainage exceeds
+        that of the vertices, and the height of the end is used.
         """
         along, right = self.plan.place(xyz)
         return along, right, xyz[:, 2] - np.interp(along, self.chainage, self.vertices[:, 2])
 
     def tangent(self, chainage: Float) -> Float:
-        """Unit vectors (n, 3) up-chainage, at chainages (n,)."""
+        """Return unit vectors (n, 3) up-chainage, at chainages (n,)."""
         slope = np.column_stack([np.interp(chainage, self.chainage, self._slope[:, k]) for k in range(3)])
         return slope / np.linalg.norm(slope, axis=1)[:, None]
 
     def covers(self, chainage: float) -> bool:
-        """Whether a chainage lies between the ends."""
+        """Return True if a chainage lies between the ends."""
         return bool(self.chainage[0] <= chainage <= self.chainage[-1])
 
     @cached_property
     def sagitta(self) -> float:
-        """How far the arcs that the polyline stands for bulge from its chords at most, m: what straight pieces cost."""
+        """Return the greatest sagitta of the arcs that the polyline approximates, m: the error of straight pieces."""
         step = np.diff(self.vertices, axis=0)
         length = np.linalg.norm(step, axis=1)
         if len(length) < 2:

@@ -1,4 +1,4 @@
-"""Circles that a fit begins with: Taubin's, and the one nearest to half of the points."""
+"""Initial circles of a fit: Taubin's, and the circle nearest to half of the points."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 from tunneldb.arrays import Float
 
 _TRIPLES = 300
-_SAMPLE = 500  # points that candidates are judged by
+_SAMPLE = 500  # points used to compare candidates
 
 
 def taubin(xy: Float) -> Float | None:
-    """Circle by Taubin's algebraic fit.
+    """Fit a circle by Taubin's algebraic method.
 
     Parameters
     ----------
@@ -21,12 +21,12 @@ def taubin(xy: Float) -> Float | None:
     Returns
     -------
     (3,) float array or None
-        Centre and radius, m; None where the points lie on a line.
+        Centre and radius, m; None if the points lie on a line.
 
     Notes
     -----
-    Taubin (1991), by the singular value decomposition of Al-Sharadqah & Chernov (2009, section 7): its essential bias is half
-    that of Pratt's fit, and small arcs are not made smaller, as they are by Kåsa's.
+    Taubin (1991), by the singular value decomposition of Al-Sharadqah & Chernov (2009, section 7). Its essential bias is half
+    that of Pratt's fit, and small arcs are not underestimated as by Kåsa's.
     """
     middle = xy.mean(axis=0)
     near = xy - middle
@@ -47,12 +47,12 @@ def taubin(xy: Float) -> Float | None:
 
 
 def nearest_to_half(xy: Float) -> Float | None:
-    """Circle through three of many points to which half of all lie nearest: centre and radius (3,), m; None without one.
+    """Return the circle through three of many points that is nearest to half of them: centre and radius (3,), m, or None.
 
     Notes
     -----
-    Least median of squares (Rousseeuw, 1984): up to half of the points may be of something else. The triples are drawn by a
-    generator with a fixed seed, so that the same points give the same circle.
+    Least median of squares (Rousseeuw, 1984): up to half of the points may be outliers. The triples are drawn with a fixed
+    seed, so that the same points give the same circle.
     """
     random = np.random.default_rng(len(xy))
     triples = xy[random.integers(0, len(xy), (_TRIPLES, 3))]

@@ -1,4 +1,4 @@
-"""Where a ring departs most from its own circle, inwards and outwards."""
+"""Greatest departures of a ring from its own circle, inwards and outwards."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from tunneldb.shape.adjustment import Adjustment
 from tunneldb.shape.ellipse import distances
 
 SECTOR = 2.0
-"""Of many points the median of each sector of so many degrees is taken: the greatest of thousands is noise."""
+"""Sector size, °: with many points the median of each sector is used, because the greatest of thousands is noise."""
 
 MANY = 1800
-"""From so many points on that is done: twice as many as all sectors together need."""
+"""Minimum number of points for medians by sector: twice what all sectors together need."""
 
 LEAST = 5
-"""Points that a sector needs."""
+"""Minimum number of points of a sector."""
 
-_MEDIAN = 1.2533  # standard error of a median by that of a mean: √(π/2)
+_MEDIAN = 1.2533  # standard error of a median relative to that of a mean: √(π/2)
 
 
 @dataclass(frozen=True)
 class Departure:
-    """A place where the ring departs from its circle.
+    """Place where the ring departs from its circle.
 
     Attributes
     ----------
     size, size_se : float
-        By how much in the direction that was asked for, and its standard error, m.
+        Departure in the requested direction, and its standard error, m.
     clock : float
         Clock position, °.
     """
@@ -40,12 +40,12 @@ class Departure:
 
 
 def clock_of(xy: Float, centre: Float) -> Float:
-    """Clock positions (n,) of points (n, 2), right and up, about a centre (2,): ° from up to the right, 0 to 360."""
+    """Return clock positions (n,) of points (n, 2), right and up, about a centre (2,): ° clockwise from up, 0 to 360."""
     return np.degrees(np.arctan2(xy[:, 0] - centre[0], xy[:, 1] - centre[1])) % 360.0
 
 
 def departures(xy: Float, adjustment: Adjustment) -> tuple[Departure, Departure]:
-    """Greatest departure of used points inwards and outwards from the circle with the ring's centre and mean radius."""
+    """Return the greatest departures of used points inwards and outwards from the circle with the mean radius."""
     ellipse, used = adjustment.ellipse, adjustment.used
     points = xy[used]
     round_ = np.concatenate([ellipse.parameters[:3], [0.0, 0.0]])
@@ -66,7 +66,7 @@ def departures(xy: Float, adjustment: Adjustment) -> tuple[Departure, Departure]
 
 
 def _sectors(off: Float, clock: Float, slopes: Float, scale: float) -> tuple[Float, Float, Float, Float]:
-    """Medians by sector: departure, clock position, slopes, and variance by the points' noise."""
+    """Return medians by sector: departure, clock position, slopes, and variance from the points' noise."""
     sector = np.floor(clock / SECTOR).astype(int)
     order = np.argsort(sector, kind="stable")
     starts = np.flatnonzero(np.diff(sector[order], prepend=-1))

@@ -1,13 +1,13 @@
-r"""Ellipses that may be circles: distances of points from them, and the least sum of their squares.
+r"""Ellipses that may be circles: distances of points from them, and least-squares fits.
 
-An ellipse is written so that nothing becomes undetermined where it is round. With the mean radius R = (a + b)/2 and
+The parameters stay determined where an ellipse is round. With the mean radius R = (a + b)/2 and
 p + iq = (a - b)/2 · exp(2iφ), φ being the direction of the longest diameter, its points are
 
 .. math:: X(s) = c + R (\cos s, \sin s) + p (\cos s, -\sin s) + q (\sin s, \cos s)
 
 which is linear in all five: near a circle p and q are the second harmonic of the radius, and the circle is p = q = 0. The
-distance is that of the nearest point, by Newton's method (Ahn, Rauh & Warnecke, 2001, orthogonal distance), and changes
-with the parameters as that point does along the normal.
+distance is to the nearest point, by Newton's method (Ahn, Rauh & Warnecke, 2001, orthogonal distance). Its derivative by
+the parameters is the movement of that point along the normal.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ _REWEIGHTED, _STILL = 50, 1e-8  # m
 
 @dataclass(frozen=True)
 class Ellipse:
-    """An ellipse in the plane of a ring.
+    """Ellipse in the plane of a ring.
 
     Attributes
     ----------
     parameters : (5,) float array
         Centre to the right and upwards, mean radius R, p, q, m.
     covariance : (5, 5) float array
-        Theirs, m²; zero for what was held.
+        Covariance of the parameters, m²; zero for fixed ones.
     """
 
     parameters: Float
@@ -61,7 +61,7 @@ class Ellipse:
 
     @cached_property
     def flattening_se(self) -> float:
-        """Its standard error, m; that of p and q where it is so small that it has no direction."""
+        """Standard error of the flattening, m; that of p and q if it is too small to have a direction."""
         pq = self.covariance[3:, 3:]
         e = self.flattening
         if e * e <= np.trace(pq) / 2.0:
@@ -76,7 +76,7 @@ class Ellipse:
 
     @cached_property
     def axes_se(self) -> tuple[float, float]:
-        """Their standard errors, m."""
+        """Standard errors of the semi-axes, m."""
         e = self.flattening
         turn = self.parameters[3:] / e if e > 0.0 else np.array([1.0, 0.0])
         both = [np.concatenate([[1.0], sign * turn]) for sign in (1.0, -1.0)]
@@ -91,7 +91,7 @@ class Ellipse:
 
     @cached_property
     def direction_se(self) -> float:
-        """Its standard error, °; at most that of a direction of which nothing is known, 52°."""
+        """Standard error of the direction, °; at most 52°, that of an unknown direction."""
         e = self.flattening
         unknown = 180.0 / np.sqrt(12.0)
         if e <= 0.0:
@@ -100,17 +100,17 @@ class Ellipse:
         return min(float(np.degrees(np.sqrt(across @ self.covariance[3:, 3:] @ across)) / (2.0 * e)), unknown)
 
     def distance(self, xy: Float) -> Float:
-        """Distance (n,) of points (n, 2) from it, outwards positive, m."""
+        """Return the distance (n,) of points (n, 2) from the ellipse, outwards positive, m."""
         return distances(self.parameters, xy)[0]
 
 
 def distances(parameters: Float, xy: Float) -> tuple[Float, Float]:
-    """Distance of points from an ellipse, and how it changes with the parameters.
+    """Compute the distances of points from an ellipse, and their derivatives by the parameters.
 
     Parameters
     ----------
     parameters : (5,) float array
-        As those of `Ellipse`, m.
+        Parameters as in `Ellipse`, m.
     xy : (n, 2) float array
         Points, m.
 
@@ -129,7 +129,7 @@ def distances(parameters: Float, xy: Float) -> tuple[Float, Float]:
         ex, ey = dx - ((radius + p) * c + q * d), dy - (q * c + (radius - p) * d)
         tx, ty = -(radius + p) * d + q * c, -q * d + (radius - p) * c
         bend = tx * tx + ty * ty + ex * ((radius + p) * c + q * d) + ey * (q * c + (radius - p) * d)
-        # Inside the evolute the second derivative is none: go by the first alone, which leads to a nearest point, too.
+        # Inside the evolute the second derivative is not usable: the first alone also leads to a nearest point.
         step = (ex * tx + ey * ty) / np.where(bend > 0.1 * radius**2, bend, tx * tx + ty * ty)
         s = s + np.clip(step, -0.5, 0.5)
         if np.abs(step).max(initial=0.0) < _TINY:
@@ -143,25 +143,25 @@ def distances(parameters: Float, xy: Float) -> tuple[Float, Float]:
 
 
 def solve(xy: Float, start: Float, free: int, limit: float | None = None, beside: Float | None = None) -> Float:
-    """Ellipse of the least squares of distances, or of the least of Tukey's losses.
+    """Fit an ellipse by least squares of distances, or by Tukey's loss.
 
     Parameters
     ----------
     xy : (n, 2) float array
         Points, m, n at least ``free``.
     start : (5,) float array
-        Parameters to begin with; those beyond ``free`` are held.
+        Initial parameters; those beyond ``free`` stay fixed.
     free : int
         CIRCLE or ELLIPSE.
     limit : float, optional
-        Distance from which a point has no weight (Tukey's biweight), m; without one all count alike.
+        Distance from which a point has no weight (Tukey's biweight), m; without it all count equally.
     beside : (n, m) float array, optional
-        What the distances may hold beside the ellipse, columns that are fitted with it.
+        Columns of further effects on the distances, fitted together with the ellipse.
 
     Returns
     -------
     (5 + m,) float array
-        Parameters, and by how much of each column the points lie outside.
+        Parameters, and the coefficient of each column.
     """
     more = np.empty((len(xy), 0)) if beside is None else beside
     if limit is not None:
@@ -182,7 +182,7 @@ def solve(xy: Float, start: Float, free: int, limit: float | None = None, beside
 
 
 def _reweighted(xy: Float, start: Float, free: int, limit: float, more: Float) -> Float:
-    """Ellipse of the least of Tukey's losses, by least squares that are reweighted until nothing moves (Huber, 1981, 7.8)."""
+    """Fit an ellipse with Tukey's loss, by iteratively reweighted least squares (Huber, 1981, 7.8)."""
     parameters, beside = start.copy(), np.zeros(more.shape[1])
     for _ in range(_REWEIGHTED):
         distance, slope = distances(parameters, xy)

@@ -1,4 +1,4 @@
-"""Fourier harmonics of a ring's radius by clock position, and chords of the curve that they are."""
+"""Fourier harmonics of a ring's radius by clock position, and chords of the fitted curve."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ import numpy as np
 from tunneldb.arrays import Float
 
 HOPELESS = 5.0
-"""A harmonic is not stated whose standard error is so many times that of as many points evenly around the ring."""
+"""Maximum inflation of a harmonic's standard error, compared with as many points evenly around the ring."""
 
 REACH = 30.0
-"""A chord ends where there is a point within so many degrees."""
+"""Maximum angle from a chord's end to the nearest point, °."""
 
-_OWN = 30  # points left over from which on the scale comes from their own residuals
+_OWN = 30  # minimum redundancy for the scale to come from the ring's own residuals
 
 
 @dataclass(frozen=True)
 class Harmonics:
-    """The radius about a centre, by clock position α: r = c₀ + Σ (aₖ cos kα + bₖ sin kα), k from 1.
+    """Radius about a centre, by clock position α: r = c₀ + Σ (aₖ cos kα + bₖ sin kα), k from 1.
 
     Attributes
     ----------
     coefficients : (1 + 2 order,) float array
-        c₀, a₁, b₁, a₂, b₂ …, m. The first order is small: it is what the centre is off that of the curve.
+        c₀, a₁, b₁, a₂, b₂ …, m. The first order is small: the offset between this centre and that of the curve.
     covariance : (1 + 2 order, 1 + 2 order) float array
-        Theirs, m².
+        Covariance of the coefficients, m².
     determined : (order,) bool array
-        Which orders the points determine.
+        True for orders that the points determine.
     clock : (n,) float array
-        Clock positions of the points, growing, °.
+        Clock positions of the points, increasing, °.
     """
 
     coefficients: Float
@@ -44,9 +44,9 @@ class Harmonics:
         return len(self.coefficients) // 2
 
     def amplitude(self, order: int) -> tuple[float, float, float]:
-        """Amplitude of an order and its standard error, m, and the first clock position where it is outwards most, °.
+        """Return an order's amplitude and its standard error, m, and the first clock position of its maximum, °.
 
-        NaN where the points don't determine it.
+        NaN if the points do not determine it.
         """
         if order > self.orders or not self.determined[order - 1]:
             return float("nan"), float("nan"), float("nan")
@@ -59,9 +59,9 @@ class Harmonics:
         return size, float(np.sqrt(variance)), float(clock)
 
     def chord(self, first: float, second: float) -> tuple[float, float]:
-        """Chord between two clock positions in °, and its standard error, m; NaN without points near the ends.
+        """Return the chord between two clock positions in °, and its standard error, m; NaN without points near the ends.
 
-        Nor is it stated where some order is not determined: the curve runs free in a gap then.
+        NaN also if some order is not determined, because the curve is then arbitrary in a gap.
         """
         if not (all(self.determined) and self.near(first) and self.near(second)):
             return float("nan"), float("nan")
@@ -75,12 +75,12 @@ class Harmonics:
         return length, float(np.sqrt(slope @ self.covariance @ slope))
 
     def near(self, clock: float) -> bool:
-        """Whether there is a point within `REACH` of a clock position, °."""
+        """Return True if there is a point within `REACH` of a clock position, °."""
         return bool((np.abs((self.clock - clock + 180.0) % 360.0 - 180.0) <= REACH).any())
 
 
 def fit_harmonics(clock: Float, radius: Float, orders: int, scale: float) -> Harmonics:
-    """Fit harmonics by least squares, all orders at once, so that gaps between points don't mix them.
+    """Fit harmonics by least squares, all orders together, so that gaps between points do not mix them.
 
     Parameters
     ----------
@@ -89,9 +89,9 @@ def fit_harmonics(clock: Float, radius: Float, orders: int, scale: float) -> Har
     radius : (n,) float array
         Their distances from the centre, m.
     orders : int
-        How many are wanted; n points have no more than (n - 1) / 2.
+        Number of orders requested; n points determine at most (n - 1) / 2.
     scale : float
-        Standard deviation of a point, m; of many points it is taken from what the harmonics leave.
+        Standard deviation of a point, m; with many points the residuals give it.
     """
     orders = min(orders, (len(clock) - 1) // 2)
     design = _design(np.radians(clock), orders)
@@ -106,7 +106,7 @@ def fit_harmonics(clock: Float, radius: Float, orders: int, scale: float) -> Har
 
 
 def _design(clock: Float, orders: int) -> Float:
-    """Rows of 1, cos α, sin α, cos 2α, …, by clock positions in radians."""
+    """Return rows of 1, cos α, sin α, cos 2α, … for clock positions in radians."""
     turns = clock[:, None] * np.arange(1, orders + 1)
     both = np.stack([np.cos(turns), np.sin(turns)], axis=2).reshape(len(clock), -1)
     return np.hstack([np.ones((len(clock), 1)), both])

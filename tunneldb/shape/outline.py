@@ -1,4 +1,4 @@
-"""Outlines of lines and arcs about the axis: how long they are, what they enclose, where they cross themselves."""
+"""Outlines of lines and arcs about the axis: length, enclosed area, and self-intersections."""
 
 from __future__ import annotations
 
@@ -11,43 +11,43 @@ import shapely
 from tunneldb.arrays import Float
 
 TOLERANCE = 1e-6
-"""Ends that lie nearer than this are one point, m."""
+"""Distance below which ends are one point, m."""
 
-_CHORD_ERROR = 1e-4  # m, of the chords by which crossings are looked for
+_CHORD_ERROR = 1e-4  # m, of the chords that are tested for crossings
 
 
 @dataclass(frozen=True)
 class Outline:
-    """Lines and arcs, each beginning where the one before ends, clockwise as seen looking up-chainage.
+    """Lines and arcs, each beginning where the one before ends, clockwise when looking up-chainage.
 
-    So an open outline runs from the left foot over the crown to the right foot, and inside is on the right-hand side of it.
+    An open outline runs from the left foot over the crown to the right foot; inside is on its right-hand side.
 
     Attributes
     ----------
     elements : (m, 5) float array
-        Begin and end, each right of the axis and above it, m, and the bulge: the tangent of a quarter of the angle that an arc
-        turns through, 0 of a line, negative where it bulges outwards (clockwise), as in DXF.
+        Begin and end, each right of the axis and above it, m, and the bulge: the tangent of a quarter of the arc's angle,
+        0 for a line, negative where it bulges outwards (clockwise), as in DXF.
     """
 
     elements: Float
 
     @classmethod
     def of(cls, vertices: Float, bulges: Float, closed: bool) -> Outline:
-        """Make an outline of vertices and of what leads from each to the next.
+        """Make an outline of vertices and of the bulges between them.
 
         Parameters
         ----------
         vertices : (n, 2) float array
             Right of the axis and above it, m, in either direction.
         bulges : (n,) float array
-            Of the element that begins at each vertex, positive counterclockwise; the last one's counts if it is closed.
+            Bulge of the element that begins at each vertex, positive counterclockwise; the last one is used only if closed.
         closed : bool
-            Whether the last vertex is joined to the first.
+            True if the last vertex is joined to the first.
 
         Notes
         -----
-        A closed outline is made to begin straight below the axis, or else at its lowest vertex, so that places along outlines
-        of different size go together.
+        A closed outline begins straight below the axis, or else at its lowest vertex, so that places along outlines of
+        different size correspond.
         """
         ends = np.roll(vertices, -1, axis=0)
         elements = np.column_stack([vertices, ends, bulges])[: None if closed else -1]
@@ -57,7 +57,7 @@ class Outline:
 
     @property
     def closed(self) -> bool:
-        """Whether it ends where it begins."""
+        """True if it ends where it begins."""
         return bool(np.hypot(*(self.elements[-1, 2:4] - self.elements[0, :2])) < TOLERANCE)
 
     @cached_property
@@ -72,11 +72,11 @@ class Outline:
 
     @property
     def area(self) -> float:
-        """Area that it encloses, m²; of an open one, with the straight line from foot to foot."""
+        """Enclosed area, m²; for an open outline closed by the straight line from foot to foot."""
         return -_turning_area(self.elements)
 
     def places(self, share: Float) -> tuple[Float, Float]:
-        """Points and inward unit normals, both (n, 2), at shares (n,) of the length, 0 to 1."""
+        """Return points and inward unit normals, both (n, 2), at shares (n,) of the length, 0 to 1."""
         ends = np.cumsum(self.lengths)
         along = np.clip(share, 0.0, 1.0) * ends[-1]
         k = np.minimum(np.searchsorted(ends, along, side="right"), len(ends) - 1)
@@ -84,7 +84,7 @@ class Outline:
         return _within(self.elements[k], within)
 
     def curvature(self, share: Float) -> Float:
-        """Curvature at shares (n,) of the length, 1/m, positive where it is concave seen from inside."""
+        """Return the curvature at shares (n,) of the length, 1/m, positive where concave as seen from inside."""
         ends = np.cumsum(self.lengths)
         begin, end, bulge = self.elements[:, :2], self.elements[:, 2:4], self.elements[:, 4]
         each = -4.0 * bulge / (np.hypot(*(end - begin).T) * (1.0 + bulge**2))
@@ -92,7 +92,7 @@ class Outline:
         return np.asarray(each[k])
 
     def flattened(self, chord_error: float = _CHORD_ERROR) -> Float:
-        """Vertices (n, 2) of chords that stray from the arcs by no more than the error, m."""
+        """Return vertices (n, 2) of chords that deviate from the arcs by no more than the error, m."""
         parts = []
         for element, length in zip(self.elements, self.lengths, strict=True):
             turn = 4.0 * abs(np.arctan(element[4]))
@@ -103,7 +103,7 @@ class Outline:
         return np.vstack([*parts, self.elements[-1:, 2:4]])
 
     def crossing(self) -> tuple[int, int] | None:
-        """Numbers, from 0, of two elements that cross or touch apart from where one ends and the next begins; None without."""
+        """Return the numbers, from 0, of two elements that cross or touch other than end to end; None if there are none."""
         line = self.flattened()
         whole = shapely.LineString(line)
         if whole.is_simple:
@@ -123,7 +123,7 @@ class Outline:
         return None
 
     def cut(self, shares: Float) -> Outline:
-        """Return the same outline with its elements cut at shares of its length too, growing, 0 to 1."""
+        """Return the same outline with its elements also cut at shares of its length, increasing, 0 to 1."""
         ends = np.cumsum(self.lengths)
         parts = []
         for k, (element, length) in enumerate(zip(self.elements, self.lengths, strict=True)):
@@ -139,10 +139,10 @@ class Outline:
 
 
 def matched(first: Outline, second: Outline) -> tuple[Outline, Outline]:
-    """Cut two outlines into as many elements each, those of one number going together in a transition.
+    """Cut two outlines into equally many elements; elements with the same number correspond in a transition.
 
-    Where both have the same elements in the same order, they go together as they are; else both are cut at the shares of the
-    length at which either has a vertex.
+    Outlines with the same elements in the same order stay as they are. Others are cut at the shares of the length at which
+    either has a vertex.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def matched(first: Outline, second: Outline) -> tuple[Outline, Outline]:
         If one is closed and the other open.
     """
     if first.closed != second.closed:
-        raise ValueError("a closed outline does not go over into an open one")
+        raise ValueError("no transition is possible between a closed and an open outline")
     if np.array_equal(np.sign(first.elements[:, 4]), np.sign(second.elements[:, 4])):
         return first, second
     shares = [np.cumsum(outline.lengths)[:-1] / outline.length for outline in (first, second)]
@@ -159,12 +159,12 @@ def matched(first: Outline, second: Outline) -> tuple[Outline, Outline]:
     both = both[np.diff(both, prepend=-1.0) > 4.0 * least]
     cuts = first.cut(both), second.cut(both)
     if len(cuts[0].elements) != len(cuts[1].elements):
-        raise ValueError("the outlines have vertices too near to each other")
+        raise ValueError("the outlines have vertices too close to each other")
     return cuts
 
 
 def element_lengths(elements: Float) -> Float:
-    """Length of elements (m, 5), (m,), m."""
+    """Return the length of elements (m, 5), (m,), m."""
     chord = np.hypot(elements[:, 2] - elements[:, 0], elements[:, 3] - elements[:, 1])
     bulge = np.abs(elements[:, 4])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -173,7 +173,7 @@ def element_lengths(elements: Float) -> Float:
 
 
 def _turning_area(elements: Float) -> float:
-    """Area to the left of the way along elements and straight back, m²: between vertices, and of the segments of arcs."""
+    """Return the area left of the way along elements and straight back, m²: between vertices, plus arc segments."""
     x0, y0, x1, y1, bulge = elements.T
     turn = 4.0 * np.arctan(bulge)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -190,7 +190,7 @@ def _reversed(elements: Float) -> Float:
 
 
 def _begun_below(elements: Float) -> Float:
-    """The same closed outline, begun straight below the axis, where it is lowest."""
+    """Return the same closed outline, beginning straight below the axis, where it is lowest."""
     outline = Outline(elements)
     line = outline.flattened()
     x, y = line.T
@@ -204,7 +204,7 @@ def _begun_below(elements: Float) -> Float:
 
 
 def _share_below(outline: Outline, line: Float, k: int) -> float:
-    """Share of the length at which the outline passes below the axis, near chord k, by the secant method."""
+    """Return the share of the length at which the outline passes below the axis, near chord k (secant method)."""
     steps = np.hypot(*np.diff(line, axis=0).T)
     low, high = (steps[:k].sum() / steps.sum(), steps[: k + 1].sum() / steps.sum())
     low, high = low - 1e-6, high + 1e-6
@@ -216,14 +216,14 @@ def _share_below(outline: Outline, line: Float, k: int) -> float:
 
 
 def _within(elements: Float, at: Float) -> tuple[Float, Float]:
-    """Points and inward unit normals, both (n, 2), at shares (n,) of the lengths of elements (n, 5)."""
+    """Return points and inward unit normals, both (n, 2), at shares (n,) of the lengths of elements (n, 5)."""
     begin, end, bulge = elements[:, :2], elements[:, 2:4], elements[:, 4]
     chord = end - begin
     length = np.hypot(*chord.T)[:, None]
     ahead = chord / length
     left = np.column_stack([-ahead[:, 1], ahead[:, 0]])
-    half = 2.0 * np.arctan(bulge)  # of the angle that it turns through
-    # Of an arc, the chord to the point is sin(a/2)/sin(half) of the chord long, and turned against it by half - a/2.
+    half = 2.0 * np.arctan(bulge)  # half of the arc's angle
+    # The chord to a point at angle a is sin(a/2)/sin(half) of the arc's chord long, and turned against it by half - a/2.
     turned = half * at
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(bulge == 0.0, at, np.sin(turned) / np.where(bulge == 0.0, 1.0, np.sin(half)))

@@ -1,4 +1,4 @@
-"""The plane of a ring, which a point that was aimed at a wrong place does not tilt, and the ring's directions in it."""
+"""Plane of a ring, fitted robustly against single wrong points, and the ring's directions in it."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from tunneldb.shape.limits import BAD_SHARE, FEW, LEVEL_OWN
 from tunneldb.shape.tukey import CUT, weights
 
 ASIDE = 0.05
-"""A prism that stands so far off the plane of the others, along the tunnel, does not belong to it, m."""
+"""Distance from the plane of the other prisms, along the tunnel, beyond which a prism does not belong to it, m."""
 
 _TRIPLES = 200
 _STEPS = 20
-_LEAST_SPREAD = 1e-4  # m; points of a drawing lie in their plane exactly
+_LEAST_SPREAD = 1e-4  # m; points of a drawing are exactly in their plane
 
 
 @dataclass(frozen=True)
 class RingPlane:
-    """Plane of a ring with the directions that clock positions are counted by.
+    """Plane of a ring, with the directions from which clock positions are counted.
 
     Attributes
     ----------
     origin : (3,) float array
-        A point of it, m.
+        A point of the plane, m.
     normal, right, up : (3,) float arrays
         Unit vectors: up-chainage, level to the right, and upwards in the plane.
     spread : float
-        Standard deviation of the points from it, m; 0 where the plane was given.
+        Standard deviation of the points from it, m; 0 if the plane was given.
     """
 
     origin: Float
@@ -42,22 +42,22 @@ class RingPlane:
 
     @classmethod
     def across(cls, origin: Float, normal: Float, spread: float = 0.0) -> RingPlane:
-        """Plane through a point across a direction that is not vertical."""
+        """Make a plane through a point, across a direction that is not vertical."""
         normal = normal / np.linalg.norm(normal)
         right = np.array([normal[1], -normal[0], 0.0])
         right /= np.linalg.norm(right)
         return cls(origin, normal, right, np.cross(right, normal), spread)
 
     def project(self, xyz: Float) -> Float:
-        """Coordinates (n, 2) in the plane, right and up of the origin, of points (n, 3), m."""
+        """Return coordinates (n, 2) in the plane, right and up of the origin, of points (n, 3), m."""
         return (xyz - self.origin) @ np.column_stack([self.right, self.up])
 
     def along(self, xyz: Float) -> Float:
-        """Distance (n,) of points (n, 3) from the plane, up-chainage positive, m."""
+        """Return the distance (n,) of points (n, 3) from the plane, up-chainage positive, m."""
         return (xyz - self.origin) @ self.normal
 
     def to_space(self, plane: Float) -> Float:
-        """Points (n, 3) of coordinates (n, 2) in the plane, m."""
+        """Return points (n, 3) for coordinates (n, 2) in the plane, m."""
         return self.origin + plane @ np.vstack([self.right, self.up])
 
 
@@ -69,18 +69,18 @@ def fit_plane(xyz: Float, ahead: Float) -> RingPlane | None:
     xyz : (n, 3) float array
         Points of a ring, m, n ≥ 4.
     ahead : (3,) float array
-        Direction up-chainage, to which side the normal points.
+        Direction up-chainage; the normal points that way.
 
     Returns
     -------
     RingPlane or None
-        None where the points lie on a line, or in a plane that is level.
+        None if the points lie on a line, or in a horizontal plane.
 
     Notes
     -----
-    Few points: least squares without what stands aside of all others; prisms are set up by hand, and what is within `ASIDE`
-    says as much of where the ring is as any other. Many: Tukey's weights, from the triple with the least median of distances
-    (Rousseeuw, 1984).
+    Few points: least squares without points far from the plane of all others. Prisms are set up by hand, and within
+    `ASIDE` each says equally well where the ring is. Many points: Tukey's weights, starting from the triple with the least
+    median of distances (Rousseeuw, 1984).
     """
     origin = np.median(xyz, axis=0)
     found = _few(xyz - origin) if len(xyz) <= FEW else _many(xyz - origin)
@@ -93,7 +93,7 @@ def fit_plane(xyz: Float, ahead: Float) -> RingPlane | None:
 
 
 def _few(near: Float) -> tuple[Float, Float, float] | None:
-    """Point, normal and spread of the plane of few points, tested one by one."""
+    """Return point, normal and spread of the plane of few points, tested one by one."""
     used = np.ones(len(near), bool)
     for left in range(int(np.ceil(len(near) * BAD_SHARE)), -1, -1):
         found = _principal(near[used], np.ones(int(used.sum())))
@@ -111,7 +111,7 @@ def _few(near: Float) -> tuple[Float, Float, float] | None:
 
 
 def _aside(centred: Float, normal: Float, off: Float) -> int | None:
-    """Point that stands more than `ASIDE` off the plane through the others, which agree too well for it to be chance."""
+    """Return a point more than `ASIDE` off the plane of the others, if they agree too well for chance; else None."""
     design = np.column_stack([np.ones(len(off)), centred - np.outer(off, normal)])
     share = 1.0 - np.einsum("ij,ji->i", design, np.linalg.pinv(design))
     share = np.maximum(share, 1e-6)
@@ -124,7 +124,7 @@ def _aside(centred: Float, normal: Float, off: Float) -> int | None:
 
 
 def _many(near: Float) -> tuple[Float, Float, float] | None:
-    """Point, normal and spread of the plane of many points."""
+    """Return point, normal and spread of the plane of many points."""
     begun = _best_triple(near)
     if begun is None:
         return None
@@ -145,7 +145,7 @@ def _many(near: Float) -> tuple[Float, Float, float] | None:
 
 
 def _principal(near: Float, weight: Float) -> tuple[Float, Float] | None:
-    """Centre of gravity of weighted points, and the axis along which they spread least; None where they lie on a line."""
+    """Return the centroid of weighted points, and their axis of least spread; None if they lie on a line."""
     middle = weight @ near / weight.sum()
     centred = near - middle
     values, axes = np.linalg.eigh((centred * weight[:, None]).T @ centred)
@@ -153,13 +153,13 @@ def _principal(near: Float, weight: Float) -> tuple[Float, Float] | None:
 
 
 def _best_triple(near: Float) -> tuple[Float, Float] | None:
-    """Point and normal of the plane through three of the points to which the half of them lies nearest."""
+    """Return point and normal of the plane through three of the points that is nearest to half of all."""
     random = np.random.default_rng(len(near))
     triples = random.integers(0, len(near), (_TRIPLES, 3))
     first = near[triples[:, 0]]
     normals = np.cross(near[triples[:, 1]] - first, near[triples[:, 2]] - first)
     area = np.linalg.norm(normals, axis=1)
-    wide = area > 0.1 * area.max()  # long thin triangles lead away from the plane
+    wide = area > 0.1 * area.max()  # long thin triangles give poor planes
     if not area.max() > 0.0:
         return None
     first, normals = first[wide], normals[wide] / area[wide, None]

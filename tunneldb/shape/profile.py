@@ -13,12 +13,12 @@ from tunneldb.shape.outline import Outline, matched
 from tunneldb.threads import in_blocks
 
 SECTIONS = 100
-"""Sections whose points are held against the design at a time."""
+"""Number of sections compared with the design at a time."""
 
 
 @dataclass(frozen=True)
 class Profile:
-    """A profile that holds from one chainage to another.
+    """Profile that applies from one chainage to another.
 
     Attributes
     ----------
@@ -36,16 +36,16 @@ class Profile:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stretch in which one profile holds, or one goes over into the next.
+    """Stretch with one profile, or with a transition between two.
 
     Attributes
     ----------
     name : str
-        Of the profile, or of both.
+        Name of the profile, or of both.
     low, high : float
         Chainage, m.
     first, second : Outline
-        What holds at its begin and its end, with as many elements.
+        Outlines at its begin and its end, with equally many elements.
     """
 
     name: str
@@ -55,29 +55,29 @@ class Stretch:
     second: Outline
 
     def share(self, chainage: Float) -> Float:
-        """How far the transition has come at chainages (n,), 0 to 1; 0 where there is none."""
+        """Return the progress of the transition at chainages (n,), 0 to 1; 0 if there is no transition."""
         if self.first is self.second:
             return np.zeros(np.shape(chainage))
         return np.asarray(np.clip((chainage - self.low) / (self.high - self.low), 0.0, 1.0))
 
     def at(self, chainage: float) -> Outline:
-        """Outline at a chainage, m."""
+        """Return the outline at a chainage, m."""
         share = float(self.share(np.array(chainage)))
         return Outline((1.0 - share) * self.first.elements + share * self.second.elements)
 
 
 def stretches(profiles: Sequence[Profile]) -> list[Stretch]:
-    """Profiles of one layer, in order of chainage, with linear transitions over what lies between one and the next.
+    """Return the profiles of one layer in order of chainage, with linear transitions over gaps between them.
 
     Notes
     -----
-    In a transition begin, end and bulge of each element go linearly from those of the one profile to those of the other. So
-    lines stay lines and arcs arcs; of concentric circles the radius goes linearly.
+    In a transition begin, end and bulge of each element change linearly from one profile to the next. So lines stay lines and
+    arcs stay arcs; the radius of concentric circles changes linearly.
 
     Raises
     ------
     ValueError
-        If two overlap, or cannot go over into each other.
+        If two profiles overlap, or no transition between them is possible.
     """
     ordered = sorted(profiles, key=lambda profile: profile.chainage_from)
     found: list[Stretch] = []
@@ -97,16 +97,16 @@ def stretches(profiles: Sequence[Profile]) -> list[Stretch]:
 
 @dataclass(frozen=True)
 class Deviation:
-    """Of points of sections, arrays (sections, points); NaN where the nearest place is an end of an open outline.
+    """Deviation of points of sections, arrays (sections, points); NaN where the nearest place is an end of an open outline.
 
     Attributes
     ----------
     distance : float array
         Orthogonal distance from the outline, positive inside, m.
     share : float array
-        Place of the foot along the outline, as a share of its length, 0 to 1.
+        Place of the nearest point along the outline, as a share of its length, 0 to 1.
     curvature : float array
-        Of the outline at the foot, positive where it is concave seen from inside, 1/m.
+        Curvature of the outline at that point, positive where concave as seen from inside, 1/m.
     """
 
     distance: Float
@@ -115,21 +115,21 @@ class Deviation:
 
 
 def deviation(stretch: Stretch, chainage: Float, right: Float, up: Float) -> Deviation:
-    """Signed deviation of points from a design.
+    """Compute the signed deviation of points from a design.
 
     Parameters
     ----------
     stretch : Stretch
         The design.
     chainage : (c,) float array
-        Of the sections, m.
+        Chainage of the sections, m.
     right, up : (c, n) float arrays
         Points of each section, right of the axis and above it, m.
 
     Notes
     -----
-    The nearest place of each element is that of the line through it, or of the circle, if it lies within the element, else the
-    nearer end. At a vertex the side is that of the bisector.
+    The nearest place on an element is that of its line or circle, if it lies within the element, else the nearer end. At a
+    vertex the bisector decides the side.
     """
     share = stretch.share(chainage)
     right, up = np.ascontiguousarray(right, np.float64), np.ascontiguousarray(up, np.float64)
@@ -147,15 +147,15 @@ def deviation(stretch: Stretch, chainage: Float, right: Float, up: Float) -> Dev
 
 
 def signed_distance(outline: Outline, points: Float) -> Float:
-    """Signed distance of points (n, 2) from an outline, (n,), positive inside, m; NaN beyond the ends of an open one."""
+    """Return the signed distance of points (n, 2) from an outline, (n,), positive inside, m; NaN beyond open ends."""
     stretch = Stretch("", 0.0, 0.0, outline, outline)
     return deviation(stretch, np.zeros(1), points[None, :, 0], points[None, :, 1]).distance[0]
 
 
 def strip_area(distance: Float, curvature: Float) -> Float:
-    """Area between an outline and what lies off it by a distance, by metre of the outline, m²/m; of the distance's sign.
+    """Return the area between an outline and a parallel at a distance, per metre of the outline, m²/m, with that sign.
 
-    Between an arc of radius r and one r - d lie d (1 - d / 2 r) by metre of the first.
+    Between an arc of radius r and one of radius r - d the area is d (1 - d / 2 r) per metre of the first.
     """
     return np.asarray(distance * (1.0 - curvature * distance / 2.0))
 
@@ -172,9 +172,9 @@ def _deviation(
     share: Float,
     curvature: Float,
 ) -> None:  # pragma: no cover - compiled
-    """What :func:`deviation` says, section by section; the last three arrays are overwritten."""
+    """Compute :func:`deviation` section by section; the last three arrays are overwritten."""
     count = first.shape[0]
-    # Of each element: begin, end, inward normal at both; length, bulge; of an arc centre, radius, direction of its middle,
+    # For each element: begin, end, inward normal at both; length, bulge; for an arc centre, radius, direction of its middle,
     # cosine of half its angle.
     e = np.empty((count, 16))
     before = np.empty(count + 1)
@@ -191,9 +191,9 @@ def _deviation(
             )
             chord = np.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
             ax, ay = (x1 - x0) / chord, (y1 - y0) / chord
-            cosine, sine = (1.0 - b * b) / (1.0 + b * b), 2.0 * b / (1.0 + b * b)  # of half the angle that it turns through
+            cosine, sine = (1.0 - b * b) / (1.0 + b * b), 2.0 * b / (1.0 + b * b)  # of half the arc's angle
             e[k, 0], e[k, 1], e[k, 2], e[k, 3] = x0, y0, x1, y1
-            # Inward is the direction turned right; the direction is the chord's turned by minus and plus half the angle.
+            # Inward is the direction turned right; the direction is the chord's, turned by minus and plus half the angle.
             e[k, 4], e[k, 5] = ay * cosine - ax * sine, -ax * cosine - ay * sine
             e[k, 6], e[k, 7] = ay * cosine + ax * sine, -ax * cosine + ay * sine
             e[k, 8], e[k, 9] = chord, b

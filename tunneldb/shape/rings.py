@@ -1,4 +1,4 @@
-"""The shape of one ring from its points: its plane, then circle, ellipse and harmonics in it."""
+"""Shape of one ring from its points: its plane, then circle, ellipse and harmonics in the plane."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ from tunneldb.shape.limits import FEW
 from tunneldb.shape.plane import RingPlane, fit_plane
 
 LEAST_POINTS = 5
-"""A circle and two points to check it."""
+"""Minimum number of points: a circle and two points to check it."""
 
 FLAT = RingPlane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), 0.0)
-"""Plane of points that are given in it: right is x, up is z."""
+"""Plane of points given in the plane itself: right is x, up is z."""
 
 _POOLED_FREEDOM = 24
-"""Points left over in all rings together from which on they say what a point is good for."""
+"""Minimum redundancy of all rings together for estimating the accuracy of a point from them."""
 
 
 class RingRefusedError(ValueError):
-    """Points of which no ring can be made; the message says why, as a remark."""
+    """Points that form no ring; the message gives the reason, as a remark."""
 
 
 @dataclass(frozen=True)
 class Ring:
-    """A ring as fitted.
+    """Fitted ring.
 
     Attributes
     ----------
     plane : RingPlane
-        The plane that the rest is in.
+        Plane of the ring.
     adjustment : Adjustment
-        Ellipse, or circle where the points determine no ellipse.
+        Ellipse, or circle if the points do not determine an ellipse.
     harmonics : Harmonics
-        Of the radius about the ellipse's centre.
+        Harmonics of the radius about the ellipse's centre.
     inward, outward : Departure
-        Greatest departures from the circle of the mean radius.
+        Greatest departures from the circle with the mean radius.
     gap : float
         Widest angle at the centre without a point, °.
     along : (n,) float array
@@ -60,12 +60,12 @@ class Ring:
 
     @property
     def is_ellipse(self) -> bool:
-        """Whether its ellipse is determined."""
+        """True if the ellipse is determined."""
         return self.adjustment.free == ELLIPSE
 
     @property
     def used(self) -> Bool:
-        """Which points the fit rests on, (n,)."""
+        """True for points used by the fit, (n,)."""
         return self.adjustment.used
 
     @property
@@ -75,7 +75,7 @@ class Ring:
 
     @property
     def centre_covariance(self) -> Float:
-        """Its covariance (3, 3), m²: of the fit in the plane, and of the plane along the tunnel."""
+        """Covariance of the centre (3, 3), m²: from the fit in the plane, and from the plane along the tunnel."""
         across = np.vstack([self.plane.right, self.plane.up])
         along = self.plane.spread**2 / max(int(self.used.sum()), 1)
         within = across.T @ self.adjustment.ellipse.covariance[:2, :2] @ across
@@ -96,26 +96,25 @@ def fit_ring(
     Parameters
     ----------
     points : (n, 2) or (n, 3) float array
-        Points, m: to the right and up in the ring's plane, or in space. From eight of a total station to thousands of a scan.
+        Points, m: right and up in the ring's plane, or in space. From eight of a total station to thousands of a scan.
     ahead : (3,) float array, optional
-        Direction of the axis up-chainage; needed in space.
+        Direction of the axis up-chainage; required for points in space.
     across : bool
-        Take the plane across ``ahead`` instead of the one that the points lie in: for those of a scan, which fill the ring's
-        length.
+        Use the plane across ``ahead`` instead of the plane of the points: for points of a scan, which fill the ring's length.
     offset : (n,) float array, optional
-        How far each point stands before the lining, towards the centre, m.
+        Distance of each point from the lining, towards the centre, m.
     sigma : float, optional
-        What a point is good for, its standard deviation across the lining, m; of few points it tells which is wrong.
+        Standard deviation of a point across the lining, m; with few points it decides which one is an outlier.
     orders : int
-        Harmonics that are wanted.
+        Number of harmonics requested.
 
     Raises
     ------
     RingRefusedError
-        When there are fewer than 5 points, or they determine no circle.
+        If there are fewer than 5 points, or they determine no circle.
     """
     if len(points) < LEAST_POINTS:
-        raise RingRefusedError(f"{len(points)} points, a ring needs {LEAST_POINTS}")
+        raise RingRefusedError(f"only {len(points)} points; a ring needs {LEAST_POINTS}")
     plane = _plane(points, ahead, across)
     xy = points if points.shape[1] == 2 else plane.project(points)
     start = begin(xy)
@@ -143,12 +142,12 @@ def _plane(points: Float, ahead: Float | None, across: bool) -> RingPlane:
         return RingPlane.across(np.median(points, axis=0), ahead)
     plane = fit_plane(points, ahead)
     if plane is None:
-        raise RingRefusedError("the points lie on a line or level, and make no plane across the tunnel")
+        raise RingRefusedError("the points lie on a line or in a horizontal plane: no plane across the tunnel")
     return plane
 
 
 def _adjusted(xy: Float, start: Float, sigma: float | None) -> Adjustment:
-    """Ellipse where it is determined, else circle; refused where not even that is."""
+    """Fit an ellipse if it is determined, else a circle; raise an error if neither is."""
     if len(xy) > ELLIPSE:
         ellipse = adjust(xy, start, ELLIPSE, sigma)
         if ellipse.inflation <= HOPELESS[ELLIPSE] and ellipse.freedom > 0 and _sensible(ellipse):
@@ -156,26 +155,26 @@ def _adjusted(xy: Float, start: Float, sigma: float | None) -> Adjustment:
     circle = adjust(xy, start, CIRCLE, sigma)
     if not circle.inflation <= HOPELESS[CIRCLE]:
         seen = 360.0 - _gap(clock_of(xy[circle.used], circle.ellipse.centre))
-        raise RingRefusedError(f"the points lie on {seen:.0f}° of a circle, which does not determine it")
+        raise RingRefusedError(f"the points cover {seen:.0f}° of a circle, too little to determine it")
     return circle
 
 
 def _sensible(adjustment: Adjustment) -> bool:
-    """Whether an ellipse is one of a ring: not flattened to less than half, as those are that run through stray points."""
+    """Return True for a plausible ellipse: one through stray points is flattened to less than half."""
     return adjustment.ellipse.radius > 0.0 and adjustment.ellipse.flattening < adjustment.ellipse.radius / 3.0
 
 
 def _gap(clock: Float) -> float:
-    """Widest angle without a point, °."""
+    """Return the widest angle without a point, °."""
     at = np.sort(clock)
     return float(np.diff(at, append=at[0] + 360.0).max())
 
 
 def pooled_sigma(rings: Sequence[Ring]) -> float | None:
-    """What a point is good for, from all rings of few points together, m; None where they say too little.
+    """Estimate the standard deviation of a point from all rings of few points together, m; None if they determine none.
 
-    The median of the rings' own variances, each by what of it is exceeded by chance in half of all cases: rings with an
-    error do not move it.
+    The median of the rings' own variances, each divided by its median under the null hypothesis, so that rings with outliers
+    do not change it.
     """
     few = [ring.adjustment for ring in rings if ring.adjustment.freedom > 0 and len(ring.used) <= FEW]
     if sum(one.freedom for one in few) < _POOLED_FREEDOM:
@@ -186,7 +185,7 @@ def pooled_sigma(rings: Sequence[Ring]) -> float | None:
 
 @dataclass(frozen=True)
 class RingPoints:
-    """Points of one ring, as `fit_ring` takes them; lengths m."""
+    """Points of one ring, for `fit_ring`; lengths in m."""
 
     points: Float
     ahead: Float | None = None
@@ -196,23 +195,23 @@ class RingPoints:
 def fit_rings(
     rings: Sequence[RingPoints], sigma: float | None = None, orders: int = 3
 ) -> tuple[list[Ring | str], float | None]:
-    """Fit many rings of few points: first each by itself, then with what all of them say a point is good for.
+    """Fit many rings of few points: first each by itself, then with the standard deviation pooled from all.
 
     Parameters
     ----------
     rings
         Points of each.
     sigma : float, optional
-        What a point is good for, m, where that is known; else it is found.
+        Standard deviation of a point, m, if known; else it is estimated.
     orders : int
-        Harmonics that are wanted.
+        Number of harmonics requested.
 
     Returns
     -------
     rings : list of Ring or str
-        Each ring, or why there is none.
+        Each ring, or the reason why there is none.
     sigma : float or None
-        What a point was taken to be good for, m.
+        Standard deviation of a point that was used, m.
     """
     if sigma is None:
         alone = [_tried(ring, None, orders) for ring in rings]

@@ -1,4 +1,4 @@
-"""Tukey's biweight: what lies farther off than a limit has no weight at all."""
+"""Tukey's biweight: residuals beyond a limit have no weight."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ CUT = 4.685
 
 
 def weights(u: Float) -> Float:
-    """Weights (n,) of residuals (n,) in units of the limit."""
+    """Return the weights (n,) of residuals (n,) in units of the limit."""
     return np.clip(1.0 - u**2, 0.0, None) ** 2
 
 
 def rate(u: Float) -> Float:
-    """Derivative (n,) of weight times residual by the residual, of residuals (n,) in units of the limit."""
+    """Return the derivative (n,) of weight times residual by the residual, for residuals (n,) in units of the limit."""
     inside = np.clip(1.0 - u**2, 0.0, None)
     return inside * (1.0 - 5.0 * u**2)

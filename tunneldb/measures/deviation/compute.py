@@ -1,4 +1,4 @@
-"""Overbreak and underbreak of steps of chainage, from the deviation of pixels, in cells along the profile."""
+"""Overbreak and underbreak by step of chainage, from the deviation of pixels, in cells along the profile."""
 
 from __future__ import annotations
 
@@ -11,35 +11,35 @@ from tunneldb.shape.outline import Outline
 from tunneldb.shape.profile import Deviation, strip_area
 
 CELL = 0.1
-"""Length of a cell along the profile, m, where pixels are a third of it or less."""
+"""Length of a cell along the profile, m, if pixels are a third of it or less."""
 
 LEAST_PIXELS = 3
-"""A cell with fewer pixels counts as unseen."""
+"""Minimum number of pixels in a cell; with fewer the cell counts as unseen."""
 
 _SEEN_FOR_SHIFT = 0.4
-"""Less of a profile seen tells nothing of how the lining lies as a whole, share."""
+"""Minimum seen share of a profile for the shift of the whole lining to be computed."""
 
 
 @dataclass(frozen=True)
 class SectionDeviation:
-    """The lining of a step of chainage against its design.
+    """Deviation of a step of chainage from its design.
 
     Attributes
     ----------
     design_length, seen_length : float
-        Length of the profile, and what of it is seen, m.
+        Length of the profile, and of its seen part, m.
     overbreak, underbreak : float
-        Area of the lining outside and inside the profile, of what is seen, m².
+        Area of the seen lining outside and inside the profile, m².
     noise_area : float
-        Standard deviation of underbreak less overbreak by the scatter of pixels, m².
+        Standard deviation of underbreak minus overbreak from the scatter of pixels, m².
     over_by, under_by : (2,) float arrays
-        By how much overbreak and underbreak grow when the axis moves to the right, and up, m²/m.
+        Increase of overbreak and underbreak if the axis moves to the right, and up, m²/m.
     sigma : float
-        Scatter of pixels within cells, m; NaN where nothing is seen.
+        Scatter of pixels within cells, m; NaN if nothing is seen.
     shift : (2,) float array
-        How far the lining as a whole lies right of the profile and above it, m; NaN where too little is seen.
+        Shift of the whole lining to the right of the profile and above it, m; NaN if too little is seen.
     deviation : (n,) float array
-        Mean of each cell, in its middle, m, positive inside; NaN where unseen.
+        Mean of each cell, at its middle, m, positive inside; NaN where unseen.
     """
 
     design_length: float
@@ -55,12 +55,12 @@ class SectionDeviation:
 
     @property
     def mean(self) -> float:
-        """Mean of the cells, m; NaN where nothing is seen."""
+        """Mean of the cells, m; NaN if nothing is seen."""
         seen = self.deviation[np.isfinite(self.deviation)]
         return float(seen.mean()) if len(seen) else np.nan
 
     def extreme(self, sign: float) -> tuple[float, float]:
-        """Greatest (1) or least (-1) mean of a cell, m, and how far along the profile its middle is, m; NaN without any."""
+        """Return the greatest (1) or least (-1) mean of a cell, m, and the place of its middle along the profile, m, or NaN."""
         seen = np.flatnonzero(np.isfinite(self.deviation))
         if not len(seen):
             return np.nan, np.nan
@@ -69,28 +69,28 @@ class SectionDeviation:
 
 
 def cell_length(pixel: float) -> float:
-    """Length of a cell, m, that holds three pixels or more of a side, m."""
+    """Return the length of a cell, m, for pixels of a side, m: at least three pixels."""
     return max(CELL, 3.0 * pixel)
 
 
 def section_deviation(found: Deviation, outline: Outline, pixel: float) -> SectionDeviation:
-    """Sum up the pixels of a step of chainage.
+    """Summarise the pixels of a step of chainage.
 
     Parameters
     ----------
     found : Deviation
-        Of pixels of the lining; others are NaN.
+        Deviation of pixels of the lining; NaN for others.
     outline : Outline
-        The design in the middle of the step.
+        Design in the middle of the step.
     pixel : float
         Side of a pixel, m.
 
     Notes
     -----
-    The area of a cell is the mean, over its pixels, of d (1 - κ d / 2), times its length; one with fewer than LEAST_PIXELS
-    pixels is unseen. Towards an unseen neighbour a cell ends with its last pixel. Of each pixel what is outside and what is
-    inside are kept apart, so that they don't cancel within a cell. The means that are stored are those in the middle of cells:
-    pixels do not lie evenly in each, which on a slope would count.
+    The area of a cell is the mean, over its pixels, of d (1 - κ d / 2), times its length. A cell with fewer than LEAST_PIXELS
+    pixels is unseen. Next to an unseen cell, a cell ends with its last pixel. Areas outside and inside are summed separately,
+    so that they do not cancel within a cell. Stored means refer to the middle of cells, because pixels are not spread evenly in
+    each, which matters on a slope.
     """
     length = outline.length
     count = max(int(np.ceil(length / cell_length(pixel) - 1e-9)), 1)
@@ -130,17 +130,17 @@ def section_deviation(found: Deviation, outline: Outline, pixel: float) -> Secti
 
 
 def _seen_parts(within: Float, cell: Int64, seen: Bool, half: float, closed: bool) -> Float:
-    """What of each cell (n,) is seen, 0 to 1: all of it between seen neighbours, else up to its last pixel.
+    """Return the seen part of each cell (n,), 0 to 1: all of it between seen neighbours, else up to its last pixel.
 
     Parameters
     ----------
     within, cell : (p,) arrays
-        Where in its cell each pixel is, 0 to 1, and in which.
+        Place of each pixel within its cell, 0 to 1, and the cell's number.
     seen : (n,) bool array
     half : float
         Half a pixel, in cells.
     closed : bool
-        Whether the first cell follows the last.
+        True if the first cell follows the last.
     """
     low, high = np.ones(len(seen)), np.zeros(len(seen))
     np.minimum.at(low, cell, within)
@@ -154,9 +154,9 @@ def _seen_parts(within: Float, cell: Int64, seen: Bool, half: float, closed: boo
 
 
 def _slope(mean: Float, closed: bool) -> Float:
-    """By how much the mean grows from cell to cell, (n,): the lesser way to both neighbours, 0 where they differ in sign.
+    """Return the slope of the mean from cell to cell, (n,): the smaller of both sides, 0 where they differ in sign.
 
-    So a step, or a neighbour that was not seen, makes none.
+    So a step, or an unseen neighbour, makes no slope.
     """
     rise = np.diff(mean, prepend=mean[-1] if closed else np.nan)
     after = np.roll(rise, -1)
@@ -164,7 +164,7 @@ def _slope(mean: Float, closed: bool) -> Float:
 
 
 def _shift(mean: Float, inward: Float) -> Float:
-    """How far the lining lies right of the profile and above it, by least squares of its cells, with a size of its own."""
+    """Return the lining's shift right of the profile and above it, by least squares of its cells, with a free size."""
     seen = np.isfinite(mean)
     if seen.mean() < _SEEN_FOR_SHIFT:
         return np.full(2, np.nan)

@@ -1,4 +1,4 @@
-"""What lies between two surfaces that were held against the same design profile: thickness and area, in cells along it."""
+"""Layer between two surfaces with the same design profile: thickness and area, in cells along it."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from tunneldb.shape.outline import Outline
 from tunneldb.shape.profile import strip_area
 
 LEAST_SEEN = 0.5
-"""A cell made of cells of another length counts as seen where more than this share of it was."""
+"""Minimum seen share of a cell made of cells of another length."""
 
 
 @dataclass(frozen=True)
 class SectionThickness:
-    """What lies between two surfaces, of a step of chainage.
+    """Layer between two surfaces in a step of chainage.
 
     Attributes
     ----------
     design_length, compared_length : float
-        Length of the profile, and what of it both saw, m.
+        Length of the profile, and of the part that both saw, m.
     area : float
-        Area between the surfaces, of what both saw, positive where the later one lies inside of the earlier one, m².
+        Area between the surfaces where both saw, positive where the later one is inside the earlier one, m².
     area_by : (2,) float array
-        By how much it grows when the later surface moves to the right, and up, m²/m.
+        Increase of the area if the later surface moves to the right, and up, m²/m.
     thickness : (n,) float array
-        Of each cell, at right angles to the profile, m; NaN where either saw nothing.
+        Thickness in each cell, at right angles to the profile, m; NaN where either saw nothing.
     """
 
     design_length: float
@@ -44,7 +44,7 @@ class SectionThickness:
 
     @property
     def least(self) -> tuple[float, float]:
-        """Least of a cell, m, and how far along the profile its middle is, m; NaN without any."""
+        """Return the least value of a cell, m, and the place of its middle along the profile, m; NaN if there is none."""
         if not np.isfinite(self.thickness).any():
             return np.nan, np.nan
         k = int(np.nanargmin(self.thickness))
@@ -52,21 +52,22 @@ class SectionThickness:
 
 
 def section_thickness(before: Float, after: Float, outline: Outline) -> SectionThickness:
-    """Thickness and area between two surfaces.
+    """Compute thickness and area between two surfaces.
 
     Parameters
     ----------
     before, after : (n,), (m,) float arrays
-        Deviation of both from one profile in cells of equal length along it, m, positive inside; NaN unseen. Where they have
-        cells of different length, the longer ones count.
+        Deviation of both from one profile in cells of equal length along it, m, positive inside; NaN where unseen. If their
+        cells differ in length, the longer ones are used.
     outline : Outline
         The profile.
 
     Notes
     -----
-    A point of either surface is taken where its foot on the profile is, so that a cell compares what lies on one normal of the
-    profile: thickness is measured along that. Against the way at right angles to a surface that is inclined to the profile by
-    an angle a it is longer by 1 / cos a, 0.4 % at 5°. Areas are those between parallel curves (Steiner) of each cell.
+    A point of either surface is assigned to its foot on the profile, so that a cell compares points on one normal of the
+    profile: thickness is measured along that. Compared with the distance at right angles to a surface inclined to the profile
+    by an angle a it is longer by a factor 1 / cos a, 0.4 % at 5°. Areas are those between parallel curves (Steiner) of each
+    cell.
     """
     count = min(len(before), len(after))
     old, new = resampled(before, count), resampled(after, count)
@@ -86,7 +87,7 @@ def section_thickness(before: Float, after: Float, outline: Outline) -> SectionT
 
 
 def resampled(values: Float, count: int) -> Float:
-    """Means of cells (n,) in fewer cells of equal length (count,), NaN where too little of one was seen."""
+    """Return means of cells (n,) in fewer cells of equal length (count,), NaN where too little was seen."""
     values = np.asarray(values, np.float64)
     if len(values) == count:
         return values

@@ -13,20 +13,20 @@ STEP = 0.001
 """Step in which offsets are stored, m."""
 
 SEEN_SHARE = 1.0 / 3.0
-"""A cell of which a smaller share of the pixels is lining was not seen."""
+"""Minimum share of a cell's pixels that are lining; with less the cell was not seen."""
 
 LEAST_SIDE = 3
-"""Side of a cell, in pixels, at least: a plane takes three pixels, and a scatter by few says little."""
+"""Minimum side of a cell, in pixels: a plane takes three pixels, and scatter needs several."""
 
 SLOPE = 3.0
-"""Slopes are of relief from so many standard deviations on."""
+"""Standard deviations from which a slope is one of the relief."""
 
 EDGE = 2
-"""Cells so near to a wide stretch of what is not seen are not compared."""
+"""Width of the margin beside wide unseen stretches that is not compared, in cells."""
 
 _SUMS = 10
 _LEAST = 8  # pixels
-_SPREAD = 0.2  # of the pixels in a cell, against that of a full one (1/12 of its side squared): else the plane hangs in the air
+_SPREAD = 0.2  # minimum spread of the pixels relative to a full cell (1/12 of its side squared): else the plane extrapolates
 
 
 @dataclass(frozen=True)
@@ -61,16 +61,16 @@ class CellGrid:
 
 @dataclass(frozen=True)
 class Cells:
-    """What an epoch shows of the cells, (rows, columns) float32 each; NaN where it did not see them.
+    """Offsets of an epoch by cell, (rows, columns) float32 each; NaN where not seen.
 
     Attributes
     ----------
     offset : m
-        Of the fitted plane in the middle of the cell, positive inwards.
+        Offset of the fitted plane in the middle of the cell, positive inwards.
     variance : m²
-        Of that, by the scatter of the pixels about the plane, as if they were independent, and by the rounding of offsets.
+        Variance of that, from the scatter of the pixels about the plane, as if independent, and from the rounding of offsets.
     share : 0 to 1
-        Of the cell's pixels that show the lining or a recess of it; 0 where none does.
+        Share of the cell's pixels that show the lining or a recess of it; 0 where none does.
     """
 
     offset: Single
@@ -80,7 +80,7 @@ class Cells:
 
 @dataclass
 class CellSums:
-    """Sums over the pixels of each cell, of which the planes are made."""
+    """Sums over the pixels of each cell, for fitting planes."""
 
     grid: CellGrid
     pixel: float
@@ -91,9 +91,9 @@ class CellSums:
         self.lining, self.recess = (np.zeros((_SUMS, self.grid.rows * self.grid.columns), np.float32) for _ in range(2))
 
     def add(self, chainage: Float, arc: Float, offset: Float, lining: Bool) -> None:
-        """Add pixels (n,): chainage, arc and offset in the plane of the cells, m, and which are lining.
+        """Add pixels (n,): chainage, arc and offset in the plane of the cells, m, and whether each is lining.
 
-        What else is seen is recessed behind it: the back of a niche, a hollow. NaN is passed over.
+        Other pixels are recessed behind the lining: the back of a niche, or a hollow. NaN is skipped.
         """
         grid = self.grid
         x, y = (chainage - grid.west) / grid.cell, (arc - grid.south) / grid.cell
@@ -116,7 +116,7 @@ class CellSums:
                 part[k] += count.reshape(grid.rows, width)
 
     def cells(self, recesses: bool = False) -> Cells:
-        """Planes of the cells that were seen, by their lining, or by their recesses, too."""
+        """Fit planes to the cells that were seen, from their lining, and with ``recesses`` from recesses too."""
         looked = self.lining[0] + self.recess[0].astype(np.float64)
         n, u, v, uu, uv, vv, z, uz, vz, zz = (self.lining + self.recess if recesses else self.lining).astype(np.float64)
         pixels = (self.grid.cell / self.pixel) ** 2
@@ -145,10 +145,10 @@ class CellSums:
 
 
 def with_hollows(old: CellSums, new: CellSums) -> tuple[Cells, Cells]:
-    """Cells of two epochs by their lining, and by all that they show where a hollow came or was filled.
+    """Return the cells of two epochs by their lining, and by everything seen where a hollow appeared or was filled.
 
-    A spall deeper than lining may stand back is no lining any more. Where only one epoch shows lining, over 3 by 3 cells and
-    more, and the other a recess, both are taken with their recesses, lest the mean of a part is held against that of another.
+    A spall deeper than the recess limit of the lining is no longer lining. Where only one epoch shows lining, over 3 by 3 cells
+    or more, and the other a recess, both are taken with their recesses, so that different parts of a cell are not compared.
     """
     cells, deep = ([sums.cells(recesses) for sums in (old, new)] for recesses in (False, True))
     one = np.isnan(cells[0].offset) != np.isnan(cells[1].offset)
@@ -162,10 +162,10 @@ def with_hollows(old: CellSums, new: CellSums) -> tuple[Cells, Cells]:
 
 
 def without_edges(cells: Cells) -> Cells:
-    """Cells without those beside what is not seen, as far as that is no less than 3 by 3 cells.
+    """Return cells without those beside unseen parts, where the unseen part is at least 3 by 3 cells.
 
-    At the foot of a wall, and beside what hangs on it, cells hold mixed pixels, and others in each epoch; what is
-    smoothed in the state of pixels reaches a cell further.
+    At the foot of a wall, and beside fixtures, cells contain mixed pixels, which differ between epochs. The smoothing in
+    the state of pixels reaches one cell further.
     """
     unseen = ndimage.binary_opening(np.isnan(cells.offset), np.ones((3, 3)))
     beside = ndimage.binary_dilation(unseen, np.ones((3, 3)), iterations=EDGE)
@@ -174,9 +174,9 @@ def without_edges(cells: Cells) -> Cells:
 
 
 def slopes(cells: Cells, cell: float) -> tuple[Single, Single]:
-    """Slope of the lining's relief along the tunnel and around it, (rows, columns), over two cells.
+    """Return the slopes of the lining's relief along the tunnel and around it, (rows, columns), over two cells.
 
-    0 where one of them is not seen, and where it is no more than SLOPE times its noise: a smooth lining has none.
+    0 where one of them is not seen, and where the slope is at most SLOPE times its noise.
     """
     found = []
     for axis in (1, 0):
@@ -195,9 +195,9 @@ def slopes(cells: Cells, cell: float) -> tuple[Single, Single]:
 
 
 def rounding_variance(scatter: Float) -> Float:
-    """Variance (n,) of a mean of offsets by their rounding, m², beyond what their own scatter (n,), m², averages out.
+    """Return the variance (n,) of a mean of offsets from their rounding, m², that their own scatter (n,), m², leaves.
 
-    The mean of values with normal scatter s, rounded to steps q, is off by at most q / π · exp(-2 π² s² / q²) (Widrow &
-    Kollár, 2008, eq. 4.27), wherever between two steps it lies; the sine of that has half the variance.
+    The mean of values with normal scatter s, rounded to steps q, deviates by at most q / π · exp(-2 π² s² / q²) (Widrow &
+    Kollár, 2008, eq. 4.27), depending on its place between two steps; the variance of that sine is half its square.
     """
     return np.asarray(0.5 * (STEP / np.pi * np.exp(-2.0 * (np.pi / STEP) ** 2 * scatter)) ** 2)

@@ -1,4 +1,4 @@
-"""What of the difference of two epochs is change: level of detection of cells, and regions of significant change."""
+"""Significant change between two epochs: level of detection of cells, and regions of change."""
 
 from __future__ import annotations
 
@@ -14,38 +14,38 @@ from tunneldb.arrays import Bool, Float, Single
 from tunneldb.robust import MAD_TO_SIGMA
 
 CONFIDENT = 1.96
-"""Standard deviations within which 95 % of normal errors lie."""
+"""Standard deviations that include 95 % of normal errors."""
 
 FALSE_SHARE = 0.05
-"""Share of false windows among those taken for change in a kilometre, at most on average (Benjamini & Hochberg, 1995)."""
+"""Maximum mean share of false windows among those reported as change in a kilometre (Benjamini & Hochberg, 1995)."""
 
 FAMILY_SHARE = 0.05
-"""Share of unchanged kilometres in which a region is reported."""
+"""Share of unchanged kilometres in which a region is reported by chance."""
 
 WINDOW = 3
-"""Side of the windows that are tested, in cells."""
+"""Side of the tested windows, in cells."""
 
 SCALES = (1, 2, 4, 8, 16)
-"""Sides of the squares, in cells, of whose means the scatter is measured."""
+"""Sides of the squares, in cells, for whose means the scatter is measured."""
 
-_FILLED = 0.75  # of a square's cells: with fewer it says nothing on the scatter of such squares
-_PAIRS = 30  # of neighbouring squares: of fewer the scatter is not known well enough
+_FILLED = 0.75  # minimum share of a square's cells for its mean to be used
+_PAIRS = 30  # minimum number of pairs of neighbouring squares for their scatter to be used
 LEAST = 5
-"""Cells of a window: with fewer it is not tested."""
+"""Minimum number of cells in a tested window."""
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """By how much means of squares of cells scatter more than if cells were independent with the variance they state.
+    """Scatter of means of squares of cells, relative to independent cells with the variance they state.
 
     Attributes
     ----------
     sides : (k,) float array
-        Of the squares, in cells.
+        Sides of the squares, in cells.
     factors : (k,) float array
-        On the standard deviation of the mean, growing.
+        Factors on the standard deviation of the mean, increasing.
     tail : float
-        On that of single cells, so that the normal distribution holds for the 95 % that a level of detection is of.
+        Factor on the standard deviation of single cells, so that the normal distribution fits at the 95 % level of detection.
     """
 
     sides: Float
@@ -53,23 +53,23 @@ class Scatter:
     tail: float
 
     def at(self, cells: Float | float) -> Float:
-        """Factor for a mean of so many cells; linear in the logarithm of the side."""
+        """Return the factor for a mean of this number of cells; linear in the logarithm of the side."""
         side = np.maximum(np.sqrt(np.asarray(cells, dtype=np.float64)), 1.0)
         return np.asarray(np.interp(np.log(side), np.log(self.sides), self.factors))
 
 
 @dataclass(frozen=True)
 class Region:
-    """Cells next to each other that changed the same way, and together by more than their level of detection.
+    """Connected cells that changed in the same direction, and together by more than their level of detection.
 
     Attributes
     ----------
     rows, columns : (n,) int arrays
-        Its cells.
+        Cells of the region.
     mean, lod : float
         Mean change and its level of detection, 95 %, m.
     greatest : float
-        Greatest mean of a window in it, with its sign, m.
+        Greatest mean of a window in the region, signed, m.
     """
 
     rows: Float
@@ -80,14 +80,14 @@ class Region:
 
 
 def measure_scatter(difference: Single, variance: Single) -> Scatter:
-    """Scatter of squares of growing side, from the differences between neighbours, as Allan's variance is (Allan, 1966).
+    """Measure the scatter of squares of increasing side from differences between neighbours (Allan, 1966).
 
-    Whole stretches that moved do not enter but at their edges, and these the median leaves out.
+    Stretches that moved as a whole contribute only at their edges, and the median ignores these.
 
     Parameters
     ----------
     difference, variance : (rows, columns) float32 arrays
-        Change of cells, m, and its variance as if all pixels were independent, m²; NaN unseen.
+        Change of cells, m, and its variance if all pixels were independent, m²; NaN where not seen.
     """
     sides, factors, tail = [1.0], [1.0], 1.0
     for side in SCALES:
@@ -112,7 +112,7 @@ def measure_scatter(difference: Single, variance: Single) -> Scatter:
 
 
 def _squares(difference: Single, variance: Single, side: int) -> tuple[Float, Float]:
-    """Means of squares, NaN where too few cells are seen, and their variance."""
+    """Return the means of squares, NaN where too few cells are seen, and their variance."""
     rows, columns = (size // side for size in difference.shape)
     shape = rows, side, columns, side
     cut = (slice(rows * side), slice(columns * side))
@@ -126,16 +126,16 @@ def _squares(difference: Single, variance: Single, side: int) -> tuple[Float, Fl
 
 
 def detection_level(variance: Single, removed_error: Single, scatter: Scatter) -> Single:
-    """Level of detection of cells at 95 %, m, after M3C2 (Lague et al., 2013, eq. 1).
+    """Return the level of detection of cells at 95 %, m, after M3C2 (Lague et al., 2013, eq. 1).
 
     Parameters
     ----------
     variance : float32 array
         σ₁²/n₁ + σ₂²/n₂ of cells, m².
     removed_error : float32 array
-        Standard error of the motion that was removed there, m: ``reg``.
+        Standard error of the removed motion at each cell, m: ``reg``.
     scatter : Scatter
-        What the data say of the first.
+        Scatter that the data show, relative to the first.
     """
     return np.asarray(CONFIDENT * (np.sqrt(variance) * scatter.tail + removed_error), dtype=np.float32)
 
@@ -143,22 +143,23 @@ def detection_level(variance: Single, removed_error: Single, scatter: Scatter) -
 def change_regions(
     difference: Single, variance: Single, removed_error: Single, scatter: Scatter, place_error: Single
 ) -> list[Region]:
-    """Regions of significant change.
+    """Find regions of significant change.
 
-    Each window of 3 by 3 cells is tested by its mean; of all windows those are taken for change among which the share of
-    false ones is FALSE_SHARE at most on average. Neighbours that changed the same way make a region, which must be no
-    smaller than a window, and on average differ by more than its own level of detection. A share of false windows is no share
-    of false regions: where a wall moved, many may be false. So a region needs a window that chance alone shows in FAMILY_SHARE
-    of all kilometres, by whichever two of its three rows or columns show it least, or be as unlikely whole, without a line.
-    It must also be more than a shift of pixels along a slope of the relief makes; over a wide region slopes cancel.
+    Each window of 3 by 3 cells is tested by its mean. Windows are accepted as change up to a mean share FALSE_SHARE of false
+    ones. Neighbouring windows that changed in the same direction form a region. A region must be at least as large as a
+    window, and differ on average by more than its own level of detection. The share of false windows does not limit the share
+    of false regions: where a wall moved, many may be false. So a region also needs a window that occurs by chance in no more
+    than FAMILY_SHARE of all kilometres, using the two of its three rows or columns that show it least; or the whole region must
+    be equally unlikely without any one line. The change must also exceed the effect of a shift of pixels along a slope of the
+    relief; over a wide region slopes cancel.
 
     Parameters
     ----------
     difference, variance, removed_error, scatter
-        As of :func:`detection_level`.
+        See :func:`detection_level`.
     place_error : (2, rows, columns) float32 array
-        What one standard error of where pixels lie, along the tunnel and around it, does to the change of cells, m, with its
-        sign; it is alike for cells side by side.
+        Effect of one standard error of the pixels' positions, along the tunnel and around it, on the change of cells, m,
+        signed; the same for neighbouring cells.
     """
     mean, expected, number = window_means(difference, variance, removed_error, scatter)
     with np.errstate(invalid="ignore"):
@@ -180,7 +181,7 @@ def change_regions(
 def _greatest_ratio(
     region: Region, difference: Single, variance: Single, removed_error: Single, scatter: Scatter, place_error: Single
 ) -> float:
-    """Greatest of :func:`window_ratios` in a region, along its mean."""
+    """Return the greatest of :func:`window_ratios` in a region, in the direction of its mean."""
     at = region.rows.astype(np.int64), region.columns.astype(np.int64)
     first = [max(int(place.min()) - 1, 0) for place in at]
     cut = slice(first[0], int(at[0].max()) + 2), slice(first[1], int(at[1].max()) + 2)
@@ -191,7 +192,7 @@ def _greatest_ratio(
 def _ratio_without_line(
     region: Region, difference: Single, variance: Single, removed_error: Single, scatter: Scatter, place_error: Single
 ) -> float:
-    """Mean of a region without the row or column of cells that adds most to it, in standard deviations, along its mean."""
+    """Return a region's mean without its most influential row or column, in standard deviations, along its mean."""
     at = region.rows, region.columns
     change, squared, registered = (values[at].astype(np.float64) for values in (difference, variance, removed_error))
     lines = [place - place.min() for place in at]
@@ -208,7 +209,7 @@ def _ratio_without_line(
 
 
 def significant(probability: Float) -> Bool:
-    """Which probabilities of chance stand out, by Benjamini & Hochberg's step-up; NaN never."""
+    """Select significant probabilities by Benjamini & Hochberg's step-up procedure; NaN is never significant."""
     tested = np.sort(probability[np.isfinite(probability)])
     below = np.flatnonzero(tested <= FALSE_SHARE * (np.arange(len(tested)) + 1) / max(len(tested), 1))
     if not len(below):
@@ -218,7 +219,7 @@ def significant(probability: Float) -> Bool:
 
 
 def window_means(difference: Single, variance: Single, removed_error: Single, scatter: Scatter) -> tuple[Float, Float, Float]:
-    """Mean about each cell, its standard deviation, and the number of cells seen there."""
+    """Return the mean around each cell, its standard deviation, and the number of cells seen there."""
     seen = np.isfinite(difference)
 
     def total(values: Single) -> Float:
@@ -234,7 +235,7 @@ def window_means(difference: Single, variance: Single, removed_error: Single, sc
 
 
 def family_level(windows: float) -> float:
-    """Standard deviations that the greatest of so many windows exceeds in FAMILY_SHARE of unchanged linings at most (Šidák).
+    """Return the ratio that the greatest of so many windows exceeds in at most FAMILY_SHARE of unchanged linings (Šidák).
 
     Windows overlap, so that it is exceeded less often.
     """
@@ -242,10 +243,10 @@ def family_level(windows: float) -> float:
 
 
 def window_ratios(difference: Single, variance: Single, removed_error: Single, scatter: Scatter, place_error: Single) -> Float:
-    """Least mean of each window without one of its rows or columns, in standard deviations; NaN with too few cells.
+    """Return the least mean of each window without one row or column, in standard deviations; NaN with too few cells.
 
-    A groove that is narrower than a cell is hit by other pixels in each epoch, and alike in all cells along it: a line of cells
-    is one error, and no change if it stands alone. 0 where what is left without a line has the other sign.
+    Pixels hit a groove narrower than a cell differently in each epoch, and similarly in all cells along it. A single line of
+    cells is therefore one error and not a change. 0 where the rest without a line has the opposite sign.
     """
     seen = np.isfinite(difference)
     rows, columns = difference.shape
@@ -268,7 +269,7 @@ def window_ratios(difference: Single, variance: Single, removed_error: Single, s
 
 
 def sum_of_three(values: Float, axis: int) -> Float:
-    """Sums of neighbouring threes along an axis, two fewer than values."""
+    """Sum neighbouring triples along an axis; the result is two shorter than the values."""
     count = values.shape[axis]
     return np.asarray(sum(np.take(values, range(k, count - 2 + k), axis=axis) for k in range(WINDOW)))
 
@@ -282,7 +283,7 @@ def _regions(
     scatter: Scatter,
     place_error: Single,
 ) -> Iterator[Region]:
-    # A window half on a region has half of its change: there the region ends.
+    # A window half inside a region shows half its change: there the region ends.
     labels, count = ndimage.label(taken)
     if not count:
         return

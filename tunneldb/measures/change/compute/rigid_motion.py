@@ -1,7 +1,7 @@
-"""Rigid motion that a section of lining made between two epochs as a whole: what of their difference is one, robustly.
+"""Robust rigid motion of a section of lining between two epochs.
 
-It is the error of the registration of the one against the other, or a movement of the tunnel: which, nothing but points that
-did not move can tell.
+The motion is the error of the registration between them, or a movement of the tunnel. Only stable control points can separate
+the two.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.shape.tukey import CUT, weights
 
 MOTIONS = ("right", "up", "along", "roll", "yaw", "pitch")
-"""What a section can do: shifts to the right, up and along the axis, m; turns about the axis, upwards and to the right, rad."""
+"""Motions of a section: shifts to the right, up and along the axis, m; turns about the axis, upwards and to the right, rad."""
 
 DETERMINED = 1e-3
-"""A motion that moves the lining along its normal by so little that its standard error on it is more is not determined, m."""
+"""Maximum standard error on the lining along its normal, m; a motion with a larger one is not determined."""
 
 LEAST_CELLS = 50
-"""A section of which fewer cells were seen by both is compared with no motion removed, which is stated."""
+"""Minimum number of common cells; with fewer no motion is removed from the section, and this is reported."""
 
 BENT = 2.0
-"""A wall of a larger curvature is a corner, 1/m."""
+"""Curvature from which a part of the wall is a corner, 1/m."""
 
 LEAST_SHARE = 0.15
-"""Where a smaller share of a section's cells made the motion that its neighbours made, none of them says anything on it."""
+"""Minimum share of a section's cells that made the neighbours' motion, for them to say anything about it."""
 
 _KEPT = 0.6  # of the cells
 _ROUNDS = 50
-_STILL = 1e-7  # m: a round that changes no residual by more ends the search
+_STILL = 1e-7  # m: the iteration ends when no residual changes by more
 
 
 @dataclass(frozen=True)
@@ -41,14 +41,14 @@ class SectionCells:
     Attributes
     ----------
     difference, variance : (n,) float arrays
-        New less old offset, m, and its variance, m².
+        New minus old offset, m, and its variance, m².
     columns : (n, 6) float32 array
-        Of :func:`motion_columns` for these.
+        Columns of :func:`motion_columns` for these cells.
     group : (n,) int array
-        Stretch of the arc that each lies in: residuals within one are taken to be alike, those of several to be independent,
-        so that an oval section, or noise that goes over many cells, is in the standard errors (Liang & Zeger, 1986).
+        Stretch of the arc of each cell. Residuals within a stretch are treated as dependent, those of different stretches as
+        independent, so that an oval section, or noise over many cells, enters the standard errors (Liang & Zeger, 1986).
     column : (n,) int array
-        Of cells along the section, from 0.
+        Column of each cell along the section, from 0.
     """
 
     difference: Float
@@ -58,26 +58,26 @@ class SectionCells:
     column: Int64
 
     def part(self, held: Bool) -> SectionCells:
-        """Some of the cells."""
+        """Return some of the cells."""
         return SectionCells(self.difference[held], self.variance[held], self.columns[held], self.group[held], self.column[held])
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Motion of a section.
+    """Rigid motion of a section.
 
     Attributes
     ----------
     values : (6,) float array
-        By :data:`MOTIONS`; NaN where not determined and so not removed.
+        Values by :data:`MOTIONS`; NaN for those not determined and so not removed.
     covariance : (6, 6) float array
-        Of these. In a round lining a roll is much like a shift to the right, of which together far more is known than of each.
+        Their covariance. In a round lining a roll resembles a shift to the right: both together are known far better than each.
     removed : (n,) float array
-        What it does to the offset of each cell, m.
+        Effect on the offset of each cell, m.
     removed_error : (n,) float array
-        Standard error of that, m.
+        Standard error of that effect, m.
     cells : int
-        How many it was found by.
+        Number of cells used.
     """
 
     values: Float
@@ -93,17 +93,17 @@ class Motion:
 
     @property
     def used(self) -> Bool:
-        """Which motions are determined."""
+        """True for motions that are determined."""
         return np.asarray(np.isfinite(self.values))
 
 
 def motion_columns(points: Float, normals: Float, frame: Float) -> Float:
-    """By how much a unit of each motion changes the offsets of cells, (n, 6).
+    """Return the change of the cells' offsets by a unit of each motion, (n, 6).
 
     Parameters
     ----------
     points, normals : (n, 3) float arrays
-        Where the cells lie, and which way is inwards there, in the tunnel's frame, m.
+        Positions of the cells, and inward directions there, in the tunnel's frame, m.
     frame : (4, 3) float array
         Origin, tangent, right and up of the section's middle.
     """
@@ -114,7 +114,7 @@ def motion_columns(points: Float, normals: Float, frame: Float) -> Float:
 
 
 def rigid_motion(cells: SectionCells) -> Motion:
-    """Fit the motion of a section by Tukey's biweight, from the least sum of absolute residuals on."""
+    """Fit the motion of a section by Tukey's biweight, starting from the least sum of absolute residuals."""
     difference, variance, columns = cells.difference, cells.variance, cells.columns.astype(np.float64)
     spread = np.sqrt(np.mean(columns**2, axis=0)) if len(columns) else np.zeros(len(MOTIONS))
     used = _determined(columns, variance, spread)
@@ -127,7 +127,7 @@ def rigid_motion(cells: SectionCells) -> Motion:
 
 
 def motion_from(cells: SectionCells, start: Float, used: Bool) -> Motion | None:
-    """The motion that is nearest to a given one (6,), by Tukey's biweight; None where too few cells share one."""
+    """Fit the motion nearest to a given one (6,), by Tukey's biweight; None if too few cells share one."""
     used = used & np.isfinite(start)
     if not used.any() or len(cells.difference) < LEAST_CELLS:
         return None
@@ -150,32 +150,32 @@ def motion_from(cells: SectionCells, start: Float, used: Bool) -> Motion | None:
 
 
 def removed_by(cells: SectionCells, values: Float, covariance: Float, used: Bool) -> Motion:
-    """The motion with determined values (m,) and their covariance (m, m), for a section."""
+    """Make the motion of a section from determined values (m,) and their covariance (m, m)."""
     return _motion(cells, used, values, covariance)
 
 
 def unexplained(cells: SectionCells, residual: Float) -> float:
-    """Share of cells that residuals (n,) leave, by Tukey's loss: 0 where they are none, 1 where all lie beyond its limit."""
+    """Return the share of cells left by residuals (n,), by Tukey's loss: 0 if all are 0, 1 if all exceed its limit."""
     return float(np.mean(loss(cells, residual))) if len(residual) >= LEAST_CELLS else float("nan")
 
 
 def loss(cells: SectionCells, residual: Float) -> Float:
-    """Tukey's loss (n,) of residuals (n,), 1 beyond its limit."""
+    """Return Tukey's loss (n,) of residuals (n,), 1 beyond its limit."""
     u = residual / (CUT * np.sqrt(cells.variance))
     return np.asarray(1.0 - np.clip(1.0 - u**2, 0.0, None) ** 3)
 
 
 def bending_error(motion: Motion, columns: Single, curvature: Float) -> Float:
-    """By how much a shift along a sharply bent wall changes its offset (n,), m, which motions are not made of.
+    """Return the change of offset (n,), m, by a shift along a sharply bent wall, which the linear motions do not include.
 
-    With a shift t along a wall of curvature κ that is t² κ / 2: 2 mm in the corner of a box that is off by 20 mm.
+    For a shift t along a wall of curvature κ it is t² κ / 2: 2 mm in the corner of a box displaced by 20 mm.
 
     Parameters
     ----------
     columns : (n, 6) float array
-        Of :func:`motion_columns`.
+        Columns of :func:`motion_columns`.
     curvature : (n,) float array
-        Of the section, 1/m.
+        Curvature of the section, 1/m.
     """
     shift = np.nan_to_num(motion.values[:2])
     along = np.maximum(shift @ shift - (columns[:, :2] @ shift) ** 2, 0.0)
@@ -191,14 +191,14 @@ def _motion(cells: SectionCells, used: Bool, values: Float, covariance: Float) -
 
 
 def _determined(columns: Float, variance: Float, spread: Float) -> Bool:
-    """Which motions the cells determine; what they do not is left out, the least determined first."""
+    """Return the motions that the cells determine; the worst determined ones are left out one by one."""
     used = spread > 1e-6
     sigma = np.sqrt(np.median(variance)) if len(variance) else 0.0
     while used.any():
         scaled = columns[:, used] / spread[used]
         values, vectors = np.linalg.eigh(scaled.T @ scaled)
         errors = sigma * np.sqrt(np.sum(vectors**2 / np.maximum(values, 1e-12), axis=1))
-        # In the scale of a shift: one that the normals hardly show, or a turn, would move the wall along itself by more.
+        # In the scale of a shift: an undetermined shift, or turn, would move the wall along itself by more.
         moved = errors / np.minimum(spread[used], 1.0)
         if moved.max() <= DETERMINED:
             break
@@ -207,11 +207,11 @@ def _determined(columns: Float, variance: Float, spread: Float) -> Bool:
 
 
 def _fit(design: Float, difference: Float, sigma: Float) -> tuple[Float, Float, Float]:
-    """Parameters, and weight and residual of each cell."""
+    """Return parameters, and weight and residual of each cell."""
     noise = float(np.median(sigma))
     residual = difference
     for tukey in (False, True):
-        # What most cells bear is noise; where they do not, the section has changed its shape, and what is usual in it counts.
+        # What most cells show is noise; if few do, the section has changed its shape, and the usual residual in it counts.
         usual = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
         scale = noise if np.mean(np.abs(residual) < CUT * noise) >= _KEPT else max(noise, usual)
         for _ in range(_ROUNDS):
@@ -225,7 +225,7 @@ def _fit(design: Float, difference: Float, sigma: Float) -> tuple[Float, Float, 
 
 
 def _covariance(design: Float, weight: Float, residual: Float, variance: Float, group: Int64) -> Float:
-    """Covariance of the parameters by what the residuals of each group add up to; with few groups, by their noise."""
+    """Return the covariance of the parameters from the summed residuals of each group; with few groups, from their noise."""
     inverse = np.linalg.inv(design.T @ (weight[:, None] * design))
     number, member = np.unique(group, return_inverse=True)
     count = design.shape[1]

@@ -1,8 +1,8 @@
-"""Motion of sections that changed their shape, by what sections beside them did.
+"""Motion of sections that changed their shape, from the motion of sections beside them.
 
-A section of which a whole wall moved, or which became oval, does not tell by itself which of its sides stayed. The error of a
-registration goes on from section to section evenly, but where a scanner's place or a pass ends; so what sections before and
-behind it did, and what part of it did the same, is taken for its motion, and the rest for a change of its shape.
+If a whole wall moved, or a section became oval, the section alone does not show which of its sides stayed in place. The error
+of a registration continues smoothly from section to section, except where a scanner position or a pass ends. So the motion of
+the sections before and behind, where a part of this section followed it, is used as its motion, and the rest is change.
 """
 
 from __future__ import annotations
@@ -26,65 +26,65 @@ from tunneldb.measures.change.compute.rigid_motion import (
 from tunneldb.robust import MAD_TO_SIGMA
 
 MOVED = 0.04
-"""A section of which more cells than this share are not explained by its own motion changed its shape."""
+"""Share of cells not explained by its own motion from which a section changed its shape."""
 
 EXPLAINED = 0.75
-"""A section of which its own motion explains more than this share of what its neighbours' leaves moved as a whole."""
+"""Share of the neighbours' residual explained by its own motion from which a section moved as a whole."""
 
 LEAST_SECTIONS = 8
-"""With fewer sections that kept their shape nothing is known of how even the motion is."""
+"""Minimum number of sections that kept their shape, for the smoothness of the motion to be known."""
 
 COMMON = 0.5
-"""Motions that are determined in a larger share of the sections are tied."""
+"""Share of sections in which a motion must be determined to be tied."""
 
-_LAGS = (1, 2)  # sections: over more, breaks are in too many of them
-_EVEN = 1e-5  # m: second differences and errors are never taken to be smaller
-_BREAK = 3.0  # second differences beyond so many standard deviations are of breaks
+_LAGS = (1, 2)  # sections: longer lags contain too many breaks
+_EVEN = 1e-5  # m: lower limit of second differences and errors
+_BREAK = 3.0  # standard deviations of a second difference from which it is a break
 _ROUNDS = 8
 _STILL = 2e-5  # m
-_LARGE = 1e6  # variances are never larger than this, so that matrices can be solved
+_LARGE = 1e6  # upper limit of variances, so that matrices can be solved
 
 
 @dataclass(frozen=True)
 class _Axes:
-    """Motions that sections determine independently of each other: the principal axes of what the determined ones do to cells.
+    """Independently determined motions: principal axes of the effect of the determined motions on cells.
 
-    About the tunnel's axis, a roll and a shift to the right of a round lining are much the same. Each by itself is known badly,
-    and wanders much from section to section; what they do together to the lining is known well.
+    About the tunnel's axis, a roll and a shift to the right of a round lining are nearly the same. Each alone is known poorly
+    and varies much from section to section; their joint effect on the lining is known well.
 
     Attributes
     ----------
     used : (6,) bool array
-        The determined motions, m of them.
+        The determined motions, m in number.
     turn : (m, m) float array
-        From motions along the axes, m, to these.
+        From motions along the axes, m, to these motions.
     """
 
     used: Bool
     turn: Float
 
     def along(self, motion: Motion) -> tuple[Float, Float]:
-        """Values (m,) and variances (m,) of a motion along the axes."""
+        """Return values (m,) and variances (m,) of a motion along the axes."""
         back = np.linalg.inv(self.turn)
         held = motion.covariance[np.ix_(self.used, self.used)]
         return back @ motion.values[self.used], np.einsum("ij,jk,ik->i", back, held, back)
 
     def values(self, along: Float) -> Float:
-        """Values (6,) of what is (m,) along the axes; NaN of motions that are not determined."""
+        """Return values (6,) from values (m,) along the axes; NaN for motions that are not determined."""
         found = np.full(len(MOTIONS), np.nan)
         found[self.used] = self.turn @ along
         return found
 
     def removed(self, cells: SectionCells, along: Float, variance: Float) -> Motion:
-        """The motion of a section that is (m,) along the axes, with variances (m,)."""
+        """Return the motion of a section from values (m,) along the axes, with variances (m,)."""
         return removed_by(cells, self.turn @ along, self.turn * variance @ self.turn.T, self.used)
 
 
 @dataclass(frozen=True)
 class _Even:
-    """Motions that go on evenly: values and variances along the axes, (sections, m).
+    """Smooth motions: values and variances along the axes, (sections, m).
 
-    And for each axis the weights of its second differences, (m, n), less where it breaks.
+    Also, for each axis, the weights of its second differences, (m, n), smaller at breaks.
     """
 
     values: Float
@@ -93,15 +93,15 @@ class _Even:
 
 
 def tied_motions(sections: Sequence[SectionCells], number: Int64, motions: Sequence[Motion]) -> list[Motion]:
-    """Motions of sections, those replaced by what their neighbours say that changed their shape and do not tell.
+    """Replace the motions of sections that changed their shape and do not determine it by their neighbours'.
 
     Parameters
     ----------
     sections : sequence of SectionCells
     number : (k,) int array
-        Of the sections along the tunnel, growing; equal steps are equal lengths.
+        Numbers of the sections along the tunnel, increasing; equal steps are equal lengths.
     motions : sequence of Motion
-        Of each by itself.
+        Motion of each by itself.
     """
     left = np.array([unexplained(s, s.difference - m.removed) for s, m in zip(sections, motions, strict=True)])
     if np.isfinite(left).sum() < LEAST_SECTIONS:
@@ -111,7 +111,7 @@ def tied_motions(sections: Sequence[SectionCells], number: Int64, motions: Seque
     if not changed:
         return list(motions)
     used = np.mean([m.used for m in motions if m.used.any()], axis=0) > COMMON
-    # A roll that is found here and not there would be in the shift to the right there.
+    # A roll that is found in one section and not in the next would be in the next one's shift to the right.
     alike = {k: _determined_so(sections[k], motions[k], used) for k in np.flatnonzero(kept).tolist()}
     settled = {k: motion for k, motion in alike.items() if motion is not None}
     if len(settled) < LEAST_SECTIONS:
@@ -134,13 +134,13 @@ def tied_motions(sections: Sequence[SectionCells], number: Int64, motions: Seque
 
 
 def _determined_so(cells: SectionCells, own: Motion, used: Bool) -> Motion | None:
-    """The motion of a section by those that are used; None where it does not determine them."""
+    """Return the motion of a section with the used components; None if it does not determine them."""
     motion = own if (own.used == used).all() else motion_from(cells, own.values, used)
     return motion if motion is not None and (motion.used == used).all() else None
 
 
 def _axes(sections: Sequence[SectionCells], used: Bool) -> _Axes:
-    """Principal axes of what motions do to the cells of sections."""
+    """Return the principal axes of the effect of motions on the cells of sections."""
     normal, cells = np.zeros((int(used.sum()),) * 2), 0
     for one in sections:
         design = one.columns[:, used].astype(np.float64)
@@ -151,7 +151,7 @@ def _axes(sections: Sequence[SectionCells], used: Bool) -> _Axes:
 
 
 def _chosen(cells: SectionCells, own: Motion, tied: Motion, broken: Motion | None, usual: float) -> Motion:
-    """Which motion a section made: its own, its neighbours', or in one part that of those before and in one of those behind."""
+    """Choose a section's motion: its own, its neighbours', or a split between those before and behind it."""
 
     def excess(motion: Motion) -> float:
         return unexplained(cells, cells.difference - motion.removed) - usual
@@ -164,7 +164,7 @@ def _chosen(cells: SectionCells, own: Motion, tied: Motion, broken: Motion | Non
 def _with_changed(
     sections: Sequence[SectionCells], number: Int64, values: Float, variances: Float, axes: _Axes, changed: list[int]
 ) -> _Even:
-    """Even motions of the sections that kept their shape, and of what the others share with them."""
+    """Return smooth motions of the sections that kept their shape, extended by cells of the others that follow them."""
     values, variances = values.copy(), variances.copy()
     wander = _wander(number, values, variances)
     even = _even(number, values, variances, wander)
@@ -173,7 +173,7 @@ def _with_changed(
             own = motion_from(sections[k], axes.values(even.values[k]), axes.used)
             values[k], variances[k] = np.nan, np.nan
             if own is not None:
-                # What only some of its cells share counts the less, the farther it is from what its neighbours did.
+                # Cells that only a part of the section shares count less, the farther they are from the neighbours' motion.
                 found, variance = axes.along(own)
                 apart = (found - even.values[k]) ** 2 / (_BREAK**2 * (variance + even.variances[k]))
                 values[k], variances[k] = found, variance * (1.0 + apart) ** 2
@@ -184,9 +184,9 @@ def _with_changed(
 
 
 def _broken(cells: SectionCells, values: Float, number: Int64, k: int, axes: _Axes) -> Motion | None:
-    """Motion of a section in which one scanner's place ends and another begins: as before it, and from a cut on as behind it.
+    """Return the motion of a section where the scanner position changes: as before it up to a cut, as behind it after.
 
-    The cut is where both together leave least; None without two sections on either side that kept their shape.
+    The cut minimises the residuals of both; None without two unchanged sections on either side.
     """
     if not 2 <= k < len(number) - 2 or number[k + 2] - number[k - 2] != 4:
         return None
@@ -209,7 +209,7 @@ def _broken(cells: SectionCells, values: Float, number: Int64, k: int, axes: _Ax
 
 
 def _wander(number: Int64, values: Float, variances: Float) -> Float:
-    """Variance (m,) of the second differences of the motions from section to section, without their own errors."""
+    """Return the variance (m,) of the second differences of the motions between sections, without their own errors."""
     place = {int(n): k for k, n in enumerate(number)}
     found = np.full(values.shape[1], _EVEN**2)
     for lag in _LAGS:
@@ -223,13 +223,13 @@ def _wander(number: Int64, values: Float, variances: Float) -> Float:
             continue
         noise = variances[first] + 4.0 * variances[middle] + variances[last]
         spread = (MAD_TO_SIGMA * np.median(np.abs(bent[shown]), axis=0)) ** 2 - np.median(noise[shown], axis=0)
-        # Of a motion whose second differences are independent, those over a lag grow so.
+        # With independent second differences, those over a lag grow in this way.
         found = np.maximum(found, spread / (lag * (2.0 * lag**2 + 1.0) / 3.0))
     return found
 
 
 def _even(number: Int64, values: Float, variances: Float, wander: Float, ties: Float | None = None) -> _Even:
-    """The most probable motions of all sections, second differences being independent, and their variances."""
+    """Return the most probable motions of all sections, with independent second differences, and their variances."""
     at = (number - number[0]).astype(np.int64)
     count = int(at[-1]) + 1
     shown = np.isfinite(values[:, 0])
@@ -251,7 +251,7 @@ def _even(number: Int64, values: Float, variances: Float, wander: Float, ties: F
 
 
 def _bands(weight: Float, rows: Float) -> Float:
-    """Upper bands (3, n) of the normal matrix of data (n,) and second differences (n - 2,) with these weights."""
+    """Return the upper bands (3, n) of the normal matrix of data (n,) and second differences (n - 2,) with these weights."""
     count = len(weight)
     bands = np.zeros((3, count))
     bands[2] = weight + 1.0 / _LARGE

@@ -1,4 +1,4 @@
-"""Distance of what stands in a tunnel from the outline that is to be clear, by metre and by clock; what stands inside."""
+"""Clearance around a track: distance of points from an outline by metre and direction, and infringements."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ STEP = 1.0
 """Length of a section, m; sections begin at whole metres."""
 
 DIRECTIONS = 72
-"""Cells by clock, of 5°, from straight above the outline's middle to the right."""
+"""Number of direction cells, of 5° each, clockwise from straight above the outline's middle."""
 
 NEAR = 0.5
-"""Points nearer to the outline are held to be real only in a group, m."""
+"""Distance from the outline within which isolated points are ignored, m."""
 
 PIECE = 10.0
-"""Infringements longer than that are kept in pieces, m, at whole multiples."""
+"""Maximum length of an infringement, m; longer ones are split at whole multiples."""
 
 TRACK = (PointClass.GROUND, PointClass.RAIL)
 PASSING = (PointClass.OBJECT, PointClass.SPHERE)
-"""What may be gone tomorrow, people and vehicles among them: its infringements are stated, and do not count."""
+"""Classes that may be temporary, such as people and vehicles: their infringements are reported, but do not count."""
 
 
 @dataclass(frozen=True)
 class Grouping:
-    """When points are held to be real: so many within a radius, m; lengths along are shrunk first (Spacing.shrink)."""
+    """Minimum number of neighbours within a radius, m, for a real point; lengths along are shrunk first (Spacing.shrink)."""
 
     points: int = 3
     radius: float = 0.3
@@ -41,24 +41,24 @@ class Grouping:
 
 @dataclass(frozen=True)
 class Section:
-    """A metre of a track held against the outline; lengths in m.
+    """Clearance of one metre of a track; lengths in m.
 
     Attributes
     ----------
     chainage : float
-        Of its beginning.
+        Chainage of its beginning.
     margin : float
-        Least distance, positive outside of the outline, NaN where nothing counts.
+        Least distance, positive outside the outline; NaN if no point counts.
     index : int
-        Which point that is, -1 for none.
+        Index of the nearest point, -1 if none.
     clock : float
         Direction of that point, degrees from straight above to the right.
     margins : (72,) float array
-        Least distance by direction, NaN where nothing that counts was seen.
+        Least distance by direction; NaN where no point that counts was seen.
     seen : float
-        Share of the directions with a return of anything, ground and rails too.
+        Share of directions with a return of any class, ground and rails included.
     points, inside, stray, passing, ground : int
-        Points that count; of them inside; and inside, but without company, passing, ground or rail.
+        Numbers of points that count; of these inside; and inside but isolated, temporary, or ground or rail.
     """
 
     chainage: float
@@ -76,7 +76,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Infringement:
-    """A group of points of one class inside the outline: which points (k,), deepest first, and how deep the first is, m."""
+    """Group of points of one class inside the outline: indices (k,), deepest first, and the greatest depth, m."""
 
     points: Int64
     klass: int
@@ -85,7 +85,7 @@ class Infringement:
 
 @dataclass(frozen=True)
 class Clearance:
-    """Sections in order, and what stands inside."""
+    """Sections in order, and infringements."""
 
     sections: list[Section]
     infringements: list[Infringement]
@@ -95,15 +95,15 @@ class Clearance:
 def clearance(
     places: Float, classes: UInt8, begins: Float, outlines: Sequence[Outline], grouping: Grouping | None = None
 ) -> Clearance:
-    """Hold points against an outline.
+    """Compare points with an outline.
 
     Parameters
     ----------
     places : (n, 3) float array
-        Chainage, right of the track's middle and above its running surface, m; NaN where there is no track.
+        Chainage, right of the track's middle and above its running surface, m; NaN without a track.
     classes : (n,) uint8 array
     begins : (s,) float array
-        Chainage at which sections begin, growing, m.
+        Chainage at which each section begins, increasing, m.
     outlines : sequence of s Outline
         In the track's frame, closed.
     grouping : Grouping, optional
@@ -128,7 +128,7 @@ def clearance(
 
 
 def clock(places: Float, middle: Float) -> Float:
-    """Direction of places (n, 2) from the middle of an outline, degrees from straight above to the right, 0 to 360."""
+    """Return the direction of places (n, 2) from an outline's middle, degrees clockwise from straight above, 0 to 360."""
     return np.asarray(np.degrees(np.arctan2(places[:, 0] - middle[0], places[:, 1] - middle[1])) % 360.0)
 
 
@@ -138,9 +138,9 @@ def _middle(outline: Outline) -> Float:
 
 
 def _groups(places: Float, classes: UInt8, margin: Float, grouping: Grouping) -> tuple[Bool, list[Infringement]]:
-    """Which points are held to be real, and the groups of those inside."""
+    """Return which points are real, and the groups of those inside."""
     real = np.isin(classes, [*TRACK, PointClass.NOISE], invert=True) & np.isfinite(margin)
-    # The lining was told by the surface that its points make; alone is only what stands off it, or in.
+    # The lining is classified by the surface that its points form; only points off that surface can be isolated.
     doubted = np.flatnonzero(real & (margin < NEAR) & ((classes != PointClass.LINING) | (margin < 0.0)))
     scaled = places[doubted] * np.array([grouping.shrink, 1.0, 1.0])
     labels = dbscan(scaled, grouping.radius, grouping.points)

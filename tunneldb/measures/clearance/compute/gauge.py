@@ -1,4 +1,4 @@
-"""A clearance outline in the frame of a track: how much wider it is in curves, and by cant and speed."""
+"""Clearance outline in the frame of a track, widened in curves and by cant and speed."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ GRAVITY = 9.80665
 
 @dataclass(frozen=True)
 class Widening:
-    """By how much an outline is widened. All are parameters: no norm's values are taken.
+    """Widening of an outline. All values are parameters: none is taken from a standard.
 
     Attributes
     ----------
     bogie_distance, overhang : float
-        Of the vehicle: between the middles of its bogies, and from there to its end, m.
+        Vehicle's distance between bogie centres, and from there to its end, m.
     inside, outside : float
-        Widening is these over the radius, m², if the vehicle is not given.
+        Widening times radius, m², if the vehicle is not given.
     speed : float
         m/s; without it there is no roll.
     flexibility : float
-        Angle by which the vehicle rolls on its springs, over that by which the plane of the track lies off equilibrium.
+        Roll angle of the vehicle on its springs, divided by the deviation of the track's plane from equilibrium.
     roll_height : float
-        About which it rolls, above the running surface, m.
+        Height of the roll centre above the running surface, m.
     allowance : float
-        For all else, dynamic terms among them, m to each side.
+        Allowance for everything else, dynamic terms included, m to each side.
     """
 
     bogie_distance: float = 0.0
@@ -45,7 +45,7 @@ class Widening:
 
 @dataclass(frozen=True)
 class Terms:
-    """Terms of a section's widening, (n,) arrays: m; ``roll`` is an angle, rad, positive to the right."""
+    """Terms of a section's widening, (n,) arrays, m; ``roll`` is an angle, rad, positive to the right."""
 
     inward: Float
     outward: Float
@@ -54,16 +54,16 @@ class Terms:
 
 
 def overthrow(bogie_distance: float, overhang: float, curvature: Float) -> tuple[Float, Float]:
-    """How far a vehicle's middle lies inside of the track's axis, and its ends outside, (n,), m.
+    """Return the overthrow of a vehicle's middle inside the track's axis, and of its ends outside, (n,), m.
 
-    The bogies' middles stand on a circle of radius R: their chord lies h = √(R² − a²/4) from its centre, so that the middle
-    lies R − h inside, and what lies x from it √(h² + x²) − R outside. This is geometry; bogies are taken to be points.
+    The bogie centres are on a circle of radius R: their chord is h = √(R² − a²/4) from its centre. So the vehicle's middle
+    is R − h inside, and a point at x from it √(h² + x²) − R outside. This is geometry only; bogies are treated as points.
     """
     half = bogie_distance / 2.0
     bend = np.abs(curvature)
     with np.errstate(divide="ignore", invalid="ignore"):
         radius = np.where(bend > 1e-9, 1.0 / bend, np.inf)
-        # Differences of nearly equal numbers, written without them.
+        # Written without differences of nearly equal numbers.
         chord = np.sqrt(np.maximum(radius**2 - half**2, 0.0))
         inward = np.where(bend > 1e-9, half**2 / (radius + chord), 0.0)
         end = (half + overhang) ** 2 - half**2
@@ -72,7 +72,7 @@ def overthrow(bogie_distance: float, overhang: float, curvature: Float) -> tuple
 
 
 def terms(widening: Widening, curvature: Float, cant: Float, spacing: float) -> Terms:
-    """Terms of the widening at sections.
+    """Compute the terms of the widening at sections.
 
     Parameters
     ----------
@@ -80,29 +80,29 @@ def terms(widening: Widening, curvature: Float, cant: Float, spacing: float) -> 
     curvature : (n,) float array
         1/m, positive to the right.
     cant : (n,) float array
-        How much higher the left head lies, m.
+        Height of the left head above the right one, m.
     spacing : float
-        Of the heads' middles, m.
+        Distance of the heads' middles, m.
 
     Notes
     -----
     At speed v in a curve of radius R the track's plane would be in equilibrium at a cant of b v² / (g R), b being the heads'
-    distance. What it lacks is the deficiency; the vehicle rolls by ``flexibility`` times that over b.
+    distance. The missing cant is the deficiency; the vehicle rolls by ``flexibility`` times that divided by b.
     """
     inward, outward = overthrow(widening.bogie_distance, widening.overhang, curvature)
     bend = np.abs(curvature)
     inward, outward = inward + widening.inside * bend, outward + widening.outside * bend
-    # Turning right, what is to be made up for is a left head that is higher.
+    # In a right-hand curve the left head must be higher.
     deficiency = spacing * widening.speed**2 / GRAVITY * curvature - cant if widening.speed > 0.0 else np.zeros(len(bend))
-    # Too little cant rolls it outwards: to the left in a curve to the right.
+    # Cant deficiency rolls the vehicle outwards: to the left in a curve to the right.
     return Terms(inward, outward, deficiency, -widening.flexibility * deficiency / spacing)
 
 
 def widened(outline: Outline, left: float, right: float, roll: float = 0.0, about: float = 0.0) -> Outline:
-    """Outline whose left part is shifted to the left and its right part to the right, m, and then by roll.
+    """Widen an outline: shift its left part to the left and its right part to the right, m, and then roll it.
 
-    Roll shifts each vertex sideways by the angle times its height over ``about``, to the side to which it rolls, and only that
-    side: the other one stands as it did. The outline must be that of `halved`.
+    Roll shifts each vertex sideways by the angle times its height above ``about``, towards the side of the roll, and only on
+    that side. The outline must come from `halved`.
     """
     elements = outline.elements
     moved = elements.copy()

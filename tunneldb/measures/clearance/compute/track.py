@@ -1,4 +1,4 @@
-"""Tracks from points of their rails: heads, pairs of heads a gauge apart, and a smooth axis with cant through them."""
+"""Tracks from points of their rails: heads, pairs of heads at the gauge, and a smooth axis with cant."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ GAUGE = 1.435
 """Distance of the inner faces of the two heads, m: standard gauge."""
 
 HEAD = 0.072
-"""Width of a rail's head, m: that of the profile 60E1; heads of other rails differ by a few mm."""
+"""Width of a rail's head, m: profile 60E1; heads of other rails differ by a few mm."""
 
 STATION = 5.0
-"""Rails are located once in a stretch so long, m: at a point spacing of 0.1 to 0.2 m it holds dozens of points of a head."""
+"""Length of the stretches in which rails are located, m: dozens of points of a head at a point spacing of 0.1 to 0.2 m."""
 
 LEAST_TRACK = 25.0
-"""What two rails do not show along so many metres is no track."""
+"""Minimum length of two parallel rails for a track, m."""
 
-_TOP = 0.02  # m: points so far below the top of a rail are of its head
-_APART = 0.12  # m to the side without a point part two rails
-_WIDEST = 0.35  # m: wider ones are no rail
-_FEWEST = 4  # points of a head
-_SPACING = 0.06  # m by which the distance of two heads may differ: widened gauge, wear, few points
-_CANT = 0.25  # m: rails of a track differ in height by less
-_STRAY = 0.15  # m by which a track may leave the straight continuation from one station to the next
-_REACH = 30.0  # m without rails over which a track is followed, and interpolated
-_SIGMA = 0.003  # m: no station's head is told better, by dozens of points spread over 0.07 m
-_OFF = 0.05  # m: what a head of a single station may lie off the smooth track; few points see its edges only
-_EDGE = 0.05  # of the points of a head that lie beyond what is taken for its two edges
+_TOP = 0.02  # m: maximum depth below the top of a rail of points of its head
+_APART = 0.12  # m: minimum lateral gap between two rails
+_WIDEST = 0.35  # m: maximum width of a rail
+_FEWEST = 4  # minimum points of a head
+_SPACING = 0.06  # m: tolerance of the distance of two heads: widened gauge, wear, few points
+_CANT = 0.25  # m: maximum height difference of the rails of a track
+_STRAY = 0.15  # m: maximum deviation of a track from the straight continuation, from one station to the next
+_REACH = 30.0  # m without rails over which a track is followed and interpolated
+_SIGMA = 0.003  # m: lower limit of a head's standard error, from dozens of points over 0.07 m
+_OFF = 0.05  # m: maximum deviation of a head at one station from the smooth track; few points show its edges only
+_EDGE = 0.05  # share of the points of a head beyond each of its two estimated edges
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Pairs:
 
     @classmethod
     def joined(cls, parts: Sequence[Pairs]) -> Pairs:
-        """Put those of several stretches together."""
+        """Join the pairs of several stretches."""
         if not parts:
             return cls(np.empty(0), np.empty((0, 2)), np.empty((0, 2)))
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("chainage", "right", "up")))
@@ -68,15 +68,15 @@ class Track:
     right, up : float array
         Middle of the track on the plane of the running surface, about the given axis, m.
     cant : float array
-        How much higher the left head lies than the right one, m.
+        Height of the left head above the right one, m.
     right_se, up_se, cant_se : float array
-        Standard errors, m; 0 of a given track.
+        Standard errors, m; 0 for a given track.
     seen : bool array
-        Whether both rails were seen there; elsewhere it is interpolated.
+        True if both rails were seen there; elsewhere it is interpolated.
     spacing : float
-        Distance of the heads' middles, m, over which the cant is.
+        Distance of the heads' middles over which the cant is measured, m.
     reach : float
-        Places farther than this from the nearest station have no track, m.
+        Maximum distance from the nearest station at which a place has a track, m.
     """
 
     chainage: Float
@@ -91,7 +91,7 @@ class Track:
     reach: float = STATION / 2.0
 
     def at(self, chainage: Float) -> Float:
-        """Right, up, cant, right_se, up_se, cant_se at chainages (n,): (n, 6), m; NaN where there is no track."""
+        """Return right, up, cant, right_se, up_se, cant_se at chainages (n,): (n, 6), m; NaN without a track."""
         columns = (self.right, self.up, self.cant, self.right_se, self.up_se, self.cant_se)
         found = np.column_stack([_linear(chainage, self.chainage, column) for column in columns])
         if len(self.chainage) < 2:
@@ -103,7 +103,7 @@ class Track:
         return found
 
     def places(self, chainage: Float, right: Float, up: Float) -> Float:
-        """Points about the given axis (n,) in the frame of the track: right of its middle and above it, (n, 2), m."""
+        """Return points about the given axis (n,) in the track's frame: right of its middle and above it, (n, 2), m."""
         found = self.at(chainage)
         sine = np.clip(found[:, 2] / self.spacing, -1.0, 1.0)
         cosine = np.sqrt(1.0 - sine**2)
@@ -111,7 +111,7 @@ class Track:
         return np.column_stack([cosine * x - sine * y, sine * x + cosine * y])
 
     def about_axis(self, chainage: Float, right: Float, up: Float) -> Float:
-        """Points in the track's frame (n,) about the given axis, right and up, (n, 2), m: the inverse of `places`."""
+        """Return points in the track's frame (n,) about the given axis, right and up, (n, 2), m: the inverse of `places`."""
         found = self.at(chainage)
         sine = np.clip(found[:, 2] / self.spacing, -1.0, 1.0)
         cosine = np.sqrt(1.0 - sine**2)
@@ -119,9 +119,9 @@ class Track:
 
 
 def metre_places(about: Float, begin: float, right: float, up: float, cant: float) -> tuple[Float, Bool]:
-    """Points of a metre in the frame of its track, (k, 2), m, and which of those about the given axis (n, 3) these are.
+    """Return the points of a metre in its track's frame, (k, 2), m, and which of the points about the axis (n, 3) they are.
 
-    The track's middle lies right of the given axis and above it, m; cant is how much higher its left rail lies.
+    The track's middle is right of the given axis and above it, m; cant is the height of its left rail above the right one.
     """
     held = np.asarray((about[:, 0] >= begin) & (about[:, 0] < begin + 1.0))
     same, none = np.array([begin, begin + 1.0]), np.zeros(2)
@@ -130,7 +130,7 @@ def metre_places(about: Float, begin: float, right: float, up: float, cant: floa
 
 
 def rail_pairs(points: Float, gauge: float = GAUGE) -> Pairs:
-    """Pairs of heads a gauge apart in stretches of `STATION`.
+    """Find pairs of heads at the gauge in stretches of `STATION`.
 
     Parameters
     ----------
@@ -157,12 +157,12 @@ def rail_pairs(points: Float, gauge: float = GAUGE) -> Pairs:
 
 
 def follow(pairs: Pairs) -> list[Pairs]:
-    """Sort pairs into tracks, from left to right: each goes on straight from station to station, or nearly so.
+    """Sort pairs into tracks, from left to right: each continues nearly straight from station to station.
 
     Raises
     ------
     ValueError
-        If two tracks share a rail, so that which of them is one cannot be told.
+        If two tracks share a rail, so that the right one is ambiguous.
     """
     tracks: list[list[int]] = []
     order = np.argsort(pairs.chainage, kind="stable")
@@ -192,26 +192,26 @@ def follow(pairs: Pairs) -> list[Pairs]:
 
 
 def fit_track(points: Float, coarse: Pairs, low: float, high: float, gauge: float = GAUGE) -> Track:
-    """Axis and cant of a track through points of its rails.
+    """Fit axis and cant of a track to points of its rails.
 
     Parameters
     ----------
     points : (n, 3) float array
         Points of bars along the ground: chainage, right of the given axis, above it, m.
     coarse : Pairs
-        One of the tracks of `follow`.
+        One of the tracks from `follow`.
     low, high : float
-        Stretch of it, m; stations lie within, and where the coarse track does.
+        Limits of the stretch, m; stations are within, and where the coarse track is.
     gauge : float
         m.
 
     Notes
     -----
-    Each head lies in the middle of its edges, between which all but a twentieth of its points lie; its top is the median of
-    the middle of its points. Both are taken of deviations from the track so far, so that a curve does not smear them, three
-    times over. The two heads' means and difference are then smoothed along the track: least squares with a penalty on the
-    third difference, which a circular curve and a constant cant do not feel, as strong as generalised cross validation finds.
-    A station that the smooth track contradicts has none: it is not interpolated over what was measured otherwise.
+    Each head is in the middle of its edges, which enclose all but a twentieth of its points on either side; its top is the
+    median of the middle of its points. Both are measured as deviations from the track so far, so that a curve does not blur
+    them; three iterations. The two heads' means and difference are then smoothed along the track: least squares with a penalty
+    on the third difference, which does not affect a circular curve or a constant cant. Generalised cross-validation sets the
+    penalty. A station that contradicts the smooth track has no value: interpolation would hide a different measurement.
     """
     low, high = max(low, coarse.chainage[0] - STATION / 2.0), min(high, coarse.chainage[-1] + STATION / 2.0)
     first, last = int(np.floor(low / STATION)), int(np.ceil(high / STATION))
@@ -244,9 +244,9 @@ def fit_track(points: Float, coarse: Pairs, low: float, high: float, gauge: floa
 
 
 def curvature(chainage: Float, xy: Float, window: float = 50.0) -> Float:
-    """Curvature (n,), 1/m, positive to the right, of a track in plan at evenly spaced places xy (n, 2), m.
+    """Compute the curvature (n,), 1/m, positive to the right, of a track in plan at evenly spaced places xy (n, 2), m.
 
-    Of each place it is that of the parabola through the places of a window about it (Savitzky and Golay, 1964).
+    It is that of the parabola through the places of a window about each place (Savitzky and Golay, 1964).
     """
     from scipy.signal import savgol_filter
 
@@ -259,7 +259,7 @@ def curvature(chainage: Float, xy: Float, window: float = 50.0) -> Float:
 
 
 def _linear(at: Float, along: Float, values: Float) -> Float:
-    """Values (n,) at growing places interpolated linearly, and before the first and after the last of them continued so."""
+    """Interpolate values (n,) linearly at increasing places, and extrapolate linearly before the first and after the last."""
     if len(along) < 2:
         return np.full(len(at), values[0])
     k = np.clip(np.searchsorted(along, at), 1, len(along) - 1)
@@ -268,7 +268,7 @@ def _linear(at: Float, along: Float, values: Float) -> Float:
 
 
 def _runs(number: Int64) -> list[tuple[int, int]]:
-    """First and one after the last of each run of equal numbers."""
+    """Return the first index and one after the last of each run of equal numbers."""
     if not len(number):
         return []
     bounds = np.flatnonzero(np.diff(number, prepend=number[0] - 1, append=number[-1] + 1))
@@ -276,7 +276,7 @@ def _runs(number: Int64) -> list[tuple[int, int]]:
 
 
 def _heads(points: Float) -> Float:
-    """Middle and top of each rail in points of a stretch, (k, 2), from left to right, m."""
+    """Return middle and top of each rail in points of a stretch, (k, 2), from left to right, m."""
     order = np.argsort(points[:, 1])
     right, up = points[order, 1], points[order, 2]
     label = np.cumsum(np.diff(right, prepend=right[0]) > _APART)
@@ -285,14 +285,14 @@ def _heads(points: Float) -> Float:
         if stop - first < _FEWEST or right[stop - 1] - right[first] > _WIDEST:
             continue
         part = up[first:stop]
-        top = np.partition(part, -2)[-2]  # the highest may be a stray
+        top = np.partition(part, -2)[-2]  # the highest may be an outlier
         held = part > top - _TOP
         found.append((float(np.median(right[first:stop][held])), float(top)))
     return np.array(found).reshape(-1, 2)
 
 
 def _continued(pairs: Pairs, track: list[int], chainage: float) -> float:
-    """Where a track would go on to, by its last stations, m to the right."""
+    """Extrapolate a track by its last stations, m to the right."""
     recent = np.array(track[-6:])
     if len(recent) < 4:
         return float(pairs.middle[recent[-1]])
@@ -301,7 +301,7 @@ def _continued(pairs: Pairs, track: list[int], chainage: float) -> float:
 
 
 def _measured(points: Float, stations: Float, head: Float, top: Float) -> Float:
-    """Middle and top of a rail at stations, (n, 2), m, NaN where it is not seen; ``head`` and ``top`` are what it is near."""
+    """Measure middle and top of a rail at stations, (n, 2), m, NaN where not seen; ``head`` and ``top`` are approximate."""
     expected, level = _linear(points[:, 0], stations, head), _linear(points[:, 0], stations, top)
     aside, above = points[:, 1] - expected, points[:, 2] - level
     near = np.flatnonzero((np.abs(aside) <= HEAD / 2.0 + 0.04) & (np.abs(above) <= 2.0 * _TOP))
@@ -327,7 +327,7 @@ def _measured(points: Float, stations: Float, head: Float, top: Float) -> Float:
 
 
 def _smoothed(value: Float, seen: Bool) -> tuple[Float, Float, Bool]:
-    """Values (n,) smoothed and interpolated, their standard errors, and which were used, by robust penalised least squares."""
+    """Smooth and interpolate values (n,) by robust penalised least squares: values, standard errors, and which were used."""
     n = len(value)
     filled = np.where(seen, value, 0.0)
     penalty = np.diff(np.eye(n), 3, axis=0)
@@ -356,7 +356,7 @@ def _smoothed(value: Float, seen: Bool) -> tuple[Float, Float, Bool]:
 
 
 def _contradicted(stations: Float, heads: Float, coarse: Pairs) -> Bool:
-    """Stations at which heads (4, n) lie elsewhere than those of the coarse track do."""
+    """Return the stations at which heads (4, n) disagree with those of the coarse track."""
     k = np.searchsorted(coarse.chainage, stations)
     k = np.clip(k, 0, len(coarse.chainage) - 1)
     there = np.abs(coarse.chainage[k] - stations) < 0.5
@@ -365,7 +365,7 @@ def _contradicted(stations: Float, heads: Float, coarse: Pairs) -> Bool:
 
 
 def _far_from_seen(stations: Float, seen: Bool) -> Bool:
-    """Which stations lie in a gap without rails that is too long to be interpolated, or beyond the last rails."""
+    """Return the stations in a gap without rails too long to interpolate, or beyond the last rails."""
     if not seen.any():
         return np.ones(len(stations), np.bool_)
     there = stations[seen]

@@ -1,4 +1,4 @@
-"""How even a lining is: gaps beneath a straightedge along and around it, by steps of chainage, and where they are too large."""
+"""Evenness of a lining: gaps beneath a straightedge along and around it, by step of chainage, and uneven areas."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ ALONG, AROUND = "along", "around"
 
 @dataclass(frozen=True)
 class Evenness:
-    """Of a stretch of lining, in cells (arc, chainage), arc falling with the rows.
+    """Evenness of a stretch of lining, in cells (arc, chainage); the arc decreases with the rows.
 
     Attributes
     ----------
     cells : Cells
         Deviation from the design, m, positive inside.
     along, around : Gaps
-        Beneath straightedges laid along the tunnel, and around its section on a template of the design's curvature.
+        Gaps beneath straightedges along the tunnel, and around its section on a template with the design's curvature.
     """
 
     cells: Cells
@@ -32,22 +32,22 @@ class Evenness:
 
     @cached_property
     def gap(self) -> Float:
-        """The greater gap of both ways, m; NaN where no straightedge could be laid."""
+        """Greater gap of both directions, m; NaN where no straightedge fits."""
         return np.asarray(np.fmax(self.along.gap, self.around.gap))
 
 
 @dataclass(frozen=True)
 class StepEvenness:
-    """Of a step of chainage.
+    """Evenness of a step of chainage.
 
     Attributes
     ----------
     seen, measured, over : int
-        Cells seen; of these those beneath a straightedge; of these those with a greater gap than the limit.
+        Numbers of cells seen; of these measured with a straightedge; of these with a gap greater than the limit.
     along, around : (rows,) float arrays
-        Greatest gap of each row of cells, m; NaN where none could be laid.
+        Greatest gap of each row of cells, m; NaN where none was measured.
     waviness, sigma : float
-        Greatest depth of a hollow over the way to its nearer rim; standard deviation of a cell's mean, m. NaN without any.
+        Greatest depth of a hollow over the distance to its nearer rim; standard deviation of a cell's mean, m. NaN if none.
     """
 
     seen: int
@@ -61,18 +61,18 @@ class StepEvenness:
 
 @dataclass(frozen=True)
 class UnevenAreas:
-    """Areas of cells that hang together by their sides, with a greater gap than the limit.
+    """Areas of edge-connected cells with a gap greater than the limit.
 
     Attributes
     ----------
     label : (rows, columns) int32 array
-        Number of the area that a cell is in, from 1; 0 in none.
+        Number of the cell's area, from 1; 0 for none.
     cells : (n,) int array
-        How many it has.
+        Number of cells of each area.
     gap : (n,) float array
-        Greatest gap in it, m.
+        Greatest gap of each area, m.
     along : (n,) bool array
-        Whether the straightedge that has it lay along the tunnel, or else around the section.
+        True if the greatest gap is beneath a straightedge along the tunnel, False if around the section.
     """
 
     label: Int32
@@ -82,14 +82,14 @@ class UnevenAreas:
 
 
 def evenness(cells: Cells, length: float, cell: float) -> Evenness:
-    """Lay a straightedge of a length, m, on cells of a side, m, along and around."""
+    """Measure the gaps beneath a virtual straightedge of a length, m, on cells of a side, m, along and around."""
     along = gaps_beneath(cells.mean, length, cell)
     across = gaps_beneath(np.ascontiguousarray(cells.mean.T), length, cell)
     return Evenness(cells, along, Gaps(across.gap.T, across.waviness.T))
 
 
 def step_evenness(found: Evenness, columns: slice, limit: float) -> StepEvenness:
-    """Sum up the columns of a step, with a limit of the gap, m."""
+    """Summarise the columns of a step, with a limit of the gap, m."""
     gap, seen = found.gap[:, columns], np.isfinite(found.cells.mean[:, columns])
     waves = np.fmax(found.along.waviness[:, columns], found.around.waviness[:, columns])
     sigma = found.cells.sigma[:, columns][seen]
@@ -105,7 +105,7 @@ def step_evenness(found: Evenness, columns: slice, limit: float) -> StepEvenness
 
 
 def uneven_areas(found: Evenness, columns: slice, limit: float) -> UnevenAreas:
-    """Where, in some columns, the gap is greater than a limit, m."""
+    """Return the areas in some columns where the gap is greater than a limit, m."""
     gap = np.nan_to_num(found.gap[:, columns])
     label, count = ndimage.label(gap > limit, output=np.int32)
     numbers = np.arange(1, count + 1)
@@ -115,5 +115,5 @@ def uneven_areas(found: Evenness, columns: slice, limit: float) -> UnevenAreas:
 
 
 def _greatest(gap: Float) -> Float:
-    """Greatest of each row, NaN where there is none."""
+    """Return the greatest value of each row, NaN if there is none."""
     return np.asarray(np.fmax.reduce(gap, axis=1, initial=np.nan))

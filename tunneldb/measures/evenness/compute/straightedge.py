@@ -1,4 +1,4 @@
-"""Gaps beneath a straightedge laid on a lining, along rows of cells."""
+"""Gaps beneath a virtual straightedge on a lining, along rows of cells."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from tunneldb.compiled import inner, kernel
 from tunneldb.threads import in_blocks
 
 MOST_UNSEEN = 0.25
-"""A straightedge is not laid over a gap in what was seen that is longer than this share of it."""
+"""Maximum unseen share of a straightedge in one piece; otherwise it is not placed there."""
 
 NEAREST = 2
-"""A rim nearer to the lowest place of a hollow than so many cells tells nothing of a wave: it is roughness, or noise."""
+"""Minimum distance from a rim to the lowest place of a hollow, in cells; nearer it is roughness or noise, not a wave."""
 
-_LEVEL = 1e-9  # m: of two places no deeper than that the one farther from the rims is the lowest
+_LEVEL = 1e-9  # m: of places equally deep within this, the one farther from the rims is the lowest
 _ROWS = 64  # in a block of a thread
 
 
 @dataclass(frozen=True)
 class Gaps:
-    """Beneath straightedges, arrays (rows, cells) as the heights; NaN where none could be laid, or nothing was seen.
+    """Gaps beneath straightedges, arrays (rows, cells) like the heights; NaN where unseen or not measured.
 
     Attributes
     ----------
     gap : float array
-        Greatest gap between a cell and a straightedge laid over it, m.
+        Greatest gap between a cell and a straightedge over it, m.
     waviness : float array
-        At the lowest place of a hollow that lies whole beneath the straightedge its depth over the distance to its nearer rim,
-        the greatest; else 0.
+        At the lowest place of a hollow that is entirely beneath the straightedge, its depth divided by the distance to its
+        nearer rim, the greatest value; else 0.
     """
 
     gap: Float
@@ -38,33 +38,32 @@ class Gaps:
 
     @property
     def measured(self) -> Bool:
-        """Cells over which a straightedge was laid."""
+        """Cells over which a straightedge was placed."""
         return np.isfinite(self.gap)
 
 
 def reach(length: float, cell: float) -> int:
-    """Cells to either side of its middle that a straightedge of a length, m, covers."""
+    """Return the number of cells on either side of its middle that a straightedge of a length, m, covers."""
     return max(round(length / cell / 2.0), 1)
 
 
 def gaps_beneath(height: Float, length: float, cell: float) -> Gaps:
-    """Lay a straightedge on each place of rows of cells, and look beneath it.
+    """Measure the gaps beneath a straightedge placed at each cell of the rows.
 
     Parameters
     ----------
     height : (rows, cells) float array
         Height of each cell towards the straightedge, m; NaN unseen.
     length : float
-        Of the straightedge, m.
+        Length of the straightedge, m.
     cell : float
         Distance of the cells, m.
 
     Notes
     -----
-    Laid with its middle on a cell, it rests on the two points nearest to that on either side at which the upper convex hull of
-    what lies beneath it has its edge there; where the middle itself is highest, it tips to either side. The gap is measured
-    between the two points of contact alone: where it stands out over an edge, nothing is. It is laid whole, nowhere over an
-    end of the row.
+    With its middle on a cell, the straightedge rests on two points: the ends of the edge of the upper convex hull above that
+    cell. If the middle itself is highest, it tips to either side. The gap is measured only between the two points of contact,
+    not beyond them. The whole straightedge must be within the row.
     """
     half = reach(length, cell)
     height = np.ascontiguousarray(height, np.float64)
@@ -83,9 +82,9 @@ def gaps_beneath(height: Float, length: float, cell: float) -> Gaps:
 def _gaps_beneath(
     height: Float, half: int, most: int, cell: float, gap: Float, waviness: Float
 ) -> None:  # pragma: no cover - compiled
-    """What :func:`gaps_beneath` says, row by row; the last two arrays are overwritten."""
+    """Compute :func:`gaps_beneath` row by row; the last two arrays are overwritten."""
     rows, count = height.shape
-    broken = np.zeros(count + 1, np.int64)  # how many cells up to here end an unseen gap that is too long
+    broken = np.zeros(count + 1, np.int64)  # number of cells so far that end an unseen gap that is too long
     for r in range(rows):
         h = height[r]
         unseen = 0
@@ -99,7 +98,7 @@ def _gaps_beneath(
             left, right = _contacts(h, c, first, last)
             if left < 0:
                 continue
-            for x in range(first, last + 1):  # under the straightedge, if with no gap
+            for x in range(first, last + 1):  # under the straightedge, if it has no gap
                 if not np.isnan(h[x]) and np.isnan(gap[r, x]):
                     gap[r, x] = waviness[r, x] = 0.0
             level = (h[left] * (right - c) + h[right] * (c - left)) / (right - left)
@@ -113,7 +112,7 @@ def _gaps_beneath(
 
 @inner
 def _contacts(h: Float, c: int, first: int, last: int) -> tuple[int, int]:  # pragma: no cover - compiled
-    """The points left and right of c that the straightedge over both rests on, c left out; -1 where a side has none."""
+    """Return the contact points left and right of c of the straightedge over both, without c; -1 if a side has none."""
     left, right = c - 1, c + 1
     while left >= first and np.isnan(h[left]):
         left -= 1
@@ -142,7 +141,7 @@ def _contacts(h: Float, c: int, first: int, last: int) -> tuple[int, int]:  # pr
 
 @inner
 def _edges(h: Float, c: int, first: int, last: int) -> tuple[int, int]:  # pragma: no cover - compiled
-    """The next points of contact to the left and the right of c, which is one itself."""
+    """Return the next contact points to the left and right of c, which is one itself."""
     left, right = c, c
     slope = np.inf
     for x in range(c - 1, first - 1, -1):
@@ -161,9 +160,9 @@ def _edges(h: Float, c: int, first: int, last: int) -> tuple[int, int]:  # pragm
 def _hollow(
     h: Float, left: int, right: int, whole: bool, cell: float, gap: Float, waviness: Float
 ) -> None:  # pragma: no cover - compiled
-    """Take note of the gaps between two points of contact, and of a whole hollow's depth over the way to its nearer rim.
+    """Record the gaps between two contact points, and a whole hollow's depth over the distance to its nearer rim.
 
-    It is not whole where the straightedge ends at a point of contact: its rim may lie beyond.
+    A hollow is not whole if the straightedge ends at a contact point: its rim may be beyond.
     """
     deepest, lowest, near = 0.0, -1, 0
     for x in range(left + 1, right):
@@ -186,9 +185,9 @@ class Cells:
     mean : (rows, cells) float array
         m; NaN where too little was seen.
     sigma : float array
-        Standard deviation of each mean by the scatter of pixels, of the same shape.
+        Standard deviation of each mean from the scatter of pixels, same shape.
     seen : int array
-        Pixels seen in each.
+        Number of pixels seen in each.
     """
 
     mean: Float
@@ -197,7 +196,7 @@ class Cells:
 
 
 def cell_means(values: Single, factor: int, least: int) -> Cells:
-    """Means of ``factor`` × ``factor`` pixels (rows, columns), both whole multiples of it, with ``least`` pixels or more."""
+    """Return means of ``factor`` × ``factor`` pixels (rows, columns) with ``least`` pixels or more; both are multiples."""
     rows, columns = values.shape
     blocks = values.reshape(rows // factor, factor, columns // factor, factor)
     held = np.isfinite(blocks)

@@ -1,8 +1,8 @@
 """Steps of the lining: from ring to ring in cells of arc, and lips between the segments of a ring.
 
-On either side of a joint a plane is fitted to patches, robustly, and drawn on to the joint; the step is the difference. What is
-compared are places about the given axis along the wall's normal, not offsets: the surface that these are from goes over from
-section to section evenly, and hides a part of each step.
+On either side of a joint a plane is fitted robustly to patches and extrapolated to the joint; the step is the difference.
+Positions about the given axis along the wall's normal are compared, not offsets: the reference surface of the offsets changes
+smoothly from section to section, and so hides a part of each step.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.shape.tukey import CUT, rate, weights
 
 MARGIN = 0.05
-"""What is nearer to a joint than that is not looked at: chamfer, sealing, mortar, m."""
+"""Distance from a joint within which patches are ignored: chamfer, sealing, mortar, m."""
 
 REACH = 1.0
-"""Length on either side over which planes are fitted, m, but no more than a ring has."""
+"""Length on either side for fitting planes, m, at most one ring."""
 
 CELL_ROWS = 5
 """Rows of patches in a cell of arc."""
 
 LEAST_PATCHES = 0.6
-"""Share of the patches of a cell that must be seen on either side."""
+"""Minimum seen share of a cell's patches on either side."""
 
 SHORTEST = 0.25
-"""Length that what is seen on either side must have, m: a plane is not drawn on from less."""
+"""Minimum seen length on either side, m: no plane is extrapolated from less."""
 
 LIP_REACH = 0.5
-"""Length along the arc on either side of a joint between segments that lines are fitted to, m."""
+"""Length along the arc on either side of a joint between segments for fitting lines, m."""
 
 LIP_LEVEL = 6.0
-"""A lip is one that exceeds its standard error so many times: places are tried all around, some hundred of them."""
+"""Minimum ratio of a lip to its standard error: some hundred places are tested all around."""
 
 _ROUNDS = 6
 _LEAST_SCALE = 1e-5  # m
@@ -50,7 +50,7 @@ class Steps:
     ----------
     arc : (k,) float array
         Middles of the cells, m.
-    step, se : (k,) float arrays
+    Inward step of the lining behind the joint relative to that before it, and its standard error, m; NaN if not determined.
         How far the lining behind the joint stands in before that before it, and its standard error, m; NaN untold.
     """
 
@@ -60,7 +60,7 @@ class Steps:
 
     @property
     def greatest(self) -> tuple[float, float, float] | None:
-        """Greatest step either way, its standard error and arc, m; those told worst do not count; None without any."""
+        """Return the greatest step, its standard error and arc, m, without the least accurate ones; None if none is left."""
         told = np.isfinite(self.step)
         if not told.any():
             return None
@@ -71,7 +71,7 @@ class Steps:
 
 @dataclass(frozen=True)
 class Lip:
-    """Step between two segments of a ring, m; positive where the one clockwise stands in."""
+    """Step between two segments of a ring, m; positive where the clockwise one is further inside."""
 
     size: float
     se: float
@@ -79,12 +79,12 @@ class Lip:
 
 
 def joint_steps(patches: Patches, joint: float, before: float, behind: float) -> Steps:
-    """Steps at a joint.
+    """Measure the steps at a joint.
 
     Parameters
     ----------
     patches : Patches
-        Of both rings.
+        Patches of both rings.
     joint : float
         Chainage, m.
     before, behind : float
@@ -105,7 +105,7 @@ def joint_steps(patches: Patches, joint: float, before: float, behind: float) ->
 
 
 def _drawn_on(side: Patches, joint: float, normals: Float, count: int) -> tuple[Float, Float]:
-    """Level at the joint of each cell of one side, inwards, and its variance, both (count,)."""
+    """Return the level at the joint of each cell of one side, inwards, and its variance, both (count,)."""
     none = np.full(count, np.nan)
     columns = len(side.chainage)
     if columns < 3 or side.chainage[-1] - side.chainage[0] < SHORTEST:
@@ -129,7 +129,7 @@ def _drawn_on(side: Patches, joint: float, normals: Float, count: int) -> tuple[
 
 
 def _planes(values: Float, seen: Bool, design: Float) -> tuple[Float, Float]:
-    """Constants of robust planes through values (k, n), and their variances, (k,) each."""
+    """Fit robust planes to values (k, n), and return their constants and variances, (k,) each."""
     filled = np.where(seen, values, 0.0)
     base = np.nanmedian(values, axis=1)[:, None]
     filled = np.where(seen, filled - base, 0.0)
@@ -142,7 +142,7 @@ def _planes(values: Float, seen: Bool, design: Float) -> tuple[Float, Float]:
         spread = np.nanmedian(np.where(seen, np.abs(off), np.nan), axis=1)
         scale = np.maximum(MAD_TO_SIGMA * spread, _LEAST_SCALE)[:, None]
         weight = np.where(seen, weights(off / (CUT * scale)), 0.0)
-    # Variance of robust estimates (Huber, 1981, section 7.6): the influence of each residual, and how fast it changes.
+    # Variance of robust estimates (Huber, 1981, section 7.6): influence of each residual, and its derivative.
     used = seen & (weight > 0.0)
     influence = np.where(used, weight * off, 0.0)
     sigma2 = (influence**2).sum(axis=1) / np.maximum(used.sum(axis=1) - 3.0, 1.0)
@@ -153,19 +153,19 @@ def _planes(values: Float, seen: Bool, design: Float) -> tuple[Float, Float]:
 
 
 def greatest_lip(places: Float, arc: Float) -> Lip | None:
-    """Greatest lip of a ring; None where none stands out of what the lining's rows scatter.
+    """Return the greatest lip of a ring; None if none exceeds the scatter of the lining's rows.
 
     Parameters
     ----------
     places : (r, 2) float array
-        Of each row of arc, as `row_medians` gives them, less the ring's shape or not, m.
+        Place of each row of arc, from `row_medians`, with or without the ring's shape removed, m.
     arc : (r,) float array
-        Of the rows, m.
+        Arc of the rows, m.
 
     Notes
     -----
-    At each row a line with the wall's bend is fitted to the rows on either side, without the row itself, in which the joint may
-    lie. The greatest of the differences is a lip if it is `LIP_LEVEL` times its standard error.
+    At each row a line with the wall's bend is fitted to the rows on either side, without the row itself, which may contain the
+    joint. The greatest difference is a lip if it is `LIP_LEVEL` times its standard error.
     """
     side = float(np.median(np.diff(arc))) if len(arc) > 1 else 1.0
     reach = round(LIP_REACH / side)
@@ -182,7 +182,7 @@ def greatest_lip(places: Float, arc: Float) -> Lip | None:
     height = np.einsum("nkw,nk->nw", windows, normal)
     at = np.delete(np.arange(-reach, reach + 1) / reach, reach)
     behind = (at > 0.0).astype(np.float64)
-    # The bend is one over the joint; tilt may change there, as segments hinge.
+    # The bend is the same across the joint; the tilt may change there, because segments can hinge.
     design = np.column_stack([np.ones(len(at)), behind, at, at * behind, at**2])
     inverse = np.linalg.pinv(design)
     values = np.delete(height, reach, axis=1)

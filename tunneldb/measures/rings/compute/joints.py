@@ -1,8 +1,8 @@
-"""Joints between rings, found from the unrolled images: where columns of pixels differ all around, and how evenly that repeats.
+"""Joints between rings in the unrolled images, from columns of pixels that differ all around and repeat evenly.
 
-A joint shows as a narrow dark or bright line of intensity, as a groove, or as a step of the offset. Each is taken column by
-column, from many rows of which none has much to say; what repeats along the tunnel is the ring's length. Joints are then
-followed one by one: rings of curved tunnels are tapered, and one may be of other length, or its joint be hidden.
+A joint shows as a narrow dark or bright line of intensity, as a groove, or as a step of the offset. Each is measured column
+by column, over many rows that are weak one by one; the ring length is the distance at which the columns repeat. Joints are then
+followed one by one: rings of curved tunnels are tapered, a ring may have another length, and a joint may be hidden.
 """
 
 from __future__ import annotations
@@ -18,60 +18,60 @@ from tunneldb.arrays import Bool, Float, Int64, Single
 from tunneldb.robust import MAD_TO_SIGMA
 
 BESIDE = 0.06
-"""A line is held against what lies so far before and behind it, m: joints are narrower, with beam and pixels."""
+"""Distance before and behind at which a line is compared with its surroundings, m: more than a joint with beam and pixels."""
 
 ACROSS = 0.12
-"""A step is the difference of means over so much before and behind, m."""
+"""Length before and behind over which means are compared for a step, m."""
 
 SECTORS = 8
-"""Parts of the section in which steps are told one by one: a ring that is shifted steps in here and out there."""
+"""Number of sectors in which steps are measured separately: a shifted ring steps inwards on one side and outwards opposite."""
 
 LEAST_ROWS = 20
-"""Rows that a column needs in a sector."""
+"""Minimum number of rows of a column in a sector."""
 
 STRONG = 5.0
-"""A peak is one that stands out by so many standard deviations of what columns scatter anyway."""
+"""Minimum strength of a peak, in standard deviations of the columns' scatter."""
 
 SHORTEST, LONGEST = 0.8, 2.5
-"""Lengths of rings that are looked for, m."""
+"""Ring lengths searched, m."""
 
 STRETCH = 50.0
-"""Length over which rings are taken to repeat evenly, m."""
+"""Length over which rings are assumed to repeat evenly, m."""
 
 BY_CHANCE = 1e-3
-"""Peaks that lie anywhere repeat as evenly in so small a share of surveys (Rayleigh's test over all lengths)."""
+"""Share of surveys in which random peaks repeat as evenly (Rayleigh's test over all lengths)."""
 
 AS_GOOD = 0.6
-"""A longer length is the ring's if it repeats at least so well: half the length repeats as well as the whole."""
+"""Relative regularity from which a longer length is preferred: half the ring length repeats as well as the whole."""
 
 STRAY = 3.5
-"""A joint is another peak if it lies so many standard deviations of all joints off where its neighbours have it."""
+"""Deviation from the place that the neighbours give, in standard deviations of all joints, from which a peak is no joint."""
 
-_USUAL = 2.0  # m over which the usual strength of columns is taken
-_TOLERANCE = 0.012  # m, standard deviation of a ring's length about what those beside it have
-_OTHER = 9.0  # squared deviations: a ring of other length costs as much as one of three
+_USUAL = 2.0  # m, window for the usual strength of columns
+_TOLERANCE = 0.012  # m, standard deviation of a ring's length about that of its neighbours
+_OTHER = 9.0  # squared deviations: maximum cost of a ring with another length (three standard deviations)
 _OTHER_COST = 2.0 * STRONG
-_GAP = 4.0  # cost of each joint that is not seen
+_GAP = 4.0  # cost of each unseen joint
 _MOST_GAPS = 6
-_NEIGHBOURS = 3  # joints on either side that tell where one lies
+_NEIGHBOURS = 3  # joints on either side that predict a joint's place
 _STRAY_ROUNDS = 20
 _LEAST_SCALE = 0.002  # m
 
 
 class NoRingsError(ValueError):
-    """No ring length can be told; the message says why."""
+    """Ring length not determined; the message gives the reason."""
 
 
 @dataclass(frozen=True)
 class Joints:
-    """Joints as they were found.
+    """Joints of a tunnel.
 
     Attributes
     ----------
     chainage : (n,) float array
-        Growing, m.
+        Increasing, m.
     seen : (n,) bool array
-        False where a joint is put in between those beside it.
+        False if a joint is interpolated between its neighbours.
     pitch, pitch_se : float
         Mean length of the rings between seen joints, and its standard error, m.
     """
@@ -83,14 +83,14 @@ class Joints:
 
 
 def column_signals(level: Single | None, offset: Single, pixel: float) -> Float:
-    """How much each column looks like a joint: dark and bright line, groove and ridge, step, (5, columns); NaN without lining.
+    """Compute each column's likeness to a joint: dark, bright line, groove, ridge, step, (5, columns); NaN without lining.
 
     Parameters
     ----------
     level : (rows, columns) float32 array or None
         Corrected intensity of lining, dB; NaN elsewhere.
     offset : (rows, columns) float32 array
-        The same of the offset, m.
+        Offset of the same pixels, m.
     pixel : float
         Side of a pixel, m.
     """
@@ -99,7 +99,7 @@ def column_signals(level: Single | None, offset: Single, pixel: float) -> Float:
 
 
 def _lines(values: Single, pixel: float) -> Float:
-    """How much less, and how much more, each column has than those on both sides of it, (2, columns)."""
+    """Return how much darker, and how much brighter, each column is than both its sides, (2, columns)."""
     k = max(round(BESIDE / pixel), 1)
     before, behind = (np.full(values.shape, np.nan, np.float32) for _ in range(2))
     before[:, k:-k] = values[:, : -2 * k] - values[:, k:-k]
@@ -119,7 +119,7 @@ def _clipped_mean(off: Single) -> Float:
 
 
 def _step(offset: Single, pixel: float) -> Float:
-    """Root of the mean square, over the sectors, of the mean difference behind and before each column."""
+    """Return the root mean square, over the sectors, of the mean difference behind and before each column."""
     k = max(round(ACROSS / pixel), 2)
     seen = np.isfinite(offset)
     sums = [np.cumsum(np.pad(part, ((0, 0), (1, 0))), axis=1, dtype=np.float64) for part in (np.where(seen, offset, 0.0), seen)]
@@ -133,13 +133,13 @@ def _step(offset: Single, pixel: float) -> Float:
     told = np.isfinite(parts)
     out = np.full(columns, np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
-        # The difference at edge j + k lies between two columns: the one behind it takes it.
+        # The difference at edge j + k is between two columns; it is assigned to the one behind it.
         out[k : columns - k + 1] = np.sqrt(np.where(told, parts**2, 0.0).sum(axis=0) / told.sum(axis=0))
     return out
 
 
 def strength(signals: Float, pixel: float) -> Float:
-    """Strength (columns,) of all kinds together: standard deviations by which a column stands out; 0 where nothing is seen."""
+    """Combine all signals into one strength (columns,), in standard deviations; 0 where nothing is seen."""
     total = np.zeros(signals.shape[1])
     window = 2 * round(_USUAL / pixel / 2.0) + 1
     for signal in signals:
@@ -155,7 +155,7 @@ def strength(signals: Float, pixel: float) -> Float:
 
 
 def peaks(strong: Float, pixel: float) -> tuple[Float, Float]:
-    """Places of peaks, in columns, to parts of one, and their strength, (n,) each."""
+    """Return places of peaks, in columns with fractions, and their strength, (n,) each."""
     half = max(round(0.12 / pixel), 2)
     padded = np.pad(strong, half)
     highest = np.array([padded[half + k : len(padded) - half + k] for k in range(-half, half + 1)]).max(axis=0)
@@ -167,17 +167,17 @@ def peaks(strong: Float, pixel: float) -> tuple[Float, Float]:
 
 
 def ring_length(places: Float, weight: Float) -> float:
-    """Length with which peaks repeat, m.
+    """Find the length with which peaks repeat, m.
 
     Parameters
     ----------
     places, weight : (n,) float arrays
-        Chainage, m, and strength.
+        Chainage, m, and strength of the peaks.
 
     Raises
     ------
     NoRingsError
-        If they repeat no better than places that lie anywhere.
+        If they repeat no better than random places.
     """
     if len(places) < 5:
         raise NoRingsError(f"only {len(places)} places look like joints all around")
@@ -191,10 +191,10 @@ def ring_length(places: Float, weight: Float) -> float:
         turned = np.exp(2j * np.pi * np.outer(per_metre, places[first:stop] - places[first])) @ weight[first:stop]
         power += np.abs(turned) ** 2 / (weight[first:stop] ** 2).sum()
         parts += 1
-    # Where peaks lie anywhere, each stretch adds an exponential of mean 1 (Rayleigh's test): the sum has a gamma distribution.
+    # With random peaks each stretch adds an exponential of mean 1 (Rayleigh's test): the sum has a gamma distribution.
     limit = gamma.isf(BY_CHANCE / len(per_metre), max(parts, 1))
     if not parts or power.max() < limit:
-        raise NoRingsError("what looks like joints does not repeat evenly")
+        raise NoRingsError("places that look like joints do not repeat evenly")
     top = (power >= AS_GOOD * power.max()) & (power >= np.maximum(np.roll(power, 1), np.roll(power, -1)))
     return float(1.0 / per_metre[np.flatnonzero(top)[0]])
 
@@ -205,20 +205,20 @@ def _runs(number: Int64) -> Sequence[tuple[int, int]]:
 
 
 def follow(places: Float, weight: Float, pitch: float) -> Joints:
-    """Follow joints along the tunnel: the chain of peaks that is strongest and most even.
+    """Follow joints along the tunnel: find the strongest and most even chain of peaks.
 
     Parameters
     ----------
     places, weight : (n,) float arrays
-        Chainage of peaks, growing, m, and strength.
+        Chainage of the peaks, increasing, m, and strength.
     pitch : float
-        Length of a ring to begin with, m.
+        Initial ring length, m.
 
     Notes
     -----
-    The dearest chain by dynamic programming (Bellman, 1954): each peak on it gains by its strength, and costs as far as it lies
-    from a whole number of rings behind the one before, up to a limit, so that one ring of other length does not break it. It is
-    done twice, the second time with the lengths that rings have there (tapered rings make up curves).
+    The best chain is found by dynamic programming (Bellman, 1954). Each peak adds its strength, and costs its distance from
+    a whole number of rings behind the previous one, up to a limit, so that one ring of another length does not break the chain.
+    It is done twice, the second time with the local ring lengths (tapered rings form curves).
     """
     local = np.full(len(places), pitch)
     chain = _chain(places, weight, local)
@@ -233,7 +233,7 @@ def follow(places: Float, weight: Float, pitch: float) -> Joints:
 
 
 def _chain(places: Float, weight: Float, local: Float) -> Int64:
-    """Indices of the peaks on the best chain."""
+    """Return the indices of the peaks on the best chain."""
     gain = np.minimum(weight, 3.0 * STRONG)
     best, back, leader = gain.copy(), np.full(len(places), -1), np.zeros(len(places), np.int64)
     for k in range(1, len(places)):
@@ -245,7 +245,7 @@ def _chain(places: Float, weight: Float, local: Float) -> Int64:
         off = np.minimum((gaps - rings * local[k]) ** 2 / (_TOLERANCE**2 * rings), _OTHER)
         total = best[first + held] - off * _OTHER_COST / _OTHER - _GAP * (rings - 1.0)
         source = first + held
-        if first:  # where nothing is seen for long, the chain goes on with what came before
+        if first:  # across a long unseen stretch the chain continues from what came before
             total = np.append(total, best[leader[first - 1]] - _OTHER_COST - _GAP * _MOST_GAPS)
             source = np.append(source, leader[first - 1])
         if len(total) and total.max() > 0.0:
@@ -259,9 +259,9 @@ def _chain(places: Float, weight: Float, local: Float) -> Int64:
 
 
 def _in_row(seen: Float, local: Float) -> Bool:
-    """Which joints lie where those before them, or those behind them, have them, (n,).
+    """Return True for joints where the joints before or behind predict them, (n,).
 
-    What is off from both is another peak, next to a joint that is not seen: a ring of other length moves all joints behind it.
+    A joint off from both sides is another peak beside an unseen joint: a ring of another length shifts all joints behind it.
     """
     kept = np.ones(len(seen), np.bool_)
     for _ in range(_STRAY_ROUNDS):
@@ -273,7 +273,7 @@ def _in_row(seen: Float, local: Float) -> Bool:
         for k in range(1, _NEIGHBOURS + 1):
             gap = at[k:] - at[:-k] - (rings[k:] - rings[:-k]) * length[k:]
             off[0, k - 1, k:], off[1, k - 1, :-k] = gap, -gap
-        off[0, :, 0], off[1, :, -1] = np.inf, np.inf  # the ends have one side only
+        off[0, :, 0], off[1, :, -1] = np.inf, np.inf  # the ends have neighbours on one side only
         away = np.abs(np.nanmedian(off, axis=1))
         scale = MAD_TO_SIGMA * float(np.median(away[np.isfinite(away)]))
         least = away.min(axis=0)
@@ -287,9 +287,9 @@ def _in_row(seen: Float, local: Float) -> Bool:
 
 
 def _filled(seen: Float, local: Float, pitch: float) -> Joints:
-    """Joints with those between that are not seen, evenly."""
+    """Insert unseen joints evenly between seen ones."""
     if len(seen) < 4:
-        raise NoRingsError("what looks like joints makes no row")
+        raise NoRingsError("places that look like joints form no regular series")
     gaps = np.diff(seen)
     rings = np.maximum(np.rint(gaps / local[1:]), 1.0).astype(np.int64)
     number = np.concatenate([[0], np.cumsum(rings)])
@@ -298,7 +298,7 @@ def _filled(seen: Float, local: Float, pitch: float) -> Joints:
     one = rings == 1
     lengths = gaps / rings
     middle = float(np.median(lengths))
-    usual = np.abs(lengths - middle) < 0.1 * pitch  # a ring of other length is not one of the row
+    usual = np.abs(lengths - middle) < 0.1 * pitch  # without rings of another length
     mean = float(gaps[usual].sum() / rings[usual].sum()) if usual.any() else middle
     spread = float(np.std(lengths[usual & one])) if (usual & one).sum() > 2 else _TOLERANCE
     return Joints(chainage, np.isin(whole, number), mean, spread / np.sqrt(max(int(usual.sum()), 1)))

@@ -1,4 +1,4 @@
-"""What is told of one ring of a scanned lining: shape, seen share, chords, lip."""
+"""Measures of one ring of a scanned lining: shape, seen share, chords, lip."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from tunneldb.shape.departures import clock_of
 from tunneldb.shape.rings import LEAST_POINTS, Ring, RingRefusedError, fit_ring
 
 NOT_ROUND = 0.03
-"""Where a tenth of a ring departs by more than this share of the radius from its ellipse, centre and radius say nothing. Lining
-that was squeezed to the limit departs by less: 2 % are usual as most of ovality."""
+"""Maximum departure of a tenth of a ring from its ellipse, as a share of the radius; beyond it centre and radius mean nothing.
+Lining squeezed to the limit departs by less: 2 % is usual, mostly ovality."""
 
 CHORD_REACH = 3.0
-"""A chord ends in the median of what lies within so many degrees of its clock position."""
+"""Half-width of the window around a clock position whose median is the end of a chord, °."""
 
 _LEAST_ENDS = 4  # rows
-_MEDIAN = 1.2533  # standard error of a median by that of a mean
+_MEDIAN = 1.2533  # standard error of a median relative to that of a mean
 
 
 @dataclass(frozen=True)
 class RingChord:
-    """Chord between two clock positions, °; length and standard error in m, NaN where an end is not seen."""
+    """Chord between two clock positions, °; length and standard error in m, NaN if an end is not seen."""
 
     clock_from: float
     clock_to: float
@@ -42,15 +42,15 @@ class LiningRing:
     Attributes
     ----------
     seen_share : float
-        Of the rows of arc that the lining reaches over, 0 to 1.
+        Seen share of the rows of arc that the lining covers, 0 to 1.
     ring : Ring or None
-        Its shape; None where there is none.
+        Shape; None if there is none.
     lip : Lip or None
-        Greatest lip; None where none stands out.
+        Greatest lip; None if none is significant.
     chords : tuple of RingChord
-        As they were asked for.
+        The requested chords.
     remark : str
-        Why there is no shape, or what is to be known of it; empty.
+        Reason for a missing shape, or a remark on it; may be empty.
     """
 
     seen_share: float
@@ -68,15 +68,15 @@ def measure_ring(
     Parameters
     ----------
     patches : Patches
-        Those of the ring, and perhaps more.
+        Patches of the ring; more are allowed.
     low, high : float
         Chainage of its joints, m.
     girth : float
-        Length of its section, floor and all, m.
+        Length of its whole section, floor included, m.
     chords
-        Clock positions of the ends of each, °.
+        Clock positions of the ends of each chord, °.
     orders : int
-        Harmonics of the radius.
+        Number of harmonics of the radius.
     """
     own = patches.between(low + MARGIN, high - MARGIN)
     places = row_medians(straightened(own)) if len(own.chainage) else np.full((len(own.arc), 2), np.nan)
@@ -85,7 +85,7 @@ def measure_ring(
     share = min(float(seen.sum()) * side / girth, 1.0) if girth > 0.0 else 0.0
     if seen.sum() < LEAST_POINTS:
         none = tuple(RingChord(*chord, np.nan, np.nan) for chord in chords)
-        return LiningRing(share, None, None, none, "its lining is not seen")
+        return LiningRing(share, None, None, none, "lining not seen")
     points = places[seen]
     ring, remark = _shape(points, orders)
     middle = ring.adjustment.ellipse.centre if ring is not None else 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -104,12 +104,12 @@ def _shape(points: Float, orders: int) -> tuple[Ring | None, str]:
         return None, f"not round: a tenth of it departs by more than {1e3 * off:.0f} mm from an ellipse"
     return (
         ring,
-        "" if ring.is_ellipse else f"no ellipse can be told (a gap of {ring.gap:.0f}°): centre and radius are a circle's",
+        "" if ring.is_ellipse else f"ellipse not determined (a gap of {ring.gap:.0f}°): centre and radius are a circle's",
     )
 
 
 def _chord(points: Float, middle: Float, first: float, second: float) -> RingChord:
-    """Chord between the places where the lining has two clock positions about a middle."""
+    """Return the chord between the lining's places at two clock positions about a middle."""
     clock, radius = clock_of(points, middle), np.linalg.norm(points - middle, axis=1)
     ends, errors = [], []
     for position in (first, second):

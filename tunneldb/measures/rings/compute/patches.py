@@ -1,4 +1,4 @@
-"""Pixels of the lining averaged into patches of a few centimetres, by which rings are measured."""
+"""Pixels of the lining averaged into patches of a few centimetres, for measuring rings."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.shape.tukey import CUT, weights
 
 PATCH = 0.06
-"""Side of a patch, in whole pixels, m: 3 mm of noise become less than 1 mm, and what bends within is less."""
+"""Side of a patch, rounded to whole pixels, m: 3 mm of noise become less than 1 mm, and the bend within a patch is less."""
 
 LEAST_SEEN = 0.3
-"""Share of its pixels that a patch needs."""
+"""Minimum seen share of a patch's pixels."""
 
 
 _LEAST_ROWS = 10
@@ -30,11 +30,11 @@ class Patches:
     Attributes
     ----------
     chainage : (c,) float array
-        Of their middles, m, growing.
+        Middles of the patches, m, increasing.
     arc : (r,) float array
-        Of their middles, m, growing.
+        Middles of the patches, m, increasing.
     right, up : (c, r) float arrays
-        Where they lie about the given axis, m; NaN unseen.
+        Position about the given axis, m; NaN where unseen.
     """
 
     chainage: Float
@@ -43,13 +43,13 @@ class Patches:
     up: Float
 
     def between(self, low: float, high: float) -> Patches:
-        """Those whose middles lie between two chainages, m."""
+        """Return the patches whose middles lie between two chainages, m."""
         first, stop = np.searchsorted(self.chainage, [low, high])
         return Patches(self.chainage[first:stop], self.arc, self.right[first:stop], self.up[first:stop])
 
 
 def average(values: Single, chainage: Float, arc: Float, side: float) -> tuple[Float, Float, Single]:
-    """Average an image into patches that lie at whole multiples of their side.
+    """Average an image into patches on whole multiples of their side.
 
     Parameters
     ----------
@@ -58,12 +58,12 @@ def average(values: Single, chainage: Float, arc: Float, side: float) -> tuple[F
     chainage, arc : (columns,), (rows,) float arrays
         Middles of the pixels, m.
     side : float
-        Of a patch, m.
+        Side of a patch, m.
 
     Returns
     -------
     chainage, arc : (c,), (r,) float arrays
-        Middles of the patches, growing, m.
+        Middles of the patches, increasing, m.
     mean : (r, c) float32 array
         NaN where less than `LEAST_SEEN` of the pixels is seen.
     """
@@ -82,14 +82,14 @@ def average(values: Single, chainage: Float, arc: Float, side: float) -> tuple[F
 
 
 def _bins(places: Float, side: float) -> tuple[Int64, Float]:
-    """First of the growing places (n,) in each bin, and the bins' numbers."""
+    """Return the first of the increasing places (n,) in each bin, and the bins' numbers."""
     number = np.floor(places / side + 1e-9)
     first = np.flatnonzero(np.diff(number, prepend=number[0] - 1.0))
     return first, number[first]
 
 
 def join(parts: Sequence[Patches]) -> Patches:
-    """Patches one behind the other, over all arcs that any of them has."""
+    """Join consecutive patches, over all arcs that any of them has."""
     if len(parts) == 1:
         return parts[0]
     side = min((float(np.diff(part.arc).min()) for part in parts if len(part.arc) > 1), default=PATCH)
@@ -107,7 +107,7 @@ def join(parts: Sequence[Patches]) -> Patches:
 
 
 def row_medians(patches: Patches, least: float = 0.25) -> Float:
-    """Place of each row of arc (r, 2), right and up, m: medians along the ring; NaN where fewer than that share is seen."""
+    """Return the median place of each row of arc (r, 2), right and up, m; NaN if less than ``least`` of it is seen."""
     count = np.isfinite(patches.right).sum(axis=0)
     out = np.full((len(patches.arc), 2), np.nan)
     held = np.flatnonzero(count >= max(least * len(patches.chainage), 1.0))
@@ -120,11 +120,11 @@ def row_medians(patches: Patches, least: float = 0.25) -> Float:
 
 
 def straightened(patches: Patches) -> Patches:
-    """Patches of a ring less how it goes off the axis along its length, to the right and up, evenly.
+    """Remove the linear drift of a ring from the axis along its length, to the right and up.
 
-    Where a row of arc is seen over a part of the ring only, its place is else that of this part: beside what hangs on the wall
-    the lining seems to step by what the ring, or the given axis, runs askew. Found by Tukey's biweight, of each row about
-    its own middle.
+    A row of arc that is seen over a part of the ring only would otherwise get the place of this part: beside fixtures the
+    lining would seem to step by the skew between ring and axis. The drift is fitted with Tukey's biweight, each row about its
+    own middle.
     """
     normals = inward_normals(row_medians(patches))
     inward = patches.right * normals[:, 0] + patches.up * normals[:, 1]
@@ -149,7 +149,7 @@ def straightened(patches: Patches) -> Patches:
 
 
 def inward_normals(places: Float) -> Float:
-    """Unit vectors (r, 2) into the tunnel, across the rows of places (r, 2), which lie clockwise; NaN without neighbours."""
+    """Return unit vectors (r, 2) into the tunnel, across the rows of places (r, 2), clockwise; NaN without neighbours."""
     filled = places.copy()
     seen = np.flatnonzero(np.isfinite(places[:, 0]))
     if len(seen) < 3:
