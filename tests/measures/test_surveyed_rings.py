@@ -80,7 +80,7 @@ def test_a_ring_lies_where_it_was_put(files: tuple[Path, Path]) -> None:
         (lines(radius=3000.0), "ring,point,x,y,z", "in millimetres"),
         (lines(radius=6.0), "ring,point,x,y,z", "is 6 m the radius"),
         ([row.replace("20.0000", "20000") for row in lines()], "ring,point,x,y,z", "from the axis"),
-        (lines(points=4), "ring,point,x,y,z", "4 points, a ring needs 5"),
+        (lines(points=4), "ring,point,x,y,z", "only 4 points; a ring needs 5"),
         ([f"{row},30" for row in lines()], "ring,point,x,y,z,offset", "offsets are metres"),
         ([*lines(), "1,9,a,0,0"], "ring,point,x,y,z", "line 10: x is 'a'"),
     ],
@@ -119,11 +119,11 @@ def test_what_is_wrong_of_one_ring_is_its_remark(files: tuple[Path, Path]) -> No
     said = json.loads(done.stdout)
     remarks = {row["ring"]: row["remark"] for row in said["rows"]}
     assert remarks["1"] == ""
-    assert remarks["few"] == "4 points, a ring needs 5"
+    assert remarks["few"] == "only 4 points; a ring needs 5"
     assert remarks["twice"] == "point 1 is there twice: counted once"
     assert remarks["other"] == "point 1 is there twice, at different places"
     assert "m from the axis" in remarks["far"]
-    assert "no ellipse can be told" in remarks["half"]
+    assert "ellipse not determined" in remarks["half"]
     by_name = {row["ring"]: row for row in said["rows"]}
     assert by_name["few"]["radius"] is None
     assert (by_name["half"]["ovality"], by_name["half"]["radius"]) == (None, 3.0)

@@ -14,7 +14,7 @@ from tunneldb.arrays import Bool, Float
 from tunneldb.classification.classes import PointClass
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.measures.clearance.compute.clearance import PASSING, TRACK
+from tunneldb.measures.clearance.compute.clearance import TEMPORARY_CLASSES, TRACK_CLASSES
 from tunneldb.measures.clearance.compute.track import metre_places
 from tunneldb.measures.clearance.rows import load_classed
 from tunneldb.measures.clearance.tables import Row, infringement_rows, section_rows
@@ -250,7 +250,7 @@ def _point_paths(places: Float, classes: Any, outline: Float) -> dict[str, str]:
     """Paths of dots for the points (n, 2) about an outline, by what they are; noise is left out."""
     (west, low), (east, high) = outline.min(axis=0) - AROUND, outline.max(axis=0) + AROUND
     near = ((places > [west, low]) & (places < [east, high])).all(axis=1) & (classes != PointClass.NOISE)
-    ground, passing = np.isin(classes, TRACK), np.isin(classes, PASSING)
+    ground, passing = np.isin(classes, TRACK_CLASSES), np.isin(classes, TEMPORARY_CLASSES)
     counts = near & ~ground & ~passing
     inside = counts & shapely.contains_xy(shapely.Polygon(outline), places)
     kinds = {"counts": counts & ~inside, "inside": inside, "passing": near & passing, "ground": near & ground}

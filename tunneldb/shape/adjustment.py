@@ -12,26 +12,26 @@ from tunneldb.arrays import Bool, Float
 from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.shape.circle import nearest_to_half, taubin
 from tunneldb.shape.ellipse import CIRCLE, ELLIPSE, Ellipse, distances, solve
-from tunneldb.shape.limits import BAD_SHARE, FEW, LEVEL_KNOWN, LEVEL_OWN, WORSE
+from tunneldb.shape.limits import LEVEL_KNOWN_SIGMA, LEVEL_OWN_SIGMA, LEVEL_WORSE_SIGMA, MAX_OUTLIER_SHARE, MAX_TESTED_SINGLY
 from tunneldb.shape.tukey import CUT, rate, weights
 
-HOPELESS = {CIRCLE: 10.0, ELLIPSE: 5.0}
+MAX_ERROR_INFLATION = {CIRCLE: 10.0, ELLIPSE: 5.0}
 """Limit of the inflation of the worst standard error: a circle or an ellipse beyond it is not reported.
 
 The inflation compares with as many points evenly around the ring. With dense points a circle needs 90° of a ring, an ellipse
 210°. An ellipse needs more than its noise requires: shape that is neither circle nor ellipse is magnified in the same way.
 """
 
-BESIDE = (3,)
+EXTRA_ORDERS = (3,)
 """Orders of harmonics that are fitted to many points together with an ellipse. Without them the ellipse shifts where a part
 of the ring was not seen. With a fourth order, a ring without its floor determines no ellipse."""
 
-BESIDE_HOPELESS = 25.0
+MAX_EXTRA_INFLATION = 25.0
 """Inflation of the worst standard error from which the extra harmonics are left out. Dense points over more than half a ring
 reach 18, points in a few places any number."""
 
-_SETTLING = 8
-_LEAST_SCALE = 1e-6  # m
+_ROUNDS = 8
+_MIN_SCALE = 1e-6  # m
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Adjustment:
 
 def begin(xy: Float) -> Float | None:
     """Return the circle to start with, as parameters (5,), m; None if the points lie on a line."""
-    found = taubin(xy) if len(xy) <= FEW else nearest_to_half(xy)
+    found = taubin(xy) if len(xy) <= MAX_TESTED_SINGLY else nearest_to_half(xy)
     return None if found is None else np.concatenate([found, [0.0, 0.0]])
 
 
@@ -89,12 +89,12 @@ def adjust(xy: Float, start: Float, free: int, sigma: float | None = None) -> Ad
     sigma : float, optional
         Standard deviation of a point's distance, if known, m. With few points it decides which point is an outlier.
     """
-    return _few(xy, start, free, sigma) if len(xy) <= FEW else _many(xy, start, free)
+    return _few(xy, start, free, sigma) if len(xy) <= MAX_TESTED_SINGLY else _many(xy, start, free)
 
 
 def _few(xy: Float, start: Float, free: int, sigma: float | None) -> Adjustment:
     used = np.ones(len(xy), bool)
-    may_go = int(np.ceil(len(xy) * BAD_SHARE))
+    may_go = int(np.ceil(len(xy) * MAX_OUTLIER_SHARE))
     while True:
         parameters = solve(xy[used], start, free)
         wrong = _worst(xy[used], parameters, free, sigma) if (~used).sum() < may_go else None
@@ -128,16 +128,16 @@ def _worst(xy: Float, parameters: Float, free: int, sigma: float | None) -> int 
         lifted = np.where(share > 1e-6, distance**2 / share, 0.0)  # decrease of the sum of squares without the point
     worst = int(np.argmax(lifted))
     if sigma is not None:
-        return worst if lifted[worst] > (sigma * norm.isf(LEVEL_KNOWN / (2 * len(xy)))) ** 2 else None
-    left = max(float(distance @ distance - lifted[worst]), _LEAST_SCALE**2) / freedom
-    return worst if lifted[worst] > left * student.isf(LEVEL_OWN / (2 * len(xy)), freedom) ** 2 else None
+        return worst if lifted[worst] > (sigma * norm.isf(LEVEL_KNOWN_SIGMA / (2 * len(xy)))) ** 2 else None
+    left = max(float(distance @ distance - lifted[worst]), _MIN_SCALE**2) / freedom
+    return worst if lifted[worst] > left * student.isf(LEVEL_OWN_SIGMA / (2 * len(xy)), freedom) ** 2 else None
 
 
 def _scale(own: float, freedom: int, sigma: float | None) -> float:
     """Return the standard deviation of a point for the standard errors, m: the known one, unless the ring is clearly worse."""
     if sigma is None:
         return float(own)
-    if freedom > 0 and own**2 * freedom > sigma**2 * chi2.isf(WORSE, freedom):
+    if freedom > 0 and own**2 * freedom > sigma**2 * chi2.isf(LEVEL_WORSE_SIGMA, freedom):
         return float(own)
     return sigma
 
@@ -145,29 +145,29 @@ def _scale(own: float, freedom: int, sigma: float | None) -> float:
 def _many(xy: Float, start: Float, free: int) -> Adjustment:
     """Adjust to many points; an ellipse together with extra harmonics, so that its errors include their effect."""
     alone = _weighted(xy, start, free, np.empty((len(xy), 0)))
-    if free != ELLIPSE or alone.inflation > HOPELESS[ELLIPSE]:
+    if free != ELLIPSE or alone.inflation > MAX_ERROR_INFLATION[ELLIPSE]:
         return alone
     together = _weighted(xy, start, free, _beside(xy, start))
-    return replace(together, inflation=alone.inflation) if together.inflation <= BESIDE_HOPELESS else alone
+    return replace(together, inflation=alone.inflation) if together.inflation <= MAX_EXTRA_INFLATION else alone
 
 
 def _beside(xy: Float, start: Float) -> Float:
     """Return the harmonics of the extra orders at the points' directions from the initial centre, (n, 2) per order."""
     angle = np.arctan2(*(xy - start[:2]).T)
-    return np.column_stack([wave(order * angle) for order in BESIDE for wave in (np.cos, np.sin)])
+    return np.column_stack([wave(order * angle) for order in EXTRA_ORDERS for wave in (np.cos, np.sin)])
 
 
-def _weighted(xy: Float, start: Float, free: int, beside: Float) -> Adjustment:
+def _weighted(xy: Float, start: Float, free: int, extra: Float) -> Adjustment:
     parameters, scale, distance = start, np.inf, distances(start, xy)[0]
-    for step in range(_SETTLING):
+    for step in range(_ROUNDS):
         before = scale
-        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(distance))), _LEAST_SCALE)
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(distance))), _MIN_SCALE)
         if step > 1 and abs(scale - before) < 1e-3 * scale:
             break
-        found = solve(xy, parameters, free if step else CIRCLE, CUT * scale, beside)
+        found = solve(xy, parameters, free if step else CIRCLE, CUT * scale, extra)
         parameters = found[:ELLIPSE]
-        distance = distances(parameters, xy)[0] - beside @ found[ELLIPSE:]
-    slopes = np.hstack([distances(parameters, xy)[1][:, :free], -beside])
+        distance = distances(parameters, xy)[0] - extra @ found[ELLIPSE:]
+    slopes = np.hstack([distances(parameters, xy)[1][:, :free], -extra])
     count = slopes.shape[1]
     u = distance / (CUT * scale)
     used = np.abs(u) < 1.0

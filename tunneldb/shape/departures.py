@@ -13,13 +13,13 @@ from tunneldb.shape.ellipse import distances
 SECTOR = 2.0
 """Sector size, °: with many points the median of each sector is used, because the greatest of thousands is noise."""
 
-MANY = 1800
+MIN_POINTS_FOR_SECTORS = 1800
 """Minimum number of points for medians by sector: twice what all sectors together need."""
 
-LEAST = 5
+MIN_SECTOR_POINTS = 5
 """Minimum number of points of a sector."""
 
-_MEDIAN = 1.2533  # standard error of a median relative to that of a mean: √(π/2)
+_MEDIAN_ERROR = 1.2533  # standard error of a median relative to that of a mean: √(π/2)
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def departures(xy: Float, adjustment: Adjustment) -> tuple[Departure, Departure]
     own = adjustment.scale**2 - 2.0 * np.einsum(
         "ij,jk,ik->i", slopes, ellipse.covariance, distances(ellipse.parameters, points)[1]
     )
-    if len(points) >= MANY:
+    if len(points) >= MIN_POINTS_FOR_SECTORS:
         off, clock, slopes, own = _sectors(off, clock, slopes, adjustment.scale)
     variance = own + np.einsum("ij,jk,ik->i", slopes, ellipse.covariance, slopes)
     found = []
@@ -70,8 +70,8 @@ def _sectors(off: Float, clock: Float, slopes: Float, scale: float) -> tuple[Flo
     sector = np.floor(clock / SECTOR).astype(int)
     order = np.argsort(sector, kind="stable")
     starts = np.flatnonzero(np.diff(sector[order], prepend=-1))
-    groups = [group for group in np.split(order, starts[1:]) if len(group) >= LEAST]
+    groups = [group for group in np.split(order, starts[1:]) if len(group) >= MIN_SECTOR_POINTS]
     middle = np.array([np.median(off[group]) for group in groups])
     at = np.array([np.median(clock[group]) for group in groups])
     mean = np.array([slopes[group].mean(axis=0) for group in groups])
-    return middle, at, mean, np.array([(_MEDIAN * scale) ** 2 / len(group) for group in groups])
+    return middle, at, mean, np.array([(_MEDIAN_ERROR * scale) ** 2 / len(group) for group in groups])

@@ -26,7 +26,7 @@ CIRCLE, ELLIPSE = 3, 5
 
 _NEWTON = 12
 _TINY = 1e-12
-_REWEIGHTED, _STILL = 50, 1e-8  # m
+_MAX_ROUNDS, _CONVERGED = 50, 1e-8  # m
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ def solve(xy: Float, start: Float, free: int, limit: float | None = None, beside
 def _reweighted(xy: Float, start: Float, free: int, limit: float, more: Float) -> Float:
     """Fit an ellipse with Tukey's loss, by iteratively reweighted least squares (Huber, 1981, 7.8)."""
     parameters, beside = start.copy(), np.zeros(more.shape[1])
-    for _ in range(_REWEIGHTED):
+    for _ in range(_MAX_ROUNDS):
         distance, slope = distances(parameters, xy)
         slopes = np.hstack([slope[:, :free], -more])
         off = distance - more @ beside
@@ -192,6 +192,6 @@ def _reweighted(xy: Float, start: Float, free: int, limit: float, more: Float) -
         step = np.linalg.lstsq(slopes.T @ (weight * slopes), -(weight * slopes).T @ off, rcond=1e-12)[0]
         parameters[:free] += step[:free]
         beside += step[free:]
-        if np.abs(step).max() < _STILL:
+        if np.abs(step).max() < _CONVERGED:
             break
     return np.concatenate([parameters, beside])

@@ -8,13 +8,13 @@ import numpy as np
 
 from tunneldb.arrays import Float
 
-HOPELESS = 5.0
+MAX_ERROR_INFLATION = 5.0
 """Maximum inflation of a harmonic's standard error, compared with as many points evenly around the ring."""
 
 REACH = 30.0
 """Maximum angle from a chord's end to the nearest point, °."""
 
-_OWN = 30  # minimum redundancy for the scale to come from the ring's own residuals
+_MIN_OWN_FREEDOM = 30  # minimum redundancy for the scale to come from the ring's own residuals
 
 
 @dataclass(frozen=True)
@@ -98,10 +98,10 @@ def fit_harmonics(clock: Float, radius: Float, orders: int, scale: float) -> Har
     coefficients = np.linalg.lstsq(design, radius, rcond=None)[0].astype(np.float64)
     inverse = np.linalg.pinv(design.T @ design).astype(np.float64)
     left, freedom = radius - design @ coefficients, len(clock) - design.shape[1]
-    if freedom > _OWN:
+    if freedom > _MIN_OWN_FREEDOM:
         scale = float(np.sqrt(left @ left / freedom))
     inflation = np.sqrt(np.diag(inverse)[1:].reshape(-1, 2).max(axis=1) * len(clock) / 2.0)
-    determined = tuple(bool(value <= HOPELESS) for value in inflation)
+    determined = tuple(bool(value <= MAX_ERROR_INFLATION) for value in inflation)
     return Harmonics(coefficients, (inverse * scale**2).astype(np.float64), determined, np.sort(clock))
 
 

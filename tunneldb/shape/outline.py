@@ -155,8 +155,8 @@ def matched(first: Outline, second: Outline) -> tuple[Outline, Outline]:
         return first, second
     shares = [np.cumsum(outline.lengths)[:-1] / outline.length for outline in (first, second)]
     both = np.unique(np.concatenate(shares))
-    least = TOLERANCE / min(first.length, second.length)
-    both = both[np.diff(both, prepend=-1.0) > 4.0 * least]
+    min_share = TOLERANCE / min(first.length, second.length)
+    both = both[np.diff(both, prepend=-1.0) > 4.0 * min_share]
     cuts = first.cut(both), second.cut(both)
     if len(cuts[0].elements) != len(cuts[1].elements):
         raise ValueError("the outlines have vertices too close to each other")

@@ -9,15 +9,15 @@ from scipy.stats import t as student
 
 from tunneldb.arrays import Float
 from tunneldb.robust import MAD_TO_SIGMA
-from tunneldb.shape.limits import BAD_SHARE, FEW, LEVEL_OWN
+from tunneldb.shape.limits import LEVEL_OWN_SIGMA, MAX_OUTLIER_SHARE, MAX_TESTED_SINGLY
 from tunneldb.shape.tukey import CUT, weights
 
-ASIDE = 0.05
+OFF_PLANE_LIMIT = 0.05
 """Distance from the plane of the other prisms, along the tunnel, beyond which a prism does not belong to it, m."""
 
 _TRIPLES = 200
 _STEPS = 20
-_LEAST_SPREAD = 1e-4  # m; points of a drawing are exactly in their plane
+_MIN_SPREAD = 1e-4  # m; points of a drawing are exactly in their plane
 
 
 @dataclass(frozen=True)
@@ -79,11 +79,11 @@ def fit_plane(xyz: Float, ahead: Float) -> RingPlane | None:
     Notes
     -----
     Few points: least squares without points far from the plane of all others. Prisms are set up by hand, and within
-    `ASIDE` each says equally well where the ring is. Many points: Tukey's weights, starting from the triple with the least
+    `OFF_PLANE_LIMIT` each says equally well where the ring is. Many points: Tukey's weights, starting from the triple with the least
     median of distances (Rousseeuw, 1984).
     """
     origin = np.median(xyz, axis=0)
-    found = _few(xyz - origin) if len(xyz) <= FEW else _many(xyz - origin)
+    found = _few(xyz - origin) if len(xyz) <= MAX_TESTED_SINGLY else _many(xyz - origin)
     if found is None:
         return None
     middle, normal, spread = found
@@ -95,7 +95,7 @@ def fit_plane(xyz: Float, ahead: Float) -> RingPlane | None:
 def _few(near: Float) -> tuple[Float, Float, float] | None:
     """Return point, normal and spread of the plane of few points, tested one by one."""
     used = np.ones(len(near), bool)
-    for left in range(int(np.ceil(len(near) * BAD_SHARE)), -1, -1):
+    for left in range(int(np.ceil(len(near) * MAX_OUTLIER_SHARE)), -1, -1):
         found = _principal(near[used], np.ones(int(used.sum())))
         if found is None:
             return None
@@ -111,7 +111,7 @@ def _few(near: Float) -> tuple[Float, Float, float] | None:
 
 
 def _aside(centred: Float, normal: Float, off: Float) -> int | None:
-    """Return a point more than `ASIDE` off the plane of the others, if they agree too well for chance; else None."""
+    """Return a point more than `OFF_PLANE_LIMIT` off the plane of the others, if they agree too well for chance; else None."""
     design = np.column_stack([np.ones(len(off)), centred - np.outer(off, normal)])
     share = 1.0 - np.einsum("ij,ji->i", design, np.linalg.pinv(design))
     share = np.maximum(share, 1e-6)
@@ -119,8 +119,8 @@ def _aside(centred: Float, normal: Float, off: Float) -> int | None:
     worst = int(np.argmax(lifted))
     freedom = len(off) - 4
     left = max(float(off @ off - lifted[worst]), 0.0) / freedom
-    chance = student.isf(LEVEL_OWN / (2 * len(off)), freedom)
-    return worst if abs(off[worst]) / share[worst] > ASIDE and lifted[worst] > left * chance**2 else None
+    chance = student.isf(LEVEL_OWN_SIGMA / (2 * len(off)), freedom)
+    return worst if abs(off[worst]) / share[worst] > OFF_PLANE_LIMIT and lifted[worst] > left * chance**2 else None
 
 
 def _many(near: Float) -> tuple[Float, Float, float] | None:
@@ -131,7 +131,7 @@ def _many(near: Float) -> tuple[Float, Float, float] | None:
     middle, normal = begun
     for _ in range(_STEPS):
         off = (near - middle) @ normal
-        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(off))), _LEAST_SPREAD)
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(off))), _MIN_SPREAD)
         weight = weights(off / (CUT * scale))
         found = _principal(near, weight)
         if found is None:

@@ -12,7 +12,7 @@ from tunneldb.compiled import point_kernel
 from tunneldb.shape.outline import Outline, matched
 from tunneldb.threads import in_blocks
 
-SECTIONS = 100
+BLOCK_SECTIONS = 100
 """Number of sections compared with the design at a time."""
 
 
@@ -142,7 +142,7 @@ def deviation(stretch: Stretch, chainage: Float, right: Float, up: Float) -> Dev
             found.distance[part], found.share[part], found.curvature[part],
         )  # fmt: skip
 
-    in_blocks(block, len(right), SECTIONS)
+    in_blocks(block, len(right), BLOCK_SECTIONS)
     return found
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from scipy.stats import chi2
 
 from tunneldb.arrays import Bool, Float
-from tunneldb.shape.adjustment import HOPELESS, Adjustment, adjust, begin
+from tunneldb.shape.adjustment import MAX_ERROR_INFLATION, Adjustment, adjust, begin
 from tunneldb.shape.departures import Departure, clock_of, departures
 from tunneldb.shape.ellipse import CIRCLE, ELLIPSE
 from tunneldb.shape.harmonics import Harmonics, fit_harmonics
-from tunneldb.shape.limits import FEW
+from tunneldb.shape.limits import MAX_TESTED_SINGLY
 from tunneldb.shape.plane import RingPlane, fit_plane
 
 LEAST_POINTS = 5
@@ -150,10 +150,10 @@ def _adjusted(xy: Float, start: Float, sigma: float | None) -> Adjustment:
     """Fit an ellipse if it is determined, else a circle; raise an error if neither is."""
     if len(xy) > ELLIPSE:
         ellipse = adjust(xy, start, ELLIPSE, sigma)
-        if ellipse.inflation <= HOPELESS[ELLIPSE] and ellipse.freedom > 0 and _sensible(ellipse):
+        if ellipse.inflation <= MAX_ERROR_INFLATION[ELLIPSE] and ellipse.freedom > 0 and _sensible(ellipse):
             return ellipse
     circle = adjust(xy, start, CIRCLE, sigma)
-    if not circle.inflation <= HOPELESS[CIRCLE]:
+    if not circle.inflation <= MAX_ERROR_INFLATION[CIRCLE]:
         seen = 360.0 - _gap(clock_of(xy[circle.used], circle.ellipse.centre))
         raise RingRefusedError(f"the points cover {seen:.0f}° of a circle, too little to determine it")
     return circle
@@ -176,7 +176,7 @@ def pooled_sigma(rings: Sequence[Ring]) -> float | None:
     The median of the rings' own variances, each divided by its median under the null hypothesis, so that rings with outliers
     do not change it.
     """
-    few = [ring.adjustment for ring in rings if ring.adjustment.freedom > 0 and len(ring.used) <= FEW]
+    few = [ring.adjustment for ring in rings if ring.adjustment.freedom > 0 and len(ring.used) <= MAX_TESTED_SINGLY]
     if sum(one.freedom for one in few) < _POOLED_FREEDOM:
         return None
     ratios = [one.sigma**2 * one.freedom / chi2.median(one.freedom) for one in few]

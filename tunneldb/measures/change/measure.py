@@ -22,8 +22,8 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.measures.change.compute import change as shape_change
 from tunneldb.measures.change.compute.cells import (
-    LEAST_SIDE,
-    SEEN_SHARE,
+    MIN_SIDE,
+    MIN_SEEN_SHARE,
     CellGrid,
     Cells,
     CellSums,
@@ -301,8 +301,8 @@ def _old_sums(conn: psycopg.Connection[Any], old: Survey, km: int, surface: Surf
     if ends is None:
         return None
     west, east, south, north, pixel = ends
-    if cell < LEAST_SIDE * pixel * (1.0 - 1e-9):
-        raise UserError(f"cells of {cell:g} m hold too few pixels of {pixel:g} m: give --cell {LEAST_SIDE * pixel:g} or more")
+    if cell < MIN_SIDE * pixel * (1.0 - 1e-9):
+        raise UserError(f"cells of {cell:g} m hold too few pixels of {pixel:g} m: give --cell {MIN_SIDE * pixel:g} or more")
     row = np.floor(south / cell), np.ceil(north / cell)
     column = np.floor(west / cell + 1e-9), np.ceil(east / cell - 1e-9)
     grid = CellGrid(cell, float(column[0] * cell), float(row[0] * cell), int(column[1] - column[0]), int(row[1] - row[0]))
@@ -460,7 +460,7 @@ def _seen_share(outline: shapely.Geometry, cells: Cells, grid: CellGrid) -> floa
     chainage, arc = np.meshgrid(grid.chainage[column], grid.arc[row])
     boxes = shapely.box(chainage - grid.cell / 2.0, arc - grid.cell / 2.0, chainage + grid.cell / 2.0, arc + grid.cell / 2.0)
     shares = shapely.area(shapely.intersection(boxes, outline))
-    return float(np.sum(shares * (cells.share[np.ix_(row, column)] >= SEEN_SHARE)) / max(float(outline.area), 1e-9))
+    return float(np.sum(shares * (cells.share[np.ix_(row, column)] >= MIN_SEEN_SHARE)) / max(float(outline.area), 1e-9))
 
 
 def _median(values: Single) -> float:

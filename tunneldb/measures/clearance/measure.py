@@ -19,7 +19,7 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
-from tunneldb.measures.clearance.compute.clearance import PASSING, STEP, Clearance, Grouping, clearance, clock
+from tunneldb.measures.clearance.compute.clearance import TEMPORARY_CLASSES, STEP, Clearance, Grouping, clearance, clock
 from tunneldb.measures.clearance.compute.gauge import Widening, halved, terms, widened
 from tunneldb.measures.clearance.compute.track import GAUGE, HEAD, Pairs, Track, curvature, fit_track, follow, rail_pairs
 from tunneldb.measures.clearance.rows import (
@@ -260,7 +260,7 @@ def _infringements(
         at = float(clock(places[deepest, 1:][None], (ends.min(axis=0) + ends.max(axis=0)) / 2.0)[0])
         along = places[one.points, 0]
         rows.append(SavedInfringement((
-            float(along.min()), float(along.max()), one.depth, at, one.klass, one.klass not in PASSING, cluster.get(deepest),
+            float(along.min()), float(along.max()), one.depth, at, one.klass, one.klass not in TEMPORARY_CLASSES, cluster.get(deepest),
             len(one.points),
         ), _covered(surface, xyz[one.points], one.klass), xyz[one.points]))  # fmt: skip
     return rows

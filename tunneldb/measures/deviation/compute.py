@@ -13,10 +13,10 @@ from tunneldb.shape.profile import Deviation, strip_area
 CELL = 0.1
 """Length of a cell along the profile, m, if pixels are a third of it or less."""
 
-LEAST_PIXELS = 3
+MIN_PIXELS = 3
 """Minimum number of pixels in a cell; with fewer the cell counts as unseen."""
 
-_SEEN_FOR_SHIFT = 0.4
+_MIN_SEEN_FOR_SHIFT = 0.4
 """Minimum seen share of a profile for the shift of the whole lining to be computed."""
 
 
@@ -87,7 +87,7 @@ def section_deviation(found: Deviation, outline: Outline, pixel: float) -> Secti
 
     Notes
     -----
-    The area of a cell is the mean, over its pixels, of d (1 - κ d / 2), times its length. A cell with fewer than LEAST_PIXELS
+    The area of a cell is the mean, over its pixels, of d (1 - κ d / 2), times its length. A cell with fewer than MIN_PIXELS
     pixels is unseen. Next to an unseen cell, a cell ends with its last pixel. Areas outside and inside are summed separately,
     so that they do not cancel within a cell. Stored means refer to the middle of cells, because pixels are not spread evenly in
     each, which matters on a slope.
@@ -95,17 +95,17 @@ def section_deviation(found: Deviation, outline: Outline, pixel: float) -> Secti
     length = outline.length
     count = max(int(np.ceil(length / cell_length(pixel) - 1e-9)), 1)
     each = length / count
-    held = np.isfinite(found.distance)
-    distance = found.distance[held]
-    place = found.share[held] * count
+    valid = np.isfinite(found.distance)
+    distance = found.distance[valid]
+    place = found.share[valid] * count
     cell = np.minimum(place.astype(np.int64), count - 1)
-    area = strip_area(distance, found.curvature[held])
+    area = strip_area(distance, found.curvature[valid])
 
     def summed(weights: Float | None = None) -> Float:
         return np.bincount(cell, weights, count).astype(np.float64)
 
     pixels, total = summed(), summed(distance)
-    seen = pixels >= LEAST_PIXELS
+    seen = pixels >= MIN_PIXELS
     with np.errstate(divide="ignore", invalid="ignore"):
         mean = np.where(seen, total / pixels, np.nan)
         over, under = (np.where(seen, summed(part) / pixels, 0.0) for part in (-np.minimum(area, 0.0), np.maximum(area, 0.0)))
@@ -166,7 +166,7 @@ def _slope(mean: Float, closed: bool) -> Float:
 def _shift(mean: Float, inward: Float) -> Float:
     """Return the lining's shift right of the profile and above it, by least squares of its cells, with a free size."""
     seen = np.isfinite(mean)
-    if seen.mean() < _SEEN_FOR_SHIFT:
+    if seen.mean() < _MIN_SEEN_FOR_SHIFT:
         return np.full(2, np.nan)
     design = np.column_stack([inward[seen], np.ones(int(seen.sum()))])
     solved, _, rank, _ = np.linalg.lstsq(design, mean[seen], rcond=1e-3)

@@ -16,7 +16,7 @@ from affine import Affine
 from tunneldb.arrays import Single
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.measures.deviation.compute import CELL, LEAST_PIXELS
+from tunneldb.measures.deviation.compute import CELL, MIN_PIXELS
 from tunneldb.measures.deviation.measure import measure_deviation
 from tunneldb.measures.deviation.rows import STEP
 from tunneldb.measures.evenness.compute.evenness import ALONG, AROUND, Evenness, evenness, step_evenness, uneven_areas
@@ -145,7 +145,7 @@ def load_cells(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: st
         raster = load_block(conn, survey, other, kind, block)
         if raster.transform.a != pixel:
             continue
-        part = cell_means(_padded(laid(raster, like), rows * factor), factor, LEAST_PIXELS)
+        part = cell_means(_padded(laid(raster, like), rows * factor), factor, MIN_PIXELS)
         here = slice(wide * (block - first), wide * (block - first + 1))
         for whole, means in ((cells.mean, part.mean), (cells.sigma, part.sigma), (cells.seen, part.seen)):
             whole[:, here] = means[::-1]

@@ -12,7 +12,7 @@ from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.measures.rings.surveyed_points import SurveyedRing, read_axis, read_points, require_near, require_size
 from tunneldb.shape.axis import DesignAxis
-from tunneldb.shape.plane import ASIDE
+from tunneldb.shape.plane import OFF_PLANE_LIMIT
 from tunneldb.shape.rings import LEAST_POINTS, Ring, RingPoints, fit_rings
 
 MOST_TURN = 10.0
@@ -148,7 +148,7 @@ def _refusal(ring: SurveyedRing, away: float, diameter: float) -> str | None:
     if ring.refused is not None:
         return ring.refused
     if len(ring.xyz) < LEAST_POINTS:
-        return f"{len(ring.xyz)} points, a ring needs {LEAST_POINTS}"
+        return f"only {len(ring.xyz)} points; a ring needs {LEAST_POINTS}"
     return f"the points lie {away:.1f} m from the axis" if away > diameter else None
 
 
@@ -198,12 +198,12 @@ def _remarks(surveyed: SurveyedRing, ring: Ring, diameter: float) -> Iterator[st
         off = adjustment.distance[k]
         side = "outside" if off > 0.0 else "inside"
         yield f"point {surveyed.points[k]} left out: {1e3 * abs(off):.1f} mm {side} the {shape} through the others"
-    for k in np.flatnonzero(np.abs(ring.along) > ASIDE):
+    for k in np.flatnonzero(np.abs(ring.along) > OFF_PLANE_LIMIT):
         off = 1e3 * abs(ring.along[k])
         yield f"point {surveyed.points[k]} stands {off:.0f} mm along the tunnel from the plane of the others"
     if not ring.is_ellipse:
         why = f"{int(ring.used.sum())} points" if len(ring.used) <= LEAST_POINTS else f"a gap of {ring.gap:.0f}° between points"
-        yield f"no ellipse can be told ({why}): centre and radius are a circle's, which an oval ring shifts"
+        yield f"ellipse not determined ({why}): centre and radius are from a circle and biased if the ring is oval"
     ratio = adjustment.ellipse.radius / (diameter / 2.0)
     if abs(ratio - 1.0) > OTHER_SIZE:
         yield f"the radius is {100.0 * abs(ratio - 1.0):.0f} % {'more' if ratio > 1.0 else 'less'} than the design's"

@@ -10,7 +10,7 @@ from tunneldb.arrays import Float
 from tunneldb.shape.outline import Outline
 from tunneldb.shape.profile import strip_area
 
-LEAST_SEEN = 0.5
+MIN_SEEN_SHARE = 0.5
 """Minimum seen share of a cell made of cells of another length."""
 
 
@@ -97,6 +97,6 @@ def resampled(values: Float, count: int) -> Float:
     def within(amount: Float) -> Float:
         return np.diff(np.interp(wanted, edges, np.concatenate([[0.0], np.cumsum(amount)])))
 
-    held, total = within(seen.astype(np.float64)), within(np.where(seen, values, 0.0))
+    selected, total = within(seen.astype(np.float64)), within(np.where(seen, values, 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.where(held > LEAST_SEEN * len(values) / count, total / held, np.nan))
+        return np.asarray(np.where(selected > MIN_SEEN_SHARE * len(values) / count, total / selected, np.nan))

@@ -12,21 +12,23 @@ from tunneldb.arrays import Bool, Float, Single
 STEP = 0.001
 """Step in which offsets are stored, m."""
 
-SEEN_SHARE = 1.0 / 3.0
+MIN_SEEN_SHARE = 1.0 / 3.0
 """Minimum share of a cell's pixels that are lining; with less the cell was not seen."""
 
-LEAST_SIDE = 3
+MIN_SIDE = 3
 """Minimum side of a cell, in pixels: a plane takes three pixels, and scatter needs several."""
 
-SLOPE = 3.0
+SLOPE_LEVEL = 3.0
 """Standard deviations from which a slope is one of the relief."""
 
-EDGE = 2
+EDGE_CELLS = 2
 """Width of the margin beside wide unseen stretches that is not compared, in cells."""
 
 _SUMS = 10
-_LEAST = 8  # pixels
-_SPREAD = 0.2  # minimum spread of the pixels relative to a full cell (1/12 of its side squared): else the plane extrapolates
+_MIN_PIXELS = 8  # pixels
+_MIN_SPREAD = (
+    0.2  # minimum spread of the pixels relative to a full cell (1/12 of its side squared): else the plane extrapolates
+)
 
 
 @dataclass(frozen=True)
@@ -98,8 +100,8 @@ class CellSums:
         grid = self.grid
         x, y = (chainage - grid.west) / grid.cell, (arc - grid.south) / grid.cell
         with np.errstate(invalid="ignore"):
-            held = (x >= 0) & (x < grid.columns) & (y >= 0) & (y < grid.rows) & np.isfinite(offset)
-        x, y, z, shown = x[held], y[held], offset[held], lining[held]
+            valid = (x >= 0) & (x < grid.columns) & (y >= 0) & (y < grid.rows) & np.isfinite(offset)
+        x, y, z, shown = x[valid], y[valid], offset[valid], lining[valid]
         column, row = x.astype(np.int64), y.astype(np.int64)
         if not len(column):
             return
@@ -131,10 +133,10 @@ class CellSums:
             offset = z - along * u - across * v
             variance = scatter * lever + rounding_variance(scatter)
         seen = (
-            (n >= _LEAST)
-            & (n >= SEEN_SHARE * pixels)
-            & (np.minimum(uu, vv) * 12.0 > _SPREAD)
-            & (determinant * 144.0 > _SPREAD**2)
+            (n >= _MIN_PIXELS)
+            & (n >= MIN_SEEN_SHARE * pixels)
+            & (np.minimum(uu, vv) * 12.0 > _MIN_SPREAD)
+            & (determinant * 144.0 > _MIN_SPREAD**2)
         )
         shape = self.grid.rows, self.grid.columns
 
@@ -168,7 +170,7 @@ def without_edges(cells: Cells) -> Cells:
     the state of pixels reaches one cell further.
     """
     unseen = ndimage.binary_opening(np.isnan(cells.offset), np.ones((3, 3)))
-    beside = ndimage.binary_dilation(unseen, np.ones((3, 3)), iterations=EDGE)
+    beside = ndimage.binary_dilation(unseen, np.ones((3, 3)), iterations=EDGE_CELLS)
     offset, variance = (np.where(beside, np.float32(np.nan), values) for values in (cells.offset, cells.variance))
     return Cells(offset, variance, cells.share)
 
@@ -176,7 +178,7 @@ def without_edges(cells: Cells) -> Cells:
 def slopes(cells: Cells, cell: float) -> tuple[Single, Single]:
     """Return the slopes of the lining's relief along the tunnel and around it, (rows, columns), over two cells.
 
-    0 where one of them is not seen, and where the slope is at most SLOPE times its noise.
+    0 where one of them is not seen, and where the slope is at most SLOPE_LEVEL times its noise.
     """
     found = []
     for axis in (1, 0):
@@ -190,7 +192,7 @@ def slopes(cells: Cells, cell: float) -> tuple[Single, Single]:
         slope = (np.take(offset, ahead, axis) - np.take(offset, behind, axis)) / (2.0 * cell)
         noise = np.sqrt(np.take(variance, ahead, axis) + np.take(variance, behind, axis)) / (2.0 * cell)
         with np.errstate(invalid="ignore"):
-            found.append(np.where(np.abs(slope) > SLOPE * noise, slope, 0.0).astype(np.float32))
+            found.append(np.where(np.abs(slope) > SLOPE_LEVEL * noise, slope, 0.0).astype(np.float32))
     return found[0], found[1]
 
 

@@ -13,7 +13,7 @@ from scipy.stats import norm
 from tunneldb.arrays import Bool, Float, Single
 from tunneldb.robust import MAD_TO_SIGMA
 
-CONFIDENT = 1.96
+CONFIDENCE_95 = 1.96
 """Standard deviations that include 95 % of normal errors."""
 
 FALSE_SHARE = 0.05
@@ -28,9 +28,9 @@ WINDOW = 3
 SCALES = (1, 2, 4, 8, 16)
 """Sides of the squares, in cells, for whose means the scatter is measured."""
 
-_FILLED = 0.75  # minimum share of a square's cells for its mean to be used
-_PAIRS = 30  # minimum number of pairs of neighbouring squares for their scatter to be used
-LEAST = 5
+_MIN_FILLED_SHARE = 0.75  # minimum share of a square's cells for its mean to be used
+_MIN_PAIRS = 30  # minimum number of pairs of neighbouring squares for their scatter to be used
+MIN_WINDOW_CELLS = 5
 """Minimum number of cells in a tested window."""
 
 
@@ -92,19 +92,19 @@ def measure_scatter(difference: Single, variance: Single) -> Scatter:
     sides, factors, tail = [1.0], [1.0], 1.0
     for side in SCALES:
         mean, expected = _squares(difference, variance, side)
-        apart = []
+        ratios = []
         for axis in (0, 1):
             step = np.diff(mean, axis=axis)
             first, second = (np.take(expected, range(k, expected.shape[axis] - 1 + k), axis=axis) for k in (0, 1))
-            apart.append((step / np.sqrt(first + second)).ravel())
-        ratio = np.concatenate(apart)
+            ratios.append((step / np.sqrt(first + second)).ravel())
+        ratio = np.concatenate(ratios)
         ratio = ratio[np.isfinite(ratio)]
-        if len(ratio) < _PAIRS:
+        if len(ratio) < _MIN_PAIRS:
             break
         factor = MAD_TO_SIGMA * float(np.median(np.abs(ratio)))
         if side == 1:
             factors[0] = factor
-            tail = float(np.quantile(np.abs(ratio), 0.95)) / CONFIDENT
+            tail = float(np.quantile(np.abs(ratio), 0.95)) / CONFIDENCE_95
         else:
             sides.append(float(side))
             factors.append(max(factor, factors[-1]))
@@ -118,11 +118,11 @@ def _squares(difference: Single, variance: Single, side: int) -> tuple[Float, Fl
     cut = (slice(rows * side), slice(columns * side))
     seen = np.isfinite(difference[cut]).reshape(shape)
     count = seen.sum(axis=(1, 3))
-    held = count >= _FILLED * side * side
+    selected = count >= _MIN_FILLED_SHARE * side * side
     with np.errstate(divide="ignore", invalid="ignore"):
         mean = np.nansum(difference[cut].reshape(shape), axis=(1, 3), dtype=np.float64) / count
         expected = np.nansum(variance[cut].reshape(shape), axis=(1, 3), dtype=np.float64) / count.astype(np.float64) ** 2
-    return np.where(held, mean, np.nan), np.where(held, expected, np.nan)
+    return np.where(selected, mean, np.nan), np.where(selected, expected, np.nan)
 
 
 def detection_level(variance: Single, removed_error: Single, scatter: Scatter) -> Single:
@@ -137,7 +137,7 @@ def detection_level(variance: Single, removed_error: Single, scatter: Scatter) -
     scatter : Scatter
         Scatter that the data show, relative to the first.
     """
-    return np.asarray(CONFIDENT * (np.sqrt(variance) * scatter.tail + removed_error), dtype=np.float32)
+    return np.asarray(CONFIDENCE_95 * (np.sqrt(variance) * scatter.tail + removed_error), dtype=np.float32)
 
 
 def change_regions(
@@ -163,7 +163,7 @@ def change_regions(
     """
     mean, expected, number = window_means(difference, variance, removed_error, scatter)
     with np.errstate(invalid="ignore"):
-        ratio = np.where(number >= LEAST, mean / expected, np.nan)
+        ratio = np.where(number >= MIN_WINDOW_CELLS, mean / expected, np.nan)
     taken = significant(2.0 * norm.sf(np.abs(ratio))) & np.isfinite(difference)
     peak = family_level(float(np.isfinite(ratio).sum()))
     return [
@@ -200,7 +200,7 @@ def _ratio_without_line(
     which = int(sums[1].max() > sums[0].max())
     kept = lines[which] != sums[which].argmax()
     cells = int(kept.sum())
-    if cells < LEAST:
+    if cells < MIN_WINDOW_CELLS:
         return 0.0
     noise = np.sqrt(squared[kept].sum()) / cells * float(scatter.at(cells))
     placed = place_error[:, *at][:, kept].mean(axis=1, dtype=np.float64)
@@ -256,16 +256,16 @@ def window_ratios(difference: Single, variance: Single, removed_error: Single, s
         across, along = (sum_of_three(padded, axis) for axis in (1, 0))
         lines.append([across[k : k + rows] for k in range(WINDOW)] + [along[:, k : k + columns] for k in range(WINDOW)])
     totals = [of[0] + of[1] + of[2] for of in lines]
-    least, greatest = np.full(difference.shape, np.inf), np.full(difference.shape, -np.inf)
+    lowest, greatest = np.full(difference.shape, np.inf), np.full(difference.shape, -np.inf)
     factor = float(scatter.at(WINDOW**2))
     for line in zip(*lines, strict=True):
         change, squared, registered, along, around, number = (total - one for total, one in zip(totals, line, strict=True))
         expected = np.sqrt(np.maximum(squared, 0.0) * factor**2 + registered**2 + along**2 + around**2)
         ratio = np.divide(change, expected, out=np.zeros_like(change), where=(number > 0.5) & (expected > 0.0))
-        np.minimum(least, ratio, out=least)
+        np.minimum(lowest, ratio, out=lowest)
         np.maximum(greatest, ratio, out=greatest)
-    value = np.where(least > 0.0, least, np.minimum(greatest, 0.0))
-    return np.where(totals[-1] >= LEAST, value, np.nan)
+    value = np.where(lowest > 0.0, lowest, np.minimum(greatest, 0.0))
+    return np.where(totals[-1] >= MIN_WINDOW_CELLS, value, np.nan)
 
 
 def sum_of_three(values: Float, axis: int) -> Float:
@@ -299,7 +299,7 @@ def _regions(
         pooled = float(difference[at].mean(dtype=np.float64))
         noise = float(np.sqrt(variance[at].sum(dtype=np.float64))) / cells * float(scatter.at(cells))
         placed = place_error[:, *at].mean(axis=1, dtype=np.float64)
-        lod = CONFIDENT * (noise + math.hypot(removed_error[at].mean(dtype=np.float64), *placed))
+        lod = CONFIDENCE_95 * (noise + math.hypot(removed_error[at].mean(dtype=np.float64), *placed))
         if abs(pooled) > lod:
             windows = mean[at]
             yield Region(rows, columns, pooled, lod, float(windows[np.abs(windows).argmax()]))

@@ -17,21 +17,21 @@ from tunneldb.shape.tukey import CUT, weights
 MOTIONS = ("right", "up", "along", "roll", "yaw", "pitch")
 """Motions of a section: shifts to the right, up and along the axis, m; turns about the axis, upwards and to the right, rad."""
 
-DETERMINED = 1e-3
+MAX_MOTION_ERROR = 1e-3
 """Maximum standard error on the lining along its normal, m; a motion with a larger one is not determined."""
 
-LEAST_CELLS = 50
+MIN_CELLS = 50
 """Minimum number of common cells; with fewer no motion is removed from the section, and this is reported."""
 
-BENT = 2.0
+CORNER_CURVATURE = 2.0
 """Curvature from which a part of the wall is a corner, 1/m."""
 
-LEAST_SHARE = 0.15
+MIN_COMMON_SHARE = 0.15
 """Minimum share of a section's cells that made the neighbours' motion, for them to say anything about it."""
 
-_KEPT = 0.6  # of the cells
+_KEPT_SHARE = 0.6  # of the cells
 _ROUNDS = 50
-_STILL = 1e-7  # m: the iteration ends when no residual changes by more
+_CONVERGED = 1e-7  # m: the iteration ends when no residual changes by more
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def rigid_motion(cells: SectionCells) -> Motion:
     difference, variance, columns = cells.difference, cells.variance, cells.columns.astype(np.float64)
     spread = np.sqrt(np.mean(columns**2, axis=0)) if len(columns) else np.zeros(len(MOTIONS))
     used = _determined(columns, variance, spread)
-    if len(difference) < LEAST_CELLS or not used.any():
+    if len(difference) < MIN_CELLS or not used.any():
         nothing = np.full((len(MOTIONS), len(MOTIONS)), np.nan)
         return Motion(nothing[0].copy(), nothing, np.zeros(len(difference)), np.zeros(len(difference)), len(difference))
     design = columns[:, used]
@@ -129,19 +129,19 @@ def rigid_motion(cells: SectionCells) -> Motion:
 def motion_from(cells: SectionCells, start: Float, used: Bool) -> Motion | None:
     """Fit the motion nearest to a given one (6,), by Tukey's biweight; None if too few cells share one."""
     used = used & np.isfinite(start)
-    if not used.any() or len(cells.difference) < LEAST_CELLS:
+    if not used.any() or len(cells.difference) < MIN_CELLS:
         return None
     design, sigma = cells.columns[:, used].astype(np.float64), np.sqrt(cells.variance)
     values = np.asarray(start[used], dtype=np.float64)
     residual = cells.difference - design @ values
     for _ in range(_ROUNDS):
         weight = weights(residual / (CUT * float(np.median(sigma))))
-        if float(weight.mean()) < LEAST_SHARE:
+        if float(weight.mean()) < MIN_COMMON_SHARE:
             return None
         weighted = weight[:, None] * design
         values = np.asarray(np.linalg.lstsq(weighted.T @ design, weighted.T @ cells.difference, rcond=None)[0], np.float64)
         before, residual = residual, cells.difference - design @ values
-        if float(np.abs(residual - before).max()) < _STILL:
+        if float(np.abs(residual - before).max()) < _CONVERGED:
             break
     try:
         return _motion(cells, used, values, _covariance(design, weight, residual, cells.variance, cells.group))
@@ -156,7 +156,7 @@ def removed_by(cells: SectionCells, values: Float, covariance: Float, used: Bool
 
 def unexplained(cells: SectionCells, residual: Float) -> float:
     """Return the share of cells left by residuals (n,), by Tukey's loss: 0 if all are 0, 1 if all exceed its limit."""
-    return float(np.mean(loss(cells, residual))) if len(residual) >= LEAST_CELLS else float("nan")
+    return float(np.mean(loss(cells, residual))) if len(residual) >= MIN_CELLS else float("nan")
 
 
 def loss(cells: SectionCells, residual: Float) -> Float:
@@ -179,7 +179,7 @@ def bending_error(motion: Motion, columns: Single, curvature: Float) -> Float:
     """
     shift = np.nan_to_num(motion.values[:2])
     along = np.maximum(shift @ shift - (columns[:, :2] @ shift) ** 2, 0.0)
-    return np.asarray(np.where(curvature > BENT, 0.5 * along * curvature, 0.0))
+    return np.asarray(np.where(curvature > CORNER_CURVATURE, 0.5 * along * curvature, 0.0))
 
 
 def _motion(cells: SectionCells, used: Bool, values: Float, covariance: Float) -> Motion:
@@ -200,7 +200,7 @@ def _determined(columns: Float, variance: Float, spread: Float) -> Bool:
         errors = sigma * np.sqrt(np.sum(vectors**2 / np.maximum(values, 1e-12), axis=1))
         # In the scale of a shift: an undetermined shift, or turn, would move the wall along itself by more.
         moved = errors / np.minimum(spread[used], 1.0)
-        if moved.max() <= DETERMINED:
+        if moved.max() <= MAX_MOTION_ERROR:
             break
         used[np.flatnonzero(used)[int(moved.argmax())]] = False
     return np.asarray(used)
@@ -213,13 +213,13 @@ def _fit(design: Float, difference: Float, sigma: Float) -> tuple[Float, Float, 
     for tukey in (False, True):
         # What most cells show is noise; if few do, the section has changed its shape, and the usual residual in it counts.
         usual = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
-        scale = noise if np.mean(np.abs(residual) < CUT * noise) >= _KEPT else max(noise, usual)
+        scale = noise if np.mean(np.abs(residual) < CUT * noise) >= _KEPT_SHARE else max(noise, usual)
         for _ in range(_ROUNDS):
             weight = weights(residual / (CUT * scale)) if tukey else 1.0 / np.maximum(np.abs(residual), 0.1 * noise)
             weighted = weight[:, None] * design
             values = np.linalg.lstsq(weighted.T @ design, weighted.T @ difference, rcond=None)[0]
             before, residual = residual, difference - design @ values
-            if float(np.abs(residual - before).max()) < _STILL:
+            if float(np.abs(residual - before).max()) < _CONVERGED:
                 break
     return np.asarray(values, dtype=np.float64), weight, residual
 

@@ -25,24 +25,24 @@ from tunneldb.measures.change.compute.rigid_motion import (
 )
 from tunneldb.robust import MAD_TO_SIGMA
 
-MOVED = 0.04
+MAX_UNEXPLAINED_SHARE = 0.04
 """Share of cells not explained by its own motion from which a section changed its shape."""
 
-EXPLAINED = 0.75
+MIN_EXPLAINED_SHARE = 0.75
 """Share of the neighbours' residual explained by its own motion from which a section moved as a whole."""
 
-LEAST_SECTIONS = 8
+MIN_SECTIONS = 8
 """Minimum number of sections that kept their shape, for the smoothness of the motion to be known."""
 
-COMMON = 0.5
+MIN_DETERMINED_SHARE = 0.5
 """Share of sections in which a motion must be determined to be tied."""
 
 _LAGS = (1, 2)  # sections: longer lags contain too many breaks
-_EVEN = 1e-5  # m: lower limit of second differences and errors
-_BREAK = 3.0  # standard deviations of a second difference from which it is a break
+_MIN_SCATTER = 1e-5  # m: lower limit of second differences and errors
+_BREAK_LEVEL = 3.0  # standard deviations of a second difference from which it is a break
 _ROUNDS = 8
-_STILL = 2e-5  # m
-_LARGE = 1e6  # upper limit of variances, so that matrices can be solved
+_CONVERGED = 2e-5  # m
+_MAX_VARIANCE = 1e6  # upper limit of variances, so that matrices can be solved
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ class _Axes:
     def along(self, motion: Motion) -> tuple[Float, Float]:
         """Return values (m,) and variances (m,) of a motion along the axes."""
         back = np.linalg.inv(self.turn)
-        held = motion.covariance[np.ix_(self.used, self.used)]
-        return back @ motion.values[self.used], np.einsum("ij,jk,ik->i", back, held, back)
+        selected = motion.covariance[np.ix_(self.used, self.used)]
+        return back @ motion.values[self.used], np.einsum("ij,jk,ik->i", back, selected, back)
 
     def values(self, along: Float) -> Float:
         """Return values (6,) from values (m,) along the axes; NaN for motions that are not determined."""
@@ -104,17 +104,17 @@ def tied_motions(sections: Sequence[SectionCells], number: Int64, motions: Seque
         Motion of each by itself.
     """
     left = np.array([unexplained(s, s.difference - m.removed) for s, m in zip(sections, motions, strict=True)])
-    if np.isfinite(left).sum() < LEAST_SECTIONS:
+    if np.isfinite(left).sum() < MIN_SECTIONS:
         return list(motions)
     usual = float(np.nanmedian(left))
-    kept, changed = left - usual < MOVED, np.flatnonzero(left - usual >= MOVED).tolist()
+    kept, changed = left - usual < MAX_UNEXPLAINED_SHARE, np.flatnonzero(left - usual >= MAX_UNEXPLAINED_SHARE).tolist()
     if not changed:
         return list(motions)
-    used = np.mean([m.used for m in motions if m.used.any()], axis=0) > COMMON
+    used = np.mean([m.used for m in motions if m.used.any()], axis=0) > MIN_DETERMINED_SHARE
     # A roll that is found in one section and not in the next would be in the next one's shift to the right.
     alike = {k: _determined_so(sections[k], motions[k], used) for k in np.flatnonzero(kept).tolist()}
     settled = {k: motion for k, motion in alike.items() if motion is not None}
-    if len(settled) < LEAST_SECTIONS:
+    if len(settled) < MIN_SECTIONS:
         return list(motions)
     axes = _axes([sections[k] for k in settled], used)
     values, variances = np.full((2, len(motions), int(used.sum())), np.nan)
@@ -156,9 +156,9 @@ def _chosen(cells: SectionCells, own: Motion, tied: Motion, broken: Motion | Non
     def excess(motion: Motion) -> float:
         return unexplained(cells, cells.difference - motion.removed) - usual
 
-    if broken is not None and excess(broken) < (1.0 - EXPLAINED) * excess(own):
+    if broken is not None and excess(broken) < (1.0 - MIN_EXPLAINED_SHARE) * excess(own):
         return broken
-    return tied if excess(own) >= (1.0 - EXPLAINED) * excess(tied) else own
+    return tied if excess(own) >= (1.0 - MIN_EXPLAINED_SHARE) * excess(tied) else own
 
 
 def _with_changed(
@@ -175,10 +175,10 @@ def _with_changed(
             if own is not None:
                 # Cells that only a part of the section shares count less, the farther they are from the neighbours' motion.
                 found, variance = axes.along(own)
-                apart = (found - even.values[k]) ** 2 / (_BREAK**2 * (variance + even.variances[k]))
+                apart = (found - even.values[k]) ** 2 / (_BREAK_LEVEL**2 * (variance + even.variances[k]))
                 values[k], variances[k] = found, variance * (1.0 + apart) ** 2
         before, even = even, _even(number, values, variances, wander, even.ties)
-        if float(np.abs(even.values - before.values).max()) < _STILL:
+        if float(np.abs(even.values - before.values).max()) < _CONVERGED:
             break
     return even
 
@@ -202,8 +202,8 @@ def _broken(cells: SectionCells, values: Float, number: Int64, k: int, axes: _Ax
     if one is None or other is None:
         return None
     removed, error = np.empty(len(first)), np.empty(len(first))
-    for held, part in ((first, one), (~first, other)):
-        removed[held], error[held] = part.removed, part.removed_error
+    for selected, part in ((first, one), (~first, other)):
+        removed[selected], error[selected] = part.removed, part.removed_error
     larger = one if 2 * first.sum() > len(first) else other
     return Motion(larger.values, larger.covariance, removed, error, len(first))
 
@@ -211,7 +211,7 @@ def _broken(cells: SectionCells, values: Float, number: Int64, k: int, axes: _Ax
 def _wander(number: Int64, values: Float, variances: Float) -> Float:
     """Return the variance (m,) of the second differences of the motions between sections, without their own errors."""
     place = {int(n): k for k, n in enumerate(number)}
-    found = np.full(values.shape[1], _EVEN**2)
+    found = np.full(values.shape[1], _MIN_SCATTER**2)
     for lag in _LAGS:
         triples = [(place[n - lag], k, place[n + lag]) for n, k in place.items() if n - lag in place and n + lag in place]
         if not triples:
@@ -219,7 +219,7 @@ def _wander(number: Int64, values: Float, variances: Float) -> Float:
         first, middle, last = np.array(triples).T
         bent = values[first] - 2.0 * values[middle] + values[last]
         shown = np.isfinite(bent[:, 0])
-        if shown.sum() < LEAST_SECTIONS // 2:
+        if shown.sum() < MIN_SECTIONS // 2:
             continue
         noise = variances[first] + 4.0 * variances[middle] + variances[last]
         spread = (MAD_TO_SIGMA * np.median(np.abs(bent[shown]), axis=0)) ** 2 - np.median(noise[shown], axis=0)
@@ -237,14 +237,14 @@ def _even(number: Int64, values: Float, variances: Float, wander: Float, ties: F
     found = np.empty((len(wander), count - 2)) if ties is None else ties
     for c, spread in enumerate(wander):
         weight, target = np.zeros(count), np.zeros(count)
-        weight[at[shown]] = 1.0 / np.maximum(variances[shown, c], _EVEN**2)
+        weight[at[shown]] = 1.0 / np.maximum(variances[shown, c], _MIN_SCATTER**2)
         target[at[shown]] = weight[at[shown]] * values[shown, c]
         if ties is None:
             found[c] = 1.0 / spread
         for _ in range(_ROUNDS if ties is None else 1):
             smooth = solveh_banded(_bands(weight, found[c]), target)
             if ties is None:
-                found[c] = 1.0 / (spread * (1.0 + (np.diff(smooth, 2) / _BREAK) ** 2 / spread))
+                found[c] = 1.0 / (spread * (1.0 + (np.diff(smooth, 2) / _BREAK_LEVEL) ** 2 / spread))
         result[0, :, c] = smooth[at]
         result[1, :, c] = np.diag(solveh_banded(_bands(weight, found[c]), np.eye(count)))[at]
     return _Even(result[0], result[1], found)
@@ -254,7 +254,7 @@ def _bands(weight: Float, rows: Float) -> Float:
     """Return the upper bands (3, n) of the normal matrix of data (n,) and second differences (n - 2,) with these weights."""
     count = len(weight)
     bands = np.zeros((3, count))
-    bands[2] = weight + 1.0 / _LARGE
+    bands[2] = weight + 1.0 / _MAX_VARIANCE
     for k, factor in enumerate((1.0, -2.0, 1.0)):
         bands[2, k : count - 2 + k] += rows * factor**2
     bands[1, 1 : count - 1] -= 2.0 * rows

@@ -19,14 +19,14 @@ STEP = 1.0
 DIRECTIONS = 72
 """Number of direction cells, of 5° each, clockwise from straight above the outline's middle."""
 
-NEAR = 0.5
+ISOLATION_DISTANCE = 0.5
 """Distance from the outline within which isolated points are ignored, m."""
 
-PIECE = 10.0
+MAX_INFRINGEMENT_LENGTH = 10.0
 """Maximum length of an infringement, m; longer ones are split at whole multiples."""
 
-TRACK = (PointClass.GROUND, PointClass.RAIL)
-PASSING = (PointClass.OBJECT, PointClass.SPHERE)
+TRACK_CLASSES = (PointClass.GROUND, PointClass.RAIL)
+TEMPORARY_CLASSES = (PointClass.OBJECT, PointClass.SPHERE)
 """Classes that may be temporary, such as people and vehicles: their infringements are reported, but do not count."""
 
 
@@ -115,14 +115,14 @@ def clearance(
     growing = places[order, 0]
     for begin, outline in zip(begins.tolist(), outlines, strict=True):
         first, stop = np.searchsorted(growing, [begin, begin + STEP])
-        held = order[first:stop]
-        held = held[np.isfinite(places[held, 1])]
-        margin[held] = -signed_distance(outline, places[held, 1:])
-        bounds.append(held)
+        valid = order[first:stop]
+        valid = valid[np.isfinite(places[valid, 1])]
+        margin[valid] = -signed_distance(outline, places[valid, 1:])
+        bounds.append(valid)
     real, infringements = _groups(places, classes, margin, grouping)
     sections = [
-        _section(begin, _middle(outline), held, places, classes, margin, real)
-        for begin, outline, held in zip(begins.tolist(), outlines, bounds, strict=True)
+        _section(begin, _middle(outline), valid, places, classes, margin, real)
+        for begin, outline, valid in zip(begins.tolist(), outlines, bounds, strict=True)
     ]
     return Clearance(sections, infringements, margin)
 
@@ -139,15 +139,15 @@ def _middle(outline: Outline) -> Float:
 
 def _groups(places: Float, classes: UInt8, margin: Float, grouping: Grouping) -> tuple[Bool, list[Infringement]]:
     """Return which points are real, and the groups of those inside."""
-    real = np.isin(classes, [*TRACK, PointClass.NOISE], invert=True) & np.isfinite(margin)
+    real = np.isin(classes, [*TRACK_CLASSES, PointClass.NOISE], invert=True) & np.isfinite(margin)
     # The lining is classified by the surface that its points form; only points off that surface can be isolated.
-    doubted = np.flatnonzero(real & (margin < NEAR) & ((classes != PointClass.LINING) | (margin < 0.0)))
+    doubted = np.flatnonzero(real & (margin < ISOLATION_DISTANCE) & ((classes != PointClass.LINING) | (margin < 0.0)))
     scaled = places[doubted] * np.array([grouping.shrink, 1.0, 1.0])
     labels = dbscan(scaled, grouping.radius, grouping.points)
     real[doubted[labels < 0]] = False
     within = (labels >= 0) & (margin[doubted] < 0.0)
     inside, labels = doubted[within], labels[within]
-    piece = np.floor(places[inside, 0] / PIECE).astype(np.int64)
+    piece = np.floor(places[inside, 0] / MAX_INFRINGEMENT_LENGTH).astype(np.int64)
     key = np.column_stack([labels, piece, classes[inside].astype(np.int64)])
     _, number = np.unique(key, axis=0, return_inverse=True)
     found = []
@@ -166,8 +166,8 @@ def _section(
     cell = np.minimum((at / (360.0 / DIRECTIONS)).astype(np.int64), DIRECTIONS - 1)
     seen = len(np.unique(cell[classes[held] != PointClass.NOISE])) / DIRECTIONS
     within = margin[held] < 0.0
-    passing = np.isin(classes[held], PASSING)
-    ground = np.isin(classes[held], TRACK)
+    passing = np.isin(classes[held], TEMPORARY_CLASSES)
+    ground = np.isin(classes[held], TRACK_CLASSES)
     counts = real[held] & ~passing
     margins = np.full(DIRECTIONS, np.inf)
     np.minimum.at(margins, cell[counts], margin[held][counts])

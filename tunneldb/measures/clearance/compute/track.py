@@ -20,20 +20,20 @@ HEAD = 0.072
 STATION = 5.0
 """Length of the stretches in which rails are located, m: dozens of points of a head at a point spacing of 0.1 to 0.2 m."""
 
-LEAST_TRACK = 25.0
+MIN_TRACK_LENGTH = 25.0
 """Minimum length of two parallel rails for a track, m."""
 
-_TOP = 0.02  # m: maximum depth below the top of a rail of points of its head
-_APART = 0.12  # m: minimum lateral gap between two rails
-_WIDEST = 0.35  # m: maximum width of a rail
-_FEWEST = 4  # minimum points of a head
-_SPACING = 0.06  # m: tolerance of the distance of two heads: widened gauge, wear, few points
-_CANT = 0.25  # m: maximum height difference of the rails of a track
-_STRAY = 0.15  # m: maximum deviation of a track from the straight continuation, from one station to the next
-_REACH = 30.0  # m without rails over which a track is followed and interpolated
-_SIGMA = 0.003  # m: lower limit of a head's standard error, from dozens of points over 0.07 m
-_OFF = 0.05  # m: maximum deviation of a head at one station from the smooth track; few points show its edges only
-_EDGE = 0.05  # share of the points of a head beyond each of its two estimated edges
+_HEAD_DEPTH = 0.02  # m: maximum depth below the top of a rail of points of its head
+_MIN_RAIL_GAP = 0.12  # m: minimum lateral gap between two rails
+_MAX_RAIL_WIDTH = 0.35  # m: maximum width of a rail
+_MIN_HEAD_POINTS = 4  # minimum points of a head
+_SPACING_TOLERANCE = 0.06  # m: tolerance of the distance of two heads: widened gauge, wear, few points
+_MAX_CANT = 0.25  # m: maximum height difference of the rails of a track
+_MAX_SIDESTEP = 0.15  # m: maximum deviation of a track from the straight continuation, from one station to the next
+_MAX_GAP = 30.0  # m without rails over which a track is followed and interpolated
+_MIN_SIGMA = 0.003  # m: lower limit of a head's standard error, from dozens of points over 0.07 m
+_MAX_HEAD_RESIDUAL = 0.05  # m: maximum deviation of a head at one station from the smooth track; few points show its edges only
+_EDGE_SHARE = 0.05  # share of the points of a head beyond each of its two estimated edges
 
 
 @dataclass(frozen=True)
@@ -123,10 +123,10 @@ def metre_places(about: Float, begin: float, right: float, up: float, cant: floa
 
     The track's middle is right of the given axis and above it, m; cant is the height of its left rail above the right one.
     """
-    held = np.asarray((about[:, 0] >= begin) & (about[:, 0] < begin + 1.0))
+    selected = np.asarray((about[:, 0] >= begin) & (about[:, 0] < begin + 1.0))
     same, none = np.array([begin, begin + 1.0]), np.zeros(2)
     here = Track(same, none + right, none + up, none + cant, none, none, none, np.ones(2, np.bool_), reach=1.0)
-    return here.places(*about[held].T), held
+    return here.places(*about[selected].T), selected
 
 
 def rail_pairs(points: Float, gauge: float = GAUGE) -> Pairs:
@@ -148,9 +148,9 @@ def rail_pairs(points: Float, gauge: float = GAUGE) -> Pairs:
         if len(heads) < 2:
             continue
         left, right = np.triu_indices(len(heads), k=1)
-        held = np.abs(heads[right, 0] - heads[left, 0] - gauge - HEAD) <= _SPACING
-        held &= np.abs(heads[right, 1] - heads[left, 1]) <= _CANT
-        both = np.stack([heads[left[held]], heads[right[held]]], axis=1)
+        selected = np.abs(heads[right, 0] - heads[left, 0] - gauge - HEAD) <= _SPACING_TOLERANCE
+        selected &= np.abs(heads[right, 1] - heads[left, 1]) <= _MAX_CANT
+        both = np.stack([heads[left[selected]], heads[right[selected]]], axis=1)
         middle = np.full(len(both), (number[first] + 0.5) * STATION)
         found.append(Pairs(middle, both[:, :, 0], both[:, :, 1]))
     return Pairs.joined(found)
@@ -170,17 +170,17 @@ def follow(pairs: Pairs) -> list[Pairs]:
         best, nearest = None, np.inf
         for track in tracks:
             gap = pairs.chainage[k] - pairs.chainage[track[-1]]
-            if not 0.0 < gap <= _REACH:
+            if not 0.0 < gap <= _MAX_GAP:
                 continue
             off = abs(pairs.middle[k] - _continued(pairs, track, pairs.chainage[k]))
-            if off < min(nearest, _STRAY * max(gap / STATION, 1.0) ** 0.5):
+            if off < min(nearest, _MAX_SIDESTEP * max(gap / STATION, 1.0) ** 0.5):
                 best, nearest = track, off
         if best is None:
             tracks.append([k])
         else:
             best.append(k)
-    long = [t for t in tracks if (len(t) - 1) * STATION >= LEAST_TRACK / 2.0]
-    long = [t for t in long if pairs.chainage[t[-1]] - pairs.chainage[t[0]] + STATION >= LEAST_TRACK]
+    long = [t for t in tracks if (len(t) - 1) * STATION >= MIN_TRACK_LENGTH / 2.0]
+    long = [t for t in long if pairs.chainage[t[-1]] - pairs.chainage[t[0]] + STATION >= MIN_TRACK_LENGTH]
     found = [Pairs(pairs.chainage[t], pairs.right[t], pairs.up[t]) for t in long]
     found.sort(key=lambda track: float(np.median(track.middle)))
     for one, two in pairwise(found):
@@ -232,8 +232,8 @@ def fit_track(points: Float, coarse: Pairs, low: float, high: float, gauge: floa
         (left, left_up), (right, right_up) = measured[0].T, measured[1].T
         used = seen.copy()
         for row, value in enumerate(((left + right) / 2.0, (left_up + right_up) / 2.0, left_up - right_up)):
-            smooth[row], errors[row], held = _smoothed(value, seen)
-            used &= held
+            smooth[row], errors[row], selected = _smoothed(value, seen)
+            used &= selected
         half = width / 2.0 * np.sqrt(1.0 - np.clip(smooth[2] / width, -1.0, 1.0) ** 2)
         heads = np.stack([smooth[0] - half, smooth[0] + half, smooth[1] + smooth[2] / 2.0, smooth[1] - smooth[2] / 2.0])
         seen = used
@@ -279,15 +279,15 @@ def _heads(points: Float) -> Float:
     """Return middle and top of each rail in points of a stretch, (k, 2), from left to right, m."""
     order = np.argsort(points[:, 1])
     right, up = points[order, 1], points[order, 2]
-    label = np.cumsum(np.diff(right, prepend=right[0]) > _APART)
+    label = np.cumsum(np.diff(right, prepend=right[0]) > _MIN_RAIL_GAP)
     found = []
     for first, stop in _runs(label):
-        if stop - first < _FEWEST or right[stop - 1] - right[first] > _WIDEST:
+        if stop - first < _MIN_HEAD_POINTS or right[stop - 1] - right[first] > _MAX_RAIL_WIDTH:
             continue
         part = up[first:stop]
         top = np.partition(part, -2)[-2]  # the highest may be an outlier
-        held = part > top - _TOP
-        found.append((float(np.median(right[first:stop][held])), float(top)))
+        selected = part > top - _HEAD_DEPTH
+        found.append((float(np.median(right[first:stop][selected])), float(top)))
     return np.array(found).reshape(-1, 2)
 
 
@@ -304,7 +304,7 @@ def _measured(points: Float, stations: Float, head: Float, top: Float) -> Float:
     """Measure middle and top of a rail at stations, (n, 2), m, NaN where not seen; ``head`` and ``top`` are approximate."""
     expected, level = _linear(points[:, 0], stations, head), _linear(points[:, 0], stations, top)
     aside, above = points[:, 1] - expected, points[:, 2] - level
-    near = np.flatnonzero((np.abs(aside) <= HEAD / 2.0 + 0.04) & (np.abs(above) <= 2.0 * _TOP))
+    near = np.flatnonzero((np.abs(aside) <= HEAD / 2.0 + 0.04) & (np.abs(above) <= 2.0 * _HEAD_DEPTH))
     number = np.floor(points[near, 0] / STATION).astype(np.int64) - int(np.floor(stations[0] / STATION))
     near, number = near[(number >= 0) & (number < len(stations))], number[(number >= 0) & (number < len(stations))]
     order = np.argsort(number, kind="stable")
@@ -312,13 +312,13 @@ def _measured(points: Float, stations: Float, head: Float, top: Float) -> Float:
     found = np.full((len(stations), 2), np.nan)
     for first, stop in _runs(number):
         x, y = aside[near[first:stop]], above[near[first:stop]]
-        if len(x) < _FEWEST:
+        if len(x) < _MIN_HEAD_POINTS:
             continue
-        crown = np.abs(y - np.quantile(y, 0.7)) <= _TOP / 2.0 + 0.005
+        crown = np.abs(y - np.quantile(y, 0.7)) <= _HEAD_DEPTH / 2.0 + 0.005
         x, y = x[crown], y[crown]
-        if len(x) < _FEWEST:
+        if len(x) < _MIN_HEAD_POINTS:
             continue
-        middle = np.quantile(x, [_EDGE, 1.0 - _EDGE]).mean()
+        middle = np.quantile(x, [_EDGE_SHARE, 1.0 - _EDGE_SHARE]).mean()
         inner = np.abs(x - middle) <= 0.4 * HEAD
         if inner.any():
             k = int(number[first])
@@ -348,7 +348,7 @@ def _smoothed(value: Float, seen: Bool) -> tuple[Float, Float, Bool]:
                 sigma = np.sqrt((weight * (filled - guess) ** 2).sum() / freedom)
                 errors = sigma * np.sqrt((hat**2 / np.where(weight > 0.0, weight, np.inf)).sum(axis=1))
         residual = (filled - fitted)[seen]
-        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(residual - np.median(residual)))), _SIGMA)
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(residual - np.median(residual)))), _MIN_SIGMA)
         weight[seen] = np.clip(1.0 - (residual / (4.685 * scale)) ** 2, 0.0, None) ** 2
         if weight.sum() < 4.0:
             weight = seen.astype(np.float64)
@@ -361,7 +361,7 @@ def _contradicted(stations: Float, heads: Float, coarse: Pairs) -> Bool:
     k = np.clip(k, 0, len(coarse.chainage) - 1)
     there = np.abs(coarse.chainage[k] - stations) < 0.5
     rough = np.stack([*coarse.right[k].T, *coarse.up[k].T])
-    return np.asarray(there & (np.abs(heads - rough).max(axis=0) > _OFF))
+    return np.asarray(there & (np.abs(heads - rough).max(axis=0) > _MAX_HEAD_RESIDUAL))
 
 
 def _far_from_seen(stations: Float, seen: Bool) -> Bool:
@@ -374,4 +374,4 @@ def _far_from_seen(stations: Float, seen: Bool) -> Bool:
     after = there[k]
     inside = (stations >= there[0]) & (stations <= there[-1])
     gap = np.where(seen, 0.0, np.where(inside, after - before, np.inf))
-    return np.asarray(gap > _REACH)
+    return np.asarray(gap > _MAX_GAP)

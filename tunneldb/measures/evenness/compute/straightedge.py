@@ -10,14 +10,14 @@ from tunneldb.arrays import Bool, Float, Int64, Single
 from tunneldb.compiled import inner, kernel
 from tunneldb.threads import in_blocks
 
-MOST_UNSEEN = 0.25
+MAX_UNSEEN_SHARE = 0.25
 """Maximum unseen share of a straightedge in one piece; otherwise it is not placed there."""
 
-NEAREST = 2
+MIN_RIM_DISTANCE = 2
 """Minimum distance from a rim to the lowest place of a hollow, in cells; nearer it is roughness or noise, not a wave."""
 
-_LEVEL = 1e-9  # m: of places equally deep within this, the one farther from the rims is the lowest
-_ROWS = 64  # in a block of a thread
+_LEVEL_TOLERANCE = 1e-9  # m: of places equally deep within this, the one farther from the rims is the lowest
+_BLOCK_ROWS = 64  # in a block of a thread
 
 
 @dataclass(frozen=True)
@@ -68,19 +68,19 @@ def gaps_beneath(height: Float, length: float, cell: float) -> Gaps:
     half = reach(length, cell)
     height = np.ascontiguousarray(height, np.float64)
     found = Gaps(np.full(height.shape, np.nan), np.full(height.shape, np.nan))
-    most = int(np.floor(MOST_UNSEEN * length / cell))
+    max_unseen = int(np.floor(MAX_UNSEEN_SHARE * length / cell))
 
     def block(begin: int, end: int) -> None:
         part = slice(begin, end)
-        _gaps_beneath(height[part], half, most, cell, found.gap[part], found.waviness[part])
+        _gaps_beneath(height[part], half, max_unseen, cell, found.gap[part], found.waviness[part])
 
-    in_blocks(block, len(height), _ROWS)
+    in_blocks(block, len(height), _BLOCK_ROWS)
     return found
 
 
 @kernel
 def _gaps_beneath(
-    height: Float, half: int, most: int, cell: float, gap: Float, waviness: Float
+    height: Float, half: int, max_unseen: int, cell: float, gap: Float, waviness: Float
 ) -> None:  # pragma: no cover - compiled
     """Compute :func:`gaps_beneath` row by row; the last two arrays are overwritten."""
     rows, count = height.shape
@@ -90,7 +90,7 @@ def _gaps_beneath(
         unseen = 0
         for x in range(count):
             unseen = unseen + 1 if np.isnan(h[x]) else 0
-            broken[x + 1] = broken[x] + (1 if unseen > most else 0)
+            broken[x + 1] = broken[x] + (1 if unseen > max_unseen else 0)
         for c in range(half, count - half):
             first, last = c - half, c + half
             if broken[last + 1] > broken[first]:
@@ -169,10 +169,12 @@ def _hollow(
         beneath = (h[left] * (right - x) + h[right] * (x - left)) / (right - left) - h[x]
         if beneath > gap[x] or (np.isnan(gap[x]) and beneath >= 0.0):
             gap[x] = beneath
-        aside = min(x - left, right - x)
-        if beneath > deepest + _LEVEL or (beneath > deepest - _LEVEL and beneath > _LEVEL and aside > near):
-            deepest, lowest, near = beneath, x, aside
-    if whole and near >= NEAREST and deepest / (near * cell) > waviness[lowest]:
+        rim_distance = min(x - left, right - x)
+        if beneath > deepest + _LEVEL_TOLERANCE or (
+            beneath > deepest - _LEVEL_TOLERANCE and beneath > _LEVEL_TOLERANCE and rim_distance > near
+        ):
+            deepest, lowest, near = beneath, x, rim_distance
+    if whole and near >= MIN_RIM_DISTANCE and deepest / (near * cell) > waviness[lowest]:
         waviness[lowest] = deepest / (near * cell)
 
 
@@ -199,9 +201,9 @@ def cell_means(values: Single, factor: int, least: int) -> Cells:
     """Return means of ``factor`` × ``factor`` pixels (rows, columns) with ``least`` pixels or more; both are multiples."""
     rows, columns = values.shape
     blocks = values.reshape(rows // factor, factor, columns // factor, factor)
-    held = np.isfinite(blocks)
-    seen = held.sum(axis=(1, 3))
-    kept = np.where(held, blocks, np.float32(0.0)).astype(np.float64)
+    valid = np.isfinite(blocks)
+    seen = valid.sum(axis=(1, 3))
+    kept = np.where(valid, blocks, np.float32(0.0)).astype(np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         mean = np.where(seen >= least, kept.sum(axis=(1, 3)) / seen, np.nan)
         square = np.maximum((kept**2).sum(axis=(1, 3)) / seen - mean**2, 0.0)

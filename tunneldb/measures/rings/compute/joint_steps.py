@@ -26,10 +26,10 @@ REACH = 1.0
 CELL_ROWS = 5
 """Rows of patches in a cell of arc."""
 
-LEAST_PATCHES = 0.6
+MIN_PATCH_SHARE = 0.6
 """Minimum seen share of a cell's patches on either side."""
 
-SHORTEST = 0.25
+MIN_SEEN_LENGTH = 0.25
 """Minimum seen length on either side, m: no plane is extrapolated from less."""
 
 LIP_REACH = 0.5
@@ -39,7 +39,7 @@ LIP_LEVEL = 6.0
 """Minimum ratio of a lip to its standard error: some hundred places are tested all around."""
 
 _ROUNDS = 6
-_LEAST_SCALE = 1e-5  # m
+_MIN_SCALE = 1e-5  # m
 
 
 @dataclass(frozen=True)
@@ -61,10 +61,10 @@ class Steps:
     @property
     def greatest(self) -> tuple[float, float, float] | None:
         """Return the greatest step, its standard error and arc, m, without the least accurate ones; None if none is left."""
-        told = np.isfinite(self.step)
-        if not told.any():
+        determined = np.isfinite(self.step)
+        if not determined.any():
             return None
-        good = told & (self.se <= 2.0 * np.median(self.se[told]))
+        good = determined & (self.se <= 2.0 * np.median(self.se[determined]))
         k = int(np.argmax(np.where(good, np.abs(self.step), -1.0)))
         return float(self.step[k]), float(self.se[k]), float(self.arc[k])
 
@@ -108,7 +108,7 @@ def _drawn_on(side: Patches, joint: float, normals: Float, count: int) -> tuple[
     """Return the level at the joint of each cell of one side, inwards, and its variance, both (count,)."""
     none = np.full(count, np.nan)
     columns = len(side.chainage)
-    if columns < 3 or side.chainage[-1] - side.chainage[0] < SHORTEST:
+    if columns < 3 or side.chainage[-1] - side.chainage[0] < MIN_SEEN_LENGTH:
         return none, none
     inward = side.right * normals[:, 0] + side.up * normals[:, 1]
     cells = inward[:, : count * CELL_ROWS].reshape(columns, count, CELL_ROWS).transpose(1, 0, 2).reshape(count, -1)
@@ -118,13 +118,13 @@ def _drawn_on(side: Patches, joint: float, normals: Float, count: int) -> tuple[
     seen = np.isfinite(cells)
     far = np.where(seen, along, np.nan)
     with np.errstate(invalid="ignore"):
-        long = np.fmax.reduce(far, axis=1) - np.fmin.reduce(far, axis=1) >= SHORTEST
-    enough = (seen.mean(axis=1) >= LEAST_PATCHES) & long
+        long = np.fmax.reduce(far, axis=1) - np.fmin.reduce(far, axis=1) >= MIN_SEEN_LENGTH
+    enough = (seen.mean(axis=1) >= MIN_PATCH_SHARE) & long
     rows = np.fmin.reduce(np.where(seen, across, np.nan), axis=1) < np.fmax.reduce(np.where(seen, across, np.nan), axis=1)
-    held = np.flatnonzero(enough & rows)
+    indices = np.flatnonzero(enough & rows)
     level, variance = none.copy(), none.copy()
-    if len(held):
-        level[held], variance[held] = _planes(cells[held], seen[held], design)
+    if len(indices):
+        level[indices], variance[indices] = _planes(cells[indices], seen[indices], design)
     return level, variance
 
 
@@ -140,7 +140,7 @@ def _planes(values: Float, seen: Bool, design: Float) -> tuple[Float, Float]:
         solved = np.linalg.solve(inner + 1e-12 * np.eye(3), ((weight * filled) @ design)[:, :, None])[:, :, 0]
         off = filled - solved @ design.T
         spread = np.nanmedian(np.where(seen, np.abs(off), np.nan), axis=1)
-        scale = np.maximum(MAD_TO_SIGMA * spread, _LEAST_SCALE)[:, None]
+        scale = np.maximum(MAD_TO_SIGMA * spread, _MIN_SCALE)[:, None]
         weight = np.where(seen, weights(off / (CUT * scale)), 0.0)
     # Variance of robust estimates (Huber, 1981, section 7.6): influence of each residual, and its derivative.
     used = seen & (weight > 0.0)
@@ -191,11 +191,11 @@ def greatest_lip(places: Float, arc: Float) -> Lip | None:
     own = np.sqrt((off**2).sum(axis=1) / (len(at) - design.shape[1]))
     scale = np.maximum(own, np.median(own))
     se = scale * float(np.linalg.norm(inverse[1]))
-    told = np.where(np.abs(solved[:, 1]) >= LIP_LEVEL * np.maximum(se, 1e-9), np.abs(solved[:, 1]) / se, 0.0)
-    peak = told.copy()
+    determined = np.where(np.abs(solved[:, 1]) >= LIP_LEVEL * np.maximum(se, 1e-9), np.abs(solved[:, 1]) / se, 0.0)
+    peak = determined.copy()
     for shift in range(1, reach + 1):
-        peak[shift:] = np.where(told[shift:] < told[:-shift], 0.0, peak[shift:])
-        peak[:-shift] = np.where(told[:-shift] < told[shift:], 0.0, peak[:-shift])
+        peak[shift:] = np.where(determined[shift:] < determined[:-shift], 0.0, peak[shift:])
+        peak[:-shift] = np.where(determined[:-shift] < determined[shift:], 0.0, peak[:-shift])
     if not peak.any():
         return None
     k = int(np.argmax(np.where(peak > 0.0, np.abs(solved[:, 1]), -1.0)))

@@ -17,45 +17,45 @@ from scipy.stats import gamma
 from tunneldb.arrays import Bool, Float, Int64, Single
 from tunneldb.robust import MAD_TO_SIGMA
 
-BESIDE = 0.06
+LINE_SIDE = 0.06
 """Distance before and behind at which a line is compared with its surroundings, m: more than a joint with beam and pixels."""
 
-ACROSS = 0.12
+STEP_SIDE = 0.12
 """Length before and behind over which means are compared for a step, m."""
 
 SECTORS = 8
 """Number of sectors in which steps are measured separately: a shifted ring steps inwards on one side and outwards opposite."""
 
-LEAST_ROWS = 20
+MIN_ROWS = 20
 """Minimum number of rows of a column in a sector."""
 
-STRONG = 5.0
+PEAK_LEVEL = 5.0
 """Minimum strength of a peak, in standard deviations of the columns' scatter."""
 
-SHORTEST, LONGEST = 0.8, 2.5
+MIN_RING_LENGTH, MAX_RING_LENGTH = 0.8, 2.5
 """Ring lengths searched, m."""
 
 STRETCH = 50.0
 """Length over which rings are assumed to repeat evenly, m."""
 
-BY_CHANCE = 1e-3
+CHANCE_LEVEL = 1e-3
 """Share of surveys in which random peaks repeat as evenly (Rayleigh's test over all lengths)."""
 
-AS_GOOD = 0.6
+MULTIPLE_PREFERENCE = 0.6
 """Relative regularity from which a longer length is preferred: half the ring length repeats as well as the whole."""
 
-STRAY = 3.5
+STRAY_LEVEL = 3.5
 """Deviation from the place that the neighbours give, in standard deviations of all joints, from which a peak is no joint."""
 
-_USUAL = 2.0  # m, window for the usual strength of columns
+_BACKGROUND_WINDOW = 2.0  # m, window for the usual strength of columns
 _TOLERANCE = 0.012  # m, standard deviation of a ring's length about that of its neighbours
-_OTHER = 9.0  # squared deviations: maximum cost of a ring with another length (three standard deviations)
-_OTHER_COST = 2.0 * STRONG
-_GAP = 4.0  # cost of each unseen joint
-_MOST_GAPS = 6
+_MAX_LENGTH_COST = 9.0  # squared deviations: maximum cost of a ring with another length (three standard deviations)
+_OFF_LENGTH_COST = 2.0 * PEAK_LEVEL
+_GAP_COST = 4.0  # cost of each unseen joint
+_MAX_GAPS = 6
 _NEIGHBOURS = 3  # joints on either side that predict a joint's place
 _STRAY_ROUNDS = 20
-_LEAST_SCALE = 0.002  # m
+_MIN_SCALE = 0.002  # m
 
 
 class NoRingsError(ValueError):
@@ -100,7 +100,7 @@ def column_signals(level: Single | None, offset: Single, pixel: float) -> Float:
 
 def _lines(values: Single, pixel: float) -> Float:
     """Return how much darker, and how much brighter, each column is than both its sides, (2, columns)."""
-    k = max(round(BESIDE / pixel), 1)
+    k = max(round(LINE_SIDE / pixel), 1)
     before, behind = (np.full(values.shape, np.nan, np.float32) for _ in range(2))
     before[:, k:-k] = values[:, : -2 * k] - values[:, k:-k]
     behind[:, k:-k] = values[:, 2 * k :] - values[:, k:-k]
@@ -115,12 +115,12 @@ def _clipped_mean(off: Single) -> Float:
     limit = 3.0 * MAD_TO_SIGMA * float(np.median(np.abs(off[seen] - middle)))
     total = np.where(seen, np.clip(off - middle, -limit, limit), 0.0).sum(axis=0, dtype=np.float64)
     count = seen.sum(axis=0)
-    return np.where(count >= LEAST_ROWS, total / np.maximum(count, 1) * np.sqrt(count), np.nan)
+    return np.where(count >= MIN_ROWS, total / np.maximum(count, 1) * np.sqrt(count), np.nan)
 
 
 def _step(offset: Single, pixel: float) -> Float:
     """Return the root mean square, over the sectors, of the mean difference behind and before each column."""
-    k = max(round(ACROSS / pixel), 2)
+    k = max(round(STEP_SIDE / pixel), 2)
     seen = np.isfinite(offset)
     sums = [np.cumsum(np.pad(part, ((0, 0), (1, 0))), axis=1, dtype=np.float64) for part in (np.where(seen, offset, 0.0), seen)]
     columns = offset.shape[1]
@@ -130,18 +130,18 @@ def _step(offset: Single, pixel: float) -> Float:
         mean_behind = (total[2] - total[1]) / (count[2] - count[1])
     change = (mean_behind - mean_before).astype(np.float32)
     parts = np.stack([_clipped_mean(part) for part in np.array_split(change, SECTORS, axis=0)])
-    told = np.isfinite(parts)
+    determined = np.isfinite(parts)
     out = np.full(columns, np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
         # The difference at edge j + k is between two columns; it is assigned to the one behind it.
-        out[k : columns - k + 1] = np.sqrt(np.where(told, parts**2, 0.0).sum(axis=0) / told.sum(axis=0))
+        out[k : columns - k + 1] = np.sqrt(np.where(determined, parts**2, 0.0).sum(axis=0) / determined.sum(axis=0))
     return out
 
 
 def strength(signals: Float, pixel: float) -> Float:
     """Combine all signals into one strength (columns,), in standard deviations; 0 where nothing is seen."""
     total = np.zeros(signals.shape[1])
-    window = 2 * round(_USUAL / pixel / 2.0) + 1
+    window = 2 * round(_BACKGROUND_WINDOW / pixel / 2.0) + 1
     for signal in signals:
         seen = np.isfinite(signal)
         if seen.sum() < window:
@@ -159,7 +159,7 @@ def peaks(strong: Float, pixel: float) -> tuple[Float, Float]:
     half = max(round(0.12 / pixel), 2)
     padded = np.pad(strong, half)
     highest = np.array([padded[half + k : len(padded) - half + k] for k in range(-half, half + 1)]).max(axis=0)
-    at = np.flatnonzero((strong >= STRONG) & (strong == highest))
+    at = np.flatnonzero((strong >= PEAK_LEVEL) & (strong == highest))
     at = at[np.diff(at, prepend=-half - 1) > half]
     near = at[:, None] + np.arange(-2, 3)
     weight = np.take(strong, near, mode="clip") ** 2
@@ -181,7 +181,7 @@ def ring_length(places: Float, weight: Float) -> float:
     """
     if len(places) < 5:
         raise NoRingsError(f"only {len(places)} places look like joints all around")
-    per_metre = np.arange(1.0 / LONGEST, 1.0 / SHORTEST, 0.1 / STRETCH)
+    per_metre = np.arange(1.0 / MAX_RING_LENGTH, 1.0 / MIN_RING_LENGTH, 0.1 / STRETCH)
     power, parts = np.zeros(len(per_metre)), 0
     weight = np.minimum(weight, 4.0 * np.median(weight))
     number = np.floor(places / STRETCH).astype(np.int64)
@@ -192,10 +192,10 @@ def ring_length(places: Float, weight: Float) -> float:
         power += np.abs(turned) ** 2 / (weight[first:stop] ** 2).sum()
         parts += 1
     # With random peaks each stretch adds an exponential of mean 1 (Rayleigh's test): the sum has a gamma distribution.
-    limit = gamma.isf(BY_CHANCE / len(per_metre), max(parts, 1))
+    limit = gamma.isf(CHANCE_LEVEL / len(per_metre), max(parts, 1))
     if not parts or power.max() < limit:
         raise NoRingsError("places that look like joints do not repeat evenly")
-    top = (power >= AS_GOOD * power.max()) & (power >= np.maximum(np.roll(power, 1), np.roll(power, -1)))
+    top = (power >= MULTIPLE_PREFERENCE * power.max()) & (power >= np.maximum(np.roll(power, 1), np.roll(power, -1)))
     return float(1.0 / per_metre[np.flatnonzero(top)[0]])
 
 
@@ -234,23 +234,23 @@ def follow(places: Float, weight: Float, pitch: float) -> Joints:
 
 def _chain(places: Float, weight: Float, local: Float) -> Int64:
     """Return the indices of the peaks on the best chain."""
-    gain = np.minimum(weight, 3.0 * STRONG)
+    gain = np.minimum(weight, 3.0 * PEAK_LEVEL)
     best, back, leader = gain.copy(), np.full(len(places), -1), np.zeros(len(places), np.int64)
     for k in range(1, len(places)):
-        first = int(np.searchsorted(places, places[k] - (_MOST_GAPS + 0.5) * local[k]))
+        first = int(np.searchsorted(places, places[k] - (_MAX_GAPS + 0.5) * local[k]))
         gaps = places[k] - places[first:k]
-        held = np.flatnonzero(gaps >= 0.4 * local[k])
-        gaps = gaps[held]
+        indices = np.flatnonzero(gaps >= 0.4 * local[k])
+        gaps = gaps[indices]
         rings = np.maximum(np.rint(gaps / local[k]), 1.0)
-        off = np.minimum((gaps - rings * local[k]) ** 2 / (_TOLERANCE**2 * rings), _OTHER)
-        total = best[first + held] - off * _OTHER_COST / _OTHER - _GAP * (rings - 1.0)
-        source = first + held
+        off = np.minimum((gaps - rings * local[k]) ** 2 / (_TOLERANCE**2 * rings), _MAX_LENGTH_COST)
+        total = best[first + indices] - off * _OFF_LENGTH_COST / _MAX_LENGTH_COST - _GAP_COST * (rings - 1.0)
+        source = first + indices
         if first:  # across a long unseen stretch the chain continues from what came before
-            total = np.append(total, best[leader[first - 1]] - _OTHER_COST - _GAP * _MOST_GAPS)
+            total = np.append(total, best[leader[first - 1]] - _OFF_LENGTH_COST - _GAP_COST * _MAX_GAPS)
             source = np.append(source, leader[first - 1])
         if len(total) and total.max() > 0.0:
-            most = int(np.argmax(total))
-            best[k], back[k] = gain[k] + total[most], source[most]
+            last = int(np.argmax(total))
+            best[k], back[k] = gain[k] + total[last], source[last]
         leader[k] = k if best[k] > best[leader[k - 1]] else leader[k - 1]
     chain = [int(np.argmax(best))]
     while back[chain[-1]] >= 0:
@@ -276,13 +276,13 @@ def _in_row(seen: Float, local: Float) -> Bool:
         off[0, :, 0], off[1, :, -1] = np.inf, np.inf  # the ends have neighbours on one side only
         away = np.abs(np.nanmedian(off, axis=1))
         scale = MAD_TO_SIGMA * float(np.median(away[np.isfinite(away)]))
-        least = away.min(axis=0)
-        stray = least > STRAY * max(scale, _LEAST_SCALE)
+        deviation = away.min(axis=0)
+        stray = deviation > STRAY_LEVEL * max(scale, _MIN_SCALE)
         if not stray.any():
             break
-        near = np.pad(least, _NEIGHBOURS)
-        highest = np.array([near[k : k + len(least)] for k in range(2 * _NEIGHBOURS + 1)]).max(axis=0)
-        kept[np.flatnonzero(kept)[stray & (least == highest)]] = False
+        near = np.pad(deviation, _NEIGHBOURS)
+        highest = np.array([near[k : k + len(deviation)] for k in range(2 * _NEIGHBOURS + 1)]).max(axis=0)
+        kept[np.flatnonzero(kept)[stray & (deviation == highest)]] = False
     return kept
 
 

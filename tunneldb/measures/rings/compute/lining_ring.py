@@ -14,15 +14,15 @@ from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.shape.departures import clock_of
 from tunneldb.shape.rings import LEAST_POINTS, Ring, RingRefusedError, fit_ring
 
-NOT_ROUND = 0.03
+MAX_DEPARTURE_SHARE = 0.03
 """Maximum departure of a tenth of a ring from its ellipse, as a share of the radius; beyond it centre and radius mean nothing.
 Lining squeezed to the limit departs by less: 2 % is usual, mostly ovality."""
 
 CHORD_REACH = 3.0
 """Half-width of the window around a clock position whose median is the end of a chord, °."""
 
-_LEAST_ENDS = 4  # rows
-_MEDIAN = 1.2533  # standard error of a median relative to that of a mean
+_MIN_END_ROWS = 4  # rows
+_MEDIAN_ERROR = 1.2533  # standard error of a median relative to that of a mean
 
 
 @dataclass(frozen=True)
@@ -100,11 +100,11 @@ def _shape(points: Float, orders: int) -> tuple[Ring | None, str]:
         return None, str(refused)
     off = float(np.quantile(np.abs(ring.adjustment.distance), 0.9))
     radius = ring.adjustment.ellipse.radius
-    if off > NOT_ROUND * radius:
+    if off > MAX_DEPARTURE_SHARE * radius:
         return None, f"not round: a tenth of it departs by more than {1e3 * off:.0f} mm from an ellipse"
     return (
         ring,
-        "" if ring.is_ellipse else f"ellipse not determined (a gap of {ring.gap:.0f}°): centre and radius are a circle's",
+        "" if ring.is_ellipse else f"ellipse not determined (a gap of {ring.gap:.0f}°): centre and radius are from a circle",
     )
 
 
@@ -114,13 +114,13 @@ def _chord(points: Float, middle: Float, first: float, second: float) -> RingCho
     ends, errors = [], []
     for position in (first, second):
         near = np.abs((clock - position + 180.0) % 360.0 - 180.0) <= CHORD_REACH
-        if near.sum() < _LEAST_ENDS:
+        if near.sum() < _MIN_END_ROWS:
             return RingChord(first, second, np.nan, np.nan)
         away = float(np.median(radius[near]))
         scatter = MAD_TO_SIGMA * float(np.median(np.abs(radius[near] - away)))
         turn = np.radians(position)
         ends.append(away * np.array([np.sin(turn), np.cos(turn)]))
-        errors.append(_MEDIAN * scatter / np.sqrt(near.sum()))
+        errors.append(_MEDIAN_ERROR * scatter / np.sqrt(near.sum()))
     span = ends[0] - ends[1]
     length = float(np.linalg.norm(span))
     along = [abs(float(end @ span)) / (float(np.linalg.norm(end)) * length) for end in ends]

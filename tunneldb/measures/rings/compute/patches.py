@@ -14,13 +14,13 @@ from tunneldb.shape.tukey import CUT, weights
 PATCH = 0.06
 """Side of a patch, rounded to whole pixels, m: 3 mm of noise become less than 1 mm, and the bend within a patch is less."""
 
-LEAST_SEEN = 0.3
+MIN_SEEN_SHARE = 0.3
 """Minimum seen share of a patch's pixels."""
 
 
-_LEAST_ROWS = 10
+_MIN_ROWS = 10
 _ROUNDS = 5
-_LEAST_SCALE = 1e-5  # m
+_MIN_SCALE = 1e-5  # m
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def average(values: Single, chainage: Float, arc: Float, side: float) -> tuple[F
     chainage, arc : (c,), (r,) float arrays
         Middles of the patches, increasing, m.
     mean : (r, c) float32 array
-        NaN where less than `LEAST_SEEN` of the pixels is seen.
+        NaN where less than `MIN_SEEN_SHARE` of the pixels is seen.
     """
     if arc[0] > arc[-1]:
         values, arc = values[::-1], arc[::-1]
@@ -77,7 +77,7 @@ def average(values: Single, chainage: Float, arc: Float, side: float) -> tuple[F
     )
     pixels = np.outer(np.diff(row, append=len(arc)), np.diff(column, append=len(chainage)))
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.where(count >= np.maximum(LEAST_SEEN * pixels, 1.0), total / count, np.float32(np.nan))
+        mean = np.where(count >= np.maximum(MIN_SEEN_SHARE * pixels, 1.0), total / count, np.float32(np.nan))
     return (columns + 0.5) * side, (rows + 0.5) * side, mean.astype(np.float32)
 
 
@@ -110,12 +110,12 @@ def row_medians(patches: Patches, least: float = 0.25) -> Float:
     """Return the median place of each row of arc (r, 2), right and up, m; NaN if less than ``least`` of it is seen."""
     count = np.isfinite(patches.right).sum(axis=0)
     out = np.full((len(patches.arc), 2), np.nan)
-    held = np.flatnonzero(count >= max(least * len(patches.chainage), 1.0))
+    indices = np.flatnonzero(count >= max(least * len(patches.chainage), 1.0))
     for k, values in enumerate((patches.right, patches.up)):
-        ordered = np.sort(values[:, held], axis=0)  # NaN last
-        low, high = (count[held] - 1) // 2, count[held] // 2
-        across = np.arange(len(held))
-        out[held, k] = 0.5 * (ordered[low, across] + ordered[high, across])
+        ordered = np.sort(values[:, indices], axis=0)  # NaN last
+        low, high = (count[indices] - 1) // 2, count[indices] // 2
+        across = np.arange(len(indices))
+        out[indices, k] = 0.5 * (ordered[low, across] + ordered[high, across])
     return out
 
 
@@ -130,17 +130,17 @@ def straightened(patches: Patches) -> Patches:
     inward = patches.right * normals[:, 0] + patches.up * normals[:, 1]
     along = np.where(np.isfinite(inward), patches.chainage[:, None], np.nan)
     count = np.isfinite(inward).sum(axis=0)
-    held = count > 1
-    if held.sum() < _LEAST_ROWS:
+    selected = count > 1
+    if selected.sum() < _MIN_ROWS:
         return patches
-    away = (along[:, held] - np.nanmean(along[:, held], axis=0)).ravel()
-    off = (inward[:, held] - np.nanmedian(inward[:, held], axis=0)).ravel()
+    away = (along[:, selected] - np.nanmean(along[:, selected], axis=0)).ravel()
+    off = (inward[:, selected] - np.nanmedian(inward[:, selected], axis=0)).ravel()
     seen = np.isfinite(off)
-    design = away[seen, None] * np.tile(normals[held], (len(patches.chainage), 1))[seen]
+    design = away[seen, None] * np.tile(normals[selected], (len(patches.chainage), 1))[seen]
     off, run = off[seen], np.zeros(2)
     for _ in range(_ROUNDS):
         left = off - design @ run
-        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(left))), _LEAST_SCALE)
+        scale = max(MAD_TO_SIGMA * float(np.median(np.abs(left))), _MIN_SCALE)
         weight = weights(left / (CUT * scale))[:, None]
         run = np.linalg.lstsq(design.T @ (weight * design), (weight * design).T @ off, rcond=1e-9)[0]
     middle = 0.5 * (patches.chainage[0] + patches.chainage[-1])
