@@ -12,7 +12,7 @@ LEVEL_KNOWN_SIGMA = 1e-4
 """Probability that a ring without outliers loses a point, if the accuracy of points is known."""
 
 LEVEL_OWN_SIGMA = 1e-2
-"""Probability if the accuracy is estimated from the ring itself. At LEVEL_KNOWN_SIGMA no outlier of eight points could be found."""
+"""Probability if the ring itself gives the accuracy. At LEVEL_KNOWN_SIGMA no outlier of eight points could be found."""
 
 LEVEL_WORSE_SIGMA = 1e-3
 """Level at which a ring's own residuals count as worse than the known accuracy of points."""

@@ -79,8 +79,8 @@ def fit_plane(xyz: Float, ahead: Float) -> RingPlane | None:
     Notes
     -----
     Few points: least squares without points far from the plane of all others. Prisms are set up by hand, and within
-    `OFF_PLANE_LIMIT` each says equally well where the ring is. Many points: Tukey's weights, starting from the triple with the least
-    median of distances (Rousseeuw, 1984).
+    `OFF_PLANE_LIMIT` each says equally well where the ring is. Many points: Tukey's weights, starting from
+    the triple with the least median of distances (Rousseeuw, 1984).
     """
     origin = np.median(xyz, axis=0)
     found = _few(xyz - origin) if len(xyz) <= MAX_TESTED_SINGLY else _many(xyz - origin)

@@ -266,7 +266,7 @@ def section_figures(found: Change) -> list[Section]:
     grid, cell = found.grid, found.grid.cell
     window, _, number = shape_change.window_means(found.difference, found.variance, found.removed_error, found.scatter)
     both = np.isfinite(found.difference)
-    window = np.where(both & (number >= shape_change.LEAST), window, np.nan)
+    window = np.where(both & (number >= shape_change.MIN_WINDOW_CELLS), window, np.nan)
     rows = []
     for columns, motion in found.sections:
         seen_old, seen_new = (float(np.isfinite(cells.offset[:, columns]).sum()) * cell**2 for cells in (found.old, found.new))

@@ -260,7 +260,8 @@ def _infringements(
         at = float(clock(places[deepest, 1:][None], (ends.min(axis=0) + ends.max(axis=0)) / 2.0)[0])
         along = places[one.points, 0]
         rows.append(SavedInfringement((
-            float(along.min()), float(along.max()), one.depth, at, one.klass, one.klass not in TEMPORARY_CLASSES, cluster.get(deepest),
+            float(along.min()), float(along.max()), one.depth, at, one.klass, one.klass not in TEMPORARY_CLASSES,
+            cluster.get(deepest),
             len(one.points),
         ), _covered(surface, xyz[one.points], one.klass), xyz[one.points]))  # fmt: skip
     return rows
