@@ -22,8 +22,8 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.measures.change.compute import change as shape_change
 from tunneldb.measures.change.compute.cells import (
-    MIN_SIDE,
     MIN_SEEN_SHARE,
+    MIN_SIDE,
     CellGrid,
     Cells,
     CellSums,

@@ -19,7 +19,7 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
-from tunneldb.measures.clearance.compute.clearance import TEMPORARY_CLASSES, STEP, Clearance, Grouping, clearance, clock
+from tunneldb.measures.clearance.compute.clearance import STEP, TEMPORARY_CLASSES, Clearance, Grouping, clearance, clock
 from tunneldb.measures.clearance.compute.gauge import Widening, halved, terms, widened
 from tunneldb.measures.clearance.compute.track import GAUGE, HEAD, Pairs, Track, curvature, fit_track, follow, rail_pairs
 from tunneldb.measures.clearance.rows import (
