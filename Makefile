@@ -15,6 +15,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find tunneldb sql migrations -type f -not -name '*.py[co]' -not -name '*.nb[ic]') pyproject.toml README.md LICENSE
 
+# Tests that may take hours.
+ENDLESS := --timeout 0 -o faulthandler_timeout=0
+
 .PHONY: install demo demo-structure demo-canal quick test tests faults fuzz docs plugin bench lint clean
 .DELETE_ON_ERROR:
 
@@ -74,10 +77,10 @@ test: $(VENV)/wheel $(VENV)/tests
 	$(MAKE) -j 2 lint tests
 
 faults: install $(VENV)/tests $(VENV)/compiled
-	KILLS=$${KILLS:-100} $(BIN)/pytest -n 0 -s tests/faults/test_kills.py
+	KILLS=$${KILLS:-100} $(BIN)/pytest $(ENDLESS) -n 0 -s tests/faults/test_kills.py
 
 fuzz: install $(VENV)/tests $(VENV)/compiled
-	CASES=$(or $(CASES),10000) RIGHT=$(or $(RIGHT),1000) SECONDS=$(or $(SECONDS),inf) $(BIN)/pytest -n 0 -s tests/cli/test_fuzz.py
+	CASES=$(or $(CASES),10000) RIGHT=$(or $(RIGHT),1000) SECONDS=$(or $(SECONDS),inf) $(BIN)/pytest $(ENDLESS) -n 0 -s tests/cli/test_fuzz.py
 
 docs: $(VENV)/dependencies
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict

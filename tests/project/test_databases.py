@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import psycopg
+import pytest
 from support.databases import Copies
 
 HELD = "SELECT (SELECT count(*) FROM tunnel.tunnel), (SELECT count(*) FROM pg_class WHERE relname = 'mine')"
@@ -27,7 +28,15 @@ def test_what_is_committed_is_seen_by_no_other(copies: Copies, template: str) ->
     assert len(set(names)) == 3
 
 
-def test_one_that_somebody_is_still_in_is_given_to_nobody(copies: Copies, template: str) -> None:
+def test_the_server_itself_commits_nothing(copies: Copies, template: str) -> None:
+    with copies.copy(template) as dsn, psycopg.connect(dsn) as conn:
+        assert conn.execute("SHOW autovacuum").fetchone() == ("off",)
+
+
+def test_one_that_somebody_is_still_in_is_given_to_nobody(
+    copies: Copies, template: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("support.databases.PATIENCE", 0.1)
     with copies.copy(template) as dsn:
         left = psycopg.connect(dsn)
     with copies.copy(template) as again:

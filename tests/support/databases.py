@@ -14,8 +14,11 @@ from psycopg.conninfo import make_conninfo
 
 from tunneldb.database import connect
 
-SETTINGS = {"track_commit_timestamp": "on"}
-"""Settings of the server by which the copies know of commits."""
+SETTINGS = {"track_commit_timestamp": "on", "autovacuum": "off"}
+"""Settings by which the copies know of commits: nobody commits but the tests. Autovacuum does when it analyses a table."""
+
+PATIENCE = 5.0
+"""Longest wait for closed sessions to end, s: on a busy machine the server notices late that a client has gone."""
 
 Sequences = dict[tuple[str, str], tuple[int, bool]]
 
@@ -117,12 +120,13 @@ def _last_commit(server: psycopg.Connection) -> int | None:
 
 
 def _empty(server: psycopg.Connection, name: str) -> bool:
-    """Whether nobody is in a database; a session that was just closed takes a moment to go."""
-    for _ in range(10):
-        if server.execute("SELECT count(*) FROM pg_stat_activity WHERE datname = %s", [name]).fetchone() == (0,):
-            return True
+    """Return True if no session is in a database, within PATIENCE."""
+    end = time.monotonic() + PATIENCE
+    while server.execute("SELECT count(*) FROM pg_stat_activity WHERE datname = %s", [name]).fetchone() != (0,):
+        if time.monotonic() > end:
+            return False
         time.sleep(0.01)
-    return False
+    return True
 
 
 def _sequences(connection: psycopg.Connection) -> Sequences:
