@@ -121,7 +121,12 @@ def _schema(connection: psycopg.Connection[Any]) -> Finding:
         return Finding("ok", "schema tunnel", f"revision {revision}, the newest")
     if revision in revisions():
         return Finding("wrong", "schema tunnel", f"revision {revision}, older than this program", "tunneldb init")
-    return Finding("wrong", "schema tunnel", f"revision {revision}, newer than this program", "pip install --upgrade tunneldb")
+    return Finding(
+        "wrong",
+        "schema tunnel",
+        f"revision {revision}, newer than this program or never released",
+        "pip install --upgrade tunneldb",
+    )
 
 
 def _api(connection: psycopg.Connection[Any]) -> Finding:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import sqlalchemy
     from alembic.config import Config
 
-HEAD = "0031"
+HEAD = "0001"
 """The newest migration. Known here so that a command whose database is up to date need not import Alembic."""
 
 _LOCK = 7088630451  # any number: two installations of one database wait for each other
@@ -57,7 +57,7 @@ def install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> 
     Raises
     ------
     UserError
-        When PostGIS is missing and cannot be created, or the database is of a newer version.
+        When PostGIS is missing and cannot be created, or the database is of another version, newer or unreleased.
     """
     import sqlalchemy
 
@@ -85,7 +85,7 @@ def _install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) ->
         _refuse_planted(connection)  # now also by the names that PostGIS has
         present = schema_revision(connection)
         if present is not None and present not in revisions():
-            raise UserError(_newer(present))
+            raise UserError(_unknown(present))
         command.upgrade(alembic_config(session), "head")
         _fill_stages(connection, stages)
         install_api(connection)
@@ -237,13 +237,14 @@ def require_current_schema(connection: psycopg.Connection[Any]) -> None:
         raise UserError("the database has no schema tunnel yet: tunneldb init")
     if revision in revisions():
         raise UserError(f"the database's schema is older ({revision}) than this program: tunneldb init upgrades it")
-    raise UserError(_newer(revision))
+    raise UserError(_unknown(revision))
 
 
-def _newer(revision: str) -> str:
+def _unknown(revision: str) -> str:
     return (
-        f"the database is of a newer version (schema {revision}) than this tunneldb {__version__}: "
-        "pip install --upgrade tunneldb"
+        f"the database's schema {revision} is unknown to tunneldb {__version__}. It is of a newer version "
+        "(pip install --upgrade tunneldb) or of a development version before 0.1.0 (create a new database and load the "
+        "scans again)"
     )
 
 

@@ -1,6 +1,6 @@
 """The tables of schemas `tunnel` and `tunnel_audit`, as SQLAlchemy knows them.
 
-Alembic compares these with the database; migrations are written by hand from the difference. Units: metres,
+Alembic compares these with the database; `migrations/baseline/tables.sql` is written from them. Units: metres,
 decibels, seconds, square metres, unless a comment says otherwise.
 """
 

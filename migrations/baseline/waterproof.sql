@@ -1,0 +1,66 @@
+-- Statistics of waterproofing hold until a leak or the lining of their kilometre changes: triggers note each change.
+
+-- A note a kilometre, by whoever changes something, in the same transaction: new rows only, so that nobody waits for anybody. A
+-- survey that is being deleted takes its notes along.
+CREATE FUNCTION tunnel.note_anomaly() RETURNS trigger
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp
+AS $$
+BEGIN
+    INSERT INTO tunnel.waterproof (survey_id, km)
+    SELECT DISTINCT c.survey_id, k.km
+      FROM changed c
+      JOIN tunnel.survey s ON s.id = c.survey_id
+     CROSS JOIN generate_series(
+            floor((c.chainage_from - 0.01) / 1000)::int, floor((c.chainage_to + 0.01) / 1000)::int) AS k (km);
+    RETURN NULL;
+END
+$$;
+COMMENT ON FUNCTION tunnel.note_anomaly() IS
+'Trigger on tunnel.anomaly: notes the kilometres that what changed reaches into';
+CREATE TRIGGER note_insert AFTER INSERT ON tunnel.anomaly
+    REFERENCING NEW TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_anomaly();
+CREATE TRIGGER note_update_old AFTER UPDATE ON tunnel.anomaly
+    REFERENCING OLD TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_anomaly();
+CREATE TRIGGER note_update_new AFTER UPDATE ON tunnel.anomaly
+    REFERENCING NEW TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_anomaly();
+CREATE TRIGGER note_delete AFTER DELETE ON tunnel.anomaly
+    REFERENCING OLD TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_anomaly();
+
+CREATE FUNCTION tunnel.note_coverage() RETURNS trigger
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp
+AS $$
+BEGIN
+    INSERT INTO tunnel.waterproof (survey_id, km)
+    SELECT c.survey_id, c.km FROM changed c JOIN tunnel.survey s ON s.id = c.survey_id;
+    RETURN NULL;
+END
+$$;
+COMMENT ON FUNCTION tunnel.note_coverage() IS 'Trigger on tunnel.coverage: notes the kilometres whose lining changed';
+CREATE TRIGGER note_insert AFTER INSERT ON tunnel.coverage
+    REFERENCING NEW TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_coverage();
+CREATE TRIGGER note_update_old AFTER UPDATE ON tunnel.coverage
+    REFERENCING OLD TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_coverage();
+CREATE TRIGGER note_update_new AFTER UPDATE ON tunnel.coverage
+    REFERENCING NEW TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_coverage();
+CREATE TRIGGER note_delete AFTER DELETE ON tunnel.coverage
+    REFERENCING OLD TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_coverage();
+
+CREATE FUNCTION tunnel.forget_waterproof() RETURNS trigger
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp
+AS $$
+BEGIN
+    BEGIN
+        TRUNCATE tunnel.waterproof;
+    EXCEPTION
+        WHEN object_in_use THEN  -- it is being emptied with the others, or changes in them are still to be worked out
+            DELETE FROM tunnel.waterproof;
+    END;
+    RETURN NULL;
+END
+$$;
+COMMENT ON FUNCTION tunnel.forget_waterproof() IS
+'Trigger on tunnel.anomaly and tunnel.coverage: where they are emptied at once, what is kept of their kilometres goes, too';
+CREATE TRIGGER note_truncate AFTER TRUNCATE ON tunnel.anomaly
+    FOR EACH STATEMENT EXECUTE FUNCTION tunnel.forget_waterproof();
+CREATE TRIGGER note_truncate AFTER TRUNCATE ON tunnel.coverage
+    FOR EACH STATEMENT EXECUTE FUNCTION tunnel.forget_waterproof();
