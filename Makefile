@@ -1,14 +1,15 @@
-# make demo   a simulated tunnel from its scan to leaks in QGIS, in ./demo
-# make demo-structure   the same for a simulated steel structure and its spots: 40 s, and half a minute more on first use
-# make demo-canal       the same for a simulated canal tunnel, above and below the water: a minute and a half
-# make quick  those of the tests that need no server and are over soon
-# make test   lint, types and all tests, against the wheel as a user would install it
-# make faults 100 kills at random moments while a batch runs; KILLS=… and SEED=… for others
-# make fuzz   10,000 malformed files and hostile words for all verbs; CASES=…, FIRST=… and SEED=… for others
-# make docs   the documentation as a site, in ./site
-# make plugin the QGIS plugin as a zip, in ./dist
-# make bench  the main figures of docs/figures.md
-# Each installs what it lacks: PostgreSQL with PostGIS by apt, and a virtual environment in .venv.
+# make install  what a user needs, in .venv; the command is bin/tunneldb
+# make demo     a simulated tunnel from its scan to leaks in QGIS, in ./demo: 2 minutes
+# make demo-structure   a simulated steel structure and its spots: 1 minute
+# make demo-canal       a simulated canal tunnel, above and below the water: 1.5 minutes
+# make quick    the tests that need no server and are short: 1 minute
+# make test     lint, types and all tests, against the wheel as a user would install it
+# make faults   100 kills at random moments while a batch runs; KILLS=… and SEED=… for others
+# make fuzz     10,000 malformed files and hostile words for all commands; CASES=…, FIRST=… and SEED=… for others
+# make docs     the documentation as a site, in ./site
+# make plugin   the QGIS plugin as a zip, in ./dist
+# make bench    the main figures of docs/figures.md
+# Each installs missing dependencies first: PostgreSQL with PostGIS by apt, Python packages into .venv.
 
 PYTHON ?= python3
 VENV := .venv
@@ -27,19 +28,20 @@ $(VENV)/server:
 	scripts/system-packages.sh server
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "tunneldb needs Python 3.11 or newer")'
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q --upgrade pip
 	touch $@
 
-# What tests and tools need, with the project's own dependencies.
-$(VENV)/dependencies: pyproject.toml | $(VENV)/server
-	$(BIN)/python -m pip install -q --upgrade pip build
-	$(BIN)/python -m build -q --wheel --outdir $(VENV)/dist
-	$(BIN)/python -m pip install -q "$$(ls -t $(VENV)/dist/*.whl | head -n 1)[dev]"
-	touch $@
-
-$(VENV)/wheel: $(SOURCES) | $(VENV)/dependencies
+# The first pip installs new code of the same version, the second new dependencies.
+$(VENV)/wheel: $(SOURCES) | $(VENV)/server
 	rm -rf $(VENV)/dist
-	$(BIN)/python -m build -q --wheel --outdir $(VENV)/dist
+	$(BIN)/python -m pip wheel -q --no-deps --wheel-dir $(VENV)/dist .
 	$(BIN)/python -m pip install -q --no-deps --force-reinstall $(VENV)/dist/*.whl
+	$(BIN)/python -m pip install -q "$$(ls $(VENV)/dist/*.whl)[e57,ifc]"
+	touch $@
+
+# What tests and tools need beside that.
+$(VENV)/development: pyproject.toml | $(VENV)/wheel
+	$(BIN)/python -m pip install -q "$$(ls $(VENV)/dist/*.whl)[dev]"
 	touch $@
 
 $(VENV)/tests: | $(VENV)/server
@@ -60,35 +62,35 @@ demo-structure: install
 demo-canal: install
 	scripts/demo-canal.sh $(abspath $(BIN))/tunneldb
 
-lint: install
+lint: $(VENV)/wheel $(VENV)/development
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 
 # Not `python -m pytest`: that would put the source tree before the wheel. Linting takes a core for a minute, beside the tests.
-tests: $(VENV)/wheel $(VENV)/tests $(VENV)/compiled
+tests: $(VENV)/wheel $(VENV)/development $(VENV)/tests $(VENV)/compiled
 	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -rs
 
-quick: $(VENV)/wheel
+quick: $(VENV)/wheel $(VENV)/development
 	$(BIN)/pytest -n 2 --dist loadgroup --no-loadscope-reorder -m "not server and not slow" -rs
 
-test: $(VENV)/wheel $(VENV)/tests
+test: $(VENV)/wheel $(VENV)/development $(VENV)/tests
 	$(MAKE) -j 2 lint tests
 
-faults: install $(VENV)/tests $(VENV)/compiled
+faults: install $(VENV)/development $(VENV)/tests $(VENV)/compiled
 	KILLS=$${KILLS:-100} $(BIN)/pytest $(ENDLESS) -n 0 -s tests/faults/test_kills.py
 
-fuzz: install $(VENV)/tests $(VENV)/compiled
+fuzz: install $(VENV)/development $(VENV)/tests $(VENV)/compiled
 	CASES=$(or $(CASES),10000) RIGHT=$(or $(RIGHT),1000) SECONDS=$(or $(SECONDS),inf) $(BIN)/pytest $(ENDLESS) -n 0 -s tests/cli/test_fuzz.py
 
-docs: $(VENV)/dependencies
+docs: $(VENV)/wheel $(VENV)/development
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 plugin:
 	$(PYTHON) scripts/package_plugin.py dist
 
-bench: install
+bench: install $(VENV)/development
 	$(BIN)/python -m benchmarks.run
 
 clean:

@@ -33,6 +33,7 @@ collect() {
                 ;;
             tests)
                 need "postgresql-${version}-plpgsql-check" '/usr/share/postgresql/*/extension/plpgsql_check.control'
+                need qgis '/usr/bin/qgis_process'
                 need python3-qgis '/usr/lib/python3/dist-packages/qgis/core/__init__.py'
                 need qgis-providers '/usr/lib/qgis/plugins/libprovider_postgres.so'
                 need iproute2 '/usr/*bin/ip'
