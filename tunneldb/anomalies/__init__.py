@@ -1,4 +1,4 @@
-"""What is dark on the lining: background, threshold, regions, leaks among them and their geometries (Xu et al., 2018)."""
+"""Dark areas on the lining: background, threshold, regions, leaks among them and their geometries (Xu et al., 2018)."""
 
 import lazy_loader
 

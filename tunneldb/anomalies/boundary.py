@@ -1,4 +1,4 @@
-"""The boundary of dark regions, where half of their own contrast is reached."""
+"""Boundary of dark regions, at half of their own contrast."""
 
 from __future__ import annotations
 
@@ -13,40 +13,40 @@ from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import mask_of_polygons
 
 BAND = 2
-"""Pixels to both sides of the boundary that may change sides, each time."""
+"""Width of the zone on both sides of the boundary in which pixels may change sides, pixels, per iteration."""
 
 TIMES = 2
-"""How many times they may; twice as often where lining is averaged over windows, which blur the boundary more."""
+"""Number of iterations; doubled where lining is averaged over windows, which blur the boundary more."""
 
 CONTRAST = 6
-"""Half the side of the window in which the contrast of a region is taken, pixels."""
+"""Half the side of the window for the contrast of a region, pixels."""
 
 FEW = 5
-"""Fewer pixels tell no contrast."""
+"""Minimum number of pixels for a contrast."""
 
 ENOUGH = 4
-"""So many pixels tell whether one lies on this side or that: half of a contrast of four sigma is four of their mean's."""
+"""Number of pixels for deciding the side of one: half of a contrast of four sigma is four sigma of their mean."""
 
 CERTAIN = 2.5
-"""Of pixels on either side of a boundary 1 of 160 then lies on the wrong side of half of the contrast."""
+"""Significance of half of the contrast: 1 of 160 pixels near a boundary is then on the wrong side."""
 
 EMPTY, RECESS = int(PixelState.EMPTY), int(PixelState.RECESS)
 
 
 def refine_boundary(dark: Bool, contrast: ContrastImage, size: int) -> Bool:
-    """Move the boundary of dark regions to where half of their contrast is reached.
+    """Move the boundary of dark regions to half of their contrast.
 
-    The threshold of three sigma lies at the outermost edge of a strongly wet patch and at the innermost of a weak one; a mean
-    passes half of the contrast just where the edge is, whatever the contrast, the beam's footprint and the noise.
+    The threshold of three sigma is at the outer edge of a strongly wet patch and at the inner edge of a weak one. A mean passes
+    half of the contrast exactly at the edge, whatever the contrast, the beam's footprint and the noise.
 
     Parameters
     ----------
     dark : (rows, columns) bool array
         Dark pixels by the threshold; changed in place.
     contrast : ContrastImage
-        Their drop.
+        Their darkening.
     size : int
-        Side of the median filter that they went through, pixels.
+        Side of the median filter that was applied, pixels.
 
     Returns
     -------
@@ -69,13 +69,13 @@ def refine_boundary(dark: Bool, contrast: ContrastImage, size: int) -> Bool:
 
 
 def _about_boundary(dark: Bool) -> tuple[Bool, Int64]:
-    """Tell which dark pixels lie in the interior, all four neighbours being dark, and list those within BAND of the boundary.
+    """Find the dark pixels of the interior (all four neighbours dark), and list the pixels within BAND of the boundary.
 
     Returns
     -------
     interior : (rows, columns) bool array
     near : (n,) int array
-        Numbers of pixels, counted row by row.
+        Numbers of pixels, row by row.
     """
     interior, near = np.empty_like(dark), []
     for rows, about in row_blocks(len(dark), BAND):
@@ -96,7 +96,7 @@ def _about_boundary(dark: Bool) -> tuple[Bool, Int64]:
 
 
 def _dilated(mask: Bool, axis: int, reach: int) -> Bool:
-    """Set what lies so many pixels from a set pixel along an axis."""
+    """Dilate a mask by so many pixels along an axis."""
     out = mask.copy()
     grown, given = np.moveaxis(out, axis, 0), np.moveaxis(mask, axis, 0)
     for step in range(1, reach + 1):
@@ -118,12 +118,12 @@ def _changed(
     most: int,
     changed: Bool,
 ) -> None:  # pragma: no cover - compiled
-    """Tell which of the pixels near the boundary change sides: ``changed`` (n,), False before.
+    """Decide which pixels near the boundary change sides: ``changed`` (n,), False before.
 
-    The contrast of a region is the mean drop of its interior about a pixel, of every other pixel; the pixel is dark if the mean
-    drop of the lining next to it, within up to ``most`` pixels, is more than half of that. In a tile with ``windows`` (half
-    their side, pixels) lining differs by the first of ``sigmas`` from pixel to pixel, by the second over a window, steps; there
-    so much about a pixel is averaged that half of the contrast is CERTAIN of what is left.
+    The contrast of a region is the mean darkening of its interior around a pixel, from every other pixel. The pixel is dark if
+    the mean darkening of the lining next to it, within up to ``most`` pixels, exceeds half of that. In a tile with ``windows``
+    (half their side, pixels) lining varies by the first of ``sigmas`` from pixel to pixel, by the second over a window, steps;
+    there the average includes enough pixels for half of the contrast to be CERTAIN times the rest.
     """
     rows, columns = dark.shape
     for k in range(near.shape[0]):

@@ -1,4 +1,4 @@
-"""What was seen of the lining of a kilometre, and what of that is wet, along the tunnel."""
+"""Inspected and wet lining of a kilometre, along the tunnel."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from tunneldb.raster.grid import BLOCKS, Grid
 from tunneldb.raster.pixel_state import PixelState
 
 STEP = 0.1
-"""Least length of a step along the tunnel, m."""
+"""Minimum length of a step along the tunnel, m."""
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """Areas in the unrolled plane by steps of chainage, the first of which begins with the kilometre.
+    """Areas in the unrolled plane by steps of chainage; the first step begins with the kilometre.
 
     Attributes
     ----------
     step : float
         Length of a step, m.
     lining, seen, wet : (n,) float32 arrays
-        Lining, seen or not; what was seen of it; what of that is wet; m².
+        Lining in total; its inspected part; the wet part of that; m².
     """
 
     step: float
@@ -35,17 +35,17 @@ class Coverage:
 
 
 def measure_coverage(state: UInt8, dark: Bool, grid: Grid, size: int) -> Coverage:
-    """Add up the lining of a kilometre, what was seen of it and what is wet.
+    """Sum the lining of a kilometre, its inspected part and its wet part.
 
-    A pixel of lining was seen when it holds points, or when enough pixels about it do for the median filter to tell
-    whether it is wet.
+    A pixel of lining was inspected if it has points, or if enough pixels around it do for the median filter to decide whether
+    it is wet.
 
     Parameters
     ----------
     state : (rows, columns) uint8 array
         Values of :class:`tunneldb.raster.pixel_state.PixelState`.
     dark : (rows, columns) bool array
-        Wet pixels, as the median filter left them.
+        Wet pixels after the median filter.
     grid : Grid
         The pixels.
     size : int
@@ -64,7 +64,7 @@ def measure_coverage(state: UInt8, dark: Bool, grid: Grid, size: int) -> Coverag
 
 
 def _columns_of_step(grid: Grid) -> int:
-    """Columns of a step: as few as make STEP and divide a block."""
+    """Return the columns of a step: the smallest number that reaches STEP and divides a block."""
     columns = max(1, int(np.ceil(STEP / grid.pixel - 1e-6)))
     while grid.block_columns % columns:
         columns += 1

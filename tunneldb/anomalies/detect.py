@@ -1,4 +1,4 @@
-"""From the contrast image of a kilometre to what is dark in it: leaks, joints and other dark spots."""
+"""Detect leaks, joints and other dark areas in the contrast image of a kilometre."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from tunneldb.raster.image import WET_EDGE
 from tunneldb.raster.pixel_state import PixelState
 
 GAP = 5.0
-"""Lining that is seen nowhere along more of the tunnel was not scanned there, m; profiles lie closer."""
+"""Length of the tunnel without any seen lining from which it was not scanned, m; profiles are closer."""
 
 SINGLE = 1.6
-"""What a single profile shows is no longer than so many spacings: half a gap that is closed to either side of it."""
+"""Maximum length of a spot on a single profile, in spacings: half a gap is closed on either side of it."""
 
 MIN_JOINT = 0.5
-"""Joints that are seen over less are left out, m."""
+"""Minimum seen length of joints, m."""
 
 
 @dataclass(frozen=True)
 class Detection:
-    """What is dark in a kilometre.
+    """Dark areas of a kilometre.
 
     Attributes
     ----------
@@ -48,11 +48,11 @@ class Detection:
     dark : (rows, columns) bool array
         Dark pixels, before small regions were left out.
     wet : (rows, columns) bool array
-        Those of leaks.
+        Dark pixels of leaks.
     size : int
         Side of the median filter, pixels.
     pixels, wet_pixels : int
-        Lining pixels of the kilometre, and how many of them are in leaks.
+        Number of lining pixels of the kilometre, and of these in leaks.
     """
 
     anomalies: list[Anomaly]
@@ -67,18 +67,18 @@ class Detection:
 def find_anomalies(
     contrast: ContrastImage, background: BackgroundMap, min_area: float, model: EvidenceModel | None = None
 ) -> Detection:
-    """Find what is dark in a kilometre.
+    """Find leaks, joints and other dark areas in a kilometre.
 
     Parameters
     ----------
     contrast : ContrastImage
-        State and drop of its pixels.
+        State and darkening of its pixels.
     background : BackgroundMap
-        What they are relative to.
+        Background that they are relative to.
     min_area : float
-        Smaller leaks are left out, m² in the unrolled plane.
+        Minimum area of a leak, m² in the unrolled plane.
     model : EvidenceModel, optional
-        What judges regions; by default the one that comes with the program. What the regions are does not depend on it.
+        Model that classifies regions; by default the one of the program. The extent of regions does not depend on it.
     """
     grid, state = contrast.grid, contrast.state
     lining, _ = _lining_in_columns(state, grid.inner)
@@ -106,7 +106,7 @@ def find_anomalies(
 
 
 def may_count(region: Region, min_area: float) -> bool:
-    """Whether a region holds points, and is large enough for a leak, m², or long enough for a joint."""
+    """Return True if a region has points, and is large enough for a leak, m², or long enough for a joint."""
     large = region.area >= min_area * (1 - 1e-12) or max(region.mask.shape) * region.pixel >= MIN_JOINT
     return bool(region.filled) and large
 
@@ -131,7 +131,7 @@ def judge_region(
 
 
 def _judged(regions: Sequence[Region], min_area: float, model: EvidenceModel | None) -> list[Anomaly | None]:
-    """Judge the regions of a kilometre, each held against those about it; None for what is too small."""
+    """Classify the regions of a kilometre, each compared with those around it; None for those that are too small."""
     judged: list[Anomaly | None] = [None] * len(regions)
     counted = [k for k, region in enumerate(regions) if may_count(region, min_area)]
     for k, features in zip(counted, measure_regions([regions[k] for k in counted]), strict=True):
@@ -140,7 +140,7 @@ def _judged(regions: Sequence[Region], min_area: float, model: EvidenceModel | N
 
 
 def find_dark(contrast: ContrastImage) -> tuple[Bool, int]:
-    """Mark dark pixels: by the threshold, up to where half of their contrast is reached.
+    """Mark dark pixels: above the threshold, with the boundary moved to half of their contrast.
 
     Returns
     -------
@@ -154,12 +154,12 @@ def find_dark(contrast: ContrastImage) -> tuple[Bool, int]:
 
 
 def find_dark_regions(dark: Bool, contrast: ContrastImage, min_area: float) -> list[Region]:
-    """Regions of the dark pixels that may be leaks, joints or dark spots, joints cut off from what they run through."""
+    """Find the regions of dark pixels that may be leaks, joints or dry dark areas, with joints cut off."""
     inner, pixel = contrast.grid.inner, contrast.grid.pixel
     joints = find_joints(dark, inner.start, inner.stop, pixel, contrast.spacing)
     plain = dark & ~joints
     weak = weaker_parts(plain, contrast)
-    # The weaker part of a region is no dark lining for the darker one; that one ends at it.
+    # For the darker region, the weaker part of a region is not dark lining: the region ends at it.
     parts = [(plain & ~weak, dark & ~weak), (weak, dark), (joints, dark)]
     found = []
     for part, others in parts:
@@ -170,12 +170,12 @@ def find_dark_regions(dark: Bool, contrast: ContrastImage, min_area: float) -> l
 
 
 def _may_drip(region: Region) -> bool:
-    # By the program's own model: what a region is must not change with what is learned from it.
+    # By the program's own model: the extent of a region must not change with what is learned from it.
     return bool(region.filled) and classify(region).kind == "leak"
 
 
 def _without_joints(regions: Sequence[Region], judged: Sequence[Anomaly | None], spacing: float) -> list[Anomaly | None]:
-    """Take leaks that a single profile shows and that repeat as rings do for what they are, joints that profiles cross."""
+    """Reclassify as joints those leaks on single profiles that repeat at the ring length."""
     found = list(judged)
     single = [
         k
@@ -192,7 +192,7 @@ def _without_joints(regions: Sequence[Region], judged: Sequence[Anomaly | None],
 
 
 def background_places(contrast: ContrastImage, detection: Detection, chainage: Float, arc: Float) -> Bool:
-    """Tell which places (n,) in the unrolled plane, m, lie on lining of the kilometre that is neither dark nor next to it."""
+    """Return True for places (n,) in the unrolled plane, m, on lining that is neither dark nor next to dark pixels."""
     inner = contrast.grid.inner
     clear = np.zeros(contrast.state.shape, np.bool_)
     for rows, about in row_blocks(len(clear), WET_EDGE):
@@ -210,14 +210,14 @@ def _draw(image: Bool, drawn: Iterable[Region], grid: PixelGrid) -> None:
 
 
 def _scanned_share(lining: Int64, possible: Int64, gap: int) -> float:
-    """Share of the pixels that could show lining that do, where the tunnel was scanned: without gaps of more columns.
+    """Return the share of possible lining pixels that show lining, in the scanned tunnel: without gaps of more columns.
 
     Parameters
     ----------
     lining, possible : (columns,) int arrays
-        Pixels of each column that show lining, and that could.
+        Pixels of each column that show lining, and that could show it.
     gap : int
-        Columns.
+        Maximum gap, columns.
     """
     columns = np.flatnonzero(lining)
     if len(columns) == 0:
@@ -225,12 +225,12 @@ def _scanned_share(lining: Int64, possible: Int64, gap: int) -> float:
     until = np.concatenate([[0], np.cumsum(possible)])
     step = np.diff(columns, append=columns[-1] + 1)
     scanned = np.where(step > gap, 1, step)
-    # Floor and niches are marked whether or not they hold points.
+    # Floor and niches are marked whether or not they have points.
     return float(lining.sum() / (until[columns + scanned] - until[columns]).sum())
 
 
 def _lining_in_columns(state: UInt8, columns: slice) -> tuple[Int64, Int64]:
-    """Pixels of some columns that show lining, and that could."""
+    """Count the pixels of some columns that show lining, and that could show it."""
     lining, possible = np.zeros((2, columns.stop - columns.start), np.int64)
     for rows, _ in row_blocks(len(state), 0):
         here = state[rows, columns]

@@ -1,4 +1,4 @@
-"""Drips: small dark components below a wet patch, on the way that water takes, are a part of it."""
+"""Drips: small dark components below a wet patch, on the path of the water, belong to it."""
 
 from __future__ import annotations
 
@@ -9,55 +9,55 @@ from tunneldb.arrays import Bool, Int64
 from tunneldb.raster.grid import PixelGrid
 
 GAP = 0.12
-"""Water that runs down a wall leaves dry places no longer than this, m."""
+"""Maximum length of dry gaps in water that runs down a wall, m."""
 
 WIDE = 0.3
-"""A drip is no wider, m."""
+"""Maximum width of a drip, m."""
 
 PROFILES = 1.5
-"""Where profiles lie apart, a drip shows on a single one, which stands for no more than so many spacings."""
+"""Maximum width of a drip in spacings: if profiles are far apart, it shows on a single one."""
 
 
 def attach_drips(components: Components, wanted: Bool, cut: Bool, grid: PixelGrid, spacing: float = 0.0) -> tuple[Int64, Int64]:
-    """Find what each component is a part of.
+    """Assign drips to the component above them.
 
-    A drip is narrower than WIDE, smaller than what lies above it, and begins within GAP of it, towards the crown, or of
-    another drip of it.
+    A drip is narrower than WIDE, smaller than the component above, and begins within GAP of it, towards the crown, or of
+    another of its drips.
 
     Parameters
     ----------
     components : Components
-        Of the dark pixels.
+        Components of the dark pixels.
     wanted : (k,) bool array
-        Those that are regions of their own: below them there may be drips.
+        True for regions in their own right: drips may be below them.
     cut : (k,) bool array
-        Those that an end of the kilometre cuts: how large they are is not known, so that they are no drips, and that all
-        others are taken for smaller.
+        True if an end of the kilometre cuts the component: its size is unknown, so it is no drip, and all others count as
+        smaller.
     grid : PixelGrid
         The pixels.
     spacing : float
-        Distance of profiles along the tunnel, m; 0 where they lie as close as pixels.
+        Distance of profiles along the tunnel, m; 0 if they are as close as pixels.
 
     Returns
     -------
     whole : (k,) int array
-        Component that each one is a part of; itself, where it is none's.
+        Component that each one is a part of; itself if of none.
     bridges : (m, 4) int array
-        Row, first column, column behind the last one and whole of the pixels that join the drips to it.
+        Row, first column, column behind the last one and whole of the pixels that connect the drips to it.
     """
     crown = grid.bottom + grid.rows  # rows before this one lie at arcs above 0
     gap = max(1, round(GAP / grid.pixel))
     narrow = (components.width <= max(WIDE, PROFILES * spacing) / grid.pixel) & ~cut
     above, row, column, distance = _above(components, narrow, grid.rows, crown, gap)
     whole = np.arange(len(components.pixels))
-    for _ in range(8):  # a drip below a drip below a drip …
+    for _ in range(8):  # chains of drips
         drip = np.flatnonzero((above >= 0) & (whole == np.arange(len(whole))))
         root = whole[above[drip]]
         joined = wanted[root] & (cut[root] | (components.pixels[drip] < components.pixels[root])) & (root != drip)
         if not joined.any():
             break
         whole[drip[joined]] = root[joined]
-    # What has drips may itself have become a drip of something larger.
+    # A component with drips may itself be a drip of a larger one.
     while not np.array_equal(whole, whole[whole]):
         whole = whole[whole]
     drips = np.flatnonzero(whole != np.arange(len(whole)))
@@ -70,12 +70,12 @@ def attach_drips(components: Components, wanted: Bool, cut: Bool, grid: PixelGri
 
 
 def _above(components: Components, narrow: Bool, rows: int, crown: int, gap: int) -> tuple[Int64, Int64, Int64, Int64]:
-    """The nearest other component within a gap above each narrow one.
+    """Find the nearest other component within a gap above each narrow one.
 
     Returns
     -------
     above, row, column, distance : (k,) int arrays
-        Component, -1 for none; from which pixel it is the nearest, the first of several, and how many pixels away.
+        Component, -1 for none; its nearest pixel, the first of several, and the distance in pixels.
     """
     runs, count = components.runs, len(narrow)
     above, row, column = np.full(count, -1, np.int64), np.zeros(count, np.int64), np.zeros(count, np.int64)

@@ -1,8 +1,8 @@
-"""How probable it is that a dark region is a leak: trees of its features, boosted, and what each feature says in them.
+"""Probability that a dark region is a leak, by boosted trees of its features, with the contribution of each feature.
 
-The logarithm of the odds is the sum of what the trees add (gradient boosting: Friedman, 2001). On its way through a tree a
-region passes nodes; by how much the mean of a node differs from that of the one before is due to the feature that was asked
-there (Saabas, 2014). So what each feature says can be told, and adds up.
+The log odds are the sum of the trees' contributions (gradient boosting: Friedman, 2001). On its path through a tree a region
+passes nodes; the difference of a node's mean from that of the previous node is attributed to the feature that was tested there
+(Saabas, 2014). These contributions of the features add up to the log odds.
 """
 
 from __future__ import annotations
@@ -20,42 +20,42 @@ from tunneldb.anomalies.features import FEATURES
 from tunneldb.arrays import Bool, Float, Intp
 
 FORMAT = 2
-"""Of the trees' file."""
+"""Format version of the trees' file."""
 
 FAR = 3.0
-"""What lies farther out than so many scales counts as that."""
+"""Maximum deviation of a feature, in scales; larger ones are clipped."""
 
 
 @dataclass(frozen=True)
 class EvidenceModel:
-    """Boosted trees, their nodes one behind the other.
+    """Boosted trees, with their nodes in one sequence.
 
     Attributes
     ----------
     version : str
-        Names the model.
+        Name of the model.
     constant : float
-        Logarithm of the odds before anything is known of a region.
+        Log odds before any feature of a region is known.
     roots : (trees,) int array
         First node of each tree.
     feature : (nodes,) int array
-        Number of the feature that is asked.
+        Number of the tested feature.
     threshold : (nodes,) float array
-        Up to this value a region goes left.
+        A region up to this value goes left.
     missing_left : (nodes,) bool array
-        Whether one of which the feature can't be measured goes left.
+        True if a region without that feature goes left.
     left, right : (nodes,) int array
         Next nodes; the node itself at the end of a tree.
     value : (nodes,) float array
-        Mean of what a tree adds to the logarithm of the odds, from this node on.
+        Mean contribution of the tree to the log odds, from this node on.
     trained_on : mapping
-        What it was fitted to.
+        Training data.
     factors : (len(FEATURES),) float array
-        By how much more or less each feature counts than in the trees: 1, but for what was learned from an owner's reviews
+        Factor on the weight of each feature relative to the trees: 1, except for what was learned from an owner's reviews
         (:mod:`tunneldb.anomalies.learning`). Not stored with the trees.
     own : (3, len(FEATURES)) float array
-        What was learned of each feature beside the trees: the value from which it counts, a scale, and the logarithm of the
-        odds by scale (:func:`deviations`); 0 for what was not. Not stored with the trees.
+        Learned terms of each feature in addition to the trees: the value from which it counts, a scale, and the log odds per
+        scale (:func:`deviations`); 0 if none. Not stored with the trees.
     """
 
     version: str
@@ -72,7 +72,7 @@ class EvidenceModel:
     own: Float = field(default_factory=lambda: np.repeat([[0.0], [1.0], [0.0]], len(FEATURES), axis=1))
 
     def contributions(self, features: Float) -> Float:
-        """What each feature adds to the logarithm of the odds.
+        """Return the contribution of each feature to the log odds.
 
         Parameters
         ----------
@@ -97,11 +97,11 @@ class EvidenceModel:
         return out * self.factors + deviations(features, centre, scale) * weight
 
     def probabilities(self, features: Float) -> Float:
-        """Probability (n,) that each region is a leak."""
+        """Return the probability (n,) that each region is a leak."""
         return np.asarray(1.0 / (1.0 + np.exp(-self.constant - self.contributions(features).sum(axis=1))))
 
     def to_json(self) -> dict[str, Any]:
-        """Trees as they are stored."""
+        """Return the trees in the form in which they are stored."""
         arrays = {name: getattr(self, name).tolist() for name in ARRAYS}
         arrays["missing_left"] = self.missing_left.astype(int).tolist()
         return {
@@ -113,7 +113,7 @@ class EvidenceModel:
     def from_json(cls, values: Mapping[str, Any]) -> EvidenceModel:
         """Read stored trees."""
         if values["format"] != FORMAT or values["features"] != [feature.name for feature in FEATURES]:
-            raise ValueError(f"trees of format {values['format']}, of the features {values['features']}")
+            raise ValueError(f"unsupported trees: format {values['format']}, features {values['features']}")
         arrays: dict[str, Any] = {name: np.array(values[name], kind) for name, kind in ARRAYS.items()}
         return cls(version=values["version"], constant=values["constant"], trained_on=values["trained_on"], **arrays)
 
@@ -122,16 +122,16 @@ ARRAYS: Mapping[str, type] = {
     "roots": np.intp, "feature": np.intp, "threshold": np.float64, "missing_left": np.bool_, "left": np.intp, "right": np.intp,
     "value": np.float64,
 }  # fmt: skip
-"""Arrays of a model, and of what kind they are."""
+"""Arrays of a model, and their types."""
 
 
 def deviations(features: Float, centre: Float, scale: Float) -> Float:
-    """How far features (n, len(FEATURES)) lie from their centres, in scales, FAR at the most; 0 where one can't be measured."""
+    """Return the deviation of features (n, len(FEATURES)) from their centres, in scales, FAR at most; 0 if not measured."""
     return np.asarray(np.clip(np.nan_to_num((features - centre) / scale, nan=0.0), -FAR, FAR))
 
 
 def reasons_of(contributions: Float) -> dict[str, float]:
-    """What features (len(FEATURES),) add, summed up by the reasons that they speak of, the strongest first."""
+    """Sum the contributions of features (len(FEATURES),) by reason, the strongest first."""
     sums: dict[str, float] = {}
     for feature, weight in zip(FEATURES, contributions.tolist(), strict=True):
         sums[feature.reason] = sums.get(feature.reason, 0.0) + weight
@@ -140,5 +140,5 @@ def reasons_of(contributions: Float) -> dict[str, float]:
 
 @cache
 def standard_model() -> EvidenceModel:
-    """Model that comes with the program; ``python -m benchmarks.evidence`` makes it."""
+    """Return the model that comes with the program; ``python -m benchmarks.evidence`` creates it."""
     return EvidenceModel.from_json(json.loads(files("tunneldb.anomalies").joinpath("evidence.json").read_text()))

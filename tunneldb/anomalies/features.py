@@ -1,4 +1,4 @@
-"""What of a dark region speaks for water or against it: measures of its contrast, its rim, its shape and what it lies at."""
+"""Features of a dark region as evidence for or against water: contrast, rim, shape and surroundings."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from tunneldb.arrays import Bool, Float
 
 
 class Feature(NamedTuple):
-    """A measure of a region.
+    """Feature of a region.
 
     Attributes
     ----------
     name : str
     reason : str
-        What it speaks of: measures of the same are summed up when a verdict gives its reasons.
+        Kind of evidence: features with the same reason are summed in a verdict.
     meaning : str
-        What it is, with its unit.
+        Meaning, with the unit.
     """
 
     name: str
@@ -41,7 +41,7 @@ DEGREES = {
     "stripe": "like a painted stripe",
     "shadow": "like the shadow of an appendage",
 }
-"""Of :mod:`tunneldb.anomalies.degrees`; each stands for its reason."""
+"""Degrees of :mod:`tunneldb.anomalies.degrees`; each is its own reason."""
 
 FEATURES = (
     Feature("contrast", "faint", "mean drop, standard deviations of dry lining"),
@@ -72,33 +72,31 @@ FEATURES = (
     Feature("bright_rim", "salts", "share of its rim with lining brighter than dry lining is by chance"),
     Feature("foot", "foot", "share of its sides that face the floor"),
     Feature("support", "small", "pixels that were measured, as a logarithm"),
-    Feature(
-        "alike", "repeated", "others like it within 5 m along the tunnel, their number as a logarithm: what is built repeats"
-    ),
+    Feature("alike", "repeated", "number of similar regions within 5 m along the tunnel, as a logarithm: built objects repeat"),
     *(Feature(f"{name}_degree", name, f"degree to which it looks {look}, 0 to 1") for name, look in DEGREES.items()),
 )
-"""In the order of `measure_features`."""
+"""Features in the order of `measure_features`."""
 
 
 NAMES = tuple(feature.name for feature in FEATURES)
 
 ALIKE = {"mean_width": 0.3, "drop": 0.3, "upright": 0.8}
-"""Regions are alike if these, as logarithms, differ by no more."""
+"""Maximum differences of these features, as logarithms, between similar regions."""
 
 ABOUT = 5.0
-"""Regions that are farther apart along the tunnel are not held against each other, m."""
+"""Maximum distance along the tunnel of regions that are compared with each other, m."""
 
 BY_CHANCE = 4
-"""So many may be alike by chance; what is built repeats more often."""
+"""Number of similar regions that occurs by chance; built objects repeat more often."""
 
 
 def measure_regions(regions: Sequence[Region]) -> Float:
-    """Measure the dark regions of a kilometre, each by itself, and how many others are like it.
+    """Measure the dark regions of a kilometre, each by itself, and count similar ones.
 
     Returns
     -------
     (n, len(FEATURES)) float array
-        NaN where a measure can't be taken.
+        NaN for features that cannot be measured.
     """
     features = np.array([measure_features(region) for region in regions]).reshape(len(regions), len(FEATURES))
     if len(regions):
@@ -117,7 +115,7 @@ def measure_features(region: Region) -> Float:
     Returns
     -------
     (len(FEATURES),) float array
-        NaN where a measure can't be taken, and for what others tell.
+        NaN for features that cannot be measured, and for those that need other regions.
     """
     shape = measure_shape(region.mask, region.pixel)
     degrees = degrees_of(region, shape)
@@ -167,13 +165,13 @@ def _place(region: Region, shape: Shape) -> tuple[float, ...]:
 
 
 def _perimeter(mask: Bool) -> int:
-    """Sides of pixels on the outline of a mask and of its holes."""
+    """Count the pixel sides on the outline of a mask and of its holes."""
     padded = np.pad(mask, 1)
     return sum(int(np.count_nonzero(np.diff(padded, axis=axis))) for axis in (0, 1))
 
 
 def _turned_box(mask: Bool) -> float:
-    """Share of the smallest rectangle of any direction that a mask fills."""
+    """Return the share that a mask fills of the smallest rotated rectangle around it."""
     edge = mask & ~_eroded(mask)
     row, column = np.nonzero(edge)
     corners = np.concatenate([np.column_stack([column + x, row + y]) for x in (0, 1) for y in (0, 1)])
@@ -182,17 +180,17 @@ def _turned_box(mask: Bool) -> float:
 
 
 def _eroded(mask: Bool) -> Bool:
-    """Pixels all four neighbours of which are set."""
+    """Return the pixels whose four neighbours are all set."""
     padded = np.pad(mask, 1)
     return padded[2:, 1:-1] & padded[:-2, 1:-1] & padded[1:-1, 2:] & padded[1:-1, :-2]
 
 
 def _taper(region: Region) -> float:
-    """Height of the middle of its area above that of its extent, over this; water gathers above, and runs down narrower."""
+    """Return the height of the area's middle above that of its extent, relative to it; water is wider at its top."""
     counts = np.count_nonzero(region.mask, axis=1)
     rows = len(counts)
     middle = (np.arange(rows) + 0.5) @ counts / counts.sum()
-    up = -1.0 if region.row + 0.5 * rows >= 0.0 else 1.0  # rows grow with the arc, which is 0 at the crown
+    up = -1.0 if region.row + 0.5 * rows >= 0.0 else 1.0  # rows increase with the arc, which is 0 at the crown
     return float(up * (middle / rows - 0.5))
 
 

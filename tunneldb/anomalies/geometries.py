@@ -1,4 +1,4 @@
-"""A leak's three geometries, its clock position and its area on the surface."""
+"""Three geometries of a leak, its clock position and its area on the surface."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.surface import Surface
 
 DENSIFY = 0.1
-"""Longest straight edge of a polygon on the curved surface, m."""
+"""Maximum length of a straight edge of a polygon on the curved surface, m."""
 
 SAMPLES = 5000
-"""Places at which the stretch of the surface is averaged, at most about."""
+"""Approximate maximum number of places at which the stretch of the surface is averaged."""
 
 _STEP = 0.01
 
 
 @dataclass(frozen=True)
 class Geometries:
-    """A leak in space.
+    """Geometries of a leak in space.
 
     Attributes
     ----------
     map : Polygon
-        In the map: each vertex lies beside the axis, at its chainage, by its arc (Gonçalves et al.,
-        2012, eq. 1); the tunnel's SRID.
+        In the map: each vertex is beside the axis at its chainage, at the distance of its arc (Gonçalves et al., 2012, eq. 1);
+        the tunnel's SRID.
     surface : Polygon
         On the surface, with Z.
     clock : float
@@ -45,14 +45,14 @@ class Geometries:
 
 
 def anomaly_geometries(outline: Polygon, surface: Surface) -> Geometries:
-    """Lay an outline in the unrolled plane on the map and on the surface.
+    """Project an outline in the unrolled plane onto the map and the surface.
 
     Parameters
     ----------
     outline : Polygon
         (chainage, arc), m.
     surface : Surface
-        The tunnel.
+        Surface of the tunnel.
     """
     dense = _within(shapely.segmentize(outline, DENSIFY), surface)
     return Geometries(
@@ -64,9 +64,9 @@ def anomaly_geometries(outline: Polygon, surface: Surface) -> Geometries:
 
 
 def _within(outline: Polygon, surface: Surface) -> Polygon:
-    """An outline whose vertices all lie on the surface: pixels at its end reach beyond it.
+    """Return an outline whose vertices are all on the surface: pixels at its end reach beyond it.
 
-    A vertex beyond the first or the last plane goes onto it, one that lies off for another reason to the nearest that doesn't.
+    A vertex beyond the first or the last plane moves onto it; any other vertex off the surface moves to the nearest one on it.
     """
     at = shapely.get_coordinates(outline)
     lost = _off(at, surface)
@@ -80,12 +80,12 @@ def _within(outline: Polygon, surface: Surface) -> Polygon:
 
 
 def _off(unrolled: Float, surface: Surface) -> Bool:
-    """Which (chainage, arc) rows (n, 2) don't lie on the surface."""
+    """Return True for (chainage, arc) rows (n, 2) off the surface."""
     return np.isnan(surface.to_space(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled)))[:, 0])
 
 
 def to_map(surface: Surface, unrolled: Float) -> Float:
-    """Map coordinates (n, 2) of (chainage, arc) rows (n, 2): axis in plan + arc · right."""
+    """Return map coordinates (n, 2) of (chainage, arc) rows (n, 2): axis in plan + arc · right."""
     frames = surface.frames(unrolled[:, 0])
     return np.asarray(frames[:, 0, :2] + unrolled[:, 1, None] * frames[:, 2, :2], dtype=np.float64)
 
@@ -108,7 +108,7 @@ def _clock(outline: Polygon, surface: Surface) -> float:
 
 
 def _area(outline: Polygon, surface: Surface) -> float:
-    """Area in the unrolled plane × the mean stretch of the surface against it (slope, curve)."""
+    """Return the area in the unrolled plane × the mean stretch of the surface relative to it (slope, curve)."""
     chainage, arc = _samples(outline)
     zero = np.zeros(len(chainage))
     here = surface.to_space(chainage, arc, zero)
@@ -120,7 +120,7 @@ def _area(outline: Polygon, surface: Surface) -> float:
 
 
 def _samples(outline: Polygon) -> tuple[Float, Float]:
-    """Places spread evenly over a polygon."""
+    """Return places spread evenly over a polygon."""
     west, south, east, north = outline.bounds
     step = max(np.sqrt((east - west) * (north - south) / SAMPLES), 1e-3)
     x, y = (g.ravel() for g in np.meshgrid(np.arange(west, east, step) + step / 2, np.arange(south, north, step) + step / 2))

@@ -1,4 +1,4 @@
-"""Lining hidden behind cables and pipes: dark on both sides of a narrow strip, it is dark behind it, too."""
+"""Lining hidden behind cables and pipes: where both sides of a narrow strip are dark, the lining behind it counts as dark."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from tunneldb.compiled import kernel
 from tunneldb.raster.pixel_state import PixelState
 
 STRIP = 0.25
-"""Strips are no wider, m: a pipe of 0.15 m, and at either side the pixels about its edges that are no lining."""
+"""Maximum width of strips, m: a pipe of 0.15 m, and on either side the pixels at its edges that are no lining."""
 
 OFF = int(PixelState.OFF)
 EMPTY = int(PixelState.EMPTY)
 
 
 def behind_strips(dark: Bool, state: UInt8, first: int, stop: int, pixel: float) -> Bool:
-    """Mark hidden pixels in narrow strips, upright or level, that end on dark pixels on both sides.
+    """Mark hidden pixels in narrow strips, vertical or horizontal, with dark pixels on both sides.
 
     Parameters
     ----------
     dark : (rows, columns) bool array
-        Dark pixels, none of which is hidden.
+        Dark pixels, none of them hidden.
     state : (rows, columns) uint8 array
         Values of :class:`tunneldb.raster.pixel_state.PixelState`.
     first, stop : int
-        Columns that count.
+        Range of columns to process.
     pixel : float
         Side of a pixel, m.
     """
@@ -39,13 +39,13 @@ def behind_strips(dark: Bool, state: UInt8, first: int, stop: int, pixel: float)
 
 @kernel
 def _fill_down(dark: Bool, state: UInt8, most: int, found: Bool) -> None:  # pragma: no cover - compiled
-    """Mark runs of up to ``most`` hidden pixels down the columns that have a dark one at both ends.
+    """Mark runs of up to ``most`` hidden pixels down the columns with a dark pixel at both ends.
 
-    At least one of a run shows what hides the lining; the others may hold no points.
+    At least one pixel of a run shows the hiding object; the others may be empty.
     """
     rows, columns = dark.shape
-    last = np.full(columns, -1)  # row of the last dark pixel, -1 when lining that is not dark came after it
-    hidden = np.zeros(columns, np.bool_)  # whether something that hides the lining came after it
+    last = np.full(columns, -1)  # row of the last dark pixel, -1 if lining that is not dark followed
+    hidden = np.zeros(columns, np.bool_)  # True if something that hides the lining followed
     for i in range(rows):
         for j in range(columns):
             if dark[i, j]:

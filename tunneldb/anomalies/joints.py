@@ -1,4 +1,4 @@
-"""Joints: narrow straight dark lines, around the tunnel or along it, that must not tie leaks together."""
+"""Joints: narrow straight dark lines, around the tunnel or along it, that must not connect leaks."""
 
 from __future__ import annotations
 
@@ -9,57 +9,57 @@ from tunneldb.anomalies.runs import adjacent_runs, column_runs, connected, pixel
 from tunneldb.arrays import Bool, Float, Int64
 
 NARROW_AROUND, NARROW_ALONG = 0.08, 0.06
-"""Joints are at most 2 cm wide; the beam, the pixels and grout widen them, but not to more, m. Along the tunnel there are
-painted stripes of 10 cm, which are to stay in one piece."""
+"""Maximum width of joints around the tunnel and along it, m: 2 cm, widened by beam, pixels and grout. Painted stripes of 10 cm
+along the tunnel must stay in one piece."""
 
 LONG_AROUND, LONG_ALONG = 1.0, 0.5
-"""Water that runs down a wall keeps no straight line for longer, and runs along the tunnel no farther, m."""
+"""Minimum length of joints around the tunnel and along it, m: water on a wall is straight for less, and spreads less."""
 
 STRAIGHT = 0.015
-"""Standard deviation of the middle of a joint about a straight line, m: it is built to millimetres, pixels are larger."""
+"""Standard deviation of the middle of a joint about a straight line, m: joints are built to millimetres, pixels are larger."""
 
 RING_SHORTEST, RING_LONGEST = 0.6, 12.0
-"""Rings of a lining, from one joint around the tunnel to the next, are no shorter and no longer, m."""
+"""Minimum and maximum distance of joints around the tunnel (ring length), m."""
 
 STRETCH = 100.0
 """Length of tunnel over which rings repeat evenly, m; the next stretch begins half-way."""
 
 BY_CHANCE = 1e-3
-"""Spots that lie anywhere repeat as evenly in so small a share of stretches (Rayleigh's test, over all lengths of rings)."""
+"""Share of stretches in which random spots repeat as evenly (Rayleigh's test, over all ring lengths)."""
 
 AS_PROFILES = 0.1
-"""Whatever profiles show repeats as they do: lengths that differ by less from their distance, or a part of it, don't count."""
+"""Tolerance around the profile distance and its fractions: spots on profiles repeat with it, so such lengths are ignored."""
 
 NEAR_RING = 1.0 / 6.0
-"""A spot is of a ring's joint up to so much of the ring's length from it: profiles stand askew to rings."""
+"""Maximum distance of a spot from a ring's joint, as a share of the ring length: profiles are skew to rings."""
 
 RESOLVED = 0.75
-"""The same in pixels, at least: a line cannot be told to be straighter."""
+"""Minimum of the same deviation in pixels: a finer straightness cannot be measured."""
 
 
 PROFILES = 3.0
-"""Where profiles lie apart, joints along the tunnel are seen over so many spacings: a spot of a single one is straight, too."""
+"""Minimum length of joints along the tunnel if profiles are far apart, in spacings: a spot on one profile is straight too."""
 
 
 def find_joints(dark: Bool, first: int, stop: int, pixel: float, spacing: float = 0.0) -> Bool:
     """Find the pixels of narrow straight lines around the tunnel or along it that are long enough.
 
-    Profiles that lie apart can't tell how narrow is what goes around the tunnel: then only lines along it are found.
+    With profiles far apart the width of a line around the tunnel is unknown: then only lines along it are found.
 
     Parameters
     ----------
     dark : (rows, columns) bool array
         Dark pixels.
     first, stop : int
-        Columns that count.
+        Range of columns to process.
     pixel : float
         Side of a pixel, m.
     spacing : float
-        Distance of profiles along the tunnel, m; 0 where they lie as close as pixels.
+        Distance of profiles along the tunnel, m; 0 if they are as close as pixels.
     """
     found = np.zeros(dark.shape, np.bool_)
     if 2 * pixel > NARROW_AROUND:
-        return found  # a line of two pixels may be anything
+        return found  # a line of two pixels has no significance
     for runs_of, image, width, length in (
         (row_runs, found, NARROW_AROUND, LONG_AROUND),
         (column_runs, found.T, NARROW_ALONG, max(LONG_ALONG, PROFILES * spacing)),
@@ -75,23 +75,23 @@ def find_joints(dark: Bool, first: int, stop: int, pixel: float, spacing: float 
 
 
 def crossed_joints(chainage: Float, spacing: float) -> Float:
-    """How evenly dark spots of single profiles repeat along the tunnel, as joints of rings do that profiles cross.
+    """Measure how evenly dark spots of single profiles repeat along the tunnel, as joints crossed by profiles do.
 
-    A profile never stands quite as the rings do, and crosses the joint between two of them in some place only. What it shows
-    there is like a leak that is narrower than profiles are apart, but it comes back with the length of the rings.
+    A profile is never exactly parallel to the rings, and crosses the joint between two of them somewhere. The spot there looks
+    like a leak narrower than the profile distance, but it repeats with the ring length.
 
     Parameters
     ----------
     chainage : (n,) float array
-        Of the spots, m.
+        Chainage of the spots, m.
     spacing : float
-        Distance of the profiles, m. Rings as long as that, or as a part of it, can't be told.
+        Distance of the profiles, m. Rings of that length, or a fraction of it, cannot be detected.
 
     Returns
     -------
     (n,) float array
-        Length of the mean of the spots' directions in the ring, 0 to 1, for those near the joint; 0 for the others, and
-        where spots lie anywhere (Rayleigh's test; Mardia and Jupp, 2000).
+        Length of the mean of the spots' directions in the ring, 0 to 1, for spots near the joint; 0 for others, and for
+        randomly placed spots (Rayleigh's test; Mardia and Jupp, 2000).
     """
     found = np.zeros(len(chainage))
     per_metre = np.arange(1.0 / RING_LONGEST, 1.0 / RING_SHORTEST, 0.25 / STRETCH)
@@ -116,16 +116,16 @@ def crossed_joints(chainage: Float, spacing: float) -> Float:
 
 
 def _straight(runs: Int64, length: int, deviation: float) -> Bool:
-    """Which runs, of a line and from a place up to another one each, are parts of a long straight joint across these lines.
+    """Select runs, from a line and a place up to another one each, that belong to a long straight joint across these lines.
 
     Parameters
     ----------
     runs : (n, 3) int array
         Line, first place and place behind the last one, in order.
     length : int
-        Least number of lines that a joint runs across.
+        Minimum number of lines that a joint crosses.
     deviation : float
-        Greatest standard deviation of the middles of its runs about a straight line, pixels.
+        Maximum standard deviation of the middles of its runs about a straight line, pixels.
     """
     count, label = connected(len(runs), *adjacent_runs(runs))
     at, middle = runs[:, 0].astype(np.float64), 0.5 * (runs[:, 1] + runs[:, 2])
@@ -142,6 +142,6 @@ def _straight(runs: Int64, length: int, deviation: float) -> Bool:
     np.minimum.at(low, label, runs[:, 0])
     np.maximum.at(high, label, runs[:, 0])
     lines = high - low + 1
-    # One run a line: no net, no branches.
+    # One run per line: no networks, no branches.
     straight = (lines >= length) & (residual <= deviation) & (np.abs(slope) < 0.1) & (number <= 1.2 * lines)
     return np.asarray(straight[label], dtype=np.bool_)

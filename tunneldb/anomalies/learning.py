@@ -1,9 +1,9 @@
-"""What the reviews of an owner's tunnels teach the model of evidence: how sure it may be, and how much each reason counts.
+"""Adapt the evidence model to an owner's reviews: its certainty, and the weight of each reason.
 
-Ways to adjust the model are held against the model as it is, on reviews of other places than those that they were fitted to:
-to *recalibrate* it, a slope and an offset of the logarithm of the odds (Platt, 1999); to *refit* the weights of its reasons, a
-factor for each and an offset; and to *extend* it, by terms that are linear in its features, beside these. All have Gaussian
-priors about no change (ridge), so that few reviews change little.
+Adjustments of the model are compared with the unchanged model, on reviews of other places than those used for fitting:
+*recalibrate*, a slope and an offset of the log odds (Platt, 1999); *refit*, a factor for the weight of each reason and an
+offset; and *extend*, additional terms that are linear in its features. All have Gaussian priors centred on no change (ridge),
+so that few reviews change little.
 """
 
 from __future__ import annotations
@@ -23,47 +23,47 @@ from tunneldb.arrays import Bool, Float, Int64
 Way = Literal["base", "recalibrated", "refit", "extended"]
 
 SLOPE, OFFSET = 0.25, 1.0
-"""Standard deviations of slope and offset before any review: an owner's leaks are more or less frequent by a factor of 2.7."""
+"""Prior standard deviations of slope and offset: an owner's leaks are more or less frequent by a factor of 2.7."""
 
 FACTORS = (0.125, 0.25, 0.5)
 """Standard deviations of the reasons' factors that are tried."""
 
 TERMS = (0.125, 0.25, 0.5)
-"""Of the terms of features, beside factors of the greatest of FACTORS."""
+"""Standard deviations of the terms of features, together with factors of the greatest of FACTORS."""
 
 FEWEST, FEWEST_REFIT = 10, 25
-"""With fewer reviews nothing is learned; with fewer than the second the reasons' weights stay."""
+"""Minimum number of reviews for learning anything, and for changing the reasons' weights."""
 
 CHANCE = 1.5
-"""Something is learned if it is better by more than so many standard errors of the gain on reviews held out. With less, more is
-learned that is none; with 2, of 50 reviews next to nothing (both on synthetic reviews)."""
+"""Minimum gain on held-out reviews, in standard errors. With less, random effects are learned more often; with 2, next to
+nothing is learned from 50 reviews (both on synthetic reviews)."""
 
 FOLDS = 5
-"""Parts of the reviews, each judged by what was fitted to the others."""
+"""Number of parts of the reviews; each is predicted by the model fitted to the others."""
 
 APART = 10.0
-"""Reviews of one stretch of so many metres are in one part: neighbours are often of one kind, and would tell of each other."""
+"""Length of stretches whose reviews stay in one part, m: neighbours are often of one kind, and would reveal each other."""
 
 REASONS = tuple(dict.fromkeys(feature.reason for feature in FEATURES))
-"""Reasons of the features, each once."""
+"""Reasons of the features, without duplicates."""
 
 _REASON = np.array([REASONS.index(feature.reason) for feature in FEATURES])
 
 
 @dataclass(frozen=True)
 class Adjustment:
-    """How the model of evidence is adjusted to an owner.
+    """Adjustment of the evidence model to an owner.
 
     Attributes
     ----------
     way : {'base', 'recalibrated', 'refit', 'extended'}
-        Not at all; slope and offset alone; factors and offset; or terms of features, too.
+        None; slope and offset alone; factors and offset; or terms of features in addition.
     slope, offset : float
-        What the logarithm of the odds is multiplied by, and what is added then.
+        Factor on the log odds, and the term added then.
     factors : mapping
-        Of reasons: by how much more or less they count; 1 for those without.
+        Factor on the weight by reason; 1 for those missing.
     terms : mapping
-        Of features: centre, scale, and the logarithm of the odds by scale; none for those without.
+        By feature: centre, scale, and the log odds per scale; none for those missing.
     """
 
     way: Way = "base"
@@ -73,7 +73,7 @@ class Adjustment:
     terms: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
     def apply(self, model: EvidenceModel, name: str) -> EvidenceModel:
-        """Adjust a model; its version is that of the model, ``+``, and a name."""
+        """Adjust a model; the version is that of the model, ``+``, and a name."""
         each = np.array([self.factors.get(feature.reason, 1.0) for feature in FEATURES])
         own = np.array([self.terms.get(feature.name, (0.0, 1.0, 0.0)) for feature in FEATURES]).T
         return replace(
@@ -85,7 +85,7 @@ class Adjustment:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Parameters as they are stored."""
+        """Return the parameters in the form in which they are stored."""
         return {"slope": self.slope, "offset": self.offset, "factors": dict(self.factors), "terms": dict(self.terms)}
 
     @classmethod
@@ -101,15 +101,15 @@ class Reviewed:
     Attributes
     ----------
     features : (n, len(FEATURES)) float array
-        What was measured of each.
+        Features of each.
     outline : (n,) float array
-        How much its outline tells, 0 to 1 (:class:`tunneldb.anomalies.verdict.Verdict`).
+        Reliability of its outline, 0 to 1 (:class:`tunneldb.anomalies.verdict.Verdict`).
     leak : (n,) bool array
-        Whether it was said to be a leak.
+        True if the inspector called it a leak.
     tunnel : (n,) int array
-        Which tunnel it is in.
+        Number of its tunnel.
     chainage : (n,) float array
-        Where its middle is, m.
+        Chainage of its middle, m.
     """
 
     features: Float
@@ -121,17 +121,17 @@ class Reviewed:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """How a way fares on reviews that it was not fitted to.
+    """Performance of an adjustment on held-out reviews.
 
     Attributes
     ----------
     way : {'base', 'recalibrated', 'refit', 'extended'}
     loss : float
-        Mean negative logarithm of the probability of what was said.
+        Mean negative logarithm of the probability of the review's answer.
     false_leaks : int
-        What it takes for leaks and was said to be none.
+        Number of false alarms: predicted as leaks, reviewed as none.
     missed : int
-        Leaks that it takes for none.
+        Number of leaks predicted as none.
     """
 
     way: Way
@@ -141,23 +141,23 @@ class HeldOut:
 
     @classmethod
     def of(cls, way: Way, odds: Float, leak: Bool) -> HeldOut:
-        """Hold logarithms of the odds (n,) of leaks against what was said."""
+        """Compare log odds (n,) of leaks with the reviews."""
         called = odds >= 0.0
         return cls(way, float(losses(odds, leak).mean()), int((called & ~leak).sum()), int((leak & ~called).sum()))
 
 
 @dataclass(frozen=True)
 class Lesson:
-    """What reviews teach.
+    """Result of learning from reviews.
 
     Attributes
     ----------
     adjustment : Adjustment
-        The way that is best on reviews held out, fitted to all of them; no change where none is better than that.
+        Adjustment that is best on held-out reviews, fitted to all of them; no change if none is better.
     held_out : list of HeldOut
-        The ways that were tried, the model as it is first.
+        Results of all adjustments, the unchanged model first.
     reviews : int
-        How many there were.
+        Number of reviews.
     """
 
     adjustment: Adjustment
@@ -166,17 +166,17 @@ class Lesson:
 
 
 def learn(model: EvidenceModel, reviewed: Reviewed) -> Lesson:
-    """Learn from reviews: choose whether to recalibrate or refit a model, or leave it, by what was not seen in fitting.
+    """Learn from reviews: recalibrate, refit or extend the model, or leave it, whichever predicts held-out reviews best.
 
-    Another way than to leave it is taken if on reviews held out it is better by more than chance (CHANCE), stretches of APART
-    metres being what chance draws.
+    A change is accepted if it is better on held-out reviews by more than chance (CHANCE), with stretches of APART metres as
+    the random units.
 
     Parameters
     ----------
     model : EvidenceModel
-        As it comes with the program.
+        Model of the program.
     reviewed : Reviewed
-        At least one.
+        At least one review.
     """
     leak, count = reviewed.leak, len(reviewed.leak)
     parts = by_reason(weigh(model, reviewed.features, reviewed.outline))
@@ -208,7 +208,7 @@ def learn(model: EvidenceModel, reviewed: Reviewed) -> Lesson:
 
 
 def spread_of(features: Float) -> tuple[Float, Float]:
-    """Mean and standard deviation (len(FEATURES),) of features (n, len(FEATURES)); 0 and 1 where nothing differs."""
+    """Return mean and standard deviation (len(FEATURES),) of features (n, len(FEATURES)); 0 and 1 for constant ones."""
     known = np.isfinite(features)
     count = np.maximum(known.sum(axis=0), 1)
     centre = np.where(known, features, 0.0).sum(axis=0) / count
@@ -218,25 +218,25 @@ def spread_of(features: Float) -> tuple[Float, Float]:
 
 
 def by_reason(contributions: Float) -> Float:
-    """Sum what features (n, len(FEATURES)) add by their reasons: (n, len(REASONS))."""
+    """Sum the contributions of features (n, len(FEATURES)) by reason: (n, len(REASONS))."""
     return np.asarray(contributions @ (_REASON[:, None] == np.arange(len(REASONS))))
 
 
 def stretches(tunnel: Int64, chainage: Float) -> Int64:
-    """Number the stretches of APART metres that hold something, in order of tunnel and chainage: (n,)."""
+    """Assign reviews to stretches of APART metres, numbered in order of tunnel and chainage: (n,)."""
     places = np.column_stack([tunnel, np.floor(chainage / APART)])
     return np.asarray(np.unique(places, axis=0, return_inverse=True)[1]).reshape(-1)
 
 
 def folds(stretch: Int64) -> Int64:
-    """Part (n,) of FOLDS that each review belongs to: parts follow each other along the tunnels, and hold about as many."""
+    """Assign each review (n,) to one of FOLDS parts, consecutive along the tunnels and of about equal size."""
     counts = np.bincount(stretch)
     middle = np.cumsum(counts) - 0.5 * counts
     return np.asarray((middle * FOLDS / max(len(stretch), 1)).astype(np.int64)[stretch])
 
 
 def losses(odds: Float, leak: Bool) -> Float:
-    """Negative logarithms (n,) of the probabilities of what was said, by the logarithms of the odds of a leak."""
+    """Return the negative logarithms (n,) of the probabilities of the reviews, from the log odds of a leak."""
     return np.logaddexp(0.0, np.where(leak, -odds, odds))
 
 
@@ -244,8 +244,8 @@ def losses(odds: Float, leak: Bool) -> Float:
 class _Problem:
     """Logistic regression with a Gaussian prior.
 
-    The logarithm of the odds is ``constant + design @ weights``; weights that multiply evidence, whose prior is 1, are not
-    negative, as what counted the other way round would be none.
+    The log odds are ``constant + design @ weights``. Weights that multiply evidence, with prior mean 1, are not negative,
+    because evidence must not count in the opposite direction.
     """
 
     constant: float
@@ -254,7 +254,7 @@ class _Problem:
     width: Float
 
     def fit(self, leak: Bool, rows: Bool | slice = slice(None)) -> Float:
-        """Most probable weights, given some rows."""
+        """Fit the most probable weights to some rows."""
         design, said = self.design[rows], leak[rows].astype(np.float64)
 
         def cost(weights: Float) -> tuple[float, Float]:
@@ -267,7 +267,7 @@ class _Problem:
         return np.asarray(minimize(cost, self.prior, jac=True, method="L-BFGS-B", bounds=bounds).x)
 
     def held_out(self, leak: Bool, fold: Int64) -> Float:
-        """Logarithms of the odds (n,) in each part by weights fitted to the others."""
+        """Return the log odds (n,) in each part with weights fitted to the others."""
         odds = np.zeros(len(leak))
         for number in np.unique(fold):
             here = fold == number
@@ -281,7 +281,7 @@ def _recalibration(constant: float, parts: Float) -> _Problem:
 
 
 def _refit(constant: float, parts: Float, width: float, told: Float | None = None, term: float = 0.0) -> _Problem:
-    """Factors of parts (n, reasons), terms of what features tell (n, features), and an offset, and how wide they spread."""
+    """Set up factors of parts (n, reasons), terms of features (n, features), and an offset, with their prior widths."""
     told = np.empty((len(parts), 0)) if told is None else told
     counts = parts.shape[1], told.shape[1], 1
     prior, widths = np.repeat([1.0, 0.0, 0.0], counts), np.repeat([width, term, OFFSET], counts)
@@ -301,6 +301,6 @@ def _adjustment(way: Way, weights: Float, features: Float) -> Adjustment:
 
 
 def _beyond_chance(gain: Float, stretch: Int64) -> bool:
-    """Whether the sum of gains (n,) is more than CHANCE standard errors, where those of a stretch come and go together."""
+    """Return True if the sum of gains (n,) exceeds CHANCE standard errors, with each stretch as one unit."""
     sums = np.bincount(stretch, gain)
     return bool(gain.sum() > CHANCE * np.sqrt((sums**2).sum()))

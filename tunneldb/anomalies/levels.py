@@ -1,4 +1,4 @@
-"""Dark regions of two levels: a leak in lining that is a little darker anyway, a wet core in what is only damp."""
+"""Dark regions with two levels: a leak in slightly darker lining, or a wet core in damp lining."""
 
 from __future__ import annotations
 
@@ -11,36 +11,36 @@ from tunneldb.arrays import Bool, Float
 from tunneldb.raster.geotiff import NODATA, STEP
 
 RATIO = 2.0
-"""The darker part is so many times as dark as the other: of one patch, which ends at half of its contrast, no part is."""
+"""Minimum ratio of the two levels; a single patch, which ends at half of its contrast, has no such parts."""
 
 SMOOTH = 0.1
-"""Drops are averaged over so much before parts are told, m: noise and drops of water make no parts."""
+"""Width of the average before levels are separated, m: noise and drops of water are no levels."""
 
 LEAST_AREA = 0.05
-"""A part is no smaller, m²."""
+"""Minimum area of a part, m²."""
 
 NARROW = 0.1
-"""What is left about the darker part and no wider belongs to it, m."""
+"""Maximum width of a remaining rim that is added to the darker part, m."""
 
 LARGEST = 8_000_000
-"""Boxes of regions of more pixels are networks of joints and the like, no patches."""
+"""Maximum size of a region's box, pixels: larger ones are networks of joints or similar, no patches."""
 
 BINS = 40
-"""Classes of the drop, between which parts are divided."""
+"""Number of darkening classes between which levels are separated."""
 
 
 def weaker_parts(dark: Bool, contrast: ContrastImage) -> Bool:
-    """Mark the weaker parts of dark regions that hold two levels.
+    """Mark the weaker parts of dark regions that have two levels.
 
-    The two are divided where they differ most in the mean (Otsu, 1979). If the darker is RATIO times as dark, what lies below
-    half of its contrast is the weaker part: just as all boundaries lie at half of the contrast.
+    The levels are separated where their means differ most (Otsu, 1979). If the darker one is RATIO times as dark, pixels below
+    half of its contrast are the weaker part, because all boundaries are at half of the contrast.
 
     Parameters
     ----------
     dark : (rows, columns) bool array
         Dark pixels.
     contrast : ContrastImage
-        Their drop.
+        Their darkening.
     """
     found = np.zeros(dark.shape, np.bool_)
     grid = contrast.grid
@@ -66,7 +66,7 @@ def weaker_parts(dark: Bool, contrast: ContrastImage) -> Bool:
 
 
 def _weaker(mask: Bool, drop: np.ndarray, pixel: float) -> Bool | None:
-    """Weaker part of one region; None if it is all of one level."""
+    """Return the weaker part of one region; None if it has a single level."""
     held = mask & (drop != NODATA)
     side = 2 * round(SMOOTH / pixel / 2) + 1
     weight = ndimage.uniform_filter(held.astype(np.float32), side)
@@ -85,7 +85,7 @@ def _weaker(mask: Bool, drop: np.ndarray, pixel: float) -> Bool | None:
 
 
 def _otsu(values: Float) -> tuple[float, float]:
-    """Means of the values above and below the limit between which most of the variance lies."""
+    """Return the means of the values above and below the limit with the greatest variance between them."""
     if len(values) < 2 or values.min() == values.max():
         return 0.0, 0.0
     count, edges = np.histogram(values, BINS)
@@ -98,7 +98,7 @@ def _otsu(values: Float) -> tuple[float, float]:
 
 
 def _larger(mask: Bool, pixels: float) -> Bool:
-    """Pieces of a mask of so many pixels and more."""
+    """Return the pieces of a mask with at least so many pixels."""
     pieces, _ = ndimage.label(mask)
     kept = np.bincount(pieces.ravel()) >= pixels
     kept[0] = False

@@ -1,4 +1,4 @@
-"""Which leaks of an earlier run are found again, and which are parts of one found now."""
+"""Match leaks of an earlier run with those found now, as a whole or in parts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 MIN_IOU = 0.3
-"""Smallest share of intersection in union at which two outlines are the same leak."""
+"""Minimum intersection over union of two outlines of the same leak."""
 
 
 def match(before: Sequence[Polygon], now: Sequence[Polygon], min_iou: float = MIN_IOU) -> dict[int, int]:
@@ -22,7 +22,7 @@ def match(before: Sequence[Polygon], now: Sequence[Polygon], min_iou: float = MI
     before, now : sequences of Polygon
         Outlines in the unrolled plane, m.
     min_iou : float
-        Smallest intersection over union of a pair.
+        Minimum intersection over union of a pair.
 
     Returns
     -------
@@ -42,19 +42,19 @@ def match(before: Sequence[Polygon], now: Sequence[Polygon], min_iou: float = MI
 def match_parts(
     before: Sequence[Polygon], reviewed: Sequence[bool], now: Sequence[Polygon], min_share: float = MIN_IOU
 ) -> dict[int, int]:
-    """Pair leaks over the end of a kilometre with earlier ones that may have been a part of them, or have them for a part.
+    """Pair leaks across a kilometre boundary with earlier ones of which they are a part, or the reverse.
 
-    They are the same when they share enough of the smaller one. Where there are several, one that was reviewed counts
-    first, then the one that shares most.
+    They are the same if they share enough of the smaller one. Among several, a reviewed one is preferred, then the one
+    with the largest overlap.
 
     Parameters
     ----------
     before, now : sequences of Polygon
         Outlines in the unrolled plane, m.
     reviewed : sequence of bool
-        Which of the earlier ones were reviewed.
+        True for reviewed earlier leaks.
     min_share : float
-        Smallest intersection of a pair over the area of the smaller one.
+        Minimum intersection of a pair divided by the area of the smaller one.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def match_parts(
 
 
 def _best(owner: NDArray[Any], iou: NDArray[Any], count: int) -> NDArray[Any]:
-    """Pair of the greatest overlap for each owner, the first of several; -1 where there is none."""
+    """Return the pair with the greatest overlap for each owner, the first of several; -1 if there is none."""
     best = np.full(count, -1)
     for k in np.argsort(-iou, kind="stable")[::-1]:
         best[owner[k]] = k

@@ -1,4 +1,4 @@
-"""What the image shows of outlines that people drew: by how much they are darker than dry lining."""
+"""Darkening of outlines that people drew, relative to dry lining."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from tunneldb.raster.geotiff import NODATA, STEP
 
 @dataclass(frozen=True)
 class Measurement:
-    """What the image shows of an outline.
+    """Image measurements of an outline.
 
     Attributes
     ----------
     drop_mean, drop_max, contrast : float or None
-        Mean and greatest drop below dry lining, dB, and the mean in its standard deviations; None where nothing was measured.
+        Mean and greatest darkening relative to dry lining, dB, and the mean in its standard deviations; None if not measured.
     image_share : float
-        Share of its pixels that hold points; pixels beyond the image hold none.
+        Share of its pixels that have points; pixels outside the image have none.
     """
 
     drop_mean: float | None
@@ -31,12 +31,12 @@ class Measurement:
 
 
 def measure_outline(contrast: ContrastImage, outline: Polygon) -> Measurement:
-    """Measure the pixels whose centres lie within an outline, or, if it is narrower than they are, those at its vertices.
+    """Measure the pixels whose centres are within an outline, or, if it is narrower than they are, those at its vertices.
 
     Parameters
     ----------
     contrast : ContrastImage
-        By how much each pixel is darker.
+        Darkening of each pixel.
     outline : Polygon
         (chainage, arc), m.
     """

@@ -17,7 +17,7 @@ from tunneldb.geometry.stationing import KILOMETRE
 
 @dataclass(frozen=True)
 class Cluster:
-    """Boundary regions that touch one another, of one kilometre or several, and what they make together.
+    """Boundary regions that touch each other, of one kilometre or several, and their union.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Cluster:
 
 @dataclass(frozen=True)
 class Boundary:
-    """What lies across the ends of a kilometre.
+    """Clusters at the ends of a kilometre.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Boundary:
     first, last : int
         Kilometres over which the clusters reach.
     other_pixels : list of int
-        Neighbours with parts at its ends whose pixels have another size: nothing can be merged with them.
+        Neighbours whose boundary parts have another pixel size: nothing can be merged with them.
     """
 
     km: int
@@ -69,7 +69,7 @@ class Boundary:
 
 @dataclass(frozen=True)
 class Reconciliation:
-    """What becomes of the findings of a kilometre.
+    """Actions on the findings of a kilometre.
 
     Candidates are numbered: first the anomalies of the boundary's clusters, in their order, then those found within the
     kilometre.
@@ -83,7 +83,7 @@ class Reconciliation:
     keep, delete : list of int
         Keys of earlier findings that were not found again: the reviewed ones stay, the others are deleted.
     summary : Summary
-        How many there are.
+        Numbers of findings.
     """
 
     insert: list[int]
@@ -102,9 +102,9 @@ class Summary:
     kinds : Counter of str
         Candidates of each kind, as detected.
     new, again : int
-        Leaks found for the first time, and leaks that were a finding before, of whatever kind.
+        Number of leaks found for the first time, and of leaks that were a finding of any kind before.
     kept, gone : int
-        Wet findings that were not found again: kept for their review, and deleted.
+        Wet findings that were not found again: kept because of their review, and deleted.
     over_ends : int
         Leaks across a kilometre boundary.
     """
@@ -161,7 +161,7 @@ def gather_boundary(
 def reconcile(
     found: Sequence[Anomaly], across: Sequence[Anomaly | None], boundary: Boundary, earlier: Sequence[EarlierFinding]
 ) -> Reconciliation:
-    """Decide which earlier finding each anomaly is, and what becomes of the others.
+    """Match each anomaly with an earlier finding, and decide what happens to the others.
 
     An anomaly within the kilometre is an earlier finding if the two overlap best with each other, by at least 0.3 of their
     union, whatever their kinds. One across an end of the kilometre is an earlier finding if the two share 0.3 of the smaller:
@@ -173,9 +173,9 @@ def reconcile(
     found : sequence of Anomaly
         Anomalies within the kilometre.
     across : sequence of (Anomaly or None)
-        What each cluster of the boundary is; None if it is too small or holds no points.
+        Anomaly of each boundary cluster; None if it is too small or has no points.
     boundary : Boundary
-        What lies across its ends.
+        Clusters at its ends.
     earlier : sequence of EarlierFinding
         Findings that may be found again: those of the kilometre, those of the boundary, and those of the kilometres that the
         boundary reaches which an earlier run lost.
@@ -221,7 +221,7 @@ def reconcile(
 
 
 def _is_near_end(outline: Polygon, boundary: Boundary) -> bool:
-    """Return True if an outline lies as near to an end of the kilometre as its straightening can move it."""
+    """Return True if an outline is so near an end of the kilometre that its straightening can move it there."""
     west, _, east, _ = outline.bounds
     planes = (boundary.km, boundary.km + 1)
     return any(west - boundary.pixel <= plane * KILOMETRE <= east + boundary.pixel for plane in planes)

@@ -1,4 +1,4 @@
-"""Plain records of detection: what it found, what an earlier run had found, and regions at the ends of kilometres."""
+"""Plain records of detection: anomalies, earlier findings, and regions at the ends of kilometres."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class Anomaly:
     outline : Polygon
         (chainage, arc), m.
     drop_mean, drop_max : float
-        Mean and greatest drop below the background, dB.
+        Mean and greatest darkening relative to the background, dB.
     contrast : float
-        Mean drop in standard deviations of the background about it.
+        Mean darkening in standard deviations of the surrounding background.
     image_share : float
-        Share of its pixels into which points fell, 0 to 1.
+        Share of its pixels with points, 0 to 1.
     verdict : Verdict
-        What it is.
+        Its classification.
     """
 
     outline: Polygon
@@ -39,7 +39,7 @@ class Anomaly:
 
 @dataclass(frozen=True)
 class EarlierFinding:
-    """A finding that an earlier run of detection made.
+    """Finding of an earlier detection run.
 
     Attributes
     ----------
@@ -48,9 +48,9 @@ class EarlierFinding:
     km : int
         Kilometre of its middle.
     reviewed : bool
-        True if an inspector said anything about it: a review, a kind, a severity, a remark, a photo, or a merge.
+        True if an inspector edited it: a review, a kind, a severity, a remark, a photo, or a merge.
     wet : bool
-        True if its kind counts as wet, as the inspector has it, else as detected.
+        True if its kind counts as wet, by the inspector, else as detected.
     dry : bool
         True if it is open and a dry region removes it. Detection does not find it again for that reason.
     outline : Polygon

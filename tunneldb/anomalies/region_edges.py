@@ -1,4 +1,4 @@
-"""Sides by which dark regions end: what they face, what is lost over them, which are sharp and lie on straight lines."""
+"""Sides of dark regions: what they face, the step across them, and which are sharp and on straight lines."""
 
 from __future__ import annotations
 
@@ -12,43 +12,43 @@ from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.pixel_state import PixelState
 
 ACROSS = 0.06
-"""The step over a side is measured so far inside and outside, m: a wet patch ends within it, soot doesn't."""
+"""Distance inside and outside of a side at which the step is measured, m: a wet patch ends within it, soot does not."""
 
 FAR = 0.2
-"""It is measured so far outside, too, m: what fades over decimetres, as halos of dust do, is still dark there."""
+"""Second distance outside, m: areas that fade over decimetres, such as halos of dust, are still dark there."""
 
 BRIGHT = 2.0
-"""What is brighter than the background by so many standard deviations is so by chance in 2 of 100 pixels."""
+"""Standard deviations above the background that occur by chance in 2 of 100 pixels."""
 
 SHARP = 0.5
-"""Part of the region's mean drop that is lost over a sharp side."""
+"""Minimum share of the region's mean darkening that is lost across a sharp side."""
 
 SLOPES = np.arange(-0.04, 0.05, 0.02)
-"""Slopes of lines along the tunnel and around it, on which sides are taken for straight: what is built keeps to these within
-some degrees, and so does the unrolled plane."""
+"""Slopes of lines along the tunnel and around it for straight sides: built objects, and the unrolled plane, follow these
+within some degrees."""
 
 NEAR_LINE = 0.02
-"""Sides lie on a line up to so far from it, m."""
+"""Maximum distance of a side from its line, m."""
 
 ASIDE = 0.02
-"""What is lost over a sharp side is the mean of the pixels up to so far to either side of it, m."""
+"""Half-width of the mean along a side for its step, m."""
 
 FACING = ((-1, 0), (1, 0), (0, -1), (0, 1))
 """Rows and columns from a pixel to its four neighbours."""
 
 UPWARDS = (1, 0)
-"""Which of FACING leads to the crown, from rows at arcs above 0 and from those below."""
+"""Index in FACING that leads to the crown, from rows at arcs above 0 and from those below."""
 
 
 class Sides(NamedTuple):
-    """Sides by which pixels of regions face what is not dark.
+    """Sides of region pixels that face pixels that are not dark.
 
     Attributes
     ----------
     label : (n,) int array
-        Region.
+        Region number.
     facing : (n,) int array
-        Which of FACING.
+        Index in FACING.
     row, column : (n,) int arrays
         Pixel of the region.
     """
@@ -59,11 +59,11 @@ class Sides(NamedTuple):
     column: Int64
 
     def where(self, mask: Bool) -> Sides:
-        """Those of a mask (n,)."""
+        """Return the sides of a mask (n,)."""
         return Sides(*(part[mask] for part in self))
 
     def beyond(self, along: int, aside: int) -> tuple[Int64, Int64]:
-        """Row and column of the pixels so many from each side's own, the way that it faces, and so many beside these."""
+        """Return row and column of the pixels so many from each side, in its direction, and so many beside these."""
         down, right = np.array(FACING).T
         return (
             self.row + along * down[self.facing] + aside * right[self.facing],
@@ -72,17 +72,17 @@ class Sides(NamedTuple):
 
 
 class Edges:
-    """What is dark in a kilometre, and how regions end on it.
+    """Dark pixels of a kilometre, and the sides of its regions.
 
-    Where profiles lie apart, a region ends along the tunnel between two of them, nobody knows where or how. Then the sides that
-    face up and down alone tell how sharp and how straight it is.
+    With profiles far apart, a region ends along the tunnel somewhere between two of them. Then only the sides that face up and
+    down show how sharp and how straight it is.
 
     Parameters
     ----------
     dark : (rows, columns) bool array
-        All dark pixels; regions don't end at these.
+        All dark pixels; regions do not end at these.
     contrast : ContrastImage
-        Their state and drop.
+        Their state and darkening.
     """
 
     def __init__(self, dark: Bool, contrast: ContrastImage) -> None:
@@ -96,7 +96,7 @@ class Edges:
         self.facings = 2 if contrast.spacing else len(FACING)
 
     def sides(self, label: Intp, row: Int64, column: Int64) -> Sides:
-        """Sides of dark pixels (n,), in order of direction and then of the pixels."""
+        """Return the sides of dark pixels (n,), in order of direction and then of the pixels."""
         found = []
         for facing, (down, right) in enumerate(FACING):
             m, n = row + down, column + right
@@ -106,10 +106,9 @@ class Edges:
         return Sides(*map(np.concatenate, zip(*found, strict=True)))
 
     def perimeter(self, sides: Sides, count: int) -> Float:
-        """Sides of each of so many regions, by what they face: see :class:`RegionProperties`.
+        """Count the sides of each region, by what they face: see :class:`RegionProperties`.
 
-        All, towards an appendage or the floor, towards lining in a recess, towards an appendage above, towards the floor:
-        (regions, 5).
+        All, towards a fixture or the floor, towards recessed lining, towards a fixture above, towards the floor: (regions, 5).
         """
         state = self.state[sides.beyond(1, 0)]
         off = state > PixelState.RECESS
@@ -121,9 +120,9 @@ class Edges:
         return np.column_stack([np.bincount(sides.label[mask], minlength=count) for mask in masks]).astype(np.float64)
 
     def steps(self, sides: Sides, count: int) -> Float:
-        """Where the drop is known on both sides, ACROSS from them: how many, sum of the drop inside and outside, dB.
+        """Sum the darkening where it is known ACROSS from both sides: number, sum inside and outside, dB.
 
-        Then of how many it is known FAR outside, too, the sum there, and how many lie beside bright lining: (regions, 6).
+        Then the number also known FAR outside, the sum there, and the number beside bright lining: (regions, 6).
         """
         sides = sides.where(sides.facing < self.facings)
         for along, usable in ((1 - self.across, self._interior), (self.across, self._background)):
@@ -141,17 +140,17 @@ class Edges:
         return np.column_stack([number, *sums, known, outside, np.bincount(sides.label[bright], minlength=count)])
 
     def straight(self, sides: Sides, mean_drop: Float) -> Int64:
-        """Count the sharp sides of regions, and those of them that lie on one straight line for each of the four directions.
+        """Count the sharp sides of regions, and those of them on one straight line for each of the four directions.
 
-        What was built ends along the tunnel and around it, on four lines; water ends anywhere. Sides that face appendages, the
-        floor or other dark pixels don't count.
+        Built objects end along the tunnel and around it, on four lines; water ends anywhere. Sides that face fixtures, the
+        floor or other dark pixels are not counted.
 
         Parameters
         ----------
         sides : Sides
-            Of all regions.
+            Sides of all regions.
         mean_drop : (regions,) float array
-            Mean drop of each, dB.
+            Mean darkening of each, dB.
 
         Returns
         -------
@@ -161,13 +160,13 @@ class Edges:
         sides = sides.where(sides.facing < self.facings)
         sides = sides.where(self.state[sides.beyond(1, 0)] <= PixelState.RECESS)
         sides = sides.where(self._lost(sides) >= SHARP * mean_drop[sides.label] / STEP["corrected"])
-        upright = sides.facing >= 2  # faces along the tunnel, and lies on a line around it
+        upright = sides.facing >= 2  # faces along the tunnel, and is on a line around it
         along, across = np.where(upright, sides.row, sides.column), np.where(upright, sides.column, sides.row)
         most = _most_on_a_line(len(FACING) * sides.label + sides.facing, along, across, len(FACING) * count, self.near)
         return np.column_stack([np.bincount(sides.label, minlength=count), most.reshape(count, len(FACING)).sum(axis=1)])
 
     def _lost(self, sides: Sides) -> Float:
-        """Mean drop inside sides less that outside, steps of the drop; -inf where either is hidden."""
+        """Return the mean darkening inside sides minus that outside, steps of the image; -inf where either is hidden."""
         sums, held = np.zeros((2, len(sides.label)), np.int64), np.zeros((2, len(sides.label)), np.int64)
         hidden = np.zeros(len(sides.label), np.bool_)
         for aside in range(-self.aside, self.aside + 1):
@@ -184,23 +183,23 @@ class Edges:
         return np.where(hidden | (held == 0).any(axis=0), -np.inf, mean[0] - mean[1])
 
     def _inside(self, row: Int64, column: Int64) -> Bool:
-        """Which pixels lie in the image."""
+        """Return True for pixels in the image."""
         rows, columns = self.dark.shape
         return (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
 
     def _interior(self, row: Int64, column: Int64) -> Bool:
-        """Which pixels are dark and hold points."""
+        """Return True for pixels that are dark and have points."""
         return self.dark[row, column] & (self.drop[row, column] != NODATA)
 
     def _background(self, row: Int64, column: Int64) -> Bool:
-        """Which pixels of the lining hold points and are not dark."""
+        """Return True for pixels of the lining that have points and are not dark."""
         state = self.state[row, column]
         seen = (state == PixelState.LINING) | (state == PixelState.RECESS)
         return seen & ~self.dark[row, column] & (self.drop[row, column] != NODATA)
 
 
 def _most_on_a_line(group: Int64, along: Int64, across: Int64, count: int, near: int) -> Int64:
-    """Most of the places of each of so many groups that lie on one line: up to so many pixels across from it."""
+    """Return the largest number of places of each group on one line: up to so many pixels across from it."""
     most = np.zeros(count, np.int64)
     found, first = np.unique(group, return_index=True)
     start = np.zeros(count, np.int64)
@@ -208,7 +207,7 @@ def _most_on_a_line(group: Int64, along: Int64, across: Int64, count: int, near:
     for slope in SLOPES:
         place = np.rint(across - slope * (along - start[group])).astype(np.int64)
         low = int(place.min(initial=0))
-        wide = int(place.max(initial=0)) - low + 2 * near + 1  # so far apart that no line is near places of two groups
+        wide = int(place.max(initial=0)) - low + 2 * near + 1  # groups far enough apart not to share a line
         line, held = np.unique(group * wide + (place - low), return_counts=True)
         total = np.concatenate([[0], np.cumsum(held)])
         within = total[np.searchsorted(line, line + 2 * near, side="right")] - total[:-1]

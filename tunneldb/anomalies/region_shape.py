@@ -1,4 +1,4 @@
-"""The shape of a region: how wide and how long it is, whether its sides are straight."""
+"""Shape of a region: width, length, and straightness of its sides."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from tunneldb.arrays import Bool, Int32, Intp
 from tunneldb.compiled import kernel
 
 PIECE = 2.0
-"""Sides are compared with straight lines piece by piece, so long at most, m: a tunnel's alignment is no straighter."""
+"""Maximum length of the pieces in which sides are compared with straight lines, m: a tunnel's alignment is no straighter."""
 
 CORNER = 0.12
 """Share of a side that belongs to the corners, at either end of it."""
 
 FARTHEST = np.int32(65000)
-"""Distances are no greater, in thirds of a pixel."""
+"""Maximum distance, in thirds of a pixel."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """Measures of a region, m.
+    """Shape measures of a region, m.
 
     Attributes
     ----------
@@ -30,19 +30,19 @@ class Shape:
     area : float
         m².
     width : float
-        Diameter of the largest circle that fits in, about.
+        Approximate diameter of the largest inscribed circle.
     rectangularity : float
-        Share that it fills, 0 to 1, of the box of the rows and columns that hold at least half as many of its pixels as the
-        one of the median pixel: what sticks out of it is left out.
+        Share that it fills, 0 to 1, of its box without protruding parts. The box has the rows and columns with at least half as
+        many pixels as that of the median pixel.
     corners : float
         Share that it fills of the emptiest corner of that box, 0 to 1.
     deviation_box : float
-        As ``deviation_along``, of what lies in that box.
+        ``deviation_along`` within that box.
     aspect_ratio : float
         Length of that box along the tunnel over its width.
     deviation_along, deviation_across : float
-        Standard deviation about straight lines of the sides that face arcs, as one goes along the tunnel, and of those that
-        face chainages, as one goes around it.
+        Standard deviation about straight lines of the sides that face arcs, along the tunnel, and of those that face
+        chainages, around it.
     """
 
     along: float
@@ -58,7 +58,7 @@ class Shape:
 
     @property
     def length(self) -> float:
-        """The greater extent, m."""
+        """Greater extent, m."""
         return max(self.along, self.across)
 
     @property
@@ -83,7 +83,7 @@ def measure_shape(mask: Bool, pixel: float) -> Shape:
 
 
 def _box(mask: Bool, pixel: float, piece: int) -> tuple[float, float, float, float]:
-    """Of the box without what sticks out: rectangularity, its least corner's, edge deviation and aspect ratio."""
+    """Measure the box without protruding parts: rectangularity, its emptiest corner, edge deviation and aspect ratio."""
     full = mask[np.ix_(_usual(np.count_nonzero(mask, axis=1)), _usual(np.count_nonzero(mask, axis=0)))]
     high, wide = (max(2, round(CORNER * side)) for side in full.shape)
     corners = (full[i, j] for i in (slice(high), slice(-high, None)) for j in (slice(wide), slice(-wide, None)))
@@ -92,14 +92,14 @@ def _box(mask: Bool, pixel: float, piece: int) -> tuple[float, float, float, flo
 
 
 def _usual(counts: Intp) -> Bool:
-    """Which rows or columns hold at least half as many pixels as the one of the median pixel."""
+    """Select rows or columns with at least half as many pixels as that of the median pixel."""
     ordered = np.sort(counts)
     median = ordered[np.searchsorted(np.cumsum(ordered), 0.5 * ordered.sum())]
     return np.asarray(counts >= 0.5 * median, dtype=np.bool_)
 
 
 def _inscribed_diameter(mask: Bool) -> float:
-    """Diameter of the largest inscribed circle, pixels: by chamfer distances (Borgefors, 1986: 3 to sides, 4 to corners)."""
+    """Return the diameter of the largest inscribed circle, pixels, by chamfer distances (Borgefors, 1986: 3 and 4)."""
     distance = np.where(np.pad(mask, 1), FARTHEST, np.int32(0))
     _chamfer(distance)
     return 2.0 * float(distance.max()) / 3.0 - 1.0
@@ -107,10 +107,10 @@ def _inscribed_diameter(mask: Bool) -> float:
 
 @kernel
 def _chamfer(distance: Int32) -> None:  # pragma: no cover - compiled
-    """Lower distances (rows, columns) to those from the nearest 0, in thirds of a pixel; they are 0 all around."""
+    """Lower distances (rows, columns) to those from the nearest 0, in thirds of a pixel; the border is 0."""
     rows, columns = distance.shape
     for turn in range(2):
-        step = 1 - 2 * turn  # from the first to the last, and back
+        step = 1 - 2 * turn  # forwards, then backwards
         for m in range(1, rows - 1):
             i = m if turn == 0 else rows - 1 - m
             for n in range(1, columns - 1):
@@ -124,7 +124,7 @@ def _chamfer(distance: Int32) -> None:  # pragma: no cover - compiled
 
 
 def _edge_deviation(mask: Bool, piece: int) -> float:
-    """Standard deviation, pixels, of the first and the last pixel of the columns about straight lines, piece by piece."""
+    """Return the standard deviation, pixels, of the first and last pixel of the columns about straight lines, by pieces."""
     rows, columns = mask.shape
     trim = max(1, round(CORNER * columns))
     begin, stop = trim, columns - trim

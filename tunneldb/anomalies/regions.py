@@ -1,4 +1,4 @@
-"""Connected dark regions: cut out of the image of a kilometre, with their drips, and merged across its ends."""
+"""Connected dark regions: extracted from the image of a kilometre, with their drips, and merged across its ends."""
 
 from __future__ import annotations
 
@@ -19,41 +19,41 @@ from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import outline
 
 LONG = 0.5
-"""Regions that are longer are kept even if they are small, m: joints."""
+"""Minimum length of small regions that are kept, m: joints."""
 
 PIXELS = 1_000_000
-"""Pixels whose sums are made at a time, about."""
+"""Approximate number of pixels summed at a time."""
 
 
 class RegionProperties(NamedTuple):
-    """Sums over the pixels of a region, and over the sides by which they face what is not dark.
+    """Sums over the pixels of a region, and over its sides that face pixels that are not dark.
 
     Attributes
     ----------
     sigma : float
-        Local standard deviation of the background, dB, over the pixels with points.
+        Local standard deviation of the background, dB, summed over the pixels with points.
     recess : float
-        Pixels on lining set back behind the wall.
+        Number of pixels on recessed lining.
     perimeter, perimeter_off, perimeter_recess : float
-        Sides, of them those towards an appendage or the floor, and those towards lining set back behind the wall.
+        Number of sides; of these towards a fixture or the floor; and towards recessed lining.
     steps : float
-        Sides at which the drop was measured on both, :data:`tunneldb.anomalies.region_edges.ACROSS` from them.
+        Number of sides with a known darkening on both sides, :data:`tunneldb.anomalies.region_edges.ACROSS` from them.
     inside, outside : float
-        Sum of the drop there, dB.
+        Sum of the darkening there, dB.
     sharp, straight : float
-        Sides over which half of the region's drop is lost, and those of them that lie on straight lines
+        Number of sides across which half of the region's darkening is lost, and of those on straight lines
         (:meth:`tunneldb.anomalies.region_edges.Edges.straight`).
     between : float
-        Pixels between profiles, which show what the nearest profile does.
+        Number of pixels between profiles, which take the value of the nearest profile.
     drop_square : float
-        Sum of the squares of the drop, dB², over the pixels with points.
+        Sum of the squared darkening, dB², over the pixels with points.
     far_steps, far_outside : float
-        Of ``steps``, sides at which it was measured :data:`tunneldb.anomalies.region_edges.FAR` outside, too; sum of the drop
-        there, dB.
+        Number of ``steps`` with a known darkening also :data:`tunneldb.anomalies.region_edges.FAR` outside; sum of the
+        darkening there, dB.
     bright : float
-        Of ``steps``, sides outside of which lining is brighter than dry lining is by chance.
+        Number of ``steps`` with lining outside that is brighter than dry lining is by chance.
     off_above, floor : float
-        Sides towards an appendage in the direction of the crown, and those towards the floor.
+        Number of sides towards a fixture in the direction of the crown, and towards the floor.
     """
 
     sigma: float = 0.0
@@ -77,7 +77,7 @@ class RegionProperties(NamedTuple):
 
 @dataclass(frozen=True)
 class Region:
-    """Dark pixels that are connected by their sides, and what they show.
+    """Dark pixels connected by their sides, with sums.
 
     Attributes
     ----------
@@ -88,9 +88,9 @@ class Region:
     mask : (rows, columns) bool array
         Its pixels, the first row at the lowest arc.
     filled : int
-        How many of them hold points, or show what the nearest profile does.
+        Number of pixels with points, or with the value of the nearest profile.
     drop_sum, drop_max : float
-        Sum over those and greatest of the drop below the background, dB.
+        Sum and maximum over those of the darkening relative to the background, dB.
     properties : RegionProperties
         Further sums.
     """
@@ -111,35 +111,35 @@ class Region:
 
     @property
     def place(self) -> tuple[int, int, int]:
-        """Column and row of the lowest corner, and the first pixel of the lowest row: no two regions have the same."""
+        """Column and row of the lowest corner, and the first pixel of the lowest row: unique for each region."""
         return self.column, self.row, self.column + int(self.mask[0].argmax())
 
     @property
     def area(self) -> float:
-        """m² in the unrolled plane."""
+        """Area in the unrolled plane, m²."""
         return float(np.count_nonzero(self.mask)) * self.pixel**2
 
     @property
     def measured(self) -> float:
-        """How many of its pixels hold points."""
+        """Number of its pixels with points."""
         return self.filled - self.properties.between
 
     @property
     def spacing(self) -> float:
-        """Distance along the tunnel of the profiles that show it, m: up to half of that its ends are uncertain.
+        """Distance along the tunnel of the profiles that show it, m: its ends are uncertain by up to half of that.
 
-        0 where profiles lie as close as pixels.
+        0 if profiles are as close as pixels.
         """
         return self.pixel * self.filled / max(self.measured, 1.0) if self.properties.between else 0.0
 
     @property
     def drop_mean(self) -> float:
-        """Mean drop over the pixels with points, dB."""
+        """Mean darkening over the pixels with points, dB."""
         return self.drop_sum / self.filled
 
     @property
     def contrast(self) -> float:
-        """Mean drop in standard deviations of the background about it."""
+        """Mean darkening in standard deviations of the surrounding background."""
         return self.drop_sum / self.properties.sigma if self.properties.sigma > 0 else 0.0
 
     @property
@@ -151,22 +151,22 @@ class Region:
 def find_regions(
     part: Bool, dark: Bool, contrast: ContrastImage, min_area: float, may_drip: Callable[[Region], bool] | None
 ) -> list[Region]:
-    """Connected dark regions of a kilometre that are large or long enough, or are cut by its ends and may be a part of one.
+    """Find connected dark regions of a kilometre that are large or long enough, or that its ends cut.
 
     Drips below a region are a part of it.
 
     Parameters
     ----------
     part : (rows, columns) bool array
-        Dark pixels that may belong to a region; those beyond the ends of the kilometre don't count.
+        Dark pixels that may belong to a region; those beyond the ends of the kilometre are ignored.
     dark : (rows, columns) bool array
-        All dark pixels; regions don't end at these.
+        All dark pixels; regions do not end at these.
     contrast : ContrastImage
-        Their drop.
+        Their darkening.
     min_area : float
-        Smaller regions within the kilometre are left out, m².
+        Minimum area of regions within the kilometre, m².
     may_drip : callable or None
-        Tells whether a region may have drips; None where nothing drips.
+        Returns True if a region may have drips; None if nothing drips.
     """
     grid = contrast.grid
     inner = grid.inner
@@ -192,7 +192,7 @@ def find_regions(
 
 
 def _regions(runs: Int64, label: Intp, chosen: Intp, dark: Bool, contrast: ContrastImage) -> list[Region]:
-    """Cut out the regions whose runs have the chosen labels, which are in order, and sum up what they show."""
+    """Extract the regions whose runs have the chosen labels, which are in order, and sum their pixels."""
     if not len(chosen):
         return []
     grid = contrast.grid
@@ -215,9 +215,9 @@ def _regions(runs: Int64, label: Intp, chosen: Intp, dark: Bool, contrast: Contr
 
 
 def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastImage) -> Float:
-    """Pixels with points, sum and maximum of the drop over these, dB, and the properties of each of so many regions.
+    """Return pixels with points, sum and maximum of the darkening over these, dB, and the properties of each region.
 
-    Of the runs (row, first column, column behind the last one) the numbers of the regions are in order.
+    Runs are (row, first column, column behind the last one), in order of the numbers of their regions.
     """
     edges, found = Edges(dark, contrast), []
     pixels, recess, steps, squares, sigma, between = (np.zeros(count) for _ in range(6))
@@ -226,7 +226,7 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
     for part in np.split(np.arange(len(runs)), np.searchsorted(until, np.arange(PIXELS, until[-1], PIXELS))):
         row, column = pixels_of(runs[part])
         label = np.repeat(number[part], (runs[:, 2] - runs[:, 1])[part])
-        is_dark = dark[row, column]  # all but those between a drip and what lies above it
+        is_dark = dark[row, column]  # all except those between a drip and the component above it
         row, column, label = row[is_dark], column[is_dark], label[is_dark]
         found.append(edges.sides(label, row, column))
         recess += np.bincount(label[contrast.state[row, column] == PixelState.RECESS], minlength=count)
@@ -253,7 +253,7 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
 
 
 def merge_regions(parts: Sequence[Region]) -> Region:
-    """Make one region of several that touch one another."""
+    """Merge regions that touch each other."""
     if len(parts) == 1:
         return parts[0]
     column, row = min(part.column for part in parts), min(part.row for part in parts)
@@ -273,7 +273,7 @@ def merge_regions(parts: Sequence[Region]) -> Region:
 
 
 def touching_groups(parts: Sequence[Region]) -> list[list[int]]:
-    """Which of the parts touch, at their first and last columns: groups of their numbers, in order of chainage."""
+    """Group parts that touch at their first and last columns: their numbers, in order of chainage."""
     pairs = [
         (a, b)
         for a, before in enumerate(parts)
@@ -281,7 +281,7 @@ def touching_groups(parts: Sequence[Region]) -> list[list[int]]:
         if before.stop == after.column and _touch(before, after)
     ]
     count, label = connected(len(parts), *np.array(pairs, dtype=np.int64).reshape(-1, 2).T)
-    # In order of place, whatever order the kilometres came in.
+    # In order of place, whatever the order of the kilometres.
     places = sorted(range(len(parts)), key=lambda k: parts[k].place)
     groups: list[list[int]] = [[] for _ in range(count)]
     for k in places:
@@ -290,7 +290,7 @@ def touching_groups(parts: Sequence[Region]) -> list[list[int]]:
 
 
 def _touch(before: Region, after: Region) -> bool:
-    """Tell whether a pixel of the last column lies beside one of the other region's first column."""
+    """Return True if a pixel of the last column is beside one of the other region's first column."""
     if before.pixel != after.pixel:
         return False
     low, high = max(before.row, after.row), min(before.row + len(before.mask), after.row + len(after.mask))

@@ -1,4 +1,4 @@
-"""Unbroken runs of pixels (run-length encoding), which of them touch, and the connected components that they make."""
+"""Unbroken runs of pixels (run-length encoding), touching pairs, and connected components."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Components:
     label : (n,) int array
         Component of each run.
     pixels, extent, width : (k,) int arrays
-        Pixels of each component, the greater side of its box and that along the tunnel, pixels.
+        Number of pixels of each component, the greater side of its box and that along the tunnel, pixels.
     """
 
     runs: Int64
@@ -33,7 +33,7 @@ class Components:
 
     @classmethod
     def of(cls, runs: Int64) -> Components:
-        """Label runs that hang together by the sides of their pixels."""
+        """Label runs that are connected by the sides of their pixels."""
         count, label = connected(len(runs), *adjacent_runs(runs))
         low, high = np.full((2, count), np.iinfo(np.int64).max), np.full((2, count), -1)
         for axis, (first, last) in enumerate(((runs[:, 0], runs[:, 0] + 1), (runs[:, 1], runs[:, 2]))):
@@ -43,14 +43,14 @@ class Components:
         return cls(runs, label, pixels, (high - low).max(axis=0), high[1] - low[1])
 
     def touching(self, first: int, stop: int) -> Bool:
-        """Tell which components reach the first of some columns or the last."""
+        """Return True for components that reach the first or the last of some columns."""
         cut = np.zeros(len(self.pixels), np.bool_)
         cut[self.label[(self.runs[:, 1] == first) | (self.runs[:, 2] == stop)]] = True
         return cut
 
 
 def row_runs(mask: Bool, first: int, stop: int) -> Int64:
-    """Runs along the rows of a mask, in some of its columns.
+    """Find runs along the rows of a mask, in some of its columns.
 
     Returns
     -------
@@ -63,14 +63,14 @@ def row_runs(mask: Bool, first: int, stop: int) -> Int64:
         edge = np.zeros((len(part), wide), np.bool_)
         edge[:, 0], edge[:, -1] = part[:, 0], part[:, -1]
         np.not_equal(part[:, 1:], part[:, :-1], out=edge[:, 1:-1])
-        at = np.flatnonzero(edge)  # where a run begins and where it ends, by turns
+        at = np.flatnonzero(edge)  # begins and ends of runs, alternating
         row = at[::2] // wide
         found.append(np.column_stack([row + top, *(ends - row * wide + first for ends in (at[::2], at[1::2]))]))
     return np.concatenate(found)
 
 
 def column_runs(mask: Bool, first: int, stop: int) -> Int64:
-    """Runs along some columns of a mask: column, first row and row behind the last one, column by column."""
+    """Find runs along some columns of a mask: column, first row and row behind the last one, column by column."""
     edges = []
     for top in range(0, len(mask) + 1, ROWS):
         part = np.zeros((min(ROWS, len(mask) + 1 - top) + 1, stop - first), np.bool_)  # with the row before
@@ -85,7 +85,7 @@ def column_runs(mask: Bool, first: int, stop: int) -> Int64:
 
 
 def adjacent_runs(runs: Int64) -> tuple[Int64, Int64]:
-    """Pairs of runs of neighbouring lines that share sides, by their numbers.
+    """Return pairs of runs of neighbouring lines that share sides, by their numbers.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def adjacent_runs(runs: Int64) -> tuple[Int64, Int64]:
     Returns
     -------
     (m,), (m,) int arrays
-        Run of the line before, run of the line after; of n runs in a line with m in the next, at most n + m - 1 pairs.
+        Run of the line before, run of the line after; with n runs in a line and m in the next, at most n + m - 1 pairs.
     """
     if not len(runs):
         return np.empty(0, np.int64), np.empty(0, np.int64)
@@ -108,20 +108,20 @@ def adjacent_runs(runs: Int64) -> tuple[Int64, Int64]:
 
 
 def connected(count: int, first: Int64, second: Int64) -> tuple[int, Intp]:
-    """Connected components of a graph with so many nodes: how many there are, and that of each node."""
+    """Return the number of connected components of a graph with so many nodes, and the component of each node."""
     graph = sparse.coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
     components, label = sparse.csgraph.connected_components(graph, directed=False)
     return int(components), label.astype(np.intp)
 
 
 def ranges(first: Int64, number: Int64) -> Int64:
-    """So many whole numbers from each first one on, one range behind the other."""
+    """Concatenate ranges of whole numbers, each from its first one with its length."""
     stop = np.cumsum(number)
     total = int(stop[-1]) if len(stop) else 0
     return np.arange(total) + np.repeat(first - (stop - number), number)
 
 
 def pixels_of(runs: Int64) -> tuple[Int64, Int64]:
-    """Line and place of all pixels of runs (line, first place, place behind the last one)."""
+    """Return line and place of all pixels of runs (line, first place, place behind the last one)."""
     number = runs[:, 2] - runs[:, 1]
     return np.repeat(runs[:, 0], number), ranges(runs[:, 1], number)

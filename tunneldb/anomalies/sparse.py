@@ -1,4 +1,4 @@
-"""Where an image has too few points for its leaks to be told: what is left out there counts as unseen."""
+"""Parts of an image with too few points for detecting leaks; they count as not inspected."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from tunneldb.raster.image import MAX_MEDIAN, LiningImage
 from tunneldb.raster.pixel_state import PixelState
 
 TILE = MAX_MEDIAN // 3
-"""Side of the tiles that are judged as a whole, pixels: three by three are as large as the widest median filter."""
+"""Side of the tiles, pixels: three by three are as large as the widest median filter."""
 
 WIDE = 4
-"""Tiles about one that tell whether it holds enough points by chance: a square three times as wide."""
+"""Number of tiles to either side for the wider test: a square three times as wide."""
 
 CERTAIN = 2.0
-"""So many times as many points as are asked for are there by no chance: where a third less is due, in fewer than 1 of 100 000
-places (Poisson)."""
+"""Factor on the required number of points that is not reached by chance: with a third less expected, in fewer than 1 of
+100 000 places (Poisson)."""
 
 MOST = 0.25
-"""Of pixels so coarse that each holds points no larger share is asked for."""
+"""Maximum required share of pixels with points, for pixels so coarse that each has one."""
 
 
 def least_density(density: float, pixel: float) -> float:
-    """Points per m² that lining must hold to be searched.
+    """Return the points per m² that lining must have to be searched.
 
-    So many that the widest median filter holds MEDIAN_PIXELS pixels with points, no fewer than ``density``.
+    The widest median filter then has MEDIAN_PIXELS pixels with points; at least ``density``.
 
     Parameters
     ----------
     density : float
-        What is wanted, points per m².
+        Required density, points per m².
     pixel : float
         Side of a pixel, m.
     """
@@ -44,11 +44,11 @@ def least_density(density: float, pixel: float) -> float:
 
 
 def leave_out_sparse(picture: LiningImage, density: float) -> float:
-    """Take from a picture, in place, the lining about which it holds too few points, as if there were none.
+    """Remove from a picture, in place, the lining with too few points around it, as if it had none.
 
-    About each tile the lining that could be seen, in a square as large as the widest median filter, must show in as many
-    pixels as so many points strewn at random fill; and so it must in a square three times as wide, unless the first holds so
-    many that it's by no chance. What is taken from a profile nearby counts as it does for the filter.
+    Around each tile, in a square as large as the widest median filter, the possible lining must have as many pixels with points
+    as this density of random points fills. A square three times as wide must too, unless the first has so many that chance is
+    excluded. Values from a nearby profile count as they do for the filter.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def leave_out_sparse(picture: LiningImage, density: float) -> float:
     Returns
     -------
     float
-        Share of the kilometre's lining, where there are points at all, that was left out.
+        Share removed of the kilometre's lining that has any points.
     """
     grid, state = picture.grid, picture.state
     rows = _edges(grid.rows, -grid.bottom - grid.rows)
@@ -85,12 +85,12 @@ def leave_out_sparse(picture: LiningImage, density: float) -> float:
 
 
 def _about(tiles: Int64, reach: int) -> Int64:
-    """Sum of each tile and those so far about it, beyond the ends of which there is nothing."""
+    """Sum each tile and those up to ``reach`` around it; there is nothing beyond the ends."""
     around: Int64 = convolve(tiles, np.ones((2 * reach + 1, 2 * reach + 1), np.int64), mode="constant")
     return around
 
 
 def _edges(count: int, first: int) -> Int64:
-    """Where tiles begin among so many pixels, the first of which has this number, and the end of the last."""
+    """Return the edges of tiles among so many pixels, the first with this number, and the end of the last."""
     inside = np.arange(-first % TILE, count, TILE, dtype=np.int64)
     return np.unique(np.concatenate([[0], inside, [count]]))

@@ -1,4 +1,4 @@
-"""Which pixels are dark: three-sigma threshold and median filter (Xu et al., 2018, eq. 19–20 and fig. 9c)."""
+"""Dark pixels: three-sigma threshold and median filter (Xu et al., 2018, eq. 19–20 and fig. 9c)."""
 
 from __future__ import annotations
 
@@ -16,20 +16,19 @@ from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import mask_of_polygons
 
 MEDIAN = 5
-"""Side of the median filter where every pixel holds points, pixels."""
+"""Side of the median filter if every pixel has points, pixels."""
 
 MEDIAN_PIXELS = 12
-"""The filter is widened until it holds so many pixels with points on average."""
+"""Mean number of pixels with points to which the filter is widened."""
 
 ENOUGH = 0.2
-"""Share of those pixels from which the filter tells whether its middle is dark."""
+"""Minimum share of those pixels for the filter to decide about its middle."""
 
 
 def filter_size(filled: float) -> int:
-    """Side of the median filter, pixels (odd), for an image of whose pixels the share ``filled`` hold points.
+    """Return the side of the median filter, pixels (odd), for an image with the share ``filled`` of pixels with points.
 
-    Where profiles are farther apart than pixels are wide, a filter of five pixels would hold a handful of
-    values.
+    If profiles are farther apart than pixels are wide, a filter of five pixels would have only a handful of values.
     """
     size = MEDIAN
     while size * size * filled < MEDIAN_PIXELS and size < MAX_MEDIAN:
@@ -40,14 +39,14 @@ def filter_size(filled: float) -> int:
 def dark_pixels(contrast: ContrastImage, size: int) -> Bool:
     """Mark dark pixels.
 
-    A lining pixel that lies more than three local standard deviations below the local level of the background is dark
-    (eq. 20). The median of the dark and other ones about each pixel then decides: single ones go, and pixels without a
-    point take the state of those about them. Appendages and floor are never dark, nor is what lies in a drawn dry region.
+    A lining pixel more than three local standard deviations below the local level of the background is dark (eq. 20). Then the
+    median of dark and other pixels around each one decides: single ones disappear, and pixels without a point take the state of
+    their surroundings. Fixtures and floor are never dark, nor are drawn dry regions.
 
     Parameters
     ----------
     contrast : ContrastImage
-        The picture relative to its background.
+        Picture relative to its background.
     size : int
         Side of the median filter, pixels.
 
@@ -70,7 +69,7 @@ def dark_pixels(contrast: ContrastImage, size: int) -> Bool:
 
 
 def averaged(contrast: ContrastImage, rows: slice) -> Int16:
-    """Drop of some rows, over the windows of their tiles; see :mod:`tunneldb.anomalies.background.texture`."""
+    """Return the darkening of some rows, over the windows of their tiles; see :mod:`tunneldb.anomalies.background.texture`."""
     half = None if contrast.texture is None else contrast.texture.half
     if half is None or not (most := int(half[rows.start // contrast.tile : (rows.stop - 1) // contrast.tile + 1].max())):
         return contrast.drop[rows]
@@ -79,7 +78,7 @@ def averaged(contrast: ContrastImage, rows: slice) -> Int16:
 
 
 def seen_lining(state: UInt8, size: int) -> Iterator[tuple[slice, Bool]]:
-    """Tell which lining was seen: holds points, or has enough about it that does for the median filter to tell if it is dark.
+    """Yield the inspected lining: with points, or enough of them around it for the median filter to decide if it is dark.
 
     Parameters
     ----------
@@ -102,5 +101,5 @@ def seen_lining(state: UInt8, size: int) -> Iterator[tuple[slice, Bool]]:
 
 
 def _least_votes(size: int) -> int:
-    """So many pixels of a filter, or fewer, don't tell whether its middle is dark."""
+    """Return the number of pixels of a filter up to which it cannot decide about its middle."""
     return int(ENOUGH * min(size * size, MEDIAN_PIXELS))

@@ -1,4 +1,4 @@
-"""What a dark region is: a leak, a joint, or something else that is dark but dry; how probable, and what speaks for it."""
+"""Classification of a dark region: a leak, a joint, or a dry dark area, with probability and evidence."""
 
 from __future__ import annotations
 
@@ -17,37 +17,37 @@ from tunneldb.arrays import Float
 Kind = Literal["leak", "joint", "dark"]
 
 NAMED = 0.5
-"""What changes the odds by less than a factor of 1.6 is not named as a reason."""
+"""Minimum factor on the odds, 1.6 as a logarithm, for a reason to be named."""
 
 BUILT = ("thin", "rectangular", "stripe", "shape")
-"""Reasons that go by the outline, of which few profiles tell nothing."""
+"""Reasons based on the outline, which few profiles do not show."""
 
 LINE = NAMES.index("line")
-"""Number of the feature that tells joints from other things that are dark but dry."""
+"""Number of the feature that separates joints from other dry dark areas."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a region is taken for.
+    """Classification of a region.
 
     Attributes
     ----------
     kind : {'leak', 'joint', 'dark'}
-        A leak; a joint; or dark but dry.
+        A leak; a joint; or a dry dark area.
     reasons : tuple of str
-        Of what is no leak: what it looks like, then what else the model goes by, the strongest first. Of a leak what makes it
-        doubtful, at last that it is ``sparse``: on fewer than FEW_PROFILES profiles that lie apart, so that its length and
-        area may be wrong by as much as themselves.
+        If not a leak: what it looks like, then further evidence, the strongest first. If a leak: reasons for doubt, and last
+        ``sparse``: on fewer than FEW_PROFILES profiles far apart, so that its length and area may be wrong by as much as
+        themselves.
     confidence : float
-        Probability that it is of its kind, 0 to 1; of joints and what is dark that it is no leak.
+        Probability of its kind, 0 to 1; for joints and dry dark areas that it is no leak.
     evidence : mapping
-        By how much each reason changes the odds of a leak, as logarithms; positive: for it.
+        Change of the log odds of a leak by each reason; positive: for a leak.
     features : (len(FEATURES),) float array
-        What was measured of it.
+        Its features.
     outline : float
-        How much its outline tells, 0 to 1: by so much the reasons of BUILT count.
+        Reliability of its outline, 0 to 1: weight of the reasons of BUILT.
     model : str
-        Version of the model that judged.
+        Version of the model used.
     """
 
     kind: Kind
@@ -60,15 +60,15 @@ class Verdict:
 
 
 def classify(region: Region, features: Float | None = None, model: EvidenceModel | None = None) -> Verdict:
-    """Tell what a region is, by its features: a leak if that is more probable than not.
+    """Classify a region by its features: as a leak if that is more probable than not.
 
     Parameters
     ----------
     region : Region
     features : (len(FEATURES),) float array, optional
-        What was measured of it; by default what can be of a region by itself.
+        Its features; by default those of the region by itself.
     model : EvidenceModel, optional
-        What judges it; by default the model that comes with the program.
+        Model to use; by default the one that comes with the program.
     """
     model = model or standard_model()
     features = measure_features(region) if features is None else features
@@ -87,12 +87,12 @@ def classify(region: Region, features: Float | None = None, model: EvidenceModel
 
 
 def weigh(model: EvidenceModel, features: Float, outline: Float) -> Float:
-    """What features (n, len(FEATURES)) add to the odds, as logarithms, where outlines (n,) tell more or less."""
+    """Return the contributions of features (n, len(FEATURES)) to the log odds, with outlines (n,) of given reliability."""
     return weigh_built(model.contributions(features), outline)
 
 
 def weigh_built(contributions: Float, outline: Float) -> Float:
-    """What features (n, len(FEATURES)) say, less where they go by outlines (n,) that tell less."""
+    """Reduce the contributions of features (n, len(FEATURES)) based on outlines (n,) by the reliability of these."""
     built = np.array([feature.reason in BUILT for feature in FEATURES])
     return contributions * np.where(built, outline[:, None], 1.0)
 

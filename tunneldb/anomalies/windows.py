@@ -13,11 +13,11 @@ from tunneldb.raster.pixel_state import PixelState
 Counts = TypeVar("Counts", UInt8, UInt16)
 
 ROWS = 64
-"""Rows that are worked on at a time: what is made of them stays in a processor's cache."""
+"""Number of rows processed at a time: their data stay in a processor's cache."""
 
 
 def row_blocks(count: int, half: int) -> Iterator[tuple[slice, slice]]:
-    """Blocks of so many rows, and the rows of each with up to ``half`` more to either side."""
+    """Yield blocks of so many rows, and the rows of each with up to ``half`` more to either side."""
     size = max(ROWS, 2 * half)
     for top in range(0, count, size):
         stop = min(top + size, count)
@@ -25,22 +25,22 @@ def row_blocks(count: int, half: int) -> Iterator[tuple[slice, slice]]:
 
 
 def on_lining(state: UInt8) -> Bool:
-    """Which pixels hold points on lining, set back in a recess or not."""
+    """Return True for pixels with points on lining, recessed or not."""
     lining: Bool = (state == PixelState.LINING) | (state == PixelState.RECESS)
     return lining
 
 
 def count_about(mask: Bool, rows: slice, about: slice, half: int) -> UInt16:
-    """Count the pixels of a mask in the square about each pixel.
+    """Count the pixels of a mask in the square around each pixel.
 
     Parameters
     ----------
     mask : (m, columns) bool array
         Rows ``about`` of an image, beyond which nothing counts.
     rows, about : slice
-        Rows to be counted about, and those of the mask, as `row_blocks` gives them.
+        Rows to count around, and those of the mask, from `row_blocks`.
     half : int
-        The square reaches so many pixels to either side, at most 127.
+        Half-width of the square, pixels, at most 127.
 
     Returns
     -------
@@ -51,13 +51,13 @@ def count_about(mask: Bool, rows: slice, about: slice, half: int) -> UInt16:
     held[above : above + len(mask)] = mask
     columns: UInt16 = np.zeros((rows.stop - rows.start, mask.shape[1] + 2 * half), np.uint16)
     columns[:, half : half + mask.shape[1]] = _sum_along(held, size)
-    # Of the transposed image, so that one function does for both axes.
+    # The image is transposed, so that one function serves both axes.
     counts: UInt16 = _sum_along(columns.T, size).T
     return counts
 
 
 def count_in_columns(mask: Bool) -> Int64:
-    """Pixels of each column of a mask (rows, columns)."""
+    """Count the pixels of each column of a mask (rows, columns)."""
     counts = np.zeros(mask.shape[1], np.int64)
     for top in range(0, len(mask), 255):  # as many as a byte can count
         counts += np.add.reduce(mask[top : top + 255].view(np.uint8), axis=0, dtype=np.uint8)
@@ -65,7 +65,7 @@ def count_in_columns(mask: Bool) -> Int64:
 
 
 def _sum_along(values: Counts, size: int) -> Counts:
-    """Sum of each value and the next ``size`` - 1 (even) along the first axis, from sums of 1, 2, 4 … of them."""
+    """Sum each value and the next ``size`` - 1 (even) along the first axis, from sums of 1, 2, 4 … of them."""
     count = len(values) - size + 1
     total, at, power = values[:count].copy(order="K"), 1, 1
     while 2 * power <= size:

@@ -1,1 +1,1 @@
-"""Level and standard deviation of the lining that is not dark, and how much darker than it each pixel is."""
+"""Level and standard deviation of the dry lining (background), and the darkening of each pixel relative to it."""

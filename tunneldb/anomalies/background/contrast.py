@@ -1,4 +1,4 @@
-"""The picture of a kilometre relative to its background: by how much each pixel is darker."""
+"""Picture of a kilometre relative to its background: darkening of each pixel."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tunneldb.raster.polygons import mask_of_polygons
 
 @dataclass(frozen=True)
 class ContrastImage:
-    """State of all pixels of a picture, and how much darker than the background they are.
+    """State of all pixels of a picture, and their darkening relative to the background.
 
     Attributes
     ----------
@@ -27,22 +27,22 @@ class ContrastImage:
     state : (rows, columns) uint8 array
         Values of :class:`tunneldb.raster.pixel_state.PixelState`.
     drop : (rows, columns) int16 array
-        Level of the background there less that of the pixel, in steps of 0.01 dB, positive where it is darker; NODATA where
-        there is no point. What lies in drawn dry regions is at most 0.
+        Darkening: level of the background minus that of the pixel, in steps of 0.01 dB, positive where the pixel is darker;
+        NODATA where there is no point. In drawn dry regions it is at most 0.
     tile : int
         Side of the tiles of ``sigma``, pixels.
     sigma : (tiles down, tiles along) float32 array
-        Standard deviation of the background, dB; of pixel (i, j) in tile (i // tile, j // tile).
+        Standard deviation of the background, dB; for pixel (i, j) in tile (i // tile, j // tile).
     drawn : tuple of Polygon
         Dry regions that the user drew, in the unrolled plane, m.
     spacing : float
-        Distance of profiles along the tunnel, m, where pixels between them show what the nearest one does; 0 where profiles lie
-        as close as pixels.
+        Distance of profiles along the tunnel, m, if pixels between them take the value of the nearest profile; 0 if profiles
+        are as close as pixels.
     between : (rows, columns) bool array or None
-        Those pixels.
+        True for those pixels.
     texture : Texture or None
-        The windows over which lining is averaged before it is told whether it is dark, and that ``sigma`` is of. None: pixels
-        by themselves.
+        Windows over which lining is averaged before dark lining is detected, and to which ``sigma`` refers. None: single
+        pixels.
     """
 
     grid: PixelGrid
@@ -57,7 +57,7 @@ class ContrastImage:
 
 
 def contrast_image(picture: LiningImage, background: BackgroundMap) -> ContrastImage:
-    """Take the level of the background from that of all pixels, in the memory of ``picture.level``, which is lost."""
+    """Subtract all pixels from the background level, in the memory of ``picture.level``, which is overwritten."""
     drop = picture.level
     background.level.subtract(drop)
     spacing, between = 0.0, None

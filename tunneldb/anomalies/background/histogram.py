@@ -1,4 +1,4 @@
-"""Mean and standard deviation of the background in histograms of what a picture shows beyond a model of its level."""
+"""Mean and standard deviation of the background, from histograms of the residuals of a picture from a model of its level."""
 
 from __future__ import annotations
 
@@ -18,47 +18,47 @@ from tunneldb.raster.pixel_state import PixelState
 from tunneldb.robust import MAD_TO_SIGMA
 
 BIN = 0.05
-"""Width of a bin, dB: half the standard deviation of pixels that average many points; means come out far finer."""
+"""Width of a bin, dB: half the standard deviation of pixels that average many points; means are far more precise."""
 
 BINS = 384
-"""Bins of the histograms of rows and columns; the middle one begins at 0."""
+"""Number of bins of the histograms of rows and columns; the middle one begins at 0."""
 
 TILE_BINS = 160
-"""Bins of the histograms of tiles."""
+"""Number of bins of the histograms of tiles."""
 
 SHORTH = 0.25
-"""Share of all values in the shortest run of bins that marks where the background lies.
+"""Share of all values in the shortest run of bins that locates the background.
 
-It is less than that of `radiometry.robust_statistics`, 0.4, for a column, a row or a tile may be half wet, all values of a
-kilometre are not. Up to 30 % of darker pixels both give the same from some hundred values on; of a hundred, 0.4 scatters less;
-at 50 % the mean is less wrong with 0.25, by LONGER still less. At 60 % nothing helps.
+It is less than that of `radiometry.robust_statistics`, 0.4, because a column, a row or a tile may be half wet, while all
+values of a kilometre are not. Up to 30 % of darker pixels both give the same from some hundred values on; with a hundred
+values, 0.4 scatters less. At 50 % the mean is less wrong with 0.25, and even less with LONGER. At 60 % neither works.
 """
 
 LONGER = 1.5
-"""Of runs of bins up to so much longer than the shortest the brightest is taken: where half is wet, it is the dry one."""
+"""Factor on the shortest run; among runs up to that length the brightest is used: if half is wet, it is the dry one."""
 
 PER_LEVEL = STEP["corrected"] / BIN
 
 CHUNK = 10
-"""Rows, or tiles along the tunnel, that are worked on together: their histograms fit a processor's cache."""
+"""Number of rows, or tiles along the tunnel, processed together: their histograms fit a processor's cache."""
 
 LINING = int(PixelState.LINING)
 
 
 @dataclass(frozen=True)
 class Residuals:
-    """What the lining of a picture shows beyond a model of the background.
+    """Residuals of the lining of a picture from a model of the background.
 
     Attributes
     ----------
     picture : LiningImage
         State and level of the pixels.
     model : BackgroundLevel
-        The model.
+        Model of the background.
     used : (tiles down, tiles along) bool array
-        Tiles that are looked at.
+        Tiles to use.
     every : int
-        Of these every n-th row or tile is.
+        Use only every n-th row or tile.
     """
 
     picture: LiningImage
@@ -67,9 +67,9 @@ class Residuals:
     every: int
 
     def of_rows(self, beside: int, enough: int) -> tuple[Single, Single]:
-        """Mean of the background in each row: about each block, from so many blocks beside it, and everywhere.
+        """Return the mean of the background in each row: around each block, from blocks up to ``beside`` away, and everywhere.
 
-        (rows, blocks) and (rows,), dB; NaN where there are not enough values.
+        (rows, blocks) and (rows,), dB; NaN if there are not enough values.
         """
         rows, blocks = self.model.bands.shape
         tiles = self.model.smooth.shape[1]
@@ -85,7 +85,7 @@ class Residuals:
         return found[:, :-1], found[:, -1]
 
     def of_columns(self, enough: int) -> Single:
-        """Mean of the background in each column (columns,), dB; NaN where there are not enough values."""
+        """Return the mean of the background in each column (columns,), dB; NaN if there are not enough values."""
         tile, tiles = self.model.tile, self.model.smooth.shape[1]
         rows = self._rows()
         lines = self.model.lines(rows)
@@ -100,7 +100,7 @@ class Residuals:
         return found
 
     def of_tiles(self) -> UInt16:
-        """Histograms (tiles down, tiles along, bins)."""
+        """Return the histograms (tiles down, tiles along, bins)."""
         down, along = self.model.smooth.shape
         rows = self._rows()
         found = np.empty((down, along, TILE_BINS), np.uint16)
@@ -129,7 +129,7 @@ class Residuals:
         bins: int,
         lines: Single | None = None,
     ) -> Int32:
-        """Histograms (count, bins) of some rows; see :func:`_add`."""
+        """Return histograms (count, bins) of some rows; see :func:`_add`."""
         histograms = np.zeros((count, bins), np.int32)
         model = self.model.lines(rows) if lines is None else lines, self.model.rings, *self._weights
         pixels = self.picture.state, self.picture.level, self.used
@@ -138,21 +138,21 @@ class Residuals:
 
 
 def window_statistics(histograms: UInt16, used: Bool, half: int) -> tuple[Single, Single, Int32]:
-    """Mean and standard deviation of the background in windows of 2 ``half`` + 1 tiles to a side about each tile.
+    """Compute mean and standard deviation of the background in windows of 2 ``half`` + 1 tiles a side around each tile.
 
     Parameters
     ----------
     histograms : (tiles down, tiles along, bins) uint16 array
-        Of the tiles.
+        Histograms of the tiles.
     used : (tiles down, tiles along) bool array
-        Those that count.
+        True for tiles to include.
     half : int
         Tiles.
 
     Returns
     -------
     mean, sigma : (tiles down, tiles along) float32 arrays
-        dB; NaN where there is nothing.
+        dB; NaN if there is no value.
     count : (tiles down, tiles along) int32 array
         Number of values.
     """
@@ -171,7 +171,7 @@ def window_statistics(histograms: UInt16, used: Bool, half: int) -> tuple[Single
 
 
 def _windows(histograms: Int32, half: int) -> Int32:
-    """Sums over so many places to either side along the first axis."""
+    """Sum over so many places to either side along the first axis."""
     if half == 0:
         return histograms
     until = np.zeros((len(histograms) + 1, *histograms.shape[1:]), np.int32)
@@ -181,9 +181,9 @@ def _windows(histograms: Int32, half: int) -> Int32:
 
 
 def histogram_statistics(histograms: Int32) -> tuple[Float, Float, Int64]:
-    """Mean and standard deviation of the background in histograms, as in `radiometry.robust_statistics`.
+    """Compute mean and standard deviation of the background in histograms, as `radiometry.robust_statistics` does.
 
-    Values are taken for evenly spread over their bin.
+    Values are treated as evenly spread over their bin.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def histogram_statistics(histograms: Int32) -> tuple[Float, Float, Int64]:
     Returns
     -------
     mean, sigma : (n,) float arrays
-        dB; NaN where there is no value.
+        dB; NaN if there is no value.
     count : (n,) int array
         Number of values.
     """
@@ -205,11 +205,11 @@ def histogram_statistics(histograms: Int32) -> tuple[Float, Float, Int64]:
 
 @kernel
 def _statistics(histograms: Int32, until: Float, found: Float) -> None:  # pragma: no cover - compiled
-    """Mean and standard deviation, in bins, and number of values of each histogram.
+    """Compute mean and standard deviation, in bins, and number of values of each histogram.
 
-    The shortest interval that holds a share SHORTH of the values marks the background (Rousseeuw and Leroy, 1988: shorth), the
-    lesser of the median deviations above and below its mean its standard deviation; then values within CLIP of it are averaged,
-    until both rest.
+    The shortest interval with a share SHORTH of the values locates the background (Rousseeuw and Leroy, 1988: shorth). The
+    smaller of the median deviations above and below its mean is its standard deviation. Then values within CLIP of it are
+    averaged, until both converge.
     ``until`` (bins + 1, 3) is working memory: number, sum and sum of squares up to each bin.
     """
     for n in range(histograms.shape[0]):
@@ -229,7 +229,7 @@ def _statistics(histograms: Int32, until: Float, found: Float) -> None:  # pragm
             until[k + 1, 1] = until[k, 1] + value * (k + 0.5)
             until[k + 1, 2] = until[k, 2] + value * (k * (k + 1.0) + 1.0 / 3.0)
         total = until[bins, 0]
-        # The first turn finds the length of the shortest run of bins, the second one the brightest that is hardly longer.
+        # The first pass finds the length of the shortest run of bins, the second the brightest run that is hardly longer.
         wanted, shortest, mean = SHORTH * total, float(bins + 1), 0.0
         for turn in range(2):
             low = 0
@@ -243,7 +243,7 @@ def _statistics(histograms: Int32, until: Float, found: Float) -> None:  # pragm
                             shortest = float(k - low)
                     elif k - low <= LONGER * shortest:
                         mean = (until[k, 1] - until[low, 1]) / held
-        # Water makes the dark side wider, salts the bright one: the narrower side tells the standard deviation.
+        # Water makes the dark side wider, salts the bright one: the narrower side gives the standard deviation.
         below = until[int(mean), 0] + histograms[n, first + int(mean)] * (mean - int(mean))
         median = [float(bins), 0.0]
         for turn, wanted in enumerate((0.5 * (below + total), 0.5 * below)):
@@ -277,7 +277,7 @@ def _statistics(histograms: Int32, until: Float, found: Float) -> None:  # pragm
             mean, sigma = centre, wider
             if rests:
                 break
-        # Less Sheppard's correction for the width of the bins.
+        # Minus Sheppard's correction for the width of the bins.
         variance = sigma * sigma - 1.0 / 12.0
         found[0, n], found[1, n], found[2, n] = first + mean, math.sqrt(variance) if variance > 0.0 else 0.0, total
 
@@ -301,9 +301,9 @@ def _add(
     bins: int,
     histograms: Int32,
 ) -> None:  # pragma: no cover - compiled
-    """Add what lining shows beyond the model in some rows (n,) to histograms (cells * bins,).
+    """Add the residuals of lining in some rows (n,) to histograms (cells * bins,).
 
-    Every ``step``-th tile from ``begin`` (n,) to ``stop`` is looked at, if used. The model is ``rings`` and, interpolated by
+    Every ``step``-th tile from ``begin`` (n,) to ``stop`` is included, if used. The model is ``rings`` and, interpolated by
     ``middles`` and ``weights``, ``lines`` (n, tiles). Pixels of a tile are counted in the histogram of cell ``row_cell`` (n,)
     + ``tile_cell`` (tiles,), and ``stride`` further for each column of the tile.
     """

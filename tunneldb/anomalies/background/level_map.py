@@ -1,4 +1,4 @@
-"""Level and standard deviation of the background, lining that is dry, everywhere in the picture of a kilometre."""
+"""Level and standard deviation of the background (dry lining) everywhere in the picture of a kilometre."""
 
 from __future__ import annotations
 
@@ -16,32 +16,32 @@ from tunneldb.raster.image import LiningImage
 from tunneldb.raster.pixel_state import PixelState
 
 TILE = 0.5
-"""Side of a tile, about, m."""
+"""Approximate side of a tile, m."""
 
 PASSES = 2
-"""How often bands, rings and what changes slowly are told apart anew, each from what the others leave."""
+"""Number of passes in which bands, rings and the smooth part are fitted again, each to the residuals of the others."""
 
 SHOWN = 2_000_000
-"""Pixels, about, that mean and spread of the kilometre are told from."""
+"""Approximate number of pixels for mean and spread of the kilometre."""
 
 
 @dataclass(frozen=True)
 class BackgroundMap:
-    """Level and standard deviation of the background, locally.
+    """Local level and standard deviation of the background.
 
     Attributes
     ----------
     grid : Grid
         The pixels.
     level : BackgroundLevel
-        The level: that of the kilometre, of each column (rings of other concrete), of each row by blocks of 50 m (soot,
-        grime, stripes), and what changes slowly, by tiles.
+        Level: of the kilometre, of each column (rings of other concrete), of each row by blocks of 50 m (soot, grime, stripes),
+        and a smooth part by tiles.
     sigma : (tiles down, tiles along) float32 array
-        Standard deviation, dB, above 0; of pixel (i, j) in tile (i // level.tile, j // level.tile).
+        Standard deviation, dB, above 0; for pixel (i, j) in tile (i // level.tile, j // level.tile).
     mean, spread : float
         Medians over the lining of level and standard deviation, dB; NaN without lining.
     count : int
-        Pixels that it rests on; 0: there is no lining.
+        Number of pixels used; 0 if there is no lining.
     drawn : tuple of Polygon
         Dry regions that the user drew, in the unrolled plane, m.
     """
@@ -58,17 +58,17 @@ class BackgroundMap:
 def map_background(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) -> BackgroundMap:
     """Map the background of a picture.
 
-    Level and standard deviation are those of the dry part of the lining (`radiometry.robust_statistics`):
-    of a column, of a row along 150 m, of windows of tiles. As long as no more than half of each is wet, leaks don't count.
-    Lining set back behind the wall doesn't count either, nor what lies between profiles.
+    Level and standard deviation are those of the dry part of the lining (`radiometry.robust_statistics`): of a column, of a row
+    along 150 m, of windows of tiles. As long as no more than half of each is wet, leaks have no influence. Recessed lining, and
+    pixels between profiles, are not used either.
 
     Parameters
     ----------
     picture : LiningImage
         State and level of the pixels.
     dry_regions : sequence of Polygon
-        Dry lining that the user drew, in the unrolled plane, m. Tiles that lie in it for the larger part take plain mean
-        and standard deviation (Xu et al., 2018, eq. 19) of the pixels in it, however dark these are; others are left alone.
+        Dry lining that the user drew, in the unrolled plane, m. Tiles mostly inside it take plain mean and standard deviation
+        (Xu et al., 2018, eq. 19) of the pixels in it, however dark these are; other tiles are not affected.
     """
     spacing = 0.0 if picture.gaps is None else picture.gaps.spacing
     picture = picture.measured()
@@ -87,14 +87,14 @@ def map_background(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) ->
 
 
 def _tile_side(grid: Grid) -> int:
-    """Side of a tile, pixels: what divides a block and is nearest to TILE, so that tiles always lie at the same chainages."""
+    """Return the side of a tile, pixels: the divisor of a block nearest to TILE, so that tiles are at fixed chainages."""
     sides = np.arange(1, grid.block_columns + 1)
     sides = sides[grid.block_columns % sides == 0]
     return int(sides[np.argmin(np.abs(sides * grid.pixel - TILE))])
 
 
 def _nothing(grid: Grid, tile: int, drawn: tuple[Polygon, ...]) -> BackgroundMap:
-    """Map of a picture without lining."""
+    """Return the map of a picture without lining."""
     shape = -(-grid.rows // tile), grid.columns // tile
     parts = np.zeros(grid.columns, np.float32), np.zeros((grid.rows, grid.blocks), np.float32), np.zeros(shape, np.float32)
     level = BackgroundLevel(tile, 0.0, *parts)
@@ -102,7 +102,7 @@ def _nothing(grid: Grid, tile: int, drawn: tuple[Polygon, ...]) -> BackgroundMap
 
 
 def _mean_level(level: BackgroundLevel, state: UInt8) -> float:
-    """Median over the lining of the level of the background, from some of its rows, dB; NaN without lining there."""
+    """Return the median over the lining of the background level, from some of its rows, dB; NaN without lining there."""
     rows, columns = state.shape
     every = max(1, rows * columns // SHOWN)
     levels = []
@@ -114,7 +114,7 @@ def _mean_level(level: BackgroundLevel, state: UInt8) -> float:
 
 
 def _weighted_median(values: Single, weights: Int64) -> float:
-    """Median of values that count so often."""
+    """Return the weighted median of values."""
     order = np.argsort(values, axis=None)
     until = np.cumsum(weights.ravel()[order])
     return float(values.ravel()[order][np.searchsorted(until, 0.5 * until[-1])])

@@ -1,4 +1,4 @@
-"""Model of the background, fitted to a picture step by step: base, rings, bands and what changes slowly."""
+"""Model of the background, fitted to a picture step by step: base, rings, bands and a smooth part."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import mask_of_polygons
 
 SAMPLE, LINES = 15_000_000, 6_000_000
-"""Pixels, about, that are looked at for tiles, and for rows and columns, which hold far more each."""
+"""Approximate number of pixels used for tiles; rows and columns use the same, and have far more each."""
 
 BESIDE = 1
-"""Blocks to either side by which a band is told: with the block itself 150 m, of which a leak is a small part."""
+"""Number of blocks to either side for a band: with the block itself 150 m, of which a leak is a small part."""
 
 ROW = 0.1
 """Length of the running median across bands, m: joints along the tunnel are narrower than half of it."""
@@ -33,41 +33,41 @@ RING = 0.3
 """Length of the running median along rings, m: joints are narrower than half of it, steps stay sharp."""
 
 PROFILE = 0.5
-"""Columns up to so many spacings apart are of one profile, which need not stand upright on the axis."""
+"""Distance, in spacings, up to which columns belong to one profile, which need not be perpendicular to the axis."""
 
 NARROW = 0.6
-"""Rings are longer, m: a darker one is a joint that leaks all round."""
+"""Minimum length of a ring, m: a narrower dark one is a joint that leaks all round."""
 
 ENOUGH = 100
-"""Values that tell the level of the background to a tenth of their standard deviation, about."""
+"""Number of values that give the background level to about a tenth of their standard deviation."""
 
 FEW = 10
-"""From fewer values no level is told."""
+"""Minimum number of values for a level."""
 
 PART = 0.15
-"""Part of what a row or a column holds on average from which its level is told."""
+"""Minimum number of values of a row or a column for a level, as a share of the mean number."""
 
 AROUND = 2.0
-"""Half the side of the windows for the standard deviation, m: they hold a few segments of a ring."""
+"""Half the side of the windows for the standard deviation, m: they contain a few segments of a ring."""
 
 BETWEEN = 5.0
-"""Half the side of the windows in which it is told by how much tiles differ, m: they hold some segments and blocks."""
+"""Half the side of the windows for the differences between tiles, m: they contain several segments and blocks."""
 
 FEW_TILES = 50
-"""Fewer tiles don't tell it."""
+"""Minimum number of tiles for these differences."""
 
 LEAST = 10.0
-"""Percentile of the standard deviations of the kilometre below which none falls."""
+"""Percentile of the kilometre's standard deviations that is the lower limit of all."""
 
 DRAWN = 0.5
-"""Part of a tile's lining that must lie in drawn dry regions for them to rule it."""
+"""Minimum share of a tile's lining in drawn dry regions for these to determine its level."""
 
 VALUES = 4_000_000
-"""So many values at most are sorted at a time."""
+"""Maximum number of values sorted at a time."""
 
 
 class BackgroundFit:
-    """Model of the background of a picture that holds lining; see `BackgroundLevel` for its parts.
+    """Model of the background of a picture with lining; see `BackgroundLevel` for its parts.
 
     Parameters
     ----------
@@ -76,11 +76,11 @@ class BackgroundFit:
     tile : int
         Side of a tile, pixels.
     count : int
-        Its lining pixels.
+        Number of lining pixels.
     drawn : sequence of Polygon
         Drawn dry regions.
     spacing : float
-        Distance of profiles along the tunnel, m; 0 where they lie as close as pixels.
+        Distance of profiles along the tunnel, m; 0 if they are as close as pixels.
     """
 
     def __init__(self, picture: LiningImage, tile: int, count: int, drawn: Sequence[Polygon], spacing: float = 0.0) -> None:
@@ -104,11 +104,11 @@ class BackgroundFit:
 
     @property
     def level(self) -> BackgroundLevel:
-        """The model as far as it is known."""
+        """Return the model in its current state."""
         return BackgroundLevel(self.tile, self.base, self.rings, self.bands, self.smooth)
 
     def add_bands(self) -> None:
-        """Add what each row shows: about each block, or where too little is seen of it, in the whole kilometre."""
+        """Add the band of each row: around each block, or if too little of it is seen, over the whole kilometre."""
         scanned, per_block = int(self.lining.any(axis=0).sum()), self.smooth.shape[1] // self.bands.shape[1]
         along = min(scanned, (2 * BESIDE + 1) * per_block)
         enough = max(FEW, round(PART * along * self.per_tile / self.tile / self.apart))
@@ -123,15 +123,15 @@ class BackgroundFit:
         self.bands += ndimage.median_filter(found, (size, 1), mode="nearest")
 
     def add_rings(self) -> None:
-        """Add what each column shows, without joints.
+        """Add the level of each column, without joints.
 
-        Profiles that lie apart can't tell a joint from a ring: each takes the level that it shows itself.
+        Profiles at a distance cannot separate a joint from a ring: each takes its own level.
         """
         pixel = self.grid.pixel
         per_column = self.per_tile * self.lining.shape[0] / self.tile
         enough = max(FEW, round(PART * per_column / self.apart))
         found = Residuals(self.picture, self.level, self._plain, self.apart).of_columns(enough)
-        # Where columns hold little, more of them are taken together.
+        # Where columns have few values, more of them are combined.
         least = 10.0 * ENOUGH / max(per_column, 1.0)
         size = _odd(PROFILE * self.spacing / pixel if self.spacing else max(RING / pixel, least))
         found = _running_median(found, size // 2)
@@ -146,7 +146,7 @@ class BackgroundFit:
         self.rings = np.where(closed - rings > 0.5 * self.spread, closed, rings).astype(np.float32)
 
     def add_smooth(self) -> None:
-        """Add what changes slowly."""
+        """Add the smooth part."""
         held = max(self.per_tile / self.every, 1e-3)
         half = int(np.ceil((np.sqrt(ENOUGH / held) - 1) / 2)) if held < ENOUGH else 0
         histograms = self._histograms()
@@ -162,7 +162,7 @@ class BackgroundFit:
         self.smooth, self.outlying = smooth_level(level, self.smooth, self.spread, self.fixed)
 
     def sigma(self) -> Single:
-        """Standard deviation about the model, by tiles, dB: of pixels, and of what whole tiles differ by beyond it."""
+        """Compute the standard deviation about the model, by tiles, dB: of pixels, plus the differences between whole tiles."""
         half = max(1, round(AROUND / (self.tile * self.grid.pixel)))
         while (2 * half + 1) ** 2 * self.per_tile / self.every < 4 * ENOUGH and half < 10:
             half += 1
@@ -185,9 +185,9 @@ class BackgroundFit:
         return sigma
 
     def _between(self, histograms: UInt16) -> Single:
-        """Standard deviation of whole tiles about the model, dB: segments and blocks differ, towards bright as towards dark.
+        """Compute the standard deviation of whole tiles about the model, dB: segments and blocks are darker or brighter.
 
-        Of the tiles about each one, without those that are set off.
+        It uses the tiles around each one, without those set off by a sharp edge.
         """
         level, _, count = window_statistics(histograms, np.ones(self.smooth.shape, np.bool_), 0)
         known = (count >= ENOUGH) & ~self.fixed & ~self.outlying
@@ -203,13 +203,13 @@ class BackgroundFit:
 
     @property
     def _plain(self) -> Bool:
-        """Tiles with lining that nothing sets off."""
+        """Return the tiles with lining that are not set off."""
         return (self.lining > 0) & ~self.outlying
 
     def _drawn_moments(self, smooth: Single) -> tuple[Float, Float, Float]:
-        """Of the lining pixels in drawn regions, by tiles: number, sum and squares of what they show beyond the model.
+        """Return number, sum and sum of squares of the residuals of lining pixels in drawn regions, by tiles.
 
-        With ``smooth`` in the place of the model's.
+        ``smooth`` replaces the model's smooth part.
         """
         tile, shape = self.tile, self.smooth.shape
         moments = np.zeros((3, *shape))
@@ -224,12 +224,12 @@ class BackgroundFit:
 
 
 def _odd(length: float) -> int:
-    """Odd number of pixels next to a length in pixels."""
+    """Return the odd number of pixels nearest to a length in pixels."""
     return 2 * int(length / 2) + 1
 
 
 def _sample(state: UInt8, level: Int16, every: int) -> Int16:
-    """Level of every n-th lining pixel, row by row."""
+    """Return the level of every n-th lining pixel, row by row."""
     kept, seen = [], 0
     for row in range(len(state)):
         lining = np.flatnonzero(state[row] == PixelState.LINING)
@@ -239,7 +239,7 @@ def _sample(state: UInt8, level: Int16, every: int) -> Int16:
 
 
 def _lining_pixels(state: UInt8, tile: int) -> Int64:
-    """Lining pixels of each tile (tiles down, tiles along)."""
+    """Count the lining pixels of each tile (tiles down, tiles along)."""
     tiles = state.shape[1] // tile
     return np.array(
         [
@@ -250,7 +250,7 @@ def _lining_pixels(state: UInt8, tile: int) -> Int64:
 
 
 def _running_median(values: Single, half: int) -> Single:
-    """Median of the known values (not NaN) within so many places; NaN where there are none."""
+    """Return the median of the known values (not NaN) within so many places; NaN if there are none."""
     padded = np.pad(values, half, constant_values=np.nan)
     size, out = 2 * half + 1, np.empty_like(values)
     for start in range(0, len(values), max(1, VALUES // size)):

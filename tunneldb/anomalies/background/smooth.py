@@ -1,4 +1,4 @@
-"""What changes slowly along and across the lining, told from what is set off by a sharp edge; on tiles of half a metre."""
+"""Smooth changes along and across the lining, separated from areas with a sharp edge; on tiles of half a metre."""
 
 from __future__ import annotations
 
@@ -9,56 +9,56 @@ from tunneldb.arrays import Bool, Float, Single
 from tunneldb.robust import MAD_TO_SIGMA
 
 LIMIT = 3.0
-"""A tile stands out when it differs by so many standard deviations of the tiles at like arcs."""
+"""Deviation from which a tile is an outlier, in standard deviations of the tiles at similar arcs."""
 
 BAND = 4
-"""So many tiles to either side in arc, of the whole kilometre, say how much tiles differ."""
+"""Number of tiles to either side in arc, over the whole kilometre, for the scatter of tiles."""
 
 EDGE, ABOUT = 3, 7
-"""Tiles to a side of the windows that show an edge itself and what it is part of: 1 m and 3 m from middle to middle."""
+"""Sides of the windows, in tiles, that show the edge itself and its surroundings: 1 m and 3 m from middle to middle."""
 
 SHARP = 0.6
-"""Part of the step about it from which an edge is sharp: one that fades over more than 1.7 m is not."""
+"""Share of the surrounding step from which an edge is sharp: an edge that fades over more than 1.7 m is not."""
 
 WIDE = (7, 13)
-"""Tiles down and along of the windows that show the level about a tile."""
+"""Tiles down and along of the windows for the level around a tile."""
 
 SMOOTH = (5, 9)
 """Tiles down and along of the median filter."""
 
 FEW = 20
-"""So many tiles tell by how much they differ."""
+"""Minimum number of tiles for their scatter."""
 
 
 def smooth_level(level: Single, before: Single, spread: float, fixed: Bool) -> tuple[Single, Bool]:
-    """Follow what changes slowly, and nothing that is set off by a sharp edge.
+    """Follow smooth changes, but no areas with a sharp edge.
 
-    Dry lining differs from place to place as much towards dark as towards bright, and wet lining is only ever darker. So
-    the brighter half of the tiles at like arcs tells by how much tiles may differ (at least ``spread``). Tiles that stand
-    out in one piece are followed when their boundary is soft: soot fades over metres, a leak or a patch ends within a
-    decimetre. Otherwise the level about them is laid over them.
+    Dry lining varies as much towards dark as towards bright, while wet lining is only ever darker. So the brighter half of the
+    tiles at similar arcs gives the expected scatter of tiles (at least ``spread``). Connected outlying tiles are followed if
+    their boundary is soft: soot fades over metres, a leak or a patch ends within a decimetre. Otherwise the surrounding level
+    is extended over them.
 
     Parameters
     ----------
     level : (tiles down, tiles along) float32 array
-        Level of the background in each tile beyond base, rings and bands, dB; NaN where it is unknown.
+        Level of the background in each tile relative to base, rings and bands, dB; NaN where it is unknown.
     before : (tiles down, tiles along) float32 array
-        What is known already to change slowly, dB; what is found is added to it.
+        Smooth part known so far, dB; the new part is added to it.
     spread : float
         Standard deviation of the pixels of the background, dB.
     fixed : (tiles down, tiles along) bool array
-        Tiles whose level is known, and kept.
+        True for tiles whose level is known and stays.
 
     Returns
     -------
     smooth : (tiles down, tiles along) float32 array
         dB; 0 everywhere if nothing is known.
     outlying : (tiles down, tiles along) bool array
-        Tiles set off by a sharp edge; fixed ones too.
+        True for tiles set off by a sharp edge, and for fixed ones.
     """
     known = np.isfinite(level)
     outlying = _outlying(level, known, spread)
-    # Soot that comes and goes hides leaks until it is taken off.
+    # Varying soot hides leaks until it is removed.
     about = ndimage.uniform_filter(extrapolate(np.where(outlying | fixed, np.nan, level)), WIDE, mode="nearest")
     outlying |= _outlying(level - about, known & ~outlying, spread)
     residual = extrapolate(np.where(outlying | fixed, np.nan, level - before))
@@ -68,7 +68,7 @@ def smooth_level(level: Single, before: Single, spread: float, fixed: Bool) -> t
 
 
 def extrapolate(values: Single) -> Single:
-    """Give unknown tiles (NaN) the mean of known ones in ever larger windows; 0 where nothing is known at all."""
+    """Fill unknown tiles (NaN) with the mean of known ones in ever larger windows; 0 if none is known."""
     out = np.asarray(values, dtype=np.float32).copy()
     known = np.isfinite(out)
     if not known.any():
@@ -77,7 +77,7 @@ def extrapolate(values: Single) -> Single:
     size = 3
     while not known.all():
         held = ndimage.uniform_filter(weight, size, mode="constant")
-        # A window's share of known tiles comes out as a sum with rounding errors.
+        # A window's share of known tiles is a sum with rounding errors.
         new = ~known & (held * size * size > 0.5)
         out[new] = (ndimage.uniform_filter(total, size, mode="constant") / np.maximum(held, 1e-9))[new]
         known |= new
@@ -86,7 +86,7 @@ def extrapolate(values: Single) -> Single:
 
 
 def _outlying(level: Single, free: Bool, spread: float) -> Bool:
-    """Tiles that stand out in pieces with a sharp boundary, and those that lie partly in them."""
+    """Return the tiles in outlying pieces with a sharp boundary, and the tiles partly inside them."""
     limit = _limits(level, free, spread)
     outlying = np.zeros(level.shape, np.bool_)
     for sign in (1.0, -1.0):
@@ -98,7 +98,7 @@ def _outlying(level: Single, free: Bool, spread: float) -> Bool:
 
 
 def _limits(level: Single, used: Bool, spread: float) -> Float:
-    """By how much a tile may differ, for each row of tiles, dB."""
+    """Return the permitted deviation of a tile, for each row of tiles, dB."""
     limit = np.full(len(level), np.nan)
     for row in range(len(level)):
         about = slice(max(row - BAND, 0), row + BAND + 1)
@@ -111,7 +111,7 @@ def _limits(level: Single, used: Bool, spread: float) -> Float:
 
 
 def _sharp(level: Single, out: Bool) -> Bool:
-    """Of tiles that stand out from the level, those in pieces whose boundary is sharp; pieces without one are."""
+    """Return those outlying tiles in pieces with a sharp boundary; a piece without a boundary counts as sharp."""
     pieces, count = ndimage.label(out)
     if not count:
         return out
@@ -123,7 +123,7 @@ def _sharp(level: Single, out: Bool) -> Bool:
 
 
 def _range(level: Single, size: int) -> Single:
-    """By how much known tiles differ in windows of so many tiles to a side."""
+    """Return the range of known tiles in windows of so many tiles a side."""
     known = np.isfinite(level)
     highest = ndimage.maximum_filter(np.where(known, level, -np.inf), size, mode="nearest")
     lowest = ndimage.minimum_filter(np.where(known, level, np.inf), size, mode="nearest")

@@ -1,4 +1,4 @@
-"""Over how large windows lining is averaged before it is told from water: where bricks, stones or facets of rock differ."""
+"""Size of the windows over which lining is averaged before detection, for walls of bricks, stones or rock facets."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.pixel_state import PixelState
 
 TOLD = 2.0
-"""A drop by so much is to be three standard deviations of dry lining, dB: wet lining is seldom less dark (Xu et al., 2018)."""
+"""Darkening that should be three standard deviations of dry lining, dB: wet lining is rarely less dark (Xu et al., 2018)."""
 
 CELL = 0.1
 """Side of the cells that windows are made of, m."""
 
 WINDOWS = (3, 5)
-"""Sides of the windows, cells: a brick is 0.25 m long, most stones of a wall and facets of rock are not much larger."""
+"""Sides of the windows, cells: a brick is 0.25 m long, most stones of a wall and rock facets are not much larger."""
 
 AROUND = 4.0
-"""Half the side of the windows in which it is told how much lining differs, m."""
+"""Half the side of the windows for the variation of lining, m."""
 
 FEW = 100
-"""From fewer cells it isn't."""
+"""Minimum number of cells for the variation."""
 
 RECESS = int(PixelState.RECESS)
 
 
 @dataclass(frozen=True)
 class Texture:
-    """Of each tile (tiles down, tiles along).
+    """Averaging windows by tile (tiles down, tiles along).
 
     Attributes
     ----------
     half : uint8 array
-        Half the side of the windows over which the lining is averaged, pixels; 0: pixels are taken by themselves.
+        Half the side of the windows over which the lining is averaged, pixels; 0: single pixels.
     sigma : float32 array
-        Standard deviation of dry lining, so averaged, dB.
+        Standard deviation of dry lining after averaging, dB.
     pixel_sigma : float32 array
-        That of pixels by themselves, dB.
+        Standard deviation of single pixels, dB.
     """
 
     half: UInt8
@@ -52,15 +52,15 @@ class Texture:
 
 
 def measure_texture(state: UInt8, drop: Int16, sigma: Single, tile: int, pixel: float) -> Texture:
-    """Choose for each tile the smallest window over which lining differs so little that a drop of TOLD stands out.
+    """Choose for each tile the smallest window in which a darkening of TOLD stands out from the variation of lining.
 
-    Noise of pixels goes with their number; what bricks, stones or facets differ by goes only where a window holds several.
-    Where pixels themselves differ little, nothing is averaged.
+    Noise of pixels decreases with their number. The differences between bricks, stones or facets decrease only if a window
+    contains several. Where single pixels vary little, nothing is averaged.
 
     Parameters
     ----------
     state, drop : (rows, columns) arrays
-        State of the pixels, and how much darker than the background they are, steps of the image.
+        State of the pixels, and their darkening relative to the background, steps of the image.
     sigma : (tiles down, tiles along) float32 array
         Standard deviation of pixels of dry lining, dB.
     tile : int
@@ -86,7 +86,7 @@ def measure_texture(state: UInt8, drop: Int16, sigma: Single, tile: int, pixel: 
 
 
 def windowed(state: UInt8, drop: Int16, half: UInt8, tile: int, rows: slice, about: slice) -> Int16:
-    """Drop of some rows, averaged over the windows of their tiles.
+    """Return the darkening of some rows, averaged over the windows of their tiles.
 
     Parameters
     ----------
@@ -94,14 +94,14 @@ def windowed(state: UInt8, drop: Int16, half: UInt8, tile: int, rows: slice, abo
     half : (tiles down, tiles along) uint8 array
     tile : int
     rows, about : slice
-        The rows, and those that the largest window takes in.
+        The rows, and those that the largest window covers.
 
     Returns
     -------
     (n, columns) int16 array
-        Steps of the image; NODATA where a window holds no lining.
+        Steps of the image; NODATA where a window has no lining.
     """
-    # Sums may run over: differences, of which those over windows are made, are right nevertheless.
+    # Sums may overflow: their differences over windows are right nevertheless.
     total, count = np.zeros((2, about.stop - about.start + 1, state.shape[1] + 1), np.int32)
     _integrate(state[about], drop[about], total, count)
     out = drop[rows].copy()
@@ -111,7 +111,7 @@ def windowed(state: UInt8, drop: Int16, half: UInt8, tile: int, rows: slice, abo
 
 @kernel
 def _integrate(state: UInt8, drop: Int16, total: Int32, count: Int32) -> None:  # pragma: no cover - compiled
-    """Sum of the drop and number of the pixels of lining above and before each corner of a pixel (rows + 1, columns + 1)."""
+    """Compute sum of the darkening and number of lining pixels above and before each pixel corner (rows + 1, columns + 1)."""
     for i in range(state.shape[0]):
         added, held = np.int32(0), np.int32(0)
         for j in range(state.shape[1]):
@@ -126,7 +126,7 @@ def _integrate(state: UInt8, drop: Int16, total: Int32, count: Int32) -> None:  
 def _average(
     total: Int32, count: Int32, half: UInt8, tile: int, first: int, top: int, out: Int16
 ) -> None:  # pragma: no cover - compiled
-    """Put means over windows in the place of drops (rows, columns), of which the first is row ``first`` of the image."""
+    """Replace darkenings (rows, columns), the first in row ``first`` of the image, by their means over windows."""
     rows, columns = total.shape[0] - 1, total.shape[1] - 1
     for i in range(out.shape[0]):
         of_row = half[(first + i) // tile]
@@ -154,21 +154,21 @@ def _cell_sums(state: UInt8, drop: Int16, side: int, total: Int64, count: Int64)
 
 
 def _cells(state: UInt8, drop: Int16, side: int) -> tuple[Int64, Int64]:
-    """Sum of the drop over the lining of each cell, steps, and how many pixels that are."""
+    """Return the sum of the darkening over the lining of each cell, steps, and its number of pixels."""
     total, count = np.zeros((2, -(-state.shape[0] // side), -(-state.shape[1] // side)), np.int64)
     _cell_sums(state, drop, side, total, count)
     return total, count
 
 
 def _means(total: Int64, count: Int64, cells: int) -> tuple[Float, Bool]:
-    """Mean drop over windows of so many cells to a side, dB, and which of them are half full at least."""
+    """Return the mean darkening over windows of so many cells a side, dB, and True for those at least half full."""
     around = [ndimage.uniform_filter(part.astype(np.float64), cells, mode="constant") for part in (total, count)]
     full = float(np.median(count[count > 0])) if (count > 0).any() else 1.0
     return STEP["corrected"] * around[0] / np.maximum(around[1], 1e-9), around[1] > 0.5 * full
 
 
 def _spread(means: Float, known: Bool, side: int, tile: int, shape: tuple[int, int], half: int) -> Single:
-    """Standard deviation of windows about each tile, dB; NaN where too few are known."""
+    """Return the standard deviation of windows around each tile, dB; NaN where too few are known."""
     row, column = np.nonzero(known)
     bins = np.floor(means[row, column] / BIN).astype(np.int64) + TILE_BINS // 2
     inside = (bins >= 0) & (bins < TILE_BINS)

@@ -1,4 +1,4 @@
-"""What became of leaks between two surveys: groups of those that touch each other, and the change of their wet area."""
+"""Change of leaks between two surveys: groups of leaks that touch, and the change of their wet area."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from scipy.sparse.csgraph import connected_components
 from shapely.geometry import Polygon
 
 TOUCH = 0.1
-"""Leaks so near to each other are of one place, m: what two registrations, and a shift along the lining that the shape does
-not show, may be off."""
+"""Maximum distance of leaks in one place, m: the error of two registrations, and of a shift along the lining that the shape
+does not show."""
 
 SEEN = 0.5
-"""A place of which a survey saw less is not told: neither new nor dry."""
+"""Minimum inspected share of a place for it to be called new or dry."""
 
 NAMED = 0.5
-"""Of a leak so much must be a joint or a dark spot in the other survey, for it to be of another kind there."""
+"""Minimum share of a leak that must be a joint or a dark spot in the other survey for it to be of another kind there."""
 
 EDGE = 4.0
-"""Width of the edge of a leak in the image, in pixels: with half of it, two of 15 leaks that had not changed between two scans
-would be said to have shrunk (docs/figures.md)."""
+"""Width of the edge of a leak in the image, in pixels: with half of it, two of 15 unchanged leaks between two scans would be
+reported as shrunk (docs/figures.md)."""
 
 CONFIDENT = 1.96
-"""Standard deviations within which 95 % of normal errors lie."""
+"""Standard deviations that include 95 % of normal errors."""
 
 LEAST_CONTRAST = 3.0
-"""Of a leak, in standard deviations of dry lining, where none is stored: the threshold of detection."""
+"""Contrast of a leak, in standard deviations of dry lining, if none is stored: the threshold of detection."""
 
 
 @dataclass(frozen=True)
 class Leak:
-    """A finding of one survey: its outline is in the unrolled plane of the older one."""
+    """Finding of one survey, with its outline in the unrolled plane of the older one."""
 
     id: int
     kind: str
@@ -53,17 +53,17 @@ class Group:
 
     @property
     def outline(self) -> shapely.Geometry:
-        """What is wet in either, or where it is."""
+        """Union of the wet areas, or of all findings."""
         return shapely.union_all([leak.outline for leak in (*self.old, *self.new)])
 
     @property
     def wet(self) -> bool:
-        """Whether one of them is a leak."""
+        """True if one of them is a leak."""
         return any(leak.wet for leak in (*self.old, *self.new))
 
 
 def groups(old: Sequence[Leak], new: Sequence[Leak]) -> list[Group]:
-    """Groups of findings that touch, from one survey to the other; a leak that fell apart and its parts are one."""
+    """Group findings that touch, across both surveys; a leak and the parts it split into form one group."""
     count = len(old) + len(new)
     if not count:
         return []
@@ -78,11 +78,11 @@ def groups(old: Sequence[Leak], new: Sequence[Leak]) -> list[Group]:
 
 
 def wet_area(leaks: Sequence[Leak], pixel: float) -> tuple[float, float]:
-    """Wet area, and its standard error by resolution and threshold, m².
+    """Return the wet area, and its standard error from resolution and threshold, m².
 
-    Resolution: each of the P / p pixels that the outline passes is wet by a share that is not known, with standard deviation
-    p² / √12; together p √(P p / 12). Threshold: one standard deviation of dry lining more or less moves the whole outline by
-    the width of its edge over the leak's contrast, P · 4 p / c. P perimeter, p pixel, c contrast.
+    Resolution: each of the P / p pixels on the outline is wet by an unknown share, with standard deviation p² / √12; together p
+    √(P p / 12). Threshold: one standard deviation of dry lining more or less moves the whole outline by the width of its edge
+    over the leak's contrast, P · 4 p / c. P perimeter, p pixel, c contrast.
     """
     area = variance = 0.0
     for leak in leaks:
@@ -95,17 +95,17 @@ def wet_area(leaks: Sequence[Leak], pixel: float) -> tuple[float, float]:
 
 
 def state_of(group: Group, old: tuple[float, float], new: tuple[float, float], seen_old: float, seen_new: float) -> str:
-    """What became of a group: new, grown, shrunk, same, dry, kind or unseen.
+    """Return the state of a group: new, grown, shrunk, same, dry, kind or unseen.
 
     Parameters
     ----------
     group : Group
-        One of which is wet.
+        Group with at least one leak.
     old, new : (float, float)
         Wet area and its standard error, m².
     seen_old, seen_new : float
-        Share of the place that each survey saw. Water in what one of them did not see may have been there: it must be grown, or
-        shrunk, by more than that.
+        Share of the place that each survey inspected. The part that one of them did not inspect may have been wet: a change
+        must exceed that.
     """
     was, now = (any(leak.wet for leak in leaks) for leaks in (group.old, group.new))
     if was and now:
@@ -123,7 +123,7 @@ def state_of(group: Group, old: tuple[float, float], new: tuple[float, float], s
 
 
 def _named_otherwise(group: Group, was: bool) -> bool:
-    """Whether half of what is wet in one survey is something else in the other: a dark spot beside it says nothing on it."""
+    """Return True if half of the wet area of one survey is another kind in the other; a dark spot beside it does not count."""
     there, beside = (group.old, group.new) if was else (group.new, group.old)
     wet = shapely.union_all([leak.outline for leak in there if leak.wet])
     other = shapely.union_all([leak.outline for leak in beside])
