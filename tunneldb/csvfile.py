@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, TextIO
 import numpy as np
 
 from tunneldb.arrays import Float, Int64
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 
 if TYPE_CHECKING:
     import _csv
@@ -66,12 +66,12 @@ class CsvTable:
         """Return several columns, (rows, len(names))."""
         return np.ascontiguousarray(self.values[:, [self.names.index(name) for name in names]])
 
-    def error(self, row: int, text: str) -> UserError:
+    def error(self, row: int, text: str) -> InputError:
         """Return an error about a row, naming file and line."""
-        return UserError(f"{self.path}, line {self.lines[row]}: {text}")
+        return InputError(f"{self.path}, line {self.lines[row]}: {text}")
 
     def require_growing(self, name: str) -> None:
-        """Raise a UserError unless a column grows strictly from row to row."""
+        """Raise a InputError unless a column grows strictly from row to row."""
         column = self[name]
         wrong = np.flatnonzero(np.diff(column) <= 0)
         if len(wrong):
@@ -107,13 +107,13 @@ def read_header(path: Path) -> list[str]:
 
     Raises
     ------
-    UserError
+    InputError
         When the file cannot be read or is empty.
     """
     with _opened(path) as file:
         header = next(_rows(file)[0], None)
     if header is None:
-        raise UserError(f"{path} is empty; it needs a header that names its columns, such as x,y,z")
+        raise InputError(f"{path} is empty; it needs a header that names its columns, such as x,y,z")
     return [cell.strip() for cell in header]
 
 
@@ -122,7 +122,7 @@ def read_texts(path: Path, name: str) -> list[str]:
 
     Raises
     ------
-    UserError
+    InputError
         When the file cannot be read or has no such column, or a row is longer or shorter than the header; names file and line.
     """
     with _opened(path) as file:
@@ -155,7 +155,7 @@ def read_csv(
 
     Raises
     ------
-    UserError
+    InputError
         When the file cannot be read, a column is missing, or a value is not a finite number; names file, line and
         value.
     """
@@ -172,11 +172,11 @@ def _opened(path: Path) -> Iterator[TextIO]:
         with path.open(encoding="utf-8-sig", newline="") as file:
             yield file
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror}") from None
+        raise InputError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError as error:
-        raise UserError(f"{path} is not a text file in UTF-8 (byte {error.start}); save it as CSV") from None
+        raise InputError(f"{path} is not a text file in UTF-8 (byte {error.start}); save it as CSV") from None
     except csv.Error as error:
-        raise UserError(f"{path} is not a CSV file: {error}") from None
+        raise InputError(f"{path} is not a CSV file: {error}") from None
 
 
 def _rows(file: Iterable[str]) -> tuple[_csv.Reader, bool]:
@@ -200,7 +200,7 @@ def _read_rows(
 ) -> tuple[list[list[float]], list[int]]:
     header = next(reader, None)
     if header is None:
-        raise UserError(f"{path} is empty; it needs the header {','.join(names)}")
+        raise InputError(f"{path} is empty; it needs the header {','.join(names)}")
     indices = _indices(path, [cell.strip() for cell in header], names, default, hint)
     rows: list[list[float]] = []
     lines: list[int] = []
@@ -215,9 +215,9 @@ def _read_rows(
     return rows, lines
 
 
-def _uneven(path: Path, line: int, row: Sequence[str], header: Sequence[str]) -> UserError:
+def _uneven(path: Path, line: int, row: Sequence[str], header: Sequence[str]) -> InputError:
     """An error about a row that has other columns than the header."""
-    return UserError(f"{path}, line {line}: {len(row)} values under a header of {len(header)} columns")
+    return InputError(f"{path}, line {line}: {len(row)} values under a header of {len(header)} columns")
 
 
 def _indices(
@@ -227,10 +227,10 @@ def _indices(
     if missing:
         said = ["separate columns by commas, semicolons, tabs or spaces"] if len(header) == 1 else []
         said += [hint[name] for name in missing if name in hint]
-        raise UserError("; ".join([f"{path} has no column {', '.join(missing)}: its header is {','.join(header)!r}", *said]))
+        raise InputError("; ".join([f"{path} has no column {', '.join(missing)}: its header is {','.join(header)!r}", *said]))
     repeated = [name for name in names if header.count(name) > 1]
     if repeated:
-        raise UserError(f"{path} has the column {repeated[0]} twice")
+        raise InputError(f"{path} has the column {repeated[0]} twice")
     return {name: header.index(name) for name in names if name in header}
 
 
@@ -239,7 +239,7 @@ def _number(path: Path, line: int, name: str, text: str, decimal_comma: bool) ->
     try:
         value = float(text.replace(",", ".") if comma else text)
     except ValueError:
-        raise UserError(f"{path}, line {line}: {name} is {text.strip()!r}, not a number") from None
+        raise InputError(f"{path}, line {line}: {name} is {text.strip()!r}, not a number") from None
     if not abs(value) <= LARGEST:  # NaN is not, either
-        raise UserError(f"{path}, line {line}: {name} is {text.strip()}, which is no measurement; remove the line")
+        raise InputError(f"{path}, line {line}: {name} is {text.strip()}, which is no measurement; remove the line")
     return value

@@ -1,4 +1,4 @@
-"""The error that is the user's to mend, and what a mistyped word may have meant."""
+"""Errors that the user can fix, and suggestions for mistyped words."""
 
 from __future__ import annotations
 
@@ -7,11 +7,19 @@ from collections.abc import Iterable
 
 
 class UserError(Exception):
-    """Bad input or a missing thing that the user can put right.
+    """Error that the user can fix.
 
-    The message is one clear line: what is wrong, where (file, line, value) and what to do. The command line
-    prints it without a traceback and exits with code 2; every other exception is a bug and keeps its traceback.
+    The message is one line: what is wrong, where (file, line, value) and what to do. The command line prints it without a
+    traceback and exits with code 2; any other exception is a bug and keeps its traceback.
     """
+
+
+class InputError(UserError):
+    """Unreadable or invalid input: a file, a value, a name."""
+
+
+class NotReadyError(UserError):
+    """Missing or stale result that the request needs: a stage was not run, or must be run again."""
 
 
 class BusyError(UserError):

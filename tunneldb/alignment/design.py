@@ -8,7 +8,7 @@ import numpy as np
 
 from tunneldb.alignment.elements import PlanElement, ProfileElement
 from tunneldb.arrays import Float
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 
 CHORD_ERROR = 0.0005  # m; half of what is promised, for lines that bend in plan and in profile at once
 LONGEST_STEP = 1.0  # m; the spline through the vertices needs even steps where a line meets an arc
@@ -70,11 +70,11 @@ class Design:
         return self.start + low, self.start + high
 
     def check(self) -> None:
-        """Raise UserError where an element does not begin where the one before it ends, or plan and profile don't meet."""
+        """Raise InputError where an element does not begin where the one before it ends, or plan and profile don't meet."""
         for number, (before, after) in enumerate(zip(self.plan, self.plan[1:], strict=False), start=1):
             gap = float(np.hypot(*(before.end - (after.x, after.y))))
             if gap > GAP:
-                raise UserError(
+                raise InputError(
                     f"{before.kind} {number} of the plan ends {gap:.3f} m from where {after.kind} {number + 1} begins, "
                     f"at {self.start + self.distances[number]:.3f} m: the file is damaged, or not all of it was exported"
                 )
@@ -82,17 +82,17 @@ class Design:
             gap = abs(high.distance - low.distance - low.length)
             step = abs(float(low.height(np.array([high.distance]))[0]) - high.z)
             if max(gap, step) > GAP:
-                raise UserError(
+                raise InputError(
                     f"{low.kind} {number} of the profile does not meet {high.kind} {number + 1} "
                     f"at {self.start + high.distance:.3f} m: {gap:.3f} m apart, a step of {step:.3f} m"
                 )
         if not self._bending() <= 1.0 / LEAST_RADIUS:
-            raise UserError(
+            raise InputError(
                 f"plan or profile has an arc of less than {LEAST_RADIUS:g} m: the file is damaged, or not in its unit"
             )
         low_end, high_end = self.reach
         if high_end - low_end < LONGEST_STEP:
-            raise UserError("plan and profile have no stretch in common: is the profile that of another alignment?")
+            raise InputError("plan and profile have no stretch in common: is the profile that of another alignment?")
 
     def _bending(self) -> float:
         """Greatest curvature of the plan and of the profile together, 1/m."""

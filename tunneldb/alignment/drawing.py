@@ -12,7 +12,7 @@ from pyproj.exceptions import CRSError
 
 from tunneldb.alignment.joining import join_pieces
 from tunneldb.arrays import Float
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.files import vector_source
 from tunneldb.geometry.crs import LOCAL, describe_crs, describe_srid, fits_srid, is_local
 
@@ -49,9 +49,9 @@ class Drawn:
         listed += f"; and {more} shorter ones" if more > 0 else ""
         count = "1 line" if len(self.lines) == 1 else f"{len(self.lines)} lines that don't meet end to end"
         if number is None:
-            raise UserError(f"{path}: layer {self.layer!r} holds {count}: {listed}; choose one by --alignment NUMBER")
+            raise InputError(f"{path}: layer {self.layer!r} holds {count}: {listed}; choose one by --alignment NUMBER")
         if not number.isdecimal() or not 1 <= int(number) <= len(self.lines):
-            raise UserError(f"{path}: layer {self.layer!r} has no line {number!r}; it holds {count}: {listed}")
+            raise InputError(f"{path}: layer {self.layer!r} has no line {number!r}; it holds {count}: {listed}")
         return self.lines[int(number) - 1]
 
 
@@ -74,7 +74,7 @@ def read_dxf(path: Path, layer: str | None, unit: float | None) -> Drawn:
 
     Raises
     ------
-    UserError
+    InputError
         If it can't be read, holds no lines, several layers to choose from, or states a unit that isn't the metre.
     """
     drawing = open_drawing(path)
@@ -94,7 +94,7 @@ def open_drawing(path: Path) -> Any:
 
     Raises
     ------
-    UserError
+    InputError
         If it can't be read.
     """
     from ezdxf import filemanagement
@@ -103,7 +103,7 @@ def open_drawing(path: Path) -> Any:
         return filemanagement.readfile(str(path))
     except Exception as error:  # of a damaged file ezdxf raises StopIteration, OverflowError, whatever comes
         said = str(error).strip().splitlines() or [f"it is damaged ({type(error).__name__})"]
-        raise UserError(f"{path} cannot be read as DXF: {said[0]}") from None
+        raise InputError(f"{path} cannot be read as DXF: {said[0]}") from None
 
 
 def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
@@ -118,7 +118,7 @@ def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
 
     Raises
     ------
-    UserError
+    InputError
         If it can't be read, holds no lines, several layers to choose from, or is in another coordinate system.
     """
     import pyogrio
@@ -131,12 +131,12 @@ def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
         chosen = choose_layer(path, linear, layer, [name for name, _ in layers])
         meta, _, wkb, _ = pyogrio.raw.read(source, layer=chosen, columns=[])
     except (pyogrio.errors.DataSourceError, UnicodeDecodeError) as error:
-        raise UserError(f"{path} cannot be read: {str(error).strip().splitlines()[0]}") from None
+        raise InputError(f"{path} cannot be read: {str(error).strip().splitlines()[0]}") from None
     notes = _check_crs(path, meta["crs"], srid)
     try:
         geometries = shapely.get_parts(shapely.get_parts(shapely.from_wkb(wkb, on_invalid="ignore")))
     except shapely.errors.GEOSException as error:
-        raise UserError(
+        raise InputError(
             f"{path}: a geometry of layer {chosen!r} is damaged ({str(error).strip().splitlines()[0]}); mend it (in QGIS: Fix "
             "geometries)"
         ) from None
@@ -144,7 +144,7 @@ def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
     pieces = [shapely.get_coordinates(line, include_z=True) for line in geometries]
     broken = sum(not np.isfinite(piece[:, :2]).all() for piece in pieces)
     if broken:
-        raise UserError(f"{path}: {broken} lines of layer {chosen!r} have coordinates that are no numbers")
+        raise InputError(f"{path}: {broken} lines of layer {chosen!r} have coordinates that are no numbers")
     return _drawn(path, join_pieces(pieces), chosen, notes)
 
 
@@ -156,19 +156,19 @@ def choose_layer(path: Path, names: list[str], wanted: str | None, others: list[
             there = (
                 f"it has {listed}" if names else f"there are none; its layers: {', '.join(map(repr, others or [])) or 'none'}"
             )
-            raise UserError(f"{path} has no layer {wanted!r} of lines; {there}")
+            raise InputError(f"{path} has no layer {wanted!r} of lines; {there}")
         return wanted
     if not names:
         held = f"; its layers: {', '.join(map(repr, others))}" if others else ""
-        raise UserError(f"{path} holds no lines{held}; an axis is drawn as a line")
+        raise InputError(f"{path} holds no lines{held}; an axis is drawn as a line")
     if len(names) > 1:
-        raise UserError(f"{path} holds {len(names)} layers of lines: {listed}; choose one by --axis-layer NAME")
+        raise InputError(f"{path} holds {len(names)} layers of lines: {listed}; choose one by --axis-layer NAME")
     return names[0]
 
 
 def _drawn(path: Path, lines: list[Float], layer: str, notes: tuple[str, ...]) -> Drawn:
     if not lines:
-        raise UserError(f"{path}: layer {layer!r} holds no line with a length")
+        raise InputError(f"{path}: layer {layer!r} holds no line with a length")
     for line in lines:
         if not np.isfinite(line[:, 2]).all() or not line[:, 2].any():
             line[:, 2] = np.nan
@@ -184,11 +184,11 @@ def _check_crs(path: Path, stated: str | None, srid: int | None) -> tuple[str, .
         own = CRS.from_user_input(stated)
         fits, wanted = fits_srid(own, srid), describe_srid(srid)
     except CRSError as error:
-        raise UserError(f"{path}: SRID {srid} or the file's coordinate system is not known: {error}") from None
+        raise InputError(f"{path}: SRID {srid} or the file's coordinate system is not known: {error}") from None
     if not fits:
         there = "in the scan's own coordinates" if srid == LOCAL else f"in EPSG:{srid}"
         mend = "--srid local" if is_local(own) else "the line's SRID"
-        raise UserError(
+        raise InputError(
             f"{path}: its coordinate system is {describe_crs(own)}, the tunnel's is {wanted}; save the line {there} (in QGIS: "
             f"Export, Save Features As), or add the tunnel with {mend}"
         )
@@ -206,7 +206,7 @@ def _dxf_unit(path: Path, code: int, unit: float | None) -> tuple[float, str]:
         return 1.0, ""
     if code == 0:
         return 1.0, "states no unit; its lengths are taken to be metres, as the SRID's are"
-    raise UserError(
+    raise InputError(
         f"{path}: its unit is {units.decode(code)} ($INSUNITS {code}); what are its lengths? Say it by --axis-unit, such "
         "as --axis-unit meter"
     )

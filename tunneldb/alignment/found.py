@@ -24,7 +24,7 @@ from tunneldb.alignment.footprint import (
 )  # fmt: skip
 from tunneldb.alignment.section_centres import Centres, Frames, place_points, roof_ends, section_centres, vault_gap
 from tunneldb.arrays import Bool, Float, Int64
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.geometry.centreline import SHORT, ends_by_projection
 from tunneldb.geometry.smoothing import smooth_line
 
@@ -132,7 +132,7 @@ def find_axis(points: Float) -> FoundAxis:
 
     Raises
     ------
-    UserError
+    InputError
         If nothing in the cloud has a roof, two walls and a floor; if there are two tunnels, or one that forks.
     """
     points = _without_stray(points)
@@ -140,9 +140,9 @@ def find_axis(points: Float) -> FoundAxis:
     local = points - origin
     parts = roofed_parts(local)
     if not parts:
-        raise UserError(f"no tunnel: nowhere do points have others {CLEARANCE:g} m or more above them, as a floor has a vault")
+        raise InputError(f"no tunnel: nowhere do points have others {CLEARANCE:g} m or more above them, as a floor has a vault")
     if len(parts) > 1 and parts[1].area > _OTHER_PART * parts[0].area:
-        raise UserError(
+        raise InputError(
             "the tunnel lies in parts that don't hang together, or there are several: "
             + "; ".join(f"{part.area:.0f} m² about {_place(part.cells.mean(axis=0) + origin[:2])}" for part in parts[:4])
             + "; give the files of one, or draw its line and give that with the files"
@@ -152,7 +152,7 @@ def find_axis(points: Float) -> FoundAxis:
     half = half_width(part, path)
     forks = branches(part, path)
     if len(forks):
-        raise UserError(
+        raise InputError(
             f"the tunnel forks: what lies about {_place(forks[0] + origin[:2])} is as wide as the rest; give the files of one "
             "tube, or draw its line and give that with the files"
         )
@@ -177,7 +177,7 @@ def follow_line(points: Float, plan: Float) -> FoundAxis:
 
     Raises
     ------
-    UserError
+    InputError
         If there are no points along it, or no sections of a tunnel.
     """
     points = _without_stray(points)
@@ -185,7 +185,7 @@ def follow_line(points: Float, plan: Float) -> FoundAxis:
     local, way = points - origin, plan - origin[:2]
     parts = _crossed(roofed_parts(local), way)
     if not parts:
-        raise UserError(
+        raise InputError(
             f"no points of a tunnel along the line from {_place(plan[0])} to {_place(plan[-1])}: is it of the same place?"
         )
     half = max(float(part.depth[cKDTree(part.cells).query(way)[1]].mean()) for part in parts)
@@ -251,7 +251,7 @@ def _centred(points: Float, line: Float, reach: float) -> tuple[Float, Centres, 
 def _require_tunnel(whole: Bool) -> None:
     count = int(whole.sum())
     if count < _FEWEST or count < _LEAST * len(whole):
-        raise UserError(
+        raise InputError(
             f"no tunnel: of {len(whole)} sections across what has a roof {count} have two walls, a vault and a floor"
         )
 
@@ -267,7 +267,7 @@ def _inside(centres: Centres, gap: int) -> slice:
     best = int(np.argmax(lasts - firsts))
     rows = rows[(rows >= firsts[best]) & (rows <= lasts[best])]
     if len(rows) < _FEWEST:
-        raise UserError("no tunnel: sections with two walls, a vault and a floor lie too far apart")
+        raise InputError("no tunnel: sections with two walls, a vault and a floor lie too far apart")
     usual = np.ones(len(rows), dtype=bool)
     for size in (centres.width[rows], centres.height[rows]):
         usual &= np.abs(size / np.median(size) - 1.0) <= _OTHER_SIZE
@@ -304,7 +304,7 @@ def _mid_heights(points: Float, plan: Float) -> Float:
     height = np.array([np.quantile(points[rows, 2], (0.05, 0.95)).mean() if len(rows) else np.nan for rows in near])
     known = np.isfinite(height)
     if not known.any():
-        raise UserError("no points lie along the line: are line and scan of one place?")
+        raise InputError("no points lie along the line: are line and scan of one place?")
     at = np.arange(len(plan))
     return np.interp(at, at[known], height[known])
 

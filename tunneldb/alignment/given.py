@@ -15,7 +15,7 @@ from tunneldb.alignment.drawing import read_dxf, read_vector
 from tunneldb.alignment.units import UNITS
 from tunneldb.arrays import Float
 from tunneldb.csvfile import read_csv, read_header
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError, UserError
 
 XYZ = ("x", "y", "z")
 LONGEST_STEP = 1e5
@@ -108,14 +108,14 @@ def read_given(
 
     Raises
     ------
-    UserError
+    InputError
         When the file can't be read, holds no such alignment or several to choose from, or is no line.
     """
     kind = _kind(path)
     _refuse_options(path, kind, {"--alignment": alignment, "--profile": profile, "--axis-layer": layer, "--axis-unit": unit})
     if kind in ("landxml", "ifc"):
         if reverse:
-            raise UserError(
+            raise InputError(
                 f"{path} is a design alignment, whose chainage has its own direction; a stationing that runs backwards is "
                 "given by --stationing"
             )
@@ -125,7 +125,7 @@ def read_given(
     else:
         drawn = read_dxf(path, layer, UNITS[unit] if unit else None) if kind == "dxf" else read_vector(path, layer, srid)
         line = drawn.choose(path, alignment)
-        _require_forward(line, lambda row, text: UserError(f"{path}: at {line[row, 0]:.2f},{line[row, 1]:.2f} {text}"))
+        _require_forward(line, lambda row, text: InputError(f"{path}: at {line[row, 0]:.2f},{line[row, 1]:.2f} {text}"))
         given = GivenAxis(line, 0.0, source=f"{path.name}: {drawn.layer}", notes=drawn.notes)
     return replace(given, xyz=given.xyz[::-1] if reverse else given.xyz, start=start or 0.0)
 
@@ -135,10 +135,10 @@ def _kind(path: Path) -> Kind:
         with path.open("rb") as file:
             head = file.read(_SNIFFED)
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror}") from None
+        raise InputError(f"{path}: {error.strerror}") from None
     for magic, why in _NOT_READ.items():
         if head.startswith(magic):
-            raise UserError(f"{path} {why}")
+            raise InputError(f"{path} {why}")
     if head.startswith(b"AutoCAD Binary DXF") or re.match(rb"\s*(999\s|0\s+SECTION\s)", head.removeprefix(b"\xef\xbb\xbf")):
         return "dxf"
     if head.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n").startswith(_GIS):
@@ -162,7 +162,7 @@ def _refuse_options(path: Path, kind: Kind, given: dict[str, str | None]) -> Non
     what, allowed = meant[kind]
     wrong = [option for option, value in given.items() if value is not None and option not in allowed]
     if wrong:
-        raise UserError(f"{path} is {what}, for which {wrong[0]} means nothing; leave it out")
+        raise InputError(f"{path} is {what}, for which {wrong[0]} means nothing; leave it out")
 
 
 def _given_design(
@@ -172,13 +172,13 @@ def _given_design(
     try:
         design.check()
     except UserError as error:
-        raise UserError(f"{path}: {error}") from None
+        raise InputError(f"{path}: {error}") from None
     source = f"{path.name}: {design.name}" if design.name else path.name
     xyz = design.polyline()
     row, plan, rise = _leap(xyz)
     if row is not None:
         along = design.chainages[0] + float(plan[:row].sum())
-        raise UserError(
+        raise InputError(
             f"{path}: at chainage {along:.0f} its profile rises or falls by {rise[row]:.6g} m within {plan[row]:.6g} m;"
             " is a decimal point missing?"
         )
@@ -192,7 +192,7 @@ def _read_design(path: Path, kind: Kind, alignment: str | None, profile: str | N
     file = LandXml(path, unit) if kind == "landxml" else Ifc(path)
     number = _choose(path, "alignment", file.names, alignment)
     if not file.profiles[number]:
-        raise UserError(
+        raise InputError(
             f"{path}: alignment {file.names[number]!r} has no profile, and a tunnel's axis needs heights: export both together"
         )
     return file.design(number, _choose(path, "profile", file.profiles[number], profile))
@@ -201,15 +201,15 @@ def _read_design(path: Path, kind: Kind, alignment: str | None, profile: str | N
 def _choose(path: Path, what: str, names: list[str], wanted: str | None) -> int:
     """Place of the one that is wanted, or of the only one there is."""
     if not names:
-        raise UserError(f"{path} holds no {what}")
+        raise InputError(f"{path} holds no {what}")
     listed = ", ".join(repr(name) for name in names)
     if wanted is None:
         if len(names) > 1:
-            raise UserError(f"{path} holds {len(names)} {what}s: {listed}; choose one by --{what} NAME")
+            raise InputError(f"{path} holds {len(names)} {what}s: {listed}; choose one by --{what} NAME")
         return 0
     if names.count(wanted) != 1:
         problem = "several" if wanted in names else "no"
-        raise UserError(f"{path} holds {problem} {what} {wanted!r}; it has {listed}")
+        raise InputError(f"{path} holds {problem} {what} {wanted!r}; it has {listed}")
     return names.index(wanted)
 
 
@@ -220,7 +220,7 @@ def _read_points(path: Path) -> GivenAxis:
     names = [column for column in columns if column is not None]
     table = read_csv(path, names)
     if len(table) < 2:
-        raise UserError(f"{path}: an axis needs at least 2 points, this one has {len(table)}")
+        raise InputError(f"{path}: an axis needs at least 2 points, this one has {len(table)}")
     xyz = np.full((len(table), 3), np.nan)
     xyz[:, : len(names)] = table.columns(names)
     if "time" in (name.lower() for name in header):
@@ -237,14 +237,14 @@ def _column(path: Path, header: list[str], name: str) -> str | None:
     found = [column for column in header if column.lower() in _HEADERS[name]]
     exact = [column for column in found if column.lower() == name]
     if len(found) > 1 and len(exact) != 1 and len(set(found)) > 1:
-        raise UserError(f"{path}: {' and '.join(found)} may both be {name}; name just one of them {name}")
+        raise InputError(f"{path}: {' and '.join(found)} may both be {name}; name just one of them {name}")
     if found:
         return exact[0] if exact else found[0]
     if name == "z" and len(header) > 1:
         return None
     numbers = sum(re.fullmatch(r"[+-]?[\d.,]+", column) is not None for column in header)
     hint = "; the first line must name the columns, such as x,y,z" if numbers > 1 else ""
-    raise UserError(f"{path} has no column {name}: its header is {','.join(header)!r}{hint}")
+    raise InputError(f"{path} has no column {name}: its header is {','.join(header)!r}{hint}")
 
 
 def _thinned(xyz: Float) -> np.ndarray:
@@ -266,7 +266,7 @@ def _leap(xyz: Float) -> tuple[int | None, Float, Float]:
     return int(steep[0]) if len(steep) else None, plan, rise
 
 
-def _require_forward(xyz: Float, error: Callable[[int, str], UserError]) -> None:
+def _require_forward(xyz: Float, error: Callable[[int, str], InputError]) -> None:
     """Raise the error of a row at which a line stands still or turns back in plan, or leaps as none does."""
     steps = np.diff(xyz[:, :2], axis=0)
     plan = np.hypot(*steps.T)

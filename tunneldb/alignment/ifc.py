@@ -17,7 +17,7 @@ import numpy as np
 
 from tunneldb.alignment.design import Design, StationPiece
 from tunneldb.alignment.elements import PlanElement, PlanKind, ProfileElement, ProfileKind
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError, UserError
 
 PLAN: dict[str, PlanKind] = {"LINE": "line", "CIRCULARARC": "arc", "CLOTHOID": "clothoid"}
 PROFILE: dict[str, ProfileKind] = {"CONSTANTGRADIENT": "grade", "PARABOLICARC": "parabola", "CIRCULARARC": "circle"}
@@ -64,7 +64,7 @@ class Ifc:
         try:
             yield
         except (AttributeError, TypeError, ValueError, IndexError, OverflowError, RuntimeError) as error:
-            raise UserError(f"{self._path} is damaged, an entity of an alignment lacks what it needs: {error}") from error
+            raise InputError(f"{self._path} is damaged, an entity of an alignment lacks what it needs: {error}") from error
 
     def _look(self) -> None:
         from ifcopenshell.util.unit import calculate_unit_scale
@@ -90,7 +90,7 @@ class Ifc:
         vertical = _verticals(alignment)[profile]
         heights = tuple(self._profile_element(segment, frame) for segment in _segments(vertical, "HorizontalLength"))
         if not plan or not heights:
-            raise UserError(
+            raise InputError(
                 f"{self._path}: alignment {self.names[number]!r} has no segments in {'profile' if plan else 'plan'}"
             )
         start, pieces = self._stationing(alignment)
@@ -125,8 +125,8 @@ class Ifc:
             segment.EndGradient,
         )
 
-    def _unknown(self, where: str, kind: str, known: dict[str, Any]) -> UserError:
-        return UserError(f"{self._path}: the {where} has a segment of type {kind}; {', '.join(known)} are read")
+    def _unknown(self, where: str, kind: str, known: dict[str, Any]) -> InputError:
+        return InputError(f"{self._path}: the {where} has a segment of type {kind}; {', '.join(known)} are read")
 
     def _frame(self, alignment: Any) -> _Frame:
         """Where the alignment's coordinates lie on the map: its placement, then the file's map conversion."""
@@ -135,14 +135,14 @@ class Ifc:
 
         matrix = np.eye(4) if alignment.ObjectPlacement is None else get_local_placement(alignment.ObjectPlacement)
         if abs(matrix[2, 2] - 1.0) > 1e-9:
-            raise UserError(f"{self._path}: the placement of alignment {alignment.Name!r} is tilted, so it has no plan")
+            raise InputError(f"{self._path}: the placement of alignment {alignment.Name!r} is tilted, so it has no plan")
         unit = self._map_unit()
         corners = [matrix @ (x, 0.0, 0.0, 1.0) for x in (0.0, ARM / self._unit)]
         origin, aside = (np.array(auto_xyz2enh(self._file, *corner[:3]), dtype=np.float64) * unit for corner in corners)
         step = (aside - origin) / ARM
         scale = float(np.hypot(step[0], step[1]))
         if abs(scale - 1.0) > LARGEST_SCALE:
-            raise UserError(
+            raise InputError(
                 f"{self._path}: its map conversion has the scale {scale:.9g}, so lengths on the map are not the alignment's; "
                 "export it in map coordinates"
             )
@@ -217,12 +217,12 @@ def _open(path: Path) -> Any:
         raise UserError('IFC files are read by ifcopenshell, which is not installed: pip install "tunneldb[ifc]"') from error
     schema, text = _schema(path)
     if schema not in SCHEMAS:
-        raise UserError(f"{path} is of {schema}; alignments are read from IFC 4.3 (IFC4X3_ADD2): export it as that")
+        raise InputError(f"{path} is of {schema}; alignments are read from IFC 4.3 (IFC4X3_ADD2): export it as that")
     try:
         # The releases of 4.3 differ in nothing that is read here, and ifcopenshell knows the last one.
         return ifcopenshell.file.from_string(text.replace(f"'{schema}'", "'IFC4X3_ADD2'", 1))
     except (RuntimeError, ifcopenshell.Error) as error:
-        raise UserError(f"{path} cannot be read as IFC: {str(error).strip().splitlines()[0]}") from None
+        raise InputError(f"{path} cannot be read as IFC: {str(error).strip().splitlines()[0]}") from None
 
 
 def _schema(path: Path) -> tuple[str, str]:
@@ -230,10 +230,10 @@ def _schema(path: Path) -> tuple[str, str]:
     try:
         text = path.read_text(encoding="latin-1")  # STEP writes other letters by escapes
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror}") from None
+        raise InputError(f"{path}: {error.strerror}") from None
     found = re.search(r"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'", text[:HEADER])
     if found is None:
-        raise UserError(f"{path} is no IFC file: its header names no schema")
+        raise InputError(f"{path} is no IFC file: its header names no schema")
     return found[1].upper(), text
 
 

@@ -15,7 +15,7 @@ from tunneldb.alignment.design import Design, StationPiece
 from tunneldb.alignment.elements import PlanElement, clothoid_from_chord
 from tunneldb.alignment.profile import Pvi, profile_elements
 from tunneldb.alignment.units import UNITS
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 
 MISMATCH = 0.02  # m between a length as stated and as the points have it; files are rounded to millimetres or centimetres
 _PVIS = ("PVI", "ParaCurve", "UnsymParaCurve", "CircCurve")
@@ -49,7 +49,7 @@ class LandXml:
         stated = self._linear_unit(root)
         name = unit or stated
         if name is None:
-            raise UserError(f"{path} states no unit of its lengths (linearUnit of Units); say it: --axis-unit meter, foot, ...")
+            raise InputError(f"{path} states no unit of its lengths (linearUnit of Units): give --axis-unit meter, foot, ...")
         self._unit = UNITS[name]
         self._told = "" if unit is None or unit == stated else f", as told; the file says {stated or 'nothing'}"
         self._points = {
@@ -66,11 +66,11 @@ class LandXml:
         start = self._length(alignment, "staStart", default=0.0)
         geometry = _child(alignment, "CoordGeom")
         if geometry is None or not len(geometry):
-            raise UserError(f"{self._path}: alignment {self.names[number]!r} has no geometry in plan (CoordGeom)")
+            raise InputError(f"{self._path}: alignment {self.names[number]!r} has no geometry in plan (CoordGeom)")
         elements = [self._element(element) for element in geometry if _tag(element) not in ("Feature", "Description")]
         plan = tuple(element for element in elements if element.length > 0.0)
         if not plan:
-            raise UserError(f"{self._path}: the plan of alignment {self.names[number]!r} (CoordGeom) has no length")
+            raise InputError(f"{self._path}: the plan of alignment {self.names[number]!r} (CoordGeom) has no length")
         pvis = list(self._pvis(self._profiles(alignment)[profile], start))
         notes = []
         if self._unit != 1.0 or self._told:
@@ -92,7 +92,7 @@ class LandXml:
             for system in units:
                 unit = system.get("linearUnit")
                 if unit is not None and unit not in UNITS:
-                    raise UserError(f"{self._path}: its linearUnit {unit!r} is none of {', '.join(UNITS)}")
+                    raise InputError(f"{self._path}: its linearUnit {unit!r} is none of {', '.join(UNITS)}")
                 return unit
         return None
 
@@ -113,7 +113,7 @@ class LandXml:
             return self._curve(element)
         if kind == "Spiral":
             return self._spiral(element)
-        raise UserError(f"{self._path}: the plan has a {kind}; Line, Curve and Spiral are read")
+        raise InputError(f"{self._path}: the plan has a {kind}; Line, Curve and Spiral are read")
 
     def _line(self, element: Element) -> PlanElement:
         start, end = self._point(element, "Start"), self._point(element, "End")
@@ -143,7 +143,7 @@ class LandXml:
         """Clothoid between two points, whose length and radii say how it bends."""
         kind = element.get("spiType", "clothoid")
         if kind != "clothoid":
-            raise UserError(f"{self._path}: the plan has a spiral of type {kind}; only clothoids are read")
+            raise InputError(f"{self._path}: the plan has a spiral of type {kind}; only clothoids are read")
         turn = self._turn(element)
         length = self._extent(element, "length")
         before, after = (turn * self._curvature(element, name) for name in ("radiusStart", "radiusEnd"))
@@ -165,13 +165,13 @@ class LandXml:
     def _turn(self, element: Element) -> float:
         rotation = element.get("rot")
         if rotation not in ("cw", "ccw"):
-            raise UserError(f"{self._path}: a {_tag(element)} has the rotation {rotation!r}; it must be cw or ccw")
+            raise InputError(f"{self._path}: a {_tag(element)} has the rotation {rotation!r}; it must be cw or ccw")
         return 1.0 if rotation == "ccw" else -1.0
 
     def _compare(self, element: Element, what: str, stated: float, measured: float) -> None:
         if abs(stated - measured) > MISMATCH:
             place = element.find("{*}Start")
-            raise UserError(
+            raise InputError(
                 f"{self._path}: the {what} of the {_tag(element)} from {'' if place is None else (place.text or '').strip()} "
                 f"is off by {abs(stated - measured):.3f} m from what its points, radii and length say"
             )
@@ -180,13 +180,13 @@ class LandXml:
         """Easting and northing of a point, which is given or refers to a CgPoint."""
         place = _child(element, name)
         if place is None:
-            raise UserError(f"{self._path}: a {_tag(element)} has no {name}")
+            raise InputError(f"{self._path}: a {_tag(element)} has no {name}")
         reference = place.get("pntRef")
         text = (self._points.get(reference) if reference else place.text) or ""
         try:
             north, east = (_number(value) for value in text.split()[:2])
         except ValueError:
-            raise UserError(
+            raise InputError(
                 f"{self._path}: {name} of a {_tag(element)} is {text.strip()!r}, not northing and easting"
             ) from None
         return east * self._unit, north * self._unit
@@ -198,13 +198,13 @@ class LandXml:
             if kind in ("Feature", "Description"):
                 continue
             if kind not in _PVIS:
-                raise UserError(
+                raise InputError(
                     f"{self._path}: the profile has a {kind}; PVI, ParaCurve, UnsymParaCurve and CircCurve are read"
                 )
             try:
                 station, height = (_number(value) * self._unit for value in (point.text or "").split())
             except ValueError:
-                raise UserError(
+                raise InputError(
                     f"{self._path}: a {kind} of the profile is {(point.text or '').strip()!r}, not station and height"
                 ) from None
             before, after, radius = 0.0, 0.0, 0.0
@@ -237,13 +237,13 @@ class LandXml:
         try:
             return _number(text or "") * self._unit
         except ValueError:
-            raise UserError(f"{self._path}: {name} of a {_tag(element)} is {text!r}, not a number") from None
+            raise InputError(f"{self._path}: {name} of a {_tag(element)} is {text!r}, not a number") from None
 
     def _extent(self, element: Element, name: str, default: float | None = None) -> float:
         """Return an attribute that is a length from one place to another, m."""
         length = self._length(element, name, default)
         if length < 0.0:
-            raise UserError(f"{self._path}: {name} of a {_tag(element)} is {element.get(name)!r}; it must not be negative")
+            raise InputError(f"{self._path}: {name} of a {_tag(element)} is {element.get(name)!r}; it must not be negative")
         return length
 
 
@@ -262,13 +262,13 @@ def _read(path: Path) -> Element:
                 stack[-1].remove(element)
             kept -= _tag(element) in _KEPT
     except ParseError as error:
-        raise UserError(f"{path} is not a whole XML file: {error}") from None
+        raise InputError(f"{path} is not a whole XML file: {error}") from None
     except (ValueError, LookupError) as error:  # an encoding of several bytes, or one that isn't known
-        raise UserError(f"{path} cannot be read as XML: {error}; save it as UTF-8") from None
+        raise InputError(f"{path} cannot be read as XML: {error}; save it as UTF-8") from None
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror}") from None
+        raise InputError(f"{path}: {error.strerror}") from None
     if _tag(element) != "LandXML":
-        raise UserError(f"{path} is XML, but its root is {_tag(element)}, not LandXML")
+        raise InputError(f"{path} is XML, but its root is {_tag(element)}, not LandXML")
     return element
 
 

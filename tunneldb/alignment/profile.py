@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tunneldb.alignment.elements import ProfileElement, ProfileKind
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 
 _OVERLAP = 0.001  # m by which rounded files let two curves overlap
 
@@ -40,14 +40,14 @@ def profile_elements(pvis: Sequence[Pvi], path: Path) -> tuple[ProfileElement, .
 
     Raises
     ------
-    UserError
+    InputError
         If there are fewer than two, they are not in order, or their curves overlap.
     """
     if len(pvis) < 2:
-        raise UserError(f"{path}: a profile needs at least 2 points of vertical intersection, this one has {len(pvis)}")
+        raise InputError(f"{path}: a profile needs at least 2 points of vertical intersection, this one has {len(pvis)}")
     for low, high in itertools.pairwise(pvis):
         if high.distance <= low.distance:
-            raise UserError(f"{path}: the profile turns back {high.distance:.3f} m from the beginning of its alignment")
+            raise InputError(f"{path}: the profile turns back {high.distance:.3f} m from the beginning of its alignment")
     grades = [(high.z - low.z) / (high.distance - low.distance) for low, high in itertools.pairwise(pvis)]
     elements: list[ProfileElement] = []
     at, z = pvis[0].distance, pvis[0].z
@@ -55,7 +55,7 @@ def profile_elements(pvis: Sequence[Pvi], path: Path) -> tuple[ProfileElement, .
         curve = [] if following is None else _curve(pvi, grade, following)
         begin = curve[0].distance if curve else pvi.distance
         if begin - at < -_OVERLAP:
-            raise UserError(f"{path}: two curves of the profile overlap by {at - begin:.3f} m before {pvi.distance:.3f} m")
+            raise InputError(f"{path}: two curves of the profile overlap by {at - begin:.3f} m before {pvi.distance:.3f} m")
         if begin - at > 1e-6:
             elements.append(ProfileElement("grade", at, begin - at, z, grade, grade))
         elements += curve

@@ -17,7 +17,7 @@ from tunneldb.cli.progress import bar, say, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.cli.tables import print_classes
 from tunneldb.database import connect
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError, UserError
 from tunneldb.files import made_folder, replacing, told_to_end
 from tunneldb.stages.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
@@ -138,7 +138,7 @@ def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Pat
     total = np.zeros(256, np.int64)
     there = loaded_kilometres(conn, survey)
     if not there:
-        raise UserError(f"survey {survey.name} holds no points yet: tunneldb load {survey.name} FILE...")
+        raise NotReadyError(f"survey {survey.name} holds no points yet: tunneldb load {survey.name} FILE...")
     wanted = parse_km(km, there)
     conn.rollback()
     files: list[dict[str, Any]] = []

@@ -13,7 +13,7 @@ from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar, say
 from tunneldb.cli.stage_sentence import number, stage_sentence
 from tunneldb.database import connect
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError
 from tunneldb.stages.ledger import Run
 from tunneldb.stages.parameters import PARAMETERS, settings
 from tunneldb.store.coverage import sum_leaks
@@ -75,7 +75,7 @@ def run(
         there = loaded_kilometres(conn, found)
         conn.rollback()
         if not there:
-            raise UserError(f"survey {survey} holds no points yet: tunneldb load {survey} FILE...")
+            raise NotReadyError(f"survey {survey} holds no points yet: tunneldb load {survey} FILE...")
         kilometres = parse_km(km, there)
         if stale:
             tasks = stale_tasks(conn, found, kilometres, stages, assignments)

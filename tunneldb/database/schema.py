@@ -14,7 +14,7 @@ from tunneldb import __version__
 from tunneldb.database.connection import MINIMUM_POSTGIS, engine_on
 from tunneldb.database.foreign import catalogue_alone, overloads
 from tunneldb.database.resources import resource_dir
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError, UserError
 
 if TYPE_CHECKING:
     import sqlalchemy
@@ -234,7 +234,7 @@ def require_current_schema(connection: psycopg.Connection[Any]) -> None:
             raise UserError("schema tunnel_api is missing: tunneldb init")
         return
     if revision is None:
-        raise UserError("the database has no schema tunnel yet: tunneldb init")
+        raise NotReadyError("the database has no schema tunnel yet: tunneldb init")
     if revision in revisions():
         raise UserError(f"the database's schema is older ({revision}) than this program: tunneldb init upgrades it")
     raise UserError(_unknown(revision))
@@ -251,7 +251,7 @@ def _unknown(revision: str) -> str:
 def _require_postgis(connection: psycopg.Connection[Any], *, create: bool) -> None:
     version = postgis_version(connection)
     if version is None and not create:
-        raise UserError("the database is not set up for tunneldb yet: tunneldb init")
+        raise NotReadyError("the database is not set up for tunneldb yet: tunneldb init")
     if version is None:
         try:
             with connection.transaction():

@@ -13,7 +13,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from tunneldb.arrays import Bool
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.evaluate.truth import read_polygons
 from tunneldb.geometry.crs import LOCAL, srid_name
 from tunneldb.store.survey import Survey
@@ -53,7 +53,7 @@ def read_spot_truth(survey: Survey, path: Path, layer: str | None = None) -> Spo
 
     Raises
     ------
-    UserError
+    InputError
         The file can't be read or holds no polygon, they are in another coordinate system or have no heights.
     """
     simulated = _simulated(path)
@@ -61,13 +61,13 @@ def read_spot_truth(survey: Survey, path: Path, layer: str | None = None) -> Spo
         try:
             return _of_simulation(survey, path, simulated)
         except (LookupError, TypeError, ValueError, AttributeError, shapely.errors.ShapelyError) as error:
-            raise UserError(f"{path} is no truth of simulate-structure: {error!r}") from error
+            raise InputError(f"{path} is no truth of simulate-structure: {error!r}") from error
     given = read_polygons(path, survey, layer, "spot")
     if not given.in_space and survey.srid != LOCAL:
-        raise UserError(f"{given.where} has no coordinate system: polygons of spots must be 3D, in {srid_name(survey.srid)}")
+        raise InputError(f"{given.where} has no coordinate system: polygons of spots must be 3D, in {srid_name(survey.srid)}")
     for key, shape in zip(given.ids, given.shapes, strict=True):
         if not shape.has_z:
-            raise UserError(f"{given.naming(key)} has no heights: polygons of spots must be 3D, on their surface")
+            raise InputError(f"{given.naming(key)} has no heights: polygons of spots must be 3D, on their surface")
     return SpotTruth(given.ids, list(given.shapes), np.ones(len(given.ids), np.bool_))
 
 
@@ -78,17 +78,17 @@ def _simulated(path: Path) -> dict[str, Any] | None:
     try:
         content = json.loads(path.read_text("utf-8"))
     except (ValueError, RecursionError) as error:
-        raise UserError(f"{path} is no JSON: {error}") from None
+        raise InputError(f"{path} is no JSON: {error}") from None
     return content if isinstance(content, dict) and "anomalies" in content and "parameters" in content else None
 
 
 def _of_simulation(survey: Survey, path: Path, content: dict[str, Any]) -> SpotTruth:
     srid = content["parameters"]["srid"]
     if survey.srid not in (srid, LOCAL):
-        raise UserError(f"{path} is in EPSG:{srid}, survey {survey.name} in {srid_name(survey.srid)}")
+        raise InputError(f"{path} is in EPSG:{srid}, survey {survey.name} in {srid_name(survey.srid)}")
     rows = [row for row in content["anomalies"] if row["points"]]
     if not rows:
-        raise UserError(f"{path} has no anomaly that the scanner saw: there is nothing to compare with")
+        raise InputError(f"{path} has no anomaly that the scanner saw: there is nothing to compare with")
     asked = [row["points"] >= FEWEST and row["incidence"][1] <= STEEPEST for row in rows]
     shapes = [shapely.force_3d(Polygon(row["outline_3d"])) for row in rows]
     return SpotTruth([str(row["id"]) for row in rows], list(shapes), np.array(asked, np.bool_))

@@ -13,7 +13,7 @@ from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
 from tunneldb.arrays import Float
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError
 from tunneldb.evaluate.measure import compare
 from tunneldb.evaluate.report import SPOTS, Report, make_report
 from tunneldb.evaluate.spot_truth import read_spot_truth
@@ -70,7 +70,7 @@ def evaluate_spots(
     truth = read_spot_truth(survey, path, layer)
     listed = read_spots(conn, survey, "3d")
     if not listed.searched and not listed.face_area:
-        raise UserError(f"spots were not searched for in survey {survey.name}: tunneldb members {survey.name}")
+        raise NotReadyError(f"spots were not searched for in survey {survey.name}: tunneldb members {survey.name}")
     rows = [row for row in listed.rows if row.review != "rejected"]
     origin = np.floor(shapely.get_coordinates(truth.shapes, include_z=True).mean(axis=0))
     faces = _read_faces(conn, survey, origin)

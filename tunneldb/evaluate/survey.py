@@ -14,7 +14,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from tunneldb.arrays import Float
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError, UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.stages.run import loaded_kilometres, parse_km
@@ -78,12 +78,12 @@ def read_findings(conn: psycopg.Connection[Any], survey: Survey, km: str | None 
         )
     ]
     if not detected:
-        raise UserError(f"no leaks were sought in survey {survey.name} yet: tunneldb run {survey.name}")
+        raise NotReadyError(f"no leaks were sought in survey {survey.name} yet: tunneldb run {survey.name}")
     kilometres = detected
     if km is not None:
         kilometres = parse_km(km, loaded_kilometres(conn, survey))
         if left := sorted(set(kilometres) - set(detected)):
-            raise UserError(f"no leaks were sought in kilometre {left[0]} yet: tunneldb run {survey.name} --km {left[0]}")
+            raise NotReadyError(f"no leaks were sought in kilometre {left[0]} yet: tunneldb run {survey.name} --km {left[0]}")
     rows = conn.execute(
         "SELECT id, public.ST_AsBinary(unrolled) FROM tunnel_api.leak"
         " WHERE survey_id = %s AND (detected OR review = 'confirmed') AND review <> 'rejected'"

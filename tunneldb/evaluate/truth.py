@@ -18,7 +18,7 @@ from pyogrio.errors import DataLayerError, DataSourceError
 from pyproj.exceptions import CRSError
 from shapely.geometry import MultiPolygon, Polygon
 
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.files import vector_source
 from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.survey import Survey
@@ -57,7 +57,7 @@ def read_truth(conn: psycopg.Connection[Any], survey: Survey, path: Path, layer:
 
     Raises
     ------
-    UserError
+    InputError
         The file can't be read, has no such layer or no polygon, another coordinate system, or a geometry that is no valid
         polygon or lies off the tunnel.
     """
@@ -67,7 +67,7 @@ def read_truth(conn: psycopg.Connection[Any], survey: Survey, path: Path, layer:
         shapes = [_unrolled(conn, survey, shape, given.naming(key)) for key, shape in zip(ids, shapes, strict=True)]
     for key, shape in zip(ids, shapes, strict=True):
         if not shape.is_valid:
-            raise UserError(
+            raise InputError(
                 f"{given.naming(key)} is no valid polygon ({shapely.is_valid_reason(shape)}): mend it, and try again"
             )
     return Truth(ids, shapes)
@@ -105,7 +105,7 @@ def read_polygons(path: Path, survey: Survey, layer: str | None, noun: str) -> P
 
     Raises
     ------
-    UserError
+    InputError
         See `read_truth`.
     """
     chosen = _layer(path, layer, noun)
@@ -113,9 +113,9 @@ def read_polygons(path: Path, survey: Survey, layer: str | None, noun: str) -> P
     try:
         meta, _, wkb, columns = pyogrio.raw.read(vector_source(path), layer=chosen)
     except (DataSourceError, DataLayerError, RuntimeError, UnicodeDecodeError) as error:
-        raise UserError(f"{where}: cannot be read: {_line(error)}") from None
+        raise InputError(f"{where}: cannot be read: {_line(error)}") from None
     if wkb is None or not len(wkb):
-        raise UserError(f"{where} is empty: there must be at least one polygon; what has no {noun} has nothing to compare with")
+        raise InputError(f"{where} is empty: it needs at least one polygon; without a {noun} there is nothing to compare with")
     ids = _ids(meta, columns, len(wkb))
     return Polygons(where, noun, ids, _polygons(wkb, ids, where, noun), _in_space(path, meta["crs"], survey, where, noun))
 
@@ -123,21 +123,21 @@ def read_polygons(path: Path, survey: Survey, layer: str | None, noun: str) -> P
 def _layer(path: Path, wanted: str | None, noun: str) -> str:
     """Layer of a file that is to be read."""
     if not path.is_file():
-        raise UserError(f"{path}: there is no such file")
+        raise InputError(f"{path}: there is no such file")
     source = vector_source(path)
     try:
         there = [str(name) for name, kind in pyogrio.list_layers(source) if kind is not None]  # a table is no layer
     except UnicodeDecodeError as error:
-        raise UserError(f"{path}: the name of a layer is no UTF-8: {_line(error)}") from None
+        raise InputError(f"{path}: the name of a layer is no UTF-8: {_line(error)}") from None
     except DataSourceError:
-        raise UserError(f"{path} is neither GeoPackage nor GeoJSON: write the truth as one of these") from None
+        raise InputError(f"{path} is neither GeoPackage nor GeoJSON: write the truth as one of these") from None
     listed = ", ".join(there) or "none"
     if wanted is not None:
         if wanted not in there:
-            raise UserError(f"{path} has no layer {wanted}; it has {listed}")
+            raise InputError(f"{path} has no layer {wanted}; it has {listed}")
         return wanted
     if len(there) != 1 and noun not in there:
-        raise UserError(f"{path} has the layers {listed}: say by --layer which holds the true {noun}s")
+        raise InputError(f"{path} has the layers {listed}: say by --layer which holds the true {noun}s")
     return noun if noun in there else there[0]
 
 
@@ -153,12 +153,12 @@ def _polygons(wkb: NDArray[np.object_], ids: list[str], where: str, noun: str) -
         try:
             shape = None if data is None else shapely.from_wkb(data, on_invalid="ignore")
         except shapely.errors.GEOSException as error:
-            raise UserError(f"{where}, {noun} {key} is no valid polygon ({_line(error)}): mend it, and try again") from None
+            raise InputError(f"{where}, {noun} {key} is no valid polygon ({_line(error)}): mend it, and try again") from None
         if not isinstance(shape, Polygon | MultiPolygon) or shape.is_empty:
             kind = "nothing" if shape is None or shape.is_empty else shape.geom_type
-            raise UserError(f"{where}, {noun} {key} is {kind}: each {noun} must be a polygon")
+            raise InputError(f"{where}, {noun} {key} is {kind}: each {noun} must be a polygon")
         if not np.isfinite(shapely.get_coordinates(shape)).all():
-            raise UserError(f"{where}, {noun} {key} has a coordinate that is no number: mend it, and try again")
+            raise InputError(f"{where}, {noun} {key} has a coordinate that is no number: mend it, and try again")
         shapes.append(shape)
     return shapes
 
@@ -180,9 +180,9 @@ def _in_space(path: Path, given: str | None, survey: Survey, where: str, noun: s
     name = crs.name if crs is not None else given
     if noun == "spot":
         system = "without a coordinate system" if local else f"in EPSG:{survey.srid}"
-        raise UserError(f"{where} is in {name}: polygons of spots must be 3D, {system}")
+        raise InputError(f"{where} is in {name}: polygons of spots must be 3D, {system}")
     space = "" if local else f", or 3D in the tunnel's, EPSG:{survey.srid}"
-    raise UserError(f"{where} is in {name}: polygons must be in the unrolled plane, without a coordinate system{space}")
+    raise InputError(f"{where} is in {name}: polygons must be in the unrolled plane, without a coordinate system{space}")
 
 
 def _bare_geojson(path: Path) -> bool:
@@ -201,7 +201,7 @@ def _unrolled(
 ) -> Polygon | MultiPolygon:
     """A leak in space, in the unrolled plane."""
     if not shape.has_z:
-        raise UserError(f"{where} has no heights: polygons in EPSG:{survey.srid} must be 3D, on the lining")
+        raise InputError(f"{where} has no heights: polygons in EPSG:{survey.srid} must be 3D, on the lining")
     parts = []
     for part in shapely.get_parts(shape):
         row = conn.execute(
@@ -209,7 +209,7 @@ def _unrolled(
             (survey.id, shapely.to_wkb(part), survey.srid),
         ).fetchone()
         if row is None or row[0] is None:
-            raise UserError(f"{where} lies off the tunnel of survey {survey.name}, or where it has no sections")
+            raise InputError(f"{where} lies off the tunnel of survey {survey.name}, or where it has no sections")
         parts.append(shapely.from_wkb(bytes(row[0])))
     return parts[0] if len(parts) == 1 else MultiPolygon(parts)
 

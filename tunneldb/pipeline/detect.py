@@ -17,7 +17,7 @@ from tunneldb.anomalies.detect import Detection, find_anomalies
 from tunneldb.anomalies.measure import Measurement, measure_outline
 from tunneldb.anomalies.sparse import least_density, leave_out_sparse
 from tunneldb.arrays import UInt8
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError, UserError
 from tunneldb.geometry.section_outliers import MOST, SectionOutliers
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
@@ -328,7 +328,7 @@ def load_floor(conn: psycopg.Connection[Any], survey: Survey, surface: Surface, 
         (survey.id, km),
     ).fetchone()
     if done is None:
-        raise UserError(f"the ground of kilometre {km} is not known yet: tunneldb run {survey.name} --km {km} --from ground")
+        raise NotReadyError(f"the ground of kilometre {km} is unknown: tunneldb run {survey.name} --km {km} --from ground")
     # Far enough for both kilometres to see the ground on both sides of a gap at their border.
     beyond = int(np.ceil(halo)) + HIDDEN
     first, last = int(km * KILOMETRE) - beyond, int((km + 1) * KILOMETRE) + beyond
@@ -353,7 +353,7 @@ def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:
     """Grid of a kilometre and its halo: blocks that have a surface, from the lowest to the highest arc of their sections."""
     first, last = km * KILOMETRE - surface.reach, (km + 1) * KILOMETRE + surface.reach
     if not ((surface.chainages >= first) & (surface.chainages <= last)).any():
-        raise UserError(f"kilometre {km} has no sections yet: run its stages segments and sections first")
+        raise NotReadyError(f"kilometre {km} has no sections yet: run its stages segments and sections first")
     beyond = halo(pixel)  # what is farther away counts only where profiles lie apart, and adds no rows
     inside = (surface.chainages >= first - beyond * pixel) & (surface.chainages <= last + beyond * pixel)
     low, high = float(surface.arcs[inside, 0].min()), float(surface.arcs[inside, -1].max())

@@ -7,7 +7,7 @@ from typing import Any, LiteralString
 
 import psycopg
 
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError, UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.stages.stage import Counts, Progress
 from tunneldb.store.surface import load_alignment
@@ -93,7 +93,7 @@ def segments(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Map
     """Stage 3: segments, and the segment and chainage of every point."""
     built = _one(conn, "SELECT tunnel_api.segment_build(%s, %s)", survey.id, km)
     if not built:
-        raise UserError(f"kilometre {km} has no axis yet: tunneldb run {survey.name} --km {km} --from axis")
+        raise NotReadyError(f"kilometre {km} has no axis yet: tunneldb run {survey.name} --km {km} --from axis")
     progress(0.1)
     return {"segments": built, "points": _one(conn, "SELECT tunnel_api.segment_tag(%s, %s)", survey.id, km)}
 
@@ -101,7 +101,7 @@ def segments(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Map
 def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
     """Stage 4: two cross-sections a segment."""
     if not _one(conn, "SELECT count(*) FROM tunnel.segment WHERE survey_id = %s AND km = %s", survey.id, km):
-        raise UserError(f"kilometre {km} has no segments yet: tunneldb run {survey.name} --km {km} --from segments")
+        raise NotReadyError(f"kilometre {km} has no segments yet: tunneldb run {survey.name} --km {km} --from segments")
     built = _one(
         conn,
         "SELECT tunnel_api.section_build(%s, %s, %s, %s, %s, %s, %s)",
@@ -115,7 +115,7 @@ def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Map
     )
     points = _one(conn, "SELECT coalesce(sum(points), 0) FROM tunnel.segment WHERE survey_id = %s AND km = %s", survey.id, km)
     if not built and points >= FEW_POINTS:
-        raise UserError(
+        raise NotReadyError(
             f"kilometre {km} has no section: the {points} points in its segments fill no section"
             f" (tunneldb run {survey.name} --km {km} --from segments, or load more)"
         )

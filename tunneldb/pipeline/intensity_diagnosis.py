@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from tunneldb.arrays import Float, Int32, Single
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError, UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.calibration import UNKNOWN, Sample, find_range_curve, observe_sample, roughness_of
 from tunneldb.pipeline.detect import ASIDE, load_floor, load_radiometer
@@ -60,13 +60,13 @@ def diagnose_survey(
 
     Raises
     ------
-    UserError
+    InputError
         If the survey has no intensity, or a kilometre no sections or ground yet.
     """
     if survey.intensity_kind == "none":
-        raise UserError(f"survey {survey.name} has no intensity: it was added with --intensity-kind none")
+        raise InputError(f"survey {survey.name} has no intensity: it was added with --intensity-kind none")
     if survey.platform == "unknown":
-        raise UserError(f"survey {survey.name} has no scanner positions, so range and incidence are not known (--no-poses)")
+        raise InputError(f"survey {survey.name} has no scanner positions, so range and incidence are not known (--no-poses)")
     share = max(1, SAMPLE // len(kilometres))
     diagnoses = []
     for km in kilometres:
@@ -164,14 +164,14 @@ def diagnose_file(
 
     Raises
     ------
-    UserError
+    InputError
         If the file can't be read, or it isn't known where the scanner stood.
     """
     stations = _stations(path, scanner)
     xyz, scan_id, raw = _thinned(path, dimension, begin(path.name, read_header(path).points))
     scans = np.unique(scan_id)
     if scanner is not None and len(scans) > 1:
-        raise UserError(
+        raise InputError(
             f"{path} holds {len(scans)} scans ({_some(scans)}), and --scanner is the place of one: split the file by"
             " point_source_id, or load it into a survey with --stations"
         )
@@ -186,7 +186,7 @@ def diagnose_file(
     level = to_decibel(raw, kind)
     flat = np.isfinite(cosine) & np.isfinite(level)
     if not flat.any():
-        raise UserError(f"{path}: no surface is flat enough for its normal, and so for incidence angles, to be known")
+        raise InputError(f"{path}: no surface is flat enough for its normal, and so for incidence angles, to be known")
     samples = IntensitySamples(xyz, scan_id, range_m, cosine, level).some(flat)
     range_m, cosine, level = samples.range_m, samples.cosine, samples.level
     found, refused = _attempt(lambda: estimate_range_curve(samples, unrolled=False), level)
@@ -271,17 +271,17 @@ def _stations(path: Path, scanner: tuple[float, float, float] | None) -> dict[in
     """Positions of a file's scans by their numbers; none where ``scanner`` says it."""
     if not has_scans(path):
         if scanner is None:
-            raise UserError(f"{path}: where the scanner stood isn't in the file: give --scanner X Y Z in its coordinates")
+            raise InputError(f"{path}: where the scanner stood isn't in the file: give --scanner X Y Z in its coordinates")
         return {}
     scans = posed_scans(path)
     posed = {scan.number: scan.position for scan in scans if scan.position is not None}
     if scanner is not None:
         if posed:
-            raise UserError(f"{path}: its scans bring their poses, so --scanner isn't needed: leave it out")
+            raise InputError(f"{path}: its scans bring their poses, so --scanner isn't needed: leave it out")
         return {}
     for scan in scans:
         if scan.number not in posed:
-            raise UserError(
+            raise InputError(
                 f"{path}: scan {scan.name!r} has no pose, so where the scanner stood isn't known: give --scanner X Y Z"
             )
     return posed
@@ -300,7 +300,7 @@ def _thinned(path: Path, dimension: str, progress: Callable[[float], None]) -> t
             edge *= 1.0 if count <= MOST_POINTS else 2.0**0.5
         progress(len(chunk))
     if not count:
-        raise UserError(f"{path}: the file holds no points")
+        raise InputError(f"{path}: the file holds no points")
     points = _thin(_joined(kept), edge)
     return points.xyz, points.scan_id, points.intensity
 

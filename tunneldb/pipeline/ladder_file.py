@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tunneldb.csvfile import CsvTable, read_csv, read_texts
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.registration.underwater import Ladder, Near
 
 COLUMNS = ("rung", "height", "stile_gap", "diameter")
@@ -24,12 +24,12 @@ def read_ladders(path: Path) -> list[Ladder]:
 
     Raises
     ------
-    UserError
+    InputError
         If a ladder has too few rungs, or figures that no ladder has; names file, line and value.
     """
     table = read_csv(path, COLUMNS)
     if len(table) == 0:
-        raise UserError(f"{path} holds no ladder; it needs rows ladder,{','.join(COLUMNS)}")
+        raise InputError(f"{path} holds no ladder; it needs rows ladder,{','.join(COLUMNS)}")
     names = read_texts(path, "ladder")
     return [_ladder(table, name, [k for k, other in enumerate(names) if other == name]) for name in dict.fromkeys(names)]
 
@@ -66,7 +66,7 @@ def read_start(path: Path) -> dict[str, Near]:
 
     Raises
     ------
-    UserError
+    InputError
         Names file, line and value.
     """
     table = read_csv(path, ("x", "y", "within"))

@@ -15,7 +15,7 @@ from tunneldb.anomalies.features import NAMES
 from tunneldb.anomalies.learning import Lesson, Reviewed, learn
 from tunneldb.anomalies.verdict import weigh
 from tunneldb.arrays import Bool, Float
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError, UserError
 from tunneldb.store.learned import (
     Measured,
     apply_learned,
@@ -128,7 +128,7 @@ def plan_learning(conn: psycopg.Connection[Any], surveys: Sequence[Survey]) -> P
     reviewed = (measured.said != "") & np.isin(measured.survey, [survey.id for survey in surveys])
     without = {survey.name: int((reviewed & ~measured.known & (measured.survey == survey.id)).sum()) for survey in surveys}
     if not reviewed.any():
-        raise UserError(
+        raise NotReadyError(
             f"no anomaly of {' or '.join(names)} was reviewed yet: confirm, reject or rename some, in QGIS or through the view"
             " tunnel_api.leak"
         )

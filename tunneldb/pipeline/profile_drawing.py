@@ -10,7 +10,7 @@ import numpy as np
 
 from tunneldb.alignment.drawing import open_drawing
 from tunneldb.arrays import Float
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
 """Metres in a unit."""
@@ -49,7 +49,7 @@ def read_drawing(path: Path, unit: str | None, layer: str | None) -> DrawnOutlin
 
     Raises
     ------
-    UserError
+    InputError
         If it can't be read, states no unit and none is given, or another; has several layers of lines and none is chosen; has
         curves that are no arcs; or leaves a gap.
     """
@@ -63,7 +63,7 @@ def read_drawing(path: Path, unit: str | None, layer: str | None) -> DrawnOutlin
             continue
         name = f"{entity.dxftype()} {entity.dxf.handle}"
         if entity.dxftype() in _CURVES:
-            raise UserError(f"{path}, {name}: a profile is lines and arcs, which a {entity.dxftype()} is not")
+            raise InputError(f"{path}, {name}: a profile is lines and arcs, which a {entity.dxftype()} is not")
         parts = entity.virtual_entities() if entity.dxftype() in _POLYLINES else [entity]
         for part in parts:
             for element in _elements(part):
@@ -71,7 +71,7 @@ def read_drawing(path: Path, unit: str | None, layer: str | None) -> DrawnOutlin
                     elements.append(element)
                     names.append(name)
     if not elements:
-        raise UserError(f"{path}: layer {chosen!r} holds no line with a length")
+        raise InputError(f"{path}: layer {chosen!r} holds no line with a length")
     scaled = np.array(elements)
     scaled[:, :4] *= metres
     return DrawnOutline(*_joined(path, scaled, names), metres, notes)
@@ -85,20 +85,20 @@ def _unit(path: Path, code: int, unit: str | None) -> tuple[float, tuple[str, ..
     if unit is None:
         if stated is None:
             says = f"its unit is {units.decode(code)}" if code else "it states no unit"
-            raise UserError(f"{path}: {says} ($INSUNITS {code}); say what its lengths are by --unit {'|'.join(METRES)}")
+            raise InputError(f"{path}: {says} ($INSUNITS {code}); say what its lengths are by --unit {'|'.join(METRES)}")
         return METRES[stated], ()
     if stated is not None and stated != unit:
-        raise UserError(f"{path}: it states {stated} ($INSUNITS {code}), --unit says {unit}; leave one out")
+        raise InputError(f"{path}: it states {stated} ($INSUNITS {code}), --unit says {unit}; leave one out")
     return METRES[unit], ()
 
 
 def _layer(path: Path, names: list[str], wanted: str | None) -> str:
     listed = ", ".join(map(repr, names)) or "none"
     if wanted is not None and wanted not in names:
-        raise UserError(f"{path} has no layer {wanted!r} of lines; it has {listed}")
+        raise InputError(f"{path} has no layer {wanted!r} of lines; it has {listed}")
     if wanted is None and len(names) != 1:
         mend = "; choose one by --drawing-layer NAME" if names else ""
-        raise UserError(f"{path} holds {len(names)} layers of lines: {listed}{mend}")
+        raise InputError(f"{path} holds {len(names)} layers of lines: {listed}{mend}")
     return wanted or names[0]
 
 
@@ -133,7 +133,7 @@ def _joined(path: Path, elements: Float, names: list[str]) -> tuple[Float, list[
         if away > NEAR:
             x, y = chain[-1][2:4] if away == ahead[0] else chain[0][:2]
             beside = order[-1] if away == ahead[0] else order[0]
-            raise UserError(
+            raise InputError(
                 f"{path}, {names[beside]}: a gap of {1e3 * away:.1f} mm between its end at {x:.4f},{y:.4f} m and the nearest "
                 f"other, of {names[k]}"
             )

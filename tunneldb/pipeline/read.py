@@ -14,7 +14,7 @@ from typing import Any
 import psycopg
 
 from tunneldb.arrays import Single
-from tunneldb.errors import UserError
+from tunneldb.errors import BusyError, UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import require_same_density
@@ -223,7 +223,7 @@ class Reading:
         key = -(1 << 30) - (zlib.crc32(name.encode()) >> 2)
         row = self.conn.execute("SELECT pg_try_advisory_xact_lock(%s, %s)", [self.survey.id, key]).fetchone()
         if row is None or not row[0]:
-            raise UserError(f"another process is reading {name}: wait until it has finished (tunneldb status)")
+            raise BusyError(f"another process is reading {name}: wait until it has finished (tunneldb status)")
 
     def overlapped(self, former: Sequence[Recorded], rest: Iterable[Recorded]) -> list[Recorded]:
         """Files that overlap one that is replaced: points of theirs may come back where it was nearer to the centre."""

@@ -8,7 +8,7 @@ from typing import Any, cast
 import psycopg
 
 from tunneldb.database import snapshot
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError, UserError
 from tunneldb.pipeline.members import AUTO, Begin, FileMembers, Inputs
 from tunneldb.pipeline.replace_structures import replace_structures
 from tunneldb.pipeline.spot_colours import find_coloured_members
@@ -89,7 +89,7 @@ def _inputs(conn: psycopg.Connection[Any], survey: Survey) -> Inputs:
         "SELECT path, bytes, checksum FROM tunnel.scan_file WHERE survey_id = %s ORDER BY name", [survey.id]
     ).fetchall()
     if not rows:
-        raise UserError(f"survey {survey.name} holds no files yet: tunneldb load {survey.name} FILE...")
+        raise NotReadyError(f"survey {survey.name} holds no files yet: tunneldb load {survey.name} FILE...")
     return Inputs(
         tuple(unchanged_file(*row) for row in rows),
         survey.intensity_dimension,

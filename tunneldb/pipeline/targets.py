@@ -14,7 +14,7 @@ from tunneldb.arrays import Bool, Float
 from tunneldb.classification.targets.curvature import CurvedCells
 from tunneldb.classification.targets.detection import LEAST_POINTS, Refusal, Sphere, confirmed, find_spheres, join
 from tunneldb.database import snapshot
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError, UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
@@ -112,7 +112,7 @@ def search(
         kilometres = loaded_kilometres(conn, survey)
         place = _Place.of(conn, survey) if kilometres else None
     if place is None:
-        raise UserError(f"survey {survey.name} holds no points yet: tunneldb load {survey.name} FILE...")
+        raise NotReadyError(f"survey {survey.name} holds no points yet: tunneldb load {survey.name} FILE...")
     rows: list[TargetObservation] = []
     refusals: list[tuple[int, Refusal]] = []
     points = 0

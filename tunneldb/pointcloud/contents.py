@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunneldb.arrays import Float, Int64
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.table import format_of
 from tunneldb.pointcloud.points import CHUNK, Raw, on_earth
 
@@ -107,7 +107,7 @@ def read_contents(path: Path, progress: Callable[[int], None] = lambda count: No
 
     Raises
     ------
-    UserError
+    InputError
         If it cannot be read.
     """
     sample, scans = UniformSample(), dict[int, int]()
@@ -135,7 +135,7 @@ def read_contents(path: Path, progress: Callable[[int], None] = lambda count: No
             first, last = min(first, float(good.min(initial=np.inf))), max(last, float(good.max(initial=-np.inf)))
         progress(len(raw))
     if points == misplaced:
-        raise UserError(f"{path}: none of its {points} points has coordinates")
+        raise InputError(f"{path}: none of its {points} points has coordinates")
     times = (first, last) if timed and first < last else None
     return Contents(points, misplaced, low, high, times, untimed, scans, sample.xyz, sample.numbers, sample.share)
 
@@ -158,7 +158,7 @@ def read_values(path: Path, dimension: str, points: int) -> NDArray[Any]:
 
     Raises
     ------
-    UserError
+    InputError
         If they cannot be read as one number a point.
     """
     runs = -(-points // RUN)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.geometry.crs import LOCAL, describe_crs, describe_srid, fits_srid, horizontal, is_local, srid_name
 from tunneldb.pointcloud.formats.faults import require_dimension
 from tunneldb.pointcloud.formats.raw import read_raw
@@ -25,7 +25,7 @@ def read_header(path: Path) -> ScanHeader:
 
     Raises
     ------
-    UserError
+    InputError
         If the file is missing, is none of its kind, or holds no points.
     """
     require_known(path)
@@ -60,14 +60,14 @@ def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_tim
 
     Raises
     ------
-    UserError
+    InputError
         If the dimension or ``gps_time`` is missing, or the horizontal coordinate system is another one.
     """
     require_dimension(header.path, dimension, header.dimensions, "the survey's intensity")
     require_dimension(header.path, "gps_time" if needs_time else None, header.dimensions, "the trajectory")
     if header.crs is not None and not fits_srid(header.crs, srid):
         mend = "with --srid local" if is_local(header.crs) else "with the file's SRID"
-        raise UserError(
+        raise InputError(
             f"{header.path}: its coordinate system is {describe_crs(header.crs)}, the tunnel's is {describe_srid(srid)}; "
             f"transform the file or add the tunnel {mend}"
         )

@@ -16,7 +16,7 @@ import numpy as np
 from laspy import DecompressionSelection, LazBackend
 
 from tunneldb.arrays import Float, Int64, UInt8, UInt32
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.e57 import is_e57
 from tunneldb.pointcloud.formats.e57_records import E57Records
 from tunneldb.pointcloud.formats.faults import decoding
@@ -78,7 +78,7 @@ def rewrite(
 
     Raises
     ------
-    UserError
+    InputError
         If the source cannot be read, holds no points, or holds waveforms.
     OSError
         If the target cannot be written.
@@ -118,7 +118,7 @@ def rewrite_with_numbers(
 
     Raises
     ------
-    UserError
+    InputError
         As of `rewrite`, and if the file has a dimension of that name.
     OSError
         If the target cannot be written.
@@ -127,7 +127,7 @@ def rewrite_with_numbers(
     try:
         head = what.head.with_numbers(names, record_size(what.head.point_format))
     except ValueError as error:
-        raise UserError(f"{source}: it has a dimension {str(error)!r} already; write it without") from None
+        raise InputError(f"{source}: it has a dimension {str(error)!r} already; write it without") from None
     values = _Pieces(numbers)
     with writing(target, head) as writer:
         for records in what.chunks:
@@ -167,7 +167,7 @@ def records_of(path: Path, size: int = CHUNK, only: Collection[int] | None = Non
 
     Raises
     ------
-    UserError
+    InputError
         If the file cannot be read, or holds waveforms; while it is read, if it is cut off.
     """
     return _of_las(path, size, only) if format_of(path).is_las else _of_others(path, size, only)
@@ -178,7 +178,7 @@ def read_coordinates(path: Path, size: int = CHUNK) -> Iterator[Float]:
 
     Raises
     ------
-    UserError
+    InputError
         If the file cannot be read, or holds no points.
     """
     if not format_of(path).is_las:
@@ -198,9 +198,9 @@ def _of_las(path: Path, size: int, only: Collection[int] | None) -> Source:
     with decoding(path, KIND):
         head = read_head(path)
     if head.holds_waveforms:
-        raise UserError(f"{path}: it holds waveforms, which would be lost; write it without them, or with them in a file aside")
+        raise InputError(f"{path}: its waveforms would be lost: write it without them, or with them in a separate file")
     if head.points != header.points:
-        raise UserError(f"{path}: its header announces {head.points} and {header.points} points; mend the file")
+        raise InputError(f"{path}: its header announces {head.points} and {header.points} points; mend the file")
     before = head.point_format
     after = FORMAT_OF[before]
     head = head.with_points(after, record_size(after) + head.record_size - record_size(before)).with_crs(header.crs)
@@ -229,7 +229,7 @@ def _read(
                     las.seek(done)
                 array = las.read_points(size).array
             if len(array) == 0:
-                raise UserError(f"{path}: truncated: {done} points read of the {count} that its header announces")
+                raise InputError(f"{path}: truncated: {done} points read of the {count} that its header announces")
             done += len(array)
             at = done
             yield array.view(np.uint8).reshape(len(array), -1)

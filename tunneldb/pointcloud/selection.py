@@ -18,7 +18,7 @@ import numpy as np
 import scipy  # its parts when they are used: they take long to import
 
 from tunneldb.arrays import Bool, Float, Int32, Int64, Intp, Single
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.misplacement import explain_misplacement
 from tunneldb.geometry.stationing import KILOMETRE
@@ -190,7 +190,7 @@ def filter_file(
 
     Raises
     ------
-    UserError
+    InputError
         If the file cannot be read, no point lies near the axis (says how far they are), all near it are noise, or of more
         points near the axis than ``max_left_out`` allows a number is invalid or the scanner position unknown.
     """
@@ -200,7 +200,7 @@ def filter_file(
             rows["tag"] = tag
             survivors.add(rows)
     if work.counts.kept == 0:
-        raise UserError(
+        raise InputError(
             f"{path}: all {work.counts.noise} points near the axis are noise: none has {settings.noise_points} points around it"
         )
     return work.counts
@@ -258,7 +258,7 @@ class _Filter:
         counts.seconds = {km: self.times.seconds(ranges) for km, ranges in counts.ranges.items()}
         if counts.outside and counts.outside + counts.invalid == counts.points:
             check = "check the axis, the file's coordinates and the tunnel's SRID"
-            raise UserError(
+            raise InputError(
                 f"{self.path}: no points near the axis: the nearest is about {nearest:.0f} m from it and the limit is "
                 f"{self.settings.max_distance:g} m; {guess or check}"
             )
@@ -271,7 +271,7 @@ class _Filter:
         nothing = counts.invalid + counts.unposed == near
         for count, reason in ((counts.invalid, self.invalid), (counts.unposed, self.faults.text())):
             if count > self.settings.max_left_out * near or (nothing and count):
-                raise UserError(
+                raise InputError(
                     f"{self.path}: {reason} ({100.0 * count / near:.3g} % of the points near the axis; "
                     f"--max-left-out {100.0 * self.settings.max_left_out:g} allows less)"
                 )

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from tunneldb.arrays import Float
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.text_lines import TextLines, are_numbers, divider_of, parse
 from tunneldb.pointcloud.reader import read_chunks, read_header
 
@@ -26,13 +26,13 @@ def read_sonar(path: Path) -> tuple[Float, int]:
 
     Raises
     ------
-    UserError
+    InputError
         If it is no such file, or its coordinates are not those of a scanner's own axes in metres.
     """
     points, invalid = read_soundings(path)
     far = float(np.percentile(np.linalg.norm(points, axis=1), 50))
     if far > FARTHEST:
-        raise UserError(
+        raise InputError(
             f"{path}: its points lie {far:.0f} m from the origin, which is the sonar's place in a scan of its own:"
             " is it a scan in the tunnel's system (load it with --medium water), or in feet or millimetres?"
         )
@@ -43,9 +43,9 @@ def read_soundings(path: Path) -> tuple[Float, int]:
     """Points of a sonar in whatever axes its file has, see `read_sonar`."""
     suffix = path.suffix.lower()
     if suffix in RAW:
-        raise UserError(f"{path}: {suffix} is raw data, which needs the maker's software: export it as .xyz, .las or .off")
+        raise InputError(f"{path}: {suffix} is raw data, which needs the maker's software: export it as .xyz, .las or .off")
     if not path.is_file():
-        raise UserError(f"{path}: there is no such file")
+        raise InputError(f"{path}: there is no such file")
     if suffix == ".off":
         points = _read_off(path)
     elif suffix in TEXT:
@@ -56,10 +56,10 @@ def read_soundings(path: Path) -> tuple[Float, int]:
     finite = np.isfinite(points).all(axis=1)
     invalid = int((~finite).sum())
     if invalid > MOST_INVALID * len(points):
-        raise UserError(f"{path}: {invalid} of its {len(points)} points have coordinates that are no numbers: export it again")
+        raise InputError(f"{path}: {invalid} of its {len(points)} points have coordinates that are no numbers: export it again")
     points = points[finite]
     if len(points) == 0:
-        raise UserError(f"{path}: the file holds no points")
+        raise InputError(f"{path}: the file holds no points")
     return points, invalid
 
 
@@ -67,17 +67,17 @@ def _read_text(path: Path) -> Float:
     with TextLines(path) as lines:
         while (text := lines.text()) is not None and not _is_place(text):
             if text.startswith(POINTER):
-                raise UserError(f"{path}: it is the pointer to a file in Git LFS, not the file: git lfs pull")
+                raise InputError(f"{path}: it is the pointer to a file in Git LFS, not the file: git lfs pull")
             if lines.line > 100:
-                raise UserError(f"{path}, line {lines.line - 1}: no line of numbers so far: it is no table of points")
+                raise InputError(f"{path}, line {lines.line - 1}: no line of numbers so far: it is no table of points")
         if text is None:
-            raise UserError(f"{path}: the file holds no points: no line begins with x, y and z, decimals with a point")
+            raise InputError(f"{path}: the file holds no points: no line begins with x, y and z, decimals with a point")
         lines.back()
         divider = divider_of(text)
         width = len(text.split(divider))
         if width < 3:
             comma = " (are its decimals written with a comma?)" if divider == "," else ""
-            raise UserError(f"{path}, line {lines.line}: {width} values where x, y and z are expected{comma}")
+            raise InputError(f"{path}, line {lines.line}: {width} values where x, y and z are expected{comma}")
         parts: list[Float] = []
         while True:
             first = lines.line
@@ -97,19 +97,19 @@ def _read_off(path: Path) -> Float:
     """Vertices of an OFF file."""
     with TextLines(path) as lines:
         if (lines.text() or "").upper() != "OFF":
-            raise UserError(f"{path}, line 1: an OFF file begins with OFF")
+            raise InputError(f"{path}, line 1: an OFF file begins with OFF")
         counts = (lines.text() or "").split()
         if not counts or not counts[0].isdigit():
-            raise UserError(f"{path}, line 2: the numbers of vertices, faces and edges are expected")
+            raise InputError(f"{path}, line 2: the numbers of vertices, faces and edges are expected")
         wanted, parts, found = int(counts[0]), [np.zeros((0, 3))], 0
         while found < wanted:
             first = lines.line
             block, count = lines.take(min(_LINES, wanted - found))
             if not count:
-                raise UserError(f"{path}: truncated: line 2 announces {wanted} vertices, {found} follow")
+                raise InputError(f"{path}: truncated: line 2 announces {wanted} vertices, {found} follow")
             width = len(block.split(b"\n", 1)[0].split())
             if width < 3:
-                raise UserError(f"{path}, line {first}: {width} values where x, y and z are expected")
+                raise InputError(f"{path}, line {first}: {width} values where x, y and z are expected")
             parts.append(parse(path, block, first, None, width, (0, 1, 2)))
             found += count
         return np.vstack(parts)

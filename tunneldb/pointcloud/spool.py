@@ -103,7 +103,7 @@ class Spool:
 
         Raises
         ------
-        UserError
+        InputError
             If the disk of the temporary folder is full.
         """
         if len(rows) == 0:

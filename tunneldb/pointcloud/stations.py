@@ -10,7 +10,7 @@ import numpy as np
 
 from tunneldb.arrays import Float, Int32
 from tunneldb.csvfile import read_csv
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.table import has_scans, posed_scans
 
 SCAN_ID_LIMIT = 1 << 31  # point_source_id of LAS has 16 bits, the numbers of E57 scans have 31
@@ -52,7 +52,7 @@ def read_stations(paths: Sequence[Path]) -> Stations:
 
     Raises
     ------
-    UserError
+    InputError
         If a file cannot be read or holds no station, a number is none, a scan has no position, or one number has two.
     """
     known: dict[int, _Station] = {}
@@ -64,10 +64,10 @@ def read_stations(paths: Sequence[Path]) -> Stations:
                 continue
             other = known.setdefault(station.scan_id, station)
             if other.place is not None and np.linalg.norm(other.place - station.place) > SAME_PLACE:
-                raise UserError(f"scan_id {station.scan_id} has two positions: by {other.origin} and by {station.origin}")
+                raise InputError(f"scan_id {station.scan_id} has two positions: by {other.origin} and by {station.origin}")
     for station in placeless:
         if station.scan_id not in known:
-            raise UserError(
+            raise InputError(
                 f"{station.origin} has no pose, so it is not known where the scanner stood; "
                 f"give it in a CSV file: --stations FILE, scan_id {station.scan_id}"
             )
@@ -81,7 +81,7 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
             continue
         found = sorted(file for file in path.iterdir() if has_scans(file))
         if not found:
-            raise UserError(f"{path}: no E57 or PTX file in this folder")
+            raise InputError(f"{path}: no E57 or PTX file in this folder")
         yield from found
 
 
@@ -93,7 +93,7 @@ def _of_scans(path: Path) -> Iterator[_Station]:
 def _of_csv(path: Path) -> Iterator[_Station]:
     table = read_csv(path, ("scan_id", "x", "y", "z"), hint={"scan_id": SCAN_ID})
     if not len(table):
-        raise UserError(f"{path} holds no station")
+        raise InputError(f"{path} holds no station")
     ids = table["scan_id"]
     wrong = np.flatnonzero((ids != np.floor(ids)) | (ids < 0) | (ids >= SCAN_ID_LIMIT))
     if len(wrong):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunneldb.arrays import Bool, Float
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError, UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pointcloud.poses import PoseModel
@@ -124,7 +124,7 @@ class Observer:
         start, stop = km * KILOMETRE, (km + 1) * KILOMETRE
         touching = (surface.ends[:, 1] > start) & (surface.ends[:, 0] < stop)
         if not touching.any():
-            raise UserError(f"kilometre {km} has no segments yet: run its stages segments and sections first")
+            raise NotReadyError(f"kilometre {km} has no segments yet: run its stages segments and sections first")
         # Whole metres, so that what is laid out each metre lies at the same places from either kilometre.
         start, stop = start - math.ceil(halo), stop + math.ceil(halo)
         touching = (surface.ends[:, 1] > start) & (surface.ends[:, 0] < stop)

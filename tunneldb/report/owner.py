@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from PIL import Image
 
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.report.words import ENGLISH, Words, known_texts, languages, read_language
 
 CHAPTERS = {
@@ -84,7 +84,7 @@ def read_owner(path: Path) -> Owner:
 
     Raises
     ------
-    UserError
+    InputError
         If it cannot be read, or something in it is wrong: file, key and value are told.
     """
     given = _Given(path, _load(path))
@@ -105,11 +105,11 @@ def _load(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text("utf-8"))
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: is not TOML: {error}") from error
+        raise InputError(f"{path}: is not TOML: {error}") from error
     except RecursionError:
-        raise UserError(f"{path}: its lists are nested too deep") from None
+        raise InputError(f"{path}: its lists are nested too deep") from None
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class _Given:
     values: dict[str, Any]
 
     def refuse(self, key: str, said: str) -> NoReturn:
-        raise UserError(f"{self.path}: {key}: {said}")
+        raise InputError(f"{self.path}: {key}: {said}")
 
     def refuse_others(self, known: tuple[str, ...]) -> None:
         for key in self.values:

@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from tunneldb import __version__
 from tunneldb.database import snapshot
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError
 from tunneldb.export.tables.dry_regions import read_dry_regions
 from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, STATES, UNCOUNTED
 from tunneldb.export.tables.leaks import clock_label
@@ -126,7 +126,7 @@ def write_site_html(conn: psycopg.Connection[Any], survey: Survey, path: Path, o
     with snapshot(conn):
         found = read_structures(conn, survey)
         if found is None:
-            raise UserError(f"survey {survey.name} has nothing to report yet: tunneldb members {survey.name}")
+            raise NotReadyError(f"survey {survey.name} has nothing to report yet: tunneldb members {survey.name}")
         numbers = {spot.id: spot.number for spot in found.spots.rows}
         edits_in_all, edits = data.read_edits(conn, survey)
         context = {

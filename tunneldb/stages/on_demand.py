@@ -7,7 +7,7 @@ from typing import Any
 
 import psycopg
 
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError, UserError
 from tunneldb.stages.ledger import stage_run
 from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
@@ -64,7 +64,7 @@ def refuse_stale(reasons: Mapping[int, str | None], survey: str, verb: str) -> N
     """
     for km, why in reasons.items():
         if why is not None and " is stale" in why:
-            raise UserError(f"kilometre {km}: {why}; tunneldb run {survey} --stale, then {verb}")
+            raise NotReadyError(f"kilometre {km}: {why}; tunneldb run {survey} --stale, then {verb}")
 
 
 def refuse_beyond(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from tunneldb.errors import UserError, did_you_mean
+from tunneldb.errors import InputError, did_you_mean
 
 
 @dataclass(frozen=True)
@@ -87,14 +87,14 @@ def settings(assignments: Iterable[str] = ()) -> dict[str, float]:
 
     Raises
     ------
-    UserError
+    InputError
         For an unknown name, a value that is no number, one out of bounds, or two that do not go together.
     """
     values = {name: parameter.default for name, parameter in PARAMETERS.items()}
     for assignment in assignments:
         name, equals, text = assignment.partition("=")
         if name not in PARAMETERS:
-            raise UserError(
+            raise InputError(
                 f"there is no parameter {name!r}; there are {', '.join(PARAMETERS)}.{did_you_mean(name, PARAMETERS)}"
             )
         values[name] = _value(name, text if equals else "")
@@ -107,13 +107,13 @@ def check_together(values: Mapping[str, float]) -> None:
 
     Raises
     ------
-    UserError
+    InputError
         If they do not.
     """
     if 180.0 / values["section.angle_step"] % 1 > 1e-9:
-        raise UserError(f"section.angle_step must divide 180 degrees: {values['section.angle_step']:g} does not")
+        raise InputError(f"section.angle_step must divide 180 degrees: {values['section.angle_step']:g} does not")
     if values["section.half_width"] > values["section.max_half_width"]:
-        raise UserError("section.half_width must not exceed section.max_half_width")
+        raise InputError("section.half_width must not exceed section.max_half_width")
 
 
 def of_stage(values: Mapping[str, float], prefixes: Iterable[str]) -> dict[str, float]:
@@ -127,9 +127,9 @@ def _value(name: str, text: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise UserError(f"{name} needs a number, not {text!r}: --set {name}={parameter.default:g}") from None
+        raise InputError(f"{name} needs a number, not {text!r}: --set {name}={parameter.default:g}") from None
     if not parameter.low <= value <= parameter.high:
-        raise UserError(f"{name}={value:g} is out of bounds: {parameter.low:g} to {parameter.high:g} {parameter.unit}".rstrip())
+        raise InputError(f"{name}={value:g} is out of bounds {parameter.low:g} to {parameter.high:g} {parameter.unit}".rstrip())
     if parameter.whole and value != int(value):
-        raise UserError(f"{name}={value:g} must be a whole number")
+        raise InputError(f"{name}={value:g} must be a whole number")
     return value

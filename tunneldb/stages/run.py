@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import psycopg
 
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError, UserError
 from tunneldb.stages.ledger import Run, stage_run
 from tunneldb.stages.parameters import check_together, of_stage, settings
 from tunneldb.stages.registry import STAGES
@@ -64,12 +64,12 @@ def loaded_kilometres(conn: psycopg.Connection[Any], survey: Survey) -> list[int
     return [row[0] for row in rows]
 
 
-def nothing_yet(conn: psycopg.Connection[Any], survey: Survey, lack: str) -> UserError:
+def nothing_yet(conn: psycopg.Connection[Any], survey: Survey, lack: str) -> NotReadyError:
     """Return what to raise where a survey lacks what its stages make: what to type is to load it, or to run it."""
     run = f"tunneldb run {survey.name}"
     if not loaded_kilometres(conn, survey):
         run = f"it holds no points: tunneldb load {survey.name} FILE..., then {run}"
-    return UserError(f"survey {survey.name} {lack} yet: {run}")
+    return NotReadyError(f"survey {survey.name} {lack} yet: {run}")
 
 
 def choose_stages(first: str | None, last: str | None) -> list[Stage]:

@@ -15,7 +15,7 @@ from tunneldb.alignment.design import Design
 from tunneldb.alignment.deviation import Deviation, Part
 from tunneldb.arrays import Float
 from tunneldb.csvfile import read_csv
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError, UserError
 from tunneldb.geometry.stationing import Equation, Stationing
 from tunneldb.store.survey import Survey
 
@@ -170,7 +170,7 @@ def load_deviation(
         [survey.id, low, high],
     ).fetchall()
     if not rows:
-        raise UserError(f"survey {survey.name} has no axis there: tunneldb run {survey.name} --to axis")
+        raise NotReadyError(f"survey {survey.name} has no axis there: tunneldb run {survey.name} --to axis")
     elements = connection.execute(
         """
         SELECT plane, kind, turn, chainage_from, chainage_to, label_from, label_to, radius_from, radius_to, grade_from, grade_to

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import psycopg
 
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.survey import Survey
@@ -52,7 +52,7 @@ def load_surface(conn: psycopg.Connection[Any], survey: Survey, first: float = -
         [survey.id, low, high],
     ).fetchall()
     if not segments or not sections:
-        raise UserError(f"survey {survey.name} has no sections yet: tunneldb run {survey.name} --to sections")
+        raise NotReadyError(f"survey {survey.name} has no sections yet: tunneldb run {survey.name} --to sections")
     return Surface(
         number=np.array([row[0] for row in segments]),
         segments=np.array([row[3] for row in segments]),

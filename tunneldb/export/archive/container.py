@@ -19,7 +19,7 @@ from typing import Any
 
 import zstandard
 
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 
 FORMAT = 1
 """Version of the format: another one is refused."""
@@ -119,7 +119,7 @@ class ArchiveReader:
 
     Raises
     ------
-    UserError
+    InputError
         For a file that is none, is cut off, of another version of the format, or says what cannot be.
     """
 
@@ -128,9 +128,9 @@ class ArchiveReader:
         try:
             self._zip = zipfile.ZipFile(path)
         except FileNotFoundError:
-            raise UserError(f"{path}: there is no such file") from None
+            raise InputError(f"{path}: there is no such file") from None
         except (zipfile.BadZipFile, zlib.error, OSError, ValueError, NotImplementedError) as error:
-            raise UserError(f"{path} is no archive of a survey, or is cut off: {error}") from None
+            raise InputError(f"{path} is no archive of a survey, or is cut off: {error}") from None
         try:
             self.manifest = self._manifest()
             self._require_members()
@@ -151,7 +151,7 @@ class ArchiveReader:
 
         Raises
         ------
-        UserError
+        InputError
             At the end, if they are not what the manifest announces; before it, as soon as they are more.
         """
         member = self.manifest.members[name]
@@ -180,9 +180,9 @@ class ArchiveReader:
         if size != member.bytes or digest.hexdigest() != member.sha256:
             raise self.wrong(f"the checksum of {name} is not that of the manifest")
 
-    def wrong(self, what: str) -> UserError:
+    def wrong(self, what: str) -> InputError:
         """Error for what is wrong with the file."""
-        return UserError(f"{self.path}: {what}; the file is damaged, or was changed. Nothing was imported")
+        return InputError(f"{self.path}: {what}; the file is damaged, or was changed. Nothing was imported")
 
     def _manifest(self) -> Manifest:
         try:
@@ -192,7 +192,7 @@ class ArchiveReader:
             with self._zip.open(info) as file:
                 said = json.loads(file.read(_MANIFEST_BYTES))
             if said["format"] != FORMAT:
-                raise UserError(
+                raise InputError(
                     f"{self.path} has version {str(said['format'])[:20]} of the format, this tunneldb reads version {FORMAT}:"
                     " use the tunneldb that wrote it"
                 )
@@ -200,7 +200,7 @@ class ArchiveReader:
             manifest = Manifest(**{f.name: said[f.name] for f in fields(Manifest) if f.name != "members"}, members=members)
             _require_types(manifest)
         except KeyError as error:
-            raise UserError(f"{self.path} is no archive of a survey: {error.args[0]} is missing") from None
+            raise InputError(f"{self.path} is no archive of a survey: {error.args[0]} is missing") from None
         except (
             zipfile.BadZipFile,
             zlib.error,

@@ -13,7 +13,7 @@ from psycopg import sql
 
 from tunneldb.database.failures import first_line
 from tunneldb.database.schema import HEAD
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.export.archive.container import ArchiveReader, Manifest
 from tunneldb.stages.ledger import stage_run
 from tunneldb.store.archive.into import (
@@ -100,7 +100,7 @@ def load_survey(conn: psycopg.Connection[Any], path: Path, name: str | None, beg
 
     Raises
     ------
-    UserError
+    InputError
         For a file that is none, is damaged, of another schema, or does not fit this database. Nothing is changed then.
     """
     conn.rollback()
@@ -135,7 +135,7 @@ def _require_schema(archive: ArchiveReader) -> None:
     """Refuse rows of another schema: what a migration moves and works out, no reading of columns by their names does."""
     manifest = archive.manifest
     if manifest.schema != HEAD:
-        raise UserError(
+        raise InputError(
             f"{archive.path} is of schema {manifest.schema}, this tunneldb has {HEAD}: import it with tunneldb"
             f" {manifest.tunneldb} into a database of its own, upgrade that (tunneldb init of this one), and export it again"
         )

@@ -46,7 +46,7 @@ def save_survey(conn: psycopg.Connection[Any], survey: Survey, path: Path, begin
     ------
     BusyError
         When a stage is at work on it.
-    UserError
+    InputError
         When points wait to be loaded, or the file cannot be written.
     """
     conn.rollback()

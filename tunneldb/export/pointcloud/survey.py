@@ -14,7 +14,7 @@ import psycopg
 from tunneldb.arrays import Int64
 from tunneldb.classification.classes import PointClass
 from tunneldb.database import snapshot
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError, UserError
 from tunneldb.files import replacing
 from tunneldb.pointcloud.rewrite import rewrite
 from tunneldb.stages.run import loaded_kilometres
@@ -176,7 +176,7 @@ def require_ground(conn: psycopg.Connection[Any], survey: Survey, kilometres: Co
     first, last = min(missing + stale), max(missing + stale)
     stages = [stage for _, stage, _, _ in rows if stage != "load"]
     begin = stages[0] if stages else _STAGE
-    raise UserError(
+    raise NotReadyError(
         f"survey {survey.name} has {' and '.join(filter(None, parts))}: tunneldb run {survey.name}"
         f" --km {first if first == last else f'{first}-{last}'} --from {begin} --to {_STAGE}"
     )

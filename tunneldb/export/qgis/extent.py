@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import psycopg
 
-from tunneldb.errors import UserError
+from tunneldb.errors import NotReadyError
 from tunneldb.stages.run import nothing_yet
 from tunneldb.store.survey import Survey
 
@@ -81,7 +81,7 @@ def map_extent(conn: psycopg.Connection, survey: Survey) -> Extent:
         {"survey": survey.name},
     ).fetchone()
     if row is None and survey.site:
-        raise UserError(f"no members were found in survey {survey.name} yet: tunneldb members {survey.name}")
+        raise NotReadyError(f"no members were found in survey {survey.name} yet: tunneldb members {survey.name}")
     if row is None:
         raise nothing_yet(conn, survey, "has no axis")
     return Extent(*row).grown()

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 
 COORDINATES = ("x", "y", "z")
 SKIPPED = "-"
@@ -49,19 +49,19 @@ def columns_of(path: Path, names: Sequence[str], source: str) -> tuple[str, ...]
 
     Raises
     ------
-    UserError
+    InputError
         If one of x, y and z is missing, or a name stands twice.
     """
     columns = tuple(name if name == SKIPPED else meaning_of(name) for name in names)
     missing = [name for name in COORDINATES if name not in columns]
     if missing:
-        raise UserError(
+        raise InputError(
             f"{path}: no column {', '.join(missing)} by {source}, which names {', '.join(names)}; "
             f"name the columns, x, y and z among them, in {own_names(path)}"
         )
     repeated = [name for name in columns if name != SKIPPED and columns.count(name) > 1]
     if repeated:
-        raise UserError(f"{path}: {source} names the column {repeated[0]} twice")
+        raise InputError(f"{path}: {source} names the column {repeated[0]} twice")
     return columns
 
 
@@ -83,7 +83,7 @@ def given_names(path: Path) -> tuple[list[str], str] | None:
 
     Raises
     ------
-    UserError
+    InputError
         If it cannot be read or names nothing.
     """
     file = names_file(path)
@@ -92,10 +92,10 @@ def given_names(path: Path) -> tuple[list[str], str] | None:
     try:
         text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{file}: cannot be read as names of columns: {error}") from None
+        raise InputError(f"{file}: cannot be read as names of columns: {error}") from None
     names = split_names(text)
     if not names:
-        raise UserError(f"{file}: names no column; write them in one line: x y z intensity")
+        raise InputError(f"{file}: names no column; write them in one line: x y z intensity")
     return names, str(file)
 
 

@@ -21,7 +21,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from tunneldb.arrays import Bool, Float, UInt16
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError, UserError
 from tunneldb.pointcloud.formats.e57_xml import require_bounded_xml
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_dimension
 from tunneldb.pointcloud.formats.scans import scan_number
@@ -109,7 +109,7 @@ def read_e57_scans(path: Path) -> list[Scan]:
 
     Raises
     ------
-    UserError
+    InputError
         If the file cannot be read or holds no points, or pye57 is missing.
     """
     with open_e57(path) as image, decoding(path, KIND):
@@ -157,7 +157,7 @@ def read_e57(
         names = _dimensions(scans)
         require_dimension(path, dimension, names)
         if dimension == "gps_time":
-            raise UserError(f"{path}: gps_time is no intensity; the file has {', '.join(names)}")
+            raise InputError(f"{path}: gps_time is no intensity; the file has {', '.join(names)}")
         records = sum(scan.records for scan in scans)
         wanted = check_ranges(path, ranges, records)
         cursor = _Cursor(path, image, scans, dimension, size, colours)
@@ -199,7 +199,7 @@ class _Cursor:
             self.at = self.stop
             self.piece = next(self.stream, None)
             if self.piece is None:
-                raise UserError(f"{self.path}: changed: it has {self.at} valid points, points up to {end} are wanted")
+                raise InputError(f"{self.path}: changed: it has {self.at} valid points, points up to {end} are wanted")
             self.stop = self.at + len(self.piece)
 
     def _go_to(self, number: int) -> None:
@@ -238,7 +238,7 @@ def good_of(fields: dict[str, NDArray[Any]], flags: Sequence[str]) -> Bool:
 def require_good(path: Path, scans: Sequence[Scan], good: int) -> None:
     """Refuse a file of whose points, read to the end, none was good."""
     if not good:
-        raise UserError(f"{path}: all {sum(scan.records for scan in scans)} points are marked as invalid")
+        raise InputError(f"{path}: all {sum(scan.records for scan in scans)} points are marked as invalid")
 
 
 def _read_scan(image: Any, scan: Scan, dimension: str | None, size: int, colours: bool = False) -> Iterator[Raw]:
@@ -349,17 +349,17 @@ def scans_of(path: Path, image: Any) -> list[Scan]:
     root = image.root()
     nodes = root["data3D"] if root.isDefined("data3D") else []
     if len(nodes) == 0:
-        raise UserError(f"{path}: the file holds no scan")
+        raise InputError(f"{path}: the file holds no scan")
     scans = [scan for scan in (_scan(index, nodes[index]) for index in range(len(nodes))) if scan.records]
     if not scans:
-        raise UserError(f"{path}: the file holds no points")
+        raise InputError(f"{path}: the file holds no points")
     for scan in scans:
         if not (scan.fields.issuperset(CARTESIAN) or scan.fields.issuperset(SPHERICAL)):
-            raise UserError(
+            raise InputError(
                 f"{path}: the points of scan {scan.name!r} have no coordinates, only {', '.join(sorted(scan.fields))}"
             )
         if scan.position is not None and not np.isfinite([*scan.position, *scan.rotation.ravel()]).all():
-            raise UserError(f"{path}: the pose of scan {scan.name!r} is no pose; mend the file")
+            raise InputError(f"{path}: the pose of scan {scan.name!r} is no pose; mend the file")
     return scans
 
 

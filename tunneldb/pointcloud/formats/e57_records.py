@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunneldb.arrays import Float, UInt8, UInt16
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.e57 import (
     KIND,
     Scan,
@@ -57,7 +57,7 @@ class E57Records:
 
     Raises
     ------
-    UserError
+    InputError
         If the file cannot be read.
     """
 
@@ -88,7 +88,7 @@ class E57Records:
 
         Raises
         ------
-        UserError
+        InputError
             If they cannot be read, one has no place, or all are marked as invalid.
         """
         with open_e57(self.path) as image:
@@ -120,10 +120,10 @@ class E57Records:
         if scan.position is not None:
             xyz += scan.position
         if not np.isfinite(xyz).all():
-            raise UserError(f"{self.path}: a coordinate of scan {scan.name!r} is NaN or infinite; mend the file")
+            raise InputError(f"{self.path}: a coordinate of scan {scan.name!r} is NaN or infinite; mend the file")
         stored = np.rint((xyz - self.offsets) / self.scale)
         if np.abs(stored).max() >= 2**31:
-            raise UserError(f"{self.path}: scan {scan.name!r} lies outside of the bounds in its header; mend the file")
+            raise InputError(f"{self.path}: scan {scan.name!r} lies outside of the bounds in its header; mend the file")
         before = record_size(FORMAT)
         out: UInt8 = np.zeros((len(xyz), before + 4 * len(self.extras)), np.uint8)
         point = fields(out, FORMAT)

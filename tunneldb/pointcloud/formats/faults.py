@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError, UserError
 from tunneldb.pointcloud.points import Ranges
 
 
@@ -19,15 +19,15 @@ def decoding(path: Path, kind: str) -> Iterator[None]:
     except UserError:
         raise
     except FileNotFoundError as error:
-        raise UserError(f"{path}: no such file") from error
+        raise InputError(f"{path}: no such file") from error
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror or line_of(error)}") from error
+        raise InputError(f"{path}: cannot be read: {error.strerror or line_of(error)}") from error
     except Exception as error:
-        raise UserError(f"{path}: truncated, corrupt or not {kind} file: {line_of(error)}") from error
+        raise InputError(f"{path}: truncated, corrupt or not {kind} file: {line_of(error)}") from error
     except BaseException as error:
         if type(error).__name__ != "PanicException":  # how a panic of the LAZ decoder's Rust arrives
             raise
-        raise UserError(f"{path}: truncated or corrupt: {line_of(error)}") from error
+        raise InputError(f"{path}: truncated or corrupt: {line_of(error)}") from error
 
 
 def line_of(error: BaseException) -> str:
@@ -38,7 +38,7 @@ def line_of(error: BaseException) -> str:
 def require_dimension(
     path: Path, dimension: str | None, dimensions: Collection[str], use: str | None = None, mend: str | None = None
 ) -> None:
-    """Raise a UserError that lists the file's dimensions, unless `dimension`, needed for `use`, is one of them.
+    """Raise a InputError that lists the file's dimensions, unless `dimension`, needed for `use`, is one of them.
 
     What to type is `mend` with the dimension that is meant.
     """
@@ -49,7 +49,8 @@ def require_dimension(
     near = alike or next(iter(difflib.get_close_matches(dimension, dimensions, 1)), None)
     meant = f" (did you mean {near!r}?{' capitals matter' if alike else ''})" if near else ""
     typed = f": {mend} {near or 'DIMENSION'}" if mend else ""
-    raise UserError(f"{path}: no dimension {dimension!r}{needed}{meant}; the file has {', '.join(dimensions) or 'none'}{typed}")
+    there = ", ".join(dimensions) or "none"
+    raise InputError(f"{path}: no dimension {dimension!r}{needed}{meant}; the file has {there}{typed}")
 
 
 def check_ranges(path: Path, ranges: Ranges | None, count: int) -> Ranges:
@@ -57,7 +58,7 @@ def check_ranges(path: Path, ranges: Ranges | None, count: int) -> Ranges:
 
     Raises
     ------
-    UserError
+    InputError
         If a range reaches beyond the file's points.
     """
     if ranges is None:
@@ -66,5 +67,5 @@ def check_ranges(path: Path, ranges: Ranges | None, count: int) -> Ranges:
         if not 0 <= begin <= end:
             raise ValueError(f"({begin}, {end}) is no range of point numbers")
         if end > count:
-            raise UserError(f"{path}: truncated or changed: it announces {count} points, points up to {end} are wanted")
+            raise InputError(f"{path}: truncated or changed: it announces {count} points, points up to {end} are wanted")
     return ranges

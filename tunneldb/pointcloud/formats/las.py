@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pyproj.exceptions import CRSError
 
 from tunneldb.arrays import Float
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, line_of, require_dimension
 from tunneldb.pointcloud.formats.las_bounds import check_envelope
 from tunneldb.pointcloud.formats.laz_chunks import VariedChunks
@@ -71,7 +71,7 @@ def read_las_header(path: Path) -> ScanHeader:
         except CRSError as error:
             unread = line_of(error)
     if count == 0:
-        raise UserError(f"{path}: the file holds no points")
+        raise InputError(f"{path}: the file holds no points")
     _check_scales(path, scales, offsets)
     return ScanHeader(path, count, dimensions, crs, np.array(header.mins), np.array(header.maxs), unread)
 
@@ -117,7 +117,7 @@ def read_las(
                 with decoding(path, KIND):
                     raw = take(next(records))
                 if len(raw) == 0:
-                    raise UserError(
+                    raise InputError(
                         f"{path}: truncated: {done} points read of the {header.point_count} that its header announces"
                     )
                 done += len(raw)
@@ -142,7 +142,7 @@ class _Taker:
         self.before = header.point_format.size - header.point_format.num_extra_bytes
         self.extra = next((extra for extra in _extra_bytes(header) if extra.name == dimension), None)
         if self.extra is not None and self.extra.dtype.subdtype is not None:
-            raise UserError(f"{path}: {dimension} has several values a point; an intensity is one number")
+            raise InputError(f"{path}: {dimension} has several values a point; an intensity is one number")
 
     def selection(self) -> DecompressionSelection:
         """What of a point is decompressed; the extra bytes come all or none."""
@@ -180,7 +180,7 @@ class _Taker:
         if self.extra.no_data is not None:
             missing = int(np.count_nonzero(stored == self.extra.no_data))
             if missing:
-                raise UserError(
+                raise InputError(
                     f"{self.path}: {missing} points of a chunk have no {self.dimension}: their value is {self.extra.no_data}, "
                     "which the file's header says stands for none; remove these points, or that entry of the header"
                 )
@@ -220,7 +220,7 @@ def _check_scales(path: Path, scales: Float, offsets: Float) -> None:
     with np.errstate(over="ignore", invalid="ignore"):
         farthest = np.abs(scales) * 2.0**31 + np.abs(offsets)
     if not (np.all(np.isfinite(farthest)) and np.all(scales > 0)):
-        raise UserError(
+        raise InputError(
             f"{path}: the header's scale {_row(scales)} or offset {_row(offsets)} is not a usable number, "
             "so its coordinates would not be either"
         )

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunneldb.arrays import Float
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.columns import COORDINATES, meaning_of
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_dimension
 from tunneldb.pointcloud.formats.text import CloudBuilder, TextCloud, TextScan, read_cloud
@@ -74,7 +74,7 @@ def read_ply_header(path: Path) -> ScanHeader:
     found, _, low, high = _look_through(path, (status.st_size, status.st_mtime_ns))
     step = _step(found, low, high)
     if step > COARSEST:
-        raise UserError(
+        raise InputError(
             f"{path}: its coordinates are numbers of 32 bits, which so far from the origin come in steps of {step:.3g} m; "
             "export them as double, or nearer to the origin"
         )
@@ -116,7 +116,7 @@ def _look_through(path: Path, version: tuple[int, int]) -> tuple[Vertices, TextC
             return _ascii(path, lines, found)
         size = path.stat().st_size
         if size < found.offset + found.count * found.dtype.itemsize:
-            raise UserError(
+            raise InputError(
                 f"{path}: truncated: it announces {found.count} vertices and has room for "
                 f"{(size - found.offset) // found.dtype.itemsize}"
             )
@@ -132,7 +132,7 @@ def _ascii(path: Path, lines: TextLines, found: Vertices) -> tuple[Vertices, Tex
     builder = CloudBuilder(path, lines)
     count = builder.add(TextScan(found.names, None), found.count)
     if count < found.count:
-        raise UserError(f"{path}: truncated: it announces {found.count} vertices, {count} lines follow")
+        raise InputError(f"{path}: truncated: it announces {found.count} vertices, {count} lines follow")
     cloud = builder.cloud()
     return found, cloud, cloud.low, cloud.high
 
@@ -141,7 +141,7 @@ def _read(path: Path, found: Vertices, first: int, count: int) -> NDArray[Any]:
     dtype = found.dtype
     vertices: NDArray[Any] = np.fromfile(path, dtype, count, offset=found.offset + first * dtype.itemsize)
     if len(vertices) != count:
-        raise UserError(f"{path}: it was changed while it was read")
+        raise InputError(f"{path}: it was changed while it was read")
     return vertices
 
 
@@ -155,7 +155,7 @@ def _step(found: Vertices, low: Float, high: Float) -> float:
 
 def _read_header(path: Path, lines: TextLines) -> Vertices:
     if lines.text() != "ply":
-        raise UserError(f"{path}: it does not begin with ply, so it is no PLY file")
+        raise InputError(f"{path}: it does not begin with ply, so it is no PLY file")
     order: str | None = None
     elements: list[tuple[str, int, list[tuple[str, str]]]] = []
     for _ in range(_LONGEST_HEADER):
@@ -174,9 +174,9 @@ def _read_header(path: Path, lines: TextLines) -> Vertices:
             case ["end_header"]:
                 break
             case _:
-                raise UserError(f"{path}, line {lines.line - 1}: {' '.join(words)[:60]!r} is nothing that a PLY header has")
+                raise InputError(f"{path}, line {lines.line - 1}: {' '.join(words)[:60]!r} is nothing that a PLY header has")
     if order is None:
-        raise UserError(f"{path}: its header names no format: ascii, binary_little_endian or binary_big_endian")
+        raise InputError(f"{path}: its header names no format: ascii, binary_little_endian or binary_big_endian")
     return _vertices(path, order, elements, lines)
 
 
@@ -184,19 +184,19 @@ def _vertices(path: Path, order: str, elements: list[tuple[str, int, list[tuple[
     offset = lines.offset
     for element, count, properties in elements:
         if any(not kind for _, kind in properties):
-            raise UserError(f"{path}: its element {element} has a list, before or in the vertices; export the points alone")
+            raise InputError(f"{path}: its element {element} has a list, before or in the vertices; export the points alone")
         if element == "vertex":
             break
         offset += count * sum(np.dtype(kind).itemsize for _, kind in properties)
         if not order:
             lines.skip(count)
     else:
-        raise UserError(f"{path}: it has no element vertex; it has {', '.join(name for name, _, _ in elements) or 'none'}")
+        raise InputError(f"{path}: it has no element vertex; it has {', '.join(name for name, _, _ in elements) or 'none'}")
     if not count:
-        raise UserError(f"{path}: the file holds no points")
+        raise InputError(f"{path}: the file holds no points")
     names = tuple(meaning_of(name) for name, _ in properties)
     missing = [name for name in COORDINATES if name not in names]
     if missing or len(set(names)) < len(names):
         wrong = f"no property {', '.join(missing)}" if missing else "a property twice"
-        raise UserError(f"{path}: its vertices have {wrong}: {', '.join(name for name, _ in properties)}")
+        raise InputError(f"{path}: its vertices have {wrong}: {', '.join(name for name, _ in properties)}")
     return Vertices(order, names, tuple(kind for _, kind in properties), count, offset)

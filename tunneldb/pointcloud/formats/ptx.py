@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from tunneldb.arrays import Float
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.faults import decoding
 from tunneldb.pointcloud.formats.scans import PosedScan, scan_number
 from tunneldb.pointcloud.formats.text import CloudBuilder, TextCloud, TextScan
@@ -32,7 +32,7 @@ def read_ptx(path: Path) -> TextCloud:
 
     Raises
     ------
-    UserError
+    InputError
         If it is missing, damaged or holds no points; with file and line.
     """
     with decoding(path, KIND):
@@ -55,11 +55,11 @@ def _read_ptx(path: Path, version: tuple[int, int]) -> TextCloud:
             line, columns, rows, matrix = head
             first = lines.text()
             if first is None:
-                raise UserError(f"{path}: truncated: no point follows the scan that begins in line {line}")
+                raise InputError(f"{path}: truncated: no point follows the scan that begins in line {line}")
             lines.back()
             width = len(first.split())
             if width not in LEICA:
-                raise UserError(f"{path}, line {lines.line}: {width} values; a line of PTX has {', '.join(map(str, LEICA))}")
+                raise InputError(f"{path}, line {lines.line}: {width} values; a line of PTX has {', '.join(map(str, LEICA))}")
             key = f"ptx {columns} {rows}".encode() + matrix.tobytes()
             seen[key] = seen.get(key, 0) + 1
             index = len(builder.scans)
@@ -68,7 +68,7 @@ def _read_ptx(path: Path, version: tuple[int, int]) -> TextCloud:
             scan = TextScan(LEICA[width], None, pose, matrix[:3, :3].T, True)
             found = builder.add(scan, columns * rows)
             if found < columns * rows:
-                raise UserError(f"{path}: truncated: line {line} announces {columns} × {rows} points, {found} follow")
+                raise InputError(f"{path}: truncated: line {line} announces {columns} × {rows} points, {found} follow")
         return builder.cloud()
 
 
@@ -83,23 +83,23 @@ def _read_head(path: Path, lines: TextLines) -> tuple[int, int, int, Float] | No
     values: list[list[float]] = []
     for count in _HEADER:
         if text is None:
-            raise UserError(f"{path}: truncated in the header of the scan that begins in line {begin}")
+            raise InputError(f"{path}: truncated in the header of the scan that begins in line {begin}")
         try:
             numbers = list(map(float, text.split()))
         except ValueError:
             numbers = []
         if len(numbers) != count or not np.isfinite(numbers).all():
             what = "a number" if count == 1 else f"{count} numbers"
-            raise UserError(f"{path}, line {lines.line - 1}: {text[:60]!r} where the header of a scan has {what}")
+            raise InputError(f"{path}, line {lines.line - 1}: {text[:60]!r} where the header of a scan has {what}")
         values.append(numbers)
         if len(values) < len(_HEADER):
             text = lines.text()
     (columns,), (rows,) = values[:2]
     if min(columns, rows) < 1 or columns != int(columns) or rows != int(rows):
-        raise UserError(f"{path}, line {begin}: a scan of {columns:g} × {rows:g} points is none")
+        raise InputError(f"{path}, line {begin}: a scan of {columns:g} × {rows:g} points is none")
     matrix = np.array(values[6:])
     if not np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=_SKEW):
-        raise UserError(
+        raise InputError(
             f"{path}, line {begin + 6}: the scan's matrix is no rotation (is it scaled?); export it with its pose, in metres"
         )
     return begin, int(columns), int(rows), matrix

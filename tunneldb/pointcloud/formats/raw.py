@@ -37,7 +37,7 @@ def read_raw(
 
     Raises
     ------
-    UserError
+    InputError
         If the file is missing, truncated or corrupt, has fewer points than the ranges say, or lacks the dimension.
     """
     form = format_of(path)

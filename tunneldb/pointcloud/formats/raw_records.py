@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tunneldb.arrays import Float, UInt8
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.e57_records import extra_bytes, new_header, spread
 from tunneldb.pointcloud.formats.las_header import Head
 from tunneldb.pointcloud.formats.las_records import fields, record_size
@@ -38,7 +38,7 @@ class RawRecords:
 
     Raises
     ------
-    UserError
+    InputError
         If the file cannot be read.
     """
 
@@ -68,7 +68,7 @@ class RawRecords:
 
         Raises
         ------
-        UserError
+        InputError
             If they cannot be read, or one has no place.
         """
         # A pass for each column: readers give one at a time, and tables have few.
@@ -78,10 +78,10 @@ class RawRecords:
             raw = parts[0]
             xyz = np.column_stack([raw.x, raw.y, raw.z]) * raw.scales + raw.offsets
             if not np.isfinite(xyz).all():
-                raise UserError(f"{self.path}: a coordinate is NaN or infinite; mend the file")
+                raise InputError(f"{self.path}: a coordinate is NaN or infinite; mend the file")
             stored = np.rint((xyz - self.offsets) / self.scale)
             if np.abs(stored).max() >= 2**31:
-                raise UserError(f"{self.path}: it was changed while it was read")
+                raise InputError(f"{self.path}: it was changed while it was read")
             out: UInt8 = np.zeros((len(raw), before + 8 * len(self.extras)), np.uint8)
             point = fields(out, self.format)
             for column, axis in enumerate("XYZ"):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.e57 import read_e57, read_e57_header, read_e57_scans
 from tunneldb.pointcloud.formats.las import read_las, read_las_header
 from tunneldb.pointcloud.formats.las_header import SIGNATURE
@@ -57,14 +57,14 @@ def require_known(path: Path) -> None:
 
     Raises
     ------
-    UserError
+    InputError
     """
     if path.suffix.lower() in scan_suffixes() or not path.is_file():
         return
     with path.open("rb") as file:
         if file.read(len(SIGNATURE)) != SIGNATURE:
             known = ", ".join(scan_suffixes())
-            raise UserError(f"{path}: a file of points is known by how its name ends: {known}")
+            raise InputError(f"{path}: a file of points is known by how its name ends: {known}")
 
 
 def scan_suffixes() -> tuple[str, ...]:
@@ -82,7 +82,7 @@ def posed_scans(path: Path) -> list[PosedScan]:
 
     Raises
     ------
-    UserError
+    InputError
         If the file cannot be read or holds no points.
     """
     scans = format_of(path).scans
@@ -94,7 +94,7 @@ def has_colours(path: Path) -> bool:
 
     Raises
     ------
-    UserError
+    InputError
         If the file cannot be read or holds no points.
     """
     told = format_of(path).has_colours

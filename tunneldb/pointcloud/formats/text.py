@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tunneldb.arrays import Bool, Float
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.columns import COORDINATES, SKIPPED
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_dimension
 from tunneldb.pointcloud.formats.scans import PosedScan
@@ -169,11 +169,11 @@ class CloudBuilder:
 
         Raises
         ------
-        UserError
+        InputError
             If there are no points.
         """
         if not self.points:
-            raise UserError(f"{self.path}: the file holds no points")
+            raise InputError(f"{self.path}: the file holds no points")
         return TextCloud(self.path, tuple(self.scans), tuple(self.blocks), self.low, self.high)
 
 
@@ -200,7 +200,7 @@ def _read_block(cloud: TextCloud, block: Block, dimension: str | None) -> Raw:
     scan = cloud.scans[block.scan]
     table = scan.table(cloud.path, data, block.line)
     if len(table) != block.points:
-        raise UserError(f"{cloud.path}: it was changed while it was read")
+        raise InputError(f"{cloud.path}: it was changed while it was read")
     turned = table.turned()
     numbers = _whole(cloud.path, table, block, "scan_id")
     classes = _whole(cloud.path, table, block, "classification")
@@ -226,7 +226,7 @@ def _whole(path: Path, table: TextTable, block: Block, name: str) -> Float | Non
     wrong = ~((values >= 0) & (values < _LIMITS[name]) & (values == np.floor(values)))
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise UserError(
+        raise InputError(
             f"{path}: {name} of point {block.point + row + 1} is {values[row]:g}, not a whole number from 0 to "
             f"{_LIMITS[name] - 1}"
         )

@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 
 from tunneldb.arrays import Float
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.columns import SKIPPED
 
 BLOCK_BYTES = 1 << 24
@@ -58,14 +58,14 @@ class TextLines:
 
         Raises
         ------
-        UserError
+        InputError
             If it is no text.
         """
         data, count = self.take(1)
         if not count:
             return None
         if b"\0" in data:
-            raise UserError(f"{self.path}, line {self.line - 1}: it is no text file")
+            raise InputError(f"{self.path}, line {self.line - 1}: it is no text file")
         return data.decode("utf-8-sig", "replace").strip()
 
     def skip(self, count: int) -> None:
@@ -90,7 +90,7 @@ class TextLines:
         self._ends = np.flatnonzero(np.frombuffer(self._held, np.uint8) == ord("\n")) + 1
         self._at = 0
         if self._held and (not len(self._ends) or self._ends[0] > LONGEST):
-            raise UserError(f"{self.path}, line {self.line}: no line of text ends within {LONGEST} bytes: it is no text file")
+            raise InputError(f"{self.path}, line {self.line}: no line of text ends within {LONGEST} bytes: it is no text file")
         return bool(len(self._ends))
 
 
@@ -135,7 +135,7 @@ def parse(path: Path, block: bytes, first: int, divider: str | None, width: int,
 
     Raises
     ------
-    UserError
+    InputError
         If a line has more or fewer values, or one that is wanted is no number.
     """
     if not block.strip():
@@ -146,25 +146,25 @@ def parse(path: Path, block: bytes, first: int, divider: str | None, width: int,
         chosen = None if used == tuple(range(width)) else used
         values = np.loadtxt(text, np.float64, comments=None, delimiter=divider, ndmin=2, usecols=chosen)
     except (ValueError, UnicodeDecodeError) as error:
-        raise _fault(path, block, first, divider, width, used) or UserError(f"{path}: {error}") from None
+        raise _fault(path, block, first, divider, width, used) or InputError(f"{path}: {error}") from None
     if chosen is None and values.shape[1] != width:
-        raise _fault(path, block, first, divider, width, used) or UserError(f"{path}: lines of {values.shape[1]} values")
+        raise _fault(path, block, first, divider, width, used) or InputError(f"{path}: lines of {values.shape[1]} values")
     return values
 
 
-def _fault(path: Path, block: bytes, first: int, divider: str | None, width: int, used: tuple[int, ...]) -> UserError | None:
+def _fault(path: Path, block: bytes, first: int, divider: str | None, width: int, used: tuple[int, ...]) -> InputError | None:
     for number, line in enumerate(block.decode("utf-8", "replace").split("\n"), first):
         if not line.strip():
             continue
         values = line.split(divider)
         if len(values) != width:
-            return UserError(f"{path}, line {number}: {len(values)} values where {width} are expected: {_short(line)!r}")
+            return InputError(f"{path}, line {number}: {len(values)} values where {width} are expected: {_short(line)!r}")
         for place in used:
             try:
                 float(values[place])
             except ValueError:
                 comma = "; write decimals with a point" if divider == ";" and "," in values[place] else ""
-                return UserError(f"{path}, line {number}: {_short(values[place])!r} is not a number{comma}")
+                return InputError(f"{path}, line {number}: {_short(values[place])!r} is not a number{comma}")
     return None
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from functools import lru_cache
 from pathlib import Path
 
-from tunneldb.errors import UserError
+from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.columns import COORDINATES, columns_of, given_names, names_file, own_names, split_names
 from tunneldb.pointcloud.formats.faults import decoding
 from tunneldb.pointcloud.formats.text import KIND, CloudBuilder, TextCloud, TextScan
@@ -34,7 +34,7 @@ def read_table(path: Path) -> TextCloud:
 
     Raises
     ------
-    UserError
+    InputError
         If it is missing or damaged, holds no points, or its columns are not named; with file and line.
     """
     with decoding(path, KIND):
@@ -71,10 +71,10 @@ def _read_pts(builder: CloudBuilder) -> None:
         lines.back()
         width = len(text.split())
         if width not in LEICA:
-            raise UserError(f"{path}, line {lines.line}: {width} values; a line of PTS has {', '.join(map(str, LEICA))}")
+            raise InputError(f"{path}, line {lines.line}: {width} values; a line of PTS has {', '.join(map(str, LEICA))}")
         found = builder.add(TextScan(LEICA[width], None), count)
         if count is not None and found < count:
-            raise UserError(f"{path}: truncated: line {at} announces {count} points, {found} follow")
+            raise InputError(f"{path}: truncated: line {at} announces {count} points, {found} follow")
 
 
 def _layout(path: Path, lines: TextLines) -> TextScan:
@@ -92,7 +92,7 @@ def _layout(path: Path, lines: TextLines) -> TextScan:
         else:
             break
     if text is None:
-        raise UserError(f"{path}: the file holds no points")
+        raise InputError(f"{path}: the file holds no points")
     lines.back()
     divider = divider_of(text)
     width = len(text.split(divider))
@@ -119,10 +119,10 @@ def _columns(
     if not names and path.suffix.lower() == ".xyz" and width == len(COORDINATES):
         return COORDINATES
     if not names:
-        raise UserError(
+        raise InputError(
             f"{path}: its {width} columns have no names (line {line}: {first[:60]}); say what they are: "
             f"echo 'x y z …' > {own_names(path)}"
         )
     if len(names) != width:
-        raise UserError(f"{path}, line {line}: {width} values, but {source} names {len(names)} columns: {', '.join(names)}")
+        raise InputError(f"{path}, line {line}: {width} values, but {source} names {len(names)} columns: {', '.join(names)}")
     return columns_of(path, names, source)
