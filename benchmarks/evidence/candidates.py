@@ -20,7 +20,7 @@ MOSTLY = 0.5
 """A region is a leak if so much of its area is wet."""
 
 LEAST = 0.05
-"""Regions are judged from this size on, m²: ``leak.min_area``; joints from :data:`tunneldb.anomalies.detect.MIN_JOINT` on."""
+"""Minimum area of a region, m²: ``leak.min_area``; for joints see :data:`tunneldb.anomalies.detect.MIN_JOINT_LENGTH`."""
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tunneldb.anomalies.hidden import STRIP, behind_strips
+from tunneldb.anomalies.hidden import MAX_STRIP_WIDTH, behind_strips
 from tunneldb.raster.pixel_state import PixelState
 
 PIXEL = 0.02
-MOST = round(STRIP / PIXEL)
+MOST = round(MAX_STRIP_WIDTH / PIXEL)
 
 
 def scene(strip: int, level: bool) -> tuple[np.ndarray, np.ndarray, tuple[slice, slice]]:

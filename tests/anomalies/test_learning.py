@@ -8,10 +8,10 @@ import pytest
 from tunneldb.anomalies.evidence import EvidenceModel, standard_model
 from tunneldb.anomalies.features import FEATURES, NAMES
 from tunneldb.anomalies.learning import (
-    APART,
-    FEWEST,
     FOLDS,
+    MIN_REVIEWS,
     REASONS,
+    STRETCH_LENGTH,
     Adjustment,
     Reviewed,
     folds,
@@ -19,7 +19,7 @@ from tunneldb.anomalies.learning import (
     losses,
     stretches,
 )
-from tunneldb.anomalies.verdict import BUILT, weigh
+from tunneldb.anomalies.verdict import OUTLINE_REASONS, weigh
 
 STEPS = np.linspace(-1.5, 1.5, 7)
 SPEAKING = [next(k for k, feature in enumerate(FEATURES) if feature.reason == reason) for reason in REASONS]
@@ -92,8 +92,8 @@ def test_a_feature_that_could_not_be_measured_says_nothing_of_its_own(stairs: Ev
 
 @pytest.mark.parametrize("leak", [True, False])
 def test_fewer_reviews_than_tell_anything_change_nothing(stairs: EvidenceModel, leak: bool) -> None:
-    reviewed = drawn(stairs, FEWEST - 1, 3)
-    contrary = Reviewed(reviewed.features, reviewed.outline, np.full(FEWEST - 1, leak), reviewed.tunnel, reviewed.chainage)
+    reviewed = drawn(stairs, MIN_REVIEWS - 1, 3)
+    contrary = Reviewed(reviewed.features, reviewed.outline, np.full(MIN_REVIEWS - 1, leak), reviewed.tunnel, reviewed.chainage)
     lesson = learn(stairs, contrary)
     assert lesson.adjustment == Adjustment()
     assert [one.way for one in lesson.held_out] == ["base"]
@@ -139,7 +139,7 @@ def test_neighbours_are_in_one_part() -> None:
     assert set(part.tolist()) == set(range(FOLDS))
     for number in range(stretch.max() + 1):
         here = stretch == number
-        assert np.ptp(chainage[here]) <= APART
+        assert np.ptp(chainage[here]) <= STRETCH_LENGTH
         assert len(set(tunnel[here].tolist())) == len(set(part[here].tolist())) == 1
     order = np.lexsort([chainage, tunnel])
     assert (np.diff(part[order]) >= 0).all()  # parts follow each other along the tunnels
@@ -173,4 +173,4 @@ def test_reasons_by_outlines_that_tell_less_weigh_less(stairs: EvidenceModel) ->
     features = np.ones((2, len(FEATURES)))
     whole, half = weigh(stairs, features, np.array([1.0, 0.5]))
     for k, feature in enumerate(FEATURES):
-        assert half[k] == whole[k] * (0.5 if feature.reason in BUILT else 1.0), NAMES[k]
+        assert half[k] == whole[k] * (0.5 if feature.reason in OUTLINE_REASONS else 1.0), NAMES[k]

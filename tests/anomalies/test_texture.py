@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 from tunneldb.anomalies.background.contrast import ContrastImage
-from tunneldb.anomalies.background.texture import TOLD, measure_texture, windowed
+from tunneldb.anomalies.background.texture import TYPICAL_DARKENING, measure_texture, windowed
 from tunneldb.anomalies.detect import find_dark
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
@@ -44,7 +44,7 @@ def test_bricks_are_averaged_until_what_is_told_stands_out():
     assert (half > 0).mean() > 0.9
     # A window of 0.3 m holds 4.8 bricks; these overlap it in part, so that fewer count in full.
     assert np.median(sigma) == pytest.approx(1.2 / np.sqrt(4.8), rel=0.35)
-    assert np.median(sigma) < TOLD / 3
+    assert np.median(sigma) < TYPICAL_DARKENING / 3
 
 
 @pytest.mark.parametrize(("spread", "along", "across", "drop"), [(1.2, 0.25, 0.075, 4.0), (1.5, 0.5, 0.3, 6.0)])

@@ -12,22 +12,22 @@ from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import mask_of_polygons
 
-BAND = 2
+BAND_PIXELS = 2
 """Width of the zone on both sides of the boundary in which pixels may change sides, pixels, per iteration."""
 
-TIMES = 2
+ITERATIONS = 2
 """Number of iterations; doubled where lining is averaged over windows, which blur the boundary more."""
 
-CONTRAST = 6
+CONTRAST_HALF_WIDTH = 6
 """Half the side of the window for the contrast of a region, pixels."""
 
-FEW = 5
+MIN_CONTRAST_PIXELS = 5
 """Minimum number of pixels for a contrast."""
 
-ENOUGH = 4
+VOTING_PIXELS = 4
 """Number of pixels for deciding the side of one: half of a contrast of four sigma is four sigma of their mean."""
 
-CERTAIN = 2.5
+MIN_SIGNIFICANCE = 2.5
 """Significance of half of the contrast: 1 of 160 pixels near a boundary is then on the wrong side."""
 
 EMPTY, RECESS = int(PixelState.EMPTY), int(PixelState.RECESS)
@@ -57,7 +57,7 @@ def refine_boundary(dark: Bool, contrast: ContrastImage, size: int) -> Bool:
     if contrast.texture is not None and contrast.texture.half.any():
         windows, tile = contrast.texture.half, contrast.tile
         sigmas = np.stack([contrast.texture.pixel_sigma, contrast.texture.sigma]) / np.float32(STEP["corrected"])
-    for _ in range(2 * TIMES if windows.any() else TIMES):
+    for _ in range(2 * ITERATIONS if windows.any() else ITERATIONS):
         interior, near = _about_boundary(dark)
         changed = np.zeros(len(near), np.bool_)
         _changed(dark, interior, contrast.drop, contrast.state, windows, sigmas, tile, near, size // 2, changed)
@@ -69,7 +69,7 @@ def refine_boundary(dark: Bool, contrast: ContrastImage, size: int) -> Bool:
 
 
 def _about_boundary(dark: Bool) -> tuple[Bool, Int64]:
-    """Find the dark pixels of the interior (all four neighbours dark), and list the pixels within BAND of the boundary.
+    """Find the dark pixels of the interior (all four neighbours dark), and list the pixels within BAND_PIXELS of the boundary.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def _about_boundary(dark: Bool) -> tuple[Bool, Int64]:
         Numbers of pixels, row by row.
     """
     interior, near = np.empty_like(dark), []
-    for rows, about in row_blocks(len(dark), BAND):
+    for rows, about in row_blocks(len(dark), BAND_PIXELS):
         part = dark[about]
         edge = np.zeros_like(part)  # next to a pixel of the other kind
         for axis in (0, 1):
@@ -90,7 +90,7 @@ def _about_boundary(dark: Bool) -> tuple[Bool, Int64]:
         inner = slice(rows.start - about.start, rows.stop - about.start)
         np.logical_and(part[inner], ~edge[inner], out=interior[rows])
         for axis in (0, 1):
-            edge = _dilated(edge, axis, BAND - 1)
+            edge = _dilated(edge, axis, BAND_PIXELS - 1)
         near.append(np.flatnonzero(edge[inner]) + rows.start * dark.shape[1])
     return interior, np.concatenate(near)
 
@@ -123,7 +123,7 @@ def _changed(
     The contrast of a region is the mean darkening of its interior around a pixel, from every other pixel. The pixel is dark if
     the mean darkening of the lining next to it, within up to ``most`` pixels, exceeds half of that. In a tile with ``windows``
     (half their side, pixels) lining varies by the first of ``sigmas`` from pixel to pixel, by the second over a window, steps;
-    there the average includes enough pixels for half of the contrast to be CERTAIN times the rest.
+    there the average includes enough pixels for half of the contrast to be MIN_SIGNIFICANCE times the rest.
     """
     rows, columns = dark.shape
     for k in range(near.shape[0]):
@@ -132,22 +132,22 @@ def _changed(
             continue
         down, along = i // tile, min(j // tile, windows.shape[1] - 1)
         window = int(windows[down, along])
-        reach, step = max(CONTRAST, 2 * window), 2 if window == 0 else 3
-        contrast, held = 0, 0
+        reach, step = max(CONTRAST_HALF_WIDTH, 2 * window), 2 if window == 0 else 3
+        contrast, selected = 0, 0
         for m in range(i - reach, i + reach + 1, step):
             for n in range(j - reach, j + reach + 1, step):
                 if 0 <= m < rows and 0 <= n < columns and interior[m, n] and drop[m, n] != NODATA:
                     contrast += drop[m, n]
-                    held += 1
-        if held < FEW:
+                    selected += 1
+        if selected < MIN_CONTRAST_PIXELS:
             continue
         half = 0
         if window > 0:
-            least, single = sigmas[1, down, along], sigmas[0, down, along]
-            share = (single - 0.5 * contrast / held / CERTAIN) / max(single - least, 1e-6)
+            floor_sigma, single = sigmas[1, down, along], sigmas[0, down, along]
+            share = (single - 0.5 * contrast / selected / MIN_SIGNIFICANCE) / max(single - floor_sigma, 1e-6)
             half = max(round(window * min(max(share, 0.0), 1.0)) - 1, 0)
         level, seen = 0, 0
-        while seen < ENOUGH and half < max(most, window):
+        while seen < VOTING_PIXELS and half < max(most, window):
             half += 1
             level, seen = 0, 0
             for m in range(i - half, i + half + 1):
@@ -155,5 +155,5 @@ def _changed(
                     if 0 <= m < rows and 0 <= n < columns and EMPTY < state[m, n] <= RECESS and drop[m, n] != NODATA:
                         level += drop[m, n]
                         seen += 1
-        if seen >= ENOUGH:
-            changed[k] = (2.0 * (level / seen) > contrast / held) != dark[i, j]
+        if seen >= VOTING_PIXELS:
+            changed[k] = (2.0 * (level / seen) > contrast / selected) != dark[i, j]

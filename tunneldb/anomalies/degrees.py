@@ -11,24 +11,24 @@ STRONG_CONTRAST, STRONG_DROP = 8.0, 3.0
 """Contrast (standard deviations) and darkening (dB) from which a patch with straight sides may be water that fills a panel:
 shades of concrete and mortar reach neither, water takes away half of the light and more."""
 
-DARKEST_JOINT = 3.0
+MAX_JOINT_DARKENING = 3.0
 """Maximum darkening of a dry joint, dB: of 2 cm, the blur of pixels and beam, a joint of up to 1 cm takes at most half of the
 light. Finer pixels do not make the beam finer."""
 
-RESOLVED = 0.02
+REFERENCE_PIXEL = 0.02
 """Pixel size up to which limits of widths, areas and straightness apply in metres, m; they grow with larger pixels: with few
 pixels sides look straight by chance, and leaks would be classified as something built."""
 
-STRAIGHT = 0.02
+MAX_STRAIGHT_DEVIATION = 0.02
 """Maximum standard deviation of the sides of built objects about straight lines, m."""
 
-POCKET = 0.3
+MAX_POCKET_SIZE = 0.3
 """Maximum size of bolt pockets, m."""
 
 FEW_PROFILES, MANY_PROFILES = 3.0, 6.0
 """On so few profiles that lie apart anything looks straight along the tunnel; so many tell whether it is."""
 
-LEAST_STEPS = 0.2
+MIN_STEP_LENGTH = 0.2
 """Minimum length of a region's boundary with a known step for the boundary to be called soft, m."""
 
 
@@ -39,7 +39,7 @@ def degrees_of(region: Region, shape: Shape) -> dict[str, float]:
         "recess": _recess(region),
         "gradual": _gradual(region, shape),
         "rectangular": _rectangular(region, shape),
-        "stripe": min(_stripe(shape, _straight(region)), told(region)),
+        "stripe": min(_stripe(shape, _straight(region)), straightness_weight(region)),
         "shadow": _shadow(region, shape),
     }
 
@@ -49,11 +49,11 @@ def _thin(region: Region, shape: Shape) -> float:
     straight = _straight(region)
     deviation = shape.deviation_along if shape.along > shape.across else shape.deviation_across
     return min(
-        told(region),
+        straightness_weight(region),
         ramp(shape.mean_width, 0.10, 0.07),
         ramp(shape.length / max(shape.mean_width, region.pixel), 4.0, 8.0),
         ramp(deviation, 2.0 * straight, straight),
-        ramp(region.drop_mean, DARKEST_JOINT + 0.5, DARKEST_JOINT),
+        ramp(region.drop_mean, MAX_JOINT_DARKENING + 0.5, MAX_JOINT_DARKENING),
     )
 
 
@@ -62,7 +62,7 @@ def _recess(region: Region) -> float:
     properties, pixels = region.properties, np.count_nonzero(region.mask)
     about = properties.perimeter_recess / properties.perimeter if properties.perimeter else 0.0
     # A profile that hits a pocket represents more than the pocket's length.
-    area = region.area / max(1.0, region.spacing / POCKET)
+    area = region.area / max(1.0, region.spacing / MAX_POCKET_SIZE)
     return min(ramp(properties.recess / pixels, 0.3, 0.7), ramp(about, 0.4, 0.2), ramp(area, 0.12, 0.08))
 
 
@@ -72,10 +72,10 @@ def _gradual(region: Region, shape: Shape) -> float:
     Grime beneath a cable forms a band along the tunnel, which water does not: there less softness is required.
     """
     properties = region.properties
-    if properties.steps * region.pixel < LEAST_STEPS * _coarseness(region) * (1 - 1e-12) or region.drop_sum <= 0:
+    if properties.steps * region.pixel < MIN_STEP_LENGTH * _coarseness(region) * (1 - 1e-12) or region.drop_sum <= 0:
         return 0.0
     step = (properties.inside - properties.outside) / properties.steps / region.drop_mean
-    band = min(ramp(shape.along / shape.across, 4.0, 8.0), told(region))
+    band = min(ramp(shape.along / shape.across, 4.0, 8.0), straightness_weight(region))
     return ramp(step, 0.6 + 0.25 * band, 0.3 + 0.25 * band)
 
 
@@ -89,12 +89,12 @@ def _rectangular(region: Region, shape: Shape) -> float:
     if not properties.sharp or not shown:
         return 0.0
     width, area = shape.mean_width / _coarseness(region), region.area / _coarseness(region) ** 2
-    most = 0.71 + 0.15 * ramp(width, 0.35, 0.2) + 0.12 * ramp(area, 0.3, 0.1)
-    lines = ramp(properties.straight / properties.sharp, most, most + 0.08)
+    min_share = 0.71 + 0.15 * ramp(width, 0.35, 0.2) + 0.12 * ramp(area, 0.3, 0.1)
+    lines = ramp(properties.straight / properties.sharp, min_share, min_share + 0.08)
     # Water that fills a panel between joints is rectangular too, but darker than repairs; small blobs are excluded too.
     panel = _strong(region) * max(ramp(region.area, 0.8, 1.2), ramp(width, 0.45, 0.3))
     sharp = ramp(properties.sharp / shown, 0.15, 0.25)
-    return min(lines, sharp, ramp(width, 0.16, 0.22), 1.0 - panel, told(region))
+    return min(lines, sharp, ramp(width, 0.16, 0.22), 1.0 - panel, straightness_weight(region))
 
 
 def _strong(region: Region) -> float:
@@ -117,23 +117,23 @@ def _stripe(shape: Shape, straight: float) -> float:
 def _shadow(region: Region, shape: Shape) -> float:
     """Compute the likeness to a shadow: a narrow band beside a cable or pipe, or a gap between fixtures without free ends."""
     properties = region.properties
-    beside = properties.perimeter_off / properties.perimeter if properties.perimeter else 0.0
-    return max(min(ramp(beside, 0.25, 0.45), ramp(shape.width, 0.14, 0.08)), ramp(beside, 0.8, 0.9))
+    facing_share = properties.perimeter_off / properties.perimeter if properties.perimeter else 0.0
+    return max(min(ramp(facing_share, 0.25, 0.45), ramp(shape.width, 0.14, 0.08)), ramp(facing_share, 0.8, 0.9))
 
 
-def told(region: Region) -> float:
+def straightness_weight(region: Region) -> float:
     """Return how far the number of profiles suffices to judge straightness: 1 if they are as close as pixels."""
     return ramp(region.mask.shape[1] * region.pixel / region.spacing, FEW_PROFILES, MANY_PROFILES) if region.spacing else 1.0
 
 
 def _straight(region: Region) -> float:
     """Return the maximum standard deviation of straight sides, m."""
-    return STRAIGHT * _coarseness(region)
+    return MAX_STRAIGHT_DEVIATION * _coarseness(region)
 
 
 def _coarseness(region: Region) -> float:
     """Return the size of the pixels relative to those for which limits apply in metres, at least 1."""
-    return max(1.0, region.pixel / RESOLVED)
+    return max(1.0, region.pixel / REFERENCE_PIXEL)
 
 
 def ramp(value: float, none: float, full: float) -> float:

@@ -25,13 +25,13 @@ from tunneldb.raster.grid import PixelGrid
 from tunneldb.raster.image import WET_EDGE
 from tunneldb.raster.pixel_state import PixelState
 
-GAP = 5.0
+MIN_UNSCANNED_LENGTH = 5.0
 """Length of the tunnel without any seen lining from which it was not scanned, m; profiles are closer."""
 
-SINGLE = 1.6
+MAX_SINGLE_SPACINGS = 1.6
 """Maximum length of a spot on a single profile, in spacings: half a gap is closed on either side of it."""
 
-MIN_JOINT = 0.5
+MIN_JOINT_LENGTH = 0.5
 """Minimum seen length of joints, m."""
 
 
@@ -90,10 +90,10 @@ def find_anomalies(
     anomalies, cut, leaks = [], [], []
     ends = (grid.first_column + grid.inner.start, grid.first_column + grid.inner.stop)
     regions = find_dark_regions(dark, contrast, min_area)
-    judged = _judged(regions, min_area, model)
+    verdicts = _classified(regions, min_area, model)
     if contrast.spacing:
-        judged = _without_joints(regions, judged, contrast.spacing)
-    for region, anomaly in zip(regions, judged, strict=True):
+        verdicts = _without_joints(regions, verdicts, contrast.spacing)
+    for region, anomaly in zip(regions, verdicts, strict=True):
         if region.column == ends[0] or region.stop == ends[1]:
             cut.append(region)
         elif anomaly is not None:
@@ -107,7 +107,7 @@ def find_anomalies(
 
 def may_count(region: Region, min_area: float) -> bool:
     """Return True if a region has points, and is large enough for a leak, m², or long enough for a joint."""
-    large = region.area >= min_area * (1 - 1e-12) or max(region.mask.shape) * region.pixel >= MIN_JOINT
+    large = region.area >= min_area * (1 - 1e-12) or max(region.mask.shape) * region.pixel >= MIN_JOINT_LENGTH
     return bool(region.filled) and large
 
 
@@ -116,13 +116,13 @@ def judge_region(
 ) -> Anomaly | None:
     """Classify a region by its features and a model; None if it holds no point or is too small.
 
-    Leaks and dark spots must not be smaller than ``min_area``, m², joints no shorter than MIN_JOINT.
+    Leaks and dark spots must not be smaller than ``min_area``, m², joints no shorter than MIN_JOINT_LENGTH.
     """
     if not may_count(region, min_area):
         return None
     verdict = classify(region, features, model)
     if verdict.kind == "joint":
-        if max(region.mask.shape) * region.pixel < MIN_JOINT:
+        if max(region.mask.shape) * region.pixel < MIN_JOINT_LENGTH:
             return None
     elif region.area < min_area * (1 - 1e-12):
         return None
@@ -130,13 +130,13 @@ def judge_region(
     return Anomaly(region.outline, region.drop_mean, region.drop_max, region.contrast, float(share), verdict)
 
 
-def _judged(regions: Sequence[Region], min_area: float, model: EvidenceModel | None) -> list[Anomaly | None]:
+def _classified(regions: Sequence[Region], min_area: float, model: EvidenceModel | None) -> list[Anomaly | None]:
     """Classify the regions of a kilometre, each compared with those around it; None for those that are too small."""
-    judged: list[Anomaly | None] = [None] * len(regions)
+    verdicts: list[Anomaly | None] = [None] * len(regions)
     counted = [k for k, region in enumerate(regions) if may_count(region, min_area)]
     for k, features in zip(counted, measure_regions([regions[k] for k in counted]), strict=True):
-        judged[k] = judge_region(regions[k], min_area, features, model)
-    return judged
+        verdicts[k] = judge_region(regions[k], min_area, features, model)
+    return verdicts
 
 
 def find_dark(contrast: ContrastImage) -> tuple[Bool, int]:
@@ -149,7 +149,7 @@ def find_dark(contrast: ContrastImage) -> tuple[Bool, int]:
         Side of the median filter, pixels.
     """
     lining, possible = _lining_in_columns(contrast.state, contrast.grid.inner)
-    size = filter_size(_scanned_share(lining, possible, round(GAP / contrast.grid.pixel)))
+    size = filter_size(_scanned_share(lining, possible, round(MIN_UNSCANNED_LENGTH / contrast.grid.pixel)))
     return refine_boundary(dark_pixels(contrast, size), contrast, size), size
 
 
@@ -174,13 +174,15 @@ def _may_drip(region: Region) -> bool:
     return bool(region.filled) and classify(region).kind == "leak"
 
 
-def _without_joints(regions: Sequence[Region], judged: Sequence[Anomaly | None], spacing: float) -> list[Anomaly | None]:
+def _without_joints(regions: Sequence[Region], classified: Sequence[Anomaly | None], spacing: float) -> list[Anomaly | None]:
     """Reclassify as joints those leaks on single profiles that repeat at the ring length."""
-    found = list(judged)
+    found = list(classified)
     single = [
         k
-        for k, (region, anomaly) in enumerate(zip(regions, judged, strict=True))
-        if anomaly is not None and anomaly.verdict.kind == "leak" and region.mask.shape[1] * region.pixel < SINGLE * spacing
+        for k, (region, anomaly) in enumerate(zip(regions, classified, strict=True))
+        if anomaly is not None
+        and anomaly.verdict.kind == "leak"
+        and region.mask.shape[1] * region.pixel < MAX_SINGLE_SPACINGS * spacing
     ]
     middle = np.array([0.5 * (regions[k].column + regions[k].stop) * regions[k].pixel for k in single])
     for k, even in zip(single, crossed_joints(middle, spacing).tolist(), strict=True):

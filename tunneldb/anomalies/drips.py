@@ -8,21 +8,21 @@ from tunneldb.anomalies.runs import Components, pixels_of
 from tunneldb.arrays import Bool, Int64
 from tunneldb.raster.grid import PixelGrid
 
-GAP = 0.12
+MAX_GAP = 0.12
 """Maximum length of dry gaps in water that runs down a wall, m."""
 
-WIDE = 0.3
+MAX_WIDTH = 0.3
 """Maximum width of a drip, m."""
 
-PROFILES = 1.5
+MAX_WIDTH_SPACINGS = 1.5
 """Maximum width of a drip in spacings: if profiles are far apart, it shows on a single one."""
 
 
 def attach_drips(components: Components, wanted: Bool, cut: Bool, grid: PixelGrid, spacing: float = 0.0) -> tuple[Int64, Int64]:
     """Assign drips to the component above them.
 
-    A drip is narrower than WIDE, smaller than the component above, and begins within GAP of it, towards the crown, or of
-    another of its drips.
+    A drip is narrower than MAX_WIDTH, smaller than the component above, and begins within MAX_GAP of it, towards the crown, or
+    of another of its drips.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ def attach_drips(components: Components, wanted: Bool, cut: Bool, grid: PixelGri
         Row, first column, column behind the last one and whole of the pixels that connect the drips to it.
     """
     crown = grid.bottom + grid.rows  # rows before this one lie at arcs above 0
-    gap = max(1, round(GAP / grid.pixel))
-    narrow = (components.width <= max(WIDE, PROFILES * spacing) / grid.pixel) & ~cut
+    gap = max(1, round(MAX_GAP / grid.pixel))
+    narrow = (components.width <= max(MAX_WIDTH, MAX_WIDTH_SPACINGS * spacing) / grid.pixel) & ~cut
     above, row, column, distance = _above(components, narrow, grid.rows, crown, gap)
     whole = np.arange(len(components.pixels))
     for _ in range(8):  # chains of drips

@@ -22,7 +22,7 @@ from tunneldb.arrays import Bool, Float, Intp
 FORMAT = 2
 """Format version of the trees' file."""
 
-FAR = 3.0
+MAX_DEVIATION = 3.0
 """Maximum deviation of a feature, in scales; larger ones are clipped."""
 
 
@@ -126,8 +126,8 @@ ARRAYS: Mapping[str, type] = {
 
 
 def deviations(features: Float, centre: Float, scale: Float) -> Float:
-    """Return the deviation of features (n, len(FEATURES)) from their centres, in scales, FAR at most; 0 if not measured."""
-    return np.asarray(np.clip(np.nan_to_num((features - centre) / scale, nan=0.0), -FAR, FAR))
+    """Return the deviation of features (n, len(FEATURES)) from centres, in scales, at most MAX_DEVIATION; 0 if unknown."""
+    return np.asarray(np.clip(np.nan_to_num((features - centre) / scale, nan=0.0), -MAX_DEVIATION, MAX_DEVIATION))
 
 
 def reasons_of(contributions: Float) -> dict[str, float]:

@@ -80,13 +80,13 @@ FEATURES = (
 
 NAMES = tuple(feature.name for feature in FEATURES)
 
-ALIKE = {"mean_width": 0.3, "drop": 0.3, "upright": 0.8}
+SIMILARITY_LIMITS = {"mean_width": 0.3, "drop": 0.3, "upright": 0.8}
 """Maximum differences of these features, as logarithms, between similar regions."""
 
-ABOUT = 5.0
+SIMILARITY_RANGE = 5.0
 """Maximum distance along the tunnel of regions that are compared with each other, m."""
 
-BY_CHANCE = 4
+CHANCE_COUNT = 4
 """Number of similar regions that occurs by chance; built objects repeat more often."""
 
 
@@ -100,12 +100,14 @@ def measure_regions(regions: Sequence[Region]) -> Float:
     """
     features = np.array([measure_features(region) for region in regions]).reshape(len(regions), len(FEATURES))
     if len(regions):
-        values = {name: features[:, NAMES.index(name)] for name in ALIKE}
+        values = {name: features[:, NAMES.index(name)] for name in SIMILARITY_LIMITS}
         values["drop"] = np.log(np.maximum(values["drop"], 0.1))
         chainage = np.array([0.5 * (region.column + region.stop) * region.pixel for region in regions])
-        places = np.column_stack([chainage / ABOUT, *(values[name] / width for name, width in ALIKE.items())])
+        places = np.column_stack(
+            [chainage / SIMILARITY_RANGE, *(values[name] / width for name, width in SIMILARITY_LIMITS.items())]
+        )
         alike = cKDTree(places).query_ball_point(places, 1.0, p=np.inf, return_length=True) - 1
-        features[:, NAMES.index("alike")] = np.log1p(np.maximum(alike - BY_CHANCE, 0))
+        features[:, NAMES.index("alike")] = np.log1p(np.maximum(alike - CHANCE_COUNT, 0))
     return features
 
 

@@ -12,10 +12,10 @@ from shapely.geometry import Polygon
 from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.surface import Surface
 
-DENSIFY = 0.1
+MAX_EDGE_LENGTH = 0.1
 """Maximum length of a straight edge of a polygon on the curved surface, m."""
 
-SAMPLES = 5000
+MAX_SAMPLES = 5000
 """Approximate maximum number of places at which the stretch of the surface is averaged."""
 
 _STEP = 0.01
@@ -54,7 +54,7 @@ def anomaly_geometries(outline: Polygon, surface: Surface) -> Geometries:
     surface : Surface
         Surface of the tunnel.
     """
-    dense = _within(shapely.segmentize(outline, DENSIFY), surface)
+    dense = _within(shapely.segmentize(outline, MAX_EDGE_LENGTH), surface)
     return Geometries(
         map=shapely.transform(dense, lambda unrolled: to_map(surface, unrolled)),
         surface=_to_space(dense, surface),
@@ -122,7 +122,7 @@ def _area(outline: Polygon, surface: Surface) -> float:
 def _samples(outline: Polygon) -> tuple[Float, Float]:
     """Return places spread evenly over a polygon."""
     west, south, east, north = outline.bounds
-    step = max(np.sqrt((east - west) * (north - south) / SAMPLES), 1e-3)
+    step = max(np.sqrt((east - west) * (north - south) / MAX_SAMPLES), 1e-3)
     x, y = (g.ravel() for g in np.meshgrid(np.arange(west, east, step) + step / 2, np.arange(south, north, step) + step / 2))
     inside = shapely.contains_xy(outline, x, y)
     if not inside.any():

@@ -8,7 +8,7 @@ from tunneldb.arrays import Bool, UInt8
 from tunneldb.compiled import kernel
 from tunneldb.raster.pixel_state import PixelState
 
-STRIP = 0.25
+MAX_STRIP_WIDTH = 0.25
 """Maximum width of strips, m: a pipe of 0.15 m, and on either side the pixels at its edges that are no lining."""
 
 OFF = int(PixelState.OFF)
@@ -30,15 +30,15 @@ def behind_strips(dark: Bool, state: UInt8, first: int, stop: int, pixel: float)
         Side of a pixel, m.
     """
     found = np.zeros(dark.shape, np.bool_)
-    most = round(STRIP / pixel)
+    max_run = round(MAX_STRIP_WIDTH / pixel)
     here = np.s_[:, first:stop]
-    _fill_down(dark[here], state[here], most, found[here])
-    _fill_along(dark[here], state[here], most, found[here])
+    _fill_down(dark[here], state[here], max_run, found[here])
+    _fill_along(dark[here], state[here], max_run, found[here])
     return found
 
 
 @kernel
-def _fill_down(dark: Bool, state: UInt8, most: int, found: Bool) -> None:  # pragma: no cover - compiled
+def _fill_down(dark: Bool, state: UInt8, max_run: int, found: Bool) -> None:  # pragma: no cover - compiled
     """Mark runs of up to ``most`` hidden pixels down the columns with a dark pixel at both ends.
 
     At least one pixel of a run shows the hiding object; the others may be empty.
@@ -49,7 +49,7 @@ def _fill_down(dark: Bool, state: UInt8, most: int, found: Bool) -> None:  # pra
     for i in range(rows):
         for j in range(columns):
             if dark[i, j]:
-                if last[j] >= 0 and hidden[j] and i - last[j] - 1 <= most:
+                if last[j] >= 0 and hidden[j] and i - last[j] - 1 <= max_run:
                     found[last[j] + 1 : i, j] = True
                 last[j], hidden[j] = i, False
             elif state[i, j] == OFF:
@@ -59,14 +59,14 @@ def _fill_down(dark: Bool, state: UInt8, most: int, found: Bool) -> None:  # pra
 
 
 @kernel
-def _fill_along(dark: Bool, state: UInt8, most: int, found: Bool) -> None:  # pragma: no cover - compiled
+def _fill_along(dark: Bool, state: UInt8, max_run: int, found: Bool) -> None:  # pragma: no cover - compiled
     """Do the same along the rows."""
     rows, columns = dark.shape
     for i in range(rows):
         last, hidden = -1, False
         for j in range(columns):
             if dark[i, j]:
-                if last >= 0 and hidden and j - last - 1 <= most:
+                if last >= 0 and hidden and j - last - 1 <= max_run:
                     found[i, last + 1 : j] = True
                 last, hidden = j, False
             elif state[i, j] == OFF:

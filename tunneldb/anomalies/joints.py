@@ -8,36 +8,36 @@ from numpy.typing import NDArray
 from tunneldb.anomalies.runs import adjacent_runs, column_runs, connected, pixels_of, row_runs
 from tunneldb.arrays import Bool, Float, Int64
 
-NARROW_AROUND, NARROW_ALONG = 0.08, 0.06
+MAX_WIDTH_AROUND, MAX_WIDTH_ALONG = 0.08, 0.06
 """Maximum width of joints around the tunnel and along it, m: 2 cm, widened by beam, pixels and grout. Painted stripes of 10 cm
 along the tunnel must stay in one piece."""
 
-LONG_AROUND, LONG_ALONG = 1.0, 0.5
+MIN_LENGTH_AROUND, MIN_LENGTH_ALONG = 1.0, 0.5
 """Minimum length of joints around the tunnel and along it, m: water on a wall is straight for less, and spreads less."""
 
-STRAIGHT = 0.015
+MAX_DEVIATION = 0.015
 """Standard deviation of the middle of a joint about a straight line, m: joints are built to millimetres, pixels are larger."""
 
-RING_SHORTEST, RING_LONGEST = 0.6, 12.0
+MIN_RING_LENGTH, MAX_RING_LENGTH = 0.6, 12.0
 """Minimum and maximum distance of joints around the tunnel (ring length), m."""
 
 STRETCH = 100.0
 """Length of tunnel over which rings repeat evenly, m; the next stretch begins half-way."""
 
-BY_CHANCE = 1e-3
+CHANCE_LEVEL = 1e-3
 """Share of stretches in which random spots repeat as evenly (Rayleigh's test, over all ring lengths)."""
 
-AS_PROFILES = 0.1
+PROFILE_TOLERANCE = 0.1
 """Tolerance around the profile distance and its fractions: spots on profiles repeat with it, so such lengths are ignored."""
 
-NEAR_RING = 1.0 / 6.0
+MAX_JOINT_DISTANCE = 1.0 / 6.0
 """Maximum distance of a spot from a ring's joint, as a share of the ring length: profiles are skew to rings."""
 
-RESOLVED = 0.75
+MIN_PIXEL_DEVIATION = 0.75
 """Minimum of the same deviation in pixels: a finer straightness cannot be measured."""
 
 
-PROFILES = 3.0
+MIN_LENGTH_SPACINGS = 3.0
 """Minimum length of joints along the tunnel if profiles are far apart, in spacings: a spot on one profile is straight too."""
 
 
@@ -58,11 +58,11 @@ def find_joints(dark: Bool, first: int, stop: int, pixel: float, spacing: float 
         Distance of profiles along the tunnel, m; 0 if they are as close as pixels.
     """
     found = np.zeros(dark.shape, np.bool_)
-    if 2 * pixel > NARROW_AROUND:
+    if 2 * pixel > MAX_WIDTH_AROUND:
         return found  # a line of two pixels has no significance
     for runs_of, image, width, length in (
-        (row_runs, found, NARROW_AROUND, LONG_AROUND),
-        (column_runs, found.T, NARROW_ALONG, max(LONG_ALONG, PROFILES * spacing)),
+        (row_runs, found, MAX_WIDTH_AROUND, MIN_LENGTH_AROUND),
+        (column_runs, found.T, MAX_WIDTH_ALONG, max(MIN_LENGTH_ALONG, MIN_LENGTH_SPACINGS * spacing)),
     ):
         if spacing and runs_of is row_runs:
             continue
@@ -70,7 +70,7 @@ def find_joints(dark: Bool, first: int, stop: int, pixel: float, spacing: float 
         runs = runs[runs[:, 2] - runs[:, 1] <= max(2, round(width / pixel))]
         lines = round(length / pixel)
         if len(runs) >= lines:
-            image[pixels_of(runs[_straight(runs, lines, max(STRAIGHT / pixel, RESOLVED))])] = True
+            image[pixels_of(runs[_straight(runs, lines, max(MAX_DEVIATION / pixel, MIN_PIXEL_DEVIATION))])] = True
     return found
 
 
@@ -94,9 +94,9 @@ def crossed_joints(chainage: Float, spacing: float) -> Float:
         randomly placed spots (Rayleigh's test; Mardia and Jupp, 2000).
     """
     found = np.zeros(len(chainage))
-    per_metre = np.arange(1.0 / RING_LONGEST, 1.0 / RING_SHORTEST, 0.25 / STRETCH)
+    per_metre = np.arange(1.0 / MAX_RING_LENGTH, 1.0 / MIN_RING_LENGTH, 0.25 / STRETCH)
     beats = np.rint(per_metre * spacing)
-    lengths = 1.0 / per_metre[(beats == 0.0) | (np.abs(per_metre * spacing - beats) > AS_PROFILES)]
+    lengths = 1.0 / per_metre[(beats == 0.0) | (np.abs(per_metre * spacing - beats) > PROFILE_TOLERANCE)]
     low = np.floor(chainage.min(initial=np.inf) / STRETCH) if len(chainage) else 0.0
     for number in range(2 * int(np.ceil((chainage.max(initial=0.0) / STRETCH) - low)) if len(chainage) else 0):
         start = (low + 0.5 * number) * STRETCH
@@ -107,10 +107,10 @@ def crossed_joints(chainage: Float, spacing: float) -> Float:
         mean = np.exp(2j * np.pi * turns).mean(axis=1)
         best = int(np.argmax(np.abs(mean)))
         even = float(np.abs(mean[best]))
-        if len(here) * even**2 < np.log(len(lengths) / BY_CHANCE):
+        if len(here) * even**2 < np.log(len(lengths) / CHANCE_LEVEL):
             continue
         off = turns[best] - np.angle(mean[best]) / (2.0 * np.pi)
-        near = here[np.abs(off - np.rint(off)) <= NEAR_RING]
+        near = here[np.abs(off - np.rint(off)) <= MAX_JOINT_DISTANCE]
         found[near] = np.maximum(found[near], even)
     return found
 

@@ -22,26 +22,26 @@ from tunneldb.arrays import Bool, Float, Int64
 
 Way = Literal["base", "recalibrated", "refit", "extended"]
 
-SLOPE, OFFSET = 0.25, 1.0
+SLOPE_PRIOR, OFFSET_PRIOR = 0.25, 1.0
 """Prior standard deviations of slope and offset: an owner's leaks are more or less frequent by a factor of 2.7."""
 
-FACTORS = (0.125, 0.25, 0.5)
+FACTOR_PRIORS = (0.125, 0.25, 0.5)
 """Standard deviations of the reasons' factors that are tried."""
 
-TERMS = (0.125, 0.25, 0.5)
-"""Standard deviations of the terms of features, together with factors of the greatest of FACTORS."""
+TERM_PRIORS = (0.125, 0.25, 0.5)
+"""Standard deviations of the terms of features, together with factors of the greatest of FACTOR_PRIORS."""
 
-FEWEST, FEWEST_REFIT = 10, 25
+MIN_REVIEWS, MIN_REVIEWS_REFIT = 10, 25
 """Minimum number of reviews for learning anything, and for changing the reasons' weights."""
 
-CHANCE = 1.5
+MIN_GAIN = 1.5
 """Minimum gain on held-out reviews, in standard errors. With less, random effects are learned more often; with 2, next to
 nothing is learned from 50 reviews (both on synthetic reviews)."""
 
 FOLDS = 5
 """Number of parts of the reviews; each is predicted by the model fitted to the others."""
 
-APART = 10.0
+STRETCH_LENGTH = 10.0
 """Length of stretches whose reviews stay in one part, m: neighbours are often of one kind, and would reveal each other."""
 
 REASONS = tuple(dict.fromkeys(feature.reason for feature in FEATURES))
@@ -168,8 +168,8 @@ class Lesson:
 def learn(model: EvidenceModel, reviewed: Reviewed) -> Lesson:
     """Learn from reviews: recalibrate, refit or extend the model, or leave it, whichever predicts held-out reviews best.
 
-    A change is accepted if it is better on held-out reviews by more than chance (CHANCE), with stretches of APART metres as
-    the random units.
+    A change is accepted if it is better on held-out reviews by more than chance (MIN_GAIN), with stretches of STRETCH_LENGTH
+    metres as the random units.
 
     Parameters
     ----------
@@ -183,13 +183,13 @@ def learn(model: EvidenceModel, reviewed: Reviewed) -> Lesson:
     stretch = stretches(reviewed.tunnel, reviewed.chainage)
     fold = folds(stretch)
     ways: list[tuple[Way, _Problem]] = []
-    if count >= FEWEST and len(np.unique(fold)) > 1:
+    if count >= MIN_REVIEWS and len(np.unique(fold)) > 1:
         ways.append(("recalibrated", _recalibration(model.constant, parts)))
-    if ways and count >= FEWEST_REFIT:
-        ways += [("refit", _refit(model.constant, parts, width)) for width in FACTORS]
+    if ways and count >= MIN_REVIEWS_REFIT:
+        ways += [("refit", _refit(model.constant, parts, width)) for width in FACTOR_PRIORS]
         centre, scale = spread_of(reviewed.features)
-        told = weigh_built(deviations(reviewed.features, centre, scale), reviewed.outline)
-        ways += [("extended", _refit(model.constant, parts, FACTORS[-1], told, width)) for width in TERMS]
+        terms = weigh_built(deviations(reviewed.features, centre, scale), reviewed.outline)
+        ways += [("extended", _refit(model.constant, parts, FACTOR_PRIORS[-1], terms, width)) for width in TERM_PRIORS]
     plain = model.constant + parts.sum(axis=1)
     base = losses(plain, leak)
     tried: dict[Way, tuple[Float, Float, _Problem]] = {}
@@ -223,8 +223,8 @@ def by_reason(contributions: Float) -> Float:
 
 
 def stretches(tunnel: Int64, chainage: Float) -> Int64:
-    """Assign reviews to stretches of APART metres, numbered in order of tunnel and chainage: (n,)."""
-    places = np.column_stack([tunnel, np.floor(chainage / APART)])
+    """Assign reviews to stretches of STRETCH_LENGTH metres, numbered in order of tunnel and chainage: (n,)."""
+    places = np.column_stack([tunnel, np.floor(chainage / STRETCH_LENGTH)])
     return np.asarray(np.unique(places, axis=0, return_inverse=True)[1]).reshape(-1)
 
 
@@ -255,12 +255,12 @@ class _Problem:
 
     def fit(self, leak: Bool, rows: Bool | slice = slice(None)) -> Float:
         """Fit the most probable weights to some rows."""
-        design, said = self.design[rows], leak[rows].astype(np.float64)
+        design, answers = self.design[rows], leak[rows].astype(np.float64)
 
         def cost(weights: Float) -> tuple[float, Float]:
             odds = self.constant + design @ weights
             off = (weights - self.prior) / self.width
-            wrong = 1.0 / (1.0 + np.exp(-odds)) - said
+            wrong = 1.0 / (1.0 + np.exp(-odds)) - answers
             return float(losses(odds, leak[rows]).sum() + 0.5 * off @ off), design.T @ wrong + off / self.width
 
         bounds = [(0.0 if prior else None, None) for prior in self.prior.tolist()]
@@ -277,15 +277,17 @@ class _Problem:
 
 def _recalibration(constant: float, parts: Float) -> _Problem:
     odds = constant + parts.sum(axis=1)
-    return _Problem(0.0, np.column_stack([odds, np.ones(len(odds))]), np.array([1.0, 0.0]), np.array([SLOPE, OFFSET]))
+    return _Problem(
+        0.0, np.column_stack([odds, np.ones(len(odds))]), np.array([1.0, 0.0]), np.array([SLOPE_PRIOR, OFFSET_PRIOR])
+    )
 
 
-def _refit(constant: float, parts: Float, width: float, told: Float | None = None, term: float = 0.0) -> _Problem:
+def _refit(constant: float, parts: Float, width: float, features: Float | None = None, term: float = 0.0) -> _Problem:
     """Set up factors of parts (n, reasons), terms of features (n, features), and an offset, with their prior widths."""
-    told = np.empty((len(parts), 0)) if told is None else told
-    counts = parts.shape[1], told.shape[1], 1
-    prior, widths = np.repeat([1.0, 0.0, 0.0], counts), np.repeat([width, term, OFFSET], counts)
-    return _Problem(constant, np.column_stack([parts, told, np.ones(len(parts))]), prior, widths)
+    features = np.empty((len(parts), 0)) if features is None else features
+    counts = parts.shape[1], features.shape[1], 1
+    prior, widths = np.repeat([1.0, 0.0, 0.0], counts), np.repeat([width, term, OFFSET_PRIOR], counts)
+    return _Problem(constant, np.column_stack([parts, features, np.ones(len(parts))]), prior, widths)
 
 
 def _adjustment(way: Way, weights: Float, features: Float) -> Adjustment:
@@ -301,6 +303,6 @@ def _adjustment(way: Way, weights: Float, features: Float) -> Adjustment:
 
 
 def _beyond_chance(gain: Float, stretch: Int64) -> bool:
-    """Return True if the sum of gains (n,) exceeds CHANCE standard errors, with each stretch as one unit."""
+    """Return True if the sum of gains (n,) exceeds MIN_GAIN standard errors, with each stretch as one unit."""
     sums = np.bincount(stretch, gain)
-    return bool(gain.sum() > CHANCE * np.sqrt((sums**2).sum()))
+    return bool(gain.sum() > MIN_GAIN * np.sqrt((sums**2).sum()))

@@ -10,19 +10,19 @@ from tunneldb.anomalies.runs import Components, row_runs
 from tunneldb.arrays import Bool, Float
 from tunneldb.raster.geotiff import NODATA, STEP
 
-RATIO = 2.0
+MIN_RATIO = 2.0
 """Minimum ratio of the two levels; a single patch, which ends at half of its contrast, has no such parts."""
 
-SMOOTH = 0.1
+SMOOTHING_WIDTH = 0.1
 """Width of the average before levels are separated, m: noise and drops of water are no levels."""
 
-LEAST_AREA = 0.05
+MIN_AREA = 0.05
 """Minimum area of a part, m²."""
 
-NARROW = 0.1
+MAX_RIM_WIDTH = 0.1
 """Maximum width of a remaining rim that is added to the darker part, m."""
 
-LARGEST = 8_000_000
+MAX_BOX_PIXELS = 8_000_000
 """Maximum size of a region's box, pixels: larger ones are networks of joints or similar, no patches."""
 
 BINS = 40
@@ -32,8 +32,8 @@ BINS = 40
 def weaker_parts(dark: Bool, contrast: ContrastImage) -> Bool:
     """Mark the weaker parts of dark regions that have two levels.
 
-    The levels are separated where their means differ most (Otsu, 1979). If the darker one is RATIO times as dark, pixels below
-    half of its contrast are the weaker part, because all boundaries are at half of the contrast.
+    The levels are separated where their means differ most (Otsu, 1979). If the darker one is MIN_RATIO times as dark, pixels
+    below half of its contrast are the weaker part, because all boundaries are at half of the contrast.
 
     Parameters
     ----------
@@ -48,13 +48,13 @@ def weaker_parts(dark: Bool, contrast: ContrastImage) -> Bool:
     if not len(runs):
         return found
     components = Components.of(runs)
-    large = components.pixels * grid.pixel**2 >= 2.0 * LEAST_AREA
+    large = components.pixels * grid.pixel**2 >= 2.0 * MIN_AREA
     order = np.argsort(components.label, kind="stable")
     starts = np.searchsorted(components.label[order], np.arange(len(components.pixels) + 1))
     for k in np.flatnonzero(large).tolist():
         own = runs[order[starts[k] : starts[k + 1]]]
         top, stop, left, right = own[:, 0].min(), own[:, 0].max() + 1, own[:, 1].min(), own[:, 2].max()
-        if (stop - top) * (right - left) > LARGEST:
+        if (stop - top) * (right - left) > MAX_BOX_PIXELS:
             continue
         mask = np.zeros((stop - top, right - left), np.bool_)
         for row, first, last in (own - [top, left, left]).tolist():
@@ -67,20 +67,20 @@ def weaker_parts(dark: Bool, contrast: ContrastImage) -> Bool:
 
 def _weaker(mask: Bool, drop: np.ndarray, pixel: float) -> Bool | None:
     """Return the weaker part of one region; None if it has a single level."""
-    held = mask & (drop != NODATA)
-    side = 2 * round(SMOOTH / pixel / 2) + 1
-    weight = ndimage.uniform_filter(held.astype(np.float32), side)
-    level = ndimage.uniform_filter(np.where(held, drop, 0).astype(np.float32), side) / np.maximum(weight, 1e-6)
+    selected = mask & (drop != NODATA)
+    side = 2 * round(SMOOTHING_WIDTH / pixel / 2) + 1
+    weight = ndimage.uniform_filter(selected.astype(np.float32), side)
+    level = ndimage.uniform_filter(np.where(selected, drop, 0).astype(np.float32), side) / np.maximum(weight, 1e-6)
     level *= np.float32(STEP["corrected"])
-    above, below = _otsu(level[held])
-    if not above >= RATIO * max(below, 1e-6):
+    above, below = _otsu(level[selected])
+    if not above >= MIN_RATIO * max(below, 1e-6):
         return None
     strong = mask & (level > 0.5 * above) & (weight > 1e-6)
-    strong = _larger(strong, LEAST_AREA / pixel**2)
+    strong = _larger(strong, MIN_AREA / pixel**2)
     if not strong.any():
         return None
-    narrow = np.ones((max(1, round(NARROW / pixel)),) * 2, np.bool_)
-    weak = _larger(ndimage.binary_opening(mask & ~strong, narrow), LEAST_AREA / pixel**2)
+    narrow = np.ones((max(1, round(MAX_RIM_WIDTH / pixel)),) * 2, np.bool_)
+    weak = _larger(ndimage.binary_opening(mask & ~strong, narrow), MIN_AREA / pixel**2)
     return weak if weak.any() else None
 
 

@@ -54,12 +54,12 @@ def measure_outline(contrast: ContrastImage, outline: Polygon) -> Measurement:
     row, column = contrast.grid.place(chainage, arc)
     row, column = row[column >= 0], column[column >= 0]
     drop = contrast.drop[row, column]
-    held = drop != NODATA
-    share = float(np.count_nonzero(held)) / len(chainage)
-    if not held.any():
+    selected = drop != NODATA
+    share = float(np.count_nonzero(selected)) / len(chainage)
+    if not selected.any():
         return Measurement(None, None, None, share)
-    decibels = STEP["corrected"] * drop[held].astype(np.float64)
-    sigma = contrast.sigma[row[held] // contrast.tile, column[held] // contrast.tile].astype(np.float64)
+    decibels = STEP["corrected"] * drop[selected].astype(np.float64)
+    sigma = contrast.sigma[row[selected] // contrast.tile, column[selected] // contrast.tile].astype(np.float64)
     known = sigma > 0
     relative = float(decibels[known].sum() / sigma[known].sum()) if known.any() else None
     return Measurement(float(decibels.mean()), float(decibels.max()), relative, share)

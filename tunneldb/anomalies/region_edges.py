@@ -11,26 +11,26 @@ from tunneldb.arrays import Bool, Float, Int64, Intp
 from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.pixel_state import PixelState
 
-ACROSS = 0.06
+STEP_DISTANCE = 0.06
 """Distance inside and outside of a side at which the step is measured, m: a wet patch ends within it, soot does not."""
 
-FAR = 0.2
+FAR_STEP_DISTANCE = 0.2
 """Second distance outside, m: areas that fade over decimetres, such as halos of dust, are still dark there."""
 
-BRIGHT = 2.0
+BRIGHT_LEVEL = 2.0
 """Standard deviations above the background that occur by chance in 2 of 100 pixels."""
 
-SHARP = 0.5
+SHARP_SHARE = 0.5
 """Minimum share of the region's mean darkening that is lost across a sharp side."""
 
 SLOPES = np.arange(-0.04, 0.05, 0.02)
 """Slopes of lines along the tunnel and around it for straight sides: built objects, and the unrolled plane, follow these
 within some degrees."""
 
-NEAR_LINE = 0.02
+MAX_LINE_DISTANCE = 0.02
 """Maximum distance of a side from its line, m."""
 
-ASIDE = 0.02
+SIDE_HALF_WIDTH = 0.02
 """Half-width of the mean along a side for its step, m."""
 
 FACING = ((-1, 0), (1, 0), (0, -1), (0, 1))
@@ -89,10 +89,10 @@ class Edges:
         self.dark, self.state, self.drop = dark, contrast.state, contrast.drop
         self.sigma, self.tile = contrast.sigma, contrast.tile
         self.crown = contrast.grid.bottom + contrast.grid.rows
-        self.far = max(1, round(FAR / contrast.grid.pixel))
-        self.across = max(1, round(ACROSS / contrast.grid.pixel))
-        self.aside = max(1, round(ASIDE / contrast.grid.pixel))
-        self.near = max(1, round(NEAR_LINE / contrast.grid.pixel))
+        self.far = max(1, round(FAR_STEP_DISTANCE / contrast.grid.pixel))
+        self.across = max(1, round(STEP_DISTANCE / contrast.grid.pixel))
+        self.aside = max(1, round(SIDE_HALF_WIDTH / contrast.grid.pixel))
+        self.near = max(1, round(MAX_LINE_DISTANCE / contrast.grid.pixel))
         self.facings = 2 if contrast.spacing else len(FACING)
 
     def sides(self, label: Intp, row: Int64, column: Int64) -> Sides:
@@ -120,9 +120,9 @@ class Edges:
         return np.column_stack([np.bincount(sides.label[mask], minlength=count) for mask in masks]).astype(np.float64)
 
     def steps(self, sides: Sides, count: int) -> Float:
-        """Sum the darkening where it is known ACROSS from both sides: number, sum inside and outside, dB.
+        """Sum the darkening where it is known STEP_DISTANCE from both sides: number, sum inside and outside, dB.
 
-        Then the number also known FAR outside, the sum there, and the number beside bright lining: (regions, 6).
+        Then the number also known FAR_STEP_DISTANCE outside, the sum there, and the number beside bright lining: (regions, 6).
         """
         sides = sides.where(sides.facing < self.facings)
         for along, usable in ((1 - self.across, self._interior), (self.across, self._background)):
@@ -132,7 +132,7 @@ class Edges:
         sums = [np.bincount(sides.label, drop, count) * STEP["corrected"] for drop in drops]
         row, column = sides.beyond(self.across, 0)
         sigma = self.sigma[row // self.tile, np.minimum(column // self.tile, self.sigma.shape[1] - 1)]
-        bright = drops[1] * STEP["corrected"] < -BRIGHT * sigma
+        bright = drops[1] * STEP["corrected"] < -BRIGHT_LEVEL * sigma
         far = sides.where(self._inside(*sides.beyond(self.far, 0)))
         far = far.where(self._background(*far.beyond(self.far, 0)))
         outside = np.bincount(far.label, self.drop[far.beyond(self.far, 0)], count) * STEP["corrected"]
@@ -159,15 +159,15 @@ class Edges:
         count = len(mean_drop)
         sides = sides.where(sides.facing < self.facings)
         sides = sides.where(self.state[sides.beyond(1, 0)] <= PixelState.RECESS)
-        sides = sides.where(self._lost(sides) >= SHARP * mean_drop[sides.label] / STEP["corrected"])
+        sides = sides.where(self._lost(sides) >= SHARP_SHARE * mean_drop[sides.label] / STEP["corrected"])
         upright = sides.facing >= 2  # faces along the tunnel, and is on a line around it
         along, across = np.where(upright, sides.row, sides.column), np.where(upright, sides.column, sides.row)
-        most = _most_on_a_line(len(FACING) * sides.label + sides.facing, along, across, len(FACING) * count, self.near)
-        return np.column_stack([np.bincount(sides.label, minlength=count), most.reshape(count, len(FACING)).sum(axis=1)])
+        on_line = _max_count_on_line(len(FACING) * sides.label + sides.facing, along, across, len(FACING) * count, self.near)
+        return np.column_stack([np.bincount(sides.label, minlength=count), on_line.reshape(count, len(FACING)).sum(axis=1)])
 
     def _lost(self, sides: Sides) -> Float:
         """Return the mean darkening inside sides minus that outside, steps of the image; -inf where either is hidden."""
-        sums, held = np.zeros((2, len(sides.label)), np.int64), np.zeros((2, len(sides.label)), np.int64)
+        sums, selected = np.zeros((2, len(sides.label)), np.int64), np.zeros((2, len(sides.label)), np.int64)
         hidden = np.zeros(len(sides.label), np.bool_)
         for aside in range(-self.aside, self.aside + 1):
             for k, (along, usable) in enumerate(((1 - self.across, self._interior), (self.across, self._background))):
@@ -178,9 +178,9 @@ class Edges:
                     hidden[there] |= self.state[row, column] > PixelState.RECESS
                 good = usable(row, column)
                 sums[k, there[good]] += self.drop[row[good], column[good]]
-                held[k, there[good]] += 1
-        mean = sums / np.maximum(held, 1)
-        return np.where(hidden | (held == 0).any(axis=0), -np.inf, mean[0] - mean[1])
+                selected[k, there[good]] += 1
+        mean = sums / np.maximum(selected, 1)
+        return np.where(hidden | (selected == 0).any(axis=0), -np.inf, mean[0] - mean[1])
 
     def _inside(self, row: Int64, column: Int64) -> Bool:
         """Return True for pixels in the image."""
@@ -198,9 +198,9 @@ class Edges:
         return seen & ~self.dark[row, column] & (self.drop[row, column] != NODATA)
 
 
-def _most_on_a_line(group: Int64, along: Int64, across: Int64, count: int, near: int) -> Int64:
+def _max_count_on_line(group: Int64, along: Int64, across: Int64, count: int, near: int) -> Int64:
     """Return the largest number of places of each group on one line: up to so many pixels across from it."""
-    most = np.zeros(count, np.int64)
+    largest = np.zeros(count, np.int64)
     found, first = np.unique(group, return_index=True)
     start = np.zeros(count, np.int64)
     start[found] = along[first]
@@ -208,8 +208,8 @@ def _most_on_a_line(group: Int64, along: Int64, across: Int64, count: int, near:
         place = np.rint(across - slope * (along - start[group])).astype(np.int64)
         low = int(place.min(initial=0))
         wide = int(place.max(initial=0)) - low + 2 * near + 1  # groups far enough apart not to share a line
-        line, held = np.unique(group * wide + (place - low), return_counts=True)
-        total = np.concatenate([[0], np.cumsum(held)])
+        line, selected = np.unique(group * wide + (place - low), return_counts=True)
+        total = np.concatenate([[0], np.cumsum(selected)])
         within = total[np.searchsorted(line, line + 2 * near, side="right")] - total[:-1]
-        np.maximum.at(most, line // wide, within)
-    return most
+        np.maximum.at(largest, line // wide, within)
+    return largest

@@ -9,13 +9,13 @@ import numpy as np
 from tunneldb.arrays import Bool, Int32, Intp
 from tunneldb.compiled import kernel
 
-PIECE = 2.0
+PIECE_LENGTH = 2.0
 """Maximum length of the pieces in which sides are compared with straight lines, m: a tunnel's alignment is no straighter."""
 
-CORNER = 0.12
+CORNER_SHARE = 0.12
 """Share of a side that belongs to the corners, at either end of it."""
 
-FARTHEST = np.int32(65000)
+MAX_DISTANCE = np.int32(65000)
 """Maximum distance, in thirds of a pixel."""
 
 
@@ -70,7 +70,7 @@ class Shape:
 def measure_shape(mask: Bool, pixel: float) -> Shape:
     """Measure a region of pixels with a given side, m."""
     rows, columns = mask.shape
-    piece = max(4, round(PIECE / pixel))
+    piece = max(4, round(PIECE_LENGTH / pixel))
     return Shape(
         columns * pixel,
         rows * pixel,
@@ -85,10 +85,10 @@ def measure_shape(mask: Bool, pixel: float) -> Shape:
 def _box(mask: Bool, pixel: float, piece: int) -> tuple[float, float, float, float]:
     """Measure the box without protruding parts: rectangularity, its emptiest corner, edge deviation and aspect ratio."""
     full = mask[np.ix_(_usual(np.count_nonzero(mask, axis=1)), _usual(np.count_nonzero(mask, axis=0)))]
-    high, wide = (max(2, round(CORNER * side)) for side in full.shape)
+    high, wide = (max(2, round(CORNER_SHARE * side)) for side in full.shape)
     corners = (full[i, j] for i in (slice(high), slice(-high, None)) for j in (slice(wide), slice(-wide, None)))
-    least = min(float(corner.mean()) for corner in corners)
-    return float(full.mean()), least, _edge_deviation(full, piece) * pixel, full.shape[1] / full.shape[0]
+    emptiest = min(float(corner.mean()) for corner in corners)
+    return float(full.mean()), emptiest, _edge_deviation(full, piece) * pixel, full.shape[1] / full.shape[0]
 
 
 def _usual(counts: Intp) -> Bool:
@@ -100,7 +100,7 @@ def _usual(counts: Intp) -> Bool:
 
 def _inscribed_diameter(mask: Bool) -> float:
     """Return the diameter of the largest inscribed circle, pixels, by chamfer distances (Borgefors, 1986: 3 and 4)."""
-    distance = np.where(np.pad(mask, 1), FARTHEST, np.int32(0))
+    distance = np.where(np.pad(mask, 1), MAX_DISTANCE, np.int32(0))
     _chamfer(distance)
     return 2.0 * float(distance.max()) / 3.0 - 1.0
 
@@ -126,18 +126,18 @@ def _chamfer(distance: Int32) -> None:  # pragma: no cover - compiled
 def _edge_deviation(mask: Bool, piece: int) -> float:
     """Return the standard deviation, pixels, of the first and last pixel of the columns about straight lines, by pieces."""
     rows, columns = mask.shape
-    trim = max(1, round(CORNER * columns))
+    trim = max(1, round(CORNER_SHARE * columns))
     begin, stop = trim, columns - trim
     if stop - begin < 3:
         return 0.0
     mask = mask[:, begin:stop]
-    held = np.flatnonzero(mask.any(axis=0))
+    indices = np.flatnonzero(mask.any(axis=0))
     pieces = -(-(stop - begin) // piece)
-    bounds = np.searchsorted(held, [(stop - begin) * k // pieces for k in range(pieces + 1)])
+    bounds = np.searchsorted(indices, [(stop - begin) * k // pieces for k in range(pieces + 1)])
     total, number = 0.0, 0
     for side in (mask.argmax(axis=0), rows - 1 - mask[::-1].argmax(axis=0)):
         for k in range(pieces):
-            at = held[bounds[k] : bounds[k + 1]]
+            at = indices[bounds[k] : bounds[k + 1]]
             if len(at) < 3:
                 continue
             x, y = at - at.mean(), side[at]

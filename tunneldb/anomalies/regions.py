@@ -18,10 +18,10 @@ from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import outline
 
-LONG = 0.5
+MIN_JOINT_LENGTH = 0.5
 """Minimum length of small regions that are kept, m: joints."""
 
-PIXELS = 1_000_000
+PIXELS_AT_A_TIME = 1_000_000
 """Approximate number of pixels summed at a time."""
 
 
@@ -37,7 +37,7 @@ class RegionProperties(NamedTuple):
     perimeter, perimeter_off, perimeter_recess : float
         Number of sides; of these towards a fixture or the floor; and towards recessed lining.
     steps : float
-        Number of sides with a known darkening on both sides, :data:`tunneldb.anomalies.region_edges.ACROSS` from them.
+        Number of sides with a known darkening on both sides, :data:`tunneldb.anomalies.region_edges.STEP_DISTANCE` from them.
     inside, outside : float
         Sum of the darkening there, dB.
     sharp, straight : float
@@ -48,8 +48,8 @@ class RegionProperties(NamedTuple):
     drop_square : float
         Sum of the squared darkening, dB², over the pixels with points.
     far_steps, far_outside : float
-        Number of ``steps`` with a known darkening also :data:`tunneldb.anomalies.region_edges.FAR` outside; sum of the
-        darkening there, dB.
+        Number of ``steps`` with a known darkening also :data:`tunneldb.anomalies.region_edges.FAR_STEP_DISTANCE` outside; sum
+        of the darkening there, dB.
     bright : float
         Number of ``steps`` with lining outside that is brighter than dry lining is by chance.
     off_above, floor : float
@@ -176,7 +176,7 @@ def find_regions(
     components = Components.of(runs)
     ends = components.touching(inner.start, inner.stop)
     large = components.pixels * grid.pixel**2 >= min_area * (1 - 1e-12)
-    wanted = ends | large | (components.extent * grid.pixel >= LONG)
+    wanted = ends | large | (components.extent * grid.pixel >= MIN_JOINT_LENGTH)
     if may_drip is None:
         found = _regions(runs, components.label, np.flatnonzero(wanted), dark, contrast)
         return sorted(found, key=lambda region: region.place)
@@ -197,8 +197,8 @@ def _regions(runs: Int64, label: Intp, chosen: Intp, dark: Bool, contrast: Contr
         return []
     grid = contrast.grid
     number = np.searchsorted(chosen, label)
-    held = chosen[np.minimum(number, len(chosen) - 1)] == label
-    order = np.flatnonzero(held)[np.argsort(number[held], kind="stable")]
+    selected = chosen[np.minimum(number, len(chosen) - 1)] == label
+    order = np.flatnonzero(selected)[np.argsort(number[selected], kind="stable")]
     runs, number = runs[order], number[order]
     starts = np.searchsorted(number, np.arange(len(chosen)))
     low, high = np.minimum.reduceat(runs, starts), np.maximum.reduceat(runs, starts)
@@ -221,9 +221,11 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
     """
     edges, found = Edges(dark, contrast), []
     pixels, recess, steps, squares, sigma, between = (np.zeros(count) for _ in range(6))
-    most = np.full(count, NODATA, np.int16)
+    highest = np.full(count, NODATA, np.int16)
     until = np.cumsum(runs[:, 2] - runs[:, 1])
-    for part in np.split(np.arange(len(runs)), np.searchsorted(until, np.arange(PIXELS, until[-1], PIXELS))):
+    for part in np.split(
+        np.arange(len(runs)), np.searchsorted(until, np.arange(PIXELS_AT_A_TIME, until[-1], PIXELS_AT_A_TIME))
+    ):
         row, column = pixels_of(runs[part])
         label = np.repeat(number[part], (runs[:, 2] - runs[:, 1])[part])
         is_dark = dark[row, column]  # all except those between a drip and the component above it
@@ -231,19 +233,19 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
         found.append(edges.sides(label, row, column))
         recess += np.bincount(label[contrast.state[row, column] == PixelState.RECESS], minlength=count)
         drop = contrast.drop[row, column]
-        held = drop != NODATA
-        row, column, label, drop = row[held], column[held], label[held], drop[held]
+        selected = drop != NODATA
+        row, column, label, drop = row[selected], column[selected], label[selected], drop[selected]
         if contrast.between is not None:
             between += np.bincount(label[contrast.between[row, column]], minlength=count)
         pixels += np.bincount(label, minlength=count)
         steps += np.bincount(label, drop, count)
         squares += np.bincount(label, drop.astype(np.float64) ** 2, count)
-        np.maximum.at(most, label, drop)
+        np.maximum.at(highest, label, drop)
         sigma += np.bincount(label, contrast.sigma[row // contrast.tile, column // contrast.tile], count)
     sides = Sides(*map(np.concatenate, zip(*found, strict=True)))
     drop_sum = steps * STEP["corrected"]
     straight = edges.straight(sides, drop_sum / np.maximum(pixels, 1))
-    drop_max = np.where(pixels > 0, most * STEP["corrected"], -np.inf)
+    drop_max = np.where(pixels > 0, highest * STEP["corrected"], -np.inf)
     perimeter, about = edges.perimeter(sides, count), edges.steps(sides, count)
     squares *= STEP["corrected"] ** 2
     return np.column_stack(

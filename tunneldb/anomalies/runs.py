@@ -75,8 +75,8 @@ def column_runs(mask: Bool, first: int, stop: int) -> Int64:
     for top in range(0, len(mask) + 1, ROWS):
         part = np.zeros((min(ROWS, len(mask) + 1 - top) + 1, stop - first), np.bool_)  # with the row before
         low = max(top - 1, 0)
-        held = mask[low : top + ROWS, first:stop]
-        part[low - top + 1 :][: len(held)] = held
+        selected = mask[low : top + ROWS, first:stop]
+        part[low - top + 1 :][: len(selected)] = selected
         row, column = np.nonzero(part[1:] != part[:-1])
         edges.append((column + first) * (len(mask) + 1) + row + top)
     at = np.sort(np.concatenate(edges))

@@ -17,14 +17,14 @@ from tunneldb.raster.pixel_state import PixelState
 TILE = MAX_MEDIAN // 3
 """Side of the tiles, pixels: three by three are as large as the widest median filter."""
 
-WIDE = 4
+WIDE_REACH = 4
 """Number of tiles to either side for the wider test: a square three times as wide."""
 
-CERTAIN = 2.0
+CERTAIN_FACTOR = 2.0
 """Factor on the required number of points that is not reached by chance: with a third less expected, in fewer than 1 of
 100 000 places (Poisson)."""
 
-MOST = 0.25
+MAX_POINT_SHARE = 0.25
 """Maximum required share of pixels with points, for pixels so coarse that each has one."""
 
 
@@ -65,16 +65,18 @@ def leave_out_sparse(picture: LiningImage, density: float) -> float:
     grid, state = picture.grid, picture.state
     rows = _edges(grid.rows, -grid.bottom - grid.rows)
     columns = _edges(grid.columns, grid.first_column)
-    held, possible = np.zeros((2, len(rows) - 1, len(columns) - 1), np.int64)
+    selected, possible = np.zeros((2, len(rows) - 1, len(columns) - 1), np.int64)
     for k, (top, stop) in enumerate(pairwise(rows.tolist())):
         part = state[top:stop]
-        held[k] = np.add.reduceat(count_in_columns(on_lining(part)), columns[:-1])
+        selected[k] = np.add.reduceat(count_in_columns(on_lining(part)), columns[:-1])
         possible[k] = np.add.reduceat(count_in_columns(part <= PixelState.RECESS), columns[:-1])
-    share = min(1.0 - np.exp(-density * grid.pixel**2), MOST)
-    there, room = _about(held, 1), _about(possible, 1)
-    by_chance = (_about(held, WIDE) < share * _about(possible, WIDE)) & (there < CERTAIN * share * (3 * TILE) ** 2)
+    share = min(1.0 - np.exp(-density * grid.pixel**2), MAX_POINT_SHARE)
+    there, room = _about(selected, 1), _about(possible, 1)
+    by_chance = (_about(selected, WIDE_REACH) < share * _about(possible, WIDE_REACH)) & (
+        there < CERTAIN_FACTOR * share * (3 * TILE) ** 2
+    )
     sparse = (there < share * room) | by_chance
-    for k in np.flatnonzero((sparse & (held > 0)).any(axis=1)).tolist():
+    for k in np.flatnonzero((sparse & (selected > 0)).any(axis=1)).tolist():
         here = slice(rows[k], rows[k + 1])
         gone = on_lining(state[here]) & np.repeat(sparse[k], np.diff(columns))
         state[here][gone] = PixelState.EMPTY

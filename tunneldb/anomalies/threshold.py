@@ -21,7 +21,7 @@ MEDIAN = 5
 MEDIAN_PIXELS = 12
 """Mean number of pixels with points to which the filter is widened."""
 
-ENOUGH = 0.2
+MIN_VOTE_SHARE = 0.2
 """Minimum share of those pixels for the filter to decide about its middle."""
 
 
@@ -71,9 +71,9 @@ def dark_pixels(contrast: ContrastImage, size: int) -> Bool:
 def averaged(contrast: ContrastImage, rows: slice) -> Int16:
     """Return the darkening of some rows, over the windows of their tiles; see :mod:`tunneldb.anomalies.background.texture`."""
     half = None if contrast.texture is None else contrast.texture.half
-    if half is None or not (most := int(half[rows.start // contrast.tile : (rows.stop - 1) // contrast.tile + 1].max())):
+    if half is None or not (reach := int(half[rows.start // contrast.tile : (rows.stop - 1) // contrast.tile + 1].max())):
         return contrast.drop[rows]
-    about = slice(max(rows.start - most, 0), min(rows.stop + most, len(contrast.drop)))
+    about = slice(max(rows.start - reach, 0), min(rows.stop + reach, len(contrast.drop)))
     return windowed(contrast.state, contrast.drop, half, contrast.tile, rows, about)
 
 
@@ -102,4 +102,4 @@ def seen_lining(state: UInt8, size: int) -> Iterator[tuple[slice, Bool]]:
 
 def _least_votes(size: int) -> int:
     """Return the number of pixels of a filter up to which it cannot decide about its middle."""
-    return int(ENOUGH * min(size * size, MEDIAN_PIXELS))
+    return int(MIN_VOTE_SHARE * min(size * size, MEDIAN_PIXELS))

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from tunneldb.anomalies.degrees import FEW_PROFILES, told
+from tunneldb.anomalies.degrees import FEW_PROFILES, straightness_weight
 from tunneldb.anomalies.evidence import EvidenceModel, reasons_of, standard_model
 from tunneldb.anomalies.features import DEGREES, FEATURES, NAMES, measure_features
 from tunneldb.anomalies.regions import Region
@@ -16,13 +16,13 @@ from tunneldb.arrays import Float
 
 Kind = Literal["leak", "joint", "dark"]
 
-NAMED = 0.5
+MIN_NAMED_CHANGE = 0.5
 """Minimum factor on the odds, 1.6 as a logarithm, for a reason to be named."""
 
-BUILT = ("thin", "rectangular", "stripe", "shape")
+OUTLINE_REASONS = ("thin", "rectangular", "stripe", "shape")
 """Reasons based on the outline, which few profiles do not show."""
 
-LINE = NAMES.index("line")
+LINE_FEATURE = NAMES.index("line")
 """Number of the feature that separates joints from other dry dark areas."""
 
 
@@ -45,7 +45,7 @@ class Verdict:
     features : (len(FEATURES),) float array
         Its features.
     outline : float
-        Reliability of its outline, 0 to 1: weight of the reasons of BUILT.
+        Reliability of its outline, 0 to 1: weight of the reasons of OUTLINE_REASONS.
     model : str
         Version of the model used.
     """
@@ -72,12 +72,12 @@ def classify(region: Region, features: Float | None = None, model: EvidenceModel
     """
     model = model or standard_model()
     features = measure_features(region) if features is None else features
-    outline = told(region)
+    outline = straightness_weight(region)
     contributions = weigh(model, features[None], np.array([outline]))[0]
     p = float(1.0 / (1.0 + np.exp(-model.constant - contributions.sum())))
-    kind: Kind = "leak" if p >= 0.5 else "joint" if features[LINE] >= 0.5 else "dark"
+    kind: Kind = "leak" if p >= 0.5 else "joint" if features[LINE_FEATURE] >= 0.5 else "dark"
     evidence = reasons_of(contributions)
-    against = [name for name, weight in sorted(evidence.items(), key=lambda item: item[1]) if weight <= -NAMED]
+    against = [name for name, weight in sorted(evidence.items(), key=lambda item: item[1]) if weight <= -MIN_NAMED_CHANGE]
     if kind != "leak":
         looks = sorted((name for name in DEGREES if _degree(features, name) > 0.5), key=lambda name: -_degree(features, name))
         against = [*looks, *(name for name in against if name not in looks)]
@@ -93,7 +93,7 @@ def weigh(model: EvidenceModel, features: Float, outline: Float) -> Float:
 
 def weigh_built(contributions: Float, outline: Float) -> Float:
     """Reduce the contributions of features (n, len(FEATURES)) based on outlines (n,) by the reliability of these."""
-    built = np.array([feature.reason in BUILT for feature in FEATURES])
+    built = np.array([feature.reason in OUTLINE_REASONS for feature in FEATURES])
     return contributions * np.where(built, outline[:, None], 1.0)
 
 

@@ -47,10 +47,10 @@ def count_about(mask: Bool, rows: slice, about: slice, half: int) -> UInt16:
     (n, columns) uint16 array
     """
     size, above = 2 * half + 1, half - (rows.start - about.start)
-    held = np.zeros((rows.stop - rows.start + 2 * half, mask.shape[1]), np.uint8)
-    held[above : above + len(mask)] = mask
+    selected = np.zeros((rows.stop - rows.start + 2 * half, mask.shape[1]), np.uint8)
+    selected[above : above + len(mask)] = mask
     columns: UInt16 = np.zeros((rows.stop - rows.start, mask.shape[1] + 2 * half), np.uint16)
-    columns[:, half : half + mask.shape[1]] = _sum_along(held, size)
+    columns[:, half : half + mask.shape[1]] = _sum_along(selected, size)
     # The image is transposed, so that one function serves both axes.
     counts: UInt16 = _sum_along(columns.T, size).T
     return counts

@@ -31,10 +31,10 @@ SHORTH = 0.25
 
 It is less than that of `radiometry.robust_statistics`, 0.4, because a column, a row or a tile may be half wet, while all
 values of a kilometre are not. Up to 30 % of darker pixels both give the same from some hundred values on; with a hundred
-values, 0.4 scatters less. At 50 % the mean is less wrong with 0.25, and even less with LONGER. At 60 % neither works.
+values, 0.4 scatters less. At 50 % the mean is less wrong with 0.25, and even less with LENGTH_TOLERANCE. At 60 % neither works.
 """
 
-LONGER = 1.5
+LENGTH_TOLERANCE = 1.5
 """Factor on the shortest run; among runs up to that length the brightest is used: if half is wet, it is the dry one."""
 
 PER_LEVEL = STEP["corrected"] / BIN
@@ -236,13 +236,13 @@ def _statistics(histograms: Int32, until: Float, found: Float) -> None:  # pragm
             for k in range(1, bins + 1):
                 while until[k, 0] - until[low + 1, 0] >= wanted:
                     low += 1
-                held = until[k, 0] - until[low, 0]
-                if held >= wanted:
+                selected = until[k, 0] - until[low, 0]
+                if selected >= wanted:
                     if turn == 0:
                         if k - low < shortest:
                             shortest = float(k - low)
-                    elif k - low <= LONGER * shortest:
-                        mean = (until[k, 1] - until[low, 1]) / held
+                    elif k - low <= LENGTH_TOLERANCE * shortest:
+                        mean = (until[k, 1] - until[low, 1]) / selected
         # Water makes the dark side wider, salts the bright one: the narrower side gives the standard deviation.
         below = until[int(mean), 0] + histograms[n, first + int(mean)] * (mean - int(mean))
         median = [float(bins), 0.0]

@@ -21,7 +21,7 @@ TILE = 0.5
 PASSES = 2
 """Number of passes in which bands, rings and the smooth part are fitted again, each to the residuals of the others."""
 
-SHOWN = 2_000_000
+SAMPLE_PIXELS = 2_000_000
 """Approximate number of pixels for mean and spread of the kilometre."""
 
 
@@ -104,7 +104,7 @@ def _nothing(grid: Grid, tile: int, drawn: tuple[Polygon, ...]) -> BackgroundMap
 def _mean_level(level: BackgroundLevel, state: UInt8) -> float:
     """Return the median over the lining of the background level, from some of its rows, dB; NaN without lining there."""
     rows, columns = state.shape
-    every = max(1, rows * columns // SHOWN)
+    every = max(1, rows * columns // SAMPLE_PIXELS)
     levels = []
     for row in range(every // 2, rows, every):
         here = state[row] == PixelState.LINING

@@ -23,46 +23,46 @@ from tunneldb.raster.polygons import mask_of_polygons
 SAMPLE, LINES = 15_000_000, 6_000_000
 """Approximate number of pixels used for tiles; rows and columns use the same, and have far more each."""
 
-BESIDE = 1
+BLOCKS_TO_EITHER_SIDE = 1
 """Number of blocks to either side for a band: with the block itself 150 m, of which a leak is a small part."""
 
-ROW = 0.1
+ROW_MEDIAN_LENGTH = 0.1
 """Length of the running median across bands, m: joints along the tunnel are narrower than half of it."""
 
-RING = 0.3
+RING_MEDIAN_LENGTH = 0.3
 """Length of the running median along rings, m: joints are narrower than half of it, steps stay sharp."""
 
-PROFILE = 0.5
+PROFILE_SPACINGS = 0.5
 """Distance, in spacings, up to which columns belong to one profile, which need not be perpendicular to the axis."""
 
-NARROW = 0.6
+MIN_RING_LENGTH = 0.6
 """Minimum length of a ring, m: a narrower dark one is a joint that leaks all round."""
 
-ENOUGH = 100
+GOOD_VALUES = 100
 """Number of values that give the background level to about a tenth of their standard deviation."""
 
-FEW = 10
+MIN_VALUES = 10
 """Minimum number of values for a level."""
 
-PART = 0.15
+MIN_VALUE_SHARE = 0.15
 """Minimum number of values of a row or a column for a level, as a share of the mean number."""
 
-AROUND = 2.0
+SIGMA_HALF_WIDTH = 2.0
 """Half the side of the windows for the standard deviation, m: they contain a few segments of a ring."""
 
-BETWEEN = 5.0
+TILE_SCATTER_HALF_WIDTH = 5.0
 """Half the side of the windows for the differences between tiles, m: they contain several segments and blocks."""
 
-FEW_TILES = 50
+MIN_TILES = 50
 """Minimum number of tiles for these differences."""
 
-LEAST = 10.0
+MIN_SIGMA_PERCENTILE = 10.0
 """Percentile of the kilometre's standard deviations that is the lower limit of all."""
 
-DRAWN = 0.5
+MIN_DRAWN_SHARE = 0.5
 """Minimum share of a tile's lining in drawn dry regions for these to determine its level."""
 
-VALUES = 4_000_000
+SORTED_AT_A_TIME = 4_000_000
 """Maximum number of values sorted at a time."""
 
 
@@ -100,7 +100,7 @@ class BackgroundFit:
         self.fixed = np.zeros(shape, np.bool_)
         if drawn:
             number = self._drawn_moments(self.smooth)[0]
-            self.fixed = (number >= DRAWN * self.lining) & (number > 0)
+            self.fixed = (number >= MIN_DRAWN_SHARE * self.lining) & (number > 0)
 
     @property
     def level(self) -> BackgroundLevel:
@@ -110,16 +110,16 @@ class BackgroundFit:
     def add_bands(self) -> None:
         """Add the band of each row: around each block, or if too little of it is seen, over the whole kilometre."""
         scanned, per_block = int(self.lining.any(axis=0).sum()), self.smooth.shape[1] // self.bands.shape[1]
-        along = min(scanned, (2 * BESIDE + 1) * per_block)
-        enough = max(FEW, round(PART * along * self.per_tile / self.tile / self.apart))
-        found, whole = Residuals(self.picture, self.level, self._plain, self.apart).of_rows(BESIDE, enough)
+        along = min(scanned, (2 * BLOCKS_TO_EITHER_SIDE + 1) * per_block)
+        enough = max(MIN_VALUES, round(MIN_VALUE_SHARE * along * self.per_tile / self.tile / self.apart))
+        found, whole = Residuals(self.picture, self.level, self._plain, self.apart).of_rows(BLOCKS_TO_EITHER_SIDE, enough)
         found = np.where(np.isfinite(found), found, whole[:, None])
         rows = np.flatnonzero(np.isfinite(whole))
         if not len(rows):
             return
         for b in range(found.shape[1]):
             found[:, b] = np.interp(np.arange(len(found)), rows, found[rows, b])
-        size = _odd(ROW / self.grid.pixel)
+        size = _odd(ROW_MEDIAN_LENGTH / self.grid.pixel)
         self.bands += ndimage.median_filter(found, (size, 1), mode="nearest")
 
     def add_rings(self) -> None:
@@ -129,11 +129,11 @@ class BackgroundFit:
         """
         pixel = self.grid.pixel
         per_column = self.per_tile * self.lining.shape[0] / self.tile
-        enough = max(FEW, round(PART * per_column / self.apart))
+        enough = max(MIN_VALUES, round(MIN_VALUE_SHARE * per_column / self.apart))
         found = Residuals(self.picture, self.level, self._plain, self.apart).of_columns(enough)
         # Where columns have few values, more of them are combined.
-        least = 10.0 * ENOUGH / max(per_column, 1.0)
-        size = _odd(PROFILE * self.spacing / pixel if self.spacing else max(RING / pixel, least))
+        least = 10.0 * GOOD_VALUES / max(per_column, 1.0)
+        size = _odd(PROFILE_SPACINGS * self.spacing / pixel if self.spacing else max(RING_MEDIAN_LENGTH / pixel, least))
         found = _running_median(found, size // 2)
         columns = np.flatnonzero(np.isfinite(found))
         if not len(columns):
@@ -142,13 +142,13 @@ class BackgroundFit:
         if self.spacing:
             self.rings = rings.astype(np.float32)
             return
-        closed = ndimage.grey_closing(rings, _odd(NARROW / pixel), mode="nearest")
+        closed = ndimage.grey_closing(rings, _odd(MIN_RING_LENGTH / pixel), mode="nearest")
         self.rings = np.where(closed - rings > 0.5 * self.spread, closed, rings).astype(np.float32)
 
     def add_smooth(self) -> None:
         """Add the smooth part."""
-        held = max(self.per_tile / self.every, 1e-3)
-        half = int(np.ceil((np.sqrt(ENOUGH / held) - 1) / 2)) if held < ENOUGH else 0
+        selected = max(self.per_tile / self.every, 1e-3)
+        half = int(np.ceil((np.sqrt(GOOD_VALUES / selected) - 1) / 2)) if selected < GOOD_VALUES else 0
         histograms = self._histograms()
         used = np.ones(self.smooth.shape, np.bool_)
         mean, sigma, count = window_statistics(histograms, used, half)
@@ -163,17 +163,19 @@ class BackgroundFit:
 
     def sigma(self) -> Single:
         """Compute the standard deviation about the model, by tiles, dB: of pixels, plus the differences between whole tiles."""
-        half = max(1, round(AROUND / (self.tile * self.grid.pixel)))
-        while (2 * half + 1) ** 2 * self.per_tile / self.every < 4 * ENOUGH and half < 10:
+        half = max(1, round(SIGMA_HALF_WIDTH / (self.tile * self.grid.pixel)))
+        while (2 * half + 1) ** 2 * self.per_tile / self.every < 4 * GOOD_VALUES and half < 10:
             half += 1
         histograms = self._histograms()
         _, sigma, count = window_statistics(histograms, ~self.outlying, half)
-        sigma[count < ENOUGH] = np.nan
+        sigma[count < GOOD_VALUES] = np.nan
         known = np.isfinite(sigma) & (sigma > 0)
         seen = known & (self.lining > 0)
         if not seen.any():
             return np.full_like(sigma, self.spread)
-        sigma = extrapolate(np.where(known, np.maximum(sigma, np.percentile(sigma[seen], LEAST)), np.nan).astype(np.float32))
+        sigma = extrapolate(
+            np.where(known, np.maximum(sigma, np.percentile(sigma[seen], MIN_SIGMA_PERCENTILE)), np.nan).astype(np.float32)
+        )
         sigma = np.hypot(sigma, self._between(histograms))
         if self.fixed.any():
             number, total, squares = (
@@ -190,13 +192,13 @@ class BackgroundFit:
         It uses the tiles around each one, without those set off by a sharp edge.
         """
         level, _, count = window_statistics(histograms, np.ones(self.smooth.shape, np.bool_), 0)
-        known = (count >= ENOUGH) & ~self.fixed & ~self.outlying
+        known = (count >= GOOD_VALUES) & ~self.fixed & ~self.outlying
         place = np.floor(level / BIN) + TILE_BINS // 2
         known &= (place >= 0) & (place < TILE_BINS)
         levels = np.zeros((*level.shape, TILE_BINS), np.uint16)
         levels[known, place[known].astype(np.int64)] = 1
-        _, sigma, number = window_statistics(levels, known, round(BETWEEN / (self.tile * self.grid.pixel)))
-        return extrapolate(np.where(number >= FEW_TILES, sigma, np.nan).astype(np.float32))
+        _, sigma, number = window_statistics(levels, known, round(TILE_SCATTER_HALF_WIDTH / (self.tile * self.grid.pixel)))
+        return extrapolate(np.where(number >= MIN_TILES, sigma, np.nan).astype(np.float32))
 
     def _histograms(self) -> UInt16:
         return Residuals(self.picture, self.level, self.lining > 0, self.every).of_tiles()
@@ -253,8 +255,8 @@ def _running_median(values: Single, half: int) -> Single:
     """Return the median of the known values (not NaN) within so many places; NaN if there are none."""
     padded = np.pad(values, half, constant_values=np.nan)
     size, out = 2 * half + 1, np.empty_like(values)
-    for start in range(0, len(values), max(1, VALUES // size)):
-        part = padded[start : start + max(1, VALUES // size) + 2 * half]
+    for start in range(0, len(values), max(1, SORTED_AT_A_TIME // size)):
+        part = padded[start : start + max(1, SORTED_AT_A_TIME // size) + 2 * half]
         about = np.sort(np.lib.stride_tricks.sliding_window_view(part, size), axis=1)  # NaNs come last
         known = np.count_nonzero(~np.isnan(about), axis=1)
         middle = (np.take_along_axis(about, k[:, None], axis=1)[:, 0] for k in (np.maximum(known - 1, 0) // 2, known // 2))

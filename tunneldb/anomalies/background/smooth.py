@@ -8,25 +8,25 @@ from scipy import ndimage
 from tunneldb.arrays import Bool, Float, Single
 from tunneldb.robust import MAD_TO_SIGMA
 
-LIMIT = 3.0
+OUTLIER_LEVEL = 3.0
 """Deviation from which a tile is an outlier, in standard deviations of the tiles at similar arcs."""
 
-BAND = 4
+BAND_TILES = 4
 """Number of tiles to either side in arc, over the whole kilometre, for the scatter of tiles."""
 
-EDGE, ABOUT = 3, 7
+EDGE_WINDOW, SURROUNDING_WINDOW = 3, 7
 """Sides of the windows, in tiles, that show the edge itself and its surroundings: 1 m and 3 m from middle to middle."""
 
-SHARP = 0.6
+MIN_SHARP_SHARE = 0.6
 """Share of the surrounding step from which an edge is sharp: an edge that fades over more than 1.7 m is not."""
 
-WIDE = (7, 13)
+LEVEL_WINDOW = (7, 13)
 """Tiles down and along of the windows for the level around a tile."""
 
-SMOOTH = (5, 9)
+MEDIAN_WINDOW = (5, 9)
 """Tiles down and along of the median filter."""
 
-FEW = 20
+MIN_TILES = 20
 """Minimum number of tiles for their scatter."""
 
 
@@ -59,10 +59,10 @@ def smooth_level(level: Single, before: Single, spread: float, fixed: Bool) -> t
     known = np.isfinite(level)
     outlying = _outlying(level, known, spread)
     # Varying soot hides leaks until it is removed.
-    about = ndimage.uniform_filter(extrapolate(np.where(outlying | fixed, np.nan, level)), WIDE, mode="nearest")
+    about = ndimage.uniform_filter(extrapolate(np.where(outlying | fixed, np.nan, level)), LEVEL_WINDOW, mode="nearest")
     outlying |= _outlying(level - about, known & ~outlying, spread)
     residual = extrapolate(np.where(outlying | fixed, np.nan, level - before))
-    smooth = before + ndimage.uniform_filter(ndimage.median_filter(residual, SMOOTH, mode="nearest"), 3, mode="nearest")
+    smooth = before + ndimage.uniform_filter(ndimage.median_filter(residual, MEDIAN_WINDOW, mode="nearest"), 3, mode="nearest")
     smooth[fixed] = level[fixed]
     return smooth.astype(np.float32), outlying
 
@@ -76,10 +76,10 @@ def extrapolate(values: Single) -> Single:
     weight, total = known.astype(np.float32), np.where(known, out, np.float32(0.0))
     size = 3
     while not known.all():
-        held = ndimage.uniform_filter(weight, size, mode="constant")
+        selected = ndimage.uniform_filter(weight, size, mode="constant")
         # A window's share of known tiles is a sum with rounding errors.
-        new = ~known & (held * size * size > 0.5)
-        out[new] = (ndimage.uniform_filter(total, size, mode="constant") / np.maximum(held, 1e-9))[new]
+        new = ~known & (selected * size * size > 0.5)
+        out[new] = (ndimage.uniform_filter(total, size, mode="constant") / np.maximum(selected, 1e-9))[new]
         known |= new
         size = 2 * size + 1
     return out
@@ -101,11 +101,11 @@ def _limits(level: Single, used: Bool, spread: float) -> Float:
     """Return the permitted deviation of a tile, for each row of tiles, dB."""
     limit = np.full(len(level), np.nan)
     for row in range(len(level)):
-        about = slice(max(row - BAND, 0), row + BAND + 1)
+        about = slice(max(row - BAND_TILES, 0), row + BAND_TILES + 1)
         bright = level[about][used[about]]
         bright = bright[bright > 0.0]
-        if len(bright) >= FEW:
-            limit[row] = LIMIT * MAD_TO_SIGMA * float(np.median(bright))
+        if len(bright) >= MIN_TILES:
+            limit[row] = OUTLIER_LEVEL * MAD_TO_SIGMA * float(np.median(bright))
     usual = np.nanmedian(limit) if np.isfinite(limit).any() else 0.0
     return np.maximum(np.where(np.isfinite(limit), limit, usual), spread)
 
@@ -116,9 +116,11 @@ def _sharp(level: Single, out: Bool) -> Bool:
     if not count:
         return out
     boundary = out & ndimage.binary_dilation(np.isfinite(level) & ~out)
-    steep = (_range(level, EDGE)[boundary] / np.maximum(_range(level, ABOUT)[boundary], 1e-6)).astype(np.float64)
+    steep = (_range(level, EDGE_WINDOW)[boundary] / np.maximum(_range(level, SURROUNDING_WINDOW)[boundary], 1e-6)).astype(
+        np.float64
+    )
     part = ndimage.labeled_comprehension(steep, pieces[boundary], np.arange(1, count + 1), np.median, float, 1.0)
-    sharp: Bool = np.concatenate([[False], part > SHARP])[pieces]
+    sharp: Bool = np.concatenate([[False], part > MIN_SHARP_SHARE])[pieces]
     return sharp
 
 

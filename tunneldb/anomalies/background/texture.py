@@ -14,7 +14,7 @@ from tunneldb.compiled import kernel
 from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.pixel_state import PixelState
 
-TOLD = 2.0
+TYPICAL_DARKENING = 2.0
 """Darkening that should be three standard deviations of dry lining, dB: wet lining is rarely less dark (Xu et al., 2018)."""
 
 CELL = 0.1
@@ -23,10 +23,10 @@ CELL = 0.1
 WINDOWS = (3, 5)
 """Sides of the windows, cells: a brick is 0.25 m long, most stones of a wall and rock facets are not much larger."""
 
-AROUND = 4.0
+SCATTER_HALF_WIDTH = 4.0
 """Half the side of the windows for the variation of lining, m."""
 
-FEW = 100
+MIN_CELLS = 100
 """Minimum number of cells for the variation."""
 
 RECESS = int(PixelState.RECESS)
@@ -52,7 +52,7 @@ class Texture:
 
 
 def measure_texture(state: UInt8, drop: Int16, sigma: Single, tile: int, pixel: float) -> Texture:
-    """Choose for each tile the smallest window in which a darkening of TOLD stands out from the variation of lining.
+    """Choose for each tile the smallest window in which TYPICAL_DARKENING stands out from the variation of lining.
 
     Noise of pixels decreases with their number. The differences between bricks, stones or facets decrease only if a window
     contains several. Where single pixels vary little, nothing is averaged.
@@ -68,7 +68,7 @@ def measure_texture(state: UInt8, drop: Int16, sigma: Single, tile: int, pixel: 
     pixel : float
         Side of a pixel, m.
     """
-    limit = TOLD / 3.0
+    limit = TYPICAL_DARKENING / 3.0
     half = np.zeros(sigma.shape, np.uint8)
     open_ = ndimage.median_filter(sigma, 5, mode="nearest") > limit
     if not open_.any():
@@ -78,7 +78,7 @@ def measure_texture(state: UInt8, drop: Int16, sigma: Single, tile: int, pixel: 
     out = sigma.copy()
     for cells in WINDOWS:
         means, known = _means(total, count, cells)
-        found = _spread(means, known, side, tile, sigma.shape, round(AROUND / (tile * pixel)))
+        found = _spread(means, known, side, tile, sigma.shape, round(SCATTER_HALF_WIDTH / (tile * pixel)))
         better = open_ & np.isfinite(found) & (found < out)
         half[better], out[better] = (cells * side) // 2, found[better]
         open_ &= ndimage.median_filter(out, 5, mode="nearest") > limit
@@ -113,13 +113,13 @@ def windowed(state: UInt8, drop: Int16, half: UInt8, tile: int, rows: slice, abo
 def _integrate(state: UInt8, drop: Int16, total: Int32, count: Int32) -> None:  # pragma: no cover - compiled
     """Compute sum of the darkening and number of lining pixels above and before each pixel corner (rows + 1, columns + 1)."""
     for i in range(state.shape[0]):
-        added, held = np.int32(0), np.int32(0)
+        added, selected = np.int32(0), np.int32(0)
         for j in range(state.shape[1]):
             if 0 < state[i, j] <= RECESS and drop[i, j] != NODATA:
                 added += np.int32(drop[i, j])
-                held += np.int32(1)
+                selected += np.int32(1)
             total[i + 1, j + 1] = total[i, j + 1] + added
-            count[i + 1, j + 1] = count[i, j + 1] + held
+            count[i + 1, j + 1] = count[i, j + 1] + selected
 
 
 @kernel
@@ -137,9 +137,9 @@ def _average(
             m, n = max(first + i - top - h, 0), min(first + i - top + h + 1, rows)
             for j in range(begin, min(begin + tile, columns)):
                 k, q = max(j - h, 0), min(j + h + 1, columns)
-                held = np.int32(count[n, q] - count[m, q] - count[n, k] + count[m, k])
-                if held:
-                    out[i, j] = round(np.int32(total[n, q] - total[m, q] - total[n, k] + total[m, k]) / held)
+                selected = np.int32(count[n, q] - count[m, q] - count[n, k] + count[m, k])
+                if selected:
+                    out[i, j] = round(np.int32(total[n, q] - total[m, q] - total[n, k] + total[m, k]) / selected)
                 else:
                     out[i, j] = NODATA
 
@@ -177,4 +177,4 @@ def _spread(means: Float, known: Bool, side: int, tile: int, shape: tuple[int, i
     place = (np.minimum(down, shape[0] - 1) * shape[1] + along) * TILE_BINS + bins[inside]
     histograms = np.bincount(place, minlength=shape[0] * shape[1] * TILE_BINS).astype(np.uint16).reshape(*shape, TILE_BINS)
     _, sigma, count = window_statistics(histograms, np.ones(shape, np.bool_), half)
-    return extrapolate(np.where((count >= FEW) & (sigma > 0.0), sigma, np.nan).astype(np.float32))
+    return extrapolate(np.where((count >= MIN_CELLS) & (sigma > 0.0), sigma, np.nan).astype(np.float32))
