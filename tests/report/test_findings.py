@@ -29,13 +29,13 @@ from support.example_survey import NAME
 from tunneldb.cli.main import main
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.export.tables.dry_regions import read_dry_regions
 from tunneldb.export.tables.finding_counts import UNCOUNTED
 from tunneldb.report import findings
 from tunneldb.report.change import CHANGE_WORDS
 from tunneldb.report.owner import CHAPTERS, Owner, read_owner
 from tunneldb.report.photos import Photo, make_thumbnails
 from tunneldb.report.words import languages, read_language
+from tunneldb.store.dry_regions import read_dry_regions
 from tunneldb.store.survey import get_survey
 
 NONE = np.empty(0, np.int64)

@@ -16,9 +16,9 @@ from tunneldb.anomalies.reconcile import Summary
 from tunneldb.anomalies.records import Anomaly
 from tunneldb.anomalies.verdict import Verdict
 from tunneldb.export.tables.finding_counts import STATES, count_findings
-from tunneldb.export.tables.findings import Chosen, read_findings
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.replace_findings import replace_findings
+from tunneldb.store.findings import Chosen, read_findings
 from tunneldb.store.learned import load_measured
 from tunneldb.store.survey import get_survey
 

@@ -17,13 +17,15 @@ from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.export.tables.dry_regions import read_dry_regions
-from tunneldb.export.tables.finding_counts import count_findings, read_kinds, read_severities
-from tunneldb.export.tables.findings import COUNTED, Chosen, Finding, State, as_csv, as_geojson, read_findings, write_gpkg
-from tunneldb.export.tables.leaks import Geometry, clock_label
+from tunneldb.export.tables.finding_counts import count_findings
+from tunneldb.export.tables.findings import as_csv, as_geojson, write_gpkg
+from tunneldb.export.tables.leaks import clock_label
 from tunneldb.export.tables.workbooks import write_findings
 from tunneldb.files import replacing
 from tunneldb.pipeline.findings import import_findings
+from tunneldb.store.dry_regions import read_dry_regions
+from tunneldb.store.finding_kinds import read_kinds, read_severities
+from tunneldb.store.findings import COUNTED, Chosen, Finding, Geometry, State, read_findings
 from tunneldb.store.survey import Survey, get_survey
 
 

@@ -21,14 +21,16 @@ from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.export.tables.dry_regions import DryRegion, read_dry_regions
 from tunneldb.export.tables.leak_files import as_csv, as_geojson, write_gpkg
-from tunneldb.export.tables.leaks import Geometry, Kind, LeakList, Selection, as_table, read_leaks
+from tunneldb.export.tables.leaks import as_table
 from tunneldb.export.tables.workbooks import write_leaks
 from tunneldb.files import replacing
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.stages.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
+from tunneldb.store.dry_regions import DryRegion, read_dry_regions
+from tunneldb.store.findings import Geometry
+from tunneldb.store.leaks import Kind, LeakList, Selection, read_leaks
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 

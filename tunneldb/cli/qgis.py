@@ -18,10 +18,10 @@ from tunneldb.errors import UserError
 from tunneldb.export.images.change import export_change
 from tunneldb.export.images.image import export_filled, export_kilometre, image_kilometres
 from tunneldb.export.qgis import store_project, store_styles, write_project
-from tunneldb.export.tables.spots import read_spots
 from tunneldb.files import made_folder, told_to_end
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
+from tunneldb.store.spots import read_spots
 from tunneldb.store.survey import Survey, get_survey
 
 

@@ -17,7 +17,7 @@ from tunneldb.files import replacing
 from tunneldb.store.survey import get_survey
 
 if TYPE_CHECKING:
-    from tunneldb.export.tables.spots import Geometry, SpotList
+    from tunneldb.store.spots import Geometry, SpotList
 
 
 @verb(
@@ -70,7 +70,8 @@ def spots(
     changed since tunneldb members. Listed, but not counted, are those that an inspector rejected, or confirmed and the last run
     did not find again.
     """
-    from tunneldb.export.tables.spots import Kind, SpotSelection, as_csv, as_geojson, read_spots, write_gpkg
+    from tunneldb.export.tables.spots import as_csv, as_geojson, write_gpkg
+    from tunneldb.store.spots import Kind, SpotSelection, read_spots
 
     settings: Settings = context.obj
     chosen = cast("Geometry", geometry)

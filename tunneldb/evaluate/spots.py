@@ -19,8 +19,8 @@ from tunneldb.evaluate.report import SPOTS, Report, make_report
 from tunneldb.evaluate.spot_truth import read_spot_truth
 from tunneldb.evaluate.surfaces import FoundFace, Laid, lay_on_face, lay_on_faces, on_one_plane, place_of
 from tunneldb.evaluate.survey import distance_from_scanner
-from tunneldb.export.tables.spots import ListedSpot, read_spots
 from tunneldb.store.poses import load_poses
+from tunneldb.store.spots import ListedSpot, read_spots
 from tunneldb.store.survey import Survey
 
 

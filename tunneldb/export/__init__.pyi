@@ -4,4 +4,3 @@ from .pointcloud.single_file import classify_file as classify_file
 from .pointcloud.survey import export_classified as export_classified
 from .qgis.project import store_project as store_project
 from .qgis.project import write_project as write_project
-from .tables.leaks import read_leaks as read_leaks

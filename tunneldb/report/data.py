@@ -16,9 +16,9 @@ from shapely.geometry import Polygon
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.export.tables.leaks import listed_column
 from tunneldb.stages.registry import STAGE_NAMES
 from tunneldb.stages.run import nothing_yet
+from tunneldb.store.leaks import listed_column
 from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 

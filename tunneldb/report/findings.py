@@ -16,20 +16,12 @@ import psycopg
 import shapely
 
 from tunneldb.arrays import Int64
-from tunneldb.export.tables.dry_regions import DryRegion
-from tunneldb.export.tables.finding_counts import (
-    STATES,
-    UNCOUNTED,
-    KindCount,
-    KindTally,
-    in_order,
-    read_kinds,
-    read_severities,
-    read_wet_kinds,
-)
-from tunneldb.export.tables.findings import Chosen, Finding, stream_findings
+from tunneldb.export.tables.finding_counts import STATES, UNCOUNTED, KindCount, KindTally, in_order
 from tunneldb.report.drawing import line_path, outline_path
 from tunneldb.report.photos import Thumbnail, make_thumbnails, read_photos
+from tunneldb.store.dry_regions import DryRegion
+from tunneldb.store.finding_kinds import read_kinds, read_severities, read_wet_kinds
+from tunneldb.store.findings import Chosen, Finding, stream_findings
 from tunneldb.store.survey import Survey
 
 MOST = 2000

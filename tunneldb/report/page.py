@@ -16,7 +16,6 @@ from markupsafe import Markup
 from tunneldb import __version__
 from tunneldb.database import snapshot
 from tunneldb.errors import NotReadyError
-from tunneldb.export.tables.dry_regions import read_dry_regions
 from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, STATES, UNCOUNTED
 from tunneldb.export.tables.leaks import clock_label
 from tunneldb.raster.gap_fill import TOLD
@@ -36,6 +35,7 @@ from tunneldb.report.structures import StructuresChapter, read_structures
 from tunneldb.report.underwater import read_underwater
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.coverage import Coverage, read_coverage
+from tunneldb.store.dry_regions import read_dry_regions
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey
 

@@ -10,13 +10,13 @@ import numpy as np
 import psycopg
 from markupsafe import Markup
 
-from tunneldb.export.tables.findings import Finding
 from tunneldb.report import text
 from tunneldb.report.data import CoverageBins, Leak, Row, label_chainages, read_statistics
 from tunneldb.report.drawing import Section, Sign, near, outline_path, place_signs, share_path, ticks, without_detection
 from tunneldb.report.findings import Mark, draw_mark
 from tunneldb.report.lining import Form, Lining, Picture, Window
 from tunneldb.report.words import Words
+from tunneldb.store.findings import Finding
 from tunneldb.store.survey import Survey
 
 PICTURE, SHAPE = 256, 4 / 3

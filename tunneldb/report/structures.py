@@ -9,8 +9,8 @@ import psycopg
 import shapely
 from psycopg.rows import dict_row
 
-from tunneldb.export.tables.spots import ListedSpot, SpotList, SpotSelection, read_spots
 from tunneldb.report.drawing import outline_path, step_for
+from tunneldb.store.spots import ListedSpot, SpotList, SpotSelection, read_spots
 from tunneldb.store.survey import Survey
 
 WIDTH = 1000.0

@@ -73,7 +73,6 @@ from tunneldb.export.qgis.sheet import sheet_layout
 from tunneldb.export.qgis.source import RECOMPUTED_FROM, Source, recompute
 from tunneldb.export.qgis.space import docks, filled_layers, has_rows, scene, site_viewpoint, viewpoint
 from tunneldb.export.qgis.styles import require_table, style_elements
-from tunneldb.export.tables.spots import read_spots
 from tunneldb.files import replacing
 from tunneldb.measures.change.rows import older_compared
 from tunneldb.measures.deviation.rows import layers_held
@@ -83,6 +82,7 @@ from tunneldb.raster.geotiff import DEVIATION_KINDS
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.sonar import has_sonar
+from tunneldb.store.spots import read_spots
 from tunneldb.store.survey import Survey
 
 QGIS_VERSION = "3.22.0-Białowieża"

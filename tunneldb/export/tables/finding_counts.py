@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, get_args
+from typing import get_args
 
-import psycopg
-
-from tunneldb.export.tables.findings import COUNTED, Finding, State
+from tunneldb.store.findings import COUNTED, Finding, State
 
 ORIGINS = ("detected", "drawn", "redrawn", "split", "merged")
 STATES: tuple[State, ...] = get_args(State)
@@ -109,18 +107,3 @@ def in_order(kinds: Iterable[str], order: Sequence[str]) -> list[str]:
     """Put codes of kinds in an order; others follow by their code."""
     place = {kind: n for n, kind in enumerate(order)}
     return sorted(kinds, key=lambda kind: (place.get(kind, len(place)), kind))
-
-
-def read_kinds(conn: psycopg.Connection[Any]) -> list[str]:
-    """Read the codes of all kinds, in the order of the catalogue."""
-    return [code for (code,) in conn.execute("SELECT code FROM tunnel_api.finding_kind ORDER BY position, code")]
-
-
-def read_wet_kinds(conn: psycopg.Connection[Any]) -> frozenset[str]:
-    """Read the codes of the kinds that count as wet: the leaks of statistics and classes."""
-    return frozenset(code for (code,) in conn.execute("SELECT code FROM tunnel_api.finding_kind WHERE wet"))
-
-
-def read_severities(conn: psycopg.Connection[Any]) -> dict[int, str]:
-    """Read the owner's words for the degrees of severity."""
-    return dict(conn.execute("SELECT id, label FROM tunnel_api.severity ORDER BY id").fetchall())

@@ -19,8 +19,9 @@ from shapely.geometry import mapping
 from tunneldb.csvfile import write_csv
 from tunneldb.export.tables.cell import DECIMALS, plain
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN, write_gaps, write_remarks
-from tunneldb.export.tables.leaks import COLUMNS, Anomaly, Geometry, Kind, LeakList
 from tunneldb.geometry.crs import LOCAL
+from tunneldb.store.findings import Geometry
+from tunneldb.store.leaks import COLUMNS, Anomaly, Kind, LeakList
 
 
 def as_csv(leaks: LeakList) -> str:

@@ -1,194 +1,22 @@
-"""Spots of structures as a table, CSV, GeoJSON or GeoPackage, with what of the members could be judged."""
+"""Spots of structures written as CSV, GeoJSON or GeoPackage, with what of the members could be judged."""
 
 from __future__ import annotations
 
-import datetime as dt
 import json
 import warnings
-from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-import psycopg
 import pyogrio.raw
 import shapely
-from psycopg import sql
-from shapely.geometry import Polygon, mapping
+from shapely.geometry import mapping
 
 from tunneldb.csvfile import write_csv
 from tunneldb.export.tables.cell import DECIMALS, plain
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
 from tunneldb.geometry.crs import LOCAL
-from tunneldb.store.survey import Survey
-
-Geometry = Literal["face", "map", "3d"]
-"""The face's own plane; the map; in space."""
-
-Kind = Literal["dark", "bright", "all"]
-
-_COLUMN = {"face": "outline", "map": "map", "3d": "surface"}
-
-
-@dataclass(frozen=True)
-class ListedSpot:
-    """A spot as it is listed; see the columns of view ``spot``."""
-
-    id: int
-    number: int
-    member: int | None
-    member_kind: str | None
-    face: int | None
-    kind: str
-    chainage: float | None
-    label: str | None
-    reasons: list[str]
-    confidence: float
-    contrast: float
-    difference: float
-    area: float
-    points: int
-    scans: int
-    review: str
-    reviewed_by: str | None
-    reviewed_at: dt.datetime | None
-    remark: str | None
-    detected: bool
-    counted: bool
-    rgb: list[int] | None
-    geometry: Polygon
-
-
-COLUMNS = tuple(field.name for field in fields(ListedSpot) if field.name != "geometry")
-
-
-@dataclass(frozen=True)
-class SpotSelection:
-    """Which spots to read.
-
-    Attributes
-    ----------
-    kind : {'dark', 'bright', 'all'}
-    min_area, min_confidence : float
-        Of at least so many m², of which detection is at least so sure.
-    stretch : (float, float) or None
-        Those whose middle has a chainage in between, m, and faces and members likewise; None for all, also those without one.
-    """
-
-    kind: Kind = "all"
-    min_area: float = 0.0
-    min_confidence: float = 0.0
-    stretch: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True)
-class SpotList:
-    """Spots of a survey.
-
-    Attributes
-    ----------
-    rows : list of ListedSpot
-        By member and number: those that the last run found, and those that an inspector confirmed although it did not.
-    count : int
-        How many of them sums count: found last, and not rejected.
-    area : float
-        Area of these, m².
-    face_area, seen_area : float
-        Area of all faces, and what of it could be judged, m².
-    statement : str or None
-        For what the list can't be vouched for, if for anything.
-    searched : bool
-        Whether members were found at all, in the files and with the settings that the survey has now.
-    """
-
-    rows: list[ListedSpot]
-    count: int
-    area: float
-    face_area: float
-    seen_area: float
-    statement: str | None
-    searched: bool
-
-    @property
-    def total(self) -> str:
-        """How many there are, how large together, and of how much."""
-        if not self.rows and not self.seen_area:
-            return "spots were not searched for"
-        return (
-            f"{self.count} spots, {self.area:.4f} m², on {self.seen_area:.1f} m² that were judged,"
-            f" of {self.face_area:.1f} m² of faces"
-        )
-
-
-def read_spots(
-    conn: psycopg.Connection[Any], survey: Survey, geometry: Geometry = "face", selection: SpotSelection | None = None
-) -> SpotList:
-    """Read the spots of a survey, and what can be said of the rest."""
-    chosen = SpotSelection() if selection is None else selection
-    query = sql.SQL(
-        "SELECT {}, public.ST_AsBinary({}) FROM tunnel_api.spot WHERE survey_id = %(survey)s"
-        " AND (detected OR review = 'confirmed') AND %(kind)s IN (kind, 'all') AND area >= %(min_area)s"
-        " AND confidence >= %(min_confidence)s"
-        " AND (%(low)s::float8 IS NULL OR chainage BETWEEN %(low)s AND %(high)s) ORDER BY member, number"
-    ).format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)), sql.Identifier(_COLUMN[geometry]))
-    low, high = chosen.stretch or (None, None)
-    asked = {
-        "survey": survey.id,
-        "kind": chosen.kind,
-        "min_area": chosen.min_area,
-        "min_confidence": chosen.min_confidence,
-        "low": low,
-        "high": high,
-    }
-    rows = [
-        ListedSpot(**dict(zip(COLUMNS, row[:-1], strict=True)), geometry=shapely.from_wkb(bytes(row[-1])))
-        for row in conn.execute(query, asked).fetchall()
-    ]
-    counted = [row for row in rows if row.counted]
-    face_area, seen_area, statement, searched = _coverage(conn, survey, low, high)
-    return SpotList(rows, len(counted), sum(row.area for row in counted), face_area, seen_area, statement, searched)
-
-
-def _coverage(
-    conn: psycopg.Connection[Any], survey: Survey, low: float | None, high: float | None
-) -> tuple[float, float, str | None, bool]:
-    """Area of the faces and what of it was judged, m², for what nothing is said, and whether the search is up to date."""
-    row = conn.execute(
-        """
-        SELECT a.area, a.seen, a.unplaced,
-               (SELECT r.parameters @> tunnel_api.members_inputs(s.id) FROM tunnel.run r
-                 WHERE r.survey_id = s.id AND r.stage = 'members' AND r.outcome = 'done' ORDER BY r.id DESC LIMIT 1),
-               (SELECT string_agg(m.number::text, ', ' ORDER BY m.number) FROM tunnel.member m
-                 WHERE m.survey_id = s.id AND m.bimodal
-                   AND (%(low)s::float8 IS NULL OR m.chainage BETWEEN %(low)s AND %(high)s))
-          FROM tunnel.survey s
-         CROSS JOIN LATERAL (
-            SELECT coalesce(sum(f.area) FILTER (WHERE t.inside), 0) AS area,
-                   coalesce(sum(f.area * f.seen_share) FILTER (WHERE t.inside), 0) AS seen,
-                   coalesce(sum(f.area) FILTER (WHERE t.inside IS NULL), 0) AS unplaced
-              FROM tunnel.face f
-             CROSS JOIN LATERAL (SELECT CASE WHEN %(low)s::float8 IS NULL THEN true
-                                             ELSE f.chainage BETWEEN %(low)s AND %(high)s END AS inside) t
-             WHERE f.survey_id = s.id) a
-         WHERE s.id = %(survey)s
-        """,
-        {"survey": survey.id, "low": low, "high": high},
-    ).fetchone()
-    assert row is not None
-    face_area, seen_area, unplaced, current, bimodal = row
-    if current is None:
-        return 0.0, 0.0, f"members were never looked for: tunneldb members {survey.name}", False
-    said = []
-    if not current:
-        said.append(f"files or settings have changed since members were found: tunneldb members {survey.name}")
-    if seen_area < face_area:
-        share = 1.0 - seen_area / face_area
-        said.append(f"{100 * share:.0f} % of the faces ({face_area - seen_area:.1f} m²) could not be judged")
-    if unplaced:
-        said.append(f"{unplaced:.1f} m² of faces have no chainage, and are not in the stretch")
-    if bimodal:
-        said.append(f"more than half differs of member {bimodal}: which half is its own surface is open")
-    return face_area, seen_area, "; ".join(said) or None, current
+from tunneldb.store.spots import COLUMNS, Geometry, SpotList
 
 
 def as_csv(spots: SpotList) -> str:

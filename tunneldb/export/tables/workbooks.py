@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tunneldb.export.tables.dry_regions import DryRegion
 from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, UNCOUNTED, KindCount
-from tunneldb.export.tables.findings import Finding
-from tunneldb.export.tables.leaks import LeakList, clock_label
+from tunneldb.export.tables.leaks import clock_label
 from tunneldb.export.tables.workbook import Column, Sheet, write_workbook
+from tunneldb.store.dry_regions import DryRegion
+from tunneldb.store.findings import Finding
+from tunneldb.store.leaks import LeakList
 
 _METRES, _WHOLE = "0.000", "0"
 
