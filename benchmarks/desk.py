@@ -39,7 +39,7 @@ KINDS = {
 
 STATE = (
     "SELECT id, kind, origin, review, severity, remark, merged_into, parent_id, photos, round(area::numeric, 6),"
-    " ST_AsText(unrolled, 6) FROM tunnel_api.lining_finding WHERE survey = %s AND origin <> 'detected' ORDER BY id"
+    " ST_AsText(unrolled, 6) FROM tunnel_api.finding WHERE survey = %s AND origin <> 'detected' ORDER BY id"
 )
 
 
@@ -125,7 +125,7 @@ def wrong_after_the_rerun(conn: psycopg.Connection, former: list[Any], counted: 
     if len(now) != len(former):
         wrong.append(f"of {len(former)} findings that people drew there are {len(now)}")
     (again,) = conn.execute(  # type: ignore[misc]
-        "SELECT count(*) FROM tunnel_api.lining_finding WHERE survey = %s AND counted AND wet", [SURVEY]
+        "SELECT count(*) FROM tunnel_api.finding WHERE survey = %s AND counted AND wet", [SURVEY]
     ).fetchone()
     if again != counted:
         wrong.append(f"{counted} leaks counted, now {again} do")
@@ -147,7 +147,7 @@ def run(folder: Path, pictures: Path) -> int:
     (folder / "pg_service.conf").write_text("\n".join(["[desk]", *lines, ""]))
     tunneldb("qgis", SURVEY, "-o", folder / "desk.qgz", "--service", "desk")
     with connect(dsn) as conn:
-        conn.execute("DELETE FROM tunnel.anomaly WHERE origin <> 'detected'")  # of a day before
+        conn.execute("DELETE FROM tunnel.finding WHERE origin <> 'detected'")  # of a day before
         conn.commit()
         (before,) = conn.execute("SELECT coalesce(max(id), 0) FROM tunnel_api.audit").fetchone()  # type: ignore[misc]
         conn.rollback()
@@ -158,7 +158,7 @@ def run(folder: Path, pictures: Path) -> int:
         wrong = wrong_after_the_day(conn, before, steps)
         former = conn.execute(STATE, [SURVEY]).fetchall()
         (counted,) = conn.execute(  # type: ignore[misc]
-            "SELECT count(*) FROM tunnel_api.lining_finding WHERE survey = %s AND counted AND wet", [SURVEY]
+            "SELECT count(*) FROM tunnel_api.finding WHERE survey = %s AND counted AND wet", [SURVEY]
         ).fetchone()
         conn.rollback()
         progress("all stages again")

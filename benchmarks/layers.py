@@ -23,7 +23,7 @@ from tunneldb.database import connect, resolve_dsn
 
 SURVEY, REPEATS, SCHEMA = "demo-2024", 9, "tunnel_25830"
 BOX = (
-    "(SELECT ST_Expand(map, 50) FROM tunnel.anomaly WHERE survey_id = 1 AND chainage_from > 12500"
+    "(SELECT ST_Expand(map, 50) FROM tunnel.finding WHERE survey_id = 1 AND chainage_from > 12500"
     " ORDER BY chainage_from LIMIT 1)"
 )
 QUERIES = {

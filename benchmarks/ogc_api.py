@@ -32,7 +32,7 @@ HIDDEN = (
     "tunnel_api.leak_map",
     "tunnel_api.leak_unrolled",
     "tunnel_api.audit",
-    "tunnel.anomaly",
+    "tunnel.finding",
     "tunnel_api.leak_statistics",
     "public.layer_styles",
 )

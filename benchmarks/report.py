@@ -43,7 +43,7 @@ def images(conn: psycopg.Connection[Any], survey_id: int, kilometres: int, pixel
         progress(f"images of kilometre {km}")
         grid = Grid.covering(km, pixel, -REACH, REACH)
         rows = conn.execute(
-            "SELECT ST_AsBinary(unrolled) FROM tunnel.anomaly WHERE survey_id = %s AND km = %s", (survey_id, km)
+            "SELECT ST_AsBinary(unrolled) FROM tunnel.finding WHERE survey_id = %s AND km = %s", (survey_id, km)
         ).fetchall()
         outlines = shapely.from_wkb([bytes(wkb) for (wkb,) in rows])
         tree = shapely.STRtree(outlines)

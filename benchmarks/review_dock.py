@@ -156,7 +156,7 @@ class Review:
         until(
             f"{verdict} of {finding}",
             lambda: (
-                self.conn.execute("SELECT review FROM tunnel.anomaly WHERE id = %s", [finding]).fetchone() == (verdict.review,)
+                self.conn.execute("SELECT review FROM tunnel.finding WHERE id = %s", [finding]).fetchone() == (verdict.review,)
             ),
         )
 
@@ -171,7 +171,7 @@ class Review:
         hands.click(eyes.place("widget", "mAutoPanButton", True))
         following = eyes.place("widget", "mNextFeatureButton", True)
         order = [
-            id for (id,) in self.conn.execute("SELECT id FROM tunnel.anomaly ORDER BY id::text LIMIT %s", [count]).fetchall()
+            id for (id,) in self.conn.execute("SELECT id FROM tunnel.finding ORDER BY id::text LIMIT %s", [count]).fetchall()
         ]
         measured = Measured()
         self.drawn()
@@ -195,7 +195,7 @@ class Review:
         hands.click(eyes.place("widget", "Toggle editing mode"))
         hands.press("alt+F4")
         eyes.until("the table closed", lambda seen: "Findings" not in (seen["window"] or ""))
-        rows = dict(self.conn.execute("SELECT id, review FROM tunnel.anomaly WHERE id = ANY (%s)", [order]).fetchall())
+        rows = dict(self.conn.execute("SELECT id, review FROM tunnel.finding WHERE id = ANY (%s)", [order]).fetchall())
         self.wrong += [f"form: {id} is {rows[id]}" for id in order if rows[id] != meant(id).review]
         return measured
 
@@ -226,7 +226,7 @@ class Review:
         eyes.until("to and fro", lambda seen: seen["current"] == first and seen["settled"])
         self.check(second == eyes.ask("order")[1], f"after {first} came {second}")
         (large,) = self.conn.execute(  # type: ignore[misc]
-            "SELECT count(*) FROM tunnel_api.lining_finding WHERE survey = %s AND area >= 0.5", [SURVEY]
+            "SELECT count(*) FROM tunnel_api.finding WHERE survey = %s AND area >= 0.5", [SURVEY]
         ).fetchone()
         for text, wanted in (("0.5", large), ("0", COUNT)):
             hands.click(eyes.place("widget", "min_area"))
@@ -239,7 +239,7 @@ class Review:
         hands.type("larg")
         hands.press("Return")
         largest = self.conn.execute(
-            "SELECT id FROM tunnel_api.lining_finding WHERE survey = %s ORDER BY area DESC LIMIT 1", [SURVEY]
+            "SELECT id FROM tunnel_api.finding WHERE survey = %s ORDER BY area DESC LIMIT 1", [SURVEY]
         ).fetchone()
         eyes.until("the largest first", lambda seen: (seen["current"],) == largest and seen["settled"])
         eyes.until("keys in the dock again", lambda seen: seen["keys"])
@@ -296,7 +296,7 @@ class Review:
     def check_database(self, left: list[int]) -> None:
         """Compare all verdicts, kinds, remarks and names with what was meant, but those that are left, which must be open."""
         rows = self.conn.execute(
-            "SELECT f.id, f.review, f.kind, f.found, f.remark, f.reviewed_by FROM tunnel_api.lining_finding f"
+            "SELECT f.id, f.review, f.kind, f.kind_detected, f.remark, f.reviewed_by FROM tunnel_api.finding f"
             " WHERE f.survey = %s",
             [SURVEY],
         ).fetchall()

@@ -13,7 +13,8 @@ LINING = 9.0
 """Arc from the crown to either side that is filled, m."""
 
 _COPIED = (
-    "survey_id", "drop_mean", "drop_max", "image_share", "kind", "reasons", "confidence", "contrast", "feature_list_id",
+    "survey_id", "darkening_mean", "darkening_max", "image_share", "kind", "reasons", "confidence", "contrast",
+    "feature_list_id",
     "features", "evidence", "model",
 )  # fmt: skip
 _FIGURES = ("km", "chainage_from", "chainage_to", "arc_from", "arc_to", "clock", "area", "unrolled", "map", "surface")
@@ -21,7 +22,7 @@ _FIGURES = ("km", "chainage_from", "chainage_to", "arc_from", "arc_to", "clock",
 _REPEAT = """
     WITH found AS (
         SELECT a.*, row_number() OVER (ORDER BY a.id) - 1 AS n, count(*) OVER () AS of
-          FROM tunnel.anomaly a JOIN tunnel.survey s ON s.id = a.survey_id WHERE s.name = %(survey)s
+          FROM tunnel.finding a JOIN tunnel.survey s ON s.id = a.survey_id WHERE s.name = %(survey)s
     ), cell AS (
         SELECT row_number() OVER (ORDER BY md5(c.chainage::text || c.arc::text)) - 1 AS n, c.chainage, c.arc
           FROM (SELECT x::float8 AS chainage, y::float8 AS arc
@@ -41,7 +42,7 @@ _REPEAT = """
                       (f.chainage_from + f.chainage_to) / 2 AS x, (f.arc_from + f.arc_to) / 2 AS y) g
          WHERE c.n < %(count)s - f.of
     )
-    INSERT INTO tunnel.anomaly ({copied}, {figures})
+    INSERT INTO tunnel.finding ({copied}, {figures})
     SELECT {copies}, {worked_out}
       FROM fitted f CROSS JOIN LATERAL tunnel_api.drawn_figures(f.survey_id, f.outline, NULL) w
 """
@@ -62,7 +63,7 @@ def repeat(conn: psycopg.Connection) -> int:
          "along": CELL[0] + GAP, "around": CELL[1] + GAP},
     )  # fmt: skip
     (made,) = conn.execute(  # type: ignore[misc]
-        "SELECT count(*) FROM tunnel_api.lining_finding f WHERE f.survey = %s AND f.state = 'open'", [SURVEY]
+        "SELECT count(*) FROM tunnel_api.finding f WHERE f.survey = %s AND f.state = 'open'", [SURVEY]
     ).fetchone()
     conn.commit()
     return int(made)
@@ -75,7 +76,7 @@ def _names(columns: tuple[str, ...], *of: str) -> sql.Composed:
 def reopen(conn: psycopg.Connection) -> None:
     """Take all reviews away, as if nobody had looked; commits."""
     conn.execute(
-        "UPDATE tunnel.anomaly a SET review = 'open', remark = NULL, judged = NULL, reviewed_by = NULL, reviewed_at = NULL"
+        "UPDATE tunnel.finding a SET review = 'open', remark = NULL, judged = NULL, reviewed_by = NULL, reviewed_at = NULL"
         " FROM tunnel.survey s WHERE s.id = a.survey_id AND s.name = %s", [SURVEY],
     )  # fmt: skip
     conn.commit()

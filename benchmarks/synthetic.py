@@ -262,8 +262,9 @@ GROUP BY v.number
 """
 
 ANOMALIES = """
-INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, confidence,
-    contrast, judged, area, drop_mean, drop_max, image_share, unrolled, map, surface, review, reviewed_by, reviewed_at, remark,
+INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, confidence,
+    contrast, judged, area, darkening_mean, darkening_max, image_share, unrolled, map, surface, review, reviewed_by,
+    reviewed_at, remark,
     detected, created_at, detected_at)
 SELECT %(id)s, floor((o.chainage_from + o.chainage_to) / 2000), o.chainage_from, o.chainage_to, o.arc_from, o.arc_to,
     12 - mod((12 - 6 * s.arc / %(radius)s / pi())::numeric, 12)::float8, s.kind,
@@ -282,10 +283,12 @@ ORDER BY o.chainage_from
 
 AUDIT = """
 INSERT INTO tunnel_audit.entry (at, who, survey, view, row_id, action, before, after)
-SELECT a.reviewed_at, a.reviewed_by, %(survey)s, 'anomaly', a.id, 'update',
-    jsonb_build_object('review', 'open') || CASE WHEN a.judged IS NULL THEN '{}' ELSE jsonb_build_object('kind', a.kind) END,
-    jsonb_build_object('review', a.review) || CASE WHEN a.judged IS NULL THEN '{}' ELSE jsonb_build_object('kind', a.judged) END
-FROM tunnel.anomaly a WHERE a.survey_id = %(id)s AND a.reviewed_at IS NOT NULL ORDER BY a.reviewed_at
+SELECT a.reviewed_at, a.reviewed_by, %(survey)s, 'finding', a.id, 'update',
+    jsonb_build_object('review', 'open') || CASE WHEN a.kind_override IS NULL THEN '{}' ELSE jsonb_build_object('kind',
+    a.kind) END,
+    jsonb_build_object('review', a.review) || CASE WHEN a.kind_override IS NULL THEN '{}' ELSE jsonb_build_object('kind',
+    a.kind_override) END
+FROM tunnel.finding a WHERE a.survey_id = %(id)s AND a.reviewed_at IS NOT NULL ORDER BY a.reviewed_at
 """
 
 MOVED = """
@@ -303,10 +306,11 @@ FROM moved m
 # What people drew, eight kinds in turn: lines and points have the outline of a spot about them. A drawn leak stands for the
 # next that was detected; one in fifty waits to be measured.
 DRAWN = """
-INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, area, length, width,
+INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, area, length, width,
     severity,
-    drop_mean, drop_max, image_share, contrast, unrolled, map, surface, shape, shape_map, shape_surface, review, reviewed_by,
-    reviewed_at, origin, by_hand, drawn_by, drawn_at, created_at)
+    darkening_mean, darkening_max, image_share, contrast, unrolled, map, surface, shape, shape_map, shape_surface, review,
+    reviewed_by,
+    reviewed_at, origin, manual, drawn_by, drawn_at, created_at)
 SELECT %(id)s, floor((o.chainage_from + o.chainage_to) / 2000), o.chainage_from, o.chainage_to, o.arc_from, o.arc_to,
     12 - mod((12 - 6 * s.arc / %(radius)s / pi())::numeric, 12)::float8, s.kind,
     CASE WHEN q.line THEN 0.002 * 2 * s.along WHEN q.point THEN 0 ELSE ST_Area(o.unrolled) END,
@@ -329,28 +333,28 @@ WHERE s.number >= %(leaks)s + %(dry)s ORDER BY o.chainage_from
 """
 
 LINKED = """
-UPDATE tunnel.anomaly d SET same_as = q.other
+UPDATE tunnel.finding d SET same_as = q.other
 FROM (SELECT DISTINCT ON (x.id) x.id, h.id AS other
-      FROM tunnel.anomaly h
-      CROSS JOIN LATERAL (SELECT x.id FROM tunnel.anomaly x WHERE x.survey_id = h.survey_id AND x.origin = 'detected'
-                            AND x.kind = 'leak' AND x.judged IS NULL
+      FROM tunnel.finding h
+      CROSS JOIN LATERAL (SELECT x.id FROM tunnel.finding x WHERE x.survey_id = h.survey_id AND x.origin = 'detected'
+                            AND x.kind = 'leak' AND x.kind_override IS NULL
                                 AND x.chainage_from >= h.chainage_from ORDER BY x.chainage_from LIMIT 1) x
-      WHERE h.survey_id = %(id)s AND h.by_hand AND h.kind = 'leak' ORDER BY x.id, h.id) q
+      WHERE h.survey_id = %(id)s AND h.manual AND h.kind = 'leak' ORDER BY x.id, h.id) q
 WHERE d.id = q.id
 """
 
 DRAWN_AUDIT = """
 INSERT INTO tunnel_audit.entry (at, who, survey, view, row_id, action, before, after)
-SELECT a.drawn_at, a.drawn_by, %(survey)s, 'anomaly', a.id, CASE s.n WHEN 0 THEN 'insert' ELSE 'update' END,
+SELECT a.drawn_at, a.drawn_by, %(survey)s, 'finding', a.id, CASE s.n WHEN 0 THEN 'insert' ELSE 'update' END,
     CASE s.n WHEN 1 THEN jsonb_build_object('geom', ST_AsEWKT(a.unrolled)) END, jsonb_build_object('geom',
         ST_AsEWKT(a.unrolled))
-FROM tunnel.anomaly a CROSS JOIN generate_series(0, 1) AS s (n)
-WHERE a.survey_id = %(id)s AND a.by_hand AND (s.n = 0 OR a.id %% 20 = 0) ORDER BY a.drawn_at
+FROM tunnel.finding a CROSS JOIN generate_series(0, 1) AS s (n)
+WHERE a.survey_id = %(id)s AND a.manual AND (s.n = 0 OR a.id %% 20 = 0) ORDER BY a.drawn_at
 """
 
 PHOTOS = """
-INSERT INTO tunnel.photo (anomaly_id, path)
-SELECT a.id, 'photos/' || a.id || '.jpg' FROM tunnel.anomaly a WHERE a.survey_id = %(id)s AND a.by_hand AND a.id %% 4 = 0
+INSERT INTO tunnel.photo (finding_id, path)
+SELECT a.id, 'photos/' || a.id || '.jpg' FROM tunnel.finding a WHERE a.survey_id = %(id)s AND a.manual AND a.id %% 4 = 0
 """
 
 DRY_REGIONS = """
@@ -496,7 +500,7 @@ INSERT INTO tunnel.leak_change (survey_id, old_survey_id, km, state, old_ids, ne
 SELECT n.id, %(id)s, a.km, CASE a.id %% 25 WHEN 0 THEN 'grown' WHEN 1 THEN 'dry' ELSE 'same' END, ARRAY[a.id], ARRAY[a.id],
     '{leak}', '{leak}', a.area, 0.02, a.area * (1 + (a.id %% 25 = 0)::int), 0.02, 1, 1, a.chainage_from, a.chainage_to, a.clock,
     ST_Multi(a.unrolled), ST_Multi(a.map), ST_Multi(a.surface)
-FROM tunnel.survey n, tunnel.anomaly a WHERE n.name = 'demo-2026' AND a.survey_id = %(id)s AND a.wet
+FROM tunnel.survey n, tunnel.finding a WHERE n.name = 'demo-2026' AND a.survey_id = %(id)s AND a.wet
 """
 
 SURFACES = """
@@ -537,7 +541,7 @@ STEPS = {
     "what people drew": (
         "ANALYZE outline",
         DRAWN,
-        "ANALYZE tunnel.anomaly",
+        "ANALYZE tunnel.finding",
         LINKED,
         DRAWN_AUDIT,
         PHOTOS,

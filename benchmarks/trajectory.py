@@ -33,7 +33,7 @@ FROM (SELECT survey_id, min(time) AS begin, max(time) AS until, min(geom) AS geo
 """
 FOUND = (
     "SELECT md5(string_agg(md5(tiff), '' ORDER BY kind, block)) FROM tunnel.image",
-    "SELECT md5(string_agg(public.ST_AsEWKB(unrolled)::text, '' ORDER BY chainage_from, arc_from)) FROM tunnel.anomaly",
+    "SELECT md5(string_agg(public.ST_AsEWKB(unrolled)::text, '' ORDER BY chainage_from, arc_from)) FROM tunnel.finding",
     "SELECT md5(string_agg(p.*::text, '' ORDER BY chainage, gps_time, scan_id)) FROM tunnel.point p",
 )
 

@@ -33,7 +33,7 @@ OWNERS = {"tunnel", "survey"}
 """Views that nearly all others lead to, by tunnel_id and survey_id: boxes of their own."""
 
 LEADS_TO = {
-    "finding_id": "lining_finding",
+    "finding_id": "finding",
     "profile_id": "design_profile",
     "scan_id": "scan_station",
     "sonar_point.scan_id": "sonar_scan",

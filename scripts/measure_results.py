@@ -37,7 +37,7 @@ VOLATILE = TIMES | MACHINES | {"checksum"}  # a LAZ file holds its day
 
 IDENTITIES = {
     "id",
-    "anomaly_id",
+    "finding_id",
     "cluster_id",
     "file_id",
     "fid",

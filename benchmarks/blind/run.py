@@ -131,7 +131,7 @@ def outcome(conn: psycopg.Connection[Any], scene: Scene, folder: Path, seconds: 
     other, marks = layer(conn, survey, folder / "other.geojson")
     rows = conn.execute(
         "SELECT public.ST_AsBinary(unrolled), coalesce(judged, kind), coalesce(confidence, 0.0), reasons"
-        " FROM tunnel.anomaly WHERE survey_id = %s AND detected ORDER BY id",
+        " FROM tunnel.finding WHERE survey_id = %s AND detected ORDER BY id",
         (survey.id,),
     ).fetchall()
     kinds = [str(row[1]) for row in rows]

@@ -104,8 +104,9 @@ def _add_leak(conn: psycopg.Connection[Any], survey: int, shape: BaseGeometry) -
     west, south, east, north = shape.bounds
     outline = shape if isinstance(shape, shapely.Polygon) else shape.convex_hull
     conn.execute(
-        "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean,"
-        " drop_max, image_share, unrolled, map, surface) VALUES (%(survey)s, %(km)s, %(west)s, %(east)s, %(south)s, %(north)s,"
+        "INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, darkening_mean,"
+        " darkening_max, image_share, unrolled, map, surface) VALUES (%(survey)s, %(km)s, %(west)s, %(east)s,"
+        " %(south)s, %(north)s,"
         " 12, %(area)s, 0, 0, 1, %(flat)s, %(flat)s, public.ST_Force3D(%(flat)s::public.geometry))",
         {
             "survey": survey, "km": int((west + east) / 2 // KILOMETRE), "west": west, "east": east, "south": south,

@@ -19,14 +19,14 @@ Connection = psycopg.Connection[Any]
 AT_ONCE = 10
 """Surveys that are made in one transaction: their partitions take some four locks each."""
 
-ROWS = {"anomaly": 200, "run": 300, "segment": 250, "axis_vertex": 250, "coverage": 1}
+ROWS = {"finding": 200, "run": 300, "segment": 250, "axis_vertex": 250, "coverage": 1}
 OTHERS = 50
 """Rows of a table that each other survey has, at most: of those named, and of all others."""
 
 RERUNS = 4
 """How often each stage of each kilometre of the other surveys ran."""
 
-LEFT_OUT = ("survey", "point", "image", "anomaly_part")
+LEFT_OUT = ("survey", "point", "image", "boundary_region")
 CLEARED = ("same_as", "parent_id", "merged_into", "dry_region_id", "cluster_id", "feature_list_id")
 """Columns that name a row of the sample survey."""
 
@@ -78,8 +78,8 @@ HANGING = (
     SELECT id, 270, 90, 8, 0.0005 FROM tunnel.ring WHERE survey_id = ANY (%(surveys)s)
     """,
     """
-    INSERT INTO tunnel.photo (anomaly_id, path) SELECT a.id, 'photos/' || a.id || '.jpg'
-    FROM tunnel.anomaly a WHERE a.survey_id = ANY (%(surveys)s) AND a.by_hand AND a.id %% 4 = 0
+    INSERT INTO tunnel.photo (finding_id, path) SELECT a.id, 'photos/' || a.id || '.jpg'
+    FROM tunnel.finding a WHERE a.survey_id = ANY (%(surveys)s) AND a.manual AND a.id %% 4 = 0
     """,
     """
     INSERT INTO tunnel.file_km (file_id, km, rows, points, loaded_at)
@@ -88,9 +88,9 @@ HANGING = (
     """,
     """
     INSERT INTO tunnel_audit.entry (at, who, survey, view, row_id, action, before, after)
-    SELECT a.reviewed_at, a.reviewed_by, s.name, 'anomaly', a.id, 'update', '{"review": "open"}',
+    SELECT a.reviewed_at, a.reviewed_by, s.name, 'finding', a.id, 'update', '{"review": "open"}',
         jsonb_build_object('review', a.review)
-    FROM tunnel.anomaly a JOIN tunnel.survey s ON s.id = a.survey_id
+    FROM tunnel.finding a JOIN tunnel.survey s ON s.id = a.survey_id
     WHERE a.survey_id = ANY (%(surveys)s) AND a.reviewed_at IS NOT NULL ORDER BY a.reviewed_at LIMIT 1000
     """,
     """

@@ -1154,7 +1154,7 @@ CREATE TABLE tunnel.region (
     drawn_by TEXT DEFAULT CURRENT_USER NOT NULL,
     drawn_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
     reason TEXT,
-    waits BOOLEAN DEFAULT false NOT NULL,
+    pending_approval BOOLEAN DEFAULT false NOT NULL,
     approved_by TEXT,
     approved_at TIMESTAMP WITH TIME ZONE,
     CONSTRAINT region_pkey PRIMARY KEY (id),
@@ -1169,7 +1169,7 @@ COMMENT ON COLUMN tunnel.region.geom IS 'Region in the unrolled plane (chainage,
 COMMENT ON COLUMN tunnel.region.drawn_by IS 'Who drew it';
 COMMENT ON COLUMN tunnel.region.drawn_at IS 'When it was drawn';
 COMMENT ON COLUMN tunnel.region.reason IS 'Why; a dry region larger than the tunnel''s limit needs one';
-COMMENT ON COLUMN tunnel.region.waits IS 'Whether it waits for an operator, being larger than the tunnel''s limit: until then it marks nothing';
+COMMENT ON COLUMN tunnel.region.pending_approval IS 'Whether it waits for an operator, being larger than the tunnel''s limit: until then it marks nothing';
 COMMENT ON COLUMN tunnel.region.approved_by IS 'Operator who put it in force, where it had to wait';
 COMMENT ON COLUMN tunnel.region.approved_at IS 'When';
 CREATE INDEX region_geom_idx ON tunnel.region USING gist (geom);
@@ -1648,138 +1648,6 @@ COMMENT ON COLUMN tunnel.waterproof.window_wet_area IS 'Greatest wet area in any
 COMMENT ON COLUMN tunnel.waterproof.class IS 'Best class of waterproofing that the lining seen keeps';
 CREATE INDEX waterproof_survey_id_km_idx ON tunnel.waterproof (survey_id, km);
 
-CREATE TABLE tunnel.anomaly (
-    id BIGINT GENERATED ALWAYS AS IDENTITY,
-    survey_id INTEGER NOT NULL,
-    km INTEGER NOT NULL,
-    chainage_from DOUBLE PRECISION NOT NULL,
-    chainage_to DOUBLE PRECISION NOT NULL,
-    arc_from DOUBLE PRECISION NOT NULL,
-    arc_to DOUBLE PRECISION NOT NULL,
-    clock DOUBLE PRECISION NOT NULL,
-    kind TEXT DEFAULT 'leak' NOT NULL,
-    reasons TEXT[] DEFAULT '{}' NOT NULL,
-    confidence DOUBLE PRECISION,
-    contrast DOUBLE PRECISION,
-    judged TEXT,
-    area DOUBLE PRECISION NOT NULL,
-    drop_mean DOUBLE PRECISION,
-    drop_max DOUBLE PRECISION,
-    image_share DOUBLE PRECISION,
-    unrolled geometry(POLYGON,-1) NOT NULL,
-    map geometry(POLYGON,-1) NOT NULL,
-    surface geometry(POLYGONZ,-1) NOT NULL,
-    feature_list_id INTEGER,
-    features DOUBLE PRECISION[],
-    evidence JSONB,
-    model TEXT,
-    origin TEXT DEFAULT 'detected' NOT NULL,
-    by_hand BOOLEAN DEFAULT false NOT NULL,
-    severity SMALLINT,
-    width DOUBLE PRECISION,
-    length DOUBLE PRECISION,
-    shape geometry(GEOMETRY,-1),
-    shape_map geometry(GEOMETRY,-1),
-    shape_surface geometry(GEOMETRYZ,-1),
-    drawn_by TEXT,
-    drawn_at TIMESTAMP WITH TIME ZONE,
-    parent_id BIGINT,
-    merged_into BIGINT,
-    same_as BIGINT,
-    dry_region_id INTEGER,
-    wet BOOLEAN DEFAULT true NOT NULL,
-    aside BOOLEAN GENERATED ALWAYS AS (merged_into IS NOT NULL OR same_as IS NOT NULL OR (dry_region_id IS NOT NULL AND review = 'open')) STORED NOT NULL,
-    review TEXT DEFAULT 'open' NOT NULL,
-    reviewed_by TEXT,
-    reviewed_at TIMESTAMP WITH TIME ZONE,
-    remark TEXT,
-    detected BOOLEAN DEFAULT true NOT NULL,
-    created_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
-    detected_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
-    CONSTRAINT anomaly_pkey PRIMARY KEY (id),
-    CONSTRAINT anomaly_review_check CHECK (review IN ('open', 'confirmed', 'rejected')),
-    CONSTRAINT anomaly_origin_check CHECK (origin IN ('detected', 'drawn', 'redrawn', 'split', 'merged')),
-    CONSTRAINT anomaly_width_check CHECK (width > 0),
-    CONSTRAINT anomaly_other_check CHECK (merged_into <> id AND same_as <> id),
-    CONSTRAINT anomaly_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE,
-    CONSTRAINT anomaly_kind_fkey FOREIGN KEY(kind) REFERENCES tunnel.finding_kind (code),
-    CONSTRAINT anomaly_judged_fkey FOREIGN KEY(judged) REFERENCES tunnel.finding_kind (code),
-    CONSTRAINT anomaly_feature_list_id_fkey FOREIGN KEY(feature_list_id) REFERENCES tunnel.feature_list (id),
-    CONSTRAINT anomaly_severity_fkey FOREIGN KEY(severity) REFERENCES tunnel.severity (id),
-    CONSTRAINT anomaly_parent_id_fkey FOREIGN KEY(parent_id) REFERENCES tunnel.anomaly (id) ON DELETE SET NULL,
-    CONSTRAINT anomaly_merged_into_fkey FOREIGN KEY(merged_into) REFERENCES tunnel.anomaly (id) ON DELETE SET NULL,
-    CONSTRAINT anomaly_same_as_fkey FOREIGN KEY(same_as) REFERENCES tunnel.anomaly (id) ON DELETE SET NULL,
-    CONSTRAINT anomaly_dry_region_id_fkey FOREIGN KEY(dry_region_id) REFERENCES tunnel.region (id) ON DELETE SET NULL
-);
-COMMENT ON TABLE tunnel.anomaly IS 'Findings: leaks, joints and dark spots that were detected, and what people drew, in three geometries';
-COMMENT ON COLUMN tunnel.anomaly.id IS 'Key';
-COMMENT ON COLUMN tunnel.anomaly.survey_id IS 'Survey that the row belongs to';
-COMMENT ON COLUMN tunnel.anomaly.km IS 'Kilometre: floor(chainage / 1000) of its middle';
-COMMENT ON COLUMN tunnel.anomaly.chainage_from IS 'Least chainage, m';
-COMMENT ON COLUMN tunnel.anomaly.chainage_to IS 'Greatest chainage, m';
-COMMENT ON COLUMN tunnel.anomaly.arc_from IS 'Least arc, m, positive right looking up-chainage';
-COMMENT ON COLUMN tunnel.anomaly.arc_to IS 'Greatest arc, m, positive right looking up-chainage';
-COMMENT ON COLUMN tunnel.anomaly.clock IS 'Clock position of its middle, hours: 12 is the crown, 3 is right looking up-chainage';
-COMMENT ON COLUMN tunnel.anomaly.kind IS 'What detection takes it for: leak, joint or dark (dark but dry); of what was drawn, what it was drawn as';
-COMMENT ON COLUMN tunnel.anomaly.reasons IS 'Why, such as thin, straight, gradual, rectangular, recess';
-COMMENT ON COLUMN tunnel.anomaly.confidence IS 'Confidence that it is of its kind, 0 to 1; none from before';
-COMMENT ON COLUMN tunnel.anomaly.contrast IS 'Mean drop in standard deviations of the dry lining about it; none from before';
-COMMENT ON COLUMN tunnel.anomaly.judged IS 'What an inspector takes it for, where he says so';
-COMMENT ON COLUMN tunnel.anomaly.area IS 'Area on the surface, m²; of a line length times width, of a point 0';
-COMMENT ON COLUMN tunnel.anomaly.drop_mean IS 'Mean drop below dry lining, dB; none until measured';
-COMMENT ON COLUMN tunnel.anomaly.drop_max IS 'Greatest drop below dry lining, dB; none until measured';
-COMMENT ON COLUMN tunnel.anomaly.image_share IS 'Share of its pixels that hold measured data, 0 to 1; none until measured';
-COMMENT ON COLUMN tunnel.anomaly.unrolled IS 'In the unrolled plane (chainage, arc), m';
-COMMENT ON COLUMN tunnel.anomaly.map IS 'On the map strip beside the axis, tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel.anomaly.surface IS 'On the lining in space, tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel.anomaly.feature_list_id IS 'Order of its features; none from before they were stored';
-COMMENT ON COLUMN tunnel.anomaly.features IS 'What was measured of it; NaN what could not be';
-COMMENT ON COLUMN tunnel.anomaly.evidence IS 'What each reason adds to the logarithm of the odds that it is a leak';
-COMMENT ON COLUMN tunnel.anomaly.model IS 'Version of the model of evidence that judged it';
-COMMENT ON COLUMN tunnel.anomaly.origin IS 'How its outline came about: detected, drawn, redrawn, split or merged; detection changes the first alone';
-COMMENT ON COLUMN tunnel.anomaly.by_hand IS 'Whether it was drawn, or split off what was: never detected';
-COMMENT ON COLUMN tunnel.anomaly.severity IS 'Severity, 1 to 4';
-COMMENT ON COLUMN tunnel.anomaly.width IS 'Width of a line, such as a crack, m';
-COMMENT ON COLUMN tunnel.anomaly.length IS 'Length of a line on the surface, m';
-COMMENT ON COLUMN tunnel.anomaly.shape IS 'The line or point that it is, if it is no polygon, in the unrolled plane, m';
-COMMENT ON COLUMN tunnel.anomaly.shape_map IS 'The same on the map strip, tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel.anomaly.shape_surface IS 'The same in space, tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel.anomaly.drawn_by IS 'Who drew its outline last; none of what was detected';
-COMMENT ON COLUMN tunnel.anomaly.drawn_at IS 'When its outline was drawn last';
-COMMENT ON COLUMN tunnel.anomaly.parent_id IS 'Finding that it was split off';
-COMMENT ON COLUMN tunnel.anomaly.merged_into IS 'Finding that it is merged into: that one counts';
-COMMENT ON COLUMN tunnel.anomaly.same_as IS 'Finding that is the same: that one counts';
-COMMENT ON COLUMN tunnel.anomaly.dry_region_id IS 'Dry region that it lies in: it does not count while it is open';
-COMMENT ON COLUMN tunnel.anomaly.wet IS 'Whether its kind counts as wet: kept by the database, from finding_kind';
-COMMENT ON COLUMN tunnel.anomaly.aside IS 'Whether another stands for it, or a dry region takes it away';
-COMMENT ON COLUMN tunnel.anomaly.review IS 'open, confirmed or rejected, by an inspector';
-COMMENT ON COLUMN tunnel.anomaly.reviewed_by IS 'Who reviewed it';
-COMMENT ON COLUMN tunnel.anomaly.reviewed_at IS 'When it was reviewed';
-COMMENT ON COLUMN tunnel.anomaly.remark IS 'Inspector''s remark';
-COMMENT ON COLUMN tunnel.anomaly.detected IS 'Whether the last detection found it again';
-COMMENT ON COLUMN tunnel.anomaly.created_at IS 'When it was first found';
-COMMENT ON COLUMN tunnel.anomaly.detected_at IS 'When it was last found';
-CREATE INDEX anomaly_by_hand_idx ON tunnel.anomaly (survey_id, chainage_from) WHERE origin <> 'detected';
-CREATE INDEX anomaly_dry_region_id_idx ON tunnel.anomaly (dry_region_id);
-CREATE INDEX anomaly_feature_list_id_idx ON tunnel.anomaly (feature_list_id);
-CREATE INDEX anomaly_gone_idx ON tunnel.anomaly (survey_id) WHERE NOT detected;
-CREATE INDEX anomaly_judged_idx ON tunnel.anomaly (judged);
-CREATE INDEX anomaly_kind_idx ON tunnel.anomaly (survey_id, COALESCE(judged, kind));
-CREATE INDEX anomaly_kind_key_idx ON tunnel.anomaly (kind);
-CREATE INDEX anomaly_length_idx ON tunnel.anomaly (survey_id, (chainage_to - chainage_from));
-CREATE INDEX anomaly_map_idx ON tunnel.anomaly USING gist (map);
-CREATE INDEX anomaly_merged_into_idx ON tunnel.anomaly (merged_into);
-CREATE INDEX anomaly_parent_id_idx ON tunnel.anomaly (parent_id);
-CREATE INDEX anomaly_same_as_idx ON tunnel.anomaly (same_as) WHERE same_as IS NOT NULL;
-CREATE INDEX anomaly_severity_idx ON tunnel.anomaly (severity);
-CREATE INDEX anomaly_survey_id_area_idx ON tunnel.anomaly (survey_id, area);
-CREATE INDEX anomaly_survey_id_chainage_from_chainage_to_idx ON tunnel.anomaly (survey_id, chainage_from, chainage_to) INCLUDE (id, kind, judged, review, detected, area, wet, aside);
-CREATE INDEX anomaly_survey_id_created_at_idx ON tunnel.anomaly (survey_id, created_at);
-CREATE INDEX anomaly_survey_id_km_idx ON tunnel.anomaly (survey_id, km) INCLUDE (kind, judged, review, detected, area, wet, aside, drop_max);
-CREATE INDEX anomaly_survey_id_severity_idx ON tunnel.anomaly (survey_id, severity) WHERE severity IS NOT NULL;
-CREATE INDEX anomaly_uncounted_idx ON tunnel.anomaly (survey_id) INCLUDE (id, kind, judged, severity, review, detected, aside, merged_into, same_as, dry_region_id) WHERE NOT (detected AND review <> 'rejected' AND NOT aside);
-CREATE INDEX anomaly_unrolled_idx ON tunnel.anomaly USING gist (unrolled);
-
 CREATE TABLE tunnel.face (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
     survey_id INTEGER NOT NULL,
@@ -1856,6 +1724,138 @@ COMMENT ON COLUMN tunnel.file_km.points IS 'Where in the file the points of the 
 COMMENT ON COLUMN tunnel.file_km.seconds IS 'When these were measured: whole seconds between which their gps_time lies; NULL where not known';
 COMMENT ON COLUMN tunnel.file_km.read_at IS 'When the file was read';
 COMMENT ON COLUMN tunnel.file_km.loaded_at IS 'When they were loaded into the kilometre; none while they wait';
+
+CREATE TABLE tunnel.finding (
+    id BIGINT GENERATED ALWAYS AS IDENTITY,
+    survey_id INTEGER NOT NULL,
+    km INTEGER NOT NULL,
+    chainage_from DOUBLE PRECISION NOT NULL,
+    chainage_to DOUBLE PRECISION NOT NULL,
+    arc_from DOUBLE PRECISION NOT NULL,
+    arc_to DOUBLE PRECISION NOT NULL,
+    clock DOUBLE PRECISION NOT NULL,
+    kind TEXT DEFAULT 'leak' NOT NULL,
+    reasons TEXT[] DEFAULT '{}' NOT NULL,
+    confidence DOUBLE PRECISION,
+    contrast DOUBLE PRECISION,
+    kind_override TEXT,
+    area DOUBLE PRECISION NOT NULL,
+    darkening_mean DOUBLE PRECISION,
+    darkening_max DOUBLE PRECISION,
+    image_share DOUBLE PRECISION,
+    unrolled geometry(POLYGON,-1) NOT NULL,
+    map geometry(POLYGON,-1) NOT NULL,
+    surface geometry(POLYGONZ,-1) NOT NULL,
+    feature_list_id INTEGER,
+    features DOUBLE PRECISION[],
+    evidence JSONB,
+    model TEXT,
+    origin TEXT DEFAULT 'detected' NOT NULL,
+    manual BOOLEAN DEFAULT false NOT NULL,
+    severity SMALLINT,
+    width DOUBLE PRECISION,
+    length DOUBLE PRECISION,
+    shape geometry(GEOMETRY,-1),
+    shape_map geometry(GEOMETRY,-1),
+    shape_surface geometry(GEOMETRYZ,-1),
+    drawn_by TEXT,
+    drawn_at TIMESTAMP WITH TIME ZONE,
+    parent_id BIGINT,
+    merged_into BIGINT,
+    same_as BIGINT,
+    dry_region_id INTEGER,
+    wet BOOLEAN DEFAULT true NOT NULL,
+    superseded BOOLEAN GENERATED ALWAYS AS (merged_into IS NOT NULL OR same_as IS NOT NULL OR (dry_region_id IS NOT NULL AND review = 'open')) STORED NOT NULL,
+    review TEXT DEFAULT 'open' NOT NULL,
+    reviewed_by TEXT,
+    reviewed_at TIMESTAMP WITH TIME ZONE,
+    remark TEXT,
+    detected BOOLEAN DEFAULT true NOT NULL,
+    created_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
+    detected_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
+    CONSTRAINT finding_pkey PRIMARY KEY (id),
+    CONSTRAINT finding_review_check CHECK (review IN ('open', 'confirmed', 'rejected')),
+    CONSTRAINT finding_origin_check CHECK (origin IN ('detected', 'drawn', 'redrawn', 'split', 'merged')),
+    CONSTRAINT finding_width_check CHECK (width > 0),
+    CONSTRAINT finding_other_check CHECK (merged_into <> id AND same_as <> id),
+    CONSTRAINT finding_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE,
+    CONSTRAINT finding_kind_fkey FOREIGN KEY(kind) REFERENCES tunnel.finding_kind (code),
+    CONSTRAINT finding_kind_override_fkey FOREIGN KEY(kind_override) REFERENCES tunnel.finding_kind (code),
+    CONSTRAINT finding_feature_list_id_fkey FOREIGN KEY(feature_list_id) REFERENCES tunnel.feature_list (id),
+    CONSTRAINT finding_severity_fkey FOREIGN KEY(severity) REFERENCES tunnel.severity (id),
+    CONSTRAINT finding_parent_id_fkey FOREIGN KEY(parent_id) REFERENCES tunnel.finding (id) ON DELETE SET NULL,
+    CONSTRAINT finding_merged_into_fkey FOREIGN KEY(merged_into) REFERENCES tunnel.finding (id) ON DELETE SET NULL,
+    CONSTRAINT finding_same_as_fkey FOREIGN KEY(same_as) REFERENCES tunnel.finding (id) ON DELETE SET NULL,
+    CONSTRAINT finding_dry_region_id_fkey FOREIGN KEY(dry_region_id) REFERENCES tunnel.region (id) ON DELETE SET NULL
+);
+COMMENT ON TABLE tunnel.finding IS 'Findings: leaks, joints and dark spots that were detected, and what people drew, in three geometries';
+COMMENT ON COLUMN tunnel.finding.id IS 'Key';
+COMMENT ON COLUMN tunnel.finding.survey_id IS 'Survey that the row belongs to';
+COMMENT ON COLUMN tunnel.finding.km IS 'Kilometre: floor(chainage / 1000) of its middle';
+COMMENT ON COLUMN tunnel.finding.chainage_from IS 'Least chainage, m';
+COMMENT ON COLUMN tunnel.finding.chainage_to IS 'Greatest chainage, m';
+COMMENT ON COLUMN tunnel.finding.arc_from IS 'Least arc, m, positive right looking up-chainage';
+COMMENT ON COLUMN tunnel.finding.arc_to IS 'Greatest arc, m, positive right looking up-chainage';
+COMMENT ON COLUMN tunnel.finding.clock IS 'Clock position of its middle, hours: 12 is the crown, 3 is right looking up-chainage';
+COMMENT ON COLUMN tunnel.finding.kind IS 'What detection takes it for: leak, joint or dark (dark but dry); of what was drawn, what it was drawn as';
+COMMENT ON COLUMN tunnel.finding.reasons IS 'Why, such as thin, straight, gradual, rectangular, recess';
+COMMENT ON COLUMN tunnel.finding.confidence IS 'Confidence that it is of its kind, 0 to 1; none from before';
+COMMENT ON COLUMN tunnel.finding.contrast IS 'Mean drop in standard deviations of the dry lining about it; none from before';
+COMMENT ON COLUMN tunnel.finding.kind_override IS 'What an inspector takes it for, where he says so';
+COMMENT ON COLUMN tunnel.finding.area IS 'Area on the surface, m²; of a line length times width, of a point 0';
+COMMENT ON COLUMN tunnel.finding.darkening_mean IS 'Mean drop below dry lining, dB; none until measured';
+COMMENT ON COLUMN tunnel.finding.darkening_max IS 'Greatest drop below dry lining, dB; none until measured';
+COMMENT ON COLUMN tunnel.finding.image_share IS 'Share of its pixels that hold measured data, 0 to 1; none until measured';
+COMMENT ON COLUMN tunnel.finding.unrolled IS 'In the unrolled plane (chainage, arc), m';
+COMMENT ON COLUMN tunnel.finding.map IS 'On the map strip beside the axis, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel.finding.surface IS 'On the lining in space, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel.finding.feature_list_id IS 'Order of its features; none from before they were stored';
+COMMENT ON COLUMN tunnel.finding.features IS 'What was measured of it; NaN what could not be';
+COMMENT ON COLUMN tunnel.finding.evidence IS 'What each reason adds to the logarithm of the odds that it is a leak';
+COMMENT ON COLUMN tunnel.finding.model IS 'Version of the model of evidence that judged it';
+COMMENT ON COLUMN tunnel.finding.origin IS 'How its outline came about: detected, drawn, redrawn, split or merged; detection changes the first alone';
+COMMENT ON COLUMN tunnel.finding.manual IS 'Whether it was drawn, or split off what was: never detected';
+COMMENT ON COLUMN tunnel.finding.severity IS 'Severity, 1 to 4';
+COMMENT ON COLUMN tunnel.finding.width IS 'Width of a line, such as a crack, m';
+COMMENT ON COLUMN tunnel.finding.length IS 'Length of a line on the surface, m';
+COMMENT ON COLUMN tunnel.finding.shape IS 'The line or point that it is, if it is no polygon, in the unrolled plane, m';
+COMMENT ON COLUMN tunnel.finding.shape_map IS 'The same on the map strip, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel.finding.shape_surface IS 'The same in space, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel.finding.drawn_by IS 'Who drew its outline last; none of what was detected';
+COMMENT ON COLUMN tunnel.finding.drawn_at IS 'When its outline was drawn last';
+COMMENT ON COLUMN tunnel.finding.parent_id IS 'Finding that it was split off';
+COMMENT ON COLUMN tunnel.finding.merged_into IS 'Finding that it is merged into: that one counts';
+COMMENT ON COLUMN tunnel.finding.same_as IS 'Finding that is the same: that one counts';
+COMMENT ON COLUMN tunnel.finding.dry_region_id IS 'Dry region that it lies in: it does not count while it is open';
+COMMENT ON COLUMN tunnel.finding.wet IS 'Whether its kind counts as wet: kept by the database, from finding_kind';
+COMMENT ON COLUMN tunnel.finding.superseded IS 'Whether another stands for it, or a dry region takes it away';
+COMMENT ON COLUMN tunnel.finding.review IS 'open, confirmed or rejected, by an inspector';
+COMMENT ON COLUMN tunnel.finding.reviewed_by IS 'Who reviewed it';
+COMMENT ON COLUMN tunnel.finding.reviewed_at IS 'When it was reviewed';
+COMMENT ON COLUMN tunnel.finding.remark IS 'Inspector''s remark';
+COMMENT ON COLUMN tunnel.finding.detected IS 'Whether the last detection found it again';
+COMMENT ON COLUMN tunnel.finding.created_at IS 'When it was first found';
+COMMENT ON COLUMN tunnel.finding.detected_at IS 'When it was last found';
+CREATE INDEX finding_dry_region_id_idx ON tunnel.finding (dry_region_id);
+CREATE INDEX finding_feature_list_id_idx ON tunnel.finding (feature_list_id);
+CREATE INDEX finding_gone_idx ON tunnel.finding (survey_id) WHERE NOT detected;
+CREATE INDEX finding_kind_idx ON tunnel.finding (survey_id, COALESCE(kind_override, kind));
+CREATE INDEX finding_kind_key_idx ON tunnel.finding (kind);
+CREATE INDEX finding_kind_override_idx ON tunnel.finding (kind_override);
+CREATE INDEX finding_length_idx ON tunnel.finding (survey_id, (chainage_to - chainage_from));
+CREATE INDEX finding_manual_idx ON tunnel.finding (survey_id, chainage_from) WHERE origin <> 'detected';
+CREATE INDEX finding_map_idx ON tunnel.finding USING gist (map);
+CREATE INDEX finding_merged_into_idx ON tunnel.finding (merged_into);
+CREATE INDEX finding_parent_id_idx ON tunnel.finding (parent_id);
+CREATE INDEX finding_same_as_idx ON tunnel.finding (same_as) WHERE same_as IS NOT NULL;
+CREATE INDEX finding_severity_idx ON tunnel.finding (severity);
+CREATE INDEX finding_survey_id_area_idx ON tunnel.finding (survey_id, area);
+CREATE INDEX finding_survey_id_chainage_from_chainage_to_idx ON tunnel.finding (survey_id, chainage_from, chainage_to) INCLUDE (id, kind, kind_override, review, detected, area, wet, superseded);
+CREATE INDEX finding_survey_id_created_at_idx ON tunnel.finding (survey_id, created_at);
+CREATE INDEX finding_survey_id_km_idx ON tunnel.finding (survey_id, km) INCLUDE (kind, kind_override, review, detected, area, wet, superseded, darkening_max);
+CREATE INDEX finding_survey_id_severity_idx ON tunnel.finding (survey_id, severity) WHERE severity IS NOT NULL;
+CREATE INDEX finding_uncounted_idx ON tunnel.finding (survey_id) INCLUDE (id, kind, kind_override, severity, review, detected, superseded, merged_into, same_as, dry_region_id) WHERE NOT (detected AND review <> 'rejected' AND NOT superseded);
+CREATE INDEX finding_unrolled_idx ON tunnel.finding USING gist (unrolled);
 
 CREATE TABLE tunnel.registration_residual (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
@@ -1947,7 +1947,7 @@ CREATE INDEX sonar_point_scan_id_idx ON tunnel.sonar_point (scan_id);
 CREATE INDEX sonar_point_survey_id_chainage_idx ON tunnel.sonar_point (survey_id, chainage);
 CREATE INDEX sonar_point_survey_id_km_idx ON tunnel.sonar_point (survey_id, km);
 
-CREATE TABLE tunnel.anomaly_part (
+CREATE TABLE tunnel.boundary_region (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
     survey_id INTEGER NOT NULL,
     km INTEGER NOT NULL,
@@ -1955,48 +1955,48 @@ CREATE TABLE tunnel.anomaly_part (
     box INTEGER[] NOT NULL,
     mask BYTEA NOT NULL,
     filled BIGINT NOT NULL,
-    drop_sum DOUBLE PRECISION NOT NULL,
-    drop_max DOUBLE PRECISION NOT NULL,
-    traits DOUBLE PRECISION[] DEFAULT '{}' NOT NULL,
-    anomaly_id BIGINT,
-    CONSTRAINT anomaly_part_pkey PRIMARY KEY (id),
-    CONSTRAINT anomaly_part_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE,
-    CONSTRAINT anomaly_part_anomaly_id_fkey FOREIGN KEY(anomaly_id) REFERENCES tunnel.anomaly (id) ON DELETE SET NULL
+    darkening_sum DOUBLE PRECISION NOT NULL,
+    darkening_max DOUBLE PRECISION NOT NULL,
+    properties DOUBLE PRECISION[] DEFAULT '{}' NOT NULL,
+    finding_id BIGINT,
+    CONSTRAINT boundary_region_pkey PRIMARY KEY (id),
+    CONSTRAINT boundary_region_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE,
+    CONSTRAINT boundary_region_finding_id_fkey FOREIGN KEY(finding_id) REFERENCES tunnel.finding (id) ON DELETE SET NULL
 );
-COMMENT ON TABLE tunnel.anomaly_part IS 'Dark regions cut by an end of their kilometre, from which anomalies over several are put together';
-COMMENT ON COLUMN tunnel.anomaly_part.id IS 'Key';
-COMMENT ON COLUMN tunnel.anomaly_part.survey_id IS 'Survey that the row belongs to';
-COMMENT ON COLUMN tunnel.anomaly_part.km IS 'Kilometre: floor(chainage / 1000)';
-COMMENT ON COLUMN tunnel.anomaly_part.pixel IS 'Edge of a pixel, m';
-COMMENT ON COLUMN tunnel.anomaly_part.box IS 'First column (chainage / pixel), first row (arc / pixel), columns and rows of the mask';
-COMMENT ON COLUMN tunnel.anomaly_part.mask IS 'Its dark pixels, a bit each, row by row from the lowest arc';
-COMMENT ON COLUMN tunnel.anomaly_part.filled IS 'Its pixels that hold measured data';
-COMMENT ON COLUMN tunnel.anomaly_part.drop_sum IS 'Sum over them of the drop below dry lining, dB';
-COMMENT ON COLUMN tunnel.anomaly_part.drop_max IS 'Greatest drop below dry lining, dB';
-COMMENT ON COLUMN tunnel.anomaly_part.traits IS 'Sums over its pixels by which it is told what it is, see Region in leak/region.py';
-COMMENT ON COLUMN tunnel.anomaly_part.anomaly_id IS 'Anomaly that it is a part of, if it is large enough';
-CREATE INDEX anomaly_part_anomaly_id_idx ON tunnel.anomaly_part (anomaly_id);
-CREATE INDEX anomaly_part_survey_id_km_idx ON tunnel.anomaly_part (survey_id, km);
+COMMENT ON TABLE tunnel.boundary_region IS 'Dark regions cut by an end of their kilometre, from which anomalies over several are put together';
+COMMENT ON COLUMN tunnel.boundary_region.id IS 'Key';
+COMMENT ON COLUMN tunnel.boundary_region.survey_id IS 'Survey that the row belongs to';
+COMMENT ON COLUMN tunnel.boundary_region.km IS 'Kilometre: floor(chainage / 1000)';
+COMMENT ON COLUMN tunnel.boundary_region.pixel IS 'Edge of a pixel, m';
+COMMENT ON COLUMN tunnel.boundary_region.box IS 'First column (chainage / pixel), first row (arc / pixel), columns and rows of the mask';
+COMMENT ON COLUMN tunnel.boundary_region.mask IS 'Its dark pixels, a bit each, row by row from the lowest arc';
+COMMENT ON COLUMN tunnel.boundary_region.filled IS 'Its pixels that hold measured data';
+COMMENT ON COLUMN tunnel.boundary_region.darkening_sum IS 'Sum over them of the drop below dry lining, dB';
+COMMENT ON COLUMN tunnel.boundary_region.darkening_max IS 'Greatest drop below dry lining, dB';
+COMMENT ON COLUMN tunnel.boundary_region.properties IS 'Sums over its pixels by which it is told what it is, see Region in leak/region.py';
+COMMENT ON COLUMN tunnel.boundary_region.finding_id IS 'Anomaly that it is a part of, if it is large enough';
+CREATE INDEX boundary_region_finding_id_idx ON tunnel.boundary_region (finding_id);
+CREATE INDEX boundary_region_survey_id_km_idx ON tunnel.boundary_region (survey_id, km);
 
 CREATE TABLE tunnel.photo (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
-    anomaly_id BIGINT NOT NULL,
+    finding_id BIGINT NOT NULL,
     path TEXT NOT NULL,
     caption TEXT,
     added_by TEXT DEFAULT SESSION_USER NOT NULL,
     added_at TIMESTAMP WITH TIME ZONE DEFAULT clock_timestamp() NOT NULL,
     CONSTRAINT photo_pkey PRIMARY KEY (id),
     CONSTRAINT photo_path_check CHECK (path <> ''),
-    CONSTRAINT photo_anomaly_id_fkey FOREIGN KEY(anomaly_id) REFERENCES tunnel.anomaly (id) ON DELETE CASCADE
+    CONSTRAINT photo_finding_id_fkey FOREIGN KEY(finding_id) REFERENCES tunnel.finding (id) ON DELETE CASCADE
 );
 COMMENT ON TABLE tunnel.photo IS 'Photos of findings, by path or URL';
 COMMENT ON COLUMN tunnel.photo.id IS 'Key';
-COMMENT ON COLUMN tunnel.photo.anomaly_id IS 'Finding that it shows';
+COMMENT ON COLUMN tunnel.photo.finding_id IS 'Finding that it shows';
 COMMENT ON COLUMN tunnel.photo.path IS 'Path or URL';
 COMMENT ON COLUMN tunnel.photo.caption IS 'What it shows';
 COMMENT ON COLUMN tunnel.photo.added_by IS 'Who added it';
 COMMENT ON COLUMN tunnel.photo.added_at IS 'When it was added';
-CREATE INDEX photo_anomaly_id_idx ON tunnel.photo (anomaly_id);
+CREATE INDEX photo_finding_id_idx ON tunnel.photo (finding_id);
 
 CREATE TABLE tunnel.spot (
     id BIGINT GENERATED ALWAYS AS IDENTITY,

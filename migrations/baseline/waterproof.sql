@@ -2,7 +2,7 @@
 
 -- A note a kilometre, by whoever changes something, in the same transaction: new rows only, so that nobody waits for anybody. A
 -- survey that is being deleted takes its notes along.
-CREATE FUNCTION tunnel.note_anomaly() RETURNS trigger
+CREATE FUNCTION tunnel.note_finding() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp
 AS $$
 BEGIN
@@ -15,16 +15,16 @@ BEGIN
     RETURN NULL;
 END
 $$;
-COMMENT ON FUNCTION tunnel.note_anomaly() IS
-'Trigger on tunnel.anomaly: notes the kilometres that what changed reaches into';
-CREATE TRIGGER note_insert AFTER INSERT ON tunnel.anomaly
-    REFERENCING NEW TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_anomaly();
-CREATE TRIGGER note_update_old AFTER UPDATE ON tunnel.anomaly
-    REFERENCING OLD TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_anomaly();
-CREATE TRIGGER note_update_new AFTER UPDATE ON tunnel.anomaly
-    REFERENCING NEW TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_anomaly();
-CREATE TRIGGER note_delete AFTER DELETE ON tunnel.anomaly
-    REFERENCING OLD TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_anomaly();
+COMMENT ON FUNCTION tunnel.note_finding() IS
+'Trigger on tunnel.finding: notes the kilometres that what changed reaches into';
+CREATE TRIGGER note_insert AFTER INSERT ON tunnel.finding
+    REFERENCING NEW TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_finding();
+CREATE TRIGGER note_update_old AFTER UPDATE ON tunnel.finding
+    REFERENCING OLD TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_finding();
+CREATE TRIGGER note_update_new AFTER UPDATE ON tunnel.finding
+    REFERENCING NEW TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_finding();
+CREATE TRIGGER note_delete AFTER DELETE ON tunnel.finding
+    REFERENCING OLD TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_finding();
 
 CREATE FUNCTION tunnel.note_coverage() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp
@@ -59,8 +59,8 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel.forget_waterproof() IS
-'Trigger on tunnel.anomaly and tunnel.coverage: where they are emptied at once, what is kept of their kilometres goes, too';
-CREATE TRIGGER note_truncate AFTER TRUNCATE ON tunnel.anomaly
+'Trigger on tunnel.finding and tunnel.coverage: where they are emptied at once, what is kept of their kilometres goes, too';
+CREATE TRIGGER note_truncate AFTER TRUNCATE ON tunnel.finding
     FOR EACH STATEMENT EXECUTE FUNCTION tunnel.forget_waterproof();
 CREATE TRIGGER note_truncate AFTER TRUNCATE ON tunnel.coverage
     FOR EACH STATEMENT EXECUTE FUNCTION tunnel.forget_waterproof();

@@ -90,7 +90,7 @@ def _lines(facts: Dict[str, Any], probability: float | None) -> List[str]:
     """Facts in words, a line each."""
     lines = []
     if probability is not None and facts["confidence"] is not None:
-        lines.append(f"leak with probability <b>{probability:.2f}</b> (found as {facts['found']})")
+        lines.append(f"leak with probability <b>{probability:.2f}</b> (found as {facts['kind_detected']})")
     else:
         lines.append(f"{facts['origin']} by hand")
     size = f"{facts['area']:.2f}\u00a0m²"
@@ -98,8 +98,8 @@ def _lines(facts: Dict[str, Any], probability: float | None) -> List[str]:
         minutes = round(float(facts["clock"]) * 60) % 720
         size += f", at {minutes // 60 or 12}:{minutes % 60:02d}"
     lines.append(size + f", arc {facts['arc_from']:+.2f} to {facts['arc_to']:+.2f} m")
-    if facts["drop_mean"] is not None:
-        darker = f"{facts['drop_mean']:.1f} dB darker, at most {facts['drop_max']:.1f}"
+    if facts["darkening_mean"] is not None:
+        darker = f"{facts['darkening_mean']:.1f} dB darker, at most {facts['darkening_max']:.1f}"
         if facts["contrast"] is not None:
             darker += f"; contrast {facts['contrast']:.0f}"
         if facts["image_share"] is not None:

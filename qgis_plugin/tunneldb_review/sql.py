@@ -22,12 +22,13 @@ PERSON = (
 )
 
 _LISTED = (
-    "id", "km", "chainage_from", "chainage_to", "arc_from", "arc_to", "kind", "found", "confidence", "area", "review", "counted"
+    "id", "km", "chainage_from", "chainage_to", "arc_from", "arc_to", "kind", "kind_detected", "confidence", "area",
+    "review", "counted"
 )  # fmt: skip
 # dates and lists as text, so that what is read does not depend on how QGIS turns types into Python's
 _FACTS = {
     **{name: f"f.{name}" for name in (*_LISTED, "label", "clock", "kind_label", "origin", "state", "remark", "reviewed_by")},
-    **{name: f"f.{name}" for name in ("drop_mean", "drop_max", "contrast", "image_share", "photos")},
+    **{name: f"f.{name}" for name in ("darkening_mean", "darkening_max", "contrast", "image_share", "photos")},
     "reviewed_at": "to_char(f.reviewed_at, 'YYYY-MM-DD HH24:MI')",
     "reasons": "array_to_string(f.reasons, ', ')",
     "evidence": "(SELECT a.evidence FROM tunnel_api.anomaly a WHERE a.id = f.id)",
@@ -41,14 +42,14 @@ def findings(survey_id: int) -> str:
     """Return the query of what there is to review in a survey; columns as :func:`listed` names them."""
     columns = ", ".join(f"f.{name}" for name in _LISTED)
     return (
-        f"SELECT {columns} FROM tunnel_api.lining_finding f WHERE f.survey_id = {int(survey_id)}"
+        f"SELECT {columns} FROM tunnel_api.finding f WHERE f.survey_id = {int(survey_id)}"
         " AND f.state IN ('open', 'confirmed', 'rejected', 'gone')"
     )
 
 
 def facts(finding_id: int) -> str:
     """Return the query of all that the dock tells of a finding; columns as :func:`told` names them."""
-    return f"SELECT {', '.join(_FACTS.values())} FROM tunnel_api.lining_finding f WHERE f.id = {int(finding_id)}"
+    return f"SELECT {', '.join(_FACTS.values())} FROM tunnel_api.finding f WHERE f.id = {int(finding_id)}"
 
 
 def review(finding_id: int, seen: Mapping[str, Any], values: Mapping[str, Any]) -> str:

@@ -36,7 +36,7 @@ class Finding:
         """How probable it is that it is a leak, as detection has it; what people drew as wet is one."""
         if self.confidence is None:
             return 1.0 if self.kind in ("leak", "drip") else 0.0
-        return self.confidence if self.found == "leak" else 1.0 - self.confidence
+        return self.confidence if self.kind_detected == "leak" else 1.0 - self.confidence
 
 
 ORDERS: Dict[str, Tuple[str, Callable[[Finding], Tuple[float, ...]]]] = {

@@ -34,13 +34,13 @@ SET search_path = pg_catalog, pg_temp
 AS $$
     WITH given AS MATERIALIZED (
         SELECT s.id, greatest($2, e.chainage_from) AS low, least($3, e.chainage_to) AS high,
-            (SELECT max(l.chainage_to - l.chainage_from) FROM tunnel.anomaly l WHERE l.survey_id = s.id) AS longest
+            (SELECT max(l.chainage_to - l.chainage_from) FROM tunnel.finding l WHERE l.survey_id = s.id) AS longest
         FROM tunnel.survey s CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e WHERE s.name = $1
     )
     SELECT coalesce(sum(CASE WHEN l.chainage_from >= g.low AND l.chainage_to <= g.high THEN l.area
-        ELSE (SELECT tunnel_api.area_between(a.unrolled, a.area, g.low, g.high) FROM tunnel.anomaly a WHERE a.id = l.id) END), 0)
+        ELSE (SELECT tunnel_api.area_between(a.unrolled, a.area, g.low, g.high) FROM tunnel.finding a WHERE a.id = l.id) END), 0)
     FROM given g
-    JOIN tunnel.anomaly l ON l.survey_id = g.id AND l.detected AND l.review <> 'rejected' AND l.wet AND NOT l.aside
+    JOIN tunnel.finding l ON l.survey_id = g.id AND l.detected AND l.review <> 'rejected' AND l.wet AND NOT l.superseded
         AND l.chainage_from > g.low - 1e-6 - g.longest AND l.chainage_to > g.low AND l.chainage_from < g.high
     WHERE g.low < g.high AND tunnel_api.in_order($2, $3)
 $$;

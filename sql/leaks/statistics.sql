@@ -131,7 +131,7 @@ DECLARE
         FROM tunnel.coverage c WHERE c.survey_id = survey_key);
     -- no leak that begins before this reaches into a stretch
     first_leak constant float8 := first_start - 1e-6 - (
-        SELECT coalesce(max(l.chainage_to - l.chainage_from), 0) FROM tunnel.anomaly l WHERE l.survey_id = survey_key);
+        SELECT coalesce(max(l.chainage_to - l.chainage_from), 0) FROM tunnel.finding l WHERE l.survey_id = survey_key);
 BEGIN
     RETURN QUERY
     WITH given AS MATERIALIZED (
@@ -149,15 +149,15 @@ BEGIN
     ), leak AS (
         SELECT l.id, l.area, l.chainage_from AS low, l.chainage_to AS high, generate_series(
             greatest(width_bucket(l.chainage_from, g.low), 1), width_bucket(l.chainage_to, g.low)) AS n
-        FROM given g CROSS JOIN tunnel.anomaly l
-        WHERE l.survey_id = survey_key AND l.detected AND l.review <> 'rejected' AND l.wet AND NOT l.aside
+        FROM given g CROSS JOIN tunnel.finding l
+        WHERE l.survey_id = survey_key AND l.detected AND l.review <> 'rejected' AND l.wet AND NOT l.superseded
             AND l.chainage_from > first_leak AND l.chainage_to > first_start AND l.chainage_from < last_end
     ), cut AS (
         SELECT l.n, l.id, greatest(l.low, g.low[l.n]) AS low, least(l.high, g.high[l.n]) AS high, l.area AS whole,
             CASE WHEN l.low >= g.low[l.n] AND l.high <= g.high[l.n] THEN l.area
                  -- few are cut: only they are looked up, the others come from the index alone
                  ELSE (SELECT tunnel_api.area_between(a.unrolled, a.area, g.low[l.n], g.high[l.n])
-                     FROM tunnel.anomaly a WHERE a.id = l.id) END AS area
+                     FROM tunnel.finding a WHERE a.id = l.id) END AS area
         FROM leak l CROSS JOIN given g
         WHERE l.high > g.low[l.n] AND l.low < g.high[l.n]
     ), patch AS MATERIALIZED (
@@ -281,10 +281,10 @@ BEGIN
         SELECT t.* FROM tunnel_api.leak_statistics(survey, low, high) t
     ), leak AS MATERIALIZED (
         SELECT l.id, l.area, (l.chainage_from + l.chainage_to) / 2 AS chainage
-        FROM found t JOIN tunnel.anomaly l ON l.chainage_to > t.chainage_from AND l.chainage_from < t.chainage_to
-        WHERE l.survey_id = survey_key AND l.detected AND l.review <> 'rejected' AND l.wet AND NOT l.aside
+        FROM found t JOIN tunnel.finding l ON l.chainage_to > t.chainage_from AND l.chainage_from < t.chainage_to
+        WHERE l.survey_id = survey_key AND l.detected AND l.review <> 'rejected' AND l.wet AND NOT l.superseded
             AND l.chainage_from > t.chainage_from - 1e-6 - (
-                SELECT max(o.chainage_to - o.chainage_from) FROM tunnel.anomaly o WHERE o.survey_id = survey_key)
+                SELECT max(o.chainage_to - o.chainage_from) FROM tunnel.finding o WHERE o.survey_id = survey_key)
     ), breach AS (
         SELECT c.id AS class, 1 AS n, format('wet area is %s ‰ of the lining seen > %s ‰',
                 round((1000 * t.wet_ratio)::numeric, 2), 1000 * c.wet_ratio) AS text,

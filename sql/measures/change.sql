@@ -73,10 +73,10 @@ CALL tunnel_api.make_geometry_views(
 
 CREATE OR REPLACE FUNCTION tunnel_api.leaks_checksum(survey_id int, chainage_from float8, chainage_to float8) RETURNS text
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
-    SELECT md5(string_agg(concat_ws(' ', a.id, coalesce(a.judged, a.kind), a.wet, a.area, a.chainage_from, a.chainage_to), ';' ORDER BY a.id))
-      FROM tunnel.anomaly a
+    SELECT md5(string_agg(concat_ws(' ', a.id, coalesce(a.kind_override, a.kind), a.wet, a.area, a.chainage_from, a.chainage_to), ';' ORDER BY a.id))
+      FROM tunnel.finding a
      WHERE a.survey_id = $1 AND a.chainage_to > $2 AND a.chainage_from < $3 AND a.detected AND a.review <> 'rejected'
-       AND NOT a.aside AND (a.wet OR a.kind IN ('leak', 'joint', 'dark')) AND tunnel_api.in_order($2, $3)
+       AND NOT a.superseded AND (a.wet OR a.kind IN ('leak', 'joint', 'dark')) AND tunnel_api.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.leaks_checksum(int, float8, float8) IS
     'Checksum of the leaks, joints and dark spots that count between two chainages (m): another as soon as one is judged, drawn or found anew; NULL without any';
@@ -244,7 +244,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 1000 SECURITY DEFINER SET search_p
                    sum(a.area) AS area
               FROM tunnel.tunnel t
               JOIN tunnel.survey s ON s.tunnel_id = t.id
-              JOIN tunnel.anomaly a ON a.survey_id = s.id AND a.detected AND a.review <> 'rejected' AND a.wet AND NOT a.aside
+              JOIN tunnel.finding a ON a.survey_id = s.id AND a.detected AND a.review <> 'rejected' AND a.wet AND NOT a.superseded
              WHERE t.name = $1 AND $2 > 0
              GROUP BY s.tunnel_id, s.id, s.name, s.date, 4) q
      ORDER BY q.k, q.date, q.name

@@ -21,20 +21,20 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.chainage_from, a.chainage_to,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, m.chainage) l) AS label,
        a.arc_from, a.arc_to, a.clock,
-       coalesce(a.judged, a.kind) AS kind, a.kind AS found, a.reasons, a.confidence, a.contrast,
-       a.area, a.drop_mean, a.drop_max, a.image_share,
+       coalesce(a.kind_override, a.kind) AS kind, a.kind AS kind_detected, a.reasons, a.confidence, a.contrast,
+       a.area, a.darkening_mean, a.darkening_max, a.image_share,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.detected, a.created_at, a.detected_at,
        a.detected AND a.review <> 'rejected' AS counted,
        tunnel_api.evidence_text(a.evidence) AS evidence, a.model, a.wet, a.origin,
        a.unrolled::public.geometry(Polygon, 0) AS unrolled,
        a.map::public.geometry AS map,
        a.surface::public.geometry AS surface
-  FROM tunnel.anomaly a
+  FROM tunnel.finding a
   JOIN tunnel.survey s ON s.id = a.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
  CROSS JOIN LATERAL (SELECT (a.chainage_from + a.chainage_to) / 2 AS chainage,
                             floor((a.chainage_from + a.chainage_to) / 2 / t.spacing)::integer AS near) m
- WHERE NOT a.aside AND (a.wet OR a.kind IN ('leak', 'joint', 'dark'));
+ WHERE NOT a.superseded AND (a.wet OR a.kind IN ('leak', 'joint', 'dark'));
 
 CREATE OR REPLACE VIEW tunnel_api.leak AS SELECT * FROM tunnel_api.anomaly WHERE wet;
 
@@ -42,16 +42,16 @@ COMMENT ON VIEW tunnel_api.anomaly IS
     'What is darker than dry lining or was drawn as wet, with three geometries: leaks, joints, other dark spots; review, remark and kind can be updated';
 COMMENT ON VIEW tunnel_api.leak IS 'Water leaks: anomalies that are wet, detected and drawn, with their three geometries; review, remark and kind can be updated';
 
-CREATE OR REPLACE VIEW tunnel_api.anomaly_evidence AS
-SELECT a.id * 100 + e.n AS id, a.id AS anomaly_id, a.survey_id, s.name AS survey, e.reason, e.log_odds
-  FROM tunnel.anomaly a
+CREATE OR REPLACE VIEW tunnel_api.finding_evidence AS
+SELECT a.id * 100 + e.n AS id, a.id AS finding_id, a.survey_id, s.name AS survey, e.reason, e.log_odds
+  FROM tunnel.finding a
   JOIN tunnel.survey s ON s.id = a.survey_id
  CROSS JOIN LATERAL (SELECT v.key AS reason, v.value::double precision AS log_odds, row_number() OVER (ORDER BY v.key) AS n
                        FROM jsonb_each_text(a.evidence) v) e;
-COMMENT ON VIEW tunnel_api.anomaly_evidence IS 'What speaks for each anomaly being a leak and against it: a row for each reason';
-COMMENT ON COLUMN tunnel_api.anomaly_evidence.anomaly_id IS 'Its id in the view anomaly';
-COMMENT ON COLUMN tunnel_api.anomaly_evidence.reason IS 'What was measured: faint, thin, rectangular, …';
-COMMENT ON COLUMN tunnel_api.anomaly_evidence.log_odds IS 'What it adds to the logarithm of the odds of a leak; negative: against one';
+COMMENT ON VIEW tunnel_api.finding_evidence IS 'What speaks for each anomaly being a leak and against it: a row for each reason';
+COMMENT ON COLUMN tunnel_api.finding_evidence.finding_id IS 'Its id in the view anomaly';
+COMMENT ON COLUMN tunnel_api.finding_evidence.reason IS 'What was measured: faint, thin, rectangular, …';
+COMMENT ON COLUMN tunnel_api.finding_evidence.log_odds IS 'What it adds to the logarithm of the odds of a leak; negative: against one';
 
 -- The comments on the columns of both, and their views of one geometry.
 DO $$
@@ -67,13 +67,13 @@ BEGIN
         ('arc_to', 'Greatest arc, m'),
         ('clock', 'Clock position of the middle, hours: 12 is the crown, 3 the right wall looking up-chainage'),
         ('kind', 'leak, joint or dark (dark but dry), or another of finding_kind: as an inspector judged it, else as found'),
-        ('found', 'What detection takes it for'),
+        ('kind_detected', 'What detection takes it for'),
         ('reasons', 'Why detection takes it for that'),
         ('confidence', 'How sure detection is of that, 0-1; NULL from before there were kinds'),
         ('contrast', 'Mean drop in standard deviations of the dry lining about it; NULL from before there were kinds'),
         ('area', 'Area on the lining, m²'),
-        ('drop_mean', 'Mean drop of corrected intensity below dry lining, dB; NULL until what was drawn is measured'),
-        ('drop_max', 'Greatest drop of corrected intensity below dry lining, dB; NULL until then'),
+        ('darkening_mean', 'Mean drop of corrected intensity below dry lining, dB; NULL until what was drawn is measured'),
+        ('darkening_max', 'Greatest drop of corrected intensity below dry lining, dB; NULL until then'),
         ('image_share', 'Share of the polygon on which the image holds measurements, 0-1; NULL until then'),
         ('review', 'open, confirmed or rejected'),
         ('reviewed_by', 'Who reviewed or judged it last, set by the database'),
@@ -82,7 +82,7 @@ BEGIN
         ('detected', 'False when the last detection found it no more (kept for its review)'),
         ('counted', 'Whether sums count it: found last, and not rejected'),
         ('wet', 'Whether its kind counts as wet: those are in the views of leaks'),
-        ('origin', 'How its outline came about: detected, drawn, redrawn, split or merged (lining_finding has more of it)'),
+        ('origin', 'How its outline came about: detected, drawn, redrawn, split or merged (finding has more of it)'),
         ('evidence', 'What speaks for a leak (+) and against it (-): logarithms of odds by reason, the strongest first; NULL from before'),
         ('model', 'Version of the model of evidence that judged it; NULL from before')) AS t (name, text)
       JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0

@@ -2,7 +2,7 @@
 
 CREATE OR REPLACE VIEW tunnel_api.change AS
 SELECT e.id * 2 AS id, e.survey, e.at, e.who, e.view AS what,
-       CASE e.view WHEN 'anomaly' THEN (SELECT a.km FROM tunnel.anomaly a WHERE a.id = e.row_id)
+       CASE e.view WHEN 'finding' THEN (SELECT a.km FROM tunnel.finding a WHERE a.id = e.row_id)
                    WHEN 'axis_vertex' THEN (SELECT v.km FROM tunnel.axis_vertex v WHERE v.id = e.row_id) END AS km,
        (SELECT format('%s %s', e.action, e.row_id)
                || coalesce(': ' || string_agg(CASE k.key WHEN 'geom' THEN 'geom'

@@ -5,10 +5,10 @@
 CREATE OR REPLACE FUNCTION tunnel_api.finding_state(id bigint) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_strip_nulls(jsonb_build_object(
-        'kind', coalesce(a.judged, a.kind), 'severity', a.severity, 'width', a.width, 'review', a.review, 'remark', a.remark,
+        'kind', coalesce(a.kind_override, a.kind), 'severity', a.severity, 'width', a.width, 'review', a.review, 'remark', a.remark,
         'origin', a.origin, 'parent_id', a.parent_id, 'merged_into', a.merged_into,
         'geom', public.ST_AsEWKT(coalesce(a.shape, a.unrolled))))
-      FROM tunnel.anomaly a WHERE a.id = $1
+      FROM tunnel.finding a WHERE a.id = $1
 $$;
 COMMENT ON FUNCTION tunnel_api.finding_state(bigint) IS
     'What the audit has of a finding: what people can change, geometry in the unrolled plane as EWKT';
@@ -17,10 +17,10 @@ COMMENT ON FUNCTION tunnel_api.finding_state(bigint) IS
 CREATE OR REPLACE FUNCTION tunnel_api.finding_measured(id bigint) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
-        'drop_mean', a.drop_mean, 'drop_max', a.drop_max, 'image_share', a.image_share, 'contrast', a.contrast,
+        'darkening_mean', a.darkening_mean, 'darkening_max', a.darkening_max, 'image_share', a.image_share, 'contrast', a.contrast,
         'confidence', a.confidence, 'reasons', a.reasons, 'evidence', a.evidence, 'features', a.features,
         'feature_list_id', a.feature_list_id, 'model', a.model, 'detected', a.detected, 'area', a.area, 'clock', a.clock)
-      FROM tunnel.anomaly a WHERE a.id = $1 AND a.image_share IS NOT NULL
+      FROM tunnel.finding a WHERE a.id = $1 AND a.image_share IS NOT NULL
 $$;
 COMMENT ON FUNCTION tunnel_api.finding_measured(bigint) IS
     'What was measured of a finding''s outline, as the audit keeps it when that changes; NULL of one that was not measured';
@@ -41,13 +41,13 @@ BEGIN
     WITH near AS MATERIALIZED (
         SELECT a.id, a.origin <> 'detected' AS by_person, a.review, a.same_as, a.unrolled, a.wet AND a.detected
                AND a.merged_into IS NULL AND a.shape IS NULL AS apt
-          FROM tunnel.anomaly a
+          FROM tunnel.finding a
          WHERE a.survey_id = survey_key AND a.unrolled OPERATOR(public.&&) about
     ), pair AS MATERIALIZED (
         SELECT d.id AS found, h.id AS drawn, d.review, public.ST_Area(public.ST_Intersection(d.unrolled, h.unrolled)) AS shared,
                public.ST_Area(d.unrolled) AS found_area, public.ST_Area(h.unrolled) AS drawn_area
           FROM near d
-          JOIN tunnel.anomaly h ON h.survey_id = survey_key AND h.unrolled OPERATOR(public.&&) d.unrolled
+          JOIN tunnel.finding h ON h.survey_id = survey_key AND h.unrolled OPERATOR(public.&&) d.unrolled
            AND h.origin <> 'detected' AND h.wet
                AND h.merged_into IS NULL AND h.shape IS NULL
          WHERE d.apt AND NOT d.by_person
@@ -55,7 +55,7 @@ BEGIN
         SELECT d.id, h.id, d.review, public.ST_Area(public.ST_Intersection(d.unrolled, h.unrolled)),
                public.ST_Area(d.unrolled), public.ST_Area(h.unrolled)
           FROM near h
-          JOIN tunnel.anomaly d ON d.survey_id = survey_key AND d.unrolled OPERATOR(public.&&) h.unrolled
+          JOIN tunnel.finding d ON d.survey_id = survey_key AND d.unrolled OPERATOR(public.&&) h.unrolled
            AND d.origin = 'detected' AND d.wet AND d.detected
                AND d.merged_into IS NULL AND d.shape IS NULL
          WHERE h.apt AND h.by_person
@@ -72,12 +72,12 @@ BEGIN
     ), concerned AS (
         SELECT n.id, n.same_as FROM near n
          UNION
-        SELECT a.id, a.same_as FROM link l JOIN tunnel.anomaly a ON a.id = l.id
+        SELECT a.id, a.same_as FROM link l JOIN tunnel.finding a ON a.id = l.id
     )
     SELECT c.id, l.other FROM concerned c LEFT JOIN link l ON l.id = c.id
      WHERE c.same_as IS DISTINCT FROM l.other ORDER BY c.id
     LOOP
-        UPDATE tunnel.anomaly a SET same_as = changed.other WHERE a.id = changed.id;
+        UPDATE tunnel.finding a SET same_as = changed.other WHERE a.id = changed.id;
     END LOOP;
 END
 $$;
@@ -88,14 +88,14 @@ COMMENT ON FUNCTION tunnel_api.link_findings(int, geometry) IS
 -- an operator has none. What is no longer a leak lies in none.
 CREATE OR REPLACE FUNCTION tunnel_api.mark_dry(survey_id int, place geometry) RETURNS void
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
-    UPDATE tunnel.anomaly a SET dry_region_id = w.region
+    UPDATE tunnel.finding a SET dry_region_id = w.region
       FROM (SELECT x.id, (SELECT r.id FROM tunnel.region r
-                           WHERE x.wet AND r.survey_id = x.survey_id AND r.kind = 'dry' AND NOT r.waits
+                           WHERE x.wet AND r.survey_id = x.survey_id AND r.kind = 'dry' AND NOT r.pending_approval
                              AND r.geom OPERATOR(public.&&) x.unrolled
                              AND public.ST_Area(public.ST_Intersection(r.geom, x.unrolled)) >= 0.5 * public.ST_Area(x.unrolled)
                            ORDER BY r.id LIMIT 1) AS region
-              FROM tunnel.anomaly x
-             WHERE x.survey_id = $1 AND x.unrolled OPERATOR(public.&&) $2 AND NOT x.by_hand) w
+              FROM tunnel.finding x
+             WHERE x.survey_id = $1 AND x.unrolled OPERATOR(public.&&) $2 AND NOT x.manual) w
      WHERE a.id = w.id AND a.dry_region_id IS DISTINCT FROM w.region
 $$;
 COMMENT ON FUNCTION tunnel_api.mark_dry(int, geometry) IS
@@ -190,14 +190,14 @@ COMMENT ON FUNCTION tunnel_api.drawn_in(int, text, geometry) IS
 -- detection measures the new one.
 CREATE OR REPLACE FUNCTION tunnel_api.redraw(id bigint, drawn geometry, width float8, origin text) RETURNS void
 LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
-    UPDATE tunnel.anomaly a
+    UPDATE tunnel.finding a
        SET km = f.km, chainage_from = f.chainage_from, chainage_to = f.chainage_to, arc_from = f.arc_from, arc_to = f.arc_to,
            clock = f.clock, area = f.area, length = f.length, width = $3, unrolled = f.unrolled, map = f.map, surface = f.surface,
            shape = f.shape, shape_map = f.shape_map, shape_surface = f.shape_surface, origin = $4, drawn_by = session_user,
-           drawn_at = clock_timestamp(), detected = true, drop_mean = NULL, drop_max = NULL, image_share = NULL, contrast = NULL,
+           drawn_at = clock_timestamp(), detected = true, darkening_mean = NULL, darkening_max = NULL, image_share = NULL, contrast = NULL,
            confidence = NULL, reasons = '{}', evidence = NULL, features = NULL, feature_list_id = NULL, model = NULL,
            same_as = NULL, dry_region_id = NULL
-      FROM tunnel.anomaly w
+      FROM tunnel.finding w
      CROSS JOIN LATERAL tunnel_api.drawn_figures(w.survey_id, $2, $3) f
      WHERE w.id = $1 AND a.id = w.id
 $$;
@@ -206,13 +206,13 @@ COMMENT ON FUNCTION tunnel_api.redraw(bigint, geometry, float8, text) IS
 
 -- A new finding of a person's, like another or on its own; its id, which is given for one that comes back.
 CREATE OR REPLACE FUNCTION tunnel_api.add_finding(
-    survey_id int, kind text, drawn geometry, width float8, severity int, review text, remark text, origin text, by_hand boolean,
+    survey_id int, kind text, drawn geometry, width float8, severity int, review text, remark text, origin text, manual boolean,
     parent_id bigint, id bigint DEFAULT NULL) RETURNS bigint
 LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
-    INSERT INTO tunnel.anomaly (id, survey_id, kind, width, severity, review, reviewed_by, reviewed_at, remark, origin, by_hand,
+    INSERT INTO tunnel.finding (id, survey_id, kind, width, severity, review, reviewed_by, reviewed_at, remark, origin, manual,
         parent_id, drawn_by, drawn_at, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, length, unrolled, map,
         surface, shape, shape_map, shape_surface, created_at) OVERRIDING SYSTEM VALUE
-    SELECT coalesce($11, nextval('tunnel.anomaly_id_seq')), $1, $2, $4, $5, $6, CASE WHEN $6 <> 'open' THEN session_user END,
+    SELECT coalesce($11, nextval('tunnel.finding_id_seq')), $1, $2, $4, $5, $6, CASE WHEN $6 <> 'open' THEN session_user END,
            CASE WHEN $6 <> 'open' THEN clock_timestamp() END, $7, $8, $9, $10, session_user, clock_timestamp(), f.km,
            f.chainage_from, f.chainage_to, f.arc_from, f.arc_to, f.clock, f.area, f.length, f.unrolled, f.map, f.surface, f.shape,
            f.shape_map, f.shape_surface, clock_timestamp()
@@ -229,12 +229,12 @@ LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, p
 DECLARE
     survey_key constant int := survey_id;
     kilometre constant int := km;
-    was tunnel.anomaly;
+    was tunnel.finding;
 BEGIN
-    FOR was IN SELECT a.* FROM tunnel.anomaly a
+    FOR was IN SELECT a.* FROM tunnel.finding a
                 WHERE a.survey_id = survey_key AND a.km = kilometre AND a.origin <> 'detected' ORDER BY a.id FOR UPDATE LOOP
         BEGIN
-            UPDATE tunnel.anomaly a
+            UPDATE tunnel.finding a
                SET clock = f.clock, area = f.area, length = f.length, map = f.map, surface = f.surface, shape_map = f.shape_map,
                    shape_surface = f.shape_surface
               FROM tunnel_api.drawn_figures(survey_key, coalesce(was.shape, was.unrolled), was.width) f
@@ -264,8 +264,8 @@ DECLARE
     editable CONSTANT text[] := ARRAY['kind', 'severity', 'width', 'review', 'remark'];
     key text;
     its tunnel.survey;
-    was tunnel.anomaly;
-    is_now tunnel.anomaly;
+    was tunnel.finding;
+    is_now tunnel.finding;
     before jsonb;
     old_row jsonb;
     new_row jsonb;
@@ -292,7 +292,7 @@ BEGIN
                                          NEW.remark, 'drawn', true, NULL);
     ELSE
         PERFORM tunnel_api.lock_findings(OLD.survey_id);
-        SELECT a.* INTO was FROM tunnel.anomaly a WHERE a.id = OLD.id FOR UPDATE;
+        SELECT a.* INTO was FROM tunnel.finding a WHERE a.id = OLD.id FOR UPDATE;
         IF NOT FOUND THEN
             RETURN NULL;  -- gone meanwhile
         END IF;
@@ -303,17 +303,17 @@ BEGIN
         END IF;
     END IF;
     IF TG_OP = 'DELETE' THEN
-        IF NOT was.by_hand THEN
+        IF NOT was.manual THEN
             RAISE EXCEPTION 'finding % was detected: reject it instead', was.id USING ERRCODE = 'feature_not_supported';
-        ELSIF EXISTS (SELECT FROM tunnel.anomaly x WHERE x.merged_into = was.id) THEN
+        ELSIF EXISTS (SELECT FROM tunnel.finding x WHERE x.merged_into = was.id) THEN
             RAISE EXCEPTION 'finding % stands for others that are merged into it: reject it instead', was.id
                 USING ERRCODE = 'feature_not_supported';
         END IF;
-        step := tunnel_api.note_edit(OLD.survey, 'anomaly', was.id, before, NULL, kept => tunnel_api.finding_measured(was.id));
-        PERFORM tunnel_api.note_edit(OLD.survey, 'photo', p.id, to_jsonb(p) - 'id' - 'anomaly_id' || jsonb_build_object('finding_id', was.id),
+        step := tunnel_api.note_edit(OLD.survey, 'finding', was.id, before, NULL, kept => tunnel_api.finding_measured(was.id));
+        PERFORM tunnel_api.note_edit(OLD.survey, 'photo', p.id, to_jsonb(p) - 'id',
                                      NULL, part_of => step)
-           FROM tunnel.photo p WHERE p.anomaly_id = was.id;
-        DELETE FROM tunnel.anomaly a WHERE a.id = was.id;
+           FROM tunnel.photo p WHERE p.finding_id = was.id;
+        DELETE FROM tunnel.finding a WHERE a.id = was.id;
         PERFORM tunnel_api.settle_findings(was.survey_id, was.unrolled);
         RETURN OLD;
     END IF;
@@ -324,7 +324,7 @@ BEGIN
             RAISE EXCEPTION 'of a finding only the kind, the severity, the width, the review, the remark and the geometry can be edited'
                 USING ERRCODE = 'feature_not_supported';
         END IF;
-        was_row := jsonb_build_object('kind', coalesce(was.judged, was.kind), 'severity', was.severity, 'width', was.width,
+        was_row := jsonb_build_object('kind', coalesce(was.kind_override, was.kind), 'severity', was.severity, 'width', was.width,
                                       'review', was.review, 'remark', was.remark);
         shape_before := CASE place WHEN 'unrolled' THEN coalesce(was.shape, was.unrolled) WHEN 'map' THEN coalesce(was.shape_map, was.map)
                                    ELSE coalesce(was.shape_surface, was.surface) END;
@@ -356,7 +356,7 @@ BEGIN
         -- one of a kind that is offered no more may still be redrawn
         IF new_row -> 'kind' <> was_row -> 'kind'
            OR (redrawn AND EXISTS (SELECT FROM tunnel.finding_kind k WHERE k.code = NEW.kind AND k.active)) THEN
-            PERFORM tunnel_api.check_kind(NEW.kind, CASE WHEN was.by_hand OR redrawn THEN drawn END);
+            PERFORM tunnel_api.check_kind(NEW.kind, CASE WHEN was.manual OR redrawn THEN drawn END);
         END IF;
         IF redrawn OR (was.shape IS NOT NULL AND new_row -> 'width' <> was_row -> 'width') THEN
             kept := tunnel_api.finding_measured(was.id);
@@ -370,16 +370,16 @@ BEGIN
             NEW.reviewed_by := was.reviewed_by;
             NEW.reviewed_at := was.reviewed_at;
         END IF;
-        UPDATE tunnel.anomaly a
+        UPDATE tunnel.finding a
            SET severity = NEW.severity, width = NEW.width, review = NEW.review, remark = NEW.remark,
                reviewed_by = NEW.reviewed_by, reviewed_at = NEW.reviewed_at,
-               kind = CASE WHEN a.by_hand THEN NEW.kind ELSE a.kind END,
-               judged = CASE WHEN a.by_hand THEN NULL WHEN NEW.kind = coalesce(a.judged, a.kind) THEN a.judged
+               kind = CASE WHEN a.manual THEN NEW.kind ELSE a.kind END,
+               kind_override = CASE WHEN a.manual THEN NULL WHEN NEW.kind = coalesce(a.kind_override, a.kind) THEN a.kind_override
                              ELSE nullif(NEW.kind, a.kind) END
          WHERE a.id = was.id;
     END IF;
-    SELECT a.* INTO is_now FROM tunnel.anomaly a WHERE a.id = NEW.id;
-    PERFORM tunnel_api.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = is_now.survey_id), 'anomaly', is_now.id,
+    SELECT a.* INTO is_now FROM tunnel.finding a WHERE a.id = NEW.id;
+    PERFORM tunnel_api.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = is_now.survey_id), 'finding', is_now.id,
                                  before, tunnel_api.finding_state(is_now.id), kept => kept);
     PERFORM tunnel_api.settle_findings(is_now.survey_id, public.ST_Collect(was.unrolled, is_now.unrolled));
     RETURN NEW;
@@ -421,7 +421,7 @@ LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_pat
 #variable_conflict use_column
 DECLARE
     finding constant bigint := id;
-    was tunnel.anomaly;
+    was tunnel.finding;
     made bigint;
     before jsonb;
     name text;
@@ -434,12 +434,12 @@ DECLARE
     step bigint;
 BEGIN
     SELECT a.survey_id, s.name INTO survey_key, name
-      FROM tunnel.anomaly a JOIN tunnel.survey s ON s.id = a.survey_id WHERE a.id = finding;
+      FROM tunnel.finding a JOIN tunnel.survey s ON s.id = a.survey_id WHERE a.id = finding;
     IF survey_key IS NULL THEN
         RAISE EXCEPTION 'there is no finding %', finding USING ERRCODE = 'invalid_parameter_value';
     END IF;
     PERFORM tunnel_api.lock_findings(survey_key);
-    SELECT a.* INTO was FROM tunnel.anomaly a WHERE a.id = finding FOR UPDATE;
+    SELECT a.* INTO was FROM tunnel.finding a WHERE a.id = finding FOR UPDATE;
     IF was.id IS NULL OR was.merged_into IS NOT NULL THEN
         RAISE EXCEPTION 'finding % is %', finding, coalesce('merged into ' || was.merged_into || ', which stands for it', 'gone')
             USING ERRCODE = 'feature_not_supported';
@@ -458,12 +458,12 @@ BEGIN
     PERFORM tunnel_api.redraw(finding, parts[1], was.width, 'split');
     ids := ARRAY[finding];
     FOREACH part IN ARRAY parts[2:] LOOP
-        ids := ids || tunnel_api.add_finding(survey_key, coalesce(was.judged, was.kind), part, was.width, was.severity, was.review,
-                                             was.remark, 'split', was.by_hand, finding);
+        ids := ids || tunnel_api.add_finding(survey_key, coalesce(was.kind_override, was.kind), part, was.width, was.severity, was.review,
+                                             was.remark, 'split', was.manual, finding);
     END LOOP;
-    step := tunnel_api.note_edit(name, 'anomaly', finding, before, tunnel_api.finding_state(finding), kept => kept);
+    step := tunnel_api.note_edit(name, 'finding', finding, before, tunnel_api.finding_state(finding), kept => kept);
     FOREACH made IN ARRAY ids[2:] LOOP
-        PERFORM tunnel_api.note_edit(name, 'anomaly', made, NULL, tunnel_api.finding_state(made), part_of => step);
+        PERFORM tunnel_api.note_edit(name, 'finding', made, NULL, tunnel_api.finding_state(made), part_of => step);
     END LOOP;
     PERFORM tunnel_api.settle_findings(survey_key, was.unrolled);
     RETURN ids;
@@ -481,8 +481,8 @@ DECLARE
     gap constant float8 := 1.0;
     surveys int[];
     name text;
-    oldest tunnel.anomaly;
-    was tunnel.anomaly;
+    oldest tunnel.finding;
+    was tunnel.finding;
     before jsonb;
     whole public.geometry;
     a_part public.geometry;
@@ -494,18 +494,18 @@ BEGIN
     IF cardinality(wanted) < 2 THEN
         RAISE EXCEPTION 'at least two findings are merged' USING ERRCODE = 'invalid_parameter_value';
     END IF;
-    surveys := ARRAY(SELECT DISTINCT a.survey_id FROM tunnel.anomaly a WHERE a.id = ANY (wanted));
-    IF cardinality(surveys) <> 1 OR (SELECT count(*) FROM tunnel.anomaly a WHERE a.id = ANY (wanted)) <> cardinality(wanted) THEN
+    surveys := ARRAY(SELECT DISTINCT a.survey_id FROM tunnel.finding a WHERE a.id = ANY (wanted));
+    IF cardinality(surveys) <> 1 OR (SELECT count(*) FROM tunnel.finding a WHERE a.id = ANY (wanted)) <> cardinality(wanted) THEN
         RAISE EXCEPTION 'findings % are not all there, or of several surveys', array_to_string(wanted, ', ')
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     PERFORM tunnel_api.lock_findings(surveys[1]);
-    PERFORM FROM tunnel.anomaly a WHERE a.id = ANY (wanted) ORDER BY a.id FOR UPDATE;
+    PERFORM FROM tunnel.finding a WHERE a.id = ANY (wanted) ORDER BY a.id FOR UPDATE;
     name := (SELECT s.name FROM tunnel.survey s WHERE s.id = surveys[1]);
-    SELECT a.* INTO oldest FROM tunnel.anomaly a WHERE a.id = ANY (wanted) ORDER BY a.created_at, a.id LIMIT 1;
-    SELECT a.* INTO was FROM tunnel.anomaly a
+    SELECT a.* INTO oldest FROM tunnel.finding a WHERE a.id = ANY (wanted) ORDER BY a.created_at, a.id LIMIT 1;
+    SELECT a.* INTO was FROM tunnel.finding a
      WHERE a.id = ANY (wanted) AND (a.merged_into IS NOT NULL OR a.review = 'rejected'
-           OR coalesce(a.judged, a.kind) <> coalesce(oldest.judged, oldest.kind)
+           OR coalesce(a.kind_override, a.kind) <> coalesce(oldest.kind_override, oldest.kind)
            OR public.ST_Dimension(coalesce(a.shape, a.unrolled)) <> public.ST_Dimension(coalesce(oldest.shape, oldest.unrolled))
            OR public.GeometryType(a.shape) = 'POINT')
      ORDER BY a.id LIMIT 1;
@@ -513,13 +513,13 @@ BEGIN
         RAISE EXCEPTION 'finding % cannot be merged: %', was.id,
             CASE WHEN was.merged_into IS NOT NULL THEN 'it is merged into ' || was.merged_into
                  WHEN was.review = 'rejected' THEN 'it is rejected'
-                 WHEN coalesce(was.judged, was.kind) <> coalesce(oldest.judged, oldest.kind)
-                     THEN format('it is %s, finding %s %s', coalesce(was.judged, was.kind), oldest.id, coalesce(oldest.judged, oldest.kind))
+                 WHEN coalesce(was.kind_override, was.kind) <> coalesce(oldest.kind_override, oldest.kind)
+                     THEN format('it is %s, finding %s %s', coalesce(was.kind_override, was.kind), oldest.id, coalesce(oldest.kind_override, oldest.kind))
                  ELSE 'polygons are merged with polygons, lines with lines, and points not' END
             USING ERRCODE = 'feature_not_supported';
     END IF;
     SELECT public.ST_Union(coalesce(a.shape, a.unrolled)), public.ST_Collect(a.unrolled) INTO whole, place
-      FROM tunnel.anomaly a WHERE a.id = ANY (wanted);
+      FROM tunnel.finding a WHERE a.id = ANY (wanted);
     WHILE public.ST_NumGeometries(whole) > 1 LOOP
         IF public.ST_Dimension(whole) = 1 THEN
             whole := public.ST_LineMerge(whole);
@@ -539,19 +539,19 @@ BEGIN
     before := tunnel_api.finding_state(oldest.id);
     kept := tunnel_api.finding_measured(oldest.id);
     PERFORM tunnel_api.redraw(oldest.id, whole, oldest.width, 'merged');
-    UPDATE tunnel.anomaly a SET severity = m.severity, remark = m.remark
+    UPDATE tunnel.finding a SET severity = m.severity, remark = m.remark
       FROM (SELECT max(x.severity) AS severity, string_agg(DISTINCT x.remark, '; ') AS remark
-              FROM tunnel.anomaly x WHERE x.id = ANY (wanted)) m
+              FROM tunnel.finding x WHERE x.id = ANY (wanted)) m
      WHERE a.id = oldest.id;
     -- named also where the outline of the oldest is that of all
-    step := tunnel_api.note_edit(name, 'anomaly', oldest.id, before,
+    step := tunnel_api.note_edit(name, 'finding', oldest.id, before,
         tunnel_api.finding_state(oldest.id) || jsonb_build_object('merged', array_remove(wanted, oldest.id)), kept => kept);
-    FOR was IN SELECT a.* FROM tunnel.anomaly a
+    FOR was IN SELECT a.* FROM tunnel.finding a
                 WHERE (a.id = ANY (wanted) OR a.merged_into = ANY (wanted)) AND a.id <> oldest.id
                   AND a.merged_into IS DISTINCT FROM oldest.id ORDER BY a.id FOR UPDATE LOOP
         before := tunnel_api.finding_state(was.id);
-        UPDATE tunnel.anomaly a SET merged_into = oldest.id, same_as = NULL WHERE a.id = was.id;
-        PERFORM tunnel_api.note_edit(name, 'anomaly', was.id, before, tunnel_api.finding_state(was.id), part_of => step);
+        UPDATE tunnel.finding a SET merged_into = oldest.id, same_as = NULL WHERE a.id = was.id;
+        PERFORM tunnel_api.note_edit(name, 'finding', was.id, before, tunnel_api.finding_state(was.id), part_of => step);
     END LOOP;
     PERFORM tunnel_api.settle_findings(surveys[1], place);
     RETURN oldest.id;
@@ -578,7 +578,7 @@ BEGIN
     IF coalesce(NEW.path, '') = '' THEN
         RAISE EXCEPTION 'a photo needs a path or URL' USING ERRCODE = 'null_value_not_allowed';
     END IF;
-    SELECT s.name INTO name FROM tunnel.anomaly a JOIN tunnel.survey s ON s.id = a.survey_id WHERE a.id = NEW.finding_id;
+    SELECT s.name INTO name FROM tunnel.finding a JOIN tunnel.survey s ON s.id = a.survey_id WHERE a.id = NEW.finding_id;
     IF NOT FOUND OR (TG_OP = 'UPDATE' AND NEW.finding_id <> OLD.finding_id) THEN
         RAISE EXCEPTION 'a photo is of one finding, which stays; there is no finding %', NEW.finding_id
             USING ERRCODE = 'invalid_parameter_value';
@@ -587,7 +587,7 @@ BEGIN
     NEW.added_by := session_user;
     NEW.added_at := clock_timestamp();
     IF TG_OP = 'INSERT' THEN
-        INSERT INTO tunnel.photo (anomaly_id, path, caption, added_by, added_at)
+        INSERT INTO tunnel.photo (finding_id, path, caption, added_by, added_at)
         VALUES (NEW.finding_id, NEW.path, NEW.caption, NEW.added_by, NEW.added_at) RETURNING id INTO NEW.id;
     ELSE
         UPDATE tunnel.photo p SET path = NEW.path, caption = NEW.caption, added_by = NEW.added_by, added_at = NEW.added_at

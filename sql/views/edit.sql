@@ -99,9 +99,9 @@ BEGIN
     IF TG_ARGV[0] = 'spot' THEN
         SELECT p.review, p.remark, p.kind INTO was FROM tunnel.spot p WHERE p.id = OLD.id FOR UPDATE;
     ELSE
-        PERFORM tunnel_api.lock_findings(a.survey_id) FROM tunnel.anomaly a WHERE a.id = OLD.id;
-        SELECT a.review, a.remark, coalesce(a.judged, a.kind) AS kind INTO was
-          FROM tunnel.anomaly a WHERE a.id = OLD.id FOR UPDATE;
+        PERFORM tunnel_api.lock_findings(a.survey_id) FROM tunnel.finding a WHERE a.id = OLD.id;
+        SELECT a.review, a.remark, coalesce(a.kind_override, a.kind) AS kind INTO was
+          FROM tunnel.finding a WHERE a.id = OLD.id FOR UPDATE;
     END IF;
     IF NOT FOUND THEN
         RETURN NULL;  -- gone meanwhile
@@ -126,12 +126,12 @@ BEGIN
            SET review = NEW.review, remark = NEW.remark, reviewed_by = NEW.reviewed_by, reviewed_at = NEW.reviewed_at
          WHERE p.id = OLD.id;
     ELSE
-        UPDATE tunnel.anomaly a
+        UPDATE tunnel.finding a
            SET review = NEW.review, remark = NEW.remark, reviewed_by = NEW.reviewed_by, reviewed_at = NEW.reviewed_at,
-               kind = CASE WHEN a.by_hand THEN NEW.kind ELSE a.kind END,
-               judged = CASE WHEN a.by_hand THEN NULL WHEN NEW.kind = was.kind THEN a.judged ELSE nullif(NEW.kind, a.kind) END
+               kind = CASE WHEN a.manual THEN NEW.kind ELSE a.kind END,
+               kind_override = CASE WHEN a.manual THEN NULL WHEN NEW.kind = was.kind THEN a.kind_override ELSE nullif(NEW.kind, a.kind) END
          WHERE a.id = OLD.id;
-        PERFORM tunnel_api.settle_findings(a.survey_id, a.unrolled) FROM tunnel.anomaly a WHERE a.id = OLD.id;
+        PERFORM tunnel_api.settle_findings(a.survey_id, a.unrolled) FROM tunnel.finding a WHERE a.id = OLD.id;
     END IF;
     PERFORM tunnel_api.note_edit(OLD.survey, TG_ARGV[0], OLD.id, to_jsonb(was),
                                  jsonb_build_object('review', NEW.review, 'remark', NEW.remark, 'kind', NEW.kind));
@@ -199,7 +199,7 @@ $$;
 -- What the audit has of a region.
 CREATE OR REPLACE FUNCTION tunnel_api.region_state(id int) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
-    SELECT jsonb_strip_nulls(jsonb_build_object('kind', r.kind, 'reason', r.reason, 'waits', nullif(r.waits, false),
+    SELECT jsonb_strip_nulls(jsonb_build_object('kind', r.kind, 'reason', r.reason, 'pending_approval', nullif(r.pending_approval, false),
         'approved_by', r.approved_by, 'geom', public.ST_AsEWKT(r.geom)))
       FROM tunnel.region r WHERE r.id = $1
 $$;
@@ -232,8 +232,8 @@ BEGIN
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     IF TG_OP = 'UPDATE' THEN
-        IF (NEW.id, NEW.survey_id, NEW.survey, NEW.drawn_by, NEW.drawn_at, NEW.waits, NEW.approved_by, NEW.approved_at) IS DISTINCT FROM
-           (OLD.id, OLD.survey_id, OLD.survey, OLD.drawn_by, OLD.drawn_at, OLD.waits, OLD.approved_by, OLD.approved_at) THEN
+        IF (NEW.id, NEW.survey_id, NEW.survey, NEW.drawn_by, NEW.drawn_at, NEW.pending_approval, NEW.approved_by, NEW.approved_at) IS DISTINCT FROM
+           (OLD.id, OLD.survey_id, OLD.survey, OLD.drawn_by, OLD.drawn_at, OLD.pending_approval, OLD.approved_by, OLD.approved_at) THEN
             RAISE EXCEPTION 'of a region only the kind, the reason and the outline (geom) can be edited'
                 USING ERRCODE = 'feature_not_supported';
         END IF;
@@ -282,22 +282,22 @@ BEGIN
     END IF;
     -- what an operator put in force is the region for the reason that it had
     IF was.id IS NULL OR NEW.kind <> was.kind OR NOT NEW.geom OPERATOR(public.=) was.geom OR NEW.reason IS DISTINCT FROM was.reason THEN
-        NEW.waits := NEW.kind = 'dry' AND public.ST_Area(NEW.geom) > most;
+        NEW.pending_approval := NEW.kind = 'dry' AND public.ST_Area(NEW.geom) > most;
         NEW.approved_by := NULL;
         NEW.approved_at := NULL;
     ELSE
-        NEW.waits := was.waits;
+        NEW.pending_approval := was.pending_approval;
         NEW.approved_by := was.approved_by;
         NEW.approved_at := was.approved_at;
     END IF;
     IF TG_OP = 'INSERT' THEN
-        INSERT INTO tunnel.region (survey_id, kind, geom, drawn_by, drawn_at, reason, waits)
-        VALUES (NEW.survey_id, NEW.kind, NEW.geom, NEW.drawn_by, NEW.drawn_at, NEW.reason, NEW.waits)
+        INSERT INTO tunnel.region (survey_id, kind, geom, drawn_by, drawn_at, reason, pending_approval)
+        VALUES (NEW.survey_id, NEW.kind, NEW.geom, NEW.drawn_by, NEW.drawn_at, NEW.reason, NEW.pending_approval)
         RETURNING id INTO NEW.id;
     ELSE
         UPDATE tunnel.region r
            SET kind = NEW.kind, geom = NEW.geom, drawn_by = NEW.drawn_by, drawn_at = NEW.drawn_at, reason = NEW.reason,
-               waits = NEW.waits, approved_by = NEW.approved_by, approved_at = NEW.approved_at
+               pending_approval = NEW.pending_approval, approved_by = NEW.approved_by, approved_at = NEW.approved_at
          WHERE r.id = OLD.id;
     END IF;
     PERFORM tunnel_api.note_edit(NEW.survey, 'region', NEW.id, before, tunnel_api.region_state(NEW.id));
@@ -318,12 +318,12 @@ DECLARE
     before constant jsonb := tunnel_api.region_state(region_id);
 BEGIN
     SELECT r.* INTO was FROM tunnel.region r WHERE r.id = region_id FOR UPDATE;
-    IF was.id IS NULL OR NOT was.waits THEN
+    IF was.id IS NULL OR NOT was.pending_approval THEN
         RAISE EXCEPTION '%', CASE WHEN was.id IS NULL THEN format('there is no region %s', region_id)
                                   ELSE format('region %s does not wait: it is in force', region_id) END
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
-    UPDATE tunnel.region r SET waits = false, approved_by = session_user, approved_at = clock_timestamp()
+    UPDATE tunnel.region r SET pending_approval = false, approved_by = session_user, approved_at = clock_timestamp()
      WHERE r.id = region_id;
     PERFORM tunnel_api.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = was.survey_id), 'region', region_id,
                                  before, tunnel_api.region_state(region_id));

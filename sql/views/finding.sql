@@ -1,5 +1,5 @@
 -- Findings on the lining: what was detected and what people drew, of all kinds, with what became of each. Rows are those of
--- tunnel.anomaly, so that ids are those of the views leak and anomaly; these show what is dark or wet and counts for itself, the
+-- tunnel.finding, so that ids are those of the views leak and anomaly; these show what is dark or wet and counts for itself, the
 -- views here all. Drawn and edited through finding_unrolled, finding_map and finding_3d (views/draw.sql).
 
 CREATE OR REPLACE VIEW tunnel_api.finding_kind AS
@@ -19,7 +19,7 @@ COMMENT ON COLUMN tunnel_api.severity.id IS '1, the least, to 4';
 COMMENT ON COLUMN tunnel_api.severity.label IS 'Its name, in the owner''s words';
 COMMENT ON COLUMN tunnel_api.severity.text IS 'What it means';
 
-CREATE OR REPLACE VIEW tunnel_api.lining_finding AS
+CREATE OR REPLACE VIEW tunnel_api.finding AS
 SELECT a.id, a.survey_id, s.name AS survey, a.km,
        (SELECT min(g.n) FROM tunnel.segment g
          WHERE g.survey_id = a.survey_id AND g.n BETWEEN m.near - 2 AND m.near + 2
@@ -27,33 +27,33 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.chainage_from, a.chainage_to,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, m.chainage) l) AS label,
        a.arc_from, a.arc_to, a.clock,
-       coalesce(a.judged, a.kind) AS kind, k.label AS kind_label, CASE WHEN NOT a.by_hand THEN a.kind END AS found, a.wet,
-       a.origin, a.by_hand, a.severity, v.label AS severity_label, a.width, a.length, a.area,
-       a.image_share IS NOT NULL AS measured, a.drop_mean, a.drop_max, a.image_share, a.contrast, a.confidence, a.reasons,
+       coalesce(a.kind_override, a.kind) AS kind, k.label AS kind_label, CASE WHEN NOT a.manual THEN a.kind END AS kind_detected, a.wet,
+       a.origin, a.manual, a.severity, v.label AS severity_label, a.width, a.length, a.area,
+       a.image_share IS NOT NULL AS measured, a.darkening_mean, a.darkening_max, a.image_share, a.contrast, a.confidence, a.reasons,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.drawn_by, a.drawn_at,
-       a.detected, a.created_at, CASE WHEN NOT a.by_hand THEN a.detected_at END AS detected_at,
-       EXISTS (SELECT FROM tunnel.anomaly x
-                WHERE x.same_as = a.id AND x.same_as IS NOT NULL AND NOT x.by_hand AND x.detected) AS also_detected,
-       (SELECT array_agg(x.id ORDER BY x.id) FROM tunnel.anomaly x
-         WHERE x.same_as = a.id AND NOT x.by_hand AND x.detected) AS detected_as,
-       a.parent_id, a.merged_into, (SELECT array_agg(x.id ORDER BY x.id) FROM tunnel.anomaly x WHERE x.merged_into = a.id) AS merged,
+       a.detected, a.created_at, CASE WHEN NOT a.manual THEN a.detected_at END AS detected_at,
+       EXISTS (SELECT FROM tunnel.finding x
+                WHERE x.same_as = a.id AND x.same_as IS NOT NULL AND NOT x.manual AND x.detected) AS also_detected,
+       (SELECT array_agg(x.id ORDER BY x.id) FROM tunnel.finding x
+         WHERE x.same_as = a.id AND NOT x.manual AND x.detected) AS detected_as,
+       a.parent_id, a.merged_into, (SELECT array_agg(x.id ORDER BY x.id) FROM tunnel.finding x WHERE x.merged_into = a.id) AS merged,
        a.same_as, a.dry_region_id,
-       a.detected AND a.review <> 'rejected' AND NOT a.aside AS counted,
+       a.detected AND a.review <> 'rejected' AND NOT a.superseded AS counted,
        CASE WHEN a.merged_into IS NOT NULL THEN 'merged' WHEN a.same_as IS NOT NULL THEN 'same'
-            WHEN a.review = 'rejected' THEN 'rejected' WHEN a.aside THEN 'dry' WHEN NOT a.detected THEN 'gone'
+            WHEN a.review = 'rejected' THEN 'rejected' WHEN a.superseded THEN 'dry' WHEN NOT a.detected THEN 'gone'
             ELSE a.review END AS state,
-       (SELECT count(*) FROM tunnel.photo p WHERE p.anomaly_id = a.id) AS photos,
+       (SELECT count(*) FROM tunnel.photo p WHERE p.finding_id = a.id) AS photos,
        coalesce(a.shape, a.unrolled) AS unrolled,
        coalesce(a.shape_map, a.map) AS map,
        coalesce(a.shape_surface, a.surface) AS surface
-  FROM tunnel.anomaly a
+  FROM tunnel.finding a
   JOIN tunnel.survey s ON s.id = a.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
-  LEFT JOIN tunnel.finding_kind k ON k.code = coalesce(a.judged, a.kind)
+  LEFT JOIN tunnel.finding_kind k ON k.code = coalesce(a.kind_override, a.kind)
   LEFT JOIN tunnel.severity v ON v.id = a.severity
  CROSS JOIN LATERAL (SELECT (a.chainage_from + a.chainage_to) / 2 AS chainage,
                             floor((a.chainage_from + a.chainage_to) / 2 / t.spacing)::integer AS near) m;
-COMMENT ON VIEW tunnel_api.lining_finding IS
+COMMENT ON VIEW tunnel_api.finding IS
     'Findings on the lining, detected and drawn, of all kinds and states, with their three geometries: polygons, lines and points as they are. To be edited through finding_unrolled, finding_map and finding_3d';
 
 -- The comments on its columns, and its views of one geometry.
@@ -71,18 +71,18 @@ BEGIN
         ('clock', 'Clock position of the middle, hours: 12 is the crown, 3 the right wall looking up-chainage'),
         ('kind', 'Code of its kind (finding_kind), as an inspector judged it, else as found or drawn'),
         ('kind_label', 'Name of its kind'),
-        ('found', 'What detection takes it for; NULL of what was drawn'),
+        ('kind_detected', 'What detection takes it for; NULL of what was drawn'),
         ('wet', 'Whether its kind counts as wet'),
         ('origin', 'How its outline came about: detected, drawn, redrawn, split or merged'),
-        ('by_hand', 'Whether it was drawn, never detected: only that can be deleted'),
+        ('manual', 'Whether it was drawn, never detected: only that can be deleted'),
         ('severity', 'Severity, 1 (the least) to 4'),
         ('severity_label', 'Its name'),
         ('width', 'Width of a line, m'),
         ('length', 'Length of a line on the surface, m'),
         ('area', 'Area on the lining, m²; of a line length times width, of a point 0'),
         ('measured', 'Whether it was measured on the image: what was drawn or redrawn waits for the next detect'),
-        ('drop_mean', 'Mean drop of corrected intensity below dry lining, dB'),
-        ('drop_max', 'Greatest drop of corrected intensity below dry lining, dB'),
+        ('darkening_mean', 'Mean drop of corrected intensity below dry lining, dB'),
+        ('darkening_max', 'Greatest drop of corrected intensity below dry lining, dB'),
         ('image_share', 'Share of its outline on which the image holds measurements, 0-1'),
         ('contrast', 'Mean drop in standard deviations of the dry lining about it'),
         ('confidence', 'How sure detection is of what it found, 0-1; NULL of what was drawn'),
@@ -110,20 +110,20 @@ BEGIN
         ('surface', 'On the lining in space, tunnel''s SRID')) AS t (name, text)
       JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
       JOIN pg_class c ON c.oid = a.attrelid
-     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname = 'lining_finding'
+     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname = 'finding'
     LOOP
         EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', comment.view, comment."column", comment.text);
     END LOOP;
 END
 $$;
 CALL tunnel_api.make_geometry_views(
-    'lining_finding', 'finding', 'Findings',
+    'finding', 'finding', 'Findings',
     ': polygons, lines and points are drawn, redrawn and reviewed here, and what was drawn is deleted');
 
 CREATE OR REPLACE VIEW tunnel_api.finding_photo AS
-SELECT p.id, p.anomaly_id AS finding_id, a.survey_id, s.name AS survey, p.path, p.caption, p.added_by, p.added_at
+SELECT p.id, p.finding_id, a.survey_id, s.name AS survey, p.path, p.caption, p.added_by, p.added_at
   FROM tunnel.photo p
-  JOIN tunnel.anomaly a ON a.id = p.anomaly_id
+  JOIN tunnel.finding a ON a.id = p.finding_id
   JOIN tunnel.survey s ON s.id = a.survey_id;
 COMMENT ON VIEW tunnel_api.finding_photo IS 'Photos of findings, by path or URL; rows may be added, changed and deleted';
 COMMENT ON COLUMN tunnel_api.finding_photo.finding_id IS 'Its finding';
@@ -132,7 +132,7 @@ COMMENT ON COLUMN tunnel_api.finding_photo.caption IS 'What it shows';
 COMMENT ON COLUMN tunnel_api.finding_photo.added_by IS 'Who added it, set by the database';
 COMMENT ON COLUMN tunnel_api.finding_photo.added_at IS 'When it was added, set by the database';
 
--- How many there are of each kind and origin, and what becomes of each, from the sums that triggers on tunnel.anomaly keep.
+-- How many there are of each kind and origin, and what becomes of each, from the sums that triggers on tunnel.finding keep.
 CREATE OR REPLACE VIEW tunnel_api.finding_count AS
 SELECT (a.survey_id::bigint * 100000 + min(k.id)) * 10
            + array_position('{detected,drawn,redrawn,split,merged}'::text[], a.origin) AS id,
@@ -175,13 +175,13 @@ SELECT r.id, r.survey_id, s.name AS survey, ST_XMin(r.geom) AS chainage_from, ST
        tunnel_api.station_label(s.tunnel_id, ST_XMin(r.geom)) AS label_from,
        tunnel_api.station_label(s.tunnel_id, ST_XMax(r.geom)) AS label_to,
        ST_YMin(r.geom) AS arc_from, ST_YMax(r.geom) AS arc_to, ST_Area(r.geom) AS area, t.dry_region_limit AS area_limit, r.reason,
-       r.drawn_by, r.drawn_at, r.waits, r.approved_by, r.approved_at, l.leaks, l.leaks_area, l.ids AS leak_ids, r.geom::public.geometry(Polygon, 0) AS geom
+       r.drawn_by, r.drawn_at, r.pending_approval, r.approved_by, r.approved_at, l.leaks, l.leaks_area, l.ids AS leak_ids, r.geom::public.geometry(Polygon, 0) AS geom
   FROM tunnel.region r
   JOIN tunnel.survey s ON s.id = r.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
  CROSS JOIN LATERAL (
         SELECT count(*) AS leaks, coalesce(sum(a.area), 0) AS leaks_area, array_agg(a.id ORDER BY a.id) AS ids
-          FROM tunnel.anomaly a
+          FROM tunnel.finding a
          WHERE a.dry_region_id = r.id AND a.review = 'open' AND a.merged_into IS NULL AND a.same_as IS NULL) l
  WHERE r.kind = 'dry';
 COMMENT ON VIEW tunnel_api.dry_region IS
@@ -191,12 +191,12 @@ COMMENT ON COLUMN tunnel_api.dry_region.arc_to IS 'Greatest arc, m';
 COMMENT ON COLUMN tunnel_api.dry_region.area IS 'Its area in the unrolled plane, m²';
 COMMENT ON COLUMN tunnel_api.dry_region.area_limit IS 'Area above which it must say why, and waits for an operator (tunnel.tunnel.dry_region_limit), m²';
 COMMENT ON COLUMN tunnel_api.dry_region.reason IS 'Why it was drawn';
-COMMENT ON COLUMN tunnel_api.dry_region.waits IS 'Whether it waits for an operator (dry_region_approve): until then it takes nothing away';
+COMMENT ON COLUMN tunnel_api.dry_region.pending_approval IS 'Whether it waits for an operator (dry_region_approve): until then it takes nothing away';
 COMMENT ON COLUMN tunnel_api.dry_region.approved_by IS 'Operator who put it in force, where it had to wait';
 COMMENT ON COLUMN tunnel_api.dry_region.approved_at IS 'When';
 COMMENT ON COLUMN tunnel_api.dry_region.leaks IS 'How many open leaks it took away';
 COMMENT ON COLUMN tunnel_api.dry_region.leaks_area IS 'Their area, m²';
-COMMENT ON COLUMN tunnel_api.dry_region.leak_ids IS 'Their ids (lining_finding)';
+COMMENT ON COLUMN tunnel_api.dry_region.leak_ids IS 'Their ids (finding)';
 COMMENT ON COLUMN tunnel_api.dry_region.geom IS 'Polygon in the unrolled plane (chainage, arc), m';
 
 -- An example of an owner's view, by the Specifications for the National Tunnel Inventory (FHWA): severity 1 to 4 as condition

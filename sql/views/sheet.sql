@@ -5,7 +5,7 @@
 -- the table of leaks (sheet_leak), and of these people's severities are drawn, and drips as what they are, points.
 CREATE OR REPLACE VIEW tunnel_api.sheet_finding AS
 SELECT f.id, f.survey_id, f.survey, f.km, f.chainage_from, f.chainage_to, f.label, f.arc_from, f.arc_to, f.clock,
-       f.kind, f.kind_label, k.position, f.wet, f.origin, f.by_hand, f.severity, f.severity_label, f.width, f.length, f.area,
+       f.kind, f.kind_label, k.position, f.wet, f.origin, f.manual, f.severity, f.severity_label, f.width, f.length, f.area,
        f.counted, f.state, f.remark, p.shown, p.shown AND NOT f.wet AS listed, f.geom
   FROM tunnel_api.finding_unrolled f
   LEFT JOIN tunnel.finding_kind k ON k.code = f.kind
@@ -21,12 +21,12 @@ COMMENT ON COLUMN tunnel_api.sheet_finding.geom IS 'In the unrolled plane (chain
 
 CREATE OR REPLACE VIEW tunnel_api.sheet_leak AS
 SELECT l.id, l.survey_id, l.survey, l.km, l.chainage_from, l.chainage_to, l.label, l.arc_from, l.arc_to, l.clock, l.kind,
-       l.area, l.drop_mean, CASE WHEN l.kind = l.found THEN l.confidence END AS confidence, l.review, l.remark, l.detected,
+       l.area, l.darkening_mean, CASE WHEN l.kind = l.kind_detected THEN l.confidence END AS confidence, l.review, l.remark, l.detected,
        concat_ws('; ', nullif(concat_ws(', ', CASE WHEN l.kind <> 'leak' THEN k.label END, v.label), ''), nullif(l.remark, ''))
            AS note,
        l.geom
   FROM tunnel_api.leak_unrolled l
-  JOIN tunnel.anomaly a ON a.id = l.id
+  JOIN tunnel.finding a ON a.id = l.id
   LEFT JOIN tunnel.finding_kind k ON k.code = l.kind
   LEFT JOIN tunnel.severity v ON v.id = a.severity;
 COMMENT ON VIEW tunnel_api.sheet_leak IS 'Leaks as sheets draw and list them';
@@ -74,8 +74,8 @@ SELECT s.id::bigint * 1000000 + 500000 + r.number AS id, s.id AS survey_id, s.na
                  GROUP BY i
                 HAVING sum(least(g.chainage_to, e.chainage_to, (i + 1) * 50) - greatest(g.chainage_from, e.chainage_from, i * 50))
                            >= 1
-                    OR EXISTS (SELECT FROM tunnel.anomaly x
-                                WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND x.wet AND NOT x.aside
+                    OR EXISTS (SELECT FROM tunnel.finding x
+                                WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND x.wet AND NOT x.superseded
                                   AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(i * 50, -1e4, (i + 1) * 50, 1e4)
                                   AND x.chainage_to > greatest(e.chainage_from, i * 50)
                                   AND x.chainage_from < least(e.chainage_to, (i + 1) * 50))) q
@@ -108,8 +108,8 @@ SELECT s.id::bigint * 1000000 + 500000 + r.number AS id, s.id AS survey_id, s.na
         SELECT CASE WHEN c.lining IS NOT NULL OR count(*) > 0 THEN count(*) END AS leaks,
                coalesce(sum(tunnel_api.area_between(x.unrolled, x.area, r.chainage_from, r.chainage_to)),
                         CASE WHEN c.lining IS NOT NULL THEN 0 END) AS wet_area
-          FROM tunnel.anomaly x
-         WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND x.wet AND NOT x.aside
+          FROM tunnel.finding x
+         WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND x.wet AND NOT x.superseded
            AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(b.chainage_from, -1e4, b.chainage_to, 1e4)
            AND x.chainage_to > r.chainage_from AND x.chainage_from < r.chainage_to) l ON true
   LEFT JOIN LATERAL (
@@ -117,7 +117,7 @@ SELECT s.id::bigint * 1000000 + 500000 + r.number AS id, s.id AS survey_id, s.na
                string_agg(t.findings || ' ' || t.state, ', ' ORDER BY t.state)
                    FILTER (WHERE t.state IN ('rejected', 'merged', 'same', 'dry')) AS left_out
           FROM (SELECT q.state, q.listed, count(*) AS findings
-                  FROM tunnel.anomaly x
+                  FROM tunnel.finding x
                   JOIN tunnel_api.sheet_finding q ON q.id = x.id
                  WHERE x.survey_id = s.id
                    AND x.unrolled OPERATOR(public.&&) public.st_makeenvelope(b.chainage_from, -1e4, b.chainage_to, 1e4)

@@ -53,12 +53,12 @@ SELECT g.id, g.survey_id, g.survey, g.km, g.chainage_from, g.chainage_to, g.lini
         SELECT count(*) FILTER (WHERE k.detected AND k.review = 'open') AS leaks_open,
                count(*) FILTER (WHERE k.detected AND k.review = 'confirmed') AS leaks_confirmed,
                count(*) FILTER (WHERE k.detected AND k.review = 'rejected') AS leaks_rejected,
-               max(k.drop_max) FILTER (WHERE k.detected AND k.review <> 'rejected') AS greatest_drop
-          FROM tunnel.anomaly k
+               max(k.darkening_max) FILTER (WHERE k.detected AND k.review <> 'rejected') AS greatest_drop
+          FROM tunnel.finding k
          WHERE k.survey_id = g.survey_id AND k.chainage_to > g.chainage_from AND k.chainage_from < g.chainage_to
            AND k.chainage_from >= g.chainage_from - (  -- no more of the index is read than the longest can reach
-                   SELECT max(m.chainage_to - m.chainage_from) FROM tunnel.anomaly m WHERE m.survey_id = g.survey_id) - 1e-6
-           AND k.wet AND NOT k.aside) l;
+                   SELECT max(m.chainage_to - m.chainage_from) FROM tunnel.finding m WHERE m.survey_id = g.survey_id) - 1e-6
+           AND k.wet AND NOT k.superseded) l;
 COMMENT ON VIEW tunnel_api.km_statistics IS 'Leaks of each kilometre, summed, as km_waterproof has them; without those rejected or no longer found';
 COMMENT ON COLUMN tunnel_api.km_statistics.lining_area IS 'Lining, seen or not, m²; NULL before detection, and after one by an earlier version';
 COMMENT ON COLUMN tunnel_api.km_statistics.seen_area IS 'Lining that the last detection saw, m²; NULL before it';

@@ -1,7 +1,7 @@
 -- Views of structures: members, faces, and spots that differ from their own surface (Ono et al.). A spot has three geometries,
 -- each with a view of its own for QGIS: in its face's own plane (SRID 0), on the map and in space. A fourth view has those of
--- the face laid out to be drawn, member below member, as *_sheet has members and faces. finding has leaks and
--- spots together. Needs stationing (geometry/stationing.sql) and views/anomaly.sql.
+-- the face laid out to be drawn, member below member, as *_sheet has members and faces. Needs stationing
+-- (geometry/stationing.sql).
 
 -- What members of a survey are found from: its files' checksums by name, and when its settings were last changed. A search is up
 -- to date as long as these are the same as in its row of the ledger.
@@ -318,30 +318,3 @@ $$;
 CALL tunnel_api.make_geometry_views(
     'spot', 'spot', 'Spots', '; review and remark can be updated', 'outline', 'face', 'in their face''s own plane, SRID 0',
     'on the map, in the tunnel''s SRID', 'in space, in the tunnel''s SRID');
-
-CREATE OR REPLACE VIEW tunnel_api.finding AS
-SELECT 2 * l.id AS id, 'leak' AS finding, l.id AS row_id, l.survey_id, l.survey, l.id AS number, l.kind,
-       (l.chainage_from + l.chainage_to) / 2 AS chainage, l.label, l.area, l.confidence, l.contrast,
-       l.review, l.reviewed_by, l.reviewed_at, l.remark, l.detected, l.counted, l.surface AS geom
-  FROM tunnel_api.leak l
- UNION ALL
-SELECT 2 * p.id + 1, 'spot', p.id, p.survey_id, p.survey, p.number, p.kind, p.chainage, p.label, p.area, p.confidence,
-       p.contrast, p.review, p.reviewed_by, p.reviewed_at, p.remark, p.detected, p.counted, p.surface
-  FROM tunnel_api.spot p;
-COMMENT ON VIEW tunnel_api.finding IS 'Leaks and spots of structures together, in space. Waterproofing rests on leaks alone';
-COMMENT ON COLUMN tunnel_api.finding.finding IS 'leak (a row of tunnel_api.leak) or spot (of tunnel_api.spot)';
-COMMENT ON COLUMN tunnel_api.finding.row_id IS 'Its id there';
-COMMENT ON COLUMN tunnel_api.finding.number IS 'The number by which people know it: of a leak its id';
-COMMENT ON COLUMN tunnel_api.finding.kind IS 'leak; of a spot dark or bright';
-COMMENT ON COLUMN tunnel_api.finding.chainage IS 'Chainage of its middle, m; NULL of a site';
-COMMENT ON COLUMN tunnel_api.finding.counted IS 'Whether sums count it: found last, and not rejected';
-COMMENT ON COLUMN tunnel_api.finding.geom IS 'In space, in the tunnel''s SRID';
-COMMENT ON COLUMN tunnel_api.finding.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.finding.area IS 'Area on the lining, or on its face, m²';
-COMMENT ON COLUMN tunnel_api.finding.confidence IS 'How sure detection is of it, 0-1';
-COMMENT ON COLUMN tunnel_api.finding.contrast IS 'Mean difference from the surface about it, in standard deviations of that';
-COMMENT ON COLUMN tunnel_api.finding.review IS 'open, confirmed or rejected';
-COMMENT ON COLUMN tunnel_api.finding.reviewed_by IS 'Who reviewed it last';
-COMMENT ON COLUMN tunnel_api.finding.reviewed_at IS 'When it was reviewed last';
-COMMENT ON COLUMN tunnel_api.finding.remark IS 'The reviewer''s remark';
-COMMENT ON COLUMN tunnel_api.finding.detected IS 'False when the last run found it no more (kept for its review)';

@@ -142,7 +142,7 @@ COMMENT ON COLUMN tunnel_api.section_unrolled.arc_from IS 'Arc at the left end, 
 COMMENT ON COLUMN tunnel_api.section_unrolled.arc_to IS 'Arc at the right end, straight below the axis, m';
 
 CREATE OR REPLACE VIEW tunnel_api.region AS
-SELECT r.id, r.survey_id, s.name AS survey, r.kind, r.drawn_by, r.drawn_at, r.reason, r.waits, r.approved_by, r.approved_at,
+SELECT r.id, r.survey_id, s.name AS survey, r.kind, r.drawn_by, r.drawn_at, r.reason, r.pending_approval, r.approved_by, r.approved_at,
        r.geom::public.geometry(Polygon, 0) AS geom
   FROM tunnel.region r
   JOIN tunnel.survey s ON s.id = r.survey_id;
@@ -150,7 +150,7 @@ COMMENT ON VIEW tunnel_api.region IS
     'Regions of the unrolled plane drawn by hand for the intensity correction; rows may be added, changed and deleted';
 COMMENT ON COLUMN tunnel_api.region.kind IS 'homogeneous (one material: gives the roughness) or dry (dry lining: gives the threshold)';
 COMMENT ON COLUMN tunnel_api.region.reason IS 'Why it is drawn: a dry region larger than the tunnel''s limit (dry_region) needs one';
-COMMENT ON COLUMN tunnel_api.region.waits IS 'Whether it waits for an operator (dry_region_approve), being larger than that limit: until then it is as if it were not there';
+COMMENT ON COLUMN tunnel_api.region.pending_approval IS 'Whether it waits for an operator (dry_region_approve), being larger than that limit: until then it is as if it were not there';
 COMMENT ON COLUMN tunnel_api.region.approved_by IS 'Operator who put it in force, where it had to wait';
 COMMENT ON COLUMN tunnel_api.region.approved_at IS 'When';
 COMMENT ON COLUMN tunnel_api.region.geom IS 'Polygon in the unrolled plane (chainage, arc), m';

@@ -5,7 +5,7 @@
 CREATE OR REPLACE FUNCTION tunnel_api.last_step(finding_id bigint) RETURNS tunnel_audit.entry
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
     SELECT e.* FROM tunnel_audit.entry e
-     WHERE e.view = 'anomaly' AND e.row_id = $1 AND e.undoes IS NULL
+     WHERE e.view = 'finding' AND e.row_id = $1 AND e.undoes IS NULL
        AND NOT EXISTS (SELECT FROM tunnel_audit.entry u WHERE u.undoes = e.id)
      ORDER BY e.id DESC LIMIT 1
 $$;
@@ -28,7 +28,7 @@ BEGIN
         why := format('its last change is of %s: only who made it, or an operator, takes it back', step.who);
     ELSIF (is_now IS NULL) <> (step.action = 'delete') THEN
         why := CASE WHEN is_now IS NULL THEN 'it is gone' ELSE 'it is there' END;
-    ELSIF step.action = 'insert' AND EXISTS (SELECT FROM tunnel.photo p WHERE p.anomaly_id = finding_id) THEN
+    ELSIF step.action = 'insert' AND EXISTS (SELECT FROM tunnel.photo p WHERE p.finding_id = check_undo.finding_id) THEN
         why := 'it has photos: delete them first';
     ELSIF step.action = 'update' AND NOT step.after ? 'merged' AND step.after ->> 'origin' IN ('split', 'merged')
           AND NOT EXISTS (SELECT FROM tunnel_audit.entry e WHERE e.part_of = step.id) THEN
@@ -39,13 +39,13 @@ BEGIN
          WHERE is_now ->> k.key IS DISTINCT FROM step.after ->> k.key
         HAVING count(*) > 0;
     END IF;
-    FOR part IN SELECT e.* FROM tunnel_audit.entry e WHERE e.part_of = step.id AND e.view = 'anomaly' ORDER BY e.id LOOP
+    FOR part IN SELECT e.* FROM tunnel_audit.entry e WHERE e.part_of = step.id AND e.view = 'finding' ORDER BY e.id LOOP
         EXIT WHEN why IS NOT NULL;
         IF (tunnel_api.last_step(part.row_id)).id <> part.id THEN
             why := format('finding %s, a part of it, was changed since: take that back first', part.row_id);
-        ELSIF part.action = 'insert' AND EXISTS (SELECT FROM tunnel.photo p WHERE p.anomaly_id = part.row_id) THEN
+        ELSIF part.action = 'insert' AND EXISTS (SELECT FROM tunnel.photo p WHERE p.finding_id = part.row_id) THEN
             why := format('finding %s, a part of it, has photos: delete them first', part.row_id);
-        ELSIF NOT EXISTS (SELECT FROM tunnel.anomaly a WHERE a.id = part.row_id) THEN
+        ELSIF NOT EXISTS (SELECT FROM tunnel.finding a WHERE a.id = part.row_id) THEN
             why := format('finding %s, a part of it, is gone', part.row_id);
         END IF;
     END LOOP;
@@ -62,10 +62,10 @@ CREATE OR REPLACE FUNCTION tunnel_api.stamp_finding(finding_id bigint, step tunn
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
     WITH stood AS MATERIALIZED (
         SELECT e.* FROM tunnel_audit.entry e
-         WHERE e.view = 'anomaly' AND e.row_id = $1 AND e.id < $2.id AND e.undoes IS NULL
+         WHERE e.view = 'finding' AND e.row_id = $1 AND e.id < $2.id AND e.undoes IS NULL
            AND NOT EXISTS (SELECT FROM tunnel_audit.entry u WHERE u.undoes = e.id)
     )
-    UPDATE tunnel.anomaly a
+    UPDATE tunnel.finding a
        SET drawn_by = CASE WHEN a.origin <> 'detected' THEN coalesce(d.who, a.drawn_by, session_user) END,
            drawn_at = CASE WHEN a.origin <> 'detected' THEN coalesce(d.at, a.drawn_at, clock_timestamp()) END,
            reviewed_by = CASE WHEN c.reviewed THEN r.who ELSE a.reviewed_by END,
@@ -88,25 +88,25 @@ DECLARE
     becomes jsonb := tunnel_api.finding_state(finding_id) - ARRAY(SELECT jsonb_object_keys(changed)) || coalesce(step.before, '{}');
 BEGIN
     IF changed ?| ARRAY['geom', 'origin']
-       OR (changed ? 'width' AND EXISTS (SELECT FROM tunnel.anomaly a WHERE a.id = finding_id AND a.shape IS NOT NULL)) THEN
+       OR (changed ? 'width' AND EXISTS (SELECT FROM tunnel.finding a WHERE a.id = finding_id AND a.shape IS NOT NULL)) THEN
         -- what detection has found of it since would count beside it if it were detected again
         IF becomes ->> 'origin' = 'detected' AND EXISTS (
-            SELECT FROM tunnel.anomaly x WHERE x.same_as = finding_id AND x.origin = 'detected' AND x.created_at > step.at) THEN
+            SELECT FROM tunnel.finding x WHERE x.same_as = finding_id AND x.origin = 'detected' AND x.created_at > step.at) THEN
             becomes := becomes || '{"origin": "redrawn"}';
         END IF;
         PERFORM tunnel_api.redraw(finding_id, public.ST_GeomFromEWKT(becomes ->> 'geom'), (becomes ->> 'width')::float8, becomes ->> 'origin');
-        UPDATE tunnel.anomaly a
-           SET drop_mean = k.drop_mean, drop_max = k.drop_max, image_share = k.image_share, contrast = k.contrast,
+        UPDATE tunnel.finding a
+           SET darkening_mean = k.darkening_mean, darkening_max = k.darkening_max, image_share = k.image_share, contrast = k.contrast,
                confidence = k.confidence, reasons = k.reasons, evidence = k.evidence, features = k.features,
                feature_list_id = k.feature_list_id, model = k.model, detected = k.detected, area = k.area, clock = k.clock
-          FROM jsonb_populate_record(NULL::tunnel.anomaly, step.kept) k
+          FROM jsonb_populate_record(NULL::tunnel.finding, step.kept) k
          WHERE a.id = finding_id AND step.kept IS NOT NULL;
     END IF;
-    UPDATE tunnel.anomaly a
+    UPDATE tunnel.finding a
        SET severity = (becomes ->> 'severity')::smallint, width = (becomes ->> 'width')::float8, review = becomes ->> 'review',
            remark = becomes ->> 'remark', merged_into = (becomes ->> 'merged_into')::bigint,
-           kind = CASE WHEN a.by_hand THEN becomes ->> 'kind' ELSE a.kind END,
-           judged = CASE WHEN NOT a.by_hand THEN nullif(becomes ->> 'kind', a.kind) END
+           kind = CASE WHEN a.manual THEN becomes ->> 'kind' ELSE a.kind END,
+           kind_override = CASE WHEN NOT a.manual THEN nullif(becomes ->> 'kind', a.kind) END
      WHERE a.id = finding_id;
     PERFORM tunnel_api.stamp_finding(finding_id, step);
 END
@@ -123,12 +123,12 @@ BEGIN
     PERFORM tunnel_api.add_finding(
         survey_id, had ->> 'kind', public.ST_GeomFromEWKT(had ->> 'geom'), (had ->> 'width')::float8, (had ->> 'severity')::int,
         had ->> 'review', had ->> 'remark', had ->> 'origin', true,
-        (SELECT a.id FROM tunnel.anomaly a WHERE a.id = (had ->> 'parent_id')::bigint), step.row_id);
-    UPDATE tunnel.anomaly a SET drop_mean = k.drop_mean, drop_max = k.drop_max, image_share = k.image_share, contrast = k.contrast
-      FROM jsonb_populate_record(NULL::tunnel.anomaly, step.kept) k
+        (SELECT a.id FROM tunnel.finding a WHERE a.id = (had ->> 'parent_id')::bigint), step.row_id);
+    UPDATE tunnel.finding a SET darkening_mean = k.darkening_mean, darkening_max = k.darkening_max, image_share = k.image_share, contrast = k.contrast
+      FROM jsonb_populate_record(NULL::tunnel.finding, step.kept) k
      WHERE a.id = step.row_id AND step.kept IS NOT NULL;
     PERFORM tunnel_api.stamp_finding(step.row_id, step);
-    INSERT INTO tunnel.photo (id, anomaly_id, path, caption, added_by, added_at) OVERRIDING SYSTEM VALUE
+    INSERT INTO tunnel.photo (id, finding_id, path, caption, added_by, added_at) OVERRIDING SYSTEM VALUE
     SELECT e.row_id, step.row_id, e.before ->> 'path', e.before ->> 'caption', e.before ->> 'added_by', (e.before ->> 'added_at')::timestamptz
       FROM tunnel_audit.entry e WHERE e.part_of = step.id AND e.view = 'photo';
 END
@@ -154,39 +154,39 @@ BEGIN
         RAISE EXCEPTION 'there is no change of a finding % to be taken back', finding USING ERRCODE = 'invalid_parameter_value';
     END IF;
     PERFORM tunnel_api.lock_findings(survey_key);
-    PERFORM FROM tunnel.anomaly a
-      WHERE a.id = finding OR a.id IN (SELECT e.row_id FROM tunnel_audit.entry e WHERE e.part_of = step.id AND e.view = 'anomaly')
+    PERFORM FROM tunnel.finding a
+      WHERE a.id = finding OR a.id IN (SELECT e.row_id FROM tunnel_audit.entry e WHERE e.part_of = step.id AND e.view = 'finding')
       ORDER BY a.id FOR UPDATE;
     step := tunnel_api.last_step(finding);  -- of now, that nobody else can change it
     PERFORM tunnel_api.check_undo(finding, step);
     before := tunnel_api.finding_state(finding);
-    place := (SELECT a.unrolled FROM tunnel.anomaly a WHERE a.id = finding);
+    place := (SELECT a.unrolled FROM tunnel.finding a WHERE a.id = finding);
     IF step.action = 'insert' THEN
-        DELETE FROM tunnel.anomaly a WHERE a.id = finding;
+        DELETE FROM tunnel.finding a WHERE a.id = finding;
     ELSIF step.action = 'delete' THEN
         PERFORM tunnel_api.revive_finding(survey_key, step);
     ELSE
         PERFORM tunnel_api.restore_finding(finding, step);
     END IF;
-    done := tunnel_api.note_edit(step.survey, 'anomaly', finding, before, tunnel_api.finding_state(finding), undoes => step.id);
+    done := tunnel_api.note_edit(step.survey, 'finding', finding, before, tunnel_api.finding_state(finding), undoes => step.id);
     IF done IS NULL THEN  -- a merge into one that held all
-        done := tunnel_api.note_edit(step.survey, 'anomaly', finding, before || jsonb_build_object('merged', step.after -> 'merged'),
+        done := tunnel_api.note_edit(step.survey, 'finding', finding, before || jsonb_build_object('merged', step.after -> 'merged'),
                                      tunnel_api.finding_state(finding), undoes => step.id);
     END IF;
     FOR part IN SELECT e.* FROM tunnel_audit.entry e WHERE e.part_of = step.id ORDER BY e.id LOOP
-        before := CASE part.view WHEN 'anomaly' THEN tunnel_api.finding_state(part.row_id) END;
+        before := CASE part.view WHEN 'finding' THEN tunnel_api.finding_state(part.row_id) END;
         IF part.view = 'photo' THEN
             PERFORM tunnel_api.note_edit(step.survey, 'photo', part.row_id, NULL, part.before, undoes => part.id, part_of => done);
             CONTINUE;
         ELSIF part.action = 'insert' THEN
-            DELETE FROM tunnel.anomaly a WHERE a.id = part.row_id;
+            DELETE FROM tunnel.finding a WHERE a.id = part.row_id;
         ELSE
             PERFORM tunnel_api.restore_finding(part.row_id, part);
         END IF;
-        PERFORM tunnel_api.note_edit(step.survey, 'anomaly', part.row_id, before, tunnel_api.finding_state(part.row_id),
+        PERFORM tunnel_api.note_edit(step.survey, 'finding', part.row_id, before, tunnel_api.finding_state(part.row_id),
                                      undoes => part.id, part_of => done);
     END LOOP;
-    place := public.ST_Collect(place, (SELECT a.unrolled FROM tunnel.anomaly a WHERE a.id = finding));
+    place := public.ST_Collect(place, (SELECT a.unrolled FROM tunnel.finding a WHERE a.id = finding));
     PERFORM tunnel_api.settle_findings(survey_key, place);
     RETURN CASE WHEN step.action = 'insert' THEN 'drawn' WHEN step.action = 'delete' THEN 'deleted'
                 WHEN step.after ? 'merged' THEN 'merged'

@@ -316,8 +316,8 @@ def test_wet_polygon_with_a_hole_has_the_true_area_and_drop():
     assert found.intersection(true).area / found.union(true).area > 0.96
     shown = mask & (level != NODATA)
     assert region.filled == shown.sum()
-    assert region.drop_sum == pytest.approx((0.5 - level[shown] / 100).sum())
-    assert region.drop_max == pytest.approx(0.5 - level[shown].min() / 100)
+    assert region.darkening_sum == pytest.approx((0.5 - level[shown] / 100).sum())
+    assert region.darkening_max == pytest.approx(0.5 - level[shown].min() / 100)
     np.testing.assert_array_equal(region.mask, mask[np.ix_(mask.any(axis=1), mask.any(axis=0))][::-1])
 
 

@@ -49,7 +49,7 @@ def test_softness_and_brightness_of_the_rim_and_what_it_lies_at():
     found = measured(
         np.ones((40, 40), bool), steps=100, inside=400.0, outside=150.0, far_steps=50, far_outside=10.0, bright=25,
         perimeter=160, perimeter_off=40, off_above=16, floor=8, perimeter_recess=16, recess=160, sharp=60, straight=45,
-        drop_square=1600 * 17.0,
+        darkening_square=1600 * 17.0,
     )  # fmt: skip
     assert found["step"] == pytest.approx((4.0 - 1.5) / 4.0)
     assert found["far_step"] == pytest.approx((4.0 - 0.2) / 4.0)

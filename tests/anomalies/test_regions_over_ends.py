@@ -50,7 +50,9 @@ def assert_same(one: list[Anomaly], other: list[Anomaly]) -> None:
     assert len(one) == len(other)
     for a, b in zip(one, other, strict=True):
         assert a.outline.equals_exact(b.outline, 1e-9)
-        assert (a.drop_mean, a.drop_max, a.image_share) == pytest.approx((b.drop_mean, b.drop_max, b.image_share))
+        assert (a.darkening_mean, a.darkening_max, a.image_share) == pytest.approx(
+            (b.darkening_mean, b.darkening_max, b.image_share)
+        )
         assert a.contrast == pytest.approx(b.contrast)
         # Which sides are sharp goes by the drop of each part; all other features are those of the whole.
         by_part = {"straight", "sharp", "rectangular_degree"}
@@ -90,7 +92,7 @@ def test_a_leak_across_three_kilometres_is_one() -> None:
     whole, speck = leaks([region for _, region in found], 0.0)
     assert whole.outline.bounds == (5000 - 250 + 20, 0.5 * (3 + 2), 5000 - 250 + 1540, 0.5 * (3 + 4))
     assert whole.outline.area == pytest.approx(0.25 * (mask.sum() - 3))
-    assert whole.drop_mean == pytest.approx(DRY + 1.0)
+    assert whole.darkening_mean == pytest.approx(DRY + 1.0)
     assert speck.outline.area == pytest.approx(0.25 * 3)
 
 

@@ -271,7 +271,7 @@ def _region(side: int, drop: float, share: float = 1.0, pixel: float = PIXEL) ->
     rim = 4.0 * side
     properties = RegionProperties(
         sigma=filled * SIGMA, perimeter=rim, steps=rim, inside=0.9 * rim * drop, outside=0.2 * rim * drop, far_steps=rim,
-        sharp=rim, straight=0.4 * rim, drop_square=1.05 * filled * drop**2,
+        sharp=rim, straight=0.4 * rim, darkening_square=1.05 * filled * drop**2,
     )  # fmt: skip
     return Region(pixel, 0, 0, mask, filled, filled * drop, drop, properties)
 

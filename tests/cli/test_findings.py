@@ -52,7 +52,7 @@ DRAWN = (
 def test_the_list_is_what_counts_and_is_filtered(conn: psycopg.Connection) -> None:
     conn.execute(DRAWN)
     conn.commit()
-    counted = [r[0] for r in conn.execute("SELECT id FROM tunnel_api.lining_finding WHERE counted ORDER BY id")]
+    counted = [r[0] for r in conn.execute("SELECT id FROM tunnel_api.finding WHERE counted ORDER BY id")]
     conn.rollback()
     assert sorted(ids(run("findings", NAME, "--json"))) == counted
     assert len(ids(run("findings", NAME, "--kind", "crack", "--kind", "missing_bolt", "--json"))) == 2
@@ -80,8 +80,7 @@ def test_files_hold_what_the_database_has(conn: psycopg.Connection, tmp_path: Pa
     conn.commit()
     column = {"3d": "surface"}.get(geometry, geometry)
     rows = conn.execute(
-        f"SELECT id, severity, length, remark, ST_AsBinary({column}) FROM tunnel_api.lining_finding "
-        "WHERE counted ORDER BY id".encode()
+        f"SELECT id, severity, length, remark, ST_AsBinary({column}) FROM tunnel_api.finding WHERE counted ORDER BY id".encode()
     ).fetchall()
     conn.rollback()
     for name in ("f.gpkg", "f.geojson", "f.csv"):
@@ -115,9 +114,7 @@ def test_the_workbook_is_what_the_database_has(conn: psycopg.Connection, tmp_pat
     conn.execute("UPDATE tunnel_api.finding_unrolled SET remark = %s WHERE kind = 'crack'", [formula])
     conn.execute("UPDATE tunnel_api.finding_unrolled SET remark = '@SUM(1)', review = 'rejected' WHERE kind = 'missing_bolt'")
     conn.commit()
-    select = (
-        "SELECT id, kind, severity, area, length, drawn_at, state, remark FROM tunnel_api.lining_finding WHERE counted = %s"
-    )
+    select = "SELECT id, kind, severity, area, length, drawn_at, state, remark FROM tunnel_api.finding WHERE counted = %s"
     path = tmp_path / "f.xlsx"
     told = json.loads(run("findings", NAME, "-o", path, "--json").stdout)
     names = ("No.", "Code of kind", "Severity", "Area, m²", "Length, m", "Drawn, UTC", "State", "Remark")
@@ -184,7 +181,7 @@ def test_a_csv_of_another_system_is_imported_whole(conn: psycopg.Connection, tmp
     assert done.stdout == f"{NAME}: 4 findings imported: 1 crack, 1 leak, 2 missing_bolt\n"
     rows = conn.execute(
         "SELECT kind, severity, remark, photos, (chainage_from + chainage_to) / 2, (arc_from + arc_to) / 2, origin "
-        "FROM tunnel_api.lining_finding WHERE by_hand ORDER BY id"
+        "FROM tunnel_api.finding WHERE manual ORDER BY id"
     ).fetchall()
     assert rows == [
         ("missing_bolt", 2, "fehlt", 1, pytest.approx(12360), pytest.approx(-2), "drawn"),
@@ -208,12 +205,12 @@ def test_each_bad_row_is_one_line_and_nothing_is_half_written(conn: psycopg.Conn
         lines, ("not ghost", "beyond the lining", "chainage is 'here'", "1 to 4", "'big'", "not as point"), strict=False
     ):
         assert said in line
-    assert conn.execute("SELECT count(*) FROM tunnel_api.lining_finding WHERE by_hand").fetchone() == (0,)
+    assert conn.execute("SELECT count(*) FROM tunnel_api.finding WHERE manual").fetchone() == (0,)
 
 
 def test_stations_are_read_and_what_is_no_place_is_told(conn: psycopg.Connection, tmp_path: Path) -> None:
     assert import_csv(tmp_path, "kind,chainage,arc\nmissing_bolt,12+308.5,1\n").exit_code == 0
-    (place,) = conn.execute("SELECT (chainage_from + chainage_to) / 2 FROM tunnel_api.lining_finding WHERE by_hand").fetchone()
+    (place,) = conn.execute("SELECT (chainage_from + chainage_to) / 2 FROM tunnel_api.finding WHERE manual").fetchone()
     conn.rollback()
     assert place == pytest.approx(12308.5)
     text = (
@@ -241,8 +238,8 @@ def test_what_was_exported_is_imported_as_it_was(conn: psycopg.Connection, tmp_p
     done = run("findings", "import", NAME, path)
     assert done.exit_code == 0, done.output
     rows = conn.execute(
-        "SELECT kind, severity, width, round(area::numeric, 3), round(length::numeric, 3) FROM tunnel_api.lining_finding "
-        "WHERE by_hand ORDER BY id"
+        "SELECT kind, severity, width, round(area::numeric, 3), round(length::numeric, 3) FROM tunnel_api.finding "
+        "WHERE manual ORDER BY id"
     ).fetchall()
     assert sorted(rows[:3], key=str) == sorted(rows[3:], key=str)
 
@@ -310,7 +307,7 @@ def test_what_was_drawn_is_in_the_list_of_leaks_and_in_the_report_without_figure
         assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
         assert "leaks are written as .csv, .geojson, .gpkg, .xlsx or .txt" in refused.stderr
     (drawn,) = [f for f in json.loads((tmp_path / "leaks.geojson").read_text())["features"] if f["id"] == key]
-    assert (drawn["properties"]["drop_mean"], drawn["properties"]["counted"]) == (None, True)
+    assert (drawn["properties"]["darkening_mean"], drawn["properties"]["counted"]) == (None, True)
     done = run("report", NAME, "-o", tmp_path / "report.html")
     assert done.exit_code in (0, 1), done.output
     written = run("export", NAME, "-o", tmp_path / "all.gpkg")
@@ -320,10 +317,10 @@ def test_what_was_drawn_is_in_the_list_of_leaks_and_in_the_report_without_figure
 
 def test_the_last_change_is_taken_back_or_why_not_is_one_line(conn: psycopg.Connection, tmp_path: Path) -> None:
     assert import_csv(tmp_path, "kind,chainage,arc\nmissing_bolt,12350,1\n").exit_code == 0
-    (key,) = conn.execute("SELECT max(id) FROM tunnel_api.lining_finding").fetchone()  # type: ignore[misc]
+    (key,) = conn.execute("SELECT max(id) FROM tunnel_api.finding").fetchone()  # type: ignore[misc]
     conn.rollback()
     assert run("findings", "undo", key).output == f"finding {key}: what was drawn is taken back\n"
-    assert conn.execute("SELECT count(*) FROM tunnel_api.lining_finding WHERE id = %s", [key]).fetchone() == (0,)
+    assert conn.execute("SELECT count(*) FROM tunnel_api.finding WHERE id = %s", [key]).fetchone() == (0,)
     refused = run("findings", "undo", key)
     assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
     assert f"there is no change of a finding {key} to be taken back" in refused.stderr

@@ -38,7 +38,7 @@ def first_leak(connection: psycopg.Connection) -> int:
 
 def first_of(connection: psycopg.Connection, view: str) -> tuple[int, bytes]:
     """Key of a row of a view, and the query that shows the row."""
-    if view in ("leak", "anomaly"):
+    if view in ("leak", "finding"):
         key = first_leak(connection)
     else:
         key = connection.execute(f"SELECT min(id) FROM tunnel_api.{view}".encode()).fetchone()[0]
@@ -53,13 +53,13 @@ def test_a_review_is_noted_with_only_what_changed(person: psycopg.Connection) ->
     person.execute("UPDATE tunnel_api.leak SET remark = 'drips', review = 'confirmed' WHERE id = %s", (key,))
     person.execute("UPDATE tunnel_api.anomaly_3d SET kind = 'joint' WHERE id = %s", (key,))
     assert entries(person) == [
-        ("ines", SURVEY, "anomaly", key, "update", {"review": "open"}, {"review": "confirmed"}),
-        ("ines", SURVEY, "anomaly", key, "update", {"remark": None}, {"remark": "drips"}),
-        ("ines", SURVEY, "anomaly", key, "update", {"kind": "leak"}, {"kind": "joint"}),
+        ("ines", SURVEY, "finding", key, "update", {"review": "open"}, {"review": "confirmed"}),
+        ("ines", SURVEY, "finding", key, "update", {"remark": None}, {"remark": "drips"}),
+        ("ines", SURVEY, "finding", key, "update", {"kind": "leak"}, {"kind": "joint"}),
     ]
     assert person.execute(
         "SELECT max(d.at) = a.reviewed_at OR max(d.at) - a.reviewed_at < interval '1 s'"
-        "  FROM tunnel_api.anomaly a JOIN tunnel_api.audit d ON d.view = 'anomaly' AND d.row_id = a.id"
+        "  FROM tunnel_api.anomaly a JOIN tunnel_api.audit d ON d.view = 'finding' AND d.row_id = a.id"
         " WHERE a.id = %s GROUP BY a.reviewed_at", (key,)
     ).fetchone() == (True,)  # fmt: skip
 
@@ -203,7 +203,7 @@ def test_two_who_judge_otherwise_are_not_both_right(
 @pytest.mark.parametrize("person", ["ines"], indirect=True)
 @pytest.mark.parametrize(
     ("view", "change"),
-    [("anomaly", "review = 'confirmed', kind = 'joint'"), ("axis_vertex", "geom = ST_Translate(geom, 0, 0, 0.1)"),
+    [("finding", "review = 'confirmed', kind = 'joint'"), ("axis_vertex", "geom = ST_Translate(geom, 0, 0, 0.1)"),
      ("region", f"kind = 'homogeneous', geom = {REGION % 1}")],
 )  # fmt: skip
 def test_two_of_one_mind_are_the_work_of_the_first(
@@ -231,8 +231,8 @@ def test_no_role_touches_the_audit(person: psycopg.Connection) -> None:
     for statement in (
         "UPDATE tunnel_api.audit SET who = 'nobody'",
         "DELETE FROM tunnel_api.audit",
-        "INSERT INTO tunnel_api.audit (who, survey, view, row_id, action) VALUES ('vera', 'demo-2024', 'anomaly', 1, 'update')",
-        "SELECT tunnel_api.note_edit('demo-2024', 'anomaly', 1, '{}', '{\"review\": \"confirmed\"}')",
+        "INSERT INTO tunnel_api.audit (who, survey, view, row_id, action) VALUES ('vera', 'demo-2024', 'finding', 1, 'update')",
+        "SELECT tunnel_api.note_edit('demo-2024', 'finding', 1, '{}', '{\"review\": \"confirmed\"}')",
         "SELECT count(*) FROM tunnel_audit.entry",
         "UPDATE tunnel_audit.entry SET who = 'nobody'",
         "DELETE FROM tunnel_audit.entry",
@@ -273,7 +273,7 @@ def test_even_the_owner_does_not_change_it_by_mistake(conn: psycopg.Connection, 
 FORGE = """
 CREATE FUNCTION tunnel.forge() RETURNS void LANGUAGE plpgsql AS $$
 BEGIN
-    INSERT INTO tunnel_audit.entry (who, survey, view, row_id, action) VALUES ('nobody', 'demo-2024', 'anomaly', 1, 'update');
+    INSERT INTO tunnel_audit.entry (who, survey, view, row_id, action) VALUES ('nobody', 'demo-2024', 'finding', 1, 'update');
 EXCEPTION WHEN insufficient_privilege THEN
 END $$;
 CREATE FUNCTION tunnel.mine(text) RETURNS boolean LANGUAGE plpgsql IMMUTABLE AS $$
@@ -289,21 +289,21 @@ END $$
 @pytest.mark.parametrize(
     ("way", "what"),
     [
-        ("ALTER TABLE tunnel.anomaly ADD CONSTRAINT mine CHECK (tunnel.mine(review))", "check mine of tunnel.anomaly"),
-        ("ALTER TABLE tunnel.anomaly ADD CONSTRAINT mine CHECK (query_to_xml($x$SELECT tunnel.mine('')$x$, true, false, '')"
-         " IS NOT NULL)", "check mine of tunnel.anomaly"),
+        ("ALTER TABLE tunnel.finding ADD CONSTRAINT mine CHECK (tunnel.mine(review))", "check mine of tunnel.finding"),
+        ("ALTER TABLE tunnel.finding ADD CONSTRAINT mine CHECK (query_to_xml($x$SELECT tunnel.mine('')$x$, true, false, '')"
+         " IS NOT NULL)", "check mine of tunnel.finding"),
         ("CREATE DOMAIN tunnel.word AS text CHECK (tunnel.mine(VALUE));"
          "ALTER TABLE tunnel.region ADD mine tunnel.word DEFAULT ''",
          "type of column mine of tunnel.region"),
         ("CREATE OPERATOR tunnel.!! (FUNCTION = tunnel.mine, RIGHTARG = text);"
-         "ALTER TABLE tunnel.anomaly ADD CONSTRAINT mine CHECK (OPERATOR(tunnel.!!) review)", "check mine of tunnel.anomaly"),
-        ("ALTER TABLE tunnel.anomaly ADD mine boolean GENERATED ALWAYS AS (tunnel.mine(review)) STORED",
-         "default of column mine of tunnel.anomaly"),
+         "ALTER TABLE tunnel.finding ADD CONSTRAINT mine CHECK (OPERATOR(tunnel.!!) review)", "check mine of tunnel.finding"),
+        ("ALTER TABLE tunnel.finding ADD mine boolean GENERATED ALWAYS AS (tunnel.mine(review)) STORED",
+         "default of column mine of tunnel.finding"),
         ("ALTER TABLE tunnel.region ADD mine boolean DEFAULT tunnel.mine('')", "default of column mine of tunnel.region"),
-        ("CREATE INDEX mine ON tunnel.anomaly (tunnel.mine(review))", "index tunnel.mine of tunnel.anomaly"),
-        ("CREATE INDEX mine ON tunnel.anomaly (id) WHERE tunnel.mine(review)", "index tunnel.mine of tunnel.anomaly"),
-        ("CREATE RULE mine AS ON UPDATE TO tunnel.anomaly DO ALSO UPDATE tunnel.survey SET name = name WHERE tunnel.mine(name)",
-         "rule mine on tunnel.anomaly"),
+        ("CREATE INDEX mine ON tunnel.finding (tunnel.mine(review))", "index tunnel.mine of tunnel.finding"),
+        ("CREATE INDEX mine ON tunnel.finding (id) WHERE tunnel.mine(review)", "index tunnel.mine of tunnel.finding"),
+        ("CREATE RULE mine AS ON UPDATE TO tunnel.finding DO ALSO UPDATE tunnel.survey SET name = name WHERE tunnel.mine(name)",
+         "rule mine on tunnel.finding"),
     ],
     ids=["check", "built-in", "domain", "operator", "generated", "default", "index", "predicate", "rule"],
 )  # fmt: skip
@@ -352,11 +352,11 @@ def test_a_table_is_not_made_part_of_another_unseen(person: psycopg.Connection, 
 
 
 def test_own_triggers_that_do_not_fire_are_reported(conn: psycopg.Connection) -> None:
-    conn.execute("ALTER TABLE tunnel.anomaly DISABLE TRIGGER note_update_new; DROP TRIGGER drop_points ON tunnel.survey")
+    conn.execute("ALTER TABLE tunnel.finding DISABLE TRIGGER note_update_new; DROP TRIGGER drop_points ON tunnel.survey")
     conn.commit()
     output = CliRunner().invoke(main, ["check"]).output
-    assert "note_update_new on tunnel.anomaly is switched off" in output
-    assert "ALTER TABLE tunnel.anomaly ENABLE TRIGGER note_update_new; then tunneldb init" in output
+    assert "note_update_new on tunnel.finding is switched off" in output
+    assert "ALTER TABLE tunnel.finding ENABLE TRIGGER note_update_new; then tunneldb init" in output
     assert "drop_points on tunnel.survey is missing" in output
 
 

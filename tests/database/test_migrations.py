@@ -84,12 +84,12 @@ def test_the_functions_are_made_anew_and_data_stay(example: str, dsn: str, conn:
     conn.execute("DROP FUNCTION tunnel_api.chainage_label CASCADE")
     conn.execute("CREATE FUNCTION tunnel_api.left_over() RETURNS int LANGUAGE sql AS 'SELECT 1'")
     conn.commit()
-    leaks = conn.execute("SELECT count(*) FROM tunnel.anomaly").fetchone()
+    leaks = conn.execute("SELECT count(*) FROM tunnel.finding").fetchone()
     conn.commit()
     install(conn, STAGES)
     assert conn.execute("SELECT tunnel_api.chainage_label(12345.678)").fetchone() == ("12+345.678",)
     assert conn.execute("SELECT to_regproc('tunnel_api.left_over')").fetchone() == (None,)
-    assert conn.execute("SELECT count(*) FROM tunnel.anomaly").fetchone() == leaks
+    assert conn.execute("SELECT count(*) FROM tunnel.finding").fetchone() == leaks
 
 
 def test_a_view_of_the_users_own_is_not_dropped_unasked(conn: psycopg.Connection) -> None:
@@ -214,7 +214,7 @@ def test_a_dump_restored_is_a_working_database(example: str, dsn: str, empty_dsn
     subprocess.run([folder["pg_restore"], "--exit-on-error", "--dbname", empty_dsn, str(archive)], check=True)
     with connect(empty_dsn) as restored, connect(dsn) as original:
         for view in (
-            "leak", "leak_map", "segment", "section", "axis", "stage_status", "survey", "point", "lining_finding",
+            "leak", "leak_map", "segment", "section", "axis", "stage_status", "survey", "point", "finding",
             "finding_count", "finding_photo", "dry_region", "audit", "km_waterproof", "snti_condition",
         ):  # fmt: skip
             query = sql.SQL("SELECT * FROM tunnel_api.{} ORDER BY id").format(sql.Identifier(view))

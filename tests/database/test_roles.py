@@ -23,8 +23,8 @@ EDITABLE = {
         for part in ("_unrolled", "_map", "_3d")
     },
     "finding_photo": {"path", "caption", "INSERT", "DELETE"},
-    **{base + part: KEEP for base in ("anomaly", "leak") for part in ("", "_3d")},
-    **{base + part: KEEP | {"geom", "INSERT", "DELETE"} for base in ("anomaly", "leak") for part in ("_unrolled", "_map")},
+    **{base + part: KEEP for base in ("finding", "leak") for part in ("", "_3d")},
+    **{base + part: KEEP | {"geom", "INSERT", "DELETE"} for base in ("finding", "leak") for part in ("_unrolled", "_map")},
     **{"spot" + part: {"review", "remark"} for part in ("", "_face", "_map", "_3d", "_sheet")},
 }
 """What inspectors and operators may change of the views, and nobody else of any: columns, new rows, rows deleted."""
@@ -36,7 +36,7 @@ CATALOGUE = {
 """What operators alone may."""
 
 READ = "SELECT count(*) FROM tunnel_api.leak"
-TABLE = "SELECT count(*) FROM tunnel.anomaly"
+TABLE = "SELECT count(*) FROM tunnel.finding"
 
 
 @pytest.fixture(scope="session")
@@ -75,9 +75,9 @@ def test_readers_unroll_and_sum_without_rights_on_tables(person: psycopg.Connect
 @pytest.mark.parametrize("person", ["vera", "ines"], indirect=True)
 def test_readers_see_no_table_and_run_no_stage(person: psycopg.Connection) -> None:
     refused(person, TABLE)
-    refused(person, "UPDATE tunnel.anomaly SET review = 'confirmed'")
+    refused(person, "UPDATE tunnel.finding SET review = 'confirmed'")
     refused(person, "DELETE FROM tunnel.point")
-    refused(person, "DROP TABLE tunnel.anomaly")
+    refused(person, "DROP TABLE tunnel.finding")
     refused(person, "CREATE TABLE tunnel.mine (x int)")
     refused(person, "CREATE VIEW tunnel_api.mine AS SELECT 1")
     refused(person, "SELECT tunnel_api.axis_refine(1, 12)")
@@ -193,7 +193,7 @@ def test_inspector_reviews_moves_and_draws_under_her_own_name(person: psycopg.Co
     assert person.execute("SELECT DISTINCT reviewed_by FROM tunnel_api.leak WHERE reviewed_by IS NOT NULL").fetchall() == [
         ("ines",)
     ]
-    assert person.execute("SELECT reviewed_by FROM tunnel_api.anomaly WHERE kind <> found").fetchall() == [("ines",)]
+    assert person.execute("SELECT reviewed_by FROM tunnel_api.anomaly WHERE kind <> kind_detected").fetchall() == [("ines",)]
     assert person.execute("SELECT edited_by FROM tunnel_api.axis_vertex WHERE source = 'edited'").fetchall() == [("ines",)]
     assert person.execute("SELECT count(*) FROM tunnel_api.region WHERE drawn_by = 'ines'").fetchone() == (1,)
 
@@ -205,7 +205,7 @@ def test_inspector_may_change_nothing_else(person: psycopg.Connection) -> None:
         "SELECT tunnel_api.dry_region_approve(1)",
         "UPDATE tunnel_api.leak SET reviewed_by = 'vera'",
         "UPDATE tunnel_api.leak SET area = 0",
-        "UPDATE tunnel_api.anomaly SET found = 'leak'",
+        "UPDATE tunnel_api.anomaly SET kind_detected = 'leak'",
         "UPDATE tunnel_api.anomaly_3d SET reasons = '{}'",
         "DELETE FROM tunnel_api.leak",
         "UPDATE tunnel_api.axis_vertex SET source = 'measured'",
@@ -253,7 +253,7 @@ def test_operator_forges_no_entry_of_the_audit(person: psycopg.Connection, conn:
     for function in ("review_finding", "edit_axis_vertex", "edit_region"):
         refused(person, f"CREATE TRIGGER edit INSTEAD OF UPDATE ON mine FOR EACH ROW EXECUTE FUNCTION tunnel_api.{function}()")
     with pytest.raises(psycopg.errors.InsufficientPrivilege, match="permission denied for function note_edit"):
-        person.execute("SELECT tunnel_api.note_edit('demo-2024', 'anomaly', 1, '{}', '{\"review\": \"confirmed\"}')")
+        person.execute("SELECT tunnel_api.note_edit('demo-2024', 'finding', 1, '{}', '{\"review\": \"confirmed\"}')")
     assert conn.execute(
         "SELECT count(*) FROM pg_proc p WHERE p.pronamespace = 'tunnel_api'::regnamespace"
         " AND p.prorettype = 'trigger'::regtype AND has_function_privilege('tunnel_operator', p.oid, 'EXECUTE')"

@@ -15,7 +15,7 @@ from support.queue_rows import add_job
 from tunneldb.cli.main import main
 from tunneldb.database.vacuum import tables_to_vacuum, vacuum
 
-DEAD = "SELECT coalesce(sum(pg_stat_get_dead_tuples(oid)), 0) FROM pg_class WHERE relname IN ('anomaly_part', 'section')"
+DEAD = "SELECT coalesce(sum(pg_stat_get_dead_tuples(oid)), 0) FROM pg_class WHERE relname IN ('boundary_region', 'section')"
 
 
 @pytest.fixture(scope="session")

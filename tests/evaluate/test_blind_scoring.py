@@ -120,7 +120,7 @@ def test_parts_of_a_leak_are_one_patch_and_pieces_that_were_found_are_several(co
 def test_stretches_are_classed_by_what_lies_in_them_and_nothing_stays_in_the_database(conn: psycopg.Connection) -> None:
     found = waterproof.classes(conn, lining(10), [square(103, 0.5), square(107, 0.19)])
     assert found == [4, 1, 4, 1, 3, 1]
-    for table in ("tunnel", "survey", "segment", "coverage", "anomaly"):
+    for table in ("tunnel", "survey", "segment", "coverage", "finding"):
         assert conn.execute(sql.SQL("SELECT count(*) FROM tunnel.{}").format(sql.Identifier(table))).fetchone() == (0,)
 
 

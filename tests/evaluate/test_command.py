@@ -50,7 +50,7 @@ def survey(conn, example):
 
 def leaks(conn, where="review <> 'rejected'"):
     rows = conn.execute(
-        f"SELECT ST_AsBinary(unrolled) FROM tunnel.anomaly WHERE kind = 'leak' AND {where} ORDER BY id"
+        f"SELECT ST_AsBinary(unrolled) FROM tunnel.finding WHERE kind = 'leak' AND {where} ORDER BY id"
     ).fetchall()
     conn.commit()
     return [shapely.from_wkb(bytes(row[0])) for row in rows]
@@ -124,11 +124,11 @@ def test_lining_seen_before_there_was_a_coverage_is_that_of_the_ledger(conn, sur
 def test_an_inspector_s_word_counts(conn, survey, tmp_path):
     truth = gpkg(tmp_path / "truth.gpkg", leaks(conn))
     (key,) = conn.execute(
-        "UPDATE tunnel.anomaly SET review = 'rejected' WHERE id = (SELECT min(id) FROM tunnel.anomaly) RETURNING id"
+        "UPDATE tunnel.finding SET review = 'rejected' WHERE id = (SELECT min(id) FROM tunnel.finding) RETURNING id"
     ).fetchone()
     conn.commit()
     assert figures(survey, truth, tmp_path)["groups"][0]["found"] == 5
-    conn.execute("UPDATE tunnel.anomaly SET review = 'confirmed', detected = false WHERE id = %s", [key])
+    conn.execute("UPDATE tunnel.finding SET review = 'confirmed', detected = false WHERE id = %s", [key])
     conn.commit()
     assert figures(survey, truth, tmp_path)["groups"][0]["found"] == 6
 
@@ -165,9 +165,9 @@ def test_kinds_are_those_after_judging(conn, survey, tmp_path):
     truth = gpkg(tmp_path / "truth.gpkg", leaks(conn))
     before = figures(survey, truth, tmp_path)["groups"][0]
     conn.execute(
-        "UPDATE tunnel.anomaly SET judged = 'dark' WHERE id = (SELECT min(id) FROM tunnel.anomaly WHERE kind = 'leak')"
+        "UPDATE tunnel.finding SET kind_override = 'dark' WHERE id = (SELECT min(id) FROM tunnel.finding WHERE kind = 'leak')"
     )
-    conn.execute("UPDATE tunnel.anomaly SET judged = 'leak' WHERE kind = 'dark'")
+    conn.execute("UPDATE tunnel.finding SET kind_override = 'leak' WHERE kind = 'dark'")
     conn.commit()
     after = figures(survey, truth, tmp_path)["groups"][0]
     assert after["found"] == before["found"] - 1

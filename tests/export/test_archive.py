@@ -49,7 +49,7 @@ def edit(conn: psycopg.Connection) -> None:
     conn.execute("UPDATE tunnel_api.leak SET review = 'confirmed', remark = 'drips' WHERE id = %s", [leaks[0]])
     conn.execute("UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, 0.1) WHERE id = %s", [leaks[1]])
     cut = "(SELECT ST_SetSRID(ST_MakeLine(ST_MakePoint(ST_XMin(g) - 1, y), ST_MakePoint(ST_XMax(g) + 1, y)), 0)"
-    cut += " FROM (SELECT unrolled AS g, ST_Y(ST_Centroid(unrolled)) AS y FROM tunnel.anomaly WHERE id = %(id)s) q)"
+    cut += " FROM (SELECT unrolled AS g, ST_Y(ST_Centroid(unrolled)) AS y FROM tunnel.finding WHERE id = %(id)s) q)"
     parts = conn.execute(f"SELECT tunnel_api.finding_split(%(id)s, {cut})".encode(), {"id": leaks[2]}).fetchone()
     assert parts is not None
     conn.execute("SELECT tunnel_api.finding_merge(%s)", parts)
@@ -59,7 +59,7 @@ def edit(conn: psycopg.Connection) -> None:
         " VALUES (%s, 'leak', ST_MakeEnvelope(12350, 1, 12351, 2, 0))",
         [NAME],
     )
-    drawn = conn.execute("SELECT max(id) FROM tunnel.anomaly WHERE origin = 'drawn'").fetchone()
+    drawn = conn.execute("SELECT max(id) FROM tunnel.finding WHERE origin = 'drawn'").fetchone()
     assert drawn is not None
     conn.execute("DELETE FROM tunnel_api.finding_unrolled WHERE id = %s", [drawn[0]])
     conn.execute(
@@ -181,7 +181,7 @@ def test_under_another_name_it_is_the_same_up_to_numbers_and_steps_can_be_taken_
     assert merged is not None
     assert conn.execute("SELECT tunnel_api.finding_undo(%s)", [merged[0]]).fetchone() == ("merged",)
     untouched = conn.execute(
-        "SELECT count(*) FROM tunnel.anomaly a JOIN tunnel.survey s ON s.id = a.survey_id"
+        "SELECT count(*) FROM tunnel.finding a JOIN tunnel.survey s ON s.id = a.survey_id"
         " WHERE s.name = %s AND a.merged_into IS NOT NULL",
         [NAME],
     ).fetchone()

@@ -117,9 +117,9 @@ def test_geopackage_holds_the_rows_of_the_views(files: Path, shared_dsn: str) ->
 
 
 def test_missing_values_stay_missing(dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
-    conn.execute("UPDATE tunnel.anomaly SET contrast = NULL WHERE id = 2")
+    conn.execute("UPDATE tunnel.finding SET contrast = NULL WHERE id = 2")
     conn.execute("UPDATE tunnel_api.leak SET review = 'confirmed', remark = 'drips – é' WHERE id = 2")
-    (moment,) = conn.execute("SELECT reviewed_at FROM tunnel.anomaly WHERE id = 2").fetchone()
+    (moment,) = conn.execute("SELECT reviewed_at FROM tunnel.finding WHERE id = 2").fetchone()
     conn.commit()
     run("export", example, "-o", tmp_path / "x.gpkg")
     _, _, columns = layer(tmp_path / "x.gpkg", "leak_map")

@@ -90,7 +90,7 @@ def test_nothing_of_a_forged_archive_is_written(example: str, conn: psycopg.Conn
     def state() -> list[tuple[object, ...]]:
         names = [name for (name,) in conn.execute(tables).fetchall()]
         rows = conn.execute("SELECT count(*), sum(xmin::text::bigint) FROM tunnel.survey").fetchall()
-        rows += conn.execute("SELECT count(*), sum(xmin::text::bigint) FROM tunnel.anomaly").fetchall()
+        rows += conn.execute("SELECT count(*), sum(xmin::text::bigint) FROM tunnel.finding").fetchall()
         conn.rollback()
         return [tuple(names), *rows]
 

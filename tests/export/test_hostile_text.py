@@ -38,7 +38,7 @@ def template(example_template: str) -> str:
 def hostile(conn: psycopg.Connection, example: str) -> str:
     """The example survey, whose leaks and findings bear hostile texts wherever somebody may write one."""
     texts = list(HOSTILE.values())
-    ids = [row[0] for row in conn.execute("SELECT id FROM tunnel.anomaly ORDER BY id").fetchall()]
+    ids = [row[0] for row in conn.execute("SELECT id FROM tunnel.finding ORDER BY id").fetchall()]
     for number, text in enumerate(texts):
         conn.execute("UPDATE tunnel_api.leak SET remark = %s WHERE id = %s", [text, ids[number % 7]])
         finding = conn.execute(

@@ -21,7 +21,7 @@ from tunneldb.cli.main import main
 COLUMNS = [
     *("id", "km", "chainage_from", "chainage_to", "label", "arc_from", "arc_to", "clock"),
     *("kind", "confidence", "reasons", "contrast", "area"),
-    *("drop_mean", "drop_max", "image_share", "review", "reviewed_by", "reviewed_at"),
+    *("darkening_mean", "darkening_max", "image_share", "review", "reviewed_by", "reviewed_at"),
 ]
 
 
@@ -68,7 +68,7 @@ def test_chainage_is_parsed_or_refused(conn):
 
 def test_wet_area_is_cut_at_the_ends_and_leaves_out_the_rejected(conn, example):
     leaks = conn.execute(
-        "SELECT chainage_from, chainage_to, area, review FROM tunnel.anomaly WHERE kind = 'leak' ORDER BY chainage_from"
+        "SELECT chainage_from, chainage_to, area, review FROM tunnel.finding WHERE kind = 'leak' ORDER BY chainage_from"
     ).fetchall()
 
     def wet(start, end):
@@ -103,7 +103,7 @@ HEADINGS = [
 @pytest.mark.parametrize("width", [80, 100, 120, 132, 200])
 def test_table_fits_the_terminal(conn, example, width, kind):
     """What is shown is whole, on one line a leak; what there is no room for is named."""
-    conn.execute("UPDATE tunnel.anomaly SET detected = false, reviewed_by = 'inspectora.de.guardia' WHERE review = 'confirmed'")
+    conn.execute("UPDATE tunnel.finding SET detected = false, reviewed_by = 'inspectora.de.guardia' WHERE review = 'confirmed'")
     conn.commit()
     terminal = {"FORCE_COLOR": "1", "TERM": "xterm", "COLUMNS": str(width)}
     result = CliRunner().invoke(main, ["leaks", example, "--kind", kind], env=terminal)
@@ -135,7 +135,7 @@ def test_kinds_are_listed_and_exported(conn, example, tmp_path, kind, number):
     conn.execute("UPDATE tunnel_api.anomaly SET kind = 'dark' WHERE id = 1")
     conn.execute("UPDATE tunnel_api.anomaly SET kind = 'leak' WHERE kind = 'joint'")
     conn.execute("UPDATE tunnel_api.anomaly SET kind = 'joint' WHERE id = 2")
-    conn.execute("UPDATE tunnel.anomaly SET confidence = NULL, contrast = NULL WHERE id = 3")
+    conn.execute("UPDATE tunnel.finding SET confidence = NULL, contrast = NULL WHERE id = 3")
     conn.commit()
     expected = conn.execute(
         "SELECT id, kind, CASE WHEN id NOT IN (1, 2) AND found <> 'joint' THEN confidence END, array_to_string(reasons, ', ')"
@@ -242,7 +242,7 @@ def test_a_folder_that_is_not_there_is_named_and_nothing_is_left(example, tmp_pa
 
 
 def test_a_leak_confirmed_but_not_found_again_is_listed(conn, example):
-    conn.execute("UPDATE tunnel.anomaly SET detected = false")
+    conn.execute("UPDATE tunnel.finding SET detected = false")
     conn.commit()
     rows = listed(run("leaks", example, "--format", "csv").stdout)
     assert [row["review"] for row in rows] == ["confirmed", "confirmed"]
@@ -263,7 +263,7 @@ def test_images_are_cloud_optimized_and_lie_in_the_unrolled_plane(conn, example,
         pixel = image.transform.a
         values = image.read(1)
         # The leaks that were painted are darker than what lies about them.
-        (wkb,) = conn.execute("SELECT ST_AsBinary(unrolled) FROM tunnel.anomaly ORDER BY id LIMIT 1").fetchone()
+        (wkb,) = conn.execute("SELECT ST_AsBinary(unrolled) FROM tunnel.finding ORDER BY id LIMIT 1").fetchone()
         centre = shapely.from_wkb(bytes(wkb)).representative_point()
         row, column = image.index(centre.x, centre.y)
         assert np.nanmean(values[row - 2 : row + 3, column - 2 : column + 3]) < np.nanmedian(values) - 2

@@ -49,7 +49,7 @@ def survey(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Survey]:
         assert [row for row in runs(project) if row[3] != 1] == []
         assert {row[2:4] for row in survey.undisturbed["status"]} == {("done", False)}
         assert survey.undisturbed["jobs"] == survey.undisturbed["incoming"] == survey.undisturbed["scratch"] == []
-        assert len(survey.undisturbed["anomaly"]) >= 2 * last - 1
+        assert len(survey.undisturbed["finding"]) >= 2 * last - 1
         yield survey
     finally:
         project.close()

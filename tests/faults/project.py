@@ -180,11 +180,13 @@ _TABLES = {
     "image": "SELECT km, kind, block, tiff FROM tunnel.image ORDER BY 1, 2, 3",
     "coverage": "SELECT km, step, lining, seen, wet FROM tunnel.coverage ORDER BY km",
     "range_curve": "SELECT km, range_m, intensity_db, sigma_db FROM tunnel.range_curve ORDER BY km",
-    "anomaly": "SELECT km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean, drop_max, image_share, "
-    "kind, reasons, confidence, contrast, judged, "
+    "finding": "SELECT km, chainage_from, chainage_to, arc_from, arc_to, clock, area, darkening_mean, darkening_max,"
+    " image_share, "
+    "kind, reasons, confidence, contrast, kind_override, "
     f"{_COORDINATES.format('unrolled')}, {_COORDINATES.format('map')}, {_COORDINATES.format('surface')}, review, detected "
-    "FROM tunnel.anomaly ORDER BY 2, 4",
-    "anomaly_part": "SELECT km, pixel, box, mask, filled, drop_sum, drop_max, traits FROM tunnel.anomaly_part ORDER BY km, box",
+    "FROM tunnel.finding ORDER BY 2, 4",
+    "boundary_region": "SELECT km, pixel, box, mask, filled, darkening_sum, darkening_max, properties"
+    " FROM tunnel.boundary_region ORDER BY km, box",
     "waterproof": "SELECT km, chainage_from, chainage_to, lining_area, seen_share, wet_area, patches, largest_area, "
     "window_patches, window_wet_area, class FROM tunnel_api.km_waterproof ORDER BY km",
     "tables": "SELECT relname FROM pg_class WHERE relnamespace = 'tunnel'::regnamespace AND relkind IN ('r', 'p') ORDER BY 1",

@@ -137,7 +137,7 @@ def test_images_are_the_same(ways: dict[str, Any], way: str) -> None:
 
 @pytest.mark.parametrize("way", WAYS)
 def test_leaks_are_the_same_and_whole(ways: dict[str, Any], way: str) -> None:
-    one, other = ways[way]["anomaly"], ways["whole"]["anomaly"]
+    one, other = ways[way]["finding"], ways["whole"]["finding"]
     assert len(one) == len(other) == 2 * LAST - 1
     for a, b in zip(one, other, strict=True):
         assert a[0] == b[0]

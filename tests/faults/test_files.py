@@ -40,12 +40,12 @@ def test_bad_file_fails_its_kilometres_alone(survey: Survey, tmp_path: Path) -> 
 def test_comparison_sees_what_is_lost_or_doubled(survey: Survey) -> None:
     """Otherwise nothing here could fail."""
     good = survey.undisturbed
-    leak = (*good["anomaly"][0][:6], good["anomaly"][0][6] * 1.0001, *good["anomaly"][0][7:])
+    leak = (*good["finding"][0][:6], good["finding"][0][6] * 1.0001, *good["finding"][0][7:])
     moved = good["point"].copy()
     moved["segment"][7] += 1
     for name, rows in {
         "point": good["point"][1:],
-        "anomaly": [leak, *good["anomaly"][1:]],
+        "finding": [leak, *good["finding"][1:]],
         "image": [(*good["image"][0][:3], good["image"][0][3] + b"\0"), *good["image"][1:]],
         "tables": [*good["tables"], ("fragment_s1_f1_km1",)],
     }.items():

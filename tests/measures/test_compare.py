@@ -121,7 +121,7 @@ def test_change_leaks_files_and_when_they_are_stale(surveys: tuple[str, str], co
         return [row[0] for row in conn.execute("SELECT reason FROM tunnel_api.change_status ORDER BY km").fetchall()]
 
     assert reasons() == [None, None]
-    conn.execute("UPDATE tunnel.anomaly SET review = 'rejected' WHERE chainage_from = 970")
+    conn.execute("UPDATE tunnel.finding SET review = 'rejected' WHERE chainage_from = 970")
     conn.commit()
     assert reasons() == ["leaks of the older survey changed since"] * 2  # it lies within 100 m of the next kilometre, too
     assert run("compare", *surveys)["made"] == [0, 1]

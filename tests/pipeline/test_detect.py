@@ -74,7 +74,7 @@ def prepare(folder: Path, scanner: str, kind: str = "amplitude", start: float = 
 
 
 def outlines(conn: psycopg.Connection) -> dict[int, shapely.Polygon]:
-    rows = conn.execute("SELECT id, ST_AsBinary(unrolled) FROM tunnel.anomaly WHERE detected ORDER BY id").fetchall()
+    rows = conn.execute("SELECT id, ST_AsBinary(unrolled) FROM tunnel.finding WHERE detected ORDER BY id").fetchall()
     conn.rollback()
     return {key: shapely.from_wkb(bytes(wkb)) for key, wkb in rows}
 
@@ -167,7 +167,8 @@ def _check_radiometry(conn: psycopg.Connection, simulation: Simulation, scanner:
 
 def _check_statistics(conn: psycopg.Connection, simulation: Simulation) -> None:
     rows = conn.execute(
-        "SELECT ST_AsBinary(unrolled), ST_AsBinary(surface), clock, area, drop_mean, drop_max, image_share FROM tunnel.anomaly"
+        "SELECT ST_AsBinary(unrolled), ST_AsBinary(surface), clock, area, darkening_mean, darkening_max,"
+        " image_share FROM tunnel.finding"
     ).fetchall()
     conn.rollback()
     for unrolled, surface, clock, area, mean, greatest, share in rows:
@@ -230,18 +231,18 @@ def test_a_rerun_gives_the_same_however_long_the_trajectory_and_reviews_survive(
     before = outlines(conn)
     assert len(before) >= 3
     confirmed, rejected, *_ = before
-    conn.execute("UPDATE tunnel.anomaly SET review = 'confirmed', reviewed_by = 'ines' WHERE id = %s", [confirmed])
-    conn.execute("UPDATE tunnel.anomaly SET review = 'rejected', remark = 'stain' WHERE id = %s", [rejected])
+    conn.execute("UPDATE tunnel.finding SET review = 'confirmed', reviewed_by = 'ines' WHERE id = %s", [confirmed])
+    conn.execute("UPDATE tunnel.finding SET review = 'rejected', remark = 'stain' WHERE id = %s", [rejected])
     # A reviewed leak and an unreviewed one where there is none any more.
     ghosts = []
     for chainage, review in ((START + 3, "confirmed"), (START + 5, "open")):
         ghosts.append(
             conn.execute(
-                "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area,"
-                " drop_mean, drop_max, image_share, unrolled, map, surface, review)"
+                "INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area,"
+                " darkening_mean, darkening_max, image_share, unrolled, map, surface, review)"
                 " SELECT survey_id, km, %(c)s, %(c)s + 0.1, 0, 0.1, 12,"
                 " 0.01, 1, 1, 1, ST_MakeEnvelope(%(c)s, 0, %(c)s + 0.1, 0.1, 0), map, surface, %(review)s"
-                " FROM tunnel.anomaly LIMIT 1 RETURNING id",
+                " FROM tunnel.finding LIMIT 1 RETURNING id",
                 {"c": chainage, "review": review},
             ).fetchone()[0]
         )
@@ -252,10 +253,10 @@ def test_a_rerun_gives_the_same_however_long_the_trajectory_and_reviews_survive(
     after = outlines(conn)
     assert after.keys() == before.keys()
     assert all(after[key].equals(before[key]) for key in before)
-    reviews = dict(conn.execute("SELECT id, review FROM tunnel.anomaly WHERE review <> 'open'").fetchall())
+    reviews = dict(conn.execute("SELECT id, review FROM tunnel.finding WHERE review <> 'open'").fetchall())
     assert reviews == {confirmed: "confirmed", rejected: "rejected", ghosts[0]: "confirmed"}
     state = conn.execute(
-        "SELECT detected, reviewed_by, remark FROM tunnel.anomaly WHERE id = ANY (%s) ORDER BY id", [list(reviews)]
+        "SELECT detected, reviewed_by, remark FROM tunnel.finding WHERE id = ANY (%s) ORDER BY id", [list(reviews)]
     )
     assert state.fetchall() == [(True, "ines", None), (True, None, "stain"), (False, None, None)]
     assert conn.execute("SELECT kind, block, md5(tiff) FROM tunnel.image ORDER BY 1, 2").fetchall() == images
@@ -274,7 +275,7 @@ def test_what_was_measured_is_stored_with_what_it_says(detected: psycopg.Connect
     result = job.compute_detection(inputs, inputs.sample, values, lambda window: None, lambda share: None)
     rows = conn.execute(
         "SELECT ST_AsBinary(a.unrolled), a.features, a.evidence, a.model, a.kind, a.confidence, l.names"
-        "  FROM tunnel.anomaly a JOIN tunnel.feature_list l ON l.id = a.feature_list_id"
+        "  FROM tunnel.finding a JOIN tunnel.feature_list l ON l.id = a.feature_list_id"
     ).fetchall()
     stored = {shapely.from_wkb(bytes(wkb)).wkb: rest for wkb, *rest in rows}
     assert len(stored) == len(rows) == len(result.anomalies.anomalies) >= 3
@@ -292,21 +293,21 @@ def test_what_was_measured_is_stored_with_what_it_says(detected: psycopg.Connect
 
 def test_what_was_learned_judges_the_next_run_and_reviews_stay(detected: psycopg.Connection) -> None:
     conn = detected
-    leaks = [key for (key,) in conn.execute("SELECT id FROM tunnel.anomaly WHERE kind = 'leak' ORDER BY id")]
+    leaks = [key for (key,) in conn.execute("SELECT id FROM tunnel.finding WHERE kind = 'leak' ORDER BY id")]
     confirmed, rejected, renamed = leaks[:3]
     conn.execute("UPDATE tunnel_api.leak SET review = 'confirmed' WHERE id = %s", [confirmed])
     conn.execute("UPDATE tunnel_api.leak SET review = 'rejected' WHERE id = %s", [rejected])
     conn.execute("UPDATE tunnel_api.leak SET kind = 'joint' WHERE id = %s", [renamed])
     said = "SELECT id, review, kind, reviewed_by, reviewed_at FROM tunnel_api.anomaly WHERE id = ANY (%s) ORDER BY id"
     reviews = conn.execute(said, [leaks[:3]]).fetchall()
-    before = conn.execute("SELECT id, kind, confidence, features, evidence FROM tunnel.anomaly ORDER BY id").fetchall()
+    before = conn.execute("SELECT id, kind, confidence, features, evidence FROM tunnel.finding ORDER BY id").fetchall()
     # The owner's leaks are said to be rarer by a factor of e^20: nothing is one.
     tunnel = get_survey(conn, NAME).tunnel_id
     adjustment = Adjustment("recalibrated", 0.5, -20.0)
     assert apply_learned(conn, tunnel, adjustment, [NAME], {"rejected": 40}, (0.7, 0.3), None) == 1
     conn.commit()
     command("run", NAME, "--stale")
-    after = conn.execute("SELECT id, kind, confidence, features, evidence, model FROM tunnel.anomaly ORDER BY id").fetchall()
+    after = conn.execute("SELECT id, kind, confidence, features, evidence, model FROM tunnel.finding ORDER BY id").fetchall()
     assert [row[0] for row in after] == [row[0] for row in before]
     assert {kind for _, kind, *_ in after} <= {"joint", "dark"}
     assert {model for *_, model in after} == {f"{standard_model().version}+learned 1"}
@@ -322,7 +323,7 @@ def test_what_was_learned_judges_the_next_run_and_reviews_stay(detected: psycopg
     assert "nothing of" in command("run", NAME, "--stale").output
     command("learn", NAME, "--undo")
     command("run", NAME, "--stale")
-    again = conn.execute("SELECT id, kind, confidence, features, evidence FROM tunnel.anomaly ORDER BY id").fetchall()
+    again = conn.execute("SELECT id, kind, confidence, features, evidence FROM tunnel.finding ORDER BY id").fetchall()
     assert [row[:3] for row in again] == [row[:3] for row in before]
     assert conn.execute(said, [leaks[:3]]).fetchall() == reviews
 
@@ -352,7 +353,7 @@ def test_dry_and_homogeneous_regions_that_the_user_drew(detected: psycopg.Connec
 def test_what_people_drew_is_measured_and_stays(detected: psycopg.Connection) -> None:
     conn = detected
     key, drop, held = conn.execute(
-        "SELECT id, drop_mean, image_share FROM tunnel_api.leak WHERE counted AND area > 0.2 ORDER BY area DESC LIMIT 1"
+        "SELECT id, darkening_mean, image_share FROM tunnel_api.leak WHERE counted AND area > 0.2 ORDER BY area DESC LIMIT 1"
     ).fetchone()
     conn.execute(
         "UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, -0.05), review = 'confirmed' WHERE id = %s", [key]
@@ -369,13 +370,13 @@ def test_what_people_drew_is_measured_and_stays(detected: psycopg.Connection) ->
         [NAME, key],
     ).fetchone()
     conn.commit()
-    kept = "SELECT id, unrolled, review, origin FROM tunnel_api.lining_finding WHERE id = ANY (%s) ORDER BY id"
+    kept = "SELECT id, unrolled, review, origin FROM tunnel_api.finding WHERE id = ANY (%s) ORDER BY id"
     before = conn.execute(kept, [[key, dry, line]]).fetchall()
     number = conn.execute("SELECT count(*), sum(area) FROM tunnel_api.leak WHERE counted").fetchone()
     conn.rollback()
     command("run", NAME, "--from", "sections")
     assert conn.execute(kept, [[key, dry, line]]).fetchall() == before
-    figures = "SELECT drop_mean, drop_max, image_share, also_detected FROM tunnel_api.lining_finding WHERE id = %s"
+    figures = "SELECT darkening_mean, darkening_max, image_share, also_detected FROM tunnel_api.finding WHERE id = %s"
     mean, most, share, also = conn.execute(figures, [key]).fetchone()
     assert mean == pytest.approx(drop, rel=0.15)
     assert most > mean

@@ -83,7 +83,7 @@ def process(folder: Path, survey: str, stations: list[Path], dimension: str, fil
 
 def leaks(conn: psycopg.Connection, survey: str) -> list[tuple[shapely.Geometry, float]]:
     rows = conn.execute(
-        "SELECT ST_AsBinary(l.unrolled), l.drop_mean FROM tunnel.anomaly l JOIN tunnel.survey s ON s.id = l.survey_id "
+        "SELECT ST_AsBinary(l.unrolled), l.darkening_mean FROM tunnel.finding l JOIN tunnel.survey s ON s.id = l.survey_id "
         "WHERE s.name = %s AND l.detected ORDER BY l.chainage_from, l.arc_from",
         (survey,),
     ).fetchall()

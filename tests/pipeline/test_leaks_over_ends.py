@@ -152,9 +152,9 @@ def test_leaks_over_the_end_are_what_they_are_elsewhere(sections: psycopg.Connec
         assert same.intersection(wet).area / same.union(wet).area > 0.8
         assert share_of(scan, same, APPENDAGE) < 0.05
         assert share_of(scan, same, FLOOR) < 0.05
-    assert conn.execute("SELECT count(*) FROM tunnel.anomaly WHERE features IS NULL OR model IS NULL").fetchone() == (0,)
+    assert conn.execute("SELECT count(*) FROM tunnel.finding WHERE features IS NULL OR model IS NULL").fetchone() == (0,)
     for km, west, east, share, area in conn.execute(
-        "SELECT km, chainage_from, chainage_to, image_share, area / ST_Area(unrolled) FROM tunnel.anomaly"
+        "SELECT km, chainage_from, chainage_to, image_share, area / ST_Area(unrolled) FROM tunnel.finding"
     ):
         assert km == (west + east) / 2 // 1000
         assert 0.3 < share <= 1
@@ -162,7 +162,7 @@ def test_leaks_over_the_end_are_what_they_are_elsewhere(sections: psycopg.Connec
     conn.rollback()
     # Doing both again, or only one, changes nothing; a review stays.
     (larger, _) = sorted(over_end(conn), key=lambda key: -found[key].area)
-    conn.execute("UPDATE tunnel.anomaly SET review = 'confirmed' WHERE id = %s", [larger])
+    conn.execute("UPDATE tunnel.finding SET review = 'confirmed' WHERE id = %s", [larger])
     conn.commit()
     for options in ([], ["--km", 12], ["--km", 13]):
         command("run", NAME, "--from", "detect", *options)
@@ -170,10 +170,10 @@ def test_leaks_over_the_end_are_what_they_are_elsewhere(sections: psycopg.Connec
         assert again.keys() == found.keys()
         assert all(again[key].equals(found[key]) for key in found)
         assert (counts(conn)["leaks_new"], counts(conn)["leaks_gone"]) == (0, 0)
-    assert conn.execute("SELECT review FROM tunnel.anomaly WHERE id = %s", [larger]).fetchone() == ("confirmed",)
+    assert conn.execute("SELECT review FROM tunnel.finding WHERE id = %s", [larger]).fetchone() == ("confirmed",)
     conn.rollback()
     command("survey", "remove", NAME, "--yes")
-    assert conn.execute("SELECT count(*) FROM tunnel.anomaly_part").fetchone() == (0,)
+    assert conn.execute("SELECT count(*) FROM tunnel.boundary_region").fetchone() == (0,)
 
 
 @pytest.mark.parametrize(("first", "second"), [(12, 13), (13, 12)])
@@ -188,13 +188,13 @@ def test_a_half_that_was_found_first_becomes_the_whole(
     # What the smaller leak has in kilometre 12 is too small for a leak of its own.
     assert len(halves) == {12: 1, 13: 2}[first]
     assert not over_end(conn)
-    conn.execute("UPDATE tunnel.anomaly SET review = 'rejected', remark = 'old stain' WHERE id = ANY (%s)", [list(halves)])
+    conn.execute("UPDATE tunnel.finding SET review = 'rejected', remark = 'old stain' WHERE id = ANY (%s)", [list(halves)])
     conn.commit()
     command("run", NAME, "--from", "detect", "--km", second)
     assert_same(outlines(conn), uncut)
     assert len(over_end(conn)) == 2
     assert halves.keys() <= over_end(conn).keys()
-    kept = conn.execute("SELECT review, remark, detected FROM tunnel.anomaly WHERE id = ANY (%s)", [list(halves)]).fetchall()
+    kept = conn.execute("SELECT review, remark, detected FROM tunnel.finding WHERE id = ANY (%s)", [list(halves)]).fetchall()
     assert kept == [("rejected", "old stain", True)] * len(halves)
 
 
@@ -255,7 +255,10 @@ def test_any_order_of_kilometres_puts_the_same_together(conn: psycopg.Connection
             box = (made.column, made.row, made.stop, made.row + len(made.mask))
             assert seen.setdefault(box, made).mask.tolist() == made.mask.tolist()
             assert made.properties == RegionProperties(perimeter=float(len(cluster.parts)))
-            assert (made.filled, made.drop_max) == (made.mask.sum(), max(part.region.drop_max for part in cluster.parts))
+            assert (made.filled, made.darkening_max) == (
+                made.mask.sum(),
+                max(part.region.darkening_max for part in cluster.parts),
+            )
     assert sorted(seen) == [
         (25_500, 9, 26_000, 11), (25_990, 0, 28_020, 2), (26_000, 20, 26_007, 22), (28_000, -9, 28_020, -7),
     ]  # fmt: skip

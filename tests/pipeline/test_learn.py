@@ -61,10 +61,11 @@ def reviewed(conn: psycopg.Connection) -> psycopg.Connection:
     order = feature_list(conn)
     for k, features in enumerate(pool):
         conn.execute(
-            "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, confidence,"
-            " area, drop_mean, drop_max, image_share, unrolled, map, surface, review, feature_list_id, features, evidence,"
+            "INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, confidence,"
+            " area, darkening_mean, darkening_max, image_share, unrolled, map, surface, review, feature_list_id,"
+            " features, evidence,"
             " model) SELECT survey_id, km, %(c)s, %(c)s + 0.5, 0, 0.5, 12, 'leak', 0.7, 0.2, 3, 4, 1, unrolled, map, surface,"
-            " %(review)s, %(order)s, %(features)s, %(evidence)s, '1' FROM tunnel.anomaly WHERE id = 1",
+            " %(review)s, %(order)s, %(features)s, %(evidence)s, '1' FROM tunnel.finding WHERE id = 1",
             {
                 "c": 12310.0 + 1.5 * k, "review": "rejected" if rng.random() < 0.85 else "confirmed", "order": order,
                 "features": [*features.tolist(), 1.0], "evidence": json.dumps({"faint": -1.26, "salts": 2.0, "thin": 0.01}),
@@ -75,7 +76,7 @@ def reviewed(conn: psycopg.Connection) -> psycopg.Connection:
 
 
 def test_without_reviews_it_is_one_line(conn: psycopg.Connection) -> None:
-    conn.execute("UPDATE tunnel.anomaly SET review = 'open'")
+    conn.execute("UPDATE tunnel.finding SET review = 'open'")
     conn.commit()
     output = command("learn", SURVEY, code=2).stderr
     assert output.startswith("tunneldb: no anomaly of demo-2024 was reviewed yet")
@@ -105,9 +106,9 @@ def test_features_in_another_order_are_told_by_their_names(reviewed: psycopg.Con
         "UPDATE tunnel.feature_list SET names = ARRAY(SELECT unnest(names || 'new'::text) ORDER BY 1 DESC) WHERE id = %s", [own]
     )
     names = conn.execute("SELECT names FROM tunnel.feature_list WHERE id = %s", [own]).fetchone()[0]
-    for key, values in conn.execute("SELECT id, features FROM tunnel.anomaly WHERE features IS NOT NULL").fetchall():
+    for key, values in conn.execute("SELECT id, features FROM tunnel.finding WHERE features IS NOT NULL").fetchall():
         by_name = {**dict(zip(STORED, values, strict=True)), "new": 9.0}
-        conn.execute("UPDATE tunnel.anomaly SET features = %s WHERE id = %s", [[by_name[name] for name in names], key])
+        conn.execute("UPDATE tunnel.finding SET features = %s WHERE id = %s", [[by_name[name] for name in names], key])
     after = load_measured(conn, [tunnel_id(conn)])
     assert np.array_equal(after.features, before.features, equal_nan=True)
     assert after.known.sum() == MANY
@@ -228,6 +229,6 @@ def test_evidence_is_told_by_the_views(reviewed: psycopg.Connection) -> None:
     assert set(rows) == {("salts +2.0, faint -1.3", "1")}
     assert reviewed.execute("SELECT count(*) FROM tunnel_api.leak WHERE evidence IS NULL").fetchone() == (7,)
     shown = reviewed.execute(
-        "SELECT reason, log_odds FROM tunnel_api.anomaly_evidence WHERE anomaly_id = (SELECT max(id) FROM tunnel.anomaly)"
+        "SELECT reason, log_odds FROM tunnel_api.finding_evidence WHERE finding_id = (SELECT max(id) FROM tunnel.finding)"
     ).fetchall()
     assert dict(shown) == {"faint": -1.26, "salts": 2.0, "thin": 0.01}

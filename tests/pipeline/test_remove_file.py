@@ -60,8 +60,9 @@ def results(conn: psycopg.Connection, km: int) -> None:
         )
     conn.execute(
         """
-        INSERT INTO tunnel.anomaly (survey_id, km, kind, reasons, confidence, contrast, chainage_from, chainage_to, arc_from,
-                                    arc_to, clock, area, drop_mean, drop_max, image_share, unrolled, map, surface, review)
+        INSERT INTO tunnel.finding (survey_id, km, kind, reasons, confidence, contrast, chainage_from, chainage_to, arc_from,
+                                    arc_to, clock, area, darkening_mean, darkening_max, image_share, unrolled, map, surface,
+                                    review)
         SELECT %(key)s, %(km)s, 'leak', '{}', 0.9, 3, m, m + 1, 0, 1, 12, 1, 3, 4, 1, ST_MakeEnvelope(m, 0, m + 1, 1, 0),
                ST_MakeEnvelope(0, 0, 1, 1, 25830), ST_GeomFromText('POLYGONZ((0 0 0, 1 0 0, 1 1 0, 0 0 0))', 25830), 'confirmed'
           FROM (SELECT %(km)s * 1000 + 2 AS m) p
@@ -124,11 +125,11 @@ def test_reviewed_leaks_do_not_go_without_a_word(survey: psycopg.Connection, sca
     results(survey, 1)
     # one that was drawn, and one that was redrawn
     survey.execute(
-        "INSERT INTO tunnel.anomaly (survey_id, km, kind, chainage_from, chainage_to, arc_from, arc_to, clock, area, unrolled,"
-        " map, surface, review, origin, by_hand, drawn_by, drawn_at)"
+        "INSERT INTO tunnel.finding (survey_id, km, kind, chainage_from, chainage_to, arc_from, arc_to, clock, area, unrolled,"
+        " map, surface, review, origin, manual, drawn_by, drawn_at)"
         " SELECT survey_id, km, 'spall', chainage_from + 3, chainage_to + 3, arc_from, arc_to, clock, area,"
         " ST_Translate(unrolled, 3, 0), map, surface, 'confirmed', o, o = 'drawn', 'ines', now()"
-        " FROM tunnel.anomaly, unnest('{drawn,redrawn}'::text[]) AS o WHERE km = 1"
+        " FROM tunnel.finding, unnest('{drawn,redrawn}'::text[]) AS o WHERE km = 1"
     )
     survey.commit()
     before = rows(survey)
@@ -141,10 +142,10 @@ def test_reviewed_leaks_do_not_go_without_a_word(survey: psycopg.Connection, sca
     assert "read again: a.laz" in said
     assert "no points are left in kilometre 1" in said
     assert "1 of them reviewed; 2 findings that people drew are kept" in said
-    assert survey.execute("SELECT km, origin FROM tunnel.anomaly ORDER BY id").fetchall() == [
+    assert survey.execute("SELECT km, origin FROM tunnel.finding ORDER BY id").fetchall() == [
         (0, "detected"), (1, "drawn"), (1, "redrawn"),
     ]  # fmt: skip
-    assert survey.execute("SELECT count(*) FROM tunnel_api.lining_finding WHERE counted").fetchone() == (3,)
+    assert survey.execute("SELECT count(*) FROM tunnel_api.finding WHERE counted").fetchone() == (3,)
     # what kilometre 0 has rests on points that it has not any more, and on those of its neighbour
     state = survey.execute("SELECT DISTINCT km, stage, reason FROM tunnel_api.stage_status WHERE stale").fetchall()
     assert (0, "axis", "load ran since") in state

@@ -30,7 +30,7 @@ def test_leaks_over_several_profiles_are_found_once_and_with_their_area(
     prepare(tmp_path, "profiler")
     command("run", NAME)
     found = list(outlines(conn).values())
-    rows = conn.execute("SELECT kind, image_share FROM tunnel.anomaly ORDER BY id").fetchall()
+    rows = conn.execute("SELECT kind, image_share FROM tunnel.finding ORDER BY id").fetchall()
     assert [kind for kind, _ in rows] == ["leak"] * len(WET)
     assert all(share == pytest.approx(0.02 / SPACING, rel=0.5) for _, share in rows)
     for leak in WET:

@@ -87,12 +87,12 @@ def two(dock: Any) -> dict[str, Any]:
     press(dock, Qt.Key_C)
     seen["said"], seen["stays"] = dock.message.text(), at(dock)
     seen["shown"] = [dock.session.facts["review"], dock.panel.remark.text(), "rejected" in dock.panel.head.text()]
-    seen["kept"] = ask(f"SELECT review, remark FROM tunnel_api.lining_finding WHERE id = {at(dock)}")
+    seen["kept"] = ask(f"SELECT review, remark FROM tunnel_api.finding WHERE id = {at(dock)}")
     press(dock, Qt.Key_M)
     QTest.keyClicks(dock.panel.remark, "no soot")
     QTest.keyClick(dock.panel.remark, Qt.Key_Return)
     ask(f"UPDATE tunnel_api.finding_unrolled SET review = 'rejected' WHERE id = {second}")
-    ask(f"DELETE FROM tunnel.anomaly WHERE id = {third}")
+    ask(f"DELETE FROM tunnel.finding WHERE id = {third}")
     press(dock, Qt.Key_C)
     return {**seen, "wanted": fourth, "came": at(dock), "listed": third in [f.id for f in dock.session.work.findings]}
 
@@ -138,7 +138,7 @@ def undone(dock: Any) -> int | None:
 
 def remarked(finding: int | None) -> str:
     """Review and remark of a finding in the database."""
-    return ask(f"SELECT review, remark FROM tunnel_api.lining_finding WHERE id = {finding}")
+    return ask(f"SELECT review, remark FROM tunnel_api.finding WHERE id = {finding}")
 
 
 def ended(dock: Any) -> str:

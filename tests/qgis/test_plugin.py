@@ -167,17 +167,15 @@ def test_an_inspector_reviews_by_keys(
     assert did["focus_back"]
     assert did["after_undo"] == did["undone"]
     assert "is taken back" in did["said"]
-    rows = {
-        key: rest for key, *rest in conn.execute("SELECT id, review, kind, remark, reviewed_by FROM tunnel_api.lining_finding")
-    }
+    rows = {key: rest for key, *rest in conn.execute("SELECT id, review, kind, remark, reviewed_by FROM tunnel_api.finding")}
     assert rows[did["first"]][0] == "confirmed"
     assert rows[did["rejected"]][0] == "rejected"
     assert rows[did["renamed"]] == ["confirmed", "efflorescence", "it's a \\ 'trap'; no CR", "ines"]
     assert rows[did["undone"]][0] == "open"
-    who = conn.execute("SELECT DISTINCT who FROM tunnel_api.audit WHERE view = 'anomaly'").fetchall()
+    who = conn.execute("SELECT DISTINCT who FROM tunnel_api.audit WHERE view = 'finding'").fetchall()
     assert who == [("ines",)]
     (large,) = conn.execute(  # type: ignore[misc]
-        "SELECT count(*) FROM tunnel_api.lining_finding WHERE survey = %s AND area >= 1"
+        "SELECT count(*) FROM tunnel_api.finding WHERE survey = %s AND area >= 1"
         " AND state IN ('open', 'confirmed', 'rejected', 'gone')", [example],
     ).fetchone()  # fmt: skip
     assert len(did["large"]) == large
@@ -219,15 +217,14 @@ def test_what_comes_between_loses_nothing_and_overwrites_nothing(
     assert lost["remark_kept"][1:] == ["wet again", True]
     with psycopg.connect(dsn) as connection:
         rows = {
-            key: rest
-            for key, *rest in connection.execute("SELECT id, review, remark, reviewed_by FROM tunnel_api.lining_finding")
+            key: rest for key, *rest in connection.execute("SELECT id, review, remark, reviewed_by FROM tunnel_api.finding")
         }
         assert rows[lost["cut"]] == ["confirmed", None, "ines"]
         assert rows[lost["lost"]] == ["confirmed", "wet again", "ines"]
         assert rows[two["first"]] == ["confirmed", "no soot", "ines"]
         audit = connection.execute(
             "SELECT before ->> 'review', before ->> 'remark', after ->> 'review', after ->> 'remark' FROM tunnel_api.audit"
-            " WHERE view = 'anomaly' AND row_id = %s ORDER BY id", [two["first"]],
+            " WHERE view = 'finding' AND row_id = %s ORDER BY id", [two["first"]],
         ).fetchall()  # fmt: skip
         assert audit == [
             ("open", None, "rejected", "soot"), (None, "soot", None, "no soot"), ("rejected", None, "confirmed", None),
@@ -259,7 +256,7 @@ def test_what_another_wrote_alike_is_no_step_of_the_dock(
 ) -> None:
     """An operator, who may take back what others did, says of a finding what an inspector has just said."""
     seen = in_qgis(unpacked, tmp_path, dsn, "otto", "together_in_qgis.py")
-    rows = {key: rest for key, *rest in conn.execute("SELECT id, review, reviewed_by FROM tunnel_api.lining_finding")}
+    rows = {key: rest for key, *rest in conn.execute("SELECT id, review, reviewed_by FROM tunnel_api.finding")}
     assert seen["at_once"]["waited"]
     for how in ("ines", "at_once"):
         confirmed, undone = seen[how]["confirmed"], seen[how]["undone"]

@@ -144,8 +144,7 @@ def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str
         assert layer["error"] == "", name
     for name, kind in FINDINGS.items():
         (count,) = rows.execute(  # type: ignore[misc]
-            "SELECT count(*) FROM tunnel_api.lining_finding"
-            " WHERE GeometryType(unrolled) = upper(%s) AND (%s OR by_hand AND NOT wet)",
+            "SELECT count(*) FROM tunnel_api.finding WHERE GeometryType(unrolled) = upper(%s) AND (%s OR manual AND NOT wet)",
             [kind.removesuffix("Z"), not name.endswith("3d")],
         ).fetchone()
         assert (layers[name]["wkb"], layers[name]["features"], layers[name]["error"]) == (kind, count, ""), name
@@ -341,7 +340,7 @@ def test_a_leak_over_the_edge_of_a_sheet_is_in_both_tables(conn: psycopg.Connect
     crowd(conn, 2, 0.5, "No %s")  # from 12351.5 and 12352.0
     for number, (start, end) in {1: (12349.9, 12350.2), 2: (12350.3, 12350.8)}.items():
         conn.execute(
-            "UPDATE tunnel.anomaly SET chainage_from = %s, chainage_to = %s, unrolled = ST_MakeEnvelope(%s, 0, %s, 0.5)"
+            "UPDATE tunnel.finding SET chainage_from = %s, chainage_to = %s, unrolled = ST_MakeEnvelope(%s, 0, %s, 0.5)"
             " WHERE remark = %s",
             (start, end, start, end, f"No {number}"),
         )
@@ -358,13 +357,13 @@ def test_a_leak_over_the_edge_of_a_sheet_is_in_both_tables(conn: psycopg.Connect
 
 def crowd(conn: psycopg.Connection, count: int, apart: float, remark: str) -> None:
     """Put so many leaks on the second sheet, some metres apart, each with a remark; the database has the last first."""
-    conn.execute("DELETE FROM tunnel.anomaly WHERE kind <> 'leak'")
+    conn.execute("DELETE FROM tunnel.finding WHERE kind <> 'leak'")
     conn.execute(
-        "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, area, "
-        "drop_mean, drop_max, image_share, unrolled, map, surface, remark) "
-        "SELECT survey_id, km, at, at + 0.05, 0, 0.1, clock, kind, reasons, 0.01, drop_mean, drop_max, 1, "
+        "INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, area, "
+        "darkening_mean, darkening_max, image_share, unrolled, map, surface, remark) "
+        "SELECT survey_id, km, at, at + 0.05, 0, 0.1, clock, kind, reasons, 0.01, darkening_mean, darkening_max, 1, "
         "ST_MakeEnvelope(at, 0, at + 0.05, 0.1), map, surface, format(%s, i) "
-        "FROM tunnel.anomaly, generate_series(%s, 1, -1) AS i, LATERAL (SELECT 12351 + i * %s AS at) AS placed WHERE id = 1",
+        "FROM tunnel.finding, generate_series(%s, 1, -1) AS i, LATERAL (SELECT 12351 + i * %s AS at) AS placed WHERE id = 1",
         (remark, count, apart),
     )
     conn.commit()
@@ -441,12 +440,12 @@ def test_a_table_that_is_too_long_says_how_many_findings_it_lacks(
     """Here some 250 fit."""
     draw(conn, "crack", "LINESTRING(12351 3, 12351.1 3)")
     conn.execute(
-        "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, area,"
-        " length, width, unrolled, map, surface, shape, shape_map, shape_surface, origin, by_hand, review, remark)"
+        "INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, area,"
+        " length, width, unrolled, map, surface, shape, shape_map, shape_surface, origin, manual, review, remark)"
         " SELECT survey_id, km, chainage_from + i * 0.1, chainage_to + i * 0.1, arc_from, arc_to, clock, kind, reasons, area,"
         " length, width, ST_Translate(unrolled, i * 0.1, 0), map, surface, ST_Translate(shape, i * 0.1, 0), shape_map,"
-        " shape_surface, origin, by_hand, review, 'No ' || i || ', wet in winter, dry in summer'"
-        " FROM tunnel.anomaly, generate_series(1, 299) AS i WHERE by_hand"
+        " shape_surface, origin, manual, review, 'No ' || i || ', wet in winter, dry in summer'"
+        " FROM tunnel.finding, generate_series(1, 299) AS i WHERE manual"
     )
     conn.commit()
     act(project, "atlas", str(tmp_path / "long.pdf"))
@@ -463,7 +462,7 @@ def test_findings_are_drawn_with_what_the_form_begins_with(conn: psycopg.Connect
     done = act(project, "draw_findings")
     assert all(one["saved"] for one in done.values()), done
     rows = conn.execute(
-        "SELECT kind, origin, review, survey, GeometryType(unrolled) FROM tunnel_api.lining_finding WHERE by_hand ORDER BY id"
+        "SELECT kind, origin, review, survey, GeometryType(unrolled) FROM tunnel_api.finding WHERE manual ORDER BY id"
     ).fetchall()
     assert rows == [
         ("leak", "drawn", "confirmed", "demo-2024", "POLYGON"), ("crack", "drawn", "confirmed", "demo-2024", "LINESTRING"),
@@ -583,10 +582,10 @@ def test_review_in_qgis_is_saved_with_its_stamp(
     conn: psycopg.Connection, project: Path, layer: str, key: str, kind: str
 ) -> None:
     assert act(project, "review", key, "rejected", "a stain, dry to the touch", layer, kind)["saved"]
-    review, remark, judged, by, at = conn.execute(
-        "SELECT review, remark, judged, reviewed_by, reviewed_at FROM tunnel.anomaly WHERE id = %s", (key,)
+    review, remark, kind_override, by, at = conn.execute(
+        "SELECT review, remark, kind_override, reviewed_by, reviewed_at FROM tunnel.finding WHERE id = %s", (key,)
     ).fetchone()  # type: ignore[misc]
-    assert (review, remark, judged) == ("rejected", "a stain, dry to the touch", kind or None)
+    assert (review, remark, kind_override) == ("rejected", "a stain, dry to the touch", kind or None)
     assert (by,) == conn.execute("SELECT session_user::text").fetchone()
     assert at is not None
 
@@ -625,7 +624,7 @@ def test_inspector_edits_and_what_is_stale_can_be_recomputed(conn: psycopg.Conne
     assert act(project, "review", "3", "confirmed", "wet")["saved"]
     edited = conn.execute("SELECT n, edited_by FROM tunnel.axis_vertex WHERE source = 'edited'").fetchall()
     assert edited == [(1235, "mover")]
-    assert conn.execute("SELECT reviewed_by FROM tunnel.anomaly WHERE id = 3").fetchone() == ("mover",)
+    assert conn.execute("SELECT reviewed_by FROM tunnel.finding WHERE id = 3").fetchone() == ("mover",)
     stale = conn.execute("SELECT stage FROM tunnel_api.stage_status WHERE stale ORDER BY step").fetchall()
     assert stale == [("segments",), ("sections",), ("ground",)]
     # as the action has it, but by one who may: without its points the example itself cannot be computed
@@ -844,7 +843,7 @@ def test_errors_are_one_line(conn: psycopg.Connection, example: str, tmp_path: P
     result = write(tmp_path / "nowhere" / "demo.qgz")
     assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
     conn.execute("DELETE FROM tunnel.axis_vertex")
-    conn.execute("DELETE FROM tunnel.anomaly")
+    conn.execute("DELETE FROM tunnel.finding")
     conn.execute("DELETE FROM tunnel.image")
     conn.commit()
     result = write(tmp_path / "demo.qgz")

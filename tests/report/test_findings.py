@@ -51,8 +51,8 @@ DRAWN = """
     ('demo-2024', 'leak', 2, NULL, 'confirmed', NULL, 'POLYGON((12390 0, 12391 0, 12391 1, 12390 1, 12390 0))'),
     ('demo-2024', 'leak', 2, NULL, 'confirmed', NULL, 'POLYGON((12391.5 0, 12392 0, 12392 1, 12391.5 1, 12391.5 0))');
     SELECT tunnel_api.finding_split(id, 'LINESTRING(12380.5 -1, 12380.5 2)')
-      FROM tunnel_api.lining_finding WHERE kind = 'delamination';
-    SELECT tunnel_api.finding_merge(array_agg(id)) FROM tunnel_api.lining_finding WHERE kind = 'leak' AND origin = 'drawn';
+      FROM tunnel_api.finding WHERE kind = 'delamination';
+    SELECT tunnel_api.finding_merge(array_agg(id)) FROM tunnel_api.finding WHERE kind = 'leak' AND origin = 'drawn';
     UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, 0.05) WHERE id = 5;
     INSERT INTO tunnel_api.region (survey_id, kind, reason, geom)
         SELECT id, 'dry', 'oil', ST_MakeEnvelope(12470, -1, 12472, 2, 0) FROM tunnel.survey;
@@ -118,7 +118,7 @@ def drawn(server_dsn: str, example_template: str, web: str) -> Iterator[str]:
             for path in ("upright.jpg", "gone.jpg", "broken.jpg", f"{web}/1.jpg", f"{web}/2.jpg"):
                 conn.execute(
                     "INSERT INTO tunnel_api.finding_photo (finding_id, path, caption)"
-                    " SELECT id, %s, 'of it' FROM tunnel_api.lining_finding WHERE kind = 'crack' AND severity = 3",
+                    " SELECT id, %s, 'of it' FROM tunnel_api.finding WHERE kind = 'crack' AND severity = 3",
                     [path],
                 )
         yield dsn
@@ -182,7 +182,7 @@ def test_each_finding_has_a_row_or_is_in_a_line_that_says_so(drawn: str, report:
     with connect(drawn) as conn:
         for kind in KINDS:
             rows = conn.execute(
-                "SELECT id, state, label, coalesce(severity_label, '–') FROM tunnel_api.lining_finding WHERE kind = %s", [kind]
+                "SELECT id, state, label, coalesce(severity_label, '–') FROM tunnel_api.finding WHERE kind = %s", [kind]
             ).fetchall()
             chapter = section(text, f"kind-{kind}")
             listed = {
@@ -197,7 +197,7 @@ def test_each_finding_has_a_row_or_is_in_a_line_that_says_so(drawn: str, report:
             for key, _, label, severity in rows:
                 if key in listed:
                     assert (listed[key][0], listed[key][1], listed[key][6]) == (str(key), label, severity)
-        (merged,) = conn.execute("SELECT id FROM tunnel_api.lining_finding WHERE origin = 'merged'").fetchone()
+        (merged,) = conn.execute("SELECT id FROM tunnel_api.finding WHERE origin = 'merged'").fetchone()
         region, ids = conn.execute("SELECT id, leak_ids FROM tunnel_api.dry_region WHERE reason = 'oil'").fetchone()
     assert f"; merged into {merged}" in section(text, "kind-leak")
     assert "<b>open" not in section(text, "kind-crack"), "a remark is text"
@@ -226,7 +226,7 @@ def test_report_workbook_and_json_say_which_dry_region_waits_and_who_approved(
     assert "approved by" not in rows[str(waiting)][5]
     assert f"; approved by {operator}, " in rows[str(approved)][5]
     told = json.loads(run(dsn, "findings", example, "-o", tmp_path / "f.xlsx", "--json").stdout)
-    stated = {region["id"]: (region["waits"], region["approved_by"]) for region in told["dry_regions"]}
+    stated = {region["id"]: (region["pending_approval"], region["approved_by"]) for region in told["dry_regions"]}
     assert (stated[waiting], stated[approved]) == ((True, None), (False, operator))
     head, *cells = openpyxl.load_workbook(tmp_path / "f.xlsx")["Dry regions"].iter_rows(values_only=True)
     sheet = {row["No."]: row for row in (dict(zip(head, row, strict=True)) for row in cells)}
@@ -312,9 +312,7 @@ def test_a_strip_shows_what_reaches_into_it_as_far_as_it_does(drawn: str, folder
     run(drawn, "report", NAME, "-o", path, "--photos", folder)
     with connect(drawn) as conn:
         cracks = dict(
-            conn.execute(
-                "SELECT severity, id FROM tunnel_api.lining_finding WHERE kind = 'crack' AND origin = 'drawn'"
-            ).fetchall()
+            conn.execute("SELECT severity, id FROM tunnel_api.finding WHERE kind = 'crack' AND origin = 'drawn'").fetchall()
         )
     strips = dict(re.findall(r'<figure class="strip" id="strip-(\d+)">(.*?)</figure>', path.read_text("utf-8"), re.DOTALL))
     shown = {}

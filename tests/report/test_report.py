@@ -67,7 +67,7 @@ def leaks(shared: str) -> list[dict[str, Any]]:
     with connect(shared) as conn, conn.cursor(row_factory=psycopg.rows.dict_row) as cursor:
         return cursor.execute(
             "SELECT id, (chainage_from + chainage_to) / 2 AS chainage, arc_from, arc_to, clock, area, review,"
-            " ST_AsText(unrolled) AS outline FROM tunnel.anomaly WHERE kind = 'leak' ORDER BY chainage_from"
+            " ST_AsText(unrolled) AS outline FROM tunnel.finding WHERE kind = 'leak' ORDER BY chainage_from"
         ).fetchall()
 
 
@@ -219,7 +219,7 @@ def test_what_was_rejected_and_not_found_again_counts_alike_everywhere(
     example: str, conn: psycopg.Connection, tmp_path: Path
 ) -> None:
     conn.execute("UPDATE tunnel_api.leak SET review = CASE id WHEN 2 THEN 'rejected' ELSE 'confirmed' END WHERE id IN (1, 2)")
-    conn.execute("UPDATE tunnel.anomaly SET detected = false WHERE id IN (1, 2)")
+    conn.execute("UPDATE tunnel.finding SET detected = false WHERE id IN (1, 2)")
     conn.commit()
     run("report", example, "-o", tmp_path / "r.html")
     text = (tmp_path / "r.html").read_text("utf-8")
@@ -235,7 +235,7 @@ def test_what_was_rejected_and_not_found_again_counts_alike_everywhere(
 
 def test_state_that_does_not_hold_is_warned_of(example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
     conn.execute("UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0.03, 0.04, 0) WHERE n = 1240")
-    conn.execute("UPDATE tunnel.anomaly SET detected = false WHERE id = 3")
+    conn.execute("UPDATE tunnel.finding SET detected = false WHERE id = 3")
     conn.execute("DELETE FROM tunnel.coverage")
     conn.execute("UPDATE tunnel.scan_file SET unposed = 3, points = points + 3")
     conn.execute("""UPDATE tunnel.run SET counts = counts || '{"note": "roughness 9° is taken"}' WHERE stage = 'detect'""")
@@ -259,7 +259,7 @@ def test_edits_are_those_of_this_survey_not_of_a_former_one(example: str, conn: 
     conn.execute(edit, ["of the former"])
     conn.commit()
     conn.execute("UPDATE tunnel.survey SET created_at = clock_timestamp()")
-    conn.execute("UPDATE tunnel.anomaly SET remark = NULL")
+    conn.execute("UPDATE tunnel.finding SET remark = NULL")
     conn.execute(edit, ["of this one"])
     conn.commit()
     run("report", example, "-o", tmp_path / "r.html", "--from", "12+400", "--to", "12+450")
@@ -507,9 +507,9 @@ def test_the_digest_is_of_leaks_listed_or_not(example: str, conn: psycopg.Connec
 def test_thousands_of_leaks_come_by_pages(example: str, conn: psycopg.Connection, browser: Browser, tmp_path: Path) -> None:
     rows = conn.execute(
         "SELECT attname FROM pg_attribute"
-        " WHERE attrelid = 'tunnel.anomaly'::regclass AND attnum > 0 AND attname <> 'id' AND attgenerated = ''"
+        " WHERE attrelid = 'tunnel.finding'::regclass AND attnum > 0 AND attname <> 'id' AND attgenerated = ''"
     ).fetchall()
-    copy = "INSERT INTO tunnel.anomaly ({0}) SELECT {0} FROM tunnel.anomaly, generate_series(1, 500) WHERE id = 3"
+    copy = "INSERT INTO tunnel.finding ({0}) SELECT {0} FROM tunnel.finding, generate_series(1, 500) WHERE id = 3"
     conn.execute(sql.SQL(copy).format(sql.SQL(", ").join(sql.Identifier(name) for (name,) in rows)))
     survey = get_survey(conn, example)
     conn.commit()

@@ -112,7 +112,7 @@ def asked(server_dsn: str, example_template: str) -> Iterator[Asked]:
         answers = {title: put(conn, query) for title, query in QUESTIONS.items() if title not in OF_FINDINGS}
         rows = conn.execute(
             "SELECT id, kind, detected, review, area, confidence, ST_AsBinary(unrolled), ST_AsBinary(map), ST_AsBinary(surface)"
-            " FROM tunnel.anomaly WHERE survey_id = 1 ORDER BY chainage_from"
+            " FROM tunnel.finding WHERE survey_id = 1 ORDER BY chainage_from"
         ).fetchall()
         anomalies = [Leak(*row[:6], *(shapely.from_wkb(bytes(wkb)) for wkb in row[6:])) for row in rows]
         drawn = draw_findings(conn, NAME)
@@ -327,7 +327,7 @@ def changes(rows: Rows, a: Asked) -> None:
     assert times == sorted(times, reverse=True)
     edits = [(row["what"], row["detail"]) for row in rows if row["who"] == a.who]
     assert f"update {a.at(CONFIRMED)}: remark - -> seen, review open -> confirmed" in [text for _, text in edits]
-    assert [what for what, _ in edits] == ["axis_vertex", "anomaly", "anomaly", "region"]
+    assert [what for what, _ in edits] == ["axis_vertex", "finding", "finding", "region"]
     assert [row["what"] for row in rows[len(edits) :]] == ["detect", "ground", "sections", "segments", "axis", "load"]
     assert {row["detail"] for row in rows[len(edits) :]} == {"done"}
     assert {row["km"] for row in rows} == {12, None}  # the region has none

@@ -43,7 +43,7 @@ def draw(conn: psycopg.Connection, shape: shapely.Geometry, kind: str = "leak", 
 
 
 def row(conn: psycopg.Connection, key: int, columns: str) -> tuple[Any, ...]:
-    found = conn.execute(f"SELECT {columns} FROM tunnel_api.lining_finding WHERE id = {key}".encode()).fetchone()
+    found = conn.execute(f"SELECT {columns} FROM tunnel_api.finding WHERE id = {key}".encode()).fetchone()
     assert found is not None
     return found
 
@@ -55,7 +55,7 @@ def wet(conn: psycopg.Connection) -> tuple[int, float]:
     ).fetchone()
     for query in (
         "SELECT count(*), sum(area) FROM tunnel_api.leak WHERE counted",
-        "SELECT count(*), sum(area) FROM tunnel_api.lining_finding WHERE counted AND wet",
+        "SELECT count(*), sum(area) FROM tunnel_api.finding WHERE counted AND wet",
         "SELECT sum(counted), sum(area) FROM tunnel_api.finding_count WHERE wet",
         "SELECT sum(leaks), sum(wet_area) FROM tunnel_api.km_statistics",
         "SELECT sum(patches), tunnel_api.wet_area('demo-2024', -1e9, 1e9) FROM tunnel_api.km_waterproof",
@@ -74,7 +74,8 @@ def test_of_what_is_drawn_on_the_unrolled_image_all_else_follows(person: psycopg
     assert clock == pytest.approx(truth.clock, abs=0.05)
     assert shapely.hausdorff_distance(shapely.from_wkb(bytes(map_wkb)), truth.map) < 1e-3
     assert shapely.hausdorff_distance(shapely.from_wkb(bytes(surface_wkb)), truth.surface) < 1e-3
-    assert row(person, key, "origin, by_hand, review, reviewed_by, drawn_by, severity_label, measured, drop_mean, counted") == (
+    columns = "origin, manual, review, reviewed_by, drawn_by, severity_label, measured, darkening_mean, counted"
+    assert row(person, key, columns) == (
         "drawn", True, "confirmed", "ines", "ines", "serious", False, None, True,
     )  # fmt: skip
     assert row(person, key, "km, chainage_from, chainage_to, arc_from, arc_to, remark, label") == (
@@ -103,14 +104,15 @@ def test_drawn_in_one_place_it_lies_at_the_same_in_the_others(person: psycopg.Co
 @INSPECTOR
 def test_what_is_redrawn_keeps_number_and_review_and_loses_what_was_measured(person: psycopg.Connection) -> None:
     (key,) = person.execute("SELECT min(id) FROM tunnel_api.leak WHERE review = 'confirmed'").fetchone()
-    was = row(person, key, "area, review, reviewed_by, remark, found")
+    was = row(person, key, "area, review, reviewed_by, remark, kind_detected")
     person.execute(
         "UPDATE tunnel_api.finding_unrolled SET geom = ST_Scale(geom, 'POINT(1 2)'::geometry, ST_Centroid(geom)) WHERE id = %s",
         [key],
     )
-    now = row(person, key, "area, review, reviewed_by, remark, found")
+    now = row(person, key, "area, review, reviewed_by, remark, kind_detected")
     assert now == (pytest.approx(2 * was[0], rel=0.01), *was[1:])
-    assert row(person, key, "origin, by_hand, measured, drop_mean, drop_max, image_share, contrast, confidence, drawn_by") == (
+    columns = "origin, manual, measured, darkening_mean, darkening_max, image_share, contrast, confidence, drawn_by"
+    assert row(person, key, columns) == (
         "redrawn", False, False, None, None, None, None, None, "ines",
     )  # fmt: skip
     wet(person)
@@ -128,7 +130,7 @@ def test_the_larger_part_keeps_the_number_and_the_oldest_keeps_it_again(person: 
     (ids,) = person.execute("SELECT tunnel_api.finding_split(%s, 'LINESTRING(12350.5 0, 12350.5 2)')", [key]).fetchone()
     assert ids[0] == key
     assert row(person, key, "chainage_from, chainage_to, origin") == (12350.5, 12352.0, "split")
-    assert row(person, ids[1], "chainage_from, chainage_to, origin, parent_id, severity, review, by_hand") == (
+    assert row(person, ids[1], "chainage_from, chainage_to, origin, parent_id, severity, review, manual") == (
         12350.0, 12350.5, "split", key, 2, "confirmed", True,
     )  # fmt: skip
     (area,) = row(person, key, "area")
@@ -144,7 +146,7 @@ def test_the_larger_part_keeps_the_number_and_the_oldest_keeps_it_again(person: 
         (f"SELECT tunnel_api.finding_split({key}, 'LINESTRING(12340 0, 12341 0)')", "does not split"),
         (f"SELECT tunnel_api.finding_merge(ARRAY[{key}, {ids[1]}])", "is merged into"),
         (
-            f"SELECT tunnel_api.finding_merge(ARRAY[{key}, (SELECT max(id) + 1 FROM tunnel_api.lining_finding)])",
+            f"SELECT tunnel_api.finding_merge(ARRAY[{key}, (SELECT max(id) + 1 FROM tunnel_api.finding)])",
             "not all there",
         ),
     ):
@@ -315,7 +317,7 @@ def test_a_large_dry_region_waits_for_an_operator(people: None, dsn: str, exampl
         ).fetchone()  # fmt: skip
         ines.commit()
         assert wet(ines) == before
-        stated = "SELECT waits, approved_by, leaks FROM tunnel_api.dry_region WHERE id = %s"
+        stated = "SELECT pending_approval, approved_by, leaks FROM tunnel_api.dry_region WHERE id = %s"
         assert ines.execute(stated, [region]).fetchone() == (True, None, 0)
         ines.commit()
         with pytest.raises(psycopg.errors.InsufficientPrivilege):
@@ -344,7 +346,7 @@ def test_a_client_that_is_killed_leaves_nothing_half_written(people: None, dsn: 
     """As QGIS is, in the middle of a save of several edits; nobody waits for what it held."""
     with psycopg.connect(make_conninfo(dsn, user="otto")) as other:
         whole = (
-            "SELECT count(*), round(sum(area)::numeric, 6) FROM tunnel_api.lining_finding"
+            "SELECT count(*), round(sum(area)::numeric, 6) FROM tunnel_api.finding"
             " UNION ALL SELECT count(*), 0 FROM tunnel_api.audit"
         )
         before = other.execute(whole).fetchall()
@@ -443,7 +445,7 @@ def everything(conn: psycopg.Connection) -> list[tuple[Any, ...]]:
         " || jsonb_build_object('area', round(a.area::numeric, 5), 'clock', round(a.clock::numeric, 4),"
         " 'unrolled', ST_AsText(a.unrolled, 6)),"
         " (SELECT jsonb_agg(to_jsonb(p) - 'added_at') FROM tunnel_api.finding_photo p WHERE p.finding_id = a.id)"
-        " FROM tunnel_api.lining_finding a ORDER BY id"
+        " FROM tunnel_api.finding a ORDER BY id"
     ).fetchall()
 
 
@@ -463,7 +465,7 @@ def test_each_step_is_taken_back_to_what_was_before(person: psycopg.Connection) 
         (found, "reviewed", f"UPDATE tunnel_api.leak SET review = 'rejected', remark = NULL, kind = 'dark' WHERE id = {found}"),
         (found, "redrawn", f"UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, 0.2) WHERE id = {found}"),
         (found, "split", f"""SELECT tunnel_api.finding_split(id, ST_MakeLine(ST_MakePoint(chainage_from + 0.5, -9),
-            ST_MakePoint(chainage_from + 0.5, 9))) FROM tunnel_api.lining_finding WHERE id = {found}"""),
+            ST_MakePoint(chainage_from + 0.5, 9))) FROM tunnel_api.finding WHERE id = {found}"""),
     )  # fmt: skip
     for key, said, statement in steps:
         before, sums = everything(person), wet(person)

@@ -64,7 +64,8 @@ SELECT g.survey_id, g.km, g.n, half, g.chainage_from + half / 10.0, 0.15, 5, '{1
   FROM tunnel.segment g, (VALUES (25), (75)) AS h (half)
 """
 LEAKS = """
-INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, drop_mean, drop_max,
+INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, darkening_mean,
+darkening_max,
     image_share, unrolled, map, surface)
 SELECT g.survey_id, g.km, g.chainage_from, g.chainage_from + 1, 0, 1, 12, 1, 3, 3, 1,
     ST_MakeEnvelope(g.chainage_from, 0, g.chainage_from + 1, 1, 0),
@@ -99,7 +100,7 @@ def many(server_dsn: str, template: str) -> Iterator[str]:
             conn.execute(statement)
         conn.commit()
         conn.autocommit = True
-        conn.execute("ANALYZE tunnel.survey, tunnel.tunnel, tunnel.segment, tunnel.section, tunnel.anomaly")
+        conn.execute("ANALYZE tunnel.survey, tunnel.tunnel, tunnel.segment, tunnel.section, tunnel.finding")
     yield dsn
     with psycopg.connect(server_dsn, autocommit=True) as conn:
         conn.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(sql.Identifier(DATABASE)))

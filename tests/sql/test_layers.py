@@ -27,7 +27,7 @@ from tunneldb.stages.registry import STAGES
 from tunneldb.store.catalog import add_site, make_layers, remove_tunnel
 
 SCHEMA = "tunnel_25830"
-WITH_MORE = {"anomaly", "leak", "lining_finding", "spot", "change_region", "leak_change", "clearance_infringement"}
+WITH_MORE = {"anomaly", "leak", "finding", "spot", "change_region", "leak_change", "clearance_infringement"}
 """Views with several geometries, each of which has a view of one."""
 
 NO_LAYERS = WITH_MORE | {"face_placement", "section_piece"}
@@ -191,7 +191,7 @@ def test_inspectors_review_and_edit_in_them(person: psycopg.Connection, conn: ps
     ).fetchone()
     conn.commit()
     assert person.execute(f"UPDATE {SCHEMA}.leak_map SET review = 'confirmed' WHERE id = %s", key).rowcount == 1
-    row = conn.execute("SELECT review, reviewed_by FROM tunnel.anomaly WHERE id = %s", key).fetchone()
+    row = conn.execute("SELECT review, reviewed_by FROM tunnel.finding WHERE id = %s", key).fetchone()
     assert row == ("confirmed", "ines")
     person.execute(f"UPDATE {SCHEMA}.axis_vertex SET geom = ST_Translate(geom, 0, 0, 0.1) WHERE n = 1240")
     assert conn.execute("SELECT source FROM tunnel.axis_vertex WHERE n = 1240").fetchone() == ("edited",)

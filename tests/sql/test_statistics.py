@@ -96,12 +96,13 @@ def add_leak(conn: psycopg.Connection, survey: int, outline: Polygon, area: floa
     west, south, east, north = outline.bounds
     values = {
         "survey_id": survey, "km": int((west + east) / 2 // 1000), "chainage_from": west, "chainage_to": east,
-        "arc_from": south, "arc_to": north, "clock": 12, "area": area, "drop_mean": 3, "drop_max": 4, "image_share": 1,
+        "arc_from": south, "arc_to": north, "clock": 12, "area": area, "darkening_mean": 3, "darkening_max": 4,
+        "image_share": 1,
         "unrolled": outline.wkt, "map": outline.wkt, "surface": shapely.force_3d(outline).wkt, **others,
     }  # fmt: skip
     places = ", ".join(f"%({name})s" for name in values)
     row = conn.execute(
-        f"INSERT INTO tunnel.anomaly ({', '.join(values)}) VALUES ({places}) RETURNING id",  # type: ignore[arg-type]
+        f"INSERT INTO tunnel.finding ({', '.join(values)}) VALUES ({places}) RETURNING id",  # type: ignore[arg-type]
         values,
     ).fetchone()
     assert row is not None
@@ -150,10 +151,10 @@ def made(rows: psycopg.Connection) -> Made:
         outline = shapely.transform(outline, lambda xy, m=middle: xy + np.array([m, rng.uniform(-7, 7)]))  # type: ignore[misc]
         area = outline.area * rng.uniform(0.95, 1.05)
         leaks[add_leak(conn, survey, outline, area)] = (outline, area)
-    for others in ({"kind": "joint"}, {"judged": "dark"}, {"review": "rejected"}, {"detected": False}):
+    for others in ({"kind": "joint"}, {"kind_override": "dark"}, {"review": "rejected"}, {"detected": False}):
         add_leak(conn, survey, Point(3500, 1).buffer(3), 28, **others)
     judged = Point(3300, 1).buffer(0.4)
-    leaks[add_leak(conn, survey, judged, 0.5, kind="joint", judged="leak", review="confirmed")] = (judged, 0.5)
+    leaks[add_leak(conn, survey, judged, 0.5, kind="joint", kind_override="leak", review="confirmed")] = (judged, 0.5)
     return Made(start, end, summed(3000, lining), summed(3000, seen), summed(3000, wet), leaks)
 
 

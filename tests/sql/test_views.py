@@ -103,11 +103,11 @@ def test_every_view_begins_with_a_stable_integer_key(
     conn: psycopg.Connection, example: str, points: None, queue: None, stationing: None
 ) -> None:
     conn.execute("UPDATE tunnel.scan_file SET unposed = 3")  # a remark
-    conn.execute('UPDATE tunnel.anomaly SET evidence = \'{"faint": 2.3, "thin": -1.1}\'')
+    conn.execute('UPDATE tunnel.finding SET evidence = \'{"faint": 2.3, "thin": -1.1}\'')
     conn.execute(
         "SELECT tunnel_api.learned_apply(id, '1', 'recalibrated', '{}', '{}', '{}', 0.7, 0.6, NULL) FROM tunnel.tunnel"
     )
-    conn.execute("INSERT INTO tunnel.photo (anomaly_id, path) SELECT min(id), 'p.jpg' FROM tunnel.anomaly")
+    conn.execute("INSERT INTO tunnel.photo (finding_id, path) SELECT min(id), 'p.jpg' FROM tunnel.finding")
     save_example_structures(conn, "demo-2024")
     save_example_registration(conn, "demo-2024")
     add_clearance_run(conn, "demo-2024")
@@ -283,19 +283,19 @@ ANOMALY_VIEWS = ["anomaly", "anomaly_unrolled", "anomaly_map", "anomaly_3d"]
 
 @pytest.mark.parametrize("view", LEAK_VIEWS + ANOMALY_VIEWS)
 def test_review_is_stamped(conn: psycopg.Connection, example: str, view: str) -> None:
-    key = one(conn, "SELECT min(id) FROM tunnel.anomaly")
+    key = one(conn, "SELECT min(id) FROM tunnel.finding")
     target = sql.Identifier(view)
     conn.execute(sql.SQL("UPDATE tunnel_api.{} SET review = 'confirmed', remark = 'drips' WHERE id = {}").format(target, key))
     review, remark, by, recent = one(
         conn,
-        "SELECT review, remark, reviewed_by, reviewed_at > now() - interval '1 minute' FROM tunnel.anomaly WHERE id = %s",
+        "SELECT review, remark, reviewed_by, reviewed_at > now() - interval '1 minute' FROM tunnel.finding WHERE id = %s",
         key,
     )
     assert (review, remark, by, recent) == ("confirmed", "drips", one(conn, "SELECT session_user::text"), True)
-    assert one(conn, "SELECT count(*) FROM tunnel.anomaly WHERE reviewed_by IS NOT NULL") == 1
+    assert one(conn, "SELECT count(*) FROM tunnel.finding WHERE reviewed_by IS NOT NULL") == 1
     for change in (
         "review = 'maybe'", "review = NULL", "area = 0", "reviewed_by = 'another'", "kind = 'crack'", "kind = NULL",
-        "found = 'dark'", "confidence = 1", "reasons = NULL",
+        "kind_detected = 'dark'", "confidence = 1", "reasons = NULL",
     ):  # fmt: skip
         complaint = r"open, confirmed or rejected|leak, joint or dark|only the review"
         with pytest.raises(psycopg.Error, match=complaint), conn.transaction():
@@ -304,22 +304,23 @@ def test_review_is_stamped(conn: psycopg.Connection, example: str, view: str) ->
 
 @pytest.mark.parametrize("view", ANOMALY_VIEWS)
 def test_kind_is_judged_stamped_and_taken_back(conn: psycopg.Connection, example: str, view: str) -> None:
-    key = one(conn, "SELECT id FROM tunnel.anomaly WHERE kind = 'joint'")
+    key = one(conn, "SELECT id FROM tunnel.finding WHERE kind = 'joint'")
     change = sql.SQL("UPDATE tunnel_api.{} SET kind = %s WHERE id = %s").format(sql.Identifier(view))
     counts = "SELECT count(*) FROM tunnel_api.leak"
     before = one(conn, counts)
     conn.execute(change, ("leak", key))
-    assert one(conn, "SELECT kind, judged, reviewed_by = session_user, review FROM tunnel.anomaly WHERE id = %s", key) == (
+    assert one(conn, "SELECT kind, kind_override, reviewed_by = session_user, review FROM tunnel.finding WHERE id = %s",
+    key) == (
         "joint", "leak", True, "open",
     )  # fmt: skip
     assert one(conn, counts) == before + 1
-    assert one(conn, "SELECT kind, found FROM tunnel_api.anomaly WHERE id = %s", key) == ("leak", "joint")
+    assert one(conn, "SELECT kind, kind_detected FROM tunnel_api.anomaly WHERE id = %s", key) == ("leak", "joint")
     conn.execute("UPDATE tunnel_api.leak SET remark = 'drips' WHERE id = %s", (key,))
-    assert one(conn, "SELECT judged, remark FROM tunnel.anomaly WHERE id = %s", key) == ("leak", "drips")
+    assert one(conn, "SELECT kind_override, remark FROM tunnel.finding WHERE id = %s", key) == ("leak", "drips")
     conn.execute(change, ("joint", key))
-    assert one(conn, "SELECT judged FROM tunnel.anomaly WHERE id = %s", key) is None
+    assert one(conn, "SELECT kind_override FROM tunnel.finding WHERE id = %s", key) is None
     assert one(conn, counts) == before
-    assert one(conn, "SELECT count(*) FROM tunnel.anomaly WHERE reviewed_by IS NOT NULL") == 1
+    assert one(conn, "SELECT count(*) FROM tunnel.finding WHERE reviewed_by IS NOT NULL") == 1
 
 
 def test_views_of_leaks_hold_leaks_and_those_of_anomalies_all(conn: psycopg.Connection, example: str) -> None:
@@ -329,7 +330,7 @@ def test_views_of_leaks_hold_leaks_and_those_of_anomalies_all(conn: psycopg.Conn
                 sql.SQL("SELECT kind, count(*)::int FROM tunnel_api.{} GROUP BY 1").format(sql.Identifier(view))
             ).fetchall()
             assert dict(rows) == kinds, view
-    assert one(conn, "SELECT found, reasons, label FROM tunnel_api.anomaly WHERE kind = 'joint'") == (
+    assert one(conn, "SELECT kind_detected, reasons, label FROM tunnel_api.anomaly WHERE kind = 'joint'") == (
         "joint", ["thin"], "12+415.050",
     )  # fmt: skip
 

@@ -21,7 +21,7 @@ NAMES = (
 
 REJECT = """
     UPDATE tunnel_api.leak SET review = 'rejected'
-     WHERE id = (SELECT id FROM tunnel.anomaly WHERE km = 4 ORDER BY id OFFSET %s LIMIT 1)
+     WHERE id = (SELECT id FROM tunnel.finding WHERE km = 4 ORDER BY id OFFSET %s LIMIT 1)
 """
 """Rejects one of the leaks of the middle kilometre."""
 
@@ -152,7 +152,7 @@ def change(conn: psycopg.Connection, survey: int, side: int, rng: np.random.Gene
         chainage = float(rng.choice([4000.1, 5000.0, rng.uniform(3200, 5800)]))
         add_leak(conn, survey, box(chainage - 0.3, 0, chainage + 0.3, 0.3), 0.18)
     elif which == 1:
-        conn.execute("DELETE FROM tunnel.anomaly WHERE id = %s", (2 * int(rng.integers(35)) + side,))
+        conn.execute("DELETE FROM tunnel.finding WHERE id = %s", (2 * int(rng.integers(35)) + side,))
     elif which == 2:
         conn.execute("UPDATE tunnel.coverage SET seen = lining WHERE km = %s", (3 + 2 * side,))
     else:
@@ -192,7 +192,7 @@ def test_inspectors_and_operators_have_it_kept(conn: psycopg.Connection, survey:
 def test_operators_have_it_kept_of_what_they_change_in_the_tables(
     conn: psycopg.Connection, survey: int, person: psycopg.Connection
 ) -> None:
-    for statement in ("DELETE FROM tunnel.anomaly WHERE id < 20", "UPDATE tunnel.coverage SET seen = lining"):
+    for statement in ("DELETE FROM tunnel.finding WHERE id < 20", "UPDATE tunnel.coverage SET seen = lining"):
         person.execute(statement)
         assert kept(conn) == [3, 4, 5]
         assert differences(conn) == []
@@ -207,7 +207,7 @@ def test_a_survey_takes_what_is_kept_along(conn: psycopg.Connection, survey: int
 
 
 def test_emptied_tables_leave_nothing_kept(conn: psycopg.Connection, survey: int) -> None:
-    conn.execute("TRUNCATE tunnel.anomaly CASCADE")
+    conn.execute("TRUNCATE tunnel.finding CASCADE")
     conn.commit()
     assert differences(conn) == []
     assert conn.execute("SELECT sum(patches) FROM tunnel_api.km_waterproof").fetchone() == (0,)
@@ -215,7 +215,7 @@ def test_emptied_tables_leave_nothing_kept(conn: psycopg.Connection, survey: int
 
 def test_leaks_with_changes_still_to_be_worked_out_can_be_emptied(conn: psycopg.Connection, survey: int) -> None:
     conn.execute("UPDATE tunnel_api.leak SET review = 'confirmed'")
-    conn.execute("TRUNCATE tunnel.anomaly CASCADE")
+    conn.execute("TRUNCATE tunnel.finding CASCADE")
     conn.commit()
     assert differences(conn) == []
     assert conn.execute("SELECT sum(patches) FROM tunnel_api.km_waterproof").fetchone() == (0,)
@@ -257,7 +257,7 @@ def test_under_a_stricter_isolation_nothing_is_kept_and_all_is_right(
     conn.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ")
     conn.execute("UPDATE tunnel_api.leak SET review = 'rejected' WHERE chainage_from BETWEEN 4010 AND 4900")
     with connect(dsn) as other:  # whose change of another leak in the same kilometre is no reason to fail
-        other.execute("UPDATE tunnel_api.leak SET review = 'confirmed' WHERE id = (SELECT max(id) FROM tunnel.anomaly)")
+        other.execute("UPDATE tunnel_api.leak SET review = 'confirmed' WHERE id = (SELECT max(id) FROM tunnel.finding)")
     conn.commit()
     assert differences(conn) == []
     assert kept(conn) == [3, 5]

@@ -25,7 +25,7 @@ from tunneldb.store.survey import get_survey
 SUMS = (
     "SELECT patches, wet_area FROM tunnel_api.leak_statistics('demo-2024', '-Infinity', 'Infinity')",
     "SELECT count(*)::int, coalesce(sum(area), 0) FROM tunnel_api.leak WHERE counted",
-    "SELECT count(*)::int, coalesce(sum(area), 0) FROM tunnel_api.lining_finding WHERE counted AND wet",
+    "SELECT count(*)::int, coalesce(sum(area), 0) FROM tunnel_api.finding WHERE counted AND wet",
     "SELECT sum(counted)::int, sum(area) FROM tunnel_api.finding_count WHERE wet",
     "SELECT sum(leaks)::int, sum(wet_area) FROM tunnel_api.km_statistics",
     "SELECT sum(patches)::int, tunnel_api.wet_area('demo-2024', -1e9, 1e9) FROM tunnel_api.km_waterproof",
@@ -57,7 +57,7 @@ def found(outline: Polygon, kind: str = "leak") -> Anomaly:
 
 
 def outlines(conn: psycopg.Connection) -> list[Polygon]:
-    rows = conn.execute("SELECT ST_AsBinary(unrolled) FROM tunnel.anomaly WHERE kind = 'leak' ORDER BY id").fetchall()
+    rows = conn.execute("SELECT ST_AsBinary(unrolled) FROM tunnel.finding WHERE kind = 'leak' ORDER BY id").fetchall()
     return [shapely.from_wkb(bytes(wkb)) for (wkb,) in rows]
 
 
@@ -89,7 +89,7 @@ def draw(conn: psycopg.Connection, shape: Polygon) -> int:
 
 
 def state(conn: psycopg.Connection, key: int) -> str | None:
-    row = conn.execute("SELECT state FROM tunnel_api.lining_finding WHERE id = %s", [key]).fetchone()
+    row = conn.execute("SELECT state FROM tunnel_api.finding WHERE id = %s", [key]).fetchone()
     return None if row is None else row[0]
 
 
@@ -98,21 +98,21 @@ def test_a_rerun_leaves_what_was_redrawn_and_links_what_it_finds(conn: psycopg.C
     rerun(conn, surface, leaks)
     (key,) = conn.execute("SELECT min(id) FROM tunnel_api.leak WHERE review = 'confirmed'").fetchone()
     conn.execute("UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, 0.1) WHERE id = %s", [key])
-    before = conn.execute("SELECT unrolled, area, origin, review FROM tunnel.anomaly WHERE id = %s", [key]).fetchone()
+    before = conn.execute("SELECT unrolled, area, origin, review FROM tunnel.finding WHERE id = %s", [key]).fetchone()
     counted = wet(conn)
     for _ in range(2):
         rerun(conn, surface, leaks)
         assert (
-            conn.execute("SELECT unrolled, area, origin, review FROM tunnel.anomaly WHERE id = %s", [key]).fetchone() == before
+            conn.execute("SELECT unrolled, area, origin, review FROM tunnel.finding WHERE id = %s", [key]).fetchone() == before
         )
         assert wet(conn) == (counted[0], pytest.approx(counted[1], rel=1e-12))  # summed in another order
         also, ids = conn.execute(
-            "SELECT also_detected, cardinality(detected_as) FROM tunnel_api.lining_finding WHERE id = %s", [key]
+            "SELECT also_detected, cardinality(detected_as) FROM tunnel_api.finding WHERE id = %s", [key]
         ).fetchone()
         assert (also, ids) == (True, 1)
     rerun(conn, surface, [])
     assert state(conn, key) == "confirmed"
-    assert conn.execute("SELECT also_detected FROM tunnel_api.lining_finding WHERE id = %s", [key]).fetchone() == (False,)
+    assert conn.execute("SELECT also_detected FROM tunnel_api.finding WHERE id = %s", [key]).fetchone() == (False,)
 
 
 def test_learning_takes_what_is_found_of_the_redrawn_as_that_is_reviewed(conn: psycopg.Connection, surface: Surface) -> None:
@@ -173,10 +173,10 @@ def test_a_finding_over_the_end_of_a_kilometre_is_found_from_both_sides(conn: ps
 
 def test_after_the_axis_has_moved_what_was_drawn_lies_on_the_new_surface(conn: psycopg.Connection, surface: Surface) -> None:
     key = draw(conn, box(12350.0, 0.0, 12351.0, 1.0))
-    conn.execute("UPDATE tunnel.anomaly SET surface = ST_Translate(surface, 0, 0, 5), area = 99 WHERE id = %s", [key])
+    conn.execute("UPDATE tunnel.finding SET surface = ST_Translate(surface, 0, 0, 5), area = 99 WHERE id = %s", [key])
     rerun(conn, surface, [])
     height, area = conn.execute(
-        "SELECT ST_ZMin(surface) - ST_Z(tunnel_api.roll(survey_id, 12350, 0)), area FROM tunnel.anomaly WHERE id = %s", [key]
+        "SELECT ST_ZMin(surface) - ST_Z(tunnel_api.roll(survey_id, 12350, 0)), area FROM tunnel.finding WHERE id = %s", [key]
     ).fetchone()
     assert abs(height) < 0.3
     assert area < 2
@@ -206,13 +206,13 @@ def test_any_order_of_steps_leaves_counts_and_areas_that_agree(
             if not all_ids:
                 break
             key = all_ids[number % len(all_ids)]
-            area = conn.execute("SELECT area FROM tunnel.anomaly WHERE id = %s", [key]).fetchone()[0]
+            area = conn.execute("SELECT area FROM tunnel.finding WHERE id = %s", [key]).fetchone()[0]
             if step == "draw":
                 mine.append(draw(conn, box(12350.0, -3 + number / 20, 12350.6, -3 + number / 20 + 0.04)))
                 assert wet(conn)[0] == before[0] + 1
             elif step == "split":
                 middle = (
-                    "SELECT (chainage_from + chainage_to) / 2, arc_from - 0.1, arc_to + 0.1 FROM tunnel.anomaly WHERE id = %s"
+                    "SELECT (chainage_from + chainage_to) / 2, arc_from - 0.1, arc_to + 0.1 FROM tunnel.finding WHERE id = %s"
                 )
                 x, low, high = conn.execute(middle, [key]).fetchone()
                 line = shapely.to_wkb(shapely.LineString([(x, low), (x, high)]))
@@ -230,7 +230,7 @@ def test_any_order_of_steps_leaves_counts_and_areas_that_agree(
             elif step == "delete" and mine:
                 gone = mine.pop(number % len(mine))
                 held = (
-                    "SELECT EXISTS (SELECT FROM tunnel.anomaly WHERE merged_into = %(id)s OR (id = %(id)s AND merged_into > 0))"
+                    "SELECT EXISTS (SELECT FROM tunnel.finding WHERE merged_into = %(id)s OR (id = %(id)s AND merged_into > 0))"
                 )
                 if conn.execute(held, {"id": gone}).fetchone()[0]:
                     continue
@@ -245,7 +245,7 @@ def test_any_order_of_steps_leaves_counts_and_areas_that_agree(
             elif step == "rerun":
                 rerun(conn, surface, leaks)
                 assert wet(conn) == (before[0], pytest.approx(before[1]))
-        by_state = conn.execute("SELECT count(*) FROM tunnel_api.lining_finding").fetchone()
+        by_state = conn.execute("SELECT count(*) FROM tunnel_api.finding").fetchone()
         columns = "counted + rejected + merged + same + dry + gone"
         assert conn.execute(f"SELECT sum({columns}) FROM tunnel_api.finding_count".encode()).fetchone() == by_state
         assert known[0] >= 0

@@ -47,7 +47,7 @@ def add_network(conn: psycopg.Connection, survey: str) -> None:
         ).fetchone()
         for table in ("scan_file", "segment", "coverage"):
             _copy(conn, table, source, keys[name])
-        _copy(conn, "anomaly", source, keys[name], where)
+        _copy(conn, "finding", source, keys[name], where)
     conn.execute(
         "INSERT INTO tunnel.change_section (survey_id, old_survey_id, km, chainage_from, chainage_to, seen_old, seen_new,"
         " seen_both, cell, arc_from, change) SELECT %s, %s, km, chainage_from, chainage_to, seen_old, seen_new, seen_both,"

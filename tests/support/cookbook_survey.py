@@ -35,18 +35,19 @@ def prepare(conn: psycopg.Connection, survey: str) -> None:
             " WHERE survey = %s AND %s BETWEEN chainage_from AND chainage_to",
             (review, survey, chainage),
         )
-    conn.execute("UPDATE tunnel.anomaly SET detected = false WHERE %s BETWEEN chainage_from AND chainage_to", (GONE,))
+    conn.execute("UPDATE tunnel.finding SET detected = false WHERE %s BETWEEN chainage_from AND chainage_to", (GONE,))
     conn.execute(
-        "UPDATE tunnel.anomaly SET created_at = now() - interval '20 days' WHERE %s BETWEEN chainage_from AND chainage_to",
+        "UPDATE tunnel.finding SET created_at = now() - interval '20 days' WHERE %s BETWEEN chainage_from AND chainage_to",
         (OLD,),
     )
     for number, shift in enumerate(COPIES, start=1):
         conn.execute(
-            "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, confidence,"
-            " contrast, area, drop_mean, drop_max, image_share, unrolled, map, surface, created_at)"
+            "INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, confidence,"
+            " contrast, area, darkening_mean, darkening_max, image_share, unrolled, map, surface, created_at)"
             " SELECT survey_id, km, chainage_from + %(by)s, chainage_to + %(by)s, arc_from, arc_to, clock, kind, confidence,"
-            " contrast, area * %(share)s, drop_mean, drop_max, image_share, ST_Translate(unrolled, %(by)s, 0), map, surface,"
-            " created_at FROM tunnel.anomaly WHERE %(at)s BETWEEN chainage_from AND chainage_to",
+            " contrast, area * %(share)s, darkening_mean, darkening_max, image_share, ST_Translate(unrolled, %(by)s,"
+            " 0), map, surface,"
+            " created_at FROM tunnel.finding WHERE %(at)s BETWEEN chainage_from AND chainage_to",
             {"by": shift, "at": COPIED, "share": 1 - 0.03 * number},
         )
     conn.execute(
@@ -103,20 +104,20 @@ def draw_findings(conn: psycopg.Connection, survey: str) -> dict[str, int]:
     }
     conn.execute("INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (%s, 'spall.jpg')", (made["spall"],))
     conn.execute("SELECT tunnel_api.finding_merge(%s)", ([made["spall"], made["other spall"]],))
-    place = "FROM tunnel.anomaly WHERE kind = 'leak' AND %s BETWEEN chainage_from AND chainage_to"
+    place = "FROM tunnel.finding WHERE kind = 'leak' AND %s BETWEEN chainage_from AND chainage_to"
     made["leak"], made["dry leak"] = (
         conn.execute(f"SELECT id {place}".encode(), (at,)).fetchone()[0]  # type: ignore[index]
         for at in (OLD, COPIED)
     )
     made["leak over it"] = conn.execute(  # type: ignore[index]
         "INSERT INTO tunnel_api.finding_unrolled (survey_id, kind, geom) "
-        "SELECT survey_id, 'leak', ST_Buffer(unrolled, 0.1) FROM tunnel.anomaly WHERE id = %s RETURNING id",
+        "SELECT survey_id, 'leak', ST_Buffer(unrolled, 0.1) FROM tunnel.finding WHERE id = %s RETURNING id",
         (made["leak"],),
     ).fetchone()[0]
     conn.execute("UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, 0.1) WHERE id = %s", (made["leak over it"],))
     made["region"] = conn.execute(  # type: ignore[index]
         "INSERT INTO tunnel_api.region (survey_id, kind, reason, geom) "
-        "SELECT survey_id, 'dry', 'seen dry', ST_Envelope(ST_Buffer(unrolled, 0.1)) FROM tunnel.anomaly "
+        "SELECT survey_id, 'dry', 'seen dry', ST_Envelope(ST_Buffer(unrolled, 0.1)) FROM tunnel.finding "
         "WHERE id = %s RETURNING id",
         (made["dry leak"],),
     ).fetchone()[0]

@@ -254,8 +254,9 @@ def _anomaly(
     shaped = anomaly_geometries(outline, surface)
     west, south, east, north = outline.bounds
     conn.execute(
-        "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, "
-        "confidence, contrast, area, drop_mean, drop_max, image_share, unrolled, map, surface, review) VALUES (%s, %s, %s, %s, "
+        "INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, "
+        "confidence, contrast, area, darkening_mean, darkening_max, image_share, unrolled, map, surface,"
+        " review) VALUES (%s, %s, %s, %s, "
         "%s, %s, %s, %s, %s, %s, %s, %s, %s, 5, 0.97, "
         "ST_GeomFromWKB(%s, 0), ST_GeomFromWKB(%s, %s), ST_GeomFromWKB(%s, %s), %s)",
         (
@@ -305,7 +306,7 @@ def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines
 
 def without_intensity(conn: psycopg.Connection, every: int = 1) -> None:
     """Make the example a survey without intensity, of whose offset images only every so manyth column holds points."""
-    for table in ("anomaly", "coverage", "radiometry", "range_curve"):
+    for table in ("finding", "coverage", "radiometry", "range_curve"):
         conn.execute(sql.SQL("DELETE FROM tunnel.{}").format(sql.Identifier(table)))
     conn.execute("DELETE FROM tunnel.image WHERE kind <> 'offset'")
     conn.execute("UPDATE tunnel.survey SET intensity_kind = 'none', intensity_dimension = NULL, reference = 'none'")

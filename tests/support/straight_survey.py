@@ -190,8 +190,9 @@ def _coverage(conn: psycopg.Connection, survey: int, km: int, scene: Scene) -> N
 def _leak(conn: psycopg.Connection, survey: int, surface: Surface, leak: Wet) -> None:
     shaped = anomaly_geometries(leak.outline, surface)
     conn.execute(
-        "INSERT INTO tunnel.anomaly (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, confidence, "
-        "area, drop_mean, drop_max, image_share, unrolled, map, surface, review, detected) VALUES (%s, %s, %s, %s, %s, %s, "
+        "INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, confidence, "
+        "area, darkening_mean, darkening_max, image_share, unrolled, map, surface, review, detected) VALUES (%s, %s,"
+        " %s, %s, %s, %s, "
         "%s, %s, %s, %s, 3, 4, 1, ST_GeomFromWKB(%s, 0), ST_GeomFromWKB(%s, %s), ST_GeomFromWKB(%s, %s), %s, %s)",
         (
             survey, int((leak.west + leak.east) // 2000), leak.west, leak.east, leak.south, leak.north, shaped.clock, leak.kind,

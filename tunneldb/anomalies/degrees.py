@@ -53,7 +53,7 @@ def _thin(region: Region, shape: Shape) -> float:
         ramp(shape.mean_width, 0.10, 0.07),
         ramp(shape.length / max(shape.mean_width, region.pixel), 4.0, 8.0),
         ramp(deviation, 2.0 * straight, straight),
-        ramp(region.drop_mean, MAX_JOINT_DARKENING + 0.5, MAX_JOINT_DARKENING),
+        ramp(region.darkening_mean, MAX_JOINT_DARKENING + 0.5, MAX_JOINT_DARKENING),
     )
 
 
@@ -72,9 +72,9 @@ def _gradual(region: Region, shape: Shape) -> float:
     Grime beneath a cable forms a band along the tunnel, which water does not: there less softness is required.
     """
     properties = region.properties
-    if properties.steps * region.pixel < MIN_STEP_LENGTH * _coarseness(region) * (1 - 1e-12) or region.drop_sum <= 0:
+    if properties.steps * region.pixel < MIN_STEP_LENGTH * _coarseness(region) * (1 - 1e-12) or region.darkening_sum <= 0:
         return 0.0
-    step = (properties.inside - properties.outside) / properties.steps / region.drop_mean
+    step = (properties.inside - properties.outside) / properties.steps / region.darkening_mean
     band = min(ramp(shape.along / shape.across, 4.0, 8.0), straightness_weight(region))
     return ramp(step, 0.6 + 0.25 * band, 0.3 + 0.25 * band)
 
@@ -99,7 +99,7 @@ def _rectangular(region: Region, shape: Shape) -> float:
 
 def _strong(region: Region) -> float:
     """Return how certainly a region is as dark as water, unlike any shade of concrete."""
-    return ramp(min(region.contrast / STRONG_CONTRAST, region.drop_mean / STRONG_DROP), 0.8, 1.0)
+    return ramp(min(region.contrast / STRONG_CONTRAST, region.darkening_mean / STRONG_DROP), 0.8, 1.0)
 
 
 def _stripe(shape: Shape, straight: float) -> float:

@@ -127,7 +127,7 @@ def judge_region(
     elif region.area < min_area * (1 - 1e-12):
         return None
     share = region.measured / np.count_nonzero(region.mask)
-    return Anomaly(region.outline, region.drop_mean, region.drop_max, region.contrast, float(share), verdict)
+    return Anomaly(region.outline, region.darkening_mean, region.darkening_max, region.contrast, float(share), verdict)
 
 
 def _classified(regions: Sequence[Region], min_area: float, model: EvidenceModel | None) -> list[Anomaly | None]:

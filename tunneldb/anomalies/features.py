@@ -126,7 +126,7 @@ def measure_features(region: Region) -> Float:
 
 
 def _contrast(region: Region) -> tuple[float, float]:
-    return region.contrast, region.drop_mean
+    return region.contrast, region.darkening_mean
 
 
 def _extent(shape: Shape) -> tuple[float, ...]:
@@ -143,10 +143,10 @@ def _recess(region: Region) -> tuple[float, float]:
 
 
 def _rim(region: Region, shape: Shape) -> tuple[float, ...]:
-    properties, mean = region.properties, max(region.drop_mean, 1e-6)
+    properties, mean = region.properties, max(region.darkening_mean, 1e-6)
     inside, outside = _ratio(properties.inside, properties.steps), _ratio(properties.outside, properties.steps)
     far = _ratio(properties.far_outside, properties.far_steps)
-    variance = properties.drop_square / region.filled - region.drop_mean**2
+    variance = properties.darkening_square / region.filled - region.darkening_mean**2
     shown = properties.perimeter - properties.perimeter_off
     return (
         (inside - outside) / mean, (inside - far) / mean, math.sqrt(max(variance, 0.0)) / mean,

@@ -18,14 +18,14 @@ class Measurement:
 
     Attributes
     ----------
-    drop_mean, drop_max, contrast : float or None
+    darkening_mean, darkening_max, contrast : float or None
         Mean and greatest darkening relative to dry lining, dB, and the mean in its standard deviations; None if not measured.
     image_share : float
         Share of its pixels that have points; pixels outside the image have none.
     """
 
-    drop_mean: float | None
-    drop_max: float | None
+    darkening_mean: float | None
+    darkening_max: float | None
     contrast: float | None
     image_share: float
 

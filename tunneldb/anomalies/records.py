@@ -19,7 +19,7 @@ class Anomaly:
     ----------
     outline : Polygon
         (chainage, arc), m.
-    drop_mean, drop_max : float
+    darkening_mean, darkening_max : float
         Mean and greatest darkening relative to the background, dB.
     contrast : float
         Mean darkening in standard deviations of the surrounding background.
@@ -30,8 +30,8 @@ class Anomaly:
     """
 
     outline: Polygon
-    drop_mean: float
-    drop_max: float
+    darkening_mean: float
+    darkening_max: float
     contrast: float
     image_share: float
     verdict: Verdict

@@ -45,7 +45,7 @@ class RegionProperties(NamedTuple):
         (:meth:`tunneldb.anomalies.region_edges.Edges.straight`).
     between : float
         Number of pixels between profiles, which take the value of the nearest profile.
-    drop_square : float
+    darkening_square : float
         Sum of the squared darkening, dB², over the pixels with points.
     far_steps, far_outside : float
         Number of ``steps`` with a known darkening also :data:`tunneldb.anomalies.region_edges.FAR_STEP_DISTANCE` outside; sum
@@ -67,7 +67,7 @@ class RegionProperties(NamedTuple):
     sharp: float = 0.0
     straight: float = 0.0
     between: float = 0.0
-    drop_square: float = 0.0
+    darkening_square: float = 0.0
     far_steps: float = 0.0
     far_outside: float = 0.0
     bright: float = 0.0
@@ -89,7 +89,7 @@ class Region:
         Its pixels, the first row at the lowest arc.
     filled : int
         Number of pixels with points, or with the value of the nearest profile.
-    drop_sum, drop_max : float
+    darkening_sum, darkening_max : float
         Sum and maximum over those of the darkening relative to the background, dB.
     properties : RegionProperties
         Further sums.
@@ -100,8 +100,8 @@ class Region:
     row: int
     mask: Bool
     filled: int
-    drop_sum: float
-    drop_max: float
+    darkening_sum: float
+    darkening_max: float
     properties: RegionProperties
 
     @property
@@ -133,14 +133,14 @@ class Region:
         return self.pixel * self.filled / max(self.measured, 1.0) if self.properties.between else 0.0
 
     @property
-    def drop_mean(self) -> float:
+    def darkening_mean(self) -> float:
         """Mean darkening over the pixels with points, dB."""
-        return self.drop_sum / self.filled
+        return self.darkening_sum / self.filled
 
     @property
     def contrast(self) -> float:
         """Mean darkening in standard deviations of the surrounding background."""
-        return self.drop_sum / self.properties.sigma if self.properties.sigma > 0 else 0.0
+        return self.darkening_sum / self.properties.sigma if self.properties.sigma > 0 else 0.0
 
     @property
     def outline(self) -> Polygon:
@@ -208,9 +208,11 @@ def _regions(runs: Int64, label: Intp, chosen: Intp, dark: Bool, contrast: Contr
         mask = np.zeros((high[k, 0] + 1 - low[k, 0], high[k, 2] - low[k, 1]), np.bool_)
         row, column = pixels_of(of)
         mask[high[k, 0] - row, column - low[k, 1]] = True
-        filled, drop_sum, drop_max, *properties = sums[k].tolist()
+        filled, darkening_sum, darkening_max, *properties = sums[k].tolist()
         corner = grid.first_column + int(low[k, 1]), grid.bottom + grid.rows - 1 - int(high[k, 0])
-        regions.append(Region(grid.pixel, *corner, mask, int(filled), drop_sum, drop_max, RegionProperties(*properties)))
+        regions.append(
+            Region(grid.pixel, *corner, mask, int(filled), darkening_sum, darkening_max, RegionProperties(*properties))
+        )
     return regions
 
 
@@ -243,13 +245,13 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
         np.maximum.at(highest, label, drop)
         sigma += np.bincount(label, contrast.sigma[row // contrast.tile, column // contrast.tile], count)
     sides = Sides(*map(np.concatenate, zip(*found, strict=True)))
-    drop_sum = steps * STEP["corrected"]
-    straight = edges.straight(sides, drop_sum / np.maximum(pixels, 1))
-    drop_max = np.where(pixels > 0, highest * STEP["corrected"], -np.inf)
+    darkening_sum = steps * STEP["corrected"]
+    straight = edges.straight(sides, darkening_sum / np.maximum(pixels, 1))
+    darkening_max = np.where(pixels > 0, highest * STEP["corrected"], -np.inf)
     perimeter, about = edges.perimeter(sides, count), edges.steps(sides, count)
     squares *= STEP["corrected"] ** 2
     return np.column_stack(
-        [pixels, drop_sum, drop_max, sigma, recess, perimeter[:, :3], about[:, :3], straight, between, squares,
+        [pixels, darkening_sum, darkening_max, sigma, recess, perimeter[:, :3], about[:, :3], straight, between, squares,
          about[:, 3:], perimeter[:, 3:]]
     )  # fmt: skip
 
@@ -268,8 +270,8 @@ def merge_regions(parts: Sequence[Region]) -> Region:
         row,
         mask,
         sum(part.filled for part in parts),
-        float(sum(part.drop_sum for part in parts)),
-        max(part.drop_max for part in parts),
+        float(sum(part.darkening_sum for part in parts)),
+        max(part.darkening_max for part in parts),
         RegionProperties(*(float(sum(sums)) for sums in zip(*(part.properties for part in parts), strict=True))),
     )
 

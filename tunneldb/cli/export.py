@@ -116,7 +116,7 @@ def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, st
 def _say_left_out(conn: psycopg.Connection[Any], survey: Survey, output: Path, stretch: Stretch) -> None:
     """Say how many findings that are no water the file doesn't hold: cracks, spalls, bolts."""
     (left_out,) = conn.execute(
-        "SELECT count(*) FROM tunnel_api.lining_finding f WHERE survey_id = %s AND counted AND chainage_to >= %s"
+        "SELECT count(*) FROM tunnel_api.finding f WHERE survey_id = %s AND counted AND chainage_to >= %s"
         " AND chainage_from <= %s AND NOT EXISTS (SELECT FROM tunnel_api.anomaly a WHERE a.id = f.id)",
         [survey.id, stretch.low, stretch.high],
     ).fetchone() or (0,)

@@ -307,9 +307,9 @@ def remove(settings: Settings, name: str, yes: bool) -> None:
         row = connection.execute(
             """
             SELECT (SELECT coalesce(sum(kept), 0) FROM tunnel.scan_file WHERE survey_id = %(id)s),
-                   (SELECT count(*) FROM tunnel.anomaly WHERE survey_id = %(id)s),
-                   (SELECT count(*) FROM tunnel.anomaly WHERE survey_id = %(id)s
-                     AND (review <> 'open' OR judged IS NOT NULL))
+                   (SELECT count(*) FROM tunnel.finding WHERE survey_id = %(id)s),
+                   (SELECT count(*) FROM tunnel.finding WHERE survey_id = %(id)s
+                     AND (review <> 'open' OR kind_override IS NOT NULL))
             """,
             {"id": found.id},
         ).fetchone()

@@ -41,10 +41,10 @@ _HELD = """
 _NOTES = ("note_insert", "note_update_old", "note_update_new", "note_delete")
 _OWN = (
     *(("survey", name, "tunnel", name) for name in ("drop_points", "make_images")),
-    *((table, name, "tunnel", f"note_{table}") for table in ("anomaly", "coverage") for name in _NOTES),
-    *((table, "note_truncate", "tunnel", "forget_waterproof") for table in ("anomaly", "coverage")),
-    *(("anomaly", name, "tunnel", name) for name in ("set_wet", "count_insert", "count_update", "count_delete")),
-    ("anomaly", "count_truncate", "tunnel", "forget_findings"),
+    *((table, name, "tunnel", f"note_{table}") for table in ("finding", "coverage") for name in _NOTES),
+    *((table, "note_truncate", "tunnel", "forget_waterproof") for table in ("finding", "coverage")),
+    *(("finding", name, "tunnel", name) for name in ("set_wet", "count_insert", "count_update", "count_delete")),
+    ("finding", "count_truncate", "tunnel", "forget_findings"),
     ("finding_kind", "wet_of_kind", "tunnel", "wet_of_kind"),
     ("waterproof", "keep", "tunnel_api", "keep_at_commit"),
 )

@@ -41,7 +41,7 @@ class Leak:
         Hours, 12 is the crown.
     area, inside : float
         Its area, and that of its part in the stretch reported, m².
-    drop_mean, drop_max : float or None
+    darkening_mean, darkening_max : float or None
         dB below dry lining.
     contrast, confidence : float or None
         Drop in standard deviations of dry lining; 0 to 1.
@@ -66,8 +66,8 @@ class Leak:
     clock: float
     area: float
     inside: float
-    drop_mean: float | None
-    drop_max: float | None
+    darkening_mean: float | None
+    darkening_max: float | None
     contrast: float | None
     confidence: float | None
     image_share: float | None

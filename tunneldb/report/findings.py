@@ -306,7 +306,7 @@ def digest_findings(digest: hashlib._Hash, found: FindingsChapter | None, region
     for region in regions:
         place = [f"{end:.4f}" for end in (region.chainage_from, region.chainage_to, region.arc_from, region.arc_to)]
         stated_of_region = (
-            region.id, place, f"{region.area:.4f}", region.reason, region.drawn_by, region.waits, region.approved_by,
+            region.id, place, f"{region.area:.4f}", region.reason, region.drawn_by, region.pending_approval, region.approved_by,
             region.leak_ids,
         )  # fmt: skip
         digest.update(repr(stated_of_region).encode())

@@ -356,7 +356,8 @@ class _Report:
             [
                 leak.id, round(leak.middle, 3), leak.label, round(leak.chainage_to - leak.chainage_from, 2),
                 round(leak.arc_from, 2), round(leak.arc_to, 2), round(leak.clock, 3), clock_label(leak.clock),
-                round(leak.area, 5), round(leak.inside, 5), text.rounded(leak.drop_mean, 1), text.rounded(leak.drop_max, 1),
+                round(leak.area, 5), round(leak.inside, 5), text.rounded(leak.darkening_mean, 1),
+                text.rounded(leak.darkening_max, 1),
                 text.rounded(leak.contrast, 1), text.rounded(leak.confidence, 2), text.rounded(leak.image_share, 2),
                 leak.review, leak.reviewed_by or "", text.when(leak.reviewed_at) if leak.reviewed_at else "",
                 leak.remark or "", int(leak.detected), self.strips.of(leak), *self._as_finding(leak.id),

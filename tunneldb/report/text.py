@@ -139,7 +139,7 @@ def script_json(value: Any) -> Markup:
     return Markup(plain.replace("<", "\\u003c"))
 
 
-_WHAT = {"anomaly": "finding", "axis_vertex": "axis vertex", "region": "region", "spot": "spot", "photo": "photo"}
+_WHAT = {"finding": "finding", "axis_vertex": "axis vertex", "region": "region", "spot": "spot", "photo": "photo"}
 
 
 def edit(entry: Edit, spots: Mapping[int, int]) -> dict[str, str]:

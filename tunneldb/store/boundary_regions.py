@@ -23,11 +23,12 @@ def replace_boundary_regions(conn: psycopg.Connection[Any], survey: Survey, km: 
     """
     conn.execute("SELECT pg_advisory_xact_lock(%s, %s)", (LOCK, survey.id))
     before = conn.execute(
-        "DELETE FROM tunnel.anomaly_part WHERE survey_id = %s AND km = %s RETURNING anomaly_id", (survey.id, km)
+        "DELETE FROM tunnel.boundary_region WHERE survey_id = %s AND km = %s RETURNING finding_id", (survey.id, km)
     ).fetchall()
     with conn.cursor() as cursor:
         cursor.executemany(
-            "INSERT INTO tunnel.anomaly_part (survey_id, km, pixel, box, mask, filled, drop_sum, drop_max, traits)"
+            "INSERT INTO tunnel.boundary_region (survey_id, km, pixel, box, mask, filled, darkening_sum,"
+            " darkening_max, properties)"
             " VALUES (%s, %s, %s, %s, %b, %s, %s, %s, %s)",
             [_row(survey, km, region) for region in regions],
         )
@@ -37,7 +38,8 @@ def replace_boundary_regions(conn: psycopg.Connection[Any], survey: Survey, km: 
 def load_boundary_regions(conn: psycopg.Connection[Any], survey: Survey, kilometres: Iterable[int]) -> list[BoundaryRegion]:
     """Read the boundary regions of some kilometres."""
     rows = conn.execute(
-        "SELECT id, km, anomaly_id, pixel, box, mask, filled, drop_sum, drop_max, traits FROM tunnel.anomaly_part"
+        "SELECT id, km, finding_id, pixel, box, mask, filled, darkening_sum, darkening_max, properties"
+        " FROM tunnel.boundary_region"
         " WHERE survey_id = %s AND km = ANY (%s) ORDER BY id",
         (survey.id, list(kilometres)),
         binary=True,
@@ -53,13 +55,14 @@ def load_boundary_regions(conn: psycopg.Connection[Any], survey: Survey, kilomet
 def link_boundary_regions(conn: psycopg.Connection[Any], regions: Sequence[BoundaryRegion], finding: int | None) -> None:
     """Write which finding some boundary regions are parts of."""
     keys = [region.id for region in regions]
-    conn.execute("UPDATE tunnel.anomaly_part SET anomaly_id = %s WHERE id = ANY (%s)", (finding, keys))
+    conn.execute("UPDATE tunnel.boundary_region SET finding_id = %s WHERE id = ANY (%s)", (finding, keys))
 
 
 def _row(survey: Survey, km: int, region: Region) -> tuple[Any, ...]:
     rows, columns = region.mask.shape
     box = [region.column, region.row, columns, rows]
     return (
-        survey.id, km, region.pixel, box, np.packbits(region.mask).tobytes(), region.filled, region.drop_sum, region.drop_max,
+        survey.id, km, region.pixel, box, np.packbits(region.mask).tobytes(), region.filled, region.darkening_sum,
+        region.darkening_max,
         list(region.properties),
     )  # fmt: skip

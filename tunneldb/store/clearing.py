@@ -12,7 +12,7 @@ from tunneldb.store.survey import Survey
 
 _RESULTS = (
     "change_section", "change_image", "change_region", "leak_change", "clearance_infringement", "clearance_section", "ring",
-    "evenness_area", "evenness_section", "thickness_section", "deviation_section", "anomaly_part", "anomaly", "coverage",
+    "evenness_area", "evenness_section", "thickness_section", "deviation_section", "boundary_region", "finding", "coverage",
     "image", "radiometry", "range_curve", "target_sphere",
     "cluster", "lining", "ground", "section", "segment", "axis_vertex",
 )  # fmt: skip
@@ -50,8 +50,8 @@ def work_in(conn: psycopg.Connection[Any], survey: Survey, kms: list[int]) -> Wo
                    AND v.edited_at IS NOT NULL),
                count(*) FILTER (WHERE q.drawn)
           FROM (SELECT l.origin <> 'detected' OR l.merged_into IS NOT NULL AS drawn,
-                       l.review <> 'open' OR l.judged IS NOT NULL AS reviewed
-                  FROM tunnel.anomaly l WHERE l.survey_id = %(survey)s AND l.km = ANY (%(kms)s)) q
+                       l.review <> 'open' OR l.kind_override IS NOT NULL AS reviewed
+                  FROM tunnel.finding l WHERE l.survey_id = %(survey)s AND l.km = ANY (%(kms)s)) q
         """,
         {"survey": survey.id, "kms": kms},
     ).fetchone()
@@ -75,7 +75,7 @@ def clear_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int) -> W
     """
     lost = work_in(conn, survey, [km])
     for table in _RESULTS:
-        detected = sql.SQL(" AND origin = 'detected' AND merged_into IS NULL" if table == "anomaly" else "")
+        detected = sql.SQL(" AND origin = 'detected' AND merged_into IS NULL" if table == "finding" else "")
         query = sql.SQL("DELETE FROM {} WHERE survey_id = %s AND km = %s{}").format(sql.Identifier("tunnel", table), detected)
         conn.execute(query, [survey.id, km])
     conn.execute("DELETE FROM tunnel.run WHERE survey_id = %s AND km = %s AND stage <> 'load'", [survey.id, km])

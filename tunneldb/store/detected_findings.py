@@ -43,14 +43,16 @@ def load_earlier_findings(
     """
     rows = conn.execute(
         """
-        SELECT l.id, l.km, l.review <> 'open' OR l.judged IS NOT NULL OR l.merged_into IS NOT NULL OR l.severity IS NOT NULL
-                   OR l.remark IS NOT NULL OR EXISTS (SELECT FROM tunnel.photo p WHERE p.anomaly_id = l.id),
+        SELECT l.id, l.km, l.review <> 'open' OR l.kind_override IS NOT NULL OR l.merged_into IS NOT NULL OR l.severity IS
+        NOT NULL
+                   OR l.remark IS NOT NULL OR EXISTS (SELECT FROM tunnel.photo p WHERE p.finding_id = l.id),
                l.wet, l.dry_region_id IS NOT NULL AND l.review = 'open', public.ST_AsBinary(l.unrolled)
-          FROM tunnel.anomaly l
+          FROM tunnel.finding l
          WHERE l.survey_id = %(survey)s AND l.origin = 'detected'
            AND (l.id = ANY (%(across)s)
                 OR (l.km BETWEEN %(first)s AND %(last)s AND (l.km = %(km)s OR NOT l.detected)
-                    AND NOT EXISTS (SELECT FROM tunnel.anomaly_part p WHERE p.survey_id = l.survey_id AND p.anomaly_id = l.id)))
+                    AND NOT EXISTS (SELECT FROM tunnel.boundary_region p WHERE p.survey_id = l.survey_id AND p.finding_id =
+                    l.id)))
          ORDER BY l.id
            FOR UPDATE OF l
         """,
@@ -62,11 +64,12 @@ def load_earlier_findings(
 
 
 _INSERT = """
-    INSERT INTO tunnel.anomaly (survey_id, km, kind, reasons, confidence, contrast, chainage_from, chainage_to, arc_from,
-                                arc_to, clock, area, drop_mean, drop_max, image_share, feature_list_id, features, evidence,
+    INSERT INTO tunnel.finding (survey_id, km, kind, reasons, confidence, contrast, chainage_from, chainage_to, arc_from,
+                                arc_to, clock, area, darkening_mean, darkening_max, image_share, feature_list_id, features,
+                                evidence,
                                 model, unrolled, map, surface)
     VALUES (%(survey)s, %(km)s, %(kind)s, %(reasons)s, %(confidence)s, %(contrast)s, %(chainage_from)s, %(chainage_to)s,
-            %(arc_from)s, %(arc_to)s, %(clock)s, %(area)s, %(drop_mean)s, %(drop_max)s, %(image_share)s,
+            %(arc_from)s, %(arc_to)s, %(clock)s, %(area)s, %(darkening_mean)s, %(darkening_max)s, %(image_share)s,
             %(feature_list)s, %(features)s, %(evidence)s, %(model)s,
             public.ST_GeomFromWKB(%(unrolled)s, 0), public.ST_GeomFromWKB(%(map)s, %(srid)s::int),
             public.ST_GeomFromWKB(%(surface)s, %(srid)s::int))
@@ -74,13 +77,15 @@ _INSERT = """
 """
 # What an inspector has confirmed it to be it remains when detection now takes it for something else.
 _UPDATE = """
-    UPDATE tunnel.anomaly
+    UPDATE tunnel.finding
        SET km = %(km)s, kind = %(kind)s, reasons = %(reasons)s, confidence = %(confidence)s, contrast = %(contrast)s,
            chainage_from = %(chainage_from)s, chainage_to = %(chainage_to)s, arc_from = %(arc_from)s,
-           arc_to = %(arc_to)s, clock = %(clock)s, area = %(area)s, drop_mean = %(drop_mean)s, drop_max = %(drop_max)s,
+           arc_to = %(arc_to)s, clock = %(clock)s, area = %(area)s, darkening_mean = %(darkening_mean)s,
+           darkening_max = %(darkening_max)s,
            image_share = %(image_share)s, feature_list_id = %(feature_list)s, features = %(features)s,
            evidence = %(evidence)s, model = %(model)s,
-           judged = CASE WHEN review = 'confirmed' AND judged IS NULL AND kind <> %(kind)s THEN kind ELSE judged END,
+           kind_override = CASE WHEN review = 'confirmed' AND kind_override IS NULL AND kind <> %(kind)s THEN kind ELSE
+           kind_override END,
            unrolled = public.ST_GeomFromWKB(%(unrolled)s, 0),
            map = public.ST_GeomFromWKB(%(map)s, %(srid)s::int),
            surface = public.ST_GeomFromWKB(%(surface)s, %(srid)s::int), detected = true, detected_at = now()
@@ -114,8 +119,8 @@ def save_finding(
 
 def lose_findings(conn: psycopg.Connection[Any], keep: Sequence[int], delete: Sequence[int]) -> None:
     """Mark findings as not detected any more, and delete others."""
-    conn.execute("UPDATE tunnel.anomaly SET detected = false WHERE id = ANY (%s)", (list(keep),))
-    conn.execute("DELETE FROM tunnel.anomaly WHERE id = ANY (%s)", (list(delete),))
+    conn.execute("UPDATE tunnel.finding SET detected = false WHERE id = ANY (%s)", (list(keep),))
+    conn.execute("DELETE FROM tunnel.finding WHERE id = ANY (%s)", (list(delete),))
 
 
 def _row(found: PlacedAnomaly, srid: int, features: int) -> dict[str, Any]:
@@ -133,8 +138,8 @@ def _row(found: PlacedAnomaly, srid: int, features: int) -> dict[str, Any]:
         "arc_to": north,
         "clock": geometries.clock,
         "area": geometries.area,
-        "drop_mean": anomaly.drop_mean,
-        "drop_max": anomaly.drop_max,
+        "darkening_mean": anomaly.darkening_mean,
+        "darkening_max": anomaly.darkening_max,
         "image_share": anomaly.image_share,
         "feature_list": features,
         "features": [*anomaly.verdict.features.tolist(), anomaly.verdict.outline],

@@ -38,7 +38,7 @@ class Drawn:
 def load_drawn(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Drawn]:
     """Read the findings of a kilometre, by their middles, whose outlines people drew."""
     rows = conn.execute(
-        "SELECT id, drawn_at, public.ST_AsBinary(unrolled) FROM tunnel.anomaly"
+        "SELECT id, drawn_at, public.ST_AsBinary(unrolled) FROM tunnel.finding"
         " WHERE survey_id = %s AND km = %s AND origin <> 'detected' AND merged_into IS NULL ORDER BY id",
         (survey.id, km),
     ).fetchall()
@@ -49,10 +49,10 @@ def save_measured(conn: psycopg.Connection[Any], drawn: Sequence[Drawn], measure
     """Write what was measured of outlines, but of those that were redrawn meanwhile."""
     with conn.cursor() as cursor:
         cursor.executemany(
-            "UPDATE tunnel.anomaly SET drop_mean = %s, drop_max = %s, contrast = %s, image_share = %s"
+            "UPDATE tunnel.finding SET darkening_mean = %s, darkening_max = %s, contrast = %s, image_share = %s"
             " WHERE id = %s AND drawn_at = %s",
             [
-                (found.drop_mean, found.drop_max, found.contrast, found.image_share, finding.id, finding.drawn_at)
+                (found.darkening_mean, found.darkening_max, found.contrast, found.image_share, finding.id, finding.drawn_at)
                 for finding, found in zip(drawn, measured, strict=True)
             ],
         )

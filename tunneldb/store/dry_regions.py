@@ -18,7 +18,8 @@ from tunneldb.store.survey import Survey
 class DryRegion:
     """A dry region, as tunnel_api.dry_region has it; lengths in m, areas in m².
 
-    ``leak_ids`` are the open leaks that lie in it by half: they are kept, but not counted. One that ``waits`` for an
+    ``leak_ids`` are the open leaks that lie in it by half: they are kept,
+    but not counted. One that has ``pending_approval`` for an
     operator takes nothing away yet; ``approved_by`` is who put in force one that had to.
     """
 
@@ -34,7 +35,7 @@ class DryRegion:
     reason: str | None
     drawn_by: str | None
     drawn_at: dt.datetime | None
-    waits: bool
+    pending_approval: bool
     approved_by: str | None
     approved_at: dt.datetime | None
     leaks: int

@@ -24,7 +24,7 @@ COUNTED: tuple[State, ...] = ("open", "confirmed")
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding, as tunnel_api.lining_finding has it; names are those of its columns.
+    """A finding, as tunnel_api.finding has it; names are those of its columns.
 
     Lengths are in m, areas in m², drops in dB, clock positions in hours. ``share`` is that of it which lies in the stretch that
     was asked for, 0 to 1: sums count it by that part.
@@ -46,7 +46,7 @@ class Finding:
     area: float
     length: float | None
     width: float | None
-    drop_mean: float | None
+    darkening_mean: float | None
     confidence: float | None
     review: str
     state: str
@@ -132,7 +132,7 @@ def stream_findings(
     """Yield findings of a survey in order of chainage, of which only BLOCK are in memory; until the transaction ends."""
     wanted = Chosen() if chosen is None else chosen
     query = sql.SQL(
-        "SELECT {}, coalesce({}, 1), public.ST_AsBinary({}) FROM tunnel_api.lining_finding WHERE survey_id = %(survey)s"
+        "SELECT {}, coalesce({}, 1), public.ST_AsBinary({}) FROM tunnel_api.finding WHERE survey_id = %(survey)s"
         " AND (%(kinds)s::text[] = '{{}}' OR kind = ANY (%(kinds)s))"
         " AND (%(origins)s::text[] = '{{}}' OR origin = ANY (%(origins)s))"
         " AND (%(states)s::text[] = '{{}}' OR state = ANY (%(states)s)) AND area >= %(min_area)s"

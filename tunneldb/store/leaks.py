@@ -51,7 +51,7 @@ class Anomaly:
         Mean drop in standard deviations of the dry lining about it.
     area : float
         On the surface, m².
-    drop_mean, drop_max : float or None
+    darkening_mean, darkening_max : float or None
         dB below dry lining.
     image_share : float or None
         0 to 1.
@@ -80,8 +80,8 @@ class Anomaly:
     reasons: list[str]
     contrast: float | None
     area: float
-    drop_mean: float | None
-    drop_max: float | None
+    darkening_mean: float | None
+    darkening_max: float | None
     image_share: float | None
     review: str
     reviewed_by: str | None
@@ -162,7 +162,7 @@ class LeakList:
 
 _CHOSEN = sql.SQL(
     "FROM tunnel_api.anomaly WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed') AND area >= %(min_area)s"
-    " AND (%(min_confidence)s = 0 OR kind = found AND confidence >= %(min_confidence)s)"
+    " AND (%(min_confidence)s = 0 OR kind = kind_detected AND confidence >= %(min_confidence)s)"
     " AND CASE %(kind)s WHEN 'all' THEN true WHEN 'leak' THEN wet ELSE kind = %(kind)s END"
     " AND chainage_to > %(low)s AND chainage_from < %(high)s"
     " AND (%(clock)s::float8[] IS NULL OR tunnel_api.clock_between(clock, (%(clock)s)[1], (%(clock)s)[2]))"
@@ -171,7 +171,11 @@ _CHOSEN = sql.SQL(
 
 def listed_column(name: str) -> sql.Composable:
     """A column of the views of leaks as lists have it: beside a kind that an inspector gave stands no confidence in another."""
-    return sql.SQL("CASE WHEN kind = found THEN confidence END AS confidence") if name == "confidence" else sql.Identifier(name)
+    return (
+        sql.SQL("CASE WHEN kind = kind_detected THEN confidence END AS confidence")
+        if name == "confidence"
+        else sql.Identifier(name)
+    )
 
 
 def read_leaks(

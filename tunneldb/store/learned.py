@@ -120,12 +120,12 @@ def load_measured(conn: psycopg.Connection[Any], tunnels: Iterable[int]) -> Meas
         SELECT a.id, a.survey_id, s.tunnel_id, (a.chainage_from + a.chainage_to) / 2, a.detected,
                a.kind = 'joint' AND 'sparse' = ANY (a.reasons),
                CASE WHEN r.review = 'rejected' THEN 'rejected'
-                    WHEN a.judged <> a.kind THEN 'renamed to ' || a.judged
-                    WHEN r.review = 'confirmed' OR a.judged = a.kind THEN 'confirmed ' || a.kind ELSE '' END,
+                    WHEN a.kind_override <> a.kind THEN 'renamed to ' || a.kind_override
+                    WHEN r.review = 'confirmed' OR a.kind_override = a.kind THEN 'confirmed ' || a.kind ELSE '' END,
                r.review <> 'rejected' AND a.wet, a.feature_list_id, a.features
-          FROM tunnel.anomaly a
+          FROM tunnel.finding a
           JOIN tunnel.survey s ON s.id = a.survey_id
-          LEFT JOIN tunnel.anomaly h ON h.id = coalesce(a.merged_into, a.same_as) AND h.origin <> 'detected'
+          LEFT JOIN tunnel.finding h ON h.id = coalesce(a.merged_into, a.same_as) AND h.origin <> 'detected'
          CROSS JOIN LATERAL (SELECT CASE a.review WHEN 'open' THEN coalesce(h.review, a.review) ELSE a.review END AS review) r
          WHERE s.tunnel_id = ANY (%s)
          ORDER BY s.tunnel_id, s.id, a.chainage_from, a.id

@@ -79,12 +79,12 @@ class Photo(Base):
     __tablename__ = "photo"
     __table_args__ = (
         CheckConstraint("path <> ''", name="path"),
-        Index(None, "anomaly_id"),
+        Index(None, "finding_id"),
         {"comment": "Photos of findings, by path or URL"},
     )
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
-    anomaly_id: Mapped[int] = mapped_column(parent("anomaly"), comment="Finding that it shows")
+    finding_id: Mapped[int] = mapped_column(parent("finding"), comment="Finding that it shows")
     path: Mapped[str] = mapped_column(comment="Path or URL")
     caption: Mapped[str | None] = mapped_column(comment="What it shows")
     added_by: Mapped[str] = mapped_column(server_default=text("SESSION_USER"), comment="Who added it")

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 from tunneldb.database.models.base import CLOCK, KM, NOW, SURVEY, Base, Floats, Reals, Review, geometry, one_of, parent
 from tunneldb.database.models.finding import FindingKind, Severity
 
-_SUMMED = ["kind", "judged", "review", "detected", "area", "wet", "aside"]
+_SUMMED = ["kind", "kind_override", "review", "detected", "area", "wet", "superseded"]
 """Columns that sums over anomalies need: they come from an index alone."""
 
 
@@ -130,7 +130,7 @@ class Region(Base):
     drawn_by: Mapped[str] = mapped_column(server_default=text("CURRENT_USER"), comment="Who drew it")
     drawn_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was drawn")
     reason: Mapped[str | None] = mapped_column(comment="Why; a dry region larger than the tunnel's limit needs one")
-    waits: Mapped[bool] = mapped_column(
+    pending_approval: Mapped[bool] = mapped_column(
         server_default=text("false"),
         comment="Whether it waits for an operator, being larger than the tunnel's limit: until then it marks nothing",
     )
@@ -177,44 +177,44 @@ class FeatureList(Base):
     )
 
 
-class Anomaly(Review, Base):
+class Finding(Review, Base):
     """A leak, or what is dark but dry."""
 
-    __tablename__ = "anomaly"
+    __tablename__ = "finding"
     __table_args__ = (
         one_of("review", "open", "confirmed", "rejected"),
         one_of("origin", "detected", "drawn", "redrawn", "split", "merged"),
         CheckConstraint("width > 0", name="width"),
         CheckConstraint("merged_into <> id AND same_as <> id", name="other"),
-        Index(None, "survey_id", "km", postgresql_include=[*_SUMMED, "drop_max"]),
+        Index(None, "survey_id", "km", postgresql_include=[*_SUMMED, "darkening_max"]),
         Index(None, "survey_id", "chainage_from", "chainage_to", postgresql_include=["id", *_SUMMED]),
-        Index("anomaly_length_idx", "survey_id", text("(chainage_to - chainage_from)")),
+        Index("finding_length_idx", "survey_id", text("(chainage_to - chainage_from)")),
         Index(None, "survey_id", "area"),
         Index(None, "survey_id", "created_at"),
-        Index("anomaly_gone_idx", "survey_id", postgresql_where=text("NOT detected")),
-        Index("anomaly_kind_idx", "survey_id", text("COALESCE(judged, kind)")),
+        Index("finding_gone_idx", "survey_id", postgresql_where=text("NOT detected")),
+        Index("finding_kind_idx", "survey_id", text("COALESCE(kind_override, kind)")),
         Index(None, "survey_id", "severity", postgresql_where=text("severity IS NOT NULL")),
         Index(
-            "anomaly_uncounted_idx",
+            "finding_uncounted_idx",
             "survey_id",
-            postgresql_where=text("NOT (detected AND review <> 'rejected' AND NOT aside)"),
+            postgresql_where=text("NOT (detected AND review <> 'rejected' AND NOT superseded)"),
             postgresql_include=[
                 "id",
                 "kind",
-                "judged",
+                "kind_override",
                 "severity",
                 "review",
                 "detected",
-                "aside",
+                "superseded",
                 "merged_into",
                 "same_as",
                 "dry_region_id",
             ],
         ),
-        Index("anomaly_by_hand_idx", "survey_id", "chainage_from", postgresql_where=text("origin <> 'detected'")),
+        Index("finding_manual_idx", "survey_id", "chainage_from", postgresql_where=text("origin <> 'detected'")),
         Index(None, "feature_list_id"),
-        Index("anomaly_kind_key_idx", "kind"),
-        Index(None, "judged"),
+        Index("finding_kind_key_idx", "kind"),
+        Index(None, "kind_override"),
         Index(None, "severity"),
         Index(None, "merged_into"),
         Index(None, "same_as", postgresql_where=text("same_as IS NOT NULL")),
@@ -247,12 +247,12 @@ class Anomaly(Review, Base):
     contrast: Mapped[float | None] = mapped_column(
         comment="Mean drop in standard deviations of the dry lining about it; none from before"
     )
-    judged: Mapped[str | None] = mapped_column(
+    kind_override: Mapped[str | None] = mapped_column(
         ForeignKey(FindingKind.code), comment="What an inspector takes it for, where he says so"
     )
     area: Mapped[float] = mapped_column(comment="Area on the surface, m²; of a line length times width, of a point 0")
-    drop_mean: Mapped[float | None] = mapped_column(comment="Mean drop below dry lining, dB; none until measured")
-    drop_max: Mapped[float | None] = mapped_column(comment="Greatest drop below dry lining, dB; none until measured")
+    darkening_mean: Mapped[float | None] = mapped_column(comment="Mean drop below dry lining, dB; none until measured")
+    darkening_max: Mapped[float | None] = mapped_column(comment="Greatest drop below dry lining, dB; none until measured")
     image_share: Mapped[float | None] = mapped_column(
         comment="Share of its pixels that hold measured data, 0 to 1; none until measured"
     )
@@ -271,7 +271,7 @@ class Anomaly(Review, Base):
         server_default=text("'detected'"),
         comment="How its outline came about: detected, drawn, redrawn, split or merged; detection changes the first alone",
     )
-    by_hand: Mapped[bool] = mapped_column(
+    manual: Mapped[bool] = mapped_column(
         server_default=text("false"), comment="Whether it was drawn, or split off what was: never detected"
     )
     severity: Mapped[int | None] = mapped_column(SmallInteger, ForeignKey(Severity.id), comment="Severity, 1 to 4")
@@ -290,13 +290,13 @@ class Anomaly(Review, Base):
     drawn_by: Mapped[str | None] = mapped_column(comment="Who drew its outline last; none of what was detected")
     drawn_at: Mapped[dt.datetime | None] = mapped_column(comment="When its outline was drawn last")
     parent_id: Mapped[int | None] = mapped_column(
-        ForeignKey("tunnel.anomaly.id", ondelete="SET NULL"), comment="Finding that it was split off"
+        ForeignKey("tunnel.finding.id", ondelete="SET NULL"), comment="Finding that it was split off"
     )
     merged_into: Mapped[int | None] = mapped_column(
-        ForeignKey("tunnel.anomaly.id", ondelete="SET NULL"), comment="Finding that it is merged into: that one counts"
+        ForeignKey("tunnel.finding.id", ondelete="SET NULL"), comment="Finding that it is merged into: that one counts"
     )
     same_as: Mapped[int | None] = mapped_column(
-        ForeignKey("tunnel.anomaly.id", ondelete="SET NULL"), comment="Finding that is the same: that one counts"
+        ForeignKey("tunnel.finding.id", ondelete="SET NULL"), comment="Finding that is the same: that one counts"
     )
     dry_region_id: Mapped[int | None] = mapped_column(
         ForeignKey(Region.id, ondelete="SET NULL"), comment="Dry region that it lies in: it does not count while it is open"
@@ -304,7 +304,7 @@ class Anomaly(Review, Base):
     wet: Mapped[bool] = mapped_column(
         server_default=text("true"), comment="Whether its kind counts as wet: kept by the database, from finding_kind"
     )
-    aside: Mapped[bool] = mapped_column(
+    superseded: Mapped[bool] = mapped_column(
         Computed(
             "merged_into IS NOT NULL OR same_as IS NOT NULL OR (dry_region_id IS NOT NULL AND review = 'open')", persisted=True
         ),
@@ -345,13 +345,13 @@ class LearnedModel(Base):
     undone_at: Mapped[dt.datetime | None] = mapped_column(comment="When it was taken back")
 
 
-class AnomalyPart(Base):
+class BoundaryRegion(Base):
     """A dark region that an end of its kilometre cuts."""
 
-    __tablename__ = "anomaly_part"
+    __tablename__ = "boundary_region"
     __table_args__ = (
         Index(None, "survey_id", "km"),
-        Index(None, "anomaly_id"),
+        Index(None, "finding_id"),
         {"comment": "Dark regions cut by an end of their kilometre, from which anomalies over several are put together"},
     )
 
@@ -364,11 +364,11 @@ class AnomalyPart(Base):
     )
     mask: Mapped[bytes] = mapped_column(comment="Its dark pixels, a bit each, row by row from the lowest arc")
     filled: Mapped[int] = mapped_column(BigInteger, comment="Its pixels that hold measured data")
-    drop_sum: Mapped[float] = mapped_column(comment="Sum over them of the drop below dry lining, dB")
-    drop_max: Mapped[float] = mapped_column(comment="Greatest drop below dry lining, dB")
-    traits: Mapped[Floats] = mapped_column(
+    darkening_sum: Mapped[float] = mapped_column(comment="Sum over them of the drop below dry lining, dB")
+    darkening_max: Mapped[float] = mapped_column(comment="Greatest drop below dry lining, dB")
+    properties: Mapped[Floats] = mapped_column(
         server_default=text("'{}'"), comment="Sums over its pixels by which it is told what it is, see Region in leak/region.py"
     )
-    anomaly_id: Mapped[int | None] = mapped_column(
-        ForeignKey(Anomaly.id, ondelete="SET NULL"), comment="Anomaly that it is a part of, if it is large enough"
+    finding_id: Mapped[int | None] = mapped_column(
+        ForeignKey(Finding.id, ondelete="SET NULL"), comment="Anomaly that it is a part of, if it is large enough"
     )

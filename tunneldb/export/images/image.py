@@ -204,7 +204,7 @@ def preview_factor(pixel: float) -> int:
 
 def _leaks(conn: psycopg.Connection, survey: Survey, km: int) -> list[Polygon]:
     rows = conn.execute(
-        "SELECT public.ST_AsBinary(unrolled) FROM tunnel.anomaly"
+        "SELECT public.ST_AsBinary(unrolled) FROM tunnel.finding"
         " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected'"
         " AND wet AND NOT aside ORDER BY id",
         (survey.id, km * KILOMETRE, (km + 1) * KILOMETRE),

@@ -19,10 +19,10 @@ _ALIASES = {
     "id": "Number", "survey_id": "Survey key", "survey": "Survey", "km": "Kilometre", "segment": "Segment",
     "chainage_from": "Chainage from (m)", "chainage_to": "Chainage to (m)", "label": "Chainage", "arc_from": "Arc from (m)",
     "arc_to": "Arc to (m)", "clock": "Clock position (h)", "kind": "Kind", "kind_label": "Name of its kind",
-    "found": "Found as",
-    "wet": "Wet", "origin": "Origin of the outline", "by_hand": "Drawn, never detected", "severity": "Severity",
+    "kind_detected": "Found as",
+    "wet": "Wet", "origin": "Origin of the outline", "manual": "Drawn, never detected", "severity": "Severity",
     "severity_label": "Name of its severity", "width": "Width of the line (m)", "length": "Length (m)", "area": "Area (m²)",
-    "measured": "Measured on the image", "drop_mean": "Mean drop (dB)", "drop_max": "Greatest drop (dB)",
+    "measured": "Measured on the image", "darkening_mean": "Mean drop (dB)", "darkening_max": "Greatest drop (dB)",
     "image_share": "Share measured", "contrast": "Contrast (sigma)", "confidence": "Confidence (0-1)", "reasons": "Reasons",
     "review": "Review", "reviewed_by": "Reviewed by", "reviewed_at": "Reviewed at", "remark": "Remark", "drawn_by": "Drawn by",
     "drawn_at": "Drawn at", "detected": "Found by the last detection", "created_at": "First found or drawn",
@@ -35,8 +35,8 @@ _PHOTO_ALIASES = {
     "caption": "What it shows", "added_by": "Added by", "added_at": "Added at",
 }  # fmt: skip
 _DECIMALS = {
-    "chainage_from": 3, "chainage_to": 3, "arc_from": 2, "arc_to": 2, "clock": 1, "length": 2, "area": 3, "drop_mean": 1,
-    "drop_max": 1, "image_share": 2, "contrast": 1, "confidence": 2,
+    "chainage_from": 3, "chainage_to": 3, "arc_from": 2, "arc_to": 2, "clock": 1, "length": 2, "area": 3, "darkening_mean": 1,
+    "darkening_max": 1, "image_share": 2, "contrast": 1, "confidence": 2,
 }  # fmt: skip
 _MOMENTS = ("reviewed_at", "drawn_at", "created_at", "detected_at", "added_at")
 _SAVED = '"label" IS NOT NULL'
@@ -46,7 +46,8 @@ _REVIEWS = {"Open": "open", "Confirmed": "confirmed", "Rejected": "rejected"}
 _FACTS = (
     "id", "label", CLOCK_TEXT, "state", "area", "length", "origin", "drawn_by", "drawn_at", "reviewed_by", "reviewed_at",
     "measured",
-    "drop_mean", "drop_max", "image_share", "found", "confidence", "reasons", "also_detected", "merged", "merged_into",
+    "darkening_mean", "darkening_max", "image_share", "kind_detected", "confidence", "reasons", "also_detected", "merged",
+    "merged_into",
     "same_as",
     "parent_id", "dry_region_id", "segment", "chainage_from", "chainage_to", "arc_from", "arc_to", "survey",
 )  # fmt: skip

@@ -69,7 +69,7 @@ def _renderer(catalogue: Catalogue, geometry: str, *, on_sheet: bool = False) ->
         quoted = kind.code.replace("'", "''")
         condition, layers = f"\"kind\" = '{quoted}'", _layers(geometry, kind.look)
         if kind.code in _DRY and not on_sheet:
-            rule(kinds, f"{kind.label}, as detected", f'{condition} AND NOT "by_hand"', layers, shown=False)
+            rule(kinds, f"{kind.label}, as detected", f'{condition} AND NOT "manual"', layers, shown=False)
         else:
             rule(kinds, kind.label, condition, layers)
     rule(kinds, "Of another kind", "ELSE", _layers(geometry, _UNKNOWN))

@@ -166,7 +166,7 @@ LAYERS = (
         where="\"review\" <> 'rejected' AND \"detected\"",
     ),
     VectorLayer("leak_3d", "Leaks in space (review)", "leak_3d", "PolygonZ", "leak_3d", SPACE, (SPACE,), True),
-    *_findings("3d", SPACE, SPACE, "Z", '"by_hand" AND NOT "wet"'),
+    *_findings("3d", SPACE, SPACE, "Z", '"manual" AND NOT "wet"'),
     VectorLayer("ground", "Ground", "ground", "LineStringZ", "ground", SPACE, (SPACE,)),
 )  # fmt: skip
 

@@ -93,7 +93,7 @@ LEAKS = SheetTable(
         ("Arc, m", 'format_number(("arc_from" + "arc_to") / 2, 1)', 10, 2),
         ("Clock", CLOCK, 9, 2),
         ("Area, m²", "if(\"area\" > 0, format_number(\"area\", 2), '')", 12.5, 2),
-        ("Drop, dB", 'format_number("drop_mean", 1)', 12.5, 2),
+        ("Drop, dB", 'format_number("darkening_mean", 1)', 12.5, 2),
         ("Sure", "coalesce(round(100 * \"confidence\") || ' %', '')", 9, 2),
         ("Review", '"review"', 15, 1),
         _Words("Remark", '"note"', 23, 10, 12),

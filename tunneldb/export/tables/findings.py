@@ -85,7 +85,18 @@ _TYPE: dict[str, Any] = {
     **dict.fromkeys(("counted", "also_detected"), np.bool_),
     **dict.fromkeys(("drawn_at", "reviewed_at"), "datetime64[ms]"),
     **dict.fromkeys(
-        ("chainage_from", "chainage_to", "arc_from", "arc_to", "clock", "area", "length", "width", "drop_mean", "confidence"),
+        (
+            "chainage_from",
+            "chainage_to",
+            "arc_from",
+            "arc_to",
+            "clock",
+            "area",
+            "length",
+            "width",
+            "darkening_mean",
+            "confidence",
+        ),
         np.float64,
     ),
 }

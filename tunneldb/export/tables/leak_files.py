@@ -23,6 +23,12 @@ from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.findings import Geometry
 from tunneldb.store.leaks import COLUMNS, Anomaly, Kind, LeakList
 
+NAMES = {"darkening_mean": "darkening_mean", "darkening_max": "darkening_max"}
+"""Columns that files name otherwise than the views do: programs that read the files rely on these names."""
+
+FILE_COLUMNS = tuple(NAMES.get(name, name) for name in COLUMNS)
+"""Columns of the files, in the order of COLUMNS."""
+
 
 def as_csv(leaks: LeakList) -> str:
     """Write leaks as CSV with a header; the last column, ``geometry``, is WKT.
@@ -37,9 +43,14 @@ def as_csv(leaks: LeakList) -> str:
     rows += [{"kind": "remark", "reasons": remark.said, "counted": False} for remark in leaks.remarks]
     for leak in leaks.rows:
         wkt = shapely.to_wkt(leak.geometry, rounding_precision=DECIMALS)
-        rows.append({**{name: plain(getattr(leak, name)) for name in COLUMNS}, "geometry": wkt})
-    names = [*COLUMNS, "geometry"]
+        rows.append({**_facts(leak), "geometry": wkt})
+    names = [*FILE_COLUMNS, "geometry"]
     return write_csv(names, ([row.get(name) for name in names] for row in rows))
+
+
+def _facts(leak: Anomaly) -> dict[str, Any]:
+    """Return what a file states of a leak, by the names of its columns."""
+    return {theirs: plain(getattr(leak, ours)) for ours, theirs in zip(COLUMNS, FILE_COLUMNS, strict=True)}
 
 
 def as_geojson(leaks: LeakList, geometry: Geometry, srid: int) -> str:
@@ -61,7 +72,7 @@ def as_geojson(leaks: LeakList, geometry: Geometry, srid: int) -> str:
             "type": "Feature",
             "id": leak.id,
             "geometry": _rounded(mapping(leak.geometry)),
-            "properties": {name: plain(getattr(leak, name)) for name in COLUMNS},
+            "properties": _facts(leak),
         }
         for leak in leaks.rows
     ]
@@ -99,7 +110,7 @@ def _write_layer(
         str(path),
         shapely.to_wkb(np.array([leak.geometry for leak in leaks], dtype=object)),
         data,
-        np.array(COLUMNS),
+        np.array(FILE_COLUMNS),
         geometry_type="Polygon Z" if geometry == "3d" else "Polygon",
         crs=None if bare else f"EPSG:{srid}",
         driver="GPKG",
@@ -124,8 +135,8 @@ _GPKG_TYPE: dict[str, Any] = {
             "confidence",
             "contrast",
             "area",
-            "drop_mean",
-            "drop_max",
+            "darkening_mean",
+            "darkening_max",
             "image_share",
         ),
         np.float64,

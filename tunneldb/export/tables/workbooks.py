@@ -26,15 +26,15 @@ _FINDING = (
     (Column("Merged into", _WHOLE), "merged_into"), (Column("Same as", _WHOLE), "same_as"),
     (Column("Split off", _WHOLE), "parent_id"), (Column("Dry region", _WHOLE), "dry_region_id"),
     (Column("Drawn by"), "drawn_by"), (Column("Drawn, UTC"), "drawn_at"), (Column("Reviewed by"), "reviewed_by"),
-    (Column("Reviewed, UTC"), "reviewed_at"), (Column("Mean drop, dB", "0.0"), "drop_mean"),
+    (Column("Reviewed, UTC"), "reviewed_at"), (Column("Mean drop, dB", "0.0"), "darkening_mean"),
     (Column("Confidence", "0.00"), "confidence"), (Column("Photos", _WHOLE), "photos"), (Column("Remark"), "remark"),
 )  # fmt: skip
 _LEAK = (
     (Column("No.", _WHOLE), "id"), (Column("Chainage"), "label"), (Column("Chainage from, m", _METRES), "chainage_from"),
     (Column("Chainage to, m", _METRES), "chainage_to"), (Column("Arc from, m", _METRES), "arc_from"),
     (Column("Arc to, m", _METRES), "arc_to"), (Column("Clock"), "clock"), (Column("Kind"), "kind"),
-    (Column("Area, m²", "0.0000"), "area"), (Column("Mean drop, dB", "0.0"), "drop_mean"),
-    (Column("Greatest drop, dB", "0.0"), "drop_max"), (Column("Contrast, σ", "0.0"), "contrast"),
+    (Column("Area, m²", "0.0000"), "area"), (Column("Mean drop, dB", "0.0"), "darkening_mean"),
+    (Column("Greatest drop, dB", "0.0"), "darkening_max"), (Column("Contrast, σ", "0.0"), "contrast"),
     (Column("Confidence", "0.00"), "confidence"), (Column("Share measured", "0.00"), "image_share"),
     (Column("Review"), "review"), (Column("Found again"), "detected"), (Column("Counted"), "counted"),
     (Column("Reviewed by"), "reviewed_by"), (Column("Reviewed, UTC"), "reviewed_at"), (Column("Reasons"), "reasons"),
@@ -168,7 +168,7 @@ def _regions(regions: Sequence[DryRegion]) -> Sheet:
         [
             [
                 region.id, region.label_from, region.label_to, region.arc_from, region.arc_to, region.area, region.drawn_by,
-                region.drawn_at, region.reason, region.waits, region.approved_by, region.approved_at,
+                region.drawn_at, region.reason, region.pending_approval, region.approved_by, region.approved_at,
                 region.leaks, region.leaks_area, ", ".join(map(str, region.leak_ids or [])),
             ]
             for region in regions

@@ -107,7 +107,7 @@ def stale_kilometres(
 def load_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Leak]:
     """Findings that count between two chainages (m), whole or in part: leaks, joints, other dark spots."""
     rows = conn.execute(
-        "SELECT id, coalesce(judged, kind), wet, area, contrast, public.ST_AsBinary(unrolled) FROM tunnel.anomaly"
+        "SELECT id, coalesce(kind_override, kind), wet, area, contrast, public.ST_AsBinary(unrolled) FROM tunnel.finding"
         " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected' AND NOT aside"
         " AND (wet OR kind IN ('leak', 'joint', 'dark')) ORDER BY id",
         [survey.id, low, high],

@@ -181,7 +181,7 @@ def load_audit(conn: psycopg.Connection[Any], survey: int) -> int:
         row=sql.SQL("CASE a.view {} END").format(
             sql.SQL(" ").join(
                 sql.SQL("WHEN {} THEN {}").format(sql.Literal(view), number_of(view, sql.SQL("a.row_id"), others=False))
-                for view in ("anomaly", "spot", "axis_vertex", "region", "photo", "learned_model")
+                for view in ("finding", "spot", "axis_vertex", "region", "photo", "learned_model")
             )
         ),
         before=_state("before"),
@@ -198,8 +198,8 @@ def load_audit(conn: psycopg.Connection[Any], survey: int) -> int:
 def _state(column: str) -> sql.Composable:
     """What a finding or a photo was, with the numbers that it names: parent, merged into, merged with, finding."""
     value = sql.Identifier("a", column)
-    changed = _numbers(value, dict.fromkeys(("parent_id", "merged_into", "finding_id"), "anomaly"))
-    here = number_of("anomaly", sql.SQL("(e.v)::text::bigint"), others=False)
+    changed = _numbers(value, dict.fromkeys(("parent_id", "merged_into", "finding_id"), "finding"))
+    here = number_of("finding", sql.SQL("(e.v)::text::bigint"), others=False)
     merged = sql.SQL(
         "CASE WHEN jsonb_typeof({value} -> 'merged') = 'array' THEN jsonb_build_object('merged',"
         " (SELECT jsonb_agg({here} ORDER BY e.n) FROM jsonb_array_elements({value} -> 'merged') WITH ORDINALITY e (v, n)))"

@@ -28,7 +28,7 @@ PARAMETERS: Mapping[tuple[str, str], str] = {
 }
 """Keys of the ledger's parameters that hold numbers of rows, or arrays of them, by stage: what a result was made from."""
 
-_AUDITED = ("anomaly", "spot", "axis_vertex", "region", "photo", "learned_model")
+_AUDITED = ("finding", "spot", "axis_vertex", "region", "photo", "learned_model")
 
 
 def staged(table: str) -> sql.Identifier:
@@ -98,9 +98,9 @@ def number_rows(conn: psycopg.Connection[Any], tables: Iterable[Table], *, keep:
 def number_shared(conn: psycopg.Connection[Any], tables: Mapping[str, Table]) -> None:
     """Add rows of the tables of all surveys that are missing here and needed, and find the numbers of the others."""
     needed = {
-        "feature_list": "SELECT feature_list_id FROM pg_temp.archive_anomaly",
-        "finding_kind": "SELECT kind FROM pg_temp.archive_anomaly UNION SELECT judged FROM pg_temp.archive_anomaly",
-        "severity": "SELECT severity FROM pg_temp.archive_anomaly",
+        "feature_list": "SELECT feature_list_id FROM pg_temp.archive_finding",
+        "finding_kind": "SELECT kind FROM pg_temp.archive_finding UNION SELECT kind_override FROM pg_temp.archive_finding",
+        "severity": "SELECT severity FROM pg_temp.archive_finding",
     }
     for name, key in SHARED.items():
         table = tables[name]
@@ -133,9 +133,9 @@ def number_others(conn: psycopg.Connection[Any]) -> None:
     )
     conn.execute(
         sql.SQL(
-            "CREATE TEMPORARY TABLE others_anomaly ON COMMIT DROP AS SELECT DISTINCT ON (a.id) a.id AS old, x.id AS new"
-            " FROM pg_temp.archive_other_anomaly a JOIN pg_temp.others_survey o ON o.old = a.survey_id"
-            " JOIN tunnel.anomaly x ON x.survey_id = o.new AND x.created_at = a.created_at AND {} = a.outline"
+            "CREATE TEMPORARY TABLE others_finding ON COMMIT DROP AS SELECT DISTINCT ON (a.id) a.id AS old, x.id AS new"
+            " FROM pg_temp.archive_other_finding a JOIN pg_temp.others_survey o ON o.old = a.survey_id"
+            " JOIN tunnel.finding x ON x.survey_id = o.new AND x.created_at = a.created_at AND {} = a.outline"
             " ORDER BY a.id, x.id <> a.id"
         ).format(outline_checksum("x"))
     )

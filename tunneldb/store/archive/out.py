@@ -33,7 +33,7 @@ AUDIT = (
 OTHER_SURVEY = (Column("id", "integer"), Column("name", "text"), Column("created_at", "timestamp with time zone"))
 """Surveys that this one was compared with, which the archive does not hold."""
 
-OTHER_ANOMALY = (
+OTHER_FINDING = (
     Column("id", "bigint"),
     Column("survey_id", "integer"),
     Column("created_at", "timestamp with time zone"),
@@ -50,7 +50,7 @@ OTHER_RUN = (
 )
 """Their runs that comparisons rest on, and by what each is known again."""
 
-OTHERS = {"other_survey": OTHER_SURVEY, "other_anomaly": OTHER_ANOMALY, "other_run": OTHER_RUN}
+OTHERS = {"other_survey": OTHER_SURVEY, "other_finding": OTHER_FINDING, "other_run": OTHER_RUN}
 
 
 @dataclass(frozen=True)
@@ -219,9 +219,9 @@ def _others(tables: Sequence[Table], survey: Survey) -> Iterator[tuple[str, sql.
         ).format(key, others),
     )
     yield (
-        "other_anomaly",
+        "other_finding",
         sql.SQL(
-            "SELECT a.id, a.survey_id, a.created_at, {} FROM tunnel.anomaly a WHERE a.survey_id <> {} AND a.id IN"
+            "SELECT a.id, a.survey_id, a.created_at, {} FROM tunnel.finding a WHERE a.survey_id <> {} AND a.id IN"
             " (SELECT unnest(c.old_ids || c.new_ids) FROM tunnel.leak_change c WHERE c.survey_id = {} OR c.old_survey_id = {})"
             " ORDER BY a.id"
         ).format(outline_checksum("a"), key, key, key),

@@ -30,8 +30,8 @@ SHARED: Mapping[str, tuple[str, ...]] = {"feature_list": ("names",), "finding_ki
 UNDECLARED: Mapping[tuple[str, str], str] = {
     ("clearance_section", "cluster_id"): "cluster",
     ("clearance_infringement", "cluster_id"): "cluster",
-    ("leak_change", "old_ids"): "anomaly",
-    ("leak_change", "new_ids"): "anomaly",
+    ("leak_change", "old_ids"): "finding",
+    ("leak_change", "new_ids"): "finding",
 }
 """Columns that hold ids of a table without a foreign key: ids that may be gone, arrays."""
 

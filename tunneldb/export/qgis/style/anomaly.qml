@@ -50,7 +50,7 @@
   </renderer-v2>
   <labeling type="simple">
     <settings calloutType="simple">
-      <text-style fieldName="&quot;kind&quot; || coalesce(': ' || array_to_string(&quot;reasons&quot;, ', '), '') || '\n' || format_number(&quot;area&quot;, 2) || ' m²' || if(&quot;kind&quot; = &quot;found&quot;, coalesce(', ' || round(100 * &quot;confidence&quot;) || ' %', ''), '')" isExpression="1" fontFamily="Sans Serif" namedStyle="Regular" fontWeight="50" fontSize="8" fontSizeUnit="Point" textColor="30,30,30,255" textOpacity="1" multilineHeight="1" allowHtml="0">
+      <text-style fieldName="&quot;kind&quot; || coalesce(': ' || array_to_string(&quot;reasons&quot;, ', '), '') || '\n' || format_number(&quot;area&quot;, 2) || ' m²' || if(&quot;kind&quot; = &quot;kind_detected&quot;, coalesce(', ' || round(100 * &quot;confidence&quot;) || ' %', ''), '')" isExpression="1" fontFamily="Sans Serif" namedStyle="Regular" fontWeight="50" fontSize="8" fontSizeUnit="Point" textColor="30,30,30,255" textOpacity="1" multilineHeight="1" allowHtml="0">
         <text-buffer bufferDraw="0" bufferSize="0.7" bufferSizeUnits="MM" bufferColor="255,255,255,215" bufferOpacity="1" bufferJoinStyle="128" bufferNoFill="1"/>
         <background shapeDraw="1" shapeType="0" shapeSizeType="0" shapeSizeX="0.8" shapeSizeY="0.5" shapeSizeUnit="MM" shapeRadiiX="0.8" shapeRadiiY="0.8" shapeRadiiUnit="MM" shapeFillColor="255,255,255,225" shapeBorderColor="150,150,150,255" shapeBorderWidth="0.1" shapeBorderWidthUnit="MM" shapeOpacity="1" shapeJoinStyle="128"/>
         <shadow shadowDraw="0"/>
@@ -190,7 +190,7 @@
         </config>
       </editWidget>
     </field>
-    <field name="found" configurationFlags="None">
+    <field name="kind_detected" configurationFlags="None">
       <editWidget type="TextEdit">
         <config>
           <Option/>
@@ -237,7 +237,7 @@
         </config>
       </editWidget>
     </field>
-    <field name="drop_mean" configurationFlags="None">
+    <field name="darkening_mean" configurationFlags="None">
       <editWidget type="Range">
         <config>
           <Option type="Map">
@@ -248,7 +248,7 @@
         </config>
       </editWidget>
     </field>
-    <field name="drop_max" configurationFlags="None">
+    <field name="darkening_max" configurationFlags="None">
       <editWidget type="Range">
         <config>
           <Option type="Map">
@@ -401,13 +401,13 @@
     <alias index="9" field="arc_to" name="Arc to (m)"/>
     <alias index="10" field="clock" name="Clock position (h)"/>
     <alias index="11" field="kind" name="Kind"/>
-    <alias index="12" field="found" name="Found as"/>
+    <alias index="12" field="kind_detected" name="Found as"/>
     <alias index="13" field="reasons" name="Reasons"/>
     <alias index="14" field="confidence" name="Confidence (0-1)"/>
     <alias index="15" field="contrast" name="Contrast (sigma)"/>
     <alias index="16" field="area" name="Area (m²)"/>
-    <alias index="17" field="drop_mean" name="Mean drop (dB)"/>
-    <alias index="18" field="drop_max" name="Greatest drop (dB)"/>
+    <alias index="17" field="darkening_mean" name="Mean drop (dB)"/>
+    <alias index="18" field="darkening_max" name="Greatest drop (dB)"/>
     <alias index="19" field="image_share" name="Share measured"/>
     <alias index="20" field="review" name="Review"/>
     <alias index="21" field="reviewed_by" name="Reviewed by"/>
@@ -436,13 +436,13 @@
     <field name="arc_to" editable="0"/>
     <field name="clock" editable="0"/>
     <field name="kind" editable="1"/>
-    <field name="found" editable="0"/>
+    <field name="kind_detected" editable="0"/>
     <field name="reasons" editable="0"/>
     <field name="confidence" editable="0"/>
     <field name="contrast" editable="0"/>
     <field name="area" editable="0"/>
-    <field name="drop_mean" editable="0"/>
-    <field name="drop_max" editable="0"/>
+    <field name="darkening_mean" editable="0"/>
+    <field name="darkening_max" editable="0"/>
     <field name="image_share" editable="0"/>
     <field name="review" editable="1"/>
     <field name="reviewed_by" editable="0"/>
@@ -473,13 +473,13 @@
       <attributeEditorField name="clock_text" index="32" showLabel="1"/>
       <attributeEditorField name="area" index="16" showLabel="1"/>
       <attributeEditorField name="image_share" index="19" showLabel="1"/>
-      <attributeEditorField name="found" index="12" showLabel="1"/>
+      <attributeEditorField name="kind_detected" index="12" showLabel="1"/>
       <attributeEditorField name="confidence" index="14" showLabel="1"/>
       <attributeEditorField name="reasons" index="13" showLabel="1"/>
       <attributeEditorField name="evidence" index="28" showLabel="1"/>
       <attributeEditorField name="contrast" index="15" showLabel="1"/>
-      <attributeEditorField name="drop_mean" index="17" showLabel="1"/>
-      <attributeEditorField name="drop_max" index="18" showLabel="1"/>
+      <attributeEditorField name="darkening_mean" index="17" showLabel="1"/>
+      <attributeEditorField name="darkening_max" index="18" showLabel="1"/>
       <attributeEditorField name="chainage_from" index="5" showLabel="1"/>
       <attributeEditorField name="chainage_to" index="6" showLabel="1"/>
       <attributeEditorField name="arc_from" index="8" showLabel="1"/>
@@ -494,6 +494,6 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "found" %]&lt;br&gt;drop [% format_number("drop_mean", 1) %] dB, [% "review" %]</mapTip>
+  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "found" %]&lt;br&gt;drop [% format_number("darkening_mean", 1) %] dB, [% "review" %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -1,6 +1,6 @@
 <!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
 <qgis version="3.22.0" styleCategories="AllStyleCategories" hasScaleBasedVisibilityFlag="0" minScale="0" maxScale="0" readOnly="0">
-  <renderer-v2 type="categorizedSymbol" attr="if(&quot;waits&quot;, 'waits', &quot;kind&quot;)" forceraster="0" enableorderby="0" symbollevels="0">
+  <renderer-v2 type="categorizedSymbol" attr="if(&quot;pending_approval&quot;, 'waits', &quot;kind&quot;)" forceraster="0" enableorderby="0" symbollevels="0">
     <categories>
       <category symbol="0" value="homogeneous" label="One material" render="true"/>
       <category symbol="1" value="dry" label="Dry lining" render="true"/>
@@ -115,7 +115,7 @@
         </config>
       </editWidget>
     </field>
-    <field name="waits" configurationFlags="None">
+    <field name="pending_approval" configurationFlags="None">
       <editWidget type="TextEdit">
         <config>
           <Option type="Map">
@@ -156,7 +156,7 @@
     <alias index="4" field="drawn_by" name="Drawn by"/>
     <alias index="5" field="drawn_at" name="Drawn at"/>
     <alias index="6" field="reason" name="Reason"/>
-    <alias index="7" field="waits" name="Waits for an operator"/>
+    <alias index="7" field="pending_approval" name="Waits for an operator"/>
     <alias index="8" field="approved_by" name="Put in force by"/>
     <alias index="9" field="approved_at" name="Put in force at"/>
   </aliases>
@@ -168,7 +168,7 @@
     <field name="drawn_by" editable="0"/>
     <field name="drawn_at" editable="0"/>
     <field name="reason" editable="1"/>
-    <field name="waits" editable="0"/>
+    <field name="pending_approval" editable="0"/>
     <field name="approved_by" editable="0"/>
     <field name="approved_at" editable="0"/>
   </editable>
@@ -177,7 +177,7 @@
     <attributeEditorContainer name="Region" columnCount="1" groupBox="1" showLabel="1" visibilityExpressionEnabled="0" visibilityExpression="">
       <attributeEditorField name="kind" index="3" showLabel="1"/>
       <attributeEditorField name="reason" index="6" showLabel="1"/>
-      <attributeEditorField name="waits" index="7" showLabel="1"/>
+      <attributeEditorField name="pending_approval" index="7" showLabel="1"/>
       <attributeEditorField name="approved_by" index="8" showLabel="1"/>
       <attributeEditorField name="approved_at" index="9" showLabel="1"/>
       <attributeEditorField name="drawn_by" index="4" showLabel="1"/>
@@ -185,6 +185,6 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"kind"</previewExpression>
-  <mapTip>&lt;b&gt;[% "kind" %]&lt;/b&gt;&lt;br&gt;drawn by [% "drawn_by" %][% if("waits", ', waits for an operator', '') %][% coalesce('&lt;br&gt;' || replace("reason", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %]</mapTip>
+  <mapTip>&lt;b&gt;[% "kind" %]&lt;/b&gt;&lt;br&gt;drawn by [% "drawn_by" %][% if("pending_approval", ', waits for an operator', '') %][% coalesce('&lt;br&gt;' || replace("reason", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>
