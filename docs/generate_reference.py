@@ -148,10 +148,10 @@ def database(conn: psycopg.Connection[Any]) -> str:
         "the right looking up-chainage, offset is positive into the tunnel. Angles of sections are degrees from the upward "
         "direction, positive to the right. Geometry is in the tunnel's SRID, or in the unrolled plane (chainage, arc), SRID 0.",
         "## Views",
-        "Members of `tunnel_viewer` may read all of them. `axis_vertex` (its geometry), the views of leaks and anomalies "
+        "Members of `tunnel_viewer` may read all of them. `axis_vertex` (its geometry), the views of leaks "
         "(`review`, `remark` and `kind`), those of spots (`review` and `remark`), `region`, `finding_unrolled`, `finding_map`, "
         "`finding_3d` and `finding_photo` may be changed by members of `tunnel_inspector`; findings are drawn also through the "
-        "unrolled and map views of leaks and anomalies. They may call `finding_split`, `finding_merge` and `finding_undo`, "
+        "unrolled and map views of leaks. They may call `finding_split`, `finding_merge` and `finding_undo`, "
         "too.",
     ]
     parts += [

@@ -14,7 +14,7 @@ from tunneldb.database.schema import sql_files
 TOPICS = {
     "Axis and sections": ("stationing", "survey", "survey_ends", "outline", "alignment"),
     "The scanner": ("scanner",),
-    "Leaks and findings": ("anomaly", "finding", "learned"),
+    "Leaks and findings": ("finding", "learned"),
     "How wet, and what was seen": ("coverage", "statistics", "waterproof", "coverage_gap"),
     "Ground and objects": ("ground",),
     "Inspection sheets": ("sheet",),

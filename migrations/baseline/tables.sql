@@ -6,7 +6,7 @@ CREATE TABLE tunnel.feature_list (
     CONSTRAINT feature_list_pkey PRIMARY KEY (id),
     CONSTRAINT feature_list_names_key UNIQUE (names)
 );
-COMMENT ON TABLE tunnel.feature_list IS 'In which order the features of anomalies are stored: versions of the program differ';
+COMMENT ON TABLE tunnel.feature_list IS 'In which order the features of findings are stored: versions of the program differ';
 COMMENT ON COLUMN tunnel.feature_list.id IS 'Key';
 COMMENT ON COLUMN tunnel.feature_list.names IS 'Their names; outline: how much the outline tells, 0 to 1';
 
@@ -170,7 +170,7 @@ COMMENT ON COLUMN tunnel_audit.entry.id IS 'Key';
 COMMENT ON COLUMN tunnel_audit.entry.at IS 'When';
 COMMENT ON COLUMN tunnel_audit.entry.who IS 'Who was logged in';
 COMMENT ON COLUMN tunnel_audit.entry.survey IS 'Name of the survey';
-COMMENT ON COLUMN tunnel_audit.entry.view IS 'What was changed: anomaly, spot, axis_vertex, region or photo';
+COMMENT ON COLUMN tunnel_audit.entry.view IS 'What was changed: finding, spot, axis_vertex, region or photo';
 COMMENT ON COLUMN tunnel_audit.entry.row_id IS 'Its id there';
 COMMENT ON COLUMN tunnel_audit.entry.action IS 'insert, update or delete';
 COMMENT ON COLUMN tunnel_audit.entry.before IS 'Columns that changed, as they were; none of an insert';
@@ -1963,7 +1963,7 @@ CREATE TABLE tunnel.boundary_region (
     CONSTRAINT boundary_region_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE,
     CONSTRAINT boundary_region_finding_id_fkey FOREIGN KEY(finding_id) REFERENCES tunnel.finding (id) ON DELETE SET NULL
 );
-COMMENT ON TABLE tunnel.boundary_region IS 'Dark regions cut by an end of their kilometre, from which anomalies over several are put together';
+COMMENT ON TABLE tunnel.boundary_region IS 'Dark regions cut by an end of their kilometre, from which findings across several are merged';
 COMMENT ON COLUMN tunnel.boundary_region.id IS 'Key';
 COMMENT ON COLUMN tunnel.boundary_region.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.boundary_region.km IS 'Kilometre: floor(chainage / 1000)';

@@ -31,7 +31,7 @@ _FACTS = {
     **{name: f"f.{name}" for name in ("darkening_mean", "darkening_max", "contrast", "image_share", "photos")},
     "reviewed_at": "to_char(f.reviewed_at, 'YYYY-MM-DD HH24:MI')",
     "reasons": "array_to_string(f.reasons, ', ')",
-    "evidence": "(SELECT a.evidence FROM tunnel_api.anomaly a WHERE a.id = f.id)",
+    "evidence": "f.evidence",
     "outline": "public.ST_AsText(f.unrolled, 3)",
     "map_west": "public.ST_XMin(f.map)", "map_south": "public.ST_YMin(f.map)",
     "map_east": "public.ST_XMax(f.map)", "map_north": "public.ST_YMax(f.map)",

@@ -9,7 +9,7 @@ COMMENT ON VIEW tunnel_api.audit IS
     'What people changed through the views: who, when, before and after; it outlives what it speaks of. No role changes it, but for operators by a trigger or a function of their own on a table, which tunneldb check reports';
 COMMENT ON COLUMN tunnel_api.audit.at IS 'When';
 COMMENT ON COLUMN tunnel_api.audit.who IS 'Who was logged in';
-COMMENT ON COLUMN tunnel_api.audit.view IS 'What was changed: anomaly (of leaks and all findings), spot, axis_vertex, region, photo or learned_model';
+COMMENT ON COLUMN tunnel_api.audit.view IS 'What was changed: finding (leaks, too), spot, axis_vertex, region, photo or learned_model';
 COMMENT ON COLUMN tunnel_api.audit.row_id IS 'Its id in that view';
 COMMENT ON COLUMN tunnel_api.audit.action IS 'insert, update or delete';
 COMMENT ON COLUMN tunnel_api.audit.before IS 'Columns that changed, as they were, geometry as EWKT; NULL of an insert';

@@ -22,9 +22,6 @@ LANGUAGE sql IMMUTABLE PARALLEL SAFE ROWS 60 SET search_path = pg_catalog, pg_te
         ('leak_unrolled', 'Polygon', true),
         ('leak_map', 'Polygon', false),
         ('leak_3d', 'PolygonZ', false),
-        ('anomaly_unrolled', 'Polygon', true),
-        ('anomaly_map', 'Polygon', false),
-        ('anomaly_3d', 'PolygonZ', false),
         ('finding_unrolled', 'Geometry', true),  -- polygons, lines and points
         ('finding_map', 'Geometry', false),
         ('finding_3d', 'GeometryZ', false),

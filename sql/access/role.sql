@@ -80,11 +80,10 @@ BEGIN
     END IF;
     GRANT UPDATE (geom) ON tunnel_api.axis_vertex TO tunnel_inspector;
     GRANT UPDATE (review, remark, kind) ON
-        tunnel_api.anomaly, tunnel_api.anomaly_unrolled, tunnel_api.anomaly_map, tunnel_api.anomaly_3d,
-        tunnel_api.leak, tunnel_api.leak_unrolled, tunnel_api.leak_map, tunnel_api.leak_3d
+        tunnel_api.finding, tunnel_api.leak, tunnel_api.leak_unrolled, tunnel_api.leak_map, tunnel_api.leak_3d
         TO tunnel_inspector;
     GRANT INSERT, DELETE, UPDATE (geom) ON
-        tunnel_api.leak_unrolled, tunnel_api.leak_map, tunnel_api.anomaly_unrolled, tunnel_api.anomaly_map TO tunnel_inspector;
+        tunnel_api.leak_unrolled, tunnel_api.leak_map TO tunnel_inspector;
     GRANT UPDATE (review, remark) ON tunnel_api.spot, tunnel_api.spot_face, tunnel_api.spot_map, tunnel_api.spot_3d, tunnel_api.spot_sheet
         TO tunnel_inspector;
     GRANT INSERT, DELETE, UPDATE (kind, geom, reason) ON tunnel_api.region TO tunnel_inspector;

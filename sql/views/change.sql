@@ -18,6 +18,6 @@ SELECT r.id * 2 + 1, s.name, r.finished_at, r.worker, r.stage, r.km, concat_ws('
 COMMENT ON VIEW tunnel_api.change IS 'What happened to a survey: edits by hand (tunnel_api.audit) and stages that ran (tunnel_api.run)';
 COMMENT ON COLUMN tunnel_api.change.at IS 'When it was changed, or the run ended';
 COMMENT ON COLUMN tunnel_api.change.who IS 'Who was logged in; of a stage the machine and process, NULL of one by hand';
-COMMENT ON COLUMN tunnel_api.change.what IS 'anomaly, axis_vertex, region, photo or learned_model, or the stage';
+COMMENT ON COLUMN tunnel_api.change.what IS 'finding, axis_vertex, region, photo or learned_model, or the stage';
 COMMENT ON COLUMN tunnel_api.change.km IS 'Kilometre; NULL of a region, of what is there no more, and of a run over the whole survey';
 COMMENT ON COLUMN tunnel_api.change.detail IS 'What was done to which row, or how the run ended';

@@ -54,7 +54,7 @@ BEGIN
                                              WHEN v.relname ~ '^clearance_infringement_' THEN 'tunnel_api.clearance_infringement'
                                              WHEN v.relname ~ '^(change_region|leak_change)(_|$)'
                                              THEN 'tunnel.' || substring(v.relname FROM '^(change_region|leak_change)')
-                                             WHEN v.relname ~ '^(leak|anomaly)(_|$)' THEN 'tunnel.finding'
+                                             WHEN v.relname ~ '^leak(_|$)' THEN 'tunnel.finding'
                                              ELSE format('tunnel.%I', v.relname) END)
           LEFT JOIN pg_attribute b ON b.attrelid = t.oid AND b.attname = a.attname
           LEFT JOIN LATERAL (SELECT col_description(t.oid, b.attnum) AS text WHERE t.relkind = 'v') w ON true

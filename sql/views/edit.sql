@@ -1,5 +1,5 @@
 -- What may be written through the views, by INSTEAD OF triggers: the position of axis vertices, review, remark and kind of
--- leaks, other anomalies (views/anomaly.sql) and spots of structures (views/structures.sql), and regions drawn by hand. The functions run with the owner's rights, so that who edits
+-- leaks (views/finding.sql) and spots of structures (views/structures.sql), and regions drawn by hand. The functions run with the owner's rights, so that who edits
 -- needs no right on schema tunnel, and stamp each row with session_user, which stays the person's own name in them. Each locks
 -- its row and takes only what the person changed: what somebody else did meanwhile stays, and the audit says what truly was.
 -- What both changed, each to something else, is refused to the later one, as a failure of serialization.
@@ -65,7 +65,7 @@ CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.axis_vertex
     FOR EACH ROW EXECUTE FUNCTION tunnel_api.edit_axis_vertex();
 
 -- Sets the review, the remark and, where there are kinds to choose from, the kind of a finding: TG_ARGV is its table in schema
--- tunnel, what it is called, and its kinds. For the views of anomalies, leaks and spots alike. A kind other than the one that
+-- tunnel, what it is called, and its kinds, or any: those of finding_kind. For the views of leaks and spots, and finding. A kind other than the one that
 -- was found is noted as judged; the one that was found takes that back. Geometries, whose columns differ between the views, are
 -- never written back.
 CREATE OR REPLACE FUNCTION tunnel_api.review_finding() RETURNS trigger
@@ -87,7 +87,11 @@ BEGIN
             OLD.kind, OLD.id, coalesce(NEW.review, 'empty')
             USING ERRCODE = 'check_violation';
     END IF;
-    IF judging AND NEW.kind IS DISTINCT FROM OLD.kind AND (NEW.kind IS NULL OR NEW.kind <> ALL (kinds)) THEN
+    IF kinds = ARRAY['any'] THEN
+        IF NEW.kind IS DISTINCT FROM OLD.kind THEN
+            PERFORM tunnel_api.check_kind(NEW.kind, CASE WHEN OLD.manual THEN OLD.unrolled END);
+        END IF;
+    ELSIF judging AND NEW.kind IS DISTINCT FROM OLD.kind AND (NEW.kind IS NULL OR NEW.kind <> ALL (kinds)) THEN
         RAISE EXCEPTION 'the kind of % % can be %, not %', OLD.kind, OLD.id,
             array_to_string(kinds[:cardinality(kinds) - 1], ', ') || ' or ' || kinds[cardinality(kinds)],
             coalesce(NEW.kind, 'empty')
@@ -139,17 +143,18 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.review_finding() IS
-    'Trigger of the views of anomalies, leaks and spots: sets review, remark and kind and notes who and when';
+    'Trigger of the views of leaks and spots: sets review, remark and kind and notes who and when';
 
 DO $$
 DECLARE
     name text;
 BEGIN
-    FOREACH name IN ARRAY ARRAY['anomaly', 'anomaly_unrolled', 'anomaly_map', 'anomaly_3d',
-                                'leak', 'leak_unrolled', 'leak_map', 'leak_3d'] LOOP
+    FOREACH name IN ARRAY ARRAY['leak', 'leak_unrolled', 'leak_map', 'leak_3d'] LOOP
         EXECUTE format('CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.%I FOR EACH ROW EXECUTE FUNCTION'
-                       ' tunnel_api.review_finding(''anomaly'', ''a leak or another anomaly'', ''leak'', ''joint'', ''dark'')', name);
+                       ' tunnel_api.review_finding(''finding'', ''a leak'', ''leak'', ''joint'', ''dark'')', name);
     END LOOP;
+    CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.finding
+        FOR EACH ROW EXECUTE FUNCTION tunnel_api.review_finding('finding', 'a finding', 'any');
     FOREACH name IN ARRAY ARRAY['spot', 'spot_face', 'spot_map', 'spot_3d', 'spot_sheet'] LOOP
         EXECUTE format('CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.%I FOR EACH ROW EXECUTE FUNCTION'
                        ' tunnel_api.review_finding(''spot'', ''a spot'')', name);
@@ -157,9 +162,9 @@ BEGIN
 END
 $$;
 
--- What is drawn, redrawn and deleted in a layer of leaks or of what is dark but dry is a finding: TG_ARGV is the place, see
--- draw_finding, and the kind of one that says none. Runs before the review of the same update.
-CREATE OR REPLACE FUNCTION tunnel_api.draw_anomaly() RETURNS trigger
+-- What is drawn, redrawn and deleted in a layer of leaks is a finding, a leak unless it says another kind: TG_ARGV is the place, see
+-- draw_finding. Runs before the review of the same update.
+CREATE OR REPLACE FUNCTION tunnel_api.draw_leak() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     view CONSTANT text := 'finding_' || TG_ARGV[0];
@@ -168,7 +173,7 @@ BEGIN
     IF TG_OP = 'INSERT' THEN
         EXECUTE format('INSERT INTO tunnel_api.%I (survey_id, survey, kind, review, remark, geom)'
                        ' VALUES ($1, $2, $3, $4, $5, $6) RETURNING id', view)
-           INTO NEW.id USING NEW.survey_id, NEW.survey, coalesce(NEW.kind, TG_ARGV[1]), NEW.review, NEW.remark, NEW.geom;
+           INTO NEW.id USING NEW.survey_id, NEW.survey, coalesce(NEW.kind, 'leak'), NEW.review, NEW.remark, NEW.geom;
         RETURN NEW;
     ELSIF TG_OP = 'DELETE' THEN
         EXECUTE format('DELETE FROM tunnel_api.%I WHERE id = $1', view) USING OLD.id;
@@ -180,8 +185,8 @@ BEGIN
     RETURN NEW;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.draw_anomaly() IS
-    'Trigger of the views of leaks and anomalies with one geometry: draws, redraws and deletes by the view of findings';
+COMMENT ON FUNCTION tunnel_api.draw_leak() IS
+    'Trigger of the views of leaks with one geometry: draws, redraws and deletes by the view of findings';
 
 DO $$
 DECLARE
@@ -189,9 +194,7 @@ DECLARE
 BEGIN
     FOREACH place IN ARRAY ARRAY['unrolled', 'map', '3d'] LOOP
         EXECUTE format('CREATE OR REPLACE TRIGGER draw INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.%I FOR EACH ROW'
-                       ' EXECUTE FUNCTION tunnel_api.draw_anomaly(%L, ''leak'')', 'leak_' || place, place);
-        EXECUTE format('CREATE OR REPLACE TRIGGER draw INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.%I FOR EACH ROW'
-                       ' EXECUTE FUNCTION tunnel_api.draw_anomaly(%L, ''dark'')', 'anomaly_' || place, place);
+                       ' EXECUTE FUNCTION tunnel_api.draw_leak(%L)', 'leak_' || place, place);
     END LOOP;
 END
 $$;

@@ -1,6 +1,16 @@
--- Findings on the lining: what was detected and what people drew, of all kinds, with what became of each. Rows are those of
--- tunnel.finding, so that ids are those of the views leak and anomaly; these show what is dark or wet and counts for itself, the
--- views here all. Drawn and edited through finding_unrolled, finding_map and finding_3d (views/draw.sql).
+-- Findings on the lining: what was detected and what people drew, of all kinds and states; leaks are the wet ones. A finding on a
+-- vertical wall has no area in plan, so there are three geometries, each with a view of its own for QGIS: unrolled (chainage,
+-- arc; SRID 0), on the map beside the axis, and in space. Findings are drawn and edited through finding_unrolled, finding_map and
+-- finding_3d (views/draw.sql). Needs stationing (geometry/stationing.sql) and make_geometry_views (views/geometry.sql).
+
+-- What each reason adds to the logarithm of the odds of a leak, the strongest first, as "faint +2.3, rectangular -1.2".
+CREATE OR REPLACE FUNCTION tunnel_api.evidence_text(evidence jsonb) RETURNS text
+LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE SET search_path = pg_catalog, pg_temp AS $$
+    SELECT string_agg(e.key || ' ' || to_char(e.value::numeric, 'FMSG990.0'), ', ' ORDER BY abs(e.value::numeric) DESC, e.key)
+      FROM jsonb_each_text($1) e WHERE abs(e.value::numeric) >= 0.05
+$$;
+COMMENT ON FUNCTION tunnel_api.evidence_text(jsonb) IS
+    'What speaks for a leak and against it, in words: logarithms of odds by reason, the strongest first';
 
 CREATE OR REPLACE VIEW tunnel_api.finding_kind AS
 SELECT k.id, k.code, k.label, k.geometries, k.wet, k.position, k.active FROM tunnel.finding_kind k;
@@ -43,6 +53,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
             WHEN a.review = 'rejected' THEN 'rejected' WHEN a.superseded THEN 'dry' WHEN NOT a.detected THEN 'gone'
             ELSE a.review END AS state,
        (SELECT count(*) FROM tunnel.photo p WHERE p.finding_id = a.id) AS photos,
+       tunnel_api.evidence_text(a.evidence) AS evidence, a.model, a.superseded,
        coalesce(a.shape, a.unrolled) AS unrolled,
        coalesce(a.shape_map, a.map) AS map,
        coalesce(a.shape_surface, a.surface) AS surface
@@ -54,7 +65,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
  CROSS JOIN LATERAL (SELECT (a.chainage_from + a.chainage_to) / 2 AS chainage,
                             floor((a.chainage_from + a.chainage_to) / 2 / t.spacing)::integer AS near) m;
 COMMENT ON VIEW tunnel_api.finding IS
-    'Findings on the lining, detected and drawn, of all kinds and states, with their three geometries: polygons, lines and points as they are. To be edited through finding_unrolled, finding_map and finding_3d';
+    'Findings on the lining, detected and drawn, of all kinds and states, with their three geometries: polygons, lines and points as they are; review, remark and kind can be updated, and all that people draw through finding_unrolled, finding_map and finding_3d';
 
 -- The comments on its columns, and its views of one geometry.
 DO $$
@@ -105,6 +116,9 @@ BEGIN
         ('counted', 'Whether sums count it: there, not rejected, and nothing else stands for it'),
         ('state', 'open, confirmed, rejected, gone (not found again), dry (taken away by a dry region), same or merged (another counts)'),
         ('photos', 'How many photos it has (finding_photo)'),
+        ('evidence', 'Evidence for a leak (+) and against it (-): logarithms of odds by reason, the strongest first; NULL of what was drawn'),
+        ('model', 'Version of the model of evidence that classified it'),
+        ('superseded', 'True if another finding (merged_into, same_as) or a dry region takes its place'),
         ('unrolled', 'In the unrolled plane'),
         ('map', 'On the map strip beside the axis, tunnel''s SRID'),
         ('surface', 'On the lining in space, tunnel''s SRID')) AS t (name, text)
@@ -119,6 +133,98 @@ $$;
 CALL tunnel_api.make_geometry_views(
     'finding', 'finding', 'Findings',
     ': polygons, lines and points are drawn, redrawn and reviewed here, and what was drawn is deleted');
+
+CREATE OR REPLACE VIEW tunnel_api.finding_polygon AS
+SELECT a.id, a.survey_id, s.name AS survey, a.unrolled::public.geometry(Polygon, 0) AS unrolled, a.map::public.geometry AS map,
+       a.surface::public.geometry AS surface
+  FROM tunnel.finding a
+  JOIN tunnel.survey s ON s.id = a.survey_id;
+COMMENT ON VIEW tunnel_api.finding_polygon IS
+    'Findings as polygons: of a line the strip of its width, of a point a circle of 5 cm radius; all else is in finding, by id';
+COMMENT ON COLUMN tunnel_api.finding_polygon.id IS 'Its id in finding';
+COMMENT ON COLUMN tunnel_api.finding_polygon.unrolled IS 'In the unrolled plane';
+COMMENT ON COLUMN tunnel_api.finding_polygon.map IS 'On the map strip beside the axis, tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.finding_polygon.surface IS 'On the lining in space, tunnel''s SRID';
+
+CREATE OR REPLACE VIEW tunnel_api.finding_evidence AS
+SELECT a.id * 100 + e.n AS id, a.id AS finding_id, a.survey_id, s.name AS survey, e.reason, e.log_odds
+  FROM tunnel.finding a
+  JOIN tunnel.survey s ON s.id = a.survey_id
+ CROSS JOIN LATERAL (SELECT v.key AS reason, v.value::double precision AS log_odds, row_number() OVER (ORDER BY v.key) AS n
+                       FROM jsonb_each_text(a.evidence) v) e;
+COMMENT ON VIEW tunnel_api.finding_evidence IS 'Evidence for and against each finding being a leak: a row for each reason';
+COMMENT ON COLUMN tunnel_api.finding_evidence.finding_id IS 'Its finding';
+COMMENT ON COLUMN tunnel_api.finding_evidence.reason IS 'What was measured: faint, thin, rectangular, …';
+COMMENT ON COLUMN tunnel_api.finding_evidence.log_odds IS 'What it adds to the logarithm of the odds of a leak; negative: against one';
+
+CREATE OR REPLACE VIEW tunnel_api.leak AS
+SELECT a.id, a.survey_id, s.name AS survey, a.km,
+       (SELECT min(g.n) FROM tunnel.segment g
+         WHERE g.survey_id = a.survey_id AND g.n BETWEEN m.near - 2 AND m.near + 2
+           AND m.chainage BETWEEN g.chainage_from AND g.chainage_to) AS segment,
+       a.chainage_from, a.chainage_to,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, m.chainage) l) AS label,
+       a.arc_from, a.arc_to, a.clock,
+       coalesce(a.kind_override, a.kind) AS kind, a.kind AS kind_detected, a.reasons, a.confidence, a.contrast,
+       a.area, a.darkening_mean, a.darkening_max, a.image_share,
+       a.review, a.reviewed_by, a.reviewed_at, a.remark, a.detected, a.created_at, a.detected_at,
+       a.detected AND a.review <> 'rejected' AS counted,
+       tunnel_api.evidence_text(a.evidence) AS evidence, a.model, a.wet, a.origin,
+       a.unrolled::public.geometry(Polygon, 0) AS unrolled,
+       a.map::public.geometry AS map,
+       a.surface::public.geometry AS surface
+  FROM tunnel.finding a
+  JOIN tunnel.survey s ON s.id = a.survey_id
+  JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+ CROSS JOIN LATERAL (SELECT (a.chainage_from + a.chainage_to) / 2 AS chainage,
+                            floor((a.chainage_from + a.chainage_to) / 2 / t.spacing)::integer AS near) m
+ WHERE a.wet AND NOT a.superseded;
+
+COMMENT ON VIEW tunnel_api.leak IS
+    'Water leaks: findings whose kind is wet, detected and drawn, as polygons in three geometries; review, remark and kind can be updated';
+
+-- The comments on its columns, and its views of one geometry.
+DO $$
+DECLARE
+    comment record;
+BEGIN
+    FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
+        ('segment', 'Number of the segment that holds its middle'),
+        ('label', 'Station of its middle, as 12+345.678'),
+        ('chainage_from', 'Least chainage, m'),
+        ('chainage_to', 'Greatest chainage, m'),
+        ('arc_from', 'Least arc, m from the crown, positive right looking up-chainage'),
+        ('arc_to', 'Greatest arc, m'),
+        ('clock', 'Clock position of the middle, hours: 12 is the crown, 3 the right wall looking up-chainage'),
+        ('kind', 'leak, joint or dark (dark but dry), or another of finding_kind: as an inspector judged it, else as found'),
+        ('kind_detected', 'What detection takes it for'),
+        ('reasons', 'Why detection takes it for that'),
+        ('confidence', 'How sure detection is of that, 0-1; NULL from before there were kinds'),
+        ('contrast', 'Mean drop in standard deviations of the dry lining about it; NULL from before there were kinds'),
+        ('area', 'Area on the lining, m²'),
+        ('darkening_mean', 'Mean drop of corrected intensity below dry lining, dB; NULL until what was drawn is measured'),
+        ('darkening_max', 'Greatest drop of corrected intensity below dry lining, dB; NULL until then'),
+        ('image_share', 'Share of the polygon on which the image holds measurements, 0-1; NULL until then'),
+        ('review', 'open, confirmed or rejected'),
+        ('reviewed_by', 'Who reviewed or judged it last, set by the database'),
+        ('reviewed_at', 'When it was reviewed or judged last, set by the database'),
+        ('remark', 'The reviewer''s remark'),
+        ('detected', 'False when the last detection found it no more (kept for its review)'),
+        ('counted', 'Whether sums count it: found last, and not rejected'),
+        ('wet', 'Whether its kind counts as wet: those are in the views of leaks'),
+        ('origin', 'How its outline came about: detected, drawn, redrawn, split or merged'),
+        ('evidence', 'What speaks for a leak (+) and against it (-): logarithms of odds by reason, the strongest first; NULL from before'),
+        ('model', 'Version of the model of evidence that judged it; NULL from before')) AS t (name, text)
+      JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
+      JOIN pg_class c ON c.oid = a.attrelid
+     WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname = 'leak'
+    LOOP
+        EXECUTE format('COMMENT ON COLUMN tunnel_api.%I.%I IS %L', comment.view, comment."column", comment.text);
+    END LOOP;
+END
+$$;
+
+CALL tunnel_api.make_geometry_views('leak', 'leak', 'Leaks', '; review, remark and kind can be updated');
 
 CREATE OR REPLACE VIEW tunnel_api.finding_photo AS
 SELECT p.id, p.finding_id, a.survey_id, s.name AS survey, p.path, p.caption, p.added_by, p.added_at

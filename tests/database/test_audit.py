@@ -51,7 +51,7 @@ def test_a_review_is_noted_with_only_what_changed(person: psycopg.Connection) ->
     key = first_leak(person)
     person.execute("UPDATE tunnel_api.leak_map SET review = 'confirmed' WHERE id = %s", (key,))
     person.execute("UPDATE tunnel_api.leak SET remark = 'drips', review = 'confirmed' WHERE id = %s", (key,))
-    person.execute("UPDATE tunnel_api.anomaly_3d SET kind = 'joint' WHERE id = %s", (key,))
+    person.execute("UPDATE tunnel_api.finding_3d SET kind = 'joint' WHERE id = %s", (key,))
     assert entries(person) == [
         ("ines", SURVEY, "finding", key, "update", {"review": "open"}, {"review": "confirmed"}),
         ("ines", SURVEY, "finding", key, "update", {"remark": None}, {"remark": "drips"}),
@@ -59,7 +59,7 @@ def test_a_review_is_noted_with_only_what_changed(person: psycopg.Connection) ->
     ]
     assert person.execute(
         "SELECT max(d.at) = a.reviewed_at OR max(d.at) - a.reviewed_at < interval '1 s'"
-        "  FROM tunnel_api.anomaly a JOIN tunnel_api.audit d ON d.view = 'finding' AND d.row_id = a.id"
+        "  FROM tunnel_api.finding a JOIN tunnel_api.audit d ON d.view = 'finding' AND d.row_id = a.id"
         " WHERE a.id = %s GROUP BY a.reviewed_at", (key,)
     ).fetchone() == (True,)  # fmt: skip
 

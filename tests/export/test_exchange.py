@@ -29,7 +29,7 @@ RADIUS, HEIGHT = 4.0, 2.5  # of the example's tunnel: a circle, and its floor be
 CURVE, CENTRE = 300.0, np.array([500_300.0, 4_640_000.0])  # of its axis, in plan
 FIRST, LAST = 12300.0, 12500.0
 UNROLLED = {
-    *("leak_unrolled", "anomaly_unrolled", "region", "section_unrolled", "sheet", "chainage_unrolled", "lining_unrolled"),
+    *("leak_unrolled", "dark_unrolled", "region", "section_unrolled", "sheet", "chainage_unrolled", "lining_unrolled"),
     "coverage_gap",
 }  # fmt: skip
 PYTHON = "/usr/bin/python3"
@@ -91,7 +91,7 @@ def test_geopackage_has_the_layers_in_their_systems(files: Path, shared_dsn: str
         ).fetchone()
     assert organisation == ("EPSG", 25830)
     with psycopg.connect(shared_dsn) as conn:
-        for view in ("axis_vertex", "segment", "section", "leak_map", "anomaly_3d", "cluster", "target_sphere", "region"):
+        for view in ("axis_vertex", "segment", "section", "leak_map", "cluster", "target_sphere", "region"):
             if view in named:
                 query = sql.SQL("SELECT count(*) FROM tunnel_api.{}").format(sql.Identifier(view))
                 assert pyogrio.read_info(path, layer=view)["features"] == conn.execute(query).fetchone()[0], view
@@ -170,7 +170,7 @@ def test_a_stretch_is_cut_out(files: Path) -> None:
     assert ends == pytest.approx([12400, 12430], abs=0.01)
     _, _, segments = layer(path, "segment")
     assert segments["chainage_from"].tolist() == [12400, 12410, 12420]
-    _, _, leaks = layer(path, "anomaly_unrolled")
+    _, _, leaks = layer(path, "dark_unrolled")
     assert leaks["kind"].tolist() == ["joint"]
     _, _, leaks = layer(path, "leak_unrolled")
     middles = np.sort((leaks["chainage_from"] + leaks["chainage_to"]) / 2)

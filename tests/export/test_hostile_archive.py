@@ -77,7 +77,7 @@ def test_nothing_of_a_forged_archive_is_written(example: str, conn: psycopg.Conn
 
     forged = {
         "rows of another survey": lambda: forge(path, "rows/segment.zst", of_theirs),
-        "findings of another survey": lambda: forge(path, "rows/anomaly.zst", of_theirs),
+        "findings of another survey": lambda: forge(path, "rows/finding.zst", of_theirs),
         "the survey itself is another": lambda: forge(path, "rows/survey.zst", of_theirs),
         "more rows than are told": lambda: forge(path, "rows/coverage.zst", twice),
         "no rows but bytes": lambda: forge(path, "rows/axis_vertex.zst", lambda rows: b"\xff" * len(rows)),

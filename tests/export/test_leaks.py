@@ -132,14 +132,15 @@ def test_table_fits_the_terminal(conn, example, width, kind):
 
 @pytest.mark.parametrize(("kind", "number"), [("leak", 6), ("joint", 1), ("dark", 2), ("all", 9)])
 def test_kinds_are_listed_and_exported(conn, example, tmp_path, kind, number):
-    conn.execute("UPDATE tunnel_api.anomaly SET kind = 'dark' WHERE id = 1")
-    conn.execute("UPDATE tunnel_api.anomaly SET kind = 'leak' WHERE kind = 'joint'")
-    conn.execute("UPDATE tunnel_api.anomaly SET kind = 'joint' WHERE id = 2")
+    conn.execute("UPDATE tunnel_api.finding SET kind = 'dark' WHERE id = 1")
+    conn.execute("UPDATE tunnel_api.finding SET kind = 'leak' WHERE kind = 'joint'")
+    conn.execute("UPDATE tunnel_api.finding SET kind = 'joint' WHERE id = 2")
     conn.execute("UPDATE tunnel.finding SET confidence = NULL, contrast = NULL WHERE id = 3")
     conn.commit()
     expected = conn.execute(
-        "SELECT id, kind, CASE WHEN id NOT IN (1, 2) AND found <> 'joint' THEN confidence END, array_to_string(reasons, ', ')"
-        " FROM tunnel_api.anomaly WHERE kind = %s OR %s = 'all' ORDER BY id", (kind, kind),
+        "SELECT id, kind, CASE WHEN id NOT IN (1, 2) AND kind_detected <> 'joint' THEN confidence END,"
+        " array_to_string(reasons, ', ')"
+        " FROM tunnel_api.finding WHERE kind = %s OR %s = 'all' ORDER BY id", (kind, kind),
     ).fetchall()  # fmt: skip
     assert len(expected) == number
     assert kind != "all" or sum(row[2] is not None for row in expected) == 5  # none in a kind that an inspector gave

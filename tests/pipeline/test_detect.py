@@ -298,7 +298,7 @@ def test_what_was_learned_judges_the_next_run_and_reviews_stay(detected: psycopg
     conn.execute("UPDATE tunnel_api.leak SET review = 'confirmed' WHERE id = %s", [confirmed])
     conn.execute("UPDATE tunnel_api.leak SET review = 'rejected' WHERE id = %s", [rejected])
     conn.execute("UPDATE tunnel_api.leak SET kind = 'joint' WHERE id = %s", [renamed])
-    said = "SELECT id, review, kind, reviewed_by, reviewed_at FROM tunnel_api.anomaly WHERE id = ANY (%s) ORDER BY id"
+    said = "SELECT id, review, kind, reviewed_by, reviewed_at FROM tunnel_api.finding WHERE id = ANY (%s) ORDER BY id"
     reviews = conn.execute(said, [leaks[:3]]).fetchall()
     before = conn.execute("SELECT id, kind, confidence, features, evidence FROM tunnel.finding ORDER BY id").fetchall()
     # The owner's leaks are said to be rarer by a factor of e^20: nothing is one.

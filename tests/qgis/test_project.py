@@ -37,7 +37,7 @@ ON_MAP = {
     "segment": "LineStringZ",
     "section": "LineStringZ",
     "leak_map": "Polygon",
-    "anomaly_map": "Polygon",
+    "dark_map": "Polygon",
     "target_sphere": "PointZ",
     "cluster": "Polygon",
     "outline": "LineString",
@@ -50,12 +50,12 @@ ON_MAP = {
 }
 IMAGES = ("raw", "corrected", "corrected-filled", "offset", "state", "class")
 UNROLLED = {
-    "leak_unrolled": "Polygon", "anomaly_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon",
+    "leak_unrolled": "Polygon", "dark_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon",
     "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon", "clearance_unrolled": "Polygon",
     "clearance_infringement_unrolled": "MultiPolygon",
     "ring_unrolled": "Polygon", "deviation_bar": "Polygon", "evenness_area": "Polygon",
 }  # fmt: skip
-NOT_AT_FIRST = {"anomaly_unrolled", "leak_sheet", "ring_unrolled", "deviation_bar", "evenness_area"}
+NOT_AT_FIRST = {"dark_unrolled", "leak_sheet", "ring_unrolled", "deviation_bar", "evenness_area"}
 """Layers of the unrolled plane that its theme does not show."""
 FINDINGS = {
     f"finding_{name}_{place}": kind + z
@@ -133,8 +133,8 @@ def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str
     assert seen["crs"] == "EPSG:25830"
     for name, kind in (ON_MAP | UNROLLED).items():
         layer = layers[name]
-        view = "sheet_leak" if name == "leak_sheet" else name
-        dry = "AND kind <> 'leak'" if name.startswith("anomaly") else ""
+        view = "sheet_leak" if name == "leak_sheet" else name.replace("dark", "finding")
+        dry = "AND kind IN ('joint', 'dark') AND GeometryType(geom) = 'POLYGON'" if name.startswith("dark") else ""
         on_sheet = "AND review <> 'rejected'" if name == "leak_sheet" else ""
         (count,) = rows.execute(  # type: ignore[misc]
             f"SELECT count(*) FROM tunnel_api.{view} WHERE survey = 'demo-2024' {dry} {on_sheet}"  # type: ignore[arg-type]
@@ -169,7 +169,7 @@ def test_height_reaches_qgis(rows: psycopg.Connection, seen: dict[str, Any]) -> 
 
 def test_only_what_may_be_edited_is_editable(seen: dict[str, Any]) -> None:
     layers = seen["layers"]
-    for name in ("leak_map", "leak_unrolled", "leak_3d", "anomaly_map", "anomaly_unrolled"):
+    for name in ("leak_map", "leak_unrolled", "leak_3d", "dark_map", "dark_unrolled"):
         assert (layers[name]["read_only"], layers[name]["editable"]) == (False, ["kind", "review", "remark"])
         assert layers[name]["widget"]["review"] == layers[name]["widget"]["kind"] == "ValueMap"
         assert set(layers[name]["aliases"]) == set(layers[name]["widget"]) - {"geom"}
@@ -574,8 +574,8 @@ def test_vertex_moved_in_qgis_is_saved_with_its_stamp(conn: psycopg.Connection, 
 @pytest.mark.parametrize(
     ("layer", "key", "kind"),
     [
-        ("leak_unrolled", "3", "dark"), ("leak_map", "3", "joint"), ("leak_3d", "3", ""), ("anomaly_unrolled", "8", "leak"),
-        ("anomaly_map", "9", "joint"),
+        ("leak_unrolled", "3", "dark"), ("leak_map", "3", "joint"), ("leak_3d", "3", ""), ("dark_unrolled", "8", "leak"),
+        ("dark_map", "9", "joint"),
     ],
 )  # fmt: skip
 def test_review_in_qgis_is_saved_with_its_stamp(
@@ -642,7 +642,7 @@ def test_inspector_edits_and_what_is_stale_can_be_recomputed(conn: psycopg.Conne
 @pytest.mark.parametrize(
     "view",
     [
-        "leak_map", "leak_3d", "leak_unrolled", "anomaly_map", "anomaly_unrolled", "axis_vertex", "segment", "section",
+        "leak_map", "leak_3d", "leak_unrolled", "dark_map", "dark_unrolled", "axis_vertex", "segment", "section",
         "target_sphere", "cluster", "ground",
     ],
 )  # fmt: skip
@@ -669,7 +669,7 @@ def test_styles_have_one_default_a_layer_and_are_replaced(conn: psycopg.Connecti
     first = styles()
     assert {(row[0], row[1]) for row in first} == {
         *((name, "geom") for name in STYLED), ("leak", "unrolled"), ("leak", "map"), ("leak", "surface"),
-        ("anomaly", "unrolled"), ("anomaly", "map"), ("spot", "map"), ("spot", "surface"),
+        ("spot", "map"), ("spot", "surface"),
         *((layer.view, "geom") for layer in (*SCANNER_LAYERS, *STRUCTURE_LAYERS, *UNDERWATER_LAYERS, *CHANGE_LAYERS)),
         ("spot_face", "geom"),
     }  # fmt: skip
@@ -716,7 +716,7 @@ def test_service_stands_for_the_connection(conn: psycopg.Connection, example: st
 
 
 def test_project_without_leaks_sections_and_images(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
-    for table in ("anomaly", "image", "section"):
+    for table in ("finding", "image", "section"):
         conn.execute(f"DELETE FROM tunnel.{table}")  # type: ignore[arg-type]
     conn.commit()
     assert write(tmp_path / "demo.qgz").exit_code == 0

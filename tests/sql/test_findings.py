@@ -118,7 +118,7 @@ def test_what_is_redrawn_keeps_number_and_review_and_loses_what_was_measured(per
     wet(person)
     entry = person.execute("SELECT view, action, before, after FROM tunnel_api.audit WHERE row_id = %s ORDER BY id DESC", [key])
     view, action, before, after = entry.fetchone()
-    assert (view, action, set(before), set(after)) == ("anomaly", "update", {"geom", "origin"}, {"geom", "origin"})
+    assert (view, action, set(before), set(after)) == ("finding", "update", {"geom", "origin"}, {"geom", "origin"})
     person.execute("UPDATE tunnel_api.finding_unrolled SET geom = %s::geometry WHERE id = %s", [before["geom"], key])
     assert row(person, key, "area")[0] == pytest.approx(was[0], rel=1e-3)
 
@@ -268,7 +268,7 @@ def test_only_what_is_a_leak_is_in_a_dry_region_whichever_view_says_so(person: p
         [NAME, shapely.to_wkb(outline.envelope.buffer(0.1, join_style="mitre"))],
     ).fetchone()
     state = "state, dry_region_id"
-    for view in ("finding_unrolled", "anomaly"):
+    for view in ("finding_unrolled", "finding"):
         person.execute("UPDATE tunnel_api.finding_unrolled SET kind = 'dark' WHERE id = %s", [key])
         assert row(person, key, state) == ("open", None)
         person.execute(f"UPDATE tunnel_api.{view} SET kind = 'leak' WHERE id = %s".encode(), [key])

@@ -267,7 +267,7 @@ def test_points_asked_for_by_name_look_at_no_other_survey(conn: psycopg.Connecti
     [
         ("segment", "segment", "chainage_to >= 5000 AND chainage_from < 5100"),
         ("section", "section", "chainage BETWEEN 5000 AND 5100"),
-        ("leak", "anomaly", "chainage_to >= 5000 AND chainage_from < 5100"),
+        ("leak", "finding", "chainage_to >= 5000 AND chainage_from < 5100"),
     ],
 )
 def test_rows_of_a_stretch_are_found_by_an_index_on_the_survey(

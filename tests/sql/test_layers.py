@@ -27,7 +27,7 @@ from tunneldb.stages.registry import STAGES
 from tunneldb.store.catalog import add_site, make_layers, remove_tunnel
 
 SCHEMA = "tunnel_25830"
-WITH_MORE = {"anomaly", "leak", "finding", "spot", "change_region", "leak_change", "clearance_infringement"}
+WITH_MORE = {"leak", "finding", "finding_polygon", "spot", "change_region", "leak_change", "clearance_infringement"}
 """Views with several geometries, each of which has a view of one."""
 
 NO_LAYERS = WITH_MORE | {"face_placement", "section_piece"}

@@ -19,9 +19,9 @@ def check(settings: Settings) -> None:
 
     ✓ is as it should be, • works but could be better, ✗ is wrong.
     """
-    from tunneldb.database.health import Finding, examine
+    from tunneldb.database.health import CheckResult, examine
 
-    findings: list[Finding] = []
+    findings: list[CheckResult] = []
     tell(findings=findings)
     for finding in examine(settings.dsn):
         findings.append(finding)

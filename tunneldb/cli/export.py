@@ -21,6 +21,7 @@ from tunneldb.errors import NotReadyError, UserError
 from tunneldb.files import made_folder, replacing, told_to_end
 from tunneldb.stages.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
+from tunneldb.store.leaks import DARK
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
@@ -117,8 +118,8 @@ def _say_left_out(conn: psycopg.Connection[Any], survey: Survey, output: Path, s
     """Say how many findings that are no water the file doesn't hold: cracks, spalls, bolts."""
     (left_out,) = conn.execute(
         "SELECT count(*) FROM tunnel_api.finding f WHERE survey_id = %s AND counted AND chainage_to >= %s"
-        " AND chainage_from <= %s AND NOT EXISTS (SELECT FROM tunnel_api.anomaly a WHERE a.id = f.id)",
-        [survey.id, stretch.low, stretch.high],
+        " AND chainage_from <= %s AND NOT (wet OR coalesce(kind_detected, kind) = ANY (%s))",
+        [survey.id, stretch.low, stretch.high, list(DARK)],
     ).fetchone() or (0,)
     tell(findings_left_out=left_out)
     if left_out:

@@ -35,7 +35,7 @@ GIB = 1024**3
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckResult:
     """One thing that was looked at.
 
     Attributes
@@ -54,12 +54,12 @@ class Finding:
     mend: str = ""
 
 
-def examine(dsn: str | None) -> Iterator[Finding]:
+def examine(dsn: str | None) -> Iterator[CheckResult]:
     """Look at everything, in the order in which things depend on each other; stop where nothing more can be seen."""
     try:
         connection = open_connection(dsn)
     except UserError as error:
-        yield Finding("wrong", "server", str(error))
+        yield CheckResult("wrong", "server", str(error))
         return
     with connection:
         with catalogue_alone(connection):  # what was planted in public is looked for, and must not run
@@ -77,11 +77,11 @@ def examine(dsn: str | None) -> Iterator[Finding]:
             yield _space()
 
 
-def _foundations(connection: psycopg.Connection[Any], *, embedded: bool) -> Generator[Finding, None, bool]:
+def _foundations(connection: psycopg.Connection[Any], *, embedded: bool) -> Generator[CheckResult, None, bool]:
     """Look at what all else rests on; returns whether it can be looked at."""
     info = connection.info
     where = "embedded" if embedded else f"{info.host or 'local'}, database {info.dbname}"
-    yield Finding("ok", "server", f"PostgreSQL {info.parameter_status('server_version')} ({where})")
+    yield CheckResult("ok", "server", f"PostgreSQL {info.parameter_status('server_version')} ({where})")
     for look in (_postgis, _schema):
         found = look(connection)
         yield found
@@ -98,30 +98,30 @@ def _foundations(connection: psycopg.Connection[Any], *, embedded: bool) -> Gene
     return all(found.level != "wrong" or found.subject != "functions" for found in foreign)
 
 
-def _postgis(connection: psycopg.Connection[Any]) -> Finding:
+def _postgis(connection: psycopg.Connection[Any]) -> CheckResult:
     version = postgis_version(connection)
     if version is None:
-        return Finding(
+        return CheckResult(
             "wrong", "PostGIS", "not in this database", "tunneldb init   -- or a superuser: CREATE EXTENSION postgis;"
         )
     if tuple(map(int, version.split(".")[:2])) < MINIMUM_POSTGIS:
         least = ".".join(map(str, MINIMUM_POSTGIS))
-        return Finding("wrong", "PostGIS", f"{version}, older than {least}", "SELECT postgis_extensions_upgrade();")
+        return CheckResult("wrong", "PostGIS", f"{version}, older than {least}", "SELECT postgis_extensions_upgrade();")
     schema = postgis_schema(connection)
     if schema != "public":
-        return Finding("wrong", "PostGIS", f"{version}, in schema {schema} instead of public", "use a database of its own")
-    return Finding("ok", "PostGIS", version)
+        return CheckResult("wrong", "PostGIS", f"{version}, in schema {schema} instead of public", "use a database of its own")
+    return CheckResult("ok", "PostGIS", version)
 
 
-def _schema(connection: psycopg.Connection[Any]) -> Finding:
+def _schema(connection: psycopg.Connection[Any]) -> CheckResult:
     revision = schema_revision(connection)
     if revision is None:
-        return Finding("wrong", "schema tunnel", "missing", "tunneldb init")
+        return CheckResult("wrong", "schema tunnel", "missing", "tunneldb init")
     if revision == HEAD:
-        return Finding("ok", "schema tunnel", f"revision {revision}, the newest")
+        return CheckResult("ok", "schema tunnel", f"revision {revision}, the newest")
     if revision in revisions():
-        return Finding("wrong", "schema tunnel", f"revision {revision}, older than this program", "tunneldb init")
-    return Finding(
+        return CheckResult("wrong", "schema tunnel", f"revision {revision}, older than this program", "tunneldb init")
+    return CheckResult(
         "wrong",
         "schema tunnel",
         f"revision {revision}, newer than this program or never released",
@@ -129,32 +129,32 @@ def _schema(connection: psycopg.Connection[Any]) -> Finding:
     )
 
 
-def _api(connection: psycopg.Connection[Any]) -> Finding:
+def _api(connection: psycopg.Connection[Any]) -> CheckResult:
     installed = installed_api_version(connection)
     if installed == api_version():
-        return Finding("ok", "schema tunnel_api", installed.split(";")[0])
+        return CheckResult("ok", "schema tunnel_api", installed.split(";")[0])
     text = "missing" if installed is None else f"not this program's ({installed.split(';')[0]})"
-    return Finding("wrong", "schema tunnel_api", text, "tunneldb init")
+    return CheckResult("wrong", "schema tunnel_api", text, "tunneldb init")
 
 
-def _roles(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
+def _roles(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
     there = {row[0] for row in connection.execute("SELECT rolname FROM pg_roles WHERE rolname = ANY(%s)", [list(ROLES)])}
     missing = [role for role in ROLES if role not in there]
     if missing:
         mend = "; ".join(f"CREATE ROLE {role}" for role in missing)
         mend = f"tunneldb init   -- if you may not create roles, first a superuser: {mend};"
-        yield Finding("wrong", "roles", f"missing: {', '.join(missing)}", mend)
+        yield CheckResult("wrong", "roles", f"missing: {', '.join(missing)}", mend)
         return
     granted = connection.execute(
         "SELECT bool_and(has_schema_privilege(role, 'tunnel_api', 'USAGE')) FROM unnest(%s::text[]) role", [list(ROLES)]
     ).fetchone()
     if granted is None or not granted[0]:
-        yield Finding("wrong", "roles", "without their rights, as after a restore", "tunneldb init")
+        yield CheckResult("wrong", "roles", "without their rights, as after a restore", "tunneldb init")
     else:
-        yield Finding("ok", "roles", ", ".join(ROLES))
+        yield CheckResult("ok", "roles", ", ".join(ROLES))
 
 
-def _public(connection: psycopg.Connection[Any]) -> Finding:
+def _public(connection: psycopg.Connection[Any]) -> CheckResult:
     """Who may create in the schema of PostGIS, which is in everybody's search path."""
     rows = connection.execute(
         """
@@ -167,13 +167,13 @@ def _public(connection: psycopg.Connection[Any]) -> Finding:
         """
     ).fetchall()
     if not rows:
-        return Finding("ok", "schema public", "only its owner and the database's may create in it")
+        return CheckResult("ok", "schema public", "only its owner and the database's may create in it")
     names = ", ".join(name for (name,) in rows)
     text = f"{names} may create functions in it, which run in the place of PostgreSQL's with the rights of whoever calls them"
-    return Finding("wrong", "schema public", text, f"as a superuser: REVOKE CREATE ON SCHEMA public FROM {names};")
+    return CheckResult("wrong", "schema public", text, f"as a superuser: REVOKE CREATE ON SCHEMA public FROM {names};")
 
 
-def _audit(connection: psycopg.Connection[Any]) -> Finding:
+def _audit(connection: psycopg.Connection[Any]) -> CheckResult:
     """Whether what people change by hand is kept: the table's own trigger is on, and operators don't own the table."""
     row = connection.execute(
         """
@@ -186,31 +186,33 @@ def _audit(connection: psycopg.Connection[Any]) -> Finding:
         """
     ).fetchone()
     if row is None:
-        return Finding("wrong", "audit", "its table tunnel_audit.entry is missing", "restore schema tunnel_audit from a backup")
+        return CheckResult(
+            "wrong", "audit", "its table tunnel_audit.entry is missing", "restore schema tunnel_audit from a backup"
+        )
     if not row[0]:
         mend = "ALTER TABLE tunnel_audit.entry ENABLE TRIGGER append_only;"
-        return Finding("wrong", "audit", "entries can be changed and deleted: its trigger is switched off", mend)
+        return CheckResult("wrong", "audit", "entries can be changed and deleted: its trigger is switched off", mend)
     if row[1]:
         mend = f"ALTER SCHEMA tunnel_audit OWNER TO {row[2]}; ALTER TABLE tunnel_audit.entry OWNER TO {row[2]};"
-        return Finding("wrong", "audit", "it belongs to the operators, who could drop it", mend)
-    return Finding("ok", "audit", "takes new entries only")
+        return CheckResult("wrong", "audit", "it belongs to the operators, who could drop it", mend)
+    return CheckResult("ok", "audit", "takes new entries only")
 
 
-def _foreign(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
+def _foreign(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
     """What is not the project's own on the tables and in schema public, and triggers of its own that do not fire."""
     found = [("triggers", text, mend) for text, mend in silent_triggers(connection)]
     found += foreign_objects(connection)
     for subject, text, mend in found:
-        yield Finding("wrong", subject, text, mend)
+        yield CheckResult("wrong", subject, text, mend)
     for subject in SUBJECTS:
         if not any(subject == other for other, *_ in found):
-            yield Finding("ok", subject, "none but tunneldb's own")
+            yield CheckResult("ok", subject, "none but tunneldb's own")
 
 
-def _settings(connection: psycopg.Connection[Any], *, embedded: bool) -> Iterator[Finding]:
+def _settings(connection: psycopg.Connection[Any], *, embedded: bool) -> Iterator[CheckResult]:
     """Settings that make a survey slow; the embedded server has its own."""
     if embedded:
-        yield Finding("ok", "settings", "sized to this machine")
+        yield CheckResult("ok", "settings", "sized to this machine")
         return
     rows = connection.execute(
         """
@@ -222,12 +224,12 @@ def _settings(connection: psycopg.Connection[Any], *, embedded: bool) -> Iterato
     small = [(name, least) for name, size, wanted, least in rows if size < wanted]
     for name, least in small:
         mend = f"as a superuser: ALTER SYSTEM SET {name} = '{least}'; then restart the server"
-        yield Finding("note", "settings", f"{name} is small for scans", mend)
+        yield CheckResult("note", "settings", f"{name} is small for scans", mend)
     if not small:
-        yield Finding("ok", "settings", "memory and WAL are big enough")
+        yield CheckResult("ok", "settings", "memory and WAL are big enough")
 
 
-def _locks(connection: psycopg.Connection[Any]) -> Finding:
+def _locks(connection: psycopg.Connection[Any]) -> CheckResult:
     """Whether the server has locks for what takes most at once: a dump of all tables, or the removal of the longest survey."""
     row = connection.execute(
         """
@@ -247,10 +249,10 @@ def _locks(connection: psycopg.Connection[Any]) -> Finding:
     wanted = max(dump, removal or 0)
     text = f"{there} for {dump} tables, one a kilometre"
     if wanted + places * LOCKS_OF_A_SESSION <= there:
-        return Finding("ok", "locks", text)
+        return CheckResult("ok", "locks", text)
     least = 64 * -(-(2 * wanted + places * LOCKS_OF_A_SESSION) // (64 * places))
     what = "to dump them all" if dump >= (removal or 0) else "to remove the longest survey"
-    return Finding(
+    return CheckResult(
         "note", "locks", f"{text}: too few {what}",
         f"as a superuser: ALTER SYSTEM SET max_locks_per_transaction = {least}; then restart the server",
     )  # fmt: skip
@@ -262,25 +264,25 @@ SELECT survey, km, stage, outcome, message, stale FROM tunnel_api.stage_status
 """
 
 
-def _work(state: Sequence[tuple[Any, ...]]) -> Iterator[Finding]:
+def _work(state: Sequence[tuple[Any, ...]]) -> Iterator[CheckResult]:
     """Stages that were cut off or failed."""
     rows = [row for row in state if row[3] in ("interrupted", "failed")]
     for survey, km, stage, outcome, message, _ in rows:
         why = f": {message.splitlines()[0]}" if message else ""
         mend = f"tunneldb run {survey} --km {km} --from {stage}" if stage != "load" else f"tunneldb load {survey} FILES"
-        yield Finding("note", "work", f"{survey} km {km}, {stage} {outcome}{why}", mend)
+        yield CheckResult("note", "work", f"{survey} km {km}, {stage} {outcome}{why}", mend)
     if not rows:
-        yield Finding("ok", "work", "no stage failed or was interrupted")
+        yield CheckResult("ok", "work", "no stage failed or was interrupted")
 
 
-def _queue(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
+def _queue(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
     """Files that could not be read, and jobs that nobody takes."""
     for survey, name, path, message in connection.execute(
         "SELECT survey, name, path, message FROM tunnel_api.incoming WHERE state = 'failed' ORDER BY survey, name"
     ).fetchall():
         why = (message or "it could not be read").splitlines()[0]
         mend = f"tunneldb batch {survey} {path}   -- once it is mended; or tunneldb survey remove-file {survey} {name}"
-        yield Finding("note", "files", f"{survey}, {name}: {why}", mend)
+        yield CheckResult("note", "files", f"{survey}, {name}: {why}", mend)
     row = connection.execute(
         """
         SELECT (SELECT count(*) FROM tunnel_api.job WHERE state = 'queued'), (SELECT count(*) FROM tunnel_api.worker)
@@ -289,30 +291,30 @@ def _queue(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
     assert row is not None
     queued, workers = row
     if queued and not workers:
-        yield Finding("note", "queue", f"{queued} jobs wait, and no worker serves them", "tunneldb worker")
+        yield CheckResult("note", "queue", f"{queued} jobs wait, and no worker serves them", "tunneldb worker")
 
 
-def _remarks(connection: psycopg.Connection[Any]) -> Iterator[Finding]:
+def _remarks(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
     """What a reader of the results is to know."""
     for survey, said in connection.execute(
         "SELECT s.name, r.said FROM tunnel.survey s CROSS JOIN LATERAL tunnel_api.remarks(s.id) WITH ORDINALITY AS"
         " r (file, stage, kilometres, remark, said, n) ORDER BY s.name, r.n"
     ).fetchall():
-        yield Finding("note", "results", f"{survey}, {said}")
+        yield CheckResult("note", "results", f"{survey}, {said}")
 
 
-def _stale(state: Sequence[tuple[Any, ...]]) -> Iterator[Finding]:
+def _stale(state: Sequence[tuple[Any, ...]]) -> Iterator[CheckResult]:
     """Results that are out of date, a line a survey."""
     for survey, rows in groupby((row for row in state if row[5]), key=itemgetter(0)):
         kilometres = [row[1] for row in rows]
         text = f"{survey}: {len(kilometres)} stages of {len(set(kilometres))} kilometres are out of date"
-        yield Finding("note", "work", text, f"tunneldb run {survey} --stale")
+        yield CheckResult("note", "work", text, f"tunneldb run {survey} --stale")
 
 
-def _space() -> Finding:
+def _space() -> CheckResult:
     home = Server().home()
     free = shutil.disk_usage(home.state).free
     text = f"{free / GIB:.1f} GB free in {home.state}"
     if free < LITTLE_SPACE:
-        return Finding("note", "disk", text, "free some, or set TUNNELDB_HOME to a folder on a bigger disk")
-    return Finding("ok", "disk", text)
+        return CheckResult("note", "disk", text, "free some, or set TUNNELDB_HOME to a folder on a bigger disk")
+    return CheckResult("ok", "disk", text)

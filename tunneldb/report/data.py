@@ -18,7 +18,7 @@ from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.stages.registry import STAGE_NAMES
 from tunneldb.stages.run import nothing_yet
-from tunneldb.store.leaks import listed_column
+from tunneldb.store.leaks import DARK
 from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
@@ -138,6 +138,15 @@ def find_stretch(conn: psycopg.Connection[Any], survey: Survey, low: float, high
     return start, end
 
 
+def _listed_column(name: str) -> sql.Composable:
+    """A column of the views of leaks as lists have it: beside a kind that an inspector gave stands no confidence in another."""
+    return (
+        sql.SQL("CASE WHEN kind = kind_detected THEN confidence END AS confidence")
+        if name == "confidence"
+        else sql.Identifier(name)
+    )
+
+
 REPORTED = sql.SQL(
     "FROM tunnel_api.leak WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed') AND chainage_to > %(low)s"
     " AND chainage_from < %(high)s"
@@ -150,7 +159,7 @@ _LEAK = sql.SQL(
     "SELECT id {reported} ORDER BY review = 'rejected', detected, area DESC, id LIMIT %(most)s)"
     " ORDER BY chainage_from + chainage_to, arc_from, id"
 ).format(
-    columns=sql.SQL(", ").join(listed_column(f.name) for f in fields(Leak) if f.name not in ("inside", "outline")),
+    columns=sql.SQL(", ").join(_listed_column(f.name) for f in fields(Leak) if f.name not in ("inside", "outline")),
     reported=REPORTED,
 )
 
@@ -272,9 +281,9 @@ def read_radiometry(conn: psycopg.Connection[Any], survey: Survey, low: float, h
 def read_others(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> dict[str, int]:
     """Count what is dark but no leak: joints and other dark spots."""
     rows = conn.execute(
-        "SELECT kind, count(*) FROM tunnel_api.anomaly WHERE survey_id = %s AND detected AND NOT wet"
-        " AND chainage_to > %s AND chainage_from < %s GROUP BY kind",
-        [survey.id, low, high],
+        "SELECT kind, count(*) FROM tunnel_api.finding WHERE survey_id = %s AND detected AND NOT wet AND NOT superseded"
+        " AND coalesce(kind_detected, kind) = ANY (%s) AND chainage_to > %s AND chainage_from < %s GROUP BY kind",
+        [survey.id, list(DARK), low, high],
     ).fetchall()
     return dict(rows)
 

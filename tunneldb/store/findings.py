@@ -24,10 +24,18 @@ COUNTED: tuple[State, ...] = ("open", "confirmed")
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding, as tunnel_api.finding has it; names are those of its columns.
+    """A finding; the attributes are the columns of the view ``finding``, which describes them.
 
-    Lengths are in m, areas in m², drops in dB, clock positions in hours. ``share`` is that of it which lies in the stretch that
-    was asked for, 0 to 1: sums count it by that part.
+    Lengths are in m, areas in m², darkening in dB, clock positions in hours, shares and confidence from 0 to 1.
+
+    Attributes
+    ----------
+    id : int
+        Number by which lists, sheets, reports and QGIS name it.
+    share : float
+        Share of it in the stretch that was asked for: sums include it by this share.
+    geometry : geometry
+        In the coordinates that were asked for.
     """
 
     id: int
@@ -40,6 +48,8 @@ class Finding:
     clock: float
     kind: str
     kind_label: str
+    kind_detected: str | None
+    reasons: list[str]
     origin: str
     severity: int | None
     severity_label: str | None
@@ -47,9 +57,13 @@ class Finding:
     length: float | None
     width: float | None
     darkening_mean: float | None
+    darkening_max: float | None
+    contrast: float | None
+    image_share: float | None
     confidence: float | None
     review: str
     state: str
+    detected: bool
     counted: bool
     also_detected: bool
     merged_into: int | None
@@ -70,9 +84,22 @@ class Finding:
         """Chainage of its middle, m."""
         return (self.chainage_from + self.chainage_to) / 2
 
+    @property
+    def confidence_in_kind(self) -> float | None:
+        """Confidence in its kind; None if an inspector gave it another kind than detection."""
+        return self.confidence if self.kind == self.kind_detected else None
+
 
 COLUMNS = tuple(field.name for field in fields(Finding) if field.name not in ("share", "geometry"))
-_PLACE = {"unrolled": "unrolled", "map": "map", "3d": "surface"}
+"""Columns of the view that a finding is read from."""
+
+GEOMETRY_COLUMN = {"unrolled": "unrolled", "map": "map", "3d": "surface"}
+
+
+def finding_of(row: Sequence[Any]) -> Finding:
+    """Return the finding of a row: COLUMNS, its share and its geometry as WKB."""
+    names = (*COLUMNS, "share", "geometry")
+    return Finding(**dict(zip(names, (*row[:-1], shapely.from_wkb(bytes(row[-1]))), strict=True)))
 
 
 @dataclass(frozen=True)
@@ -139,7 +166,7 @@ def stream_findings(
         " AND coalesce(severity, 0) >= %(min_severity)s AND chainage_to > %(low)s AND chainage_from < %(high)s"
         " AND (%(clock)s::float8[] IS NULL OR tunnel_api.clock_between(clock, (%(clock)s)[1], (%(clock)s)[2]))"
         " ORDER BY chainage_from + chainage_to, arc_from, id"
-    ).format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)), _SHARE, sql.Identifier(_PLACE[geometry]))
+    ).format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)), _SHARE, sql.Identifier(GEOMETRY_COLUMN[geometry]))
     values = {
         "survey": survey.id,
         "kinds": list(wanted.kinds),
@@ -151,9 +178,8 @@ def stream_findings(
         "min_area": wanted.min_area,
         "min_severity": wanted.min_severity,
     }
-    names = (*COLUMNS, "share", "geometry")
     with conn.transaction(), conn.cursor(name="findings") as cursor:
         cursor.execute(query, values)
         while rows := cursor.fetchmany(BLOCK):
             for row in rows:
-                yield Finding(**dict(zip(names, (*row[:-1], shapely.from_wkb(bytes(row[-1]))), strict=True)))
+                yield finding_of(row)

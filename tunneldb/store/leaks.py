@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import psycopg
-import shapely
 from psycopg import sql
-from shapely.geometry import Polygon
 
 from tunneldb.store.coverage import Coverage, read_coverage
-from tunneldb.store.findings import Geometry
+from tunneldb.store.findings import COLUMNS, GEOMETRY_COLUMN, Finding, Geometry, finding_of
 from tunneldb.store.remarks import Remark, read_remarks
 from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
@@ -22,81 +19,11 @@ Kind = Literal["leak", "joint", "dark", "all"]
 """What is listed: leaks, joints, what else is dark but dry, or all of it."""
 
 _PLURAL = {"leak": "leaks", "joint": "joints", "dark": "dark spots", "all": "anomalies"}
-_COLUMN = {"unrolled": "unrolled", "map": "map", "3d": "surface"}
-
-
-@dataclass(frozen=True)
-class Anomaly:
-    """A leak, a joint or another dark spot as it is listed.
-
-    Attributes
-    ----------
-    id, km : int
-        Key and kilometre.
-    chainage_from, chainage_to : float
-        m.
-    label : str
-        Chainage of the middle, km + m.
-    arc_from, arc_to : float
-        m from the crown, positive to the right looking up-chainage.
-    clock : float
-        Hours.
-    kind : str
-        leak, joint or dark: as an inspector judged it, else as found.
-    confidence : float or None
-        That it is what detection takes it for, 0 to 1.
-    reasons : list of str
-        Why detection takes it for that.
-    contrast : float or None
-        Mean drop in standard deviations of the dry lining about it.
-    area : float
-        On the surface, m².
-    darkening_mean, darkening_max : float or None
-        dB below dry lining.
-    image_share : float or None
-        0 to 1.
-    review : str
-        open, confirmed or rejected.
-    reviewed_by : str or None
-    reviewed_at : datetime or None
-    detected : bool
-        False when the last detection found it no more.
-    counted : bool
-        Whether sums count it: found last, and not rejected.
-    geometry : Polygon
-        In the coordinates asked for.
-    """
-
-    id: int
-    km: int
-    chainage_from: float
-    chainage_to: float
-    label: str
-    arc_from: float
-    arc_to: float
-    clock: float
-    kind: str
-    confidence: float | None
-    reasons: list[str]
-    contrast: float | None
-    area: float
-    darkening_mean: float | None
-    darkening_max: float | None
-    image_share: float | None
-    review: str
-    reviewed_by: str | None
-    reviewed_at: dt.datetime | None
-    detected: bool
-    counted: bool
-    geometry: Polygon
-
-
-COLUMNS = tuple(f.name for f in fields(Anomaly) if f.name != "geometry")
 
 
 @dataclass(frozen=True)
 class Selection:
-    """Which anomalies to read.
+    """Which leaks, joints and dry dark areas to read.
 
     Attributes
     ----------
@@ -128,7 +55,7 @@ class LeakList:
     ----------
     kind : {'leak', 'joint', 'dark', 'all'}
         What they are.
-    rows : list of Anomaly
+    rows : list of Finding
         In order of chainage: those that the last detection found, and those that an inspector confirmed although it did not.
     count : int
         How many of them sums count: found last, and not rejected.
@@ -141,7 +68,7 @@ class LeakList:
     """
 
     kind: Kind
-    rows: list[Anomaly]
+    rows: list[Finding]
     count: int
     area: float
     coverage: Coverage
@@ -160,22 +87,18 @@ class LeakList:
         return f"{self.count} {_PLURAL[self.kind]}, {self.area:.2f} m²" + (f"; listed besides: {besides}" if besides else "")
 
 
+DARK = ("leak", "joint", "dark")
+"""Kinds that detection tells apart; what people drew as one of them is listed with what was detected."""
+
 _CHOSEN = sql.SQL(
-    "FROM tunnel_api.anomaly WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed') AND area >= %(min_area)s"
+    "FROM tunnel_api.finding f JOIN tunnel_api.finding_polygon p USING (id) WHERE f.survey_id = %(survey)s"
+    " AND NOT superseded AND (wet OR coalesce(kind_detected, kind) = ANY (%(dark)s))"
+    " AND (detected OR review = 'confirmed') AND area >= %(min_area)s"
     " AND (%(min_confidence)s = 0 OR kind = kind_detected AND confidence >= %(min_confidence)s)"
     " AND CASE %(kind)s WHEN 'all' THEN true WHEN 'leak' THEN wet ELSE kind = %(kind)s END"
     " AND chainage_to > %(low)s AND chainage_from < %(high)s"
     " AND (%(clock)s::float8[] IS NULL OR tunnel_api.clock_between(clock, (%(clock)s)[1], (%(clock)s)[2]))"
 )
-
-
-def listed_column(name: str) -> sql.Composable:
-    """A column of the views of leaks as lists have it: beside a kind that an inspector gave stands no confidence in another."""
-    return (
-        sql.SQL("CASE WHEN kind = kind_detected THEN confidence END AS confidence")
-        if name == "confidence"
-        else sql.Identifier(name)
-    )
 
 
 def read_leaks(
@@ -197,24 +120,25 @@ def read_leaks(
     asked = {
         "survey": survey.id,
         "kind": chosen.kind,
+        "dark": list(DARK),
         "min_area": chosen.min_area,
         "min_confidence": chosen.min_confidence,
         "low": max(chosen.low, ends[0]),
         "high": min(chosen.high, ends[1]),
         "clock": None if chosen.clock is None else list(chosen.clock),
     }
-    columns = sql.SQL(", ").join(map(listed_column, COLUMNS))
-    query = sql.SQL("SELECT {}, public.ST_AsBinary({}) {} ORDER BY chainage_from + chainage_to, arc_from, id")
-    rows = conn.execute(query.format(columns, sql.Identifier(_COLUMN[geometry]), _CHOSEN), asked).fetchall()
-    names = [*COLUMNS, "geometry"]
+    query = sql.SQL("SELECT {}, 1, public.ST_AsBinary(p.{}) {} ORDER BY chainage_from + chainage_to, arc_from, id").format(
+        sql.SQL(", ").join(map(sql.Identifier, COLUMNS)), sql.Identifier(GEOMETRY_COLUMN[geometry]), _CHOSEN
+    )
+    rows = conn.execute(query, asked).fetchall()
     sums = sql.SQL(
-        "SELECT count(*), coalesce(sum(tunnel_api.area_between(unrolled, area, %(low)s, %(high)s)), 0) {} AND counted"
+        "SELECT count(*), coalesce(sum(tunnel_api.area_between(p.unrolled, area, %(low)s, %(high)s)), 0) {} AND counted"
     )
     summed = conn.execute(sums.format(_CHOSEN), asked).fetchone()
     assert summed is not None
     return LeakList(
         chosen.kind,
-        [Anomaly(**dict(zip(names, (*row[:-1], shapely.from_wkb(bytes(row[-1]))), strict=True))) for row in rows],
+        [finding_of(row) for row in rows],
         count=summed[0],
         area=summed[1],
         coverage=read_coverage(conn, survey, chosen.low, chosen.high),

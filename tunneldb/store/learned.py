@@ -218,7 +218,7 @@ def list_learned(conn: psycopg.Connection[Any], tunnels: Iterable[int]) -> list[
 
 def places_of(conn: psycopg.Connection[Any], anomalies: Sequence[int]) -> dict[int, tuple[str, str]]:
     """Survey and station of the middle of anomalies, by their keys."""
-    rows = conn.execute("SELECT id, survey, label FROM tunnel_api.anomaly WHERE id = ANY (%s)", [list(anomalies)])
+    rows = conn.execute("SELECT id, survey, label FROM tunnel_api.finding WHERE id = ANY (%s)", [list(anomalies)])
     return {key: (survey, label) for key, survey, label in rows}
 
 

@@ -14,7 +14,7 @@ from tunneldb.database.models.base import CLOCK, KM, NOW, SURVEY, Base, Floats, 
 from tunneldb.database.models.finding import FindingKind, Severity
 
 _SUMMED = ["kind", "kind_override", "review", "detected", "area", "wet", "superseded"]
-"""Columns that sums over anomalies need: they come from an index alone."""
+"""Columns that sums over findings need: they come from an index alone."""
 
 
 class Radiometry(Base):
@@ -169,7 +169,7 @@ class FeatureList(Base):
     """An order of features."""
 
     __tablename__ = "feature_list"
-    __table_args__ = {"comment": "In which order the features of anomalies are stored: versions of the program differ"}  # noqa: RUF012
+    __table_args__ = {"comment": "In which order the features of findings are stored: versions of the program differ"}  # noqa: RUF012
 
     id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
     names: Mapped[list[str]] = mapped_column(
@@ -352,7 +352,7 @@ class BoundaryRegion(Base):
     __table_args__ = (
         Index(None, "survey_id", "km"),
         Index(None, "finding_id"),
-        {"comment": "Dark regions cut by an end of their kilometre, from which anomalies over several are put together"},
+        {"comment": "Dark regions cut by an end of their kilometre, from which findings across several are merged"},
     )
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")

@@ -126,7 +126,7 @@ class Audit(Base):
     at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When")
     who: Mapped[str] = mapped_column(server_default=text("SESSION_USER"), comment="Who was logged in")
     survey: Mapped[str] = mapped_column(comment="Name of the survey")
-    view: Mapped[str] = mapped_column(comment="What was changed: anomaly, spot, axis_vertex, region or photo")
+    view: Mapped[str] = mapped_column(comment="What was changed: finding, spot, axis_vertex, region or photo")
     row_id: Mapped[int] = mapped_column(BigInteger, comment="Its id there")
     action: Mapped[str] = mapped_column(comment="insert, update or delete")
     before: Mapped[dict[str, Any] | None] = mapped_column(comment="Columns that changed, as they were; none of an insert")

@@ -30,6 +30,7 @@ from tunneldb.export.exchange.lines import (
 )  # fmt: skip
 from tunneldb.export.exchange.sheet import Box, draw_profiles, draw_unrolled
 from tunneldb.export.exchange.table import Table, read_table
+from tunneldb.export.qgis.layer import DRY_DARK
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.alignment import labels
 from tunneldb.store.catalog import crs_text
@@ -126,13 +127,13 @@ def write_survey_dxf(
     parts = stretches(surface, low, high)
     box = _draw_map(conn, survey, surface, parts, space)
     progress(1)
-    for place, view in (("MAP", "anomaly_map"), ("3D", "anomaly_3d")):
-        spots = read_spots(conn, survey, view, low, high)
+    for place, geometry in (("MAP", "map"), ("3D", "3d")):
+        spots = read_spots(conn, survey, geometry, low, high)
         _add_kinds(conn, document, spots)
         for spot in spots:
             draw_spot(space, spot, place)
         progress(1)
-    unrolled = read_spots(conn, survey, "anomaly_unrolled", low, high)
+    unrolled = read_spots(conn, survey, "unrolled", low, high)
     _add_kinds(conn, document, unrolled)
     sides = [side for side in (edges(surface, part) for part in parts) if len(side[0]) > 1]
     ticked = tick_chainages(surface, low, high)
@@ -180,11 +181,17 @@ def _write_remarks(space: Any, corner: tuple[float, float], said: Sequence[str |
     return *corner, corner[0] + TEXT * max(map(len, lines)), corner[1] + len(lines) * LINE * TEXT
 
 
-def read_spots(conn: psycopg.Connection[Any], survey: Survey, view: str, low: float, high: float) -> list[Spot]:
-    """Read leaks, joints and dark spots that were found or confirmed and not rejected, in one of their geometries."""
-    table = read_table(conn, survey, view, low, high, "review <> 'rejected' AND (detected OR review = 'confirmed')")
-    shapes = shapely.from_wkb(table.geometry)
-    return [_spot(row, shape) for row, shape in zip(_rows(table), shapes, strict=True)]
+_DRAWN = "review <> 'rejected' AND (detected OR review = 'confirmed')"
+
+
+def read_spots(conn: psycopg.Connection[Any], survey: Survey, geometry: str, low: float, high: float) -> list[Spot]:
+    """Read leaks, joints and dry dark areas that were found or confirmed and not rejected, in one of their geometries."""
+    spots = []
+    for view, where in ((f"leak_{geometry}", _DRAWN), (f"finding_{geometry}", f"{_DRAWN} AND {DRY_DARK}")):
+        table = read_table(conn, survey, view, low, high, where)
+        shapes = shapely.from_wkb(table.geometry)
+        spots += [_spot(row, shape) for row, shape in zip(_rows(table), shapes, strict=True)]
+    return sorted(spots, key=lambda spot: spot.id)
 
 
 def _rows(table: Table) -> Iterator[dict[str, Any]]:

@@ -101,7 +101,7 @@ def write_survey_gpkg(
     counts: dict[str, int] = {}
     styled: list[tuple[str, str, str]] = []
     for layer in layers():
-        spots = layer.view.startswith(("leak", "anomaly"))
+        spots = layer.view.startswith(("leak", "finding"))
         table = read_table(conn, survey, layer.view, *(inside if spots else (low, high)), layer.where)
         if layer.view == "coverage_gap":
             table = replace(table, description=read_coverage(conn, survey, low, high).statement or table.description)

@@ -22,13 +22,14 @@ _ALIASES = {
     "kind_detected": "Found as",
     "wet": "Wet", "origin": "Origin of the outline", "manual": "Drawn, never detected", "severity": "Severity",
     "severity_label": "Name of its severity", "width": "Width of the line (m)", "length": "Length (m)", "area": "Area (m²)",
-    "measured": "Measured on the image", "darkening_mean": "Mean drop (dB)", "darkening_max": "Greatest drop (dB)",
+    "measured": "Measured on the image", "darkening_mean": "Mean darkening (dB)", "darkening_max": "Greatest darkening (dB)",
     "image_share": "Share measured", "contrast": "Contrast (sigma)", "confidence": "Confidence (0-1)", "reasons": "Reasons",
     "review": "Review", "reviewed_by": "Reviewed by", "reviewed_at": "Reviewed at", "remark": "Remark", "drawn_by": "Drawn by",
     "drawn_at": "Drawn at", "detected": "Found by the last detection", "created_at": "First found or drawn",
     "detected_at": "Last detected", "also_detected": "Also detected", "detected_as": "Detected as", "parent_id": "Split off",
     "merged_into": "Merged into", "merged": "Merged into this", "same_as": "The same as", "dry_region_id": "In dry region",
-    "counted": "Counted in sums", "state": "State", "photos": "Photos", CLOCK_TEXT: "Clock position",
+    "counted": "Counted in sums", "state": "State", "photos": "Photos", "evidence": "Evidence for (+) and against (-)",
+    "model": "Classified by model", "superseded": "Superseded", CLOCK_TEXT: "Clock position",
 }  # fmt: skip
 _PHOTO_ALIASES = {
     "id": "Photo", "finding_id": "Of finding", "survey_id": "Survey key", "survey": "Survey", "path": "File or URL",

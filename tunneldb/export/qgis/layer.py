@@ -108,7 +108,11 @@ class VectorLayer:
 SHEET_FINDING = "sheet_finding"
 """View of the findings of the inspection sheets, and the table that these list."""
 
-_DRY = "\"kind\" <> 'leak'"
+DRY_DARK = (
+    'NOT "wet" AND NOT "superseded" AND coalesce("kind_detected", "kind") IN (\'leak\', \'joint\', \'dark\')'
+    " AND public.geometrytype(\"geom\") = 'POLYGON'"
+)
+"""Condition that a finding is dark on the image and dry: a joint, or what else was found dark and is no leak."""
 
 
 def _only(wkb: str) -> str:
@@ -136,8 +140,8 @@ LAYERS = (
     VectorLayer("axis_vertex", "Axis vertices (editable)", "axis_vertex", "PointZ", "axis_vertex", MAP, (MAP,), True),
     VectorLayer("leak_map", "Leaks beside the axis, unrolled (review)", "leak_map", "Polygon", "leak", MAP, (MAP,), True),
     VectorLayer(
-        "anomaly_map", "Dark but dry, map (review)", "anomaly_map", "Polygon", "anomaly", MAP, (), True,
-        where=_DRY,
+        "dark_map", "Dark but dry, map (review)", "finding_map", "Polygon", "dark", MAP, (), True,
+        where=DRY_DARK,
     ),
     VectorLayer("target_sphere", "Target spheres", "target_sphere", "PointZ", "target_sphere", MAP, (MAP, SPACE)),
     VectorLayer("axis", "Axis", "axis", "LineStringZ", "axis", MAP, (MAP, SPACE, FINDINGS_MAP)),
@@ -151,8 +155,8 @@ LAYERS = (
     ),
     VectorLayer("leak_unrolled", "Leaks (review)", "leak_unrolled", "Polygon", "leak", UNROLLED, (UNROLLED,), True),
     VectorLayer(
-        "anomaly_unrolled", "Dark but dry (review)", "anomaly_unrolled", "Polygon", "anomaly", UNROLLED, (), True,
-        where=_DRY,
+        "dark_unrolled", "Dark but dry (review)", "finding_unrolled", "Polygon", "dark", UNROLLED, (), True,
+        where=DRY_DARK,
     ),
     VectorLayer("region", "Regions drawn by hand", "region", "Polygon", "region", UNROLLED, (UNROLLED, FINDINGS), True),
     VectorLayer(

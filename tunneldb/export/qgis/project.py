@@ -88,7 +88,7 @@ from tunneldb.store.survey import Survey
 QGIS_VERSION = "3.22.0-Białowieża"
 """Version whose form of project is written; later ones read it."""
 
-NEW_KINDS = {"leak_map": "leak", "leak_unrolled": "leak", "anomaly_map": "dark", "anomaly_unrolled": "dark"}
+NEW_KINDS = {"leak_map": "leak", "leak_unrolled": "leak", "dark_map": "dark", "dark_unrolled": "dark"}
 """Layers of leaks and dark spots in which findings may be drawn, and the kind that such a one begins with."""
 
 _DOCTYPE = "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"

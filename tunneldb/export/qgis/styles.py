@@ -112,8 +112,6 @@ def styled_columns() -> list[tuple[str, str, str, str]]:
         )
         if layer.id == layer.view
     ] + [
-        ("anomaly", "unrolled", "anomaly", "Leaks, joints and dark spots, unrolled"),
-        ("anomaly", "map", "anomaly", "Leaks, joints and dark spots beside the axis"),
         ("leak", "unrolled", "leak", "Leaks, unrolled"),
         ("leak", "map", "leak", "Leaks beside the axis"),
         ("leak", "surface", "leak_3d", "Leaks in space"),

@@ -18,7 +18,15 @@ from tunneldb.csvfile import write_csv
 from tunneldb.export.tables.cell import DECIMALS, plain
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
 from tunneldb.geometry.crs import LOCAL
-from tunneldb.store.findings import COLUMNS, Finding, Geometry
+from tunneldb.store.findings import Finding, Geometry
+
+COLUMNS = (
+    "id", "km", "label", "chainage_from", "chainage_to", "arc_from", "arc_to", "clock", "kind", "kind_label", "origin",
+    "severity", "severity_label", "area", "length", "width", "darkening_mean", "confidence", "review", "state", "counted",
+    "also_detected", "merged_into", "same_as", "parent_id", "dry_region_id", "drawn_by", "drawn_at", "reviewed_by",
+    "reviewed_at", "remark", "photos",
+)  # fmt: skip
+"""Columns of the files: attributes of a finding."""
 
 
 def as_csv(findings: Sequence[Finding]) -> str:

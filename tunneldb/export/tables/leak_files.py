@@ -20,14 +20,18 @@ from tunneldb.csvfile import write_csv
 from tunneldb.export.tables.cell import DECIMALS, plain
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN, write_gaps, write_remarks
 from tunneldb.geometry.crs import LOCAL
-from tunneldb.store.findings import Geometry
-from tunneldb.store.leaks import COLUMNS, Anomaly, Kind, LeakList
+from tunneldb.store.findings import Finding, Geometry
+from tunneldb.store.leaks import Kind, LeakList
 
-NAMES = {"darkening_mean": "darkening_mean", "darkening_max": "darkening_max"}
-"""Columns that files name otherwise than the views do: programs that read the files rely on these names."""
-
-FILE_COLUMNS = tuple(NAMES.get(name, name) for name in COLUMNS)
-"""Columns of the files, in the order of COLUMNS."""
+COLUMNS = {
+    **{name: name for name in ("id", "km", "chainage_from", "chainage_to", "label", "arc_from", "arc_to", "clock", "kind")},
+    "confidence": "confidence_in_kind",
+    **{name: name for name in ("reasons", "contrast", "area")},
+    "drop_mean": "darkening_mean",
+    "drop_max": "darkening_max",
+    **{name: name for name in ("image_share", "review", "reviewed_by", "reviewed_at", "detected", "counted")},
+}
+"""Columns of the files, and the attribute of a finding that each has: programs rely on these names."""
 
 
 def as_csv(leaks: LeakList) -> str:
@@ -44,13 +48,13 @@ def as_csv(leaks: LeakList) -> str:
     for leak in leaks.rows:
         wkt = shapely.to_wkt(leak.geometry, rounding_precision=DECIMALS)
         rows.append({**_facts(leak), "geometry": wkt})
-    names = [*FILE_COLUMNS, "geometry"]
+    names = [*COLUMNS, "geometry"]
     return write_csv(names, ([row.get(name) for name in names] for row in rows))
 
 
-def _facts(leak: Anomaly) -> dict[str, Any]:
-    """Return what a file states of a leak, by the names of its columns."""
-    return {theirs: plain(getattr(leak, ours)) for ours, theirs in zip(COLUMNS, FILE_COLUMNS, strict=True)}
+def _facts(leak: Finding) -> dict[str, Any]:
+    """Return what a file states of a leak."""
+    return {column: plain(getattr(leak, attribute)) for column, attribute in COLUMNS.items()}
 
 
 def as_geojson(leaks: LeakList, geometry: Geometry, srid: int) -> str:
@@ -86,16 +90,17 @@ def write_gpkg(path: Path, leaks: LeakList, geometry: Geometry, srid: int) -> No
     to be known in a table ``remark``, if there is anything; both are in the description of the layer, too.
     """
     rows = leaks.rows
-    data = [np.array([getattr(leak, name) for leak in rows], dtype=_GPKG_TYPE.get(name, object)) for name in COLUMNS]
-    data[COLUMNS.index("reasons")] = np.array([plain(leak.reasons) for leak in rows], dtype=object)
+    data = {
+        column: np.array([getattr(leak, attribute) for leak in rows], dtype=_GPKG_TYPE.get(column, object))
+        for column, attribute in COLUMNS.items()
+    }
+    data["reasons"] = np.array([plain(leak.reasons) for leak in rows], dtype=object)
     moments = [leak.reviewed_at for leak in rows]
-    data[COLUMNS.index("reviewed_at")] = np.array(
-        [np.datetime64("NaT") if m is None else _utc(m) for m in moments], dtype="datetime64[ms]"
-    )
+    data["reviewed_at"] = np.array([np.datetime64("NaT") if m is None else _utc(m) for m in moments], dtype="datetime64[ms]")
     said = ". ".join(filter(None, (leaks.coverage.statement, leaks.total, *(remark.said for remark in leaks.remarks))))
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "'crs' was not provided")  # the unrolled plane has none, nor have local coordinates
-        _write_layer(path, rows, data, geometry, srid, layer_name(geometry, leaks.kind), said)
+        _write_layer(path, rows, list(data.values()), geometry, srid, layer_name(geometry, leaks.kind), said)
     if leaks.coverage.gaps:
         write_gaps(path, leaks.coverage)
     if leaks.remarks:
@@ -103,14 +108,14 @@ def write_gpkg(path: Path, leaks: LeakList, geometry: Geometry, srid: int) -> No
 
 
 def _write_layer(
-    path: Path, leaks: Sequence[Anomaly], data: list[NDArray[Any]], geometry: Geometry, srid: int, layer: str, said: str
+    path: Path, leaks: Sequence[Finding], data: list[NDArray[Any]], geometry: Geometry, srid: int, layer: str, said: str
 ) -> None:
     bare = geometry == "unrolled" or srid == LOCAL
     pyogrio.raw.write(
         str(path),
         shapely.to_wkb(np.array([leak.geometry for leak in leaks], dtype=object)),
         data,
-        np.array(FILE_COLUMNS),
+        np.array(list(COLUMNS)),
         geometry_type="Polygon Z" if geometry == "3d" else "Polygon",
         crs=None if bare else f"EPSG:{srid}",
         driver="GPKG",
@@ -135,8 +140,8 @@ _GPKG_TYPE: dict[str, Any] = {
             "confidence",
             "contrast",
             "area",
-            "darkening_mean",
-            "darkening_max",
+            "drop_mean",
+            "drop_max",
             "image_share",
         ),
         np.float64,

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from rich.cells import cell_len
 from rich.table import Table
 
-from tunneldb.store.leaks import Anomaly, LeakList
+from tunneldb.store.findings import Finding
+from tunneldb.store.leaks import LeakList
 
 
 def as_table(leaks: LeakList, title: str, width: int | None = None) -> Table:
@@ -41,14 +42,14 @@ def _width(cells: dict[str, list[str]]) -> int:
     return 1 + sum(3 + max(map(cell_len, (heading, *column))) for heading, column in cells.items())
 
 
-_CELLS: dict[str, Callable[[Anomaly], str]] = {
+_CELLS: dict[str, Callable[[Finding], str]] = {
     "id": lambda leak: str(leak.id),
     "chainage": lambda leak: leak.label,
     "length m": lambda leak: f"{leak.chainage_to - leak.chainage_from:.2f}",
     "arc m": lambda leak: f"{leak.arc_from:+.2f} to {leak.arc_to:+.2f}",
     "clock": lambda leak: clock_label(leak.clock),
     "kind": lambda leak: leak.kind,
-    "conf.": lambda leak: "" if leak.confidence is None else f"{leak.confidence:.2f}",
+    "conf.": lambda leak: "" if leak.confidence_in_kind is None else f"{leak.confidence_in_kind:.2f}",
     "contrast": lambda leak: "" if leak.contrast is None else f"{leak.contrast:.1f}",
     "area m²": lambda leak: f"{leak.area:.2f}",
     "drop dB": lambda leak: "" if leak.darkening_mean is None else f"{leak.darkening_mean:.1f}",

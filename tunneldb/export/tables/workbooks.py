@@ -35,7 +35,7 @@ _LEAK = (
     (Column("Arc to, m", _METRES), "arc_to"), (Column("Clock"), "clock"), (Column("Kind"), "kind"),
     (Column("Area, m²", "0.0000"), "area"), (Column("Mean drop, dB", "0.0"), "darkening_mean"),
     (Column("Greatest drop, dB", "0.0"), "darkening_max"), (Column("Contrast, σ", "0.0"), "contrast"),
-    (Column("Confidence", "0.00"), "confidence"), (Column("Share measured", "0.00"), "image_share"),
+    (Column("Confidence", "0.00"), "confidence_in_kind"), (Column("Share measured", "0.00"), "image_share"),
     (Column("Review"), "review"), (Column("Found again"), "detected"), (Column("Counted"), "counted"),
     (Column("Reviewed by"), "reviewed_by"), (Column("Reviewed, UTC"), "reviewed_at"), (Column("Reasons"), "reasons"),
 )  # fmt: skip

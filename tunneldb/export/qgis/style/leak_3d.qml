@@ -411,8 +411,8 @@
     <alias index="14" field="confidence" name="Confidence (0-1)"/>
     <alias index="15" field="contrast" name="Contrast (sigma)"/>
     <alias index="16" field="area" name="Area (m²)"/>
-    <alias index="17" field="darkening_mean" name="Mean drop (dB)"/>
-    <alias index="18" field="darkening_max" name="Greatest drop (dB)"/>
+    <alias index="17" field="darkening_mean" name="Mean darkening (dB)"/>
+    <alias index="18" field="darkening_max" name="Greatest darkening (dB)"/>
     <alias index="19" field="image_share" name="Share measured"/>
     <alias index="20" field="review" name="Review"/>
     <alias index="21" field="reviewed_by" name="Reviewed by"/>
@@ -423,7 +423,7 @@
     <alias index="26" field="detected_at" name="Last detected"/>
     <alias index="27" field="counted" name="Counted in sums"/>
     <alias index="28" field="evidence" name="Evidence for (+) and against (-)"/>
-    <alias index="29" field="model" name="Judged by model"/>
+    <alias index="29" field="model" name="Classified by model"/>
     <alias index="30" field="wet" name="Wet"/>
     <alias index="31" field="origin" name="Origin of the outline"/>
     <alias index="32" field="clock_text" name="Clock position"/>

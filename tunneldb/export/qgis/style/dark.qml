@@ -190,6 +190,13 @@
         </config>
       </editWidget>
     </field>
+    <field name="kind_label" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
     <field name="kind_detected" configurationFlags="None">
       <editWidget type="TextEdit">
         <config>
@@ -197,32 +204,52 @@
         </config>
       </editWidget>
     </field>
-    <field name="reasons" configurationFlags="None">
-      <editWidget type="List">
+    <field name="wet" configurationFlags="None">
+      <editWidget type="TextEdit">
         <config>
           <Option/>
         </config>
       </editWidget>
     </field>
-    <field name="confidence" configurationFlags="None">
-      <editWidget type="Range">
+    <field name="origin" configurationFlags="None">
+      <editWidget type="TextEdit">
         <config>
-          <Option type="Map">
-            <Option type="bool" name="AllowNull" value="true"/>
-            <Option type="int" name="Precision" value="2"/>
-            <Option type="QString" name="Style" value="SpinBox"/>
-          </Option>
+          <Option/>
         </config>
       </editWidget>
     </field>
-    <field name="contrast" configurationFlags="None">
-      <editWidget type="Range">
+    <field name="manual" configurationFlags="None">
+      <editWidget type="TextEdit">
         <config>
-          <Option type="Map">
-            <Option type="bool" name="AllowNull" value="true"/>
-            <Option type="int" name="Precision" value="1"/>
-            <Option type="QString" name="Style" value="SpinBox"/>
-          </Option>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="severity" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="severity_label" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="width" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="length" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
         </config>
       </editWidget>
     </field>
@@ -234,6 +261,13 @@
             <Option type="int" name="Precision" value="2"/>
             <Option type="QString" name="Style" value="SpinBox"/>
           </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="measured" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
         </config>
       </editWidget>
     </field>
@@ -267,6 +301,35 @@
             <Option type="int" name="Precision" value="2"/>
             <Option type="QString" name="Style" value="SpinBox"/>
           </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="contrast" configurationFlags="None">
+      <editWidget type="Range">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="AllowNull" value="true"/>
+            <Option type="int" name="Precision" value="1"/>
+            <Option type="QString" name="Style" value="SpinBox"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="confidence" configurationFlags="None">
+      <editWidget type="Range">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="AllowNull" value="true"/>
+            <Option type="int" name="Precision" value="2"/>
+            <Option type="QString" name="Style" value="SpinBox"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="reasons" configurationFlags="None">
+      <editWidget type="List">
+        <config>
+          <Option/>
         </config>
       </editWidget>
     </field>
@@ -318,6 +381,25 @@
         </config>
       </editWidget>
     </field>
+    <field name="drawn_by" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="drawn_at" configurationFlags="None">
+      <editWidget type="DateTime">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="allow_null" value="true"/>
+            <Option type="bool" name="calendar_popup" value="true"/>
+            <Option type="QString" name="display_format" value="yyyy-MM-dd HH:mm"/>
+            <Option type="bool" name="field_iso_format" value="false"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
     <field name="detected" configurationFlags="None">
       <editWidget type="TextEdit">
         <config>
@@ -349,7 +431,70 @@
         </config>
       </editWidget>
     </field>
+    <field name="also_detected" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="detected_as" configurationFlags="None">
+      <editWidget type="List">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="parent_id" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="merged_into" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="merged" configurationFlags="None">
+      <editWidget type="List">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="same_as" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="dry_region_id" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
     <field name="counted" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="state" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="photos" configurationFlags="None">
       <editWidget type="TextEdit">
         <config>
           <Option/>
@@ -370,14 +515,7 @@
         </config>
       </editWidget>
     </field>
-    <field name="wet" configurationFlags="None">
-      <editWidget type="TextEdit">
-        <config>
-          <Option/>
-        </config>
-      </editWidget>
-    </field>
-    <field name="origin" configurationFlags="None">
+    <field name="superseded" configurationFlags="None">
       <editWidget type="TextEdit">
         <config>
           <Option/>
@@ -401,27 +539,46 @@
     <alias index="9" field="arc_to" name="Arc to (m)"/>
     <alias index="10" field="clock" name="Clock position (h)"/>
     <alias index="11" field="kind" name="Kind"/>
-    <alias index="12" field="kind_detected" name="Found as"/>
-    <alias index="13" field="reasons" name="Reasons"/>
-    <alias index="14" field="confidence" name="Confidence (0-1)"/>
-    <alias index="15" field="contrast" name="Contrast (sigma)"/>
-    <alias index="16" field="area" name="Area (m²)"/>
-    <alias index="17" field="darkening_mean" name="Mean drop (dB)"/>
-    <alias index="18" field="darkening_max" name="Greatest drop (dB)"/>
-    <alias index="19" field="image_share" name="Share measured"/>
-    <alias index="20" field="review" name="Review"/>
-    <alias index="21" field="reviewed_by" name="Reviewed by"/>
-    <alias index="22" field="reviewed_at" name="Reviewed at"/>
-    <alias index="23" field="remark" name="Remark"/>
-    <alias index="24" field="detected" name="Found by the last detection"/>
-    <alias index="25" field="created_at" name="First detected"/>
-    <alias index="26" field="detected_at" name="Last detected"/>
-    <alias index="27" field="counted" name="Counted in sums"/>
-    <alias index="28" field="evidence" name="Evidence for (+) and against (-)"/>
-    <alias index="29" field="model" name="Judged by model"/>
-    <alias index="30" field="wet" name="Wet"/>
-    <alias index="31" field="origin" name="Origin of the outline"/>
-    <alias index="32" field="clock_text" name="Clock position"/>
+    <alias index="12" field="kind_label" name="Name of its kind"/>
+    <alias index="13" field="kind_detected" name="Found as"/>
+    <alias index="14" field="wet" name="Wet"/>
+    <alias index="15" field="origin" name="Origin of the outline"/>
+    <alias index="16" field="manual" name="Drawn, never detected"/>
+    <alias index="17" field="severity" name="Severity"/>
+    <alias index="18" field="severity_label" name="Name of its severity"/>
+    <alias index="19" field="width" name="Width of the line (m)"/>
+    <alias index="20" field="length" name="Length (m)"/>
+    <alias index="21" field="area" name="Area (m²)"/>
+    <alias index="22" field="measured" name="Measured on the image"/>
+    <alias index="23" field="darkening_mean" name="Mean darkening (dB)"/>
+    <alias index="24" field="darkening_max" name="Greatest darkening (dB)"/>
+    <alias index="25" field="image_share" name="Share measured"/>
+    <alias index="26" field="contrast" name="Contrast (sigma)"/>
+    <alias index="27" field="confidence" name="Confidence (0-1)"/>
+    <alias index="28" field="reasons" name="Reasons"/>
+    <alias index="29" field="review" name="Review"/>
+    <alias index="30" field="reviewed_by" name="Reviewed by"/>
+    <alias index="31" field="reviewed_at" name="Reviewed at"/>
+    <alias index="32" field="remark" name="Remark"/>
+    <alias index="33" field="drawn_by" name="Drawn by"/>
+    <alias index="34" field="drawn_at" name="Drawn at"/>
+    <alias index="35" field="detected" name="Found by the last detection"/>
+    <alias index="36" field="created_at" name="First detected"/>
+    <alias index="37" field="detected_at" name="Last detected"/>
+    <alias index="38" field="also_detected" name="Also detected"/>
+    <alias index="39" field="detected_as" name="Detected as"/>
+    <alias index="40" field="parent_id" name="Split off"/>
+    <alias index="41" field="merged_into" name="Merged into"/>
+    <alias index="42" field="merged" name="Merged into this"/>
+    <alias index="43" field="same_as" name="The same as"/>
+    <alias index="44" field="dry_region_id" name="In dry region"/>
+    <alias index="45" field="counted" name="Counted in sums"/>
+    <alias index="46" field="state" name="State"/>
+    <alias index="47" field="photos" name="Photos"/>
+    <alias index="48" field="evidence" name="Evidence for (+) and against (-)"/>
+    <alias index="49" field="model" name="Classified by model"/>
+    <alias index="50" field="superseded" name="Superseded"/>
+    <alias index="51" field="clock_text" name="Clock position"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -436,60 +593,79 @@
     <field name="arc_to" editable="0"/>
     <field name="clock" editable="0"/>
     <field name="kind" editable="1"/>
+    <field name="kind_label" editable="0"/>
     <field name="kind_detected" editable="0"/>
-    <field name="reasons" editable="0"/>
-    <field name="confidence" editable="0"/>
-    <field name="contrast" editable="0"/>
+    <field name="wet" editable="0"/>
+    <field name="origin" editable="0"/>
+    <field name="manual" editable="0"/>
+    <field name="severity" editable="0"/>
+    <field name="severity_label" editable="0"/>
+    <field name="width" editable="0"/>
+    <field name="length" editable="0"/>
     <field name="area" editable="0"/>
+    <field name="measured" editable="0"/>
     <field name="darkening_mean" editable="0"/>
     <field name="darkening_max" editable="0"/>
     <field name="image_share" editable="0"/>
+    <field name="contrast" editable="0"/>
+    <field name="confidence" editable="0"/>
+    <field name="reasons" editable="0"/>
     <field name="review" editable="1"/>
     <field name="reviewed_by" editable="0"/>
     <field name="reviewed_at" editable="0"/>
     <field name="remark" editable="1"/>
+    <field name="drawn_by" editable="0"/>
+    <field name="drawn_at" editable="0"/>
     <field name="detected" editable="0"/>
     <field name="created_at" editable="0"/>
     <field name="detected_at" editable="0"/>
+    <field name="also_detected" editable="0"/>
+    <field name="detected_as" editable="0"/>
+    <field name="parent_id" editable="0"/>
+    <field name="merged_into" editable="0"/>
+    <field name="merged" editable="0"/>
+    <field name="same_as" editable="0"/>
+    <field name="dry_region_id" editable="0"/>
     <field name="counted" editable="0"/>
+    <field name="state" editable="0"/>
+    <field name="photos" editable="0"/>
     <field name="evidence" editable="0"/>
     <field name="model" editable="0"/>
-    <field name="wet" editable="0"/>
-    <field name="origin" editable="0"/>
+    <field name="superseded" editable="0"/>
   </editable>
   <editorlayout>tablayout</editorlayout>
   <attributeEditorForm>
     <attributeEditorContainer name="Review" columnCount="1" groupBox="1" showLabel="1" visibilityExpressionEnabled="0" visibilityExpression="">
-      <attributeEditorField name="review" index="20" showLabel="1"/>
+      <attributeEditorField name="review" index="29" showLabel="1"/>
       <attributeEditorField name="kind" index="11" showLabel="1"/>
-      <attributeEditorField name="remark" index="23" showLabel="1"/>
-      <attributeEditorField name="reviewed_by" index="21" showLabel="1"/>
-      <attributeEditorField name="reviewed_at" index="22" showLabel="1"/>
+      <attributeEditorField name="remark" index="32" showLabel="1"/>
+      <attributeEditorField name="reviewed_by" index="30" showLabel="1"/>
+      <attributeEditorField name="reviewed_at" index="31" showLabel="1"/>
     </attributeEditorContainer>
-    <attributeEditorContainer name="Anomaly" columnCount="2" groupBox="1" showLabel="1" visibilityExpressionEnabled="0" visibilityExpression="">
+    <attributeEditorContainer name="Finding" columnCount="2" groupBox="1" showLabel="1" visibilityExpressionEnabled="0" visibilityExpression="">
       <attributeEditorField name="id" index="0" showLabel="1"/>
       <attributeEditorField name="label" index="7" showLabel="1"/>
       <attributeEditorField name="segment" index="4" showLabel="1"/>
-      <attributeEditorField name="clock_text" index="32" showLabel="1"/>
-      <attributeEditorField name="area" index="16" showLabel="1"/>
-      <attributeEditorField name="image_share" index="19" showLabel="1"/>
-      <attributeEditorField name="kind_detected" index="12" showLabel="1"/>
-      <attributeEditorField name="confidence" index="14" showLabel="1"/>
-      <attributeEditorField name="reasons" index="13" showLabel="1"/>
-      <attributeEditorField name="evidence" index="28" showLabel="1"/>
-      <attributeEditorField name="contrast" index="15" showLabel="1"/>
-      <attributeEditorField name="darkening_mean" index="17" showLabel="1"/>
-      <attributeEditorField name="darkening_max" index="18" showLabel="1"/>
+      <attributeEditorField name="clock_text" index="51" showLabel="1"/>
+      <attributeEditorField name="area" index="21" showLabel="1"/>
+      <attributeEditorField name="image_share" index="25" showLabel="1"/>
+      <attributeEditorField name="kind_detected" index="13" showLabel="1"/>
+      <attributeEditorField name="confidence" index="27" showLabel="1"/>
+      <attributeEditorField name="reasons" index="28" showLabel="1"/>
+      <attributeEditorField name="evidence" index="48" showLabel="1"/>
+      <attributeEditorField name="contrast" index="26" showLabel="1"/>
+      <attributeEditorField name="darkening_mean" index="23" showLabel="1"/>
+      <attributeEditorField name="darkening_max" index="24" showLabel="1"/>
       <attributeEditorField name="chainage_from" index="5" showLabel="1"/>
       <attributeEditorField name="chainage_to" index="6" showLabel="1"/>
       <attributeEditorField name="arc_from" index="8" showLabel="1"/>
       <attributeEditorField name="arc_to" index="9" showLabel="1"/>
-      <attributeEditorField name="detected" index="24" showLabel="1"/>
-      <attributeEditorField name="created_at" index="25" showLabel="1"/>
-      <attributeEditorField name="detected_at" index="26" showLabel="1"/>
-      <attributeEditorField name="counted" index="27" showLabel="1"/>
-      <attributeEditorField name="model" index="29" showLabel="1"/>
-      <attributeEditorField name="origin" index="31" showLabel="1"/>
+      <attributeEditorField name="detected" index="35" showLabel="1"/>
+      <attributeEditorField name="created_at" index="36" showLabel="1"/>
+      <attributeEditorField name="detected_at" index="37" showLabel="1"/>
+      <attributeEditorField name="counted" index="45" showLabel="1"/>
+      <attributeEditorField name="model" index="49" showLabel="1"/>
+      <attributeEditorField name="origin" index="15" showLabel="1"/>
       <attributeEditorField name="survey" index="2" showLabel="1"/>
     </attributeEditorContainer>
   </attributeEditorForm>
