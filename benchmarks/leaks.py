@@ -84,7 +84,7 @@ class Outcome:
     def read(cls, conn: psycopg.Connection[Any], scene: Scene, name: str) -> Outcome:
         survey = get_survey(conn, scene.name)
         rows = conn.execute(
-            "SELECT public.ST_AsBinary(unrolled), coalesce(judged, kind), reasons, confidence, contrast, darkening_mean"
+            "SELECT public.ST_AsBinary(unrolled), coalesce(kind_override, kind), reasons, confidence, contrast, darkening_mean"
             " FROM tunnel.finding WHERE survey_id = %s ORDER BY chainage_from, arc_from",
             (survey.id,),
         ).fetchall()

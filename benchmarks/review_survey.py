@@ -76,7 +76,8 @@ def _names(columns: tuple[str, ...], *of: str) -> sql.Composed:
 def reopen(conn: psycopg.Connection) -> None:
     """Take all reviews away, as if nobody had looked; commits."""
     conn.execute(
-        "UPDATE tunnel.finding a SET review = 'open', remark = NULL, judged = NULL, reviewed_by = NULL, reviewed_at = NULL"
+        "UPDATE tunnel.finding a SET review = 'open', remark = NULL, kind_override = NULL, reviewed_by = NULL,"
+        " reviewed_at = NULL"
         " FROM tunnel.survey s WHERE s.id = a.survey_id AND s.name = %s", [SURVEY],
     )  # fmt: skip
     conn.commit()

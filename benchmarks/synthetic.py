@@ -263,7 +263,7 @@ GROUP BY v.number
 
 ANOMALIES = """
 INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, confidence,
-    contrast, judged, area, darkening_mean, darkening_max, image_share, unrolled, map, surface, review, reviewed_by,
+    contrast, kind_override, area, darkening_mean, darkening_max, image_share, unrolled, map, surface, review, reviewed_by,
     reviewed_at, remark,
     detected, created_at, detected_at)
 SELECT %(id)s, floor((o.chainage_from + o.chainage_to) / 2000), o.chainage_from, o.chainage_to, o.arc_from, o.arc_to,

@@ -470,9 +470,9 @@ def example_catalogue() -> frozenset[str]:
     texts |= {"Prepared by", "Checked by", "Accepted by", "Name", "Position", "Date", "Signature"}
     source = (package / "photos.py").read_text("utf-8")
     texts |= {said for said in re.findall(r'_NotHadError\("([^"]+)"\)', source) if "fetched" not in said}
-    migration = next((Path(__file__).parents[2] / "migrations" / "versions").glob("0022_*.py")).read_text("utf-8")
-    texts |= set(re.findall(r'^    \("\w+", "([^"]+)", \[', migration, re.MULTILINE))
-    texts |= set(re.findall(r'^    \(\d, "(\w+)",', migration, re.MULTILINE))
+    baseline = (Path(__file__).parents[2] / "migrations" / "baseline" / "finding.sql").read_text("utf-8")
+    texts |= set(re.findall(r"^    \('\w+', '([^']+)', '{", baseline, re.MULTILINE))
+    texts |= set(re.findall(r"^    \(\d, '(\w+)',", baseline, re.MULTILINE))
     for path in [*(package / "templates").rglob("*.*"), package / "strip.py"]:
         text = path.read_text("utf-8")
         texts |= set(re.findall(r'(?<![\w.])(?:_|self\.words|words)\(\s*"([^"]+)"', text))

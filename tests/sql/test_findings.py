@@ -15,6 +15,7 @@ from shapely.geometry import LineString, Point, Polygon, box
 from support.example_survey import NAME, example_surface
 
 from tunneldb.anomalies.geometries import anomaly_geometries
+from tunneldb.finding_kind import DRY, FindingKind
 from tunneldb.geometry.surface import Surface
 
 INSPECTOR = pytest.mark.parametrize("person", ["ines"], indirect=True)
@@ -560,3 +561,9 @@ def test_conditions_by_fhwa_are_sums_of_what_is_counted(person: psycopg.Connecti
     assert states["bolts"] == ("each", 0, 1, 0, 0)
     lining = person.execute("SELECT sum(lining_area) FROM tunnel_api.km_statistics").fetchone()[0]
     assert sum(states["liner"][1:]) == pytest.approx(lining)
+
+
+def test_the_program_knows_the_kinds_of_the_catalogue(conn: psycopg.Connection) -> None:
+    assert [code for (code,) in conn.execute("SELECT code FROM tunnel_api.finding_kind ORDER BY position")] == list(FindingKind)
+    wet = {code for (code,) in conn.execute("SELECT code FROM tunnel_api.finding_kind WHERE wet")}
+    assert not wet & set(DRY)

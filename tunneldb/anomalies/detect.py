@@ -21,6 +21,7 @@ from tunneldb.anomalies.threshold import dark_pixels, filter_size
 from tunneldb.anomalies.verdict import classify
 from tunneldb.anomalies.windows import count_about, count_in_columns, on_lining, row_blocks
 from tunneldb.arrays import Bool, Float, Int64, UInt8
+from tunneldb.finding_kind import FindingKind
 from tunneldb.raster.grid import PixelGrid
 from tunneldb.raster.image import WET_EDGE
 from tunneldb.raster.pixel_state import PixelState
@@ -98,7 +99,7 @@ def find_anomalies(
             cut.append(region)
         elif anomaly is not None:
             anomalies.append(anomaly)
-        if anomaly is not None and anomaly.verdict.kind == "leak":
+        if anomaly is not None and anomaly.verdict.kind == FindingKind.LEAK:
             leaks.append(region)
     _draw(wet, leaks, grid)
     wet &= dark
@@ -121,7 +122,7 @@ def judge_region(
     if not may_count(region, min_area):
         return None
     verdict = classify(region, features, model)
-    if verdict.kind == "joint":
+    if verdict.kind == FindingKind.JOINT:
         if max(region.mask.shape) * region.pixel < MIN_JOINT_LENGTH:
             return None
     elif region.area < min_area * (1 - 1e-12):
@@ -171,7 +172,7 @@ def find_dark_regions(dark: Bool, contrast: ContrastImage, min_area: float) -> l
 
 def _may_drip(region: Region) -> bool:
     # By the program's own model: the extent of a region must not change with what is learned from it.
-    return bool(region.filled) and classify(region).kind == "leak"
+    return bool(region.filled) and classify(region).kind == FindingKind.LEAK
 
 
 def _without_joints(regions: Sequence[Region], classified: Sequence[Anomaly | None], spacing: float) -> list[Anomaly | None]:
@@ -181,14 +182,14 @@ def _without_joints(regions: Sequence[Region], classified: Sequence[Anomaly | No
         k
         for k, (region, anomaly) in enumerate(zip(regions, classified, strict=True))
         if anomaly is not None
-        and anomaly.verdict.kind == "leak"
+        and anomaly.verdict.kind == FindingKind.LEAK
         and region.mask.shape[1] * region.pixel < MAX_SINGLE_SPACINGS * spacing
     ]
     middle = np.array([0.5 * (regions[k].column + regions[k].stop) * regions[k].pixel for k in single])
     for k, even in zip(single, crossed_joints(middle, spacing).tolist(), strict=True):
         anomaly = found[k]
         if even and anomaly is not None:
-            verdict = replace(anomaly.verdict, kind="joint", reasons=("thin", "sparse"), confidence=even)
+            verdict = replace(anomaly.verdict, kind=FindingKind.JOINT, reasons=("thin", "sparse"), confidence=even)
             found[k] = replace(anomaly, verdict=verdict)
     return found
 

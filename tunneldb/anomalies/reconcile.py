@@ -12,6 +12,7 @@ from shapely.geometry import Polygon
 from tunneldb.anomalies.matching import match, match_parts
 from tunneldb.anomalies.records import Anomaly, BoundaryRegion, EarlierFinding
 from tunneldb.anomalies.regions import Region, merge_regions, touching_groups
+from tunneldb.finding_kind import FindingKind
 from tunneldb.geometry.stationing import KILOMETRE
 
 
@@ -199,7 +200,7 @@ def reconcile(
         if k not in again.values() and (one.km == boundary.km or one.id in boundary.findings) and not one.dry
     ]
     kept, gone = [one for one in lost if one.reviewed], [one for one in lost if not one.reviewed]
-    leaks = [number in update for number, anomaly in enumerate(candidates) if anomaly.verdict.kind == "leak"]
+    leaks = [number in update for number, anomaly in enumerate(candidates) if anomaly.verdict.kind == FindingKind.LEAK]
     return Reconciliation(
         [number for number in range(len(candidates)) if number not in update],
         update,
@@ -214,7 +215,7 @@ def reconcile(
             sum(
                 cluster.crosses
                 for cluster, anomaly in zip(boundary.clusters, across, strict=True)
-                if anomaly is not None and anomaly.verdict.kind == "leak"
+                if anomaly is not None and anomaly.verdict.kind == FindingKind.LEAK
             ),
         ),
     )

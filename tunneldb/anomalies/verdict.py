@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -13,8 +12,7 @@ from tunneldb.anomalies.evidence import EvidenceModel, reasons_of, standard_mode
 from tunneldb.anomalies.features import DEGREES, FEATURES, NAMES, measure_features
 from tunneldb.anomalies.regions import Region
 from tunneldb.arrays import Float
-
-Kind = Literal["leak", "joint", "dark"]
+from tunneldb.finding_kind import FindingKind
 
 MIN_NAMED_CHANGE = 0.5
 """Minimum factor on the odds, 1.6 as a logarithm, for a reason to be named."""
@@ -32,8 +30,8 @@ class Verdict:
 
     Attributes
     ----------
-    kind : {'leak', 'joint', 'dark'}
-        A leak; a joint; or a dry dark area.
+    kind : FindingKind
+        A leak; a joint; or another dry dark area.
     reasons : tuple of str
         If not a leak: what it looks like, then further evidence, the strongest first. If a leak: reasons for doubt, and last
         ``sparse``: on fewer than FEW_PROFILES profiles far apart, so that its length and area may be wrong by as much as
@@ -50,7 +48,7 @@ class Verdict:
         Version of the model used.
     """
 
-    kind: Kind
+    kind: FindingKind
     reasons: tuple[str, ...]
     confidence: float
     evidence: Mapping[str, float]
@@ -75,15 +73,22 @@ def classify(region: Region, features: Float | None = None, model: EvidenceModel
     outline = straightness_weight(region)
     contributions = weigh(model, features[None], np.array([outline]))[0]
     p = float(1.0 / (1.0 + np.exp(-model.constant - contributions.sum())))
-    kind: Kind = "leak" if p >= 0.5 else "joint" if features[LINE_FEATURE] >= 0.5 else "dark"
+    kind = kind_of(p, line=bool(features[LINE_FEATURE] >= 0.5))
     evidence = reasons_of(contributions)
     against = [name for name, weight in sorted(evidence.items(), key=lambda item: item[1]) if weight <= -MIN_NAMED_CHANGE]
-    if kind != "leak":
+    if kind != FindingKind.LEAK:
         looks = sorted((name for name in DEGREES if _degree(features, name) > 0.5), key=lambda name: -_degree(features, name))
         against = [*looks, *(name for name in against if name not in looks)]
-    if kind == "leak" and region.spacing and region.mask.shape[1] * region.pixel < FEW_PROFILES * region.spacing:
+    if kind == FindingKind.LEAK and region.spacing and region.mask.shape[1] * region.pixel < FEW_PROFILES * region.spacing:
         against.append("sparse")
-    return Verdict(kind, tuple(against), p if kind == "leak" else 1.0 - p, evidence, features, outline, model.version)
+    return Verdict(kind, tuple(against), p if kind == FindingKind.LEAK else 1.0 - p, evidence, features, outline, model.version)
+
+
+def kind_of(probability: float, *, line: bool) -> FindingKind:
+    """Return the kind of a region by its probability of being a leak, and by whether it is a line."""
+    if probability >= 0.5:
+        return FindingKind.LEAK
+    return FindingKind.JOINT if line else FindingKind.DARK
 
 
 def weigh(model: EvidenceModel, features: Float, outline: Float) -> Float:

@@ -19,9 +19,9 @@ from tunneldb.cli.tables import print_classes
 from tunneldb.database import connect
 from tunneldb.errors import NotReadyError, UserError
 from tunneldb.files import made_folder, replacing, told_to_end
+from tunneldb.finding_kind import DETECTED
 from tunneldb.stages.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
-from tunneldb.store.leaks import DARK
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
@@ -119,7 +119,7 @@ def _say_left_out(conn: psycopg.Connection[Any], survey: Survey, output: Path, s
     (left_out,) = conn.execute(
         "SELECT count(*) FROM tunnel_api.finding f WHERE survey_id = %s AND counted AND chainage_to >= %s"
         " AND chainage_from <= %s AND NOT (wet OR coalesce(kind_detected, kind) = ANY (%s))",
-        [survey.id, stretch.low, stretch.high, list(DARK)],
+        [survey.id, stretch.low, stretch.high, list(map(str, DETECTED))],
     ).fetchone() or (0,)
     tell(findings_left_out=left_out)
     if left_out:

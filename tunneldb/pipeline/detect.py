@@ -18,6 +18,7 @@ from tunneldb.anomalies.measure import Measurement, measure_outline
 from tunneldb.anomalies.sparse import least_density, leave_out_sparse
 from tunneldb.arrays import UInt8
 from tunneldb.errors import NotReadyError, UserError
+from tunneldb.finding_kind import FindingKind
 from tunneldb.geometry.section_outliers import MOST, SectionOutliers
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
@@ -286,8 +287,8 @@ def _save(
         "wet_pixels": found.wet_pixels,
         "seen": round(seen_share(conn, survey, km), 4),
         "leaks": matched.new + matched.again,
-        "joints": matched.kinds["joint"],
-        "dark": matched.kinds["dark"],
+        "joints": matched.kinds[FindingKind.JOINT],
+        "dark": matched.kinds[FindingKind.DARK],
         "leaks_over_ends": matched.over_ends,
         "leaks_new": matched.new,
         "leaks_again": matched.again,

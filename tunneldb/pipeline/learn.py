@@ -13,7 +13,7 @@ import psycopg
 from tunneldb.anomalies.evidence import EvidenceModel, standard_model
 from tunneldb.anomalies.features import NAMES
 from tunneldb.anomalies.learning import Lesson, Reviewed, learn
-from tunneldb.anomalies.verdict import weigh
+from tunneldb.anomalies.verdict import kind_of, weigh
 from tunneldb.arrays import Bool, Float
 from tunneldb.errors import NotReadyError, UserError
 from tunneldb.store.learned import (
@@ -208,7 +208,7 @@ def _changes(
     line = measured.features[:, NAMES.index("line")] >= 0.5
 
     def kind(k: int, p: Float) -> str:
-        return "leak" if p[k] >= 0.5 else "joint" if line[k] else "dark"
+        return kind_of(float(p[k]), line=bool(line[k]))
 
     return counts, [
         Change(

@@ -16,9 +16,9 @@ from shapely.geometry import Polygon
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
+from tunneldb.finding_kind import DETECTED
 from tunneldb.stages.registry import STAGE_NAMES
 from tunneldb.stages.run import nothing_yet
-from tunneldb.store.leaks import DARK
 from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
@@ -283,7 +283,7 @@ def read_others(conn: psycopg.Connection[Any], survey: Survey, low: float, high:
     rows = conn.execute(
         "SELECT kind, count(*) FROM tunnel_api.finding WHERE survey_id = %s AND detected AND NOT wet AND NOT superseded"
         " AND coalesce(kind_detected, kind) = ANY (%s) AND chainage_to > %s AND chainage_from < %s GROUP BY kind",
-        [survey.id, list(DARK), low, high],
+        [survey.id, list(map(str, DETECTED)), low, high],
     ).fetchall()
     return dict(rows)
 

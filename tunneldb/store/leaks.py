@@ -9,6 +9,7 @@ from typing import Any, Literal
 import psycopg
 from psycopg import sql
 
+from tunneldb.finding_kind import DETECTED
 from tunneldb.store.coverage import Coverage, read_coverage
 from tunneldb.store.findings import COLUMNS, GEOMETRY_COLUMN, Finding, Geometry, finding_of
 from tunneldb.store.remarks import Remark, read_remarks
@@ -87,12 +88,9 @@ class LeakList:
         return f"{self.count} {_PLURAL[self.kind]}, {self.area:.2f} m²" + (f"; listed besides: {besides}" if besides else "")
 
 
-DARK = ("leak", "joint", "dark")
-"""Kinds that detection tells apart; what people drew as one of them is listed with what was detected."""
-
 _CHOSEN = sql.SQL(
     "FROM tunnel_api.finding f JOIN tunnel_api.finding_polygon p USING (id) WHERE f.survey_id = %(survey)s"
-    " AND NOT superseded AND (wet OR coalesce(kind_detected, kind) = ANY (%(dark)s))"
+    " AND NOT superseded AND (wet OR coalesce(kind_detected, kind) = ANY (%(detected)s))"
     " AND (detected OR review = 'confirmed') AND area >= %(min_area)s"
     " AND (%(min_confidence)s = 0 OR kind = kind_detected AND confidence >= %(min_confidence)s)"
     " AND CASE %(kind)s WHEN 'all' THEN true WHEN 'leak' THEN wet ELSE kind = %(kind)s END"
@@ -120,7 +118,7 @@ def read_leaks(
     asked = {
         "survey": survey.id,
         "kind": chosen.kind,
-        "dark": list(DARK),
+        "detected": list(map(str, DETECTED)),
         "min_area": chosen.min_area,
         "min_confidence": chosen.min_confidence,
         "low": max(chosen.low, ends[0]),

@@ -206,7 +206,7 @@ def _leaks(conn: psycopg.Connection, survey: Survey, km: int) -> list[Polygon]:
     rows = conn.execute(
         "SELECT public.ST_AsBinary(unrolled) FROM tunnel.finding"
         " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected'"
-        " AND wet AND NOT aside ORDER BY id",
+        " AND wet AND NOT superseded ORDER BY id",
         (survey.id, km * KILOMETRE, (km + 1) * KILOMETRE),
     )
     return [shapely.from_wkb(bytes(wkb)) for (wkb,) in rows]

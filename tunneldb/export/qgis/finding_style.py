@@ -7,15 +7,13 @@ import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
 from tunneldb.export.qgis.catalogue import HALOS, SHAPES, Catalogue, Look
+from tunneldb.finding_kind import DRY as DRY_KINDS
 
 COUNTS = 'coalesce("counted", true)'
 """What is shown: also what was just drawn and is not saved yet."""
 
 DRY = 'NOT "wet"'
 """What has no outline and no number as a leak."""
-
-_DRY = ("joint", "dark")
-"""Kinds that detection finds by the hundred: switched off at first."""
 
 _WHITE, _GREY = "255,255,255,200", "110,110,110,255"
 _UNKNOWN = Look("230,106,177")
@@ -68,7 +66,7 @@ def _renderer(catalogue: Catalogue, geometry: str, *, on_sheet: bool = False) ->
     for kind in catalogue.drawn_as(SHAPES[geometry]):
         quoted = kind.code.replace("'", "''")
         condition, layers = f"\"kind\" = '{quoted}'", _layers(geometry, kind.look)
-        if kind.code in _DRY and not on_sheet:
+        if kind.code in DRY_KINDS and not on_sheet:
             rule(kinds, f"{kind.label}, as detected", f'{condition} AND NOT "manual"', layers, shown=False)
         else:
             rule(kinds, kind.label, condition, layers)

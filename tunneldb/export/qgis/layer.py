@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tunneldb.finding_kind import DETECTED
+
 MAP, UNROLLED, SPACE = "Map", "Unrolled", "3D"
 """Groups of the layer tree, and the map themes of the same names."""
 
@@ -108,8 +110,9 @@ class VectorLayer:
 SHEET_FINDING = "sheet_finding"
 """View of the findings of the inspection sheets, and the table that these list."""
 
+_DETECTED = ", ".join(f"'{kind}'" for kind in DETECTED)
 DRY_DARK = (
-    'NOT "wet" AND NOT "superseded" AND coalesce("kind_detected", "kind") IN (\'leak\', \'joint\', \'dark\')'
+    f'NOT "wet" AND NOT "superseded" AND coalesce("kind_detected", "kind") IN ({_DETECTED})'
     " AND public.geometrytype(\"geom\") = 'POLYGON'"
 )
 """Condition that a finding is dark on the image and dry: a joint, or what else was found dark and is no leak."""

@@ -23,6 +23,7 @@ from tunneldb.export.qgis.sheet_tables import (
     sheet_table,
     table_width,
 )
+from tunneldb.finding_kind import DETECTED
 from tunneldb.raster.gap_fill import TOLD
 from tunneldb.store.survey import Survey
 
@@ -199,7 +200,7 @@ def _texts(survey: Survey, scale: int, goes_on: Sequence[str]) -> list[ET.Elemen
 
 def _colours(catalogue: Catalogue, y: float) -> list[ET.Element]:
     """A line with the colours of the kinds and of the halos, as many as there is room for; leaks have their own."""
-    named = [(f"■ {kind.label}", kind.look.colour) for kind in catalogue.kinds if kind.code not in ("leak", "joint", "dark")]
+    named = [(f"■ {kind.label}", kind.look.colour) for kind in catalogue.kinds if kind.code not in DETECTED]
     named = [(f"○ {catalogue.severities[degree]}", colour) for degree, colour in HALOS.items()] + named
     texts, x = [], MARGIN
     for text, colour in named:

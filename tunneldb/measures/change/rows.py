@@ -14,6 +14,7 @@ from psycopg import sql
 
 from tunneldb.anomalies.geometries import Geometries
 from tunneldb.arrays import Float, Single, known
+from tunneldb.finding_kind import DETECTED
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.measures.change.compute.leaks import Leak
 from tunneldb.measures.change.compute.rigid_motion import Motion
@@ -108,9 +109,9 @@ def load_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: 
     """Findings that count between two chainages (m), whole or in part: leaks, joints, other dark spots."""
     rows = conn.execute(
         "SELECT id, coalesce(kind_override, kind), wet, area, contrast, public.ST_AsBinary(unrolled) FROM tunnel.finding"
-        " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected' AND NOT aside"
-        " AND (wet OR kind IN ('leak', 'joint', 'dark')) ORDER BY id",
-        [survey.id, low, high],
+        " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected'"
+        " AND NOT superseded AND (wet OR kind = ANY (%s)) ORDER BY id",
+        [survey.id, low, high, list(map(str, DETECTED))],
     ).fetchall()
     return [
         Leak(id, kind, wet, area, contrast, shapely.make_valid(shapely.from_wkb(bytes(outline))))
