@@ -10,7 +10,7 @@ LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE SET search_path = pg_catalog, pg_tem
       FROM jsonb_each_text($1) e WHERE abs(e.value::numeric) >= 0.05
 $$;
 COMMENT ON FUNCTION tunnel_api.evidence_text(jsonb) IS
-    'What speaks for a leak and against it, in words: logarithms of odds by reason, the strongest first';
+    'Evidence for a leak and against it as text: logarithms of odds by reason, the strongest first';
 
 CREATE OR REPLACE VIEW tunnel_api.finding_kind AS
 SELECT k.id, k.code, k.label, k.geometries, k.wet, k.position, k.active FROM tunnel.finding_kind k;
@@ -73,6 +73,7 @@ DECLARE
     comment record;
 BEGIN
     FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
+        ('id', 'Number by which lists, sheets, reports and QGIS name it'),
         ('segment', 'Number of the segment that holds its middle'),
         ('label', 'Station of its middle, as 12+345.678'),
         ('chainage_from', 'Least chainage, m'),
@@ -80,41 +81,41 @@ BEGIN
         ('arc_from', 'Least arc, m from the crown, positive right looking up-chainage'),
         ('arc_to', 'Greatest arc, m'),
         ('clock', 'Clock position of the middle, hours: 12 is the crown, 3 the right wall looking up-chainage'),
-        ('kind', 'Code of its kind (finding_kind), as an inspector judged it, else as found or drawn'),
+        ('kind', 'Code of its kind (finding_kind): the one that an inspector gave, else the one that it was detected or drawn as'),
         ('kind_label', 'Name of its kind'),
-        ('kind_detected', 'What detection takes it for; NULL of what was drawn'),
-        ('wet', 'Whether its kind counts as wet'),
-        ('origin', 'How its outline came about: detected, drawn, redrawn, split or merged'),
-        ('manual', 'Whether it was drawn, never detected: only that can be deleted'),
+        ('kind_detected', 'Kind that detection gave: leak, joint or dark (dry dark area); NULL of what was drawn'),
+        ('wet', 'True if its kind counts as wet'),
+        ('origin', 'Origin of its outline: detected, drawn, redrawn, split or merged'),
+        ('manual', 'True if it was drawn, never detected: only such findings can be deleted'),
         ('severity', 'Severity, 1 (the least) to 4'),
         ('severity_label', 'Its name'),
         ('width', 'Width of a line, m'),
         ('length', 'Length of a line on the surface, m'),
         ('area', 'Area on the lining, m²; of a line length times width, of a point 0'),
-        ('measured', 'Whether it was measured on the image: what was drawn or redrawn waits for the next detect'),
-        ('darkening_mean', 'Mean drop of corrected intensity below dry lining, dB'),
-        ('darkening_max', 'Greatest drop of corrected intensity below dry lining, dB'),
-        ('image_share', 'Share of its outline on which the image holds measurements, 0-1'),
-        ('contrast', 'Mean drop in standard deviations of the dry lining about it'),
-        ('confidence', 'How sure detection is of what it found, 0-1; NULL of what was drawn'),
-        ('reasons', 'Why detection takes it for that'),
+        ('measured', 'True if it was measured on the image; what was drawn or redrawn is measured by the next detect'),
+        ('darkening_mean', 'Mean darkening, dB: how much lower than dry lining the corrected intensity is'),
+        ('darkening_max', 'Greatest darkening, dB'),
+        ('image_share', 'Share of its outline on which the image holds measurements, 0 to 1'),
+        ('contrast', 'Mean darkening in standard deviations of the surrounding dry lining'),
+        ('confidence', 'Confidence of detection in its kind, 0 to 1; NULL of what was drawn'),
+        ('reasons', 'Reasons of detection for its kind'),
         ('review', 'open, confirmed or rejected; what is drawn is confirmed unless it says otherwise'),
-        ('reviewed_by', 'Who reviewed or judged it last, set by the database'),
-        ('reviewed_at', 'When it was reviewed or judged last, set by the database'),
+        ('reviewed_by', 'Who reviewed it last, set by the database'),
+        ('reviewed_at', 'When it was reviewed last, set by the database'),
         ('drawn_by', 'Who drew its outline last, set by the database'),
         ('drawn_at', 'When its outline was drawn last, set by the database'),
-        ('detected', 'False when the last detection found it no more (kept for what people said of it); true of what was drawn'),
+        ('detected', 'False if the last detection did not find it again (kept for its review); true of what was drawn'),
         ('created_at', 'When it was first found or drawn'),
         ('detected_at', 'When it was last detected; NULL of what was drawn'),
-        ('also_detected', 'Whether the last detection found the same'),
-        ('detected_as', 'Ids of what it found: they are listed as same and not counted'),
+        ('also_detected', 'True if the last detection found the same'),
+        ('detected_as', 'Ids of what it found: their state is same, and totals do not include them'),
         ('parent_id', 'Finding that it was split off'),
-        ('merged_into', 'Finding that it is merged into: that one counts'),
+        ('merged_into', 'Finding that it is merged into, which totals include instead'),
         ('merged', 'Ids of the findings that are merged into it'),
-        ('same_as', 'Finding that is the same: that one counts'),
-        ('dry_region_id', 'Dry region (dry_region) that it lies in; it does not count while it is open'),
-        ('counted', 'Whether sums count it: there, not rejected, and nothing else stands for it'),
-        ('state', 'open, confirmed, rejected, gone (not found again), dry (taken away by a dry region), same or merged (another counts)'),
+        ('same_as', 'Finding that is the same, which totals include instead'),
+        ('dry_region_id', 'Dry region (dry_region) that it lies in; totals do not include it while it is open'),
+        ('counted', 'True if totals include it: detected or drawn, not rejected, not superseded'),
+        ('state', 'open, confirmed, rejected, gone (not detected again), dry (in a dry region), same or merged (another is included instead)'),
         ('photos', 'How many photos it has (finding_photo)'),
         ('evidence', 'Evidence for a leak (+) and against it (-): logarithms of odds by reason, the strongest first; NULL of what was drawn'),
         ('model', 'Version of the model of evidence that classified it'),
@@ -155,7 +156,7 @@ SELECT a.id * 100 + e.n AS id, a.id AS finding_id, a.survey_id, s.name AS survey
 COMMENT ON VIEW tunnel_api.finding_evidence IS 'Evidence for and against each finding being a leak: a row for each reason';
 COMMENT ON COLUMN tunnel_api.finding_evidence.finding_id IS 'Its finding';
 COMMENT ON COLUMN tunnel_api.finding_evidence.reason IS 'What was measured: faint, thin, rectangular, …';
-COMMENT ON COLUMN tunnel_api.finding_evidence.log_odds IS 'What it adds to the logarithm of the odds of a leak; negative: against one';
+COMMENT ON COLUMN tunnel_api.finding_evidence.log_odds IS 'Its contribution to the logarithm of the odds of a leak; negative: against one';
 
 CREATE OR REPLACE VIEW tunnel_api.leak AS
 SELECT a.id, a.survey_id, s.name AS survey, a.km,
@@ -189,6 +190,7 @@ DECLARE
     comment record;
 BEGIN
     FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
+        ('id', 'Number by which lists, sheets, reports and QGIS name it'),
         ('segment', 'Number of the segment that holds its middle'),
         ('label', 'Station of its middle, as 12+345.678'),
         ('chainage_from', 'Least chainage, m'),
@@ -196,25 +198,25 @@ BEGIN
         ('arc_from', 'Least arc, m from the crown, positive right looking up-chainage'),
         ('arc_to', 'Greatest arc, m'),
         ('clock', 'Clock position of the middle, hours: 12 is the crown, 3 the right wall looking up-chainage'),
-        ('kind', 'leak, joint or dark (dark but dry), or another of finding_kind: as an inspector judged it, else as found'),
-        ('kind_detected', 'What detection takes it for'),
-        ('reasons', 'Why detection takes it for that'),
-        ('confidence', 'How sure detection is of that, 0-1; NULL from before there were kinds'),
-        ('contrast', 'Mean drop in standard deviations of the dry lining about it; NULL from before there were kinds'),
+        ('kind', 'Code of its kind (finding_kind): the one that an inspector gave, else the one that detection gave'),
+        ('kind_detected', 'Kind that detection gave: leak, joint or dark (dry dark area)'),
+        ('reasons', 'Reasons of detection for its kind'),
+        ('confidence', 'Confidence of detection in its kind, 0 to 1'),
+        ('contrast', 'Mean darkening in standard deviations of the surrounding dry lining'),
         ('area', 'Area on the lining, m²'),
-        ('darkening_mean', 'Mean drop of corrected intensity below dry lining, dB; NULL until what was drawn is measured'),
-        ('darkening_max', 'Greatest drop of corrected intensity below dry lining, dB; NULL until then'),
-        ('image_share', 'Share of the polygon on which the image holds measurements, 0-1; NULL until then'),
+        ('darkening_mean', 'Mean darkening, dB: how much lower than dry lining the corrected intensity is; NULL until what was drawn is measured'),
+        ('darkening_max', 'Greatest darkening, dB; NULL until then'),
+        ('image_share', 'Share of the polygon on which the image holds measurements, 0 to 1; NULL until then'),
         ('review', 'open, confirmed or rejected'),
-        ('reviewed_by', 'Who reviewed or judged it last, set by the database'),
-        ('reviewed_at', 'When it was reviewed or judged last, set by the database'),
+        ('reviewed_by', 'Who reviewed it last, set by the database'),
+        ('reviewed_at', 'When it was reviewed last, set by the database'),
         ('remark', 'The reviewer''s remark'),
-        ('detected', 'False when the last detection found it no more (kept for its review)'),
-        ('counted', 'Whether sums count it: found last, and not rejected'),
-        ('wet', 'Whether its kind counts as wet: those are in the views of leaks'),
-        ('origin', 'How its outline came about: detected, drawn, redrawn, split or merged'),
-        ('evidence', 'What speaks for a leak (+) and against it (-): logarithms of odds by reason, the strongest first; NULL from before'),
-        ('model', 'Version of the model of evidence that judged it; NULL from before')) AS t (name, text)
+        ('detected', 'False if the last detection did not find it again (kept for its review)'),
+        ('counted', 'True if totals include it: detected last, and not rejected'),
+        ('wet', 'True if its kind counts as wet: those are in the views of leaks'),
+        ('origin', 'Origin of its outline: detected, drawn, redrawn, split or merged'),
+        ('evidence', 'Evidence for a leak (+) and against it (-): logarithms of odds by reason, the strongest first'),
+        ('model', 'Version of the model of evidence that classified it')) AS t (name, text)
       JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
       JOIN pg_class c ON c.oid = a.attrelid
      WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname = 'leak'

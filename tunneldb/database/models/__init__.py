@@ -9,14 +9,11 @@ from tunneldb.database.models.catalog import AlignmentElement, Pose, Reference, 
 from tunneldb.database.models.change import ChangeImage, ChangeRegion, ChangeSection, LeakChange
 from tunneldb.database.models.clearance import ClearanceInfringement, ClearanceSection, Gauge
 from tunneldb.database.models.files import FileKm, Incoming, Point, ScanFile
-from tunneldb.database.models.finding import FindingKind, FindingSum, Photo, Severity
+from tunneldb.database.models.finding import BoundaryRegion, FeatureList, Finding, FindingKind, FindingSum, Photo, Severity
 from tunneldb.database.models.geometry import AxisVertex, Section, SectionClass, Segment
 from tunneldb.database.models.ground import Cluster, Ground, Lining, TargetSphere
 from tunneldb.database.models.leak import (
-    BoundaryRegion,
     Coverage,
-    FeatureList,
-    Finding,
     Image,
     LearnedModel,
     Radiometry,

@@ -1,4 +1,4 @@
-"""Intensity, images and what is dark in them."""
+"""Intensity, images, what was seen of the lining, and what was learned from reviews."""
 
 from __future__ import annotations
 
@@ -6,15 +6,11 @@ import datetime as dt
 from typing import Any
 
 from geoalchemy2 import WKBElement
-from sqlalchemy import BigInteger, CheckConstraint, Computed, ForeignKey, Identity, Index, Integer, SmallInteger, Text, text
+from sqlalchemy import BigInteger, Computed, Identity, Index, Text, text
 from sqlalchemy.dialects.postgresql import ARRAY
 from sqlalchemy.orm import Mapped, mapped_column
 
-from tunneldb.database.models.base import CLOCK, KM, NOW, SURVEY, Base, Floats, Reals, Review, geometry, one_of, parent
-from tunneldb.database.models.finding import FindingKind, Severity
-
-_SUMMED = ["kind", "kind_override", "review", "detected", "area", "wet", "superseded"]
-"""Columns that sums over findings need: they come from an index alone."""
+from tunneldb.database.models.base import CLOCK, KM, NOW, SURVEY, Base, Floats, Reals, geometry, one_of, parent
 
 
 class Radiometry(Base):
@@ -165,153 +161,6 @@ class Image(Base):
     tiff: Mapped[bytes] = mapped_column(comment="GeoTIFF in the unrolled plane (chainage, arc), m")
 
 
-class FeatureList(Base):
-    """An order of features."""
-
-    __tablename__ = "feature_list"
-    __table_args__ = {"comment": "In which order the features of findings are stored: versions of the program differ"}  # noqa: RUF012
-
-    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
-    names: Mapped[list[str]] = mapped_column(
-        ARRAY(Text), unique=True, comment="Their names; outline: how much the outline tells, 0 to 1"
-    )
-
-
-class Finding(Review, Base):
-    """A leak, or what is dark but dry."""
-
-    __tablename__ = "finding"
-    __table_args__ = (
-        one_of("review", "open", "confirmed", "rejected"),
-        one_of("origin", "detected", "drawn", "redrawn", "split", "merged"),
-        CheckConstraint("width > 0", name="width"),
-        CheckConstraint("merged_into <> id AND same_as <> id", name="other"),
-        Index(None, "survey_id", "km", postgresql_include=[*_SUMMED, "darkening_max"]),
-        Index(None, "survey_id", "chainage_from", "chainage_to", postgresql_include=["id", *_SUMMED]),
-        Index("finding_length_idx", "survey_id", text("(chainage_to - chainage_from)")),
-        Index(None, "survey_id", "area"),
-        Index(None, "survey_id", "created_at"),
-        Index("finding_gone_idx", "survey_id", postgresql_where=text("NOT detected")),
-        Index("finding_kind_idx", "survey_id", text("COALESCE(kind_override, kind)")),
-        Index(None, "survey_id", "severity", postgresql_where=text("severity IS NOT NULL")),
-        Index(
-            "finding_uncounted_idx",
-            "survey_id",
-            postgresql_where=text("NOT (detected AND review <> 'rejected' AND NOT superseded)"),
-            postgresql_include=[
-                "id",
-                "kind",
-                "kind_override",
-                "severity",
-                "review",
-                "detected",
-                "superseded",
-                "merged_into",
-                "same_as",
-                "dry_region_id",
-            ],
-        ),
-        Index("finding_manual_idx", "survey_id", "chainage_from", postgresql_where=text("origin <> 'detected'")),
-        Index(None, "feature_list_id"),
-        Index("finding_kind_key_idx", "kind"),
-        Index(None, "kind_override"),
-        Index(None, "severity"),
-        Index(None, "merged_into"),
-        Index(None, "same_as", postgresql_where=text("same_as IS NOT NULL")),
-        Index(None, "parent_id"),
-        Index(None, "dry_region_id"),
-        Index(None, "unrolled", postgresql_using="gist"),
-        Index(None, "map", postgresql_using="gist"),
-        {"comment": "Findings: leaks, joints and dark spots that were detected, and what people drew, in three geometries"},
-    )
-
-    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
-    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
-    km: Mapped[int] = mapped_column(comment=KM + " of its middle")
-    chainage_from: Mapped[float] = mapped_column(comment="Least chainage, m")
-    chainage_to: Mapped[float] = mapped_column(comment="Greatest chainage, m")
-    arc_from: Mapped[float] = mapped_column(comment="Least arc, m, positive right looking up-chainage")
-    arc_to: Mapped[float] = mapped_column(comment="Greatest arc, m, positive right looking up-chainage")
-    clock: Mapped[float] = mapped_column(
-        comment="Clock position of its middle, hours: 12 is the crown, 3 is right looking up-chainage"
-    )
-    kind: Mapped[str] = mapped_column(
-        ForeignKey(FindingKind.code),
-        server_default=text("'leak'"),
-        comment="What detection takes it for: leak, joint or dark (dark but dry); of what was drawn, what it was drawn as",
-    )
-    reasons: Mapped[list[str]] = mapped_column(
-        ARRAY(Text), server_default=text("'{}'"), comment="Why, such as thin, straight, gradual, rectangular, recess"
-    )
-    confidence: Mapped[float | None] = mapped_column(comment="Confidence that it is of its kind, 0 to 1; none from before")
-    contrast: Mapped[float | None] = mapped_column(
-        comment="Mean drop in standard deviations of the dry lining about it; none from before"
-    )
-    kind_override: Mapped[str | None] = mapped_column(
-        ForeignKey(FindingKind.code), comment="What an inspector takes it for, where he says so"
-    )
-    area: Mapped[float] = mapped_column(comment="Area on the surface, m²; of a line length times width, of a point 0")
-    darkening_mean: Mapped[float | None] = mapped_column(comment="Mean drop below dry lining, dB; none until measured")
-    darkening_max: Mapped[float | None] = mapped_column(comment="Greatest drop below dry lining, dB; none until measured")
-    image_share: Mapped[float | None] = mapped_column(
-        comment="Share of its pixels that hold measured data, 0 to 1; none until measured"
-    )
-    unrolled: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="In the unrolled plane (chainage, arc), m")
-    map: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="On the map strip beside the axis, tunnel's SRID, m")
-    surface: Mapped[WKBElement] = mapped_column(geometry("POLYGONZ"), comment="On the lining in space, tunnel's SRID, m")
-    feature_list_id: Mapped[int | None] = mapped_column(
-        ForeignKey(FeatureList.id), comment="Order of its features; none from before they were stored"
-    )
-    features: Mapped[Floats | None] = mapped_column(comment="What was measured of it; NaN what could not be")
-    evidence: Mapped[dict[str, Any] | None] = mapped_column(
-        comment="What each reason adds to the logarithm of the odds that it is a leak"
-    )
-    model: Mapped[str | None] = mapped_column(comment="Version of the model of evidence that judged it")
-    origin: Mapped[str] = mapped_column(
-        server_default=text("'detected'"),
-        comment="How its outline came about: detected, drawn, redrawn, split or merged; detection changes the first alone",
-    )
-    manual: Mapped[bool] = mapped_column(
-        server_default=text("false"), comment="Whether it was drawn, or split off what was: never detected"
-    )
-    severity: Mapped[int | None] = mapped_column(SmallInteger, ForeignKey(Severity.id), comment="Severity, 1 to 4")
-    width: Mapped[float | None] = mapped_column(comment="Width of a line, such as a crack, m")
-    length: Mapped[float | None] = mapped_column(comment="Length of a line on the surface, m")
-    shape: Mapped[WKBElement | None] = mapped_column(
-        geometry("GEOMETRY"),
-        comment="The line or point that it is, if it is no polygon, in the unrolled plane, m",
-    )
-    shape_map: Mapped[WKBElement | None] = mapped_column(
-        geometry("GEOMETRY"), comment="The same on the map strip, tunnel's SRID, m"
-    )
-    shape_surface: Mapped[WKBElement | None] = mapped_column(
-        geometry("GEOMETRYZ"), comment="The same in space, tunnel's SRID, m"
-    )
-    drawn_by: Mapped[str | None] = mapped_column(comment="Who drew its outline last; none of what was detected")
-    drawn_at: Mapped[dt.datetime | None] = mapped_column(comment="When its outline was drawn last")
-    parent_id: Mapped[int | None] = mapped_column(
-        ForeignKey("tunnel.finding.id", ondelete="SET NULL"), comment="Finding that it was split off"
-    )
-    merged_into: Mapped[int | None] = mapped_column(
-        ForeignKey("tunnel.finding.id", ondelete="SET NULL"), comment="Finding that it is merged into: that one counts"
-    )
-    same_as: Mapped[int | None] = mapped_column(
-        ForeignKey("tunnel.finding.id", ondelete="SET NULL"), comment="Finding that is the same: that one counts"
-    )
-    dry_region_id: Mapped[int | None] = mapped_column(
-        ForeignKey(Region.id, ondelete="SET NULL"), comment="Dry region that it lies in: it does not count while it is open"
-    )
-    wet: Mapped[bool] = mapped_column(
-        server_default=text("true"), comment="Whether its kind counts as wet: kept by the database, from finding_kind"
-    )
-    superseded: Mapped[bool] = mapped_column(
-        Computed(
-            "merged_into IS NOT NULL OR same_as IS NOT NULL OR (dry_region_id IS NOT NULL AND review = 'open')", persisted=True
-        ),
-        comment="Whether another stands for it, or a dry region takes it away",
-    )
-
-
 class LearnedModel(Base):
     """What the model of evidence learned from the reviews of a tunnel."""
 
@@ -343,32 +192,3 @@ class LearnedModel(Base):
     active_from: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Since when it is in force")
     undone_by: Mapped[str | None] = mapped_column(comment="Who took it back")
     undone_at: Mapped[dt.datetime | None] = mapped_column(comment="When it was taken back")
-
-
-class BoundaryRegion(Base):
-    """A dark region that an end of its kilometre cuts."""
-
-    __tablename__ = "boundary_region"
-    __table_args__ = (
-        Index(None, "survey_id", "km"),
-        Index(None, "finding_id"),
-        {"comment": "Dark regions cut by an end of their kilometre, from which findings across several are merged"},
-    )
-
-    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
-    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
-    km: Mapped[int] = mapped_column(comment=KM)
-    pixel: Mapped[float] = mapped_column(comment="Edge of a pixel, m")
-    box: Mapped[list[int]] = mapped_column(
-        ARRAY(Integer), comment="First column (chainage / pixel), first row (arc / pixel), columns and rows of the mask"
-    )
-    mask: Mapped[bytes] = mapped_column(comment="Its dark pixels, a bit each, row by row from the lowest arc")
-    filled: Mapped[int] = mapped_column(BigInteger, comment="Its pixels that hold measured data")
-    darkening_sum: Mapped[float] = mapped_column(comment="Sum over them of the drop below dry lining, dB")
-    darkening_max: Mapped[float] = mapped_column(comment="Greatest drop below dry lining, dB")
-    properties: Mapped[Floats] = mapped_column(
-        server_default=text("'{}'"), comment="Sums over its pixels by which it is told what it is, see Region in leak/region.py"
-    )
-    finding_id: Mapped[int | None] = mapped_column(
-        ForeignKey(Finding.id, ondelete="SET NULL"), comment="Anomaly that it is a part of, if it is large enough"
-    )
