@@ -5,12 +5,12 @@
 -- (geometry/stationing.sql) and make_geometry_views (views/geometry.sql).
 
 -- What each reason adds to the logarithm of the odds of a leak, the strongest first, as "faint +2.3, rectangular -1.2".
-CREATE OR REPLACE FUNCTION tunnel_api.evidence_text(evidence jsonb) RETURNS text
+CREATE OR REPLACE FUNCTION tunnel_internal.evidence_text(evidence jsonb) RETURNS text
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE SET search_path = pg_catalog, pg_temp AS $$
     SELECT string_agg(e.key || ' ' || to_char(e.value::numeric, 'FMSG990.0'), ', ' ORDER BY abs(e.value::numeric) DESC, e.key)
       FROM jsonb_each_text($1) e WHERE abs(e.value::numeric) >= 0.05
 $$;
-COMMENT ON FUNCTION tunnel_api.evidence_text(jsonb) IS
+COMMENT ON FUNCTION tunnel_internal.evidence_text(jsonb) IS
     'What speaks for a leak and against it, in words: logarithms of odds by reason, the strongest first';
 
 CREATE OR REPLACE VIEW tunnel_api.anomaly AS
@@ -25,7 +25,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.area, a.drop_mean, a.drop_max, a.image_share,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.detected, a.created_at, a.detected_at,
        a.detected AND a.review <> 'rejected' AS counted,
-       tunnel_api.evidence_text(a.evidence) AS evidence, a.model, a.wet, a.origin,
+       tunnel_internal.evidence_text(a.evidence) AS evidence, a.model, a.wet, a.origin,
        a.unrolled::public.geometry(Polygon, 0) AS unrolled,
        a.map::public.geometry AS map,
        a.surface::public.geometry AS surface
@@ -94,5 +94,5 @@ BEGIN
 END
 $$;
 
-CALL tunnel_api.make_geometry_views('anomaly', 'anomaly', 'Anomalies', '; review, remark and kind can be updated');
-CALL tunnel_api.make_geometry_views('leak', 'leak', 'Leaks', '; review, remark and kind can be updated');
+CALL tunnel_internal.make_geometry_views('anomaly', 'anomaly', 'Anomalies', '; review, remark and kind can be updated');
+CALL tunnel_internal.make_geometry_views('leak', 'leak', 'Leaks', '; review, remark and kind can be updated');

@@ -116,7 +116,7 @@ BEGIN
     END LOOP;
 END
 $$;
-CALL tunnel_api.make_geometry_views(
+CALL tunnel_internal.make_geometry_views(
     'lining_finding', 'finding', 'Findings',
     ': polygons, lines and points are drawn, redrawn and reviewed here, and what was drawn is deleted');
 

@@ -209,7 +209,7 @@ def read_leaks(
     rows = conn.execute(query.format(columns, sql.Identifier(_COLUMN[geometry]), _CHOSEN), asked).fetchall()
     names = [*COLUMNS, "geometry"]
     sums = sql.SQL(
-        "SELECT count(*), coalesce(sum(tunnel_api.area_between(unrolled, area, %(low)s, %(high)s)), 0) {} AND counted"
+        "SELECT count(*), coalesce(sum(tunnel_internal.area_between(unrolled, area, %(low)s, %(high)s)), 0) {} AND counted"
     )
     summed = conn.execute(sums.format(_CHOSEN), asked).fetchone()
     assert summed is not None
