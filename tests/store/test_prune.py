@@ -41,7 +41,7 @@ def views(conn: psycopg.Connection) -> dict[str, list[str]]:
     listed = conn.execute("SELECT viewname FROM pg_views WHERE schemaname = 'tunnel_api'").fetchall()
     queries = {name: sql.SQL("SELECT v::text FROM tunnel_api.{} AS v").format(sql.Identifier(name)) for (name,) in listed}
     for function in ("stage_state", "queue_state"):
-        queries[function] = sql.SQL("SELECT s.id, f::text FROM tunnel.survey s, tunnel_api.{}(s.id) f").format(
+        queries[function] = sql.SQL("SELECT s.id, f::text FROM tunnel.survey s, tunnel_internal.{}(s.id) f").format(
             sql.Identifier(function)
         )
     queries["inputs"] = sql.SQL(INPUTS)
