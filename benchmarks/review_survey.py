@@ -44,7 +44,7 @@ _REPEAT = """
     )
     INSERT INTO tunnel.finding ({copied}, {figures})
     SELECT {copies}, {worked_out}
-      FROM fitted f CROSS JOIN LATERAL tunnel_api.drawn_figures(f.survey_id, f.outline, NULL) w
+      FROM fitted f CROSS JOIN LATERAL tunnel_internal.drawn_figures(f.survey_id, f.outline, NULL) w
 """
 
 

@@ -138,7 +138,7 @@ def _points(connection: Connection, survey: Survey, km: int, count: int) -> None
     girth = np.ptp(surface.arcs[0]) - 1e-3
     name = f"km-{km}.laz"
     file_id = _one(connection, "SELECT id FROM tunnel.scan_file WHERE survey_id = %s AND name = %s", (survey.id, name))
-    connection.execute("SELECT tunnel_api.partition_new(%s, %s)", (survey.id, km))
+    connection.execute("SELECT tunnel_internal.partition_new(%s, %s)", (survey.id, km))
 
     def chunks() -> Iterator[bytes]:
         for first in range(0, count, CHUNK):
@@ -156,7 +156,7 @@ def _points(connection: Connection, survey: Survey, km: int, count: int) -> None
             ])  # fmt: skip
 
     copy_binary(connection, partition(survey, km, "_new"), COLUMNS, chunks(), fresh=True)
-    connection.execute("SELECT tunnel_api.partition_swap(%s, %s)", (survey.id, km))
+    connection.execute("SELECT tunnel_internal.partition_swap(%s, %s)", (survey.id, km))
     connection.commit()
 
 
@@ -182,7 +182,7 @@ UNION ALL
 SELECT %(id)s, %(kilometres)s / 3, 'load', '2024-05-20 08:00Z', '2024-05-20 08:02Z', 'done', '{}', '{}', '{}'
 """
 
-SEGMENTS = "SELECT tunnel_api.segment_build(%(id)s, km) FROM generate_series(0, %(kilometres)s - 1) AS km"
+SEGMENTS = "SELECT tunnel_internal.segment_build(%(id)s, km) FROM generate_series(0, %(kilometres)s - 1) AS km"
 COUNTED = """
 UPDATE tunnel.segment SET points = %(points)s / (%(kilometres)s * 1000 / %(spacing)s) WHERE survey_id = %(id)s
 """
@@ -209,7 +209,7 @@ SELECT %(id)s, s.km, s.n, h.half, s.chainage_from + h.half / 100.0 * (s.chainage
      FROM ring r),
     900, CASE WHEN s.n %% 40 = 0 THEN 6 ELSE 0 END
 FROM tunnel.segment s CROSS JOIN (VALUES (25), (75)) AS h (half) CROSS JOIN listed l
-CROSS JOIN LATERAL (SELECT tunnel_api.segment_frame(
+CROSS JOIN LATERAL (SELECT tunnel_internal.segment_frame(
     s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to, h.half / 100.0) AS frame OFFSET 0) f
 WHERE s.survey_id = %(id)s
 """
@@ -256,7 +256,7 @@ FROM (
                                s.arc + s.across * r.reach * sin(pi() * (i %% 16) / 8) AS arc) p
 ) v
 JOIN tunnel.segment g ON g.survey_id = %(id)s AND g.n = floor(v.chainage / %(spacing)s)
-CROSS JOIN LATERAL (SELECT tunnel_api.segment_frame(g.vertex_from || g.vertex_to || g.tangent_from || g.tangent_to,
+CROSS JOIN LATERAL (SELECT tunnel_internal.segment_frame(g.vertex_from || g.vertex_to || g.tangent_from || g.tangent_to,
     (v.chainage - g.chainage_from) / (g.chainage_to - g.chainage_from)) AS f OFFSET 0) q
 GROUP BY v.number
 """
@@ -386,7 +386,7 @@ GROUND = """
 INSERT INTO tunnel.ground (survey_id, n, km, across, height, gamma, foot, lean, arc_left, arc_right, geom)
 SELECT %(id)s, m.n, m.n / 1000, -3.1, p.height, 0.05, '{-3.12,3.12}', '{-0.8,0.8}', -%(corner)s, %(corner)s, p.geom
 FROM tunnel.segment g, generate_series((g.n * %(spacing)s)::int, ((g.n + 1) * %(spacing)s)::int - 1) AS m (n)
-CROSS JOIN LATERAL (SELECT tunnel_api.segment_frame(g.vertex_from || g.vertex_to || g.tangent_from || g.tangent_to,
+CROSS JOIN LATERAL (SELECT tunnel_internal.segment_frame(g.vertex_from || g.vertex_to || g.tangent_from || g.tangent_to,
     (m.n - g.n * %(spacing)s) / %(spacing)s) AS f OFFSET 0) q
 CROSS JOIN LATERAL (
     SELECT array_agg(f[3] - %(floor)s ORDER BY i) AS height, ST_SetSRID(ST_MakeLine(ST_MakePoint(
@@ -546,7 +546,7 @@ STEPS = {
         DRAWN_AUDIT,
         PHOTOS,
         DRY_REGIONS,
-        "SELECT tunnel_api.pack_sums(%(id)s)",
+        "SELECT tunnel_internal.pack_sums(%(id)s)",
     ),
     "coverage and radiometry": (COVERAGE, RADIOMETRY, CURVES),
     "ground, clusters, target spheres": (GROUND, CLUSTERS, SPHERES),

@@ -144,7 +144,8 @@ def database(conn: psycopg.Connection[Any]) -> str:
     parts = [
         "# Views and functions",
         NOTE,
-        "Schema `tunnel_api`. Lengths are metres, chainage is in plan along the axis, arc is from the crown and positive to "
+        "Schema `tunnel_api`. What only its views and functions, triggers and the program call is in schema `tunnel_internal`. "
+        "Lengths are metres, chainage is in plan along the axis, arc is from the crown and positive to "
         "the right looking up-chainage, offset is positive into the tunnel. Angles of sections are degrees from the upward "
         "direction, positive to the right. Geometry is in the tunnel's SRID, or in the unrolled plane (chainage, arc), SRID 0.",
         "## Views",

@@ -55,10 +55,10 @@ DO $$
 DECLARE survey int; km int;
 BEGIN
     FOREACH survey IN ARRAY {surveys}::int[] LOOP
-        PERFORM tunnel_api.partition_parent(survey);
+        PERFORM tunnel_internal.partition_parent(survey);
         FOR km IN 0 .. {kilometres} - 1 LOOP
             EXECUTE format('CREATE TABLE tunnel.%I PARTITION OF tunnel.%I FOR VALUES IN (%s) WITH (autovacuum_enabled = off)',
-                tunnel_api.partition_name(survey, km), 'point_s' || survey, km);
+                tunnel_internal.partition_name(survey, km), 'point_s' || survey, km);
         END LOOP;
         EXECUTE format('INSERT INTO tunnel.%I SELECT %s, p.km, p.chainage, p.gps_time, p.geom, p.segment, p.scan_id, p.file_id,'
             'p.intensity, p.classification, p.class FROM first_point p', 'point_s' || survey, survey);
@@ -112,12 +112,15 @@ CROSS JOIN LATERAL ({runs}) AS q (stage, parameters) WHERE %(sample)s = {of}
 """
 
 RUNS = (
-    ("s.id", "SELECT 'deviation', jsonb_build_object('layer', 'lining') || tunnel_api.deviation_inputs(s.id, km, 'lining')"),
-    ("s.id", "SELECT 'evenness', jsonb_build_object('length', 2) || tunnel_api.evenness_inputs(s.id, km, 'lining')"),
-    ("s.id", "SELECT 'thickness', tunnel_api.thickness_inputs(o.id, s.id, km, 'lining')"),
-    ("s.id", "SELECT 'clearance', jsonb_build_object('track', 'single') || tunnel_api.clearance_inputs(s.id, km, 'A')"),
-    ("s.id", "SELECT 'rings', tunnel_api.ring_inputs(s.id, km)"),
-    ("o.id", "SELECT 'compare', jsonb_build_object('old', o.id, 'cell', 0.1) || tunnel_api.change_inputs(s.id, o.id, km)"),
+    (
+        "s.id",
+        "SELECT 'deviation', jsonb_build_object('layer', 'lining') || tunnel_internal.deviation_inputs(s.id, km, 'lining')",
+    ),
+    ("s.id", "SELECT 'evenness', jsonb_build_object('length', 2) || tunnel_internal.evenness_inputs(s.id, km, 'lining')"),
+    ("s.id", "SELECT 'thickness', tunnel_internal.thickness_inputs(o.id, s.id, km, 'lining')"),
+    ("s.id", "SELECT 'clearance', jsonb_build_object('track', 'single') || tunnel_internal.clearance_inputs(s.id, km, 'A')"),
+    ("s.id", "SELECT 'rings', tunnel_internal.ring_inputs(s.id, km)"),
+    ("o.id", "SELECT 'compare', jsonb_build_object('old', o.id, 'cell', 0.1) || tunnel_internal.change_inputs(s.id, o.id, km)"),
 )
 """Runs of the stages that have verbs of their own, with what they were made from: of the sample, or of the later survey."""
 

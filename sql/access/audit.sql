@@ -23,7 +23,7 @@ COMMENT ON COLUMN tunnel_api.audit.imported_at IS 'When it was brought in';
 
 -- Notes an edit: of what was and is, the columns that differ; nothing when none does. Without before it is an insert, without
 -- after a delete. Only the triggers, which run with the owner's rights, get through to the table. Returns the entry's id.
-CREATE OR REPLACE FUNCTION tunnel_api.note_edit(
+CREATE OR REPLACE FUNCTION tunnel_internal.note_edit(
     survey text, view text, row_id bigint, before jsonb, after jsonb, undoes bigint DEFAULT NULL, part_of bigint DEFAULT NULL,
     kept jsonb DEFAULT NULL) RETURNS bigint
 LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
@@ -34,5 +34,5 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_
      WHERE $4 IS DISTINCT FROM $5
     RETURNING id
 $$;
-COMMENT ON FUNCTION tunnel_api.note_edit(text, text, bigint, jsonb, jsonb, bigint, bigint, jsonb) IS
+COMMENT ON FUNCTION tunnel_internal.note_edit(text, text, bigint, jsonb, jsonb, bigint, bigint, jsonb) IS
     'Writes into the audit which columns of a row an edit changed; for the triggers of the views alone, called by no role';

@@ -2,13 +2,13 @@
 -- but the triggers of the views; those of an archive are taken from operators, and each says who brought it in and when, so that
 -- none is taken for what was seen to be done here.
 
-CREATE OR REPLACE FUNCTION tunnel_api.audit_reserve(count int) RETURNS SETOF bigint
+CREATE OR REPLACE FUNCTION tunnel_internal.audit_reserve(count int) RETURNS SETOF bigint
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER ROWS 1000 SET search_path = pg_catalog, pg_temp AS $$
     SELECT nextval('tunnel_audit.entry_id_seq'::regclass) FROM generate_series(1, $1)
 $$;
-COMMENT ON FUNCTION tunnel_api.audit_reserve(int) IS 'So many numbers of entries of the audit, growing, that nobody else gets; for survey import';
+COMMENT ON FUNCTION tunnel_internal.audit_reserve(int) IS 'So many numbers of entries of the audit, growing, that nobody else gets; for survey import';
 
-CREATE OR REPLACE FUNCTION tunnel_api.audit_import(survey_id int, entries jsonb) RETURNS int
+CREATE OR REPLACE FUNCTION tunnel_internal.audit_import(survey_id int, entries jsonb) RETURNS int
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     name constant text := (SELECT s.name FROM tunnel.survey s WHERE s.id = survey_id);
@@ -27,5 +27,5 @@ BEGIN
     RETURN done;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.audit_import(int, jsonb) IS
+COMMENT ON FUNCTION tunnel_internal.audit_import(int, jsonb) IS
     'Enters what an archive has of the audit of a survey, as imported by who calls, now; for survey import. Returns how many entries';

@@ -114,14 +114,14 @@ BEGIN
             RAISE WARNING 'no layers of SRID % are made: there is a schema % already that is not tunneldb''s', wanted.srid, wanted.schema;
             CONTINUE;
         END IF;
-        CALL tunnel_api.make_layer_schema(wanted.schema, wanted.srid);
+        CALL tunnel_internal.make_layer_schema(wanted.schema, wanted.srid);
     END LOOP;
 END
 $$;
 COMMENT ON PROCEDURE tunnel_api.make_layers() IS
     'Makes the schemas of typed layers of all coordinate systems that tunnels are in, and drops those of others; tunnel add and tunnel remove call it';
 
-CREATE OR REPLACE PROCEDURE tunnel_api.make_layer_schema(name text, srid int)
+CREATE OR REPLACE PROCEDURE tunnel_internal.make_layer_schema(name text, srid int)
 LANGUAGE plpgsql SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     layer record;
@@ -187,5 +187,5 @@ BEGIN
     END LOOP;
 END
 $$;
-COMMENT ON PROCEDURE tunnel_api.make_layer_schema(text, int) IS
+COMMENT ON PROCEDURE tunnel_internal.make_layer_schema(text, int) IS
     'Makes one schema of typed layers, of the tunnels with that SRID: views, comments, what may be edited and by whom; make_layers calls it';

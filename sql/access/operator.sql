@@ -1,7 +1,7 @@
 -- What only operators are to see in a view that all read: where files lie on the machines of those who process.
 
-CREATE OR REPLACE FUNCTION tunnel_api.for_operators(said text) RETURNS text
+CREATE OR REPLACE FUNCTION tunnel_internal.for_operators(said text) RETURNS text
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
     SELECT CASE WHEN coalesce(pg_has_role(to_regrole('tunnel_operator'), 'USAGE'), true) THEN said END
 $$;
-COMMENT ON FUNCTION tunnel_api.for_operators(text) IS 'The text, if who asks is an operator; NULL to others. Where there is no such role, to all';
+COMMENT ON FUNCTION tunnel_internal.for_operators(text) IS 'The text, if who asks is an operator; NULL to others. Where there is no such role, to all';

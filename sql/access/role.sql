@@ -47,14 +47,15 @@ END
 $$;
 
 REVOKE ALL ON SCHEMA tunnel FROM PUBLIC;
-REVOKE ALL ON SCHEMA tunnel_api FROM PUBLIC;
-REVOKE EXECUTE ON ALL FUNCTIONS IN SCHEMA tunnel_api FROM PUBLIC;
-REVOKE EXECUTE ON ALL PROCEDURES IN SCHEMA tunnel_api FROM PUBLIC;
+REVOKE ALL ON SCHEMA tunnel_api, tunnel_internal FROM PUBLIC;
+REVOKE EXECUTE ON ALL FUNCTIONS IN SCHEMA tunnel_api, tunnel_internal FROM PUBLIC;
+REVOKE EXECUTE ON ALL PROCEDURES IN SCHEMA tunnel_api, tunnel_internal FROM PUBLIC;
 REVOKE ALL ON SCHEMA tunnel_queue FROM PUBLIC;
 REVOKE ALL ON SCHEMA tunnel_audit FROM PUBLIC;  -- nobody's but the owner's: operators, who own schema tunnel, could drop it there
 
--- Viewers: all views, and the functions that only read. One that reads tables must itself run with the owner's rights
--- (SECURITY DEFINER) to be of use to them.
+-- Viewers: all views of tunnel_api, and its functions that only read. One that reads tables must itself run with the owner's
+-- rights (SECURITY DEFINER) to be of use to them. Of tunnel_internal, only the functions that run with the viewer's own rights:
+-- those that the views of tunnel_api call, and those that a function granted here names and that isn't SECURITY DEFINER.
 DO $$
 DECLARE
     f regprocedure;
@@ -62,11 +63,27 @@ BEGIN
     IF to_regrole('tunnel_viewer') IS NULL THEN
         RETURN;
     END IF;
-    GRANT USAGE ON SCHEMA tunnel_api TO tunnel_viewer;
+    GRANT USAGE ON SCHEMA tunnel_api, tunnel_internal TO tunnel_viewer;
     GRANT SELECT ON ALL TABLES IN SCHEMA tunnel_api TO tunnel_viewer;
-    FOR f IN SELECT p.oid FROM pg_proc p
-              WHERE p.pronamespace = 'tunnel_api'::regnamespace AND p.prokind = 'f'
-                AND p.provolatile <> 'v' LOOP
+    FOR f IN
+        WITH RECURSIVE reading AS (
+            SELECT p.oid, p.pronamespace::regnamespace::text || '.' || p.proname AS name, p.prosrc, p.prosecdef
+              FROM pg_proc p
+             WHERE p.pronamespace IN ('tunnel_api'::regnamespace, 'tunnel_internal'::regnamespace) AND p.prokind = 'f'
+               AND p.provolatile <> 'v'
+        ), granted AS (
+            SELECT r.* FROM reading r
+             WHERE r.name LIKE 'tunnel_api.%'
+                OR r.oid IN (SELECT d.refobjid FROM pg_depend d
+                               JOIN pg_rewrite w ON d.classid = 'pg_rewrite'::regclass AND d.objid = w.oid
+                               JOIN pg_class c ON c.oid = w.ev_class AND c.relnamespace IN ('tunnel_api'::regnamespace, 'tunnel_internal'::regnamespace)
+                              WHERE d.refclassid = 'pg_proc'::regclass)
+            UNION
+            SELECT r.* FROM granted g JOIN reading r ON g.prosrc ~ ('\m' || r.name || '\M')
+             WHERE NOT g.prosecdef
+        )
+        SELECT oid FROM granted
+    LOOP
         EXECUTE format('GRANT EXECUTE ON FUNCTION %s TO tunnel_viewer', f);
     END LOOP;
 END
@@ -105,11 +122,12 @@ BEGIN
     IF to_regrole('tunnel_operator') IS NULL THEN
         RETURN;
     END IF;
-    GRANT EXECUTE ON ALL FUNCTIONS IN SCHEMA tunnel_api TO tunnel_operator;
-    GRANT EXECUTE ON ALL PROCEDURES IN SCHEMA tunnel_api TO tunnel_operator;
+    GRANT SELECT ON ALL TABLES IN SCHEMA tunnel_internal TO tunnel_operator;
+    GRANT EXECUTE ON ALL FUNCTIONS IN SCHEMA tunnel_api, tunnel_internal TO tunnel_operator;
+    GRANT EXECUTE ON ALL PROCEDURES IN SCHEMA tunnel_api, tunnel_internal TO tunnel_operator;
     -- who may execute the function of a trigger may put it on a view of his own, which says what was before and after
     FOR f IN SELECT p.oid FROM pg_proc p
-              WHERE p.pronamespace = 'tunnel_api'::regnamespace
+              WHERE p.pronamespace = 'tunnel_internal'::regnamespace
                 AND (p.prorettype = 'trigger'::regtype OR p.proname IN ('note_edit', 'note_learned')) LOOP
         EXECUTE format('REVOKE EXECUTE ON FUNCTION %s FROM tunnel_operator', f);
     END LOOP;

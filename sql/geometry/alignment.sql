@@ -18,7 +18,7 @@ AS $$
                     array_agg(v.geom ORDER BY v.n) AS geom, array_agg(v.source ORDER BY v.n) AS source
                 FROM tunnel.axis_vertex v WHERE v.survey_id = $1) v
     -- side by side, both in the order of n: the planner would join them by comparing each with every other
-    CROSS JOIN LATERAL ROWS FROM (tunnel_api.axis_frame(v.n, v.x, v.y, v.z), unnest(v.geom), unnest(v.source))
+    CROSS JOIN LATERAL ROWS FROM (tunnel_internal.axis_frame(v.n, v.x, v.y, v.z), unnest(v.geom), unnest(v.source))
         AS d (n, x, y, z, tx, ty, tz, ux, uy, wx, wy, wz, geom, source)
     CROSS JOIN LATERAL (SELECT public.ST_X(d.geom) - d.x AS x, public.ST_Y(d.geom) - d.y AS y, public.ST_Z(d.geom) - d.z AS z OFFSET 0) q
     WHERE d.n * t.spacing BETWEEN t.low - 0.001 AND t.high + 0.001

@@ -3,7 +3,7 @@
 -- Vertices with their frames. Tangent: from the vertex before to the one after (Gonçalves et al., 2012, fig. 5); at an end,
 -- the parabola through three vertices; of two vertices, the chord. Right = tangent × vertical, up = right × tangent.
 -- n: vertex numbers; x, y, z: coordinates in the tunnel's SRID, m. Neighbours are those whose numbers differ by one.
-CREATE OR REPLACE FUNCTION tunnel_api.axis_frame(n int[], x float8[], y float8[], z float8[])
+CREATE OR REPLACE FUNCTION tunnel_internal.axis_frame(n int[], x float8[], y float8[], z float8[])
 RETURNS TABLE (
     n int, x float8, y float8, z float8,
     tx float8, ty float8, tz float8,
@@ -45,13 +45,13 @@ AS $$
     FROM tangent t, LATERAL (SELECT sqrt(t.tx ^ 2 + t.ty ^ 2) AS plan) p
     ORDER BY t.n
 $$;
-COMMENT ON FUNCTION tunnel_api.axis_frame(int[], float8[], float8[], float8[]) IS
+COMMENT ON FUNCTION tunnel_internal.axis_frame(int[], float8[], float8[], float8[]) IS
 'Vertices of an axis with unit tangent (t), right (u) and up (w) vectors, in the tunnel''s SRID. Neighbours are vertices whose numbers differ by one. Source: Gonçalves et al. (2012), fig. 5.';
 
 
 -- The points that may lie at most half_width (m) from the planes of vertices n, by their chainage, as text for FROM: number of
 -- the vertex and coordinates.
-CREATE OR REPLACE FUNCTION tunnel_api.axis_source(survey_id int, n int[], half_width float8)
+CREATE OR REPLACE FUNCTION tunnel_internal.axis_source(survey_id int, n int[], half_width float8)
 RETURNS text
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 AS $$
@@ -69,64 +69,64 @@ BEGIN
           -- chainage is good to a metre or so until the axis rests; the plane decides
           AND abs(p.chainage - round(p.chainage / %1$s) * %1$s) <= %4$s + 1.5
     $query$, spacing, low, high, half_width,
-        tunnel_api.partition_source(survey_id, floor(low / 1000)::int, floor(high / 1000)::int));
+        tunnel_internal.partition_source(survey_id, floor(low / 1000)::int, floor(high / 1000)::int));
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.axis_source(int, int[], float8) IS
+COMMENT ON FUNCTION tunnel_internal.axis_source(int, int[], float8) IS
 'What to read in FROM for the points near the planes of axis vertices n, by chainage: n, x, y, z (m).';
 
 
 -- The table in which axis_near sets points of a kilometre aside.
-CREATE OR REPLACE FUNCTION tunnel_api.axis_near_name(survey_id int, km int)
+CREATE OR REPLACE FUNCTION tunnel_internal.axis_near_name(survey_id int, km int)
 RETURNS text
 LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
 AS $$
-    SELECT tunnel_api.partition_name($1, $2) || '_axis'
+    SELECT tunnel_internal.partition_name($1, $2) || '_axis'
 $$;
-COMMENT ON FUNCTION tunnel_api.axis_near_name(int, int) IS
+COMMENT ON FUNCTION tunnel_internal.axis_near_name(int, int) IS
 'Name of the table of schema tunnel that stage axis has while it works on a kilometre.';
 
 
 -- Sets the points near the planes of vertices aside in a table, in the place of an older one, for the passes of axis_refine:
 -- those within half a metre more than half_width of their plane, and those 30 m and more from their vertex. Not a temporary
 -- table, which no parallel worker could read; it is there until the transaction ends.
-CREATE OR REPLACE FUNCTION tunnel_api.axis_near(
+CREATE OR REPLACE FUNCTION tunnel_internal.axis_near(
     survey_id int, km int, n int[], x float8[], y float8[], z float8[], half_width float8)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
 AS $$
 DECLARE
-    near constant text := tunnel_api.axis_near_name(survey_id, km);
+    near constant text := tunnel_internal.axis_near_name(survey_id, km);
 BEGIN
     EXECUTE format('DROP TABLE IF EXISTS tunnel.%I', near);
     EXECUTE format($query$
         CREATE UNLOGGED TABLE tunnel.%I AS
         SELECT p.n, p.x, p.y, p.z
         FROM (%s) p
-        JOIN tunnel_api.axis_frame($2, $3, $4, $5) f ON f.n = p.n
+        JOIN tunnel_internal.axis_frame($2, $3, $4, $5) f ON f.n = p.n
         CROSS JOIN LATERAL (SELECT p.x - f.x AS x, p.y - f.y AS y, p.z - f.z AS z) d
         WHERE abs(d.x * f.tx + d.y * f.ty + d.z * f.tz) <= $1 + 0.5 OR d.x * d.x + d.y * d.y + d.z * d.z > 900
-    $query$, near, tunnel_api.axis_source(axis_near.survey_id, axis_near.n, axis_near.half_width))
+    $query$, near, tunnel_internal.axis_source(axis_near.survey_id, axis_near.n, axis_near.half_width))
     USING axis_near.half_width, axis_near.n, axis_near.x, axis_near.y, axis_near.z;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.axis_near(int, int, int[], float8[], float8[], float8[], float8) IS
+COMMENT ON FUNCTION tunnel_internal.axis_near(int, int, int[], float8[], float8[], float8[], float8) IS
 'Sets the points near the planes of axis vertices of a kilometre aside, in the table that axis_near_name names: n, x, y, z (m).';
 
 
 -- Whether the planes of vertices have moved since points were set aside, so far that one within half_width of its plane may be
 -- missing: by half a metre within 30 m of the vertex. ox, oy, oz: where the vertices were then.
-CREATE OR REPLACE FUNCTION tunnel_api.axis_astray(
+CREATE OR REPLACE FUNCTION tunnel_internal.axis_astray(
     n int[], x float8[], y float8[], z float8[], ox float8[], oy float8[], oz float8[])
 RETURNS boolean
 LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
 AS $$
     SELECT coalesce(bool_or(abs((f.x - o.x) * f.tx + (f.y - o.y) * f.ty + (f.z - o.z) * f.tz)
         + 30.0 * sqrt((f.tx - o.tx) ^ 2 + (f.ty - o.ty) ^ 2 + (f.tz - o.tz) ^ 2) > 0.499), false)
-    FROM tunnel_api.axis_frame($1, $2, $3, $4) f
-    JOIN tunnel_api.axis_frame($1, $5, $6, $7) o ON o.n = f.n
+    FROM tunnel_internal.axis_frame($1, $2, $3, $4) f
+    JOIN tunnel_internal.axis_frame($1, $5, $6, $7) o ON o.n = f.n
 $$;
-COMMENT ON FUNCTION tunnel_api.axis_astray(int[], float8[], float8[], float8[], float8[], float8[], float8[]) IS
+COMMENT ON FUNCTION tunnel_internal.axis_astray(int[], float8[], float8[], float8[], float8[], float8[], float8[]) IS
 'Whether planes of axis vertices have moved by half a metre within 30 m of their vertex, since these were at ox, oy, oz.';
 
 
@@ -142,7 +142,7 @@ COMMENT ON FUNCTION tunnel_api.axis_astray(int[], float8[], float8[], float8[], 
 -- cut the walls' tops and the slopes say nothing of the tunnel's centre. Where fewer than three pairs of classes are filled it is the plain
 -- mean of the points, as the paper has it. A vertex whose slab holds fewer than min_points points is left out.
 -- near: what axis_near has set aside of the points; without it all are looked at.
-CREATE OR REPLACE FUNCTION tunnel_api.axis_shift(
+CREATE OR REPLACE FUNCTION tunnel_internal.axis_shift(
     survey_id int, n int[], x float8[], y float8[], z float8[],
     half_width float8 DEFAULT 1.0, angle_step float8 DEFAULT 5.0, min_points int DEFAULT 100, near regclass DEFAULT '-')
 RETURNS TABLE (vertex int, "right" float8, up float8, points bigint)
@@ -155,7 +155,7 @@ BEGIN
         WITH profile AS (
             SELECT f.n, q.u, q.w
             FROM (SELECT p.n, p.x, p.y, p.z FROM %s p) p
-            JOIN tunnel_api.axis_frame($4, $5, $6, $7) f ON f.n = p.n
+            JOIN tunnel_internal.axis_frame($4, $5, $6, $7) f ON f.n = p.n
             CROSS JOIN LATERAL (SELECT p.x - f.x AS dx, p.y - f.y AS dy, p.z - f.z AS dz) d
             CROSS JOIN LATERAL (SELECT d.dx * f.ux + d.dy * f.uy AS u, d.dx * f.wx + d.dy * f.wy + d.dz * f.wz AS w) q
             WHERE abs(d.dx * f.tx + d.dy * f.ty + d.dz * f.tz) <= $1
@@ -215,13 +215,13 @@ BEGIN
         JOIN roofed r ON r.n = t.n
         WHERE (r.has_roof OR NOT r.has_floor OR NOT (SELECT bool_or(o.has_roof) FROM roofed o)) AND t.points >= $3 AND (s.shift IS NOT NULL OR s.is_low IS NOT TRUE)
         ORDER BY t.n
-    $query$, CASE WHEN near = 0 THEN '(' || tunnel_api.axis_source(axis_shift.survey_id, axis_shift.n, axis_shift.half_width) || ')'
+    $query$, CASE WHEN near = 0 THEN '(' || tunnel_internal.axis_source(axis_shift.survey_id, axis_shift.n, axis_shift.half_width) || ')'
                   ELSE near::text END)
     USING axis_shift.half_width, axis_shift.angle_step, axis_shift.min_points,
         axis_shift.n, axis_shift.x, axis_shift.y, axis_shift.z;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.axis_shift(int, int[], float8[], float8[], float8[], float8, float8, int, regclass) IS
+COMMENT ON FUNCTION tunnel_internal.axis_shift(int, int[], float8[], float8[], float8[], float8, float8, int, regclass) IS
 'One pass of stage 1: how far each vertex lies from the tunnel''s centre, to the right and up in its plane, m, from the points within half_width of the plane, averaged by angular class. After Gonçalves et al. (2012), stage 1.';
 
 
@@ -232,7 +232,7 @@ COMMENT ON FUNCTION tunnel_api.axis_shift(int, int[], float8[], float8[], float8
 -- first great, a curve of the tunnel that begins at once the second; a vertex that is out of place both. At an end the first
 -- compares with the one neighbour, the second continues the parabola through three.
 -- x, y, z: places; gx, gy, gz: where the given axis has them, m. Neighbours are the next in the arrays.
-CREATE OR REPLACE FUNCTION tunnel_api.axis_residual(
+CREATE OR REPLACE FUNCTION tunnel_internal.axis_residual(
     n int[], x float8[], y float8[], z float8[], gx float8[], gy float8[], gz float8[])
 RETURNS TABLE (n int, deviation float8)
 LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
@@ -255,7 +255,7 @@ AS $$
     )
     SELECT r.n, sqrt(least(sum(r.shift ^ 2), sum(r.place ^ 2))) FROM residual r GROUP BY r.n ORDER BY r.n
 $$;
-COMMENT ON FUNCTION tunnel_api.axis_residual(int[], float8[], float8[], float8[], float8[], float8[], float8[]) IS
+COMMENT ON FUNCTION tunnel_internal.axis_residual(int[], float8[], float8[], float8[], float8[], float8[], float8[]) IS
 'How far each vertex of an axis lies off where its neighbours lead, m: the lesser of what its shift from the given axis differs from theirs, and its distance from the curve through their places.';
 
 
@@ -267,7 +267,7 @@ COMMENT ON FUNCTION tunnel_api.axis_residual(int[], float8[], float8[], float8[]
 -- in max_iterations passes, or lies farther than max_deviation off where its neighbours lead (axis_residual); of several side
 -- by side the worst first, then the others are asked again. axis_vertex.remark says why. It ends when all others rest, or when
 -- a greater share than max_rejected (and more than one) was taken out.
-CREATE OR REPLACE FUNCTION tunnel_api.axis_refine(
+CREATE OR REPLACE FUNCTION tunnel_internal.axis_refine(
     survey_id int, km int,
     half_width float8 DEFAULT 1.0, angle_step float8 DEFAULT 5.0,
     tolerance float8 DEFAULT 0.002, max_iterations int DEFAULT 20, min_points int DEFAULT 100,
@@ -288,7 +288,7 @@ DECLARE
     rejected int := 0;
     since int := 0;  -- pass in which the last one was
     worse text[];
-    near constant text := tunnel_api.axis_near_name(survey_id, km);
+    near constant text := tunnel_internal.axis_near_name(survey_id, km);
     ox float8[]; oy float8[]; oz float8[];  -- the vertices when the points near them were set aside
 BEGIN
     SELECT t.spacing INTO STRICT spacing
@@ -311,13 +311,13 @@ BEGIN
     FOR pass IN 1 .. axis_refine.max_iterations * cardinality(vn) LOOP
         -- a few millimetres may go to and fro for ever as points enter and leave the slab: later passes go a part of the way
         share := least(1.0, 5.0 / pass);
-        IF ox IS NULL OR tunnel_api.axis_astray(vn, vx, vy, vz, ox, oy, oz) THEN
-            PERFORM tunnel_api.axis_near(axis_refine.survey_id, axis_refine.km, vn, vx, vy, vz, axis_refine.half_width);
+        IF ox IS NULL OR tunnel_internal.axis_astray(vn, vx, vy, vz, ox, oy, oz) THEN
+            PERFORM tunnel_internal.axis_near(axis_refine.survey_id, axis_refine.km, vn, vx, vy, vz, axis_refine.half_width);
             ox := vx; oy := vy; oz := vz;
         END IF;
         WITH frame AS (
             SELECT f.*, g.gx, g.gy, g.gz, g.fixed, g.why
-            FROM tunnel_api.axis_frame(vn, vx, vy, vz) f
+            FROM tunnel_internal.axis_frame(vn, vx, vy, vz) f
             JOIN unnest(vn, gx, gy, gz, fixed, why) AS g (n, gx, gy, gz, fixed, why) ON g.n = f.n
         ), shifted AS (
             SELECT f.n, f.gx, f.gy, f.gz, f.fixed, f.x, f.y, f.z, s.points,
@@ -326,7 +326,7 @@ BEGIN
                 f.y + share * (s."right" * f.uy + s.up * f.wy) AS sy,
                 f.z + share * s.up * f.wz AS sz
             FROM frame f
-            LEFT JOIN tunnel_api.axis_shift(axis_refine.survey_id, vn, vx, vy, vz,
+            LEFT JOIN tunnel_internal.axis_shift(axis_refine.survey_id, vn, vx, vy, vz,
                 axis_refine.half_width, axis_refine.angle_step, axis_refine.min_points,
                 to_regclass('tunnel.' || quote_ident(near))) s
                 ON s.vertex = f.n AND NOT f.fixed AND f.why IS NULL
@@ -368,7 +368,7 @@ BEGIN
                       array_agg(v.z ORDER BY v.n) AS z, array_agg(v.gx ORDER BY v.n) AS gx,
                       array_agg(v.gy ORDER BY v.n) AS gy, array_agg(v.gz ORDER BY v.n) AS gz
                   FROM measured_vertex v) a
-            CROSS JOIN LATERAL tunnel_api.axis_residual(a.n, a.x, a.y, a.z, a.gx, a.gy, a.gz) d
+            CROSS JOIN LATERAL tunnel_internal.axis_residual(a.n, a.x, a.y, a.z, a.gx, a.gy, a.gz) d
         ), fault AS (  -- how many times the limit
             SELECT v.n, v.moved, d.deviation, d.deviation > axis_refine.max_deviation AS off,
                 greatest(v.moved / axis_refine.tolerance, d.deviation / axis_refine.max_deviation) AS times
@@ -400,8 +400,8 @@ BEGIN
     -- vertices next door go along where that kilometre holds no points; else it places them itself, first or last
     WHERE v.survey_id = axis_refine.survey_id AND v.n = p.n AND v.source <> 'edited'
       AND (v.km = axis_refine.km
-           OR to_regclass(format('tunnel.%I', tunnel_api.partition_name(v.survey_id, v.km))) IS NULL);
+           OR to_regclass(format('tunnel.%I', tunnel_internal.partition_name(v.survey_id, v.km))) IS NULL);
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.axis_refine(int, int, float8, float8, float8, int, int, float8, float8) IS
+COMMENT ON FUNCTION tunnel_internal.axis_refine(int, int, float8, float8, float8, int, int, float8, float8) IS
 'Stage 1 for one kilometre: moves the axis vertices onto the tunnel''s centre until none moves by tolerance (m) in a pass; returns each pass with its greatest move, m. Vertices edited by hand stay; one that does not rest in max_iterations passes, or lies farther than max_deviation (m) off where its neighbours lead, is interpolated, with a remark, as long as they are no greater share than max_rejected. After Gonçalves et al. (2012), stages 1 and 2.';

@@ -38,7 +38,7 @@ COMMENT ON FUNCTION tunnel_api.chainage_parse(text) IS
 
 
 -- What functions of a stretch or of kilometres begin with: one that runs backwards would be an empty one, with no leak in it.
-CREATE OR REPLACE FUNCTION tunnel_api.in_order(first float8, last float8, unit text DEFAULT 'm')
+CREATE OR REPLACE FUNCTION tunnel_internal.in_order(first float8, last float8, unit text DEFAULT 'm')
 RETURNS boolean
 LANGUAGE plpgsql IMMUTABLE STRICT PARALLEL SAFE
 SET search_path = pg_catalog, pg_temp
@@ -52,5 +52,5 @@ BEGIN
         USING ERRCODE = 'invalid_parameter_value';
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.in_order(float8, float8, text) IS
+COMMENT ON FUNCTION tunnel_internal.in_order(float8, float8, text) IS
 'True; an error where the end of a stretch (m) or of kilometres comes before its beginning.';

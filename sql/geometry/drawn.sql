@@ -4,7 +4,7 @@
 -- A point of the map strip (tunnel's SRID) in the unrolled plane (chainage, arc; SRID 0), from a chainage near it: the plane of
 -- the axis through it is sought step by step, each of which leaves the arc's share of the radius of curvature. NULL where there
 -- is no axis. The inverse of map_point.
-CREATE OR REPLACE FUNCTION tunnel_api.unmap_point(survey_id int, point geometry, near float8)
+CREATE OR REPLACE FUNCTION tunnel_internal.unmap_point(survey_id int, point geometry, near float8)
 RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 AS $$
@@ -17,8 +17,8 @@ DECLARE
     along float8;
 BEGIN
     FOR n IN 1..50 LOOP
-        axis := tunnel_api.map_point(survey_id, at, 0);
-        beside := tunnel_api.map_point(survey_id, at, 1);
+        axis := tunnel_internal.map_point(survey_id, at, 0);
+        beside := tunnel_internal.map_point(survey_id, at, 1);
         IF axis IS NULL THEN
             RETURN NULL;
         END IF;
@@ -33,11 +33,11 @@ BEGIN
     RETURN NULL;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.unmap_point(int, geometry, float8) IS
+COMMENT ON FUNCTION tunnel_internal.unmap_point(int, geometry, float8) IS
 'A point of the map strip (tunnel''s SRID) in the unrolled plane (chainage, arc; m), sought from a chainage near it; NULL where there is no axis. The inverse of map_point.';
 
 
-CREATE OR REPLACE FUNCTION tunnel_api.unmap_strip(survey_id int, shape geometry)
+CREATE OR REPLACE FUNCTION tunnel_internal.unmap_strip(survey_id int, shape geometry)
 RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 SECURITY DEFINER SET search_path = pg_catalog, pg_temp
@@ -63,7 +63,7 @@ BEGIN
                 UNION ALL
                 SELECT 0, public.ST_Segmentize(public.ST_Force2D(shape), 1.0) WHERE kind <> 'POLYGON') r
           CROSS JOIN LATERAL (
-              SELECT coalesce(v.path[1], 1) AS j, tunnel_api.unmap_point(survey_key, v.geom, near) AS carried
+              SELECT coalesce(v.path[1], 1) AS j, tunnel_internal.unmap_point(survey_key, v.geom, near) AS carried
               FROM public.ST_DumpPoints(r.line) v) p
           GROUP BY r.i) q;
     IF rings IS NULL OR array_position(rings, NULL) IS NOT NULL THEN
@@ -74,12 +74,12 @@ BEGIN
     RETURN rings[1];
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.unmap_strip(int, geometry) IS
+COMMENT ON FUNCTION tunnel_internal.unmap_strip(int, geometry) IS
 'A point, line or polygon of the map strip (tunnel''s SRID) in the unrolled plane (chainage, arc; m; SRID 0), edges cut to pieces of a metre. NULL if any vertex lies beyond the ends of the axis. The inverse of map_strip.';
 
 
 -- Clock position of a place on the lining, as detection has it: of the ray from the axis to it, above 0 up to 12.
-CREATE OR REPLACE FUNCTION tunnel_api.clock_at(survey_id int, chainage float8, arc float8)
+CREATE OR REPLACE FUNCTION tunnel_internal.clock_at(survey_id int, chainage float8, arc float8)
 RETURNS float8
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 SECURITY DEFINER SET search_path = pg_catalog, pg_temp
@@ -95,7 +95,7 @@ BEGIN
     IF place IS NULL OR s.n IS NULL THEN
         RETURN NULL;
     END IF;
-    frame := tunnel_api.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to,
+    frame := tunnel_internal.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to,
         (chainage - s.chainage_from) / (s.chainage_to - s.chainage_from));
     hours := degrees(atan2(
         (public.ST_X(place) - frame[1]) * frame[7] + (public.ST_Y(place) - frame[2]) * frame[8] + (public.ST_Z(place) - frame[3]) * frame[9],
@@ -103,14 +103,14 @@ BEGIN
     RETURN CASE WHEN hours > 0 THEN hours ELSE hours + 12 END;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.clock_at(int, float8, float8) IS
+COMMENT ON FUNCTION tunnel_internal.clock_at(int, float8, float8) IS
 'Clock position (hours above 0 up to 12: 12 is the crown, 3 right looking up-chainage) of a place of the unrolled plane (m); NULL off the tunnel.';
 
 
 -- A polygon drawn is its own outline; a line has one as wide as it is, at least a centimetre, and a point one of 5 cm about it, so
 -- that all can be found, drawn and exported as polygons. Area on the surface: that in the unrolled plane times the mean stretch
 -- of the surface against it (slope, curve) at 16 places.
-CREATE OR REPLACE FUNCTION tunnel_api.drawn_figures(
+CREATE OR REPLACE FUNCTION tunnel_internal.drawn_figures(
     survey_id int, drawn geometry, width float8,
     OUT km int, OUT chainage_from float8, OUT chainage_to float8, OUT arc_from float8, OUT arc_to float8, OUT clock float8,
     OUT area float8, OUT length float8, OUT unrolled geometry, OUT map geometry, OUT surface geometry,
@@ -181,8 +181,8 @@ BEGIN
     arc_from := public.ST_YMin(unrolled);
     arc_to := public.ST_YMax(unrolled);
     km := floor((chainage_from + chainage_to) / 2000);
-    clock := tunnel_api.clock_at(survey_id, public.ST_X(middle), public.ST_Y(middle));
+    clock := tunnel_internal.clock_at(survey_id, public.ST_X(middle), public.ST_Y(middle));
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.drawn_figures(int, geometry, float8) IS
+COMMENT ON FUNCTION tunnel_internal.drawn_figures(int, geometry, float8) IS
 'All that follows from a polygon, line (with its width, m) or point drawn in the unrolled plane (chainage, arc; m): kilometre and clock position of its middle, extent, area and length on the surface, outline and three geometries. An error if it is not valid or reaches beyond the lining.';

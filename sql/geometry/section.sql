@@ -2,20 +2,20 @@
 
 -- The planes of the sections of a kilometre, at 25 % and 75 % of each segment, within what was scanned: beyond its end a slab
 -- would show the portal's face and what stands before it. Needs km_ends (geometry/survey_ends.sql).
-CREATE OR REPLACE FUNCTION tunnel_api.section_plane(survey_id int, km int)
+CREATE OR REPLACE FUNCTION tunnel_internal.section_plane(survey_id int, km int)
 RETURNS TABLE (segment int, half int2, chainage float8, frame float8[])
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 ROWS 200
 AS $$
     SELECT s.n, h.half::int2, s.chainage_from + h.half / 100.0 * (s.chainage_to - s.chainage_from),
-        tunnel_api.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to, h.half / 100.0)
+        tunnel_internal.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to, h.half / 100.0)
     FROM tunnel.segment s CROSS JOIN (VALUES (25), (75)) AS h (half)
-    JOIN tunnel_api.km_ends e ON e.survey_id = s.survey_id AND e.km = s.km
+    JOIN tunnel_internal.km_ends e ON e.survey_id = s.survey_id AND e.km = s.km
     WHERE s.survey_id = section_plane.survey_id AND s.km = section_plane.km
         AND s.chainage_from + h.half / 100.0 * (s.chainage_to - s.chainage_from) BETWEEN e.chainage_from AND e.chainage_to
     ORDER BY 3
 $$;
-COMMENT ON FUNCTION tunnel_api.section_plane(int, int) IS
+COMMENT ON FUNCTION tunnel_internal.section_plane(int, int) IS
 'Planes of the cross-sections of one kilometre, at 25 % and 75 % of each segment, within what was scanned: chainage (m) and frame (origin, tangent, right, up; 12 numbers). Source: Gonçalves et al. (2012), stage 4.';
 
 
@@ -23,7 +23,7 @@ COMMENT ON FUNCTION tunnel_api.section_plane(int, int) IS
 -- far from it they are in chainage, m. Where
 -- sonar scans were loaded, those on the bed and on the submerged lining belong to it; what the laser has below 0.1 m above
 -- the water there are images mirrored by it, or the water itself.
-CREATE OR REPLACE FUNCTION tunnel_api.section_slab(survey_id int, chainage float8, frame float8[], half_width float8)
+CREATE OR REPLACE FUNCTION tunnel_internal.section_slab(survey_id int, chainage float8, frame float8[], half_width float8)
 RETURNS TABLE (u float8, w float8, away float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 1000
@@ -42,14 +42,14 @@ BEGIN
         SELECT d.x * $1[7] + d.y * $1[8], d.x * $1[10] + d.y * $1[11] + d.z * $1[12], d.away
         FROM (%s FROM %s p WHERE p.chainage BETWEEN $3 AND $4 %s
               OFFSET 0) d  -- a fence: the coordinates are taken out once
-    $query$, from_origin, tunnel_api.partition_source(section_slab.survey_id, km_from, km_to), CASE WHEN water IS NOT NULL THEN
+    $query$, from_origin, tunnel_internal.partition_source(section_slab.survey_id, km_from, km_to), CASE WHEN water IS NOT NULL THEN
         'AND public.ST_Z(p.geom) >= $5 + 0.1 UNION ALL ' || from_origin || ' FROM tunnel.sonar_point p'
         ' WHERE p.survey_id = $6 AND p.classification IN (40, 42) AND p.chainage BETWEEN $3 AND $4' END)
     USING frame, section_slab.chainage, section_slab.chainage - half_width, section_slab.chainage + half_width, water,
         section_slab.survey_id;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.section_slab(int, float8, float8[], float8) IS
+COMMENT ON FUNCTION tunnel_internal.section_slab(int, float8, float8[], float8) IS
 'Points at most half_width (m of chainage) from the plane of a section, those of sonar scans on the bed and the submerged lining included, in its frame: right and up of the axis, and how far from the plane in chainage, m. Source: Gonçalves et al. (2012), stage 4.';
 
 
@@ -63,7 +63,7 @@ COMMENT ON FUNCTION tunnel_api.section_slab(int, float8, float8[], float8) IS
 -- radius, parallel to that through the medians of the classes beside it; what the median leaves out can't shift it.
 -- sigma: standard deviation of the points kept from the line, m; spread: variance of their position along it, m².
 -- only: the sections wanted, as segment * 100 + half.
-CREATE OR REPLACE FUNCTION tunnel_api.section_classes(
+CREATE OR REPLACE FUNCTION tunnel_internal.section_classes(
     survey_id int, km int, half_width float8, angle_step float8, "only" int[])
 RETURNS TABLE (
     segment int, half int2, class int, radius float8, slope float8, sigma float8, spread float8, points bigint)
@@ -76,12 +76,12 @@ AS $$
     -- OFFSET 0 is a fence: each step is reckoned once, not in each place where it is used.
     WITH plane AS MATERIALIZED (
         SELECT p.segment, p.half, p.chainage, p.frame, row_number() OVER (ORDER BY p.segment, p.half)::int AS i
-        FROM tunnel_api.section_plane(section_classes.survey_id, section_classes.km) p
+        FROM tunnel_internal.section_plane(section_classes.survey_id, section_classes.km) p
         WHERE p.segment * 100 + p.half = ANY (section_classes."only")
     ), polar AS (
         SELECT p.i, sqrt(q.u * q.u + q.w * q.w) AS r, degrees(atan2(q.u, q.w)) + 180 AS angle
         FROM plane p
-        CROSS JOIN LATERAL tunnel_api.section_slab(
+        CROSS JOIN LATERAL tunnel_internal.section_slab(
             section_classes.survey_id, p.chainage, p.frame, section_classes.half_width) q
         OFFSET 0
     ), classed AS (
@@ -131,5 +131,5 @@ AS $$
     JOIN plane p ON p.i = f.number / 360
     ORDER BY 1, 2, 3
 $$;
-COMMENT ON FUNCTION tunnel_api.section_classes(int, int, float8, float8, int[]) IS
+COMMENT ON FUNCTION tunnel_internal.section_classes(int, int, float8, float8, int[]) IS
 'Angular classes of the sections of one kilometre: a line through the points within two standard deviations, by class of angle_step degrees counted from -180°. radius, sigma in m, slope in m/m, spread in m². Source: Gonçalves et al. (2012), stage 4.';

@@ -3,7 +3,7 @@
 -- The narrowest slab in which each section of a kilometre may have what section_gather asks for: half_width, twice that, or
 -- four times where nine classes of ten do not hold enough points even before any is left out. For who need not try the others.
 -- section: segment * 100 + half.
-CREATE OR REPLACE FUNCTION tunnel_api.section_least_width(
+CREATE OR REPLACE FUNCTION tunnel_internal.section_least_width(
     survey_id int, km int, angle_step float8, half_width float8, min_points int)
 RETURNS TABLE (section int, width float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
@@ -12,8 +12,8 @@ AS $$
     WITH polar AS (
         SELECT p.segment * 100 + p.half AS section, q.away,
             floor((degrees(atan2(q.u, q.w)) + 180) / section_least_width.angle_step) AS class
-        FROM tunnel_api.section_plane(section_least_width.survey_id, section_least_width.km) p
-        CROSS JOIN LATERAL tunnel_api.section_slab(
+        FROM tunnel_internal.section_plane(section_least_width.survey_id, section_least_width.km) p
+        CROSS JOIN LATERAL tunnel_internal.section_slab(
             section_least_width.survey_id, p.chainage, p.frame, 2 * section_least_width.half_width) q
         OFFSET 0
     ), class AS (
@@ -29,11 +29,11 @@ AS $$
     )
     SELECT p.segment * 100 + p.half, section_least_width.half_width
         * CASE WHEN f.once >= 0.9 * n.classes THEN 1 WHEN f.twice >= 0.9 * n.classes THEN 2 ELSE 4 END
-    FROM tunnel_api.section_plane(section_least_width.survey_id, section_least_width.km) p
+    FROM tunnel_internal.section_plane(section_least_width.survey_id, section_least_width.km) p
     CROSS JOIN (SELECT round(360 / section_least_width.angle_step) AS classes) n
     LEFT JOIN filled f ON f.section = p.segment * 100 + p.half
 $$;
-COMMENT ON FUNCTION tunnel_api.section_least_width(int, int, float8, float8, int) IS
+COMMENT ON FUNCTION tunnel_internal.section_least_width(int, int, float8, float8, int) IS
 'Of each section (segment * 100 + half) of one kilometre the narrowest slab in which nine classes of ten hold four times min_points points, counted before any is left out: half_width, two or at least four times that, m.';
 
 
@@ -43,7 +43,7 @@ COMMENT ON FUNCTION tunnel_api.section_least_width(int, int, float8, float8, int
 -- of ten hold four times min_points points: enough for their median to tell the wall from the cables and brackets before it,
 -- the bolt pockets in it. Where profiles are far apart it widens further, up to max_half_width, until nine of ten hold
 -- min_points: a class of so many counts. Slabs that have too few points from the outset are passed over.
-CREATE OR REPLACE FUNCTION tunnel_api.section_gather(
+CREATE OR REPLACE FUNCTION tunnel_internal.section_gather(
     survey_id int, km int, angle_step float8, half_width float8, max_half_width float8, min_points int)
 RETURNS TABLE (
     segment int, half int2, width float8,
@@ -61,12 +61,12 @@ DECLARE
     finished int[] := '{}'::int[];
 BEGIN
     SELECT array_agg(l.section), array_agg(least(l.width, max_half_width)) INTO pending, widths
-    FROM tunnel_api.section_least_width(
+    FROM tunnel_internal.section_least_width(
         section_gather.survey_id, section_gather.km, section_gather.angle_step, slab, section_gather.min_points) l;
     WHILE cardinality(pending) > 0 LOOP
         FOR segment, half, width, radius, slope, sigma, spread, points IN
             WITH class AS MATERIALIZED (
-                SELECT c.* FROM tunnel_api.section_classes(
+                SELECT c.* FROM tunnel_internal.section_classes(
                     section_gather.survey_id, section_gather.km, slab, section_gather.angle_step,
                     ARRAY(SELECT w.section FROM unnest(pending, widths) AS w (section, width) WHERE w.width <= slab)) c
                 WHERE c.points >= section_gather.min_points
@@ -95,13 +95,13 @@ BEGIN
     END LOOP;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.section_gather(int, int, float8, float8, float8, int) IS
+COMMENT ON FUNCTION tunnel_internal.section_gather(int, int, float8, float8, float8, int) IS
 'Angular classes of each section of one kilometre as arrays; the slab (width: half of it, m) is widened until nine classes of ten hold four times min_points points, from four times half_width on min_points; a class of so many counts.';
 
 
 -- Whether a section has a roof: at least a third of the classes within 45° of the upward direction are filled (radius: over the
 -- classes, NULL for an empty one). A portal or an open cut has none, and no lining.
-CREATE OR REPLACE FUNCTION tunnel_api.section_roofed(angle_step float8, radius float8[])
+CREATE OR REPLACE FUNCTION tunnel_internal.section_roofed(angle_step float8, radius float8[])
 RETURNS boolean
 LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
 AS $$
@@ -109,12 +109,12 @@ AS $$
     FROM unnest($2) WITH ORDINALITY AS k (radius, class)
     WHERE abs((k.class - 0.5) * $1 - 180) < 45
 $$;
-COMMENT ON FUNCTION tunnel_api.section_roofed(float8, float8[]) IS
+COMMENT ON FUNCTION tunnel_internal.section_roofed(float8, float8[]) IS
 'Whether at least a third of the angular classes within 45° of the upward direction are filled: without a roof there is no lining. radius: over the classes, counted from -180°, NULL for an empty one.';
 
 
 -- Where a kilometre has a floor and no roof, so no section: the chainage that each such plane stands for, m.
-CREATE OR REPLACE FUNCTION tunnel_api.section_open(
+CREATE OR REPLACE FUNCTION tunnel_internal.section_open(
     survey_id int, km int, angle_step float8, max_half_width float8, min_points int)
 RETURNS TABLE (chainage_from float8, chainage_to float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
@@ -123,10 +123,10 @@ AS $$
     WITH class AS MATERIALIZED (
         SELECT c.segment, c.half, c.class, c.radius
         FROM (SELECT coalesce(array_agg(p.segment * 100 + p.half), '{}') AS missing
-              FROM tunnel_api.section_plane($1, $2) p
+              FROM tunnel_internal.section_plane($1, $2) p
               WHERE NOT EXISTS (SELECT FROM tunnel.section s
                                 WHERE s.survey_id = $1 AND s.km = $2 AND s.segment = p.segment AND s.half = p.half)) m
-        CROSS JOIN LATERAL tunnel_api.section_classes($1, $2, $4, $3, m.missing) c
+        CROSS JOIN LATERAL tunnel_internal.section_classes($1, $2, $4, $3, m.missing) c
         WHERE c.points >= $5
     ), seen AS (
         SELECT d.segment, d.half, array_agg(c.radius ORDER BY i) AS radius,
@@ -140,10 +140,10 @@ AS $$
     SELECT s.chainage_from + (q.half - 25) / 100.0 * (s.chainage_to - s.chainage_from),
         s.chainage_from + (q.half + 25) / 100.0 * (s.chainage_to - s.chainage_from)
     FROM seen q JOIN tunnel.segment s ON s.survey_id = $1 AND s.km = $2 AND s.n = q.segment
-    WHERE q.floored AND NOT tunnel_api.section_roofed($3, q.radius)
+    WHERE q.floored AND NOT tunnel_internal.section_roofed($3, q.radius)
     ORDER BY 1
 $$;
-COMMENT ON FUNCTION tunnel_api.section_open(int, int, float8, float8, int) IS
+COMMENT ON FUNCTION tunnel_internal.section_open(int, int, float8, float8, int) IS
 'Where a kilometre has a floor and no roof, as at portals and in open cuts, and therefore no section: chainage from and to of each plane, m.';
 
 
@@ -156,7 +156,7 @@ COMMENT ON FUNCTION tunnel_api.section_open(int, int, float8, float8, int) IS
 -- wall that the section by itself did not tell from it: it is rejected, and the curve drawn again. Where more than a quarter
 -- of the classes stand in, it is the tunnel that is narrower, and nothing is rejected. Below the water nothing is, either: what
 -- stands there before the wall or on the bed was left out by the class of its points, and a bed has its own shape anywhere.
-CREATE OR REPLACE FUNCTION tunnel_api.section_curves(
+CREATE OR REPLACE FUNCTION tunnel_internal.section_curves(
     survey_id int, km int, angle_step float8, half_width float8, max_half_width float8, min_points int, protrusion float8)
 RETURNS TABLE (
     segment int, half int2, width float8, slope float8[], sigma float8[], points bigint[],
@@ -167,13 +167,13 @@ SET enable_nestloop = off  -- the planner expects few classes and would compare 
 AS $$
     WITH gathered AS MATERIALIZED (
         SELECT row_number() OVER (ORDER BY g.segment, g.half) AS i, g.*
-        FROM tunnel_api.section_gather(section_curves.survey_id, section_curves.km, section_curves.angle_step,
+        FROM tunnel_internal.section_gather(section_curves.survey_id, section_curves.km, section_curves.angle_step,
             section_curves.half_width, section_curves.max_half_width, section_curves.min_points) g
-        WHERE tunnel_api.section_roofed(section_curves.angle_step, g.radius)
+        WHERE tunnel_internal.section_roofed(section_curves.angle_step, g.radius)
     ), alone AS MATERIALIZED (
         SELECT g.i, q.*
         FROM gathered g
-        CROSS JOIN LATERAL tunnel_api.section_curve(
+        CROSS JOIN LATERAL tunnel_internal.section_curve(
             section_curves.angle_step, g.radius, g.slope, g.sigma, g.spread, section_curves.protrusion) q
         WHERE q.node_radius IS NOT NULL
     ), class AS (
@@ -195,7 +195,7 @@ AS $$
         SELECT b.i, array_agg(b.class::int) AS classes
         FROM beside b JOIN usual u ON u.i = b.i
         JOIN gathered g ON g.i = b.i
-        JOIN tunnel_api.section_plane(section_curves.survey_id, section_curves.km) p ON p.segment = g.segment AND p.half = g.half
+        JOIN tunnel_internal.section_plane(section_curves.survey_id, section_curves.km) p ON p.segment = g.segment AND p.half = g.half
         WHERE b.apart < -u.tolerance AND NOT EXISTS (
             SELECT FROM tunnel.water_level w
             WHERE w.survey_id = section_curves.survey_id AND w.km = section_curves.km
@@ -209,7 +209,7 @@ AS $$
         CROSS JOIN LATERAL (
             SELECT array_agg(CASE WHEN k.class = ANY (h.classes) THEN NULL ELSE k.radius END ORDER BY k.class) AS radius
             FROM unnest(g.radius) WITH ORDINALITY AS k (radius, class)) r
-        CROSS JOIN LATERAL tunnel_api.section_curve(
+        CROSS JOIN LATERAL tunnel_internal.section_curve(
             section_curves.angle_step, r.radius, g.slope, g.sigma, g.spread, section_curves.protrusion) q
         WHERE q.node_radius IS NOT NULL
     )
@@ -223,12 +223,12 @@ AS $$
     LEFT JOIN again b ON b.i = g.i
     ORDER BY g.i
 $$;
-COMMENT ON FUNCTION tunnel_api.section_curves(int, int, float8, float8, float8, int, float8) IS
+COMMENT ON FUNCTION tunnel_internal.section_curves(int, int, float8, float8, float8, int, float8) IS
 'The curves of the sections of one kilometre, each compared with its neighbours: radius and arc (m) at each degree from -180° to 180°, and radius and state of each angular class.';
 
 
 -- Writes the sections of a kilometre to tunnel.section and tunnel.section_class, replacing those there; returns how many.
-CREATE OR REPLACE FUNCTION tunnel_api.section_build(
+CREATE OR REPLACE FUNCTION tunnel_internal.section_build(
     survey_id int, km int,
     angle_step float8 DEFAULT 5.0, half_width float8 DEFAULT 0.15, max_half_width float8 DEFAULT 2.5, min_points int DEFAULT 5,
     protrusion float8 DEFAULT 0.03)
@@ -244,9 +244,9 @@ BEGIN
     DELETE FROM tunnel.section s WHERE s.survey_id = section_build.survey_id AND s.km = section_build.km;
     WITH curve AS MATERIALIZED (
         SELECT c.*, p.chainage, p.frame
-        FROM tunnel_api.section_curves(section_build.survey_id, section_build.km, section_build.angle_step,
+        FROM tunnel_internal.section_curves(section_build.survey_id, section_build.km, section_build.angle_step,
             section_build.half_width, section_build.max_half_width, section_build.min_points, section_build.protrusion) c
-        JOIN tunnel_api.section_plane(section_build.survey_id, section_build.km) p ON p.segment = c.segment AND p.half = c.half
+        JOIN tunnel_internal.section_plane(section_build.survey_id, section_build.km) p ON p.segment = c.segment AND p.half = c.half
     ), written AS (
         INSERT INTO tunnel.section (survey_id, km, segment, half, chainage, half_width, angle_step, radius, arc, geom,
             points, interpolated)
@@ -277,5 +277,5 @@ BEGIN
     RETURN built;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.section_build(int, int, float8, float8, float8, int, float8) IS
+COMMENT ON FUNCTION tunnel_internal.section_build(int, int, float8, float8, float8, int, float8) IS
 'Stage 4 for one kilometre: rewrites tunnel.section and tunnel.section_class; returns the number of sections. angle_step in degrees, widths in m. Source: Gonçalves et al. (2012), stage 4.';

@@ -2,7 +2,7 @@
 
 -- Radius between two classes, by the cubic through both with their slopes: s from 0 to 1 is the share of the way, slopes are
 -- in m over the whole way.
-CREATE OR REPLACE FUNCTION tunnel_api.section_between(
+CREATE OR REPLACE FUNCTION tunnel_internal.section_between(
     s float8, radius_a float8, slope_a float8, radius_b float8, slope_b float8)
 RETURNS float8
 LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT  -- so that it is inlined
@@ -10,13 +10,13 @@ AS $$
     SELECT radius_a + s * (slope_a + s * (
         3 * (radius_b - radius_a) - 2 * slope_a - slope_b + s * (2 * (radius_a - radius_b) + slope_a + slope_b)))
 $$;
-COMMENT ON FUNCTION tunnel_api.section_between(float8, float8, float8, float8, float8) IS
+COMMENT ON FUNCTION tunnel_internal.section_between(float8, float8, float8, float8, float8) IS
 'Radius (m) at the share s (0-1) of the way from one angular class to another: the cubic Hermite curve with their radii (m) and slopes (m over the whole way).';
 
 
 -- Where the lines of two classes meet: angle (degrees) and radius (m); NULL if they don't between the two classes.
 -- The classes stand at angles a and b (degrees), their lines at radius (m) with slope (m/m) in each class' own frame.
-CREATE OR REPLACE FUNCTION tunnel_api.section_corner(
+CREATE OR REPLACE FUNCTION tunnel_internal.section_corner(
     angle_a float8, radius_a float8, slope_a float8, angle_b float8, radius_b float8, slope_b float8)
 RETURNS float8[]
 LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE STRICT
@@ -47,7 +47,7 @@ BEGIN
     RETURN ARRAY[angle_a + angle, sqrt(x * x + y * y)];
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.section_corner(float8, float8, float8, float8, float8, float8) IS
+COMMENT ON FUNCTION tunnel_internal.section_corner(float8, float8, float8, float8, float8, float8) IS
 'Angle (degrees) and radius (m) where the lines of two angular classes meet; NULL if not between them.';
 
 
@@ -65,7 +65,7 @@ COMMENT ON FUNCTION tunnel_api.section_corner(float8, float8, float8, float8, fl
 -- Arc is the length of this curve from the upward direction, positive to the right. NULL if under a third of the classes
 -- are filled or more than 120° in a row is empty.
 -- radius (m), slope (m/m), sigma (m), spread (m²): of the classes in order from -180°, NULL for an empty one.
-CREATE OR REPLACE FUNCTION tunnel_api.section_curve(
+CREATE OR REPLACE FUNCTION tunnel_internal.section_curve(
     angle_step float8, radius float8[], slope float8[], sigma float8[], spread float8[], protrusion float8 DEFAULT 0.03,
     OUT node_radius float8[], OUT node_arc float8[], OUT class_radius float8[], OUT class_state text[])
 LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT
@@ -124,7 +124,7 @@ BEGIN
         a := (k + classes - 2) % classes + 1;
         c := k % classes + 1;
         IF r[k] IS NOT NULL AND r[a] IS NOT NULL AND r[c] IS NOT NULL THEN
-            differences := differences || abs(r[k] - tunnel_api.section_between(
+            differences := differences || abs(r[k] - tunnel_internal.section_between(
                 0.5, r[a], 2 * step * r[a] * b[a], r[c], 2 * step * r[c] * b[c]));
         END IF;
     END LOOP;
@@ -147,7 +147,7 @@ BEGIN
                 EXIT WHEN NOT apart;
             END LOOP;
             CONTINUE WHEN NOT apart OR abs((g + 1) * step - (atan(b[j]) - atan(b[i]))) < radians(45)
-                OR tunnel_api.section_corner(0, r[i], b[i], (g + 1) * angle_step, r[j], b[j]) IS NULL;
+                OR tunnel_internal.section_corner(0, r[i], b[i], (g + 1) * angle_step, r[j], b[j]) IS NULL;
             FOR c IN 0 .. g - 1 LOOP
                 class_state[(k + c - 1) % classes + 1] := 'rejected';
             END LOOP;
@@ -184,17 +184,17 @@ BEGIN
             FOR c IN k .. k + g - 1 LOOP
                 a := (c - 1) % classes + 1;
                 apart := apart AND class_state[a] = 'measured' AND NOT (chamfer AND sigma[a] <= greatest(3 * usual, 0.01))
-                    AND r[a] < tunnel_api.section_between((c - beside[1])::float8 / (beside[3] - beside[1]),
+                    AND r[a] < tunnel_internal.section_between((c - beside[1])::float8 / (beside[3] - beside[1]),
                         r[i], way * r[i] * b[i], r[j], way * r[j] * b[j]) - tolerance;
                 EXIT WHEN NOT apart;
             END LOOP;
             CONTINUE WHEN NOT apart;
             wide := (beside[3] - beside[2]) * step;
-            CONTINUE WHEN abs(r[i] - tunnel_api.section_between(
+            CONTINUE WHEN abs(r[i] - tunnel_internal.section_between(
                     (beside[1] - beside[2])::float8 / (beside[3] - beside[2]),
                     r[first], wide * r[first] * b[first], r[j], wide * r[j] * b[j])) > tolerance;
             wide := (beside[4] - beside[1]) * step;
-            CONTINUE WHEN abs(r[j] - tunnel_api.section_between(
+            CONTINUE WHEN abs(r[j] - tunnel_internal.section_between(
                     (beside[3] - beside[1])::float8 / (beside[4] - beside[1]),
                     r[i], wide * r[i] * b[i], r[last], wide * r[last] * b[last])) > tolerance;
             FOR c IN 0 .. g - 1 LOOP
@@ -233,7 +233,7 @@ BEGIN
             way := radians(angles[i + 1] - angles[i]);
             at_corner := NULL;
             IF abs(turn) > greatest(30, 2.5 * (angles[i + 1] - angles[i])) THEN
-                at_corner := tunnel_api.section_corner(
+                at_corner := tunnel_internal.section_corner(
                     angles[i], radii[i], slopes[i], angles[i + 1], radii[i + 1], slopes[i + 1]);
                 IF at_corner IS NOT NULL THEN
                     corners := corners || at_corner;
@@ -241,7 +241,7 @@ BEGIN
             END IF;
         END IF;
         IF at_corner IS NULL THEN
-            node_radius[k + 181] := tunnel_api.section_between((k - angles[i]) / (angles[i + 1] - angles[i]),
+            node_radius[k + 181] := tunnel_internal.section_between((k - angles[i]) / (angles[i + 1] - angles[i]),
                 radii[i], way * radii[i] * slopes[i], radii[i + 1], way * radii[i + 1] * slopes[i + 1]);
         ELSE
             j := CASE WHEN k < at_corner[1] THEN i ELSE i + 1 END;
@@ -291,5 +291,5 @@ BEGIN
     END LOOP;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.section_curve(float8, float8[], float8[], float8[], float8[], float8) IS
+COMMENT ON FUNCTION tunnel_internal.section_curve(float8, float8[], float8[], float8[], float8[], float8) IS
 'The smooth closed curve of a section through its angular classes: radius and arc (m) at each degree from -180° to 180°, and the radius and state of each class (measured, rejected, interpolated). After Gonçalves et al. (2012), stage 4, with a curve for the polygon.';

@@ -5,7 +5,7 @@
 -- The plane turns steadily from the first to the second one; its normal is (1 - f) t_from + f t_to. The origin is where the
 -- cubic Hermite curve through the vertices meets it. The same as tunneldb.geometry.frame.frame_at.
 -- segment: vertex_from, vertex_to, tangent_from, tangent_to, 3 numbers each.
-CREATE OR REPLACE FUNCTION tunnel_api.segment_frame(segment float8[], f float8)
+CREATE OR REPLACE FUNCTION tunnel_internal.segment_frame(segment float8[], f float8)
 RETURNS float8[]
 LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE STRICT
 AS $$
@@ -42,7 +42,7 @@ BEGIN
         -nx / flat * nz, -ny / flat * nz, flat];
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.segment_frame(float8[], float8) IS
+COMMENT ON FUNCTION tunnel_internal.segment_frame(float8[], float8) IS
 'The plane at the fraction f (0-1) of a segment: origin, tangent, right and up (12 numbers), in the tunnel''s SRID, m. segment: vertex_from, vertex_to, tangent_from, tangent_to.';
 
 
@@ -51,7 +51,7 @@ COMMENT ON FUNCTION tunnel_api.segment_frame(float8[], float8) IS
 -- Chainage is measured in plan along the axis found, arc by arc, from the start of the kilometre; where the axis goes on
 -- beyond its end, the kilometre is closed on the given axis' whole kilometre, so that no kilometre depends on another one.
 -- line: vertex_from, vertex_to, tangent_from, tangent_to.
-CREATE OR REPLACE FUNCTION tunnel_api.segment_plan(survey_id int, km int)
+CREATE OR REPLACE FUNCTION tunnel_internal.segment_plan(survey_id int, km int)
 RETURNS TABLE (n int, chainage_from float8, chainage_to float8, line float8[])
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 ROWS 100
@@ -67,7 +67,7 @@ AS $$
         FROM tunnel.axis_vertex v, setting s
         WHERE v.survey_id = segment_plan.survey_id AND v.n BETWEEN s.first - 2 AND s.last + 2
     ), frame AS (
-        SELECT f.* FROM vertex v, tunnel_api.axis_frame(v.n, v.x, v.y, v.z) f
+        SELECT f.* FROM vertex v, tunnel_internal.axis_frame(v.n, v.x, v.y, v.z) f
     ), pair AS (
         SELECT a.n, ARRAY[a.x, a.y, a.z, b.x, b.y, b.z, a.tx, a.ty, a.tz, b.tx, b.ty, b.tz] AS line,
             sqrt((b.x - a.x) ^ 2 + (b.y - a.y) ^ 2) AS chord,
@@ -89,7 +89,7 @@ AS $$
         SELECT CASE WHEN m.last = s.last THEN (m.last - m.first) * s.spacing / m.total ELSE 1 END AS scale) c
     ORDER BY m.n
 $$;
-COMMENT ON FUNCTION tunnel_api.segment_plan(int, int) IS
+COMMENT ON FUNCTION tunnel_internal.segment_plan(int, int) IS
 'The segments of one kilometre as they follow from the axis vertices: number, chainage of both planes (m, in plan), and vertex_from, vertex_to, tangent_from, tangent_to (12 numbers, tunnel''s SRID). Source: Gonçalves et al. (2012), stage 3.';
 
 
@@ -97,7 +97,7 @@ COMMENT ON FUNCTION tunnel_api.segment_plan(int, int) IS
 -- since it was made, or a plane has turned because of the vertex beyond, by as much there. A plane at the axis' end has no
 -- vertex beyond: it turns with the vertices of the other plane.
 -- What the neighbouring segments were made of says nothing: they may be of another kilometre, and made anew since.
-CREATE OR REPLACE FUNCTION tunnel_api.segment_moved(survey_id int, n int, segment float8[])
+CREATE OR REPLACE FUNCTION tunnel_internal.segment_moved(survey_id int, n int, segment float8[])
 RETURNS boolean
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER
 SET search_path = pg_catalog, pg_temp
@@ -118,12 +118,12 @@ AS $$
                + (b.z - a.z - c.length * $3[3 * a.i + 12]) ^ 2 > 1e-8
     )
 $$;
-COMMENT ON FUNCTION tunnel_api.segment_moved(int, int, float8[]) IS
+COMMENT ON FUNCTION tunnel_internal.segment_moved(int, int, float8[]) IS
 'Whether the axis has moved under a segment since it was made, so that its planes are others now. n: its number; segment: vertex_from, vertex_to, tangent_from, tangent_to, 3 numbers each.';
 
 
 -- Writes the segments of a kilometre to tunnel.segment, replacing those there; returns how many.
-CREATE OR REPLACE FUNCTION tunnel_api.segment_build(survey_id int, km int)
+CREATE OR REPLACE FUNCTION tunnel_internal.segment_build(survey_id int, km int)
 RETURNS int
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
 AS $$
@@ -136,16 +136,16 @@ BEGIN
     SELECT segment_build.survey_id, p.n, segment_build.km, p.chainage_from, p.chainage_to,
         p.line[1:3], p.line[4:6], p.line[7:9], p.line[10:12],
         (SELECT public.ST_MakeLine(array_agg(public.ST_SetSRID(public.ST_MakePoint(f.frame[1], f.frame[2], f.frame[3]), t.srid) ORDER BY i))
-         FROM generate_series(0, 4) AS i, LATERAL (SELECT tunnel_api.segment_frame(p.line, i / 4.0) AS frame) f),
+         FROM generate_series(0, 4) AS i, LATERAL (SELECT tunnel_internal.segment_frame(p.line, i / 4.0) AS frame) f),
         0
-    FROM tunnel_api.segment_plan(segment_build.survey_id, segment_build.km) p,
+    FROM tunnel_internal.segment_plan(segment_build.survey_id, segment_build.km) p,
         tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id
     WHERE s.id = segment_build.survey_id;
     GET DIAGNOSTICS built = ROW_COUNT;
     RETURN built;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.segment_build(int, int) IS
+COMMENT ON FUNCTION tunnel_internal.segment_build(int, int) IS
 'Stage 3 for one kilometre: rewrites tunnel.segment from the axis vertices; returns the number of segments. Source: Gonçalves et al. (2012), stage 3.';
 
 
@@ -157,7 +157,7 @@ COMMENT ON FUNCTION tunnel_api.segment_build(int, int) IS
 -- both, so it is 0 and 1 on the planes. The segment is first looked up by the chainage known so far; a point that lies before
 -- its first plane or beyond its second one belongs to the segment beside. Points before the first or after the last plane of
 -- the tunnel keep their chainage and have no segment.
-CREATE OR REPLACE FUNCTION tunnel_api.segment_tag(survey_id int, km int)
+CREATE OR REPLACE FUNCTION tunnel_internal.segment_tag(survey_id int, km int)
 RETURNS bigint
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
 SET synchronize_seqscans = off  -- rows keep their order
@@ -165,7 +165,7 @@ SET enable_mergejoin = off  -- it would sort all points by their segment first, 
 SET plan_cache_mode = force_custom_plan  -- a generic plan is made for, and locks, every partition of every survey
 AS $$
 DECLARE
-    building constant text := tunnel_api.partition_name(survey_id, km) || '_new';
+    building constant text := tunnel_internal.partition_name(survey_id, km) || '_new';
     spacing float8;
     tagged bigint;
     numbers int[]; counts bigint[];
@@ -183,9 +183,9 @@ BEGIN
         array_agg(p.line[10]), array_agg(p.line[11]), array_agg(p.line[12]),
         array_agg(p.line[4] * p.line[10] + p.line[5] * p.line[11] + p.line[6] * p.line[12])
     INTO n, a, b, px, py, pz, pl, qx, qy, qz, ql
-    FROM generate_series(segment_tag.km - 1, segment_tag.km + 1) AS k, tunnel_api.segment_plan(segment_tag.survey_id, k) p;
+    FROM generate_series(segment_tag.km - 1, segment_tag.km + 1) AS k, tunnel_internal.segment_plan(segment_tag.survey_id, k) p;
 
-    PERFORM tunnel_api.partition_new(segment_tag.survey_id, segment_tag.km);
+    PERFORM tunnel_internal.partition_new(segment_tag.survey_id, segment_tag.km);
     -- OFFSET 0: what stands before it is reckoned once.
     -- The segments beside share a plane: a point lies as far before theirs as beyond one's own.
     EXECUTE format($query$
@@ -215,7 +215,7 @@ BEGIN
         CROSS JOIN LATERAL (
             SELECT c.x * c.previous[3] + c.y * c.previous[4] + c.z * c.previous[5] - c.previous[6] AS before,
                 c.next[6] - (c.x * c.next[3] + c.y * c.next[4] + c.z * c.next[5]) AS after) m
-    $query$, building, tunnel_api.partition_name(survey_id, km))
+    $query$, building, tunnel_internal.partition_name(survey_id, km))
     USING spacing, n, a, b, px, py, pz, pl, qx, qy, qz, ql;
 
     EXECUTE format($query$
@@ -225,9 +225,9 @@ BEGIN
     UPDATE tunnel.segment s SET points = c.points
     FROM unnest(numbers, counts) AS c (n, points)
     WHERE s.survey_id = segment_tag.survey_id AND s.km = segment_tag.km AND s.n = c.n;
-    PERFORM tunnel_api.partition_swap(segment_tag.survey_id, segment_tag.km);
+    PERFORM tunnel_internal.partition_swap(segment_tag.survey_id, segment_tag.km);
     RETURN tagged;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.segment_tag(int, int) IS
+COMMENT ON FUNCTION tunnel_internal.segment_tag(int, int) IS
 'Stage 3 for the points of one kilometre: rewrites their partition with segment number and chainage (m, in plan) and swaps it in; returns the number of points tagged. Source: Gonçalves et al. (2012), stage 3.';

@@ -22,7 +22,7 @@ COMMENT ON FUNCTION tunnel_api.survey_id(text) IS 'The id of a survey, by its na
 -- A point, line or polygon with each vertex carried over: 'roll' (unrolled plane to surface), 'map' (unrolled plane to map
 -- strip) or 'unroll' (space to unrolled plane). Edges are cut to pieces of at most step metres first, so that they follow
 -- the surface. NULL if any vertex lies off the tunnel.
-CREATE OR REPLACE FUNCTION tunnel_api.carry_over(survey_id int, shape geometry, way text, step float8)
+CREATE OR REPLACE FUNCTION tunnel_internal.carry_over(survey_id int, shape geometry, way text, step float8)
 RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 AS $$
@@ -45,7 +45,7 @@ BEGIN
               SELECT coalesce(v.path[1], 1) AS j,
                   CASE way
                       WHEN 'roll' THEN tunnel_api.roll(survey_id, public.ST_X(v.geom), public.ST_Y(v.geom))
-                      WHEN 'map' THEN tunnel_api.map_point(survey_id, public.ST_X(v.geom), public.ST_Y(v.geom))
+                      WHEN 'map' THEN tunnel_internal.map_point(survey_id, public.ST_X(v.geom), public.ST_Y(v.geom))
                       WHEN 'unroll' THEN (SELECT public.ST_MakePoint(u.chainage, u.arc) FROM tunnel_api.unroll(survey_id, v.geom) u)
                   END AS carried
               FROM public.ST_DumpPoints(r.line) v) p
@@ -58,14 +58,14 @@ BEGIN
     RETURN rings[1];
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.carry_over(int, geometry, text, float8) IS
+COMMENT ON FUNCTION tunnel_internal.carry_over(int, geometry, text, float8) IS
 'A point, line or polygon carried over vertex by vertex, edges cut to pieces of step metres: way is roll (unrolled plane to surface), map (unrolled plane to map strip) or unroll (space to unrolled plane). NULL if any vertex lies off the tunnel.';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.roll(survey_id int, unrolled geometry)
 RETURNS geometry
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
-AS $$ SELECT tunnel_api.carry_over(survey_id, unrolled, 'roll', 0.1) $$;
+AS $$ SELECT tunnel_internal.carry_over(survey_id, unrolled, 'roll', 0.1) $$;
 COMMENT ON FUNCTION tunnel_api.roll(int, geometry) IS
 'A point, line or polygon of the unrolled plane (chainage, arc; m) laid on the tunnel''s surface: 3D, tunnel''s SRID. NULL if any of it lies off the tunnel.';
 
@@ -73,7 +73,7 @@ COMMENT ON FUNCTION tunnel_api.roll(int, geometry) IS
 CREATE OR REPLACE FUNCTION tunnel_api.map_strip(survey_id int, unrolled geometry)
 RETURNS geometry
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
-AS $$ SELECT tunnel_api.carry_over(survey_id, unrolled, 'map', 1.0) $$;
+AS $$ SELECT tunnel_internal.carry_over(survey_id, unrolled, 'map', 1.0) $$;
 COMMENT ON FUNCTION tunnel_api.map_strip(int, geometry) IS
 'A point, line or polygon of the unrolled plane (chainage, arc; m) laid on the map beside the axis, tunnel''s SRID. Source: Gonçalves et al. (2012), eq. 1.';
 
@@ -81,6 +81,6 @@ COMMENT ON FUNCTION tunnel_api.map_strip(int, geometry) IS
 CREATE OR REPLACE FUNCTION tunnel_api.unroll_shape(survey_id int, shape geometry)
 RETURNS geometry
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
-AS $$ SELECT tunnel_api.carry_over(survey_id, shape, 'unroll', 0.1) $$;
+AS $$ SELECT tunnel_internal.carry_over(survey_id, shape, 'unroll', 0.1) $$;
 COMMENT ON FUNCTION tunnel_api.unroll_shape(int, geometry) IS
 'A point, line or polygon in space (3D, tunnel''s SRID) in the unrolled plane (chainage, arc; m; SRID 0). NULL if any of it lies off the tunnel.';

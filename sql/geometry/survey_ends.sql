@@ -3,7 +3,7 @@
 -- given axis, on which segment n goes from n to n + 1 times the spacing; that is carried over to the axis found. A kilometre
 -- without segments of a survey that has some, whose axis failed, say, goes as far as its points along the given axis: it is a
 -- part of what was scanned, and must not be missing where that is stated.
-CREATE OR REPLACE VIEW tunnel_api.km_ends AS
+CREATE OR REPLACE VIEW tunnel_internal.km_ends AS
 SELECT k.survey_id::bigint * 1000000 + 500000 + k.km AS id, k.survey_id, k.km, k.chainage_from, k.chainage_to
   FROM (
     SELECT g.survey_id, g.km,
@@ -24,7 +24,7 @@ SELECT k.survey_id::bigint * 1000000 + 500000 + k.km AS id, k.survey_id, k.km, k
      WHERE EXISTS (SELECT FROM tunnel.segment g WHERE g.survey_id = q.survey_id)
        AND NOT EXISTS (SELECT FROM tunnel.segment g WHERE g.survey_id = q.survey_id AND g.km = i.km)
      GROUP BY q.survey_id, i.km) k;
-COMMENT ON VIEW tunnel_api.km_ends IS
+COMMENT ON VIEW tunnel_internal.km_ends IS
     'Where each kilometre of a survey begins and ends: with its segments, as far as they were scanned; without segments with its points';
 
 
@@ -32,6 +32,6 @@ CREATE OR REPLACE FUNCTION tunnel_api.survey_ends(survey_id int, OUT chainage_fr
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 COST 5000  -- once a survey, not once a kilometre
 SECURITY DEFINER SET search_path = pg_catalog, pg_temp
-AS $$ SELECT min(k.chainage_from), max(k.chainage_to) FROM tunnel_api.km_ends k WHERE k.survey_id = $1 $$;
+AS $$ SELECT min(k.chainage_from), max(k.chainage_to) FROM tunnel_internal.km_ends k WHERE k.survey_id = $1 $$;
 COMMENT ON FUNCTION tunnel_api.survey_ends(int) IS
 'Least and greatest chainage (m) of what a survey scanned: its first and last point, within its segments. NULL before it has any.';

@@ -37,7 +37,7 @@ COMMENT ON FUNCTION tunnel_api.section_at(int, float8) IS
 
 
 -- Node of a section (taken round the circle) and the unit direction of the section there, towards growing angle: u, w, du, dw.
-CREATE OR REPLACE FUNCTION tunnel_api.section_node(radius float8[], k int)
+CREATE OR REPLACE FUNCTION tunnel_internal.section_node(radius float8[], k int)
 RETURNS float8[]
 LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE STRICT
 AS $$
@@ -52,7 +52,7 @@ BEGIN
     RETURN ARRAY[radius[i + 1] * sind(i - 180), radius[i + 1] * cosd(i - 180), du / length, dw / length];
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.section_node(float8[], int) IS
+COMMENT ON FUNCTION tunnel_internal.section_node(float8[], int) IS
 'Node k (0-359, -180° + k) of a section, right and up of the axis (m), and the unit direction of the section there.';
 
 
@@ -116,7 +116,7 @@ BEGIN
     END LOOP;
     -- a point between the planes of two segments (where they cross, far from the axis) lies on the later one's first plane
     f := CASE WHEN before < 0 THEN 0 ELSE before / (before + after) END;
-    frame := tunnel_api.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to, f);
+    frame := tunnel_internal.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to, f);
     SELECT q.* INTO section
     FROM tunnel_api.section_at(survey_id, s.chainage_from + f * (s.chainage_to - s.chainage_from)) q;
     IF section.radius IS NULL THEN
@@ -127,8 +127,8 @@ BEGIN
 
     -- the interval between whose normals the point lies
     k := (floor(degrees(atan2(u, w)) + 180))::int % 360;
-    n0 := tunnel_api.section_node(section.radius, k);
-    n1 := tunnel_api.section_node(section.radius, k + 1);
+    n0 := tunnel_internal.section_node(section.radius, k);
+    n1 := tunnel_internal.section_node(section.radius, k + 1);
     here := (u - n0[1]) * n0[3] + (w - n0[2]) * n0[4];
     following := (u - n1[1]) * n1[3] + (w - n1[2]) * n1[4];
     FOR step IN 1 .. 180 LOOP
@@ -136,14 +136,14 @@ BEGIN
             k := (k + 359) % 360;
             n1 := n0;
             following := here;
-            n0 := tunnel_api.section_node(section.radius, k);
+            n0 := tunnel_internal.section_node(section.radius, k);
             here := (u - n0[1]) * n0[3] + (w - n0[2]) * n0[4];
             EXIT WHEN here >= 0;
         ELSIF following >= 0 THEN
             k := (k + 1) % 360;
             n0 := n1;
             here := following;
-            n1 := tunnel_api.section_node(section.radius, k + 1);
+            n1 := tunnel_internal.section_node(section.radius, k + 1);
             following := (u - n1[1]) * n1[3] + (w - n1[2]) * n1[4];
             EXIT WHEN following < 0;
         ELSE
@@ -216,14 +216,14 @@ BEGIN
         END IF;
     END LOOP;
     t := (arc - section.arc[low]) / (section.arc[low + 1] - section.arc[low]);
-    n0 := tunnel_api.section_node(section.radius, low - 1);
-    n1 := tunnel_api.section_node(section.radius, low);
+    n0 := tunnel_internal.section_node(section.radius, low - 1);
+    n1 := tunnel_internal.section_node(section.radius, low);
     du := n0[3] + t * (n1[3] - n0[3]);
     dw := n0[4] + t * (n1[4] - n0[4]);
     length := sqrt(du * du + dw * dw);
     u := n0[1] + t * (n1[1] - n0[1]) + "offset" * dw / length;
     w := n0[2] + t * (n1[2] - n0[2]) - "offset" * du / length;
-    frame := tunnel_api.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to,
+    frame := tunnel_internal.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to,
         (chainage - s.chainage_from) / (s.chainage_to - s.chainage_from));
     SELECT q.srid INTO srid FROM tunnel.survey v JOIN tunnel.tunnel q ON q.id = v.tunnel_id WHERE v.id = roll.survey_id;
     RETURN public.ST_SetSRID(public.ST_MakePoint(
@@ -238,7 +238,7 @@ COMMENT ON FUNCTION tunnel_api.roll(int, float8, float8, float8) IS
 
 -- A point of the unrolled plane laid on the map beside the axis, in the tunnel's SRID (Gonçalves et al., 2012, eq. 1):
 -- from the axis at its chainage by its arc, horizontally to the right. NULL where there is no axis.
-CREATE OR REPLACE FUNCTION tunnel_api.map_point(survey_id int, chainage float8, arc float8)
+CREATE OR REPLACE FUNCTION tunnel_internal.map_point(survey_id int, chainage float8, arc float8)
 RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 SECURITY DEFINER SET search_path = pg_catalog, pg_temp
@@ -252,10 +252,10 @@ BEGIN
     IF s.n IS NULL OR map_point.chainage > s.chainage_to THEN
         RETURN NULL;
     END IF;
-    frame := tunnel_api.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to,
+    frame := tunnel_internal.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to,
         (chainage - s.chainage_from) / (s.chainage_to - s.chainage_from));
     RETURN public.ST_SetSRID(public.ST_MakePoint(frame[1] + arc * frame[7], frame[2] + arc * frame[8]), public.ST_SRID(s.geom));
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.map_point(int, float8, float8) IS
+COMMENT ON FUNCTION tunnel_internal.map_point(int, float8, float8) IS
 'The point of the map strip (tunnel''s SRID) at chainage and arc, m: arc metres to the right of the axis. Source: Gonçalves et al. (2012), eq. 1.';

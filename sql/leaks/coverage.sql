@@ -2,27 +2,27 @@
 
 -- What is known of each kilometre, and what was summed up before it. Over kilometres without detection the sums stay as they
 -- are. Read by coverage_at below and stretch_statistics (leaks/statistics.sql).
-CREATE OR REPLACE VIEW tunnel_api.coverage_sums AS
+CREATE OR REPLACE VIEW tunnel_internal.coverage_sums AS
 SELECT c.survey_id::bigint * 1000000 + 500000 + c.km AS id, c.survey_id, c.km, c.step, c.lining_sums, c.seen_sums,
        c.wet_sums, 1000 * count(*) OVER earlier AS length_before, coalesce(sum(c.lining_total) OVER earlier, 0) AS lining_before,
        coalesce(sum(c.seen_total) OVER earlier, 0) AS seen_before, coalesce(sum(c.wet_total) OVER earlier, 0) AS wet_before
   FROM tunnel.coverage c
 WINDOW earlier AS (PARTITION BY c.survey_id ORDER BY c.km ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING);
-COMMENT ON VIEW tunnel_api.coverage_sums IS
+COMMENT ON VIEW tunnel_internal.coverage_sums IS
     'Lining of each kilometre, what the last detection saw of it and the pixels that it found wet, as running sums over steps of chainage; coverage_at reads them';
-COMMENT ON COLUMN tunnel_api.coverage_sums.step IS 'Length of a step, m; the first begins with the kilometre';
-COMMENT ON COLUMN tunnel_api.coverage_sums.lining_sums IS 'Lining from the beginning of the kilometre to that of each step and to the end of the last, m²';
-COMMENT ON COLUMN tunnel_api.coverage_sums.seen_sums IS 'The same of the lining seen, m²';
-COMMENT ON COLUMN tunnel_api.coverage_sums.wet_sums IS 'The same of wet pixels, m²';
-COMMENT ON COLUMN tunnel_api.coverage_sums.length_before IS 'Length of the kilometres before it that were detected, m';
-COMMENT ON COLUMN tunnel_api.coverage_sums.lining_before IS 'Their lining, m²';
-COMMENT ON COLUMN tunnel_api.coverage_sums.seen_before IS 'Their lining seen, m²';
-COMMENT ON COLUMN tunnel_api.coverage_sums.wet_before IS 'Their wet pixels, m²';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.step IS 'Length of a step, m; the first begins with the kilometre';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.lining_sums IS 'Lining from the beginning of the kilometre to that of each step and to the end of the last, m²';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.seen_sums IS 'The same of the lining seen, m²';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.wet_sums IS 'The same of wet pixels, m²';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.length_before IS 'Length of the kilometres before it that were detected, m';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.lining_before IS 'Their lining, m²';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.seen_before IS 'Their lining seen, m²';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.wet_before IS 'Their wet pixels, m²';
 
 
 -- Running sums of the steps of a kilometre (the first is 0) at a place so far along it (m); a step counts by its share. The
 -- planner puts the body in the place of a call, so that no call is paid for each place.
-CREATE OR REPLACE FUNCTION tunnel_api.sum_upto(sums float8[], step float8, along float8)
+CREATE OR REPLACE FUNCTION tunnel_internal.sum_upto(sums float8[], step float8, along float8)
 RETURNS float8
 LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT
 AS $$
@@ -30,11 +30,11 @@ AS $$
         + ($1[least(floor($3 / $2)::int, cardinality($1) - 2) + 2] - $1[least(floor($3 / $2)::int, cardinality($1) - 2) + 1])
             * least($3 / $2 - least(floor($3 / $2)::int, cardinality($1) - 2), 1)
 $$;
-COMMENT ON FUNCTION tunnel_api.sum_upto(float8[], float8, float8) IS
+COMMENT ON FUNCTION tunnel_internal.sum_upto(float8[], float8, float8) IS
 'Sum over steps of one length (m) up to a place (m from where they begin), of their running sums, of which the first is 0.';
 
 
-CREATE OR REPLACE FUNCTION tunnel_api.coverage_at(survey_id int, places float8[])
+CREATE OR REPLACE FUNCTION tunnel_internal.coverage_at(survey_id int, places float8[])
 RETURNS TABLE (n int, chainage float8, length float8, lining float8, seen float8, wet float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 100
@@ -56,7 +56,7 @@ BEGIN
         WITH km AS MATERIALIZED (  -- [:] takes the sums out of their storage once, not for each place
             SELECT c.km, c.km * 1000::float8 AS start, c.step, c.length_before, c.lining_before, c.seen_before, c.wet_before,
                 c.lining_sums[:] AS lining, c.seen_sums[:] AS seen, c.wet_sums[:] AS wet
-            FROM tunnel_api.coverage_sums c
+            FROM tunnel_internal.coverage_sums c
             WHERE c.survey_id = survey_key AND c.km <= last_km AND c.km >= (
                 SELECT max(b.km) FROM tunnel.coverage b WHERE b.survey_id = survey_key AND b.km <= greatest(first_km, (
                     SELECT min(a.km) FROM tunnel.coverage a WHERE a.survey_id = survey_key)))
@@ -64,16 +64,16 @@ BEGIN
             SELECT array_agg(k.km ORDER BY k.km) AS km FROM km k
         )
         SELECT p.n::int, p.chainage, coalesce(k.length_before + i.along, 0),
-            coalesce(k.lining_before + tunnel_api.sum_upto(k.lining, k.step, i.along), 0),
-            coalesce(k.seen_before + tunnel_api.sum_upto(k.seen, k.step, i.along), 0),
-            coalesce(k.wet_before + tunnel_api.sum_upto(k.wet, k.step, i.along), 0)
+            coalesce(k.lining_before + tunnel_internal.sum_upto(k.lining, k.step, i.along), 0),
+            coalesce(k.seen_before + tunnel_internal.sum_upto(k.seen, k.step, i.along), 0),
+            coalesce(k.wet_before + tunnel_internal.sum_upto(k.wet, k.step, i.along), 0)
         FROM known CROSS JOIN LATERAL unnest(wanted) WITH ORDINALITY AS p (chainage, n)
         LEFT JOIN km k ON k.km = known.km[width_bucket(floor(p.chainage / 1000)::int, known.km)]
         CROSS JOIN LATERAL (SELECT least(p.chainage - k.start, 1000) AS along) i
         ORDER BY p.n;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.coverage_at(int, float8[]) IS
+COMMENT ON FUNCTION tunnel_internal.coverage_at(int, float8[]) IS
 'At each of some chainages of a survey (m): length of tunnel that was looked at (m), its lining, the lining seen and wet pixels (m²), all from where the survey begins on. The differences between two places are those of the stretch between; a step that a place cuts counts by its share.';
 
 
@@ -90,9 +90,9 @@ AS $$
     LEFT JOIN LATERAL (
         SELECT max(c.lining) - min(c.lining) AS lining, max(c.seen) - min(c.seen) AS seen, max(c.wet) - min(c.wet) AS wet,
             max(c.length) - min(c.length) AS length
-        FROM tunnel_api.coverage_at(s.id, r.ends) c
+        FROM tunnel_internal.coverage_at(s.id, r.ends) c
         HAVING max(c.length) > min(c.length)) d ON true
-    WHERE e.chainage_from IS NOT NULL AND r.ends[1] < r.ends[2] AND tunnel_api.in_order($2, $3)
+    WHERE e.chainage_from IS NOT NULL AND r.ends[1] < r.ends[2] AND tunnel_internal.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.coverage(text, float8, float8) IS
 'Lining of a survey between two chainages (m) where it was searched for leaks, what the last detection saw of it, and the pixels that it found wet, after the median filter (m²); seen_share of the lining of the whole stretch, in which kilometres without detection count as unseen, as in leak_statistics; wet_pixel_share of what was seen, as Xu et al. (2018) state it. Steps of chainage that an end cuts count by their share.';
@@ -101,7 +101,7 @@ COMMENT ON FUNCTION tunnel_api.coverage(text, float8, float8) IS
 -- Of an area on the lining (m²) whose outline lies in the unrolled plane, the part between two chainages (m). The planner puts
 -- the body in the place of a call; one that is not cut is not clipped. Callers ask with what of a stretch lies in a survey: of none,
 -- which runs backwards then, there is no part.
-CREATE OR REPLACE FUNCTION tunnel_api.area_between(outline geometry, area float8, chainage_from float8, chainage_to float8)
+CREATE OR REPLACE FUNCTION tunnel_internal.area_between(outline geometry, area float8, chainage_from float8, chainage_to float8)
 RETURNS float8
 LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT
 AS $$
@@ -110,5 +110,5 @@ AS $$
         ELSE $2 / nullif(public.ST_Area($1), 0) * public.ST_Area(public.ST_ClipByBox2D($1, public.ST_MakeBox2D(
             public.ST_MakePoint(greatest($3, -1e9), -1e4), public.ST_MakePoint(least($4, 1e9), 1e4)))) END
 $$;
-COMMENT ON FUNCTION tunnel_api.area_between(geometry, float8, float8, float8) IS
+COMMENT ON FUNCTION tunnel_internal.area_between(geometry, float8, float8, float8) IS
 'Part of an area on the lining (m²), such as a leak''s, that lies between two chainages (m), by its outline in the unrolled plane. The area of a leak over the end of a stretch, wherever it is stated.';

@@ -5,7 +5,7 @@
 -- A kilometre was searched when detection noted what it saw of the lining there (tunnel.coverage). That of a kilometre which was
 -- not, begins and ends with its segments, or else with the points of its files along the given axis: the two differ by
 -- centimetres, and what is shorter than a metre is left out for that. Lining is looked at by bins of a metre.
-CREATE OR REPLACE FUNCTION tunnel_api.coverage_gaps_of(survey_id int, starts float8[], ends float8[])
+CREATE OR REPLACE FUNCTION tunnel_internal.coverage_gaps_of(survey_id int, starts float8[], ends float8[])
 RETURNS TABLE (
     n int, chainage_from float8, chainage_to float8, state text, reason text, searched boolean, seen_share float8)
 LANGUAGE plpgsql STABLE STRICT PARALLEL RESTRICTED
@@ -24,7 +24,7 @@ DECLARE
     least_share constant float8 := 0.5;  -- of the lining seen
     least_length constant float8 := 5;  -- over which it was not, m
 BEGIN
-    PERFORM tunnel_api.in_order(s.low, s.high) FROM unnest(starts, ends) AS s (low, high);
+    PERFORM tunnel_internal.in_order(s.low, s.high) FROM unnest(starts, ends) AS s (low, high);
     RETURN QUERY
     WITH stretch AS MATERIALIZED (
         SELECT s.n::int, s.low, s.high FROM unnest(starts, ends) WITH ORDINALITY AS s (low, high, n)
@@ -38,12 +38,12 @@ BEGIN
         SELECT p.km, p.low, p.high, c.km IS NOT NULL AND NOT blind AS searched
         FROM (SELECT coalesce(q.km, e.km) AS km, coalesce(e.chainage_from, q.low) AS low, coalesce(e.chainage_to, q.high) AS high
               FROM scanned q
-              FULL JOIN (SELECT k.* FROM tunnel_api.km_ends k WHERE k.survey_id = survey_key) e ON e.km = q.km) p
+              FULL JOIN (SELECT k.* FROM tunnel_internal.km_ends k WHERE k.survey_id = survey_key) e ON e.km = q.km) p
         LEFT JOIN tunnel.coverage c ON c.survey_id = survey_key AND c.km = p.km
     ), stage AS MATERIALIZED (
         SELECT t.km, t.step, t.stage, t.outcome, t.reason, t.done_at, split_part(t.message, E'\n', 1) AS message
         -- staleness comes from as many kilometres away as there are stages
-        FROM tunnel_api.stage_state(survey_key, greatest(first_place / 1000 - 7, -1000000)::int,
+        FROM tunnel_internal.stage_state(survey_key, greatest(first_place / 1000 - 7, -1000000)::int,
                                     least(last_place / 1000 + 6, 1000000)::int) t
         WHERE t.step <= (SELECT d.step FROM tunnel.stage d WHERE d.name = 'detect')
     ), first_bad AS (  -- of what a kilometre has not, or failed to renew, the first
@@ -106,7 +106,7 @@ BEGIN
         FROM (
             SELECT p.n, c.chainage AS low, lead(c.chainage) OVER along AS high, lead(c.lining) OVER along - c.lining AS lining,
                 lead(c.seen) OVER along - c.seen AS seen
-            FROM tunnel_api.coverage_at(survey_key, (SELECT p.at FROM place p)) c
+            FROM tunnel_internal.coverage_at(survey_key, (SELECT p.at FROM place p)) c
             JOIN unnest((SELECT p.n FROM place p)) WITH ORDINALITY AS p (n, place) ON p.place = c.n
             WINDOW along AS (PARTITION BY p.n ORDER BY c.chainage)) b
         WHERE b.high < b.low + 1 + 1e-6
@@ -166,7 +166,7 @@ BEGIN
     ORDER BY 1, 6, 2, 3 DESC, 4, 5;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.coverage_gaps_of(int, float8[], float8[]) IS
+COMMENT ON FUNCTION tunnel_internal.coverage_gaps_of(int, float8[], float8[]) IS
 'What coverage_gaps has to say of each of some stretches of a survey, given by where they begin and end (m); n: the first is 1.';
 
 
@@ -178,13 +178,13 @@ LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL RESTRICTED
 ROWS 10
 AS $$
     SELECT g.chainage_from, g.chainage_to, g.state, g.reason, g.searched, g.seen_share
-    FROM tunnel_api.coverage_gaps_of($1, ARRAY[$2], ARRAY[$3]) g
+    FROM tunnel_internal.coverage_gaps_of($1, ARRAY[$2], ARRAY[$3]) g
 $$;
 COMMENT ON FUNCTION tunnel_api.coverage_gaps(int, float8, float8) IS
 'Where a survey cannot vouch for its list of leaks between two chainages (m), or anywhere: one row a stretch, those that were not searched for leaks first, then from the least chainage on. state: not scanned (no points or no lining there), not loaded, not searched, failed, interrupted, stale (searched before something changed), unseen (5 m or more of which less than half of the lining was seen), no intensity. searched: whether the result of a search stands there. No rows: everything was searched, is up to date and was seen by more than half.';
 
 
-CREATE OR REPLACE FUNCTION tunnel_api.coverage_statements(survey_id int, starts float8[], ends float8[])
+CREATE OR REPLACE FUNCTION tunnel_internal.coverage_statements(survey_id int, starts float8[], ends float8[])
 RETURNS TABLE (n int, said text)
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
 COST 100000  -- once a survey, not once a stretch
@@ -205,7 +205,7 @@ AS $$
                         WHEN 'unseen' THEN format(' (%s %% of the lining seen)', round((100 * g.seen_share)::numeric))
                         ELSE format(' (%s)', g.reason) END) AS said
             FROM tunnel.survey s
-            CROSS JOIN LATERAL tunnel_api.coverage_gaps_of(s.id, $2, $3) g
+            CROSS JOIN LATERAL tunnel_internal.coverage_gaps_of(s.id, $2, $3) g
             CROSS JOIN LATERAL (SELECT regexp_replace(l.label, '\.0+$', '') AS label
                                 FROM tunnel_api.stationing(s.tunnel_id, g.chainage_from) l) f
             CROSS JOIN LATERAL (SELECT regexp_replace(l.label, '\.0+$', '') AS label
@@ -215,7 +215,7 @@ AS $$
     GROUP BY k.stretch
     ORDER BY k.stretch
 $$;
-COMMENT ON FUNCTION tunnel_api.coverage_statements(int, float8[], float8[]) IS
+COMMENT ON FUNCTION tunnel_internal.coverage_statements(int, float8[], float8[]) IS
 'What coverage_statement has to say of each of some stretches of a survey, given by where they begin and end (m); n: the first is 1. No row for one of which there is nothing to say.';
 
 
@@ -223,7 +223,7 @@ CREATE OR REPLACE FUNCTION tunnel_api.coverage_statement(
     survey_id int, chainage_from float8 DEFAULT '-Infinity', chainage_to float8 DEFAULT 'Infinity')
 RETURNS text
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
-AS $$ SELECT s.said FROM tunnel_api.coverage_statements($1, ARRAY[$2], ARRAY[$3]) s $$;
+AS $$ SELECT s.said FROM tunnel_internal.coverage_statements($1, ARRAY[$2], ARRAY[$3]) s $$;
 COMMENT ON FUNCTION tunnel_api.coverage_statement(int, float8, float8) IS
 'What coverage_gaps has to say of a survey between two chainages (m), in words, six stretches of each kind at most; NULL if there is nothing. What every document says before it counts leaks.';
 

@@ -90,7 +90,7 @@ COMMENT ON FUNCTION tunnel_api.image_value(int, text, float8, float8) IS
 
 -- Images lie in a partition for each survey. A plan for all surveys would open them all, each time: this one is made for the survey
 -- that is asked for.
-CREATE OR REPLACE FUNCTION tunnel_api.image_kilometres(survey_id int, kind text) RETURNS SETOF int
+CREATE OR REPLACE FUNCTION tunnel_internal.image_kilometres(survey_id int, kind text) RETURNS SETOF int
 LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 25
 SET search_path = pg_catalog, pg_temp
 SET plan_cache_mode = force_custom_plan
@@ -103,5 +103,5 @@ BEGIN
     RETURN QUERY SELECT i.km FROM tunnel.image i WHERE i.survey_id = survey_key AND i.kind = wanted GROUP BY i.km;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.image_kilometres(int, text) IS
+COMMENT ON FUNCTION tunnel_internal.image_kilometres(int, text) IS
     'Kilometres of a survey that have images of a kind: raw, corrected, offset, state, deviation_lining and so on';

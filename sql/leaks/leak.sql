@@ -38,11 +38,11 @@ AS $$
         FROM tunnel.survey s CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e WHERE s.name = $1
     )
     SELECT coalesce(sum(CASE WHEN l.chainage_from >= g.low AND l.chainage_to <= g.high THEN l.area
-        ELSE (SELECT tunnel_api.area_between(a.unrolled, a.area, g.low, g.high) FROM tunnel.finding a WHERE a.id = l.id) END), 0)
+        ELSE (SELECT tunnel_internal.area_between(a.unrolled, a.area, g.low, g.high) FROM tunnel.finding a WHERE a.id = l.id) END), 0)
     FROM given g
     JOIN tunnel.finding l ON l.survey_id = g.id AND l.detected AND l.review <> 'rejected' AND l.wet AND NOT l.superseded
         AND l.chainage_from > g.low - 1e-6 - g.longest AND l.chainage_to > g.low AND l.chainage_from < g.high
-    WHERE g.low < g.high AND tunnel_api.in_order($2, $3)
+    WHERE g.low < g.high AND tunnel_internal.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.wet_area(text, float8, float8) IS
 'Wet area (m² on the lining) of a survey between two chainages (m), of leaks found last and not rejected.';

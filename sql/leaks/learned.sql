@@ -3,15 +3,15 @@
 -- Needs note_edit (access/audit.sql).
 
 -- Number of what is in force for a tunnel; NULL where nothing was learned.
-CREATE OR REPLACE FUNCTION tunnel_api.learned_in_force(tunnel_id integer) RETURNS integer
+CREATE OR REPLACE FUNCTION tunnel_internal.learned_in_force(tunnel_id integer) RETURNS integer
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT max(m.id) FROM tunnel.learned_model m WHERE m.tunnel_id = $1 AND m.undone_at IS NULL
 $$;
-COMMENT ON FUNCTION tunnel_api.learned_in_force(integer) IS
+COMMENT ON FUNCTION tunnel_internal.learned_in_force(integer) IS
     'Number of what the model of evidence learned from a tunnel''s reviews and is in force; NULL for none';
 
 CREATE OR REPLACE VIEW tunnel_api.learned_model AS
-SELECT m.id, m.tunnel_id, t.name AS tunnel, m.id = tunnel_api.learned_in_force(m.tunnel_id) AS in_force, m.base, m.way,
+SELECT m.id, m.tunnel_id, t.name AS tunnel, m.id = tunnel_internal.learned_in_force(m.tunnel_id) AS in_force, m.base, m.way,
        m.parameters, m.surveys, m.reviews, m.loss_base, m.loss, m.note, m.applied_by, m.active_from, m.undone_by, m.undone_at
   FROM tunnel.learned_model m
   JOIN tunnel.tunnel t ON t.id = m.tunnel_id;
@@ -19,15 +19,15 @@ COMMENT ON VIEW tunnel_api.learned_model IS 'What was learned of each tunnel fro
 COMMENT ON COLUMN tunnel_api.learned_model.in_force IS 'Whether stage detect goes by it: the last of its tunnel that was not undone';
 
 -- Notes an edit of what was learned in the audit of each survey of a tunnel.
-CREATE OR REPLACE FUNCTION tunnel_api.note_learned(tunnel_id integer, id integer, before jsonb, after jsonb) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.note_learned(tunnel_id integer, id integer, before jsonb, after jsonb) RETURNS void
 LANGUAGE sql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp AS $$
-    SELECT tunnel_api.note_edit(s.name, 'learned_model', $2, $3, $4) FROM tunnel.survey s WHERE s.tunnel_id = $1 ORDER BY s.id
+    SELECT tunnel_internal.note_edit(s.name, 'learned_model', $2, $3, $4) FROM tunnel.survey s WHERE s.tunnel_id = $1 ORDER BY s.id
 $$;
-COMMENT ON FUNCTION tunnel_api.note_learned(integer, integer, jsonb, jsonb) IS
+COMMENT ON FUNCTION tunnel_internal.note_learned(integer, integer, jsonb, jsonb) IS
     'Writes into the audit what was learned or undone, once for each survey of the tunnel; called by no role';
 
 -- Puts in force what was learned; returns its number.
-CREATE OR REPLACE FUNCTION tunnel_api.learned_apply(tunnel_id integer, base text, way text, parameters jsonb, surveys text[],
+CREATE OR REPLACE FUNCTION tunnel_internal.learned_apply(tunnel_id integer, base text, way text, parameters jsonb, surveys text[],
                                                     reviews jsonb, loss_base double precision, loss double precision, note text)
 RETURNS integer
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
@@ -37,29 +37,29 @@ BEGIN
     INSERT INTO tunnel.learned_model (tunnel_id, base, way, parameters, surveys, reviews, loss_base, loss, note, applied_by)
     VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, session_user)
     RETURNING * INTO made;
-    PERFORM tunnel_api.note_learned(made.tunnel_id, made.id, NULL,
+    PERFORM tunnel_internal.note_learned(made.tunnel_id, made.id, NULL,
                                     to_jsonb(made) - ARRAY['id', 'tunnel_id', 'applied_by', 'active_from', 'undone_by', 'undone_at']);
     RETURN made.id;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.learned_apply(integer, text, text, jsonb, text[], jsonb, double precision, double precision, text) IS
+COMMENT ON FUNCTION tunnel_internal.learned_apply(integer, text, text, jsonb, text[], jsonb, double precision, double precision, text) IS
     'Puts in force what was learned from reviews for a tunnel, and notes it in the audit; returns its number';
 
 -- Takes back what is in force; what was in force before it is again. Returns its number; NULL when nothing was in force.
-CREATE OR REPLACE FUNCTION tunnel_api.learned_undo(tunnel_id integer) RETURNS integer
+CREATE OR REPLACE FUNCTION tunnel_internal.learned_undo(tunnel_id integer) RETURNS integer
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     gone tunnel.learned_model;
 BEGIN
     UPDATE tunnel.learned_model m SET undone_by = session_user, undone_at = clock_timestamp()
-     WHERE m.id = tunnel_api.learned_in_force($1)
+     WHERE m.id = tunnel_internal.learned_in_force($1)
     RETURNING m.* INTO gone;
     IF NOT FOUND THEN
         RETURN NULL;
     END IF;
-    PERFORM tunnel_api.note_learned(gone.tunnel_id, gone.id, jsonb_build_object('undone', false), jsonb_build_object('undone', true));
+    PERFORM tunnel_internal.note_learned(gone.tunnel_id, gone.id, jsonb_build_object('undone', false), jsonb_build_object('undone', true));
     RETURN gone.id;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.learned_undo(integer) IS
+COMMENT ON FUNCTION tunnel_internal.learned_undo(integer) IS
     'Takes back what was last learned for a tunnel, and notes it in the audit; returns its number, NULL when there is nothing';

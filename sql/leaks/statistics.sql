@@ -27,7 +27,7 @@ COMMENT ON COLUMN tunnel_api.waterproof_limit.description IS 'What the class all
 -- Given are the places in growing order, of both ends of each leak and of both ends of the stretch, and how the wet area per
 -- m² of lining changes there: grows where a leak begins, falls where it ends, stays at the ends of the stretch. A loop, and no
 -- query: it does in one pass what takes several sorts.
-CREATE OR REPLACE FUNCTION tunnel_api.slide_window(
+CREATE OR REPLACE FUNCTION tunnel_internal.slide_window(
     places float8[], turns float8[], OUT patches int, OUT window_from float8, OUT wet_area float8)
 LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE STRICT
 AS $$
@@ -98,7 +98,7 @@ BEGIN
     END IF;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.slide_window(float8[], float8[]) IS
+COMMENT ON FUNCTION tunnel_internal.slide_window(float8[], float8[]) IS
 'Most leaks in a window of 100 m² slid along a stretch, where it then begins (NULL without leaks), and the greatest wet area in one; places (m² of lining) and turns (of wet area per m² of lining) as stretch_statistics makes them.';
 
 
@@ -107,7 +107,7 @@ COMMENT ON FUNCTION tunnel_api.slide_window(float8[], float8[]) IS
 -- Leaks are those of kind leak that the last detection found and nobody rejected. One that an end cuts counts by its part
 -- in wet_area, as one patch, and whole where the size of a patch matters: a spot is no smaller for being cut by a limit.
 -- Windows: see slide_window. A leak where no lining is known is in none.
-CREATE OR REPLACE FUNCTION tunnel_api.stretch_statistics(survey_id int, starts float8[], ends float8[])
+CREATE OR REPLACE FUNCTION tunnel_internal.stretch_statistics(survey_id int, starts float8[], ends float8[])
 RETURNS TABLE (
     n int, chainage_from float8, chainage_to float8, lining_area float8, seen_area float8, seen_share float8,
     wet_area float8, wet_ratio float8, patches int, largest_area float8, largest_leak bigint,
@@ -138,14 +138,14 @@ BEGIN
         SELECT starts AS low, ends AS high
     ), km AS MATERIALIZED (  -- [:] takes the sums out of their storage once, not for each leak
         SELECT c.km, c.km * 1000::float8 AS start, c.step, c.lining_before AS before, c.lining_sums[:] AS lining
-        FROM tunnel_api.coverage_sums c
+        FROM tunnel_internal.coverage_sums c
         WHERE c.survey_id = survey_key AND c.km BETWEEN first_km AND floor(last_end / 1000)
     ), known AS MATERIALIZED (
         SELECT array_agg(k.km ORDER BY k.km) AS km, array_agg(k.before ORDER BY k.km) AS before FROM km k
     ), stretch AS MATERIALIZED (
         SELECT f.n, f.chainage AS low, t.chainage AS high, f.lining AS a, t.lining AS b, t.length - f.length AS looked_at,
             CASE WHEN t.length > f.length THEN t.seen - f.seen END AS seen
-        FROM tunnel_api.coverage_at(survey_key, starts) f JOIN tunnel_api.coverage_at(survey_key, ends) t ON t.n = f.n
+        FROM tunnel_internal.coverage_at(survey_key, starts) f JOIN tunnel_internal.coverage_at(survey_key, ends) t ON t.n = f.n
     ), leak AS (
         SELECT l.id, l.area, l.chainage_from AS low, l.chainage_to AS high, generate_series(
             greatest(width_bucket(l.chainage_from, g.low), 1), width_bucket(l.chainage_to, g.low)) AS n
@@ -156,14 +156,14 @@ BEGIN
         SELECT l.n, l.id, greatest(l.low, g.low[l.n]) AS low, least(l.high, g.high[l.n]) AS high, l.area AS whole,
             CASE WHEN l.low >= g.low[l.n] AND l.high <= g.high[l.n] THEN l.area
                  -- few are cut: only they are looked up, the others come from the index alone
-                 ELSE (SELECT tunnel_api.area_between(a.unrolled, a.area, g.low[l.n], g.high[l.n])
+                 ELSE (SELECT tunnel_internal.area_between(a.unrolled, a.area, g.low[l.n], g.high[l.n])
                      FROM tunnel.finding a WHERE a.id = l.id) END AS area
         FROM leak l CROSS JOIN given g
         WHERE l.high > g.low[l.n] AND l.low < g.high[l.n]
     ), patch AS MATERIALIZED (
         SELECT c.n, c.id, c.whole, c.area,
-            coalesce(f.before + tunnel_api.sum_upto(f.lining, f.step, least(c.low - f.start, 1000)), 0) AS a,
-            coalesce(t.before + tunnel_api.sum_upto(t.lining, t.step, least(c.high - t.start, 1000)), 0) AS b
+            coalesce(f.before + tunnel_internal.sum_upto(f.lining, f.step, least(c.low - f.start, 1000)), 0) AS a,
+            coalesce(t.before + tunnel_internal.sum_upto(t.lining, t.step, least(c.high - t.start, 1000)), 0) AS b
         FROM cut c CROSS JOIN known
         LEFT JOIN km f ON f.km = known.km[width_bucket(floor(c.low / 1000)::int, known.km)]
         LEFT JOIN km t ON t.km = known.km[width_bucket(floor(c.high / 1000)::int, known.km)]
@@ -187,7 +187,7 @@ BEGIN
         GROUP BY b.n
     ), slid AS MATERIALIZED (
         SELECT l.n, w.patches, w.window_from AS a, w.window_from + 100 AS b, w.wet_area
-        FROM listed l CROSS JOIN LATERAL tunnel_api.slide_window(l.places, l.turns) w
+        FROM listed l CROSS JOIN LATERAL tunnel_internal.slide_window(l.places, l.turns) w
     ), placed AS (  -- windows in chainage again
         SELECT q.n, min(q.chainage) AS low, max(q.chainage) AS high
         FROM (
@@ -235,7 +235,7 @@ BEGIN
     ORDER BY r.n;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.stretch_statistics(int, float8[], float8[]) IS
+COMMENT ON FUNCTION tunnel_internal.stretch_statistics(int, float8[], float8[]) IS
 'Statistics of leaks over stretches of a survey that follow one another, as leak_statistics gives them of one.';
 
 
@@ -254,8 +254,8 @@ AS $$
     FROM (SELECT tunnel_api.survey_id($1) AS id) s
     CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
     CROSS JOIN LATERAL (SELECT greatest($2, e.chainage_from) AS low, least($3, e.chainage_to) AS high) r
-    CROSS JOIN LATERAL tunnel_api.stretch_statistics(s.id, ARRAY[r.low], ARRAY[r.high]) t
-    WHERE e.chainage_from IS NOT NULL AND r.low < r.high AND tunnel_api.in_order($2, $3)
+    CROSS JOIN LATERAL tunnel_internal.stretch_statistics(s.id, ARRAY[r.low], ARRAY[r.high]) t
+    WHERE e.chainage_from IS NOT NULL AND r.low < r.high AND tunnel_internal.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.leak_statistics(text, float8, float8) IS
 'Leaks of a survey between two chainages (m), as far as it reaches; of kind leak, found last and not rejected. wet_ratio is wet_area of the lining seen; lining_area and seen_area are those of the part that was searched for leaks, which makes up searched_share of the length; seen_share is that of the lining of the whole stretch, in which what was not searched counts as unseen. patches and wet_area are NULL where nothing was searched and nothing is known. A leak that an end cuts counts by its part in wet_area and as one patch; largest_area and largest_leak take leaks whole. window_patches: most patches in any 100 m² of lining, here between window_from and window_to, and which; window_wet_area: greatest wet area in any 100 m² (m²). class: best class of GB 50108-2008 that the seen lining keeps, NULL if nothing was seen.';
@@ -340,7 +340,7 @@ DECLARE
     first_whole float8;
     last_whole float8;
 BEGIN
-    PERFORM tunnel_api.in_order(stretch_from, stretch_to);
+    PERFORM tunnel_internal.in_order(stretch_from, stretch_to);
     IF NOT (ring_length >= 0.1 AND ring_length < 'Infinity') THEN
         RAISE EXCEPTION 'a ring must be at least 0.1 m long, not % m', ring_length USING ERRCODE = 'invalid_parameter_value';
     END IF;
@@ -369,7 +369,7 @@ BEGIN
         SELECT round((r.low - first_chainage) / ring_length)::int + 1, r.low, r.high,
             (SELECT c.label FROM tunnel_api.stationing(tunnel_key, r.low) c), t.lining_area, t.seen_share,
             t.wet_area, t.wet_ratio, t.patches, t.largest_area, t.class
-        FROM tunnel_api.stretch_statistics(survey_key, starts, ends) t
+        FROM tunnel_internal.stretch_statistics(survey_key, starts, ends) t
         CROSS JOIN LATERAL (SELECT CASE t.n WHEN 1 THEN first_whole ELSE t.chainage_from END AS low,
             CASE t.n WHEN cardinality(ends) THEN last_whole ELSE t.chainage_to END AS high) r;
 END

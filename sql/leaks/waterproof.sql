@@ -13,7 +13,7 @@ SELECT s.id::bigint * 1000000 + 500000 + k.km AS id, s.id AS survey_id, s.name A
        k.chainage_from, k.chainage_to, t.lining_area, t.seen_share, t.wet_area, t.wet_ratio, t.patches, t.largest_area,
        t.largest_leak, t.window_patches, t.window_from, t.window_to, t.window_wet_area, t.class
   FROM tunnel.survey s
-  CROSS JOIN LATERAL (SELECT e.* FROM tunnel_api.km_ends e WHERE e.survey_id = s.id OFFSET 0) k  -- of this survey, not of all
+  CROSS JOIN LATERAL (SELECT e.* FROM tunnel_internal.km_ends e WHERE e.survey_id = s.id OFFSET 0) k  -- of this survey, not of all
   LEFT JOIN LATERAL (
         SELECT p.* FROM tunnel.waterproof p
          WHERE p.survey_id = s.id AND p.km = k.km AND p.chainage_from = k.chainage_from AND p.chainage_to = k.chainage_to
@@ -26,7 +26,7 @@ SELECT s.id::bigint * 1000000 + 500000 + k.km AS id, s.id AS survey_id, s.name A
          UNION ALL
         SELECT f.lining_area, f.seen_share, f.wet_area, f.wet_ratio, f.patches, f.largest_area, f.largest_leak,
                f.window_patches, f.window_from, f.window_to, f.window_wet_area, f.class
-          FROM tunnel_api.stretch_statistics(s.id, ARRAY[k.chainage_from], ARRAY[k.chainage_to]) f
+          FROM tunnel_internal.stretch_statistics(s.id, ARRAY[k.chainage_from], ARRAY[k.chainage_to]) f
          WHERE w.id IS NULL) t;
 COMMENT ON VIEW tunnel_api.km_waterproof IS
     'Waterproofing of each kilometre by GB 50108-2008, as far as a scan can tell: see leak_statistics and waterproof_class';
@@ -46,7 +46,7 @@ COMMENT ON COLUMN tunnel_api.km_waterproof.class IS 'Best class that the lining 
 -- Works out a kilometre anew and keeps it, in place of what was noted and kept. What goes wrong is said, but is no reason to
 -- refuse the change that brought it about. One that has no segments, or whose segments reach beyond the kilometre's ends (leaks
 -- out there are noted elsewhere), is not kept: a row of no stretch stands for it (NaN is nobody's end), in place of its notes.
-CREATE OR REPLACE FUNCTION tunnel_api.keep_waterproof(survey_id int, km int) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.keep_waterproof(survey_id int, km int) RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
 #variable_conflict use_column
@@ -67,8 +67,8 @@ BEGIN
       FROM (SELECT) one
       LEFT JOIN (
         SELECT t.*
-          FROM tunnel_api.km_ends k
-         CROSS JOIN LATERAL tunnel_api.stretch_statistics(survey_key, ARRAY[k.chainage_from], ARRAY[k.chainage_to]) t
+          FROM tunnel_internal.km_ends k
+         CROSS JOIN LATERAL tunnel_internal.stretch_statistics(survey_key, ARRAY[k.chainage_from], ARRAY[k.chainage_to]) t
          WHERE k.survey_id = survey_key AND k.km = kilometre
            AND k.chainage_from > kilometre * 1000 - 0.01 AND k.chainage_to < (kilometre + 1) * 1000 + 0.01) f ON true;
 EXCEPTION
@@ -80,36 +80,36 @@ EXCEPTION
         INSERT INTO tunnel.waterproof (survey_id, km, chainage_from, chainage_to) VALUES (survey_key, kilometre, 'NaN', 'NaN');
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.keep_waterproof(int, int) IS
+COMMENT ON FUNCTION tunnel_internal.keep_waterproof(int, int) IS
 'Keeps the statistics of a kilometre, for view km_waterproof to be quick; it is right without that, too. Called at the end of each transaction that changes leaks or coverage, and by tunneldb init.';
 
 -- At the end of a transaction, once a kilometre: the first call takes the notes of the others away. Under a stricter isolation
 -- than read committed it would make transactions fail that only look at each other's kilometres, so there nothing is kept.
-CREATE OR REPLACE FUNCTION tunnel_api.keep_at_commit() RETURNS trigger
+CREATE OR REPLACE FUNCTION tunnel_internal.keep_at_commit() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
 BEGIN
     IF current_setting('transaction_isolation') = 'read committed'
        AND EXISTS (SELECT FROM tunnel.waterproof w WHERE w.id = NEW.id) THEN
-        PERFORM tunnel_api.keep_waterproof(NEW.survey_id, NEW.km);
+        PERFORM tunnel_internal.keep_waterproof(NEW.survey_id, NEW.km);
     END IF;
     RETURN NULL;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.keep_at_commit() IS
+COMMENT ON FUNCTION tunnel_internal.keep_at_commit() IS
     'Trigger of tunnel.waterproof: keeps the statistics of a kilometre in which something was changed';
 
 DROP TRIGGER IF EXISTS keep ON tunnel.waterproof;
 CREATE CONSTRAINT TRIGGER keep AFTER INSERT ON tunnel.waterproof DEFERRABLE INITIALLY DEFERRED
-    FOR EACH ROW WHEN (NEW.chainage_from IS NULL) EXECUTE FUNCTION tunnel_api.keep_at_commit();
+    FOR EACH ROW WHEN (NEW.chainage_from IS NULL) EXECUTE FUNCTION tunnel_internal.keep_at_commit();
 
 -- Kilometres of a survey of which nothing is kept that holds: tunneldb init works them out, each in a transaction of its own.
 -- What is not to be kept (NaN) stays so until something changes there.
-CREATE OR REPLACE FUNCTION tunnel_api.waterproof_unkept(survey_id int) RETURNS SETOF int
+CREATE OR REPLACE FUNCTION tunnel_internal.waterproof_unkept(survey_id int) RETURNS SETOF int
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 25 SET search_path = pg_catalog, pg_temp
 AS $$
     SELECT k.km
-      FROM tunnel_api.km_ends k
+      FROM tunnel_internal.km_ends k
      CROSS JOIN LATERAL (
             SELECT count(*) AS rows, min(w.chainage_from) AS chainage_from, min(w.chainage_to) AS chainage_to
               FROM tunnel.waterproof w WHERE w.survey_id = $1 AND w.km = k.km) w
@@ -118,5 +118,5 @@ AS $$
             OR w.chainage_from <> 'NaN' AND (w.chainage_from <> k.chainage_from OR w.chainage_to <> k.chainage_to))
      ORDER BY k.km
 $$;
-COMMENT ON FUNCTION tunnel_api.waterproof_unkept(int) IS
+COMMENT ON FUNCTION tunnel_internal.waterproof_unkept(int) IS
 'Kilometres of a survey whose statistics are not kept, or not as they are now: the view km_waterproof works them out each time it is asked. tunneldb init keeps them.';

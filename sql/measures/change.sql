@@ -64,53 +64,53 @@ BEGIN
 END
 $$;
 
-CALL tunnel_api.make_geometry_views(
+CALL tunnel_internal.make_geometry_views(
     'change_region', 'change_region', 'Lining that changed significantly,',
     plane_text => 'in the unrolled plane (chainage, arc) of the older survey, SRID 0');
-CALL tunnel_api.make_geometry_views(
+CALL tunnel_internal.make_geometry_views(
     'leak_change', 'leak_change', 'What became of leaks,',
     plane_text => 'in the unrolled plane (chainage, arc) of the older survey, SRID 0');
 
-CREATE OR REPLACE FUNCTION tunnel_api.leaks_checksum(survey_id int, chainage_from float8, chainage_to float8) RETURNS text
+CREATE OR REPLACE FUNCTION tunnel_internal.leaks_checksum(survey_id int, chainage_from float8, chainage_to float8) RETURNS text
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT md5(string_agg(concat_ws(' ', a.id, coalesce(a.kind_override, a.kind), a.wet, a.area, a.chainage_from, a.chainage_to), ';' ORDER BY a.id))
       FROM tunnel.finding a
      WHERE a.survey_id = $1 AND a.chainage_to > $2 AND a.chainage_from < $3 AND a.detected AND a.review <> 'rejected'
-       AND NOT a.superseded AND (a.wet OR a.kind IN ('leak', 'joint', 'dark')) AND tunnel_api.in_order($2, $3)
+       AND NOT a.superseded AND (a.wet OR a.kind IN ('leak', 'joint', 'dark')) AND tunnel_internal.in_order($2, $3)
 $$;
-COMMENT ON FUNCTION tunnel_api.leaks_checksum(int, float8, float8) IS
+COMMENT ON FUNCTION tunnel_internal.leaks_checksum(int, float8, float8) IS
     'Checksum of the leaks, joints and dark spots that count between two chainages (m): another as soon as one is judged, drawn or found anew; NULL without any';
 
 -- What the change of a kilometre is made from. It is up to date as long as this is the same as in its row of the ledger.
-CREATE OR REPLACE FUNCTION tunnel_api.change_inputs(survey_id int, old_survey_id int, km int) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.change_inputs(survey_id int, old_survey_id int, km int) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
-               'detect_old', tunnel_api.last_run($2, 'detect', $3),
-               'detect_new', tunnel_api.last_run($1, 'detect', $3),
-               'leaks_old', tunnel_api.leaks_checksum($2, $3 * 1000 - 100, ($3 + 1) * 1000 + 100),
-               'leaks_new', tunnel_api.leaks_checksum($1, $3 * 1000 - 100, ($3 + 1) * 1000 + 100))
+               'detect_old', tunnel_internal.last_run($2, 'detect', $3),
+               'detect_new', tunnel_internal.last_run($1, 'detect', $3),
+               'leaks_old', tunnel_internal.leaks_checksum($2, $3 * 1000 - 100, ($3 + 1) * 1000 + 100),
+               'leaks_new', tunnel_internal.leaks_checksum($1, $3 * 1000 - 100, ($3 + 1) * 1000 + 100))
 $$;
-COMMENT ON FUNCTION tunnel_api.change_inputs(int, int, int) IS
+COMMENT ON FUNCTION tunnel_internal.change_inputs(int, int, int) IS
     'What the change of a kilometre from an older survey to this one is made from: the runs of stage detect, and checksums of the leaks of both. The run of stage compare holds the same in its parameters';
 
-CREATE OR REPLACE FUNCTION tunnel_api.change_state(survey_id int, old_survey_id int)
+CREATE OR REPLACE FUNCTION tunnel_internal.change_state(survey_id int, old_survey_id int)
 RETURNS TABLE (km int, done_at timestamptz, reason text, cell float8, length float8)
 LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
     WITH last AS (
-        SELECT r.km, r.finished_at, r.parameters FROM tunnel_api.last_runs($1, 'compare') r WHERE r.subject = $2::text
+        SELECT r.km, r.finished_at, r.parameters FROM tunnel_internal.last_runs($1, 'compare') r WHERE r.subject = $2::text
     ), seen AS (
-        SELECT i.km FROM tunnel_api.image_kilometres($1, 'offset') i (km)
+        SELECT i.km FROM tunnel_internal.image_kilometres($1, 'offset') i (km)
         INTERSECT
-        SELECT i.km FROM tunnel_api.image_kilometres($2, 'offset') i (km)
+        SELECT i.km FROM tunnel_internal.image_kilometres($2, 'offset') i (km)
     ), place AS (  -- where both saw something, or what was made of it is still there
         SELECT k.km, true AS there FROM seen k
          UNION ALL
         SELECT DISTINCT c.km, false FROM tunnel.change_section c
          WHERE c.survey_id = $1 AND c.old_survey_id = $2 AND NOT EXISTS (SELECT FROM seen k WHERE k.km = c.km)
     ), detect_new AS MATERIALIZED (
-        SELECT t.km, t.reason FROM tunnel_api.stage_state($1) t WHERE t.stage = 'detect'
+        SELECT t.km, t.reason FROM tunnel_internal.stage_state($1) t WHERE t.stage = 'detect'
     ), detect_old AS MATERIALIZED (
-        SELECT t.km, t.reason FROM tunnel_api.stage_state($2) t WHERE t.stage = 'detect'
+        SELECT t.km, t.reason FROM tunnel_internal.stage_state($2) t WHERE t.stage = 'detect'
     )
     SELECT k.km, l.finished_at,
            CASE WHEN NOT k.there THEN 'one of the surveys has nothing there any more'
@@ -124,12 +124,12 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
            END,
            (l.parameters ->> 'cell')::float8, (l.parameters ->> 'length')::float8
       FROM place k
-     CROSS JOIN LATERAL (SELECT tunnel_api.change_inputs($1, $2, k.km) AS inputs) i
+     CROSS JOIN LATERAL (SELECT tunnel_internal.change_inputs($1, $2, k.km) AS inputs) i
       LEFT JOIN last l ON l.km = k.km
       LEFT JOIN detect_old o ON o.km = k.km
       LEFT JOIN detect_new n ON n.km = k.km
 $$;
-COMMENT ON FUNCTION tunnel_api.change_state(int, int) IS
+COMMENT ON FUNCTION tunnel_internal.change_state(int, int) IS
     'How far the comparison of a survey with an older one has come: of each kilometre that both saw, when it was last made, with what cells and sections (m), and why it is out of date, if it is';
 
 CREATE OR REPLACE VIEW tunnel_api.change_status AS
@@ -137,9 +137,9 @@ SELECT ((s.id::bigint * 100000 + p.old_survey_id) * 1000000) + 500000 + t.km AS 
        p.old_survey_id, o.name AS old_survey, t.km, t.done_at, t.reason IS NOT NULL AS stale, t.reason, t.cell, t.length
   FROM tunnel.survey s
  CROSS JOIN LATERAL (
-        SELECT DISTINCT r.subject::int AS old_survey_id FROM tunnel_api.last_runs(s.id, 'compare') r) p
+        SELECT DISTINCT r.subject::int AS old_survey_id FROM tunnel_internal.last_runs(s.id, 'compare') r) p
   JOIN tunnel.survey o ON o.id = p.old_survey_id
- CROSS JOIN LATERAL tunnel_api.change_state(s.id, p.old_survey_id) t;
+ CROSS JOIN LATERAL tunnel_internal.change_state(s.id, p.old_survey_id) t;
 COMMENT ON VIEW tunnel_api.change_status IS 'Whether what is stored of the change between two surveys is up to date, by kilometre, of those that were compared';
 COMMENT ON COLUMN tunnel_api.change_status.old_survey_id IS 'Key of the survey that it is compared with';
 COMMENT ON COLUMN tunnel_api.change_status.old_survey IS 'Its name';
@@ -194,7 +194,7 @@ COMMENT ON FUNCTION tunnel_api.change_at(text, float8, float8) IS
 'Change of the lining at a place (chainage and arc of the older survey, m) in each survey that was compared with it, by date: mean over the length of the section, m, positive inwards, without the section''s rigid motion; NULL where unseen. lod: level of detection of a single cell there, m';
 
 -- Nodes of a section lie at each whole degree from -180 to 180.
-CREATE OR REPLACE FUNCTION tunnel_api.arc_at_clock(survey_id int, chainage float8, clock float8) RETURNS float8
+CREATE OR REPLACE FUNCTION tunnel_internal.arc_at_clock(survey_id int, chainage float8, clock float8) RETURNS float8
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT s.arc[floor(d.degree)::int + 181] + (d.degree - floor(d.degree))
            * (s.arc[least(floor(d.degree)::int + 182, 361)] - s.arc[floor(d.degree)::int + 181])
@@ -203,15 +203,15 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
                           WHERE c.survey_id = $1 AND c.chainage BETWEEN $2 - 10 AND $2 + 10
                           ORDER BY abs(c.chainage - $2) LIMIT 1) s
 $$;
-COMMENT ON FUNCTION tunnel_api.arc_at_clock(int, float8, float8) IS
+COMMENT ON FUNCTION tunnel_internal.arc_at_clock(int, float8, float8) IS
 'Arc (m from the crown) at a clock position (hours) of the section nearest to a chainage (m) of a survey; NULL where none lies within 10 m';
 
 CREATE OR REPLACE FUNCTION tunnel_api.convergence(old_survey text, chainage float8, clock_from float8 DEFAULT 9, clock_to float8 DEFAULT 3)
 RETURNS TABLE (survey text, date date, convergence float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 10 SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT a.survey, a.date, -(a.change + b.change)
-      FROM (SELECT tunnel_api.arc_at_clock(tunnel_api.survey_id($1), $2, $3) AS first,
-                   tunnel_api.arc_at_clock(tunnel_api.survey_id($1), $2, $4) AS second) p
+      FROM (SELECT tunnel_internal.arc_at_clock(tunnel_api.survey_id($1), $2, $3) AS first,
+                   tunnel_internal.arc_at_clock(tunnel_api.survey_id($1), $2, $4) AS second) p
      CROSS JOIN LATERAL tunnel_api.change_at($1, $2, p.first) a
       JOIN LATERAL tunnel_api.change_at($1, $2, p.second) b ON b.survey = a.survey
      ORDER BY a.date, a.survey

@@ -1,11 +1,11 @@
 -- Outlines about tracks, and how near to them what stands in a tunnel is. Needs stationing (geometry/stationing.sql), survey_id and
 -- stage_state (stages/status.sql).
 
-CREATE OR REPLACE FUNCTION tunnel_api.class_name(class int) RETURNS text
+CREATE OR REPLACE FUNCTION tunnel_internal.class_name(class int) RETURNS text
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
 RETURN CASE class WHEN 2 THEN 'ground' WHEN 64 THEN 'lining' WHEN 65 THEN 'niche' WHEN 66 THEN 'appendage' WHEN 67 THEN 'rail'
                   WHEN 68 THEN 'object' WHEN 69 THEN 'sphere' WHEN 70 THEN 'noise' ELSE 'unassigned' END;
-COMMENT ON FUNCTION tunnel_api.class_name(int) IS 'Name of a class of points';
+COMMENT ON FUNCTION tunnel_internal.class_name(int) IS 'Name of a class of points';
 
 CREATE OR REPLACE VIEW tunnel_api.gauge AS
 SELECT g.id, g.tunnel_id, t.name AS tunnel, g.name, g.outline, g.source, g.added_at
@@ -18,7 +18,7 @@ COMMENT ON COLUMN tunnel_api.gauge.source IS 'File that it was read from';
 CREATE OR REPLACE VIEW tunnel_api.clearance_section AS
 SELECT c.id, c.survey_id, s.name AS survey, c.km, c.gauge, c.track, c.chainage_from, c.chainage_to,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (c.chainage_from + c.chainage_to) / 2) l) AS label,
-       c.margin, c.margin_se, c.clock, tunnel_api.class_name(c.class) AS class, c.cluster_id, c.seen_share, c.points, c.inside,
+       c.margin, c.margin_se, c.clock, tunnel_internal.class_name(c.class) AS class, c.cluster_id, c.seen_share, c.points, c.inside,
        c.stray, c.passing, c.ground, c.track_right, c.track_up, c.cant, 1 / nullif(c.curvature, 0) AS radius, c.widened_left,
        c.widened_right, c.roll, c.margins, c.outline, c.geom::public.geometry AS geom
   FROM tunnel.clearance_section c JOIN tunnel.survey s ON s.id = c.survey_id;
@@ -51,7 +51,7 @@ COMMENT ON COLUMN tunnel_api.clearance_section.geom IS 'The point with the least
 
 CREATE OR REPLACE VIEW tunnel_api.clearance_infringement AS
 SELECT i.id, i.survey_id, s.name AS survey, i.km, i.gauge, i.track, i.chainage_from, i.chainage_to,
-       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (i.chainage_from + i.chainage_to) / 2) l) AS label, i.depth, i.clock, tunnel_api.class_name(i.class) AS class,
+       (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (i.chainage_from + i.chainage_to) / 2) l) AS label, i.depth, i.clock, tunnel_internal.class_name(i.class) AS class,
        i.counts, i.cluster_id, i.points, i.unrolled, i.geom::public.geometry AS geom
   FROM tunnel.clearance_infringement i JOIN tunnel.survey s ON s.id = i.survey_id;
 COMMENT ON VIEW tunnel_api.clearance_infringement IS 'Groups of points inside an outline about a track, in pieces of 10 m at most';
@@ -68,25 +68,25 @@ COMMENT ON COLUMN tunnel_api.clearance_infringement.unrolled IS 'What it covers 
 COMMENT ON COLUMN tunnel_api.clearance_infringement.geom IS 'Its points, at most 200, deepest first, in the tunnel''s SRID';
 
 -- What the clearance of a kilometre is made from, beside the options.
-CREATE OR REPLACE FUNCTION tunnel_api.clearance_inputs(survey_id int, km int, gauge text) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.clearance_inputs(survey_id int, km int, gauge text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
-               'ground', (SELECT max(tunnel_api.last_run($1, 'ground', k)) FROM generate_series($2 - 1, $2 + 1) k),
+               'ground', (SELECT max(tunnel_internal.last_run($1, 'ground', k)) FROM generate_series($2 - 1, $2 + 1) k),
                'gauge', $3,
                'outline', (SELECT g.checksum FROM tunnel.gauge g WHERE g.tunnel_id = s.tunnel_id AND g.name = $3))
       FROM tunnel.survey s WHERE s.id = $1
 $$;
-COMMENT ON FUNCTION tunnel_api.clearance_inputs(int, int, text) IS
+COMMENT ON FUNCTION tunnel_internal.clearance_inputs(int, int, text) IS
     'What the clearance of a survey''s kilometre is made from: the last run of stage ground there and beside, and a checksum of the outline. The run of stage clearance holds the same in its parameters';
 
-CREATE OR REPLACE FUNCTION tunnel_api.clearance_state(survey_id int)
+CREATE OR REPLACE FUNCTION tunnel_internal.clearance_state(survey_id int)
 RETURNS TABLE (run_id bigint, km int, gauge text, track text, done_at timestamptz, reason text)
 LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
     WITH last AS (
         SELECT r.id, r.km, r.parameters ->> 'gauge' AS gauge, r.parameters ->> 'track' AS track, r.finished_at, r.parameters
-          FROM tunnel_api.last_runs($1, 'clearance') r
+          FROM tunnel_internal.last_runs($1, 'clearance') r
     ), ground AS MATERIALIZED (
-        SELECT t.km, t.reason FROM tunnel_api.stage_state($1) t WHERE t.stage = 'ground'
+        SELECT t.km, t.reason FROM tunnel_internal.stage_state($1) t WHERE t.stage = 'ground'
     )
     SELECT l.id::bigint, l.km, l.gauge, l.track, l.finished_at,
            CASE WHEN t.reason IS NOT NULL THEN 'ground is stale: ' || t.reason
@@ -94,17 +94,17 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
                 WHEN l.parameters -> 'outline' IS DISTINCT FROM n.inputs -> 'outline' THEN 'outline changed since'
            END
       FROM last l
-     CROSS JOIN LATERAL (SELECT tunnel_api.clearance_inputs($1, l.km, l.gauge) AS inputs) n
+     CROSS JOIN LATERAL (SELECT tunnel_internal.clearance_inputs($1, l.km, l.gauge) AS inputs) n
       LEFT JOIN ground t ON t.km = l.km
 $$;
-COMMENT ON FUNCTION tunnel_api.clearance_state(int) IS
+COMMENT ON FUNCTION tunnel_internal.clearance_state(int) IS
     'How far the clearance of a survey has come: of each kilometre, outline and track that was measured, when, and why it is out of date, if it is';
 
 CREATE OR REPLACE VIEW tunnel_api.clearance_status AS
 SELECT t.run_id AS id, s.id AS survey_id, s.name AS survey, t.km, t.gauge, t.track,
        t.done_at, t.reason IS NOT NULL AS stale, t.reason
   FROM tunnel.survey s
- CROSS JOIN LATERAL tunnel_api.clearance_state(s.id) t;
+ CROSS JOIN LATERAL tunnel_internal.clearance_state(s.id) t;
 COMMENT ON VIEW tunnel_api.clearance_status IS 'Whether the clearance of each kilometre that was measured is up to date';
 COMMENT ON COLUMN tunnel_api.clearance_status.gauge IS 'Name of the outline';
 COMMENT ON COLUMN tunnel_api.clearance_status.track IS 'The track';

@@ -77,10 +77,10 @@ COMMENT ON COLUMN tunnel_api.deviation_section.shift_up IS 'How far it lies abov
 COMMENT ON COLUMN tunnel_api.deviation_section.deviation IS 'Mean deviation of cells of equal length along the profile, m, positive inside; NaN where unseen';
 
 -- What the deviation of a kilometre is made from. It is up to date as long as this is the same as in its row of the ledger.
-CREATE OR REPLACE FUNCTION tunnel_api.deviation_inputs(survey_id int, km int, layer text) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.deviation_inputs(survey_id int, km int, layer text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
-               'detect', tunnel_api.last_run($1, 'detect', $2),
+               'detect', tunnel_internal.last_run($1, 'detect', $2),
                'profiles', (
                    SELECT md5(string_agg(concat_ws(' ', p.name, p.chainage_from, p.chainage_to, p.outline), ';' ORDER BY p.chainage_from))
                      FROM tunnel.design_profile p
@@ -91,10 +91,10 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
                               WHERE a.tunnel_id = s.tunnel_id AND a.layer = $3 AND a.chainage_to >= ($2 + 1) * 1000), 'infinity')))
       FROM tunnel.survey s WHERE s.id = $1
 $$;
-COMMENT ON FUNCTION tunnel_api.deviation_inputs(int, int, text) IS
+COMMENT ON FUNCTION tunnel_internal.deviation_inputs(int, int, text) IS
     'What the deviation of a survey''s kilometre from a layer is made from: the run of stage detect, and a checksum of the profiles there and next to it. The run of stage deviation holds the same in its parameters';
 
-CREATE OR REPLACE FUNCTION tunnel_api.deviation_state(survey_id int)
+CREATE OR REPLACE FUNCTION tunnel_internal.deviation_state(survey_id int)
 RETURNS TABLE (km int, layer text, done_at timestamptz, reason text)
 LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
     WITH design AS (
@@ -102,15 +102,15 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
           FROM tunnel.survey s JOIN tunnel.design_profile p ON p.tunnel_id = s.tunnel_id
          WHERE s.id = $1 GROUP BY p.layer
     ), seen AS (
-        SELECT i.km FROM tunnel_api.image_kilometres($1, 'offset') i (km)
+        SELECT i.km FROM tunnel_internal.image_kilometres($1, 'offset') i (km)
     ), pictured AS MATERIALIZED (
         SELECT l.layer, i.km
           FROM (VALUES ('lining'), ('shotcrete'), ('excavation')) l (layer)
-         CROSS JOIN LATERAL tunnel_api.image_kilometres($1, 'deviation_' || l.layer) i (km)
+         CROSS JOIN LATERAL tunnel_internal.image_kilometres($1, 'deviation_' || l.layer) i (km)
     ), detect AS MATERIALIZED (
-        SELECT t.km, t.reason FROM tunnel_api.stage_state($1) t WHERE t.stage = 'detect'
+        SELECT t.km, t.reason FROM tunnel_internal.stage_state($1) t WHERE t.stage = 'detect'
     ), last AS (
-        SELECT r.km, r.subject AS layer, r.finished_at, r.parameters FROM tunnel_api.last_runs($1, 'deviation') r
+        SELECT r.km, r.subject AS layer, r.finished_at, r.parameters FROM tunnel_internal.last_runs($1, 'deviation') r
     ), place AS (  -- where there is a design, or there was one and what was made by it is still there
         SELECT k.km, d.layer FROM seen k JOIN design d ON d.low < (k.km + 1) * 1000 AND d.high > k.km * 1000
          UNION
@@ -131,18 +131,18 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
            END
       FROM seen k
       JOIN place d ON d.km = k.km
-     CROSS JOIN LATERAL (SELECT tunnel_api.deviation_inputs($1, k.km, d.layer) AS inputs) n
+     CROSS JOIN LATERAL (SELECT tunnel_internal.deviation_inputs($1, k.km, d.layer) AS inputs) n
       LEFT JOIN detect t ON t.km = k.km
       LEFT JOIN last l ON l.km = k.km AND l.layer = d.layer
 $$;
-COMMENT ON FUNCTION tunnel_api.deviation_state(int) IS
+COMMENT ON FUNCTION tunnel_internal.deviation_state(int) IS
     'How far the deviation of a survey has come: of each kilometre with an offset image and each layer with a profile or sections there, when it was last made, and why it is out of date, if it is';
 
 CREATE OR REPLACE VIEW tunnel_api.deviation_status AS
 SELECT ((s.id::bigint * 1000000 + 500000 + t.km) * 10) + CASE t.layer WHEN 'lining' THEN 1 WHEN 'shotcrete' THEN 2 ELSE 3 END AS id,
        s.id AS survey_id, s.name AS survey, t.km, t.layer, t.done_at, t.reason IS NOT NULL AS stale, t.reason
   FROM tunnel.survey s
- CROSS JOIN LATERAL tunnel_api.deviation_state(s.id) t;
+ CROSS JOIN LATERAL tunnel_internal.deviation_state(s.id) t;
 COMMENT ON VIEW tunnel_api.deviation_status IS 'Whether the deviation of each kilometre is up to date: one row per layer';
 COMMENT ON COLUMN tunnel_api.deviation_status.layer IS 'Layer of the profiles';
 COMMENT ON COLUMN tunnel_api.deviation_status.done_at IS 'When it was last made; NULL: never';
@@ -171,7 +171,7 @@ AS $$
           FROM tunnel_api.deviation_section d
          CROSS JOIN LATERAL (SELECT least(d.chainage_to, $4) - greatest(d.chainage_from, $3) AS long) p
          WHERE d.survey_id = s.id AND d.layer = $2 AND d.chainage_from > $3 - 1.001 AND d.chainage_from < $4 AND p.long > 0
-           AND tunnel_api.in_order($3, $4)
+           AND tunnel_internal.in_order($3, $4)
         HAVING count(*) > 0) d
 $$;
 COMMENT ON FUNCTION tunnel_api.deviation_volume(text, text, float8, float8, float8) IS

@@ -86,24 +86,24 @@ COMMENT ON COLUMN tunnel_api.ring_chord.length IS 'Length, m; NULL where an end 
 COMMENT ON COLUMN tunnel_api.ring_chord.length_se IS 'Standard error, m';
 
 -- Rings of other kilometres whose end is next to this one belong to it, too: the step at its beginning goes by both.
-CREATE OR REPLACE FUNCTION tunnel_api.ring_inputs(survey_id int, km int) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.ring_inputs(survey_id int, km int) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
                'detect', (SELECT jsonb_agg(l.id ORDER BY k) FROM generate_series($2 - 1, $2 + 1) k
-                           CROSS JOIN LATERAL (SELECT tunnel_api.last_run($1, 'detect', k) AS id) l WHERE l.id IS NOT NULL),
+                           CROSS JOIN LATERAL (SELECT tunnel_internal.last_run($1, 'detect', k) AS id) l WHERE l.id IS NOT NULL),
                'rings', (SELECT md5(string_agg(concat_ws(' ', g.number, g.chainage_from, g.chainage_to), ';' ORDER BY g.number))
                            FROM tunnel.ring g WHERE g.survey_id = $1 AND g.km = $2))
 $$;
-COMMENT ON FUNCTION tunnel_api.ring_inputs(int, int) IS
+COMMENT ON FUNCTION tunnel_internal.ring_inputs(int, int) IS
     'What the measures of a kilometre''s rings are made from: the runs of stage detect there and beside, and a checksum of the rings'' joints. The run of stage rings holds the same in its parameters';
 
-CREATE OR REPLACE FUNCTION tunnel_api.ring_state(survey_id int)
+CREATE OR REPLACE FUNCTION tunnel_internal.ring_state(survey_id int)
 RETURNS TABLE (km int, rings int, done_at timestamptz, reason text)
 LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
     WITH detect AS MATERIALIZED (
-        SELECT t.km, t.reason FROM tunnel_api.stage_state($1) t WHERE t.stage = 'detect'
+        SELECT t.km, t.reason FROM tunnel_internal.stage_state($1) t WHERE t.stage = 'detect'
     ), last AS (
-        SELECT r.km, r.finished_at, r.parameters FROM tunnel_api.last_runs($1, 'rings') r
+        SELECT r.km, r.finished_at, r.parameters FROM tunnel_internal.last_runs($1, 'rings') r
     )
     SELECT g.km, g.rings, l.finished_at,
            CASE WHEN t.reason IS NOT NULL THEN 'detect is stale: ' || t.reason
@@ -114,18 +114,18 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
            END
       FROM (SELECT o.km, count(*)::int AS rings, bool_or(o.shape IS NULL) AS unmeasured
               FROM tunnel.ring o WHERE o.survey_id = $1 GROUP BY o.km) g
-     CROSS JOIN LATERAL (SELECT tunnel_api.ring_inputs($1, g.km) AS inputs) n
+     CROSS JOIN LATERAL (SELECT tunnel_internal.ring_inputs($1, g.km) AS inputs) n
       LEFT JOIN detect t ON t.km = g.km
       LEFT JOIN last l ON l.km = g.km
 $$;
-COMMENT ON FUNCTION tunnel_api.ring_state(int) IS
+COMMENT ON FUNCTION tunnel_internal.ring_state(int) IS
     'How far the rings of a survey have come: of each kilometre with rings, how many, when they were last measured, and why that is out of date, if it is';
 
 CREATE OR REPLACE VIEW tunnel_api.ring_status AS
 SELECT (s.id::bigint * 1000000 + 500000 + t.km) AS id, s.id AS survey_id, s.name AS survey, t.km, t.rings, t.done_at,
        t.reason IS NOT NULL AS stale, t.reason
   FROM tunnel.survey s
- CROSS JOIN LATERAL tunnel_api.ring_state(s.id) t;
+ CROSS JOIN LATERAL tunnel_internal.ring_state(s.id) t;
 COMMENT ON VIEW tunnel_api.ring_status IS 'Whether the measures of the rings of each kilometre are up to date';
 COMMENT ON COLUMN tunnel_api.ring_status.rings IS 'How many rings have their middle there';
 COMMENT ON COLUMN tunnel_api.ring_status.done_at IS 'When they were last measured; NULL: never';
@@ -169,10 +169,10 @@ SELECT r.id, r.survey_id, r.survey, r.km, r.number, r.label, r.chainage_from, r.
   FROM tunnel_api.ring_unrolled r
  CROSS JOIN LATERAL (SELECT public.st_ymin(r.geom) AS low, public.st_ymax(r.geom) AS high) e
  CROSS JOIN LATERAL (
-        SELECT tunnel_api.map_point(r.survey_id, r.chainage_from, e.low) AS a,
-               tunnel_api.map_point(r.survey_id, r.chainage_to, e.low) AS b,
-               tunnel_api.map_point(r.survey_id, r.chainage_to, e.high) AS c,
-               tunnel_api.map_point(r.survey_id, r.chainage_from, e.high) AS d) c
+        SELECT tunnel_internal.map_point(r.survey_id, r.chainage_from, e.low) AS a,
+               tunnel_internal.map_point(r.survey_id, r.chainage_to, e.low) AS b,
+               tunnel_internal.map_point(r.survey_id, r.chainage_to, e.high) AS c,
+               tunnel_internal.map_point(r.survey_id, r.chainage_from, e.high) AS d) c
  WHERE c.a IS NOT NULL AND c.b IS NOT NULL;
 COMMENT ON VIEW tunnel_api.ring_map IS 'Rings laid on the map beside the axis, with what QGIS shows of them';
 COMMENT ON COLUMN tunnel_api.ring_map.number IS 'Number of the ring';

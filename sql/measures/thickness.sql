@@ -29,30 +29,30 @@ COMMENT ON COLUMN tunnel_api.thickness_section.thickness_least IS 'Least of a ce
 COMMENT ON COLUMN tunnel_api.thickness_section.least_at IS 'How far along the profile that is, from its left foot or lowest place clockwise, m';
 COMMENT ON COLUMN tunnel_api.thickness_section.thickness IS 'Thickness of cells of equal length along the profile, m; NaN where either saw nothing';
 
-CREATE OR REPLACE FUNCTION tunnel_api.thickness_inputs(before_id int, survey_id int, km int, layer text) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.thickness_inputs(before_id int, survey_id int, km int, layer text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object('layer', $4, 'before', $1) || jsonb_object_agg(v.part,
-               tunnel_api.last_run(v.id, 'deviation', $3, $4))
+               tunnel_internal.last_run(v.id, 'deviation', $3, $4))
       FROM (VALUES ('old', $1), ('new', $2)) v (part, id)
 $$;
-COMMENT ON FUNCTION tunnel_api.thickness_inputs(int, int, int, text) IS
+COMMENT ON FUNCTION tunnel_internal.thickness_inputs(int, int, int, text) IS
     'What the thickness between two surveys in a kilometre is made from: the runs of stage deviation of both. The run of stage thickness holds the same in its parameters';
 
-CREATE OR REPLACE FUNCTION tunnel_api.thickness_state(before_id int, survey_id int, layer text)
+CREATE OR REPLACE FUNCTION tunnel_internal.thickness_state(before_id int, survey_id int, layer text)
 RETURNS TABLE (km int, done_at timestamptz, reason text)
 LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 25 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
     SELECT n.km, l.finished_at,
            CASE WHEN o.reason IS NOT NULL THEN 'deviation of the earlier survey is stale: ' || o.reason
                 WHEN n.reason IS NOT NULL THEN 'deviation of the later survey is stale: ' || n.reason
                 WHEN l.finished_at IS NULL THEN 'never ran'
-                WHEN l.parameters IS DISTINCT FROM tunnel_api.thickness_inputs($1, $2, n.km, $3) THEN 'deviation ran since'
+                WHEN l.parameters IS DISTINCT FROM tunnel_internal.thickness_inputs($1, $2, n.km, $3) THEN 'deviation ran since'
            END
-      FROM tunnel_api.deviation_state($2) n
-      JOIN tunnel_api.deviation_state($1) o ON o.km = n.km AND o.layer = n.layer
-      LEFT JOIN tunnel_api.last_runs($2, 'thickness') l ON l.km = n.km AND l.subject = $1 || ' ' || $3
+      FROM tunnel_internal.deviation_state($2) n
+      JOIN tunnel_internal.deviation_state($1) o ON o.km = n.km AND o.layer = n.layer
+      LEFT JOIN tunnel_internal.last_runs($2, 'thickness') l ON l.km = n.km AND l.subject = $1 || ' ' || $3
      WHERE n.layer = $3
 $$;
-COMMENT ON FUNCTION tunnel_api.thickness_state(int, int, text) IS
+COMMENT ON FUNCTION tunnel_internal.thickness_state(int, int, text) IS
     'How far the thickness between two surveys has come, along a layer''s profiles: of each kilometre that both have, when it was last made, and why it is out of date, if it is';
 
 CREATE OR REPLACE VIEW tunnel_api.thickness_status AS
@@ -62,7 +62,7 @@ SELECT ((a.id::bigint * 100000 + p.before_id) * 1000000 + 500000 + t.km) * 10
   FROM tunnel.survey a
  CROSS JOIN LATERAL (SELECT DISTINCT d.before_id, d.layer FROM tunnel.thickness_section d WHERE d.survey_id = a.id) p
   JOIN tunnel.survey b ON b.id = p.before_id
- CROSS JOIN LATERAL tunnel_api.thickness_state(p.before_id, a.id, p.layer) t;
+ CROSS JOIN LATERAL tunnel_internal.thickness_state(p.before_id, a.id, p.layer) t;
 COMMENT ON VIEW tunnel_api.thickness_status IS
     'Whether the thickness between surveys is up to date: one row per kilometre of each pair of surveys and layer of which some was made';
 COMMENT ON COLUMN tunnel_api.thickness_status.survey_id IS 'Key of the later survey';

@@ -4,7 +4,7 @@
 -- in. An UPDATE of as many rows takes four times as long and leaves the old ones behind.
 --
 -- classes: one byte a row, in the order in which a scan of the partition by itself comes upon them.
-CREATE OR REPLACE FUNCTION tunnel_api.class_write(survey_id int, km int, classes bytea)
+CREATE OR REPLACE FUNCTION tunnel_internal.class_write(survey_id int, km int, classes bytea)
 RETURNS bigint
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
 SET synchronize_seqscans = off  -- from the first row to the last one
@@ -12,10 +12,10 @@ SET max_parallel_workers_per_gather = 0
 SET plan_cache_mode = force_custom_plan
 AS $$
 DECLARE
-    name constant text := tunnel_api.partition_name(survey_id, km);
+    name constant text := tunnel_internal.partition_name(survey_id, km);
     written bigint;
 BEGIN
-    PERFORM tunnel_api.partition_new(survey_id, km);
+    PERFORM tunnel_internal.partition_new(survey_id, km);
     EXECUTE format($query$
         INSERT INTO tunnel.%I (survey_id, km, chainage, gps_time, geom, segment, scan_id, file_id, intensity, classification, "class")
         SELECT p.survey_id, p.km, p.chainage, p.gps_time, p.geom, p.segment, p.scan_id, p.file_id, p.intensity, p.classification,
@@ -26,9 +26,9 @@ BEGIN
     IF written <> length(classes) THEN
         RAISE EXCEPTION 'kilometre % holds % points, not %', km, written, length(classes);
     END IF;
-    PERFORM tunnel_api.partition_swap(survey_id, km);
+    PERFORM tunnel_internal.partition_swap(survey_id, km);
     RETURN written;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.class_write(int, int, bytea) IS
+COMMENT ON FUNCTION tunnel_internal.class_write(int, int, bytea) IS
 'Classes of the points of one kilometre: rewrites their partition with one byte of classes a row, in the rows'' order, and swaps it in; returns the number of points.';

@@ -1,26 +1,26 @@
 -- Partitions of tunnel.point: one per survey and kilometre, built aside and swapped in whole; and what waits to go into them.
 
 -- Name of the partition that holds a survey's kilometre.
-CREATE OR REPLACE FUNCTION tunnel_api.partition_name(survey_id int, km int)
+CREATE OR REPLACE FUNCTION tunnel_internal.partition_name(survey_id int, km int)
 RETURNS text
 LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
 AS $$ SELECT 'point_s' || survey_id || '_km' || km $$;
-COMMENT ON FUNCTION tunnel_api.partition_name(int, int) IS
+COMMENT ON FUNCTION tunnel_internal.partition_name(int, int) IS
 'Name, in schema tunnel, of the partition of tunnel.point that holds a survey''s kilometre.';
 
 
 -- The partitions of a survey's kilometres as text for FROM: each by its name, so that what reads them holds no lock on their
 -- parent, whose other partitions may be swapped meanwhile; with none there, nothing to read.
-CREATE OR REPLACE FUNCTION tunnel_api.partition_source(survey_id int, km_from int, km_to int)
+CREATE OR REPLACE FUNCTION tunnel_internal.partition_source(survey_id int, km_from int, km_to int)
 RETURNS text
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 AS $$
     SELECT '(' || coalesce(string_agg(format('SELECT * FROM tunnel.%I', n.name), ' UNION ALL ' ORDER BY k),
         'SELECT * FROM tunnel.point WHERE false') || ')'
-    FROM generate_series(km_from, km_to) AS k, tunnel_api.partition_name(survey_id, k) AS n (name)
-    WHERE to_regclass('tunnel.' || quote_ident(n.name)) IS NOT NULL AND tunnel_api.in_order(km_from, km_to, 'km')
+    FROM generate_series(km_from, km_to) AS k, tunnel_internal.partition_name(survey_id, k) AS n (name)
+    WHERE to_regclass('tunnel.' || quote_ident(n.name)) IS NOT NULL AND tunnel_internal.in_order(km_from, km_to, 'km')
 $$;
-COMMENT ON FUNCTION tunnel_api.partition_source(int, int, int) IS
+COMMENT ON FUNCTION tunnel_internal.partition_source(int, int, int) IS
 'What to read in FROM for the points of a survey''s kilometres km_from to km_to: their partitions by name, without a lock on the table that holds them.';
 
 
@@ -30,7 +30,7 @@ COMMENT ON FUNCTION tunnel_api.partition_source(int, int, int) IS
 -- Behind a lock that waits, everybody else waits too. So it waits for no more than a tenth of a second, lets those who came
 -- meanwhile pass, and tries again: who reads for long delays the swap alone. Gives up after the session's lock_timeout, or
 -- 10 minutes if it has none.
-CREATE OR REPLACE FUNCTION tunnel_api.partition_lock(survey_id int, km int)
+CREATE OR REPLACE FUNCTION tunnel_internal.partition_lock(survey_id int, km int)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
 AS $$
@@ -39,7 +39,7 @@ DECLARE
     patience constant interval := coalesce(nullif(own::interval, '0'), '10 minutes');
     since constant timestamptz := clock_timestamp();
     parent constant text := 'point_s' || survey_id;
-    name constant text := tunnel_api.partition_name(survey_id, km);
+    name constant text := tunnel_internal.partition_name(survey_id, km);
     others text;
 BEGIN
     LOOP
@@ -66,12 +66,12 @@ BEGIN
     END LOOP;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.partition_lock(int, int) IS
+COMMENT ON FUNCTION tunnel_internal.partition_lock(int, int) IS
 'Locks a survey''s kilometre and the table that holds it, to swap or drop it, without holding up readers while it waits; gives up after the session''s lock_timeout, or 10 minutes.';
 
 
 -- Makes the table that holds a survey's partitions, if there is none. Attached, for that lets others read on meanwhile.
-CREATE OR REPLACE FUNCTION tunnel_api.partition_parent(survey_id int)
+CREATE OR REPLACE FUNCTION tunnel_internal.partition_parent(survey_id int)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
 AS $$
@@ -89,18 +89,18 @@ BEGIN
     END IF;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.partition_parent(int) IS
+COMMENT ON FUNCTION tunnel_internal.partition_parent(int) IS
 'Makes the table that holds the partitions of a survey''s kilometres, if there is none.';
 
 
 -- Makes the empty table <partition>_new, in which a survey's kilometre is built aside. Its check spares ATTACH a scan while others
 -- wait, and costs least while rows are written.
-CREATE OR REPLACE FUNCTION tunnel_api.partition_new(survey_id int, km int)
+CREATE OR REPLACE FUNCTION tunnel_internal.partition_new(survey_id int, km int)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
 AS $$
 DECLARE
-    name constant text := tunnel_api.partition_name(survey_id, km) || '_new';
+    name constant text := tunnel_internal.partition_name(survey_id, km) || '_new';
 BEGIN
     IF to_regclass('tunnel.' || quote_ident(name)) IS NOT NULL THEN
         EXECUTE format('DROP TABLE tunnel.%I', name);
@@ -109,19 +109,19 @@ BEGIN
         name, survey_id, km);
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.partition_new(int, int) IS
+COMMENT ON FUNCTION tunnel_internal.partition_new(int, int) IS
 'Makes the empty table <partition>_new, in which a survey''s kilometre of tunnel.point is built aside for partition_swap.';
 
 
 -- Puts the table <partition>_new, made by partition_new and filled in about the order of chainage, in the place of a survey's
 -- kilometre: BRIN index and statistics are made first, then the old partition is dropped and the new one attached, all in the
 -- caller's transaction. Those who read see the old kilometre until it ends, then the new one.
-CREATE OR REPLACE FUNCTION tunnel_api.partition_swap(survey_id int, km int)
+CREATE OR REPLACE FUNCTION tunnel_internal.partition_swap(survey_id int, km int)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
 AS $$
 DECLARE
-    name constant text := tunnel_api.partition_name(survey_id, km);
+    name constant text := tunnel_internal.partition_name(survey_id, km);
     parent constant text := 'point_s' || survey_id;
     owner constant regrole := (SELECT c.relowner FROM pg_class c WHERE c.oid = 'tunnel.point'::regclass);
 BEGIN
@@ -132,21 +132,21 @@ BEGIN
     EXECUTE format('ANALYZE tunnel.%I (survey_id, km, chainage, segment)', name || '_new');
     -- any operator may swap what another one loaded
     EXECUTE format('ALTER TABLE tunnel.%I OWNER TO %s', name || '_new', owner);
-    PERFORM tunnel_api.partition_parent(survey_id);
-    PERFORM tunnel_api.partition_lock(survey_id, km);
+    PERFORM tunnel_internal.partition_parent(survey_id);
+    PERFORM tunnel_internal.partition_lock(survey_id, km);
     EXECUTE format('DROP TABLE IF EXISTS tunnel.%I', name);
     EXECUTE format('ALTER TABLE tunnel.%I RENAME TO %I', name || '_new', name);
     EXECUTE format('ALTER TABLE tunnel.%I ATTACH PARTITION tunnel.%I FOR VALUES IN (%s)', parent, name, km);
     EXECUTE format('ALTER TABLE tunnel.%I DROP CONSTRAINT part', name);
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.partition_swap(int, int) IS
+COMMENT ON FUNCTION tunnel_internal.partition_swap(int, int) IS
 'Puts the table <partition>_new in the place of a survey''s kilometre of tunnel.point, with its index, in the caller''s transaction; to be called as late in it as possible. Long readers delay it and are not held up.';
 
 
 -- Makes the empty table tunnel.fragment_s<survey>_f<file>_km<km>, in the place of an older one. It belongs to the owner of
 -- tunnel.point, so that any operator may load what another one read.
-CREATE OR REPLACE FUNCTION tunnel_api.fragment_create(survey_id int, file_id int, km int)
+CREATE OR REPLACE FUNCTION tunnel_internal.fragment_create(survey_id int, file_id int, km int)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
 AS $$
@@ -163,5 +163,5 @@ BEGIN
     EXECUTE format('ALTER TABLE tunnel.%I OWNER TO %s', name, owner);
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.fragment_create(int, int, int) IS
+COMMENT ON FUNCTION tunnel_internal.fragment_create(int, int, int) IS
 'Makes the empty table that takes what was read of a file until it is loaded into a kilometre: blocks of packed rows.';

@@ -4,10 +4,10 @@
 -- Puts results of a survey in order: whoever commits one takes this lock first and holds it to the commit, and each run
 -- takes it just before it begins. A run thus sees every result that bears an earlier time than its own beginning, and the
 -- jobs that follow are found by one at a time.
-CREATE OR REPLACE FUNCTION tunnel_api.queue_lock(survey_id integer) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_lock(survey_id integer) RETURNS void
 LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
 AS $$ SELECT pg_advisory_xact_lock(-2, survey_id) $$;
-COMMENT ON FUNCTION tunnel_api.queue_lock(integer) IS
+COMMENT ON FUNCTION tunnel_internal.queue_lock(integer) IS
     'Waits until nobody commits a result of the survey, and lets nobody else until the transaction ends';
 
 -- What becomes of each stage that is wanted of each kilometre:
@@ -21,7 +21,7 @@ COMMENT ON FUNCTION tunnel_api.queue_lock(integer) IS
 --   empty    the kilometre holds no points, and awaits none
 -- A neighbour that is failed, blocked or empty, or of which the stage is not wanted, is not waited for. Stages reach no farther
 -- than as many kilometres as there are stages after the first: a range is judged with one more than these on both sides.
-CREATE OR REPLACE FUNCTION tunnel_api.queue_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
 RETURNS TABLE (km integer, step integer, stage text, state text, message text)
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000
 SET search_path = pg_catalog, pg_temp
@@ -39,7 +39,7 @@ AS $$
          CROSS JOIN LATERAL unnest(CASE w.way WHEN 0 THEN s.here ELSE s.beside END) AS n (source)
     ), span AS MATERIALIZED (
         SELECT $2 - count(*)::integer AS first, $3 + count(*)::integer AS last FROM stage
-         WHERE tunnel_api.in_order($2, $3, 'km')
+         WHERE tunnel_internal.in_order($2, $3, 'km')
     ), goal AS (
         SELECT g.km, s.step AS target, g.parameters, g.retry_after
           FROM tunnel.goal g CROSS JOIN span p JOIN stage s ON s.name = g.stage
@@ -73,7 +73,7 @@ AS $$
                AND to_regclass(format('tunnel.point_s%s_km%s', $1, s.km)) IS NULL AS empty,
                CASE s.step WHEN 1 THEN s.input_at IS NOT NULL OR coalesce(f.awaited, false)
                            ELSE s.done_at IS NULL OR s.outdated OR NOT s.done_parameters @> coalesce(w.part, '{}') END AS due
-          FROM tunnel_api.stage_state($1, (SELECT p.first FROM span p), (SELECT p.last FROM span p)) s
+          FROM tunnel_internal.stage_state($1, (SELECT p.first FROM span p), (SELECT p.last FROM span p)) s
           JOIN goal g ON g.km = s.km
           LEFT JOIN wish w ON w.parameters = g.parameters AND w.step = s.step
           LEFT JOIN file f ON f.km = s.km
@@ -120,14 +120,14 @@ AS $$
       LEFT JOIN ahead after ON after.km = c.km + 1
      WHERE c.km BETWEEN $2 AND $3
 $$;
-COMMENT ON FUNCTION tunnel_api.queue_state(integer, integer, integer) IS
+COMMENT ON FUNCTION tunnel_internal.queue_state(integer, integer, integer) IS
     'What becomes of each stage that is wanted of each kilometre of a survey: done, running, queued, ready, waits, failed, blocked or empty';
 
 -- How far a result reaches: to so many kilometres on both sides the readiness of a stage may depend on it.
-CREATE OR REPLACE FUNCTION tunnel_api.queue_reach() RETURNS integer
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_reach() RETURNS integer
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$ SELECT count(*)::integer - 1 FROM tunnel.stage $$;
-COMMENT ON FUNCTION tunnel_api.queue_reach() IS
+COMMENT ON FUNCTION tunnel_internal.queue_reach() IS
     'To how many kilometres on both sides a stage may become ready by what has been done in one: one for each stage after the first';
 
 -- Defers a job for each file to be read and for each stage of the kilometres that is ready; returns how many. Whoever commits
@@ -137,14 +137,14 @@ COMMENT ON FUNCTION tunnel_api.queue_reach() IS
 -- A kilometre goes before the next one, and in it a later stage before an earlier one, so that kilometres are finished one
 -- after the other and few fragments wait. The last stage lags by eight kilometres: it holds up nothing, and fills the workers'
 -- time at the end, when each of the other stages waits for the one before.
-CREATE OR REPLACE FUNCTION tunnel_api.queue_plan(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_plan(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
 RETURNS integer
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
 DECLARE
     found tunnel_queue.procrastinate_job_to_defer_v1[];
 BEGIN
-    PERFORM tunnel_api.queue_lock(survey_id);
+    PERFORM tunnel_internal.queue_lock(survey_id);
     WITH job AS (
         SELECT j.queueing_lock FROM tunnel_queue.procrastinate_jobs j WHERE j.status IN ('todo', 'doing')
     ), ready AS (
@@ -156,7 +156,7 @@ BEGIN
         SELECT 'stage', -10 * (s.km + CASE s.step WHEN (SELECT max(t.step) FROM tunnel.stage t) THEN 8 ELSE 0 END) + s.step,
                format('s%s.km%s', queue_plan.survey_id, s.km),
                jsonb_build_object('survey_id', queue_plan.survey_id, 'km', s.km, 'stage', s.stage)
-          FROM tunnel_api.queue_state(queue_plan.survey_id, queue_plan.km_from, queue_plan.km_to) s
+          FROM tunnel_internal.queue_state(queue_plan.survey_id, queue_plan.km_from, queue_plan.km_to) s
          WHERE s.state = 'ready'
     )
     SELECT array_agg(ROW ('tunneldb', r.task, r.priority, r.lock, r.lock, r.args, NULL)
@@ -168,38 +168,38 @@ BEGIN
     RETURN coalesce(cardinality(found), 0);
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.queue_plan(integer, integer, integer) IS
+COMMENT ON FUNCTION tunnel_internal.queue_plan(integer, integer, integer) IS
     'Defers the jobs of a survey that are ready: files to be read, and stages of the kilometres; returns how many. Under queue_lock until the transaction ends';
 
 -- Locks a job's row to the end of the transaction; true when the worker is still at it. False when it was taken to be lost, and
 -- another has the job: then the result must not be committed.
-CREATE OR REPLACE FUNCTION tunnel_api.queue_hold(job_id bigint, worker_id bigint) RETURNS boolean
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_hold(job_id bigint, worker_id bigint) RETURNS boolean
 LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
     SELECT EXISTS (SELECT FROM (SELECT j.status, j.worker_id FROM tunnel_queue.procrastinate_jobs j
                                  WHERE j.id = $1 FOR UPDATE) AS j
                     WHERE j.status = 'doing' AND j.worker_id = $2)
 $$;
-COMMENT ON FUNCTION tunnel_api.queue_hold(bigint, bigint) IS
+COMMENT ON FUNCTION tunnel_internal.queue_hold(bigint, bigint) IS
     'Locks a job, and says whether the worker is still at it';
 
 -- Ends a job that has done its work, and defers what is ready now. A file that was read is taken off the list, unless it was
 -- asked for anew after the job began; kilometres that points of it wait for are loaded, whether a batch has asked for them or
 -- not.
-CREATE OR REPLACE FUNCTION tunnel_api.queue_done(job_id bigint, started_at timestamptz) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_done(job_id bigint, started_at timestamptz) RETURNS void
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
 DECLARE
     args constant jsonb := (SELECT j.args FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
     survey constant integer := (args ->> 'survey_id')::integer;
     km constant integer := (args ->> 'km')::integer;
-    reach constant integer := tunnel_api.queue_reach();
+    reach constant integer := tunnel_internal.queue_reach();
     first integer;
     last integer;
 BEGIN
     PERFORM tunnel_queue.procrastinate_finish_job_v1(job_id, 'succeeded', false);
     IF km IS NOT NULL THEN
-        PERFORM tunnel_api.queue_plan(survey, km - reach, km + reach);
+        PERFORM tunnel_internal.queue_plan(survey, km - reach, km + reach);
         RETURN;
     END IF;
     INSERT INTO tunnel.goal (survey_id, km, stage, parameters)
@@ -218,20 +218,20 @@ BEGIN
      WHERE i.survey_id = survey AND i.name = args ->> 'file';
     DELETE FROM tunnel.incoming i
      WHERE i.survey_id = survey AND i.name = args ->> 'file' AND i.requested_at < queue_done.started_at;
-    PERFORM tunnel_api.queue_plan(survey, coalesce(first, -1000000), coalesce(last, 1000000));
+    PERFORM tunnel_internal.queue_plan(survey, coalesce(first, -1000000), coalesce(last, 1000000));
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.queue_done(bigint, timestamptz) IS
+COMMENT ON FUNCTION tunnel_internal.queue_done(bigint, timestamptz) IS
     'Ends a job that has done its work since a moment, and defers what is ready now';
 
 -- Ends a job that has failed for good, and defers what need not wait for it any more.
-CREATE OR REPLACE FUNCTION tunnel_api.queue_fail(job_id bigint, message text) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_fail(job_id bigint, message text) RETURNS void
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
 DECLARE
     args constant jsonb := (SELECT j.args FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
     survey constant integer := (args ->> 'survey_id')::integer;
-    reach constant integer := tunnel_api.queue_reach();
+    reach constant integer := tunnel_internal.queue_reach();
     first integer;
     last integer;
 BEGIN
@@ -241,15 +241,15 @@ BEGIN
     RETURNING i.km_from, i.km_to INTO first, last;
     first := coalesce(first, (args ->> 'km')::integer, -1000000);
     last := coalesce(last, (args ->> 'km')::integer, 1000000);
-    PERFORM tunnel_api.queue_plan(survey, first - reach, last + reach);
+    PERFORM tunnel_internal.queue_plan(survey, first - reach, last + reach);
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.queue_fail(bigint, text) IS
+COMMENT ON FUNCTION tunnel_internal.queue_fail(bigint, text) IS
     'Ends a job that has failed for good, and defers what need not wait for it any more';
 
 -- Puts a job back into the queue whose worker, or the worker's session, was lost; the 20th time it fails for good, for then it
 -- is likely to be the job that kills them.
-CREATE OR REPLACE FUNCTION tunnel_api.queue_return(job_id bigint) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_return(job_id bigint) RETURNS void
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
 DECLARE
@@ -261,18 +261,18 @@ BEGIN
         PERFORM pg_notify('procrastinate_queue_v1#tunneldb', json_build_object('type', 'job_inserted', 'job_id', job_id)::text);
         RETURN;
     END IF;
-    PERFORM tunnel_api.queue_lock((job.args ->> 'survey_id')::integer);
+    PERFORM tunnel_internal.queue_lock((job.args ->> 'survey_id')::integer);
     INSERT INTO tunnel.run (survey_id, km, stage, started_at, finished_at, outcome, message, job_id)
     SELECT (job.args ->> 'survey_id')::integer, (job.args ->> 'km')::integer, job.args ->> 'stage', clock_timestamp(),
            clock_timestamp(), 'failed', reason, job_id;
-    PERFORM tunnel_api.queue_fail(job_id, reason);
+    PERFORM tunnel_internal.queue_fail(job_id, reason);
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.queue_return(bigint) IS
+COMMENT ON FUNCTION tunnel_internal.queue_return(bigint) IS
     'Puts a job back into the queue whose worker was lost; the 20th time it fails';
 
 -- Whether a worker is there: while it lives, a session of its own holds this lock (queue_register).
-CREATE OR REPLACE FUNCTION tunnel_api.queue_present(worker_id bigint) RETURNS boolean
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_present(worker_id bigint) RETURNS boolean
 LANGUAGE sql VOLATILE STRICT PARALLEL RESTRICTED
 AS $$
     SELECT EXISTS (SELECT FROM pg_locks l
@@ -280,23 +280,23 @@ AS $$
                       AND l.objsubid = 2 AND l.granted
                       AND l.database = (SELECT d.oid FROM pg_database d WHERE d.datname = current_database()))
 $$;
-COMMENT ON FUNCTION tunnel_api.queue_present(bigint) IS
+COMMENT ON FUNCTION tunnel_internal.queue_present(bigint) IS
     'Whether the session lives that a worker keeps open while it lives';
 
 -- Enters a worker; the session that calls it must live as long as the worker does.
-CREATE OR REPLACE FUNCTION tunnel_api.queue_register(worker_id bigint, host text, pid integer) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_register(worker_id bigint, host text, pid integer) RETURNS void
 LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
     SELECT pg_advisory_lock(-1, worker_id::integer);
     INSERT INTO tunnel.worker (id, host, pid) VALUES (worker_id, host, pid) ON CONFLICT (id) DO NOTHING;
 $$;
-COMMENT ON FUNCTION tunnel_api.queue_register(bigint, text, integer) IS
+COMMENT ON FUNCTION tunnel_internal.queue_register(bigint, text, integer) IS
     'Enters a worker; it is there as long as the session lives that calls this';
 
 -- Takes jobs from workers that are lost: those without a heartbeat for the given time, whose sessions are ended, and those
 -- that were killed, so that both their own session and that of their job are gone. Returns how many jobs. Rows of lost workers
 -- go.
-CREATE OR REPLACE FUNCTION tunnel_api.queue_rescue(patience interval DEFAULT '25 seconds') RETURNS integer
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_rescue(patience interval DEFAULT '25 seconds') RETURNS integer
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
 DECLARE
@@ -309,39 +309,39 @@ BEGIN
           LEFT JOIN tunnel_queue.procrastinate_workers w ON w.id = j.worker_id
          WHERE j.status = 'doing' AND j.queue_name = 'tunneldb'
            AND CASE WHEN w.id IS NULL OR w.last_heartbeat < clock_timestamp() - patience THEN true
-                    WHEN tunnel_api.queue_present(w.id) THEN false
+                    WHEN tunnel_internal.queue_present(w.id) THEN false
                     ELSE NOT EXISTS (SELECT FROM tunnel.run r
                                       WHERE r.job_id = j.id AND r.outcome = 'running'
-                                        AND tunnel_api.session_lives(r.backend_pid, r.backend_start)) END
+                                        AND tunnel_internal.session_lives(r.backend_pid, r.backend_start)) END
            FOR UPDATE OF j SKIP LOCKED
     LOOP
         BEGIN
             PERFORM pg_terminate_backend(r.backend_pid) FROM tunnel.run r
               WHERE r.job_id = job.id AND r.outcome = 'running' AND r.backend_pid <> pg_backend_pid()
-                AND tunnel_api.session_lives(r.backend_pid, r.backend_start);
+                AND tunnel_internal.session_lives(r.backend_pid, r.backend_start);
         EXCEPTION WHEN insufficient_privilege THEN NULL;  -- it ends by itself, and can't commit
         END;
-        PERFORM tunnel_api.queue_return(job.id);
+        PERFORM tunnel_internal.queue_return(job.id);
         rescued := rescued + 1;
     END LOOP;
     DELETE FROM tunnel.worker v
      WHERE NOT EXISTS (SELECT FROM tunnel_queue.procrastinate_workers w
                         WHERE w.id = v.id AND w.last_heartbeat >= clock_timestamp() - patience)
-        OR NOT tunnel_api.queue_present(v.id)
+        OR NOT tunnel_internal.queue_present(v.id)
        AND NOT EXISTS (SELECT FROM tunnel_queue.procrastinate_jobs j WHERE j.worker_id = v.id AND j.status = 'doing');
     RETURN rescued;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.queue_rescue(interval) IS
+COMMENT ON FUNCTION tunnel_internal.queue_rescue(interval) IS
     'Takes jobs from workers that are lost, and puts them back into the queue; returns how many';
 
 -- Whether there are jobs of a survey that wait or run. When there are none, there is nothing left to be done: each result brings
 -- along the jobs that it makes possible.
-CREATE OR REPLACE FUNCTION tunnel_api.queue_busy(survey_id integer) RETURNS boolean
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_busy(survey_id integer) RETURNS boolean
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
     SELECT EXISTS (SELECT FROM tunnel_queue.procrastinate_jobs j
                     WHERE j.status IN ('todo', 'doing') AND (j.args ->> 'survey_id')::integer = $1)
 $$;
-COMMENT ON FUNCTION tunnel_api.queue_busy(integer) IS
+COMMENT ON FUNCTION tunnel_internal.queue_busy(integer) IS
     'Whether there are jobs of the survey that wait or run';

@@ -3,7 +3,7 @@
 -- what there is of places, not of runs. Runs are put in order by the time of their beginning, as everywhere.
 
 -- From a run the index is read backwards to the first of the place before, which is the last run there.
-CREATE OR REPLACE FUNCTION tunnel_api.last_runs_of(
+CREATE OR REPLACE FUNCTION tunnel_internal.last_runs_of(
     survey_ids int[], stages text[], succeeded boolean DEFAULT true, km_from int DEFAULT -1000000, km_to int DEFAULT 1000000)
 RETURNS SETOF tunnel.run
 LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 25
@@ -24,7 +24,7 @@ BEGIN
                 SELECT r.* FROM tunnel.run r
                  WHERE r.survey_id = s.id AND r.stage = g.stage AND r.km >= $4 AND r.km <= $5 AND (r.outcome = 'done' OR NOT $3)
                  ORDER BY r.km DESC, r.subject DESC, r.started_at DESC, r.id DESC LIMIT 1) l
-         WHERE tunnel_api.in_order($4, $5, 'km')
+         WHERE tunnel_internal.in_order($4, $5, 'km')
          UNION ALL
         SELECT n.*
           FROM last l
@@ -37,21 +37,21 @@ BEGIN
     SELECT l.* FROM last l;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.last_runs_of(int[], text[], boolean, int, int) IS
+COMMENT ON FUNCTION tunnel_internal.last_runs_of(int[], text[], boolean, int, int) IS
 'The last run of each of some stages in each kilometre of some surveys, as last_runs has them of one';
 
 
 -- The planner puts the body in the place of a call.
-CREATE OR REPLACE FUNCTION tunnel_api.last_runs(
+CREATE OR REPLACE FUNCTION tunnel_internal.last_runs(
     survey_id int, stage text, succeeded boolean DEFAULT true, km_from int DEFAULT -1000000, km_to int DEFAULT 1000000)
 RETURNS SETOF tunnel.run
 LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL SAFE ROWS 25
-AS $$ SELECT r.* FROM tunnel_api.last_runs_of(ARRAY[$1], ARRAY[$2], $3, $4, $5) r $$;
-COMMENT ON FUNCTION tunnel_api.last_runs(int, text, boolean, int, int) IS
+AS $$ SELECT r.* FROM tunnel_internal.last_runs_of(ARRAY[$1], ARRAY[$2], $3, $4, $5) r $$;
+COMMENT ON FUNCTION tunnel_internal.last_runs(int, text, boolean, int, int) IS
 'The last run of a stage in each kilometre of a survey, of those from km_from to km_to, and of each subject (layer, older survey, track and outline) that has results of its own: the last that succeeded, or with false the last that began';
 
 
-CREATE OR REPLACE FUNCTION tunnel_api.last_run(survey_id int, stage text, km int, subject text DEFAULT '') RETURNS bigint
+CREATE OR REPLACE FUNCTION tunnel_internal.last_run(survey_id int, stage text, km int, subject text DEFAULT '') RETURNS bigint
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER
 SET search_path = pg_catalog, pg_temp
 AS $$
@@ -59,12 +59,12 @@ AS $$
      WHERE r.survey_id = $1 AND r.stage = $2 AND r.km = $3 AND r.subject = $4 AND r.outcome = 'done'
      ORDER BY r.started_at DESC, r.id DESC LIMIT 1
 $$;
-COMMENT ON FUNCTION tunnel_api.last_run(int, text, int, text) IS
+COMMENT ON FUNCTION tunnel_internal.last_run(int, text, int, text) IS
 'The last run of a stage that succeeded in one kilometre of a survey, of one subject; NULL where there is none';
 
 
 -- Stages that ran in kilometres of a survey, from one to the next in the same index.
-CREATE OR REPLACE FUNCTION tunnel_api.stages_run(survey_id int) RETURNS SETOF text
+CREATE OR REPLACE FUNCTION tunnel_internal.stages_run(survey_id int) RETURNS SETOF text
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 10
 SET search_path = pg_catalog, pg_temp
 SET jit = off
@@ -82,4 +82,4 @@ AS $$
     )
     SELECT p.stage FROM part p
 $$;
-COMMENT ON FUNCTION tunnel_api.stages_run(int) IS 'Stages that the ledger has runs of in a survey, in order of their names';
+COMMENT ON FUNCTION tunnel_internal.stages_run(int) IS 'Stages that the ledger has runs of in a survey, in order of their names';

@@ -2,8 +2,8 @@
 -- by itself: the last attempt, the last success, and that which ended last; what runs; what a run that is kept was made from; and
 -- every import. What is loaded or read has no one result: there each list of files and each setting counts by itself.
 
--- The parameters by which a run says which runs it was made from. See the functions tunnel_api.…_inputs.
-CREATE OR REPLACE FUNCTION tunnel_api.run_inputs(stage text, parameters jsonb) RETURNS bigint[]
+-- The parameters by which a run says which runs it was made from. See the functions tunnel_internal.…_inputs.
+CREATE OR REPLACE FUNCTION tunnel_internal.run_inputs(stage text, parameters jsonb) RETURNS bigint[]
 LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
 AS $$
     SELECT array_agg(i.id::bigint ORDER BY i.id::bigint)
@@ -18,16 +18,16 @@ AS $$
                CASE jsonb_typeof($2 -> n.name) WHEN 'array' THEN $2 -> n.name ELSE jsonb_build_array($2 -> n.name) END) AS i (id)
      WHERE i.id ~ '^[0-9]{1,18}$'
 $$;
-COMMENT ON FUNCTION tunnel_api.run_inputs(text, jsonb) IS 'Runs that a run was made from, by its stage and parameters; NULL without any';
+COMMENT ON FUNCTION tunnel_internal.run_inputs(text, jsonb) IS 'Runs that a run was made from, by its stage and parameters; NULL without any';
 
 -- Of one survey the runs of all surveys of its tunnel are looked at: only those name each other.
-CREATE OR REPLACE FUNCTION tunnel_api.superseded_runs(survey_id int DEFAULT NULL, before timestamptz DEFAULT 'infinity')
+CREATE OR REPLACE FUNCTION tunnel_internal.superseded_runs(survey_id int DEFAULT NULL, before timestamptz DEFAULT 'infinity')
 RETURNS TABLE (id bigint, survey_id integer, km integer, stage text, outcome text, started_at timestamptz, bytes integer)
 LANGUAGE sql STABLE PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000 SET search_path = pg_catalog, pg_temp SET jit = off
 AS $$
     WITH RECURSIVE ledger AS MATERIALIZED (
         SELECT r.id, r.survey_id, r.km, r.stage, r.outcome, r.started_at, r.job_id, r.finished_at, r.backend_pid, r.backend_start,
-               pg_column_size(r.*) AS bytes, tunnel_api.run_inputs(r.stage, r.parameters) AS inputs,
+               pg_column_size(r.*) AS bytes, tunnel_internal.run_inputs(r.stage, r.parameters) AS inputs,
                CASE WHEN r.stage IN ('load', 'read') THEN r.parameters ELSE to_jsonb(r.subject) END AS result
           FROM tunnel.run r
          WHERE $1 IS NULL OR r.survey_id = ANY (ARRAY(SELECT o.id FROM tunnel.survey s JOIN tunnel.survey o USING (tunnel_id)
@@ -45,7 +45,7 @@ AS $$
           FROM ranked l
          WHERE l.attempt = 1 OR l.stage = 'import' OR l.started_at >= $2
             OR l.outcome = 'done' AND (l.latest = 1 OR l.finished = 1)
-            OR l.outcome = 'running' AND tunnel_api.session_lives(l.backend_pid, l.backend_start)
+            OR l.outcome = 'running' AND tunnel_internal.session_lives(l.backend_pid, l.backend_start)
             OR EXISTS (SELECT FROM tunnel_queue.procrastinate_jobs j WHERE j.id = l.job_id AND j.status IN ('todo', 'doing'))
          UNION
         SELECT l.id, l.inputs
@@ -57,17 +57,17 @@ AS $$
       FROM ledger l
      WHERE ($1 IS NULL OR l.survey_id = $1) AND NOT EXISTS (SELECT FROM keep k WHERE k.id = l.id)
 $$;
-COMMENT ON FUNCTION tunnel_api.superseded_runs(int, timestamptz) IS
+COMMENT ON FUNCTION tunnel_internal.superseded_runs(int, timestamptz) IS
     'Runs of the ledger, of one survey or of all, that began before a moment and that nothing goes by any more: neither state nor result, nor whether it is stale; bytes: of the row';
 
-CREATE OR REPLACE FUNCTION tunnel_api.superseded_jobs(survey_id int DEFAULT NULL, before timestamptz DEFAULT 'infinity')
+CREATE OR REPLACE FUNCTION tunnel_internal.superseded_jobs(survey_id int DEFAULT NULL, before timestamptz DEFAULT 'infinity')
 RETURNS TABLE (id bigint, survey_id integer, state text, ended_at timestamptz, rows bigint, bytes bigint)
 LANGUAGE sql STABLE PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000 SET search_path = pg_catalog, pg_temp SET jit = off
 AS $$
     WITH needed AS MATERIALIZED (
         SELECT r.job_id FROM tunnel.run r WHERE r.job_id IS NOT NULL
         EXCEPT ALL
-        SELECT r.job_id FROM tunnel_api.superseded_runs($1, $2) s JOIN tunnel.run r ON r.id = s.id WHERE r.job_id IS NOT NULL
+        SELECT r.job_id FROM tunnel_internal.superseded_runs($1, $2) s JOIN tunnel.run r ON r.id = s.id WHERE r.job_id IS NOT NULL
     ), event AS (
         SELECT v.job_id, max(v.at) AS at, count(*) AS rows, sum(pg_column_size(v.*)) AS bytes
           FROM tunnel_queue.procrastinate_events v GROUP BY v.job_id
@@ -80,5 +80,5 @@ AS $$
        AND ($1 IS NULL OR (j.args ->> 'survey_id')::integer = $1)
        AND NOT EXISTS (SELECT FROM needed n WHERE n.job_id = j.id)
 $$;
-COMMENT ON FUNCTION tunnel_api.superseded_jobs(int, timestamptz) IS
+COMMENT ON FUNCTION tunnel_internal.superseded_jobs(int, timestamptz) IS
     'Jobs of the queue, of one survey or of all, that ended before a moment, and of which no run is kept: rows and bytes with those of what happened to it';

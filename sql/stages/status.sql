@@ -2,17 +2,17 @@
 
 -- True when the database session that started a run still lives. Runs with the owner's rights, for pg_stat_activity
 -- hides the sessions of others.
-CREATE OR REPLACE FUNCTION tunnel_api.session_lives(pid integer, started timestamptz) RETURNS boolean
+CREATE OR REPLACE FUNCTION tunnel_internal.session_lives(pid integer, started timestamptz) RETURNS boolean
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT EXISTS (SELECT FROM pg_stat_activity a
                     WHERE a.pid = $1 AND (a.backend_start IS NULL OR a.backend_start = $2))
 $$;
-COMMENT ON FUNCTION tunnel_api.session_lives(integer, timestamptz) IS
+COMMENT ON FUNCTION tunnel_internal.session_lives(integer, timestamptz) IS
     'Whether the server process with this number and start still lives';
 
 CREATE OR REPLACE VIEW tunnel_api.run AS
 SELECT r.id, r.survey_id, s.name AS survey, r.km, r.stage,
-       CASE WHEN r.outcome = 'running' AND NOT tunnel_api.session_lives(r.backend_pid, r.backend_start)
+       CASE WHEN r.outcome = 'running' AND NOT tunnel_internal.session_lives(r.backend_pid, r.backend_start)
             THEN 'interrupted' ELSE r.outcome END AS outcome,
        r.started_at, r.finished_at, r.finished_at - r.started_at AS duration, r.message, r.counts, r.parameters, r.versions,
        r.worker, r.job_id
@@ -34,7 +34,7 @@ COMMENT ON COLUMN tunnel_api.run.job_id IS 'Job of the queue that it was (tunnel
 -- see bears an earlier time. An edit of a vertex takes no such lock; it shows in the segments, whose planes are not those
 -- of the axis any more (segment_moved), and what rests on them is stale with them. Only those that a vertex moved by hand
 -- can turn are looked at: what a run has moved, its time tells.
-CREATE OR REPLACE FUNCTION tunnel_api.stage_states(
+CREATE OR REPLACE FUNCTION tunnel_internal.stage_states(
     survey_ids integer[], km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
 RETURNS TABLE (survey_id integer, km integer, step integer, stage text, run_id bigint, outcome text, done_id bigint,
                input_at timestamptz, outdated boolean, reason text)
@@ -62,12 +62,12 @@ BEGIN
           FROM stage s CROSS JOIN (VALUES (-1), (0), (1)) AS w (way)
          CROSS JOIN LATERAL unnest(CASE w.way WHEN 0 THEN s.here ELSE s.beside END) AS n (source)
     ), survey AS MATERIALIZED (
-        SELECT s.id, s.settings_at, tunnel_api.learned_in_force(s.tunnel_id) AS learned
+        SELECT s.id, s.settings_at, tunnel_internal.learned_in_force(s.tunnel_id) AS learned
           FROM tunnel.survey s WHERE s.id = ANY ($1)
     ), last AS MATERIALIZED (
         SELECT r.survey_id, r.km, s.step, r.id, r.outcome, r.started_at, r.finished_at, r.backend_pid, r.backend_start,
                r.counts ->> 'kept' = '0' AS void, (r.counts ->> 'learned')::integer AS learned
-          FROM tunnel_api.last_runs_of($1, ARRAY(SELECT s.name FROM stage s), false, $2, $3) r
+          FROM tunnel_internal.last_runs_of($1, ARRAY(SELECT s.name FROM stage s), false, $2, $3) r
           JOIN stage s ON s.name = r.stage
     ), success AS MATERIALIZED (  -- mostly the last one; where that is not, the ledger is asked again
         SELECT l.survey_id, l.km, l.step, l.id, l.started_at, l.finished_at, l.void, l.learned FROM last l WHERE l.outcome = 'done'
@@ -76,7 +76,7 @@ BEGIN
                (r.counts ->> 'learned')::integer
           FROM last l
           JOIN stage s ON s.step = l.step
-         CROSS JOIN LATERAL tunnel_api.last_runs(l.survey_id, s.name, true, l.km, l.km) r
+         CROSS JOIN LATERAL tunnel_internal.last_runs(l.survey_id, s.name, true, l.km, l.km) r
          WHERE l.outcome <> 'done'
     ), pending AS (
         SELECT f.survey_id, k.km, max(k.read_at) AS read_at, (array_agg(f.name ORDER BY k.read_at DESC, f.name))[1] AS name
@@ -110,7 +110,7 @@ BEGIN
                 SELECT q.* FROM tunnel.segment q
                  WHERE q.survey_id = near.survey_id AND q.n = near.n AND q.km BETWEEN $2 AND $3 OFFSET 0) g
     ), moved AS (
-        SELECT DISTINCT t.survey_id, t.km FROM turned t WHERE tunnel_api.segment_moved(t.survey_id, t.n, t.planes)
+        SELECT DISTINCT t.survey_id, t.km FROM turned t WHERE tunnel_internal.segment_moved(t.survey_id, t.n, t.planes)
     ), cell AS MATERIALIZED (
         SELECT k.survey_id, k.km, s.step, d.started_at, d.finished_at, d.learned
           FROM kilometre k CROSS JOIN stage s
@@ -169,7 +169,7 @@ BEGIN
         SELECT r.survey_id, r.km, array_agg(r.step ORDER BY r.step) AS steps FROM ripple r GROUP BY r.survey_id, r.km
     )
     SELECT d.survey_id, d.km, d.step, s.name, l.id,
-           CASE WHEN l.outcome = 'running' AND NOT tunnel_api.session_lives(l.backend_pid, l.backend_start)
+           CASE WHEN l.outcome = 'running' AND NOT tunnel_internal.session_lives(l.backend_pid, l.backend_start)
                 THEN 'interrupted' ELSE coalesce(l.outcome, 'never') END,
            b.id, d.input_at, d.reason IS NOT NULL,
            CASE
@@ -194,11 +194,11 @@ BEGIN
      WHERE (d.survey_id, d.km) NOT IN (SELECT v.survey_id, v.km FROM void v);
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.stage_states(integer[], integer, integer) IS
+COMMENT ON FUNCTION tunnel_internal.stage_states(integer[], integer, integer) IS
     'How far kilometres of some surveys have come, as stage_state says of one; run_id and done_id: the last run and the last success (tunnel_api.run)';
 
 -- The same of one survey, with what the ledger has of the runs.
-CREATE OR REPLACE FUNCTION tunnel_api.stage_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
+CREATE OR REPLACE FUNCTION tunnel_internal.stage_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
 RETURNS TABLE (km integer, step integer, stage text, run_id bigint, outcome text, started_at timestamptz,
                finished_at timestamptz, message text, parameters jsonb, done_at timestamptz, done_parameters jsonb,
                input_at timestamptz, outdated boolean, reason text)
@@ -211,11 +211,11 @@ SET enable_seqscan = off
 AS $$
     SELECT t.km, t.step, t.stage, t.run_id, t.outcome, l.started_at, l.finished_at, l.message, l.parameters, b.finished_at,
            b.parameters, t.input_at, t.outdated, t.reason
-      FROM tunnel_api.stage_states(ARRAY[$1], $2, $3) t
+      FROM tunnel_internal.stage_states(ARRAY[$1], $2, $3) t
       LEFT JOIN tunnel.run l ON l.id = t.run_id
       LEFT JOIN tunnel.run b ON b.id = t.done_id
 $$;
-COMMENT ON FUNCTION tunnel_api.stage_state(integer, integer, integer) IS
+COMMENT ON FUNCTION tunnel_internal.stage_state(integer, integer, integer) IS
     'How far kilometres of a survey have come: for each stage the last run, the last success, and what has changed since. What lies beyond the range is not looked at';
 
 CREATE OR REPLACE VIEW tunnel_api.stage_status AS
@@ -223,7 +223,7 @@ SELECT (s.id::bigint * 1000000 + 500000 + t.km) * 10 + t.step AS id, s.id AS sur
        t.stage, t.outcome, t.started_at, t.finished_at, t.done_at, r.counts, t.message,
        t.reason IS NOT NULL AS stale, t.reason
   FROM tunnel.survey s
- CROSS JOIN LATERAL tunnel_api.stage_state(s.id) t
+ CROSS JOIN LATERAL tunnel_internal.stage_state(s.id) t
   LEFT JOIN tunnel.run r ON r.id = t.run_id;
 COMMENT ON VIEW tunnel_api.stage_status IS 'How far each kilometre of each survey has come: one row per stage';
 COMMENT ON COLUMN tunnel_api.stage_status.step IS 'Number of the stage in their order';

@@ -58,7 +58,7 @@ BEGIN
                                              ELSE format('tunnel.%I', v.relname) END)
           LEFT JOIN pg_attribute b ON b.attrelid = t.oid AND b.attname = a.attname
           LEFT JOIN LATERAL (SELECT col_description(t.oid, b.attnum) AS text WHERE t.relkind = 'v') w ON true
-         WHERE v.relnamespace = 'tunnel_api'::regnamespace AND v.relkind = 'v'
+         WHERE v.relnamespace IN ('tunnel_api'::regnamespace, 'tunnel_internal'::regnamespace) AND v.relkind = 'v'
            AND col_description(v.oid, a.attnum) IS NULL
     LOOP
         EXECUTE format('COMMENT ON COLUMN %s.%I IS %L', bare.view, bare.name, bare.text);

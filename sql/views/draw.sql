@@ -2,7 +2,7 @@
 -- care of views/edit.sql: rows are locked, what somebody else did meanwhile stays or refuses the later one, and the audit has it.
 
 -- What the audit has of a finding.
-CREATE OR REPLACE FUNCTION tunnel_api.finding_state(id bigint) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.finding_state(id bigint) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_strip_nulls(jsonb_build_object(
         'kind', coalesce(a.kind_override, a.kind), 'severity', a.severity, 'width', a.width, 'review', a.review, 'remark', a.remark,
@@ -10,11 +10,11 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
         'geom', public.ST_AsEWKT(coalesce(a.shape, a.unrolled))))
       FROM tunnel.finding a WHERE a.id = $1
 $$;
-COMMENT ON FUNCTION tunnel_api.finding_state(bigint) IS
+COMMENT ON FUNCTION tunnel_internal.finding_state(bigint) IS
     'What the audit has of a finding: what people can change, geometry in the unrolled plane as EWKT';
 
 -- What was measured of a finding, which goes with its outline.
-CREATE OR REPLACE FUNCTION tunnel_api.finding_measured(id bigint) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.finding_measured(id bigint) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
         'darkening_mean', a.darkening_mean, 'darkening_max', a.darkening_max, 'image_share', a.image_share, 'contrast', a.contrast,
@@ -22,14 +22,14 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
         'feature_list_id', a.feature_list_id, 'model', a.model, 'detected', a.detected, 'area', a.area, 'clock', a.clock)
       FROM tunnel.finding a WHERE a.id = $1 AND a.image_share IS NOT NULL
 $$;
-COMMENT ON FUNCTION tunnel_api.finding_measured(bigint) IS
+COMMENT ON FUNCTION tunnel_internal.finding_measured(bigint) IS
     'What was measured of a finding''s outline, as the audit keeps it when that changes; NULL of one that was not measured';
 
 -- Which wet findings are the same, about a place of the unrolled plane. One that was detected is the same as what a person drew,
 -- redrew, split or merged when these together cover half of it: the person's outline counts, also where he rejects it. One that a
 -- person drew is the same as a detected one that covers half of it and much more: that one counts, unless it is rejected. Lines
 -- and points are none, for they have no area of their own.
-CREATE OR REPLACE FUNCTION tunnel_api.link_findings(survey_id int, place geometry) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.link_findings(survey_id int, place geometry) RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
 #variable_conflict use_column
 DECLARE
@@ -81,12 +81,12 @@ BEGIN
     END LOOP;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.link_findings(int, geometry) IS
+COMMENT ON FUNCTION tunnel_internal.link_findings(int, geometry) IS
 'Marks which wet findings of a survey about a place (unrolled plane) are the same, so that each counts once: see settle_findings.';
 
 -- Leaks that detection found lie in a dry region when half of them does, redrawn, split and merged ones too. One that waits for
 -- an operator has none. What is no longer a leak lies in none.
-CREATE OR REPLACE FUNCTION tunnel_api.mark_dry(survey_id int, place geometry) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.mark_dry(survey_id int, place geometry) RETURNS void
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
     UPDATE tunnel.finding a SET dry_region_id = w.region
       FROM (SELECT x.id, (SELECT r.id FROM tunnel.region r
@@ -98,23 +98,23 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_te
              WHERE x.survey_id = $1 AND x.unrolled OPERATOR(public.&&) $2 AND NOT x.manual) w
      WHERE a.id = w.id AND a.dry_region_id IS DISTINCT FROM w.region
 $$;
-COMMENT ON FUNCTION tunnel_api.mark_dry(int, geometry) IS
+COMMENT ON FUNCTION tunnel_internal.mark_dry(int, geometry) IS
 'Marks the leaks of a survey about a place (unrolled plane) that detection found and that lie in a dry region by half, and takes the mark from the others: called after each change of a region, and by settle_findings.';
 
 -- What follows for other findings from a change of some.
-CREATE OR REPLACE FUNCTION tunnel_api.settle_findings(survey_id int, place geometry) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.settle_findings(survey_id int, place geometry) RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
 BEGIN
-    PERFORM tunnel_api.link_findings(survey_id, place);
-    PERFORM tunnel_api.mark_dry(survey_id, place);
+    PERFORM tunnel_internal.link_findings(survey_id, place);
+    PERFORM tunnel_internal.mark_dry(survey_id, place);
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.settle_findings(int, geometry) IS
+COMMENT ON FUNCTION tunnel_internal.settle_findings(int, geometry) IS
 'Brings the findings of a survey about a place (unrolled plane) together, as link_findings and mark_dry do: called after each change of an outline, a kind or a review, and by detection.';
 
 -- Each change of findings adds rows to their sums; there need be no more of them than sums. Who does the same meanwhile has the
 -- rows that he has.
-CREATE OR REPLACE FUNCTION tunnel_api.pack_sums(survey_id int) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.pack_sums(survey_id int) RETURNS void
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
     WITH apart AS (
         DELETE FROM tunnel.finding_sum f
@@ -127,11 +127,11 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_te
      GROUP BY 1, 2, 3, 4, 5, 6, 7
     HAVING sum(a.findings) <> 0 OR abs(sum(a.area)) + abs(sum(a.length)) + abs(sum(a.extent)) > 1e-9
 $$;
-COMMENT ON FUNCTION tunnel_api.pack_sums(int) IS
+COMMENT ON FUNCTION tunnel_internal.pack_sums(int) IS
     'Puts the rows together that changes of findings have added to their sums (tunnel.finding_sum); called by detection and imports';
 
 -- Refuses a kind that there is not, is not offered any more, or is not drawn so.
-CREATE OR REPLACE FUNCTION tunnel_api.check_kind(kind text, drawn geometry) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.check_kind(kind text, drawn geometry) RETURNS void
 LANGUAGE plpgsql STABLE PARALLEL SAFE CALLED ON NULL INPUT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 #variable_conflict use_variable
 DECLARE
@@ -149,12 +149,12 @@ BEGIN
     END IF;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.check_kind(text, geometry) IS
+COMMENT ON FUNCTION tunnel_internal.check_kind(text, geometry) IS
     'An error unless there is a kind of findings of this code which is drawn so; without a geometry, of any';
 
 -- What was drawn in a view, in the unrolled plane: of view finding_unrolled it lies there, of finding_map on the strip beside the
 -- axis, of finding_3d in space.
-CREATE OR REPLACE FUNCTION tunnel_api.drawn_in(survey_id int, place text, geom geometry) RETURNS geometry
+CREATE OR REPLACE FUNCTION tunnel_internal.drawn_in(survey_id int, place text, geom geometry) RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE CALLED ON NULL INPUT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 #variable_conflict use_variable
 DECLARE
@@ -172,7 +172,7 @@ BEGIN
         RAISE EXCEPTION 'a drawing in space needs heights' USING ERRCODE = 'invalid_parameter_value';
     END IF;
     unrolled := CASE place WHEN 'unrolled' THEN given
-                           WHEN 'map' THEN tunnel_api.unmap_strip(survey_id, public.ST_SetSRID(given, srid))
+                           WHEN 'map' THEN tunnel_internal.unmap_strip(survey_id, public.ST_SetSRID(given, srid))
                            ELSE tunnel_api.unroll_shape(survey_id, public.ST_SetSRID(given, srid)) END;
     IF unrolled IS NULL THEN
         RAISE EXCEPTION 'the drawing reaches beyond the lining: it lies between % and %',
@@ -183,12 +183,12 @@ BEGIN
     RETURN unrolled;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.drawn_in(int, text, geometry) IS
+COMMENT ON FUNCTION tunnel_internal.drawn_in(int, text, geometry) IS
     'What was drawn in a view (unrolled, map or 3d) in the unrolled plane; an error where it does not lie on the tunnel';
 
 -- Gives a finding an outline of a person's: all that follows is worked out, what was measured of the old one goes until the next
 -- detection measures the new one.
-CREATE OR REPLACE FUNCTION tunnel_api.redraw(id bigint, drawn geometry, width float8, origin text) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.redraw(id bigint, drawn geometry, width float8, origin text) RETURNS void
 LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
     UPDATE tunnel.finding a
        SET km = f.km, chainage_from = f.chainage_from, chainage_to = f.chainage_to, arc_from = f.arc_from, arc_to = f.arc_to,
@@ -198,14 +198,14 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_
            confidence = NULL, reasons = '{}', evidence = NULL, features = NULL, feature_list_id = NULL, model = NULL,
            same_as = NULL, dry_region_id = NULL
       FROM tunnel.finding w
-     CROSS JOIN LATERAL tunnel_api.drawn_figures(w.survey_id, $2, $3) f
+     CROSS JOIN LATERAL tunnel_internal.drawn_figures(w.survey_id, $2, $3) f
      WHERE w.id = $1 AND a.id = w.id
 $$;
-COMMENT ON FUNCTION tunnel_api.redraw(bigint, geometry, float8, text) IS
+COMMENT ON FUNCTION tunnel_internal.redraw(bigint, geometry, float8, text) IS
     'Gives a finding another outline (unrolled plane) and origin, works out its figures and drops what was measured of the old one; for draw_finding, finding_split and finding_merge alone';
 
 -- A new finding of a person's, like another or on its own; its id, which is given for one that comes back.
-CREATE OR REPLACE FUNCTION tunnel_api.add_finding(
+CREATE OR REPLACE FUNCTION tunnel_internal.add_finding(
     survey_id int, kind text, drawn geometry, width float8, severity int, review text, remark text, origin text, manual boolean,
     parent_id bigint, id bigint DEFAULT NULL) RETURNS bigint
 LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
@@ -216,14 +216,14 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_
            CASE WHEN $6 <> 'open' THEN clock_timestamp() END, $7, $8, $9, $10, session_user, clock_timestamp(), f.km,
            f.chainage_from, f.chainage_to, f.arc_from, f.arc_to, f.clock, f.area, f.length, f.unrolled, f.map, f.surface, f.shape,
            f.shape_map, f.shape_surface, clock_timestamp()
-      FROM tunnel_api.drawn_figures($1, $3, $4) f
+      FROM tunnel_internal.drawn_figures($1, $3, $4) f
     RETURNING id
 $$;
-COMMENT ON FUNCTION tunnel_api.add_finding(int, text, geometry, float8, int, text, text, text, boolean, bigint, bigint) IS
+COMMENT ON FUNCTION tunnel_internal.add_finding(int, text, geometry, float8, int, text, text, text, boolean, bigint, bigint) IS
     'A new finding (unrolled plane) with all that follows from its outline; its id. For draw_finding, finding_split and finding_undo alone';
 
 -- After the surface has changed: outlines in the unrolled plane stay. One that now reaches beyond the lining stays as it was.
-CREATE OR REPLACE FUNCTION tunnel_api.renew_findings(survey_id int, km int) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.renew_findings(survey_id int, km int) RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
 #variable_conflict use_column
 DECLARE
@@ -237,7 +237,7 @@ BEGIN
             UPDATE tunnel.finding a
                SET clock = f.clock, area = f.area, length = f.length, map = f.map, surface = f.surface, shape_map = f.shape_map,
                    shape_surface = f.shape_surface
-              FROM tunnel_api.drawn_figures(survey_key, coalesce(was.shape, was.unrolled), was.width) f
+              FROM tunnel_internal.drawn_figures(survey_key, coalesce(was.shape, was.unrolled), was.width) f
              WHERE a.id = was.id AND NOT (f.surface OPERATOR(public.=) was.surface AND f.map OPERATOR(public.=) was.map);
         EXCEPTION WHEN invalid_parameter_value THEN
             NULL;
@@ -245,19 +245,19 @@ BEGIN
     END LOOP;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.renew_findings(int, int) IS
+COMMENT ON FUNCTION tunnel_internal.renew_findings(int, int) IS
 'Works out anew where what people drew in a kilometre lies on the map and in space, after the axis or the sections have changed; called by detection. The outlines in the unrolled plane stay.';
 
 -- Detection writes its findings of a survey under this lock, and so sees all that was drawn before, and none is drawn meanwhile;
 -- who draws does not wait for who draws.
-CREATE OR REPLACE FUNCTION tunnel_api.lock_findings(survey_id int) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.lock_findings(survey_id int) RETURNS void
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
     SELECT pg_advisory_xact_lock_shared(-3, $1)
 $$;
-COMMENT ON FUNCTION tunnel_api.lock_findings(int) IS
+COMMENT ON FUNCTION tunnel_internal.lock_findings(int) IS
     'Keeps detection from writing the findings of a survey, or waits for it, until the transaction ends';
 
-CREATE OR REPLACE FUNCTION tunnel_api.draw_finding() RETURNS trigger
+CREATE OR REPLACE FUNCTION tunnel_internal.draw_finding() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     place CONSTANT text := TG_ARGV[0];
@@ -284,19 +284,19 @@ BEGIN
                 coalesce('with id ' || NEW.survey_id, 'named ' || NEW.survey, 'without a name')
                 USING ERRCODE = 'invalid_parameter_value';
         END IF;
-        drawn := tunnel_api.drawn_in(its.id, place, NEW.geom);
-        PERFORM tunnel_api.check_kind(NEW.kind, drawn);
-        PERFORM tunnel_api.check_finding(NEW.severity, NEW.width, coalesce(NEW.review, 'confirmed'));
-        PERFORM tunnel_api.lock_findings(its.id);
-        NEW.id := tunnel_api.add_finding(its.id, NEW.kind, drawn, NEW.width, NEW.severity, coalesce(NEW.review, 'confirmed'),
+        drawn := tunnel_internal.drawn_in(its.id, place, NEW.geom);
+        PERFORM tunnel_internal.check_kind(NEW.kind, drawn);
+        PERFORM tunnel_internal.check_finding(NEW.severity, NEW.width, coalesce(NEW.review, 'confirmed'));
+        PERFORM tunnel_internal.lock_findings(its.id);
+        NEW.id := tunnel_internal.add_finding(its.id, NEW.kind, drawn, NEW.width, NEW.severity, coalesce(NEW.review, 'confirmed'),
                                          NEW.remark, 'drawn', true, NULL);
     ELSE
-        PERFORM tunnel_api.lock_findings(OLD.survey_id);
+        PERFORM tunnel_internal.lock_findings(OLD.survey_id);
         SELECT a.* INTO was FROM tunnel.finding a WHERE a.id = OLD.id FOR UPDATE;
         IF NOT FOUND THEN
             RETURN NULL;  -- gone meanwhile
         END IF;
-        before := tunnel_api.finding_state(was.id);
+        before := tunnel_internal.finding_state(was.id);
         IF was.merged_into IS NOT NULL THEN
             RAISE EXCEPTION 'finding % is merged into %, which stands for it', was.id, was.merged_into
                 USING ERRCODE = 'feature_not_supported';
@@ -309,12 +309,12 @@ BEGIN
             RAISE EXCEPTION 'finding % stands for others that are merged into it: reject it instead', was.id
                 USING ERRCODE = 'feature_not_supported';
         END IF;
-        step := tunnel_api.note_edit(OLD.survey, 'finding', was.id, before, NULL, kept => tunnel_api.finding_measured(was.id));
-        PERFORM tunnel_api.note_edit(OLD.survey, 'photo', p.id, to_jsonb(p) - 'id',
+        step := tunnel_internal.note_edit(OLD.survey, 'finding', was.id, before, NULL, kept => tunnel_internal.finding_measured(was.id));
+        PERFORM tunnel_internal.note_edit(OLD.survey, 'photo', p.id, to_jsonb(p) - 'id',
                                      NULL, part_of => step)
            FROM tunnel.photo p WHERE p.finding_id = was.id;
         DELETE FROM tunnel.finding a WHERE a.id = was.id;
-        PERFORM tunnel_api.settle_findings(was.survey_id, was.unrolled);
+        PERFORM tunnel_internal.settle_findings(was.survey_id, was.unrolled);
         RETURN OLD;
     END IF;
     IF TG_OP = 'UPDATE' THEN
@@ -347,20 +347,20 @@ BEGIN
         NEW.width := (new_row ->> 'width')::float8;
         NEW.review := new_row ->> 'review';
         NEW.remark := new_row ->> 'remark';
-        PERFORM tunnel_api.check_finding(NEW.severity, NEW.width, NEW.review);
+        PERFORM tunnel_internal.check_finding(NEW.severity, NEW.width, NEW.review);
         IF redrawn THEN
-            drawn := tunnel_api.drawn_in(was.survey_id, place, NEW.geom);
+            drawn := tunnel_internal.drawn_in(was.survey_id, place, NEW.geom);
         ELSE
             drawn := coalesce(was.shape, was.unrolled);
         END IF;
         -- one of a kind that is offered no more may still be redrawn
         IF new_row -> 'kind' <> was_row -> 'kind'
            OR (redrawn AND EXISTS (SELECT FROM tunnel.finding_kind k WHERE k.code = NEW.kind AND k.active)) THEN
-            PERFORM tunnel_api.check_kind(NEW.kind, CASE WHEN was.manual OR redrawn THEN drawn END);
+            PERFORM tunnel_internal.check_kind(NEW.kind, CASE WHEN was.manual OR redrawn THEN drawn END);
         END IF;
         IF redrawn OR (was.shape IS NOT NULL AND new_row -> 'width' <> was_row -> 'width') THEN
-            kept := tunnel_api.finding_measured(was.id);
-            PERFORM tunnel_api.redraw(was.id, drawn, NEW.width, CASE was.origin WHEN 'detected' THEN 'redrawn' ELSE was.origin END);
+            kept := tunnel_internal.finding_measured(was.id);
+            PERFORM tunnel_internal.redraw(was.id, drawn, NEW.width, CASE was.origin WHEN 'detected' THEN 'redrawn' ELSE was.origin END);
         END IF;
         IF new_row -> 'review' <> was_row -> 'review' OR new_row -> 'remark' <> was_row -> 'remark'
            OR new_row -> 'kind' <> was_row -> 'kind' THEN
@@ -379,16 +379,16 @@ BEGIN
          WHERE a.id = was.id;
     END IF;
     SELECT a.* INTO is_now FROM tunnel.finding a WHERE a.id = NEW.id;
-    PERFORM tunnel_api.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = is_now.survey_id), 'finding', is_now.id,
-                                 before, tunnel_api.finding_state(is_now.id), kept => kept);
-    PERFORM tunnel_api.settle_findings(is_now.survey_id, public.ST_Collect(was.unrolled, is_now.unrolled));
+    PERFORM tunnel_internal.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = is_now.survey_id), 'finding', is_now.id,
+                                 before, tunnel_internal.finding_state(is_now.id), kept => kept);
+    PERFORM tunnel_internal.settle_findings(is_now.survey_id, public.ST_Collect(was.unrolled, is_now.unrolled));
     RETURN NEW;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.draw_finding() IS
+COMMENT ON FUNCTION tunnel_internal.draw_finding() IS
     'Trigger of the views of findings: draws, redraws, reviews and deletes, works out what follows and notes who and when';
 
-CREATE OR REPLACE FUNCTION tunnel_api.check_finding(severity int, width float8, review text) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.check_finding(severity int, width float8, review text) RETURNS void
 LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
 BEGIN
     IF severity NOT BETWEEN 1 AND 4 THEN
@@ -401,7 +401,7 @@ BEGIN
     END IF;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.check_finding(int, float8, text) IS
+COMMENT ON FUNCTION tunnel_internal.check_finding(int, float8, text) IS
     'An error unless these can be a finding''s severity, width (m) and review';
 
 DO $$
@@ -410,7 +410,7 @@ DECLARE
 BEGIN
     FOREACH place IN ARRAY ARRAY['unrolled', 'map', '3d'] LOOP
         EXECUTE format('CREATE OR REPLACE TRIGGER edit INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.%I FOR EACH ROW'
-                       ' EXECUTE FUNCTION tunnel_api.draw_finding(%L)', 'finding_' || place, place);
+                       ' EXECUTE FUNCTION tunnel_internal.draw_finding(%L)', 'finding_' || place, place);
     END LOOP;
 END
 $$;
@@ -438,7 +438,7 @@ BEGIN
     IF survey_key IS NULL THEN
         RAISE EXCEPTION 'there is no finding %', finding USING ERRCODE = 'invalid_parameter_value';
     END IF;
-    PERFORM tunnel_api.lock_findings(survey_key);
+    PERFORM tunnel_internal.lock_findings(survey_key);
     SELECT a.* INTO was FROM tunnel.finding a WHERE a.id = finding FOR UPDATE;
     IF was.id IS NULL OR was.merged_into IS NOT NULL THEN
         RAISE EXCEPTION 'finding % is %', finding, coalesce('merged into ' || was.merged_into || ', which stands for it', 'gone')
@@ -446,26 +446,26 @@ BEGIN
     ELSIF public.GeometryType(line) <> 'LINESTRING' OR public.GeometryType(was.shape) = 'POINT' THEN
         RAISE EXCEPTION 'a polygon or a line is split, by one line' USING ERRCODE = 'invalid_parameter_value';
     END IF;
-    blade := public.ST_Force2D(tunnel_api.drawn_in(survey_key, CASE public.ST_SRID(line) WHEN 0 THEN 'unrolled' ELSE 'map' END, line));
+    blade := public.ST_Force2D(tunnel_internal.drawn_in(survey_key, CASE public.ST_SRID(line) WHEN 0 THEN 'unrolled' ELSE 'map' END, line));
     SELECT array_agg(d.geom ORDER BY public.ST_Area(d.geom) DESC, public.ST_Length(d.geom) DESC, d.path) INTO parts
       FROM public.ST_Dump(public.ST_Split(coalesce(was.shape, was.unrolled), blade)) d;
     IF coalesce(cardinality(parts), 0) < 2 THEN
         RAISE EXCEPTION 'the line does not split finding %: it must cross it from side to side', finding
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
-    before := tunnel_api.finding_state(finding);
-    kept := tunnel_api.finding_measured(finding);
-    PERFORM tunnel_api.redraw(finding, parts[1], was.width, 'split');
+    before := tunnel_internal.finding_state(finding);
+    kept := tunnel_internal.finding_measured(finding);
+    PERFORM tunnel_internal.redraw(finding, parts[1], was.width, 'split');
     ids := ARRAY[finding];
     FOREACH part IN ARRAY parts[2:] LOOP
-        ids := ids || tunnel_api.add_finding(survey_key, coalesce(was.kind_override, was.kind), part, was.width, was.severity, was.review,
+        ids := ids || tunnel_internal.add_finding(survey_key, coalesce(was.kind_override, was.kind), part, was.width, was.severity, was.review,
                                              was.remark, 'split', was.manual, finding);
     END LOOP;
-    step := tunnel_api.note_edit(name, 'finding', finding, before, tunnel_api.finding_state(finding), kept => kept);
+    step := tunnel_internal.note_edit(name, 'finding', finding, before, tunnel_internal.finding_state(finding), kept => kept);
     FOREACH made IN ARRAY ids[2:] LOOP
-        PERFORM tunnel_api.note_edit(name, 'finding', made, NULL, tunnel_api.finding_state(made), part_of => step);
+        PERFORM tunnel_internal.note_edit(name, 'finding', made, NULL, tunnel_internal.finding_state(made), part_of => step);
     END LOOP;
-    PERFORM tunnel_api.settle_findings(survey_key, was.unrolled);
+    PERFORM tunnel_internal.settle_findings(survey_key, was.unrolled);
     RETURN ids;
 END
 $$;
@@ -499,7 +499,7 @@ BEGIN
         RAISE EXCEPTION 'findings % are not all there, or of several surveys', array_to_string(wanted, ', ')
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
-    PERFORM tunnel_api.lock_findings(surveys[1]);
+    PERFORM tunnel_internal.lock_findings(surveys[1]);
     PERFORM FROM tunnel.finding a WHERE a.id = ANY (wanted) ORDER BY a.id FOR UPDATE;
     name := (SELECT s.name FROM tunnel.survey s WHERE s.id = surveys[1]);
     SELECT a.* INTO oldest FROM tunnel.finding a WHERE a.id = ANY (wanted) ORDER BY a.created_at, a.id LIMIT 1;
@@ -536,24 +536,24 @@ BEGIN
         whole := public.ST_Union(whole, CASE public.ST_Dimension(whole) WHEN 1 THEN public.ST_ShortestLine(a_part, rest)
                                       ELSE public.ST_Buffer(public.ST_ShortestLine(a_part, rest), 0.005) END);
     END LOOP;
-    before := tunnel_api.finding_state(oldest.id);
-    kept := tunnel_api.finding_measured(oldest.id);
-    PERFORM tunnel_api.redraw(oldest.id, whole, oldest.width, 'merged');
+    before := tunnel_internal.finding_state(oldest.id);
+    kept := tunnel_internal.finding_measured(oldest.id);
+    PERFORM tunnel_internal.redraw(oldest.id, whole, oldest.width, 'merged');
     UPDATE tunnel.finding a SET severity = m.severity, remark = m.remark
       FROM (SELECT max(x.severity) AS severity, string_agg(DISTINCT x.remark, '; ') AS remark
               FROM tunnel.finding x WHERE x.id = ANY (wanted)) m
      WHERE a.id = oldest.id;
     -- named also where the outline of the oldest is that of all
-    step := tunnel_api.note_edit(name, 'finding', oldest.id, before,
-        tunnel_api.finding_state(oldest.id) || jsonb_build_object('merged', array_remove(wanted, oldest.id)), kept => kept);
+    step := tunnel_internal.note_edit(name, 'finding', oldest.id, before,
+        tunnel_internal.finding_state(oldest.id) || jsonb_build_object('merged', array_remove(wanted, oldest.id)), kept => kept);
     FOR was IN SELECT a.* FROM tunnel.finding a
                 WHERE (a.id = ANY (wanted) OR a.merged_into = ANY (wanted)) AND a.id <> oldest.id
                   AND a.merged_into IS DISTINCT FROM oldest.id ORDER BY a.id FOR UPDATE LOOP
-        before := tunnel_api.finding_state(was.id);
+        before := tunnel_internal.finding_state(was.id);
         UPDATE tunnel.finding a SET merged_into = oldest.id, same_as = NULL WHERE a.id = was.id;
-        PERFORM tunnel_api.note_edit(name, 'finding', was.id, before, tunnel_api.finding_state(was.id), part_of => step);
+        PERFORM tunnel_internal.note_edit(name, 'finding', was.id, before, tunnel_internal.finding_state(was.id), part_of => step);
     END LOOP;
-    PERFORM tunnel_api.settle_findings(surveys[1], place);
+    PERFORM tunnel_internal.settle_findings(surveys[1], place);
     RETURN oldest.id;
 END
 $$;
@@ -561,7 +561,7 @@ COMMENT ON FUNCTION tunnel_api.finding_merge(bigint[]) IS
 'Merges findings of one kind (polygons, or lines end to end) that touch or lie within a metre. The oldest keeps its number and review and gets the outline of all, their greatest severity and all their remarks; the others stay as merged into it, and are not counted. Returns its id.';
 
 -- Adds, changes or deletes a photo of a finding: a path or URL, and what it shows.
-CREATE OR REPLACE FUNCTION tunnel_api.edit_photo() RETURNS trigger
+CREATE OR REPLACE FUNCTION tunnel_internal.edit_photo() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     name text;
@@ -571,7 +571,7 @@ BEGIN
         IF NOT FOUND THEN
             RETURN NULL;  -- gone meanwhile
         END IF;
-        PERFORM tunnel_api.note_edit(OLD.survey, 'photo', OLD.id,
+        PERFORM tunnel_internal.note_edit(OLD.survey, 'photo', OLD.id,
             jsonb_build_object('finding_id', OLD.finding_id, 'path', OLD.path, 'caption', OLD.caption), NULL);
         RETURN OLD;
     END IF;
@@ -593,13 +593,13 @@ BEGIN
         UPDATE tunnel.photo p SET path = NEW.path, caption = NEW.caption, added_by = NEW.added_by, added_at = NEW.added_at
          WHERE p.id = OLD.id;
     END IF;
-    PERFORM tunnel_api.note_edit(name, 'photo', NEW.id,
+    PERFORM tunnel_internal.note_edit(name, 'photo', NEW.id,
         CASE TG_OP WHEN 'UPDATE' THEN jsonb_build_object('finding_id', OLD.finding_id, 'path', OLD.path, 'caption', OLD.caption) END,
         jsonb_build_object('finding_id', NEW.finding_id, 'path', NEW.path, 'caption', NEW.caption));
     RETURN NEW;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.edit_photo() IS 'Trigger of view finding_photo: writes a photo and notes who and when';
+COMMENT ON FUNCTION tunnel_internal.edit_photo() IS 'Trigger of view finding_photo: writes a photo and notes who and when';
 
 CREATE OR REPLACE TRIGGER edit INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.finding_photo
-    FOR EACH ROW EXECUTE FUNCTION tunnel_api.edit_photo();
+    FOR EACH ROW EXECUTE FUNCTION tunnel_internal.edit_photo();

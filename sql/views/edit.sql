@@ -5,7 +5,7 @@
 -- What both changed, each to something else, is refused to the later one, as a failure of serialization.
 
 -- Moves an axis vertex. Frame and unit: the tunnel's SRID, m.
-CREATE OR REPLACE FUNCTION tunnel_api.edit_axis_vertex() RETURNS trigger
+CREATE OR REPLACE FUNCTION tunnel_internal.edit_axis_vertex() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     was tunnel.axis_vertex;
@@ -53,22 +53,22 @@ BEGIN
     UPDATE tunnel.axis_vertex
        SET geom = NEW.geom, source = NEW.source, edited_by = NEW.edited_by, edited_at = NEW.edited_at, remark = NEW.remark
      WHERE id = OLD.id;
-    PERFORM tunnel_api.note_edit(OLD.survey, 'axis_vertex', OLD.id,
+    PERFORM tunnel_internal.note_edit(OLD.survey, 'axis_vertex', OLD.id,
                                  jsonb_build_object('geom', public.ST_AsEWKT(was.geom), 'source', was.source),
                                  jsonb_build_object('geom', public.ST_AsEWKT(NEW.geom), 'source', NEW.source));
     RETURN NEW;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.edit_axis_vertex() IS 'Trigger of view axis_vertex: moves a vertex and notes who and when';
+COMMENT ON FUNCTION tunnel_internal.edit_axis_vertex() IS 'Trigger of view axis_vertex: moves a vertex and notes who and when';
 
 CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.axis_vertex
-    FOR EACH ROW EXECUTE FUNCTION tunnel_api.edit_axis_vertex();
+    FOR EACH ROW EXECUTE FUNCTION tunnel_internal.edit_axis_vertex();
 
 -- Sets the review, the remark and, where there are kinds to choose from, the kind of a finding: TG_ARGV is its table in schema
 -- tunnel, what it is called, and its kinds, or any: those of finding_kind. For the views of leaks and spots, and finding. A kind other than the one that
 -- was found is noted as judged; the one that was found takes that back. Geometries, whose columns differ between the views, are
 -- never written back.
-CREATE OR REPLACE FUNCTION tunnel_api.review_finding() RETURNS trigger
+CREATE OR REPLACE FUNCTION tunnel_internal.review_finding() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     kinds CONSTANT text[] := TG_ARGV[2:];
@@ -89,7 +89,7 @@ BEGIN
     END IF;
     IF kinds = ARRAY['any'] THEN
         IF NEW.kind IS DISTINCT FROM OLD.kind THEN
-            PERFORM tunnel_api.check_kind(NEW.kind, CASE WHEN OLD.manual THEN OLD.unrolled END);
+            PERFORM tunnel_internal.check_kind(NEW.kind, CASE WHEN OLD.manual THEN OLD.unrolled END);
         END IF;
     ELSIF judging AND NEW.kind IS DISTINCT FROM OLD.kind AND (NEW.kind IS NULL OR NEW.kind <> ALL (kinds)) THEN
         RAISE EXCEPTION 'the kind of % % can be %, not %', OLD.kind, OLD.id,
@@ -103,7 +103,7 @@ BEGIN
     IF TG_ARGV[0] = 'spot' THEN
         SELECT p.review, p.remark, p.kind INTO was FROM tunnel.spot p WHERE p.id = OLD.id FOR UPDATE;
     ELSE
-        PERFORM tunnel_api.lock_findings(a.survey_id) FROM tunnel.finding a WHERE a.id = OLD.id;
+        PERFORM tunnel_internal.lock_findings(a.survey_id) FROM tunnel.finding a WHERE a.id = OLD.id;
         SELECT a.review, a.remark, coalesce(a.kind_override, a.kind) AS kind INTO was
           FROM tunnel.finding a WHERE a.id = OLD.id FOR UPDATE;
     END IF;
@@ -135,14 +135,14 @@ BEGIN
                kind = CASE WHEN a.manual THEN NEW.kind ELSE a.kind END,
                kind_override = CASE WHEN a.manual THEN NULL WHEN NEW.kind = was.kind THEN a.kind_override ELSE nullif(NEW.kind, a.kind) END
          WHERE a.id = OLD.id;
-        PERFORM tunnel_api.settle_findings(a.survey_id, a.unrolled) FROM tunnel.finding a WHERE a.id = OLD.id;
+        PERFORM tunnel_internal.settle_findings(a.survey_id, a.unrolled) FROM tunnel.finding a WHERE a.id = OLD.id;
     END IF;
-    PERFORM tunnel_api.note_edit(OLD.survey, TG_ARGV[0], OLD.id, to_jsonb(was),
+    PERFORM tunnel_internal.note_edit(OLD.survey, TG_ARGV[0], OLD.id, to_jsonb(was),
                                  jsonb_build_object('review', NEW.review, 'remark', NEW.remark, 'kind', NEW.kind));
     RETURN NEW;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.review_finding() IS
+COMMENT ON FUNCTION tunnel_internal.review_finding() IS
     'Trigger of the views of leaks and spots: sets review, remark and kind and notes who and when';
 
 DO $$
@@ -151,20 +151,20 @@ DECLARE
 BEGIN
     FOREACH name IN ARRAY ARRAY['leak', 'leak_unrolled', 'leak_map', 'leak_3d'] LOOP
         EXECUTE format('CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.%I FOR EACH ROW EXECUTE FUNCTION'
-                       ' tunnel_api.review_finding(''finding'', ''a leak'', ''leak'', ''joint'', ''dark'')', name);
+                       ' tunnel_internal.review_finding(''finding'', ''a leak'', ''leak'', ''joint'', ''dark'')', name);
     END LOOP;
     CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.finding
-        FOR EACH ROW EXECUTE FUNCTION tunnel_api.review_finding('finding', 'a finding', 'any');
+        FOR EACH ROW EXECUTE FUNCTION tunnel_internal.review_finding('finding', 'a finding', 'any');
     FOREACH name IN ARRAY ARRAY['spot', 'spot_face', 'spot_map', 'spot_3d', 'spot_sheet'] LOOP
         EXECUTE format('CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.%I FOR EACH ROW EXECUTE FUNCTION'
-                       ' tunnel_api.review_finding(''spot'', ''a spot'')', name);
+                       ' tunnel_internal.review_finding(''spot'', ''a spot'')', name);
     END LOOP;
 END
 $$;
 
 -- What is drawn, redrawn and deleted in a layer of leaks is a finding, a leak unless it says another kind: TG_ARGV is the place, see
 -- draw_finding. Runs before the review of the same update.
-CREATE OR REPLACE FUNCTION tunnel_api.draw_leak() RETURNS trigger
+CREATE OR REPLACE FUNCTION tunnel_internal.draw_leak() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     view CONSTANT text := 'finding_' || TG_ARGV[0];
@@ -185,7 +185,7 @@ BEGIN
     RETURN NEW;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.draw_leak() IS
+COMMENT ON FUNCTION tunnel_internal.draw_leak() IS
     'Trigger of the views of leaks with one geometry: draws, redraws and deletes by the view of findings';
 
 DO $$
@@ -194,24 +194,24 @@ DECLARE
 BEGIN
     FOREACH place IN ARRAY ARRAY['unrolled', 'map', '3d'] LOOP
         EXECUTE format('CREATE OR REPLACE TRIGGER draw INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.%I FOR EACH ROW'
-                       ' EXECUTE FUNCTION tunnel_api.draw_leak(%L)', 'leak_' || place, place);
+                       ' EXECUTE FUNCTION tunnel_internal.draw_leak(%L)', 'leak_' || place, place);
     END LOOP;
 END
 $$;
 
 -- What the audit has of a region.
-CREATE OR REPLACE FUNCTION tunnel_api.region_state(id int) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.region_state(id int) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_strip_nulls(jsonb_build_object('kind', r.kind, 'reason', r.reason, 'pending_approval', nullif(r.pending_approval, false),
         'approved_by', r.approved_by, 'geom', public.ST_AsEWKT(r.geom)))
       FROM tunnel.region r WHERE r.id = $1
 $$;
-COMMENT ON FUNCTION tunnel_api.region_state(int) IS
+COMMENT ON FUNCTION tunnel_internal.region_state(int) IS
     'What the audit has of a region: kind, reason, outline as EWKT, whether it waits and who put it in force';
 
 -- Adds, changes or deletes a region drawn by hand in the unrolled plane (m). A new one names its survey by survey_id or,
 -- without that, by name.
-CREATE OR REPLACE FUNCTION tunnel_api.edit_region() RETURNS trigger
+CREATE OR REPLACE FUNCTION tunnel_internal.edit_region() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     was tunnel.region;
@@ -221,13 +221,13 @@ DECLARE
 BEGIN
     IF TG_OP = 'DELETE' THEN
         PERFORM FROM tunnel.region r WHERE r.id = OLD.id FOR UPDATE;
-        before := tunnel_api.region_state(OLD.id);
+        before := tunnel_internal.region_state(OLD.id);
         DELETE FROM tunnel.region r WHERE r.id = OLD.id RETURNING r.* INTO was;
         IF NOT FOUND THEN
             RETURN NULL;  -- gone meanwhile
         END IF;
-        PERFORM tunnel_api.note_edit(OLD.survey, 'region', OLD.id, before, NULL);
-        PERFORM tunnel_api.mark_dry(was.survey_id, was.geom);
+        PERFORM tunnel_internal.note_edit(OLD.survey, 'region', OLD.id, before, NULL);
+        PERFORM tunnel_internal.mark_dry(was.survey_id, was.geom);
         RETURN OLD;
     END IF;
     IF NOT coalesce(public.ST_IsValid(NEW.geom), false) THEN
@@ -247,7 +247,7 @@ BEGIN
         IF NOT FOUND THEN
             RETURN NULL;
         END IF;
-        before := tunnel_api.region_state(was.id);
+        before := tunnel_internal.region_state(was.id);
         NEW.kind := CASE WHEN NEW.kind = OLD.kind THEN was.kind ELSE NEW.kind END;
         NEW.geom := CASE WHEN NEW.geom OPERATOR(public.=) OLD.geom THEN was.geom ELSE NEW.geom END;
         NEW.reason := CASE WHEN NEW.reason IS NOT DISTINCT FROM OLD.reason THEN was.reason ELSE NEW.reason END;
@@ -303,22 +303,22 @@ BEGIN
                pending_approval = NEW.pending_approval, approved_by = NEW.approved_by, approved_at = NEW.approved_at
          WHERE r.id = OLD.id;
     END IF;
-    PERFORM tunnel_api.note_edit(NEW.survey, 'region', NEW.id, before, tunnel_api.region_state(NEW.id));
-    PERFORM tunnel_api.mark_dry(NEW.survey_id, public.ST_Collect(was.geom, NEW.geom));
+    PERFORM tunnel_internal.note_edit(NEW.survey, 'region', NEW.id, before, tunnel_internal.region_state(NEW.id));
+    PERFORM tunnel_internal.mark_dry(NEW.survey_id, public.ST_Collect(was.geom, NEW.geom));
     RETURN NEW;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.edit_region() IS 'Trigger of view region: writes a region and notes who and when';
+COMMENT ON FUNCTION tunnel_internal.edit_region() IS 'Trigger of view region: writes a region and notes who and when';
 
 CREATE OR REPLACE TRIGGER edit INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.region
-    FOR EACH ROW EXECUTE FUNCTION tunnel_api.edit_region();
+    FOR EACH ROW EXECUTE FUNCTION tunnel_internal.edit_region();
 
 -- A dry region larger than the tunnel's limit takes nothing away until an operator has looked at it.
 CREATE OR REPLACE FUNCTION tunnel_api.dry_region_approve(region_id int) RETURNS int
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     was tunnel.region;
-    before constant jsonb := tunnel_api.region_state(region_id);
+    before constant jsonb := tunnel_internal.region_state(region_id);
 BEGIN
     SELECT r.* INTO was FROM tunnel.region r WHERE r.id = region_id FOR UPDATE;
     IF was.id IS NULL OR NOT was.pending_approval THEN
@@ -328,9 +328,9 @@ BEGIN
     END IF;
     UPDATE tunnel.region r SET pending_approval = false, approved_by = session_user, approved_at = clock_timestamp()
      WHERE r.id = region_id;
-    PERFORM tunnel_api.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = was.survey_id), 'region', region_id,
-                                 before, tunnel_api.region_state(region_id));
-    PERFORM tunnel_api.mark_dry(was.survey_id, was.geom);
+    PERFORM tunnel_internal.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = was.survey_id), 'region', region_id,
+                                 before, tunnel_internal.region_state(region_id));
+    PERFORM tunnel_internal.mark_dry(was.survey_id, was.geom);
     RETURN (SELECT d.leaks FROM tunnel_api.dry_region d WHERE d.id = region_id);
 END
 $$;

@@ -4,12 +4,12 @@
 -- finding_3d (views/draw.sql). Needs stationing (geometry/stationing.sql) and make_geometry_views (views/geometry.sql).
 
 -- What each reason adds to the logarithm of the odds of a leak, the strongest first, as "faint +2.3, rectangular -1.2".
-CREATE OR REPLACE FUNCTION tunnel_api.evidence_text(evidence jsonb) RETURNS text
+CREATE OR REPLACE FUNCTION tunnel_internal.evidence_text(evidence jsonb) RETURNS text
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE SET search_path = pg_catalog, pg_temp AS $$
     SELECT string_agg(e.key || ' ' || to_char(e.value::numeric, 'FMSG990.0'), ', ' ORDER BY abs(e.value::numeric) DESC, e.key)
       FROM jsonb_each_text($1) e WHERE abs(e.value::numeric) >= 0.05
 $$;
-COMMENT ON FUNCTION tunnel_api.evidence_text(jsonb) IS
+COMMENT ON FUNCTION tunnel_internal.evidence_text(jsonb) IS
     'Evidence for a leak and against it as text: logarithms of odds by reason, the strongest first';
 
 CREATE OR REPLACE VIEW tunnel_api.finding_kind AS
@@ -53,7 +53,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
             WHEN a.review = 'rejected' THEN 'rejected' WHEN a.superseded THEN 'dry' WHEN NOT a.detected THEN 'gone'
             ELSE a.review END AS state,
        (SELECT count(*) FROM tunnel.photo p WHERE p.finding_id = a.id) AS photos,
-       tunnel_api.evidence_text(a.evidence) AS evidence, a.model, a.superseded,
+       tunnel_internal.evidence_text(a.evidence) AS evidence, a.model, a.superseded,
        coalesce(a.shape, a.unrolled) AS unrolled,
        coalesce(a.shape_map, a.map) AS map,
        coalesce(a.shape_surface, a.surface) AS surface
@@ -131,7 +131,7 @@ BEGIN
     END LOOP;
 END
 $$;
-CALL tunnel_api.make_geometry_views(
+CALL tunnel_internal.make_geometry_views(
     'finding', 'finding', 'Findings',
     ': polygons, lines and points are drawn, redrawn and reviewed here, and what was drawn is deleted');
 
@@ -170,7 +170,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.area, a.darkening_mean, a.darkening_max, a.image_share,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.detected, a.created_at, a.detected_at,
        a.detected AND a.review <> 'rejected' AS counted,
-       tunnel_api.evidence_text(a.evidence) AS evidence, a.model, a.wet, a.origin,
+       tunnel_internal.evidence_text(a.evidence) AS evidence, a.model, a.wet, a.origin,
        a.unrolled::public.geometry(Polygon, 0) AS unrolled,
        a.map::public.geometry AS map,
        a.surface::public.geometry AS surface
@@ -226,7 +226,7 @@ BEGIN
 END
 $$;
 
-CALL tunnel_api.make_geometry_views('leak', 'leak', 'Leaks', '; review, remark and kind can be updated');
+CALL tunnel_internal.make_geometry_views('leak', 'leak', 'Leaks', '; review, remark and kind can be updated');
 
 CREATE OR REPLACE VIEW tunnel_api.finding_photo AS
 SELECT p.id, p.finding_id, a.survey_id, s.name AS survey, p.path, p.caption, p.added_by, p.added_at

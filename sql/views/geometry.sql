@@ -1,7 +1,7 @@
 -- The views of one geometry that QGIS and other programs show: a layer has one. Of each view with three geometries – in a plane, on
 -- the map, in space – there are three, of the same columns and with the same comments, whose geometry is geom. Needs nothing.
 
-CREATE OR REPLACE PROCEDURE tunnel_api.make_geometry_views(
+CREATE OR REPLACE PROCEDURE tunnel_internal.make_geometry_views(
     base text, stem text, subject text, remark text DEFAULT '', plane text DEFAULT 'unrolled', plane_suffix text DEFAULT 'unrolled',
     plane_text text DEFAULT 'in the unrolled plane (chainage, arc), SRID 0', map_text text DEFAULT 'on the map strip beside the axis, in the tunnel''s SRID',
     surface_text text DEFAULT 'on the lining in space, in the tunnel''s SRID')
@@ -30,5 +30,5 @@ BEGIN
     END LOOP;
 END
 $$;
-COMMENT ON PROCEDURE tunnel_api.make_geometry_views(text, text, text, text, text, text, text, text, text) IS
+COMMENT ON PROCEDURE tunnel_internal.make_geometry_views(text, text, text, text, text, text, text, text, text) IS
     'Makes of a view with three geometries the three views of one, named by stem and suffix, with its comments; subject and remark are what their own comments begin and end with';

@@ -13,7 +13,7 @@ SELECT s.id::bigint * 100000000 + 50000000 + 2 * w.first + (w.side = 'right')::i
  CROSS JOIN LATERAL (
     SELECT p.side, min(p.segment) AS first, min(p.chainage) AS chainage_from, max(p.chainage) AS chainage_to,
            min(abs(p.across)) AS nearest, max(abs(p.across)) AS farthest,
-           public.st_makeline(tunnel_api.map_point(s.id, p.chainage, p.across) ORDER BY p.chainage) AS geom
+           public.st_makeline(tunnel_internal.map_point(s.id, p.chainage, p.across) ORDER BY p.chainage) AS geom
       FROM (
         SELECT h.piece, h.segment, q.side, q.across, r.chainage
           FROM (SELECT c.id, c.segment, c.chainage, c.radius, c.piece,

@@ -7,7 +7,7 @@ RETURNS SETOF tunnel_api.point
 LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE ROWS 100000
 AS $$
 BEGIN
-    PERFORM tunnel_api.in_order(chainage_from, chainage_to);
+    PERFORM tunnel_internal.in_order(chainage_from, chainage_to);
     -- Kilometres are those of the given axis; on the axis found a point may lie some metres into the next one.
     RETURN QUERY EXECUTE
         'SELECT p.* FROM tunnel_api.point p WHERE p.survey_id = $1 AND p.km BETWEEN $2 AND $3'

@@ -12,7 +12,7 @@ COMMENT ON COLUMN tunnel_api.goal.retry_after IS 'Stages that failed before this
 
 CREATE OR REPLACE VIEW tunnel_api.incoming AS
 SELECT ('x' || left(md5(i.survey_id || '/' || i.name), 13))::bit(52)::bigint AS id, i.survey_id, s.name AS survey, i.name,
-       tunnel_api.for_operators(i.path) AS path, i.bytes, i.points, i.km_from, i.km_to,
+       tunnel_internal.for_operators(i.path) AS path, i.bytes, i.points, i.km_from, i.km_to,
        CASE WHEN i.failed_at IS NULL THEN 'waiting' ELSE 'failed' END AS state, i.requested_at, i.failed_at, i.message
   FROM tunnel.incoming i
   JOIN tunnel.survey s ON s.id = i.survey_id;

@@ -8,8 +8,8 @@ CREATE OR REPLACE VIEW tunnel_api.remark AS
 SELECT 16 * r.id AS id, s.id AS survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file,
        concat_ws('; ', r.counts ->> 'note', r.counts ->> 'place') AS remark
   FROM tunnel.survey s
- CROSS JOIN LATERAL tunnel_api.stages_run(s.id) g (stage)
- CROSS JOIN LATERAL tunnel_api.last_runs(s.id, g.stage) r
+ CROSS JOIN LATERAL tunnel_internal.stages_run(s.id) g (stage)
+ CROSS JOIN LATERAL tunnel_internal.last_runs(s.id, g.stage) r
  WHERE r.counts ?| ARRAY['note', 'place']
  UNION ALL
 SELECT 16 * f.id::bigint + w.k, f.survey_id, s.name, NULL, 'load', f.name, format('%s points (%s %%) left out: %s', w.points,
@@ -59,7 +59,7 @@ COMMENT ON COLUMN tunnel_api.remark.remark IS 'What is to be known';
 
 
 -- Files first, then by kilometre; what is the same in several kilometres is said once.
-CREATE OR REPLACE FUNCTION tunnel_api.remarks_of(survey_id int, starts float8[], ends float8[])
+CREATE OR REPLACE FUNCTION tunnel_internal.remarks_of(survey_id int, starts float8[], ends float8[])
 RETURNS TABLE (n int, file text, stage text, kilometres int[], remark text, said text)
 LANGUAGE plpgsql STABLE STRICT PARALLEL RESTRICTED
 COST 100000  -- once a survey, not once a stretch
@@ -70,7 +70,7 @@ SET plan_cache_mode = force_generic_plan  -- planning takes longer than a survey
 AS $$
 #variable_conflict use_column
 BEGIN
-    PERFORM tunnel_api.in_order(t.low, t.high) FROM unnest(starts, ends) AS t (low, high);
+    PERFORM tunnel_internal.in_order(t.low, t.high) FROM unnest(starts, ends) AS t (low, high);
     RETURN QUERY
     WITH known AS (
         SELECT DISTINCT r.file, r.stage, r.km, r.remark, coalesce(r.km * 1000, f.chainage_from, '-Infinity') AS low,
@@ -107,7 +107,7 @@ BEGIN
      ORDER BY w.n, w.file NULLS LAST, w.first, w.stage, w.remark;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.remarks_of(int, float8[], float8[]) IS
+COMMENT ON FUNCTION tunnel_internal.remarks_of(int, float8[], float8[]) IS
 'What remarks has to say of each of some stretches of a survey, given by where they begin and end (m); n: the first is 1.';
 
 
@@ -118,30 +118,30 @@ RETURNS TABLE (file text, stage text, kilometres int[], remark text, said text)
 LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL RESTRICTED
 ROWS 5
 AS $$
-    SELECT r.file, r.stage, r.kilometres, r.remark, r.said FROM tunnel_api.remarks_of($1, ARRAY[$2], ARRAY[$3]) r
+    SELECT r.file, r.stage, r.kilometres, r.remark, r.said FROM tunnel_internal.remarks_of($1, ARRAY[$2], ARRAY[$3]) r
 $$;
 COMMENT ON FUNCTION tunnel_api.remarks(int, float8, float8) IS
 'What is to be known of a survey''s results between two chainages (m), or anywhere, by the view remark: of its files there, then of its kilometres, the same in several of them once. said: the whole in words, as every document has it.';
 
 
-CREATE OR REPLACE FUNCTION tunnel_api.remark_statements(survey_id int, starts float8[], ends float8[])
+CREATE OR REPLACE FUNCTION tunnel_internal.remark_statements(survey_id int, starts float8[], ends float8[])
 RETURNS TABLE (n int, said text)
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
 COST 100000  -- once a survey, not once a stretch
 ROWS 5
 AS $$
     SELECT r.n, string_agg(r.said, '; ' ORDER BY r.place)
-      FROM tunnel_api.remarks_of($1, $2, $3) WITH ORDINALITY AS r (n, file, stage, kilometres, remark, said, place)
+      FROM tunnel_internal.remarks_of($1, $2, $3) WITH ORDINALITY AS r (n, file, stage, kilometres, remark, said, place)
      GROUP BY r.n
 $$;
-COMMENT ON FUNCTION tunnel_api.remark_statements(int, float8[], float8[]) IS
+COMMENT ON FUNCTION tunnel_internal.remark_statements(int, float8[], float8[]) IS
 'What remarks has to say of each of some stretches of a survey, given by where they begin and end (m), on one line; n: the first is 1. No row for one of which there is nothing to say.';
 
 
-CREATE OR REPLACE FUNCTION tunnel_api.remark_statement(
+CREATE OR REPLACE FUNCTION tunnel_internal.remark_statement(
     survey_id int, stretch_from float8 DEFAULT '-Infinity', stretch_to float8 DEFAULT 'Infinity')
 RETURNS text
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
-AS $$ SELECT r.said FROM tunnel_api.remark_statements($1, ARRAY[$2], ARRAY[$3]) r $$;
-COMMENT ON FUNCTION tunnel_api.remark_statement(int, float8, float8) IS
+AS $$ SELECT r.said FROM tunnel_internal.remark_statements($1, ARRAY[$2], ARRAY[$3]) r $$;
+COMMENT ON FUNCTION tunnel_internal.remark_statement(int, float8, float8) IS
 'What remarks has to say of a survey between two chainages (m), on one line; NULL if there is nothing.';

@@ -2,7 +2,7 @@
 -- (geometry/unroll.sql).
 
 -- Of what has no sections yet, or lies off them, the chainage is that on the axis as given, in plan.
-CREATE OR REPLACE FUNCTION tunnel_api.scanner_chainage(survey_id int, place geometry) RETURNS float8
+CREATE OR REPLACE FUNCTION tunnel_internal.scanner_chainage(survey_id int, place geometry) RETURNS float8
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT coalesce((SELECT u.chainage FROM tunnel_api.unroll($1, $2) u),
                     (SELECT t.start_chainage + l.share * public.ST_Length(t.alignment)
@@ -11,7 +11,7 @@ LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_c
                       CROSS JOIN LATERAL (SELECT public.ST_LineLocatePoint(t.alignment, $2) AS share) l
                       WHERE s.id = $1 AND l.share > 0 AND l.share < 1))
 $$;
-COMMENT ON FUNCTION tunnel_api.scanner_chainage(int, geometry) IS
+COMMENT ON FUNCTION tunnel_internal.scanner_chainage(int, geometry) IS
     'Chainage (m) of a place in the tunnel, also where there are no sections yet: as unroll has it, else along the axis as given; NULL beyond its ends and of a site';
 
 CREATE OR REPLACE VIEW tunnel_api.scan_station AS
@@ -20,7 +20,7 @@ SELECT (c.survey_id::bigint << 32) | (c.scan_id::bigint & 4294967295) AS id, c.s
        c.geom::public.geometry AS geom
   FROM tunnel.station c
   JOIN tunnel.survey s ON s.id = c.survey_id
- CROSS JOIN LATERAL (SELECT tunnel_api.scanner_chainage(c.survey_id, c.geom) AS chainage OFFSET 0) k;
+ CROSS JOIN LATERAL (SELECT tunnel_internal.scanner_chainage(c.survey_id, c.geom) AS chainage OFFSET 0) k;
 COMMENT ON VIEW tunnel_api.scan_station IS 'Where a static scanner stood';
 COMMENT ON COLUMN tunnel_api.scan_station.date IS 'Day of the survey';
 COMMENT ON COLUMN tunnel_api.scan_station.scan_id IS 'Number of the scan, as the points have it';
@@ -57,8 +57,8 @@ SELECT (s.id::bigint << 38) | ((m.minute & 4294967295) << 6) | m.part AS id, s.i
                          GROUP BY q.piece, q.second) v
                 WINDOW w AS (PARTITION BY v.piece ORDER BY v.time)) g
          GROUP BY g.minute, g.piece) m
- CROSS JOIN LATERAL (SELECT tunnel_api.scanner_chainage(s.id, public.st_startpoint(m.geom)) AS chainage OFFSET 0) a
- CROSS JOIN LATERAL (SELECT tunnel_api.scanner_chainage(s.id, public.st_endpoint(m.geom)) AS chainage OFFSET 0) b
+ CROSS JOIN LATERAL (SELECT tunnel_internal.scanner_chainage(s.id, public.st_startpoint(m.geom)) AS chainage OFFSET 0) a
+ CROSS JOIN LATERAL (SELECT tunnel_internal.scanner_chainage(s.id, public.st_endpoint(m.geom)) AS chainage OFFSET 0) b
  WHERE m.geom IS NOT NULL;
 COMMENT ON VIEW tunnel_api.trajectory IS
     'The way of a mobile scanner, a line for each minute, with a vertex a second; where its gaps are, a line ends';

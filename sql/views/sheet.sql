@@ -67,7 +67,7 @@ SELECT s.id::bigint * 1000000 + 500000 + r.number AS id, s.id AS survey_id, s.na
                 SELECT i AS number
                   FROM (SELECT q.chainage_from, q.chainage_to FROM tunnel.segment q WHERE q.survey_id = s.id
                          UNION ALL  -- a kilometre without segments has empty ones, which say so
-                        SELECT k.chainage_from, k.chainage_to FROM tunnel_api.km_ends k
+                        SELECT k.chainage_from, k.chainage_to FROM tunnel_internal.km_ends k
                          WHERE k.survey_id = s.id
                            AND NOT EXISTS (SELECT FROM tunnel.segment q WHERE q.survey_id = k.survey_id AND q.km = k.km)) g
                  CROSS JOIN generate_series(floor(g.chainage_from / 50)::integer, ceil(g.chainage_to / 50)::integer - 1) AS i
@@ -84,10 +84,10 @@ SELECT s.id::bigint * 1000000 + 500000 + r.number AS id, s.id AS survey_id, s.na
                   FROM (SELECT least(greatest(q.number * 50, e.chainage_from), (q.number + 1) * 50) AS chainage_from) f) r) h
   LEFT JOIN LATERAL (
         SELECT array_agg(q.n) AS places, array_agg(q.said) AS said
-          FROM tunnel_api.coverage_statements(s.id, h.starts, h.ends) q) w ON true
+          FROM tunnel_internal.coverage_statements(s.id, h.starts, h.ends) q) w ON true
   LEFT JOIN LATERAL (
         SELECT array_agg(q.n) AS places, array_agg(q.said) AS said
-          FROM tunnel_api.remark_statements(s.id, h.starts, h.ends) q) y ON true
+          FROM tunnel_internal.remark_statements(s.id, h.starts, h.ends) q) y ON true
  CROSS JOIN LATERAL unnest(h.numbers, h.starts, h.ends) WITH ORDINALITY AS r (number, chainage_from, chainage_to, place)
  CROSS JOIN LATERAL (
         SELECT r.number * 50::float8 AS chainage_from, (r.number + 1) * 50::float8 AS chainage_to,
@@ -106,7 +106,7 @@ SELECT s.id::bigint * 1000000 + 500000 + r.number AS id, s.id AS survey_id, s.na
          WHERE q.survey_id = s.id AND q.km = b.km) c ON true
   LEFT JOIN LATERAL (
         SELECT CASE WHEN c.lining IS NOT NULL OR count(*) > 0 THEN count(*) END AS leaks,
-               coalesce(sum(tunnel_api.area_between(x.unrolled, x.area, r.chainage_from, r.chainage_to)),
+               coalesce(sum(tunnel_internal.area_between(x.unrolled, x.area, r.chainage_from, r.chainage_to)),
                         CASE WHEN c.lining IS NOT NULL THEN 0 END) AS wet_area
           FROM tunnel.finding x
          WHERE x.survey_id = s.id AND x.detected AND x.review <> 'rejected' AND x.wet AND NOT x.superseded

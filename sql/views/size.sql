@@ -2,7 +2,7 @@
 -- thousands of kilometres has as many partitions of points.
 
 -- What the tables hold. A table that is not named is a result.
-CREATE OR REPLACE FUNCTION tunnel_api.table_kind(name text) RETURNS text
+CREATE OR REPLACE FUNCTION tunnel_internal.table_kind(name text) RETURNS text
 LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
 AS $$
     SELECT CASE WHEN $1 ~ '^(point|fragment)_s[0-9]+' OR $1 IN ('point', 'sonar_point') THEN 'points'
@@ -13,14 +13,14 @@ AS $$
                     THEN 'inputs'
                 ELSE 'results' END
 $$;
-COMMENT ON FUNCTION tunnel_api.table_kind(text) IS
+COMMENT ON FUNCTION tunnel_internal.table_kind(text) IS
     'What a table of schema tunnel holds of a survey: points, images, sections, results, runs or inputs';
 
 -- Points and images have tables of each survey. Of another, surveys are given the share that they have of its rows by the
 -- statistics of the planner: of a survey among the most common values its frequency, of the others what is left, in equal parts.
 -- A table without a survey's key takes the shares of that which it belongs to. One that was never analyzed has no statistics: its
 -- bytes are nobody's.
-CREATE OR REPLACE FUNCTION tunnel_api.survey_sizes()
+CREATE OR REPLACE FUNCTION tunnel_internal.survey_sizes()
 RETURNS TABLE (survey_id integer, kind text, rows bigint, bytes bigint, estimated boolean)
 LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 100 SET search_path = pg_catalog, pg_temp SET jit = off
 AS $$
@@ -30,7 +30,7 @@ AS $$
           FROM pg_class c
          WHERE c.relnamespace = 'tunnel'::regnamespace AND c.relkind = 'r'
     ), own AS (
-        SELECT r.survey_id, tunnel_api.table_kind(r.name) AS kind,
+        SELECT r.survey_id, tunnel_internal.table_kind(r.name) AS kind,
                sum(CASE WHEN r.heap = 0 THEN 0 WHEN r.reltuples >= 0 THEN r.reltuples END)
                    + CASE WHEN bool_or(r.heap > 0 AND r.reltuples < 0) THEN NULL ELSE 0 END AS rows,
                sum(r.bytes) AS bytes, false AS shared
@@ -61,13 +61,13 @@ AS $$
          CROSS JOIN tunnel.survey s
           LEFT JOIN common m ON m.tablename = t.relname AND m.survey_id = s.id
     ), part AS (
-        SELECT h.survey_id, tunnel_api.table_kind(k.name) AS kind, CASE WHEN k.heap = 0 THEN 0 ELSE k.reltuples * h.share END AS rows,
+        SELECT h.survey_id, tunnel_internal.table_kind(k.name) AS kind, CASE WHEN k.heap = 0 THEN 0 ELSE k.reltuples * h.share END AS rows,
                CASE WHEN k.heap = 0 THEN 0 ELSE k.bytes * h.share END AS bytes, true AS shared
           FROM keyed k
           JOIN share h ON h.oid = k.oid
          WHERE k.heap = 0 OR k.reltuples >= 0
          UNION ALL
-        SELECT NULL, tunnel_api.table_kind(k.name), NULL, k.bytes, false
+        SELECT NULL, tunnel_internal.table_kind(k.name), NULL, k.bytes, false
           FROM keyed k
          WHERE k.heap > 0 AND k.reltuples < 0
          UNION ALL
@@ -78,14 +78,14 @@ AS $$
       FROM part p
      GROUP BY p.survey_id, p.kind
 $$;
-COMMENT ON FUNCTION tunnel_api.survey_sizes() IS
+COMMENT ON FUNCTION tunnel_internal.survey_sizes() IS
     'What each survey takes of the database, by kind: from the catalogue, without reading a table';
 
 CREATE OR REPLACE VIEW tunnel_api.survey_size AS
 SELECT coalesce(z.survey_id, 0)::bigint * 10
            + array_position(ARRAY['points', 'images', 'sections', 'results', 'runs', 'inputs'], z.kind) AS id,
        z.survey_id, s.name AS survey, z.kind, z.rows, z.bytes, z.estimated
-  FROM tunnel_api.survey_sizes() z
+  FROM tunnel_internal.survey_sizes() z
   LEFT JOIN tunnel.survey s ON s.id = z.survey_id;
 COMMENT ON VIEW tunnel_api.survey_size IS
     'What each survey takes of the database, by kind; cheap, for it reads the catalogue and no table. What belongs to a tunnel or to the database as a whole is not in it';

@@ -43,7 +43,7 @@ SELECT g.id, g.survey_id, g.survey, g.km, g.chainage_from, g.chainage_to, g.lini
   FROM tunnel_api.km_waterproof g
   LEFT JOIN LATERAL (
         SELECT max(q.seen) - min(q.seen) AS seen, max(q.wet) - min(q.wet) AS wet
-          FROM tunnel_api.coverage_at(g.survey_id, ARRAY[g.chainage_from, g.chainage_to]) q) c ON g.lining_area IS NOT NULL
+          FROM tunnel_internal.coverage_at(g.survey_id, ARRAY[g.chainage_from, g.chainage_to]) q) c ON g.lining_area IS NOT NULL
  CROSS JOIN LATERAL (SELECT coalesce(c.seen, (
         SELECT (r.counts ->> 'lining_pixels')::float8 * (r.parameters ->> 'image.pixel')::float8 ^ 2
           FROM tunnel.run r

@@ -5,14 +5,14 @@
 
 -- What members of a survey are found from: its files' checksums by name, and when its settings were last changed. A search is up
 -- to date as long as these are the same as in its row of the ledger.
-CREATE OR REPLACE FUNCTION tunnel_api.members_inputs(survey_id int) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.members_inputs(survey_id int) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
                'files', (SELECT coalesce(jsonb_object_agg(f.name, f.checksum), '{}') FROM tunnel.scan_file f WHERE f.survey_id = s.id),
                'settings_at', extract(epoch FROM s.settings_at))
       FROM tunnel.survey s WHERE s.id = $1
 $$;
-COMMENT ON FUNCTION tunnel_api.members_inputs(int) IS
+COMMENT ON FUNCTION tunnel_internal.members_inputs(int) IS
     'What members of a survey are found from: checksums of its files by name, and when its settings were last changed, s since 1970. The run of stage members holds the same in its parameters';
 
 CREATE OR REPLACE VIEW tunnel_api.member AS
@@ -106,15 +106,15 @@ COMMENT ON COLUMN tunnel_api.member_statistics.spot_share IS 'Share of what coul
 COMMENT ON COLUMN tunnel_api.member_statistics.geom IS 'Its middle line, in the tunnel''s SRID';
 
 -- Products of vectors in space, as arrays of three numbers.
-CREATE OR REPLACE FUNCTION tunnel_api.dot(a float8[], b float8[]) RETURNS float8
+CREATE OR REPLACE FUNCTION tunnel_internal.dot(a float8[], b float8[]) RETURNS float8
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
 RETURN a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
-COMMENT ON FUNCTION tunnel_api.dot(float8[], float8[]) IS 'Inner product of two vectors in space';
+COMMENT ON FUNCTION tunnel_internal.dot(float8[], float8[]) IS 'Inner product of two vectors in space';
 
-CREATE OR REPLACE FUNCTION tunnel_api.cross_product(a float8[], b float8[]) RETURNS float8[]
+CREATE OR REPLACE FUNCTION tunnel_internal.cross_product(a float8[], b float8[]) RETURNS float8[]
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
 RETURN ARRAY[a[2] * b[3] - a[3] * b[2], a[3] * b[1] - a[1] * b[3], a[1] * b[2] - a[2] * b[1]];
-COMMENT ON FUNCTION tunnel_api.cross_product(float8[], float8[]) IS 'Vector product of two vectors in space';
+COMMENT ON FUNCTION tunnel_internal.cross_product(float8[], float8[]) IS 'Vector product of two vectors in space';
 
 -- A spot lies on its face, and of two surfaces in one place a 3D view shows now the one, now the other.
 CREATE OR REPLACE VIEW tunnel_api.face_3d AS
@@ -131,7 +131,7 @@ SELECT f.id, f.survey_id, s.name AS survey, m.number AS member, f.number, f.kind
   JOIN tunnel.member m ON m.id = f.member_id
   JOIN tunnel.survey s ON s.id = f.survey_id
  CROSS JOIN LATERAL (SELECT 1 + CASE WHEN f.inside THEN 1 ELSE -1 END * least(0.01 / f.radius, 0.25) AS k,
-                            tunnel_api.dot(f.origin, f.axis) AS along) k;
+                            tunnel_internal.dot(f.origin, f.axis) AS along) k;
 COMMENT ON VIEW tunnel_api.face_3d IS
     'Faces in space, to be drawn: 1 cm behind where they are, of a thin pipe a quarter of its radius, so that spots are seen before them';
 COMMENT ON COLUMN tunnel_api.face_3d.member IS 'Number of the member that it belongs to';
@@ -150,7 +150,7 @@ COMMENT ON COLUMN tunnel_api.face_3d.geom IS 'Its outline in space, in the tunne
 -- lie below each other, 5 cm apart, turned so that its line runs to the right. Each member has a cell of the proportions of the
 -- strip on its page (277 mm by 110 mm) with a margin of a twentieth. A window function is counted by survey and its name, so that
 -- a condition on either reaches the tables.
-CREATE OR REPLACE VIEW tunnel_api.face_placement AS
+CREATE OR REPLACE VIEW tunnel_internal.face_placement AS
 WITH placed AS NOT MATERIALIZED (
     SELECT f.id, f.survey_id, s.name AS survey, f.member_id, m.number, f.side, f.outline,
            r.c * t.xx + r.s * t.yx AS xx, r.c * t.xy + r.s * t.yy AS xy, r.c * t.yx - r.s * t.xx AS yx,
@@ -158,31 +158,31 @@ WITH placed AS NOT MATERIALIZED (
       FROM tunnel.face f
       JOIN tunnel.member m ON m.id = f.member_id
       JOIN tunnel.survey s ON s.id = f.survey_id
-     CROSS JOIN LATERAL (SELECT g.origin, g.axis, g.across, tunnel_api.cross_product(g.axis, g.across) AS other, g.radius, g.inside
+     CROSS JOIN LATERAL (SELECT g.origin, g.axis, g.across, tunnel_internal.cross_product(g.axis, g.across) AS other, g.radius, g.inside
                            FROM tunnel.face g WHERE g.member_id = m.id AND g.side = f.side ORDER BY g.area DESC, g.id LIMIT 1) b
      CROSS JOIN LATERAL (SELECT ARRAY[f.origin[1] - b.origin[1], f.origin[2] - b.origin[2], f.origin[3] - b.origin[3]] AS shift,
-                                tunnel_api.cross_product(f.axis, f.across) AS other,
-                                CASE WHEN tunnel_api.dot(f.axis, b.axis) < 0 THEN -1.0 ELSE 1.0 END AS way,
+                                tunnel_internal.cross_product(f.axis, f.across) AS other,
+                                CASE WHEN tunnel_internal.dot(f.axis, b.axis) < 0 THEN -1.0 ELSE 1.0 END AS way,
                                 CASE WHEN b.inside THEN 1.0 ELSE -1.0 END AS side) o
      CROSS JOIN LATERAL (
-            SELECT tunnel_api.dot(f.across, b.across) AS xx, tunnel_api.dot(o.other, b.across) AS xy,
-                   tunnel_api.dot(f.across, b.other) AS yx, tunnel_api.dot(o.other, b.other) AS yy,
-                   tunnel_api.dot(o.shift, b.across) AS x, tunnel_api.dot(o.shift, b.other) AS y
+            SELECT tunnel_internal.dot(f.across, b.across) AS xx, tunnel_internal.dot(o.other, b.across) AS xy,
+                   tunnel_internal.dot(f.across, b.other) AS yx, tunnel_internal.dot(o.other, b.other) AS yy,
+                   tunnel_internal.dot(o.shift, b.across) AS x, tunnel_internal.dot(o.shift, b.other) AS y
              WHERE m.kind <> 'pipe'
              UNION ALL
-            SELECT o.way, 0.0, 0.0, o.side * o.way, tunnel_api.dot(o.shift, b.axis),
-                   o.side * b.radius * atan2(tunnel_api.dot(f.across, b.other), tunnel_api.dot(f.across, b.across))
+            SELECT o.way, 0.0, 0.0, o.side * o.way, tunnel_internal.dot(o.shift, b.axis),
+                   o.side * b.radius * atan2(tunnel_internal.dot(f.across, b.other), tunnel_internal.dot(f.across, b.across))
              WHERE m.kind = 'pipe') t
      CROSS JOIN LATERAL (SELECT public.st_startpoint(m.line) AS begin, public.st_endpoint(m.line) AS finish) e
      CROSS JOIN LATERAL (SELECT ARRAY[public.st_x(e.finish) - public.st_x(e.begin), public.st_y(e.finish) - public.st_y(e.begin),
                                       public.st_z(e.finish) - public.st_z(e.begin)] AS line) d
-     CROSS JOIN LATERAL (SELECT atan2(tunnel_api.dot(d.line, b.other), tunnel_api.dot(d.line, b.across)) AS angle) a
+     CROSS JOIN LATERAL (SELECT atan2(tunnel_internal.dot(d.line, b.other), tunnel_internal.dot(d.line, b.across)) AS angle) a
      CROSS JOIN LATERAL (
             SELECT 1.0::float8 AS c, 0.0::float8 AS s, 0.0::float8 AS x WHERE m.kind <> 'profile'
              UNION ALL
             SELECT cos(a.angle), sin(a.angle),
-                   tunnel_api.dot(ARRAY[b.origin[1] - public.st_x(e.begin), b.origin[2] - public.st_y(e.begin),
-                                        b.origin[3] - public.st_z(e.begin)], d.line) / sqrt(tunnel_api.dot(d.line, d.line))
+                   tunnel_internal.dot(ARRAY[b.origin[1] - public.st_x(e.begin), b.origin[2] - public.st_y(e.begin),
+                                        b.origin[3] - public.st_z(e.begin)], d.line) / sqrt(tunnel_internal.dot(d.line, d.line))
              WHERE m.kind = 'profile') r
 ), sided AS (
     SELECT p.member_id, p.survey_id, p.survey, p.number, p.side,
@@ -211,17 +211,17 @@ SELECT p.id, p.survey_id, p.survey, p.member_id, p.xx, p.xy, p.yx, p.yy,
   FROM placed p
   JOIN stacked k ON k.member_id = p.member_id AND k.side = p.side AND k.survey_id = p.survey_id AND k.survey = p.survey
   JOIN cell c ON c.member_id = p.member_id AND c.survey_id = p.survey_id AND c.survey = p.survey;
-COMMENT ON VIEW tunnel_api.face_placement IS
+COMMENT ON VIEW tunnel_internal.face_placement IS
     'How faces are laid out on one plane to be drawn, member below member: drawn x = xx u + xy v + x, y = yx u + yy v + y';
-COMMENT ON COLUMN tunnel_api.face_placement.id IS 'Key of the face';
-COMMENT ON COLUMN tunnel_api.face_placement.member_id IS 'Key of its member';
-COMMENT ON COLUMN tunnel_api.face_placement.xx IS 'Of its unrolled u in the drawn x';
-COMMENT ON COLUMN tunnel_api.face_placement.xy IS 'Of its unrolled v in the drawn x';
-COMMENT ON COLUMN tunnel_api.face_placement.yx IS 'Of its unrolled u in the drawn y';
-COMMENT ON COLUMN tunnel_api.face_placement.yy IS 'Of its unrolled v in the drawn y';
-COMMENT ON COLUMN tunnel_api.face_placement.x IS 'Drawn x of its unrolled origin, m';
-COMMENT ON COLUMN tunnel_api.face_placement.y IS 'Drawn y of its unrolled origin, m';
-COMMENT ON COLUMN tunnel_api.face_placement.cell IS 'Rectangle that its member is drawn in; SRID 0, m';
+COMMENT ON COLUMN tunnel_internal.face_placement.id IS 'Key of the face';
+COMMENT ON COLUMN tunnel_internal.face_placement.member_id IS 'Key of its member';
+COMMENT ON COLUMN tunnel_internal.face_placement.xx IS 'Of its unrolled u in the drawn x';
+COMMENT ON COLUMN tunnel_internal.face_placement.xy IS 'Of its unrolled v in the drawn x';
+COMMENT ON COLUMN tunnel_internal.face_placement.yx IS 'Of its unrolled u in the drawn y';
+COMMENT ON COLUMN tunnel_internal.face_placement.yy IS 'Of its unrolled v in the drawn y';
+COMMENT ON COLUMN tunnel_internal.face_placement.x IS 'Drawn x of its unrolled origin, m';
+COMMENT ON COLUMN tunnel_internal.face_placement.y IS 'Drawn y of its unrolled origin, m';
+COMMENT ON COLUMN tunnel_internal.face_placement.cell IS 'Rectangle that its member is drawn in; SRID 0, m';
 
 CREATE OR REPLACE VIEW tunnel_api.member_sheet AS
 SELECT m.id, m.survey_id, m.survey, m.number, m.kind, m.length, m.chainage,
@@ -230,7 +230,7 @@ SELECT m.id, m.survey_id, m.survey, m.number, m.kind, m.length, m.chainage,
        c.cell::public.geometry(Polygon, 0) AS geom
   FROM tunnel_api.member_statistics m
   JOIN tunnel.survey s ON s.id = m.survey_id
-  JOIN (SELECT DISTINCT p.survey_id, p.survey, p.member_id, p.cell FROM tunnel_api.face_placement p) c
+  JOIN (SELECT DISTINCT p.survey_id, p.survey, p.member_id, p.cell FROM tunnel_internal.face_placement p) c
     ON c.member_id = m.id AND c.survey_id = m.survey_id AND c.survey = m.survey;
 COMMENT ON VIEW tunnel_api.member_sheet IS 'Pages of members: where each is drawn, its faces unrolled, with what could be judged of it';
 COMMENT ON COLUMN tunnel_api.member_sheet.number IS 'Its number in the survey';
@@ -251,7 +251,7 @@ COMMENT ON COLUMN tunnel_api.member_sheet.geom IS 'Rectangle that it is drawn in
 CREATE OR REPLACE VIEW tunnel_api.face_sheet AS
 SELECT f.id, f.survey_id, p.survey, m.number AS member, f.number, f.kind, f.radius, f.area, f.seen_share, f.bimodal,
        public.st_affine(f.outline, p.xx, p.xy, p.yx, p.yy, p.x, p.y)::public.geometry(MultiPolygon, 0) AS geom
-  FROM tunnel_api.face_placement p
+  FROM tunnel_internal.face_placement p
   JOIN tunnel.face f ON f.id = p.id
   JOIN tunnel.member m ON m.id = p.member_id;
 COMMENT ON VIEW tunnel_api.face_sheet IS 'Faces unrolled, member below member, as seen from the scanner''s side';
@@ -270,7 +270,7 @@ BEGIN
     EXECUTE format('CREATE OR REPLACE VIEW tunnel_api.spot_sheet AS SELECT %s, public.st_affine(q.outline, f.xx, f.xy, f.yx, f.yy, f.x,'
                    ' f.y)::public.geometry(Polygon, 0) AS geom'
                    ' FROM tunnel_api.spot q JOIN tunnel.spot r ON r.id = q.id'
-                   ' JOIN tunnel_api.face_placement f ON f.id = r.face_id AND f.survey = q.survey AND f.survey_id = q.survey_id',
+                   ' JOIN tunnel_internal.face_placement f ON f.id = r.face_id AND f.survey = q.survey AND f.survey_id = q.survey_id',
                    (SELECT string_agg('q.' || quote_ident(attname), ', ' ORDER BY attnum) FROM pg_attribute
                      WHERE attrelid = 'tunnel_api.spot'::regclass AND attnum > 0 AND attname NOT IN ('outline', 'map', 'surface')));
 END
@@ -315,6 +315,6 @@ BEGIN
 END
 $$;
 
-CALL tunnel_api.make_geometry_views(
+CALL tunnel_internal.make_geometry_views(
     'spot', 'spot', 'Spots', '; review and remark can be updated', 'outline', 'face', 'in their face''s own plane, SRID 0',
     'on the map, in the tunnel''s SRID', 'in space, in the tunnel''s SRID');

@@ -34,7 +34,7 @@ COMMENT ON COLUMN tunnel_api.survey.reference IS
     'Range curve of the intensity: none, measured on a target, or auto, from the lining of each kilometre (tunnel_api.range_curve)';
 
 CREATE OR REPLACE VIEW tunnel_api.file AS
-SELECT f.id, f.survey_id, s.name AS survey, f.name, tunnel_api.for_operators(f.path) AS path, f.checksum, f.bytes, f.points, f.noise, f.outside, f.thinned,
+SELECT f.id, f.survey_id, s.name AS survey, f.name, tunnel_internal.for_operators(f.path) AS path, f.checksum, f.bytes, f.points, f.noise, f.outside, f.thinned,
        f.kept, f.chainage_from, f.chainage_to, f.extent, f.srid, f.loaded_at, f.invalid, f.unposed
   FROM tunnel.scan_file f
   JOIN tunnel.survey s ON s.id = f.survey_id;
@@ -108,7 +108,7 @@ SELECT g.id, g.survey_id, s.name AS survey, g.n, g.km, g.chainage_from, g.chaina
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, g.chainage_to) l) AS label_to,
        g.points,
        100 * (g.vertex_to[3] - g.vertex_from[3]) / nullif(g.chainage_to - g.chainage_from, 0) AS slope,
-       tunnel_api.segment_moved(g.survey_id, g.n, g.vertex_from || g.vertex_to || g.tangent_from || g.tangent_to) AS stale,
+       tunnel_internal.segment_moved(g.survey_id, g.n, g.vertex_from || g.vertex_to || g.tangent_from || g.tangent_to) AS stale,
        g.geom::public.geometry AS geom
   FROM tunnel.segment g
   JOIN tunnel.survey s ON s.id = g.survey_id;

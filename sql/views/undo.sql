@@ -2,21 +2,21 @@
 -- names the one that it takes back.
 
 -- The last change of a finding that was not taken back.
-CREATE OR REPLACE FUNCTION tunnel_api.last_step(finding_id bigint) RETURNS tunnel_audit.entry
+CREATE OR REPLACE FUNCTION tunnel_internal.last_step(finding_id bigint) RETURNS tunnel_audit.entry
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
     SELECT e.* FROM tunnel_audit.entry e
      WHERE e.view = 'finding' AND e.row_id = $1 AND e.undoes IS NULL
        AND NOT EXISTS (SELECT FROM tunnel_audit.entry u WHERE u.undoes = e.id)
      ORDER BY e.id DESC LIMIT 1
 $$;
-COMMENT ON FUNCTION tunnel_api.last_step(bigint) IS
+COMMENT ON FUNCTION tunnel_internal.last_step(bigint) IS
     'The last entry of the audit about a finding that was not taken back; for finding_undo alone';
 
 -- Refuses to take a step back that is not the caller's, or that something later rests on.
-CREATE OR REPLACE FUNCTION tunnel_api.check_undo(finding_id bigint, step tunnel_audit.entry) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.check_undo(finding_id bigint, step tunnel_audit.entry) RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
-    is_now constant jsonb := tunnel_api.finding_state(finding_id);
+    is_now constant jsonb := tunnel_internal.finding_state(finding_id);
     part tunnel_audit.entry;
     why text;
 BEGIN
@@ -41,7 +41,7 @@ BEGIN
     END IF;
     FOR part IN SELECT e.* FROM tunnel_audit.entry e WHERE e.part_of = step.id AND e.view = 'finding' ORDER BY e.id LOOP
         EXIT WHEN why IS NOT NULL;
-        IF (tunnel_api.last_step(part.row_id)).id <> part.id THEN
+        IF (tunnel_internal.last_step(part.row_id)).id <> part.id THEN
             why := format('finding %s, a part of it, was changed since: take that back first', part.row_id);
         ELSIF part.action = 'insert' AND EXISTS (SELECT FROM tunnel.photo p WHERE p.finding_id = part.row_id) THEN
             why := format('finding %s, a part of it, has photos: delete them first', part.row_id);
@@ -54,11 +54,11 @@ BEGIN
     END IF;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.check_undo(bigint, tunnel_audit.entry) IS
+COMMENT ON FUNCTION tunnel_internal.check_undo(bigint, tunnel_audit.entry) IS
     'An error unless a finding''s last step can be taken back by who calls; for finding_undo alone';
 
 -- Who drew and who reviewed a finding, by the steps before one that is taken back.
-CREATE OR REPLACE FUNCTION tunnel_api.stamp_finding(finding_id bigint, step tunnel_audit.entry) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.stamp_finding(finding_id bigint, step tunnel_audit.entry) RETURNS void
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
     WITH stood AS MATERIALIZED (
         SELECT e.* FROM tunnel_audit.entry e
@@ -77,15 +77,15 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_te
                           ORDER BY s.id DESC LIMIT 1) r ON true
      WHERE a.id = $1
 $$;
-COMMENT ON FUNCTION tunnel_api.stamp_finding(bigint, tunnel_audit.entry) IS
+COMMENT ON FUNCTION tunnel_internal.stamp_finding(bigint, tunnel_audit.entry) IS
     'Notes with a finding who drew and who reviewed it last before a step, as the audit has it; for finding_undo alone';
 
 -- Gives a finding the columns that it had before a step.
-CREATE OR REPLACE FUNCTION tunnel_api.restore_finding(finding_id bigint, step tunnel_audit.entry) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.restore_finding(finding_id bigint, step tunnel_audit.entry) RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     changed constant jsonb := step.after || coalesce(step.before, '{}');
-    becomes jsonb := tunnel_api.finding_state(finding_id) - ARRAY(SELECT jsonb_object_keys(changed)) || coalesce(step.before, '{}');
+    becomes jsonb := tunnel_internal.finding_state(finding_id) - ARRAY(SELECT jsonb_object_keys(changed)) || coalesce(step.before, '{}');
 BEGIN
     IF changed ?| ARRAY['geom', 'origin']
        OR (changed ? 'width' AND EXISTS (SELECT FROM tunnel.finding a WHERE a.id = finding_id AND a.shape IS NOT NULL)) THEN
@@ -94,7 +94,7 @@ BEGIN
             SELECT FROM tunnel.finding x WHERE x.same_as = finding_id AND x.origin = 'detected' AND x.created_at > step.at) THEN
             becomes := becomes || '{"origin": "redrawn"}';
         END IF;
-        PERFORM tunnel_api.redraw(finding_id, public.ST_GeomFromEWKT(becomes ->> 'geom'), (becomes ->> 'width')::float8, becomes ->> 'origin');
+        PERFORM tunnel_internal.redraw(finding_id, public.ST_GeomFromEWKT(becomes ->> 'geom'), (becomes ->> 'width')::float8, becomes ->> 'origin');
         UPDATE tunnel.finding a
            SET darkening_mean = k.darkening_mean, darkening_max = k.darkening_max, image_share = k.image_share, contrast = k.contrast,
                confidence = k.confidence, reasons = k.reasons, evidence = k.evidence, features = k.features,
@@ -108,32 +108,32 @@ BEGIN
            kind = CASE WHEN a.manual THEN becomes ->> 'kind' ELSE a.kind END,
            kind_override = CASE WHEN NOT a.manual THEN nullif(becomes ->> 'kind', a.kind) END
      WHERE a.id = finding_id;
-    PERFORM tunnel_api.stamp_finding(finding_id, step);
+    PERFORM tunnel_internal.stamp_finding(finding_id, step);
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.restore_finding(bigint, tunnel_audit.entry) IS
+COMMENT ON FUNCTION tunnel_internal.restore_finding(bigint, tunnel_audit.entry) IS
     'Gives a finding the columns, the outline and what was measured of it as they were before a step; for finding_undo alone';
 
 -- Brings a finding back that was deleted, with its photos.
-CREATE OR REPLACE FUNCTION tunnel_api.revive_finding(survey_id int, step tunnel_audit.entry) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.revive_finding(survey_id int, step tunnel_audit.entry) RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     had constant jsonb := step.before;
 BEGIN
-    PERFORM tunnel_api.add_finding(
+    PERFORM tunnel_internal.add_finding(
         survey_id, had ->> 'kind', public.ST_GeomFromEWKT(had ->> 'geom'), (had ->> 'width')::float8, (had ->> 'severity')::int,
         had ->> 'review', had ->> 'remark', had ->> 'origin', true,
         (SELECT a.id FROM tunnel.finding a WHERE a.id = (had ->> 'parent_id')::bigint), step.row_id);
     UPDATE tunnel.finding a SET darkening_mean = k.darkening_mean, darkening_max = k.darkening_max, image_share = k.image_share, contrast = k.contrast
       FROM jsonb_populate_record(NULL::tunnel.finding, step.kept) k
      WHERE a.id = step.row_id AND step.kept IS NOT NULL;
-    PERFORM tunnel_api.stamp_finding(step.row_id, step);
+    PERFORM tunnel_internal.stamp_finding(step.row_id, step);
     INSERT INTO tunnel.photo (id, finding_id, path, caption, added_by, added_at) OVERRIDING SYSTEM VALUE
     SELECT e.row_id, step.row_id, e.before ->> 'path', e.before ->> 'caption', e.before ->> 'added_by', (e.before ->> 'added_at')::timestamptz
       FROM tunnel_audit.entry e WHERE e.part_of = step.id AND e.view = 'photo';
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.revive_finding(int, tunnel_audit.entry) IS
+COMMENT ON FUNCTION tunnel_internal.revive_finding(int, tunnel_audit.entry) IS
     'Brings a deleted finding back under its number, with its photos; for finding_undo alone';
 
 CREATE OR REPLACE FUNCTION tunnel_api.finding_undo(id bigint) RETURNS text
@@ -141,7 +141,7 @@ LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_pat
 #variable_conflict use_column
 DECLARE
     finding constant bigint := id;
-    step tunnel_audit.entry := tunnel_api.last_step(id);
+    step tunnel_audit.entry := tunnel_internal.last_step(id);
     part tunnel_audit.entry;
     survey_key int;
     before jsonb;
@@ -153,41 +153,41 @@ BEGIN
     IF survey_key IS NULL THEN
         RAISE EXCEPTION 'there is no change of a finding % to be taken back', finding USING ERRCODE = 'invalid_parameter_value';
     END IF;
-    PERFORM tunnel_api.lock_findings(survey_key);
+    PERFORM tunnel_internal.lock_findings(survey_key);
     PERFORM FROM tunnel.finding a
       WHERE a.id = finding OR a.id IN (SELECT e.row_id FROM tunnel_audit.entry e WHERE e.part_of = step.id AND e.view = 'finding')
       ORDER BY a.id FOR UPDATE;
-    step := tunnel_api.last_step(finding);  -- of now, that nobody else can change it
-    PERFORM tunnel_api.check_undo(finding, step);
-    before := tunnel_api.finding_state(finding);
+    step := tunnel_internal.last_step(finding);  -- of now, that nobody else can change it
+    PERFORM tunnel_internal.check_undo(finding, step);
+    before := tunnel_internal.finding_state(finding);
     place := (SELECT a.unrolled FROM tunnel.finding a WHERE a.id = finding);
     IF step.action = 'insert' THEN
         DELETE FROM tunnel.finding a WHERE a.id = finding;
     ELSIF step.action = 'delete' THEN
-        PERFORM tunnel_api.revive_finding(survey_key, step);
+        PERFORM tunnel_internal.revive_finding(survey_key, step);
     ELSE
-        PERFORM tunnel_api.restore_finding(finding, step);
+        PERFORM tunnel_internal.restore_finding(finding, step);
     END IF;
-    done := tunnel_api.note_edit(step.survey, 'finding', finding, before, tunnel_api.finding_state(finding), undoes => step.id);
+    done := tunnel_internal.note_edit(step.survey, 'finding', finding, before, tunnel_internal.finding_state(finding), undoes => step.id);
     IF done IS NULL THEN  -- a merge into one that held all
-        done := tunnel_api.note_edit(step.survey, 'finding', finding, before || jsonb_build_object('merged', step.after -> 'merged'),
-                                     tunnel_api.finding_state(finding), undoes => step.id);
+        done := tunnel_internal.note_edit(step.survey, 'finding', finding, before || jsonb_build_object('merged', step.after -> 'merged'),
+                                     tunnel_internal.finding_state(finding), undoes => step.id);
     END IF;
     FOR part IN SELECT e.* FROM tunnel_audit.entry e WHERE e.part_of = step.id ORDER BY e.id LOOP
-        before := CASE part.view WHEN 'finding' THEN tunnel_api.finding_state(part.row_id) END;
+        before := CASE part.view WHEN 'finding' THEN tunnel_internal.finding_state(part.row_id) END;
         IF part.view = 'photo' THEN
-            PERFORM tunnel_api.note_edit(step.survey, 'photo', part.row_id, NULL, part.before, undoes => part.id, part_of => done);
+            PERFORM tunnel_internal.note_edit(step.survey, 'photo', part.row_id, NULL, part.before, undoes => part.id, part_of => done);
             CONTINUE;
         ELSIF part.action = 'insert' THEN
             DELETE FROM tunnel.finding a WHERE a.id = part.row_id;
         ELSE
-            PERFORM tunnel_api.restore_finding(part.row_id, part);
+            PERFORM tunnel_internal.restore_finding(part.row_id, part);
         END IF;
-        PERFORM tunnel_api.note_edit(step.survey, 'finding', part.row_id, before, tunnel_api.finding_state(part.row_id),
+        PERFORM tunnel_internal.note_edit(step.survey, 'finding', part.row_id, before, tunnel_internal.finding_state(part.row_id),
                                      undoes => part.id, part_of => done);
     END LOOP;
     place := public.ST_Collect(place, (SELECT a.unrolled FROM tunnel.finding a WHERE a.id = finding));
-    PERFORM tunnel_api.settle_findings(survey_key, place);
+    PERFORM tunnel_internal.settle_findings(survey_key, place);
     RETURN CASE WHEN step.action = 'insert' THEN 'drawn' WHEN step.action = 'delete' THEN 'deleted'
                 WHEN step.after ? 'merged' THEN 'merged'
                 WHEN EXISTS (SELECT FROM tunnel_audit.entry e WHERE e.part_of = step.id) THEN 'split'

@@ -232,7 +232,7 @@ def test_no_role_touches_the_audit(person: psycopg.Connection) -> None:
         "UPDATE tunnel_api.audit SET who = 'nobody'",
         "DELETE FROM tunnel_api.audit",
         "INSERT INTO tunnel_api.audit (who, survey, view, row_id, action) VALUES ('vera', 'demo-2024', 'finding', 1, 'update')",
-        "SELECT tunnel_api.note_edit('demo-2024', 'finding', 1, '{}', '{\"review\": \"confirmed\"}')",
+        "SELECT tunnel_internal.note_edit('demo-2024', 'finding', 1, '{}', '{\"review\": \"confirmed\"}')",
         "SELECT count(*) FROM tunnel_audit.entry",
         "UPDATE tunnel_audit.entry SET who = 'nobody'",
         "DELETE FROM tunnel_audit.entry",
@@ -243,7 +243,7 @@ def test_no_role_touches_the_audit(person: psycopg.Connection) -> None:
         "ALTER TABLE tunnel_audit.entry OWNER TO tunnel_operator",
         "DROP TRIGGER edit ON tunnel_api.leak",
         "CREATE OR REPLACE VIEW tunnel_api.audit AS SELECT 1 AS id",
-        "ALTER FUNCTION tunnel_api.review_finding() RENAME TO unwatched",
+        "ALTER FUNCTION tunnel_internal.review_finding() RENAME TO unwatched",
         "SET SESSION AUTHORIZATION postgres",
     ):
         with pytest.raises(psycopg.errors.InsufficientPrivilege):

@@ -98,7 +98,7 @@ def test_a_view_of_the_users_own_is_not_dropped_unasked(conn: psycopg.Connection
         install_api(conn)
 
 
-def test_nothing_in_tunnel_calls_tunnel_api(conn: psycopg.Connection) -> None:
+def test_nothing_in_tunnel_calls_tunnel_api_or_tunnel_internal(conn: psycopg.Connection) -> None:
     """An upgrade drops tunnel_api whole; restoring a dump makes tunnel first. The one trigger is made anew with tunnel_api."""
     named = conn.execute(
         """
@@ -116,23 +116,25 @@ def test_nothing_in_tunnel_calls_tunnel_api(conn: psycopg.Connection) -> None:
         """
     ).fetchall()
     assert named
-    assert not [text for (text,) in named if "tunnel_api" in text]
+    assert not [text for (text,) in named if "tunnel_api" in text or "tunnel_internal" in text]
 
 
 def test_every_table_view_column_and_function_is_commented(conn: psycopg.Connection) -> None:
     bare = conn.execute(
         """
         SELECT c.oid::regclass::text FROM pg_class c
-         WHERE c.relnamespace = ANY (ARRAY['tunnel', 'tunnel_api']::regnamespace[]) AND c.relkind IN ('r', 'p', 'v')
+         WHERE c.relnamespace = ANY (ARRAY['tunnel', 'tunnel_api', 'tunnel_internal']::regnamespace[])
+           AND c.relkind IN ('r', 'p', 'v')
            AND c.relname <> 'alembic_version' AND obj_description(c.oid, 'pg_class') IS NULL
         UNION ALL
         SELECT c.oid::regclass::text || '.' || a.attname FROM pg_class c JOIN pg_attribute a ON a.attrelid = c.oid
-         WHERE c.relnamespace = ANY (ARRAY['tunnel', 'tunnel_api']::regnamespace[]) AND c.relkind IN ('r', 'p', 'v')
+         WHERE c.relnamespace = ANY (ARRAY['tunnel', 'tunnel_api', 'tunnel_internal']::regnamespace[])
+           AND c.relkind IN ('r', 'p', 'v')
            AND c.relname <> 'alembic_version'
            AND a.attnum > 0 AND NOT a.attisdropped AND col_description(c.oid, a.attnum) IS NULL
         UNION ALL
         SELECT p.oid::regprocedure::text FROM pg_proc p
-         WHERE p.pronamespace = ANY (ARRAY['tunnel', 'tunnel_api']::regnamespace[])
+         WHERE p.pronamespace = ANY (ARRAY['tunnel', 'tunnel_api', 'tunnel_internal']::regnamespace[])
            AND obj_description(p.oid, 'pg_proc') IS NULL
         """
     ).fetchall()
@@ -153,7 +155,7 @@ def test_plpgsql_check_finds_nothing(conn: psycopg.Connection) -> None:
          CROSS JOIN LATERAL plpgsql_check_function_tb(
                p.oid, coalesce(t.tgrelid, 0), oldtable => t.tgoldtable, newtable => t.tgnewtable, extra_warnings => true,
                performance_warnings => false) c
-         WHERE p.pronamespace = ANY (ARRAY['tunnel', 'tunnel_api']::regnamespace[]) AND l.lanname = 'plpgsql'
+         WHERE p.pronamespace = ANY (ARRAY['tunnel', 'tunnel_api', 'tunnel_internal']::regnamespace[]) AND l.lanname = 'plpgsql'
            AND c.message <> 'name of parameter "offset" is reserved keyword'  -- the design's word
            -- what RETURN QUERY EXECUTE returns the checker cannot see
            AND c.detail IS DISTINCT FROM 'cannot to determine result of dynamic SQL'

@@ -80,8 +80,8 @@ def test_readers_see_no_table_and_run_no_stage(person: psycopg.Connection) -> No
     refused(person, "DROP TABLE tunnel.finding")
     refused(person, "CREATE TABLE tunnel.mine (x int)")
     refused(person, "CREATE VIEW tunnel_api.mine AS SELECT 1")
-    refused(person, "SELECT tunnel_api.axis_refine(1, 12)")
-    refused(person, "SELECT tunnel_api.segment_build(1, 12)")
+    refused(person, "SELECT tunnel_internal.axis_refine(1, 12)")
+    refused(person, "SELECT tunnel_internal.segment_build(1, 12)")
     refused(person, "DROP VIEW tunnel_api.leak")
 
 
@@ -136,17 +136,19 @@ def test_every_view_and_column_is_closed_but_for_what_is_to_be_edited(
 def test_readers_call_no_function_that_could_write(person: psycopg.Connection, conn: psycopg.Connection) -> None:
     """PostgreSQL itself keeps functions that are not volatile from writing, so volatile ones are those to be refused."""
     functions = conn.execute(
-        "SELECT p.oid::regprocedure::text, p.proname, p.proargtypes::regtype[]::text[], p.provolatile = 'v' FROM pg_proc p"
-        " WHERE p.pronamespace = 'tunnel_api'::regnamespace AND p.prorettype <> 'trigger'::regtype AND p.prokind = 'f'"
+        "SELECT p.oid::regprocedure::text, p.pronamespace::regnamespace::text, p.proname, p.proargtypes::regtype[]::text[],"
+        "       p.provolatile = 'v' FROM pg_proc p"
+        " WHERE p.pronamespace = ANY (ARRAY['tunnel_api', 'tunnel_internal']::regnamespace[])"
+        "   AND p.prorettype <> 'trigger'::regtype AND p.prokind = 'f'"
     ).fetchall()
     conn.rollback()
     refused_ones = set()
-    for signature, name, types, _ in functions:
+    for signature, schema, name, types, _ in functions:
         columns = [sql.Identifier(f"c{number}") for number in range(len(types))]
         nulls = [sql.SQL("NULL::{} AS {}").format(sql.SQL(kind), column) for kind, column in zip(types, columns, strict=True)]
         # OFFSET keeps the nulls out of the planner's sight, which else would not call a STRICT function
         call = sql.SQL("SELECT {}({}) FROM (SELECT {} OFFSET 0) n").format(
-            sql.Identifier("tunnel_api", name), sql.SQL(", ").join(columns), sql.SQL(", ").join(nulls)
+            sql.Identifier(schema, name), sql.SQL(", ").join(columns), sql.SQL(", ").join(nulls)
         )
         try:
             with person.transaction(force_rollback=True):
@@ -156,12 +158,25 @@ def test_readers_call_no_function_that_could_write(person: psycopg.Connection, c
         except psycopg.Error:  # it ran, and did not like its arguments
             pass
     assert len(refused_ones) > 10
-    own = (
-        {name for _, name, *_ in functions if name in ("finding_split", "finding_merge", "finding_undo")}
-        if person.info.user == "ines"
-        else set()
-    )
-    assert refused_ones == {signature for signature, name, _, writes in functions if writes and name not in own}
+    own = {"finding_split", "finding_merge", "finding_undo"} if person.info.user == "ines" else set()
+    writing = {signature for signature, _, name, _, writes in functions if writes and name not in own}
+    assert writing <= refused_ones
+    assert [name for name in refused_ones - writing if name.startswith("tunnel_api.")] == []
+
+
+def test_viewers_call_of_tunnel_internal_only_what_views_and_functions_need(conn: psycopg.Connection) -> None:
+    rows = conn.execute(
+        "SELECT p.proname, p.provolatile = 'v' OR p.prokind <> 'f', has_function_privilege('tunnel_viewer', p.oid, 'EXECUTE')"
+        "  FROM pg_proc p WHERE p.pronamespace = 'tunnel_internal'::regnamespace"
+    ).fetchall()
+    viewers = {name for name, _, allowed in rows if allowed}
+    assert {"in_order", "scanner_chainage", "remark_statements"} <= viewers, viewers
+    assert not viewers & {"queue_state", "superseded_runs", "segment_plan", "last_step"}
+    assert [name for name, writes, allowed in rows if writes and allowed] == []
+    assert conn.execute(
+        "SELECT count(*) FROM pg_class c WHERE c.relnamespace = 'tunnel_internal'::regnamespace AND c.relkind = 'v'"
+        " AND has_table_privilege('tunnel_viewer', c.oid, 'SELECT')"
+    ).fetchone() == (0,)
 
 
 @pytest.mark.parametrize(
@@ -240,7 +255,9 @@ def test_operator_works_on_the_tables_and_swaps_partitions(person: psycopg.Conne
 @pytest.mark.parametrize("person", ["otto"], indirect=True)
 def test_operator_leaves_the_functions_alone(person: psycopg.Connection) -> None:
     refused(person, "DROP SCHEMA tunnel_api CASCADE")
-    refused(person, "CREATE FUNCTION tunnel_api.mine() RETURNS int LANGUAGE sql AS 'SELECT 1'")
+    refused(person, "DROP SCHEMA tunnel_internal CASCADE")
+    for schema in ("tunnel_api", "tunnel_internal"):
+        refused(person, f"CREATE FUNCTION {schema}.mine() RETURNS int LANGUAGE sql AS 'SELECT 1'")
     refused(person, "CREATE ROLE another")
 
 
@@ -251,11 +268,13 @@ def test_operator_forges_no_entry_of_the_audit(person: psycopg.Connection, conn:
     conn.commit()
     person.execute("CREATE TEMP VIEW mine AS SELECT * FROM tunnel_api.leak")
     for function in ("review_finding", "edit_axis_vertex", "edit_region"):
-        refused(person, f"CREATE TRIGGER edit INSTEAD OF UPDATE ON mine FOR EACH ROW EXECUTE FUNCTION tunnel_api.{function}()")
+        refused(
+            person, f"CREATE TRIGGER edit INSTEAD OF UPDATE ON mine FOR EACH ROW EXECUTE FUNCTION tunnel_internal.{function}()"
+        )
     with pytest.raises(psycopg.errors.InsufficientPrivilege, match="permission denied for function note_edit"):
-        person.execute("SELECT tunnel_api.note_edit('demo-2024', 'finding', 1, '{}', '{\"review\": \"confirmed\"}')")
+        person.execute("SELECT tunnel_internal.note_edit('demo-2024', 'finding', 1, '{}', '{\"review\": \"confirmed\"}')")
     assert conn.execute(
-        "SELECT count(*) FROM pg_proc p WHERE p.pronamespace = 'tunnel_api'::regnamespace"
+        "SELECT count(*) FROM pg_proc p WHERE p.pronamespace = ANY (ARRAY['tunnel_api', 'tunnel_internal']::regnamespace[])"
         " AND p.prorettype = 'trigger'::regtype AND has_function_privilege('tunnel_operator', p.oid, 'EXECUTE')"
     ).fetchone() == (0,)
     person.execute(REVIEW)  # type: ignore[arg-type]
@@ -270,8 +289,9 @@ def test_someone_without_a_role_sees_nothing(person: psycopg.Connection) -> None
 def test_security_definers_fix_their_search_path(conn: psycopg.Connection) -> None:
     assert (
         conn.execute(
-            "SELECT oid::regprocedure::text FROM pg_proc WHERE pronamespace = 'tunnel_api'::regnamespace AND prosecdef "
-            "AND NOT EXISTS (SELECT FROM unnest(proconfig) c WHERE c LIKE 'search_path=%pg_temp')"
+            "SELECT oid::regprocedure::text FROM pg_proc "
+            "WHERE pronamespace = ANY (ARRAY['tunnel_api', 'tunnel_internal']::regnamespace[]) "
+            "AND prosecdef AND NOT EXISTS (SELECT FROM unnest(proconfig) c WHERE c LIKE 'search_path=%pg_temp')"
         ).fetchall()
         == []
     )
@@ -283,7 +303,8 @@ def test_functions_name_postgis_by_its_schema(conn: psycopg.Connection) -> None:
         conn.execute(
             "SELECT p.oid::regprocedure::text, m[1]"
             "  FROM pg_proc p, regexp_matches(p.prosrc, '(?<![.[:alnum:]_])(st_\\w+)\\(', 'gi') m"
-            " WHERE p.pronamespace = 'tunnel_api'::regnamespace AND m[1] NOT IN ('ST_Transform', 'ST_Dump')"  # in hints
+            " WHERE p.pronamespace = ANY (ARRAY['tunnel_api', 'tunnel_internal']::regnamespace[])"
+            " AND m[1] NOT IN ('ST_Transform', 'ST_Dump')"  # in hints
         ).fetchall()
         == []
     )
@@ -317,21 +338,21 @@ def test_operators_serve_the_queue(person: psycopg.Connection) -> None:
 
     person.execute("INSERT INTO tunnel.incoming (survey_id, name, path, bytes, points, km_from, km_to)"
                    " SELECT id, 'a.laz', '/a.laz', 1, 1, 12, 12 FROM tunnel.survey")  # fmt: skip
-    assert one("SELECT tunnel_api.queue_plan(id) FROM tunnel.survey") == 1
+    assert one("SELECT tunnel_internal.queue_plan(id) FROM tunnel.survey") == 1
     worker = one("SELECT tunnel_queue.procrastinate_register_worker_v1()")
-    one(f"SELECT tunnel_api.queue_register({worker}, 'h', 1)")
+    one(f"SELECT tunnel_internal.queue_register({worker}, 'h', 1)")
     job = one(f"SELECT id FROM tunnel_queue.procrastinate_fetch_job_v2(ARRAY['tunneldb'], {worker})")
     one(f"SELECT tunnel_queue.procrastinate_update_heartbeat_v1({worker})")
-    assert one("SELECT tunnel_api.queue_rescue()") == 0
-    assert one(f"SELECT tunnel_api.queue_hold({job}, {worker})") is True
-    one(f"SELECT tunnel_api.queue_done({job}, clock_timestamp())")
+    assert one("SELECT tunnel_internal.queue_rescue()") == 0
+    assert one(f"SELECT tunnel_internal.queue_hold({job}, {worker})") is True
+    one(f"SELECT tunnel_internal.queue_done({job}, clock_timestamp())")
     assert one("SELECT count(*) FROM tunnel.incoming") == 0
 
 
 @pytest.mark.parametrize("person", ["vera", "ines"], indirect=True)
 def test_readers_leave_the_queue_alone(person: psycopg.Connection) -> None:
-    refused(person, "SELECT tunnel_api.queue_plan(1)")
-    refused(person, "SELECT tunnel_api.queue_rescue()")
+    refused(person, "SELECT tunnel_internal.queue_plan(1)")
+    refused(person, "SELECT tunnel_internal.queue_rescue()")
     refused(person, "SELECT count(*) FROM tunnel_queue.procrastinate_jobs")
     refused(person, "SELECT tunnel_queue.procrastinate_register_worker_v1()")
 

@@ -76,7 +76,7 @@ def add_points(conn: psycopg.Connection) -> None:
     ).fetchone()
     assert name is not None
     new = sql.Identifier("tunnel", name[1])
-    conn.execute("SELECT tunnel_api.partition_new(%s, %s)", [name[0], KM])
+    conn.execute("SELECT tunnel_internal.partition_new(%s, %s)", [name[0], KM])
     conn.execute(
         sql.SQL(
             "INSERT INTO {} SELECT f.survey_id, %s, 12300 + n / 7.0, n / 3.0,"
@@ -86,7 +86,7 @@ def add_points(conn: psycopg.Connection) -> None:
         ).format(new),
         [KM, name[0]],
     )
-    conn.execute("SELECT tunnel_api.partition_swap(%s, %s)", [name[0], KM])
+    conn.execute("SELECT tunnel_internal.partition_swap(%s, %s)", [name[0], KM])
     conn.commit()
 
 
@@ -322,7 +322,7 @@ def test_damaged_and_hostile_files_are_refused_in_one_line(example: str, conn: p
 
 @pytest.mark.parametrize("person", ["vera", "ines"], indirect=True)
 def test_viewers_and_inspectors_import_nothing(person: psycopg.Connection) -> None:
-    for call in (b"SELECT tunnel_api.audit_reserve(1)", b"SELECT tunnel_api.audit_import(1, '[]')"):
+    for call in (b"SELECT tunnel_internal.audit_reserve(1)", b"SELECT tunnel_internal.audit_import(1, '[]')"):
         with pytest.raises(psycopg.errors.InsufficientPrivilege):
             person.execute(call)
 

@@ -20,9 +20,13 @@ def test_bad_file_fails_its_kilometres_alone(survey: Survey, tmp_path: Path) -> 
     said = survey.project.run(*batch(files), code=1)
     assert "Traceback" not in said
     with survey.project.connect() as conn:
-        done = conn.execute("SELECT km FROM tunnel_api.queue_state(1) GROUP BY km HAVING every(state = 'done') ORDER BY km")
+        done = conn.execute(
+            "SELECT km FROM tunnel_internal.queue_state(1) GROUP BY km HAVING every(state = 'done') ORDER BY km"
+        )
         assert [row[0] for row in done.fetchall()] == [0, 1, 2]
-        failed = conn.execute("SELECT km, message FROM tunnel_api.queue_state(1) WHERE state = 'failed' ORDER BY km").fetchall()
+        failed = conn.execute(
+            "SELECT km, message FROM tunnel_internal.queue_state(1) WHERE state = 'failed' ORDER BY km"
+        ).fetchall()
         # By its box, whose ends are known to some 30 m: of kilometre 4 it holds 25 m.
         assert {3} <= {km for km, _ in failed} <= {3, 4}
         assert all("part-03.laz" in message and "\n" not in message for _, message in failed)

@@ -26,7 +26,7 @@ def wait_for(project: Project, what: Callable[[], object], process: subprocess.P
 
 def done(project: Project) -> bool:
     """Whether nothing is left of what was asked for that can be done."""
-    idle, wanted = project.ask("SELECT NOT tunnel_api.queue_busy(1), count(*) FROM tunnel.goal")
+    idle, wanted = project.ask("SELECT NOT tunnel_internal.queue_busy(1), count(*) FROM tunnel.goal")
     return bool(idle) and wanted > 0
 
 

@@ -56,14 +56,14 @@ def survey(conn: psycopg.Connection) -> str:
         here = np.flatnonzero(np.floor(s / KILOMETRE) == km)
         here = here[np.argsort(s[here])]
         table = sql.Identifier("tunnel", f"point_s{found.id}_km{km}_new")
-        conn.execute("SELECT tunnel_api.partition_new(%s, %s)", (found.id, km))
+        conn.execute("SELECT tunnel_internal.partition_new(%s, %s)", (found.id, km))
         whole = np.ones(len(here), np.int32)
         packed = pack([
             found.id * whole, km * whole, s[here], s[here], PointZ(xyz[here], found.srid), whole, whole, file_id * whole,
             np.zeros(len(here), np.float32), 0 * whole.astype(np.int16), klass[here],
         ])  # fmt: skip
         copy_binary(conn, table, COLUMNS, [packed], fresh=True)
-        conn.execute("SELECT tunnel_api.partition_swap(%s, %s)", (found.id, km))
+        conn.execute("SELECT tunnel_internal.partition_swap(%s, %s)", (found.id, km))
     conn.commit()
     assert load_alignment(conn, found, 1.0).start == FIRST
     return "straight"

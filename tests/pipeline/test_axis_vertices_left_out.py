@@ -91,7 +91,7 @@ def test_a_vertex_that_jumps_is_interpolated_and_named(survey: psycopg.Connectio
 def test_a_vertex_that_never_rests_is_interpolated_and_named(survey: psycopg.Connection) -> None:
     # its points are found 5 cm to the right and to the left by turns
     survey.execute("CREATE SEQUENCE public.turn")
-    (source,) = survey.execute("SELECT pg_get_functiondef('tunnel_api.axis_shift'::regproc)").fetchone()
+    (source,) = survey.execute("SELECT pg_get_functiondef('tunnel_internal.axis_shift'::regproc)").fetchone()
     assert "SELECT t.n, coalesce(s.shift, t.u)," in source
     by_turns = "CASE t.n WHEN 126 THEN 0.1 * mod(nextval('public.turn'), 2) - 0.05 ELSE 0 END"
     survey.execute(source.replace("coalesce(s.shift, t.u),", f"coalesce(s.shift, t.u) + {by_turns},"))

@@ -214,12 +214,12 @@ def test_operators_apply_and_undo_and_nobody_else(
             with pytest.raises(psycopg.errors.InsufficientPrivilege):
                 apply()
             with pytest.raises(psycopg.errors.InsufficientPrivilege):
-                person.execute("SELECT tunnel_api.learned_undo(1)")
+                person.execute("SELECT tunnel_internal.learned_undo(1)")
         else:
             number = apply()
-            assert person.execute("SELECT tunnel_api.learned_undo(1)").fetchone() == (number,)
+            assert person.execute("SELECT tunnel_internal.learned_undo(1)").fetchone() == (number,)
             with pytest.raises(psycopg.errors.InsufficientPrivilege):
-                person.execute("SELECT tunnel_api.note_learned(1, 1, NULL, '{}')")
+                person.execute("SELECT tunnel_internal.note_learned(1, 1, NULL, '{}')")
         seen = person.execute("SELECT applied_by, undone_by FROM tunnel_api.learned_model").fetchall()
         assert seen == ([("otto", "otto")] if may else [])
 

@@ -352,8 +352,8 @@ def loaded_curve(conn: psycopg.Connection) -> psycopg.Connection:
         " SELECT id, name, '2024-05-04', 'none', 'mobile' FROM tunnel.tunnel RETURNING id"
     ).fetchone()[0]
     for km in (0, 1):
-        conn.execute("SELECT tunnel_api.partition_new(%s, %s)", [survey, km])
-        conn.execute("SELECT tunnel_api.partition_swap(%s, %s)", [survey, km])
+        conn.execute("SELECT tunnel_internal.partition_new(%s, %s)", [survey, km])
+        conn.execute("SELECT tunnel_internal.partition_swap(%s, %s)", [survey, km])
     conn.commit()
     return conn
 
@@ -385,7 +385,7 @@ def test_readers_see_the_old_kilometre_until_the_new_one_is_whole(curve: tuple[p
     before = conn.execute("SELECT count(*), sum(points) FROM tunnel.section").fetchone()
     conn.rollback()
     with psycopg.connect(dsn) as worker, psycopg.connect(dsn) as reader:
-        worker.execute("SELECT tunnel_api.section_build(%s, 0, 10.0)", [survey.id])
+        worker.execute("SELECT tunnel_internal.section_build(%s, 0, 10.0)", [survey.id])
         assert reader.execute("SELECT count(*), sum(points) FROM tunnel.section").fetchone() == before
         worker.rollback()
         assert reader.execute("SELECT count(*), sum(points) FROM tunnel.section").fetchone() == before
@@ -411,7 +411,7 @@ def _kill_others(dsn: str) -> None:
         killer.execute(
             "SELECT pg_terminate_backend(pid) FROM pg_stat_activity"
             " WHERE datname = current_database() AND pid <> pg_backend_pid() AND application_name = 'tunneldb'"
-            "   AND query ~ 'tunnel_api'"
+            "   AND query ~ 'tunnel_(api|internal)'"
         )
 
 

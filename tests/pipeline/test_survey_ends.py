@@ -161,7 +161,7 @@ def test_what_is_to_be_said_of_sheets_is_asked_once_a_survey(conn: psycopg.Conne
         low, high = max(sheet["chainage_from"], FROM), min(sheet["chainage_to"], TO)
         (each,) = ask(
             conn,
-            "SELECT tunnel_api.coverage_statement(%s, %s, %s) AS gaps, tunnel_api.remark_statement(%s, %s, %s) AS remarks",
+            "SELECT tunnel_api.coverage_statement(%s, %s, %s) AS gaps, tunnel_internal.remark_statement(%s, %s, %s) AS remarks",
             *(scanned, low, high) * 2,
         )
         assert (sheet["gaps"], sheet["remarks"]) == (each["gaps"], each["remarks"])

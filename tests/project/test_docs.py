@@ -19,7 +19,7 @@ PAGES = sorted([*(ROOT / name for name in OUTSIDE), *(ROOT / "docs").glob("*.md"
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 FOLDERS = ("benchmarks", "docs", "migrations", "scripts", "sql", "tests", "tunneldb")
-PLACEHOLDERS = ("VERB", "…", "[OPTIONS]", "[--dsn", "DSN]", "--help", "-h")
+PLACEHOLDERS = ("COMMAND", "VERB", "…", "[OPTIONS]", "[--dsn", "DSN]", "--help", "-h")
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 
 

@@ -26,7 +26,7 @@ from review_in_qgis import NAME, at, load, press, wait
 STATE = (
     "SELECT (SELECT string_agg(s::text, ',' ORDER BY s.name) FROM tunnel.stage s),"
     " (SELECT md5(string_agg(p.oid::text, ',' ORDER BY p.oid)) FROM pg_proc p"
-    " WHERE p.pronamespace = 'tunnel_api'::regnamespace)"
+    " WHERE p.pronamespace = ANY (ARRAY['tunnel_api', 'tunnel_internal']::regnamespace[]))"
 )
 _OTHERS = "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND application_name LIKE 'tunneldb%'"
 WAITING, BACKENDS = f"{_OTHERS} AND wait_event_type = 'Lock'", _OTHERS

@@ -117,14 +117,14 @@ class Ledger:
     def states(self) -> dict[int, str]:
         found: dict[int, str] = {}
         for km, state in self.conn.execute(
-            "SELECT km, state FROM tunnel_api.queue_state(%s) ORDER BY km, step", [self.survey]
+            "SELECT km, state FROM tunnel_internal.queue_state(%s) ORDER BY km, step", [self.survey]
         ).fetchall():
             found[km] = found.get(km, "") + LETTERS.get(state, state[0])
         return found
 
     def plan(self) -> list[tuple[int | str, str]]:
         """Jobs that wait, in the order in which workers take them, after planning."""
-        self.conn.execute("SELECT tunnel_api.queue_plan(%s)", [self.survey])
+        self.conn.execute("SELECT tunnel_internal.queue_plan(%s)", [self.survey])
         return [
             (args["km"] if "km" in args else args["file"], args["stage"])
             for (args,) in self.conn.execute(
@@ -255,7 +255,7 @@ def test_failures_say_why(ledger: Ledger) -> None:
         "b.laz", 2, 2, "/b.laz: torn"
     ).want(2)
     failed = ledger.conn.execute(
-        "SELECT km, stage, message FROM tunnel_api.queue_state(%s) WHERE state = 'failed' ORDER BY km", [ledger.survey]
+        "SELECT km, stage, message FROM tunnel_internal.queue_state(%s) WHERE state = 'failed' ORDER BY km", [ledger.survey]
     )
     assert failed.fetchall() == [
         (0, "axis", "too few points"),
@@ -320,7 +320,7 @@ def test_a_part_is_planned_as_the_whole_is(ledger: Ledger) -> None:
     for km in range(30):
         part = ledger.conn.execute(
             "SELECT km, string_agg(CASE state WHEN 'ready' THEN 'R' ELSE left(state, 1) END, '' ORDER BY step)"
-            "  FROM tunnel_api.queue_state(%s, %s, %s) GROUP BY km",
+            "  FROM tunnel_internal.queue_state(%s, %s, %s) GROUP BY km",
             [ledger.survey, km, km],
         ).fetchall()
         assert part == [(km, whole[km])]
@@ -357,14 +357,14 @@ def test_from_files_to_leaks_each_stage_is_done_once_and_after_what_it_needs(led
         if (subject, stage) in failing:
             _record(ledger, subject, stage, "failed")
             failed.add(subject)
-            ledger.conn.execute("SELECT tunnel_api.queue_fail(%s, 'why')", [job])
+            ledger.conn.execute("SELECT tunnel_internal.queue_fail(%s, 'why')", [job])
             continue
         done.append((subject, stage))
         if stage == "read":
             ledger.read(str(subject), *files[str(subject)])
         else:
             _record(ledger, subject, stage, "done")
-        ledger.conn.execute("SELECT tunnel_api.queue_done(%s, clock_timestamp())", [job])
+        ledger.conn.execute("SELECT tunnel_internal.queue_done(%s, clock_timestamp())", [job])
     assert sorted(map(str, done)) == sorted(
         map(
             str,

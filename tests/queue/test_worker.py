@@ -45,7 +45,7 @@ def survey(conn: psycopg.Connection, example: str) -> int:
     conn.execute("CREATE TABLE tunnel.point_s1 PARTITION OF tunnel.point FOR VALUES IN (1) PARTITION BY LIST (km)")
     for km in (11, 12, 13):
         conn.execute(f"CREATE TABLE tunnel.point_s1_km{km} PARTITION OF tunnel.point_s1 FOR VALUES IN ({km})")
-    conn.execute("SELECT tunnel_api.queue_plan(%s)", [survey])
+    conn.execute("SELECT tunnel_internal.queue_plan(%s)", [survey])
     conn.commit()
     assert survey == 1
     return int(survey)
@@ -127,7 +127,7 @@ def test_a_failure_leaves_nothing_but_its_reason_and_lets_the_neighbours_go_on(c
     assert jobs(conn)[12, "axis"] == "failed"
     assert jobs(conn)[11, "segments"] == "todo"
     assert one(conn, "SELECT message FROM tunnel.run WHERE outcome = 'failed'") == "too few points: add some"
-    assert one(conn, "SELECT message FROM tunnel_api.queue_state(1) WHERE state = 'failed'") == "too few points: add some"
+    assert one(conn, "SELECT message FROM tunnel_internal.queue_state(1) WHERE state = 'failed'") == "too few points: add some"
 
 
 def test_a_bug_fails_with_its_type(conn: psycopg.Connection, survey: int) -> None:
@@ -204,7 +204,7 @@ def test_a_worker_that_was_cut_off_and_comes_back_cannot_commit(conn: psycopg.Co
         ghost.execute("INSERT INTO tunnel.region (survey_id, kind, geom) VALUES (1, 'dry', ST_MakeEnvelope(0, 0, 999, 1, 0))")
         # as if the server could not end the session
         conn.execute("UPDATE tunnel.run SET backend_pid = 0 WHERE job_id = %s", [job.id])
-        assert one(conn, "SELECT tunnel_api.queue_rescue()") == 1
+        assert one(conn, "SELECT tunnel_internal.queue_rescue()") == 1
         conn.commit()
         run(conn, *take(conn, other))
     assert made(conn) == [km]
@@ -215,7 +215,7 @@ def test_a_session_of_a_silent_worker_is_ended_and_its_job_taken_over(conn: psyc
     job, km, stage = take(conn, worker(conn, silent=26))
     with psycopg.connect(dsn) as ghost, pytest.raises(psycopg.OperationalError), stage_run(ghost, 1, km, stage, {}, job):
         ghost.execute("SELECT 1")
-        assert one(conn, "SELECT tunnel_api.queue_rescue()") == 1
+        assert one(conn, "SELECT tunnel_internal.queue_rescue()") == 1
         conn.commit()
         ghost.execute("SELECT pg_sleep(5)")
     assert jobs(conn)[km, stage] == "todo"
@@ -227,17 +227,17 @@ def test_a_worker_that_was_killed_is_noticed_at_once(conn: psycopg.Connection, d
     """Its heartbeat is fresh, but its sessions are gone, with which it stood in the lists."""
     number = worker(conn)
     with psycopg.connect(dsn, autocommit=True) as presence:
-        presence.execute("SELECT tunnel_api.queue_register(%s, 'h', 1)", [number])
+        presence.execute("SELECT tunnel_internal.queue_register(%s, 'h', 1)", [number])
         job, km, stage = take(conn, number)
-        assert one(conn, "SELECT tunnel_api.queue_rescue()") == 0
+        assert one(conn, "SELECT tunnel_internal.queue_rescue()") == 0
     # its job's session lives on: perhaps only the other one broke
     with psycopg.connect(dsn) as session, stage_run(session, 1, km, stage, {}, job):
-        assert _eventually(conn, "SELECT NOT tunnel_api.queue_present(%s)", number)
-        assert one(conn, "SELECT tunnel_api.queue_rescue()") == 0
+        assert _eventually(conn, "SELECT NOT tunnel_internal.queue_present(%s)", number)
+        assert one(conn, "SELECT tunnel_internal.queue_rescue()") == 0
         conn.commit()
     assert jobs(conn)[km, stage] == "succeeded"
     job, km, stage = take(conn, number)
-    assert one(conn, "SELECT tunnel_api.queue_rescue()") == 1
+    assert one(conn, "SELECT tunnel_internal.queue_rescue()") == 1
     conn.commit()
     assert jobs(conn)[km, stage] == "todo"
 
@@ -257,10 +257,10 @@ def test_a_job_that_kills_its_workers_fails_in_the_end(conn: psycopg.Connection,
     for attempt in range(20):
         job, km, stage = take(conn, worker(conn, silent=60))
         assert (job.attempts, km, stage) == (attempt, 11, "axis")
-        assert one(conn, "SELECT tunnel_api.queue_rescue()") == 1
+        assert one(conn, "SELECT tunnel_internal.queue_rescue()") == 1
         conn.commit()
     assert jobs(conn)[11, "axis"] == "failed"
-    message = one(conn, "SELECT message FROM tunnel_api.queue_state(1) WHERE km = 11 AND state = 'failed'")
+    message = one(conn, "SELECT message FROM tunnel_internal.queue_state(1) WHERE km = 11 AND state = 'failed'")
     assert "went down 20 times" in message
 
 

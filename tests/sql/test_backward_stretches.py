@@ -28,12 +28,13 @@ def template(example_template: str) -> str:
 def calls(conn: psycopg.Connection[Any]) -> dict[str, sql.Composed]:
     """A call of each function with arguments …_from and …_to, the greater first; hours of a clock may go over 12."""
     rows = conn.execute(
-        "SELECT p.proname, p.proargnames[:p.pronargs], array_agg(format_type(t.oid, NULL) ORDER BY t.n)"
+        "SELECT p.pronamespace::regnamespace::text, p.proname, p.proargnames[:p.pronargs],"
+        " array_agg(format_type(t.oid, NULL) ORDER BY t.n)"
         "  FROM pg_proc p CROSS JOIN unnest(p.proargtypes) WITH ORDINALITY AS t (oid, n)"
-        " WHERE p.pronamespace = 'tunnel_api'::regnamespace GROUP BY p.oid"
+        " WHERE p.pronamespace = ANY (ARRAY['tunnel_api', 'tunnel_internal']::regnamespace[]) GROUP BY p.oid"
     ).fetchall()
     found = {}
-    for name, arguments, types in rows:
+    for schema, name, arguments, types in rows:
         ends = [a for a in arguments or [] if a.endswith(("_from", "_to"))]
         if len(ends) != 2 or "clock_from" in ends or name == "area_between":  # a part of what was clamped has no part: 0
             continue
@@ -43,7 +44,7 @@ def calls(conn: psycopg.Connection[Any]) -> dict[str, sql.Composed]:
             for argument, type_ in zip(arguments, types, strict=True)
         }  # fmt: skip
         pairs = [sql.SQL("{} => {}").format(sql.Identifier(a), sql.SQL(text)) for a, text in texts.items()]
-        found[name] = sql.SQL("SELECT * FROM {}({})").format(sql.Identifier("tunnel_api", name), sql.SQL(", ").join(pairs))
+        found[name] = sql.SQL("SELECT * FROM {}({})").format(sql.Identifier(schema, name), sql.SQL(", ").join(pairs))
     return found
 
 

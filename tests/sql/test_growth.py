@@ -40,7 +40,7 @@ BEGIN
         PARTITION OF tunnel.point FOR VALUES IN ({survey}) PARTITION BY LIST (km);
     FOR km IN {first} .. {last} LOOP
         EXECUTE format('CREATE TABLE tunnel.%I PARTITION OF tunnel.point_s{survey} FOR VALUES IN (%s)',
-            tunnel_api.partition_name({survey}, km), km);
+            tunnel_internal.partition_name({survey}, km), km);
     END LOOP;
 END
 $$
@@ -174,13 +174,13 @@ def inner_plans(conn: psycopg.Connection, call: str) -> list[set[str]]:
 
 CALLS = {
     "axis_shift": (
-        f"SELECT * FROM tunnel_api.axis_shift({{survey}}, ARRAY[{KM}50, {KM}51], ARRAY[0, 0]::float8[],"
+        f"SELECT * FROM tunnel_internal.axis_shift({{survey}}, ARRAY[{KM}50, {KM}51], ARRAY[0, 0]::float8[],"
         f" ARRAY[{KM}500, {KM}510]::float8[], ARRAY[0, 0]::float8[])",
         [KM],
     ),
-    "section_slab": (f"SELECT * FROM tunnel_api.section_slab({{survey}}, {KM}500, {FRAME}, 0.15)", [KM]),
+    "section_slab": (f"SELECT * FROM tunnel_internal.section_slab({{survey}}, {KM}500, {FRAME}, 0.15)", [KM]),
     "section_slab at the end of a kilometre": (
-        f"SELECT * FROM tunnel_api.section_slab({{survey}}, {KM + 1}000.05, {FRAME}, 0.15)",
+        f"SELECT * FROM tunnel_internal.section_slab({{survey}}, {KM + 1}000.05, {FRAME}, 0.15)",
         [KM, KM + 1],
     ),
 }
@@ -200,7 +200,7 @@ def test_a_function_reads_the_kilometres_that_it_needs_however_often_it_is_calle
 def test_tagging_touches_no_other_kilometre_however_many_a_worker_has_done(conn: psycopg.Connection) -> None:
     survey = survey_id(conn, "short")
     for km in range(10, 10 + REPEATS):
-        conn.execute("SELECT tunnel_api.segment_tag(%s, %s)", [survey, km])
+        conn.execute("SELECT tunnel_internal.segment_tag(%s, %s)", [survey, km])
         assert locked(conn) == tables(survey, km)
         conn.commit()
 
@@ -220,7 +220,7 @@ def test_the_ground_holds_up_none_of_its_neighbours_however_many_a_worker_has_do
         points, own = load_points(conn, survey, KM, 1000.0 * KM - 30.0, 1000.0 * (KM + 1) + 30.0)
         assert (own, len(points)) == (1000, 1030)
         assert locked(conn) == set()
-        conn.execute("SELECT tunnel_api.class_write(%s, %s, %b)", [survey.id, KM, bytes(own)])
+        conn.execute("SELECT tunnel_internal.class_write(%s, %s, %b)", [survey.id, KM, bytes(own)])
         assert locked(conn) == tables(survey.id, KM)
         conn.commit()
 

@@ -50,11 +50,11 @@ def ids(conn: psycopg.Connection, query: Any, values: dict[str, Any]) -> list[in
 def test_last_runs_are_those_that_sorting_the_ledger_finds(conn: psycopg.Connection, runs: int) -> None:
     for survey in fill(conn, runs):
         stages = ids(conn, "SELECT DISTINCT stage FROM tunnel.run WHERE survey_id = %(survey)s ORDER BY 1", {"survey": survey})
-        assert [row[0] for row in conn.execute("SELECT * FROM tunnel_api.stages_run(%s)", [survey])] == stages
+        assert [row[0] for row in conn.execute("SELECT * FROM tunnel_internal.stages_run(%s)", [survey])] == stages
         for stage in STAGES:
             for done in (True, False):
                 asked = {"survey": survey, "stage": stage, "done": done}
-                found = ids(conn, "SELECT id FROM tunnel_api.last_runs(%(survey)s, %(stage)s, %(done)s, 1, 4)", asked)
+                found = ids(conn, "SELECT id FROM tunnel_internal.last_runs(%(survey)s, %(stage)s, %(done)s, 1, 4)", asked)
                 assert sorted(found) == sorted(ids(conn, SORTED, asked))
 
 
@@ -62,7 +62,7 @@ def test_last_runs_of_many_are_those_of_each(conn: psycopg.Connection) -> None:
     surveys = fill(conn, 300)
     for done in (True, False):
         asked = {"surveys": surveys[1:], "stages": ["detect", "deviation"], "done": done}
-        found = ids(conn, "SELECT id FROM tunnel_api.last_runs_of(%(surveys)s, %(stages)s, %(done)s, 1, 4)", asked)
+        found = ids(conn, "SELECT id FROM tunnel_internal.last_runs_of(%(surveys)s, %(stages)s, %(done)s, 1, 4)", asked)
         each = [
             ids(conn, SORTED, asked | {"survey": survey, "stage": stage}) for survey in surveys[1:] for stage in asked["stages"]
         ]
@@ -91,7 +91,7 @@ def test_what_ran_before_costs_nothing(conn: psycopg.Connection) -> None:
         else:
             conn.execute(RUNS, {"stages": list(STAGES), "runs": more})
         conn.execute("ANALYZE tunnel.run")
-        query = "EXPLAIN (ANALYZE, BUFFERS, TIMING OFF, FORMAT JSON) SELECT * FROM tunnel_api.last_runs(%s, 'deviation')"
+        query = "EXPLAIN (ANALYZE, BUFFERS, TIMING OFF, FORMAT JSON) SELECT * FROM tunnel_internal.last_runs(%s, 'deviation')"
         conn.execute(query, [surveys[0]])  # the catalogue is read once
         row = conn.execute(query, [surveys[0]]).fetchone()
         assert row is not None

@@ -48,7 +48,7 @@ def curve(conn: psycopg.Connection, points: NDArray[np.float64]) -> tuple[NDArra
     """Arc of each degree from -180 to 180, and what became of the classes."""
     row = conn.execute(
         "SELECT node_arc, class_state"
-        " FROM tunnel_api.section_curve(%s, %s::float8[], %s::float8[], %s::float8[], %s::float8[])",
+        " FROM tunnel_internal.section_curve(%s, %s::float8[], %s::float8[], %s::float8[], %s::float8[])",
         (STEP, *classes(points)),
     ).fetchone()
     assert row is not None
@@ -100,7 +100,7 @@ def test_a_duct_in_its_own_shadow_is_not_the_wall(conn: psycopg.Connection, side
     for k in range(duct - shadow, duct + shadow + 1):
         columns[0][k] = columns[0][k] - 0.3 if k == duct else None
     row = conn.execute(
-        "SELECT class_state FROM tunnel_api.section_curve(%s, %s::float8[], %s::float8[], %s::float8[], %s::float8[])",
+        "SELECT class_state FROM tunnel_internal.section_curve(%s, %s::float8[], %s::float8[], %s::float8[], %s::float8[])",
         (STEP, *columns),
     ).fetchone()
     assert row is not None

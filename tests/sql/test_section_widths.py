@@ -24,12 +24,12 @@ def one_after_the_other(
     conn: psycopg.Connection, survey: int, km: int, narrowest: float, widest: float, least: int
 ) -> Gathered:
     """Width, points and radii of the sections, by the rule of section_gather without a short cut."""
-    planes = conn.execute("SELECT segment, half FROM tunnel_api.section_plane(%s, %s)", [survey, km]).fetchall()
+    planes = conn.execute("SELECT segment, half FROM tunnel_internal.section_plane(%s, %s)", [survey, km]).fetchall()
     pending, found, slab = set(planes), Gathered(), min(narrowest, widest)
     while pending:
         classes: dict[tuple[int, int], dict[int, tuple[int, float]]] = {section: {} for section in pending}
         for segment, half, number, radius, points in conn.execute(
-            "SELECT segment, half, class, radius, points FROM tunnel_api.section_classes(%s, %s, %s, %s, %s)",
+            "SELECT segment, half, class, radius, points FROM tunnel_internal.section_classes(%s, %s, %s, %s, %s)",
             [survey, km, slab, STEP, [segment * 100 + half for segment, half in pending]],
         ):
             if points >= least:
@@ -54,7 +54,7 @@ def check(conn: psycopg.Connection, name: str) -> set[float]:
     needed = set()
     for narrowest, widest, least in SETTINGS:
         rows = conn.execute(
-            "SELECT segment, half, width, points, radius FROM tunnel_api.section_gather(%s, %s, %s, %s, %s, %s)",
+            "SELECT segment, half, width, points, radius FROM tunnel_internal.section_gather(%s, %s, %s, %s, %s, %s)",
             [survey, km, STEP, narrowest, widest, least],
         ).fetchall()
         expected = one_after_the_other(conn, survey, km, narrowest, widest, least)

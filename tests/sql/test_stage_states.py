@@ -70,12 +70,12 @@ GOALS = "INSERT INTO tunnel.goal (survey_id, km, stage) SELECT s, s %% 7, 'detec
 
 EACH = """
 SELECT s.id, t.km, t.step, t.stage, t.run_id, t.outcome, t.done_at, t.input_at, t.outdated, t.reason
-FROM tunnel.survey s CROSS JOIN LATERAL tunnel_api.stage_state(s.id, %(first)s, %(last)s) t ORDER BY s.id, t.km, t.step
+FROM tunnel.survey s CROSS JOIN LATERAL tunnel_internal.stage_state(s.id, %(first)s, %(last)s) t ORDER BY s.id, t.km, t.step
 """
 
 TOGETHER = """
 SELECT t.survey_id, t.km, t.step, t.stage, t.run_id, t.outcome, r.finished_at, t.input_at, t.outdated, t.reason
-FROM tunnel_api.stage_states(ARRAY(SELECT id FROM tunnel.survey), %(first)s, %(last)s) t
+FROM tunnel_internal.stage_states(ARRAY(SELECT id FROM tunnel.survey), %(first)s, %(last)s) t
 LEFT JOIN tunnel.run r ON r.id = t.done_id ORDER BY t.survey_id, t.km, t.step
 """
 
@@ -114,7 +114,7 @@ def test_stages_of_a_survey_read_nothing_of_others(conn: psycopg.Connection) -> 
             fill(conn, 3, 2 + others, 60)
         conn.execute("ANALYZE")
         before = rows_read(conn)
-        conn.execute("SELECT FROM tunnel_api.stage_state(%s)", [survey])
+        conn.execute("SELECT FROM tunnel_internal.stage_state(%s)", [survey])
         read.append(rows_read(conn) - before)
     assert read[1] <= read[0], "50 times the surveys"
 

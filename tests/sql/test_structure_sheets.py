@@ -22,7 +22,8 @@ def test_faces_are_drawn_as_they_lie(conn: psycopg.Connection, tmp_path: Path) -
     placed = {
         row[0]: row[1:]
         for row in conn.execute(
-            "SELECT f.number, p.xx, p.xy, p.yx, p.yy, p.x, p.y, public.ST_AsBinary(p.cell) FROM tunnel_api.face_placement p"
+            "SELECT f.number, p.xx, p.xy, p.yx, p.yy, p.x, p.y, public.ST_AsBinary(p.cell)"
+            " FROM tunnel_internal.face_placement p"
             " JOIN tunnel_api.face f ON f.id = p.id WHERE p.survey = 'hall-1'"
         )
     }
@@ -94,7 +95,8 @@ def test_sides_of_a_profile_are_drawn_below_each_other_along_it(conn: psycopg.Co
     replace_structures(conn, get_survey(conn, "hall-1", site=True), Structures([beam], faces, []), None)
     drawn = {}
     for number, xx, xy, yx, yy, x, y, cell in conn.execute(
-        "SELECT f.number, p.xx, p.xy, p.yx, p.yy, p.x, p.y, public.ST_AsBinary(p.cell) FROM tunnel_api.face_placement p"
+        "SELECT f.number, p.xx, p.xy, p.yx, p.yy, p.x, p.y, public.ST_AsBinary(p.cell)"
+        " FROM tunnel_internal.face_placement p"
         " JOIN tunnel_api.face f ON f.id = p.id WHERE p.survey = 'hall-1'"
     ):
         u, v, _ = unroll(faces[number - 1].model, solid[number])

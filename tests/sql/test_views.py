@@ -105,7 +105,7 @@ def test_every_view_begins_with_a_stable_integer_key(
     conn.execute("UPDATE tunnel.scan_file SET unposed = 3")  # a remark
     conn.execute('UPDATE tunnel.finding SET evidence = \'{"faint": 2.3, "thin": -1.1}\'')
     conn.execute(
-        "SELECT tunnel_api.learned_apply(id, '1', 'recalibrated', '{}', '{}', '{}', 0.7, 0.6, NULL) FROM tunnel.tunnel"
+        "SELECT tunnel_internal.learned_apply(id, '1', 'recalibrated', '{}', '{}', '{}', 0.7, 0.6, NULL) FROM tunnel.tunnel"
     )
     conn.execute("INSERT INTO tunnel.photo (finding_id, path) SELECT min(id), 'p.jpg' FROM tunnel.finding")
     save_example_structures(conn, "demo-2024")
@@ -138,9 +138,10 @@ def test_every_view_begins_with_a_stable_integer_key(
 def test_every_view_and_function_is_commented(conn: psycopg.Connection) -> None:
     assert (
         conn.execute(
-            "SELECT relname FROM pg_class WHERE relnamespace = 'tunnel_api'::regnamespace AND relkind = 'v' "
-            "AND obj_description(oid, 'pg_class') IS NULL "
-            "UNION ALL SELECT oid::regprocedure::text FROM pg_proc WHERE pronamespace = 'tunnel_api'::regnamespace "
+            "SELECT relname FROM pg_class WHERE relnamespace = ANY (ARRAY['tunnel_api', 'tunnel_internal']::regnamespace[]) "
+            "AND relkind = 'v' AND obj_description(oid, 'pg_class') IS NULL "
+            "UNION ALL SELECT oid::regprocedure::text FROM pg_proc "
+            "WHERE pronamespace = ANY (ARRAY['tunnel_api', 'tunnel_internal']::regnamespace[]) "
             "AND obj_description(oid, 'pg_proc') IS NULL"
         ).fetchall()
         == []

@@ -52,7 +52,7 @@ def differences(conn: psycopg.Connection) -> list[str]:
     found = []
     for row in ask(conn, "SELECT * FROM tunnel_api.km_waterproof"):
         (one,) = ask(
-            conn, "SELECT * FROM tunnel_api.stretch_statistics(%s, ARRAY[%s], ARRAY[%s])",
+            conn, "SELECT * FROM tunnel_internal.stretch_statistics(%s, ARRAY[%s], ARRAY[%s])",
             row["survey_id"], row["chainage_from"], row["chainage_to"],
         )  # fmt: skip
         found += [f"{row['km']}: {name}" for name in NAMES if row[name] != pytest.approx(one[name], abs=1e-9, nan_ok=True)]

@@ -163,7 +163,7 @@ def test_a_finding_over_the_end_of_a_kilometre_is_found_from_both_sides(conn: ps
     key = draw(conn, box(12399.0, 1.0, 12402.0, 2.0))
     for low, high, part in ((12390.0, 12400.0, 1 / 3), (12400.0, 12410.0, 2 / 3)):
         area, before = conn.execute(
-            "SELECT tunnel_api.wet_area(%s, %s, %s), sum(tunnel_api.area_between(unrolled, area, %s, %s)) "
+            "SELECT tunnel_api.wet_area(%s, %s, %s), sum(tunnel_internal.area_between(unrolled, area, %s, %s)) "
             "FROM tunnel_api.leak WHERE counted AND id <> %s AND chainage_to > %s AND chainage_from < %s",
             [NAME, low, high, low, high, key, low, high],
         ).fetchone()

@@ -39,7 +39,7 @@ def session(survey: psycopg.Connection, dsn: str) -> Iterator[Callable[[], psyco
 
 
 def build(conn: psycopg.Connection, km: int = 1) -> None:
-    conn.execute("SELECT tunnel_api.partition_new(1, %s)", [km])
+    conn.execute("SELECT tunnel_internal.partition_new(1, %s)", [km])
     conn.execute(f"INSERT INTO tunnel.point_s1_km{km}_new SELECT * FROM tunnel.point_s1_km{km} ORDER BY chainage LIMIT 100")
 
 
@@ -49,7 +49,7 @@ def test_a_long_reader_delays_the_swap_and_nobody_else(
     long, worker, short = session(), session(), session()
     (before,) = long.execute(COUNT).fetchone()  # in a transaction that stays open
     build(worker)
-    swap = threading.Thread(target=worker.execute, args=("SELECT tunnel_api.partition_swap(1, 1)",))
+    swap = threading.Thread(target=worker.execute, args=("SELECT tunnel_internal.partition_swap(1, 1)",))
     swap.start()
     for _ in range(20):
         time.sleep(0.05)
@@ -73,7 +73,7 @@ def test_a_swap_that_gives_up_says_why(survey: psycopg.Connection, session: Call
     with pytest.raises(
         psycopg.errors.LockNotAvailable, match=rf"kilometre 1 cannot be swapped in: .* \(sessions {long.info.backend_pid}\)"
     ):
-        worker.execute("SELECT tunnel_api.partition_swap(1, 1)")
+        worker.execute("SELECT tunnel_internal.partition_swap(1, 1)")
     worker.rollback()
     assert worker.execute(COUNT).fetchone() == before
 
@@ -81,7 +81,7 @@ def test_a_swap_that_gives_up_says_why(survey: psycopg.Connection, session: Call
 def test_the_sessions_own_timeout_stays(survey: psycopg.Connection) -> None:
     build(survey)
     survey.execute("SET LOCAL lock_timeout = '7s'")
-    survey.execute("SELECT tunnel_api.partition_swap(1, 1)")
+    survey.execute("SELECT tunnel_internal.partition_swap(1, 1)")
     assert survey.execute("SHOW lock_timeout").fetchone() == ("7s",)
 
 
@@ -91,16 +91,16 @@ def test_what_a_stage_reads_of_a_kilometre_does_not_lock_the_others(
     """Two workers on different kilometres never wait for each other."""
     reader, worker = session(), session()
     shifts = reader.execute(
-        "SELECT count(*) FROM tunnel_api.axis_shift(1, '{98,99}', '{500010,500020}', '{4500000,4500000}', '{100,100}')"
+        "SELECT count(*) FROM tunnel_internal.axis_shift(1, '{98,99}', '{500010,500020}', '{4500000,4500000}', '{100,100}')"
     ).fetchone()
     assert shifts == (2,)
     frame = "{500010,4500000,100, 1,0,0, 0,-1,0, 0,0,1}"
-    slab = reader.execute("SELECT count(*) FROM tunnel_api.section_slab(1, 981, %s, 0.5)", [frame]).fetchone()
+    slab = reader.execute("SELECT count(*) FROM tunnel_internal.section_slab(1, 981, %s, 0.5)", [frame]).fetchone()
     assert slab > (100,)
     assert len(sample(reader, get_survey(reader, SURVEY), 0)) > 1000
     build(worker)
     worker.execute("SET LOCAL lock_timeout = '500ms'")
-    worker.execute("SELECT tunnel_api.partition_swap(1, 1)")
+    worker.execute("SELECT tunnel_internal.partition_swap(1, 1)")
     worker.commit()
     assert reader.execute(COUNT).fetchone() == (100,)
 
@@ -110,7 +110,7 @@ def test_slabs_reach_into_the_kilometre_next_door(survey: psycopg.Connection) ->
     both, here = (
         survey.execute(f"SELECT count(*) FROM {source}", parameters).fetchone()
         for source, parameters in (
-            ("tunnel_api.section_slab(1, 1000, %s, 2)", [frame]),
+            ("tunnel_internal.section_slab(1, 1000, %s, 2)", [frame]),
             ("tunnel.point WHERE chainage BETWEEN 998 AND 1002", []),
         )
     )
@@ -126,10 +126,10 @@ def test_first_kilometres_of_a_survey_at_once(survey: psycopg.Connection, sessio
     reader, one, two = session(), session(), session()
     reader.execute("SELECT count(*) FROM tunnel.point")
     for worker, km in ((one, 0), (two, 1)):
-        worker.execute("SELECT tunnel_api.partition_new(%s, %s)", [number, km])
+        worker.execute("SELECT tunnel_internal.partition_new(%s, %s)", [number, km])
     one.execute("SET LOCAL lock_timeout = '500ms'")
-    one.execute("SELECT tunnel_api.partition_swap(%s, 0)", [number])
-    swap = threading.Thread(target=two.execute, args=("SELECT tunnel_api.partition_swap(%s, 1)", [number]))
+    one.execute("SELECT tunnel_internal.partition_swap(%s, 0)", [number])
+    swap = threading.Thread(target=two.execute, args=("SELECT tunnel_internal.partition_swap(%s, 1)", [number]))
     swap.start()
     one.commit()
     swap.join(20)

@@ -20,9 +20,9 @@ HISTORIES = {"run", "change", "job", "survey_size"}
 """Views that list runs and jobs, or what they take: the only ones that may be different."""
 
 INPUTS = """
-    SELECT k, tunnel_api.change_inputs(n.id, o.id, k), tunnel_api.ring_inputs(n.id, k),
-           tunnel_api.deviation_inputs(n.id, k, 'lining'), tunnel_api.evenness_inputs(n.id, k, 'lining'),
-           tunnel_api.thickness_inputs(o.id, n.id, k, 'lining'), tunnel_api.clearance_inputs(n.id, k, 'example')
+    SELECT k, tunnel_internal.change_inputs(n.id, o.id, k), tunnel_internal.ring_inputs(n.id, k),
+           tunnel_internal.deviation_inputs(n.id, k, 'lining'), tunnel_internal.evenness_inputs(n.id, k, 'lining'),
+           tunnel_internal.thickness_inputs(o.id, n.id, k, 'lining'), tunnel_internal.clearance_inputs(n.id, k, 'example')
       FROM tunnel.survey n, tunnel.survey o, generate_series(11, 13) k
 """
 """What results made now would be made from."""
@@ -41,7 +41,7 @@ def views(conn: psycopg.Connection) -> dict[str, list[str]]:
     listed = conn.execute("SELECT viewname FROM pg_views WHERE schemaname = 'tunnel_api'").fetchall()
     queries = {name: sql.SQL("SELECT v::text FROM tunnel_api.{} AS v").format(sql.Identifier(name)) for (name,) in listed}
     for function in ("stage_state", "queue_state"):
-        queries[function] = sql.SQL("SELECT s.id, f::text FROM tunnel.survey s, tunnel_api.{}(s.id) f").format(
+        queries[function] = sql.SQL("SELECT s.id, f::text FROM tunnel.survey s, tunnel_internal.{}(s.id) f").format(
             sql.Identifier(function)
         )
     queries["inputs"] = sql.SQL(INPUTS)
@@ -62,12 +62,12 @@ def add_history(conn: psycopg.Connection, count: int) -> None:
     surveys = {name: key for key, name in conn.execute("SELECT id, name FROM tunnel.survey")}
     new, old = surveys["demo-2024"], surveys[EARLIER]
     made_from = {
-        "compare": ("tunnel_api.change_inputs(%s, %s, %s)", [new, old], {"old": old, "cell": 0.1, "length": 5}),
-        "rings": ("tunnel_api.ring_inputs(%s, %s)", [new], {"options": {}}),
-        "deviation": ("tunnel_api.deviation_inputs(%s, %s, 'lining')", [new], {"layer": "lining"}),
-        "evenness": ("tunnel_api.evenness_inputs(%s, %s, 'lining')", [new], {"length": 4, "limit": 0.01}),
-        "thickness": ("tunnel_api.thickness_inputs(%s, %s, %s, 'lining')", [old, new], {}),
-        "clearance": ("tunnel_api.clearance_inputs(%s, %s, 'example')", [new], {"track": "single"}),
+        "compare": ("tunnel_internal.change_inputs(%s, %s, %s)", [new, old], {"old": old, "cell": 0.1, "length": 5}),
+        "rings": ("tunnel_internal.ring_inputs(%s, %s)", [new], {"options": {}}),
+        "deviation": ("tunnel_internal.deviation_inputs(%s, %s, 'lining')", [new], {"layer": "lining"}),
+        "evenness": ("tunnel_internal.evenness_inputs(%s, %s, 'lining')", [new], {"length": 4, "limit": 0.01}),
+        "thickness": ("tunnel_internal.thickness_inputs(%s, %s, %s, 'lining')", [old, new], {}),
+        "clearance": ("tunnel_internal.clearance_inputs(%s, %s, 'example')", [new], {"track": "single"}),
     }
     add = "INSERT INTO tunnel.run (survey_id, km, stage, parameters, counts, outcome, message, started_at, finished_at, job_id)"
     add += " SELECT %s, %s, %s, %s, %s, %s, %s, t, t + make_interval(secs => %s), %s"
@@ -132,12 +132,12 @@ def test_pruning_a_long_history_changes_no_view_and_nothing_that_status_or_check
     assert deleted["runs"] + left[0] == 500 + 6 + len(imported)  # the example's own are six
     assert deleted["runs"] > 200
     assert conn.execute("SELECT count(*) FROM tunnel.run WHERE stage = 'import'").fetchone() == (len(imported),)
-    dangling = "SELECT count(*) FROM tunnel_api.run r, unnest(tunnel_api.run_inputs(r.stage, r.parameters)) i"
+    dangling = "SELECT count(*) FROM tunnel_api.run r, unnest(tunnel_internal.run_inputs(r.stage, r.parameters)) i"
     assert conn.execute(dangling + " WHERE NOT EXISTS (SELECT FROM tunnel.run o WHERE o.id = i)").fetchone() == (0,)
     # a job stays with the run that it was, and goes with it
     held = conn.execute(
         "SELECT (SELECT count(*) FROM tunnel_queue.procrastinate_jobs),"
-        " (SELECT count(DISTINCT job_id) FROM tunnel.run), (SELECT count(*) FROM tunnel_api.superseded_jobs())"
+        " (SELECT count(DISTINCT job_id) FROM tunnel.run), (SELECT count(*) FROM tunnel_internal.superseded_jobs())"
     ).fetchone()
     assert held == (jobs[0] - deleted["jobs"], jobs[0] - deleted["jobs"], 0)
     assert said("prune")["superseded"] == []
@@ -149,7 +149,7 @@ def test_the_inputs_of_runs_are_all_known(example: str, conn: psycopg.Connection
     stages = {"change": "compare", "ring": "rings"}
     functions = conn.execute(
         "SELECT p.oid::regprocedure::text, substring(p.proname FROM '(.*)_inputs$'), p.proargtypes::regtype[]::text[]"
-        " FROM pg_proc p WHERE p.pronamespace = 'tunnel_api'::regnamespace AND p.proname ~ '_inputs$'"
+        " FROM pg_proc p WHERE p.pronamespace = 'tunnel_internal'::regnamespace AND p.proname ~ '_inputs$'"
         " AND p.proname <> 'run_inputs'"
     ).fetchall()
     assert len(functions) >= 7
@@ -157,13 +157,13 @@ def test_the_inputs_of_runs_are_all_known(example: str, conn: psycopg.Connection
     assert survey is not None
     for signature, subject, types in functions:
         arguments = ["'lining'" if kind == "text" else str(survey[0]) for kind in types]
-        call = f"SELECT tunnel_api.{subject}_inputs({', '.join(arguments)})"
+        call = f"SELECT tunnel_internal.{subject}_inputs({', '.join(arguments)})"
         given = conn.execute(call.encode()).fetchone()
         assert given is not None, signature
         stage = stages.get(subject, subject)
         runs = {name for name in given[0] if PARAMETERS.get((stage, name)) == "run"}
         assert set(given[0]) - runs <= others, signature
-        known = conn.execute("SELECT tunnel_api.run_inputs(%s, %s)", [stage, Jsonb(dict.fromkeys(runs, 7))]).fetchone()
+        known = conn.execute("SELECT tunnel_internal.run_inputs(%s, %s)", [stage, Jsonb(dict.fromkeys(runs, 7))]).fetchone()
         assert known == ([7] * len(runs) or None,), signature
 
 

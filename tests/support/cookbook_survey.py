@@ -68,7 +68,7 @@ def prepare(conn: psycopg.Connection, survey: str) -> None:
 
 
 def _points(conn: psycopg.Connection, survey_id: int) -> None:
-    conn.execute("SELECT tunnel_api.partition_new(%s, 12)", (survey_id,))
+    conn.execute("SELECT tunnel_internal.partition_new(%s, 12)", (survey_id,))
     assert survey_id == 1
     classes = np.repeat([int(klass) for klass in POINTS], list(POINTS.values())).tolist()
     for start in (12340.001, 12345.001):
@@ -79,7 +79,7 @@ def _points(conn: psycopg.Connection, survey_id: int) -> None:
             ' CASE n %% 2 WHEN 0 THEN -10 ELSE -14 END, 0, "class" FROM unnest(%s::int2[]) WITH ORDINALITY AS c ("class", n)',
             (start, classes),
         )
-    conn.execute("SELECT tunnel_api.partition_swap(1, 12)")
+    conn.execute("SELECT tunnel_internal.partition_swap(1, 12)")
 
 
 def draw_findings(conn: psycopg.Connection, survey: str) -> dict[str, int]:

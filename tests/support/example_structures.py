@@ -78,7 +78,7 @@ def save_example_structures(conn: psycopg.Connection, survey: str) -> None:
     replace_structures(conn, its, example_structures(), None)
     conn.execute(
         "INSERT INTO tunnel.run (survey_id, stage, outcome, parameters, started_at, finished_at)"
-        " VALUES (%s, 'members', 'done', tunnel_api.members_inputs(%s), now(), now())",
+        " VALUES (%s, 'members', 'done', tunnel_internal.members_inputs(%s), now(), now())",
         [its.id, its.id],
     )
     conn.commit()

@@ -125,7 +125,7 @@ def _work(survey: Survey, dsn: str | None, count: int) -> Watch:
 
 def _busy(conn: psycopg.Connection[Any], survey: Survey) -> tuple[bool, dt.datetime]:
     """Whether there is something to be done, and the server's time."""
-    row = conn.execute("SELECT tunnel_api.queue_busy(%s), clock_timestamp()", [survey.id]).fetchone()
+    row = conn.execute("SELECT tunnel_internal.queue_busy(%s), clock_timestamp()", [survey.id]).fetchone()
     assert row is not None
     return bool(row[0]), row[1]
 

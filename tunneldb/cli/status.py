@@ -80,7 +80,7 @@ def _all(connection: psycopg.Connection[Any]) -> None:
                  FROM (SELECT t.survey_id, t.step, count(*) AS there,
                               count(*) FILTER (WHERE t.outcome = 'done' AND t.reason IS NULL) AS done
                          FROM (SELECT array_agg(a.id) AS ids FROM tunnel_api.survey a GROUP BY a.id / %s) p
-                        CROSS JOIN LATERAL tunnel_api.stage_states(p.ids) t
+                        CROSS JOIN LATERAL tunnel_internal.stage_states(p.ids) t
                         WHERE t.stage = ANY (%s)
                         GROUP BY t.survey_id, t.step) d
                 GROUP BY d.survey_id) k ON k.survey_id = s.id

@@ -87,10 +87,10 @@ def stop(settings: Settings, wait: bool) -> None:
     """Ask all workers of the database to end the stages that they are at, and leave. What is wanted stays wanted."""
     with connect(settings.dsn) as conn:
         conn.autocommit = True
-        conn.execute("SELECT tunnel_api.queue_rescue()")
+        conn.execute("SELECT tunnel_internal.queue_rescue()")
         asked = conn.execute("UPDATE tunnel.worker SET stop = true RETURNING id").fetchall()
         tell(workers=len(asked))
         click.echo(f"{len(asked)} worker{'s' * (len(asked) != 1)} asked to stop")
         while wait and conn.execute("SELECT 1 FROM tunnel.worker WHERE id = ANY (%s)", [[row[0] for row in asked]]).fetchone():
             time.sleep(0.5)
-            conn.execute("SELECT tunnel_api.queue_rescue()")
+            conn.execute("SELECT tunnel_internal.queue_rescue()")

@@ -1,4 +1,4 @@
-"""Install and upgrade: migrations of schema `tunnel`, then schema `tunnel_api` anew."""
+"""Install and upgrade: migrations of schema `tunnel`, then schemas `tunnel_api` and `tunnel_internal` anew."""
 
 from __future__ import annotations
 
@@ -22,6 +22,11 @@ if TYPE_CHECKING:
 
 HEAD = "0001"
 """The newest migration. Known here so that a command whose database is up to date need not import Alembic."""
+
+API_SCHEMAS = ("tunnel_api", "tunnel_internal")
+"""Schemas of the SQL files, dropped and installed whole: what people and QGIS call, and what that calls."""
+
+_INTERNAL = "Functions and views behind tunnel_api and the program; not to be called by users; made anew by tunneldb init"
 
 _LOCK = 7088630451  # any number: two installations of one database wait for each other
 _LAYERS_LOCK = 7088630452  # the one of tunnel_api.make_layers
@@ -128,7 +133,9 @@ def _fill_stages(connection: psycopg.Connection[Any], stages: Sequence[StageRow]
 
 
 def install_api(connection: psycopg.Connection[Any]) -> None:
-    """Drop schema tunnel_api and those of typed layers, and install it from the SQL files, in the connection's transaction.
+    """Drop tunnel_api, tunnel_internal and the schemas of typed layers, and install them from the SQL files.
+
+    All in the connection's transaction.
 
     What another version kept of kilometres (`tunnel.waterproof`) may be of other limits, and is forgotten. Nobody is at it:
     making the trigger of that table has waited for all.
@@ -136,15 +143,16 @@ def install_api(connection: psycopg.Connection[Any]) -> None:
     Raises
     ------
     UserError
-        When something outside of the schema was built on it, which the drop would take along.
+        When something outside of these schemas was built on them, which the drop would take along.
     """
     connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LAYERS_LOCK])
     _refuse_dependents(connection)
     _refuse_guests(connection)
     before, version = installed_api_version(connection), api_version()
-    for schema in (*_layer_schemas(connection), "tunnel_api"):
+    for schema in (*_layer_schemas(connection), *API_SCHEMAS):
         connection.execute(sql.SQL("DROP SCHEMA IF EXISTS {} CASCADE").format(sql.Identifier(schema)))
-    connection.execute("CREATE SCHEMA tunnel_api")
+    for schema in API_SCHEMAS:
+        connection.execute(sql.SQL("CREATE SCHEMA {}").format(sql.Identifier(schema)))
     for path in sql_files():
         try:
             connection.execute(path.read_bytes())
@@ -153,11 +161,12 @@ def install_api(connection: psycopg.Connection[Any]) -> None:
             raise
     if before != version:
         connection.execute("DELETE FROM tunnel.waterproof")
-    connection.execute(sql.SQL("COMMENT ON SCHEMA tunnel_api IS {}").format(sql.Literal(version)))
+    for schema, comment in zip(API_SCHEMAS, (version, _INTERNAL), strict=True):
+        connection.execute(sql.SQL("COMMENT ON SCHEMA {} IS {}").format(sql.Identifier(schema), sql.Literal(comment)))
 
 
 def sql_files() -> list[Path]:
-    """Return the files of tunnel_api in the order of installation.
+    """Return the SQL files of tunnel_api and tunnel_internal in the order of installation.
 
     Raises
     ------
@@ -182,8 +191,11 @@ def api_version() -> str:
 
 
 def installed_api_version(connection: psycopg.Connection[Any]) -> str | None:
-    """Return the comment on the database's schema tunnel_api, None when there is none."""
-    row = connection.execute("SELECT obj_description(to_regnamespace('tunnel_api'), 'pg_namespace')").fetchone()
+    """Return the comment on the database's schema tunnel_api, None when one of API_SCHEMAS is missing."""
+    row = connection.execute(
+        "SELECT obj_description(to_regnamespace('tunnel_api'), 'pg_namespace')"
+        " WHERE to_regnamespace('tunnel_internal') IS NOT NULL"
+    ).fetchone()
     return row[0] if row else None
 
 
@@ -231,7 +243,7 @@ def require_current_schema(connection: psycopg.Connection[Any]) -> None:
     revision = schema_revision(connection)
     if revision == HEAD:
         if installed_api_version(connection) is None:
-            raise UserError("schema tunnel_api is missing: tunneldb init")
+            raise UserError("schema tunnel_api or tunnel_internal is missing: tunneldb init")
         return
     if revision is None:
         raise NotReadyError("the database has no schema tunnel yet: tunneldb init")
@@ -312,7 +324,7 @@ def _refuse_guests(connection: psycopg.Connection[Any]) -> None:
 
 
 def _refuse_dependents(connection: psycopg.Connection[Any]) -> None:
-    """Refuse to drop tunnel_api and its schemas of typed layers while views or columns outside of them rest on them."""
+    """Refuse to drop tunnel_api, tunnel_internal and the schemas of typed layers while others' views or columns use them."""
     rows = connection.execute(
         """
         WITH own AS (
@@ -333,7 +345,7 @@ def _refuse_dependents(connection: psycopg.Connection[Any]) -> None:
            AND d.deptype IN ('n', 'a')
          ORDER BY 1
         """,
-        [["tunnel_api", *_layer_schemas(connection)]],
+        [[*API_SCHEMAS, *_layer_schemas(connection)]],
     ).fetchall()
     if rows:
         names = ", ".join(row[0] for row in rows)

@@ -34,7 +34,7 @@ def axis(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping
     _place_vertices(conn, survey)
     passes = conn.execute(
         """
-        SELECT moved, measured FROM tunnel_api.axis_refine(
+        SELECT moved, measured FROM tunnel_internal.axis_refine(
             %(survey)s, %(km)s, half_width => %(half_width)s, angle_step => %(angle_step)s, tolerance => %(tolerance)s,
             max_iterations => %(max_iterations)s::int, max_deviation => %(max_deviation)s, max_rejected => %(max_rejected)s)
         """,
@@ -91,11 +91,11 @@ def _place_vertices(conn: psycopg.Connection[Any], survey: Survey) -> None:
 
 def segments(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
     """Stage 3: segments, and the segment and chainage of every point."""
-    built = _one(conn, "SELECT tunnel_api.segment_build(%s, %s)", survey.id, km)
+    built = _one(conn, "SELECT tunnel_internal.segment_build(%s, %s)", survey.id, km)
     if not built:
         raise NotReadyError(f"kilometre {km} has no axis yet: tunneldb run {survey.name} --km {km} --from axis")
     progress(0.1)
-    return {"segments": built, "points": _one(conn, "SELECT tunnel_api.segment_tag(%s, %s)", survey.id, km)}
+    return {"segments": built, "points": _one(conn, "SELECT tunnel_internal.segment_tag(%s, %s)", survey.id, km)}
 
 
 def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
@@ -104,7 +104,7 @@ def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Map
         raise NotReadyError(f"kilometre {km} has no segments yet: tunneldb run {survey.name} --km {km} --from segments")
     built = _one(
         conn,
-        "SELECT tunnel_api.section_build(%s, %s, %s, %s, %s, %s, %s)",
+        "SELECT tunnel_internal.section_build(%s, %s, %s, %s, %s, %s, %s)",
         survey.id,
         km,
         values["section.angle_step"],
@@ -142,7 +142,7 @@ def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Map
 def _without_roof(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float]) -> tuple[float, str]:
     """Length (m) of what has a floor and no roof, as portals and open cuts, and what is to be known of it."""
     planes = conn.execute(
-        "SELECT chainage_from, chainage_to FROM tunnel_api.section_open(%s, %s, %s, %s, %s)",
+        "SELECT chainage_from, chainage_to FROM tunnel_internal.section_open(%s, %s, %s, %s, %s)",
         [survey.id, km, values["section.angle_step"], values["section.max_half_width"], int(values["section.min_points"])],
     ).fetchall()
     stretches: list[list[float]] = []

@@ -110,7 +110,7 @@ def remove_files(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[
     if former:
         _reload(conn, survey, former, result, begin)
     with conn.transaction():
-        conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey.id])
+        conn.execute("SELECT tunnel_internal.queue_lock(%s)", [survey.id])
         conn.execute(
             "DELETE FROM tunnel.scan_file f WHERE f.id = ANY (%s) AND f.bytes = 0"
             " AND NOT EXISTS (SELECT FROM tunnel.file_km k WHERE k.file_id = f.id)",
@@ -118,7 +118,7 @@ def remove_files(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[
         )
         conn.execute("DELETE FROM tunnel.incoming WHERE survey_id = %s AND name = ANY (%s)", [survey.id, list(names)])
         # kilometres that failed with a file, or waited for it, can go on
-        conn.execute("SELECT tunnel_api.queue_plan(%s)", [survey.id])
+        conn.execute("SELECT tunnel_internal.queue_plan(%s)", [survey.id])
     conn.commit()
     return result
 

@@ -51,7 +51,7 @@ def find_survey_members(conn: psycopg.Connection[Any], survey: Survey, begin: Be
     """
     with snapshot(conn):
         inputs = _inputs(conn, survey)
-        row = conn.execute("SELECT tunnel_api.members_inputs(%s)", [survey.id]).fetchone()
+        row = conn.execute("SELECT tunnel_internal.members_inputs(%s)", [survey.id]).fetchone()
         assert row is not None
         made_from = row[0]
         try:

@@ -258,7 +258,7 @@ def give_up_file(conn: psycopg.Connection[Any], survey: Survey, name: str) -> No
     Does nothing for a file that has not failed for good, or of which not even the box can be read.
     """
     with conn.transaction():
-        conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey.id])
+        conn.execute("SELECT tunnel_internal.queue_lock(%s)", [survey.id])
         row = conn.execute(
             "SELECT path, parameters FROM tunnel.incoming WHERE survey_id = %s AND name = %s AND failed_at IS NOT NULL",
             [survey.id, name],
@@ -272,7 +272,7 @@ def give_up_file(conn: psycopg.Connection[Any], survey: Survey, name: str) -> No
                 "UPDATE tunnel.incoming SET km_from = %s, km_to = %s WHERE survey_id = %s AND name = %s",
                 [held[0], held[-1], survey.id, name],
             )
-            conn.execute("SELECT tunnel_api.queue_plan(%s)", [survey.id])
+            conn.execute("SELECT tunnel_internal.queue_plan(%s)", [survey.id])
 
 
 def _untouched(path: Path, size: int, known_path: str, known_size: int, read_at: dt.datetime) -> bool:
@@ -309,13 +309,13 @@ def register(conn: psycopg.Connection[Any], survey: Survey, asked: Plan, *, retr
         Whether stages that have failed are to be tried again; files that have are those of the plan.
     """
     with conn.transaction():
-        conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey.id])
+        conn.execute("SELECT tunnel_internal.queue_lock(%s)", [survey.id])
         with conn.cursor() as cursor:
             cursor.executemany(_INCOMING, [_row(survey, file, asked) for file in asked.files if not file.there])
             cursor.executemany(_GOAL, [_goal(survey, km, asked) for km in asked.kilometres])
         if retry:
             conn.execute("UPDATE tunnel.goal SET retry_after = clock_timestamp() WHERE survey_id = %s", [survey.id])
-        row = conn.execute("SELECT tunnel_api.queue_plan(%s)", [survey.id]).fetchone()
+        row = conn.execute("SELECT tunnel_internal.queue_plan(%s)", [survey.id]).fetchone()
     assert row is not None
     return int(row[0])
 
@@ -385,7 +385,7 @@ def results(conn: psycopg.Connection[Any], survey: Survey) -> list[Result]:
     with conn.cursor(row_factory=class_row(Result)) as cursor:
         cursor.execute(
             """
-            SELECT DISTINCT ON (km) km, stage, state, message FROM tunnel_api.queue_state(%s)
+            SELECT DISTINCT ON (km) km, stage, state, message FROM tunnel_internal.queue_state(%s)
              WHERE state <> 'empty' ORDER BY km, state = 'done', CASE WHEN state = 'done' THEN -step ELSE step END
             """,
             [survey.id],

@@ -127,15 +127,15 @@ def end_job(dsn: str | None, job: Job, error: Exception) -> None:
         If there is none to be had; the job is taken over when the worker has left.
     """
     with worker_session(dsn) as conn:
-        held = conn.execute("SELECT tunnel_api.queue_hold(%s, %s)", [job.id, job.worker]).fetchone()
+        held = conn.execute("SELECT tunnel_internal.queue_hold(%s, %s)", [job.id, job.worker]).fetchone()
         if held is None or not held[0]:
             return
         if isinstance(error, psycopg.OperationalError):
-            conn.execute("SELECT tunnel_api.queue_return(%s)", [job.id])
+            conn.execute("SELECT tunnel_internal.queue_return(%s)", [job.id])
         elif isinstance(error, GoneError):
             conn.execute("SELECT tunnel_queue.procrastinate_finish_job_v1(%s, 'aborted', false)", [job.id])
         else:
-            conn.execute("SELECT tunnel_api.queue_fail(%s, %s)", [job.id, describe(error)])
+            conn.execute("SELECT tunnel_internal.queue_fail(%s, %s)", [job.id, describe(error)])
 
 
 def _survey(conn: psycopg.Connection[Any], survey_id: int) -> Survey:

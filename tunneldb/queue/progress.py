@@ -208,10 +208,10 @@ def _known(conn: psycopg.Connection[Any], survey: str, files: tuple[File, ...]) 
         "SELECT km, stage, outcome, stale, reason, message FROM tunnel_api.stage_status WHERE survey_id = %s",
         of_survey,
     ).fetchall()
-    plans = conn.execute("SELECT km, stage, state, message FROM tunnel_api.queue_state(%s)", of_survey).fetchall()
+    plans = conn.execute("SELECT km, stage, state, message FROM tunnel_internal.queue_state(%s)", of_survey).fetchall()
     runs = conn.execute(
         "SELECT r.km, r.stage, r.worker, r.started_at FROM unnest(%s::text[]) AS s (stage)"
-        " CROSS JOIN LATERAL tunnel_api.last_runs(%s, s.stage, false) r WHERE r.outcome = 'running'",
+        " CROSS JOIN LATERAL tunnel_internal.last_runs(%s, s.stage, false) r WHERE r.outcome = 'running'",
         [list(STAGE_NAMES), *of_survey],
     ).fetchall()
     return _Known(

@@ -154,7 +154,7 @@ async def _serve(orders: Orders, leave: _Leave, dsn: str, presence: psycopg.Asyn
     tending: list[asyncio.Task[None]] = []
 
     async def registered(worker: int) -> None:
-        await presence.execute("SELECT tunnel_api.queue_register(%s, %s, %s)", [worker, platform.node(), os.getpid()])
+        await presence.execute("SELECT tunnel_internal.queue_register(%s, %s, %s)", [worker, platform.node(), os.getpid()])
         tending.append(asyncio.create_task(_tend(orders, leave, worker, presence)))
 
     app = make_app(dsn, orders.dsn, registered, leave.pause)
@@ -177,7 +177,7 @@ async def _serve(orders: Orders, leave: _Leave, dsn: str, presence: psycopg.Asyn
                 task.cancel()
             await asyncio.gather(*tending, return_exceptions=True)
             with contextlib.suppress(psycopg.OperationalError):
-                await presence.execute("SELECT tunnel_api.queue_rescue()")
+                await presence.execute("SELECT tunnel_internal.queue_rescue()")
 
 
 async def _tend(orders: Orders, leave: _Leave, worker: int, presence: psycopg.AsyncConnection[Any]) -> None:
@@ -188,11 +188,11 @@ async def _tend(orders: Orders, leave: _Leave, worker: int, presence: psycopg.As
             if time.monotonic() - beat >= HEARTBEAT:
                 beat = time.monotonic()
                 await presence.execute("SELECT tunnel_queue.procrastinate_update_heartbeat_v1(%s)", [worker])
-                await presence.execute("SELECT tunnel_api.queue_rescue()")
+                await presence.execute("SELECT tunnel_internal.queue_rescue()")
             row = await (
                 await presence.execute(
                     "SELECT coalesce((SELECT w.stop FROM tunnel.worker w WHERE w.id = %(worker)s), false),"
-                    "       coalesce(NOT tunnel_api.queue_busy(%(survey)s), false),"
+                    "       coalesce(NOT tunnel_internal.queue_busy(%(survey)s), false),"
                     "       NOT EXISTS (SELECT FROM tunnel_queue.procrastinate_workers w WHERE w.id = %(worker)s)",
                     {"worker": worker, "survey": orders.survey},
                 )

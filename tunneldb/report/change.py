@@ -86,7 +86,7 @@ def read_change(conn: psycopg.Connection[Any], survey: Survey, low: float, high:
     scale = WIDTH / (high - low)
     series = _series(conn, survey, low, high)
     stale = conn.execute(
-        "SELECT km FROM tunnel_api.change_state(%s, %s) WHERE reason IS NOT NULL AND done_at IS NOT NULL ORDER BY km",
+        "SELECT km FROM tunnel_internal.change_state(%s, %s) WHERE reason IS NOT NULL AND done_at IS NOT NULL ORDER BY km",
         [survey.id, old.id],
     ).fetchall()
     return ChangeChapter(

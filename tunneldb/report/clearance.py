@@ -155,7 +155,7 @@ def _track(
     rows = section_rows(conn, survey, gauge, track, low, high)
     found = infringement_rows(conn, survey, gauge, track, low, high)
     stale = conn.execute(
-        "SELECT km, reason FROM tunnel_api.clearance_state(%s) WHERE gauge = %s AND track = %s AND reason IS NOT NULL"
+        "SELECT km, reason FROM tunnel_internal.clearance_state(%s) WHERE gauge = %s AND track = %s AND reason IS NOT NULL"
         " AND (km + 1) * 1000.0 > %s AND km * 1000.0 < %s ORDER BY km",
         [survey.id, gauge, track, low, high],
     ).fetchall()

@@ -154,7 +154,7 @@ REPORTED = sql.SQL(
 """Leaks of a stretch that a report states: found last, or confirmed although found no more; also the rejected."""
 
 _LEAK = sql.SQL(
-    "SELECT {columns}, tunnel_api.area_between(unrolled, area, %(low)s, %(high)s) AS inside,"
+    "SELECT {columns}, tunnel_internal.area_between(unrolled, area, %(low)s, %(high)s) AS inside,"
     " public.ST_AsBinary(unrolled) AS outline FROM tunnel_api.leak WHERE id IN ("
     "SELECT id {reported} ORDER BY review = 'rejected', detected, area DESC, id LIMIT %(most)s)"
     " ORDER BY chainage_from + chainage_to, arc_from, id"
@@ -181,17 +181,17 @@ def read_bins(conn: psycopg.Connection[Any], survey: Survey, low: float, high: f
     edges = np.unique(np.concatenate([[low], np.arange(np.ceil(low), np.floor(high) + 1), [high]]))
     edges = edges[(edges >= low) & (edges <= high)]
     rows = conn.execute(
-        "SELECT c.lining, c.seen FROM tunnel_api.coverage_at(%s, %s) c ORDER BY c.n", (survey.id, edges.tolist())
+        "SELECT c.lining, c.seen FROM tunnel_internal.coverage_at(%s, %s) c ORDER BY c.n", (survey.id, edges.tolist())
     ).fetchall()
     lining, seen = np.diff(np.array(rows, float), axis=0).T
     return CoverageBins(edges, lining, seen)
 
 
 def read_statistics(conn: psycopg.Connection[Any], survey: Survey, starts: Sequence[float], ends: Sequence[float]) -> list[Row]:
-    """Read statistics of leaks over stretches one after another, m (``tunnel_api.stretch_statistics``)."""
+    """Read statistics of leaks over stretches one after another, m (``tunnel_internal.stretch_statistics``)."""
     return _rows(
         conn,
-        "SELECT * FROM tunnel_api.stretch_statistics(%s, %s::float8[], %s::float8[])",
+        "SELECT * FROM tunnel_internal.stretch_statistics(%s, %s::float8[], %s::float8[])",
         [survey.id, list(starts), list(ends)],
     )
 

@@ -29,7 +29,7 @@ HOURS = (7, 8, 9, 10, 11, 12, 1, 2, 3, 4, 5, 6)
 
 _ROW = sql.SQL(
     "SELECT id, review, detected, reviewed_by, remark, area, public.ST_AsBinary(unrolled), chainage_from, chainage_to, clock,"
-    " tunnel_api.area_between(unrolled, area, %(low)s, %(high)s) {reported} ORDER BY id"
+    " tunnel_internal.area_between(unrolled, area, %(low)s, %(high)s) {reported} ORDER BY id"
 ).format(reported=REPORTED)
 
 

@@ -113,7 +113,7 @@ def _begin(
 ) -> Run:
     if job is not None:
         _hold(conn, job)
-    conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey_id])
+    conn.execute("SELECT tunnel_internal.queue_lock(%s)", [survey_id])
     row = conn.execute(
         """
         INSERT INTO tunnel.run (survey_id, km, stage, parameters, versions, counts, backend_pid, backend_start,
@@ -161,7 +161,7 @@ def lock(conn: psycopg.Connection[Any], survey_id: int, km: int | None, *, share
 
 
 def _hold(conn: psycopg.Connection[Any], job: Job) -> None:
-    held = conn.execute("SELECT tunnel_api.queue_hold(%s, %s)", [job.id, job.worker]).fetchone()
+    held = conn.execute("SELECT tunnel_internal.queue_hold(%s, %s)", [job.id, job.worker]).fetchone()
     if held is None or not held[0]:
         raise LostError(f"another worker has taken over job {job.id}")
 
@@ -170,7 +170,7 @@ def _finish(conn: psycopg.Connection[Any], survey_id: int, run: Run, job: Job | 
     """Record the end, of what a load has entered for each of its kilometres, too, as the last thing before the commit."""
     if job is not None:
         _hold(conn, job)
-    conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey_id])
+    conn.execute("SELECT tunnel_internal.queue_lock(%s)", [survey_id])
     conn.execute(
         "UPDATE tunnel.run SET outcome = 'done', finished_at = clock_timestamp() WHERE survey_id = %s AND started_at = %s"
         " AND backend_pid = pg_backend_pid()",
@@ -178,7 +178,7 @@ def _finish(conn: psycopg.Connection[Any], survey_id: int, run: Run, job: Job | 
     )
     conn.execute("UPDATE tunnel.run SET counts = %s WHERE id = %s", [Jsonb(run.counts), run.id])
     if job is not None:
-        conn.execute("SELECT tunnel_api.queue_done(%s, %s)", [job.id, run.started_at])
+        conn.execute("SELECT tunnel_internal.queue_done(%s, %s)", [job.id, run.started_at])
 
 
 def _fail(conn: psycopg.Connection[Any], survey_id: int, run: Run, job: Job | None, error: BaseException) -> None:
@@ -189,7 +189,7 @@ def _fail(conn: psycopg.Connection[Any], survey_id: int, run: Run, job: Job | No
         with conn.transaction():
             if job is not None and not isinstance(error, LostError):
                 _hold(conn, job)
-            conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey_id])
+            conn.execute("SELECT tunnel_internal.queue_lock(%s)", [survey_id])
             if job is None and isinstance(error, BusyError):  # nothing was tried: what another does there is the last run
                 conn.execute("DELETE FROM tunnel.run WHERE id = %s", [run.id])
                 return
@@ -208,7 +208,7 @@ def _end_job(conn: psycopg.Connection[Any], job: Job, error: BaseException) -> N
     """Put a job back that may succeed another time; end it as failed if not."""
     again = retry_at(error, job.attempts)
     if again is None:
-        conn.execute("SELECT tunnel_api.queue_fail(%s, %s)", [job.id, describe(error)])
+        conn.execute("SELECT tunnel_internal.queue_fail(%s, %s)", [job.id, describe(error)])
     else:
         conn.execute(
             "SELECT tunnel_queue.procrastinate_retry_job_v2(%s, clock_timestamp() + %s, NULL, NULL, NULL)", [job.id, again]

@@ -135,7 +135,8 @@ def stale_tasks(
     values = settings(assignments)
     tasks = []
     rows = conn.execute(
-        "SELECT km, stage, reason, done_parameters FROM tunnel_api.stage_state(%s) WHERE reason IS NOT NULL ORDER BY step, km",
+        "SELECT km, stage, reason, done_parameters FROM tunnel_internal.stage_state(%s)"
+        " WHERE reason IS NOT NULL ORDER BY step, km",
         [survey.id],
     )
     for km, name, reason, former in rows:

@@ -99,7 +99,7 @@ def read_coverage(conn: psycopg.Connection[Any], survey: Survey, low: float = -m
 def seen_share(conn: psycopg.Connection[Any], survey: Survey, km: int) -> float:
     """Share of the lining of a kilometre that the last detection saw, as far as the survey reaches, 0 to 1."""
     row = conn.execute(
-        "SELECT c.seen_share FROM tunnel_api.km_ends k"
+        "SELECT c.seen_share FROM tunnel_internal.km_ends k"
         " CROSS JOIN LATERAL tunnel_api.coverage(%s, k.chainage_from, k.chainage_to) c WHERE k.survey_id = %s AND k.km = %s",
         [survey.name, survey.id, km],
     ).fetchone()

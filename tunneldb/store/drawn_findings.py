@@ -65,6 +65,6 @@ def settle_findings(conn: psycopg.Connection[Any], survey: Survey, km: int) -> N
     counts once, and what lies in dry regions is marked.
     """
     place = (km * KILOMETRE, (km + 1) * KILOMETRE)
-    conn.execute("SELECT tunnel_api.renew_findings(%s, %s)", (survey.id, km))
-    conn.execute("SELECT tunnel_api.settle_findings(%s, public.ST_MakeEnvelope(%s, -1e4, %s, 1e4))", (survey.id, *place))
-    conn.execute("SELECT tunnel_api.pack_sums(%s)", (survey.id,))
+    conn.execute("SELECT tunnel_internal.renew_findings(%s, %s)", (survey.id, km))
+    conn.execute("SELECT tunnel_internal.settle_findings(%s, public.ST_MakeEnvelope(%s, -1e4, %s, 1e4))", (survey.id, *place))
+    conn.execute("SELECT tunnel_internal.pack_sums(%s)", (survey.id,))

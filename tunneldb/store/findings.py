@@ -135,7 +135,7 @@ class Chosen:
 # Of a polygon by its area, as sums of leaks have it; of a line by its length; a point lies in it or not.
 _SHARE = sql.SQL(
     "CASE WHEN chainage_from >= %(low)s AND chainage_to <= %(high)s THEN 1"
-    " WHEN public.ST_Dimension(unrolled) = 2 THEN tunnel_api.area_between(unrolled, 1, %(low)s, %(high)s)"
+    " WHEN public.ST_Dimension(unrolled) = 2 THEN tunnel_internal.area_between(unrolled, 1, %(low)s, %(high)s)"
     " WHEN public.ST_Dimension(unrolled) = 1 THEN public.ST_Length(public.ST_ClipByBox2D(unrolled, public.ST_MakeBox2D("
     "public.ST_MakePoint(greatest(%(low)s, -1e9), -1e4), public.ST_MakePoint(least(%(high)s, 1e9), 1e4))))"
     " / nullif(public.ST_Length(unrolled), 0) ELSE 1 END"

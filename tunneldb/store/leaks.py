@@ -130,7 +130,7 @@ def read_leaks(
     )
     rows = conn.execute(query, asked).fetchall()
     sums = sql.SQL(
-        "SELECT count(*), coalesce(sum(tunnel_api.area_between(p.unrolled, area, %(low)s, %(high)s)), 0) {} AND counted"
+        "SELECT count(*), coalesce(sum(tunnel_internal.area_between(p.unrolled, area, %(low)s, %(high)s)), 0) {} AND counted"
     )
     summed = conn.execute(sums.format(_CHOSEN), asked).fetchone()
     assert summed is not None

@@ -157,7 +157,7 @@ def _order(names: Sequence[str]) -> list[int] | None:
 def model_in_force(conn: psycopg.Connection[Any], tunnel: int) -> InForce:
     """The model of evidence for a tunnel: the program's, adjusted as was learned for it."""
     row = conn.execute(
-        "SELECT id, base, way, parameters FROM tunnel.learned_model WHERE id = tunnel_api.learned_in_force(%s)", [tunnel]
+        "SELECT id, base, way, parameters FROM tunnel.learned_model WHERE id = tunnel_internal.learned_in_force(%s)", [tunnel]
     ).fetchone()
     model = standard_model()
     if row is None:
@@ -186,7 +186,7 @@ def apply_learned(
         Of the model as it is, and adjusted, on reviews held out.
     """
     row = conn.execute(
-        "SELECT tunnel_api.learned_apply(%s, %s, %s, %s, %s, %s, %s, %s, %s)",
+        "SELECT tunnel_internal.learned_apply(%s, %s, %s, %s, %s, %s, %s, %s, %s)",
         [
             tunnel, standard_model().version, adjustment.way, Jsonb(adjustment.to_json()), list(surveys), Jsonb(dict(reviews)),
             *losses, note,
@@ -198,7 +198,7 @@ def apply_learned(
 
 def undo_learned(conn: psycopg.Connection[Any], tunnel: int) -> int | None:
     """Take back what was last learned for a tunnel; return its number, None when nothing is in force."""
-    row = conn.execute("SELECT tunnel_api.learned_undo(%s)", [tunnel]).fetchone()
+    row = conn.execute("SELECT tunnel_internal.learned_undo(%s)", [tunnel]).fetchone()
     assert row is not None
     return None if row[0] is None else int(row[0])
 

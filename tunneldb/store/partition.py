@@ -146,7 +146,7 @@ def write_partition(
             yield from (block.data for block in pack_rows(survey, km, rows, file_ids))
             progress(int(counts[low - begin : high - begin].sum()))
 
-    conn.execute("SELECT tunnel_api.partition_new(%s, %s)", [survey.id, km])
+    conn.execute("SELECT tunnel_internal.partition_new(%s, %s)", [survey.id, km])
     with closing(prefetch(chunks(), AHEAD)) as packed:
         copy_binary(conn, partition(survey, km, "_new"), COLUMNS, packed, fresh=True)
     return written, left_out
@@ -181,11 +181,11 @@ def swap_partition(conn: psycopg.Connection[Any], survey: Survey, km: int, rows:
         If others have read the survey for too long without a break.
     """
     if rows:
-        conn.execute("SELECT tunnel_api.partition_swap(%s, %s)", [survey.id, km])
+        conn.execute("SELECT tunnel_internal.partition_swap(%s, %s)", [survey.id, km])
         return
     conn.execute(sql.SQL("DROP TABLE {}").format(partition(survey, km, "_new")))
     if partition_exists(conn, survey, km):
-        conn.execute("SELECT tunnel_api.partition_lock(%s, %s)", [survey.id, km])
+        conn.execute("SELECT tunnel_internal.partition_lock(%s, %s)", [survey.id, km])
         conn.execute(sql.SQL("DROP TABLE {}").format(partition(survey, km)))
 
 
@@ -207,7 +207,7 @@ def write_fragments(conn: psycopg.Connection[Any], survey: Survey, file_id: int,
     """
     held = spool.kilometres()
     for km in held:
-        conn.execute("SELECT tunnel_api.fragment_create(%s, %s, %s)", [survey.id, file_id, km])
+        conn.execute("SELECT tunnel_internal.fragment_create(%s, %s, %s)", [survey.id, file_id, km])
         copy_binary(conn, _table(survey, file_id, km), ("number", "rows"), _blocks(spool, km), fresh=True)
     return held
 

@@ -60,12 +60,12 @@ def superseded(conn: psycopg.Connection[Any], survey: Survey | None, before: dt.
             ), run AS (
                 SELECT r.survey_id, 'runs' AS what, r.stage, count(*) AS count, count(*) AS rows, sum(r.bytes)::bigint AS bytes,
                        min(r.started_at) AS since, max(r.started_at) AS until
-                  FROM moment m CROSS JOIN LATERAL tunnel_api.superseded_runs(%(survey)s, m.before) r
+                  FROM moment m CROSS JOIN LATERAL tunnel_internal.superseded_runs(%(survey)s, m.before) r
                  GROUP BY r.survey_id, r.stage
             ), job AS (
                 SELECT e.id AS survey_id, 'jobs' AS what, NULL AS stage, count(*) AS count, sum(j.rows)::bigint AS rows,
                        sum(j.bytes)::bigint AS bytes, min(j.ended_at) AS since, max(j.ended_at) AS until
-                  FROM moment m CROSS JOIN LATERAL tunnel_api.superseded_jobs(%(survey)s, m.before) j
+                  FROM moment m CROSS JOIN LATERAL tunnel_internal.superseded_jobs(%(survey)s, m.before) j
                   LEFT JOIN tunnel.survey e ON e.id = j.survey_id
                  GROUP BY e.id
             )
@@ -81,7 +81,7 @@ def superseded(conn: psycopg.Connection[Any], survey: Survey | None, before: dt.
 
 def busy(conn: psycopg.Connection[Any], survey_id: int) -> bool:
     """Whether jobs of a survey wait or run: how long the rest takes is told by all the runs that there are."""
-    row = conn.execute("SELECT tunnel_api.queue_busy(%s)", [survey_id]).fetchone()
+    row = conn.execute("SELECT tunnel_internal.queue_busy(%s)", [survey_id]).fetchone()
     return row is not None and bool(row[0])
 
 
@@ -99,22 +99,24 @@ def prune(conn: psycopg.Connection[Any], survey_id: int | None, before: dt.date 
         if survey_id is None:
             jobs = conn.execute(
                 "DELETE FROM tunnel_queue.procrastinate_jobs WHERE id IN"
-                " (SELECT j.id FROM tunnel_api.superseded_jobs(NULL, coalesce(%s::date::timestamptz, 'infinity')) j"
+                " (SELECT j.id FROM tunnel_internal.superseded_jobs(NULL, coalesce(%s::date::timestamptz, 'infinity')) j"
                 " WHERE NOT EXISTS (SELECT FROM tunnel.survey s WHERE s.id = j.survey_id))",
                 [before],
             )
             return 0, jobs.rowcount
-        conn.execute("SELECT tunnel_api.queue_lock(%s)", [survey_id])
+        conn.execute("SELECT tunnel_internal.queue_lock(%s)", [survey_id])
         if busy(conn, survey_id):
             raise BusyError("a batch is at work on the survey: wait until it has finished (tunneldb status)")
         jobs = conn.execute(  # first, for they go by the runs
             "DELETE FROM tunnel_queue.procrastinate_jobs WHERE id IN"
-            " (SELECT j.id FROM tunnel_api.superseded_jobs(%(survey)s, coalesce(%(before)s::date::timestamptz, 'infinity')) j)",
+            " (SELECT j.id"
+            " FROM tunnel_internal.superseded_jobs(%(survey)s, coalesce(%(before)s::date::timestamptz, 'infinity')) j)",
             {"before": before, "survey": survey_id},
         )
         runs = conn.execute(
             "DELETE FROM tunnel.run WHERE id IN"
-            " (SELECT r.id FROM tunnel_api.superseded_runs(%(survey)s, coalesce(%(before)s::date::timestamptz, 'infinity')) r)",
+            " (SELECT r.id"
+            " FROM tunnel_internal.superseded_runs(%(survey)s, coalesce(%(before)s::date::timestamptz, 'infinity')) r)",
             {"before": before, "survey": survey_id},
         )
         return runs.rowcount, jobs.rowcount

@@ -217,7 +217,7 @@ def load_clusters(conn: psycopg.Connection[Any], survey: Survey, first: float, s
 
 def save_classes(conn: psycopg.Connection[Any], survey: Survey, km: int, classes: UInt8) -> None:
     """Give the points of a kilometre their classes (n,), in the order of its rows."""
-    conn.execute("SELECT tunnel_api.class_write(%s, %s, %b)", [survey.id, km, classes.tobytes()])
+    conn.execute("SELECT tunnel_internal.class_write(%s, %s, %b)", [survey.id, km, classes.tobytes()])
 
 
 def load_scene(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km_to: int) -> Scene:

@@ -147,7 +147,7 @@ def _coverage(
     row = conn.execute(
         """
         SELECT a.area, a.seen, a.unplaced,
-               (SELECT r.parameters @> tunnel_api.members_inputs(s.id) FROM tunnel.run r
+               (SELECT r.parameters @> tunnel_internal.members_inputs(s.id) FROM tunnel.run r
                  WHERE r.survey_id = s.id AND r.stage = 'members' AND r.outcome = 'done' ORDER BY r.id DESC LIMIT 1),
                (SELECT string_agg(m.number::text, ', ' ORDER BY m.number) FROM tunnel.member m
                  WHERE m.survey_id = s.id AND m.bimodal

@@ -30,7 +30,7 @@ def keep_missing(conn: psycopg.Connection[Any], begin: Begin) -> int:
     """
     missing = conn.execute(
         "SELECT s.id, s.name, array_agg(u.km ORDER BY u.km) FROM tunnel.survey s"
-        " CROSS JOIN LATERAL tunnel_api.waterproof_unkept(s.id) AS u (km) GROUP BY s.id, s.name ORDER BY s.id"
+        " CROSS JOIN LATERAL tunnel_internal.waterproof_unkept(s.id) AS u (km) GROUP BY s.id, s.name ORDER BY s.id"
     ).fetchall()
     conn.commit()
     done = 0
@@ -42,7 +42,7 @@ def keep_missing(conn: psycopg.Connection[Any], begin: Begin) -> int:
 def _keep(conn: psycopg.Connection[Any], survey_id: int, kilometres: Sequence[int], advance: Callable[[float], None]) -> int:
     for done, km in enumerate(kilometres):
         try:
-            conn.execute("SELECT tunnel_api.keep_waterproof(%s, %s)", [survey_id, km])
+            conn.execute("SELECT tunnel_internal.keep_waterproof(%s, %s)", [survey_id, km])
             conn.commit()
         except psycopg.errors.ForeignKeyViolation:  # the survey was removed meanwhile
             conn.rollback()

@@ -258,7 +258,7 @@ class _Loading:
     def _settle(self) -> None:
         """Work out what the triggers have only noted."""
         self.conn.execute(
-            "SELECT tunnel_api.keep_waterproof(%s, w.km)"
+            "SELECT tunnel_internal.keep_waterproof(%s, w.km)"
             " FROM (SELECT DISTINCT km FROM tunnel.waterproof WHERE survey_id = %s) w",
             [self.loaded.survey_id, self.loaded.survey_id],
         )

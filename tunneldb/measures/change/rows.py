@@ -88,7 +88,7 @@ def load_blocks(
 
 def change_inputs(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int) -> dict[str, Any]:
     """What the change of a kilometre is made from, as the ledger keeps it."""
-    row = conn.execute("SELECT tunnel_api.change_inputs(%s, %s, %s)", [new.id, old.id, km]).fetchone()
+    row = conn.execute("SELECT tunnel_internal.change_inputs(%s, %s, %s)", [new.id, old.id, km]).fetchone()
     assert row is not None
     return {"old": old.id, **row[0]}
 
@@ -98,7 +98,7 @@ def stale_kilometres(
 ) -> dict[int, tuple[str | None, float | None, float | None]]:
     """Kilometres of a stretch that both saw: why what is stored is out of date, and the cell and length it was made with."""
     rows = conn.execute(
-        "SELECT km, reason, cell, length FROM tunnel_api.change_state(%s, %s)"
+        "SELECT km, reason, cell, length FROM tunnel_internal.change_state(%s, %s)"
         " WHERE (km + 1) * %s::float8 > %s AND km * %s::float8 < %s ORDER BY km",
         [new.id, old.id, KILOMETRE, low, KILOMETRE, high],
     ).fetchall()

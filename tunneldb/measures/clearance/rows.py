@@ -109,7 +109,7 @@ def save_gauge(conn: psycopg.Connection[Any], survey: Survey, name: str, outline
 
 def clearance_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, gauge: str) -> dict[str, Any]:
     """What the clearance of a kilometre is made from, but for options."""
-    row = conn.execute("SELECT tunnel_api.clearance_inputs(%s, %s, %s)", [survey.id, km, gauge]).fetchone()
+    row = conn.execute("SELECT tunnel_internal.clearance_inputs(%s, %s, %s)", [survey.id, km, gauge]).fetchone()
     assert row is not None
     return dict(row[0])
 
@@ -127,7 +127,7 @@ def made_of(conn: psycopg.Connection[Any], survey: Survey, km: int, gauge: str, 
 def ground_reason(conn: psycopg.Connection[Any], survey: Survey, km: int) -> str | None:
     """Why stage ground is out of date in a kilometre; None if it is not."""
     row = conn.execute(
-        "SELECT reason FROM tunnel_api.stage_state(%s) WHERE stage = 'ground' AND km = %s", [survey.id, km]
+        "SELECT reason FROM tunnel_internal.stage_state(%s) WHERE stage = 'ground' AND km = %s", [survey.id, km]
     ).fetchone()
     return None if row is None else row[0]
 

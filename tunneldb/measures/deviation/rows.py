@@ -65,7 +65,7 @@ def stale_kilometres(
 ) -> dict[int, str | None]:
     """Kilometres of a stretch with an offset image in which the layer has a design, and why what is stored is out of date."""
     rows = conn.execute(
-        "SELECT km, reason FROM tunnel_api.deviation_state(%s)"
+        "SELECT km, reason FROM tunnel_internal.deviation_state(%s)"
         " WHERE layer = %s AND (km + 1) * %s::float8 > %s AND km * %s::float8 < %s ORDER BY km",
         [survey.id, layer, KILOMETRE, low, KILOMETRE, high],
     ).fetchall()
@@ -74,7 +74,7 @@ def stale_kilometres(
 
 def deviation_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> dict[str, Any]:
     """What the deviation of a kilometre is made from, as the ledger keeps it."""
-    row = conn.execute("SELECT tunnel_api.deviation_inputs(%s, %s, %s)", [survey.id, km, layer]).fetchone()
+    row = conn.execute("SELECT tunnel_internal.deviation_inputs(%s, %s, %s)", [survey.id, km, layer]).fetchone()
     assert row is not None
     return {"layer": layer, **row[0]}
 

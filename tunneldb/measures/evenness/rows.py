@@ -44,7 +44,7 @@ def evenness_kilometres(
 ) -> dict[int, str | None]:
     """Kilometres of a stretch that were held against a layer, and why what is stored of their evenness is out of date."""
     rows = conn.execute(
-        "SELECT km, reason, straightedge, gap_limit FROM tunnel_api.evenness_state(%s)"
+        "SELECT km, reason, straightedge, gap_limit FROM tunnel_internal.evenness_state(%s)"
         " WHERE layer = %s AND (km + 1) * %s::float8 > %s AND km * %s::float8 < %s ORDER BY km",
         [survey.id, layer, KILOMETRE, low, KILOMETRE, high],
     ).fetchall()
@@ -54,7 +54,7 @@ def evenness_kilometres(
 
 def evenness_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> dict[str, Any]:
     """What the evenness of a kilometre is made from, as the ledger keeps it."""
-    row = conn.execute("SELECT tunnel_api.evenness_inputs(%s, %s, %s)", [survey.id, km, layer]).fetchone()
+    row = conn.execute("SELECT tunnel_internal.evenness_inputs(%s, %s, %s)", [survey.id, km, layer]).fetchone()
     assert row is not None
     inputs: dict[str, Any] = row[0]
     return inputs

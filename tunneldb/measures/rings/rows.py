@@ -101,12 +101,12 @@ def length_before(conn: psycopg.Connection[Any], survey: Survey, joint: float) -
 
 def ring_state(conn: psycopg.Connection[Any], survey: Survey) -> dict[int, str | None]:
     """Kilometres that have rings, and why what was measured of them is out of date."""
-    return dict(conn.execute("SELECT km, reason FROM tunnel_api.ring_state(%s) ORDER BY km", [survey.id]).fetchall())
+    return dict(conn.execute("SELECT km, reason FROM tunnel_internal.ring_state(%s) ORDER BY km", [survey.id]).fetchall())
 
 
 def ring_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int) -> dict[str, Any]:
     """What the measures of a kilometre's rings are made from, as the ledger keeps it."""
-    row = conn.execute("SELECT tunnel_api.ring_inputs(%s, %s)", [survey.id, km]).fetchone()
+    row = conn.execute("SELECT tunnel_internal.ring_inputs(%s, %s)", [survey.id, km]).fetchone()
     assert row is not None
     return dict(row[0])
 

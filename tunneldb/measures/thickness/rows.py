@@ -52,7 +52,7 @@ def stale_thickness(
 ) -> dict[int, str | None]:
     """Kilometres of a stretch in which both surveys were held against a layer, and why what is stored is out of date."""
     rows = conn.execute(
-        "SELECT km, reason FROM tunnel_api.thickness_state(%s, %s, %s)"
+        "SELECT km, reason FROM tunnel_internal.thickness_state(%s, %s, %s)"
         " WHERE (km + 1) * %s::float8 > %s AND km * %s::float8 < %s ORDER BY km",
         [before.id, after.id, layer, KILOMETRE, low, KILOMETRE, high],
     ).fetchall()
@@ -61,7 +61,7 @@ def stale_thickness(
 
 def thickness_inputs(conn: psycopg.Connection[Any], before: Survey, after: Survey, km: int, layer: str) -> dict[str, Any]:
     """What the thickness of a kilometre is made from, as the ledger keeps it."""
-    row = conn.execute("SELECT tunnel_api.thickness_inputs(%s, %s, %s, %s)", [before.id, after.id, km, layer]).fetchone()
+    row = conn.execute("SELECT tunnel_internal.thickness_inputs(%s, %s, %s, %s)", [before.id, after.id, km, layer]).fetchone()
     assert row is not None
     inputs: dict[str, Any] = row[0]
     return inputs

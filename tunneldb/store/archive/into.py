@@ -102,7 +102,7 @@ def load_points(
     """Write a kilometre's points into a table of their own, which `attach_points` puts into place; return how many."""
     count = stage_rows(conn, "point", columns, chunks)
     new = sql.Identifier("tunnel", f"point_s{survey}_km{km}_new")
-    conn.execute("SELECT tunnel_api.partition_new(%s, %s)", [survey, km])
+    conn.execute("SELECT tunnel_internal.partition_new(%s, %s)", [survey, km])
     row = conn.execute(
         "SELECT array_agg(old::int ORDER BY old), array_agg(new::int ORDER BY old) FROM pg_temp.map_scan_file"
     ).fetchone()
@@ -128,7 +128,7 @@ def load_points(
 def attach_points(conn: psycopg.Connection[Any], survey: int, kms: Iterable[int]) -> None:
     """Put the points of kilometres into place."""
     for km in kms:
-        conn.execute("SELECT tunnel_api.partition_swap(%s, %s)", [survey, km])
+        conn.execute("SELECT tunnel_internal.partition_swap(%s, %s)", [survey, km])
 
 
 def make_images(conn: psycopg.Connection[Any], survey: int) -> sql.Identifier:
@@ -167,7 +167,7 @@ def load_audit(conn: psycopg.Connection[Any], survey: int) -> int:
     conn.execute(
         "CREATE TEMPORARY TABLE map_audit ON COMMIT DROP AS SELECT a.old, n.new"
         " FROM (SELECT id AS old, row_number() OVER (ORDER BY id) AS n FROM pg_temp.archive_audit) a"
-        " JOIN tunnel_api.audit_reserve(%s) WITH ORDINALITY AS n (new, n) USING (n)",
+        " JOIN tunnel_internal.audit_reserve(%s) WITH ORDINALITY AS n (new, n) USING (n)",
         [count[0]],
     )
     conn.execute("CREATE UNIQUE INDEX ON pg_temp.map_audit (old)")
@@ -191,7 +191,7 @@ def load_audit(conn: psycopg.Connection[Any], survey: int) -> int:
     with conn.cursor("audit_rows") as cursor:
         cursor.execute(rows)
         while chunk := cursor.fetchmany(_CHUNK):
-            conn.execute("SELECT tunnel_api.audit_import(%s, %s)", [survey, Jsonb([entry for (entry,) in chunk])])
+            conn.execute("SELECT tunnel_internal.audit_import(%s, %s)", [survey, Jsonb([entry for (entry,) in chunk])])
     return int(count[0])
 
 
