@@ -79,14 +79,14 @@ def test_without_reviews_it_is_one_line(conn: psycopg.Connection) -> None:
     conn.execute("UPDATE tunnel.finding SET review = 'open'")
     conn.commit()
     output = command("learn", SURVEY, code=2).stderr
-    assert output.startswith("tunneldb: no anomaly of demo-2024 was reviewed yet")
+    assert output.startswith("tunneldb: no finding of demo-2024 was reviewed yet")
     assert output.count("\n") == 1
 
 
 def test_reviews_of_anomalies_without_features_are_one_line(conn: psycopg.Connection) -> None:
     """The example's anomalies are as a database from before migration 0021 has them; three are reviewed."""
     output = command("learn", SURVEY, "--apply", code=2).stderr
-    assert output.startswith("tunneldb: demo-2024: 3 reviewed anomalies have no features: run detect again")
+    assert output.startswith("tunneldb: demo-2024: 3 reviewed findings have no features: run detect again")
     assert output.count("\n") == 1
     assert as_json("learn", SURVEY, "--list")["learned"] == []
 
@@ -95,7 +95,7 @@ def test_features_of_a_version_that_measured_less_are_none(reviewed: psycopg.Con
     conn = reviewed
     conn.execute("UPDATE tunnel.feature_list SET names = names[2:]")
     conn.commit()
-    assert f"{MANY + 3} reviewed anomalies have no features" in command("learn", SURVEY, code=2).stderr
+    assert f"{MANY + 3} reviewed findings have no features" in command("learn", SURVEY, code=2).stderr
 
 
 def test_features_in_another_order_are_told_by_their_names(reviewed: psycopg.Connection) -> None:

@@ -33,7 +33,7 @@ LARGEST = 10
 
 @dataclass(frozen=True)
 class Change:
-    """An anomaly of which detection would think otherwise.
+    """A finding that detection would classify otherwise.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Changes:
-    """How many anomalies of a survey would be of another kind.
+    """Number of findings of a survey that would be of another kind.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Plan:
     reviews : mapping
         How many reviews of each sort were used.
     without : mapping
-        Of surveys, how many anomalies were reviewed and have no features.
+        Number of reviewed findings without features, by survey.
     changes : sequence of Changes
         Of all surveys of the tunnels, against what is in force.
     largest : sequence of Change
@@ -129,7 +129,7 @@ def plan_learning(conn: psycopg.Connection[Any], surveys: Sequence[Survey]) -> P
     without = {survey.name: int((reviewed & ~measured.known & (measured.survey == survey.id)).sum()) for survey in surveys}
     if not reviewed.any():
         raise NotReadyError(
-            f"no anomaly of {' or '.join(names)} was reviewed yet: confirm, reject or rename some, in QGIS or through the view"
+            f"no finding of {' or '.join(names)} was reviewed yet: confirm, reject or rename some, in QGIS or through the view"
             " tunnel_api.leak"
         )
     used = reviewed & measured.known
@@ -142,9 +142,9 @@ def plan_learning(conn: psycopg.Connection[Any], surveys: Sequence[Survey]) -> P
 
 
 def no_features(without: Mapping[str, int]) -> list[str]:
-    """Say of which surveys reviewed anomalies have no features, a line for each."""
+    """Say of which surveys reviewed findings have no features, a line for each."""
     return [
-        f"{survey}: {count} reviewed {'anomaly has' if count == 1 else 'anomalies have'} no features: run detect again:"
+        f"{survey}: {count} reviewed {'finding has' if count == 1 else 'findings have'} no features: run detect again:"
         f" tunneldb run {survey} --from detect"
         for survey, count in without.items()
         if count

@@ -1,4 +1,4 @@
-"""Features and reviews of anomalies, and what was learned from them: tables to arrays and back."""
+"""Features and reviews of findings, and what was learned from them: tables to arrays and back."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OUTLINE = "outline"
 """Name under which is stored, behind the features, how much the outline tells."""
 
 STORED = (*NAMES, OUTLINE)
-"""What this version stores of each anomaly, in this order."""
+"""What this version stores of each finding, in this order."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Learned:
 
 @dataclass(frozen=True)
 class InForce:
-    """What judges the anomalies of a tunnel.
+    """The model that classifies the findings of a tunnel.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ def feature_list(conn: psycopg.Connection[Any]) -> int:
 
 
 def load_measured(conn: psycopg.Connection[Any], tunnels: Iterable[int]) -> Measured:
-    """Read the anomalies of all surveys of some tunnels, in order of tunnel, survey and chainage.
+    """Read the findings of all surveys of some tunnels, in order of tunnel, survey and chainage.
 
     What stands for one, as redrawn or merged, says of it what was said of that. What people drew has no features.
     """
@@ -216,9 +216,9 @@ def list_learned(conn: psycopg.Connection[Any], tunnels: Iterable[int]) -> list[
         ).fetchall()
 
 
-def places_of(conn: psycopg.Connection[Any], anomalies: Sequence[int]) -> dict[int, tuple[str, str]]:
-    """Survey and station of the middle of anomalies, by their keys."""
-    rows = conn.execute("SELECT id, survey, label FROM tunnel_api.finding WHERE id = ANY (%s)", [list(anomalies)])
+def places_of(conn: psycopg.Connection[Any], findings: Sequence[int]) -> dict[int, tuple[str, str]]:
+    """Return survey and station of the middle of findings, by their keys."""
+    rows = conn.execute("SELECT id, survey, label FROM tunnel_api.finding WHERE id = ANY (%s)", [list(findings)])
     return {key: (survey, label) for key, survey, label in rows}
 
 
