@@ -41,7 +41,8 @@ def learn(settings: Settings, surveys: tuple[str, ...], apply_: bool, undo: bool
     Without --apply it changes nothing, and says what would change: how the reviews agree with the model of evidence as it
     comes with the program, recalibrated (how sure it may be) and, from 25 reviews on, refit (how much each reason counts) and
     extended (what was measured speaks for itself, too), each judged on reviews of other places than those that it was fitted
-    to; and which findings would change their kind. The best is chosen; where none is better than the model as it is by more than
+    to; and which findings would change their kind. The best is chosen; where none is better than the model as it is by more
+    than
     chance, nothing is learned. Few false leaks may be paid for with missed ones: both are stated.
 
     What is applied holds for the tunnels of the surveys, all surveys of them: their stage detect is stale then, until tunneldb
