@@ -1,4 +1,4 @@
-"""A scene without an axis: lining, told by clusters and their normals, and a surface of sections laid through it."""
+"""Scene without an axis: lining found by clusters and their normals, and a surface of sections fitted to it."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ from tunneldb.geometry.unrolling import CROWN, NODES
 from tunneldb.threads import in_blocks
 
 COHERENT = 0.8
-"""Cosine of the angle between neighbouring normals that the clusters of a lining reach on the average."""
+"""Minimum mean cosine of the angle between neighbouring normals in clusters of lining."""
 
 TALL = 0.5
-"""And the share of the height of the region of interest."""
+"""Minimum height of these clusters, as a share of the region of interest's height."""
 
 LARGE = 0.02
-"""And the share of its points."""
+"""Minimum number of their points, as a share of the region of interest's points."""
 
 CLOSED = 0.6
-"""Share of the directions above the ground that a tunnel's lining closes, seen from its middle."""
+"""Minimum share of the directions above the ground that a tunnel's lining closes, seen from its middle."""
 
 VERTICES, SECTIONS = 10.0, 2.5
 """Distance of the vertices of the axis and of the sections, m."""
 
 _DEGREES = 2  # width of an angular class of a section
 _CLASSES = 360 // _DEGREES
-_NOTCH = 5  # classes: 10 degrees, of which what hangs on the wall takes less
-_LEAST = 3  # points that fill a class
+_NOTCH = 5  # classes: 10 degrees; fixtures on the wall are narrower
+_LEAST = 3  # minimum points of a class
 _NEIGHBOURS = 16  # of a normal
 _BLOCK = 16_384  # points at a time
 
 
 def find_lining(residual: ResidualPoints, spacing: Spacing, settings: ClusterSettings) -> Bool:
-    """Tell which points are lining: clusters of the region by their size and normals, and all above it."""
+    """Select the points of the lining: clusters of the region by their size and normals, and all above it."""
     kept = residual.height >= residual.top
     region = np.flatnonzero(~kept)
     places = np.column_stack([residual.along * spacing.shrink, residual.across, residual.xyz[:, 2]])[region]
@@ -68,7 +68,7 @@ def find_lining(residual: ResidualPoints, spacing: Spacing, settings: ClusterSet
 
 
 def coherence(points: Float) -> float:
-    """Mean cosine of the angle between the normals of neighbouring points (n, 3): 1 on a plane, 0.5 where they are random."""
+    """Return the mean cosine between the normals of neighbouring points (n, 3): 1 on a plane, 0.5 if random."""
     points = points[:: 1 + len(points) // 20_000] if len(points) > 40_000 else points
     near = min(_NEIGHBOURS, len(points))
     if near < 4:
@@ -82,7 +82,7 @@ def coherence(points: Float) -> float:
 
 
 def surface_through(line: PlanLine, along: Float, across: Float, z: Float, wall: Bool) -> Surface | None:
-    """Sections through points in the frame of a line; None where walls and roof (``wall``) don't close around the middle."""
+    """Fit sections to points in the frame of a line; None if walls and roof (``wall``) do not close around the middle."""
     if wall.sum() < _LEAST:
         return None
     first, last = float(along[wall].min()) - 0.5, float(along[wall].max()) + 0.5
@@ -115,9 +115,9 @@ def surface_through(line: PlanLine, along: Float, across: Float, z: Float, wall:
 
 
 def _middles(at: Float, along: Float, across: Float, z: Float, wall: Bool) -> Float:
-    """Middle between the walls and between floor and roof at each vertex: across and z, m.
+    """Return the middle between the walls and between floor and roof at each vertex: across and z, m.
 
-    That of each stretch as long as a section's is taken, and a line laid through those about a vertex.
+    The middles of stretches as long as a section's are computed, and a line is fitted to those around a vertex.
     """
     stretch = np.floor((along - at[0]) / SECTIONS).astype(np.int64)
     order = np.argsort(stretch, kind="stable")
@@ -139,7 +139,7 @@ def _middles(at: Float, along: Float, across: Float, z: Float, wall: Bool) -> Fl
 
 
 def _placed(segments: Float, ends: Float, points: Float) -> Float:
-    """Chainage of points (n, 3) and their place right and up of the axis, (n, 3), m; NaN beyond its ends."""
+    """Return the chainage of points (n, 3) and their place right of and above the axis, (n, 3), m; NaN beyond its ends."""
     out = np.full((len(points), 3), np.nan)
     number = np.arange(len(segments))
     in_blocks(lambda begin, end: _place(segments, number, ends, points, out, begin, end), len(points), _BLOCK)
@@ -161,7 +161,7 @@ def _place(
 
 
 def _medians(key: Int64, value: Float, count: int) -> Float:
-    """Median of the values of each key below a count; NaN for fewer than ``_LEAST``."""
+    """Return the median of the values of each key below a count; NaN for fewer than ``_LEAST``."""
     order = np.lexsort((value, key))
     bounds = np.searchsorted(key[order], np.arange(count + 1))
     size = np.diff(bounds)
@@ -170,14 +170,14 @@ def _medians(key: Int64, value: Float, count: int) -> Float:
 
 
 def _without_notches(radius: Float) -> Float:
-    """Sections freed of what stands in from both its sides by more than δ: a cable or a box on the wall, not the wall."""
+    """Remove from sections what protrudes from both its sides by more than δ: a cable or a box on the wall."""
     filled = np.where(np.isnan(radius), 0.0, radius)
     closed = ndimage.grey_closing(filled, size=(1, _NOTCH), mode="wrap")
     return np.where(closed - radius > DELTA, closed, radius)
 
 
 def _nodes(radius: Float) -> Float:
-    """Radius at each whole degree from those of the classes; gaps are bridged, along the tunnel where they are wide."""
+    """Interpolate the radius at each whole degree from the classes; gaps are bridged, wide ones along the tunnel."""
     centres = (np.arange(_CLASSES) + 0.5) * _DEGREES
     known = np.isfinite(radius).any(axis=0)
     typical = np.interp(centres, centres[known], np.nanmedian(radius[:, known], axis=0), period=360.0)
@@ -192,7 +192,7 @@ def _nodes(radius: Float) -> Float:
 
 
 def _arcs(radius: Float) -> Float:
-    """Length along each section from the crown at each whole degree, m."""
+    """Return the length along each section from the crown at each whole degree, m."""
     angle = np.radians(np.arange(NODES) - 180.0)
     u, w = radius * np.sin(angle), radius * np.cos(angle)
     length = np.concatenate([np.zeros((len(radius), 1)), np.cumsum(np.hypot(np.diff(u), np.diff(w)), axis=1)], axis=1)

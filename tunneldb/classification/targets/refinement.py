@@ -1,4 +1,4 @@
-"""Moving candidates to where a sphere of the radius fits best, all at once and quickly; most lead nowhere."""
+"""Refine candidates quickly, all together, to the best fit of a sphere of the radius; most are rejected."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tunneldb.classification.targets.hough import NEAR, PointGrid
 from tunneldb.threads import in_blocks
 
 # In radii of the spheres:
-WIDE = 0.25  # points so near the sphere draw at first,
-NARROW = 0.1  # and at last
+WIDE = 0.25  # distance from the sphere of points with weight at first,
+NARROW = 0.1  # and at the end
 PASSES = 12
 
 _BLOCK = 256  # candidates at a time
@@ -21,21 +21,21 @@ _CELLS = BANDS * SECTORS
 
 
 class RefinedSpheres(NamedTuple):
-    """Where candidates have come to, k of them.
+    """Refined candidates, k of them.
 
     Attributes
     ----------
     centres : (k, 3) float64 array
-        NaN where it led away by a radius or there was nothing to fit to, m.
+        NaN if the centre moved away by a radius or had no points, m.
     on : (k,) int array
-        Points within `NARROW` radii of the sphere.
+        Number of points within `NARROW` radii of the sphere.
     share : (k,) float64 array
-        Of the points in and near the sphere, in the directions in which it is seen, those on it.
+        Share on the sphere of the points in and near it, in the directions in which it is seen.
     seen : (k,) float64 array
-        Share of its surface that is seen, as `tunneldb.classification.targets.fit.coverage` has it, about the mean direction of
-        the points on it.
+        Seen share of its surface, as `tunneldb.classification.targets.fit.coverage`, about the mean direction of the points on
+        it.
     radius, radius_sigma : (k,) float64 arrays
-        Of the best sphere of any radius there, and its standard deviation, m; infinite where there is none.
+        Radius of the best sphere with free radius, and its standard deviation, m; infinite if there is none.
     """
 
     centres: Float
@@ -47,7 +47,7 @@ class RefinedSpheres(NamedTuple):
 
 
 def refine_spheres(points: PointGrid, centres: Float, radius: float) -> RefinedSpheres:
-    """Fit spheres of a radius (m) to candidates (k, 3) by Gauss-Newton steps with Tukey's weights, whose reach shrinks."""
+    """Fit spheres of a radius (m) to candidates (k, 3) by Gauss-Newton steps with Tukey's weights of decreasing reach."""
     count = len(centres)
     found = RefinedSpheres(
         np.full((count, 3), np.nan), np.zeros(count, np.int64), np.zeros(count), np.zeros(count),
@@ -59,7 +59,7 @@ def refine_spheres(points: PointGrid, centres: Float, radius: float) -> RefinedS
         near, candidate = points.around(start, (NEAR + WIDE) * radius)
         xyz, start = points.xyz[near], start - points.low
         centre, kept = _fit_centres(xyz, candidate, start, radius)
-        # Of those that are kept, the points and the numbers.
+        # Points and numbers of the remaining candidates.
         chosen = kept[candidate]
         xyz, candidate = xyz[chosen], (np.cumsum(kept) - 1)[candidate[chosen]]
         number, centre = begin + np.flatnonzero(kept), centre[kept]
@@ -74,23 +74,23 @@ def refine_spheres(points: PointGrid, centres: Float, radius: float) -> RefinedS
 def _equations(
     xyz: Float, candidate: Int64, centre: Float, radius: Float, reach: Float, free: bool
 ) -> tuple[Float, Float, Int64, Float]:
-    """Normal equations of spheres by Tukey's weights.
+    """Build the normal equations of spheres with Tukey's weights.
 
     Parameters
     ----------
     xyz, candidate : (n, 3) and (n,) arrays
-        Points, and which of the k spheres each is near to.
+        Points, and for each the number of its sphere.
     centre, radius, reach : (k, 3), (k,) and (k,) arrays
-        Spheres, and how far from them points draw, m.
+        Spheres, and the maximum distance of points with weight, m.
     free : bool
-        Whether the radius is unknown, too.
+        True if the radius is unknown too.
 
     Returns
     -------
     matrix, vector : (k, m, m) and (k, m) arrays
         m is 3, or 4 with the radius.
     count, squares : (k,) arrays
-        Points that draw, and the weighted sum of the squares of their distances, m².
+        Number of points with weight, and the weighted sum of their squared distances, m².
     """
     out = xyz - centre[candidate]
     far = np.sqrt(out[:, 0] * out[:, 0] + out[:, 1] * out[:, 1] + out[:, 2] * out[:, 2])
@@ -110,7 +110,7 @@ def _equations(
 
 
 def _fit_centres(xyz: Float, candidate: Int64, start: Float, radius: float) -> tuple[Float, Bool]:
-    """Centres (k, 3) of spheres of a radius, from a start on, and which of them are worth keeping."""
+    """Return fitted centres (k, 3) of spheres of a radius, and True for those worth keeping."""
     centre, kept = start.copy(), np.ones(len(start), np.bool_)
     for step in range(PASSES):
         reach = radius * max(NARROW, WIDE * 0.85**step)
@@ -120,7 +120,7 @@ def _fit_centres(xyz: Float, candidate: Int64, start: Float, radius: float) -> t
         kept &= trace >= 4.0
         if not kept.any():
             break
-        # Across a nearly flat patch nothing holds the centre: let it stay there.
+        # Across a nearly flat patch the centre is not determined: it stays there.
         matrix = matrix[kept] + 1e-3 * trace[kept, None, None] * np.eye(3)
         centre[kept] += np.linalg.solve(matrix, vector[kept, :, None])[..., 0]
         kept &= ((centre - start) ** 2).sum(axis=1) <= radius * radius
@@ -130,7 +130,7 @@ def _fit_centres(xyz: Float, candidate: Int64, start: Float, radius: float) -> t
 
 
 def _fit_radii(xyz: Float, candidate: Int64, centre: Float, radius: float) -> tuple[Float, Float]:
-    """Radius of the best sphere of any radius near each of some, and its standard deviation; infinite where there is none."""
+    """Return the radius of the best sphere with free radius, and its standard deviation; infinite if there is none."""
     count = len(centre)
     state = np.column_stack([centre, np.full(count, radius)])
     sigma, lost = np.full(count, np.inf), np.zeros(count, np.bool_)
@@ -151,7 +151,7 @@ def _fit_radii(xyz: Float, candidate: Int64, centre: Float, radius: float) -> tu
 
 
 def _extent(xyz: Float, candidate: Int64, centre: Float, radius: float) -> tuple[Int64, Float, Float]:
-    """Points on each sphere, their share of those near it where it is seen, and the share of its surface that is seen."""
+    """Return the points on each sphere, their share of those near it where it is seen, and the seen share of its surface."""
     count = len(centre)
     out = xyz - centre[candidate]
     far = np.sqrt(out[:, 0] * out[:, 0] + out[:, 1] * out[:, 1] + out[:, 2] * out[:, 2])
