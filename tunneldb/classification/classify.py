@@ -129,8 +129,8 @@ def heights_above_ground(ground: Ground | None, along: Float, across: Float, z: 
     whole = replace(ground, height=ground.height[tuple(nearest)])
     rows, columns = ground.height.shape
     inside = np.clip(along, ground.start, ground.start + rows - 1)
-    beside = np.clip(across, ground.first * COLUMN, (ground.first + columns - 1) * COLUMN - 1e-9)
-    return z - whole.height_at(inside, np.maximum(beside, ground.first * COLUMN))
+    clipped = np.clip(across, ground.first * COLUMN, (ground.first + columns - 1) * COLUMN - 1e-9)
+    return z - whole.height_at(inside, np.maximum(clipped, ground.first * COLUMN))
 
 
 def tunnel_heights(along: Float, height: Float) -> Float:

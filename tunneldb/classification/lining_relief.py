@@ -33,7 +33,7 @@ REACH = 0.5
 SIGMAS = 3.0
 """Standard deviations about its plane within which points belong to the lining."""
 
-APART = 0.06
+MAX_CELL_DEVIATION = 0.06
 """Maximum deviation of a cell from its surroundings, m, unless the lining's own relief is as rough."""
 
 _PART = 2  # cells to each side whose points are used for the plane
@@ -41,9 +41,11 @@ _MIN_POINTS = 6
 _BIN, _BINS, _SMOOTH = 0.02, 25, 2  # of the histogram for the level: 2 cm to ±0.5 m, over five bins
 _FINE, _FINES = 0.002, 128  # of the histogram for the spread
 _TUKEY = 4.685  # Tukey's weights end at so many standard deviations
-_FIRST, _FITS = 0.12, 5  # width of the first fit's weights, m
-_REST = 2e-4  # the fit ends when a cell moves by less, m
-_FLATTEST = 0.05  # minimum determinant of the covariance of x and y, in cells: points on a line have less, a full part has 4.3
+_FIRST_WIDTH, _FITS = 0.12, 5  # width of the first fit's weights, m
+_CONVERGED = 2e-4  # the fit ends when a cell moves by less, m
+_MIN_DETERMINANT = (
+    0.05  # minimum determinant of the covariance of x and y, in cells: points on a line have less, a full part has 4.3
+)
 _ALONG, _ROUND = 12, 4  # cells to each side that a cell's offset is compared with: 6 m by 2 m
 _SAMPLE = 1024  # points of a part: survey density gives 150, voxels may give more
 _COLUMNS, _POINTS = 64, 1 << 16  # columns of cells, and points, at a time
@@ -167,7 +169,7 @@ def _apart(found: Float, expected: Float) -> Bool:
     off = np.abs(found - expected - level)
     usual = 5.0 * MAD_TO_SIGMA * _median(off, _ALONG, _ROUND)
     with np.errstate(invalid="ignore"):
-        return np.asarray(off > np.maximum(usual, APART))
+        return np.asarray(off > np.maximum(usual, MAX_CELL_DEVIATION))
 
 
 def _calm(spread: Float) -> Float:
@@ -269,7 +271,7 @@ def _fit_planes(
 @inner
 def _fit_plane(part: Float, count: int, level: float, fine: Int64) -> tuple[float, float]:  # pragma: no cover - compiled
     """Return the height in the middle of the plane through points, fitted from an initial level, and their spread, or NaN."""
-    a, b, c, scale, sigma = level, 0.0, 0.0, _FIRST, np.nan
+    a, b, c, scale, sigma = level, 0.0, 0.0, _FIRST_WIDTH, np.nan
     for _ in range(_FITS):
         used, s, sx, sy, sxx, sxy, syy, sz, sxz, syz = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(count):
@@ -291,7 +293,7 @@ def _fit_plane(part: Float, count: int, level: float, fine: Int64) -> tuple[floa
         if used < _MIN_POINTS:
             return np.nan, np.nan
         before, lean, slant = a, b, c
-        a, b, c = plane_of_moments(s, sx, sy, sxx, sxy, syy, sz, sxz, syz, _FLATTEST)
+        a, b, c = plane_of_moments(s, sx, sy, sxx, sxy, syy, sz, sxz, syz, _MIN_DETERMINANT)
         # Standard deviation about the plane, from the median of the distances.
         for f in range(_FINES):
             fine[f] = 0
@@ -307,9 +309,9 @@ def _fit_plane(part: Float, count: int, level: float, fine: Int64) -> tuple[floa
                 sigma = MAD_TO_SIGMA * (f + (0.5 * total - below) / fine[f]) * _FINE
                 break
             below += fine[f]
-        if max(abs(a - before), abs(b - lean), abs(c - slant)) < _REST:
+        if max(abs(a - before), abs(b - lean), abs(c - slant)) < _CONVERGED:
             break
-        scale = min(max(_TUKEY * sigma, DELTA), 2.0 * _FIRST)
+        scale = min(max(_TUKEY * sigma, DELTA), 2.0 * _FIRST_WIDTH)
     return a, sigma
 
 

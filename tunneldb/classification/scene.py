@@ -21,7 +21,7 @@ from tunneldb.threads import in_blocks
 SPHERE_SKIN = 0.01
 """Thickness outside a target sphere within which points belong to it, m: three times a scanner's noise."""
 
-BEHIND = (PointClass.NICHE, PointClass.LINING)
+RECESSED_CLASSES = (PointClass.NICHE, PointClass.LINING)
 """Classes of clusters behind the lining's plane."""
 
 _BLOCK = 1 << 16  # points
@@ -103,7 +103,7 @@ class Scene:
         """Return the cells of the clusters in front of the lining and of those behind it."""
         if self.relief is None:
             return Lookup.of(list(self.clusters)), Lookup.of([])
-        behind = [cluster for cluster in self.clusters if cluster.klass in BEHIND]
+        behind = [cluster for cluster in self.clusters if cluster.klass in RECESSED_CLASSES]
         return Lookup.of([cluster for cluster in self.clusters if cluster.klass != PointClass.NICHE]), Lookup.of(behind)
 
 
@@ -146,8 +146,8 @@ def _mark_spheres(xyz: Float, spheres: Float, begin: int, end: int, out: UInt8) 
             x1, y1, z1 = max(x1, xyz[i, 0]), max(y1, xyz[i, 1]), max(z1, xyz[i, 2])
         for k in range(spheres.shape[0]):
             x, y, z, reach = spheres[k, 0], spheres[k, 1], spheres[k, 2], spheres[k, 3] + SPHERE_SKIN
-            apart = x + reach < x0 or x - reach > x1 or y + reach < y0 or y - reach > y1 or z + reach < z0 or z - reach > z1
-            if apart:
+            outside = x + reach < x0 or x - reach > x1 or y + reach < y0 or y - reach > y1 or z + reach < z0 or z - reach > z1
+            if outside:
                 continue
             for i in range(first, last):
                 dx, dy, dz = xyz[i, 0] - x, xyz[i, 1] - y, xyz[i, 2] - z

@@ -19,16 +19,16 @@ from tunneldb.geometry.surface import Surface
 from tunneldb.geometry.unrolling import CROWN, NODES
 from tunneldb.threads import in_blocks
 
-COHERENT = 0.8
+MIN_COHERENCE = 0.8
 """Minimum mean cosine of the angle between neighbouring normals in clusters of lining."""
 
-TALL = 0.5
+MIN_HEIGHT_SHARE = 0.5
 """Minimum height of these clusters, as a share of the region of interest's height."""
 
-LARGE = 0.02
+MIN_POINT_SHARE = 0.02
 """Minimum number of their points, as a share of the region of interest's points."""
 
-CLOSED = 0.6
+MIN_CLOSED_SHARE = 0.6
 """Minimum share of the directions above the ground that a tunnel's lining closes, seen from its middle."""
 
 VERTICES, SECTIONS = 10.0, 2.5
@@ -37,7 +37,7 @@ VERTICES, SECTIONS = 10.0, 2.5
 _DEGREES = 2  # width of an angular class of a section
 _CLASSES = 360 // _DEGREES
 _NOTCH = 5  # classes: 10 degrees; fixtures on the wall are narrower
-_LEAST = 3  # minimum points of a class
+_MIN_POINTS = 3  # minimum points of a class
 _NEIGHBOURS = 16  # of a normal
 _BLOCK = 16_384  # points at a time
 
@@ -59,10 +59,10 @@ def find_lining(residual: ResidualPoints, spacing: Spacing, settings: ClusterSet
     good = np.zeros(count, np.bool_)
     for k in range(count):
         group = order[bounds[k] : bounds[k + 1]]
-        size = len(group) >= LARGE * len(region)
+        size = len(group) >= MIN_POINT_SHARE * len(region)
         share = residual.height[region[group]] / np.maximum(residual.top[region[group]], 1e-9)
-        if size and np.ptp(share) >= TALL:
-            good[k] = coherence(places[group]) >= COHERENT
+        if size and np.ptp(share) >= MIN_HEIGHT_SHARE:
+            good[k] = coherence(places[group]) >= MIN_COHERENCE
     kept[region] = (labels >= 0) & good[labels]
     return kept
 
@@ -83,7 +83,7 @@ def coherence(points: Float) -> float:
 
 def surface_through(line: PlanLine, along: Float, across: Float, z: Float, wall: Bool) -> Surface | None:
     """Fit sections to points in the frame of a line; None if walls and roof (``wall``) do not close around the middle."""
-    if wall.sum() < _LEAST:
+    if wall.sum() < _MIN_POINTS:
         return None
     first, last = float(along[wall].min()) - 0.5, float(along[wall].max()) + 0.5
     segments = max(1, round((last - first) / VERTICES))
@@ -95,19 +95,19 @@ def surface_through(line: PlanLine, along: Float, across: Float, z: Float, wall:
     count = max(1, round((last - first) / SECTIONS))
     sections = first + (np.arange(count) + 0.5) * (last - first) / count
     places = _placed(rows, ends, np.column_stack([line.point(along, across), z]))
-    held = np.isfinite(places[:, 0])
-    (along, u, w), wall = places[held].T, wall[held]
+    valid = np.isfinite(places[:, 0])
+    (along, u, w), wall = places[valid].T, wall[valid]
     angle = np.mod(np.degrees(np.arctan2(u, w)) + 180.0, 360.0)
     bins = np.minimum((angle / _DEGREES).astype(np.int64), _CLASSES - 1)
     slab = np.clip(((along - first) * count / (last - first)).astype(np.int64), 0, count - 1)
     key = slab * _CLASSES + bins
     radius = _medians(key, np.hypot(u, w), count * _CLASSES).reshape(count, _CLASSES)
     radius = _without_notches(radius)
-    walls = np.bincount(key[wall], minlength=count * _CLASSES).reshape(count, _CLASSES) >= _LEAST
+    walls = np.bincount(key[wall], minlength=count * _CLASSES).reshape(count, _CLASSES) >= _MIN_POINTS
     floor = np.isfinite(radius) & ~walls
     closed = walls.sum(axis=1) / np.maximum(_CLASSES - floor.sum(axis=1), 1)
     roof = walls[:, _CLASSES // 4 : 3 * _CLASSES // 4].mean(axis=1)
-    if np.median(np.minimum(closed, roof)) < CLOSED:
+    if np.median(np.minimum(closed, roof)) < MIN_CLOSED_SHARE:
         return None
     nodes = _nodes(radius)
     arcs = _arcs(nodes)
@@ -124,7 +124,7 @@ def _middles(at: Float, along: Float, across: Float, z: Float, wall: Bool) -> Fl
     found = []
     for part in np.split(order, np.flatnonzero(np.diff(stretch[order])) + 1):
         sides = part[wall[part]]
-        if len(sides) >= _LEAST:
+        if len(sides) >= _MIN_POINTS:
             middle = np.mean(np.quantile(across[sides], (0.02, 0.98)))
             height = 0.5 * (np.quantile(z[part], 0.02) + np.quantile(z[sides], 0.98))
             found.append((float(along[part].mean()), float(middle), float(height)))
@@ -161,12 +161,12 @@ def _place(
 
 
 def _medians(key: Int64, value: Float, count: int) -> Float:
-    """Return the median of the values of each key below a count; NaN for fewer than ``_LEAST``."""
+    """Return the median of the values of each key below a count; NaN for fewer than ``_MIN_POINTS``."""
     order = np.lexsort((value, key))
     bounds = np.searchsorted(key[order], np.arange(count + 1))
     size = np.diff(bounds)
     at = np.minimum(bounds[:-1] + size // 2, max(len(value) - 1, 0))
-    return np.where(size >= _LEAST, value[order][at], np.nan)
+    return np.where(size >= _MIN_POINTS, value[order][at], np.nan)
 
 
 def _without_notches(radius: Float) -> Float:
@@ -183,11 +183,11 @@ def _nodes(radius: Float) -> Float:
     typical = np.interp(centres, centres[known], np.nanmedian(radius[:, known], axis=0), period=360.0)
     out = np.empty((len(radius), NODES))
     for row, classes in zip(out, radius, strict=True):
-        apart = classes - typical
-        full = np.isfinite(apart)
+        deviation = classes - typical
+        full = np.isfinite(deviation)
         if full.any():
-            apart = np.interp(centres, centres[full], apart[full], period=360.0)
-        row[:] = np.interp(np.arange(NODES), centres, typical + np.where(np.isfinite(apart), apart, 0.0), period=360.0)
+            deviation = np.interp(centres, centres[full], deviation[full], period=360.0)
+        row[:] = np.interp(np.arange(NODES), centres, typical + np.where(np.isfinite(deviation), deviation, 0.0), period=360.0)
     return out
 
 

@@ -16,18 +16,18 @@ from tunneldb.arrays import Bool, Float, Int64
 
 SURFACE = 0.1  # maximum distance from the water level, m
 WAVES = 0.05  # m above it, up to which noise puts points of a wall; higher points are mirror images
-ALONE = 0.15  # minimum radius for the neighbours of a point, m; more if rays are farther apart
+MIN_NEIGHBOUR_RADIUS = 0.15  # minimum radius for the neighbours of a point, m; more if rays are farther apart
 SPREADING = 0.03  # distance of neighbouring rays, per range
-LEAST_NEIGHBOURS = 4  # others
+MIN_NEIGHBOURS = 4  # others
 STRIP, BAND = 1.0, 0.25  # cells of wall, m along and in height
 SQUARE = 0.5  # cells of bed, m
 BIN = 0.05  # m
-STEEPEST = 0.84  # maximum slope of a bed, 40°: silt and rubble are not steeper
-THICK = 0.15  # m: four standard deviations of range, and a wall's relief
-FARTHEST_FILL = 3.0  # cells
-LARGEST_STEP = 0.5  # m between places of a wall at one chainage
-MANY = 0.4  # share of the maximum of a cell's bins from which a bin has many points
-LEAST_CELL = 10  # minimum points of a cell for a wall or the bed
+MAX_BED_SLOPE = 0.84  # maximum slope of a bed, 40°: silt and rubble are not steeper
+WALL_THICKNESS = 0.15  # m: four standard deviations of range, and a wall's relief
+MAX_FILL_CELLS = 3.0  # cells
+MAX_WALL_STEP = 0.5  # m between places of a wall at one chainage
+MANY_SHARE = 0.4  # share of the maximum of a cell's bins from which a bin has many points
+MIN_CELL_POINTS = 10  # minimum points of a cell for a wall or the bed
 
 
 class WaterClass(IntEnum):
@@ -80,18 +80,18 @@ def classify(points: Float, spacing: Float) -> Int64:
         if cells is not None:
             wall[mine] = _on_line(_smoothed(cells)).at(keys[mine])
             niche[mine] = cells.at(keys[mine])
-    in_niche = (niche > wall) & (np.abs(away - niche) < THICK)
-    on_wall = sound & (height < WAVES) & ((np.abs(away - wall) < THICK) | in_niche)
-    inside = ~(away > wall + THICK)  # also where no wall is known
+    in_niche = (niche > wall) & (np.abs(away - niche) < WALL_THICKNESS)
+    on_wall = sound & (height < WAVES) & ((np.abs(away - wall) < WALL_THICKNESS) | in_niche)
+    inside = ~(away > wall + WALL_THICKNESS)  # also where no wall is known
     keys = np.floor(points[:, :2] / SQUARE).astype(np.int64)
     # with the foot of the walls: squares beside it contain little except objects in front of it
     floor = _rear_of_cells(keys[below & inside], -height[below & inside])
     depth = -_connected(_smoothed(floor)).at(keys) if floor is not None else np.full(len(points), np.nan)
-    on_bed = below & inside & (np.abs(height - depth) < THICK)
+    on_bed = below & inside & (np.abs(height - depth) < WALL_THICKNESS)
     # where the bed is hidden, the object that hides it
     out[below & inside & (height > np.where(np.isnan(depth), _deepest(depth), depth))] = WaterClass.OBJECT
-    out[sound & inside & (np.abs(height) <= SURFACE) & (away < wall - THICK)] = WaterClass.SURFACE
-    out[on_wall & ~(height < depth - THICK)] = WaterClass.LINING
+    out[sound & inside & (np.abs(height) <= SURFACE) & (away < wall - WALL_THICKNESS)] = WaterClass.SURFACE
+    out[on_wall & ~(height < depth - WALL_THICKNESS)] = WaterClass.LINING
     out[on_bed & ~on_wall] = WaterClass.BED
     return out
 
@@ -109,13 +109,13 @@ def spacing_of_rays(reach: Float) -> Float:
 
 def spacing_of_soundings(points: Float) -> Float:
     """Return the same for soundings (n, 3) with unknown sonar positions: twice their typical distance."""
-    distance, _ = scipy.spatial.cKDTree(points).query(points, k=[LEAST_NEIGHBOURS + 1])
+    distance, _ = scipy.spatial.cKDTree(points).query(points, k=[MIN_NEIGHBOURS + 1])
     return np.full(len(points), 2.0 * float(np.median(distance)))
 
 
 def _has_neighbours(points: Float, spacing: Float) -> Bool:
-    distance, _ = scipy.spatial.cKDTree(points).query(points, k=[LEAST_NEIGHBOURS + 1])
-    return np.asarray(distance[:, 0] < np.maximum(ALONE, spacing))
+    distance, _ = scipy.spatial.cKDTree(points).query(points, k=[MIN_NEIGHBOURS + 1])
+    return np.asarray(distance[:, 0] < np.maximum(MIN_NEIGHBOUR_RADIUS, spacing))
 
 
 def _middle(points: Float) -> float:
@@ -133,20 +133,20 @@ def _rear_of_cells(keys: Int64, values: Float) -> _Cells | None:
     low = keys.min(axis=0)
     shape = keys.max(axis=0) - low + 1
     cell = (keys[:, 0] - low[0]) * shape[1] + keys[:, 1] - low[1]
-    least = float(values.min())
-    level = np.floor((values - least) / BIN).astype(np.int64)
+    lowest = float(values.min())
+    level = np.floor((values - lowest) / BIN).astype(np.int64)
     levels = int(level.max()) + 1
     places, count = np.unique(cell * levels + level, return_counts=True)
     cells, level = places // levels, places % levels
-    most = np.zeros(int(shape.prod()), np.int64)
-    np.maximum.at(most, cells, count)
-    total = np.bincount(cell, minlength=len(most))
-    many = (count >= MANY * most[cells]) & (total[cells] >= LEAST_CELL)
+    largest = np.zeros(int(shape.prod()), np.int64)
+    np.maximum.at(largest, cells, count)
+    total = np.bincount(cell, minlength=len(largest))
+    many = (count >= MANY_SHARE * largest[cells]) & (total[cells] >= MIN_CELL_POINTS)
     if not many.any():
         return None
-    rear = np.full(len(most), -1, np.int64)
+    rear = np.full(len(largest), -1, np.int64)
     np.maximum.at(rear, cells[many], level[many])
-    grid = np.where(rear >= 0, least + (rear + 0.5) * BIN, np.nan)
+    grid = np.where(rear >= 0, lowest + (rear + 0.5) * BIN, np.nan)
     return _Cells(grid.reshape(shape), low)
 
 
@@ -161,16 +161,16 @@ def _smoothed(cells: _Cells) -> _Cells:
     away: Float
     nearest: Int64
     away, nearest = scipy.ndimage.distance_transform_edt(~known, return_indices=True)
-    return _Cells(np.where(away <= FARTHEST_FILL, smooth[tuple(nearest)], np.nan), cells.low)
+    return _Cells(np.where(away <= MAX_FILL_CELLS, smooth[tuple(nearest)], np.nan), cells.low)
 
 
 def _connected(cells: _Cells) -> _Cells:
-    """Return the largest surface of cells connected at no more than STEEPEST: a hull over the bed is not the bed."""
+    """Return the largest surface of cells connected at no more than MAX_BED_SLOPE: a hull over the bed is not the bed."""
     value = cells.value
     number = np.arange(value.size).reshape(value.shape)
     pairs = []
     for one, other in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
-        joined = np.abs(value[one] - value[other]) < STEEPEST * SQUARE
+        joined = np.abs(value[one] - value[other]) < MAX_BED_SLOPE * SQUARE
         pairs.append((number[one][joined], number[other][joined]))
     rows, columns = (np.concatenate(part) for part in zip(*pairs, strict=True))
     links = scipy.sparse.coo_array((np.ones(len(rows)), (rows, columns)), (value.size, value.size))
@@ -186,4 +186,4 @@ def _on_line(cells: _Cells) -> _Cells:
     """Return the cells of a wall, with those far from the others of their strip moved: most points there are on the bed."""
     known = np.isfinite(cells.value).any(axis=1, keepdims=True)
     usual = np.nanmedian(np.where(known, cells.value, 0.0), axis=1, keepdims=True)
-    return _Cells(np.where(np.abs(cells.value - usual) > LARGEST_STEP, usual, cells.value), cells.low)
+    return _Cells(np.where(np.abs(cells.value - usual) > MAX_WALL_STEP, usual, cells.value), cells.low)

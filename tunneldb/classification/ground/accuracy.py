@@ -16,29 +16,29 @@ class Agreement:
     ----------
     ground, missed : int
         True ground points that were found (a0) and missed (b0).
-    taken, other : int
+    false_ground, other : int
         Other points classified as ground (c0) and as other (d0).
     """
 
     ground: int
     missed: int
-    taken: int
+    false_ground: int
     other: int
 
     @classmethod
     def of(cls, truth: ArrayLike, found: ArrayLike) -> Agreement:
         """Compare arrays (n,) that are True for ground points."""
-        true, held = np.asarray(truth, dtype=np.bool_), np.asarray(found, dtype=np.bool_)
-        if true.shape != held.shape:
-            raise ValueError(f"reference of {true.shape} and result of {held.shape} points do not match")
-        both = int(np.count_nonzero(true & held))
-        missed, taken = int(np.count_nonzero(true)) - both, int(np.count_nonzero(held)) - both
-        return cls(both, missed, taken, true.size - both - missed - taken)
+        true, selected = np.asarray(truth, dtype=np.bool_), np.asarray(found, dtype=np.bool_)
+        if true.shape != selected.shape:
+            raise ValueError(f"reference of {true.shape} and result of {selected.shape} points do not match")
+        both = int(np.count_nonzero(true & selected))
+        missed, false_ground = int(np.count_nonzero(true)) - both, int(np.count_nonzero(selected)) - both
+        return cls(both, missed, false_ground, true.size - both - missed - false_ground)
 
     def __add__(self, more: Agreement) -> Agreement:
         """Return the sum of both."""
         return Agreement(
-            self.ground + more.ground, self.missed + more.missed, self.taken + more.taken, self.other + more.other
+            self.ground + more.ground, self.missed + more.missed, self.false_ground + more.false_ground, self.other + more.other
         )  # fmt: skip
 
     @property
@@ -49,12 +49,12 @@ class Agreement:
     @property
     def type_two(self) -> float:
         """Return the share of the other points classified as ground (eq. 10); NaN without any."""
-        return _share(self.taken, self.taken + self.other)
+        return _share(self.false_ground, self.false_ground + self.other)
 
     @property
     def total(self) -> float:
         """Return the share of all points classified wrongly (eq. 11); NaN without any."""
-        return _share(self.missed + self.taken, self._all)
+        return _share(self.missed + self.false_ground, self._all)
 
     @property
     def kappa(self) -> float:
@@ -63,13 +63,14 @@ class Agreement:
             return float("nan")
         agreed = (self.ground + self.other) / self._all
         chance = (
-            (self.ground + self.missed) * (self.ground + self.taken) + (self.taken + self.other) * (self.missed + self.other)
+            (self.ground + self.missed) * (self.ground + self.false_ground)
+            + (self.false_ground + self.other) * (self.missed + self.other)
         ) / self._all**2
         return _share(agreed - chance, 1.0 - chance)
 
     @property
     def _all(self) -> int:
-        return self.ground + self.missed + self.taken + self.other
+        return self.ground + self.missed + self.false_ground + self.other
 
 
 def _share(part: float, whole: float) -> float:

@@ -28,11 +28,11 @@ MARGIN = 32
 """Maximum distance along the line on which a row depends, m: results of overlapping stretches agree."""
 
 _STEP = 4  # of the segments along, m
-_LEAST_VOXELS = 12
-_SPREADS = 3.5  # γ in standard deviations of the ground
-_LEAST_GAMMA = 0.01  # m
+_MIN_VOXELS = 12
+_GAMMA_SPREADS = 3.5  # γ in standard deviations of the ground
+_MIN_GAMMA = 0.01  # m
 _PASSES = 3
-_TOUCHED = 2  # columns at the walls
+_WALL_COLUMNS = 2  # columns at the walls
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def _lower_part(points: Float, line: PlanLine, settings: GroundSettings, spread:
     points = points[kept]
     voxels = Voxels(settings.voxel)
     voxels.add(points)
-    if len(voxels) < _LEAST_VOXELS:
+    if len(voxels) < _MIN_VOXELS:
         return None
     xyz, within = voxels.centroids(), voxels.spread()
     if spread is not None:
@@ -191,9 +191,9 @@ def _refine(lower: _Points, height: Float, settings: GroundSettings) -> tuple[Fl
         height, number, square = refine_heights(
             lower.along, lower.across, lower.z, lower.spread, lower.cells, lower.start, lower.first, height, gamma
         )
-        height = extrapolate_edges(height, _TOUCHED)
+        height = extrapolate_edges(height, _WALL_COLUMNS)
         spread = np.sqrt(square / np.maximum(number, 1.0))
-        gamma = np.where(number > 0, np.clip(_SPREADS * spread, _LEAST_GAMMA, settings.gamma), settings.gamma)
+        gamma = np.where(number > 0, np.clip(_GAMMA_SPREADS * spread, _MIN_GAMMA, settings.gamma), settings.gamma)
     return height, gamma
 
 

@@ -9,17 +9,17 @@ import numpy as np
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.classification.ground.model import COLUMN
 
-_LOWER = 0.4  # share of the height that contains the ground
-_LEAST_LOWER = 1.0  # m
-_OUTERMOST = 0.005  # share of the lowest and highest points that is ignored for the height
+_LOWER_SHARE = 0.4  # share of the height that contains the ground
+_MIN_LOWER = 1.0  # m
+_OUTLIER_SHARE = 0.005  # share of the lowest and highest points that is ignored for the height
 _BIN = 0.05  # of the heights, m
-_MOST_BINS = 100_000
-_WIDEST = 30.0  # m
+_MAX_BINS = 100_000
+_MAX_WIDTH = 30.0  # m
 _ALONG = 1.0  # half of the window of a row's points, m
 _PRIOR = 4.0  # weight of the segments' level, in points
 _STEP = 0.02  # maximum step between columns of a slope, m
 _SLOPE = 4  # columns for the slope at the edge
-_GAP = 20  # maximum columns of hidden floor that are filled
+_MAX_GAP_COLUMNS = 20  # maximum columns of hidden floor that are filled
 
 
 def in_lower_part(along: Float, across: Float, z: Float, step: float) -> Bool:
@@ -32,7 +32,7 @@ def in_lower_part(along: Float, across: Float, z: Float, step: float) -> Bool:
     step : float
         Length of a segment, m.
     """
-    kept = np.abs(across) < _WIDEST
+    kept = np.abs(across) < _MAX_WIDTH
     kept &= np.isfinite(along) & np.isfinite(z)
     if not kept.any():
         return kept
@@ -49,19 +49,19 @@ def _tops_of_lower_parts(segment: Int64, z: Float) -> Float:
     low, high = np.full(len(number), np.inf), np.full(len(number), -np.inf)
     np.minimum.at(low, segment, z)
     np.maximum.at(high, segment, z)
-    held = number > 0
+    selected = number > 0
     # On whole multiples of a bin, so that distant points do not shift them.
-    low = np.floor(np.where(held, low, 0.0) / _BIN) * _BIN
-    bins = np.where(held, np.minimum((np.where(held, high, 0.0) - low) / _BIN, _MOST_BINS).astype(np.int64) + 1, 0)
+    low = np.floor(np.where(selected, low, 0.0) / _BIN) * _BIN
+    bins = np.where(selected, np.minimum((np.where(selected, high, 0.0) - low) / _BIN, _MAX_BINS).astype(np.int64) + 1, 0)
     first = np.concatenate([[0], np.cumsum(bins)])
     level = np.minimum((z - low[segment]) / _BIN, bins[segment] - 1).astype(np.int64)
     below = np.concatenate([[0], np.cumsum(np.bincount(first[segment] + level, minlength=first[-1]))])
-    few = (_OUTERMOST * number).astype(np.int64)
+    few = (_OUTLIER_SHARE * number).astype(np.int64)
     begin, end = first[:-1], first[1:]
     lowest = np.searchsorted(below[1:], below[begin] + few, side="right")
     highest = np.maximum(np.searchsorted(below, below[end] - few, side="left") - 1, lowest)
     bottom = low + (lowest - begin) * _BIN
-    return np.asarray(bottom + np.maximum(_LOWER * (highest + 1 - lowest) * _BIN, _LEAST_LOWER))
+    return np.asarray(bottom + np.maximum(_LOWER_SHARE * (highest + 1 - lowest) * _BIN, _MIN_LOWER))
 
 
 def blend_segments(rows: Float, columns: Float, centres: Float, planes: Float, level: Float, step: float) -> Float:
@@ -97,7 +97,7 @@ def fill_gaps(height: Float) -> Float:
     for row in out:
         known = np.flatnonzero(np.isfinite(row))
         for left, right in pairwise(known.tolist()):
-            if 1 < right - left <= _GAP:
+            if 1 < right - left <= _MAX_GAP_COLUMNS:
                 row[left + 1 : right] = np.interp(np.arange(left + 1, right), [left, right], row[[left, right]])
     return out
 
@@ -190,9 +190,9 @@ def refine_heights(
     number, square = np.zeros(rows + 2), np.zeros(rows + 2)
     for before in (2, 1, 0, -1):  # rows up to 2 m ahead of a metre, and up to 1 m behind it
         i = metre + before + 1
-        held = off < limit[i, column]
-        number += np.bincount(i[held], minlength=rows + 2)
-        square += np.bincount(i[held], left[held], rows + 2)
+        selected = off < limit[i, column]
+        number += np.bincount(i[selected], minlength=rows + 2)
+        square += np.bincount(i[selected], left[selected], rows + 2)
     return out, number[1:-1], square[1:-1]
 
 

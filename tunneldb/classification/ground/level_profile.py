@@ -12,12 +12,12 @@ LOW, HIGH = -0.8, 1.2
 
 _BIN = 0.01  # of heights, m
 _PIECE = 0.5  # along, m; longer if points are sparse
-_FEWEST_PIECES, _MOST_PIECES = 4, 16  # of a segment
-_SEEN = 0.5  # minimum share of the pieces along the segment in which a level is seen
-_LEAST = 3  # minimum pieces, and points, of a level
-_RAISED = 0.04  # m; a stretch this much higher than both its neighbours is no ground
-_NARROW = 0.35  # m; maximum width of such a stretch: a rail, a cable
-_GRADUAL = 0.15  # share of the widest stretch's width over which the surface becomes steeper in a round tunnel
+_MIN_PIECES, _MAX_PIECES = 4, 16  # of a segment
+_MIN_SEEN_SHARE = 0.5  # minimum share of the pieces along the segment in which a level is seen
+_MIN_COUNT = 3  # minimum pieces, and points, of a level
+_RAISED_BY = 0.04  # m; a stretch this much higher than both its neighbours is no ground
+_MAX_RAISED_WIDTH = 0.35  # m; maximum width of such a stretch: a rail, a cable
+_MIN_GRADUAL_SHARE = 0.15  # share of the widest stretch's width over which the surface becomes steeper in a round tunnel
 
 
 def level_profiles(
@@ -70,18 +70,18 @@ def level_profiles(
         seen = np.zeros((columns, bins), np.uint16)
         np.bitwise_or.at(seen.reshape(-1), bin_, np.left_shift(1, piece[kept]).astype(np.uint16))
         there = _bits(np.bitwise_or.reduce(seen, axis=1))
-        full = np.flatnonzero(there >= max(float(_LEAST), _SEEN * shown[g]))
+        full = np.flatnonzero(there >= max(float(_MIN_COUNT), _MIN_SEEN_SHARE * shown[g]))
         out[g, full] = _lowest_levels(number[full], seen[full], there[full], reach)
     return out
 
 
 def _pieces(cells: Int64, columns: int, window: float) -> int:
     """Return the number of pieces of a segment: as many as have two points in a typical column, but at least four."""
-    pieces = min(round(window / _PIECE), _MOST_PIECES)
+    pieces = min(round(window / _PIECE), _MAX_PIECES)
     number = np.diff(cells).reshape(-1, columns).sum(axis=0)
     number = number[number > 0]
     usual = float(np.median(number)) if len(number) else np.inf
-    while pieces > _FEWEST_PIECES and usual < 2.0 * pieces:
+    while pieces > _MIN_PIECES and usual < 2.0 * pieces:
         pieces //= 2
     return pieces
 
@@ -115,7 +115,7 @@ def _lowest_levels(number: Int64, seen: UInt16, there: UInt16, reach: int) -> Fl
     for shift in range(2 * reach + 1):
         within |= seen[:, shift : shift + len(middles)]
     pieces = _bits(within)
-    points[(points < _LEAST) | (pieces < _LEAST) | (pieces < _SEEN * there[:, None])] = 0
+    points[(points < _MIN_COUNT) | (pieces < _MIN_COUNT) | (pieces < _MIN_SEEN_SHARE * there[:, None])] = 0
     out = np.full(count, np.nan)
     found = np.flatnonzero(points.any(axis=1))
     if not len(found):
@@ -164,7 +164,7 @@ def level_ground(level: Float, slope: float) -> Float:
     runs = _stretches(level, slope)
     for k, (low, high) in enumerate(runs):
         outermost = k == 0 or k == len(runs) - 1
-        if outermost or (high - low) * COLUMN > _NARROW or not _raised(level, runs, k):
+        if outermost or (high - low) * COLUMN > _MAX_RAISED_WIDTH or not _raised(level, runs, k):
             kept[low:high] = level[low:high]
     return kept
 
@@ -185,15 +185,15 @@ def is_round(height: Float, slope: float) -> bool:
     if not runs:
         return False
     low, high = max(runs, key=lambda run: run[1] - run[0])
-    enough = _GRADUAL * (high - low)
+    enough = _MIN_GRADUAL_SHARE * (high - low)
     return _gentle(height[high - 1 :], slope) > enough and _gentle(height[: low + 1][::-1], slope) > enough
 
 
 def _raised(level: Float, runs: list[tuple[int, int]], k: int) -> bool:
     """Return True if a stretch is higher than both its neighbours."""
     (low, high), before, after = runs[k], runs[k - 1][1] - 1, runs[k + 1][0]
-    beside = max(level[before], level[after])
-    return bool(np.median(level[low:high]) > beside + _RAISED)
+    neighbours = max(level[before], level[after])
+    return bool(np.median(level[low:high]) > neighbours + _RAISED_BY)
 
 
 def _stretches(level: Float, slope: float) -> list[tuple[int, int]]:

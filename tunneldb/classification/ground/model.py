@@ -127,7 +127,7 @@ def _compare(
         if not (z[n] <= high + gate and z[n] >= low - gate):
             continue
         up = z[n] - mean
-        held = True
+        selected = True
         for side in range(2):
             at = _mix(foot[i, side], foot[after, side], g)
             if np.isnan(at):
@@ -137,5 +137,5 @@ def _compare(
             if side == 1:
                 inside = -inside
             if inside < -gate or abs(inside) < abs(up):
-                held = False
-        ground[n] = held
+                selected = False
+        ground[n] = selected

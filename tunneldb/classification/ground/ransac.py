@@ -11,15 +11,15 @@ from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Float, Int64
 
-_TRIALS, _FEWEST_TRIALS = 1000, 30
+_TRIALS, _MIN_TRIALS = 1000, 30
 _MISS = 1e-3  # accepted probability that no sample is on the plane alone
 _BATCH = 60  # trials measured together
 _SCORED = 2000  # points used to measure a plane
 _CHECKED = 60  # minimum number of points with an estimated normal
-_LEAST = 12  # minimum number of inliers
-_LEAST_NEAR = 5  # minimum number of points for a normal
+_MIN_INLIERS = 12  # minimum number of inliers
+_MIN_NORMAL_POINTS = 5  # minimum number of points for a normal
 _PROFILE = 0.1  # ratio of the second to the first principal variance below which points are on a line
-_LEAST_AREA = 1e-4  # minimum area of the parallelogram of three points in plan, m²
+_MIN_AREA = 1e-4  # minimum area of the parallelogram of three points in plan, m²
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 
@@ -70,13 +70,15 @@ def ransac_planes(
 
     for g, (begin, end) in enumerate(bounds.tolist()):
         group = points[begin:end]
-        if len(group) < _LEAST:
+        if len(group) < _MIN_INLIERS:
             continue
         normals = _Normals(group, radius)
         accept = (lambda plane, near=normals: near.are_upright(plane, distance, slope)) if check else None
         step = max(1, len(group) // _SCORED)
-        plane, most = best_plane(group, int(seed[g]), reach, _TRIALS, least=_LEAST, step=step, miss=_MISS, accept=accept)
-        if most:
+        plane, number = best_plane(
+            group, int(seed[g]), reach, _TRIALS, min_inliers=_MIN_INLIERS, step=step, miss=_MISS, accept=accept
+        )
+        if number:
             for _ in range(2):
                 plane, inliers[g] = _fitted(group, plane, distance)
             out[g] = plane
@@ -85,7 +87,7 @@ def ransac_planes(
 
 def best_plane(
     points: Float, seed: int, reach: Callable[[Float], Float], trials: int, *,
-    least: int, step: int = 1, miss: float = 0.0, accept: Callable[[Float], bool] | None = None,
+    min_inliers: int, step: int = 1, miss: float = 0.0, accept: Callable[[Float], bool] | None = None,
 ) -> tuple[Float, int]:  # fmt: skip
     """Find the plane w = c0 + c1 u + c2 v through three random points that has the most inliers.
 
@@ -99,7 +101,7 @@ def best_plane(
         Returns the maximum distance in w of an inlier for some planes (t, 3); 0 or NaN for an unacceptable plane.
     trials : int
         Maximum number of planes tried.
-    least : int
+    min_inliers : int
         Minimum number of inliers.
     step : int
         Inliers are counted among every ``step``-th point.
@@ -116,7 +118,7 @@ def best_plane(
         Number of its inliers; 0 if there is no plane.
     """
     u, v, w = np.ascontiguousarray(points[::step].T)
-    best, most, done = np.full(3, np.nan), least - 1, 0
+    best, best_count, done = np.full(3, np.nan), min_inliers - 1, 0
     while done < trials:
         planes = _sampled(points, seed, done, min(_BATCH, trials - done))
         counts = np.zeros(len(planes), np.int64)
@@ -127,19 +129,19 @@ def best_plane(
         away -= c1 * u
         away -= c2 * v
         counts[possible] = np.count_nonzero(np.abs(away, out=away) < limit[possible, None], axis=1)
-        for trial in np.flatnonzero(counts > most).tolist():
+        for trial in np.flatnonzero(counts > best_count).tolist():
             if done + trial >= trials:
                 break
             number = int(counts[trial])
-            if number <= most or (accept is not None and not accept(planes[trial])):
+            if number <= best_count or (accept is not None and not accept(planes[trial])):
                 continue
-            best, most = planes[trial], number
+            best, best_count = planes[trial], number
             if miss > 0.0:
                 share = min(number * step / len(points), 0.999)
                 needed = int(math.log(miss) / math.log(1.0 - share**3 + 1e-12)) + 1
-                trials = min(trials, max(_FEWEST_TRIALS, needed))
+                trials = min(trials, max(_MIN_TRIALS, needed))
         done += len(planes)
-    return best, most if most >= least else 0
+    return best, best_count if best_count >= min_inliers else 0
 
 
 def _sampled(points: Float, seed: int, first: int, count: int) -> Float:
@@ -148,7 +150,7 @@ def _sampled(points: Float, seed: int, first: int, count: int) -> Float:
     p, q, r = points[index[:, 0]], points[index[:, 1]], points[index[:, 2]]
     (u1, v1, w1), (u2, v2, w2) = (q - p).T, (r - p).T
     area = u1 * v2 - u2 * v1
-    area[np.abs(area) < _LEAST_AREA] = np.nan
+    area[np.abs(area) < _MIN_AREA] = np.nan
     c1 = (w1 * v2 - w2 * v1) / area
     c2 = (u1 * w2 - u2 * w1) / area
     return np.column_stack([p[:, 2] - c1 * p[:, 0] - c2 * p[:, 1], c1, c2])
@@ -206,7 +208,7 @@ class _Normals:
         with np.errstate(divide="ignore"):
             tilt = np.sqrt(np.maximum(1.0 - up * up, 0.0)) / up
         # Nearly collinear points are one profile.
-        vague = (number < _LEAST_NEAR) | (values[:, 1] < _PROFILE * values[:, 2]) | (up <= 1e-9)
+        vague = (number < _MIN_NORMAL_POINTS) | (values[:, 1] < _PROFILE * values[:, 2]) | (up <= 1e-9)
         return np.where(vague, np.inf, tilt)
 
 
@@ -218,7 +220,7 @@ def _off(points: Float, plane: Float) -> Float:
 def _fitted(points: Float, plane: Float, distance: float) -> tuple[Float, int]:
     """Fit a plane to the inliers of another by least squares, and count these."""
     inliers = points[_off(points, plane) < distance]
-    if len(inliers) < _LEAST:
+    if len(inliers) < _MIN_INLIERS:
         return plane, len(inliers)
     design = np.column_stack([np.ones(len(inliers)), inliers[:, :2]])
     # Not by BLAS, whose sums depend on the number of threads.

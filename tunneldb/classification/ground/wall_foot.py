@@ -9,16 +9,16 @@ from tunneldb.arrays import Float, Int64
 from tunneldb.classification.ground.model import COLUMN
 from tunneldb.classification.ground.ransac import best_plane
 
-_HIGH = 0.6  # maximum height of points of the wall, m
+_MAX_HEIGHT = 0.6  # maximum height of points of the wall, m
 _INWARD, _OUTWARD = 0.35, 0.9  # and their distance from the ground's edge, m
 _ALONG = 2  # and their distance before and behind a row, m
-_WITHIN = 0.02  # of the wall's plane, m
+_PLANE_TOLERANCE = 0.02  # of the wall's plane, m
 _TRIALS = 60
-_LEAST = 15
-_SLANT_ALONG, _SLANT_UP = 0.15, 3.0  # maximum slope of a wall, to the right for each metre along and up
+_MIN_POINTS = 15
+_MAX_SLOPE_ALONG, _MAX_SLOPE_UP = 0.15, 3.0  # maximum slope of a wall, to the right for each metre along and up
 _FITS = 5  # with Tukey's weights
 _NEIGHBOURS = 9  # rows whose median a foot must be near
-_APART = 0.05  # m
+_FOOT_TOLERANCE = 0.05  # m
 
 
 def fit_walls(
@@ -55,18 +55,18 @@ def fit_walls(
             left, right = (edge - outward, edge + inward) if side == 0 else (edge - inward, edge + outward)
             begin, end = cells[near * columns + max(left, 0)], cells[near * columns + min(right + 1, columns)]
             count = end - begin
-            if count.sum() < _LEAST:
+            if count.sum() < _MIN_POINTS:
                 continue
             at = np.repeat(begin - (np.cumsum(count) - count), count) + np.arange(count.sum())
             metre = np.repeat(near, count)
             share = along[at] - start - metre
             up = z[at] - (height[metre, edge] * (1.0 - share) + height[metre + 1, edge] * share)
-            kept = (up > low[i]) & (up < _HIGH)
-            if np.count_nonzero(kept) < _LEAST:
+            kept = (up > low[i]) & (up < _MAX_HEIGHT)
+            if np.count_nonzero(kept) < _MIN_POINTS:
                 continue
             near_wall = np.column_stack([along[at] - start - i, up, across[at]])[kept]
             draw = seed + 2 * (i + start + 1_000_000) + side
-            plane, number = best_plane(near_wall, draw, _reach, _TRIALS, least=_LEAST)
+            plane, number = best_plane(near_wall, draw, _reach, _TRIALS, min_inliers=_MIN_POINTS)
             if number:
                 walls.append(2 * i + side)
                 planes.append(plane)
@@ -93,8 +93,8 @@ def _fitted(points: list[Float], planes: Float) -> Float:
     along, up, across = np.concatenate(points).T
     terms = [np.ones(len(up)), along, up, up**2, across]
     surface = np.column_stack([planes, np.zeros(count)])
-    reach = (1.5 * _WITHIN * np.sqrt(1.0 + planes[:, 2] ** 2))[wall]
-    held = np.diag([1e-9, 1e-9, 1e-9, 0.01 + 1e-9])  # no curvature unless the points show one
+    reach = (1.5 * _PLANE_TOLERANCE * np.sqrt(1.0 + planes[:, 2] ** 2))[wall]
+    selected = np.diag([1e-9, 1e-9, 1e-9, 0.01 + 1e-9])  # no curvature unless the points show one
     for _ in range(_FITS):
         e = across - sum(c[wall] * term for c, term in zip(surface.T, terms[:4], strict=True))
         weight = np.maximum(1.0 - (e / reach) ** 2, 0.0) ** 2
@@ -104,14 +104,14 @@ def _fitted(points: list[Float], planes: Float) -> Float:
                 normal[:, i, j] = np.bincount(wall, weight * terms[i] * terms[j], count)
                 if j < 4:
                     normal[:, j, i] = normal[:, i, j]
-        surface = np.linalg.solve(normal[:, :, :4] + held, normal[:, :, 4:])[:, :, 0]
+        surface = np.linalg.solve(normal[:, :, :4] + selected, normal[:, :, 4:])[:, :, 0]
     return np.asarray(surface, dtype=np.float64)
 
 
 def _reach(planes: Float) -> Float:
     """Return the maximum distance across of an inlier from each wall (t, 3), m; 0 for a wall too oblique or leaning."""
-    possible = (np.abs(planes[:, 1]) <= _SLANT_ALONG) & (np.abs(planes[:, 2]) <= _SLANT_UP)
-    return np.where(possible, _WITHIN * np.sqrt(1.0 + planes[:, 2] ** 2), 0.0)
+    possible = (np.abs(planes[:, 1]) <= _MAX_SLOPE_ALONG) & (np.abs(planes[:, 2]) <= _MAX_SLOPE_UP)
+    return np.where(possible, _PLANE_TOLERANCE * np.sqrt(1.0 + planes[:, 2] ** 2), 0.0)
 
 
 def replace_outliers(foot: Float, lean: Float) -> tuple[Float, Float]:
@@ -123,7 +123,7 @@ def replace_outliers(foot: Float, lean: Float) -> tuple[Float, Float]:
     for side in range(2):
         median = _running_median(foot[:, side])
         with np.errstate(invalid="ignore"):
-            outlier = ~(np.abs(foot[:, side] - median) < _APART)
+            outlier = ~(np.abs(foot[:, side] - median) < _FOOT_TOLERANCE)
         leaning = _running_median(np.where(outlier, np.nan, lean[:, side]))
         foot[outlier, side] = median[outlier]
         lean[:, side] = leaning

@@ -15,10 +15,10 @@ from tunneldb.pointcloud.voxels import key_slot, value_table
 CELL = 0.1
 """Edge of a cell, m."""
 
-PIECE = 10.0
+MAX_CLUSTER_LENGTH = 10.0
 """Maximum length of clusters along the tunnel, m; longer ones are split at whole multiples, which divide a kilometre."""
 
-NEAR = 2
+MAX_CELL_DISTANCE = 2
 """Distance, in cells, within which a point belongs to a cell: points of survey density leave cells of a surface empty."""
 
 _SQUARE = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
@@ -63,10 +63,10 @@ class Cluster:
 
 
 def pieces(klass: int, xyz: Float, along: Float, height: Float) -> list[Cluster]:
-    """Make a cluster, or the pieces of one longer than ``PIECE``; arguments as for :meth:`Cluster.of`."""
-    if along.max() - along.min() <= PIECE:
+    """Make a cluster, or the pieces of one longer than ``MAX_CLUSTER_LENGTH``; arguments as for :meth:`Cluster.of`."""
+    if along.max() - along.min() <= MAX_CLUSTER_LENGTH:
         return [Cluster.of(klass, xyz, along, height)]
-    piece = np.floor(along / PIECE)
+    piece = np.floor(along / MAX_CLUSTER_LENGTH)
     return [Cluster.of(klass, xyz[m], along[m], height[m]) for m in (piece == p for p in np.unique(piece))]
 
 
@@ -119,7 +119,7 @@ class Lookup:
 
     @classmethod
     def of(cls, clusters: list[Cluster]) -> Lookup:
-        """Fill the table with the cells of clusters and those within ``NEAR`` of them, each with the nearest's class.
+        """Fill the table with the cells of clusters and those within ``MAX_CELL_DISTANCE``, each with the nearest class.
 
         Of two classes equally near the lower one is used, so the order of the clusters does not matter.
         """
@@ -130,7 +130,7 @@ class Lookup:
         )
         if len(cells) == 0:
             return cls(np.zeros(3, np.int64), np.full(3, -1, np.int64), *value_table(np.empty(0, np.int64), klass))
-        first, last = cells.min(axis=0) - NEAR, cells.max(axis=0) + NEAR
+        first, last = cells.min(axis=0) - MAX_CELL_DISTANCE, cells.max(axis=0) + MAX_CELL_DISTANCE
         _, wide, tall = last - first + 1
         place = cells - first
         keys, lowest = np.unique((place[:, 0] * wide + place[:, 1]) * tall + place[:, 2], return_index=True)
@@ -145,11 +145,11 @@ class Lookup:
 
 
 def _shells() -> list[Int64]:
-    """Return steps (k, 3) to the cells within ``NEAR``, grouped by length, the shortest first."""
-    side = np.arange(-NEAR, NEAR + 1)
+    """Return steps (k, 3) to the cells within ``MAX_CELL_DISTANCE``, grouped by length, the shortest first."""
+    side = np.arange(-MAX_CELL_DISTANCE, MAX_CELL_DISTANCE + 1)
     steps = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
     length = (steps**2).sum(axis=1)
-    return [steps[length == square] for square in range(1, NEAR**2 + 1)]
+    return [steps[length == square] for square in range(1, MAX_CELL_DISTANCE**2 + 1)]
 
 
 @inner

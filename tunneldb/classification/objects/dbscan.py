@@ -14,8 +14,8 @@ from tunneldb.compiled import inner, kernel, lower_bound
 from tunneldb.threads import in_blocks
 
 _EDGE = 0.577  # of the radius: a little less than 1/√3, the edge of a cube whose diagonal is the radius
-_NEAR = 2  # cells to each side that can hold a neighbour
-_RUNS = (2 * _NEAR + 1) ** 2  # runs of cells about a cell
+_NEIGHBOUR_CELLS = 2  # cells to each side that can hold a neighbour
+_RUNS = (2 * _NEIGHBOUR_CELLS + 1) ** 2  # runs of cells about a cell
 _BLOCK = 4096  # cells at a time
 
 
@@ -84,8 +84,8 @@ def _keys(points: Float, low: Float, edge: float) -> tuple[Int64, int, int]:
     keys = np.zeros(len(points), np.int64)
     steps = []
     for axis in (2, 1, 0):
-        place = ((points[:, axis] - low[axis]) / edge).astype(np.int64) + _NEAR
-        steps.append(int(place.max()) + 1 + _NEAR)
+        place = ((points[:, axis] - low[axis]) / edge).astype(np.int64) + _NEIGHBOUR_CELLS
+        steps.append(int(place.max()) + 1 + _NEIGHBOUR_CELLS)
         keys = keys * steps[-1] + place
     return keys, steps[2], steps[2] * steps[1]
 
@@ -110,12 +110,12 @@ def _in_order(labels: Int64, count: int) -> Int64:
 def _neighbours(cells: Int64, row: int, layer: int, c: int, runs: Int64) -> int:  # pragma: no cover - compiled
     """Write the first and last + 1 of the runs of filled cells around a cell, itself included, and return their number."""
     count, first = 0, np.int64(0)  # no literal, to avoid a second compilation of the called function
-    for dz in range(-_NEAR, _NEAR + 1):
-        for dy in range(-_NEAR, _NEAR + 1):
+    for dz in range(-_NEIGHBOUR_CELLS, _NEIGHBOUR_CELLS + 1):
+        for dy in range(-_NEIGHBOUR_CELLS, _NEIGHBOUR_CELLS + 1):
             key = cells[c] + dz * layer + dy * row
-            first = lower_bound(cells, key - _NEAR, first, cells.shape[0])
+            first = lower_bound(cells, key - _NEIGHBOUR_CELLS, first, cells.shape[0])
             last = first
-            while last < cells.shape[0] and cells[last] <= key + _NEAR:
+            while last < cells.shape[0] and cells[last] <= key + _NEIGHBOUR_CELLS:
                 last += 1
             if last > first:
                 runs[count, 0], runs[count, 1] = first, last

@@ -25,14 +25,14 @@ RAIL_WIDTH = 0.35
 RAIL_LENGTH = 5.0
 """Minimum length of bars, m."""
 
-FLAT = 0.35
+MAX_FIXTURE_DEPTH = 0.35
 """Maximum distance of fixtures from the wall, m; clusters that reach farther and stand on the ground are objects."""
 
-RECESS = 0.3
+MIN_RECESS_SIZE = 0.3
 """Minimum size of a recess behind the lining in two directions, m: less is the lining's own roughness."""
 
 _COLUMN = 0.1
-_FILLED = 0.7  # minimum share of the metres of a bar that have points of it
+_MIN_FILLED_SHARE = 0.7  # minimum share of the metres of a bar that have points of it
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ def bars(along: Float, across: Float, height: Float) -> Bool:
     share = ndimage.uniform_filter1d(wide.astype(np.float64), metres, axis=0, mode="constant")
     reach = ndimage.uniform_filter1d(np.ones(shape), metres, axis=0, mode="constant")
     # A bar shows in its column and in those beside it; the run of such columns is at most three wider than the bar.
-    steady = share / reach >= _FILLED
+    steady = share / reach >= _MIN_FILLED_SHARE
     runs = ndimage.label(steady, structure=[[0, 0, 0], [1, 1, 1], [0, 0, 0]])[0]
     widths = np.bincount(runs.ravel())
     widths[0] = 0
@@ -199,9 +199,9 @@ def _groups(residual: ResidualPoints, spacing: Spacing, settings: ClusterSetting
 
 
 def _is_wide(group: ResidualPoints) -> bool:
-    """Return True if a cluster is larger than ``RECESS`` in two directions."""
+    """Return True if a cluster is larger than ``MIN_RECESS_SIZE`` in two directions."""
     extent = np.ptp(np.column_stack([group.along, group.across, group.xyz[:, 2]]), axis=0)
-    return int((extent >= RECESS).sum()) >= 2
+    return int((extent >= MIN_RECESS_SIZE).sum()) >= 2
 
 
 def _sorted(group: ResidualPoints, radius: float, spacing: Spacing, settings: ClusterSettings, known: bool) -> list[Cluster]:
@@ -213,7 +213,7 @@ def _sorted(group: ResidualPoints, radius: float, spacing: Spacing, settings: Cl
         return group.clusters(PointClass.OBJECT if free else PointClass.APPENDAGE, known)
     if not on_wall:
         return group.clusters(PointClass.OBJECT, known)
-    if (depth <= FLAT).mean() >= 0.95:
+    if (depth <= MAX_FIXTURE_DEPTH).mean() >= 0.95:
         return group.clusters(PointClass.APPENDAGE, known)
     off = depth > radius
     parted = group[off]

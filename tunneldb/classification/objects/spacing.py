@@ -47,10 +47,10 @@ class Spacing:
             chosen, k=min(_NEIGHBOURS, len(places))
         )
         step = np.abs(places[near] - chosen[:, None, :])
-        beside = np.linalg.norm(step[..., 1:], axis=-1)
-        length = np.hypot(step[..., 0], beside)
+        crosswise = np.linalg.norm(step[..., 1:], axis=-1)
+        length = np.hypot(step[..., 0], crosswise)
         length[length == 0.0] = np.inf
-        ahead = step[..., 0] > beside
+        ahead = step[..., 0] > crosswise
         found = [np.where(mask, length, np.inf).min(axis=1) for mask in (ahead, ~ahead)]
         medians = [float(np.median(f[np.isfinite(f)])) if np.isfinite(f).any() else np.inf for f in found]
         shortest = min(medians)

@@ -16,10 +16,10 @@ from tunneldb.compiled import kernel
 from tunneldb.geometry.normals import least_eigenvalues
 from tunneldb.pointcloud.voxels import CellCounts
 
-FLAT = 0.08
+MIN_SCATTER = 0.08
 """Minimum scatter of a window's points about their best plane, in radii: a fifth of a sphere scatters by 0.11."""
 
-MOST = 1 << 16  # maximum points of a cell that are summed: more add nothing and lose single precision
+MAX_CELL_POINTS = 1 << 16  # maximum points of a cell that are summed: more add nothing and lose single precision
 _BLOCK = 1 << 13  # windows at a time
 _CORNERS = list(np.ndindex(2, 2, 2))  # cells of a window
 
@@ -60,7 +60,7 @@ class CurvedCells:
         order = np.lexsort((place[:, 2], place[:, 1], place[:, 0]))
         low = place.min(axis=0) if len(place) else np.zeros(3, np.int64)
         self._kept = np.zeros(len(counts), np.bool_)
-        self._kept[order] = _curved(place[order] - low, sums[order], self.points, (FLAT / 2.0) ** 2)
+        self._kept[order] = _curved(place[order] - low, sums[order], self.points, (MIN_SCATTER / 2.0) ** 2)
 
     def holds(self, xyz: Float) -> Bool:
         """Return True for points (n, 3) in cells to keep, (n,)."""
@@ -132,7 +132,7 @@ def _add(xyz: Float, numbers: Int32, edge: float, sums: Single) -> None:  # prag
     """Add points to the sums of their cells."""
     for i in range(numbers.shape[0]):
         k = numbers[i]
-        if sums[k, 9] >= MOST:
+        if sums[k, 9] >= MAX_CELL_POINTS:
             continue
         x, y, z = xyz[i, 0] / edge, xyz[i, 1] / edge, xyz[i, 2] / edge
         x, y, z = x - math.floor(x) - 0.5, y - math.floor(y) - 0.5, z - math.floor(z) - 0.5

@@ -16,24 +16,24 @@ from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.classification.targets.fit import SphereFit, cells_of, coverage, fit_sphere
-from tunneldb.classification.targets.hough import NEAR, REACH, PointGrid, hough_candidates
+from tunneldb.classification.targets.hough import NEIGHBOURHOOD, REACH, PointGrid, hough_candidates
 from tunneldb.classification.targets.refinement import refine_spheres
 
-LEAST_POINTS = 30
+MIN_POINTS = 30
 """Minimum number of points on a sphere; with fewer, its centre has an error of 1 or 2 mm at best and its radius is unknown."""
 
 FIRM_POINTS = 50
 """Number of points from which a sphere is accepted alone; with fewer it must be seen better by another scan. With so few
 points, the top of a bollard, a shoulder or a heap of ballast is sometimes as round as a sphere."""
 
-LEAST_COVERAGE = 0.15
+MIN_COVERAGE = 0.15
 """Minimum share of a sphere's surface that is seen."""
 
 # Minimum share of points on the sphere, among those near it in the directions in which it is seen: a sphere is empty inside
 # and mostly free outside.
-SHARE = 0.8
+MIN_SHARE_ON_SPHERE = 0.8
 
-ROUGH = 0.8  # factor on the limits of the final fit that the quick fit must reach
+QUICK_FIT_FACTOR = 0.8  # factor on the limits of the final fit that the quick fit must reach
 
 NEIGHBOURS = 4  # of a point, whose residuals are compared with its own
 
@@ -117,12 +117,12 @@ def find_spheres(
     centres, noise = hough_candidates(points, observers, radius)
     there = refine_spheres(points, centres, radius)
     near_radius = np.abs(there.radius - radius) <= tolerance + 3.0 * there.radius_sigma
-    other_ball = (there.radius_sigma <= tolerance / 4.0) & (there.seen >= 1.5 * LEAST_COVERAGE)  # for the report
+    other_ball = (there.radius_sigma <= tolerance / 4.0) & (there.seen >= 1.5 * MIN_COVERAGE)  # for the report
     likely = np.flatnonzero(
-        (there.on >= LEAST_POINTS)
-        & (there.share >= ROUGH * SHARE)
-        & (there.seen >= ROUGH * LEAST_COVERAGE)
-        & (there.radius_sigma <= tolerance / 2.0 / ROUGH)
+        (there.on >= MIN_POINTS)
+        & (there.share >= QUICK_FIT_FACTOR * MIN_SHARE_ON_SPHERE)
+        & (there.seen >= QUICK_FIT_FACTOR * MIN_COVERAGE)
+        & (there.radius_sigma <= tolerance / 2.0 / QUICK_FIT_FACTOR)
         & (near_radius | other_ball)
     )
     spheres: list[Sphere] = []
@@ -150,18 +150,18 @@ def _fit_candidate(
 ) -> Sphere | Refusal | None:
     """Fit a sphere to the points around a candidate; None if they are not round at all."""
     fit = fit_sphere(points, observers, start, radius, 3.0 * tolerance)
-    if fit is None or fit.on.sum() < LEAST_POINTS or fit.radius_sigma > tolerance / 2.0:
+    if fit is None or fit.on.sum() < MIN_POINTS or fit.radius_sigma > tolerance / 2.0:
         return None  # on a plane or a small cap, a sphere cannot be confirmed within the tolerance
-    count, most = int(fit.used.sum()), _greatest_rms(fit, tolerance, noise)
+    count, max_rms = int(fit.used.sum()), _greatest_rms(fit, tolerance, noise)
     towards = _scanner_direction(points[fit.on], observers[fit.on], fit.centre)
     seen = coverage(points[fit.on], fit.centre, towards)
-    if seen < LEAST_COVERAGE or _share_on(points, fit, towards, radius, tolerance) < SHARE:
+    if seen < MIN_COVERAGE or _share_on(points, fit, towards, radius, tolerance) < MIN_SHARE_ON_SPHERE:
         return None
     if abs(fit.radius - radius) > math.hypot(tolerance, 2.0 * fit.radius_sigma):
         return _other_ball(points, observers, fit, radius, tolerance, noise)
     if _is_cylinder(points, fit, radius, tolerance):
         return Refusal(fit.centre, count, "cylinder, or end of a cylinder")
-    if fit.rms > most:
+    if fit.rms > max_rms:
         return None
     if _deformation(points[fit.used], fit, radius) > tolerance / 3.0:
         return Refusal(fit.centre, count, "round, but not a sphere")
@@ -182,7 +182,7 @@ def _other_ball(
     if not radius / 2.0 < fit.radius < 2.0 * radius:
         return None
     other = fit_sphere(points, observers, fit.free_centre, fit.radius, 3.0 * tolerance)
-    if other is None or other.on.sum() < LEAST_POINTS or other.rms > _greatest_rms(other, tolerance, noise):
+    if other is None or other.on.sum() < MIN_POINTS or other.rms > _greatest_rms(other, tolerance, noise):
         return None
     if abs(other.radius - radius) <= math.hypot(tolerance, 2.0 * other.radius_sigma):
         return None
@@ -203,11 +203,11 @@ def _share_on(points: Float, fit: SphereFit, towards: Float, radius: float, tole
     """Return the share of points on the sphere among those in and near it, in the directions in which it is seen."""
     far = np.linalg.norm(points - fit.centre, axis=1)
     on = np.abs(far - radius) <= 1.5 * tolerance
-    near = far <= NEAR * radius
+    near = far <= NEIGHBOURHOOD * radius
     if not on.any():
         return 0.0
-    held = np.unique(cells_of(points[on] - fit.centre, towards))
-    return float(on.sum()) / float(np.isin(cells_of(points[near] - fit.centre, towards), held).sum())
+    selected = np.unique(cells_of(points[on] - fit.centre, towards))
+    return float(on.sum()) / float(np.isin(cells_of(points[near] - fit.centre, towards), selected).sum())
 
 
 def _is_cylinder(points: Float, fit: SphereFit, radius: float, tolerance: float) -> bool:

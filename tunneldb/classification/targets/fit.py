@@ -16,22 +16,22 @@ from scipy.optimize import least_squares
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.robust import MAD_TO_SIGMA
 
-GRAZING = 0.25
+GRAZING_COSINE = 0.25
 """Cosine of incidence (75.5°) below which a point is not used if the scanner position is known: at the limb of a sphere
 a beam measures a range between that of the sphere and that of the background."""
 
-BEHIND = -0.1
+HIDDEN_COSINE = -0.1
 """Cosine of incidence below which a point cannot be on the sphere: the sphere itself would hide it."""
 
-SLANT = 0.6
+MIN_WEIGHT_COSINE = 0.6
 """Lower limit of the cosine of incidence in weights. The distance of a point from the sphere scatters by range noise × the
 cosine of incidence, so oblique points have more weight; beyond this limit the sphere's curvature over the noise makes that
 untrue."""
 
 BAND = 3.0  # standard deviations from the sphere within which points are on it
-LEAST_SPREAD = 0.0005  # m; rounding of files
+MIN_SPREAD = 0.0005  # m; rounding of files
 
-SOFT = 1.5  # standard deviations beyond which the influence of a residual grows less than in proportion
+SOFT_LIMIT = 1.5  # standard deviations beyond which the influence of a residual grows less than in proportion
 STEPS = 25
 
 BANDS, SECTORS = 8, 6
@@ -108,13 +108,13 @@ def fit_sphere(points: Float, observers: Float, start: Float, radius: float, wid
     for _ in range(STEPS):
         before = centre
         distance, cosine = _seen(points, observers, centre, radius)
-        near = (np.abs(distance) <= widest) & ~(cosine < GRAZING)
+        near = (np.abs(distance) <= widest) & ~(cosine < GRAZING_COSINE)
         # From all nearby points, not only those within the band: these would decrease with each iteration.
-        spread = max(MAD_TO_SIGMA * float(np.median(np.abs(distance[near]))), LEAST_SPREAD) if near.any() else widest
+        spread = max(MAD_TO_SIGMA * float(np.median(np.abs(distance[near]))), MIN_SPREAD) if near.any() else widest
         used = near & (np.abs(distance) <= band)
         if used.sum() < 6:
             return None
-        scale = spread * np.clip(cosine[used], SLANT, 1.0)
+        scale = spread * np.clip(cosine[used], MIN_WEIGHT_COSINE, 1.0)
         scale[np.isnan(scale)] = spread
         centre = _step(points[used], scale, centre, radius)
         if not np.linalg.norm(centre - start) < radius:
@@ -125,7 +125,7 @@ def fit_sphere(points: Float, observers: Float, start: Float, radius: float, wid
         band = narrower
     centre, covariance = _solve(points[used], scale, centre, radius, free=False)
     distance, cosine = _seen(points, observers, centre, radius)
-    on = (np.abs(distance) <= band) & ~(cosine < BEHIND)
+    on = (np.abs(distance) <= band) & ~(cosine < HIDDEN_COSINE)
     solution, wider = _solve(points[used], scale, np.append(centre, radius), radius, free=True)
     radius_sigma = math.sqrt(wider[3, 3]) if wider[3, 3] > 0.0 else math.inf  # a plane has no radius
     expected = _rms(np.nan_to_num(cosine[used], nan=1.0))
@@ -154,7 +154,7 @@ def _step(points: Float, scale: Float, centre: Float, radius: float) -> Float:
     out = points - centre
     far = np.linalg.norm(out, axis=1)
     residual = (far - radius) / scale
-    weight = 1.0 / np.sqrt(1.0 + (residual / SOFT) ** 2)
+    weight = 1.0 / np.sqrt(1.0 + (residual / SOFT_LIMIT) ** 2)
     slope = out / (far * scale)[:, None]
     stepped: Float = centre + np.linalg.lstsq((slope.T * weight) @ slope, (slope.T * weight) @ residual, rcond=1e-9)[0]
     return stepped
@@ -179,11 +179,11 @@ def _solve(points: Float, scale: Float, start: Float, radius: float, free: bool)
         slope = -out / (far * scale)[:, None]
         return np.column_stack([slope, -1.0 / scale]) if free else slope
 
-    result = least_squares(residuals, begin, slopes, method="trf", loss="soft_l1", f_scale=SOFT, xtol=1e-10)
+    result = least_squares(residuals, begin, slopes, method="trf", loss="soft_l1", f_scale=SOFT_LIMIT, xtol=1e-10)
     # Variance of robust estimates (Huber, 1981, section 7.6): influence of each residual, and its derivative.
     r = residuals(result.x)
     jacobian = slopes(result.x)
-    bend = 1.0 + (r / SOFT) ** 2
+    bend = 1.0 + (r / SOFT_LIMIT) ** 2
     influence, rate = r / np.sqrt(bend), bend**-1.5
     inverse = np.linalg.pinv(jacobian.T @ (jacobian * rate[:, None]))
     freedom = max(len(r) - len(begin), 1)

@@ -19,15 +19,15 @@ from tunneldb.threads import in_blocks
 # In radii of the spheres:
 REACH = 0.6  # radius of the neighbourhood for a normal
 VOTE = 1.0 / 6.0  # edge of the cells of votes
-NEAR = 1.35  # radius around a centre of the points that decide about the sphere
+NEIGHBOURHOOD = 1.35  # radius around a centre of the points that decide about the sphere
 
 VOTERS = 8  # voting points in each cell of REACH: as many as a sphere of 60 points needs; more are redundant
 NEIGHBOURS = 128  # approximate number of points examined around one
-LEAST_NEIGHBOURS = 6
-GRAZING = 0.25  # cosine of incidence below which a neighbourhood is not used for the noise
-VOTES = 12  # minimum votes of a candidate; a fifth of a sphere of 60 points has as many
+MIN_NEIGHBOURS = 6
+GRAZING_COSINE = 0.25  # cosine of incidence below which a neighbourhood is not used for the noise
+MIN_VOTES = 12  # minimum votes of a candidate; a fifth of a sphere of 60 points has as many
 _BLOCK = 1024  # cells at a time
-SHARE = 0.25  # minimum share of the voters near a candidate that voted for it; on a plane it is 0.14
+MIN_VOTER_SHARE = 0.25  # minimum share of the voters near a candidate that voted for it; on a plane it is 0.14
 
 
 class PointGrid:
@@ -128,11 +128,11 @@ def hough_candidates(points: PointGrid, observers: Float, radius: float) -> tupl
     scatter = scatter[np.isfinite(scatter)]
     noise = float(np.quantile(scatter, 0.25)) if len(scatter) else math.inf
     votes, places = votes[np.isfinite(votes[:, 0])], points.xyz[voters]
-    if len(votes) < VOTES:
+    if len(votes) < MIN_VOTES:
         return np.zeros((0, 3)), math.inf
     centres, counts = _peaks(PointGrid(votes, VOTE * radius))
     _, near = PointGrid(places, radius).around(centres, (1.0 + 2.0 * VOTE) * radius)
-    good = counts >= SHARE * np.bincount(near, minlength=len(centres))
+    good = counts >= MIN_VOTER_SHARE * np.bincount(near, minlength=len(centres))
     centres, counts = centres[good], counts[good]
     order = np.lexsort((*centres.T, -counts))
     return centres[order] + points.low, noise
@@ -166,7 +166,7 @@ def _peaks(votes: PointGrid) -> tuple[Float, Int64]:
     begin = np.stack([np.searchsorted(keys, keys + column - 1) for column in columns], axis=1)
     end = np.stack([np.searchsorted(keys, keys + column + 1, side="right") for column in columns], axis=1)
     total = (bounds[end] - bounds[begin]).sum(axis=1)
-    chosen = np.flatnonzero(total >= VOTES)
+    chosen = np.flatnonzero(total >= MIN_VOTES)
     neighbours, run = ranges(begin[chosen].ravel(), end[chosen].ravel())
     own = chosen[run // len(columns)]
     # The first of equal ones.
@@ -194,9 +194,9 @@ def _vote(
             columns[column, 1] = at
             there += at - columns[column, 0]
         stride = max(1, there // NEIGHBOURS)
-        held, asked = bounds[c + 1] - bounds[c], first[c + 1] - first[c]
+        selected, asked = bounds[c + 1] - bounds[c], first[c + 1] - first[c]
         for v in range(asked):
-            i = bounds[c] + v * held // asked
+            i = bounds[c] + v * selected // asked
             voters[first[c] + v] = i
             x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
             n = 0
@@ -210,7 +210,7 @@ def _vote(
                     sx, sy, sz = sx + dx, sy + dy, sz + dz
                     xx, yy, zz = xx + dx * dx, yy + dy * dy, zz + dz * dz
                     xy, xz, yz = xy + dx * dy, xz + dx * dz, yz + dy * dz
-            if n < LEAST_NEIGHBOURS:
+            if n < MIN_NEIGHBOURS:
                 continue
             sx, sy, sz = sx / n, sy / n, sz / n
             xx, yy, zz = xx / n - sx * sx, yy / n - sy * sy, zz / n - sz * sz
@@ -225,7 +225,7 @@ def _vote(
             ox, oy, oz = observers[i, 0] - x, observers[i, 1] - y, observers[i, 2] - z
             side = nx * ox + ny * oy + nz * oz
             cosine = 1.0 if math.isnan(side) else abs(side) / math.sqrt(ox * ox + oy * oy + oz * oz)
-            if n > 3 and cosine > GRAZING:
+            if n > 3 and cosine > GRAZING_COSINE:
                 scatter[first[c] + v] = math.sqrt(max(least, 0.0) * n / (n - 3)) / cosine
             at = 2 * (first[c] + v)
             if not side > 0.0:

@@ -8,12 +8,12 @@ import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.classification.targets.fit import BANDS, SECTORS, cells_of
-from tunneldb.classification.targets.hough import NEAR, PointGrid
+from tunneldb.classification.targets.hough import NEIGHBOURHOOD, PointGrid
 from tunneldb.threads import in_blocks
 
 # In radii of the spheres:
-WIDE = 0.25  # distance from the sphere of points with weight at first,
-NARROW = 0.1  # and at the end
+FIRST_REACH = 0.25  # distance from the sphere of points with weight at first,
+LAST_REACH = 0.1  # and at the end
 PASSES = 12
 
 _BLOCK = 256  # candidates at a time
@@ -28,7 +28,7 @@ class RefinedSpheres(NamedTuple):
     centres : (k, 3) float64 array
         NaN if the centre moved away by a radius or had no points, m.
     on : (k,) int array
-        Number of points within `NARROW` radii of the sphere.
+        Number of points within `LAST_REACH` radii of the sphere.
     share : (k,) float64 array
         Share on the sphere of the points in and near it, in the directions in which it is seen.
     seen : (k,) float64 array
@@ -56,7 +56,7 @@ def refine_spheres(points: PointGrid, centres: Float, radius: float) -> RefinedS
 
     def work(begin: int, end: int) -> None:
         start = centres[begin:end]
-        near, candidate = points.around(start, (NEAR + WIDE) * radius)
+        near, candidate = points.around(start, (NEIGHBOURHOOD + FIRST_REACH) * radius)
         xyz, start = points.xyz[near], start - points.low
         centre, kept = _fit_centres(xyz, candidate, start, radius)
         # Points and numbers of the remaining candidates.
@@ -113,7 +113,7 @@ def _fit_centres(xyz: Float, candidate: Int64, start: Float, radius: float) -> t
     """Return fitted centres (k, 3) of spheres of a radius, and True for those worth keeping."""
     centre, kept = start.copy(), np.ones(len(start), np.bool_)
     for step in range(PASSES):
-        reach = radius * max(NARROW, WIDE * 0.85**step)
+        reach = radius * max(LAST_REACH, FIRST_REACH * 0.85**step)
         alike = np.full(len(start), radius), np.full(len(start), reach)
         matrix, vector, _, _ = _equations(xyz, candidate, centre, *alike, free=False)
         trace = np.trace(matrix, axis1=1, axis2=2)
@@ -124,8 +124,8 @@ def _fit_centres(xyz: Float, candidate: Int64, start: Float, radius: float) -> t
         matrix = matrix[kept] + 1e-3 * trace[kept, None, None] * np.eye(3)
         centre[kept] += np.linalg.solve(matrix, vector[kept, :, None])[..., 0]
         kept &= ((centre - start) ** 2).sum(axis=1) <= radius * radius
-        held = kept[candidate]
-        xyz, candidate = xyz[held], candidate[held]
+        selected = kept[candidate]
+        xyz, candidate = xyz[selected], candidate[selected]
     return centre, kept
 
 
@@ -134,7 +134,7 @@ def _fit_radii(xyz: Float, candidate: Int64, centre: Float, radius: float) -> tu
     count = len(centre)
     state = np.column_stack([centre, np.full(count, radius)])
     sigma, lost = np.full(count, np.inf), np.zeros(count, np.bool_)
-    reach = np.full(count, WIDE * radius)
+    reach = np.full(count, FIRST_REACH * radius)
     for step in range(PASSES):
         matrix, vector, drawing, squares = _equations(xyz, candidate, state[:, :3], state[:, 3], reach, free=True)
         lost |= drawing < 6
@@ -143,7 +143,7 @@ def _fit_radii(xyz: Float, candidate: Int64, centre: Float, radius: float) -> tu
         kept = np.flatnonzero(~lost)
         state[kept] += np.linalg.solve(matrix[kept], vector[kept, :, None])[..., 0]
         lost |= ~((state[:, 3] > 0.2 * radius) & (state[:, 3] < 5.0 * radius))
-        reach = np.maximum(0.9 * reach, NARROW * radius)
+        reach = np.maximum(0.9 * reach, LAST_REACH * radius)
         if step == PASSES - 1:
             kept = np.flatnonzero(~lost)
             sigma[kept] = np.sqrt(np.linalg.inv(matrix[kept])[:, 3, 3] * squares[kept] / matrix[kept, 3, 3])
@@ -155,15 +155,15 @@ def _extent(xyz: Float, candidate: Int64, centre: Float, radius: float) -> tuple
     count = len(centre)
     out = xyz - centre[candidate]
     far = np.sqrt(out[:, 0] * out[:, 0] + out[:, 1] * out[:, 1] + out[:, 2] * out[:, 2])
-    on = np.abs(far - radius) <= NARROW * radius
+    on = np.abs(far - radius) <= LAST_REACH * radius
     number = np.bincount(candidate[on], minlength=count)
     towards = np.column_stack([np.bincount(candidate[on], out[on, axis], minlength=count) for axis in range(3)])
     known = (number > 0) & (np.linalg.norm(towards, axis=1) > 0.0)
-    near = (far <= NEAR * radius) & (far > 0.0) & known[candidate]
+    near = (far <= NEIGHBOURHOOD * radius) & (far > 0.0) & known[candidate]
     sphere, held_by = candidate[near], on[near]
     cell = sphere * _CELLS + cells_of(out[near], towards[sphere])
     there = np.bincount(cell, minlength=count * _CELLS).reshape(count, _CELLS)
-    held = np.bincount(cell[held_by], minlength=count * _CELLS).reshape(count, _CELLS) > 0
-    among = np.where(held, there, 0).sum(axis=1)
+    selected = np.bincount(cell[held_by], minlength=count * _CELLS).reshape(count, _CELLS) > 0
+    among = np.where(selected, there, 0).sum(axis=1)
     share = np.where(known, number, 0) / np.maximum(among, 1)
-    return np.where(known, number, 0), share, held.mean(axis=1)
+    return np.where(known, number, 0), share, selected.mean(axis=1)
