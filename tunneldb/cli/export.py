@@ -11,7 +11,7 @@ import psycopg
 
 from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
@@ -110,7 +110,7 @@ def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, st
     say_coverage(coverage, survey)
     say_remarks(read_remarks(conn, survey, stretch.low, stretch.high), survey)
     _say_left_out(conn, survey, output, stretch)
-    click.echo(f"{output}: " + ", ".join(f"{name} {count}" for name, count in counts.items() if count), err=True)
+    notify(f"{output}: " + ", ".join(f"{name} {count}" for name, count in counts.items() if count))
 
 
 def _say_left_out(conn: psycopg.Connection[Any], survey: Survey, output: Path, stretch: Stretch) -> None:
@@ -122,10 +122,9 @@ def _say_left_out(conn: psycopg.Connection[Any], survey: Survey, output: Path, s
     ).fetchone() or (0,)
     tell(findings_left_out=left_out)
     if left_out:
-        click.echo(
+        notify(
             f"{output} does not hold {left_out} finding{'s' if left_out > 1 else ''} that {'are' if left_out > 1 else 'is'} no"
-            f" water, such as cracks: tunneldb findings {survey.name} -o FILE.gpkg",
-            err=True,
+            f" water, such as cracks: tunneldb findings {survey.name} -o FILE.gpkg"
         )
 
 

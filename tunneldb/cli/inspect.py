@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -52,7 +52,7 @@ def inspect(files: tuple[Path, ...]) -> None:
     found = first_steps(looks, axis_fault)
     tell(files=looks, unreadable=list(map(str, faults)), **dataclasses.asdict(found))
     for fault in faults:
-        click.echo(str(fault), err=True)
+        notify(str(fault))
     _print_steps(found)
     if faults:
         raise SystemExit(1)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast, get_args
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath, file_path
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -128,7 +128,7 @@ def _of_file(
     _tell(found, output)
     _print(found)
     said = "nothing was written: -o out.gpkg or out.laz does" if output is None else f"written to {output}"
-    click.echo(said, err=True)
+    notify(said)
 
 
 def _reference(given: str | None) -> ReferenceCurve | str | None:

@@ -10,7 +10,7 @@ import psycopg
 
 from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.database import connect
@@ -85,13 +85,13 @@ def qgis(
     if coverage is not None:
         say_coverage(coverage, found)
     if spots.statement and (found.site or spots.face_area):
-        click.echo(f"survey {survey}: {spots.statement}", err=True)
+        notify(f"survey {survey}: {spots.statement}")
     say_remarks(remarks, found)
-    click.echo(f"{', '.join(written)}: {len(images)} images, {styles}", err=True)
+    notify(f"{', '.join(written)}: {len(images)} images, {styles}")
     if settings.dsn is None and service is None:
-        click.echo("the project works while the database runs; after a restart of the machine: tunneldb server start", err=True)
+        notify("the project works while the database runs; after a restart of the machine: tunneldb server start")
     if name is not None and socket:
-        click.echo("QGIS finds projects behind a socket only by an entry of pg_service.conf: docs/howto-qgis.md", err=True)
+        notify("QGIS finds projects behind a socket only by an entry of pg_service.conf: docs/howto-qgis.md")
 
 
 def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> list[Path]:

@@ -11,7 +11,7 @@ import psycopg
 
 from tunneldb.cli.coverage import say_coverage
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import printable, tell, verb
+from tunneldb.cli.output import notify, printable, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
@@ -119,9 +119,9 @@ def report(
     tell(missing_photos=missing)
     say_coverage(coverage, found)
     for photo in written.missing:
-        click.echo(printable(f"finding {photo.photo.finding_id}: photo {photo.photo.path}: {photo.trouble}"), err=True)
+        notify(printable(f"finding {photo.photo.finding_id}: photo {photo.photo.path}: {photo.trouble}"))
     sought = leaks or coverage.searched_share
-    click.echo(f"{output}: {leaks} leaks" if sought else f"{output}: leaks were not searched for", err=True)
+    notify(f"{output}: {leaks} leaks" if sought else f"{output}: leaks were not searched for")
 
 
 def _write_site(
@@ -142,7 +142,7 @@ def _write_site(
                 conn.close()
                 _print(browser, page, temporary, shown)
     tell(survey=survey.name, file=output, spots=spots, bytes=output.stat().st_size)
-    click.echo(f"{output}: {spots} spots", err=True)
+    notify(f"{output}: {spots} spots")
 
 
 def _write(

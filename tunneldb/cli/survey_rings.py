@@ -10,7 +10,7 @@ import click
 import psycopg
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell
+from tunneldb.cli.output import notify, tell
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.stretch import parse_stretch
 from tunneldb.cli.tables import print_table
@@ -96,10 +96,9 @@ def _define(conn: psycopg.Connection[Any], survey: Survey, definition: Definitio
         define_rings(conn, survey, rings, "found")
         missing = int((~joints.seen).sum())
         tell(pitch=joints.pitch, pitch_se=joints.pitch_se, joints=len(joints.seen), joints_missing=missing)
-        click.echo(
+        notify(
             f"rings of {joints.pitch:.4f} m (± {1e3 * joints.pitch_se:.1f} mm);"
-            f" {len(joints.seen)} joints, {missing} of them not seen",
-            err=True,
+            f" {len(joints.seen)} joints, {missing} of them not seen"
         )
     elif definition.length is not None:
         rings = rings_by_length(conn, survey, definition.length, definition.start)
@@ -146,4 +145,4 @@ def _print(rows: list[Row], output: Path | None) -> None:
         kinds = sorted({whence[row["diameter_from"]] for row in told})
         click.echo(f"ovality is a share of the diameter of {' and '.join(kinds)}")
     if output is not None:
-        click.echo(f"written to {output}", err=True)
+        notify(f"written to {output}")

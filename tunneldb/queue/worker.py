@@ -18,12 +18,14 @@ import threading
 import time
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import psycopg
 
 from tunneldb.database.failures import first_line
 from tunneldb.errors import UserError
+from tunneldb.log import VARIABLE, logging_to
 from tunneldb.threads import use_threads
 
 if TYPE_CHECKING:
@@ -236,11 +238,14 @@ def main() -> int:
     """Run as a process of its own; orders come as JSON in the first argument, the DSN in TUNNELDB_DSN."""
     told = json.loads(sys.argv[1])
     _end_with_parent()
-    logging.basicConfig(format="%(asctime)s worker %(process)d: %(message)s", datefmt="%H:%M:%S", level=logging.WARNING)
+    logging.basicConfig(format="%(asctime)s worker %(process)d: %(message)s", datefmt="%H:%M:%S")
+    logging.getLogger().handlers[0].setLevel(logging.WARNING)  # the log file, if there is one, has what is done, too
     logging.getLogger("procrastinate").setLevel(logging.CRITICAL + 1)
     logging.getLogger("psycopg.pool").setLevel(logging.CRITICAL + 1)
+    file = os.environ.get(VARIABLE)
     try:
-        work(Orders(os.environ.get("TUNNELDB_DSN") or None, told["threads"], told["survey"]))
+        with logging_to(Path(file) if file else None):
+            work(Orders(os.environ.get("TUNNELDB_DSN") or None, told["threads"], told["survey"]))
     except UserError as error:
         log.error("%s", error)
         return 2
