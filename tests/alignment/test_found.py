@@ -9,6 +9,8 @@ from tunneldb.alignment.found import FoundAxis, find_axis, follow_line, without_
 from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
 
+pytestmark = pytest.mark.slow
+
 Rng = np.random.Generator
 WIDTH, HEIGHT, LENGTH = 8.0, 6.0, 120.0
 AT = np.array([512_345.0, 104_321.0, 414.0])

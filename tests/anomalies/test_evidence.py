@@ -29,6 +29,7 @@ def grown(sign: int, features: np.ndarray, names: set[str]) -> np.ndarray:
     return features + sign * np.isin(NAMES, list(names))
 
 
+@pytest.mark.slow
 def test_trees_are_those_of_the_library_that_fitted_them() -> None:
     rng = np.random.default_rng(3)
     features = rng.normal(0, 2, (900, len(FEATURES)))

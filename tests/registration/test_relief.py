@@ -49,6 +49,7 @@ def test_place_and_height_of_another_scanner_are_found(apart: float, turned: boo
     assert height_difference(one, other.turned() if turned else other, best) == pytest.approx(0.3, abs=0.01)
 
 
+@pytest.mark.slow
 def test_other_beds_are_not_alike_though_both_rise_to_the_walls() -> None:
     """Over many pairs no shift is believed: 200 shifts of either half turn, of which some ten are independent."""
     highest = []

@@ -19,6 +19,8 @@ from tunneldb.registration.underwater.observations import Pose, pose_derivatives
 from tunneldb.registration.underwater.single import prepare
 from tunneldb.registration.underwater.walls import find_walls
 
+pytestmark = pytest.mark.slow
+
 
 @dataclass(frozen=True)
 class Scene:
