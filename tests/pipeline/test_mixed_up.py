@@ -110,6 +110,6 @@ def test_scan_numbers(tunnel: Path) -> None:
     said = command(
         "survey", "add", "s", "--tunnel", "t", "--date", "2024-05-04", "--stations", unnamed, "--intensity-kind", "none", code=2
     )
-    assert "names.csv has no column scan_id: its header is 'name,x,y,z'; scan_id is the number" in said
+    assert "names.csv has no column scan_id: the header is 'name,x,y,z'; scan_id is the number" in said
     add(tunnel, "--stations", STATIONS)
     assert "no station for scan_id 7" in command("load", "s", scan(tunnel / "a.laz", scan_id=7), code=2)
