@@ -206,7 +206,7 @@ BROKEN = [
     (('linearUnit="meter"', 'linearUnit="fathom"'), r"linearUnit 'fathom' is none of"),
     (('staStart="-90.00000000"', 'staStart="minus"'), r"staStart of a Alignment is 'minus', not a number"),
     (("<PVI>-90.00000000 90.90600001</PVI>", "<PVI>-90</PVI>"), r"a PVI of the profile is '-90', not station and height"),
-    (("<PVI>-90.00000000 ", "<PVI>390.00000000 "), r"the profile turns back"),
+    (("<PVI>-90.00000000 ", "<PVI>390.00000000 "), r"the profile reverses"),
     (('<ParaCurve length="80.000000">', '<ParaCurve length="580.0">'), r"curves of the profile overlap by 20\.000 m"),
     (('<ParaCurve length="80.000000">', '<ParaCurve length="-80.0">'), r"length of a ParaCurve is '-80\.0'; it must not"),
     (('length="62.50000000" radiusStart="INF"', 'length="-62.5" radiusStart="INF"'), r"length of a Spiral is '-62\.5'; it"),
@@ -256,7 +256,7 @@ def test_a_parabola_on_one_side_only_is_no_curve(tmp_path: Path) -> None:
 
 def test_no_profile_no_axis(tmp_path: Path) -> None:
     path = edited(tmp_path, "j-landxml.xml", ("<ProfAlign ", "<Nothing "), ("</ProfAlign>", "</Nothing>"))
-    with pytest.raises(UserError, match="has no profile, and a tunnel's axis needs heights"):
+    with pytest.raises(UserError, match="has no profile, but a tunnel's axis needs heights"):
         read_given(path)
 
 
@@ -367,14 +367,14 @@ def test_map_conversion_and_placement_put_the_alignment_on_the_map(ifc: Any, tmp
     c, s = math.cos(math.pi / 6), 0.5
     expected = np.column_stack([400_000 + c * x - s * y, 4_000_000 + s * x + c * y, 500 + z])
     np.testing.assert_allclose(design.position(at), expected, rtol=0, atol=1e-5)
-    assert "the file says its coordinates are EPSG:25830" in design.notes
+    assert "the file states its coordinate system as EPSG:25830" in design.notes
 
 
 def test_a_scaled_map_is_refused(ifc: Any, tmp_path: Path) -> None:
     context = ifc.by_type("IfcGeometricRepresentationContext")[0]
     crs = ifc.createIfcProjectedCRS("EPSG:25830")
     ifc.createIfcMapConversion(context, crs, 0.0, 0.0, 0.0, 1.0, 0.0, 0.9996)
-    with pytest.raises(UserError, match=r"scale 0\.9996, so lengths on the map are not the alignment's"):
+    with pytest.raises(UserError, match=r"scale 0\.9996, so map lengths differ from the alignment's"):
         read_given(written(ifc, tmp_path))
 
 
@@ -384,10 +384,10 @@ def test_other_curves_and_other_schemas_are_refused(ifc: Any, tmp_path: Path) ->
     with pytest.raises(UserError, match="segment of type BLOSSCURVE; LINE, CIRCULARARC, CLOTHOID are read"):
         read_given(path)
     path.write_text(path.read_text().replace("IFC4X3_ADD2", "IFC2X3"))
-    with pytest.raises(UserError, match=r"is of IFC2X3; alignments are read from IFC 4\.3"):
+    with pytest.raises(UserError, match=r"has the schema IFC2X3; alignments need IFC 4\.3"):
         read_given(path)
     path.write_text("ISO-10303-21;\nHEADER;\n")
-    with pytest.raises(UserError, match="its header names no schema"):
+    with pytest.raises(UserError, match="its header states no schema"):
         read_given(path)
 
 

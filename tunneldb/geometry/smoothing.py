@@ -1,4 +1,4 @@
-"""Smooth lines through places at even distances."""
+"""Smoothing of lines through points at even distances."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from tunneldb.arrays import Bool, Float
 from tunneldb.robust import MAD_TO_SIGMA
 
 _STIFFNESS = 10.0  # of third differences; at 5 m between places waves of 45 m are halved
-_FEWEST = 6  # places of a line that is smoothed
+_FEWEST = 6  # least number of places of a line for smoothing
 _PASSES = 5
-_CLOSE = 0.02  # m within which no place is taken for an outlier
+_CLOSE = 0.02  # m; deviations up to this are never outliers
 
 
 def smooth_line(places: Float, seen: Bool) -> Float:
-    """Smooth places (k, d) at even distances, those not seen and outliers after their neighbours (Whittaker, 1923).
+    """Smooth places (k, d) at even distances; missing places and outliers follow their neighbours (Whittaker, 1923).
 
-    Third differences are kept small: neither a straight line nor a circle is bent. Fewer than 6 places stay as they are.
+    Third differences are minimised, so that straight lines and circles are preserved. Fewer than 6 places stay unchanged.
     """
     count = len(places)
     if count < _FEWEST or np.count_nonzero(seen) < 4:
@@ -36,7 +36,7 @@ def smooth_line(places: Float, seen: Bool) -> Float:
 
 
 def _third_differences(count: int) -> Float:
-    """Lower bands (4, count) of the sum of the squares of third differences of a row of numbers."""
+    """Return the lower bands (4, count) of the sum of the squares of third differences of a sequence."""
     weights = np.array([-1.0, 3.0, -3.0, 1.0])
     bands = np.zeros((4, count))
     for i in range(4):

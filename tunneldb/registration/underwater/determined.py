@@ -1,4 +1,4 @@
-"""Which directions of a pose are known well, which badly, and which not at all."""
+"""Classification of the directions of a pose: determined, weak or undetermined."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ import numpy as np
 
 from tunneldb.arrays import Float
 
-WEAK, OPEN = 0.05, 0.5  # standard deviations of a place from which it is weak, and not known, m
+WEAK, OPEN = 0.05, 0.5  # standard deviations of a position from which it is weak, and undetermined, m
 WEAK_TURN, OPEN_TURN = np.radians(0.2), np.radians(3.0)
 WEAK_SCALE = 0.005
 
 
 def judge(covariance: Float, along: Float) -> tuple[str, tuple[str, ...]]:
-    """State of a pose, and its badly known directions in words.
+    """Return the state of a pose, and the names of its badly determined directions.
 
     Parameters
     ----------
     covariance : (7, 7) float64 array
-        See `results.PARAMETERS`.
+        Covariance of `results.PARAMETERS`.
     along : (2,) float64 array
         Direction of the canal in plan.
 
     Returns
     -------
     state : str
-        See `results.SonarPose`.
+        As in `results.SonarPose`.
     directions : tuple of str
     """
     ahead = np.array([along[0], along[1], 0.0])

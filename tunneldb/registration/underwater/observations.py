@@ -1,6 +1,6 @@
-"""What ties a sonar scan to the laser's model and to other scans, as linear equations of small changes of the poses.
+"""Observations between a sonar scan, the laser's model and other scans, as linear equations of small changes of the poses.
 
-A pose's changes are those of `results.PARAMETERS`: a turn about the tunnel's axes through the scanner, a shift of the
+The changes of a pose are those of `results.PARAMETERS`: a turn about the tunnel's axes through the scanner, a shift of the
 scanner, and a change of scale.
 """
 
@@ -19,33 +19,33 @@ from tunneldb.registration.underwater.walls import Walls
 POSE = 7  # parameters of a pose
 RANGE_NOISE = 0.015  # m, of a BV5000 (Moisan et al., 2015, section 3)
 BEAM = np.radians(1.0)  # width of a beam there
-BEAM_SIGMA = BEAM / np.sqrt(12.0)  # an echo comes from anywhere in it
-BEAM_SPREAD = BEAM / np.sqrt(8.0 * np.log(2.0))  # of its power, taken for a normal distribution
+BEAM_SIGMA = BEAM / np.sqrt(12.0)  # an echo comes from anywhere in the beam
+BEAM_SPREAD = BEAM / np.sqrt(8.0 * np.log(2.0))  # of its power, assumed normally distributed
 STRETCH = 2.0  # m of wall or bed: its relief is the same for all scans
-SHARED = 0.002  # m: of a stretch of wall or bed, by relief and slanting beams
-BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: those that hear it overlap
-WATERLINE_NOISE = 0.025  # m: half a bin, and half of what is left of half a beam
+SHARED = 0.002  # m: common error of a stretch of wall or bed, by relief and slanting beams
+BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: beams that hit it overlap
+WATERLINE_NOISE = 0.025  # m: half a bin, and half of the rest of half a beam
 WATERLINE_SHARED = 0.01  # m
-FACING = 0.9  # least cosine between the normals of what is compared
+FACING = 0.9  # least cosine between the normals of compared patches
 WALL_DEPTH = 3.0  # m below the water
-WALL_TOP = 0.05  # below the water, m: nearer to it, echoes by way of the surface mix in
-RELIEF = 0.012  # m: how far a patch of stones may lie from its wall's plane
-GRAZING = 0.35  # least cosine of incidence of what is compared
-LEAST_AWAY = 0.5  # m from a surface, from which on slanting beams' echoes are taken to come nearer
+WALL_TOP = 0.05  # m below the water; closer to it, echoes by way of the surface disturb
+RELIEF = 0.012  # m: distance of a patch of stones from its wall's plane
+GRAZING = 0.35  # least cosine of incidence of compared patches
+LEAST_AWAY = 0.5  # m from a surface from which echoes of slanting beams come from nearer
 FARTHEST = 12.0  # m
-UPRIGHT = 0.6  # least cosine between the vertical and the normal of what is taken for bed
-STILES_SIDE = 0.05  # m from a stile's axis, nearer to which an echo is the stile's
+UPRIGHT = 0.6  # least cosine between the vertical and the normal of the bed
+STILES_SIDE = 0.05  # m from a stile's axis within which an echo is from the stile
 MIXTURE_ROUNDS = 10
-LEAST_TOLD = 0.02  # share of a rung's information that is left where rungs are hardly told from what is between them
-FURTHEST_OFF = 4.0  # standard deviations of an echo from the ladder that it comes from
+LEAST_TOLD = 0.02  # least share of a rung's information, where rungs are hardly separable from the space between them
+FURTHEST_OFF = 4.0  # greatest distance of an echo from its ladder, standard deviations
 PATCH = 0.3  # m
 PATCH_POINTS = 8
 FLAT = 0.035  # m: spread of a patch across its plane
-SMOOTH_PATCH = 0.2  # m, of patches that are compared with another scan's
+SMOOTH_PATCH = 0.2  # m; size of patches for the comparison of two scans
 SMOOTH_POINTS = 3
-ABOUT = 0.4  # m: their normals are those of planes through the patches so near
-MOST_ABOUT, FEWEST_ABOUT = 13, 6  # of them
-NEIGHBOUR = 0.3  # m between the middles of two scans' patches that are compared
+ABOUT = 0.4  # m: radius of the patches whose plane gives the normal
+MOST_ABOUT, FEWEST_ABOUT = 13, 6  # of these patches
+NEIGHBOUR = 0.3  # m between the centres of compared patches of two scans
 SMOOTH_GRAZING = 0.2  # least cosine of incidence by those normals
 
 
@@ -58,11 +58,11 @@ class Pose:
     scale: float
 
     def apply(self, points: Float) -> Float:
-        """Points (n, 3) of the file in the tunnel's axes."""
+        """Return points (n, 3) of the file in the tunnel's axes."""
         return np.asarray(self.scale * points @ self.rotation.T + self.translation)
 
     def to_file(self, points: Float) -> Float:
-        """Points (n, 3) of the tunnel's axes in those of the file."""
+        """Return points (n, 3) of the tunnel's axes in those of the file."""
         return np.asarray((points - self.translation) @ self.rotation / self.scale)
 
 
@@ -73,21 +73,21 @@ class Rows:
     Attributes
     ----------
     residual : (n,) float64 array
-        m.
+        Residuals, m.
     sigma : (n,) float64 array
         Standard deviations, m.
     poses : (n, 7) float64 array
-        Derivatives by the changes of the pose of scan ``scan``.
+        Derivatives with respect to the changes of the pose of scan ``scan``.
     scan : int
     other : int or None
-        A second scan, whose derivatives are ``other_poses``.
+        Second scan, with derivatives ``other_poses``.
     common : (n, c) float64 array
-        Derivatives by the parameters ``columns`` that are common to all scans.
+        Derivatives with respect to the common parameters ``columns``.
     columns : (c,) int64 array
     group : (n,) int64 array
-        Rows of one group err together; those of walls and of overlaps, places in plan, also with the rows of other scans.
+        Groups of correlated rows; rows of walls and of overlaps (places in plan) are also correlated with those of other scans.
     shared : (n,) float64 array
-        Standard deviation of what they have in common, m.
+        Standard deviation of the common error of a group, m.
     kind, name : str
     """
 
@@ -106,18 +106,18 @@ class Rows:
 
 
 def cell_keys(points: Float, edge: float) -> Int64:
-    """Numbers (n,) of the cubic cells that points (n, 3) within some kilometres lie in."""
+    """Return the numbers (n,) of the cubic cells that contain points (n, 3) within some kilometres."""
     cell = np.floor(points / edge).astype(np.int64) + (1 << 20)
     return np.asarray((cell[:, 0] << 42) | (cell[:, 1] << 21) | cell[:, 2])
 
 
 def _stretches(points: Float) -> Int64:
-    """Numbers (n,) of the stretches of wall or bed that points (n, 3) lie in, whatever their height."""
+    """Return the numbers (n,) of the stretches of wall or bed that contain points (n, 3), at any height."""
     return cell_keys(np.where([True, True, False], points, 0.0), STRETCH)
 
 
 def pose_derivatives(points: Float, pose: Pose, normal: Float) -> Float:
-    """Derivatives (n, 7) of points (n, 3), in the tunnel's axes, along normals (n, 3)."""
+    """Return the derivatives (n, 7) of points (n, 3), in the tunnel's axes, along normals (n, 3)."""
     arm = points - pose.translation
     scale = (arm * normal).sum(axis=1)[:, None] / pose.scale
     return np.hstack([np.cross(arm, normal), normal, scale])
@@ -134,12 +134,12 @@ class Patches:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Of their middles."""
+        """Search tree of their centres."""
         return cKDTree(self.centre)
 
 
 def find_patches(points: Float) -> Patches:
-    """Cells of a scan whose points lie on a plane that is not seen at a grazing angle, with that plane's normal."""
+    """Return cells of a scan whose points lie on a plane, not at grazing incidence, with that plane's normal."""
     centre, count, value, vector = _cells(points, PATCH)
     normal = _towards_scanner(vector[:, :, 0], centre)
     spread = np.sqrt(np.maximum(value[:, 0], 0.0))
@@ -149,10 +149,10 @@ def find_patches(points: Float) -> Patches:
 
 
 def find_smooth_patches(points: Float) -> Patches:
-    """Smaller cells, with the normals of planes through the middles of those about.
+    """Return smaller cells, with the normals of planes through the centres of neighbouring cells.
 
-    A beam's echoes lie on an arc about the scanner, so that the points of one patch lean towards it, the more the farther it
-    is; and they are few. Two scans whose patches are compared along such normals draw each other nearer.
+    A beam's echoes lie on an arc around the scanner, so that the points of one patch lean towards it, the more the farther away
+    it is; and they are few. Two scans whose patches are compared along such normals attract each other.
     """
     centre, count, value, _ = _cells(points, SMOOTH_PATCH)
     spread = np.sqrt(np.maximum(value[:, 0], 0.0))
@@ -173,7 +173,7 @@ def find_smooth_patches(points: Float) -> Patches:
 
 
 def _cells(points: Float, edge: float) -> tuple[Float, Int64, Float, Float]:
-    """Of cubic cells, middles of their points (k, 3), points (k,), and variances (k, 3) and axes (k, 3, 3) of their spread."""
+    """Return centroids (k, 3), numbers of points (k,), variances (k, 3) and axes (k, 3, 3) of the points in cubic cells."""
     near = points[np.linalg.norm(points, axis=1) < FARTHEST]
     _, number, count = np.unique(cell_keys(near, edge), return_inverse=True, return_counts=True)
     centre = np.column_stack([np.bincount(number, near[:, k]) for k in range(3)]) / count[:, None]
@@ -191,16 +191,16 @@ def _towards_scanner(normal: Float, centre: Float) -> Float:
 
 
 def _cosine(normal: Float, centre: Float) -> Float:
-    """Cosines of incidence (k,) of beams on patches."""
+    """Return the cosines of incidence (k,) of beams on patches."""
     return np.asarray(-(normal * centre).sum(axis=1) / np.maximum(np.linalg.norm(centre, axis=1), 1e-9))
 
 
 def nearer_by_slant(points: Float, scanner: Float, normal: Float) -> Float:
-    """How far (n,), m, in front of a surface of normals (n, 3) a beam's strongest echo seems to lie if its slant is 1.
+    """Return the offset (n,), m, of a beam's strongest echo in front of a surface with normals (n, 3) if its slant is 1.
 
-    A beam that meets a surface slantingly hears its nearer side more loudly, so that the echo comes from a direction off the
-    beam's middle by ``slant * spread² / tan(elevation over the surface)``: 1 for the power of Lambert's law alone, 3 if the
-    cell of range with the most of it is taken, less on what is rough, where a stone that faces the beam decides.
+    On a slanting surface the nearer side of a beam echoes more strongly, so that the echo comes from a direction off the beam's
+    centre by ``slant * spread² / tan(elevation over the surface)``. The slant is 1 for the power of Lambert's law alone, 3 if
+    the strongest range cell is used, and less on a rough surface, where stones that face the beam dominate.
     """
     arm = scanner - points
     over = np.maximum((arm * normal).sum(axis=1), LEAST_AWAY)
@@ -210,10 +210,10 @@ def nearer_by_slant(points: Float, scanner: Float, normal: Float) -> Float:
 def wall_rows(
     patches: Patches, pose: Pose, walls: Walls, common: Float, scan: int, columns: Int64, within: float
 ) -> list[Rows]:
-    """Compare a scan's patches with the walls, at most ``within`` m off.
+    """Compare a scan's patches with walls at most ``within`` m away.
 
-    ``common`` are how far in front of where the laser sees it a sonar hears masonry, m, and the slant (`nearer_by_slant`).
-    ``columns`` are the places among the common parameters of the changes of batter of either side, and of these two.
+    ``common`` are the offset of sonar ranges in front of masonry relative to the laser, m, and the slant (`nearer_by_slant`).
+    ``columns`` are the indices, among the common parameters, of the changes of batter of either side, and of these two.
     """
     zero, slant = common
     centre = pose.apply(patches.centre)
@@ -248,7 +248,7 @@ def wall_rows(
 
 
 def waterline_rows(edges: Float, pose: Pose, bias: float, scan: int, column: int) -> Rows | None:
-    """Heights of the edges (k, 3) of a scan's walls, file's axes, over the water; ``bias`` m is common to all scans."""
+    """Return heights of the edges (k, 3) of a scan's walls, file's axes, over the water; ``bias`` m is common to all scans."""
     if len(edges) == 0:
         return None
     place = pose.apply(edges)
@@ -269,10 +269,10 @@ def ladder_rows(
     columns: tuple[int, int],
     within: float,
 ) -> Rows | None:
-    """Distances of a scan's points (n, 3), file's axes, from a ladder's axes below the water, across and along the beam.
+    """Return distances of a scan's points (n, 3), file's axes, from a ladder's axes below the water, across and along the beam.
 
-    A sonar hears the near surface of a bar, or a little behind it, ``depth`` m. ``columns`` are the places among the common
-    parameters of that depth, and of the first of the ladder's turn and shift.
+    A sonar detects the near surface of a bar, or ``depth`` m behind it. ``columns`` are the indices, among the common
+    parameters, of that depth, and of the first of the ladder's turn and shift.
     """
     depth_column, first_column = columns
     space = pose.apply(points)
@@ -317,11 +317,11 @@ def ladder_rows(
 
 
 def _told(own: Float, which: Int64, away: Float, sigma: Float, placed: PlacedLadder) -> Float:
-    """Share (n,) of its information across the beam that each point has; 1 for those of stiles.
+    """Return the share (n,) of its information across the beam that each point has; 1 for points of stiles.
 
-    Far off and at a slant the stiles' echoes drown the rungs', and what lies between the stiles says little of where rungs
-    are: a mixture of echoes of rungs and of others, evenly spread, by expectation and maximisation (McLachlan and Peel, 2000,
-    section 2.8; the information in what is left open is that of Louis, 1982).
+    At long range and at a slant, echoes of stiles mask those of rungs, and echoes from between the stiles carry little
+    information about rungs. The model is a mixture of echoes of rungs and of uniformly distributed others, by expectation
+    maximisation (McLachlan and Peel, 2000, section 2.8; the information of incomplete data is that of Louis, 1982).
     """
     share = np.where(which < 2, 1.0, LEAST_TOLD)
     inside = (which >= 2) & (np.abs(own[:, 0]) < placed.gap / 2.0 - STILES_SIDE)
@@ -348,11 +348,11 @@ def overlap_rows(
     columns: Int64,
     within: float,
 ) -> Rows | None:
-    """Distances between smooth patches of two scans that lie beside each other and face the same way.
+    """Return distances between smooth patches of two scans that are close to each other and face the same way.
 
     ``common`` are the slants of walls and of the bed (`nearer_by_slant`), and the shares by which the relief of either seems
-    nearer to a scanner than it is, along: of a crest or a stone the near face is heard. ``columns`` are their places among the
-    common parameters.
+    nearer to a scanner along the canal, since the near face of a crest or a stone echoes. ``columns`` are their indices among
+    the common parameters.
     """
     first, second = poses
     place = first.apply(one.centre)
