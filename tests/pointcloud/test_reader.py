@@ -245,7 +245,7 @@ def test_a_coordinate_system_that_nobody_can_read_is_told(tmp_path: Path) -> Non
     las.header.global_encoding.wkt = True
     las.write(tmp_path / "b.laz")
     plain, odd = (crs_note(read_header(tmp_path / name), 25830) for name in ("a.laz", "b.laz"))
-    assert plain == "states no coordinate system: using the tunnel's, EPSG:25830"
+    assert plain == "states no coordinate system; using the tunnel's, EPSG:25830"
     assert odd is not None
     assert odd.startswith("states a coordinate system that cannot be read (Invalid")
     write(tmp_path / "c.laz", 10, CRS(25830))

@@ -81,7 +81,7 @@ def crs_note(header: ScanHeader, srid: int) -> str | None:
     if header.crs is not None or (srid == LOCAL and not header.unread_crs):
         return None
     said = f"a coordinate system that cannot be read ({header.unread_crs})" if header.unread_crs else "no coordinate system"
-    return f"states {said}: using the tunnel's, {srid_name(srid)}"
+    return f"states {said}; using the tunnel's, {srid_name(srid)}"
 
 
 def read_chunks(
