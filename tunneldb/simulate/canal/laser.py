@@ -1,4 +1,4 @@
-"""A laser's scans above the water of a synthetic canal tunnel."""
+"""Laser scans above the water of a synthetic canal tunnel."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from tunneldb.simulate.canal.parameters import CanalParameters
 from tunneldb.simulate.canal.section import WATER
 
 LIMIT = 40.0  # m
-_NADIR = 60.0  # degrees below the horizon, below which the tripod stands in the way
+_NADIR = 60.0  # degrees below the horizon, below which the tripod obstructs the view
 _LADDER_SPACING = 0.0025  # m between rays at a ladder, at least
-_BESIDE = 0.25  # m about a ladder that is scanned densely
+_BESIDE = 0.25  # m around a ladder in the dense scan
 
 
 def scan_by_laser(parameters: CanalParameters, layout: Layout) -> tuple[Float, Int32]:
-    """Points (n, 3) of all stations in the local frame, m, and the number (n,) of the station of each, from 1."""
+    """Return points (n, 3) of all stations in the local frame, m, and the station number (n,) of each, from 1."""
     rng = np.random.default_rng([parameters.seed, 2])
     points, numbers = [], []
     for k, place in enumerate(layout.lasers, start=1):
@@ -39,7 +39,7 @@ def _sphere(step: float) -> Float:
 
 
 def _about_ladders(parameters: CanalParameters, layout: Layout, place: Float) -> list[Float]:
-    """Rays about each ladder in reach, as a second, denser scan of a part would cast them."""
+    """Return rays around each ladder in reach, as in a second, denser partial scan."""
     rays = []
     for frame in layout.scene.frames:
         corners = [
@@ -66,7 +66,7 @@ def _about_ladders(parameters: CanalParameters, layout: Layout, place: Float) ->
 
 
 def directions(azimuth: Float, elevation: Float) -> Float:
-    """Unit vectors (n, 3) of angles in rad, azimuth from x towards y."""
+    """Return unit vectors (n, 3) of angles in rad, azimuth from x towards y."""
     flat = np.cos(elevation)
     return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)], axis=-1).reshape(-1, 3)
 
@@ -77,7 +77,7 @@ def _scan(parameters: CanalParameters, layout: Layout, place: Float, rays: Float
     on_water = hits.kind == WATER
     mirrored = on_water & (rng.random(len(rays)) < parameters.laser_mirror_share)
     seen = (hits.kind != NOTHING) & ~on_water
-    if mirrored.any():  # the water as a mirror: what is above it appears below
+    if mirrored.any():  # the water as a mirror: objects above it appear below
         start = place + reach[mirrored, None] * rays[mirrored]
         start[:, 2] = 1e-6
         second = cast(layout.scene, start, rays[mirrored] * [1.0, 1.0, -1.0], LIMIT - reach[mirrored])

@@ -1,4 +1,4 @@
-"""Files of a synthetic canal tunnel: the laser's points, stations, sonar scans, ladders, axis, and truth."""
+"""Files of a synthetic canal tunnel: laser points, stations, sonar scans, ladders, axis and reference data."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tunneldb.simulate.output import CREATED, SCALE
 
 @dataclass(frozen=True)
 class CanalFiles:
-    """What :func:`write` made."""
+    """Files written by :func:`write`."""
 
     laser: Path
     stations: Path
@@ -34,12 +34,12 @@ class CanalFiles:
 
 
 def write(scene: CanalScene, folder: Path) -> CanalFiles:
-    """Write a scene's files into ``folder``; they appear there when all are complete.
+    """Write a scene's files into ``folder``; they appear there only when all are complete.
 
     Raises
     ------
     UserError
-        The folder cannot be written, or the disk is full.
+        If the folder cannot be written to, or the disk is full.
     """
     name = scene.parameters.name
     try:

@@ -1,4 +1,4 @@
-"""The canal's surfaces as one implicit function: clearance of a place from walls, vault, towpath, bed, piers, objects and boat.
+"""Surfaces of a canal as one implicit function: clearance from walls, vault, towpath, bed, piers, objects and boat.
 
 Clearance is the distance to the nearest surface or less, m; 0 on a surface, negative behind it.
 """
@@ -28,7 +28,7 @@ SOLID_COLUMNS = 10
 
 
 class Section(NamedTuple):
-    """Cross-section and relief, as compiled functions take them; lengths in m, heights over the water.
+    """Cross-section and relief for compiled functions; lengths in m, heights above the water.
 
     ``radius`` is that of the axis; ``half`` the canal's half width at the water; ``slope`` and ``slope_below`` tangents of the
     batter; ``vault`` the offset and height of the vault's centre and its radius; ``side`` that of the towpath (0: none).
@@ -56,7 +56,7 @@ class Section(NamedTuple):
 
 
 def section(parameters: CanalParameters) -> Section:
-    """Cross-section that parameters describe."""
+    """Return the cross-section for some parameters."""
     p = parameters
     slope = math.tan(math.radians(p.batter))
     side = p.towpath_side()
@@ -88,7 +88,7 @@ def section(parameters: CanalParameters) -> Section:
 
 @inner
 def bed_height(c: Section, s: float, o: float) -> float:  # pragma: no cover - compiled
-    """Height of the silt at a station and offset."""
+    """Return the height of the silt at a station and offset."""
     across = min(abs(o) / c.half, 1.2)
     z = -c.depth + c.bed_rise * across * across * across * across
     if c.bed_relief > 0.0:
@@ -103,7 +103,7 @@ def bed_height(c: Section, s: float, o: float) -> float:  # pragma: no cover - c
 
 @inner
 def _stones(c: Section, s: float, v: float, face: int) -> float:  # pragma: no cover - compiled
-    """Relief of masonry towards the canal, at a station and a place along the section."""
+    """Return the relief of masonry towards the canal, at a station and a position along the section."""
     height = 0.0
     if c.roughness > 0.0:
         a, b = s / c.roughness_length, v / c.roughness_length
@@ -122,7 +122,7 @@ def _stones(c: Section, s: float, v: float, face: int) -> float:  # pragma: no c
 
 @inner
 def _solid(solids: Float, k: int, s: float, o: float, z: float) -> float:  # pragma: no cover - compiled
-    """Distance to a solid from outside, or a bound of it; to a recess's bounds from inside where it is negative."""
+    """Return the distance to a solid from outside, or a bound of it; if negative, to a recess's bounds from inside."""
     ds, do, dz = s - solids[k, 2], o - solids[k, 3], z - solids[k, 4]
     if solids[k, 0] == BALL:
         return math.sqrt(ds * ds + do * do + dz * dz) - solids[k, 5]
@@ -138,9 +138,9 @@ def _solid(solids: Float, k: int, s: float, o: float, z: float) -> float:  # pra
 
 @inner
 def clearance(c: Section, solids: Float, x: float, y: float, z: float) -> tuple[float, int]:  # pragma: no cover - compiled
-    """Clearance of a local place, and the kind of the surface that it is nearest to.
+    """Return the clearance of a local position, and the kind of the nearest surface.
 
-    Relief is computed only near its surface; elsewhere its greatest height is taken off.
+    Relief is computed only near its surface; elsewhere its greatest height is subtracted.
     """
     s, o = stationed(c.radius, x, y)
     slope = c.slope if z > 0.0 else c.slope_below
@@ -196,7 +196,7 @@ def _clearances(c: Section, solids: Float, xyz: Float, out: Float, kind: Int32) 
 
 
 def clearances(c: Section, solids: Float, local: Float) -> tuple[Float, Int32]:
-    """Clearance (n,) m and kind of the nearest surface (n,) of local points (n, 3); ladders are not among them."""
+    """Return clearance (n,) m and kind of the nearest surface (n,) of local points (n, 3), without ladders."""
     out, kind = np.empty(len(local)), np.empty(len(local), dtype=np.int32)
     _clearances(c, solids, np.ascontiguousarray(local, dtype=float), out, kind)
     return out, kind
@@ -209,7 +209,7 @@ def _beds(c: Section, s: Float, o: Float, out: Float) -> None:  # pragma: no cov
 
 
 def bed_heights(c: Section, s: Float, o: Float) -> Float:
-    """Height (n,) of the silt over the water (negative) at stations and offsets (n,), objects not counted."""
+    """Return the height (n,) of the silt above the water (negative) at stations and offsets (n,), without objects."""
     out = np.empty(len(s))
     _beds(c, np.ascontiguousarray(s, dtype=float), np.ascontiguousarray(o, dtype=float), out)
     return out

@@ -1,4 +1,4 @@
-"""Files of a synthetic structure: LAZ with truth, stations, reference curve, and truth of faces and anomalies."""
+"""Files of a synthetic structure: LAZ with reference data, stations, reference curve, and reference faces and anomalies."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ DIMENSIONS = [
 
 @dataclass
 class StructureFiles:
-    """What :func:`write_structure` made."""
+    """Files written by :func:`write_structure`."""
 
     cloud: Path
     stations: Path
@@ -45,7 +45,7 @@ class StructureFiles:
 
     @classmethod
     def named(cls, folder: Path, name: str) -> StructureFiles:
-        """Files of a name in a folder."""
+        """Return the files of a name in a folder."""
         base = str(folder / name)
         ends = (".laz", ".stations.csv", ".reference.csv", ".truth.json")
         return cls(Path(base + ends[0]), Path(base + ends[1]), Path(base + ends[2]), Path(base + ends[3]))
@@ -68,17 +68,17 @@ class _Tally:
 
 
 def write_structure(scan: StructureScan, folder: Path, progress: Callable[[int], None] | None = None) -> StructureFiles:
-    """Scan a structure into ``folder``; files appear there when all are complete.
+    """Scan a structure into ``folder``; files appear there only when all are complete.
 
     Parameters
     ----------
     progress : callable, optional
-        Called with the points written after each block.
+        Function of the number of points written, called after each block.
 
     Raises
     ------
     UserError
-        The folder cannot be written, or the disk is full.
+        If the folder cannot be written to, or the disk is full.
     """
     name = scan.parameters.name
     try:
@@ -149,7 +149,7 @@ def _record(header: laspy.LasHeader, cloud: StructureCloud) -> laspy.ScaleAwareP
 
 
 def _count(tallies: list[_Tally], ids: Any, incidence: Any) -> None:
-    """Add points to those that they lie on."""
+    """Add points to the tallies of their ids."""
     for number in np.unique(ids[ids > 0]).tolist():
         mine = ids == number
         tallies[number - 1].points += int(mine.sum())
@@ -157,7 +157,7 @@ def _count(tallies: list[_Tally], ids: Any, incidence: Any) -> None:
 
 
 def _incidence(tally: _Tally) -> list[float] | None:
-    """5, 50 and 95 % of the incidence, degrees."""
+    """Return the 5, 50 and 95 % quantiles of the incidence, degrees."""
     if not tally.points:
         return None
     return [round(float(v), 2) for v in np.percentile(np.concatenate(tally.incidence), [5, 50, 95])]
