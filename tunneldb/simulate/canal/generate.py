@@ -64,7 +64,7 @@ class CanalScene:
         return self.parameters.water_level + bed_heights(self.section, stations, -np.asarray(across, float))
 
     def bed_volume(self, start: float, stop: float, height: float, half_width: float) -> float:
-        """Return the volume of the bed above a height between two chainages, ``half_width`` m either side, m³, by 5 cm cells."""
+        """Return the volume of the bed above a height between two chainages, ``half_width`` m either side, m³ (5 cm cells)."""
         step = 0.05
         x, y = np.meshgrid(np.arange(start + step / 2, stop, step), np.arange(-half_width + step / 2, half_width, step))
         above = self.bed_height(x.ravel(), y.ravel()) - height
