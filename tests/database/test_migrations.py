@@ -293,7 +293,7 @@ def test_a_newer_or_unreleased_database_is_refused(conn: psycopg.Connection, dsn
 
 
 def test_a_database_without_postgis_or_schema_is_refused(empty_dsn: str) -> None:
-    with pytest.raises(UserError, match="not set up for tunneldb yet: tunneldb init"):
+    with pytest.raises(UserError, match="not set up for tunneldb yet; type tunneldb init"):
         connect(empty_dsn)
     with open_connection(empty_dsn) as connection:
         connection.execute("CREATE EXTENSION postgis")
@@ -308,5 +308,5 @@ def test_a_server_that_is_down_is_one_line(tmp_path: Path) -> None:
 
 
 def test_a_dsn_that_is_none(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="not one that libpq understands"):
+    with pytest.raises(UserError, match="not valid for libpq"):
         connect("this is no dsn")

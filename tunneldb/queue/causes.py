@@ -29,8 +29,8 @@ class Cause:
 PASSING = Cause(
     "passing",
     (
-        "the database stopped the work",
-        "another program was at the same rows",
+        "the database cancelled the current work",
+        "another program was changing the same rows",
         "another process is at work",
         "the connection to the database broke",
         "changed while it was read",

@@ -12,7 +12,7 @@ from tunneldb.database.models.base import CLOCK, SURVEY, Base, parent
 
 
 class FindingKind(Base):
-    """A kind of finding."""
+    """Kind of finding."""
 
     __tablename__ = "finding_kind"
     __table_args__ = (
@@ -34,7 +34,7 @@ class FindingKind(Base):
 
 
 class Severity(Base):
-    """A degree of severity."""
+    """Degree of severity."""
 
     __tablename__ = "severity"
     __table_args__ = (
@@ -48,7 +48,7 @@ class Severity(Base):
 
 
 class FindingSum(Base):
-    """By how much a change of findings changed their sums."""
+    """Change of the sums of findings by a change of findings."""
 
     __tablename__ = "finding_sum"
     __table_args__ = (
@@ -74,7 +74,7 @@ class FindingSum(Base):
 
 
 class Photo(Base):
-    """A photo of a finding."""
+    """Photo of a finding."""
 
     __tablename__ = "photo"
     __table_args__ = (

@@ -1,4 +1,4 @@
-"""Intensity, images and what is dark in them."""
+"""Intensity, images and dark regions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SUMMED = ["kind", "judged", "review", "detected", "area", "wet", "aside"]
 
 
 class Radiometry(Base):
-    """How the intensity of a kilometre was corrected."""
+    """Correction of the intensity of a kilometre."""
 
     __tablename__ = "radiometry"
     __table_args__ = {"comment": "Correction of the intensity, per kilometre (Xu et al. 2018)"}  # noqa: RUF012
@@ -38,7 +38,7 @@ class Radiometry(Base):
 
 
 class RangeCurve(Base):
-    """The range curve of a kilometre, found on its lining."""
+    """Range curve of a kilometre, estimated from its lining."""
 
     __tablename__ = "range_curve"
     __table_args__ = {"comment": "Range curve found on the lining of a kilometre, of surveys whose reference is auto"}  # noqa: RUF012
@@ -51,7 +51,7 @@ class RangeCurve(Base):
 
 
 class Coverage(Base):
-    """What detection saw of the lining of a kilometre."""
+    """Lining of a kilometre inspected by detection."""
 
     __tablename__ = "coverage"
     __table_args__ = {"comment": "Lining of a kilometre, what was seen of it and what is dark, by steps of chainage"}  # noqa: RUF012
@@ -79,7 +79,7 @@ class Coverage(Base):
 
 
 class Waterproof(Base):
-    """What is kept of a kilometre's waterproofing, or a note that something changed there."""
+    """Cached waterproofing of a kilometre, or a note that something has changed there."""
 
     __tablename__ = "waterproof"
     __table_args__ = (
@@ -113,7 +113,7 @@ class Waterproof(Base):
 
 
 class Region(Base):
-    """A region drawn by the user."""
+    """Region drawn by the user."""
 
     __tablename__ = "region"
     __table_args__ = (
@@ -139,7 +139,7 @@ class Region(Base):
 
 
 class Image(Base):
-    """A block of an unrolled image."""
+    """Block of an unrolled image."""
 
     __tablename__ = "image"
     __table_args__ = (
@@ -166,7 +166,7 @@ class Image(Base):
 
 
 class FeatureList(Base):
-    """An order of features."""
+    """Order of features."""
 
     __tablename__ = "feature_list"
     __table_args__ = {"comment": "In which order the features of anomalies are stored: versions of the program differ"}  # noqa: RUF012
@@ -178,7 +178,7 @@ class FeatureList(Base):
 
 
 class Anomaly(Review, Base):
-    """A leak, or what is dark but dry."""
+    """Leak, or dry dark area."""
 
     __tablename__ = "anomaly"
     __table_args__ = (
@@ -313,7 +313,7 @@ class Anomaly(Review, Base):
 
 
 class LearnedModel(Base):
-    """What the model of evidence learned from the reviews of a tunnel."""
+    """Model of evidence adapted to the reviews of a tunnel."""
 
     __tablename__ = "learned_model"
     __table_args__ = (
@@ -346,7 +346,7 @@ class LearnedModel(Base):
 
 
 class AnomalyPart(Base):
-    """A dark region that an end of its kilometre cuts."""
+    """Dark region cut by an end of its kilometre."""
 
     __tablename__ = "anomaly_part"
     __table_args__ = (
