@@ -196,14 +196,14 @@ assert ALIGNMENT is not None
 SECOND = ALIGNMENT[0].replace('name="○○路線"', 'name="B"')
 BROKEN = [
     (("</Alignments>", f"{SECOND}</Alignments>"), r"holds 2 alignments: '○○路線', 'B'; choose one by --alignment NAME"),
-    (("<ProfAlign ", "<ProfSurf "), r"not a whole XML file"),
+    (("<ProfAlign ", "<ProfSurf "), r"not a complete XML file"),
     (('spiType="clothoid"', 'spiType="bloss"'), r"spiral of type bloss; only clothoids"),
     (('length="62.50000000"', 'length="72.50000000"'), r"distance of its ends of the Spiral .* off by 9\.\d+ m"),
     (('rot="ccw" radius="250.00000000"', 'rot="ccw" radius="251.0"'), r"radius of the Curve .* off by 1\.000 m"),
     (('rot="ccw" radius="250', 'rot="left" radius="250'), r"rotation 'left'; it must be cw or ccw"),
     (("-5764.59435677 -16511.51399200 88.79745221</Start>", "-5764.5 -16511.5</Start>"), r"off by|ends 0\.\d+ m from"),
     (("<Start name=\"BP\">-5851", "<Start name=\"BP\">x-5851"), r"Start of a Line is 'x-5851.* not northing and easting"),
-    (('linearUnit="meter"', 'linearUnit="fathom"'), r"linearUnit 'fathom' is none of"),
+    (('linearUnit="meter"', 'linearUnit="fathom"'), r"linearUnit 'fathom' is not one of"),
     (('staStart="-90.00000000"', 'staStart="minus"'), r"staStart of a Alignment is 'minus', not a number"),
     (("<PVI>-90.00000000 90.90600001</PVI>", "<PVI>-90</PVI>"), r"a PVI of the profile is '-90', not station and height"),
     (("<PVI>-90.00000000 ", "<PVI>390.00000000 "), r"the profile reverses"),
@@ -381,7 +381,7 @@ def test_a_scaled_map_is_refused(ifc: Any, tmp_path: Path) -> None:
 def test_other_curves_and_other_schemas_are_refused(ifc: Any, tmp_path: Path) -> None:
     ifc.by_type("IfcAlignmentHorizontalSegment")[2].PredefinedType = "BLOSSCURVE"
     path = written(ifc, tmp_path)
-    with pytest.raises(UserError, match="segment of type BLOSSCURVE; LINE, CIRCULARARC, CLOTHOID are read"):
+    with pytest.raises(UserError, match="segment of type BLOSSCURVE; supported are LINE, CIRCULARARC, CLOTHOID"):
         read_given(path)
     path.write_text(path.read_text().replace("IFC4X3_ADD2", "IFC2X3"))
     with pytest.raises(UserError, match=r"has the schema IFC2X3; alignments need IFC 4\.3"):
