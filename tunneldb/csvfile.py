@@ -24,7 +24,7 @@ from tunneldb.errors import InputError
 if TYPE_CHECKING:
     import _csv
 
-LARGEST = 1e12
+MAX_MEASUREMENT = 1e12
 """Greatest measured value that is accepted; seconds since 1970 and coordinates are smaller."""
 
 _SEPARATORS = (";", "\t", ",", " ")
@@ -240,6 +240,6 @@ def _number(path: Path, line: int, name: str, text: str, decimal_comma: bool) ->
         value = float(text.replace(",", ".") if comma else text)
     except ValueError:
         raise InputError(f"{path}, line {line}: {name} is {text.strip()!r}, not a number") from None
-    if not abs(value) <= LARGEST:  # also true for NaN
+    if not abs(value) <= MAX_MEASUREMENT:  # also true for NaN
         raise InputError(f"{path}, line {line}: {name} is {text.strip()}, not a plausible measurement; remove the line")
     return value

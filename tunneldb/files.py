@@ -48,7 +48,10 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     require_regular(path)
     try:
-        with tempfile.TemporaryDirectory(prefix=f".{path.stem[:60]}-", dir=path.parent) as folder, room_told(Path(folder)):
+        with (
+            tempfile.TemporaryDirectory(prefix=f".{path.stem[:60]}-", dir=path.parent) as folder,
+            disk_full_as_oserror(Path(folder)),
+        ):
             temporary = Path(folder) / path.name
             yield temporary
             os.replace(temporary, path)  # noqa: PTH105 - the point is that it is atomic
@@ -57,7 +60,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def room_told(folder: Path) -> Iterator[None]:
+def disk_full_as_oserror(folder: Path) -> Iterator[None]:
     """Raise the system's own error if a library fails to write into a folder because the disk is full.
 
     GDAL and SQLite report a full disk with messages of their own, which depend on format and moment.
@@ -80,20 +83,20 @@ def room_told(folder: Path) -> Iterator[None]:
 
 _WRITERS = {"lazrs", "pyogrio", "rasterio", "sqlite3"}
 _FULL = ("disk is full", "No space left")
-_ROOM = 1 << 20
+_TEST_BYTES = 1 << 20
 """Bytes for the test of free space after a file could not be written."""
 
 
 def _require_room(folder: Path) -> None:
     """Write and remove a test file, since only writing shows whether a disk or a quota is full."""
     with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
-        block = memoryview(bytes(_ROOM))
+        block = memoryview(bytes(_TEST_BYTES))
         while block:
             block = block[file.write(block) :]
 
 
 @contextmanager
-def told_to_end() -> Iterator[None]:
+def exit_on_sigterm() -> Iterator[None]:
     """Exit by an exception on SIGTERM, as on Ctrl-C, so that incomplete files are removed."""
 
     def end(number: int, frame: FrameType | None) -> None:

@@ -256,7 +256,7 @@ def test_a_dump_restored_on_another_server_needs_one_init(example: str, dsn: str
 
 
 def test_init_does_not_wait_for_ever_for_others(conn: psycopg.Connection, dsn: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tunneldb.database.schema._PATIENCE", "100ms")
+    monkeypatch.setattr("tunneldb.database.schema._LOCK_TIMEOUT", "100ms")
     conn.execute("SELECT * FROM tunnel_api.leak")  # and stays in its transaction
     with open_connection(dsn) as connection, pytest.raises(UserError, match="close QGIS"):
         install(connection, STAGES)

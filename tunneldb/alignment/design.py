@@ -11,10 +11,10 @@ from tunneldb.arrays import Float
 from tunneldb.errors import InputError
 
 CHORD_ERROR = 0.0005  # m; half of the documented error, for lines that bend in plan and in profile
-LONGEST_STEP = 1.0  # m; the spline through the vertices needs even steps between line and arc
+MAX_STEP = 1.0  # m; the spline through the vertices needs even steps between line and arc
 GAP = 0.01  # m between the end of an element and the start of the next; files are rounded to millimetres
-LEAST_RADIUS = 1.0  # m; smaller than any radius of a tunnel, in plan or profile
-SHORT_END = 0.1  # m by which a profile may be shorter than the plan before the alignment ends with it
+MIN_RADIUS = 1.0  # m; smaller than any radius of a tunnel, in plan or profile
+MAX_SHORTFALL = 0.1  # m by which a profile may be shorter than the plan before the alignment ends with it
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Design:
         """Distances between which it has both plan and profile, m."""
         low, high = 0.0, float(self.distances[-1])
         first, last = self.profile[0].distance, self.profile[-1].distance + self.profile[-1].length
-        return (first if first > low + SHORT_END else low), (last if last < high - SHORT_END else high)
+        return (first if first > low + MAX_SHORTFALL else low), (last if last < high - MAX_SHORTFALL else high)
 
     @property
     def chainages(self) -> tuple[float, float]:
@@ -86,12 +86,12 @@ class Design:
                     f"{low.kind} {number} of the profile does not meet {high.kind} {number + 1} "
                     f"at {self.start + high.distance:.3f} m: gap {gap:.3f} m, step {step:.3f} m"
                 )
-        if not self._bending() <= 1.0 / LEAST_RADIUS:
+        if not self._bending() <= 1.0 / MIN_RADIUS:
             raise InputError(
-                f"plan or profile has an arc with a radius under {LEAST_RADIUS:g} m; the file is damaged, or in another unit"
+                f"plan or profile has an arc with a radius under {MIN_RADIUS:g} m; the file is damaged, or in another unit"
             )
         low_end, high_end = self.reach
-        if high_end - low_end < LONGEST_STEP:
+        if high_end - low_end < MAX_STEP:
             raise InputError("plan and profile have no common stretch; is the profile from another alignment?")
 
     def _bending(self) -> float:
@@ -130,7 +130,7 @@ class Design:
         The step is at most 1 m: a spline through distant vertices on a straight would oscillate at the start of an arc.
         """
         low, high = self.reach
-        step = min(LONGEST_STEP, np.sqrt(8.0 * CHORD_ERROR / max(self._bending(), 1e-9)))
+        step = min(MAX_STEP, np.sqrt(8.0 * CHORD_ERROR / max(self._bending(), 1e-9)))
         return self.position(np.linspace(low, high, int(np.ceil((high - low) / step)) + 1))
 
     def renumbered(self, start: float | None) -> Design:

@@ -17,8 +17,8 @@ from tunneldb.files import vector_source
 from tunneldb.geometry.crs import LOCAL, describe_crs, describe_srid, fits_srid, is_local
 
 CHORD_ERROR = 0.0005  # m, of arcs and splines
-LONGEST_STEP = 1.0  # m between vertices of a drawing with arcs, so that the spline through them keeps straights straight
-_LISTED = 8
+MAX_STEP = 1.0  # m between vertices of a drawing with arcs, so that the spline through them keeps straights straight
+_MAX_LISTED = 8
 _ENTITIES = {"LINE", "ARC", "LWPOLYLINE", "POLYLINE", "SPLINE"}
 
 
@@ -44,8 +44,8 @@ class Drawn:
         """Return the only line, or the one with a number in the list, from 1."""
         if number is None and len(self.lines) == 1:
             return self.lines[0]
-        listed = "; ".join(f"{n} ({describe_line(line)})" for n, line in enumerate(self.lines[:_LISTED], start=1))
-        more = len(self.lines) - _LISTED
+        listed = "; ".join(f"{n} ({describe_line(line)})" for n, line in enumerate(self.lines[:_MAX_LISTED], start=1))
+        more = len(self.lines) - _MAX_LISTED
         listed += f"; and {more} shorter ones" if more > 0 else ""
         count = "1 line" if len(self.lines) == 1 else f"{len(self.lines)} separate lines"
         if number is None:
@@ -231,7 +231,7 @@ def _is_mesh(entity: Any) -> bool:
 def _densified(line: Float) -> Float:
     """Return the same line with vertices at most 1 m apart."""
     length = np.hypot(*np.diff(line[:, :2], axis=0).T)
-    parts = np.maximum(np.ceil(length / LONGEST_STEP), 1.0).astype(int)
+    parts = np.maximum(np.ceil(length / MAX_STEP), 1.0).astype(int)
     within = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
     at = np.append(np.repeat(np.arange(len(parts)), parts) + within / np.repeat(parts, parts), float(len(parts)))
     return np.column_stack([np.interp(at, np.arange(len(line)), column) for column in line.T])

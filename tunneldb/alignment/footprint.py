@@ -21,9 +21,9 @@ CELLS = (1.0, 2.0, 4.0)
 CLEARANCE = 1.5
 """Empty height between points above each other from which the upper ones are a roof, m. Slopes and walls have none."""
 
-_REACH = 3.0  # edges: distance up to which cells are connected, since profiles have gaps
+_CONNECTED_WITHIN = 3.0  # edges: distance up to which cells are connected, since profiles have gaps
 _WINDOW = 2  # cells on each side, of the window that fills holes
-_FAR = 1 << 25  # cells; more than the length of any tunnel
+_CELL_OFFSET = 1 << 25  # cells; more than the length of any tunnel
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def branches(part: Footprint, path: Int64) -> Float:
     """Return centres (k, 2) of branches of a path that are as wide as the tunnel and longer than wide, m."""
     half = half_width(part, path)
     away = cKDTree(part.cells[path]).query(part.cells)[0]
-    rest = part.part((away > 2.0 * half + _REACH * part.edge) & (part.depth >= 0.6 * half))
+    rest = part.part((away > 2.0 * half + _CONNECTED_WITHIN * part.edge) & (part.depth >= 0.6 * half))
     groups = _groups(rest.cells, part.edge)
     return np.array([g.mean(axis=0) for g in groups if np.hypot(*np.ptp(g, axis=0)) > 2.0 * half]).reshape(-1, 2)
 
@@ -166,7 +166,7 @@ def _depth(cell: Int64) -> Float:
 
 def _graph(middle: Float, edge: float) -> coo_array:
     """Return the graph of distances of cells from those near them."""
-    pairs = cKDTree(middle).query_pairs(_REACH * edge, output_type="ndarray")
+    pairs = cKDTree(middle).query_pairs(_CONNECTED_WITHIN * edge, output_type="ndarray")
     length = np.hypot(*(middle[pairs[:, 0]] - middle[pairs[:, 1]]).T) if len(pairs) else np.empty(0)
     return coo_array((length, (pairs[:, 0], pairs[:, 1])), shape=(len(middle), len(middle)))
 
@@ -184,8 +184,8 @@ def _steps(reach: int) -> Int64:
 
 
 def _key(cell: Int64) -> Int64:
-    return np.asarray(cell[:, 0] * _FAR + cell[:, 1] + _FAR // 2)
+    return np.asarray(cell[:, 0] * _CELL_OFFSET + cell[:, 1] + _CELL_OFFSET // 2)
 
 
 def _cell(key: Int64) -> Int64:
-    return np.column_stack([key // _FAR, key % _FAR - _FAR // 2])
+    return np.column_stack([key // _CELL_OFFSET, key % _CELL_OFFSET - _CELL_OFFSET // 2])

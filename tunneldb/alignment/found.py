@@ -25,7 +25,7 @@ from tunneldb.alignment.footprint import (
 from tunneldb.alignment.section_centres import Centres, Frames, place_points, roof_ends, section_centres, vault_gap
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.errors import InputError
-from tunneldb.geometry.centreline import SHORT, ends_by_projection
+from tunneldb.geometry.centreline import MAX_SHORT_LENGTH, ends_by_projection
 from tunneldb.geometry.smoothing import smooth_line
 
 STEP = 5.0
@@ -33,20 +33,20 @@ STEP = 5.0
 
 _SECTIONS = 12  # sections of a short tunnel
 _PASSES = 6
-_FEWEST = 4  # least number of consecutive complete sections of a tunnel
-_LEAST = 0.2  # least share of complete sections in each pass
+_MIN_CONSECUTIVE_SECTIONS = 4  # least number of consecutive complete sections of a tunnel
+_MIN_COMPLETE_SHARE = 0.2  # least share of complete sections in each pass
 _BLOCK = 6.0  # m; cube in which a scan has about the same density
-_HAZE = 0.01  # share of the lining's points in a voxel, below which it is stray
-_LONE = 1.5  # m; radius for neighbours of a point that is not stray
-_COMPANY = 5  # number of these neighbours
-_OTHER_PART = 0.2  # share of the largest part's area from which another part is ambiguous
-_GAP = 30.0  # m without a complete section, over which the line continues
-_BEYOND = 15.0  # m; greatest extension of the line to the end of the lining
-_BENT = 8  # number of sections whose curvature is used for the extension
-_OTHER_SIZE = 0.25  # relative difference in width or height of a section at an end from those inside
-_HIGHEST = 0.6  # share of the height above the middle up to which there is vault; a portal's face continues above
-_WRONG = 0.5  # m from the line from which a section is reported
-_COURSE = 3.0  # m around a line in plan, within which points give its height
+_MIN_POINT_SHARE = 0.01  # share of the lining's points in a voxel, below which it is stray
+_NEIGHBOUR_RADIUS = 1.5  # m; radius for neighbours of a point that is not stray
+_MIN_NEIGHBOURS = 5  # number of these neighbours
+_AMBIGUOUS_AREA_SHARE = 0.2  # share of the largest part's area from which another part is ambiguous
+_MAX_GAP = 30.0  # m without a complete section, over which the line continues
+_MAX_EXTENSION = 15.0  # m; greatest extension of the line to the end of the lining
+_EXTENSION_SECTIONS = 8  # number of sections whose curvature is used for the extension
+_MAX_SIZE_DIFFERENCE = 0.25  # relative difference in width or height of a section at an end from those inside
+_VAULT_HEIGHT_SHARE = 0.6  # share of the height above the middle up to which there is vault; a portal's face continues above
+_DOUBTFUL_DISTANCE = 0.5  # m from the line from which a section is reported
+_COURSE_WIDTH = 3.0  # m around a line in plan, within which points give its height
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class FoundAxis:
     @property
     def doubtful(self) -> list[tuple[float, float]]:
         """Stretches (m along the line) of at least two sections that are incomplete or half a metre off the line."""
-        bad = np.concatenate([[False], ~self.whole | (self.away > _WRONG), [False]])
+        bad = np.concatenate([[False], ~self.whole | (self.away > _DOUBTFUL_DISTANCE), [False]])
         first, stop = np.flatnonzero(bad[1:] & ~bad[:-1]), np.flatnonzero(~bad[1:] & bad[:-1])
         return [(float(self.distance[a]), float(self.distance[b - 1])) for a, b in zip(first, stop, strict=True) if b - a > 1]
 
@@ -119,7 +119,7 @@ def without_haze(points: Float, counts: Int64) -> Float:
     order = np.lexsort((counts, block))
     first, held = np.unique(block[order], return_index=True, return_counts=True)[1:]
     dense = counts[order][first + np.floor(0.9 * (held - 1)).astype(np.int64)]
-    return points[counts >= _HAZE * dense[block]]
+    return points[counts >= _MIN_POINT_SHARE * dense[block]]
 
 
 def find_axis(points: Float) -> FoundAxis:
@@ -141,7 +141,7 @@ def find_axis(points: Float) -> FoundAxis:
     parts = roofed_parts(local)
     if not parts:
         raise InputError(f"no tunnel: nowhere is there a vault {CLEARANCE:g} m or more above a floor")
-    if len(parts) > 1 and parts[1].area > _OTHER_PART * parts[0].area:
+    if len(parts) > 1 and parts[1].area > _AMBIGUOUS_AREA_SHARE * parts[0].area:
         raise InputError(
             "the tunnel has separate parts, or there are several tunnels: "
             + "; ".join(f"{part.area:.0f} m² near {_place(part.cells.mean(axis=0) + origin[:2])}" for part in parts[:4])
@@ -158,7 +158,7 @@ def find_axis(points: Float) -> FoundAxis:
         )
     near = local[cKDTree(part.cells).query(local[:, :2])[0] <= half + part.edge]
     way = part.cells[path]
-    if _length(way) < SHORT:
+    if _length(way) < MAX_SHORT_LENGTH:
         way = ends_by_projection(near)
     found = _through_sections(local, way, half, extend=True)
     found = found if found.xyz[0, 0] <= found.xyz[-1, 0] else found.reversed()
@@ -202,7 +202,7 @@ def _with_the_rest(found: FoundAxis, cells: Float, edge: float) -> FoundAxis:
 def _crossed(parts: list[Footprint], way: Float) -> list[Footprint]:
     """Return the parts of the footprint that a line crosses."""
     even = _at_even_distances(way, 1.0)
-    return [part for part in parts if (cKDTree(part.cells).query(even)[0] < part.edge).mean() > _OTHER_PART]
+    return [part for part in parts if (cKDTree(part.cells).query(even)[0] < part.edge).mean() > _AMBIGUOUS_AREA_SHARE]
 
 
 def _through_sections(points: Float, way: Float, half: float, extend: bool) -> FoundAxis:
@@ -218,7 +218,7 @@ def _through_sections(points: Float, way: Float, half: float, extend: bool) -> F
     for turn in range(_PASSES):
         line, centres, raw = _centred(points, line, reach)
         if extend and turn >= _PASSES // 2:
-            line = line[_inside(centres, max(round(_GAP / step), 1))]
+            line = line[_inside(centres, max(round(_MAX_GAP / step), 1))]
         line = _at_even_distances(line, step)
     line, centres, raw = _centred(points, line, reach)
     ends, distance = line, _distances(line)
@@ -227,7 +227,7 @@ def _through_sections(points: Float, way: Float, half: float, extend: bool) -> F
         distance = distance + float((line[0, :2] - ends[0, :2]) @ Frames.along(line).ahead[0, :2])
     away = np.linalg.norm(raw - line, axis=1)
     width, height = (float(np.nanmedian(values)) for values in (centres.width, centres.height))
-    near = points[place_points(points, Frames.along(line), reach + _BEYOND).station >= 0]
+    near = points[place_points(points, Frames.along(line), reach + _MAX_EXTENSION).station >= 0]
     return FoundAxis(ends, centres.whole, np.where(centres.whole, away, np.nan), distance, width, height, near)
 
 
@@ -250,7 +250,7 @@ def _centred(points: Float, line: Float, reach: float) -> tuple[Float, Centres, 
 
 def _require_tunnel(whole: Bool) -> None:
     count = int(whole.sum())
-    if count < _FEWEST or count < _LEAST * len(whole):
+    if count < _MIN_CONSECUTIVE_SECTIONS or count < _MIN_COMPLETE_SHARE * len(whole):
         raise InputError(f"no tunnel: of {len(whole)} sections of the roofed area, {count} have two walls, a vault and a floor")
 
 
@@ -264,11 +264,11 @@ def _inside(centres: Centres, gap: int) -> slice:
     firsts, lasts = rows[np.append(0, cuts + 1)], rows[np.append(cuts, len(rows) - 1)]
     best = int(np.argmax(lasts - firsts))
     rows = rows[(rows >= firsts[best]) & (rows <= lasts[best])]
-    if len(rows) < _FEWEST:
+    if len(rows) < _MIN_CONSECUTIVE_SECTIONS:
         raise InputError("no tunnel: sections with two walls, a vault and a floor are too far apart")
     usual = np.ones(len(rows), dtype=bool)
     for size in (centres.width[rows], centres.height[rows]):
-        usual &= np.abs(size / np.median(size) - 1.0) <= _OTHER_SIZE
+        usual &= np.abs(size / np.median(size) - 1.0) <= _MAX_SIZE_DIFFERENCE
     kept = rows[usual]
     return slice(int(kept[0]), int(kept[-1]) + 1) if len(kept) > len(rows) // 2 else slice(int(rows[0]), int(rows[-1]) + 1)
 
@@ -277,10 +277,12 @@ def _to_the_ends(points: Float, line: Float, reach: float, height: float) -> Flo
     """Extend the line without its last sections to the end of the lining, by at most 15 m with the same curvature."""
     inner = line[1:-1]
     frames = Frames.along(inner)
-    placed = place_points(points, frames, reach + _BEYOND)
-    lining = placed.at(placed.up <= _HIGHEST * height)
+    placed = place_points(points, frames, reach + _MAX_EXTENSION)
+    lining = placed.at(placed.up <= _VAULT_HEIGHT_SHARE * height)
     gap = vault_gap(lining, _distances(inner))
-    first, last = (min(roof_ends(lining, station, way, gap), _BEYOND) for station, way in ((0, -1.0), (len(inner) - 1, 1.0)))
+    first, last = (
+        min(roof_ends(lining, station, way, gap), _MAX_EXTENSION) for station, way in ((0, -1.0), (len(inner) - 1, 1.0))
+    )
     half = 0.5 * float(np.hypot(*(line[1, :2] - line[0, :2])))
     begin, end = _drawn_on(inner[::-1], first)[::-1], _drawn_on(inner, last)
     return np.vstack([begin, inner[int(first < half) : len(inner) - int(last < half)], end])
@@ -288,17 +290,17 @@ def _to_the_ends(points: Float, line: Float, reach: float, height: float) -> Flo
 
 def _drawn_on(line: Float, length: float) -> Float:
     """Return vertices (k, 3) beyond the end of a line, on the parabola through its last sections."""
-    tail = line[-_BENT:]
+    tail = line[-_EXTENSION_SECTIONS:]
     distance = _distances(tail)
     at = distance[-1] + np.linspace(0.0, length, 1 + max(round(length / STEP), 1))[1:]
-    bend = 2 if len(tail) == _BENT else 1
+    bend = 2 if len(tail) == _EXTENSION_SECTIONS else 1
     fits = [Polynomial.fit(distance, column, degree) for column, degree in zip(tail.T, (bend, bend, 1), strict=True)]
     return np.column_stack([tail[-1, k] + fit(at) - fit(distance[-1]) for k, fit in enumerate(fits)])
 
 
 def _mid_heights(points: Float, plan: Float) -> Float:
     """Return the height midway between lowest and highest points near places (k, 2) in plan, m; interpolated where missing."""
-    near = cKDTree(points[:, :2]).query_ball_point(plan, _COURSE)
+    near = cKDTree(points[:, :2]).query_ball_point(plan, _COURSE_WIDTH)
     height = np.array([np.quantile(points[rows, 2], (0.05, 0.95)).mean() if len(rows) else np.nan for rows in near])
     known = np.isfinite(height)
     if not known.any():
@@ -328,8 +330,8 @@ def _without_stray(points: Float) -> Float:
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
         return points
-    company: Int64 = cKDTree(points).query_ball_point(points, _LONE, return_length=True)
-    return points[company > _COMPANY]
+    company: Int64 = cKDTree(points).query_ball_point(points, _NEIGHBOUR_RADIUS, return_length=True)
+    return points[company > _MIN_NEIGHBOURS]
 
 
 def _moved(found: FoundAxis, by: Float) -> FoundAxis:

@@ -18,13 +18,13 @@ from tunneldb.csvfile import read_csv, read_header
 from tunneldb.errors import InputError, UserError
 
 XYZ = ("x", "y", "z")
-LONGEST_STEP = 1e5
+MAX_STEP = 1e5
 """Greatest distance between two vertices of a given axis, m; longer than any tunnel."""
 
-STEEPEST = 2.0
+MAX_GRADE = 2.0
 """Greatest grade of a given axis, m of height per m in plan, beyond the first metre of height; chainage is length in plan."""
 
-TRAJECTORY_STEP = 5.0
+MIN_TRAJECTORY_STEP = 5.0
 """Least distance between points of a trajectory that become vertices of the axis, m."""
 
 _SNIFFED = 1024  # bytes
@@ -34,7 +34,7 @@ _HEADERS = {
     "z": ("z", "h", "height", "elevation"),
 }
 _GIS = (b"SQLite format 3\0", b"\0\0\x27\x0a", b"fgb\x03fgb", b"{")  # GeoPackage, Shapefile, FlatGeobuf, GeoJSON
-_NOT_READ = {
+_OTHER_FORMATS = {
     b"LASF": "is a scan, not an axis; --axis auto FILE... finds the axis in scans",
     b"ASTM-E57": "is a scan, not an axis; --axis auto FILE... finds the axis in scans",
     b"AC10": "is a DWG drawing; save it as DXF",
@@ -136,7 +136,7 @@ def _kind(path: Path) -> Kind:
             head = file.read(_SNIFFED)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
-    for magic, why in _NOT_READ.items():
+    for magic, why in _OTHER_FORMATS.items():
         if head.startswith(magic):
             raise InputError(f"{path} {why}")
     if head.startswith(b"AutoCAD Binary DXF") or re.match(rb"\s*(999\s|0\s+SECTION\s)", head.removeprefix(b"\xef\xbb\xbf")):
@@ -226,7 +226,7 @@ def _read_points(path: Path) -> GivenAxis:
     if "time" in (name.lower() for name in header):
         rows = _thinned(xyz)
         _require_forward(xyz[rows], lambda row, text: table.error(int(rows[row]), text))
-        note = f"a trajectory: {len(rows)} of its {len(xyz)} points, at least {TRAJECTORY_STEP:g} m apart, are the axis"
+        note = f"a trajectory: {len(rows)} of its {len(xyz)} points, at least {MIN_TRAJECTORY_STEP:g} m apart, are the axis"
         return GivenAxis(xyz[rows], 0.0, notes=(note,))
     _require_forward(xyz, table.error)
     return GivenAxis(xyz, 0.0)
@@ -251,7 +251,7 @@ def _thinned(xyz: Float) -> np.ndarray:
     """Return rows of a trajectory at least one step apart in plan; the last of them is the last that moved."""
     rows = [0]
     for row in range(1, len(xyz)):
-        if np.hypot(*(xyz[row, :2] - xyz[rows[-1], :2])) >= TRAJECTORY_STEP:
+        if np.hypot(*(xyz[row, :2] - xyz[rows[-1], :2])) >= MIN_TRAJECTORY_STEP:
             rows.append(row)
     last = len(xyz) - 1
     if len(rows) > 1 and rows[-1] != last and np.hypot(*(xyz[last, :2] - xyz[rows[-1], :2])) > 0.0:
@@ -262,7 +262,7 @@ def _thinned(xyz: Float) -> np.ndarray:
 def _leap(xyz: Float) -> tuple[int | None, Float, Float]:
     """Return the first implausible step in height (None: none), and length in plan and rise of each step, m."""
     plan, rise = np.hypot(*np.diff(xyz[:, :2], axis=0).T), np.abs(np.diff(xyz[:, 2]))
-    steep = np.flatnonzero(rise > STEEPEST * plan + STEEPEST)
+    steep = np.flatnonzero(rise > MAX_GRADE * plan + MAX_GRADE)
     return int(steep[0]) if len(steep) else None, plan, rise
 
 
@@ -270,7 +270,7 @@ def _require_forward(xyz: Float, error: Callable[[int, str], InputError]) -> Non
     """Raise an error for a row at which a line does not advance or reverses in plan, or has an implausible step."""
     steps = np.diff(xyz[:, :2], axis=0)
     plan = np.hypot(*steps.T)
-    if np.any(far := ~(plan <= LONGEST_STEP)):
+    if np.any(far := ~(plan <= MAX_STEP)):
         row = int(np.argmax(far))
         raise error(row + 1, f"it is {plan[row] / 1000.0:.6g} km from the previous point; is a decimal point missing?")
     standing = np.flatnonzero(~steps.any(axis=1))

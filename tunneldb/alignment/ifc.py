@@ -22,11 +22,11 @@ from tunneldb.errors import InputError, UserError
 PLAN: dict[str, PlanKind] = {"LINE": "line", "CIRCULARARC": "arc", "CLOTHOID": "clothoid"}
 PROFILE: dict[str, ProfileKind] = {"CONSTANTGRADIENT": "grade", "PARABOLICARC": "parabola", "CIRCULARARC": "circle"}
 
-SAME_STATION = 0.001  # m; tolerance for a station that continues the previous piece
+STATION_TOLERANCE = 0.001  # m; tolerance for a station that continues the previous piece
 SCHEMAS = ("IFC4X3", "IFC4X3_TC1", "IFC4X3_ADD1", "IFC4X3_ADD2")
 HEADER = 10_000  # characters at the start of a file that contain its schema
 ARM = 1e6  # m; length for computing directions on the map, long enough for coordinates of millions
-LARGEST_SCALE = 1e-6  # greatest difference of a map scale from 1
+MAX_SCALE_ERROR = 1e-6  # greatest difference of a map scale from 1
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ class Ifc:
         origin, aside = (np.array(auto_xyz2enh(self._file, *corner[:3]), dtype=np.float64) * unit for corner in corners)
         step = (aside - origin) / ARM
         scale = float(np.hypot(step[0], step[1]))
-        if abs(scale - 1.0) > LARGEST_SCALE:
+        if abs(scale - 1.0) > MAX_SCALE_ERROR:
             raise InputError(
                 f"{self._path}: its map conversion has the scale {scale:.9g}, so map lengths differ from the alignment's; "
                 "export it in map coordinates"
@@ -170,7 +170,7 @@ class Ifc:
         for piece in pieces[1:]:
             before = kept[-1]
             expected = before.station + before.direction * (piece.distance - before.distance)
-            if abs(expected - piece.station) > SAME_STATION or piece.direction != before.direction:
+            if abs(expected - piece.station) > STATION_TOLERANCE or piece.direction != before.direction:
                 kept.append(piece)
         if len(kept) == 1 and first.direction == 1:
             return start, ()

@@ -19,8 +19,8 @@ from tunneldb.errors import InputError
 
 MISMATCH = 0.02  # m between a stated length and that of its points; files are rounded to millimetres or centimetres
 _PVIS = ("PVI", "ParaCurve", "UnsymParaCurve", "CircCurve")
-_KEPT = ("Alignments", "Units", "CoordinateSystem", "CgPoints")
-_DROPPED = ("CrossSects", "CrossSect")  # inside Alignments; they are most of some files
+_READ_ELEMENTS = ("Alignments", "Units", "CoordinateSystem", "CgPoints")
+_SKIPPED_ELEMENTS = ("CrossSects", "CrossSect")  # inside Alignments; they are most of some files
 
 Point = tuple[float, float]
 
@@ -255,12 +255,12 @@ def _read(path: Path) -> Element:
         for event, element in iterparse(path, events=("start", "end")):
             if event == "start":
                 stack.append(element)
-                kept += _tag(element) in _KEPT
+                kept += _tag(element) in _READ_ELEMENTS
                 continue
             stack.pop()
-            if stack and (not kept or _tag(element) in _DROPPED):
+            if stack and (not kept or _tag(element) in _SKIPPED_ELEMENTS):
                 stack[-1].remove(element)
-            kept -= _tag(element) in _KEPT
+            kept -= _tag(element) in _READ_ELEMENTS
     except ParseError as error:
         raise InputError(f"{path} is not a complete XML file: {error}") from None
     except (ValueError, LookupError) as error:  # a multi-byte or unknown encoding

@@ -14,13 +14,13 @@ from tunneldb.arrays import Bool, Float, Int64
 
 _CLASS = 5  # ° of an angular class
 _CLASSES = 360 // _CLASS
-_OUTWARD = 0.9  # share of a class's points that are nearer, from fixtures and objects in the tunnel
-_FREE = 0.8  # share of sections with a reduced wall distance: a train may stand along most of a tunnel
-_UPRIGHT = 0.8  # share of the greatest width that a pair of classes must have to be on the walls of a low, wide tunnel
-_BLOCKED = 0.1  # greatest relative deviation of the wall distance of a pair of classes from the usual
-_PROFILES = 0.3  # m; greater than gaps between points of one profile
-_LEAST_GAP = 1.0  # m
-_FEWEST = 3  # least number of classes, or pairs, for the median of a wall, a vault or a floor
+_LINING_QUANTILE = 0.9  # share of a class's points that are nearer, from fixtures and objects in the tunnel
+_FREE_QUANTILE = 0.8  # share of sections with a reduced wall distance: a train may stand along most of a tunnel
+_MIN_WIDTH_SHARE = 0.8  # share of the greatest width that a pair of classes must have to be on the walls of a low, wide tunnel
+_MAX_WIDTH_DEVIATION = 0.1  # greatest relative deviation of the wall distance of a pair of classes from the usual
+_MIN_PROFILE_GAP = 0.3  # m; greater than gaps between points of one profile
+_MIN_GAP = 1.0  # m
+_MIN_CLASSES = 3  # least number of classes, or pairs, for the median of a wall, a vault or a floor
 _WALL = 25.0  # ° above and below the horizontal in which points are on a wall
 _VAULT = 1.0 / 3.0  # least share of the classes overhead for a roof
 
@@ -112,12 +112,12 @@ def section_centres(placed: Placed, count: int, half_width: float) -> Centres:
     a, b = radius[:, side], radius[:, ::-1][:, side]
     shift, apart = (a - b) / 2.0, (a + b) * np.sin(np.radians(angle[side]))
     usual = _usual(apart)
-    upright = usual >= _UPRIGHT * np.nanmax(usual, initial=0.0)  # not vault and floor of a low, wide tunnel
-    free = (np.abs(apart / usual - 1.0) <= _BLOCKED) & upright
+    upright = usual >= _MIN_WIDTH_SHARE * np.nanmax(usual, initial=0.0)  # not vault and floor of a low, wide tunnel
+    free = (np.abs(apart / usual - 1.0) <= _MAX_WIDTH_DEVIATION) & upright
     right, width = (_median(np.where(free, values, np.nan), fewest=1) for values in (shift, apart))
     right, width = np.where(np.isfinite(right), (right, width), (_median(shift[:, upright]), _median(apart[:, upright])))
     # a roof on posts has no walls at mid-height
-    walls = np.isfinite(apart[:, np.abs(angle[side] - 90.0) < _WALL]).sum(axis=1) >= _FEWEST
+    walls = np.isfinite(apart[:, np.abs(angle[side] - 90.0) < _WALL]).sum(axis=1) >= _MIN_CLASSES
     right, width = np.where(walls, (right, width), np.nan)
     floor, vault = np.abs(angle) > 135, np.abs(angle) < 45
     depth = _median(-radius[:, floor] * cosine[floor])
@@ -139,8 +139,8 @@ def vault_gap(placed: Placed, distance: Float) -> float:
     """
     overhead = placed.at((placed.station >= 0) & _overhead(placed))
     gaps = np.diff(np.sort(distance[overhead.station] + overhead.along))
-    apart = gaps[gaps > _PROFILES]
-    return 1.5 * max(float(np.quantile(apart, 0.9)) if len(apart) else 0.0, _LEAST_GAP)
+    apart = gaps[gaps > _MIN_PROFILE_GAP]
+    return 1.5 * max(float(np.quantile(apart, 0.9)) if len(apart) else 0.0, _MIN_GAP)
 
 
 def roof_ends(placed: Placed, station: int, way: float, gap: float) -> float:
@@ -168,7 +168,7 @@ def _radii(placed: Placed, count: int) -> Float:
     key, away = key[order], away[order]
     held, first, points = np.unique(key, return_index=True, return_counts=True)
     out = np.full(count * _CLASSES, np.nan)
-    out[held] = away[first + np.floor(_OUTWARD * (points - 1)).astype(np.int64)]
+    out[held] = away[first + np.floor(_LINING_QUANTILE * (points - 1)).astype(np.int64)]
     return out.reshape(count, _CLASSES)
 
 
@@ -180,12 +180,12 @@ def _usual(apart: Float) -> Float:
     known = np.isfinite(apart).any(axis=0)
     out = np.full(apart.shape[1], np.nan)
     if known.any():
-        half, most = np.nanquantile(apart[:, known], (0.5, _FREE), axis=0)
-        out[known] = np.minimum(most, (1.0 + _BLOCKED) * half.max())
+        half, most = np.nanquantile(apart[:, known], (0.5, _FREE_QUANTILE), axis=0)
+        out[known] = np.minimum(most, (1.0 + _MAX_WIDTH_DEVIATION) * half.max())
     return out
 
 
-def _median(values: Float, fewest: int = _FEWEST) -> Float:
+def _median(values: Float, fewest: int = _MIN_CLASSES) -> Float:
     """Return the median of each row; NaN if too few values are known."""
     known = np.isfinite(values).sum(axis=1) >= fewest
     out = np.full(len(values), np.nan)

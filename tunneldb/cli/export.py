@@ -18,7 +18,7 @@ from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.cli.tables import print_classes
 from tunneldb.database import connect
 from tunneldb.errors import NotReadyError, UserError
-from tunneldb.files import made_folder, replacing, told_to_end
+from tunneldb.files import exit_on_sigterm, made_folder, replacing
 from tunneldb.stages.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
@@ -104,7 +104,7 @@ def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, st
     from tunneldb.export.exchange import write_survey
 
     coverage = read_coverage(conn, survey, stretch.low, stretch.high)
-    with told_to_end(), replacing(output) as temporary, bar("parts") as progress:
+    with exit_on_sigterm(), replacing(output) as temporary, bar("parts") as progress:
         counts = write_survey(conn, survey, stretch.low, stretch.high, temporary, step(progress))
     tell(survey=survey.name, file=output, layers=counts)
     say_coverage(coverage, survey)
@@ -142,7 +142,7 @@ def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Pat
     conn.rollback()
     files: list[dict[str, Any]] = []
     tell(survey=survey.name, files=files)
-    with told_to_end(), made_folder(output), bar("points") as progress:
+    with exit_on_sigterm(), made_folder(output), bar("points") as progress:
         for file in (export_copc if copc else export_classified)(conn, survey, output, wanted, step(progress)):
             points = int(file.counts.sum())
             rate = points / file.seconds / 1e6

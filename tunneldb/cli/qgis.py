@@ -19,7 +19,7 @@ from tunneldb.export.images.change import export_change
 from tunneldb.export.images.image import export_filled, export_kilometre, image_kilometres
 from tunneldb.export.qgis import store_project, store_styles, write_project
 from tunneldb.export.tables.spots import read_spots
-from tunneldb.files import made_folder, told_to_end
+from tunneldb.files import exit_on_sigterm, made_folder
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
@@ -99,7 +99,7 @@ def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> li
     kilometres = image_kilometres(conn, survey)
     conn.rollback()
     written: list[Path] = []
-    with told_to_end(), made_folder(folder) if kilometres else nullcontext(), bar("km") as progress:
+    with exit_on_sigterm(), made_folder(folder) if kilometres else nullcontext(), bar("km") as progress:
         advance = step(progress)("images", len(kilometres))
         for km in kilometres:
             written += export_kilometre(conn, survey, km, folder)

@@ -17,7 +17,7 @@ from tunneldb.cli.progress import bar
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import replacing, told_to_end
+from tunneldb.files import exit_on_sigterm, replacing
 from tunneldb.report.owner import Owner, read_owner
 from tunneldb.report.page import CARDS, LISTED, Written, write_html, write_site_html
 from tunneldb.report.pdf import find_browser, print_pdf
@@ -105,7 +105,7 @@ def report(
         stretch = parse_stretch(conn, found, start, end)
         coverage = read_coverage(conn, found, stretch.low, stretch.high)
         conn.rollback()
-        with told_to_end(), replacing(output) as temporary, bar("strips") as shown:
+        with exit_on_sigterm(), replacing(output) as temporary, bar("strips") as shown:
             if browser is None:
                 written = _write(conn, found, stretch, temporary, shown, owner, photos, listed, paper=False)
             else:
@@ -130,7 +130,7 @@ def _write_site(
     """Write the report of a site, of which structures are all there is, and say what it counts."""
     if asked:
         raise UserError(f"{asked}: survey {survey.name} is of a site, which has no chainage: leave --from and --to out")
-    with told_to_end(), replacing(output) as temporary, bar("reports") as shown:
+    with exit_on_sigterm(), replacing(output) as temporary, bar("reports") as shown:
         if browser is None:
             spots = write_site_html(conn, survey, temporary, owner)
         else:

@@ -11,7 +11,7 @@ from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.database import connect
-from tunneldb.files import told_to_end
+from tunneldb.files import exit_on_sigterm
 from tunneldb.store.survey import get_survey
 
 
@@ -27,7 +27,7 @@ def export(settings: Settings, name: str, output: Path) -> None:
     """
     from tunneldb.export.archive.save import save_survey
 
-    with told_to_end(), connect(settings.dsn) as connection, bar("bytes") as progress:
+    with exit_on_sigterm(), connect(settings.dsn) as connection, bar("bytes") as progress:
         saved = save_survey(connection, get_survey(connection, name, site=True), output, step(progress))
     tell(survey=name, file=output, bytes=saved.bytes, kilometres=saved.kilometres, rows=saved.rows)
     notify(
@@ -55,7 +55,7 @@ def import_(settings: Settings, file: Path, name: str | None) -> None:
     """
     from tunneldb.export.archive.load import load_survey
 
-    with told_to_end(), connect(settings.dsn) as connection, bar("bytes") as progress:
+    with exit_on_sigterm(), connect(settings.dsn) as connection, bar("bytes") as progress:
         tell_warnings(connection)
         loaded = load_survey(connection, file, name, step(progress))
     notes = list(loaded.notes)

@@ -16,7 +16,7 @@ from tunneldb.cli.stretch import parse_stretch
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import replacing, told_to_end
+from tunneldb.files import exit_on_sigterm, replacing
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
@@ -66,9 +66,9 @@ def survey_rings(
         survey = get_survey(conn, name)
         part = parse_stretch(conn, survey, *ends)
         conn.rollback()
-        with told_to_end(), bar("blocks") as progress:
+        with exit_on_sigterm(), bar("blocks") as progress:
             _define(conn, survey, definition, progress)
-        with told_to_end(), bar("km") as progress:
+        with exit_on_sigterm(), bar("km") as progress:
             made = measure_survey_rings(conn, survey, part.low, part.high, options, step(progress))
         rows = ring_rows(conn, survey, part.low, part.high)
         if not rows:

@@ -15,7 +15,7 @@ from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import told_to_end
+from tunneldb.files import exit_on_sigterm
 
 if TYPE_CHECKING:
     from tunneldb.alignment.found import FoundAxis
@@ -156,7 +156,7 @@ def add(
     if axis == AUTO:
         if {axis_layer, axis_unit, alignment, profile} != {None}:
             raise UserError("--axis auto reads SCAN files; --axis-layer, --axis-unit, --alignment and --profile are for others")
-        with told_to_end(), bar("points") as progress:
+        with exit_on_sigterm(), bar("points") as progress:
             given, found = found_given(scans, srid, step(progress), start_chainage, reverse)
     else:
         given = read_given(
@@ -170,7 +170,7 @@ def add(
                     f"{axis}: its line has no heights; give the scan files too, which have them: "
                     f"tunneldb tunnel add {name} --srid {srid or 'local'} --axis {axis} SCAN..."
                 )
-            with told_to_end(), bar("points") as progress:
+            with exit_on_sigterm(), bar("points") as progress:
                 given, found = complete(given, scans, srid, step(progress))
     if found is None and axis_out is not None:
         raise UserError("--axis-out is for an axis that is found in SCAN files")
@@ -247,7 +247,7 @@ def find_axis(scans: tuple[Path, ...], output: Path | None, picture: Path | None
     from tunneldb.pipeline.axis_search import found_given
 
     name = common_name(scans)
-    with told_to_end(), bar("points") as progress:
+    with exit_on_sigterm(), bar("points") as progress:
         _, found = found_given(scans, None, step(progress), None, reverse)
     _keep(found, output or Path(f"{name}.found-axis.csv"), picture, 0.0, name)
     notify(f"chainage grows over {describe_line(found.xyz)}; --reverse turns it round")

@@ -29,7 +29,7 @@ _OF_EXTENSION = "EXISTS (SELECT FROM pg_depend e WHERE e.deptype = 'e' AND e.cla
 
 # Tables of the schema, and all that inherit from them or that they inherit from, wherever they are: a table that is made a
 # partition of another takes its triggers, checks and indexes.
-_HELD = """
+_OWN_TABLES = """
     SELECT c.oid FROM pg_class c
      WHERE c.relnamespace = 'tunnel'::regnamespace AND c.relkind IN ('r', 'p', 'v')
     UNION
@@ -51,7 +51,7 @@ _OWN = (
 _OURS = ", ".join(str(each) for each in _OWN)
 
 _TRIGGERS = f"""
-WITH RECURSIVE trusted AS ({_TRUSTED}), held AS ({_HELD})
+WITH RECURSIVE trusted AS ({_TRUSTED}), held AS ({_OWN_TABLES})
 SELECT format('%s on %s is not tunneldb''s: it runs what %s wrote', quote_ident(t.tgname), t.tgrelid::regclass,
               pg_get_userbyid(p.proowner)),
        format('DROP TRIGGER %I ON %s;', t.tgname, t.tgrelid::regclass)
@@ -77,7 +77,7 @@ SELECT format('%s on tunnel.%s %s', o.trigger, o.held, CASE WHEN t.oid IS NULL T
 
 # Foreign keys of tables elsewhere: what is deleted or renumbered here deletes or changes rows there, and runs their triggers.
 _REFERENCES = f"""
-WITH RECURSIVE held AS ({_HELD})
+WITH RECURSIVE held AS ({_OWN_TABLES})
 SELECT format('foreign key %I of %s is not tunneldb''s: it runs triggers there', k.conname, k.conrelid::regclass),
        format('ALTER TABLE %s DROP CONSTRAINT %I;', k.conrelid::regclass, k.conname)
   FROM pg_constraint k JOIN held ON held.oid = k.confrelid
@@ -88,7 +88,7 @@ SELECT format('foreign key %I of %s is not tunneldb''s: it runs triggers there',
 
 # Rules and policies: tunneldb has none; a view in a table's place is one, too.
 _RULES = f"""
-WITH RECURSIVE held AS ({_HELD})
+WITH RECURSIVE held AS ({_OWN_TABLES})
 SELECT format('rule %I on %s is not tunneldb''s: it runs', r.rulename, r.ev_class::regclass),
        CASE WHEN r.rulename = '_RETURN' THEN format('DROP VIEW %s;', r.ev_class::regclass)
             ELSE format('DROP RULE %I ON %s;', r.rulename, r.ev_class::regclass) END
@@ -103,7 +103,7 @@ SELECT format('policy %I on %s is not tunneldb''s: it runs', y.polname, y.polrel
 # Expressions by what they call: by the numbers of functions, operators and types in their trees, for dependences on what comes
 # with PostgreSQL, such as query_to_xml, are not kept. Those of tunneldb call what is immutable, the clock, and who is there.
 _EXPRESSIONS = f"""
-WITH RECURSIVE trusted AS ({_TRUSTED}), held AS ({_HELD}),
+WITH RECURSIVE trusted AS ({_TRUSTED}), held AS ({_OWN_TABLES}),
 expression (relation, what, tree, mend) AS (
     SELECT k.conrelid, format('check %I', k.conname), k.conbin::text,
            format('ALTER TABLE %s DROP CONSTRAINT %I;', k.conrelid::regclass, k.conname)

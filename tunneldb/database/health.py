@@ -26,7 +26,7 @@ from tunneldb.database.server import Server
 from tunneldb.errors import UserError
 
 ROLES = ("tunnel_viewer", "tunnel_inspector", "tunnel_operator")
-LITTLE_SPACE = 5 * 1024**3  # bytes; a kilometre at survey density takes some 0.5 GB with its rewrite
+MIN_FREE_SPACE = 5 * 1024**3  # bytes; a kilometre at survey density takes some 0.5 GB with its rewrite
 LOCKS_PER_TABLE = 6
 """Greatest number of locks for dropping a kilometre: its table, its TOAST table, and indexes."""
 LOCKS_OF_A_SESSION = 16
@@ -313,6 +313,6 @@ def _space() -> Finding:
     home = Server().home()
     free = shutil.disk_usage(home.state).free
     text = f"{free / GIB:.1f} GB free in {home.state}"
-    if free < LITTLE_SPACE:
+    if free < MIN_FREE_SPACE:
         return Finding("note", "disk", text, "free some, or set TUNNELDB_HOME to a folder on a bigger disk")
     return Finding("ok", "disk", text)

@@ -25,7 +25,7 @@ HEAD = "0001"
 
 _LOCK = 7088630451  # arbitrary number; two installations of one database wait for each other
 _LAYERS_LOCK = 7088630452  # the one of tunnel_api.make_layers
-_PATIENCE = "30s"  # time to wait for other users of the objects to change
+_LOCK_TIMEOUT = "30s"  # time to wait for other users of the objects to change
 
 
 class StageRow(Protocol):
@@ -68,7 +68,7 @@ def install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> 
         if not isinstance(cause, psycopg.errors.LockNotAvailable):
             raise cause from None
         raise UserError(
-            f"other programs have used the database for {_PATIENCE}; close QGIS, wait for runs, then type tunneldb init"
+            f"other programs have used the database for {_LOCK_TIMEOUT}; close QGIS, wait for runs, then type tunneldb init"
         ) from None
 
 
@@ -76,7 +76,7 @@ def _install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) ->
     from alembic import command
 
     with engine_on(connection).begin() as session:
-        connection.execute(sql.SQL("SET LOCAL lock_timeout = {}").format(_PATIENCE))
+        connection.execute(sql.SQL("SET LOCAL lock_timeout = {}").format(_LOCK_TIMEOUT))
         with catalogue_alone(connection):
             connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
             _close_public(connection)

@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from tunneldb.arrays import Bool, Float, Int64
 
-HALF = 0.5
+MIN_OVERLAP = 0.5
 """Share of its area from which a true leak counts as found, or a found leak as right. This is the overlap of PASCAL VOC
 (Everingham et al., 2010) and COCO (Lin et al., 2014), applied in each direction separately, since detection may divide a leak
 or join two."""
@@ -187,7 +187,7 @@ def figures(comparison: Comparison, seen: float = np.nan, true: Bool | None = No
     c = comparison
     own = np.ones(len(c.true), np.bool_) if true is None else true
     theirs = np.ones(len(c.found), np.bool_) if found is None else found
-    hit, right = own & (c.covered >= HALF), theirs & (c.right >= HALF)
+    hit, right = own & (c.covered >= MIN_OVERLAP), theirs & (c.right >= MIN_OVERLAP)
     false = theirs & (c.found_group < 0)
     all_true, all_found = shapely.union_all(c.true_shape), shapely.union_all(c.found_shape)
     demanded, called = shapely.union_all(c.true_shape[own]), shapely.union_all(c.found_shape[theirs])

@@ -13,7 +13,7 @@ import shapely
 
 from tunneldb.arrays import Float
 from tunneldb.csvfile import write_csv
-from tunneldb.evaluate.measure import HALF, Comparison, Figures, figures
+from tunneldb.evaluate.measure import MIN_OVERLAP, Comparison, Figures, figures
 
 DISTANCES = (5.0, 10.0)
 """Limits of groups of leaks by distance from the nearest scanner position, m."""
@@ -123,12 +123,12 @@ class Report:
     @property
     def missed(self) -> list[Item]:
         """True leaks that were found by less than half."""
-        return [leak for leak in self.true if leak.share < HALF]
+        return [leak for leak in self.true if leak.share < MIN_OVERLAP]
 
     @property
     def wrong(self) -> list[Item]:
         """Found leaks that are true by less than half; those that touch no true leak are false."""
-        return [leak for leak in self.found if leak.share < HALF]
+        return [leak for leak in self.found if leak.share < MIN_OVERLAP]
 
 
 def make_report(

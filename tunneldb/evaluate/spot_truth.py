@@ -18,7 +18,7 @@ from tunneldb.evaluate.truth import read_polygons
 from tunneldb.geometry.crs import LOCAL, srid_name
 from tunneldb.store.survey import Survey
 
-FEWEST, STEEPEST = 100, 75.0
+MIN_POINTS, MAX_INCIDENCE = 100, 75.0
 """Limits for required simulated spots: least number of points, and greatest median angle of incidence, degrees."""
 
 
@@ -89,6 +89,6 @@ def _of_simulation(survey: Survey, path: Path, content: dict[str, Any]) -> SpotT
     rows = [row for row in content["anomalies"] if row["points"]]
     if not rows:
         raise InputError(f"{path} has no anomaly visible to the scanner; there is nothing to compare with")
-    asked = [row["points"] >= FEWEST and row["incidence"][1] <= STEEPEST for row in rows]
+    asked = [row["points"] >= MIN_POINTS and row["incidence"][1] <= MAX_INCIDENCE for row in rows]
     shapes = [shapely.force_3d(Polygon(row["outline_3d"])) for row in rows]
     return SpotTruth([str(row["id"]) for row in rows], list(shapes), np.array(asked, np.bool_))

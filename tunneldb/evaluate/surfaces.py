@@ -16,11 +16,11 @@ from tunneldb.arrays import Float
 from tunneldb.structures.models import RADIUS, to_space, unroll
 from tunneldb.structures.reconcile import NEAR
 
-BESIDE = 0.005
+MAX_FACE_DISTANCE = 0.005
 """Distance behind the nearest face up to which a polygon is on a face, too, m."""
 
-_LEAST = 1e-6  # m²; smaller areas are rounding errors
-_APART = 1.0  # m between faces on the plane
+_MIN_AREA = 1e-6  # m²; smaller areas are rounding errors
+_FACE_SPACING = 1.0  # m between faces on the plane
 
 
 @dataclass(frozen=True)
@@ -83,23 +83,23 @@ def lay_on_faces(shape: BaseGeometry, faces: Sequence[FoundFace]) -> Laid:
             continue
         flat = lay_on_face(shape, face)
         shared = shapely.intersection(flat, face.outline)
-        if shared.area > _LEAST:
+        if shared.area > _MIN_AREA:
             near.append((float(np.median(off)), k, flat, shared))
     if not near:
         return Laid([(None, _own_plane(shape))], 0.0)
     near.sort(key=lambda one: one[:2])
-    near = [one for one in near if one[0] <= near[0][0] + BESIDE]
+    near = [one for one in near if one[0] <= near[0][0] + MAX_FACE_DISTANCE]
     home = max(near, key=lambda one: one[3].area)
     parts: dict[int, BaseGeometry] = {}
     covered: BaseGeometry = Polygon()
     for _, k, _, shared in near:
         own = shared if covered.is_empty else shapely.difference(shared, _moved(covered, faces[home[1]], faces[k]))
-        if own.area > _LEAST:
+        if own.area > _MIN_AREA:
             parts[k] = own
             covered = shapely.union(covered, _moved(own, faces[k], faces[home[1]]))
     on_faces = float(sum(part.area for part in parts.values()))
     rest = shapely.difference(home[2], covered)
-    if rest.area > _LEAST:
+    if rest.area > _MIN_AREA:
         parts[home[1]] = shapely.union(parts.get(home[1], Polygon()), rest)
     return Laid(list(parts.items()), on_faces)
 
@@ -115,7 +115,7 @@ def on_one_plane(laid: Sequence[Sequence[tuple[int | None, BaseGeometry]]]) -> l
     for key, boxes in bounds.items():
         low, high = min(box[0] for box in boxes), max(box[2] for box in boxes)
         shift[key] = end - low
-        end += high - low + _APART
+        end += high - low + _FACE_SPACING
     return [
         _polygons(shapely.union_all([translate(part, shift[(n, -1) if k is None else k]) for k, part in parts]))
         for n, parts in enumerate(laid)

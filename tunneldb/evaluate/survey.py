@@ -22,7 +22,7 @@ from tunneldb.store.poses import load_poses
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
-WIDE = 1e4  # m of arc, more than any section has
+MAX_ARC = 1e4  # m of arc, more than any section has
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Findings:
     @property
     def stretch(self) -> BaseGeometry:
         """Unrolled plane between the ends of the kilometres."""
-        boxes = [shapely.box(km * KILOMETRE, -WIDE, (km + 1) * KILOMETRE, WIDE) for km in self.kilometres]
+        boxes = [shapely.box(km * KILOMETRE, -MAX_ARC, (km + 1) * KILOMETRE, MAX_ARC) for km in self.kilometres]
         return shapely.union_all(boxes)
 
 

@@ -20,10 +20,10 @@ BLOCK = 1 << 14
 """Number of points located at a time."""
 
 MILLIMETRE = 0.001
-CLOSEST = 0.1
+MIN_SPACING = 0.1
 """Least distance between axis vertices, m; scan points do not resolve more."""
 
-DENSE = 2.0  # m; distance between vertices below which a line is dense
+MAX_DENSE_SPACING = 2.0  # m; distance between vertices below which a line is dense
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,10 @@ class Alignment:
         xyz = np.asarray(xyz, dtype=np.float64)
         if len(xyz) < 2:
             raise UserError(f"an axis needs at least 2 points, this one has {len(xyz)}")
-        if spacing < CLOSEST or abs(KILOMETRE / spacing - round(KILOMETRE / spacing)) > 1e-9:
-            raise UserError(f"the spacing of axis vertices must divide 1000 m and be {CLOSEST} m or more, not {spacing:g} m")
+        if spacing < MIN_SPACING or abs(KILOMETRE / spacing - round(KILOMETRE / spacing)) > 1e-9:
+            raise UserError(
+                f"the spacing of axis vertices must divide 1000 m and be {MIN_SPACING} m or more, not {spacing:g} m"
+            )
         chord = np.hypot(*np.diff(xyz[:, :2], axis=0).T)
         if np.any(chord == 0):
             row = int(np.argmin(chord)) + 2
@@ -169,7 +171,7 @@ def _curve(xyz: Float, chord: Float) -> tuple[Float, Float, Callable[..., Float]
     knots = np.concatenate([[0.0], np.cumsum(chord)])
     position = scipy.interpolate.CubicSpline(knots, xyz)
     # A design alignment has a vertex every metre, between which the curve is nearly straight.
-    steps = np.where(chord > DENSE, 64, 4)
+    steps = np.where(chord > MAX_DENSE_SPACING, 64, 4)
     within = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
     parameter = np.append(np.repeat(knots[:-1], steps) + within * np.repeat(chord / steps, steps), knots[-1])
     slope = position(parameter, 1)

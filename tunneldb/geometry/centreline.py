@@ -16,16 +16,16 @@ from tunneldb.geometry.smoothing import smooth_line
 
 _CELL = 1.0  # m in plan
 _REACH = 3.0  # distance up to which cells are neighbours, m, since profiles have gaps
-SHORT = 40.0
+MAX_SHORT_LENGTH = 40.0
 """Length below which a tunnel may be wider than long, and its direction is found by projection, m."""
 
 _STEP = 5.0  # m between vertices
 _SAMPLE = 10_000  # points that are projected in all directions
 _PIXEL = 0.2  # edge of a cell of the projection, m
 _SLICE = 1.0  # m, across the line
-_HELD = 10  # least number of cells in a slice
-_OUTLYING = 0.02  # greatest share of a slice's cells beyond each wall
-_FAR = 1 << 24  # cells; more than the length of any tunnel
+_MIN_CELLS = 10  # least number of cells in a slice
+_MAX_OUTLIER_SHARE = 0.02  # greatest share of a slice's cells beyond each wall
+_CELL_OFFSET = 1 << 24  # cells; more than the length of any tunnel
 
 
 def centreline_through(points: ArrayLike) -> PlanLine:
@@ -70,7 +70,7 @@ def centreline(points: Float) -> Float:
     local = points - origin
     cells = _connected_cells(local[:, :2])
     path = _path_lengths(cells)
-    vertices = _vertices_along_path(cells, path) if path.max() > SHORT else ends_by_projection(local)
+    vertices = _vertices_along_path(cells, path) if path.max() > MAX_SHORT_LENGTH else ends_by_projection(local)
     if vertices[-1, 0] < vertices[0, 0]:
         vertices = vertices[::-1]
     # Spread evenly: otherwise dense points around a scanner would dominate.
@@ -90,8 +90,8 @@ def _connected_cells(plan: Float) -> Float:
 def _occupied_cells(plan: Float, edge: float) -> Float:
     """Return the centres (m, 2) of occupied cells of the plan, without those that have far fewer points than most."""
     key = np.floor(plan / edge).astype(np.int64)
-    key, count = np.unique(key[:, 0] * _FAR + key[:, 1] + _FAR // 2, return_counts=True)
-    cells = np.column_stack([key // _FAR, key % _FAR - _FAR // 2])[count >= 0.1 * np.median(count)]
+    key, count = np.unique(key[:, 0] * _CELL_OFFSET + key[:, 1] + _CELL_OFFSET // 2, return_counts=True)
+    cells = np.column_stack([key // _CELL_OFFSET, key % _CELL_OFFSET - _CELL_OFFSET // 2])[count >= 0.1 * np.median(count)]
     return np.asarray((cells + 0.5) * edge, dtype=np.float64)
 
 
@@ -132,9 +132,9 @@ def _end_of_cells(cells: Float, at: Float, unit: Float) -> Float:
 
 def ends_by_projection(local: Float) -> Float:
     """Return both ends of a short piece, in the direction of projection in which its points occupy the fewest cells."""
-    local = local[np.abs(local - np.median(local, axis=0)).max(axis=1) < SHORT]
+    local = local[np.abs(local - np.median(local, axis=0)).max(axis=1) < MAX_SHORT_LENGTH]
     if not len(local):
-        raise ValueError(f"no points within {SHORT:g} m of their centre: not a piece of a tunnel")
+        raise ValueError(f"no points within {MAX_SHORT_LENGTH:g} m of their centre: not a piece of a tunnel")
     sample = local[:: max(1, len(local) // _SAMPLE)]
     sample = sample - sample.mean(axis=0)
     best, step = 0.0, np.pi / 90
@@ -185,8 +185,8 @@ def _walls(along: Float, across: Float, count: int) -> Float:
     number, across = number[order], across[order]
     first, stop = (np.searchsorted(number, np.arange(count), side=side) for side in ("left", "right"))
     walls = np.full((count, 2), np.nan)
-    held = stop - first >= _HELD
-    spare = np.floor(_OUTLYING * (stop - first - 1)).astype(np.int64)
+    held = stop - first >= _MIN_CELLS
+    spare = np.floor(_MAX_OUTLIER_SHARE * (stop - first - 1)).astype(np.int64)
     walls[held, 0] = across[(first + spare)[held]]
     walls[held, 1] = across[(stop - 1 - spare)[held]]
     return walls

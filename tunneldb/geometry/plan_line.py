@@ -13,7 +13,7 @@ from tunneldb.compiled import point_kernel
 from tunneldb.threads import in_blocks
 
 _APRON = 30.0  # m around the line in which the search begins at the nearest segment
-_MOST_CELLS = 1 << 20
+_MAX_CELLS = 1 << 20
 _BLOCK = 1 << 16  # points
 
 
@@ -100,7 +100,7 @@ class PlanLine:
 def _nearest_segments(vertices: Float, length: Float) -> tuple[Int32, Float]:
     """Return the segment nearest to the centre of each cell of a grid around the line, and the position of the grid."""
     low, high = vertices.min(axis=0) - _APRON, vertices.max(axis=0) + _APRON
-    edge = max(5.0, float(np.sqrt((high - low).prod() / _MOST_CELLS)))
+    edge = max(5.0, float(np.sqrt((high - low).prod() / _MAX_CELLS)))
     shape = np.ceil((high - low) / edge).astype(int)
     x, y = (low[k] + edge * (np.arange(shape[k]) + 0.5) for k in range(2))
     cells = np.column_stack([g.ravel() for g in np.meshgrid(x, y, indexing="xy")])

@@ -11,10 +11,10 @@ from scipy import ndimage
 from tunneldb.arrays import Bool, Float, Single
 from tunneldb.geometry.surface import Surface
 
-MOST = 0.4
+MAX_GIRTH_SHARE = 0.4
 """Share of a section's girth above which a deviation may be a real change of the tunnel's shape."""
 
-OFF_WALL = 0.03
+MIN_BEND = 0.03
 """Deviation of the surface from the wall, within a few degrees, above which it bends, m."""
 
 
@@ -42,8 +42,8 @@ class SectionOutliers:
 
         Sections that deviate over a larger share of their girth than ``most`` (0 to 1) are ignored. On simulated tunnels this
         matters only between 0.4 and 0.5: a section that is wider or narrower over at least half of its girth has no deviation
-        at all. MOST finds more lining where one side of the tunnel is wider for a few metres, and 1 prevents the back of a
-        niche of that size from being classified as lining.
+        at all. MAX_GIRTH_SHARE finds more lining where one side of the tunnel is wider for a few metres, and 1 prevents the
+        back of a niche of that size from being classified as lining.
         """
         apart = surface.section_outliers()
         apart[(apart != 0.0).mean(axis=1) > most] = 0.0
@@ -68,7 +68,7 @@ class SectionOutliers:
         for column, nodes, apart in columns:
             bend = ndimage.maximum_filter1d(apart, 7) - ndimage.minimum_filter1d(apart, 7)
             offset[:, column] = np.interp(arc, nodes, apart)
-            bent[:, column] = np.interp(arc, nodes, bend) > OFF_WALL
+            bent[:, column] = np.interp(arc, nodes, bend) > MIN_BEND
         return offset, bent
 
     def _columns(self, chainage: Float) -> Iterator[tuple[int, Float, Float]]:

@@ -9,9 +9,9 @@ from tunneldb.arrays import Bool, Float
 from tunneldb.robust import MAD_TO_SIGMA
 
 _STIFFNESS = 10.0  # of third differences; at 5 m between places waves of 45 m are halved
-_FEWEST = 6  # least number of places of a line for smoothing
+_MIN_PLACES = 6  # least number of places of a line for smoothing
 _PASSES = 5
-_CLOSE = 0.02  # m; deviations up to this are never outliers
+_MIN_OUTLIER_DEVIATION = 0.02  # m; deviations up to this are never outliers
 
 
 def smooth_line(places: Float, seen: Bool) -> Float:
@@ -20,7 +20,7 @@ def smooth_line(places: Float, seen: Bool) -> Float:
     Third differences are minimised, so that straight lines and circles are preserved. Fewer than 6 places stay unchanged.
     """
     count = len(places)
-    if count < _FEWEST or np.count_nonzero(seen) < 4:
+    if count < _MIN_PLACES or np.count_nonzero(seen) < 4:
         return places
     bend = _STIFFNESS * _third_differences(count)
     weight = seen.astype(np.float64)
@@ -30,7 +30,7 @@ def smooth_line(places: Float, seen: Bool) -> Float:
         bands[0] += weight + 1e-9
         out = solveh_banded(bands, (weight + 1e-9)[:, None] * places, lower=True)
         away = np.linalg.norm(places - out, axis=1)
-        usual = max(3.0 * MAD_TO_SIGMA * float(np.median(away[seen])), _CLOSE)
+        usual = max(3.0 * MAD_TO_SIGMA * float(np.median(away[seen])), _MIN_OUTLIER_DEVIATION)
         weight = np.where(seen, 1.0 / (1.0 + (away / usual) ** 2), 0.0)
     return np.asarray(out)
 

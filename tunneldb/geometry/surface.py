@@ -20,7 +20,7 @@ COLUMNS = 250
 
 _ANYWHERE = np.full(3, -np.inf), np.full(3, np.inf)
 
-APART = 0.06
+MIN_SECTION_DEVIATION = 0.06
 """Deviation of a section from its neighbours above which it was not measured on the wall, m."""
 
 MIN_SECTIONS = 4
@@ -190,7 +190,7 @@ class Surface:
         beside = np.array([[n for n in range(f, f + min(7, count)) if n != k] for k, f in enumerate(first.tolist())])
         apart = self.radius - np.median(self.radius[beside], axis=1)
         usual = 3.0 * MAD_TO_SIGMA * np.median(np.abs(apart), axis=1)
-        return np.where(np.abs(apart) > np.maximum(usual, APART)[:, None], apart, 0.0)
+        return np.where(np.abs(apart) > np.maximum(usual, MIN_SECTION_DEVIATION)[:, None], apart, 0.0)
 
 
 def _crossing(above: Float, arcs: Float) -> Float:

@@ -18,7 +18,7 @@ from tunneldb.anomalies.measure import Measurement, measure_outline
 from tunneldb.anomalies.sparse import least_density, leave_out_sparse
 from tunneldb.arrays import UInt8
 from tunneldb.errors import NotReadyError, UserError
-from tunneldb.geometry.section_outliers import MOST, SectionOutliers
+from tunneldb.geometry.section_outliers import MAX_GIRTH_SHARE, SectionOutliers
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.calibration import UNKNOWN, Calibration, calibrate, dry_sigma
@@ -225,7 +225,7 @@ def compute_detection(
     observer, view, roughness = calibration.observer, calibration.view, calibration.roughness
     with Accumulator(inputs.grid) as image:
         counts = _gather(observer, inputs.files, image, roughness.sigma, progress)
-        outliers = SectionOutliers.of(observer.surface, MOST)
+        outliers = SectionOutliers.of(observer.surface, MAX_GIRTH_SHARE)
         gaps = find_gaps(image, values["image.spacing"])
         lining = lining_image(image, gaps, observer, outliers, values["appendage.distance"], save_block)
     if gaps is not None:

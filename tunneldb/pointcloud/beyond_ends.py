@@ -7,8 +7,8 @@ import numpy as np
 from tunneldb.arrays import Float, Int64
 from tunneldb.geometry.alignment import Alignment
 
-FARTHEST = 200  # m beyond an end within which points are counted
-NEARLY_ALL = 0.99  # share of the points there that lie within their reach; a single stray does not extend it
+MAX_DISTANCE = 200  # m beyond an end within which points are counted
+REACH_SHARE = 0.99  # share of the points there that lie within their reach; a single stray does not extend it
 
 
 class BeyondEnds:
@@ -33,7 +33,7 @@ class BeyondEnds:
                 (line[-2], line[-1], chainage[-2], chainage[-1], alignment.end),
             )
         )
-        self.metres: Int64 = np.zeros((2, FARTHEST), np.int64)
+        self.metres: Int64 = np.zeros((2, MAX_DISTANCE), np.int64)
 
     def add(self, xyz: Float) -> None:
         """Count points (n, 3), m, that are known to lie outside."""
@@ -41,8 +41,8 @@ class BeyondEnds:
             apart = xyz - end
             beyond = apart @ outwards
             aside = np.sqrt(np.maximum((apart**2).sum(axis=1) - beyond**2, 0.0))
-            held = (beyond > 0.0) & (beyond < FARTHEST) & (aside <= self.limit)
-            metres += np.bincount(beyond[held].astype(np.int64), minlength=FARTHEST)
+            held = (beyond > 0.0) & (beyond < MAX_DISTANCE) & (aside <= self.limit)
+            metres += np.bincount(beyond[held].astype(np.int64), minlength=MAX_DISTANCE)
 
     @property
     def points(self) -> tuple[int, int]:
@@ -57,4 +57,4 @@ class BeyondEnds:
 
     def _reach(self, metres: Int64) -> float:
         total = int(metres.sum())
-        return float(np.searchsorted(np.cumsum(metres), NEARLY_ALL * total)) + 1.0 if total else 0.0
+        return float(np.searchsorted(np.cumsum(metres), REACH_SHARE * total)) + 1.0 if total else 0.0

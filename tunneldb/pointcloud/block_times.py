@@ -8,7 +8,7 @@ import numpy as np
 
 from tunneldb.arrays import Float
 
-LATEST = 2.0**62
+MAX_TIME = 2.0**62
 """Greatest valid time, s: greater times are invalid, and whole seconds up to it fit into eight bytes."""
 
 
@@ -43,7 +43,7 @@ class BlockTimes:
         blocks = blocks[np.isfinite(self.low[blocks])]
         found: list[tuple[int, int]] = []
         for k in blocks[np.argsort(self.low[blocks], kind="stable")].tolist():
-            begin, end = (int(np.floor(np.clip(time, -LATEST, LATEST))) for time in (self.low[k], self.high[k]))
+            begin, end = (int(np.floor(np.clip(time, -MAX_TIME, MAX_TIME))) for time in (self.low[k], self.high[k]))
             if found and begin <= found[-1][1]:
                 found[-1] = (found[-1][0], max(found[-1][1], end + 1))
             else:

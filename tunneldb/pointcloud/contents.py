@@ -16,7 +16,7 @@ from tunneldb.pointcloud.formats.table import format_of
 from tunneldb.pointcloud.points import CHUNK, Raw, on_earth
 
 SAMPLE = 400_000  # points; the sample has at most twice as many
-PLACES, RUN = 20, 50_000  # runs of points whose values are examined, and points of a run (a chunk of LAZ)
+RUNS, RUN_POINTS = 20, 50_000  # runs of points whose values are examined, and points of a run (a chunk of LAZ)
 
 
 class UniformSample:
@@ -161,9 +161,9 @@ def read_values(path: Path, dimension: str, points: int) -> NDArray[Any]:
     InputError
         If they cannot be read as one number per point.
     """
-    runs = -(-points // RUN)
-    chosen = np.unique(np.linspace(0, runs - 1, min(runs, PLACES)).astype(int)) * RUN
-    ranges = [(int(begin), min(int(begin) + RUN, points)) for begin in chosen]
+    runs = -(-points // RUN_POINTS)
+    chosen = np.unique(np.linspace(0, runs - 1, min(runs, RUNS)).astype(int)) * RUN_POINTS
+    ranges = [(int(begin), min(int(begin) + RUN_POINTS, points)) for begin in chosen]
     parts = [np.array(raw.intensity) for raw in format_of(path).read(path, dimension, CHUNK, ranges)]
     return np.concatenate(parts)
 
@@ -176,9 +176,9 @@ def read_near(path: Path, contents: Contents, near: NDArray[np.bool_]) -> Float:
     near : (n,) bool array
         True for these points of the sample.
     """
-    runs, counts = np.unique(contents.numbers[near] // RUN, return_counts=True)
-    chosen = np.sort(runs[np.argsort(-counts, kind="stable")[:PLACES]]) * RUN
-    ranges = [(int(begin), min(int(begin) + RUN, contents.points)) for begin in chosen]
+    runs, counts = np.unique(contents.numbers[near] // RUN_POINTS, return_counts=True)
+    chosen = np.sort(runs[np.argsort(-counts, kind="stable")[:RUNS]]) * RUN_POINTS
+    ranges = [(int(begin), min(int(begin) + RUN_POINTS, contents.points)) for begin in chosen]
     parts = [
         np.column_stack([np.asarray(stored) for stored in (raw.x, raw.y, raw.z)]) * raw.scales + raw.offsets
         for raw in format_of(path).read(path, None, CHUNK, ranges)

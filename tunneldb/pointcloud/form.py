@@ -14,14 +14,14 @@ from tunneldb.geometry.plan_line import PlanLine
 BALL = 1.0  # m; greater than the profile spacing, smaller than a tunnel
 BALLS = 400
 WINDOW = 5.0  # m along the tunnel in which profiles are searched
-REGULAR = 0.3
+MAX_GAP_SPREAD = 0.3
 """Greatest relative spread of gaps between profiles. For points at random places, half of the length is in gaps that differ by
 1.0 of their median; gaps between profiles differ by less than 0.3."""
 
 _EVEN = 0.25  # m; voxel edge; one point of each voxel is used to find the line
 _SLICE = 5.0  # m
-_LEAST = 20  # least number of points in a slice, and of gaps for a spacing
-_MOST_BINS = 500
+_MIN_COUNT = 20  # least number of points in a slice, and of gaps for a spacing
+_MAX_BINS = 500
 _NEAREST = 2000
 
 
@@ -61,7 +61,7 @@ def tunnel_form(xyz: Float) -> TunnelForm | None:
     slices = np.searchsorted(edges, along) - 1
     for number in range(len(edges) - 1):
         inside = slices == number
-        if inside.sum() >= _LEAST:
+        if inside.sum() >= _MIN_COUNT:
             sizes.append([np.subtract(*np.percentile(values[inside], [99.0, 1.0])) for values in (across, even[:, 2])])
     if not sizes:
         return None
@@ -95,7 +95,7 @@ def profile_spacing(along: Float, across: Float, z: Float) -> float | None:
     along, across, z : (n,) float arrays
         Distance along the tunnel and to the right of its line, height, m.
     """
-    if len(along) < _LEAST:
+    if len(along) < _MIN_COUNT:
         return None
     places = np.column_stack([along, across, z])
     some = np.unique(np.linspace(0, len(places) - 1, _NEAREST).astype(int))
@@ -107,7 +107,7 @@ def profile_spacing(along: Float, across: Float, z: Float) -> float | None:
     radius = float(np.median(np.hypot(u, w)))
     width = 3.0 * float(np.median(near))
     strips = np.floor(np.arctan2(u, w) * radius / width).astype(np.int64)
-    chosen = np.random.default_rng(1).permutation(np.unique(strips))[:_MOST_BINS]
+    chosen = np.random.default_rng(1).permutation(np.unique(strips))[:_MAX_BINS]
     kept = np.isin(strips, chosen)
     order = np.lexsort([along[kept], strips[kept]])
     strip, ordered = strips[kept][order], along[kept][order]
@@ -115,10 +115,10 @@ def profile_spacing(along: Float, across: Float, z: Float) -> float | None:
     gaps = np.sort(gaps[gaps > 0.0])
     # Half of the length is in gaps below the median: points within a profile have little weight.
     lengths = np.cumsum(gaps)
-    if len(gaps) < _LEAST:
+    if len(gaps) < _MIN_COUNT:
         return None
     low, median, high = (float(gaps[np.searchsorted(lengths, part * lengths[-1])]) for part in (0.25, 0.5, 0.75))
-    if high - low > REGULAR * median:
+    if high - low > MAX_GAP_SPREAD * median:
         return None
     return median
 

@@ -29,10 +29,10 @@ from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.compiled import kernel
 from tunneldb.pointcloud.voxels import CellCounts, column_hash
 
-EXPECTED = 20
+EXPECTED_NEIGHBOURS = 20
 SPARSE_SHARE = 0.05
 
-SELECTIVE = 4  # ratio of all points to points to be classified from which it pays to leave out distant points
+MIN_POINT_RATIO = 4  # ratio of all points to points to be classified from which it pays to leave out distant points
 
 POINTS = 5
 DIAMETER = 0.05
@@ -111,7 +111,7 @@ def is_noise(cloud: Float, xyz: Float, radius: Float, points: int = POINTS) -> B
         return noise
     cloud, xyz, radius = (np.ascontiguousarray(part, np.float64) for part in (cloud, xyz, radius))
     widest = float(radius.max())
-    if SELECTIVE * len(xyz) < len(cloud):
+    if MIN_POINT_RATIO * len(xyz) < len(cloud):
         near = np.empty(len(cloud), np.bool_)
         marks = np.zeros(1 << max(8, math.ceil(math.log2(32 * len(xyz)))), np.bool_)
         _mark_near(cloud, xyz, radius, 2.0 * widest, marks, near)
@@ -135,7 +135,7 @@ def noise_filter(xyz: Float, points: int = POINTS, diameter: float = DIAMETER) -
 
 def _radius(density: Float) -> Float:
     with np.errstate(divide="ignore"):
-        return np.sqrt(EXPECTED / (np.pi * density))
+        return np.sqrt(EXPECTED_NEIGHBOURS / (np.pi * density))
 
 
 def _sort_by_cell(xyz: Float, edge: float) -> tuple[Float, Int32, Float]:

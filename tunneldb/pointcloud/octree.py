@@ -27,8 +27,8 @@ LEAF = 50_000
 
 GRID = 7  # a node's sample has one point for each cell of a grid of 2**GRID to each side
 _BITS = 21  # bits of a position within a tile, per axis: three fit into 64 bits
-_DEEPEST = _BITS - GRID
-_LONG, _SHORT = 24, 15  # bits of a cell's index in plan, and in height
+_MAX_LEVELS = _BITS - GRID
+_PLAN_BITS, _HEIGHT_BITS = 24, 15  # bits of a cell's index in plan, and in height
 
 Key = tuple[int, int, int, int]
 """Level of a node, 0 for the root, and its index there in x, y and z."""
@@ -69,16 +69,20 @@ class CellCounts:
     def number(self, xyz: Float) -> Int64:
         """Return the packed numbers (n,) of the cells that contain points (n, 3)."""
         cell = np.floor(xyz / CELL).astype(np.int64) - self.origin
-        half = np.array([1 << (_LONG - 1), 1 << (_LONG - 1), 1 << (_SHORT - 1)])
+        half = np.array([1 << (_PLAN_BITS - 1), 1 << (_PLAN_BITS - 1), 1 << (_HEIGHT_BITS - 1)])
         cell += half
         if len(cell) and (cell.min() < 0 or (cell >= 2 * half).any()):
             raise ValueError("its points are more than 16 km apart in height, or thousands of kilometres in plan")
-        return (cell[:, 0] << (_LONG + _SHORT)) | (cell[:, 1] << _SHORT) | cell[:, 2]
+        return (cell[:, 0] << (_PLAN_BITS + _HEIGHT_BITS)) | (cell[:, 1] << _HEIGHT_BITS) | cell[:, 2]
 
     def cells(self) -> Int64:
         """Return the cells (c, 3) of the numbers; their lower corners are these × CELL, m."""
-        x, y, z = self.numbers >> (_LONG + _SHORT), self.numbers >> _SHORT & (1 << _LONG) - 1, self.numbers & (1 << _SHORT) - 1
-        half = np.array([1 << (_LONG - 1), 1 << (_LONG - 1), 1 << (_SHORT - 1)])
+        x, y, z = (
+            self.numbers >> (_PLAN_BITS + _HEIGHT_BITS),
+            self.numbers >> _HEIGHT_BITS & (1 << _PLAN_BITS) - 1,
+            self.numbers & (1 << _HEIGHT_BITS) - 1,
+        )
+        half = np.array([1 << (_PLAN_BITS - 1), 1 << (_PLAN_BITS - 1), 1 << (_HEIGHT_BITS - 1)])
         return np.column_stack([x, y, z]) - half + self.origin
 
 
@@ -234,13 +238,13 @@ class Nodes:
 def _below(code: Int64) -> Iterator[tuple[int, tuple[int, int, int], Intp]]:
     """Yield nodes within a tile: level below it, index there, and indices of their points, whose codes (n,) ascend."""
     index = np.arange(len(code))
-    for level in range(_DEEPEST + 1):
+    for level in range(_MAX_LEVELS + 1):
         if not len(code):
             return
         node = code >> 3 * (_BITS - level)
         starts = _starts(node)
         ends = np.append(starts[1:], len(node))
-        whole = (ends - starts <= LEAF) | (level == _DEEPEST)
+        whole = (ends - starts <= LEAF) | (level == _MAX_LEVELS)
         chosen = np.repeat(whole, ends - starts)
         chosen[_middles(code >> 3 * (_BITS - level - GRID))] = True
         for start, end in zip(starts.tolist(), ends.tolist(), strict=True):

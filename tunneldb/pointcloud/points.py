@@ -19,13 +19,13 @@ Ranges = Sequence[tuple[int, int]]
 """Half-open ranges of point indices, from 0, in the order of reading."""
 
 
-FARTHEST = 1e11
+MAX_COORDINATE = 1e11
 """Greatest plausible coordinate; projected systems have smaller ones, even in millimetres."""
 
 
 def on_earth(values: Float) -> Bool:
     """Return True for coordinates that are finite and plausible for a coordinate system."""
-    return np.asarray(np.abs(values) <= FARTHEST)
+    return np.asarray(np.abs(values) <= MAX_COORDINATE)
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ class Points:
         wanted += [self.time] if time else []
         wanted += [self.intensity] if intensity else []
         with np.errstate(over="ignore", invalid="ignore"):
-            if -FARTHEST <= self.xyz.min(initial=0.0) <= self.xyz.max(initial=0.0) <= FARTHEST and all(
+            if -MAX_COORDINATE <= self.xyz.min(initial=0.0) <= self.xyz.max(initial=0.0) <= MAX_COORDINATE and all(
                 np.isfinite(values.sum()) for values in wanted
             ):
                 return None

@@ -7,16 +7,16 @@ import numpy as np
 from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.alignment import Alignment
 
-FARTHEST_ASIDE = 25.0
+MAX_AXIS_DISTANCE = 25.0
 """Greatest distance of a scanner from the axis, m: the default distance up to which points are loaded."""
 
-FARTHEST_BEYOND = 500.0
+MAX_END_DISTANCE = 500.0
 """Greatest distance of a scanner beyond the ends of the axis, m; from farther away it cannot see into the tunnel."""
 
-FASTEST = 50.0
+MAX_SPEED = 50.0
 """Greatest speed of a scanner, m/s; a measuring train drives 120 km/h."""
 
-JUMP = 1.0
+MIN_JUMP = 1.0
 """Greatest deviation from the neighbours' line that is not a jump, m, however short the time between."""
 
 
@@ -38,7 +38,7 @@ def far_from_axis(xyz: Float, alignment: Alignment) -> Float:
     aside = alignment.distance(xyz)
     beyond = np.isnan(aside)
     distance = np.where(beyond, 0.0, aside)
-    limit = np.where(beyond, FARTHEST_BEYOND, FARTHEST_ASIDE)
+    limit = np.where(beyond, MAX_END_DISTANCE, MAX_AXIS_DISTANCE)
     ends = alignment.vertices[[0, -1]]
     distance[beyond] = np.linalg.norm(xyz[beyond, None] - ends, axis=2).min(axis=1)
     return np.where(distance > limit, distance, 0.0)
@@ -60,6 +60,6 @@ def jumps(time: Float, xyz: Float) -> Bool:
     share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
     between = xyz[:-2] + share * (xyz[2:] - xyz[:-2])
     speed = np.linalg.norm(np.diff(xyz, axis=0), axis=1) / np.diff(time)
-    off = np.linalg.norm(xyz[1:-1] - between, axis=1) > JUMP
-    found[1:-1] = off & (speed[:-1] > FASTEST) & (speed[1:] > FASTEST)
+    off = np.linalg.norm(xyz[1:-1] - between, axis=1) > MIN_JUMP
+    found[1:-1] = off & (speed[:-1] > MAX_SPEED) & (speed[1:] > MAX_SPEED)
     return found

@@ -15,8 +15,8 @@ from tunneldb.threads import in_blocks
 
 # Positions are not interpolated over an interval longer than both: a trolley that accelerates by 1 m/s² deviates 0.1 m
 # in the middle of a second.
-LONGEST_GAP = 1.0  # s
-GAP_INTERVALS = 10  # times the median interval of the trajectory
+MAX_GAP = 1.0  # s
+MAX_GAP_INTERVALS = 10  # times the median interval of the trajectory
 
 _BLOCK = 1 << 18  # points at a time
 
@@ -25,7 +25,7 @@ _BLOCK = 1 << 18  # points at a time
 class PoseModel:
     """Scanner positions: one station per scan, a trajectory interpolated linearly at ``gps_time``, or none.
 
-    Positions are not interpolated over gaps: intervals longer than LONGEST_GAP and than GAP_INTERVALS median intervals.
+    Positions are not interpolated over gaps: intervals longer than MAX_GAP and than MAX_GAP_INTERVALS median intervals.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class PoseModel:
     station: Float
     time: Float
     track: Float
-    longest: float = LONGEST_GAP
+    longest: float = MAX_GAP
 
     @classmethod
     def from_stations(cls, scan_id: Int64, station: Float) -> PoseModel:
@@ -100,8 +100,8 @@ class PoseModel:
 def longest_interval(time: Float) -> float:
     """Return the longest interval of a trajectory with ascending times (m,) that is interpolated, s."""
     if len(time) < 2:
-        return LONGEST_GAP
-    return max(LONGEST_GAP, GAP_INTERVALS * float(np.median(np.diff(time))))
+        return MAX_GAP
+    return max(MAX_GAP, MAX_GAP_INTERVALS * float(np.median(np.diff(time))))
 
 
 @point_inner

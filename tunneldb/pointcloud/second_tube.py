@@ -32,22 +32,22 @@ CELL = 0.25
 REACH = 50.0
 """Distance from the axis up to which tubes are distinguished, m."""
 
-PILLAR = 1.5
+MIN_PILLAR_WIDTH = 1.5
 """Least distance between tubes in plan, m; neighbouring parts of one tunnel are closer."""
 
-NARROWEST = 2.0
+MIN_TUBE_SIZE = 2.0
 """Least width and height of a tube, m."""
 
-ROOFED = 0.5
+MIN_ROOFED_SHARE = 0.5
 """Least share of a tube's cells with points so far apart in height that they are floor and roof."""
 
-FAINT = 0.02
+MIN_DENSITY_RATIO = 0.02
 """Ratio to the typical count of a stretch's cells below which a cell has only stray points."""
 
-LONGEST_PASSAGE = 20.0
+MAX_PASSAGE_LENGTH = 20.0
 """Greatest length of a cross passage along the tunnel, m; the pillar is assumed to continue over it."""
 
-SHORTEST = 10.0
+MIN_TUBE_LENGTH = 10.0
 """Least length of a second tube along the tunnel, m; cross passages are narrower."""
 
 
@@ -108,8 +108,8 @@ def find_second_tubes(parts: Iterable[Rows], alignment: Alignment, km: int) -> S
         _sort_in(rows["z"], away, which, count, low, high)
     limits = np.full((2, shape[0]), np.nan)
     for stretch in np.flatnonzero(count.any(axis=1)):
-        held = count[stretch] > max(1.0, FAINT * float(np.median(count[stretch][count[stretch] > 0])))
-        roofed = held & (high[stretch] - low[stretch] >= NARROWEST)
+        held = count[stretch] > max(1.0, MIN_DENSITY_RATIO * float(np.median(count[stretch][count[stretch] > 0])))
+        roofed = held & (high[stretch] - low[stretch] >= MIN_TUBE_SIZE)
         limits[1, stretch] = _pillar(held, roofed)
         limits[0, stretch] = -_pillar(held[::-1], roofed[::-1])
     for side in limits:
@@ -119,7 +119,7 @@ def find_second_tubes(parts: Iterable[Rows], alignment: Alignment, km: int) -> S
 
 def _pillar(held: Bool, roofed: Bool) -> float:
     """Return the distance right of the axis of a pillar with a tube behind it, m; NaN without one."""
-    middle, gap = len(held) // 2, round(PILLAR / CELL)
+    middle, gap = len(held) // 2, round(MIN_PILLAR_WIDTH / CELL)
     places = np.flatnonzero(held) - middle
     if not len(places) or np.abs(places).min() > gap:
         return np.nan
@@ -129,7 +129,7 @@ def _pillar(held: Bool, roofed: Bool) -> float:
         return np.nan
     end, begin = right[wide[0]], right[wide[0] + 1]
     beyond = right[wide[0] + 1 :] + middle
-    if np.count_nonzero(roofed[beyond]) < max(ROOFED * len(beyond), NARROWEST / CELL):
+    if np.count_nonzero(roofed[beyond]) < max(MIN_ROOFED_SHARE * len(beyond), MIN_TUBE_SIZE / CELL):
         return np.nan
     return float(CELL * (end + 1 + begin) / 2.0)
 
@@ -137,9 +137,9 @@ def _pillar(held: Bool, roofed: Bool) -> float:
 def _bridge(limits: Float) -> None:
     """Continue a pillar over passages through it; remove those that are too short for a tube."""
     known = np.flatnonzero(np.isfinite(limits))
-    breaks = np.flatnonzero(np.diff(known) > 1 + LONGEST_PASSAGE / STRETCH)
+    breaks = np.flatnonzero(np.diff(known) > 1 + MAX_PASSAGE_LENGTH / STRETCH)
     for run in np.split(known, breaks + 1):
-        if len(run) * STRETCH <= SHORTEST:
+        if len(run) * STRETCH <= MIN_TUBE_LENGTH:
             limits[run] = np.nan
         else:
             within = np.arange(run[0], run[-1] + 1)

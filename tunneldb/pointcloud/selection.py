@@ -39,13 +39,13 @@ Progress = Callable[[int], None]
 
 MEMORY = 192 << 20  # bytes of rows that each spool keeps in memory before it uses the disk
 WINDOW = 500_000  # points whose neighbourhoods a thread examines at a time
-CROWDED = 4_000_000  # points of a window from which one thread is used, to limit memory
+MAX_PARALLEL_POINTS = 4_000_000  # points of a window from which one thread is used, to limit memory
 BLOCK = 50_000  # points of a LAZ file that can be decoded separately
 MARGIN = 10.0  # m beyond the ends of a kilometre that are also read from a file
-FEW = 150  # points in a cell up to which hardly any has enough neighbours to be certain not to be noise
-SAMPLED = 1000  # one in this many intensities is kept as a sample
+MAX_SPARSE_POINTS = 150  # points in a cell up to which hardly any has enough neighbours to be certain not to be noise
+SAMPLE_STEP = 1000  # one in this many intensities is kept as a sample
 STRETCH = 5.0  # m of tunnel for which the noise filter's widest radius is computed
-CERTAIN = -1  # tag of a candidate that is certain not to be noise; others have the number of their cell
+CERTAIN_TAG = -1  # tag of a candidate that is certain not to be noise; others have the number of their cell
 
 
 @dataclass(frozen=True)
@@ -300,10 +300,10 @@ class _Filter:
             self.counts.unposed += faults.points
             number, cell, points = self._drop(number, cell, points, np.flatnonzero(~self.poses.known(points)))
         if len(points):
-            self.counts.intensities.append(points.intensity[::SAMPLED].copy())
+            self.counts.intensities.append(points.intensity[::SAMPLE_STEP].copy())
             self.counts.locate(*self.places.span(number, cell, BLOCK))
             picked, certain = self._pick(points, cell)
-            tag = np.where(certain, np.int32(CERTAIN), cell[picked])
+            tag = np.where(certain, np.int32(CERTAIN_TAG), cell[picked])
             self.rows.add(self.places.rows(points, cell, picked, tag))
             self.cloud.add(points.xyz.view(PLACE).ravel(), self.places.bin[cell])
 
@@ -324,7 +324,7 @@ class _Filter:
             self.invalid = f"{which} is NaN or infinite, first at point {number[first] + 1}; remove the point"
 
     def _pick(self, points: Points, cell: Int32) -> tuple[Int32, Bool]:
-        if self.settings.edge is None or self.cells.counts[cell].mean() < FEW:
+        if self.settings.edge is None or self.cells.counts[cell].mean() < MAX_SPARSE_POINTS:
             return np.arange(len(points), dtype=np.int32), np.zeros(len(points), np.bool_)
         return pick(
             points.xyz, points.time, points.intensity, points.scan_id, points.classification, self.places.whole[cell],
@@ -342,7 +342,7 @@ class _Filter:
         # A point's bin may differ from its cell's by some bins.
         bins, first = np.pad(bins, self.places.bins_off), first - self.places.bins_off
         parts = list(windows(first, bins, WINDOW))
-        crowded = max(int(bins[low - first : high - first].sum()) for low, high in parts) > CROWDED
+        crowded = max(int(bins[low - first : high - first].sum()) for low, high in parts) > MAX_PARALLEL_POINTS
 
         def work(low: int, high: int) -> tuple[int, Rows]:
             return self._judge(low, high, _reach(low, high, widest), radii)
@@ -361,7 +361,7 @@ class _Filter:
         begin = math.floor(low / BINS_PER_KM) * BINS_PER_KM  # each kilometre is thinned separately
         rows = self.rows.read(max(low - margin, begin), min(high + margin, begin + BINS_PER_KM))
         wide = margin + reach + self.places.bins_off
-        good = rows["tag"] == CERTAIN
+        good = rows["tag"] == CERTAIN_TAG
 
         def judge(doubtful: Bool) -> None:
             chosen = np.flatnonzero(doubtful)

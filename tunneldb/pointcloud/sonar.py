@@ -13,9 +13,9 @@ from tunneldb.pointcloud.reader import read_chunks, read_header
 
 TEXT = (".xyz", ".txt", ".csv")
 RAW = (".all", ".kmall", ".xtf", ".gsf", ".s7k", ".son")
-FARTHEST = 100.0  # m; greatest range of an echo
+MAX_RANGE = 100.0  # m; greatest range of an echo
 POINTER = "version https://git-lfs"
-MOST_INVALID = 0.01  # share
+MAX_INVALID_SHARE = 0.01  # share
 _LINES = 1 << 20
 
 
@@ -31,7 +31,7 @@ def read_sonar(path: Path) -> tuple[Float, int]:
     """
     points, invalid = read_soundings(path)
     far = float(np.percentile(np.linalg.norm(points, axis=1), 50))
-    if far > FARTHEST:
+    if far > MAX_RANGE:
         raise InputError(
             f"{path}: its points are {far:.0f} m from the origin, but a sonar scan has its origin at the sonar;"
             " is it in the tunnel's system (then load it with --medium water), or in feet or millimetres?"
@@ -55,7 +55,7 @@ def read_soundings(path: Path) -> tuple[Float, int]:
         points = np.vstack([np.zeros((0, 3)), *(chunk.xyz for chunk in read_chunks(path, None))])
     finite = np.isfinite(points).all(axis=1)
     invalid = int((~finite).sum())
-    if invalid > MOST_INVALID * len(points):
+    if invalid > MAX_INVALID_SHARE * len(points):
         raise InputError(f"{path}: {invalid} of its {len(points)} points have invalid coordinates; export it again")
     points = points[finite]
     if len(points) == 0:

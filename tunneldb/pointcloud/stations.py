@@ -15,7 +15,7 @@ from tunneldb.pointcloud.formats.table import has_scans, posed_scans
 
 SCAN_ID_LIMIT = 1 << 31  # point_source_id of LAS has 16 bits, the numbers of E57 scans have 31
 SCAN_ID = "scan_id is the number of a point's scan, its point_source_id; tunneldb inspect FILE lists them"
-SAME_PLACE = 0.001  # m; greatest distance between positions of one station in two files
+PLACE_TOLERANCE = 0.001  # m; greatest distance between positions of one station in two files
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def read_stations(paths: Sequence[Path]) -> Stations:
                 placeless.append(station)
                 continue
             other = known.setdefault(station.scan_id, station)
-            if other.place is not None and np.linalg.norm(other.place - station.place) > SAME_PLACE:
+            if other.place is not None and np.linalg.norm(other.place - station.place) > PLACE_TOLERANCE:
                 raise InputError(f"scan_id {station.scan_id} has two positions: in {other.origin} and in {station.origin}")
     for station in placeless:
         if station.scan_id not in known:

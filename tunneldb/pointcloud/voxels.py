@@ -18,10 +18,10 @@ CELL = 0.5
 """Edge of the cells in which the density of a scan is measured, m."""
 
 _BITS = 21  # bits of a voxel's index along each axis
-_HALF = 1 << (_BITS - 1)
-_FINE = 1024  # steps of a voxel's edge for the sums of positions, which are integers
-_MOST = (1 << 22) - 1  # greatest number of points summed per voxel; more would not move its centroid
-_ROOM = 1 << 16  # initial number of voxels
+_INDEX_OFFSET = 1 << (_BITS - 1)
+_STEPS_PER_EDGE = 1024  # steps of a voxel's edge for the sums of positions, which are integers
+_MAX_SUMMED = (1 << 22) - 1  # greatest number of points summed per voxel; more would not move its centroid
+_INITIAL_VOXELS = 1 << 16  # initial number of voxels
 _EMPTY = np.uint32(0xFFFFFFFF)
 _BLOCK = 1 << 16  # points at a time
 
@@ -118,11 +118,11 @@ class Voxels:
         self.edge = float(edge)
         self._base: Int64 | None = None
         self._size = 0
-        self._key = np.empty(_ROOM, np.int64)
-        self._count = np.zeros(_ROOM, np.uint32)
-        self._sum = np.zeros((_ROOM, 3), np.uint32)
-        self._square = np.zeros(_ROOM, np.uint64)
-        self._table = np.full(2 * _ROOM, _EMPTY, np.uint32)
+        self._key = np.empty(_INITIAL_VOXELS, np.int64)
+        self._count = np.zeros(_INITIAL_VOXELS, np.uint32)
+        self._sum = np.zeros((_INITIAL_VOXELS, 3), np.uint32)
+        self._square = np.zeros(_INITIAL_VOXELS, np.uint64)
+        self._table = np.full(2 * _INITIAL_VOXELS, _EMPTY, np.uint32)
 
     def __len__(self) -> int:
         return self._size
@@ -157,10 +157,10 @@ class Voxels:
         n = self._size
         out = np.empty((n, 3))
         if self._base is not None:
-            count, mask = np.minimum(self._count[:n], np.uint32(_MOST)), (1 << _BITS) - 1
+            count, mask = np.minimum(self._count[:n], np.uint32(_MAX_SUMMED)), (1 << _BITS) - 1
             for axis in range(3):
-                cell = ((self._key[:n] >> (_BITS * (2 - axis))) & mask) - _HALF + self._base[axis]
-                out[:, axis] = (cell + (self._sum[:n, axis] / count + 0.5) / _FINE) * self.edge
+                cell = ((self._key[:n] >> (_BITS * (2 - axis))) & mask) - _INDEX_OFFSET + self._base[axis]
+                out[:, axis] = (cell + (self._sum[:n, axis] / count + 0.5) / _STEPS_PER_EDGE) * self.edge
         return out
 
     def counts(self) -> Int64:
@@ -170,10 +170,10 @@ class Voxels:
     def spread(self) -> Float:
         """Return the standard deviation of the heights of the points in each voxel, (n,), m."""
         n = self._size
-        count = np.minimum(self._count[:n], _MOST).astype(np.float64)
+        count = np.minimum(self._count[:n], _MAX_SUMMED).astype(np.float64)
         mean = self._sum[:n, 2] / count
         variance = self._square[:n] / count - mean * mean
-        return np.asarray(np.sqrt(np.maximum(variance, 0.0)) * (self.edge / _FINE))
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)) * (self.edge / _STEPS_PER_EDGE))
 
     def index(self, xyz: Float) -> Int64:
         """Return the index of the voxel of each of the points (n, 3), -1 if there is none."""
@@ -255,8 +255,12 @@ def _key_of(x: float, y: float, z: float, base: Int64) -> int:  # pragma: no cov
     """Return the number of the voxel of a position, in edges; -1 if out of range, -2 if the position is not finite."""
     if not (abs(x) < np.inf and abs(y) < np.inf and abs(z) < np.inf):
         return -2
-    i, j, k = math.floor(x) - base[0] + _HALF, math.floor(y) - base[1] + _HALF, math.floor(z) - base[2] + _HALF
-    if min(i, j, k) < 0 or max(i, j, k) >= 2 * _HALF:
+    i, j, k = (
+        math.floor(x) - base[0] + _INDEX_OFFSET,
+        math.floor(y) - base[1] + _INDEX_OFFSET,
+        math.floor(z) - base[2] + _INDEX_OFFSET,
+    )
+    if min(i, j, k) < 0 or max(i, j, k) >= 2 * _INDEX_OFFSET:
         return -1
     return (i << (2 * _BITS)) | (j << _BITS) | k
 
@@ -311,12 +315,12 @@ def _add(
             size += 1
         i = table[slot]
         count[i] += np.uint32(1)
-        if count[i] > _MOST:
+        if count[i] > _MAX_SUMMED:
             continue
-        last = _FINE - 1
-        total[i, 0] += np.uint32(min(int((x - math.floor(x)) * _FINE), last))
-        total[i, 1] += np.uint32(min(int((y - math.floor(y)) * _FINE), last))
-        up = min(int((z - math.floor(z)) * _FINE), last)
+        last = _STEPS_PER_EDGE - 1
+        total[i, 0] += np.uint32(min(int((x - math.floor(x)) * _STEPS_PER_EDGE), last))
+        total[i, 1] += np.uint32(min(int((y - math.floor(y)) * _STEPS_PER_EDGE), last))
+        up = min(int((z - math.floor(z)) * _STEPS_PER_EDGE), last)
         total[i, 2] += np.uint32(up)
         square[i] += np.uint64(up * up)
     return points.shape[0], size

@@ -17,7 +17,7 @@ from types import FrameType
 from tunneldb.errors import UserError
 from tunneldb.queue.worker import Orders
 
-_PATIENCE = 30.0  # s; a worker that dies sooner is restarted with a delay
+_MIN_LIFETIME = 30.0  # s; a worker that dies sooner is restarted with a delay
 
 
 @dataclass
@@ -67,8 +67,8 @@ class WorkerPool:
                     raise UserError("a worker gave up, see above")
                 continue
             lived = time.monotonic() - member.started
-            if lived > min(2.0**member.falls, _PATIENCE):
-                falls = 0 if lived > _PATIENCE else member.falls + 1
+            if lived > min(2.0**member.falls, _MIN_LIFETIME):
+                falls = 0 if lived > _MIN_LIFETIME else member.falls + 1
                 self.members[self.members.index(member)] = _Member(self._launch(), time.monotonic(), falls)
         return bool(self.members)
 

@@ -39,7 +39,7 @@ KILOMETRE_BYTES = 17e6
 GIRTH = 25.0
 """Assumed length around a cross-section of an unknown tunnel, m: 8 m in diameter."""
 
-SMALLEST_GAP = 100.0
+MIN_GAP = 100.0
 """Least length of a reported stretch without a file, m: the box of a file gives its ends to about 30 m."""
 
 
@@ -194,7 +194,7 @@ def _stretches(conn: psycopg.Connection[Any], survey: Survey, plan: Plan) -> dic
 def _union(stretches: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
     joined: list[tuple[float, float]] = []
     for low, high in stretches:
-        if joined and low <= joined[-1][1] + SMALLEST_GAP:
+        if joined and low <= joined[-1][1] + MIN_GAP:
             joined[-1] = (joined[-1][0], max(joined[-1][1], high))
         else:
             joined.append((low, high))
@@ -208,8 +208,8 @@ def _gaps(stretches: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 def _whole(gap: tuple[float, float], missing: Sequence[int]) -> bool:
     """Return True if a gap is already reported as missing kilometres: it extends little beyond them."""
-    inside = [km for km in missing if gap[0] <= 1000 * km + SMALLEST_GAP and gap[1] >= 1000 * (km + 1) - SMALLEST_GAP]
-    return bool(inside) and gap[1] - gap[0] <= 1000 * len(inside) + 2 * SMALLEST_GAP
+    inside = [km for km in missing if gap[0] <= 1000 * km + MIN_GAP and gap[1] >= 1000 * (km + 1) - MIN_GAP]
+    return bool(inside) and gap[1] - gap[0] <= 1000 * len(inside) + 2 * MIN_GAP
 
 
 def _kept(conn: psycopg.Connection[Any], survey: Survey, plan: Plan) -> float | None:

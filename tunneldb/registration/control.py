@@ -11,18 +11,18 @@ from scipy.spatial.transform import Rotation
 
 from tunneldb.arrays import Float, Int64
 
-WITHIN = 0.1
+MAX_DISTANCE = 0.1
 """Default greatest distance between a control point and its sphere, m."""
 
-CONGRUENT = 0.02
+MAX_DISTANCE_DIFFERENCE = 0.02
 """Greatest difference between a distance of spheres and a distance of control points that are the same, m."""
 
-BASES = 3000  # pairs of spheres that are tried as a start, the longest first
+MAX_BASES = 3000  # pairs of spheres that are tried as a start, the longest first
 
-TURN_LIMIT = math.radians(1.0)
+MAX_TURN_SIGMA = math.radians(1.0)
 """Standard deviation of a rotation about a line above which the rotation is not determined."""
 
-LEAST_NOISE = 0.001  # m; least standard deviation of a centre, since residuals of few points are uncertain
+MIN_NOISE = 0.001  # m; least standard deviation of a centre, since residuals of few points are uncertain
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Motion:
         return moved
 
 
-def match(spheres: Float, control: Float, within: float = WITHIN) -> Match:
+def match(spheres: Float, control: Float, within: float = MAX_DISTANCE) -> Match:
     """Find the correspondence of spheres and control points.
 
     By place, if three pairs, or all possible pairs, are within the distance; the sum of distances is minimal. Otherwise by
@@ -117,11 +117,11 @@ def best_motion(points: Float, onto: Float) -> Motion:
     rotation = left @ sign @ right
     rms_before = _rms(onto - points)
     freedom = 3 * count - 6
-    noise = max(_rms(b - a @ rotation.T) * math.sqrt(count / max(freedom, 1)), LEAST_NOISE)
+    noise = max(_rms(b - a @ rotation.T) * math.sqrt(count / max(freedom, 1)), MIN_NOISE)
     across = float(np.linalg.svd(a, compute_uv=False)[1]) if count > 1 else 0.0
     if count == 1:
         determined, rotation, freedom = "shift", np.eye(3), 0
-    elif across == 0.0 or noise / across > TURN_LIMIT:
+    elif across == 0.0 or noise / across > MAX_TURN_SIGMA:
         determined, rotation, freedom = "line", _turn(_direction(a), _direction(b), a, b), 3 * count - 5
     else:
         determined = "all"
@@ -152,12 +152,12 @@ def _by_distances(spheres: Float, control: Float) -> tuple[Int64, int]:
     begins, ends = begins[order], ends[order]
     length = theirs[begins, ends]
     i, j = np.triu_indices(len(spheres), 1)
-    longest = np.argsort(-ours[i, j], kind="stable")[:BASES]
+    longest = np.argsort(-ours[i, j], kind="stable")[:MAX_BASES]
     best: dict[tuple[tuple[int, int], ...], Int64] = {}
     size = 2
     for base in longest:
         one, two = int(i[base]), int(j[base])
-        low, high = np.searchsorted(length, ours[one, two] + np.array([-CONGRUENT, CONGRUENT]))
+        low, high = np.searchsorted(length, ours[one, two] + np.array([-MAX_DISTANCE_DIFFERENCE, MAX_DISTANCE_DIFFERENCE]))
         for other in range(low, high):
             pairs = _grow(spheres, control, ours, theirs, (one, two), (int(begins[other]), int(ends[other])))
             if len(pairs) < max(size, 3):
@@ -176,8 +176,8 @@ def _by_distances(spheres: Float, control: Float) -> tuple[Int64, int]:
 def _grow(spheres: Float, control: Float, ours: Float, theirs: Float, base: tuple[int, int], onto: tuple[int, int]) -> Int64:
     """Return the pairs that agree with two given ones: a third by its distances, then all that the motion brings together."""
     best = np.zeros((0, 2), np.int64)
-    fits = (np.abs(ours[base[0]][:, None] - theirs[onto[0]][None]) <= CONGRUENT) & (
-        np.abs(ours[base[1]][:, None] - theirs[onto[1]][None]) <= CONGRUENT
+    fits = (np.abs(ours[base[0]][:, None] - theirs[onto[0]][None]) <= MAX_DISTANCE_DIFFERENCE) & (
+        np.abs(ours[base[1]][:, None] - theirs[onto[1]][None]) <= MAX_DISTANCE_DIFFERENCE
     )
     fits[list(base)] = False
     fits[:, list(onto)] = False
@@ -185,12 +185,12 @@ def _grow(spheres: Float, control: Float, ours: Float, theirs: Float, base: tupl
         if len(best) and (best == [third, point]).all(axis=1).any():
             continue  # already in a set found from an earlier third pair
         motion = best_motion(spheres[[*base, third]], control[[*onto, point]])
-        if motion.rms_after > CONGRUENT:
+        if motion.rms_after > MAX_DISTANCE_DIFFERENCE:
             continue
-        pairs = _by_place(motion.apply(spheres), control, 2.0 * CONGRUENT)
+        pairs = _by_place(motion.apply(spheres), control, 2.0 * MAX_DISTANCE_DIFFERENCE)
         if len(pairs) >= 3:
             refined = best_motion(spheres[pairs[:, 0]], control[pairs[:, 1]])
-            pairs = _by_place(refined.apply(spheres), control, 2.0 * CONGRUENT)
+            pairs = _by_place(refined.apply(spheres), control, 2.0 * MAX_DISTANCE_DIFFERENCE)
         if len(pairs) > len(best):
             best = pairs
     return best

@@ -17,7 +17,7 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 if TYPE_CHECKING:
     from tunneldb.simulate.parameters import Parameters
 
-GROWN = 2.0
+GROWTH_RATIO = 2.0
 """Ratio of the area of a grown leak to its former area."""
 
 WALL = (0.55, 0.7), (0.35, 0.75)
@@ -30,7 +30,7 @@ BULGE = 1.0
 """Side of a bulge, m."""
 
 _RING = 1.5  # m
-_APART = 0.5  # m between the lining and fixtures that move with it
+_FIXTURE_MARGIN = 0.5  # m between the lining and fixtures that move with it
 _DEGREES = 2.0  # order of an ovalisation
 
 
@@ -54,7 +54,7 @@ class Epoch:
     def moved(self, xyz: Float, chainage: Float, arc: Float, offset: Float) -> tuple[Float, Float]:
         """Return points (n, 3) at the later scan as they are and as placed by it, in the local frame, and their offset."""
         p, tunnel = self.parameters, self.tunnel
-        change = np.where(np.abs(offset) < _APART, self.change(chainage, arc), 0.0)
+        change = np.where(np.abs(offset) < _FIXTURE_MARGIN, self.change(chainage, arc), 0.0)
         frame = tunnel.line.frame(chainage)
         normal = np.asarray(tunnel.section.point(arc)[1])  # right and up, into the tunnel
         xyz = xyz + change[:, None] * (normal[:, :1] * frame.u + normal[:, 1:] * frame.w)
@@ -119,7 +119,7 @@ def leaks_since(parameters: Parameters, tunnel: Tunnel, room: Room, leaks: list[
 
 
 def _grown(leak: Leak, limit: float) -> Leak:
-    side = math.sqrt(GROWN)
+    side = math.sqrt(GROWTH_RATIO)
     outline = affinity.scale(leak.polygon, side, side).intersection(
         box(leak.polygon.bounds[0] - 100.0, -limit, leak.polygon.bounds[2] + 100.0, limit)
     )

@@ -20,7 +20,7 @@ from shapely.geometry import mapping
 import tunneldb
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.files import made_folder, room_told
+from tunneldb.files import disk_full_as_oserror, made_folder
 from tunneldb.simulate.generate import Cloud, Simulation
 from tunneldb.simulate.ring_truth import write_ring_truth
 from tunneldb.simulate.truth import leaks_as_built, write_truth
@@ -282,7 +282,7 @@ def write(
         with (
             made_folder(folder),
             TemporaryDirectory(dir=folder, prefix=".simulate-") as scratch,
-            room_told(Path(scratch)),
+            disk_full_as_oserror(Path(scratch)),
         ):
             files = _scan(simulation, Path(scratch), truth, progress)
             _sidecars(simulation, Path(scratch), files)

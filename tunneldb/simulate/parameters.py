@@ -107,7 +107,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
 }
 # Usual lengths of the blocks of cast lining and of rings of segments, m.
 RINGS = {"cast": 10.0, "segments": 1.5}
-MOST_OVALITY = 5.0  # %
+MAX_OVALITY = 5.0  # %
 # Pairs of ascending numbers, with their lower limit.
 PAIRS = {"ovality": 0.0, "leak_area": 1e-3, "leak_drop": 0.1, "drip_gap": 0.01, "patch_level": -15.0, "stripe_width": 0.01}
 
@@ -276,8 +276,8 @@ class Parameters:
             raise UserError(f"pocket leaks need bolt pockets, but lining {self.lining} has none: use lining segments")
         if self.segment_step and self.lining != "segments":
             raise UserError(f"segment step needs segments, but lining {self.lining} has none: use lining segments")
-        if self.ovality[1] > MOST_OVALITY:
-            raise UserError(f"ovality is {self.ovality[0]:g} to {self.ovality[1]:g}: give 0 to {MOST_OVALITY:g} %")
+        if self.ovality[1] > MAX_OVALITY:
+            raise UserError(f"ovality is {self.ovality[0]:g} to {self.ovality[1]:g}: give 0 to {MAX_OVALITY:g} %")
         if (self.ovality[1] or self.ring_shift) and self.section != "circular":
             raise UserError(f"ovality and ring shift need round rings, but the section is {self.section}: use circular")
         later = ("grown_leaks", "dried_leaks", "new_leaks", "moved_wall", "squeezed_ring", "bulges", "pose_error", "pose_turn")

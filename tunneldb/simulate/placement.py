@@ -22,14 +22,14 @@ from tunneldb.simulate.scanner import Scanner
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 # Radius of the floor that an object occupies, m.
-ROOM = {"person": 0.40, "case": 0.55, "trolley": 0.80, "tripod": 0.50, "bollard": 0.15, "globe": 0.25, "sphere": 0.45}
+FLOOR_RADIUS = {"person": 0.40, "case": 0.55, "trolley": 0.80, "tripod": 0.50, "bollard": 0.15, "globe": 0.25, "sphere": 0.45}
 # Least distance from the scanner's path or a station, m.
-CLEAR = 0.9
+MIN_SCANNER_DISTANCE = 0.9
 # Least distance from the tunnel's ends, m.
-END = 2.0
+MIN_END_DISTANCE = 2.0
 TRIES = 400
 # Least relative difference of radius between lamps and target spheres.
-UNLIKE = 0.2
+MIN_RADIUS_DIFFERENCE = 0.2
 
 
 @dataclass
@@ -59,21 +59,24 @@ class _Floor:
         if np.ptp(level) > 2.0 * room * p.camber / 100.0 + 1e-9:
             return False
         if p.scanner == "profiler":
-            if abs(across - p.scanner_offset) < CLEAR + room:
+            if abs(across - p.scanner_offset) < MIN_SCANNER_DISTANCE + room:
                 return False
         else:
             gap = np.hypot(self.scanner.station_chainage - chainage, self.scanner.station_offset - across)
-            if gap.min() < CLEAR + room:
+            if gap.min() < MIN_SCANNER_DISTANCE + room:
                 return False
         gap = np.hypot(self.taken[:, 0] - chainage, self.taken[:, 1] - across)
         return bool(np.all(gap > self.taken[:, 2] + room))
 
     def find(self, kind: str, rng: np.random.Generator) -> tuple[float, float]:
         """Find and reserve a free place; return its chainage and across."""
-        line, room = self.tunnel.line, ROOM[kind]
+        line, room = self.tunnel.line, FLOOR_RADIUS[kind]
         half = self.tunnel.section.half_width - room
         for _ in range(TRIES if half > 0.0 else 0):
-            s, u = float(rng.uniform(line.start + END, line.end - END)), float(rng.uniform(-half, half))
+            s, u = (
+                float(rng.uniform(line.start + MIN_END_DISTANCE, line.end - MIN_END_DISTANCE)),
+                float(rng.uniform(-half, half)),
+            )
             if self.is_free(s, u, room):
                 self.take(s, u, room)
                 return s, u
@@ -89,7 +92,7 @@ def _wall_spot(
     arcs = np.linspace(0.0, section.floor_arc, 2001)
     points = section.point(arcs)[0]
     for _ in range(TRIES):
-        s = float(rng.uniform(line.start + END, line.end - END))
+        s = float(rng.uniform(line.start + MIN_END_DISTANCE, line.end - MIN_END_DISTANCE))
         k = int(np.argmin(np.abs(points[:, 1] - section.floor - rng.uniform(1.2, 2.4)) + 10.0 * (points[:, 0] <= 0.0)))
         side = 1.0 if rng.random() < 0.5 else -1.0
         arc = side * float(arcs[k])
@@ -163,7 +166,7 @@ def _spheres(
 def _globe_radius(p: Parameters, rng: np.random.Generator) -> float:
     while True:
         radius = float(rng.uniform(0.05, 0.15))
-        if abs(radius - p.sphere_radius) > UNLIKE * p.sphere_radius:
+        if abs(radius - p.sphere_radius) > MIN_RADIUS_DIFFERENCE * p.sphere_radius:
             return radius
 
 

@@ -25,7 +25,7 @@ COLUMNS = (
 )  # fmt: skip
 """Columns of the file; the first three are those that ``tunneldb rings --rings`` reads."""
 
-FINE = 0.05
+ARC_STEP = 0.05
 """Distance between the arcs at which steps are searched, m."""
 
 
@@ -63,7 +63,7 @@ def write_ring_truth(simulation: Simulation, path: Path) -> Path | None:
     if rings.length == 0.0:
         return None
     edge = simulation.tunnel.section.floor_arc
-    arc = np.arange(-edge, edge, FINE)
+    arc = np.arange(-edge, edge, ARC_STEP)
     heights = ring_heights(simulation, arc)
     lines = [",".join(COLUMNS)]
     for i in range(rings.level.size):
@@ -83,7 +83,7 @@ def _of_segments(rings: Rings, shape: RingShape, ring: int, edge: float) -> Floa
 
     The third harmonic is fitted, too, as for rings with many points; above the floor, with equal weights.
     """
-    arc = np.arange(-edge, edge, 0.2 * FINE)
+    arc = np.arange(-edge, edge, 0.2 * ARC_STEP)
     out = np.zeros((1, len(arc)))
     only = RingShape(shape.radius, np.zeros((1, 4)), shape.stand[ring : ring + 1])
     _heights(rings._replace(shift=rings.shift[ring : ring + 1]), only, arc, out)

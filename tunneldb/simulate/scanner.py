@@ -23,7 +23,7 @@ START_TIME = 300_000.0  # GPS seconds of the week
 STATION_TIME = 300.0  # between the starts of two stations, s
 TRAJECTORY_STEP = 0.1  # s
 # Greatest zenith angle, degrees: the tripod hides directions below.
-LOWEST_ZENITH = 150.0
+MAX_ZENITH = 150.0
 
 
 class Rays(NamedTuple):
@@ -146,7 +146,7 @@ class Scanner:
     def _grid(self) -> tuple[int, int]:
         """Return the numbers of rows (zenith) and columns (azimuth) of a static scan."""
         step = self.parameters.angular_step
-        return int(LOWEST_ZENITH / step), round(360.0 / step)
+        return int(MAX_ZENITH / step), round(360.0 / step)
 
     def rays(self, plan: BlockPlan, rng: np.random.Generator) -> Rays:
         """Return the rays of a block."""

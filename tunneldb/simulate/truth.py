@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from tunneldb.simulate.generate import Simulation
 
 
-STEP = 1.0  # m between the vertices of soot
-FINE = 0.005  # m between points for measuring arcs on a wider section
+SOOT_STEP = 1.0  # m between the vertices of soot
+ARC_STEP = 0.005  # m between points for measuring arcs on a wider section
 
 
 class Dry(NamedTuple):
@@ -44,7 +44,7 @@ def as_built(simulation: Simulation) -> Callable[[BaseGeometry], BaseGeometry]:
     if not parameters.radius_step:
         return lambda outline: outline
     wider = wider_from(tunnel)
-    half = np.linspace(0.0, tunnel.section.floor_arc, math.ceil(tunnel.section.floor_arc / FINE) + 1)
+    half = np.linspace(0.0, tunnel.section.floor_arc, math.ceil(tunnel.section.floor_arc / ARC_STEP) + 1)
 
     def length(arc: Float) -> Float:
         point, normal = tunnel.section.point(arc)
@@ -97,7 +97,7 @@ def soot(reflectance: Reflectance, start: float, end: float) -> list[Dry]:
     asked, middle, width = reflectance.soot.tolist()
     if asked == 0.0:
         return []
-    s = np.linspace(start, end, max(2, math.ceil((end - start) / STEP) + 1))
+    s = np.linspace(start, end, max(2, math.ceil((end - start) / SOOT_STEP) + 1))
     amount = soot_amount(reflectance, s)
     half = width * np.sqrt(np.log(np.maximum(2.0 * amount, 1.0 + 1e-9)))
     outline = Polygon(np.vstack([np.column_stack([s, middle - half]), np.column_stack([s, middle + half])[::-1]]))

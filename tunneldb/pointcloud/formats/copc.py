@@ -21,7 +21,7 @@ import numpy as np
 from tunneldb.arrays import Float, UInt8
 from tunneldb.pointcloud.formats.las_header import HEADER_SIZE, Head, Record
 from tunneldb.pointcloud.formats.las_records import coordinates, fields, record_size
-from tunneldb.pointcloud.formats.laz import told
+from tunneldb.pointcloud.formats.laz import write_errors_raised
 
 FORMATS = (6, 7, 8)
 """Point formats that a COPC file may have."""
@@ -128,7 +128,7 @@ def writing_copc(path: Path, head: Head, low: Float, edge: float, spacing: float
     OSError
         If the disk is full or fails.
     """
-    with path.open("x+b") as plain, told(plain) as file:
+    with path.open("x+b") as plain, write_errors_raised(plain) as file:
         writer = CopcWriter(file, head, low, edge, spacing)
         yield writer
         writer.close()

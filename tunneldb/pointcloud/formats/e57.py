@@ -32,7 +32,7 @@ CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 COLOURS = ("colorRed", "colorGreen", "colorBlue")
 NO_COLOUR = "isColorInvalid"
 SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
-FARTHEST = 1e8  # m; greater bounds are placeholders of an exporter
+MAX_BOUND = 1e8  # m; greater bounds are placeholders of an exporter
 
 
 @dataclass(frozen=True)
@@ -409,7 +409,7 @@ def _box(image: Any, scan: Scan) -> tuple[Float, Float]:
     node = image.root()["data3D"][scan.index]
     limits = [[value_of(node, f"cartesianBounds/{axis}{end}", np.nan) for axis in "xyz"] for end in ("Minimum", "Maximum")]
     low, high = np.array(limits, np.float64)
-    if not np.all(np.abs([low, high]) < FARTHEST):
+    if not np.all(np.abs([low, high]) < MAX_BOUND):
         boxes = [(xyz.min(axis=0), xyz.max(axis=0)) for xyz in map(_xyz, _read_scan(image, scan, None, CHUNK))]
         if not boxes:
             return np.full(3, np.inf), np.full(3, -np.inf)

@@ -12,13 +12,13 @@ from xml.parsers import expat
 
 _HEADER = struct.Struct("<8sIIQQQQ")  # ASTM E2807, 6.4: signature, versions, length, XML's offset and length, page size
 _CHECKSUM = 4  # bytes at the end of each page
-_SMALLEST, _LARGEST = 64, 1 << 20  # bytes of a page; usually 1024
+_MIN_PAGE, _MAX_PAGE = 64, 1 << 20  # bytes of a page; usually 1024
 _BLOCK = 1024  # pages
 
-DEEPEST = 50
+MAX_DEPTH = 50
 """Greatest nesting depth of elements; the standard's own structures have nine levels."""
 
-MOST_CHILDREN = 1000
+MAX_CHILDREN = 1000
 """Greatest number of children of an element other than a Vector; the standard's structures have about thirty."""
 
 
@@ -36,11 +36,11 @@ def require_bounded_xml(path: Path) -> None:
     def begin(name: str, attributes: dict[str, str]) -> None:
         if children:
             children[-1] += 1
-            if children[-1] > MOST_CHILDREN:
-                raise ValueError(f"an element of its XML has more than {MOST_CHILDREN} children")
+            if children[-1] > MAX_CHILDREN:
+                raise ValueError(f"an element of its XML has more than {MAX_CHILDREN} children")
         children.append(-(1 << 62) if attributes.get("type") == "Vector" else 0)  # which may have any number
-        if len(children) > DEEPEST:
-            raise ValueError(f"its XML is nested more than {DEEPEST} deep")
+        if len(children) > MAX_DEPTH:
+            raise ValueError(f"its XML is nested more than {MAX_DEPTH} deep")
 
     def refuse(*declared: object) -> None:
         raise ValueError("its XML declares a document type, which E57 does not allow")
@@ -62,7 +62,7 @@ def _section(path: Path) -> Iterator[bytes]:
         if len(head) < _HEADER.size:
             return
         _, _, _, _, offset, length, page = _HEADER.unpack(head)
-        if not _SMALLEST <= page <= _LARGEST or offset >= path.stat().st_size:
+        if not _MIN_PAGE <= page <= _MAX_PAGE or offset >= path.stat().st_size:
             return
         within = offset % page
         file.seek(offset - within)

@@ -16,7 +16,7 @@ _VLR_BYTES = 54
 _LASZIP_ID = 22204
 _VARIABLE_CHUNKS = 0xFFFFFFFF
 _STREAMED = -1  # the offset of the chunk table is in the file's last 8 bytes
-_LARGEST_CHUNK = 1 << 32  # bytes
+_MAX_CHUNK = 1 << 32  # bytes
 _BOX_AT = 179
 _BOX = struct.Struct("<6d")  # max x, min x, max y, min y, max z, min z
 
@@ -76,7 +76,7 @@ def check_envelope(path: Path) -> None:
                 (items,) = struct.unpack_from("<H", body, 32)
                 if sum(struct.unpack_from("<HHH", body, 34 + 6 * item)[1] for item in range(items)) != record:
                     raise ValueError(f"the items of its points do not make up {record} bytes")
-                if chunk != _VARIABLE_CHUNKS and chunk * record > _LARGEST_CHUNK:
+                if chunk != _VARIABLE_CHUNKS and chunk * record > _MAX_CHUNK:
                     raise ValueError(f"its chunks would have {chunk} points")
             place += length
         file.seek(points_at)

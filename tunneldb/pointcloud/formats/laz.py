@@ -59,12 +59,12 @@ def writing(path: Path, head: Head) -> Iterator[LazWriter]:
     OSError
         If the disk is full or fails.
     """
-    with path.open("xb") as plain, told(plain) as file:
+    with path.open("xb") as plain, write_errors_raised(plain) as file:
         yield LazWriter(file, head)
 
 
 @contextmanager
-def told(plain: BinaryIO) -> Iterator[BinaryIO]:
+def write_errors_raised(plain: BinaryIO) -> Iterator[BinaryIO]:
     """Yield a file to compress into; an error of the block is raised as the cause of the failed write.
 
     Raises
@@ -72,14 +72,14 @@ def told(plain: BinaryIO) -> Iterator[BinaryIO]:
     OSError
         If the disk is full or fails.
     """
-    file = _Told(plain)
+    file = _ErrorKeepingFile(plain)
     try:
         yield file  # type: ignore[misc]  # has all methods that are needed
     except lazrs.LazrsError as error:
         raise file.error or error from error
 
 
-class _Told:
+class _ErrorKeepingFile:
     """File that stores the error of a failed write, which the compressor does not pass on."""
 
     def __init__(self, file: BinaryIO) -> None:

@@ -23,7 +23,7 @@ from tunneldb.pointcloud.formats.text_lines import TextLines
 from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
 
 KIND = "a PLY"
-COARSEST = 0.01
+MAX_ROUNDING = 0.01
 """Greatest rounding of coordinates, m; coarser rounding would show in sections and outlines."""
 
 _TYPES = {
@@ -31,7 +31,7 @@ _TYPES = {
     "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-_LONGEST_HEADER = 10_000  # lines
+_MAX_HEADER_LINES = 10_000  # lines
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def read_ply_header(path: Path) -> ScanHeader:
         status = path.stat()
     found, _, low, high = _look_through(path, (status.st_size, status.st_mtime_ns))
     step = _step(found, low, high)
-    if step > COARSEST:
+    if step > MAX_ROUNDING:
         raise InputError(
             f"{path}: its coordinates are 32-bit numbers, whose resolution is only {step:.3g} m so far from the origin; "
             "export them as double, or closer to the origin"
@@ -158,7 +158,7 @@ def _read_header(path: Path, lines: TextLines) -> Vertices:
         raise InputError(f"{path}: it does not begin with ply, so it is not a PLY file")
     order: str | None = None
     elements: list[tuple[str, int, list[tuple[str, str]]]] = []
-    for _ in range(_LONGEST_HEADER):
+    for _ in range(_MAX_HEADER_LINES):
         words = (lines.text() or "").split()
         match words:
             case ["format", name, _] if name in _ORDERS:

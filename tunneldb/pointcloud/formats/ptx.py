@@ -24,7 +24,7 @@ from tunneldb.pointcloud.formats.xyz import LEICA
 
 KIND = "a PTX"
 _HEADER = (1, 1, 3, 3, 3, 3, 4, 4, 4, 4)  # numbers in each line
-_SKEW = 1e-3  # greatest deviation from a rotation, for matrices written with few digits
+_MAX_SKEW = 1e-3  # greatest deviation from a rotation, for matrices written with few digits
 
 
 def read_ptx(path: Path) -> TextCloud:
@@ -98,7 +98,7 @@ def _read_head(path: Path, lines: TextLines) -> tuple[int, int, int, Float] | No
     if min(columns, rows) < 1 or columns != int(columns) or rows != int(rows):
         raise InputError(f"{path}, line {begin}: invalid scan size {columns:g} × {rows:g}")
     matrix = np.array(values[6:])
-    if not np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=_SKEW):
+    if not np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=_MAX_SKEW):
         raise InputError(
             f"{path}, line {begin + 6}: the scan's matrix is not a rotation (is it scaled?); export it with its pose, in metres"
         )

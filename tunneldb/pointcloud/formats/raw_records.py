@@ -22,7 +22,7 @@ from tunneldb.pointcloud.formats.table import format_of
 _SCALE = 1e-4  # m; finer than any scanner measures, and an int32 of it reaches 214 km
 _COLOURS = ("red", "green", "blue")
 _STANDARD = ("gps_time", "scan_id", "classification")
-_SHORT = 2**16
+_SCAN_ID_LIMIT = 2**16
 
 
 class RawRecords:
@@ -111,7 +111,7 @@ class RawRecords:
         scans, places = np.unique(scan_id, return_inverse=True)
         for scan in scans.tolist():
             self.scans.setdefault(scan, len(self.scans) + 1)
-        found = [scan if scan < _SHORT else min(self.scans[scan], _SHORT - 1) for scan in scans.tolist()]
+        found = [scan if scan < _SCAN_ID_LIMIT else min(self.scans[scan], _SCAN_ID_LIMIT - 1) for scan in scans.tolist()]
         return np.array(found, np.float64)[places]
 
     def _count(self, stored: Float) -> None:

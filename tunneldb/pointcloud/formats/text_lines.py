@@ -15,7 +15,7 @@ from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.columns import SKIPPED
 
 BLOCK_BYTES = 1 << 24
-LONGEST = 1 << 16  # bytes of a line; text files do not have longer ones
+MAX_LINE_BYTES = 1 << 16  # bytes of a line; text files do not have longer ones
 
 
 class TextLines:
@@ -89,8 +89,8 @@ class TextLines:
         self._held = rest + data
         self._ends = np.flatnonzero(np.frombuffer(self._held, np.uint8) == ord("\n")) + 1
         self._at = 0
-        if self._held and (not len(self._ends) or self._ends[0] > LONGEST):
-            raise InputError(f"{self.path}, line {self.line}: no line end within {LONGEST} bytes: not a text file")
+        if self._held and (not len(self._ends) or self._ends[0] > MAX_LINE_BYTES):
+            raise InputError(f"{self.path}, line {self.line}: no line end within {MAX_LINE_BYTES} bytes: not a text file")
         return bool(len(self._ends))
 
 

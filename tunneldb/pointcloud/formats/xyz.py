@@ -26,7 +26,7 @@ LEICA = {
 }
 """Columns of PTS and PTX, by their number."""
 
-_MOST_COMMENTS = 1000
+_MAX_COMMENTS = 1000
 
 
 def read_table(path: Path) -> TextCloud:
@@ -85,7 +85,7 @@ def _layout(path: Path, lines: TextLines) -> TextScan:
     while (text := lines.text()) is not None:
         if not text:
             continue
-        if text.startswith(("#", "//")) and len(remarks) < _MOST_COMMENTS:
+        if text.startswith(("#", "//")) and len(remarks) < _MAX_COMMENTS:
             remarks.append(text)
         elif header is None and not are_numbers(text, () if given is None else given[0]):
             header = text

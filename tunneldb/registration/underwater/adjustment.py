@@ -36,7 +36,7 @@ DEPTH_SHARE, DEPTH_SPREAD = 1.0 - (4.0 / 3.0) / (np.pi / 2.0), 0.2
 WATERLINE_SIGMA = 0.03  # m: common offset of wall edges above or below the water
 # Prior standard deviations of the sonar's zero on masonry, from stones and joints in its beam, m: some of RELIEF. Walls
 # separate it from scale as poorly as ladders do, so it is nearly fixed, and its uncertainty enters the covariance only.
-ZERO_SIGMA, ZERO_HELD = 0.0015, 0.0003
+ZERO_SIGMA, ZERO_PRIOR_SIGMA = 0.0015, 0.0003
 # Slant effect of walls and of the bed (nearer_by_slant): between none and that of the strongest cell on a smooth surface.
 SLANT_USUAL, SLANT_SIGMA = 1.5, 1.0
 NEARER_SIGMA = (0.0005, 0.002)  # of the shares by which relief of walls and of the bed seems nearer along the canal
@@ -46,13 +46,13 @@ COMMON = 9
 LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
 # rad: common error of slanting beams on a rough wall, 0.6 mm over 2 m of its height; not visible in a single scan
 SLANT = 0.0003
-CUT = 3.0  # standard deviations at which the weight of a row is a quarter
+QUARTER_WEIGHT_SIGMA = 3.0  # standard deviations at which the weight of a row is a quarter
 REACHES = (0.3, 0.2, 0.15, 0.12, *[0.1] * 30)  # greatest distance of rows, round by round, m
-SETTLED = 1e-5
+MAX_CHANGE = 1e-5
 SURROUNDINGS = 0.6  # m around a ladder, more than the error of a first pose
-HELD = 1e8  # precision of fixed parameters
-SINGULAR = 1e-12  # share of the largest eigenvalue up to which a direction is undetermined
-UNKNOWN = 1e4  # variance of such a direction
+FIXED_PRECISION = 1e8  # precision of fixed parameters
+MAX_SINGULAR_SHARE = 1e-12  # share of the largest eigenvalue up to which a direction is undetermined
+UNKNOWN_VARIANCE = 1e4  # variance of such a direction
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def adjust(scans: Sequence[Scan], walls: Walls, ladders: Sequence[LaserLadder], 
     fitted = fit(scans, walls, ladders, pairs, REACHES)
     spread = fitted.precision.copy()  # precision of the prior, for the covariance
     zero = POSE * len(scans) + 4
-    spread[zero, zero] *= (ZERO_SIGMA / ZERO_HELD) ** 2
+    spread[zero, zero] *= (ZERO_SIGMA / ZERO_PRIOR_SIGMA) ** 2
     covariance = _sandwich(fitted.rows, fitted.normal, fitted.precision, spread)
     blocks = [slice(POSE * i, POSE * (i + 1)) for i in range(len(scans))]
     for block in blocks:
@@ -184,7 +184,7 @@ def fit(
         leaning = replace(walls, batter=walls.batter + common[walls.side])
         rows = _all_rows(scans, poses, leaning, placed, common, pairs, reach, held)
         normal, right = _normal_equations(rows, count)
-        normal[stay, stay] += HELD
+        normal[stay, stay] += FIXED_PRECISION
         offset = _prior_offset(poses, placed, ladders, common - usual)
         offset[stay] = 0.0
         change = -_inverse(normal + precision, 0.0) @ (right + precision @ offset)
@@ -195,7 +195,7 @@ def fit(
         for k in range(len(placed)):
             first = POSE * len(scans) + COMMON + 6 * k
             placed[k] = placed[k].moved(change[first : first + 3], change[first + 3 : first + 6])
-        if reach == reaches[-1] and np.abs(change).max() < SETTLED:
+        if reach == reaches[-1] and np.abs(change).max() < MAX_CHANGE:
             break
     return Fitted(tuple(poses), tuple(rows), tuple(placed), common, normal, precision)
 
@@ -241,7 +241,7 @@ def _design(rows: Rows) -> tuple[Float, Int64]:
 
 def weights_of(rows: Rows) -> Float:
     """Return the weights (n,) of rows, 1/m², by Geman and McClure."""
-    return np.asarray(1.0 / (1.0 + (_deviation(rows) / CUT) ** 2) ** 2 / rows.sigma**2)
+    return np.asarray(1.0 / (1.0 + (_deviation(rows) / QUARTER_WEIGHT_SIGMA) ** 2) ** 2 / rows.sigma**2)
 
 
 def _deviation(rows: Rows) -> Float:
@@ -272,7 +272,7 @@ def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
         BATTER_SIGMA,
         max(DEPTH_SPREAD * radius, 1e-4),
         WATERLINE_SIGMA,
-        ZERO_HELD,
+        ZERO_PRIOR_SIGMA,
         SLANT_SIGMA,
         SLANT_SIGMA,
         *NEARER_SIGMA,
@@ -327,13 +327,13 @@ def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float, spread: Flo
     np.add.at(total, [order[key] for key in keys], np.array(sums).reshape(-1, 2, len(normal)))
     flat = total.reshape(-1, len(normal))
     middle = spread + flat.T @ flat
-    unknown = _inverse(normal + precision, UNKNOWN) - inverse
+    unknown = _inverse(normal + precision, UNKNOWN_VARIANCE) - inverse
     return np.asarray(inverse @ middle @ inverse + unknown)
 
 
 def _inverse(matrix: Float, unknown: float) -> Float:
     """Return the inverse of a symmetric matrix; undetermined directions get the variance ``unknown``."""
     value, vector = np.linalg.eigh(matrix)
-    known = value > SINGULAR * value[-1]
+    known = value > MAX_SINGULAR_SHARE * value[-1]
     inverse = np.where(known, 1.0 / np.where(known, value, 1.0), unknown)
     return np.asarray((vector * inverse) @ vector.T)

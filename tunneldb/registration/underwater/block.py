@@ -14,7 +14,7 @@ import numpy as np
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.adjustment import LADDER_SHIFT, Adjusted, adjust, scan_of
-from tunneldb.registration.underwater.chain import OVERLAP
+from tunneldb.registration.underwater.chain import MAX_OVERLAP_DISTANCE
 from tunneldb.registration.underwater.determined import judge
 from tunneldb.registration.underwater.laser_ladders import LaserLadder, find_laser_ladders
 from tunneldb.registration.underwater.observations import Pose, Rows, cell_keys
@@ -24,8 +24,8 @@ from tunneldb.registration.underwater.starting import start_all
 from tunneldb.registration.underwater.walls import Walls, find_walls, lower_edge
 
 WALL_VOXEL = 0.03  # m
-MOVED = 2.5  # standard deviations from which a ladder has moved between laser and sonar
-DRY_WALL = 0.1  # m: if the laser sees walls this far below the given water level, the level is wrong
+MIN_MOVEMENT_SIGMA = 2.5  # standard deviations from which a ladder has moved between laser and sonar
+MAX_DRY_WALL = 0.1  # m: if the laser sees walls this far below the given water level, the level is wrong
 
 
 def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladder], water_level: float) -> Registration:
@@ -51,14 +51,14 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
     thin = local[np.unique(cell_keys(local, WALL_VOXEL), return_index=True)[1]]
     walls = find_walls(thin)
     edge = lower_edge(thin, walls)
-    if edge < -DRY_WALL:
+    if edge < -MAX_DRY_WALL:
         raise UserError(f"the laser sees walls {-edge:.2f} m below the water level and lower; check --water-level")
     found = find_laser_ladders(local, walls, ladders)
     scans, faults = _prepare([_local(cloud, origin) for cloud in clouds], walls)
     seen = {one.placed.ladder.name for one in found}
     started, reasons = start_all(scans, walls, found, several=len(ladders) > 1)
     notes = []
-    if edge > DRY_WALL:
+    if edge > MAX_DRY_WALL:
         notes.append(f"the laser sees walls only from {edge:.2f} m above the water; check --water-level")
     notes += [f"ladder {one.name} is not in the laser scan, or has other gaps" for one in ladders if one.name not in seen]
     known = sorted(started)
@@ -126,7 +126,10 @@ def _adjust_all(
         scans.append(scan_of(scan.cloud.points, scan.patches, scan.smooth, scan.edges, one.pose, one.ladders, found))
     place = np.array([scan.pose.translation for scan in scans])
     pairs = [
-        (a, b) for a in range(len(scans)) for b in range(a + 1, len(scans)) if np.linalg.norm(place[a] - place[b]) < OVERLAP
+        (a, b)
+        for a in range(len(scans))
+        for b in range(a + 1, len(scans))
+        if np.linalg.norm(place[a] - place[b]) < MAX_OVERLAP_DISTANCE
     ]
     return adjust(scans, walls, found, pairs)
 
@@ -137,7 +140,7 @@ def _moved(found: Sequence[LaserLadder], adjusted: Adjusted) -> tuple[int, ...]:
     for k, (before, now) in enumerate(zip(found, adjusted.ladders, strict=True)):
         axes = before.placed.axes[:2]
         sigma = np.sqrt(np.diag(axes @ before.covariance[3:6, 3:6] @ axes.T) + LADDER_SHIFT**2)
-        if (np.abs(axes @ (now.origin - before.placed.origin)) > MOVED * sigma).any():
+        if (np.abs(axes @ (now.origin - before.placed.origin)) > MIN_MOVEMENT_SIGMA * sigma).any():
             out.append(k)
     return tuple(out)
 

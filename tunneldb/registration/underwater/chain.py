@@ -12,27 +12,29 @@ from tunneldb.arrays import Float
 from tunneldb.registration.underwater.adjustment import Scan, fit
 from tunneldb.registration.underwater.first_pose import LevelScan
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
-from tunneldb.registration.underwater.observations import UPRIGHT, Patches, Pose, overlap_rows
-from tunneldb.registration.underwater.relief import NOWHERE, PIXEL, Relief, height_difference, likelihood, relief_of
-from tunneldb.registration.underwater.single import SOME_EDGES, PreparedScan, StartedScan, misses, sees
+from tunneldb.registration.underwater.observations import MIN_BED_COSINE, Patches, Pose, overlap_rows
+from tunneldb.registration.underwater.relief import NO_EVIDENCE, PIXEL, Relief, height_difference, likelihood, relief_of
+from tunneldb.registration.underwater.single import MIN_EDGES, PreparedScan, StartedScan, misses, sees
 from tunneldb.registration.underwater.walls import Walls
 
-OVERLAP = 15.0  # m between scanners whose scans are compared
-LOOSE = 4  # pixels along the canal: tolerance of poses
-PEAKS = 5  # peaks of a pair's likelihood that are examined
-TRIED = 4  # most likely places, by the bed's relief, that are fitted
-LESS = float(np.log(100.0))  # greatest log likelihood ratio of the most likely place to another
-AHEAD = float(np.log(20.0))  # likelihood ratio to the next best place from which a place is accepted
-SAID = float(np.log(5.0))  # likelihood ratio from which two scans agree, or contradict each other
+MAX_OVERLAP_DISTANCE = 15.0  # m between scanners whose scans are compared
+POSE_TOLERANCE = 4  # pixels along the canal: tolerance of poses
+MAX_PEAKS = 5  # peaks of a pair's likelihood that are examined
+MAX_PLACES = 4  # most likely places, by the bed's relief, that are fitted
+MAX_LOG_RATIO = float(np.log(100.0))  # greatest log likelihood ratio of the most likely place to another
+MIN_LEAD = float(np.log(20.0))  # likelihood ratio to the next best place from which a place is accepted
+MIN_AGREEMENT = float(np.log(5.0))  # likelihood ratio from which two scans agree, or contradict each other
 REACHES = (0.3, 0.25, 0.2, 0.15, 0.1, 0.1)
-WITHIN = 0.3  # m; greatest distance between compared patches
-BESIDE = 3  # known scans that a scan is adjusted with
-MOST_MOVED = 1.0  # m along the canal: greatest shift by the fit; beyond it, the scan has slid to another place
+MAX_PATCH_DISTANCE = 0.3  # m; greatest distance between compared patches
+MAX_NEIGHBOURS = 3  # known scans that a scan is adjusted with
+MAX_SHIFT = 1.0  # m along the canal: greatest shift by the fit; beyond it, the scan has slid to another place
 SLIDES = np.arange(-6, 7) * 0.1  # m along the canal: shifts at which a fitted scan is tried again
-SURE = float(np.log(30.0 * TRIED * len(SLIDES)))  # required likelihood ratio of the best of so many trials to no match
-SAME_PLACE = 0.1  # m between two poses that are the same
-ODD = 0.05  # share of a bed's patches that differ from another scan: objects, false echoes
-PROFILE = 0.5  # m across: width of strips in which the bed has one height along the canal
+MIN_LOG_RATIO = float(
+    np.log(30.0 * MAX_PLACES * len(SLIDES))
+)  # required likelihood ratio of the best of so many trials to no match
+PLACE_TOLERANCE = 0.1  # m between two poses that are the same
+OUTLIER_SHARE = 0.05  # share of a bed's patches that differ from another scan: objects, false echoes
+STRIP_WIDTH = 0.5  # m across: width of strips in which the bed has one height along the canal
 
 
 @dataclass
@@ -54,7 +56,7 @@ class Reliefs:
         if (known, i, turned) not in self._pairs:
             one, other = self.of(known), self.of(i)
             if one is None or other is None:
-                self._pairs[known, i, turned] = np.full(1, NOWHERE)
+                self._pairs[known, i, turned] = np.full(1, NO_EVIDENCE)
             else:
                 self._pairs[known, i, turned] = likelihood(one, other.turned() if turned else other)
         return self._pairs[known, i, turned]
@@ -64,12 +66,12 @@ class Reliefs:
         return any(bool((self.likelihood(one, other, turned=turned) > 0.0).any()) for turned in (False, True))
 
     def near(self, known: int, i: int, shift: float, *, turned: bool) -> Float:
-        """Return the likelihoods at shifts within LOOSE pixels of ``shift``, m; 0 where undefined."""
+        """Return the likelihoods at shifts within POSE_TOLERANCE pixels of ``shift``, m; 0 where undefined."""
         values = self.likelihood(known, i, turned=turned)
-        at = round(shift / PIXEL) + len(values) // 2 + np.arange(-LOOSE, LOOSE + 1)
+        at = round(shift / PIXEL) + len(values) // 2 + np.arange(-POSE_TOLERANCE, POSE_TOLERANCE + 1)
         inside = (at >= 0) & (at < len(values))
-        found = np.where(inside, values[np.clip(at, 0, len(values) - 1)], NOWHERE)
-        return np.where(found > NOWHERE, found, 0.0)
+        found = np.where(inside, values[np.clip(at, 0, len(values) - 1)], NO_EVIDENCE)
+        return np.where(found > NO_EVIDENCE, found, 0.0)
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ class _Place:
 
     def is_at(self, other: _Place) -> bool:
         """Return True if it is the same place, within the tolerance of poses, with the same orientation."""
-        return self.along(other) <= LOOSE * PIXEL and float(self.direction @ other.direction) > 0.0
+        return self.along(other) <= POSE_TOLERANCE * PIXEL and float(self.direction @ other.direction) > 0.0
 
     def along(self, other: _Place) -> float:
         """Return the distance to another place along the canal, m."""
@@ -102,11 +104,11 @@ def place_beside(
     """Return the pose of scan ``i`` relative to started scans of the same bed, and its likelihood; None if uncertain."""
     tried = (_settled(i, place, reliefs, started, walls) for place in _likeliest(_places(i, reliefs, started)))
     settled = sorted((one for one in tried if one is not None), key=lambda one: -one[1])
-    if not settled or settled[0][1] < SURE:
+    if not settled or settled[0][1] < MIN_LOG_RATIO:
         return None
     pose, likelihood = settled[0]
     for other, less in settled[1:]:
-        if less > likelihood - AHEAD and np.linalg.norm(other.translation - pose.translation) > SAME_PLACE:
+        if less > likelihood - MIN_LEAD and np.linalg.norm(other.translation - pose.translation) > PLACE_TOLERANCE:
             return None
     seen = sees(reliefs.scans[i], pose, found)
     return None if misses(pose, seen, found) else (StartedScan(pose, seen), likelihood)
@@ -116,11 +118,11 @@ def _likeliest(places: Sequence[_Place]) -> list[_Place]:
     """Return the places that are worth fitting, without repeats."""
     out: list[_Place] = []
     for one in sorted(places, key=lambda one: -one.likelihood):
-        if out and one.likelihood < out[0].likelihood - LESS:
+        if out and one.likelihood < out[0].likelihood - MAX_LOG_RATIO:
             break
         if not any(one.is_at(other) for other in out):
             out.append(one)
-    return out[:TRIED]
+    return out[:MAX_PLACES]
 
 
 def _settled(
@@ -131,11 +133,13 @@ def _settled(
     pose = _pose(i, place, reliefs, started, walls)
     if pose is None:
         return None
-    beside = sorted(started, key=lambda k: float(np.linalg.norm(started[k].pose.translation - pose.translation)))[:BESIDE]
+    beside = sorted(started, key=lambda k: float(np.linalg.norm(started[k].pose.translation - pose.translation)))[
+        :MAX_NEIGHBOURS
+    ]
     own, others = _levelled(scans[i], pose), [_levelled(scans[k], started[k].pose) for k in beside]
     found, likelihood = _fitted_beside(own, others, walls, place.direction)
     moved = abs(float((found.translation - pose.translation)[:2] @ place.direction))
-    return (found, likelihood) if moved < MOST_MOVED else None
+    return (found, likelihood) if moved < MAX_SHIFT else None
 
 
 def _fitted_beside(own: Scan, others: Sequence[Scan], walls: Walls, direction: Float) -> tuple[Pose, float]:
@@ -161,7 +165,7 @@ def _fitted_beside(own: Scan, others: Sequence[Scan], walls: Walls, direction: F
 
 def _tells_water(scan: PreparedScan | Scan) -> bool:
     """Return True if it shows the upper edges of its walls, at the water: it is level, while errors of slope accumulate."""
-    return len(scan.edges) >= SOME_EDGES
+    return len(scan.edges) >= MIN_EDGES
 
 
 def _levelled(scan: PreparedScan, pose: Pose) -> Scan:
@@ -173,8 +177,8 @@ def _levelled(scan: PreparedScan, pose: Pose) -> Scan:
 
 def _roughness(patches: Patches, pose: Pose, direction: Float) -> float:
     """Return the spread of the bed's height, m, about the part that is constant along the canal, from a scan's patches."""
-    place = pose.apply(patches.centre)[(patches.normal @ pose.rotation.T)[:, 2] > UPRIGHT]
-    across = np.floor((place[:, :2] @ [-direction[1], direction[0]]) / PROFILE).astype(np.int64)
+    place = pose.apply(patches.centre)[(patches.normal @ pose.rotation.T)[:, 2] > MIN_BED_COSINE]
+    across = np.floor((place[:, :2] @ [-direction[1], direction[0]]) / STRIP_WIDTH).astype(np.int64)
     order = np.lexsort([place[:, 2], across])
     _, begin, number, count = np.unique(across[order], return_index=True, return_inverse=True, return_counts=True)
     height = place[order, 2]
@@ -188,14 +192,14 @@ def bed_likelihood(patches: tuple[Patches, Patches], poses: tuple[Pose, Pose], r
     Heights of the same bed differ by errors of patches, those of different beds also by the bed's roughness. The patches of a
     stretch are correlated, so their mean counts.
     """
-    rows = overlap_rows(*patches, poses, np.zeros(4), (0, 1), np.arange(4), WITHIN)
+    rows = overlap_rows(*patches, poses, np.zeros(4), (0, 1), np.arange(4), MAX_PATCH_DISTANCE)
     if rows is None:
         return 0.0
-    bed = rows.poses[:, 5] > UPRIGHT
+    bed = rows.poses[:, 5] > MIN_BED_COSINE
     square, same = rows.residual[bed] ** 2, rows.sigma[bed] ** 2
     other = same + 2.0 * roughness**2
     ratio = 0.5 * (np.log(other / same) - square / same + square / other)
-    told = np.log((1.0 - ODD) * np.exp(ratio) + ODD)
+    told = np.log((1.0 - OUTLIER_SHARE) * np.exp(ratio) + OUTLIER_SHARE)
     _, stretch, count = np.unique(rows.group[bed], return_inverse=True, return_counts=True)
     return float((np.bincount(stretch, told) / count).sum())
 
@@ -215,14 +219,14 @@ def _places(i: int, reliefs: Reliefs, started: Mapping[int, StartedScan]) -> lis
         for turned in (False, True):
             values = reliefs.likelihood(k, i, turned=turned)
             peaks, _ = find_peaks(values, height=0.0)
-            for peak in peaks[np.argsort(-values[peaks])][:PEAKS]:
+            for peak in peaks[np.argsort(-values[peaks])][:MAX_PEAKS]:
                 shift = (int(peak) - len(values) // 2) * PIXEL
                 point, direction = stand[k] + shift * look[k], look[k] * (-1.0 if turned else 1.0)
                 if not reliefs.scans[i].cloud.may_stand(point):
                     continue
-                total = np.zeros(2 * LOOSE + 1)
+                total = np.zeros(2 * POSE_TOLERANCE + 1)
                 for other in started:
-                    if np.linalg.norm(point - stand[other]) < OVERLAP:
+                    if np.linalg.norm(point - stand[other]) < MAX_OVERLAP_DISTANCE:
                         along = float((point - stand[other]) @ look[other])
                         same = float(direction @ look[other]) > 0.0
                         near = reliefs.near(other, i, along, turned=not same)
@@ -262,9 +266,9 @@ def agreement(one: int, other: int, poses: tuple[Pose, Pose], reliefs: Reliefs, 
     same = float(look @ _direction(reliefs.scans[other], second)) > 0.0
     along = float((second.translation - first.translation)[:2] @ look)
     said = float(reliefs.near(one, other, along, turned=not same).max())
-    if abs(said) > SAID:
+    if abs(said) > MIN_AGREEMENT:
         return int(np.sign(said))
     scans = reliefs.scans
     own, beside = _levelled(scans[other], second), _levelled(scans[one], first)
     _, closely = _fitted_beside(own, [beside], walls, look)
-    return int(np.sign(closely)) if abs(closely) > SURE else 0
+    return int(np.sign(closely)) if abs(closely) > MIN_LOG_RATIO else 0

@@ -12,13 +12,13 @@ import numpy as np
 
 from tunneldb.arrays import Float
 from tunneldb.registration.underwater.ladder_shape import PlacedLadder, nearest_element
-from tunneldb.registration.underwater.observations import BEAM_SIGMA, FARTHEST, RANGE_NOISE, RELIEF, Pose, cell_keys
+from tunneldb.registration.underwater.observations import BEAM_SIGMA, MAX_RANGE, RANGE_NOISE, RELIEF, Pose, cell_keys
 from tunneldb.registration.underwater.walls import Walls
 
-CUT = 3.0  # standard deviations at which a point is explained by half
+HALF_EXPLAINED_SIGMA = 3.0  # standard deviations at which a point is explained by half
 CELL = 0.25  # m
 REACH = 0.15  # m around a ladder
-DECIDED = 3.0  # standard deviations
+MIN_MARGIN = 3.0  # standard deviations
 
 
 def explained(points: Float, pose: Pose, walls: Walls, ladders: Sequence[PlacedLadder]) -> Float:
@@ -29,7 +29,7 @@ def explained(points: Float, pose: Pose, walls: Walls, ladders: Sequence[PlacedL
     space = pose.apply(points)
     reach = np.linalg.norm(space - pose.translation, axis=1)
     best = np.full(len(points), np.inf)
-    usable = reach < FARTHEST
+    usable = reach < MAX_RANGE
     away, piece = walls.tree.query(space[:, :2], distance_upper_bound=1.0)
     known = np.isfinite(away)
     best[known] = (walls.distance(space[known], piece[known]) / np.hypot(RANGE_NOISE, RELIEF)) ** 2
@@ -40,7 +40,9 @@ def explained(points: Float, pose: Pose, walls: Walls, ladders: Sequence[PlacedL
         near &= (own[:, 1] > low) & (own[:, 1] < high)
         if near.any():
             best[near] = np.minimum(best[near], _ladder_deviation(own[near], placed, pose))
-    return np.where(usable & np.isfinite(best), CUT**2 / (2.0 * (1.0 + best / CUT**2)), np.nan)
+    return np.where(
+        usable & np.isfinite(best), HALF_EXPLAINED_SIGMA**2 / (2.0 * (1.0 + best / HALF_EXPLAINED_SIGMA**2)), np.nan
+    )
 
 
 def _ladder_deviation(own: Float, placed: PlacedLadder, pose: Pose) -> Float:

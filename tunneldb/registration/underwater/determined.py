@@ -6,9 +6,9 @@ import numpy as np
 
 from tunneldb.arrays import Float
 
-WEAK, OPEN = 0.05, 0.5  # standard deviations of a position from which it is weak, and undetermined, m
-WEAK_TURN, OPEN_TURN = np.radians(0.2), np.radians(3.0)
-WEAK_SCALE = 0.005
+MIN_WEAK_SHIFT, MIN_OPEN_SHIFT = 0.05, 0.5  # standard deviations of a position from which it is weak, and undetermined, m
+MIN_WEAK_TURN, MIN_OPEN_TURN = np.radians(0.2), np.radians(3.0)
+MIN_WEAK_SCALE = 0.005
 
 
 def judge(covariance: Float, along: Float) -> tuple[str, tuple[str, ...]]:
@@ -32,13 +32,13 @@ def judge(covariance: Float, along: Float) -> tuple[str, tuple[str, ...]]:
     up = np.array([0.0, 0.0, 1.0])
     turn, place = covariance[:3, :3], covariance[3:6, 3:6]
     checks = [
-        ("along the tunnel", ahead @ place @ ahead, WEAK, OPEN),
-        ("across the tunnel", across @ place @ across, WEAK, OPEN),
-        ("height", up @ place @ up, WEAK, OPEN),
-        ("roll", ahead @ turn @ ahead, WEAK_TURN, OPEN_TURN),
-        ("pitch", across @ turn @ across, WEAK_TURN, OPEN_TURN),
-        ("yaw", up @ turn @ up, WEAK_TURN, OPEN_TURN),
-        ("range scale", covariance[6, 6], WEAK_SCALE, np.inf),
+        ("along the tunnel", ahead @ place @ ahead, MIN_WEAK_SHIFT, MIN_OPEN_SHIFT),
+        ("across the tunnel", across @ place @ across, MIN_WEAK_SHIFT, MIN_OPEN_SHIFT),
+        ("height", up @ place @ up, MIN_WEAK_SHIFT, MIN_OPEN_SHIFT),
+        ("roll", ahead @ turn @ ahead, MIN_WEAK_TURN, MIN_OPEN_TURN),
+        ("pitch", across @ turn @ across, MIN_WEAK_TURN, MIN_OPEN_TURN),
+        ("yaw", up @ turn @ up, MIN_WEAK_TURN, MIN_OPEN_TURN),
+        ("range scale", covariance[6, 6], MIN_WEAK_SCALE, np.inf),
     ]
     named, state = [], "determined"
     for name, variance, weak, unknown in checks:

@@ -21,7 +21,7 @@ from tunneldb.registration.underwater.walls import Walls
 from tunneldb.registration.underwater.waterline import find_waterline
 from tunneldb.robust import MAD_TO_SIGMA
 
-NEAR = 12.0  # m from the scanner
+MAX_RANGE = 12.0  # m from the scanner
 BIN = 0.05  # m, across
 ANGLES = np.radians(np.arange(0.0, 180.0, 1.0))
 WIDTH_TOLERANCE = 0.15  # share, before the scan is level
@@ -29,11 +29,11 @@ PIXEL = 0.03  # m
 BLUR = 0.045  # m: half a degree at 5 m
 WALL_MARGIN = 0.07  # m: four standard deviations of a sonar's range
 SLAB = 0.15  # in front of and behind the ladder's plane, m
-STEEPEST_TILT = np.radians(15.0)
-PEAKS = 4  # peaks for each ladder and orientation
+MAX_TILT = np.radians(15.0)
+MAX_PEAKS = 4  # peaks for each ladder and orientation
 LEVEL_ROUNDS = 3
-LEAST_BED = 10  # cells of 0.5 m
-HIGHEST = 95.0  # percentile of heights
+MIN_BED_CELLS = 10  # cells of 0.5 m
+TOP_PERCENTILE = 95.0  # percentile of heights
 
 
 @dataclass(frozen=True)
@@ -87,14 +87,14 @@ def level(points: Float, up: int, width: float) -> LevelScan:
     """
     rotation = np.diag([1.0, float(up), float(up)])  # half a turn about x if z points down
     turned = points @ rotation.T
-    near = np.linalg.norm(turned[:, :2], axis=1) < NEAR
+    near = np.linalg.norm(turned[:, :2], axis=1) < MAX_RANGE
     angle, low, high = _parallel_walls(turned[near], width)
     rotation = _about_z(-angle) @ rotation
     slopes = (0.0, 0.0)
     bed = 0.0
     for _ in range(LEVEL_ROUNDS):
         turned = points @ rotation.T
-        near = np.linalg.norm(turned[:, :2], axis=1) < NEAR
+        near = np.linalg.norm(turned[:, :2], axis=1) < MAX_RANGE
         first = _wall_plane(turned[near], low)
         second = _wall_plane(turned[near], high)
         pitch, bed = _bed_slope(turned[near], low, high)
@@ -107,10 +107,10 @@ def level(points: Float, up: int, width: float) -> LevelScan:
         left, _, right = np.linalg.svd(turn)
         rotation = left @ right @ rotation
     turned = points @ rotation.T
-    if np.degrees(np.arccos(np.clip(rotation[2, 2] * up, -1.0, 1.0))) > np.degrees(STEEPEST_TILT):
+    if np.degrees(np.arccos(np.clip(rotation[2, 2] * up, -1.0, 1.0))) > np.degrees(MAX_TILT):
         raise UserError("the scan is tilted by more than 15°; check --up")
     edges = find_waterline(turned, (low, high), slopes)
-    top = float(np.median(edges[:, 2])) if len(edges) else float(np.percentile(turned[:, 2], HIGHEST))
+    top = float(np.median(edges[:, 2])) if len(edges) else float(np.percentile(turned[:, 2], TOP_PERCENTILE))
     return LevelScan(rotation, (low, high), slopes, turned, bed, edges, top)
 
 
@@ -126,14 +126,14 @@ def _parallel_walls(points: Float, width: float) -> tuple[float, float, float]:
     lags = np.arange(int(width * (1.0 - WIDTH_TOLERANCE) / BIN), int(width * (1.0 + WIDTH_TOLERANCE) / BIN) + 1)
     for angle in ANGLES:
         across = -np.sin(angle) * points[:, 0] + np.cos(angle) * points[:, 1]
-        k = np.floor((across + NEAR) / BIN).astype(np.int64)
-        histogram = np.bincount(np.clip(k, 0, int(2 * NEAR / BIN)), weights=weight, minlength=int(2 * NEAR / BIN) + 1)
+        k = np.floor((across + MAX_RANGE) / BIN).astype(np.int64)
+        histogram = np.bincount(np.clip(k, 0, int(2 * MAX_RANGE / BIN)), weights=weight, minlength=int(2 * MAX_RANGE / BIN) + 1)
         smooth = np.convolve(histogram, np.ones(3), mode="same")
         for lag in lags:
             both = np.minimum(smooth[:-lag], smooth[lag:])
             i = int(np.argmax(both))
             if both[i] > best[0]:
-                best = (float(both[i]), float(angle), (i + 0.5) * BIN - NEAR, (i + lag + 0.5) * BIN - NEAR)
+                best = (float(both[i]), float(angle), (i + 0.5) * BIN - MAX_RANGE, (i + lag + 0.5) * BIN - MAX_RANGE)
     score, angle, low, high = best
     if score <= 0.0 or not low < 0.0 < high:
         raise UserError(f"no two walls {width:.1f} m apart (as in the laser scan) around the scanner; is the file in metres?")
@@ -166,7 +166,7 @@ def _bed_slope(points: Float, low: float, high: float) -> tuple[float, float]:
     # The lower quartile of a cell is its bed; echoes of the water surface from below and their images are above it.
     low_of = mine[order[begin[:-1] + count // 4], 2][count >= 5]
     centre = np.array([mine[order[b], 0] for b in begin[:-1]])[count >= 5]
-    if len(low_of) < LEAST_BED:
+    if len(low_of) < MIN_BED_CELLS:
         raise UserError("no bed between its walls; is it a sonar scan?")
     slope, middle = 0.0, float(np.median(low_of))
     for _ in range(10):
@@ -236,12 +236,12 @@ def _correlate(
     lean = np.polyfit(dots[:, 2], dots[:, 1], 1)
     expected = np.polyval(lean, height)
     mine = (np.abs(off - expected) < SLAB) & (off > WALL_MARGIN) & (height < uncertain) & (height > -depth - uncertain)
-    mine &= np.abs(points[:, 0]) < NEAR
+    mine &= np.abs(points[:, 0]) < MAX_RANGE
     own = points[mine]
     if len(own) < 50:
         return []
-    low = np.array([-NEAR - 1.0, own[:, 2].min() - 1.0])
-    shape = np.ceil((np.array([2.0 * NEAR + 2.0, np.ptp(own[:, 2]) + 2.0])) / PIXEL).astype(int)
+    low = np.array([-MAX_RANGE - 1.0, own[:, 2].min() - 1.0])
+    shape = np.ceil((np.array([2.0 * MAX_RANGE + 2.0, np.ptp(own[:, 2]) + 2.0])) / PIXEL).astype(int)
     k = np.floor((own[:, [0, 2]] - low) / PIXEL).astype(np.int64)
     weight = (own**2).sum(axis=1)
     image = np.bincount(k[:, 0] * shape[1] + k[:, 1], weights=weight, minlength=shape[0] * shape[1]).reshape(shape)
@@ -265,7 +265,7 @@ def _correlate(
     up = corner[1] - (low[1] + np.arange(alike.shape[1]) * PIXEL)
     alike[:, np.abs(up + scan.top) > uncertain] = -1.0
     out = []
-    for _ in range(PEAKS):
+    for _ in range(MAX_PEAKS):
         i, j = np.unravel_index(int(np.argmax(alike)), alike.shape)
         if alike[i, j] <= 0.1:
             break

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from tunneldb.arrays import Float, Int64
 from tunneldb.registration.underwater.results import Ladder
 
-BEYOND = 0.15  # m of the stiles beyond the outermost rungs: half a gap, since their ends are not given
+STILE_OVERHANG = 0.15  # m of the stiles beyond the outermost rungs: half a gap, since their ends are not given
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class PlacedLadder:
     def elements(self) -> tuple[Float, Float]:
         """Return the ends (r + 2, 3), (r + 2, 3) of the axes of the stiles, then of the rungs, in the ladder's own axes."""
         height, half = self.ladder.height, self.gap / 2.0
-        low, high = height[0] - BEYOND, height[-1] + BEYOND
+        low, high = height[0] - STILE_OVERHANG, height[-1] + STILE_OVERHANG
         zero = np.zeros(len(height))
         begin = np.vstack([[-half, low, 0.0], [half, low, 0.0], np.column_stack([zero - half, height, zero])])
         end = np.vstack([[-half, high, 0.0], [half, high, 0.0], np.column_stack([zero + half, height, zero])])
@@ -68,7 +68,7 @@ def nearest_element(own: Float, placed: PlacedLadder) -> tuple[Int64, Float]:
     x, y, z = own.T
     side = np.where(x < 0.0, -half, half)
     rung = np.searchsorted(0.5 * (height[1:] + height[:-1]), y)  # the rung at the nearest height
-    along_stile = y - np.clip(y, height[0] - BEYOND, height[-1] + BEYOND)
+    along_stile = y - np.clip(y, height[0] - STILE_OVERHANG, height[-1] + STILE_OVERHANG)
     to_stile = np.column_stack([x - side, along_stile, z])
     to_rung = np.column_stack([x - np.clip(x, -half, half), y - height[rung], z])
     stile = (to_stile[:, :2] ** 2).sum(axis=1) <= (to_rung[:, :2] ** 2).sum(axis=1)

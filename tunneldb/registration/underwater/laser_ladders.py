@@ -22,24 +22,24 @@ from tunneldb.registration.underwater.observations import cell_keys
 from tunneldb.registration.underwater.results import Ladder
 from tunneldb.registration.underwater.walls import Walls
 
-OFF_WALL = (0.05, 1.2)  # distance of a ladder from its wall, m
-HIGHEST = 2.5  # above the water, m
-DRY = 0.03  # m above the water; below that, waves and mirror images disturb
-LINK = 0.06  # m between neighbouring points of a ladder
-AROUND, LEAST_AROUND = 0.08, 6  # m: two diameters of a bar; points in it
-FLATTEST = 0.5  # ratio of variances on a bar, also where two bars meet; on a surface the variances are similar
-LEAST_HEIGHT = 0.3  # of a ladder above the water, m
-MOST_POINTS = 4000
-TRIED_POINTS = 600  # points of a first fit
+WALL_DISTANCE = (0.05, 1.2)  # distance of a ladder from its wall, m
+MAX_HEIGHT = 2.5  # above the water, m
+MIN_HEIGHT = 0.03  # m above the water; below that, waves and mirror images disturb
+MAX_LINK = 0.06  # m between neighbouring points of a ladder
+NEIGHBOUR_RADIUS, MIN_NEIGHBOURS = 0.08, 6  # m: two diameters of a bar; points in it
+MAX_FLATNESS = 0.5  # ratio of variances on a bar, also where two bars meet; on a surface the variances are similar
+MIN_LADDER_HEIGHT = 0.3  # of a ladder above the water, m
+MAX_POINTS = 4000
+FIRST_FIT_POINTS = 600  # points of a first fit
 LEANING = np.radians(np.arange(-15.0, 15.1, 0.5))  # sideways
 BIN = 0.005  # m
 NOISE = 0.004  # expected noise of laser points on a cylinder, m
 STARTS = 8
-TIE = float(np.log(100.0))  # likelihood ratio up to which two solutions are ambiguous
-STONES = 5.0  # one point in this many has an independent error
-MOSTLY = 0.5  # share of the cost of outliers from which a first fit is not a ladder
-RUNGS_OFF = 0.01  # m; median distance of points between the stiles from expected rungs, above which the gaps differ
-ASTRAY = 5.0  # standard deviations from which a point does not belong to the ladder
+MAX_TIE_LOG_RATIO = float(np.log(100.0))  # likelihood ratio up to which two solutions are ambiguous
+POINTS_PER_OBSERVATION = 5.0  # one point in this many has an independent error
+MAX_COST_SHARE = 0.5  # share of the cost of outliers from which a first fit is not a ladder
+MAX_RUNG_ERROR = 0.01  # m; median distance of points between the stiles from expected rungs, above which the gaps differ
+OUTLIER_SIGMA = 5.0  # standard deviations from which a point does not belong to the ladder
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class LaserLadder:
         Numbers of the visible rungs.
     points : int
     cost : float
-        Half of the robust sum of squares of its cluster's points, with one independent point in STONES.
+        Half of the robust sum of squares of its cluster's points, with one independent point in POINTS_PER_OBSERVATION.
     covariance : (7, 7) float64 array
         Covariance of turn (3) rad, shift (3) m and gap m.
     ties : tuple of float
@@ -89,30 +89,30 @@ def find_laser_ladders(points: Float, walls: Walls, ladders: Sequence[Ladder]) -
 
 def _astray(points: int) -> float:
     """Return the cost of points that are all outliers."""
-    return 0.5 * min(points, MOST_POINTS) * float(np.log1p(ASTRAY**2)) / STONES
+    return 0.5 * min(points, MAX_POINTS) * float(np.log1p(OUTLIER_SIGMA**2)) / POINTS_PER_OBSERVATION
 
 
 def _clusters(points: Float, walls: Walls) -> list[tuple[Float, Float]]:
     """Return clusters in front of the walls that may be ladders: points (n, 3), and the direction (3,) to the water."""
-    near = points[(points[:, 2] > DRY) & (points[:, 2] < HIGHEST)]
-    away, piece = walls.tree.query(near[:, :2], distance_upper_bound=OFF_WALL[1] + 0.5)
+    near = points[(points[:, 2] > MIN_HEIGHT) & (points[:, 2] < MAX_HEIGHT)]
+    away, piece = walls.tree.query(near[:, :2], distance_upper_bound=WALL_DISTANCE[1] + 0.5)
     known = np.isfinite(away)
-    near, piece = _thin(near[known], piece[known], LINK / 3.0)
+    near, piece = _thin(near[known], piece[known], MAX_LINK / 3.0)
     off = walls.distance(near, piece)
-    beside = (off > -AROUND) & (off < OFF_WALL[1] + AROUND)
+    beside = (off > -NEIGHBOUR_RADIUS) & (off < WALL_DISTANCE[1] + NEIGHBOUR_RADIUS)
     near, piece, off = near[beside], piece[beside], off[beside]
-    bars = (off > OFF_WALL[0]) & (off < OFF_WALL[1])
+    bars = (off > WALL_DISTANCE[0]) & (off < WALL_DISTANCE[1])
     bars[bars] = _elongated(near, bars)
     near, piece = near[bars], piece[bars]
     if len(near) == 0:
         return []
-    pairs = cKDTree(near).query_pairs(LINK, output_type="ndarray")
+    pairs = cKDTree(near).query_pairs(MAX_LINK, output_type="ndarray")
     count = len(near)
     _, label = connected_components(coo_array((np.ones(len(pairs)), pairs.T), (count, count)), directed=False)
     out = []
     for number in np.flatnonzero(np.bincount(label) >= 30):
         mine = label == number
-        if np.ptp(near[mine, 2]) >= LEAST_HEIGHT:
+        if np.ptp(near[mine, 2]) >= MIN_LADDER_HEIGHT:
             normal = walls.normal[piece[mine]].mean(axis=0)
             out.append((near[mine], np.array([*normal, 0.0]) / np.linalg.norm(normal)))
     return out
@@ -124,7 +124,7 @@ def _elongated(points: Float, which: Bool) -> Bool:
     Otherwise a vault or a boat in front of the wall would be one cluster with the ladder that leans on it.
     """
     tree = cKDTree(points)
-    pairs = cKDTree(points[which]).sparse_distance_matrix(tree, AROUND, output_type="coo_matrix")
+    pairs = cKDTree(points[which]).sparse_distance_matrix(tree, NEIGHBOUR_RADIUS, output_type="coo_matrix")
     count = int(which.sum())
     about = coo_array((np.ones(pairs.nnz), (pairs.row, pairs.col)), (count, len(points))).tocsr()
     number = np.asarray(about.sum(axis=1))
@@ -133,7 +133,7 @@ def _elongated(points: Float, which: Bool) -> Bool:
     square = (centred[:, :, None] * centred[:, None]).reshape(-1, 9)
     spread = (about @ square / number[:, None]).reshape(-1, 3, 3) - mean[:, :, None] * mean[:, None]
     size = np.linalg.eigvalsh(spread)
-    return np.asarray((number >= LEAST_AROUND) & (size[:, 1] < FLATTEST * size[:, 2]))
+    return np.asarray((number >= MIN_NEIGHBOURS) & (size[:, 1] < MAX_FLATNESS * size[:, 2]))
 
 
 def _thin(points: Float, piece: Int64, edge: float) -> tuple[Float, Int64]:
@@ -148,12 +148,12 @@ def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | No
     if start is None:
         return None
     order = np.random.default_rng(0).permutation(len(cluster))
-    few, cluster = cluster[order[:TRIED_POINTS]], cluster[order[:MOST_POINTS]]
+    few, cluster = cluster[order[:FIRST_FIT_POINTS]], cluster[order[:MAX_POINTS]]
     tried: list[tuple[float, PlacedLadder]] = []
     for shift in _shifts(start.to_ladder(cluster), ladder, start.gap):
         cost, fitted, _ = _refine(few, start.moved(np.zeros(3), start.axes[1] * shift), 10)
         tried.append((cost, fitted))
-    if min((cost for cost, _ in tried), default=np.inf) > MOSTLY * _astray(len(few)):
+    if min((cost for cost, _ in tried), default=np.inf) > MAX_COST_SHARE * _astray(len(few)):
         return None
     tried.sort(key=lambda one: one[0])
     refined = sorted((_refine(cluster, start, 40) for _, start in tried), key=lambda one: one[0])
@@ -166,14 +166,14 @@ def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | No
         return None
     inside = np.abs(own[:, 0]) < placed.gap / 2.0 - ladder.diameter
     between = close & inside
-    if not inside.any() or float(np.median(np.abs(residual[inside]))) > RUNGS_OFF:  # its gaps differ
+    if not inside.any() or float(np.median(np.abs(residual[inside]))) > MAX_RUNG_ERROR:  # its gaps differ
         return None
     counts = np.bincount(which[between], minlength=len(ladder.height) + 2)
     seen = np.flatnonzero(counts[2:] >= 5)
     if len(seen) < 2:
         return None
     rms = float(np.sqrt(np.mean(residual[close] ** 2)))
-    tie = TIE * (rms / NOISE) ** 2  # scaled to the observed noise
+    tie = MAX_TIE_LOG_RATIO * (rms / NOISE) ** 2  # scaled to the observed noise
     ties = tuple(
         float((other.origin - placed.origin) @ placed.axes[1])
         for other_cost, other, _ in refined[1:]
@@ -274,4 +274,8 @@ def _refine(cluster: Float, start: PlacedLadder, most: int) -> tuple[float, Plac
     )
     information = found.jac.T @ found.jac
     covariance = np.linalg.pinv(information, rcond=1e-12)
-    return float(found.cost) / STONES, start.moved(found.x[:3], found.x[3:6], float(found.x[6])), np.asarray(covariance)
+    return (
+        float(found.cost) / POINTS_PER_OBSERVATION,
+        start.moved(found.x[:3], found.x[3:6], float(found.x[6])),
+        np.asarray(covariance),
+    )

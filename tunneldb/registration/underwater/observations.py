@@ -26,27 +26,29 @@ SHARED = 0.002  # m: common error of a stretch of wall or bed, by relief and sla
 BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: beams that hit it overlap
 WATERLINE_NOISE = 0.025  # m: half a bin, and half of the rest of half a beam
 WATERLINE_SHARED = 0.01  # m
-FACING = 0.9  # least cosine between the normals of compared patches
+MIN_FACING_COSINE = 0.9  # least cosine between the normals of compared patches
 WALL_DEPTH = 3.0  # m below the water
 WALL_TOP = 0.05  # m below the water; closer to it, echoes by way of the surface disturb
 RELIEF = 0.012  # m: distance of a patch of stones from its wall's plane
-GRAZING = 0.35  # least cosine of incidence of compared patches
-LEAST_AWAY = 0.5  # m from a surface from which echoes of slanting beams come from nearer
-FARTHEST = 12.0  # m
-UPRIGHT = 0.6  # least cosine between the vertical and the normal of the bed
+MIN_INCIDENCE_COSINE = 0.35  # least cosine of incidence of compared patches
+MIN_SLANT_DISTANCE = 0.5  # m from a surface from which echoes of slanting beams come from nearer
+MAX_RANGE = 12.0  # m
+MIN_BED_COSINE = 0.6  # least cosine between the vertical and the normal of the bed
 STILES_SIDE = 0.05  # m from a stile's axis within which an echo is from the stile
 MIXTURE_ROUNDS = 10
-LEAST_TOLD = 0.02  # least share of a rung's information, where rungs are hardly separable from the space between them
-FURTHEST_OFF = 4.0  # greatest distance of an echo from its ladder, standard deviations
+MIN_INFORMATION_SHARE = (
+    0.02  # least share of a rung's information, where rungs are hardly separable from the space between them
+)
+MAX_LADDER_DISTANCE = 4.0  # greatest distance of an echo from its ladder, standard deviations
 PATCH = 0.3  # m
 PATCH_POINTS = 8
-FLAT = 0.035  # m: spread of a patch across its plane
+MAX_PATCH_SPREAD = 0.035  # m: spread of a patch across its plane
 SMOOTH_PATCH = 0.2  # m; size of patches for the comparison of two scans
 SMOOTH_POINTS = 3
-ABOUT = 0.4  # m: radius of the patches whose plane gives the normal
-MOST_ABOUT, FEWEST_ABOUT = 13, 6  # of these patches
-NEIGHBOUR = 0.3  # m between the centres of compared patches of two scans
-SMOOTH_GRAZING = 0.2  # least cosine of incidence by those normals
+NORMAL_RADIUS = 0.4  # m: radius of the patches whose plane gives the normal
+MAX_NORMAL_PATCHES, MIN_NORMAL_PATCHES = 13, 6  # of these patches
+MAX_PATCH_DISTANCE = 0.3  # m between the centres of compared patches of two scans
+MIN_SMOOTH_COSINE = 0.2  # least cosine of incidence by those normals
 
 
 @dataclass(frozen=True)
@@ -143,8 +145,8 @@ def find_patches(points: Float) -> Patches:
     centre, count, value, vector = _cells(points, PATCH)
     normal = _towards_scanner(vector[:, :, 0], centre)
     spread = np.sqrt(np.maximum(value[:, 0], 0.0))
-    keep = (count >= PATCH_POINTS) & (spread < FLAT) & (value[:, 1] > (PATCH / 8.0) ** 2)
-    keep &= _cosine(normal, centre) > GRAZING
+    keep = (count >= PATCH_POINTS) & (spread < MAX_PATCH_SPREAD) & (value[:, 1] > (PATCH / 8.0) ** 2)
+    keep &= _cosine(normal, centre) > MIN_INCIDENCE_COSINE
     return Patches(centre[keep], normal[keep], count[keep], spread[keep])
 
 
@@ -156,25 +158,27 @@ def find_smooth_patches(points: Float) -> Patches:
     """
     centre, count, value, _ = _cells(points, SMOOTH_PATCH)
     spread = np.sqrt(np.maximum(value[:, 0], 0.0))
-    keep = (count >= SMOOTH_POINTS) & (spread < FLAT) & (value[:, 1] > (SMOOTH_PATCH / 8.0) ** 2)
+    keep = (count >= SMOOTH_POINTS) & (spread < MAX_PATCH_SPREAD) & (value[:, 1] > (SMOOTH_PATCH / 8.0) ** 2)
     centre, count, spread = centre[keep], count[keep], spread[keep]
-    if len(centre) < MOST_ABOUT:
+    if len(centre) < MAX_NORMAL_PATCHES:
         return Patches(centre[:0], centre[:0], count[:0], spread[:0])
-    reach, about = cKDTree(centre).query(centre, MOST_ABOUT, distance_upper_bound=ABOUT)
+    reach, about = cKDTree(centre).query(centre, MAX_NORMAL_PATCHES, distance_upper_bound=NORMAL_RADIUS)
     there = np.isfinite(reach)[..., None]
     number = there.sum(axis=1)
     away = np.where(there, centre[np.where(there[..., 0], about, 0)] - centre[:, None], 0.0)
     away = np.where(there, away - (away.sum(axis=1) / number)[:, None], 0.0)
     value, vector = np.linalg.eigh(np.swapaxes(away, 1, 2) @ away / number[..., None])
     normal = _towards_scanner(vector[:, :, 0], centre)
-    keep = (number[:, 0] >= FEWEST_ABOUT) & (value[:, 0] < FLAT**2) & (value[:, 1] > (SMOOTH_PATCH / 3.0) ** 2)
-    keep &= _cosine(normal, centre) > SMOOTH_GRAZING
+    keep = (
+        (number[:, 0] >= MIN_NORMAL_PATCHES) & (value[:, 0] < MAX_PATCH_SPREAD**2) & (value[:, 1] > (SMOOTH_PATCH / 3.0) ** 2)
+    )
+    keep &= _cosine(normal, centre) > MIN_SMOOTH_COSINE
     return Patches(centre[keep], normal[keep], count[keep], spread[keep])
 
 
 def _cells(points: Float, edge: float) -> tuple[Float, Int64, Float, Float]:
     """Return centroids (k, 3), numbers of points (k,), variances (k, 3) and axes (k, 3, 3) of the points in cubic cells."""
-    near = points[np.linalg.norm(points, axis=1) < FARTHEST]
+    near = points[np.linalg.norm(points, axis=1) < MAX_RANGE]
     _, number, count = np.unique(cell_keys(near, edge), return_inverse=True, return_counts=True)
     centre = np.column_stack([np.bincount(number, near[:, k]) for k in range(3)]) / count[:, None]
     away = near - centre[number]
@@ -203,7 +207,7 @@ def nearer_by_slant(points: Float, scanner: Float, normal: Float) -> Float:
     the strongest range cell is used, and less on a rough surface, where stones that face the beam dominate.
     """
     arm = scanner - points
-    over = np.maximum((arm * normal).sum(axis=1), LEAST_AWAY)
+    over = np.maximum((arm * normal).sum(axis=1), MIN_SLANT_DISTANCE)
     return np.asarray(BEAM_SPREAD**2 * np.maximum((arm**2).sum(axis=1) - over**2, 0.0) / over)
 
 
@@ -222,7 +226,7 @@ def wall_rows(
     piece = np.where(wet, piece, 0)
     normal = walls.normals(piece)
     off = walls.distance(centre, piece)
-    facing = ((patches.normal @ pose.rotation.T) * normal).sum(axis=1) > FACING
+    facing = ((patches.normal @ pose.rotation.T) * normal).sum(axis=1) > MIN_FACING_COSINE
     keep = wet & facing & (np.abs(off) < within)
     centre, piece, normal, off = centre[keep], piece[keep], normal[keep], off[keep]
     sigma = np.sqrt(
@@ -279,7 +283,7 @@ def ladder_rows(
     own = placed.to_ladder(space)
     ladder = placed.ladder
     reach = np.linalg.norm(space - pose.translation, axis=1)
-    room = np.maximum(within, FURTHEST_OFF * BEAM_SIGMA * reach)
+    room = np.maximum(within, MAX_LADDER_DISTANCE * BEAM_SIGMA * reach)
     box = (np.abs(own[:, 0]) < placed.gap / 2.0 + room) & (np.abs(own[:, 2]) < room)
     box &= (own[:, 1] > ladder.height[0] - 0.3) & (own[:, 1] < ladder.height[-1] + 0.3)
     space, own, reach = space[box], own[box], reach[box]
@@ -295,7 +299,7 @@ def ladder_rows(
     along, across = (vector * ray).sum(axis=1), (vector * side).sum(axis=1)
     sigma_along = np.full(len(own), np.hypot(RANGE_NOISE, 0.005))
     sigma_across = np.hypot(BEAM_SIGMA * reach, 0.005)
-    near = np.hypot(along / sigma_along, across / sigma_across) < max(within / RANGE_NOISE / 4.0, FURTHEST_OFF)
+    near = np.hypot(along / sigma_along, across / sigma_across) < max(within / RANGE_NOISE / 4.0, MAX_LADDER_DISTANCE)
     if near.sum() < 30:
         return None
     arm = space[near] - placed.origin
@@ -304,7 +308,7 @@ def ladder_rows(
         poses.append(pose_derivatives(space[near], pose, direction))
         common.append(np.hstack([np.full((len(arm), 1), behind), -np.cross(arm, direction), -direction]))
     bar = which[near]
-    told = np.bincount(bar, _told(own[near], bar, away[near], sigma_across[near], placed))[bar]
+    told = np.bincount(bar, _information_share(own[near], bar, away[near], sigma_across[near], placed))[bar]
     return Rows(
         np.concatenate([along[near], across[near]]),
         np.concatenate([sigma_along[near], sigma_across[near]]),
@@ -316,14 +320,14 @@ def ladder_rows(
     )  # fmt: skip
 
 
-def _told(own: Float, which: Int64, away: Float, sigma: Float, placed: PlacedLadder) -> Float:
+def _information_share(own: Float, which: Int64, away: Float, sigma: Float, placed: PlacedLadder) -> Float:
     """Return the share (n,) of its information across the beam that each point has; 1 for points of stiles.
 
     At long range and at a slant, echoes of stiles mask those of rungs, and echoes from between the stiles carry little
     information about rungs. The model is a mixture of echoes of rungs and of uniformly distributed others, by expectation
     maximisation (McLachlan and Peel, 2000, section 2.8; the information of incomplete data is that of Louis, 1982).
     """
-    share = np.where(which < 2, 1.0, LEAST_TOLD)
+    share = np.where(which < 2, 1.0, MIN_INFORMATION_SHARE)
     inside = (which >= 2) & (np.abs(own[:, 0]) < placed.gap / 2.0 - STILES_SIDE)
     if not inside.any():
         return share
@@ -335,7 +339,7 @@ def _told(own: Float, which: Int64, away: Float, sigma: Float, placed: PlacedLad
         mine = rungs * echo / (rungs * echo + (1.0 - rungs) * even)
         rungs = float(mine.mean())
     told = float((mine - mine * (1.0 - mine) * off).sum() / mine.sum())
-    share[inside] = np.maximum(mine * told, LEAST_TOLD)
+    share[inside] = np.maximum(mine * told, MIN_INFORMATION_SHARE)
     return share
 
 
@@ -357,10 +361,10 @@ def overlap_rows(
     first, second = poses
     place = first.apply(one.centre)
     low = np.flatnonzero(place[:, 2] < -WALL_TOP)  # images above the water move with the scanner
-    reach, k = other.tree.query(second.to_file(place[low]), distance_upper_bound=max(NEIGHBOUR, within))
+    reach, k = other.tree.query(second.to_file(place[low]), distance_upper_bound=max(MAX_PATCH_DISTANCE, within))
     i, k = low[np.isfinite(reach)], k[np.isfinite(reach)]
     normal, beside_normal = one.normal[i] @ first.rotation.T, other.normal[k] @ second.rotation.T
-    same = (normal * beside_normal).sum(axis=1) > FACING
+    same = (normal * beside_normal).sum(axis=1) > MIN_FACING_COSINE
     i, k, normal, beside_normal = i[same], k[same], normal[same], beside_normal[same]
     if len(i) < 20:
         return None
@@ -368,7 +372,7 @@ def overlap_rows(
     mean = normal + beside_normal
     mean /= np.linalg.norm(mean, axis=1)[:, None]
     nearer = nearer_by_slant(place, first.translation, mean) - nearer_by_slant(beside, second.translation, mean)
-    bed = mean[:, 2] > UPRIGHT
+    bed = mean[:, 2] > MIN_BED_COSINE
     apart = (second.translation - first.translation) * [1.0, 1.0, 0.0]
     design = np.column_stack(
         [

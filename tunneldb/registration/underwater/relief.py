@@ -21,14 +21,14 @@ from tunneldb.registration.underwater.first_pose import LevelScan
 PIXEL = 0.1  # m
 REACH = 10.0  # m along, from the scanner
 MARGIN = 0.3  # m from the walls
-FINE = 2.5  # m: wider relief carries no information about the place
-STEPS = 0.6  # m: greater differences from the bed's height are objects and false echoes
-LEAST_CELLS = 500  # that both scans must see
-MOST_ALIKE = 0.9  # greatest correlation of two scans of one bed, which they see from different sides
-CORRELATED = 30  # pixels within which relief may be correlated
-FEWEST = 3.0  # number of independent places up to which a correlation is meaningless
-CERTAIN = 0.99  # greatest correlation, to limit the evidence
-NOWHERE = -1e3  # log likelihood where nothing is shared
+MAX_RELIEF_WIDTH = 2.5  # m: wider relief carries no information about the place
+MAX_HEIGHT_STEP = 0.6  # m: greater differences from the bed's height are objects and false echoes
+MIN_CELLS = 500  # that both scans must see
+MAX_SAME_BED_CORRELATION = 0.9  # greatest correlation of two scans of one bed, which they see from different sides
+MAX_CORRELATION_LENGTH = 30  # pixels within which relief may be correlated
+MIN_INDEPENDENT_PLACES = 3.0  # number of independent places up to which a correlation is meaningless
+MAX_CORRELATION = 0.99  # greatest correlation, to limit the evidence
+NO_EVIDENCE = -1e3  # log likelihood where nothing is shared
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Relief:
     seen : (2 n, m) float64 array
         1 where the bed was measured.
     likeness : (c, d) float64 array
-        Correlation of ``fine`` with itself at shifts of up to CORRELATED pixels in either direction.
+        Correlation of ``fine`` with itself at shifts of up to MAX_CORRELATION_LENGTH pixels in either direction.
     """
 
     height: Float
@@ -63,7 +63,7 @@ def relief_of(scan: LevelScan) -> Relief | None:
     width = high - low
     across = scan.points[:, 1] - 0.5 * (low + high)
     near = (np.abs(scan.points[:, 0]) < REACH) & (np.abs(across) < 0.5 * width - MARGIN)
-    if near.sum() < LEAST_CELLS:
+    if near.sum() < MIN_CELLS:
         return None
     half = int(np.ceil(0.5 * width / PIXEL))
     shape = (round(2.0 * REACH / PIXEL), 2 * half)
@@ -71,14 +71,14 @@ def relief_of(scan: LevelScan) -> Relief | None:
     cell = np.floor(place / PIXEL).astype(np.int64)
     key = cell[:, 0] * shape[1] + cell[:, 1]
     height = scan.points[near, 2]
-    on_bed = np.abs(height - float(np.percentile(height, 20))) < STEPS
+    on_bed = np.abs(height - float(np.percentile(height, 20))) < MAX_HEIGHT_STEP
     key, height = key[on_bed], height[on_bed]
     order = np.lexsort([height, key])
     places, begin, count = np.unique(key[order], return_index=True, return_counts=True)
     grid, seen = np.zeros(shape), np.zeros(shape)
     grid.ravel()[places] = height[order][begin + count // 2]
     seen.ravel()[places] = 1.0
-    if seen.sum() < LEAST_CELLS:
+    if seen.sum() < MIN_CELLS:
         return None
     wide = _smooth(grid * seen) / np.maximum(_smooth(seen), 1e-6)
     fine = (grid - wide) * seen
@@ -88,16 +88,16 @@ def relief_of(scan: LevelScan) -> Relief | None:
 
 
 def _smooth(grid: Float) -> Float:
-    return np.asarray(gaussian_filter(grid, FINE / PIXEL))
+    return np.asarray(gaussian_filter(grid, MAX_RELIEF_WIDTH / PIXEL))
 
 
 def _autocorrelation(fine: Float, seen: Float) -> Float:
     product = fftconvolve(fine, fine[::-1, ::-1])
     shared = fftconvolve(seen, seen[::-1, ::-1])
     variance = float((fine**2).sum() / seen.sum())
-    alike = np.where(shared > LEAST_CELLS, product / np.maximum(shared, 1.0) / variance, 0.0)
+    alike = np.where(shared > MIN_CELLS, product / np.maximum(shared, 1.0) / variance, 0.0)
     middle = np.array(fine.shape) - 1
-    reach = np.minimum(CORRELATED, middle)
+    reach = np.minimum(MAX_CORRELATION_LENGTH, middle)
     return np.asarray(alike[middle[0] - reach[0] : middle[0] + reach[0] + 1, middle[1] - reach[1] : middle[1] + reach[1] + 1])
 
 
@@ -108,27 +108,27 @@ def likelihood(one: Relief, other: Relief) -> Float:
     -------
     (4 n - 1,) float64 array
         Log likelihood ratio of the same bed to different beds, at shifts from -(2 n - 1) pixels on: x in ``one`` is x in
-        ``other`` plus the shift. NOWHERE where they share too little.
+        ``other`` plus the shift. NO_EVIDENCE where they share too little.
     """
     columns = min(one.fine.shape[1], other.fine.shape[1])
     a, b = _middle(one, columns), _middle(other, columns)
     shared = _over(a.seen, b.seen)
     product = _over(a.fine, b.fine)
     squares = _over(a.fine**2, b.seen) * _over(a.seen, b.fine**2)
-    correlation = np.clip(product / np.sqrt(np.maximum(squares, 1e-12)), -CERTAIN, CERTAIN)
+    correlation = np.clip(product / np.sqrt(np.maximum(squares, 1e-12)), -MAX_CORRELATION, MAX_CORRELATION)
     patch = max(float((_middle_of(one.likeness, other.likeness)).sum()), 1.0)  # pixels per independent place
-    weight = np.sqrt(np.maximum(shared / patch - FEWEST, 0.0))
-    told = (shared > LEAST_CELLS) & (weight > 0.0)
-    return np.where(told, _log_ratio(np.arctanh(correlation) * weight, np.where(told, weight, 1.0)), NOWHERE)
+    weight = np.sqrt(np.maximum(shared / patch - MIN_INDEPENDENT_PLACES, 0.0))
+    told = (shared > MIN_CELLS) & (weight > 0.0)
+    return np.where(told, _log_ratio(np.arctanh(correlation) * weight, np.where(told, weight, 1.0)), NO_EVIDENCE)
 
 
 def _log_ratio(score: Float, weight: Float) -> Float:
     """Return the log likelihood ratio of scores (n,), with standard deviation 1, for one bed and for two.
 
-    The similarity of two scans of one bed is not known in advance: all correlations up to MOST_ALIKE are equally likely, in
-    Fisher's z.
+    The similarity of two scans of one bed is not known in advance: all correlations up to MAX_SAME_BED_CORRELATION are
+    equally likely, in Fisher's z.
     """
-    most = np.arctanh(MOST_ALIKE) * weight
+    most = np.arctanh(MAX_SAME_BED_CORRELATION) * weight
     high, low = log_ndtr(score), log_ndtr(score - most)
     mean = high + np.log1p(-np.exp(np.minimum(low - high, -1e-12))) - np.log(most)
     return np.asarray(mean + 0.5 * score**2 + 0.5 * np.log(2.0 * np.pi))

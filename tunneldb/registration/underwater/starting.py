@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tunneldb.errors import UserError
-from tunneldb.registration.underwater.chain import OVERLAP, Reliefs, agreement, place_beside
+from tunneldb.registration.underwater.chain import MAX_OVERLAP_DISTANCE, Reliefs, agreement, place_beside
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
 from tunneldb.registration.underwater.single import PreparedScan, StartedScan, start
 from tunneldb.registration.underwater.walls import Walls
 
-FIRST = 0.5  # share of the best log likelihood of a round; less certain scans wait for the next round
+MIN_ROUND_SHARE = 0.5  # share of the best log likelihood of a round; less certain scans wait for the next round
 
 
 def start_all(
@@ -64,7 +64,7 @@ def start_all(
                 beside = {k: one for k, one in beside.items() if k != i} | ({} if at is None else {i: at})
         # less certain, more distant scans may become certain next to the first ones
         most = max((likelihood for _, likelihood in beside.values()), default=0.0)
-        new = [i for i, (_, likelihood) in beside.items() if likelihood >= FIRST * most]
+        new = [i for i, (_, likelihood) in beside.items() if likelihood >= MIN_ROUND_SHARE * most]
         started |= {i: beside.pop(i)[0] for i in new}
         left = [i for i in left if i not in started]
     reasons = {i: reason for i, reason in reasons.items() if i not in started}
@@ -89,7 +89,7 @@ def _agreeing(
         (a, b): agreement(a, b, (started[a].pose, started[b].pose), reliefs, walls)
         for a in started
         for b in started
-        if a < b and np.linalg.norm(started[a].pose.translation - started[b].pose.translation) < OVERLAP
+        if a < b and np.linalg.norm(started[a].pose.translation - started[b].pose.translation) < MAX_OVERLAP_DISTANCE
     }
 
     def votes(i: int) -> tuple[int, int]:

@@ -20,15 +20,15 @@ from tunneldb.robust import MAD_TO_SIGMA
 SPACING = 0.5  # m between anchors along a wall
 REACH = 0.8  # half length of wall fitted at an anchor, m
 FOOT, HEAD = 0.02, 1.5  # heights, m, between which a wall is fitted
-LEAST_HEIGHT = 0.25  # least height of the fitted points, m
-STEEPEST = 0.3  # batter, tangent
-ROUGHEST = 0.04  # m
-LEAST_POINTS = 20
-NARROWEST, WIDEST = 2.0, 40.0  # canal, m
+MIN_HEIGHT = 0.25  # least height of the fitted points, m
+MAX_BATTER = 0.3  # batter, tangent
+MAX_ROUGHNESS = 0.04  # m
+MIN_POINTS = 20
+MIN_WIDTH, MAX_WIDTH = 2.0, 40.0  # canal, m
 TUKEY = 4.685
-ON_WALL = 0.05  # m
+MAX_WALL_DISTANCE = 0.05  # m
 EDGE_BIN = 0.02  # m of height, for the lower edge of the walls
-USUAL = (0.1, 0.6)  # heights, m, between which walls have their usual point density
+USUAL_HEIGHTS = (0.1, 0.6)  # heights, m, between which walls have their usual point density
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def find_walls(points: Float) -> Walls:
         If no wall reaches down to the water, or only on one side.
     """
     near = points[(points[:, 2] > FOOT) & (points[:, 2] < HEAD)]
-    low = near[near[:, 2] < LEAST_HEIGHT]
+    low = near[near[:, 2] < MIN_HEIGHT]
     cells = np.unique(np.floor(low[:, :2] / SPACING), axis=0)
     found = []
     if len(cells):
@@ -116,21 +116,21 @@ def lower_edge(points: Float, walls: Walls) -> float:
 
     Only ``points`` are examined; mirror images of the walls in the water are fewer.
     """
-    low = points[points[:, 2] < USUAL[1]]
+    low = points[points[:, 2] < USUAL_HEIGHTS[1]]
     away, piece = walls.tree.query(low[:, :2], distance_upper_bound=2.0 * SPACING)
     known = np.isfinite(away)
     low, piece = low[known], piece[known]
-    height = low[np.abs(walls.distance(low, piece)) < ON_WALL, 2]
-    bins = np.arange(np.floor(height.min() / EDGE_BIN), USUAL[1] / EDGE_BIN + 0.5) * EDGE_BIN
+    height = low[np.abs(walls.distance(low, piece)) < MAX_WALL_DISTANCE, 2]
+    bins = np.arange(np.floor(height.min() / EDGE_BIN), USUAL_HEIGHTS[1] / EDGE_BIN + 0.5) * EDGE_BIN
     count, _ = np.histogram(height, bins)
-    usual = float(np.median(count[bins[:-1] > USUAL[0]]))
+    usual = float(np.median(count[bins[:-1] > USUAL_HEIGHTS[0]]))
     return float(bins[int(np.argmax(count > 0.5 * usual))])
 
 
 def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Float) -> list[float] | None:
     """Fit a line with batter around a place in plan: foot (3), normal (2), batter, standard deviations; None if no wall."""
     around = low[low_tree.query_ball_point(centre, REACH)]
-    if len(around) < LEAST_POINTS:
+    if len(around) < MIN_POINTS:
         return None
     middle = around[:, :2].mean(axis=0)
     _, _, axes = np.linalg.svd(around[:, :2] - middle, full_matrices=False)
@@ -138,7 +138,7 @@ def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Floa
     along = (mine[:, :2] - middle) @ axes[0]
     across = (mine[:, :2] - middle) @ axes[1]
     design = np.column_stack([np.ones(len(mine)), along, mine[:, 2]])
-    weight = (mine[:, 2] < LEAST_HEIGHT).astype(np.float64)  # not points that begin higher, as behind a towpath
+    weight = (mine[:, 2] < MIN_HEIGHT).astype(np.float64)  # not points that begin higher, as behind a towpath
     answer, scale = np.zeros(3), np.inf
     for _ in range(12):
         normal_matrix = design.T @ (design * weight[:, None])
@@ -149,9 +149,9 @@ def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Floa
         scale = max(MAD_TO_SIGMA * float(np.median(np.abs(residual[weight > 0.1]))), 1e-3)
         weight = np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0, None) ** 2
     used = mine[weight > 0.1]
-    if len(used) < LEAST_POINTS or np.ptp(used[:, 2]) < LEAST_HEIGHT or np.ptp(along[weight > 0.1]) < SPACING:
+    if len(used) < MIN_POINTS or np.ptp(used[:, 2]) < MIN_HEIGHT or np.ptp(along[weight > 0.1]) < SPACING:
         return None
-    if scale > ROUGHEST or abs(answer[2]) > STEEPEST:
+    if scale > MAX_ROUGHNESS or abs(answer[2]) > MAX_BATTER:
         return None
     # Stones are some decimetres wide: their relief averages out with the number of stones, not of points.
     stones = max(np.ptp(used[:, 2]) * np.ptp(along[weight > 0.1]) / 0.3**2, 1.0)
@@ -170,7 +170,7 @@ def _opposite(foot: Float, normal: Float) -> tuple[Float, Bool]:
     away = foot[None, :, :2] - foot[:, None, :2]
     ahead = (away * normal[:, None]).sum(axis=2)
     beside = np.abs(away[..., 0] * -normal[:, None, 1] + away[..., 1] * normal[:, None, 0])
-    facing = (ahead > NARROWEST) & (ahead < WIDEST) & (beside < 2.0 * SPACING)
+    facing = (ahead > MIN_WIDTH) & (ahead < MAX_WIDTH) & (beside < 2.0 * SPACING)
     distance = np.where(facing, ahead, np.inf).min(axis=1)
     return distance, np.isfinite(distance)
 

@@ -11,11 +11,11 @@ import numpy as np
 from tunneldb.arrays import Float
 
 STRIP = 1.0  # m along a wall
-NEAREST, FARTHEST = 2.0, 9.0  # m along the canal, from the sonar
-THICK = 0.1  # of a wall, m
+MIN_DISTANCE, MAX_DISTANCE = 2.0, 9.0  # m along the canal, from the sonar
+WALL_THICKNESS = 0.1  # of a wall, m
 BIN = 0.05  # m of height
-LEAST_POINTS = 60  # of a strip
-SMOOTH = 3  # bins
+MIN_POINTS = 60  # of a strip
+SMOOTHING_BINS = 3  # bins
 FAN_MARGIN = np.radians(2.0)  # below the fan's upper end; closer edges may be those of the fan
 BEAM = np.radians(1.0)
 
@@ -33,11 +33,11 @@ def find_waterline(points: Float, walls: tuple[float, float], slopes: tuple[floa
     fan = float(np.percentile(elevation[reach > 1.0], 99.8)) if (reach > 1.0).any() else 0.0
     edges = []
     for place, slope in zip(walls, slopes, strict=True):
-        wall = points[np.abs(points[:, 1] - place - slope * points[:, 2]) < THICK]
+        wall = points[np.abs(points[:, 1] - place - slope * points[:, 2]) < WALL_THICKNESS]
         strip = np.floor(wall[:, 0] / STRIP).astype(np.int64)
         for k in np.unique(strip):
             middle = (k + 0.5) * STRIP
-            if not NEAREST < abs(middle) < FARTHEST:
+            if not MIN_DISTANCE < abs(middle) < MAX_DISTANCE:
                 continue
             height = _edge(wall[strip == k, 2])
             if height is None:
@@ -51,11 +51,11 @@ def find_waterline(points: Float, walls: tuple[float, float], slopes: tuple[floa
 
 def _edge(height: Float) -> float | None:
     """Return the height above which a strip of wall has less than half as many points as below; None if there is none."""
-    if len(height) < LEAST_POINTS:
+    if len(height) < MIN_POINTS:
         return None
     low = float(height.min())
     histogram = np.bincount(((height - low) / BIN).astype(np.int64)).astype(np.float64)
-    smooth = np.convolve(histogram, np.ones(SMOOTH) / SMOOTH, mode="same")
+    smooth = np.convolve(histogram, np.ones(SMOOTHING_BINS) / SMOOTHING_BINS, mode="same")
     usual = float(np.median(smooth[smooth > 0.2 * smooth.max()]))
     above = np.flatnonzero(smooth > 0.5 * usual)
     # between the last bin with at least half and the next

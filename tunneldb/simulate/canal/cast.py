@@ -17,13 +17,13 @@ from tunneldb.simulate.canal.section import LADDER, WATER, Section, clearance
 from tunneldb.threads import in_blocks
 
 _STEPS = 800
-_SHARE = 0.85  # share of the clearance per step
-_LEAST = 0.001  # m least step; skipped surfaces are found by bisection
-_CLOSE = 1e-4  # m
+_STEP_SHARE = 0.85  # share of the clearance per step
+_MIN_STEP = 0.001  # m least step; skipped surfaces are found by bisection
+_TOLERANCE = 1e-4  # m
 _HALVINGS = 14
-_NORMAL = 0.01  # m between the points for a normal
+_NORMAL_STEP = 0.01  # m between the points for a normal
 _BLOCK = 20_000  # rays
-NOTHING = -1
+NO_HIT = -1
 # Cylinders: one end, unit axis, length, radius, ladder x 100 + rung (stiles: rung 0).
 CYLINDER_COLUMNS = 9
 # Frames: middle, three unit axes, half sizes along them, first cylinder and the one after the last.
@@ -89,7 +89,7 @@ def first_hit(
     scene: Scene, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, limit: float
 ) -> tuple[float, int, int, float]:  # pragma: no cover - compiled
     """Return range, kind, part of a ladder and cosine of incidence at the first hit of a local ray; kind -1: nowhere."""
-    end, kind, part, cosine = limit, NOTHING, 0, 0.0
+    end, kind, part, cosine = limit, NO_HIT, 0, 0.0
     if oz * dz < 0.0 and -oz / dz < end:
         end, kind, cosine = -oz / dz, WATER, abs(dz)
     for k in range(scene.frames.shape[0]):
@@ -102,7 +102,7 @@ def first_hit(
     for _ in range(_STEPS):
         x, y, z = ox + t * dx, oy + t * dy, oz + t * dz
         free, surface = clearance(scene.section, scene.solids, x, y, z)
-        if free < _CLOSE:
+        if free < _TOLERANCE:
             if free < 0.0:
                 low, high = last, t
                 for _ in range(_HALVINGS):
@@ -116,19 +116,19 @@ def first_hit(
                 return end, kind, part, cosine
             x, y, z = ox + t * dx, oy + t * dy, oz + t * dz
             if abs(stationed(scene.section.radius, x, y)[0]) > scene.section.half_length:
-                return limit, NOTHING, 0, 0.0
+                return limit, NO_HIT, 0, 0.0
             free = clearance(scene.section, scene.solids, x, y, z)[0]
-            gx = clearance(scene.section, scene.solids, x + _NORMAL, y, z)[0] - free
-            gy = clearance(scene.section, scene.solids, x, y + _NORMAL, z)[0] - free
-            gz = clearance(scene.section, scene.solids, x, y, z + _NORMAL)[0] - free
+            gx = clearance(scene.section, scene.solids, x + _NORMAL_STEP, y, z)[0] - free
+            gy = clearance(scene.section, scene.solids, x, y + _NORMAL_STEP, z)[0] - free
+            gz = clearance(scene.section, scene.solids, x, y, z + _NORMAL_STEP)[0] - free
             size = math.sqrt(gx * gx + gy * gy + gz * gz)
             slant = abs(gx * dx + gy * dy + gz * dz) / max(size, 1e-12)
             return t, surface, 0, slant
         last = t
-        t += max(_SHARE * free, _LEAST)
+        t += max(_STEP_SHARE * free, _MIN_STEP)
         if last >= end:
             return end, kind, part, cosine
-    return limit, NOTHING, 0, 0.0
+    return limit, NO_HIT, 0, 0.0
 
 
 @kernel

@@ -7,15 +7,15 @@ from itertools import product
 import numpy as np
 
 from tunneldb.arrays import Float, Int32
-from tunneldb.simulate.canal.cast import NOTHING, cast
+from tunneldb.simulate.canal.cast import NO_HIT, cast
 from tunneldb.simulate.canal.layout import Layout
 from tunneldb.simulate.canal.parameters import CanalParameters
 from tunneldb.simulate.canal.section import WATER
 
-LIMIT = 40.0  # m
-_NADIR = 60.0  # degrees below the horizon, below which the tripod obstructs the view
+MAX_RANGE = 40.0  # m
+_MAX_DEPRESSION = 60.0  # degrees below the horizon, below which the tripod obstructs the view
 _LADDER_SPACING = 0.0025  # m between rays at a ladder, at least
-_BESIDE = 0.25  # m around a ladder in the dense scan
+_LADDER_MARGIN = 0.25  # m around a ladder in the dense scan
 
 
 def scan_by_laser(parameters: CanalParameters, layout: Layout) -> tuple[Float, Int32]:
@@ -34,7 +34,7 @@ def scan_by_laser(parameters: CanalParameters, layout: Layout) -> tuple[Float, I
 
 def _sphere(step: float) -> Float:
     azimuth = np.radians(np.arange(0.0, 360.0, step))
-    elevation = np.radians(np.arange(-_NADIR, 90.0, step))
+    elevation = np.radians(np.arange(-_MAX_DEPRESSION, 90.0, step))
     return directions(*np.meshgrid(azimuth, elevation))
 
 
@@ -43,12 +43,13 @@ def _about_ladders(parameters: CanalParameters, layout: Layout, place: Float) ->
     rays = []
     for frame in layout.scene.frames:
         corners = [
-            frame[:3] + sum(sign * (frame[12 + a] + _BESIDE) * frame[3 + 3 * a : 6 + 3 * a] for a, sign in enumerate(signs))
+            frame[:3]
+            + sum(sign * (frame[12 + a] + _LADDER_MARGIN) * frame[3 + 3 * a : 6 + 3 * a] for a, sign in enumerate(signs))
             for signs in product((-1.0, 1.0), repeat=3)
         ]
         away = np.array(corners) - place
         distance = float(np.linalg.norm(frame[:3] - place))
-        if distance > LIMIT:
+        if distance > MAX_RANGE:
             continue
         step = max(np.radians(parameters.laser_ladder_step), _LADDER_SPACING / distance)
         azimuth = np.arctan2(away[:, 1], away[:, 0])
@@ -72,16 +73,16 @@ def directions(azimuth: Float, elevation: Float) -> Float:
 
 
 def _scan(parameters: CanalParameters, layout: Layout, place: Float, rays: Float, rng: np.random.Generator) -> Float:
-    hits = cast(layout.scene, place, rays, LIMIT)
+    hits = cast(layout.scene, place, rays, MAX_RANGE)
     reach = hits.range.copy()
     on_water = hits.kind == WATER
     mirrored = on_water & (rng.random(len(rays)) < parameters.laser_mirror_share)
-    seen = (hits.kind != NOTHING) & ~on_water
+    seen = (hits.kind != NO_HIT) & ~on_water
     if mirrored.any():  # the water as a mirror: objects above it appear below
         start = place + reach[mirrored, None] * rays[mirrored]
         start[:, 2] = 1e-6
-        second = cast(layout.scene, start, rays[mirrored] * [1.0, 1.0, -1.0], LIMIT - reach[mirrored])
+        second = cast(layout.scene, start, rays[mirrored] * [1.0, 1.0, -1.0], MAX_RANGE - reach[mirrored])
         reach[mirrored] += second.range
-        seen[mirrored] = second.kind != NOTHING
+        seen[mirrored] = second.kind != NO_HIT
     reach = reach[seen] + rng.normal(0.0, parameters.laser_noise, int(seen.sum()))
     return np.asarray(place + reach[:, None] * rays[seen])

@@ -13,7 +13,7 @@ import numpy as np
 
 import tunneldb
 from tunneldb.errors import UserError
-from tunneldb.files import made_folder, room_told
+from tunneldb.files import disk_full_as_oserror, made_folder
 from tunneldb.simulate.canal.generate import CanalScene
 from tunneldb.simulate.canal.layout import TrueLadder
 from tunneldb.simulate.canal.section import KINDS
@@ -46,7 +46,7 @@ def write(scene: CanalScene, folder: Path) -> CanalFiles:
         with (
             made_folder(folder),
             TemporaryDirectory(dir=folder, prefix=".simulate-") as scratch,
-            room_told(Path(scratch)),
+            disk_full_as_oserror(Path(scratch)),
         ):
             _write(scene, Path(scratch), name)
             for path in sorted(Path(scratch).iterdir()):

@@ -19,8 +19,8 @@ from tunneldb.simulate.noise_field import value_noise
 BED, WALL, VAULT, TOWPATH, LADDER, PIER, OBJECT, BOAT, WATER = range(9)
 KINDS = ("bed", "wall", "vault", "towpath", "ladder", "pier or niche", "object", "boat", "water surface")
 
-_PEAK = 2.34  # of value noise, in standard deviations
-_COURSE, _STONE = 0.30, 0.60  # height of a course, length of a stone, m
+_MAX_NOISE_SIGMA = 2.34  # of value noise, in standard deviations
+_COURSE_HEIGHT, _STONE_LENGTH = 0.30, 0.60  # height of a course, length of a stone, m
 _JOINT = 0.012  # half width of a joint, m
 # Solids: kind of solid, kind of surface, middle (s, o, z), half sizes, cosine and sine of the turn about the vertical.
 BOX, RECESS, BALL, HULL = 0.0, 1.0, 2.0, 3.0
@@ -111,11 +111,11 @@ def _stones(c: Section, s: float, v: float, face: int) -> float:  # pragma: no c
             0.9 * value_noise(a, b, c.salt + 8 + face) + 0.43 * value_noise(4.0 * a, 4.0 * b, c.salt + 16 + face)
         )
     if c.joint_depth > 0.0:
-        row = math.floor(v / _COURSE)
-        up = v - row * _COURSE
-        along = s / _STONE + 0.5 * (row % 2)
-        along = (along - math.floor(along)) * _STONE
-        away = min(min(up, _COURSE - up), min(along, _STONE - along))
+        row = math.floor(v / _COURSE_HEIGHT)
+        up = v - row * _COURSE_HEIGHT
+        along = s / _STONE_LENGTH + 0.5 * (row % 2)
+        along = (along - math.floor(along)) * _STONE_LENGTH
+        away = min(min(up, _COURSE_HEIGHT - up), min(along, _STONE_LENGTH - along))
         height -= c.joint_depth * max(0.0, 1.0 - away / _JOINT)
     return height
 
@@ -145,7 +145,7 @@ def clearance(c: Section, solids: Float, x: float, y: float, z: float) -> tuple[
     s, o = stationed(c.radius, x, y)
     slope = c.slope if z > 0.0 else c.slope_below
     cosine = 1.0 / math.sqrt(1.0 + slope * slope)
-    most = 1.33 * _PEAK * c.roughness
+    most = 1.33 * _MAX_NOISE_SIGMA * c.roughness
     best, kind = 1e9, WALL
     for face in range(2):
         side = 1.0 if face == 0 else -1.0
@@ -175,7 +175,7 @@ def clearance(c: Section, solids: Float, x: float, y: float, z: float) -> tuple[
         d -= _stones(c, s, c.vault_radius * math.atan2(across, up), 5) if d < 2.0 * most + 0.05 else most
         if d < best:
             best, kind = d, VAULT
-    top = 1.38 * _PEAK * c.bed_relief + 2.0 * c.bed_rise
+    top = 1.38 * _MAX_NOISE_SIGMA * c.bed_relief + 2.0 * c.bed_rise
     d = z + c.depth - top
     if d < 0.25 * top + 0.05:
         d = 0.85 * (z - bed_height(c, s, o))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int32
-from tunneldb.simulate.canal.cast import NOTHING, Hits, Scene, cast
+from tunneldb.simulate.canal.cast import NO_HIT, Hits, Scene, cast
 from tunneldb.simulate.canal.laser import directions
 from tunneldb.simulate.canal.layout import Layout, Tripod
 from tunneldb.simulate.canal.parameters import CanalParameters
@@ -28,7 +28,7 @@ _RINGS = {1: ((1, 0.0),), 7: ((1, 0.0), (6, 0.4)), 13: ((1, 0.0), (6, 0.35), (6,
 _BLOCK = 20_000  # beams
 # Shares of the false echoes: via the water surface, via a second wall, via side lobes; the others are noise.
 _BY_SURFACE, _BY_WALL, _BY_LOBES = 0.4, 0.2, 0.2
-_NEAREST = 0.4  # m
+_MIN_RANGE = 0.4  # m
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def scan_by_sonar(
     place = np.broadcast_to(tripod.place, beams.shape).copy()
     place[turn > np.pi] += p.sonar_settling * np.append(directions(rng.uniform(0.0, 2.0 * np.pi, 1), np.zeros(1))[0, :2], 0.0)
     echoes = _echoes(p, layout.scene, place, beams, tripod.rotation)
-    seen = (echoes.kind != NOTHING) & (echoes.range > _NEAREST) & (echoes.range < p.sonar_maximum_range)
+    seen = (echoes.kind != NO_HIT) & (echoes.range > _MIN_RANGE) & (echoes.range < p.sonar_maximum_range)
     seen &= (echoes.kind != WATER) | (rng.random(len(beams)) < p.water_surface_share)
     reach, kind, strength = echoes.range.copy(), echoes.kind.copy(), echoes.strength.copy()
     false = _false_echoes(p, layout.scene, place, beams @ tripod.rotation.T, echoes, seen, rng)
@@ -127,7 +127,7 @@ def _echoes(parameters: CanalParameters, scene: Scene, place: Float, beams: Floa
     off, weight = _cone(parameters)
     table = np.zeros(max(_STRENGTH) + 2)
     table[list(_STRENGTH)] = list(_STRENGTH.values())
-    out = _Echoes(np.full(len(beams), np.inf), np.zeros(len(beams)), np.full(len(beams), NOTHING, np.int32))
+    out = _Echoes(np.full(len(beams), np.inf), np.zeros(len(beams)), np.full(len(beams), NO_HIT, np.int32))
     for begin in range(0, len(beams), _BLOCK):
         part = slice(begin, begin + _BLOCK)
         middle = beams[part]
@@ -146,7 +146,7 @@ def _strongest(parameters: CanalParameters, hits: Hits, table: Float, weight: Fl
     """Select the range cell with the most energy of each beam; its echo is the mean of the rays in it."""
     shape = (-1, len(weight))
     reach, kind, cosine = (column.reshape(shape) for column in (hits.range, hits.kind, hits.cosine))
-    solid = (kind != NOTHING) & (kind != WATER)
+    solid = (kind != NO_HIT) & (kind != WATER)
     power = np.where(solid, table[np.where(solid, kind, 0)] * weight * cosine**_LAMBERT, 0.0)
     within = (reach[:, None, :] >= reach[:, :, None]) & (reach[:, None, :] < reach[:, :, None] + parameters.sonar_resolution)
     energy = (within * power[:, None, :]).sum(axis=2)
@@ -160,7 +160,7 @@ def _strongest(parameters: CanalParameters, hits: Hits, table: Float, weight: Fl
     strongest = kind[row, chosen.argmax(axis=1)]
     out.range[part] = np.where(met, mean, np.where(water, reach[:, 0], np.inf))
     out.strength[part] = np.where(met, total, 0.05)
-    out.kind[part] = np.where(met, strongest, np.where(water, WATER, NOTHING))
+    out.kind[part] = np.where(met, strongest, np.where(water, WATER, NO_HIT))
 
 
 def _false_echoes(
@@ -186,12 +186,12 @@ def _false_echoes(
     known = np.isfinite(echoes.range[lobe])
     out.append((beam[known].astype(np.int32), echoes.range[lobe][known]))
     beam = rng.choice(held, min(max(count - sum(len(b) for b, _ in out), 0), len(held)), replace=False)
-    out.append((beam.astype(np.int32), rng.uniform(_NEAREST, min(15.0, parameters.sonar_maximum_range), len(beam))))
+    out.append((beam.astype(np.int32), rng.uniform(_MIN_RANGE, min(15.0, parameters.sonar_maximum_range), len(beam))))
     return out
 
 
 def _bounced(scene: Scene, start: Float, ways: Float, before: Float, beam: Float) -> tuple[Int32, Float]:
     """Return beams (n,) that continued from positions (n, 3) after ``before`` (n,) m and hit something, and their ranges."""
     hits = cast(scene, start, ways, 15.0)
-    met = (hits.kind != NOTHING) & (hits.kind != WATER) & (hits.range > 0.3)
+    met = (hits.kind != NO_HIT) & (hits.kind != WATER) & (hits.range > 0.3)
     return beam[met].astype(np.int32), before[met] + hits.range[met]

@@ -21,8 +21,8 @@ from tunneldb.simulate.tunnel.tunnel import foot, gradient
 
 CELL = 0.045  # m; one stone per cell
 STONE = (0.015, 0.030)  # radii of stones, m: stones of 3 to 6 cm
-GAP = -1.0  # between stones, in heights of a dome
-HIGHEST = 1.5
+GAP_HEIGHT = -1.0  # between stones, in heights of a dome
+MAX_HEIGHT = 1.5
 
 
 class Ground(NamedTuple):
@@ -46,7 +46,7 @@ class Ground(NamedTuple):
 def stones(x: float, y: float, salt: int) -> float:
     """Return the height of the stones at a position, in heights of a dome: -1 to 1.5."""
     fx, fy = math.floor(x / CELL), math.floor(y / CELL)
-    best = GAP
+    best = GAP_HEIGHT
     part = 1.0 / 65535.0
     mask = np.uint64(0xFFFF)
     for i in range(-1, 2):
@@ -91,8 +91,8 @@ def lay(parameters: Parameters, section: Section, salt: int) -> Ground | None:
         camber,
         section.half_width,
         section.floor,
-        (GAP - mean) * scale,
-        (HIGHEST - mean) * scale + rise,
+        (GAP_HEIGHT - mean) * scale,
+        (MAX_HEIGHT - mean) * scale + rise,
     )
 
 

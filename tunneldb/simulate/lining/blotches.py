@@ -35,7 +35,7 @@ FRINGE_LEVEL = (0.5, 1.0)
 HALO_AREA, HALO_DROP, HALO = (0.1, 1.5), (1.5, 5.0), 0.25
 # Lengths of lining of one shade where there are no rings, m.
 SHADE_LENGTH = (2.0, 8.0)
-CLEAR = 0.1  # between halos, and between a halo and a leak, m
+MIN_CLEARANCE = 0.1  # between halos, and between a halo and a leak, m
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def _halos(p: Parameters, lining: Polygon, taken: BaseGeometry, rng: np.random.G
         for _ in range(TRIES):
             area = math.exp(rng.uniform(math.log(HALO_AREA[0]), math.log(HALO_AREA[1])))
             spot = _spot(area, rng.uniform(left, right), rng.uniform(bottom, top), rng).buffer(HALO)
-            apart = spot.buffer(CLEAR)
+            apart = spot.buffer(MIN_CLEARANCE)
             if lining.contains(spot) and not apart.intersects(taken) and not any(apart.intersects(h.outline) for h in halos):
                 break
         else:

@@ -20,13 +20,13 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 TRIES = 600
 # Extent of a leak across a cable on either side, m, and its least area, m².
-BEYOND, CROSSING_AREA = 0.1, 0.1
+CROSSING_MARGIN, CROSSING_AREA = 0.1, 0.1
 # At the foot: limits of the length along the floor and the height up the wall, m.
 FOOT_LENGTH, FOOT_HEIGHT = (0.5, 4.0), (0.1, 0.8)
 # Wet joint along the springline: limits of length and width, m.
 SPRING_LENGTH, SPRING_WIDTH = (5.0, 8.0), (0.1, 0.2)
 # Below a weeping pocket: limits of the streak's length and width, m; limits of the wet margin around the pocket, m.
-STREAK_LENGTH, STREAK_WIDTH, WEEPING = (0.1, 1.2), (0.04, 0.12), (0.01, 0.06)
+STREAK_LENGTH, STREAK_WIDTH, POCKET_MARGIN = (0.1, 1.2), (0.04, 0.12), (0.01, 0.06)
 # Wet ring where the lining has no rings of segments: limits of its width, m. Panel where it has none: of its sides, m.
 RING_WIDTH, PANEL = (0.2, 1.5), (0.8, 2.5)
 SEAM = 0.01  # between a wet segment and its joints, m
@@ -58,7 +58,7 @@ class _Sites:
         low, high = (math.log(max(a, CROSSING_AREA)) for a in self.p.leak_area)
         patch = wet_patch(rng, math.exp(rng.uniform(low, high)), 1 if run.arc >= 0.0 else -1, False)
         patch = affinity.translate(patch, rng.uniform(self.start, self.end), run.arc + rng.uniform(-0.3, 0.3))
-        half = 0.5 * run.width + BEYOND
+        half = 0.5 * run.width + CROSSING_MARGIN
         crosses = patch.bounds[1] < run.arc - half and patch.bounds[3] > run.arc + half
         return patch if crosses else None
 
@@ -88,7 +88,7 @@ class _Sites:
         i, _, seam = self._segment(rng)
         s = self.rings.first + i * self.rings.length + POCKET_FROM_JOINT
         arc = seam + POCKETS[int(rng.integers(len(POCKETS)))] * self.rings.period
-        around = float(rng.uniform(*WEEPING))
+        around = float(rng.uniform(*POCKET_MARGIN))
         wet = box(s - 0.5 * POCKET[0], arc - 0.5 * POCKET[1], s + 0.5 * POCKET[0], arc + 0.5 * POCKET[1]).buffer(around)
         length, width = rng.uniform((STREAK_LENGTH[0], STREAK_WIDTH[0]), (STREAK_LENGTH[1], STREAK_WIDTH[1])).tolist()
         bottom = arc + math.copysign(0.5 * POCKET[1] + length, arc)

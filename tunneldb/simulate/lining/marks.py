@@ -18,7 +18,7 @@ from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 TRIES = 600
-CLEAR = 0.15  # between marks, and between a mark and a leak, m
+MIN_CLEARANCE = 0.15  # between marks, and between a mark and a leak, m
 DIGIT = (0.18, 0.30)  # width and height, m
 # Strokes of the digits as on a seven-segment display: ends in shares of the width and the height.
 _STROKES = {
@@ -101,7 +101,7 @@ def place_marks(parameters: Parameters, tunnel: Tunnel, taken: list[BaseGeometry
     patches, paints = (np.random.default_rng(s) for s in seed.spawn(2))
     wanted = [(_patch, patches)] * p.patches + [((_number, _stripe)[i % 2], paints) for i in range(p.paint)]
     lowest = tunnel.section.floor_arc - 0.1
-    shapes = [t.buffer(CLEAR) for t in taken]
+    shapes = [t.buffer(MIN_CLEARANCE) for t in taken]
     marks: list[Mark] = []
     for number, (make, rng) in enumerate(wanted):
         tree = STRtree(shapes)
@@ -118,7 +118,7 @@ def place_marks(parameters: Parameters, tunnel: Tunnel, taken: list[BaseGeometry
                 break
         else:
             raise UserError(f"no room on the lining for mark {number + 1} of {len(wanted)}; use fewer patches or less paint")
-        shapes.append(outline.buffer(CLEAR))
+        shapes.append(outline.buffer(MIN_CLEARANCE))
         marks += made
     return marks
 

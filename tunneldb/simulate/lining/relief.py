@@ -29,19 +29,19 @@ ROUGH = {
     "stone": ((0.15, 0.004), (0.05, 0.0015)),
     "rock": ((0.05, 0.003),),
 }
-ROUGH_MOST = 2.4
+MAX_ROUGH_SIGMA = 2.4
 # Facets of unlined rock: sizes and greatest heights, m.
 FACETS = {"rock": ((0.8, 0.15), (0.25, 0.04))}
 # Limits of the factor of a tunnel's relief to these.
-ROUGHER = {"rough_shotcrete": (0.5, 1.5), "brick": (0.3, 2.0), "stone": (0.3, 2.0), "rock": (0.4, 1.6)}
+ROUGHNESS_FACTOR = {"rough_shotcrete": (0.5, 1.5), "brick": (0.3, 2.0), "stone": (0.3, 2.0), "rock": (0.4, 1.6)}
 _PART = 1.0 / 65535.0
 _MASK = np.uint64(0xFFFF)
 # Least and greatest step of the march, m; share of the gap to the surface that a step takes.
-SHORTEST, LONGEST, SHARE = 0.002, 0.02, 0.9
+MIN_STEP, MAX_STEP, STEP_SHARE = 0.002, 0.02, 0.9
 HALVINGS = 17
-CLOSE = 1e-6  # m
+TOLERANCE = 1e-6  # m
 # Depth behind a surface above which it is hit from the side, m.
-SIDE = 5e-4
+SIDE_DEPTH = 5e-4
 
 
 class LiningRelief(NamedTuple):
@@ -102,10 +102,10 @@ def lining_relief(
         return None
     rng = np.random.default_rng(seed)
     step = np.clip(rng.standard_normal(rings.level.size), -3.0, 3.0) * p.ring_step
-    scale = np.array([1.0, float(rng.uniform(*ROUGHER[p.lining])) if p.lining in ROUGHER else 1.0])
+    scale = np.array([1.0, float(rng.uniform(*ROUGHNESS_FACTOR[p.lining])) if p.lining in ROUGHNESS_FACTOR else 1.0])
     rough = np.array(ROUGH.get(p.lining, ())).reshape(-1, 2) * scale
     facets = np.array(FACETS.get(p.lining, ())).reshape(-1, 2) * scale
-    most = ROUGH_MOST * float(rough[:, 1].sum()) + float(facets[:, 1].sum()) + masonry.face
+    most = MAX_ROUGH_SIGMA * float(rough[:, 1].sum()) + float(facets[:, 1].sum()) + masonry.face
     reach = np.hypot(*shape.ellipse[:, :2].T) + np.hypot(*shape.ellipse[:, 2:].T)
     away = float((reach + np.abs(shape.stand).max(axis=1, initial=0.0)).max(initial=0.0))
     grooves = masonry.depth + (CHAMFER_DEPTH if p.chamfers else 0.0)
@@ -208,8 +208,8 @@ def intersect_relief(
         dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
         r, s = found[0, i], found[1, i]
         slant = max(found[3, i], 0.1)
-        back = relief.high / slant + SHORTEST
-        end = r + 2.0 * (SHORTEST - relief.low) / slant + 0.2
+        back = relief.high / slant + MIN_STEP
+        end = r + 2.0 * (MIN_STEP - relief.low) / slant + 0.2
         t = r
         for _ in range(7):
             t = r - back
@@ -220,14 +220,14 @@ def intersect_relief(
         before, above = t, gap
         while gap > 0.0 and at[3] > relief.floor and t < end:
             before, above = t, gap
-            t += min(max(SHARE * gap / slant, SHORTEST), LONGEST)
+            t += min(max(STEP_SHARE * gap / slant, MIN_STEP), MAX_STEP)
             arc, gap, gu, gw, at = _gap(relief, plan, profile, parts, x + t * dx, y + t * dy, z + t * dz, at[0])
         for j in range(HALVINGS):
-            if t - before < CLOSE or (-CLOSE < gap <= 0.0):
+            if t - before < TOLERANCE or (-TOLERANCE < gap <= 0.0):
                 break
             # A smooth surface is found by the secant method, a step by bisection.
             share = above / (above - gap) if j < 3 and gap < 0.0 else 0.5
-            middle = before + share * (t - before) + (0.5 * CLOSE if j < 3 else 0.0)
+            middle = before + share * (t - before) + (0.5 * TOLERANCE if j < 3 else 0.0)
             there = _gap(relief, plan, profile, parts, x + middle * dx, y + middle * dy, z + middle * dz, at[0])
             if there[1] > 0.0 and there[4][3] > relief.floor:
                 before, above = middle, there[1]
@@ -250,9 +250,9 @@ def intersect_relief(
         tx, ty, tz = c / q, n / q, g / q
         # In the direction of increasing arc.
         ax, ay, az = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
-        if gap < -SIDE:
+        if gap < -SIDE_DEPTH:
             beside = _gap(relief, plan, profile, parts, x + before * dx, y + before * dy, z + before * dz, s)
-            is_end = abs(height(relief, s, beside[0]) - height(relief, beside[4][0], beside[0])) > SIDE
+            is_end = abs(height(relief, s, beside[0]) - height(relief, beside[4][0], beside[0])) > SIDE_DEPTH
             if is_end:
                 ax, ay, az = tx, ty, tz
             found[3, i] = abs(ax * dx + ay * dy + az * dz)

@@ -19,10 +19,10 @@ from tunneldb.compiled import inner
 from tunneldb.simulate.lining.rings import Rings
 from tunneldb.simulate.parameters import Parameters
 
-LEVEL = 20.0
+MAX_TILT = 20.0
 """Greatest angle of the largest diameter to the horizontal, degrees: rings settle."""
 
-MOST = 3.0
+MAX_SIGMA = 3.0
 """Limit of random numbers, standard deviations."""
 
 
@@ -54,12 +54,12 @@ def shape(parameters: Parameters, rings: Rings, seed: np.random.SeedSequence) ->
     p, n = parameters, rings.level.size
     oval, moved, stood = (np.random.default_rng(one) for one in seed.spawn(3))
     ellipse = np.zeros((n, 4))
-    ellipse[:, :2] = np.clip(moved.standard_normal((n, 2)), -MOST, MOST) * p.ring_shift
+    ellipse[:, :2] = np.clip(moved.standard_normal((n, 2)), -MAX_SIGMA, MAX_SIGMA) * p.ring_shift
     # Largest minus smallest diameter is four times the length of (p, q), whose angle is twice that of the diameter.
     size = oval.uniform(*p.ovality, n) / 100.0 * 2.0 * p.section_radius / 4.0
-    turn = 2.0 * np.radians(oval.uniform(-LEVEL, LEVEL, n))
+    turn = 2.0 * np.radians(oval.uniform(-MAX_TILT, MAX_TILT, n))
     ellipse[:, 2], ellipse[:, 3] = size * np.cos(turn), size * np.sin(turn)
-    stand = np.clip(stood.standard_normal(rings.segment_level.shape), -MOST, MOST) * p.segment_step
+    stand = np.clip(stood.standard_normal(rings.segment_level.shape), -MAX_SIGMA, MAX_SIGMA) * p.segment_step
     return RingShape(p.section_radius, ellipse, stand)
 
 

@@ -25,7 +25,7 @@ ALONG_RINGS = 0.7
 # Leaks in niches: limits of area, m², and distance to the edges of the back wall, m.
 NICHE_AREA, NICHE_MARGIN = (0.05, 0.8), 0.1
 # Drips: least area of leaks with drips (m²), and their probability; limits of their length and width, m.
-DRIPPING, DRIP_SHARE = 0.1, 0.7
+MIN_DRIP_AREA, DRIP_SHARE = 0.1, 0.7
 DRIP_LENGTH, DRIP_WIDTH = (0.03, 0.30), (0.02, 0.06)
 
 
@@ -137,7 +137,7 @@ def with_drips(leaks: list[Leak], gaps: tuple[float, float], room: Room, seed: n
     for leak, sequence in zip(leaks, seed.spawn(len(leaks)), strict=True):
         rng = np.random.default_rng(sequence)
         down = math.copysign(1.0, leak.polygon.centroid.y)
-        if leak.kind == "niche" or leak.area < DRIPPING or rng.random() > DRIP_SHARE:
+        if leak.kind == "niche" or leak.area < MIN_DRIP_AREA or rng.random() > DRIP_SHARE:
             dripping.append(leak)
             continue
         drips = [_drip(leak.polygon, down, gaps, rng) for _ in range(int(rng.integers(1, 4)))]

@@ -17,9 +17,9 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 # Limits of the thickness of wires, of their distance from the lining, m, and of their darkening, dB.
 WIRE, GAP, DROP = (0.002, 0.008), (0.02, 0.10), (-3.0, 5.0)
 # Height of the mesh over rough lining, as a share of the greatest relief: it spans between high points.
-SPANS = 0.6
+MESH_HEIGHT_SHARE = 0.6
 # Newton steps from the lining to the mesh, and the least cosine of incidence in them.
-STEPS, LEAST_SLANT = 4, 0.05
+STEPS, MIN_COSINE = 4, 0.05
 
 
 class Mesh(NamedTuple):
@@ -37,7 +37,7 @@ def hang_mesh(parameters: Parameters, highest: float, seed: np.random.SeedSequen
         return None
     rng = np.random.default_rng(seed)
     wire, gap, drop = rng.uniform(*np.array([WIRE, GAP, DROP]).T).tolist()
-    return Mesh(parameters.mesh, wire, gap + SPANS * highest, drop)
+    return Mesh(parameters.mesh, wire, gap + MESH_HEIGHT_SHARE * highest, drop)
 
 
 def intersect_mesh(
@@ -50,7 +50,7 @@ def intersect_mesh(
     start, way, t, s = origin[rays], direction[rays], found[0, rays], found[1, rays]
     place = tunnel.unroll_near(start + t[:, None] * way, s, 1e-4)
     for _ in range(STEPS):
-        slant = np.maximum(-np.sum(place.normal * way, axis=1), LEAST_SLANT)
+        slant = np.maximum(-np.sum(place.normal * way, axis=1), MIN_COSINE)
         t = t + (place.offset - mesh.offset) / slant
         place = tunnel.unroll_near(start + t[:, None] * way, place.chainage, 1e-4)
     from_wire = [np.abs(np.mod(x, mesh.spacing) - 0.5 * mesh.spacing) for x in (place.chainage, place.arc)]

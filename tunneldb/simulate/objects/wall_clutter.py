@@ -13,15 +13,15 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 TRIES = 400
 # Limits, m: diameter of cables; distance of their visible side from the wall; cables of a bundle.
-CABLE, SEEN_SIDE, BUNDLE = (0.02, 0.08), (0.03, 0.30), (2, 5)
+CABLE, VISIBLE_SIDE, BUNDLE = (0.02, 0.08), (0.03, 0.30), (2, 5)
 PIPE, PIPE_GAP = (0.10, 0.20), (0.0, 0.08)
 # Side of signs, their distance from the wall, their thickness; size and depth of junction boxes, m.
 SIGN, SIGN_GAP, SIGN_THICK = (0.3, 0.8), (0.03, 0.06), 0.004
 BOX, BOX_DEPTH = (0.15, 0.40), (0.08, 0.20)
 SPACING = 10.0  # m between signs and between boxes
-APART = 0.1  # m between objects
+MIN_SPACING = 0.1  # m between objects
 # Limits of arcs, as shares of the lining's half arc: clear of the crown and of the floor.
-BETWEEN = (0.15, 0.93)
+ARC_LIMITS = (0.15, 0.93)
 
 
 def _run(kind: str, arc: float, start: float, end: float, rng: np.random.Generator) -> list[Appendage]:
@@ -30,7 +30,7 @@ def _run(kind: str, arc: float, start: float, end: float, rng: np.random.Generat
         (thick, gap, drop) = rng.uniform((PIPE[0], PIPE_GAP[0], 1.0), (PIPE[1], PIPE_GAP[1], 6.0)).tolist()
         return [Appendage("pipe", start, end, arc, gap + 0.5 * thick, thick, thick, drop)]
     count = int(rng.integers(BUNDLE[0], BUNDLE[1] + 1)) if kind == "bundle" else 1
-    seen = float(rng.uniform(*SEEN_SIDE))
+    seen = float(rng.uniform(*VISIBLE_SIDE))
     cables = []
     for _ in range(count):
         thick, drop = rng.uniform((CABLE[0], 3.0), (CABLE[1], 7.0)).tolist()
@@ -54,7 +54,7 @@ def _plate(kind: str, s: float, arc: float, rng: np.random.Generator) -> list[Ap
 def is_free(items: list[Appendage], hung: list[Appendage]) -> bool:
     """Return True if there is space for items beside the existing ones."""
     return all(
-        min(a.end, b.end) + APART < max(a.start, b.start) or abs(a.arc - b.arc) > 0.5 * (a.width + b.width) + APART
+        min(a.end, b.end) + MIN_SPACING < max(a.start, b.start) or abs(a.arc - b.arc) > 0.5 * (a.width + b.width) + MIN_SPACING
         for a in items
         for b in hung
     )
@@ -76,7 +76,7 @@ def clutter(
     own: list[Appendage] = []
 
     def arc(rng: np.random.Generator) -> float:
-        return math.copysign(float(rng.uniform(*BETWEEN)) * lowest, float(rng.uniform(-1.0, 1.0)))
+        return math.copysign(float(rng.uniform(*ARC_LIMITS)) * lowest, float(rng.uniform(-1.0, 1.0)))
 
     for i in range(parameters.clutter):
         for _ in range(TRIES):

@@ -8,7 +8,7 @@ import numpy as np
 
 from tunneldb.errors import UserError
 from tunneldb.simulate.objects.fixtures import Appendage
-from tunneldb.simulate.objects.wall_clutter import BETWEEN, is_free
+from tunneldb.simulate.objects.wall_clutter import ARC_LIMITS, is_free
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
@@ -17,7 +17,7 @@ TRIES = 400
 TRUNK_WIDTH, TRUNK_DEPTH, TRUNK_DROP = (0.10, 0.60), (0.10, 0.40), (-3.0, 6.0)
 # Thin cables on the wall: limits of their number side by side; of their thickness, m (the thinnest vanish in the noise of
 # ranges), and of their darkening, dB; share of runs that are flat ducts.
-THIN_BUNDLE, THIN, THIN_DROP, FLAT = (1, 10), (0.003, 0.025), (2.0, 7.0), 0.5
+THIN_BUNDLE, THIN, THIN_DROP, FLAT_SHARE = (1, 10), (0.003, 0.025), (2.0, 7.0), 0.5
 FLAT_WIDTH = (0.02, 0.15)  # m
 # Sheets: limits of length and of height along the wall, of their distance from it, m, of darkening, dB; thickness,
 # width of the strips that follow the section, m.
@@ -35,7 +35,7 @@ def _trunking(start: float, end: float, arc: float, rng: np.random.Generator) ->
 def _thin_cables(start: float, end: float, arc: float, rng: np.random.Generator) -> list[Appendage]:
     """Return cables side by side on the wall, or a flat duct."""
     thick = math.exp(rng.uniform(math.log(THIN[0]), math.log(THIN[1])))
-    if rng.random() < FLAT:
+    if rng.random() < FLAT_SHARE:
         width, drop = rng.uniform(*np.array([FLAT_WIDTH, THIN_DROP]).T).tolist()
         return [Appendage("duct", start, end, arc, 0.5 * thick, width, thick, drop)]
     count = int(rng.integers(THIN_BUNDLE[0], THIN_BUNDLE[1] + 1))
@@ -70,7 +70,7 @@ def covers(parameters: Parameters, tunnel: Tunnel, furniture: list[Appendage], s
         rng = np.random.default_rng(stream)
         for number in range(count):
             for _ in range(TRIES):
-                arc = math.copysign(float(rng.uniform(*BETWEEN)) * lowest, float(rng.uniform(-1.0, 1.0)))
+                arc = math.copysign(float(rng.uniform(*ARC_LIMITS)) * lowest, float(rng.uniform(-1.0, 1.0)))
                 made = make(line.start, line.end, arc, rng)
                 inside = all(abs(a.arc) + 0.5 * a.width < lowest for a in made)
                 if inside and is_free(made, hung + own):

@@ -22,9 +22,9 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 # Echoes of rays (by index) in other directions, without noise and stray points.
 Shoot = Callable[[Int64, Float], Echoes]
 
-EXIT = 0.006  # m; diameter of the beam at the scanner
-STEP = 0.005  # least difference of range between two surfaces, m
-LEAST = 0.02  # least share of the footprint that changes an echo
+EXIT_DIAMETER = 0.006  # m; diameter of the beam at the scanner
+MIN_STEP = 0.005  # least difference of range between two surfaces, m
+MIN_SHARE = 0.02  # least share of the footprint that changes an echo
 HALVINGS = 5
 
 
@@ -86,7 +86,7 @@ def blur(
     """
     direction = rays.direction[echoes.ray]
     across, beside = aside(direction, rng)
-    radius = 0.5 * (EXIT + 1e-3 * divergence * echoes.range)
+    radius = 0.5 * (EXIT_DIAMETER + 1e-3 * divergence * echoes.range)
 
     def at(rows: Int64, share: Float | float) -> _Spot:
         """Cast rays towards a share of the way from the centre to the second ray."""
@@ -100,7 +100,7 @@ def blur(
     second = at(candidates, 1.0)
     slant = np.minimum(echoes.cosine[candidates], second.cosine)
     plane = 1.5 * radius[candidates] * np.sqrt(1.0 - slant**2) / slant
-    is_edge = np.abs(second.range - echoes.range[candidates]) > STEP + plane  # False without an echo
+    is_edge = np.abs(second.range - echoes.range[candidates]) > MIN_STEP + plane  # False without an echo
     rows, second = candidates[is_edge], second.take(is_edge)
     if not len(rows):
         return echoes
@@ -111,7 +111,7 @@ def blur(
         is_first = np.abs(there - echoes.range[rows]) < np.abs(there - second.range)
         low, high = np.where(is_first, middle, low), np.where(is_first, high, middle)
     share = segment_share(0.5 * (low + high) * beside[rows])
-    mixed = share >= LEAST
+    mixed = share >= MIN_SHARE
     rows, second, share = rows[mixed], second.take(mixed), share[mixed]
     before = echoes.take(rows)
     first = _Spot(before.range, before.cosine, before.klass.astype(float), before.drop)

@@ -18,7 +18,7 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 # Limits of the loss by two reflections, dB.
 LOSS = (3.0, 12.0)
-ABOVE = 1e-5  # m: the mirrored ray starts off the floor
+FLOOR_OFFSET = 1e-5  # m: the mirrored ray starts off the floor
 
 # Echoes of rays from places (n, 3) in directions (n, 3), near chainages (n,), without noise and stray points.
 Shoot = Callable[[Float, Float, Float], Echoes]
@@ -33,7 +33,7 @@ def mirror(
     direction = rays.direction[echoes.ray[chosen]]
     up = tunnel.line.frame(echoes.chainage[chosen]).w
     mirrored = direction - 2.0 * np.sum(direction * up, axis=1)[:, None] * up
-    spot = rays.origin[echoes.ray[chosen]] + echoes.range[chosen, None] * direction + ABOVE * up
+    spot = rays.origin[echoes.ray[chosen]] + echoes.range[chosen, None] * direction + FLOOR_OFFSET * up
     there = shoot(spot, mirrored, echoes.chainage[chosen])
     rows, whole = chosen[there.ray], echoes.range[chosen[there.ray]] + there.range
     within = whole <= furthest

@@ -25,7 +25,7 @@ lining, and offset and chainage at the ray's start."""
 
 # A Newton step for chainage leaves an error of its square times the curvature, in chainage, u and w: after a step
 # of at most this many metres, the next iteration of the ray corrects the rest.
-LOOSE = 0.05
+CHAINAGE_TOLERANCE = 0.05
 
 
 @inner
@@ -74,7 +74,7 @@ def intersect_lining(
         arc = 0.0
         r = 0.0
         for j in range(80):
-            s, step, u, w, c, n, k, g, q, det = foot(plan, profile, x, y, z, s, LOOSE, np.int64(2))
+            s, step, u, w, c, n, k, g, q, det = foot(plan, profile, x, y, z, s, CHAINAGE_TOLERANCE, np.int64(2))
             arc, offset, gu, gw = nearest(parts, u, w)
             nx, ny, nz = gradient(gu, gw, u, w, c, n, k, g, q, det)
             slope = nx * dx + ny * dy + nz * dz
@@ -140,7 +140,7 @@ def intersect_appendages(
         at = begin
         for _ in range(200):
             x, y, z = origin[i, 0] + at * dx, origin[i, 1] + at * dy, origin[i, 2] + at * dz
-            s, _, u, w, c, n, k, g, q, det = foot(plan, profile, x, y, z, s, LOOSE, np.int64(2))
+            s, _, u, w, c, n, k, g, q, det = foot(plan, profile, x, y, z, s, CHAINAGE_TOLERANCE, np.int64(2))
             b = bin_of(s, start, bins)
             gap = 0.8  # below the REACH of a bin's list
             nearby = np.int64(-1)

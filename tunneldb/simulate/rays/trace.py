@@ -22,9 +22,9 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 # Cosine of incidence below which a scanner receives no echo.
 MINIMUM_COSINE = 0.087
 # Share of the rays near an edge of a free-standing object that give a mixed pixel.
-MIXED = 0.1
+MIXED_SHARE = 0.1
 # Least range of the scanner, m.
-NEAREST = 1.0
+MIN_RANGE = 1.0
 PIECE = 1 << 16  # rays that are traced at a time
 BUMP = 0.12  # half the wavelength of the small-scale relief, m
 
@@ -216,7 +216,7 @@ class Tracer:
             true,
             thing,
         )
-        within = (measured >= NEAREST) & (measured <= self.furthest) & (place.chainage >= start) & (place.chainage <= end)
+        within = (measured >= MIN_RANGE) & (measured <= self.furthest) & (place.chainage >= start) & (place.chainage <= end)
         return echoes if within.all() else echoes.take(np.flatnonzero(within))
 
     def _niches(
@@ -243,7 +243,7 @@ class Tracer:
 
     def _stray(self, measured: Float, klass: Int64, thing: Int64, behind: Float, edge: Float, chance: Float) -> Int64:
         """Move isolated points and mixed pixels; return their indices."""
-        candidates = np.flatnonzero(chance[:, 0] < self.outliers + max(MIXED, 0.01) * self.stray)
+        candidates = np.flatnonzero(chance[:, 0] < self.outliers + max(MIXED_SHARE, 0.01) * self.stray)
         u, v = chance[candidates].T
         is_isolated = u < self.outliers
         kind, number = klass[candidates], thing[candidates]
@@ -251,7 +251,7 @@ class Tracer:
         is_mixed |= (number > 0) & (edge[candidates] < BEAM)
         r = measured[candidates]
         # Most isolated points are in the air, some behind the wall (multipath).
-        isolated = np.where(v < 0.7, NEAREST + v / 0.7 * (0.95 * r - NEAREST), r * (1.0 + 0.5 * (v - 0.7)))
+        isolated = np.where(v < 0.7, MIN_RANGE + v / 0.7 * (0.95 * r - MIN_RANGE), r * (1.0 + 0.5 * (v - 0.7)))
         # A mixed pixel: the beam hits an edge and the surface behind it.
         mixed = r + v * (behind[candidates] - r)
         measured[candidates] = np.where(is_isolated, isolated, np.where(is_mixed, mixed, r))

@@ -14,10 +14,10 @@ from tunneldb.simulate.structure.materials import MATERIALS, RUST
 from tunneldb.simulate.structure.shapes import Face
 
 # Cosine of the incidence at which the nominal level of rust relative to its face is defined; rust has its own law.
-RUST_AT = math.cos(math.radians(30.0))
-SHARES = (0.02, 0.60)  # of the face
-LARGEST = 1.0  # m²
-NARROWEST = 0.02  # m; least visible width of a face
+RUST_COSINE = math.cos(math.radians(30.0))
+AREA_SHARES = (0.02, 0.60)  # of the face
+MAX_AREA = 1.0  # m²
+MIN_WIDTH = 0.02  # m; least visible width of a face
 
 
 @dataclass
@@ -54,7 +54,7 @@ class Anomaly:
         if self.kind != "rust":
             return np.full(len(cosine), self.shift)
         own = MATERIALS[self.face.material]
-        at = np.array([RUST_AT])
+        at = np.array([RUST_COSINE])
         return np.asarray(self.shift + (RUST.level(cosine) - RUST.level(at)) - (own.level(cosine) - own.level(at)))
 
 
@@ -105,14 +105,14 @@ def place(number: int, face: Face, seen: Float, contrast: tuple[float, float], r
         if not isinstance(line, LineString) or line.length < 0.2:
             return None
         return Anomaly(number, face, kind, line.buffer(0.5 * width, cap_style="flat"), -drop, width, line)
-    share = math.exp(rng.uniform(math.log(SHARES[0]), math.log(SHARES[1])))
-    area = min(share * inside.area, LARGEST * float(rng.uniform(0.05, 1.0)))
+    share = math.exp(rng.uniform(math.log(AREA_SHARES[0]), math.log(AREA_SHARES[1])))
+    area = min(share * inside.area, MAX_AREA * float(rng.uniform(0.05, 1.0)))
     if kind == "flake":
         area = min(area, 0.1)
     # An anomaly crosses a narrow face instead of extending along it as a thread.
     low, high = np.array(inside.bounds[:2]), np.array(inside.bounds[2:])
     narrow = float((high - low).min())
-    if narrow < NARROWEST:
+    if narrow < MIN_WIDTH:
         return None
     longer = max(float(rng.uniform(1.0, 2.5)), area / narrow**2)
     if area > 0.3 * narrow**2:

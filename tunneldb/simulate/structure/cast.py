@@ -18,7 +18,7 @@ from tunneldb.threads import in_blocks
 TILE = math.radians(1.0)
 MARGIN = math.radians(0.1)  # more than a beam's half width
 _STEPS = 64  # steps of sphere tracing for a bend
-_CLOSE = 2e-6  # m
+_TOLERANCE = 2e-6  # m
 
 
 class View(NamedTuple):
@@ -77,7 +77,7 @@ def _bend(x: float, y: float, z: float, dx: float, dy: float, dz: float, major: 
         px, py, pz = x + t * dx, y + t * dy, z + t * dz
         ring = math.hypot(px, py) - major
         gap = math.sqrt(ring * ring + pz * pz) - minor
-        if gap < _CLOSE:
+        if gap < _TOLERANCE:
             at = math.atan2(py, px)
             if 0.0 <= at <= angle:
                 return t

@@ -21,15 +21,15 @@ from tunneldb.simulate.structure.parameters import StructureParameters
 from tunneldb.simulate.structure.shapes import TUBE, Structure, normals
 
 RAYS = 400_000  # per block
-SCOUT = math.radians(0.2)  # between the rays that find visible places for anomalies
-LOWEST_ZENITH = math.radians(150.0)  # the tripod hides directions below
-FURTHEST = 60.0  # m
-MOST_SLANT = math.cos(math.radians(88.0))  # at greater incidence there is no echo
-EXIT = 0.0021  # diameter of the beam at the scanner, m
-LEAST_SHARE = 0.3  # least share of the footprint for an echo
-ASIDE = 0.003  # m: greatest distance of an echo at an edge from its face
-SOFT = 0.004  # m over which rust and stains fade, in addition to the footprint
-LEAST_PLACES = 40  # least number of visible places for an anomaly
+SCOUT_STEP = math.radians(0.2)  # between the rays that find visible places for anomalies
+MAX_ZENITH = math.radians(150.0)  # the tripod hides directions below
+MAX_RANGE = 60.0  # m
+MIN_COSINE = math.cos(math.radians(88.0))  # at greater incidence there is no echo
+EXIT_DIAMETER = 0.0021  # diameter of the beam at the scanner, m
+MIN_SHARE = 0.3  # least share of the footprint for an echo
+MAX_FACE_DISTANCE = 0.003  # m: greatest distance of an echo at an edge from its face
+FADE_WIDTH = 0.004  # m over which rust and stains fade, in addition to the footprint
+MIN_PLACES = 40  # least number of visible places for an anomaly
 SUN = np.array([0.4, -0.7, 0.6]) / np.linalg.norm([0.4, -0.7, 0.6])
 START_TIME, STATION_TIME = 300_000.0, 300.0  # s
 
@@ -114,7 +114,7 @@ class StructureScan:
     def _window(self, station: int, step: float) -> tuple[Float, Float]:
         """Return azimuths and zeniths of a station's rays."""
         seen = self._views[station]
-        last = np.minimum(seen.low + np.array([seen.columns, seen.lines]) * TILE, [math.pi, LOWEST_ZENITH])
+        last = np.minimum(seen.low + np.array([seen.columns, seen.lines]) * TILE, [math.pi, MAX_ZENITH])
         azimuth = np.arange(seen.low[0] + 0.5 * step, last[0], step)
         return azimuth, np.arange(seen.low[1] + 0.5 * step, last[1], step)
 
@@ -122,7 +122,7 @@ class StructureScan:
         """Place anomalies around visible places, at most one per face except for walls and floors."""
         seen: dict[int, list[Float]] = {}
         for k, station in enumerate(self.stations):
-            direction = _directions(*self._window(k, SCOUT))
+            direction = _directions(*self._window(k, SCOUT_STEP))
             distance, which = cast(self._rows, self._views[k], station, direction)
             owner = np.where(which >= 0, self._owner[which], 0)
             xyz = station + np.where(np.isfinite(distance), distance, 0.0)[:, None] * direction
@@ -130,9 +130,7 @@ class StructureScan:
                 seen.setdefault(face, []).append(self.structure.faces[face - 1].unroll(xyz[owner == face]))
         places = {face: np.vstack(parts) for face, parts in seen.items()}
         faces = [
-            f
-            for f in self.structure.faces
-            if f.row[0] <= TUBE and f.surfaces == 1 and len(places.get(f.id, ())) >= LEAST_PLACES
+            f for f in self.structure.faces if f.row[0] <= TUBE and f.surfaces == 1 and len(places.get(f.id, ())) >= MIN_PLACES
         ]
         out: list[Anomaly] = []
         if not faces:
@@ -215,7 +213,7 @@ class StructureScan:
         found = _Echoes(direction, distance, level, which, cosine, face, shot)
         if self.parameters.beam > 0.0:
             self._mix(k, found, np.flatnonzero(edge))
-        good = np.isfinite(found.range) & (found.range < FURTHEST) & (found.cosine > MOST_SLANT)
+        good = np.isfinite(found.range) & (found.range < MAX_RANGE) & (found.cosine > MIN_COSINE)
         return found.take(good)
 
     def _levels(self, k: int, direction: Float, distance: Float, which: Int32) -> tuple[Float, Float]:
@@ -238,7 +236,7 @@ class StructureScan:
         direction = found.direction[rows]
         distance = found.range[rows]
         reach = np.where(np.isfinite(distance), distance, self.parameters.distance)
-        radius = 0.5 * (EXIT + 1e-3 * self.parameters.beam * reach) / reach
+        radius = 0.5 * (EXIT_DIAMETER + 1e-3 * self.parameters.beam * reach) / reach
         one = np.cross(direction, [0.0, 0.0, 1.0])
         one /= np.linalg.norm(one, axis=1)[:, None]
         two = np.cross(direction, one)
@@ -251,11 +249,11 @@ class StructureScan:
             far = np.where(which >= 0, far, 1.0)
             part = np.where(which >= 0, 10.0 ** (0.1 * (level + range_term(far))), 0.0)
             power, moment, hits = power + part, moment + part * far, hits + (which >= 0)
-        gone = hits < LEAST_SHARE * len(_SAMPLES)
+        gone = hits < MIN_SHARE * len(_SAMPLES)
         mean = np.where(gone, np.inf, moment / np.maximum(power, 1e-300))
         kept = np.where(gone, 1.0, mean)
         away = np.abs(kept - np.where(np.isfinite(distance), distance, 1e9)) * found.cosine[rows]
-        is_mixed = ~np.isfinite(distance) | (away > ASIDE)
+        is_mixed = ~np.isfinite(distance) | (away > MAX_FACE_DISTANCE)
         found.range[rows] = mean
         found.face[rows[is_mixed]] = 0
         found.level[rows] = 10.0 * np.log10(np.maximum(power, 1e-300) / len(_SAMPLES)) - range_term(kept)
@@ -278,7 +276,7 @@ class StructureScan:
             kind = MATERIALS[face.material]
             shift[rows] += kind.mottle * smooth_field(uv[:, 0] / kind.cell, uv[:, 1] / kind.cell, self._salt + face.id)
             for anomaly in on.get(face.id, ()):
-                spot = EXIT + 1e-3 * self.parameters.beam * found.range[rows]
+                spot = EXIT_DIAMETER + 1e-3 * self.parameters.beam * found.range[rows]
                 part, inside = covered(anomaly, uv, spot)
                 touched = np.flatnonzero(part > 0.0)
                 mine = rows[touched]
@@ -323,7 +321,7 @@ def covered(anomaly: Anomaly, uv: Float, spot: Float) -> tuple[Float, Bool]:
         Diameter of the footprints, m.
     """
     share, inside = np.zeros(len(uv)), np.zeros(len(uv), dtype=bool)
-    fade = float(spot.max()) + SOFT if len(spot) else 0.0
+    fade = float(spot.max()) + FADE_WIDTH if len(spot) else 0.0
     low, high = np.reshape(anomaly.outline.bounds, (2, 2)) + np.array([[-fade], [fade]])
     near = np.flatnonzero(((uv >= low) & (uv <= high)).all(axis=1))
     points = shapely.points(uv[near])
@@ -335,7 +333,7 @@ def covered(anomaly: Anomaly, uv: Float, spot: Float) -> tuple[Float, Bool]:
         share[near] = np.clip(overlap / spot[near], 0.0, 1.0)
         return share, inside
     away = shapely.distance(shapely.boundary(anomaly.outline), points) * np.where(inside[near], 1.0, -1.0)
-    edge = spot[near] + (SOFT if anomaly.kind in ("rust", "stain") else 0.0)
+    edge = spot[near] + (FADE_WIDTH if anomaly.kind in ("rust", "stain") else 0.0)
     share[near] = np.clip(0.5 + away / edge, 0.0, 1.0)
     return share, inside
 

@@ -16,11 +16,11 @@ from shapely.geometry import Polygon
 import tunneldb
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.files import made_folder, room_told
+from tunneldb.files import disk_full_as_oserror, made_folder
 from tunneldb.simulate.output import CREATED, SCALE
 from tunneldb.simulate.radiometry import reference_curve
 from tunneldb.simulate.structure.anomalies import Anomaly
-from tunneldb.simulate.structure.generate import FURTHEST, StructureCloud, StructureScan
+from tunneldb.simulate.structure.generate import MAX_RANGE, StructureCloud, StructureScan
 from tunneldb.simulate.structure.shapes import RING, Face
 
 DIMENSIONS = [
@@ -85,7 +85,7 @@ def write_structure(scan: StructureScan, folder: Path, progress: Callable[[int],
         with (
             made_folder(folder),
             TemporaryDirectory(dir=folder, prefix=".simulate-") as scratch,
-            room_told(Path(scratch)),
+            disk_full_as_oserror(Path(scratch)),
         ):
             made = _write(scan, Path(scratch), name, progress)
             return made.moved(folder)
@@ -115,7 +115,7 @@ def _write(scan: StructureScan, folder: Path, name: str, progress: Callable[[int
                 progress(files.points)
     rows = np.column_stack([np.arange(1, len(scan.stations) + 1), scan.stations + origin])
     np.savetxt(files.stations, rows, ["%d"] + ["%.4f"] * 3, delimiter=",", header="scan_id,x,y,z", comments="")
-    curve = reference_curve(FURTHEST, np.random.default_rng(parameters.seed))
+    curve = reference_curve(MAX_RANGE, np.random.default_rng(parameters.seed))
     np.savetxt(files.reference, curve, ["%.2f", "%.3f"], delimiter=",", header="range_m,intensity_db", comments="")
     record = {
         "software": f"tunneldb {tunneldb.__version__}",
