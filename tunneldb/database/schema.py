@@ -1,4 +1,4 @@
-"""Installation and upgrade: migrations of schema `tunnel`, then schema `tunnel_api` from scratch."""
+"""Installation and upgrade: migrations of schema `tunnel`, then schemas `tunnel_api` and `tunnel_internal` from scratch."""
 
 from __future__ import annotations
 
@@ -22,6 +22,11 @@ if TYPE_CHECKING:
 
 HEAD = "0001"
 """Newest migration, stated here so that a command need not import Alembic if the database is up to date."""
+
+API_SCHEMAS = ("tunnel_api", "tunnel_internal")
+"""Schemas of the SQL files, dropped and installed as a whole: functions for users and QGIS, and their helpers."""
+
+_INTERNAL = "Functions and views behind tunnel_api and the program; not to be called by users; created again by tunneldb init"
 
 _LOCK = 7088630451  # arbitrary number; two installations of one database wait for each other
 _LAYERS_LOCK = 7088630452  # the one of tunnel_api.make_layers
@@ -138,7 +143,7 @@ def install_api(connection: psycopg.Connection[Any]) -> None:
     Raises
     ------
     UserError
-        If objects outside of the schema depend on it, which the drop would remove.
+        If objects outside of these schemas depend on them, which the drop would remove.
     """
     connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LAYERS_LOCK])
     _refuse_dependents(connection)
@@ -186,8 +191,11 @@ def api_version() -> str:
 
 
 def installed_api_version(connection: psycopg.Connection[Any]) -> str | None:
-    """Return the comment on the database's schema tunnel_api, None if there is none."""
-    row = connection.execute("SELECT obj_description(to_regnamespace('tunnel_api'), 'pg_namespace')").fetchone()
+    """Return the comment on the database's schema tunnel_api, None if one of API_SCHEMAS is missing."""
+    row = connection.execute(
+        "SELECT obj_description(to_regnamespace('tunnel_api'), 'pg_namespace')"
+        " WHERE to_regnamespace('tunnel_internal') IS NOT NULL"
+    ).fetchone()
     return row[0] if row else None
 
 
@@ -235,7 +243,7 @@ def require_current_schema(connection: psycopg.Connection[Any]) -> None:
     revision = schema_revision(connection)
     if revision == HEAD:
         if installed_api_version(connection) is None:
-            raise UserError("schema tunnel_api is missing; type tunneldb init")
+            raise UserError("schema tunnel_api or tunnel_internal is missing; type tunneldb init")
         return
     if revision is None:
         raise NotReadyError("the database has no schema tunnel yet; type tunneldb init")
@@ -316,7 +324,7 @@ def _refuse_guests(connection: psycopg.Connection[Any]) -> None:
 
 
 def _refuse_dependents(connection: psycopg.Connection[Any]) -> None:
-    """Refuse to drop tunnel_api and its schemas of typed layers while views or columns outside of them depend on them."""
+    """Refuse to drop tunnel_api, tunnel_internal and the schemas of typed layers while others' views or columns use them."""
     rows = connection.execute(
         """
         WITH own AS (
