@@ -1,7 +1,7 @@
 """Steps of the lining, from one ring or stretch of the tunnel to the next.
 
-Between two sections the surface passes evenly from one to the other. Where the radius of the tunnel changes at once, the
-offset image steps instead, and does so all round the section. That is no appendage.
+Between two sections the surface changes smoothly from one to the other. Where the radius of the tunnel changes abruptly, the
+offset image has a step instead, all around the section. Such a step is not a fixture.
 """
 
 from __future__ import annotations
@@ -12,53 +12,52 @@ from tunneldb.arrays import Float, Int32, Int64, Single
 from tunneldb.compiled import point_kernel
 
 LEAST = 0.01
-"""Lower steps do no harm, m: they are a third of the distance from which a pixel is off its plane."""
+"""Minimum step that is removed, m: smaller ones are under a third of the distance from which a pixel is off its plane."""
 
 GREATEST = 0.16
-"""Higher steps are not those of a lining, m."""
+"""Maximum step of a lining, m."""
 
 FADE = 1.0
-"""Length over which what is taken off on either side of a step fades out, m."""
+"""Length over which the correction on either side of a step fades out, m."""
 
 ALL_ROUND = 0.6
-"""Share of the rows that must show the same step, within a third of it or LEAST."""
+"""Minimum share of the rows with the same step, within a third of it or LEAST."""
 
-_HALF = 0.1  # m before and behind a place whose offsets are compared
-_EVERY = 0.08  # from one row that is looked at to the next, m
-_FEWEST = 12  # rows that tell
-_FINE = 2.0**-14  # m: offsets are summed in whole multiples, so that sums don't depend on where they begin
+_HALF = 0.1  # length before and behind a place over which offsets are compared, m
+_EVERY = 0.08  # distance of sampled rows, m
+_FEWEST = 12  # minimum number of rows
+_FINE = 2.0**-14  # m: offsets are summed in whole multiples, so that sums do not depend on where they begin
 _BIN, _BINS = 0.0025, round(GREATEST / 0.0025)
 
 
 def reach(pixel: float) -> int:
-    """How far, in pixels, what is taken off at a column depends on others at most."""
+    """Return the maximum distance, in pixels, of data that the correction at a column depends on."""
     return round(FADE / pixel) + 2 * _half(pixel) + 1
 
 
 def steps(offset: Single, pixel: float, row: int, arc: Float, left: Float, right: Float) -> Single:
-    """What to take off the offset of each column so that no step remains.
+    """Return the correction of the offset of each column that removes all steps.
 
-    The step at a column is the median over the rows of the difference between the mean offsets before and behind it: what
-    hangs on the wall and goes on is the same before and behind, whatever it hides. On either side half the step is taken
-    off, and less and less with the distance.
+    The step at a column is the median over the rows of the difference between the mean offsets before and behind it. A fixture
+    that continues is the same before and behind. On either side half the step is subtracted, decreasing with the distance.
 
     Parameters
     ----------
     offset : (rows, columns) float32 array
-        Offset image, m, NaN where there is no point.
+        Offset image, m, NaN without a point.
     pixel : float
         Side of a pixel, m.
     row : int
-        Number of its first row in an image of which it is a part.
+        Number of its first row in a larger image.
     arc : (rows,) float array
         Arcs of the rows, m.
     left, right : (columns,) float arrays
-        Arcs between which lie the walls, m.
+        Limits of the walls, as arcs, m.
 
     Returns
     -------
     (columns,) float32 array
-        m; the same for a column farther than :func:`reach` from the ends whichever part it is seen in.
+        m; the same for a column farther than :func:`reach` from the ends, in any part.
     """
     half = _half(pixel)
     columns = offset.shape[1]
@@ -86,9 +85,9 @@ def _differences(
     offset: Single, every: int, row: int, half: int, arc: Float, left: Float, right: Float,
     counts: Int32, shown: Int32, total: Int64, held: Int64,
 ) -> None:  # fmt: skip  # pragma: no cover - compiled
-    """Count the rows that show each difference (columns, 2 BINS + 1), and those that show any (columns,).
+    """Count the rows with each difference (columns, 2 BINS + 1), and those with any (columns,).
 
-    ``total`` and ``held`` (columns + 1,) hold sums along a row; the first of each is 0.
+    ``total`` and ``held`` (columns + 1,) are cumulative sums along a row; the first of each is 0.
     """
     rows, columns = offset.shape
     for i in range((-row) % every, rows, every):
@@ -109,7 +108,7 @@ def _differences(
 
 
 def _agreed(counts: Int32, shown: Int32) -> Float:
-    """Median of the differences at each column, m, 0 where it is no step or too few rows show it or share it."""
+    """Return the median difference at each column, m; 0 if it is no step or too few rows have or share it."""
     step = np.zeros(len(shown))
     rows = np.flatnonzero(shown >= _FEWEST)
     counts, shown = counts[rows], shown[rows]
@@ -124,7 +123,7 @@ def _agreed(counts: Int32, shown: Int32) -> Float:
 
 
 def _greatest(step: Float, half: int) -> Float:
-    """Steps that are the greatest within ``half`` columns, of equal ones the first; 0 elsewhere, as next to the ends."""
+    """Return the steps that are the greatest within ``half`` columns, the first of equal ones; 0 elsewhere and at the ends."""
     height, out = np.abs(step), np.zeros_like(step)
     for column in np.flatnonzero(step).tolist():
         if half <= column < len(step) - half:
