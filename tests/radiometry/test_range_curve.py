@@ -7,7 +7,7 @@ from tunneldb.errors import UserError
 from tunneldb.radiometry.cells import IntensitySamples
 from tunneldb.radiometry.dependence import Dependence, class_means
 from tunneldb.radiometry.oren_nayar import incidence_db
-from tunneldb.radiometry.range_curve import USABLE, RangeCurve, estimate_range_curve
+from tunneldb.radiometry.range_curve import MAX_SIGMA_FOR_DETECTION, RangeCurve, estimate_range_curve
 from tunneldb.radiometry.range_spline import RangeSpline, one_maximum
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.simulate import Parameters, simulate
@@ -173,9 +173,9 @@ def test_an_uncertain_curve_is_remarked_and_a_useless_one_refused(uncertain, rem
         assert f"uncertain by {uncertain:.2f} dB at {nodes[20]:.1f} m" in found.remark
     if refused:
         with pytest.raises(UserError, match=r"cannot be separated.*scan a target"):
-            found.require(USABLE)
+            found.require(MAX_SIGMA_FOR_DETECTION)
     else:
-        found.require(USABLE)
+        found.require(MAX_SIGMA_FOR_DETECTION)
 
 
 def test_too_little_lining_is_refused():

@@ -28,7 +28,7 @@ from tunneldb.pointcloud.reader import ScanSource
 from tunneldb.radiometry.correction import Kind, needs_reference
 from tunneldb.radiometry.robust_statistics import DryLevel
 from tunneldb.raster.accumulator import Accumulator, Window
-from tunneldb.raster.floor import HIDDEN, Floor
+from tunneldb.raster.floor import MAX_HIDDEN_LENGTH, Floor
 from tunneldb.raster.geotiff import KINDS
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import halo, halo_of_profiles, lining_image
@@ -330,7 +330,7 @@ def load_floor(conn: psycopg.Connection[Any], survey: Survey, surface: Surface, 
     if done is None:
         raise NotReadyError(f"the ground of kilometre {km} is unknown: tunneldb run {survey.name} --km {km} --from ground")
     # Far enough for both kilometres to see the ground on both sides of a gap at their border.
-    beyond = int(np.ceil(halo)) + HIDDEN
+    beyond = int(np.ceil(halo)) + MAX_HIDDEN_LENGTH
     first, last = int(km * KILOMETRE) - beyond, int((km + 1) * KILOMETRE) + beyond
     level = water_level(conn, survey, km)
     water = None if level is None else surface.waterline(np.arange(first, last + 1, dtype=np.float64), level)

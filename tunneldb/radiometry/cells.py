@@ -20,7 +20,7 @@ RING = 2.0
 STRETCH = 5.0
 """Length of the stretches that may differ in reflectance in any way, m: at most half a block of in-situ lining."""
 
-ENOUGH = 4
+MAX_VIEW_POINTS = 4
 """Maximum number of points that make a view more certain: the rest is the surface's texture."""
 
 
@@ -42,10 +42,10 @@ class Cells:
         Means of the effect of incidence, dB, for each of ROUGHNESS.
     level : (n,) float array
         Mean intensity, dB.
-    aside : (n,) float array
+    side_offset : (n,) float array
         Mean distance of a view's points from the middle of its cell, around the section, m; 0 without an unrolled plane.
     weight : (n,) float array
-        Number of points, at most ENOUGH.
+        Number of points, at most MAX_VIEW_POINTS.
     stretch, ring, alike : (count,) int arrays
         Numbers from 0 of each cell's stretch, of its ring (a stretch without an unrolled plane), and of the strip of its
         stretch, one cell wide, in which cells are compared with each other (likewise).
@@ -57,7 +57,7 @@ class Cells:
     basis: Float
     incidence: Float
     level: Float
-    aside: Float
+    side_offset: Float
     weight: Float
     stretch: Int64
     ring: Int64
@@ -130,7 +130,7 @@ def group(samples: IntensitySamples, spline: RangeSpline, *, unrolled: bool) -> 
         np.column_stack([mean(incidence_db(samples.cosine, roughness)) for roughness in ROUGHNESS]),
         mean(samples.level),
         mean(samples.place[:, 1] - (at[:, 1] + 0.5) * CELL) if unrolled else np.zeros(len(points)),
-        np.minimum(points, ENOUGH).astype(np.float64),
+        np.minimum(points, MAX_VIEW_POINTS).astype(np.float64),
         stretch,
         _number(np.floor(where[:, :1] / RING).astype(np.int64))[0] if unrolled else stretch,
         _number(np.column_stack([stretch, column]))[0] if unrolled else stretch,

@@ -10,18 +10,18 @@ from tunneldb.arrays import Float, Int64, Intp
 from tunneldb.radiometry.roughness import NOTICEABLE
 
 CLASSES = 40
-"""Maximum number of classes over the range of values; each has at least FEWEST points."""
+"""Maximum number of classes over the range of values; each has at least MIN_CLASS_POINTS points."""
 
-FEWEST = 30
+MIN_CLASS_POINTS = 30
 """Minimum number of points of a class."""
 
-ENDS = (0.001, 0.999)
+END_QUANTILES = (0.001, 0.999)
 """Quantiles of the points that limit the classes."""
 
-SMALL = 1.0 / 3.0
+SMALL_SHARE = 1.0 / 3.0
 """Residual dependence, relative to the lining's scatter, below which it is small: it then raises the scatter by 5 %."""
 
-STEEP = 10.0
+SLOPE_ANGLE = 10.0
 """Angle for which slopes over incidence are given, degrees."""
 
 
@@ -67,16 +67,16 @@ def class_means(at: Float, level: Float) -> ClassMeans:
     known = np.isfinite(at) & np.isfinite(level)
     at, level = at[known], level[known]
     none = ClassMeans(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
-    if len(at) < FEWEST:
+    if len(at) < MIN_CLASS_POINTS:
         return none
-    first, last = np.quantile(at, ENDS)
+    first, last = np.quantile(at, END_QUANTILES)
     if last <= first:
         return none
     edges = np.linspace(first, last, CLASSES + 1)
     number = np.searchsorted(edges, at, side="right") - 1
     rows = []
     for k, values in _by_class(number, level):
-        if 0 <= k < CLASSES and len(values) >= FEWEST:
+        if 0 <= k < CLASSES and len(values) >= MIN_CLASS_POINTS:
             rows.append([0.5 * (edges[k] + edges[k + 1]), *np.quantile(values, (0.25, 0.5, 0.75)), len(values)])
     if not rows:
         return none
@@ -128,7 +128,7 @@ class Dependence:
         lines = []
         for name, unit, before, after, by in (
             ("range", "dB/m", self.raw_range, self.range, 1.0),
-            ("incidence", f"dB/{STEEP:g}°", self.raw_incidence, self.incidence, STEEP),
+            ("incidence", f"dB/{SLOPE_ANGLE:g}°", self.raw_incidence, self.incidence, SLOPE_ANGLE),
         ):
             line = [name]
             line += [f"{by * c.slope:+.3f} {unit}" if len(c.at) > 1 else "" for c in (before, after)]
@@ -142,7 +142,7 @@ class Dependence:
             return "Intensity could not be corrected."
         parts = [("range", self.range.spread), ("incidence", self.incidence.spread)]
         left = [f"{name} (medians differ by {spread:.2f} dB)" for name, spread in parts if spread > NOTICEABLE]
-        if left and max(spread for _, spread in parts) < SMALL * self.scatter:
+        if left and max(spread for _, spread in parts) < SMALL_SHARE * self.scatter:
             return (
                 f"Sufficient for detection: corrected intensity still depends on {' and '.join(left)}, but by less than a"
                 f" third of the scatter of the lining, {self.scatter:.2f} dB."

@@ -15,7 +15,7 @@ from tunneldb.arrays import Bool, Float, Intp
 from tunneldb.compiled import point_inner
 from tunneldb.geometry.surface import Surface, Unrolled
 
-BEND = np.cos(np.radians(25.0))
+BEND_COSINE = np.cos(np.radians(25.0))
 """Cosine of the angle between the normals 0.3 m to the left and right from which the surface bends sharply (25°)."""
 
 _ALONG, _ACROSS, _SIDE = 1.0, 0.05, 6
@@ -55,7 +55,7 @@ class Edges:
         sharp = np.zeros(shape[:2], np.bool_)
         with np.errstate(invalid="ignore"):
             turn = np.einsum("kmi,kmi->km", normals[:, : -2 * _SIDE], normals[:, 2 * _SIDE :])
-            sharp[:, _SIDE:-_SIDE] = turn < BEND
+            sharp[:, _SIDE:-_SIDE] = turn < BEND_COSINE
         return cls(start, float(arc[0]), feet.reshape(shape), normals, sharp)
 
     def normals_of(self, points: Float, unrolled: Unrolled) -> Float:

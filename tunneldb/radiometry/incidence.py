@@ -11,7 +11,7 @@ from tunneldb.geometry.normals import principal_planes
 NEIGHBOURS = 20
 """Number of points for a plane, the point itself included."""
 
-FLAT = 0.01
+MAX_SURFACE_VARIATION = 0.01
 """Maximum surface variation (Pauly et al., 2002: least eigenvalue divided by their sum) for a usable normal."""
 
 BLOCK = 100_000
@@ -35,6 +35,6 @@ def incidence_cosine(xyz: Float, scanner: Float) -> Float:
         towards = towards / np.linalg.norm(towards, axis=1, keepdims=True)
         seen = np.abs(np.einsum("ni,ni->n", normals, towards))
         # Collinear points, for example of a single profile, have no normal.
-        flat = (values[:, 0] <= FLAT * values.sum(axis=1)) & (values[:, 1] > 10.0 * values[:, 0])
+        flat = (values[:, 0] <= MAX_SURFACE_VARIATION * values.sum(axis=1)) & (values[:, 1] > 10.0 * values[:, 0])
         cosine[part] = np.where(flat, seen, np.nan)
     return cosine

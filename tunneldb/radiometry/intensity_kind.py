@@ -25,19 +25,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-WIDEST_DB = 60.0
+MAX_SPREAD_DB = 60.0
 """Maximum spread of lining in a tunnel, dB, between the 1st and 99th percentile."""
 
-FARTHEST_DB = 150.0
+MAX_LEVEL_DB = 150.0
 """Absolute level in dB that no scanner reports: 10¹⁵ times the reference."""
 
-SATURATED = 0.01
+MIN_SATURATED_SHARE = 0.01
 """Share of values equal to the maximum from which a scan is reported as saturated …"""
 
-STOP = 3.0
+SATURATION_RATIO = 3.0
 """… if they are also so many times as frequent as the next lower value: coarse steps have many values each."""
 
-LEAST_DOUBTED = 30
+MIN_VALUES = 30
 """Minimum number of values for a remark."""
 
 _BITS = (8, 11, 12, 16)
@@ -52,7 +52,7 @@ class ValueRange:
     ----------
     count, missing : int
         Number of values, and of these the number of NaN or infinite ones.
-    least, low, median, high, most : float
+    minimum, low, median, high, maximum : float
         Minimum, 1st percentile, median, 99th percentile, maximum of the finite values; NaN if there are none.
     whole : bool
         True if all finite values are whole numbers.
@@ -60,11 +60,11 @@ class ValueRange:
 
     count: int
     missing: int
-    least: float
+    minimum: float
     low: float
     median: float
     high: float
-    most: float
+    maximum: float
     whole: bool
 
     @property
@@ -121,8 +121,8 @@ def guess_kind(values: NDArray[Any] | ValueRange, name: str = "") -> list[KindGu
     found = values if isinstance(values, ValueRange) else value_range(values)
     if not np.isfinite(found.median):
         return [KindGuess("none", "no intensity", "no value is a number")]
-    if found.least == found.most:
-        return [KindGuess("none", "no intensity", f"all values are {found.least:g}")]
+    if found.minimum == found.maximum:
+        return [KindGuess("none", "no intensity", f"all values are {found.minimum:g}")]
     guesses = [guess for guess in (_linear(found), *_decibels(found)) if guess is not None]
     # dB usually have fractions; powers are usually whole numbers, or all within 0 … 1.
     if not found.whole and found.high > 1.0:
@@ -149,8 +149,8 @@ def contradiction(kind: str, values: NDArray[Any] | ValueRange) -> str | None:
         return None
     if not np.isfinite(found.median):
         return "no value is a number"
-    if found.least == found.most:
-        return f"all values are {found.least:g}"
+    if found.minimum == found.maximum:
+        return f"all values are {found.minimum:g}"
     reason = _not_linear(found) if kind == "linear" else _not_decibels(found)
     if reason is None:
         return None
@@ -174,11 +174,11 @@ def doubt(kind: str, values: NDArray[Any]) -> str | None:
     """
     finite = np.asarray(values, np.float64)
     finite = finite[np.isfinite(finite)]
-    if kind == "none" or len(finite) < LEAST_DOUBTED:
+    if kind == "none" or len(finite) < MIN_VALUES:
         return None
     said = []
     steps, counts = np.unique(finite, return_counts=True)
-    if len(steps) > 1 and counts[-1] >= SATURATED * len(finite) and counts[-1] > STOP * counts[-2]:
+    if len(steps) > 1 and counts[-1] >= MIN_SATURATED_SHARE * len(finite) and counts[-1] > SATURATION_RATIO * counts[-2]:
         said.append(
             f"{100 * counts[-1] / len(finite):.2g} % of the intensities are the greatest value, {steps[-1]:g}: the scan is"
             " saturated, so that darker areas may not show"
@@ -200,30 +200,32 @@ def doubt(kind: str, values: NDArray[Any]) -> str | None:
 
 def _not_linear(found: ValueRange) -> str | None:
     if found.low < 0.0:
-        return f"values go below zero ({found.least:g}), but linear intensity is never negative"
+        return f"values go below zero ({found.minimum:g}), but linear intensity is never negative"
     return None
 
 
 def _not_decibels(found: ValueRange) -> str | None:
-    if max(abs(found.low), abs(found.high)) > FARTHEST_DB:
+    if max(abs(found.low), abs(found.high)) > MAX_LEVEL_DB:
         return f"values from {found.low:g} to {found.high:g} (1 to 99 %) are too far from zero to be dB"
-    if found.spread > WIDEST_DB:
-        return f"values spread over {found.spread:g} (1 to 99 %); dB of lining in a tunnel spread over at most {WIDEST_DB:g}"
+    if found.spread > MAX_SPREAD_DB:
+        return (
+            f"values spread over {found.spread:g} (1 to 99 %); dB of lining in a tunnel spread over at most {MAX_SPREAD_DB:g}"
+        )
     if found.low >= 0.0 and found.high <= 1.0:
         return f"values from {found.low:.3g} to {found.high:.3g} (1 to 99 %) are fractions of 1, not dB of a lining"
     return None
 
 
 def _linear(found: ValueRange) -> KindGuess | None:
-    limits = f"from {found.least:g} to {found.most:g}"
+    limits = f"from {found.minimum:g} to {found.maximum:g}"
     if _not_linear(found) is None:
         if not found.whole:
             what = "0–1 float: linear" if found.high <= 1.0 else "linear"
             return KindGuess("linear", what, f"fractions {limits}")
-        bits = next((bits for bits in _BITS if found.most < 2**bits), None)
+        bits = next((bits for bits in _BITS if found.maximum < 2**bits), None)
         what = "counts: linear" if bits is None else f"{bits}-bit counts: linear"
         return KindGuess("linear", what, f"whole numbers {limits}")
-    if found.whole and found.spread > WIDEST_DB and _SHIFTED[0] <= found.least and found.most <= _SHIFTED[1]:
+    if found.whole and found.spread > MAX_SPREAD_DB and _SHIFTED[0] <= found.minimum and found.maximum <= _SHIFTED[1]:
         what = "12-bit counts, shifted below zero: linear after adding 2048 to each"
         return KindGuess("linear", what, f"whole numbers {limits}")
     return None

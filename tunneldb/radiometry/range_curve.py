@@ -29,25 +29,25 @@ from tunneldb.radiometry.cells import CELL, Cells, IntensitySamples, group
 from tunneldb.radiometry.range_spline import RangeSpline
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.radiometry.regression import Fit, fit
-from tunneldb.radiometry.roughness import STEEPEST
+from tunneldb.radiometry.roughness import MAX_INCIDENCE
 
-MOST_UNCERTAIN = 0.3
+MAX_SIGMA = 0.3
 """Maximum standard deviation of a curve without a remark, dB: less than one of dry lining (Xu et al., 2018, Table 1)."""
 
-USABLE = 0.75
+MAX_SIGMA_FOR_DETECTION = 0.75
 """Maximum standard deviation of a curve for detecting darkening relative to the surrounding lining, dB: damp lining loses at
 least twice as much (1.5 dB), and only the change of the error within some metres matters."""
 
-FEWEST_CELLS = 200
+MIN_CELLS = 200
 """Minimum number of cells; fewer do not average out the surface's texture."""
 
-LEAST_SPREAD = 1.1
+MIN_RANGE_RATIO = 1.1
 """Minimum ratio of the ranges that enclose nearly all points for a curve to be estimated."""
 
-PRESENT = (0.001, 0.999)
+PRESENT_QUANTILES = (0.001, 0.999)
 """Quantiles of the points' ranges that limit the curve."""
 
-BEYOND = 1.1
+EXTENSION = 1.1
 """Factor by which the curve extends beyond the ranges seen, by its slope over ln R: full density reaches a little farther."""
 
 NODES = 60
@@ -103,9 +103,9 @@ class RangeCurve:
     @property
     def hardly_overlaps(self) -> bool:
         """Return True if several scans saw hardly any cell, so that the curve assumes uniform lining along the tunnel."""
-        return self.overlapping < FEWEST_CELLS
+        return self.overlapping < MIN_CELLS
 
-    def require(self, most: float = MOST_UNCERTAIN) -> None:
+    def require(self, most: float = MAX_SIGMA) -> None:
         """Raise UserError if the curve is more uncertain than ``most``, dB, and so not usable for correction."""
         sigma, at = self.worst
         if not sigma <= most:
@@ -118,7 +118,7 @@ class RangeCurve:
     def remark(self) -> str | None:
         """Return a remark on a curve that is used although it is uncertain."""
         sigma, at = self.worst
-        if sigma <= MOST_UNCERTAIN:
+        if sigma <= MAX_SIGMA:
             return None
         return f"the range curve is uncertain by {sigma:.2f} dB at {at:.1f} m, and so are faint leaks there; {ADVICE}"
 
@@ -144,13 +144,15 @@ def estimate_range_curve(
         :meth:`RangeCurve.require`.
     """
     angle = np.degrees(np.arccos(np.clip(samples.cosine, 0.0, 1.0)))
-    usable = np.isfinite(samples.level) & (angle <= STEEPEST) & (samples.cosine > 0) & (samples.range_m > 0)
+    usable = np.isfinite(samples.level) & (angle <= MAX_INCIDENCE) & (samples.cosine > 0) & (samples.range_m > 0)
     samples = samples.some(usable & np.isfinite(samples.place).all(axis=1))
     count = len(np.unique(np.floor(samples.place / CELL), axis=0))
-    if count < FEWEST_CELLS:
-        raise UserError(f"only {count} cells of {CELL:g} m of lining; a range curve needs at least {FEWEST_CELLS}; {ADVICE}")
-    nearest, low, high, farthest = (float(r) for r in np.quantile(samples.range_m, (PRESENT[0], 0.01, 0.99, PRESENT[1])))
-    if high < LEAST_SPREAD * low:
+    if count < MIN_CELLS:
+        raise UserError(f"only {count} cells of {CELL:g} m of lining; a range curve needs at least {MIN_CELLS}; {ADVICE}")
+    nearest, low, high, farthest = (
+        float(r) for r in np.quantile(samples.range_m, (PRESENT_QUANTILES[0], 0.01, 0.99, PRESENT_QUANTILES[1]))
+    )
+    if high < MIN_RANGE_RATIO * low:
         raise UserError(
             f"range and incidence cannot be separated on this lining: nearly all of it is {low:.2f} to {high:.2f} m from"
             f" the scanner, too small a range of distances; {ADVICE}"
@@ -158,14 +160,14 @@ def estimate_range_curve(
     spline = RangeSpline.over(nearest, farthest)
     cells = group(samples, spline, unrolled=unrolled)
     rows = np.union1d(
-        np.geomspace(min(reach[0], samples.range_m.min()) / BEYOND, max(reach[1], samples.range_m.max()) * BEYOND, NODES),
+        np.geomspace(min(reach[0], samples.range_m.min()) / EXTENSION, max(reach[1], samples.range_m.max()) * EXTENSION, NODES),
         [nearest, farthest],
     )
     curves = []
-    if cells.overlapping >= FEWEST_CELLS:
+    if cells.overlapping >= MIN_CELLS:
         curves.append(_curve(cells, spline, fit(cells, spline, among=False), rows, (nearest, farthest)))
     # Comparisons of views of one cell do not depend on the lining: if they suffice, nothing else is used.
-    if not curves or not curves[0].worst[0] <= MOST_UNCERTAIN:
+    if not curves or not curves[0].worst[0] <= MAX_SIGMA:
         curves.append(_curve(cells, spline, fit(cells, spline, among=True), rows, (nearest, farthest)))
     return min(curves, key=lambda curve: curve.worst[0])
 

@@ -13,7 +13,7 @@ from tunneldb.arrays import Float
 STEP = np.log(1.35)
 """Distance of knots over ln R: a scanner's intensity (Xu et al., 2018, Fig. 3) bends over a factor of 5."""
 
-BEND = 1.0
+BEND_SIGMA = 1.0
 """Prior standard deviation of the second differences of coefficients, dB. The radar equation has none; the curve of Xu et al.
 (2018), Fig. 3, has 0.7 dB."""
 
@@ -54,12 +54,12 @@ class RangeSpline:
         return np.asarray(values)
 
     def bending(self) -> Float:
-        """Return the prior information (len, len) that coefficients are on a line over ln R, with a deviation of BEND."""
+        """Return the prior information (len, len) that coefficients are on a line over ln R, with a deviation of BEND_SIGMA."""
         # Abscissae (Greville) for which coefficients of a straight line are linear; closer at the ends than inside.
         at = np.array([self.knots[i + 1 : i + 1 + _DEGREE].mean() for i in range(len(self))])
         slope = np.diff(np.eye(len(self)), axis=0) / np.diff(at)[:, None]
         second = np.diff(slope, axis=0) * np.diff(at)[0:-1, None]
-        return np.asarray(second.T @ second / BEND**2)
+        return np.asarray(second.T @ second / BEND_SIGMA**2)
 
 
 def one_maximum(matrix: Float, right: Float) -> Float:

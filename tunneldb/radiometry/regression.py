@@ -27,14 +27,14 @@ TUKEY = 4.685
 ROUNDS = 8
 """Number of reweighting rounds."""
 
-NEAR = 6.0
+NEIGHBOUR_DISTANCE = 6.0
 """Distance beyond which cells are not treated as neighbours, m."""
 
-APART = 2.0 * STRETCH
+MAX_LAG = 2.0 * STRETCH
 """Maximum distance along the tunnel of what the whole section has in common, m: as long as blocks of in-situ lining."""
 
 
-NOTHING = 1e6
+NO_INFLUENCE = 1e6
 """Design effect of a comparison that must have no influence."""
 
 
@@ -102,7 +102,7 @@ def fit(cells: Cells, spline: RangeSpline, *, among: bool) -> Fit:
         True to compare also cells with each other, not only the views of each.
     """
     problem = _Problem(cells, spline)
-    weights = _Weights(cells.weight, np.ones(cells.count), 1.0, 1.0, 1.0 if among else NOTHING)
+    weights = _Weights(cells.weight, np.ones(cells.count), 1.0, 1.0, 1.0 if among else NO_INFLUENCE)
     solution = problem.solve(weights)
     for k in range(ROUNDS):
         weights = problem.reweighted(solution, weights)
@@ -157,10 +157,10 @@ class _Problem:
         means = self.cell_means(columns, weights.view)
         between = weights.cell / (weights.lining + weights.noise / np.maximum(total, 1e-9)) / weights.design
         between = np.where(total > 0, between, 0.0)
-        aside = self.cell_means(self.cells.aside, weights.view)
+        side_offset = self.cell_means(self.cells.side_offset, weights.view)
         return (
             columns - means[self.cells.cell],
-            _within(self.cells.alike, means, aside, between),
+            _within(self.cells.alike, means, side_offset, between),
             weights.view / weights.noise,
             between,
         )
@@ -285,8 +285,8 @@ class _Problem:
         return _positive(spread)
 
 
-def _within(number: Int64, values: Float, aside: Float, weight: Float) -> Float:
-    """Return values (n, m) minus a constant and a slope over ``aside`` (n,) of those with the same number.
+def _within(number: Int64, values: Float, side_offset: Float, weight: Float) -> Float:
+    """Return values (n, m) minus a constant and a slope over ``side_offset`` (n,) of those with the same number.
 
     So a reflectance that depends on the place in the section, constant along a strip, leaves no residual, even where the points
     of a strip are unevenly placed in its cells.
@@ -296,9 +296,11 @@ def _within(number: Int64, values: Float, aside: Float, weight: Float) -> Float:
     def centred(of: Float) -> Float:
         return np.asarray(of - (_sums(number, of, weight) / _per(total, of))[number])
 
-    values, aside = centred(values), centred(aside)
-    slope = _sums(number, values * aside[:, None], weight) / np.maximum(_sums(number, aside**2, weight), 1e-12)[:, None]
-    return np.asarray(values - slope[number] * aside[:, None])
+    values, side_offset = centred(values), centred(side_offset)
+    slope = (
+        _sums(number, values * side_offset[:, None], weight) / np.maximum(_sums(number, side_offset**2, weight), 1e-12)[:, None]
+    )
+    return np.asarray(values - slope[number] * side_offset[:, None])
 
 
 def _positive(matrix: Float) -> Float:
@@ -318,12 +320,13 @@ def _covariances(left: Float, there: Float) -> tuple[Float, Float]:
     Returns
     -------
     along : (2m + 1,) float array
-        For cells more than NEAR apart around the section, for each shift of up to m = APART / CELL rows. Relative to the
-        farthest: anything else changes too slowly to matter within a stretch.
+        For cells more than NEIGHBOUR_DISTANCE apart around the section, for each shift of up to m = MAX_LAG / CELL rows.
+        Relative to the farthest: anything else changes too slowly to matter within a stretch.
     near : (2k + 1, 2k + 1) float array
-        Additional covariance of neighbours, by their distance, up to k = NEAR / CELL and only where it is positive.
+        Additional covariance of neighbours, by their distance, up to k = NEIGHBOUR_DISTANCE / CELL and only where it is
+        positive.
     """
-    k, m = int(NEAR / CELL), int(APART / CELL)
+    k, m = int(NEIGHBOUR_DISTANCE / CELL), int(MAX_LAG / CELL)
 
     def shifted(values: Float) -> Float:
         padded = np.pad(values, ((m, m), (k, k)))

@@ -31,19 +31,19 @@ MIN_CLASS_CELLS = 10
 MIN_CELL_POINTS = 2
 """Minimum number of points of a cell."""
 
-STEEPEST = 75.0
+MAX_INCIDENCE = 75.0
 """Maximum incidence of lining used, degrees: beyond it an error of 1° in the normal is 0.3 dB."""
 
-TELLING = 3.0
+SIGNIFICANT_CHANGE = 3.0
 """Change of roughness that must exceed NOTICEABLE for the roughness to be determined, degrees."""
 
 NOTICEABLE = 0.1
 """Smallest change of intensity over the incidence angles that is significant, dB."""
 
-TYPICAL = 9.0
+TYPICAL_ROUGHNESS = 9.0
 """Roughness of a concrete lining (Xu et al., 2018, fig. 5), degrees: used if the lining's own is not determined."""
 
-ROUGHEST = 60.0
+MAX_ROUGHNESS = 60.0
 """Maximum roughness of a lining, degrees: a larger result has another cause than incidence, such as soot or damp."""
 
 
@@ -67,12 +67,13 @@ class Roughness:
     Attributes
     ----------
     sigma : float
-        σ at the objective's minimum, or TYPICAL, degrees.
+        σ at the objective's minimum, or TYPICAL_ROUGHNESS, degrees.
     determined : bool
         False if the regions' incidence angles are too similar to determine σ; correcting with ``sigma`` is then as good as
         with any other near it.
     assumed : bool
-        True if ``sigma`` is TYPICAL, because no roughness explains the regions, or there are none; not determined then.
+        True if ``sigma`` is TYPICAL_ROUGHNESS, because no roughness explains the regions, or there are none; not determined
+        then.
     objective : float
         Value of the objective for it, √dB.
     contrast : float
@@ -132,22 +133,25 @@ def objective(regions: Regions, roughness: float) -> float:
 def find_roughness(regions: Regions) -> Roughness:
     """Find the σ of the least objective (eq. 18): 0° to 90° in steps of 1°, then of 0.02° around the best.
 
-    A result above ROUGHEST is no roughness of a lining; TYPICAL is used instead, and also if there are fewer than two
-    regions.
+    A result above MAX_ROUGHNESS is no roughness of a lining; TYPICAL_ROUGHNESS is used instead, and also if there are fewer
+    than two regions.
     """
     if len(regions) < 2:
-        return Roughness(TYPICAL, False, True, float("nan"), 0.0, len(regions), float("nan"), float("nan"))
+        return Roughness(TYPICAL_ROUGHNESS, False, True, float("nan"), 0.0, len(regions), float("nan"), float("nan"))
     coarse = np.arange(0.0, 91.0)
     best = coarse[np.argmin([objective(regions, s) for s in coarse])]
     fine = np.clip(best + np.arange(-50, 51) * 0.02, 0.0, 90.0)
     values = [objective(regions, s) for s in fine]
     sigma = float(fine[np.argmin(values)])
     least = min(values)
-    if assumed := sigma > ROUGHEST:
-        sigma, least = TYPICAL, objective(regions, TYPICAL)
+    if assumed := sigma > MAX_ROUGHNESS:
+        sigma, least = TYPICAL_ROUGHNESS, objective(regions, TYPICAL_ROUGHNESS)
     flattest, steepest = float(regions.cosine.max()), float(regions.cosine.min())
     ends = np.array([flattest, steepest])
-    course = [float(np.diff(incidence_db(ends, float(np.clip(s, 0, 90))))[0]) for s in (sigma - TELLING, sigma + TELLING)]
+    course = [
+        float(np.diff(incidence_db(ends, float(np.clip(s, 0, 90))))[0])
+        for s in (sigma - SIGNIFICANT_CHANGE, sigma + SIGNIFICANT_CHANGE)
+    ]
     contrast = abs(course[1] - course[0])
     return Roughness(
         sigma=sigma,
@@ -191,7 +195,7 @@ def automatic_regions(
         Empty if there are no usable lining points.
     """
     angle = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
-    usable = np.isfinite(distance_db) & (angle <= STEEPEST) & np.isfinite(chainage) & np.isfinite(arc)
+    usable = np.isfinite(distance_db) & (angle <= MAX_INCIDENCE) & np.isfinite(chainage) & np.isfinite(arc)
     incidence_class = np.floor(angle[usable] / CLASS_WIDTH).astype(np.int64)
     cell = [np.floor(along[usable] / CELL).astype(np.int64) for along in (chainage, arc)]
     keys = np.column_stack([incidence_class, view[usable].astype(np.int64), *cell])

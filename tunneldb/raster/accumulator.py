@@ -34,10 +34,10 @@ OFFSET, LEVEL = 2.0**-11, 2.0**-7
 """Steps of offset (m) and intensity (dB) for summing whole numbers, half a millimetre and less than a stored
 step."""
 
-GREATEST = 2**14 - 1
+MAX_STEPS = 2**14 - 1
 """Maximum number of steps that a point adds per unit of its weight: 8 m, 128 dB."""
 
-FULL = 2**17 - WEIGHT
+MAX_WEIGHT_SUM = 2**17 - WEIGHT
 """Sum of weights from which a pixel accepts no more points, so that no sum exceeds 2³¹. It is 2,047 points seen at right
 angles from nearby, 0.4 mm apart in a pixel of 2 cm. Larger pixels have 64-bit sums and are never full."""
 
@@ -88,7 +88,7 @@ class Accumulator:
         self._shape = (grid.rows, grid.block_columns, CHANNELS)
         small = grid.pixel < 0.0201
         self._type = np.dtype(np.int32 if small else np.int64)
-        self._full = FULL if small else np.iinfo(np.int64).max
+        self._full = MAX_WEIGHT_SUM if small else np.iinfo(np.int64).max
         self._bytes = self._type.itemsize * int(np.prod(self._shape))
         self._room = max(1, memory // self._bytes)
         self._blocks: OrderedDict[int, Whole] = OrderedDict()
@@ -111,7 +111,7 @@ class Accumulator:
         """Add points.
 
         Offset and intensity are rounded to OFFSET and LEVEL and summed as whole numbers. So sums are exact, and independent of
-        the order of the points, as long as no pixel is FULL.
+        the order of the points, as long as no pixel is MAX_WEIGHT_SUM.
 
         Parameters
         ----------
@@ -157,18 +157,18 @@ class Accumulator:
         """Return the means over the columns from ``start`` up to ``stop``, limited to the grid."""
         start, stop = max(start, 0), min(stop, self.grid.columns)
         width = self.grid.block_columns
-        held = set(self.blocks())
+        selected = set(self.blocks())
         weight = np.zeros((self.grid.rows, stop - start), self._type)
         means = np.empty((CHANNELS - 1, *weight.shape), np.float32)
         for block in range(start // width, (stop - 1) // width + 1):
             first, last = max(block * width, start), min((block + 1) * width, stop)
-            if block in held:
+            if block in selected:
                 _means(self._fetch(block), first - block * width, weight, means, first - start, last - start)
             else:
                 means[:, :, first - start : last - start] = np.nan
         return Window(slice(start, stop), weight, *means)
 
-    def held(self, block: int) -> Bool:
+    def has_points(self, block: int) -> Bool:
         """Return True for pixels (rows, columns) of a block that have points."""
         return np.asarray(self._fetch(block)[:, :, 0] > 0, dtype=np.bool_)
 
@@ -248,7 +248,7 @@ def _add(
 
 @point_inner
 def _multiple(value: np.float32) -> np.int32:  # pragma: no cover - compiled
-    most = np.float32(GREATEST)
+    most = np.float32(MAX_STEPS)
     return np.int32(np.rint(most if value > most else (value if value > -most else -most)))
 
 

@@ -184,13 +184,13 @@ def _distance(
         for tile in range(wide):
             left = (across + tile) * step - column
             c0, c1 = left if left > 0 else 0, left + step if left + step < columns else columns
-            held = False
+            selected = False
             for i in range(r0, r1):
                 for j in range(c0, c1):
-                    held |= not np.isnan(offset[i, j])
-                if held:
+                    selected |= not np.isnan(offset[i, j])
+                if selected:
                     break
-            if not held:
+            if not selected:
                 continue
             for k in range(2 * _BINS + 2):
                 counts[0, k] = counts[1, k] = 0

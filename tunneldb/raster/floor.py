@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from tunneldb.arrays import Bool, Float, Int64
 
-HIDDEN = 25
+MAX_HIDDEN_LENGTH = 25
 """Length of hidden ground over which the floor continues, m."""
 
 FLOOR_EDGE = 0.02
@@ -89,10 +89,10 @@ def _steady(arcs: Float) -> Float:
 
 
 def _bridged(arcs: Float) -> Float:
-    """Fill gaps of up to HIDDEN metres between places."""
+    """Fill gaps of up to MAX_HIDDEN_LENGTH metres between places."""
     out = arcs.copy()
     known = np.flatnonzero(np.isfinite(arcs))
     for before, after in pairwise(known.tolist()):
-        if after - before <= HIDDEN:
+        if after - before <= MAX_HIDDEN_LENGTH:
             out[before : after + 1] = np.linspace(arcs[before], arcs[after], after - before + 1)
     return out

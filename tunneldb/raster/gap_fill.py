@@ -13,10 +13,10 @@ from scipy import ndimage
 
 from tunneldb.arrays import Single
 
-FILL = 0.3
+MAX_FILL_DISTANCE = 0.3
 """Maximum distance of the value used to fill a gap, m."""
 
-TOLD = f"gaps up to {2 * FILL:g} m filled"
+FILL_NOTE = f"gaps up to {2 * MAX_FILL_DISTANCE:g} m filled"
 """Note on a filled image."""
 
 

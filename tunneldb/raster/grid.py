@@ -71,8 +71,8 @@ class PixelGrid:
         with np.errstate(invalid="ignore"):
             column = np.floor((chainage - self.west) / self.pixel)
             row = self.rows - 1 - (np.floor(arc / self.pixel) - self.bottom)
-            held = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
-        return np.where(held, row, 0).astype(np.int32), np.where(held, column, -1).astype(np.int32)
+            selected = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
+        return np.where(selected, row, 0).astype(np.int32), np.where(selected, column, -1).astype(np.int32)
 
     def pick(self, mask: Bool, chainage: Float, arc: Float) -> Bool:
         """Return the values of a mask (rows, columns) at places (n,) in the unrolled plane; False outside the grid."""

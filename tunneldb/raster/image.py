@@ -94,11 +94,11 @@ def lining_image(
     state = np.full((grid.rows, grid.columns), PixelState.OFF, np.uint8)
     level = np.full((grid.rows, grid.columns), NODATA, np.int16)
     beyond = 0 if gaps is None else int(gaps.longest.max())
-    judged, about = min(_judged() + beyond, grid.halo), reach(grid.pixel) + beyond
+    verdicts, about = min(_judged() + beyond, grid.halo), reach(grid.pixel) + beyond
     inner = set(image.inner_blocks())
     for block in sorted({*image.blocks(), *_with_surface(grid, outliers.surface)}):
-        first = max(block * grid.block_columns, grid.inner.start - judged)
-        columns = slice(first, min((block + 1) * grid.block_columns, grid.inner.stop + judged))
+        first = max(block * grid.block_columns, grid.inner.start - verdicts)
+        columns = slice(first, min((block + 1) * grid.block_columns, grid.inner.stop + verdicts))
         if columns.start >= columns.stop:
             continue
         window = image.window(columns.start - about, columns.stop + about)

@@ -84,13 +84,13 @@ def pixel_states(window: Window, columns: slice, grid: Grid, floor: Floor, outli
     off, recess = (mask[:, columns.start - first : columns.stop - first] for mask in (off, recess))
     if bent is not None:
         off, recess = off | bent[:, inner], recess & ~bent[:, inner]
-    held = ~np.isnan(window.offset[:, inner])
+    valid = ~np.isnan(window.offset[:, inner])
     rows, low, high = arc[:, None], *outliers.surface.arc_range(chainage[inner])
     with np.errstate(invalid="ignore"):
         # Beyond the ends of the section there is no lining.
-        off |= ~held & ~((low <= rows) & (rows <= high))
-    state = np.where(off, PixelState.OFF, np.where(held, PixelState.LINING, PixelState.EMPTY)).astype(np.uint8)
-    state[recess & held] = PixelState.RECESS
+        off |= ~valid & ~((low <= rows) & (rows <= high))
+    state = np.where(off, PixelState.OFF, np.where(valid, PixelState.LINING, PixelState.EMPTY)).astype(np.uint8)
+    state[recess & valid] = PixelState.RECESS
     state[(rows <= left[inner]) | (rows >= right[inner])] = PixelState.FLOOR
     left, right = floor.waterline(chainage[inner])
     state[(rows <= left) | (rows >= right)] = PixelState.SUBMERGED

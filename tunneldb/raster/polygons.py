@@ -15,7 +15,7 @@ from tunneldb.raster.grid import PixelGrid
 SIMPLIFY = 0.75
 """Tolerance of the simplification, pixels: enough to straighten the stairs of an oblique edge."""
 
-LEAST_HOLE = 0.01
+MIN_HOLE_AREA = 0.01
 """Minimum area of holes that are kept, m²: noise makes smaller ones in weak leaks."""
 
 
@@ -38,7 +38,7 @@ def outline(mask: Bool, column: int, row: int, pixel: float) -> Polygon:
     """
     image = np.ascontiguousarray(mask[::-1], dtype=np.uint8)
     ((shape, _),) = rasterio.features.shapes(image, mask=image.astype(bool), connectivity=4)
-    pixels = _straighten(_without_specks(shapely.geometry.shape(shape), LEAST_HOLE / pixel**2))
+    pixels = _straighten(_without_specks(shapely.geometry.shape(shape), MIN_HOLE_AREA / pixel**2))
     # Whole pixels until the end: the outline of a region must not depend on its kilometre.
     corner, down = np.array([column, row + len(mask)]), np.array([1, -1])
     moved = shapely.transform(pixels, lambda at: (corner + np.round(at) * down) * pixel)

@@ -15,27 +15,27 @@ from tunneldb.arrays import Bool, Float, Int16, Int64, Intp
 from tunneldb.raster.accumulator import Accumulator, Window
 from tunneldb.raster.geotiff import NODATA
 
-LEAST = 0.08
+MIN_GAP = 0.08
 """Minimum gap between profiles that is closed, m: the width of a joint, the narrowest shape used (`anomalies.joints`)."""
 
-GREATEST = 1.25
+MAX_GAP = 1.25
 """Maximum gap between profiles, m: larger ones separate scans, not profiles of one pass."""
 
-ANISOTROPY = 3
+MIN_ANISOTROPY = 3
 """Minimum ratio of the profile spacing to the point spacing in a profile. Far from a static scanner, where the beam is oblique,
 points may be apart in both directions."""
 
-CLOSE = 3
+MAX_ROW_DISTANCE = 3
 """Distance, in rows of pixels, within which half of the points of a profile have another one."""
 
-ALONE = 0.15
+MAX_NEIGHBOUR_SHARE = 0.15
 """Maximum share of the pixels of profiles with another one two or three columns away; random points at that distance have
 more."""
 
-JOINED = 1.5
+MAX_CLOSED_SPACINGS = 1.5
 """Maximum length of a closed gap, in spacings: a gap with a missing profile is not closed."""
 
-EVERY = 8
+SAMPLE_INTERVAL = 8
 """Interval of the rows and columns of an image used for the spacing."""
 
 ROWS = 64
@@ -63,7 +63,7 @@ class ProfileGaps:
     @classmethod
     def of(cls, spacing: Float, pixel: float) -> ProfileGaps:
         """Make gaps from the distance of the profiles, m, at each column (columns,)."""
-        return cls(float(np.median(spacing)), _columns(JOINED * spacing, pixel), _columns(0.5 * spacing, pixel))
+        return cls(float(np.median(spacing)), _columns(MAX_CLOSED_SPACINGS * spacing, pixel), _columns(0.5 * spacing, pixel))
 
     def nearest(self, held: Bool, first: int = 0) -> Intp:
         """Return the column from which each pixel takes its value.
@@ -111,7 +111,7 @@ class ProfileGaps:
 
 def farthest(pixel: float) -> int:
     """Return the maximum number of columns of a closed gap."""
-    return int(_columns(np.array([JOINED * GREATEST]), pixel)[0])
+    return int(_columns(np.array([MAX_CLOSED_SPACINGS * MAX_GAP]), pixel)[0])
 
 
 def find_gaps(image: Accumulator, wanted: float) -> ProfileGaps | None:
@@ -133,13 +133,13 @@ def find_gaps(image: Accumulator, wanted: float) -> ProfileGaps | None:
     if wanted:
         return ProfileGaps.of(np.full(grid.columns, wanted), grid.pixel) if wanted > grid.pixel else None
     blocks = np.array(image.inner_blocks())
-    spacing = np.array([profile_spacing(image.held(block), grid.pixel) for block in blocks.tolist()])
-    told = spacing > 0.0
-    if 2 * np.count_nonzero(told) <= len(blocks):
+    spacing = np.array([profile_spacing(image.has_points(block), grid.pixel) for block in blocks.tolist()])
+    determined = spacing > 0.0
+    if 2 * np.count_nonzero(determined) <= len(blocks):
         return None
     # A block without a result, and the parts beyond the ends, take that of the nearest block with one.
-    nearest = np.abs(np.arange(grid.blocks)[:, None] - blocks[told]).argmin(axis=1)
-    return ProfileGaps.of(np.repeat(spacing[told][nearest], width), grid.pixel)
+    nearest = np.abs(np.arange(grid.blocks)[:, None] - blocks[determined]).argmin(axis=1)
+    return ProfileGaps.of(np.repeat(spacing[determined][nearest], width), grid.pixel)
 
 
 def profile_spacing(held: Bool, pixel: float) -> float:
@@ -158,24 +158,24 @@ def profile_spacing(held: Bool, pixel: float) -> float:
     if not across:
         return 0.0
     # In so many rows together each profile has a point.
-    here = np.arange(0, len(held) - CLOSE, EVERY)
+    here = np.arange(0, len(held) - MAX_ROW_DISTANCE, SAMPLE_INTERVAL)
     some = np.logical_or.reduce([held[here + rows] for rows in range(across)])
-    apart = _distances(some, round(GREATEST / pixel) + 2)
+    apart = _distances(some, round(MAX_GAP / pixel) + 2)
     if not apart.any():
         return 0.0
     spacing = _median(apart * np.arange(len(apart)))
-    profiles = spacing >= ANISOTROPY * across and _beside(some) <= ALONE
-    return spacing * pixel if profiles and LEAST - 1e-9 <= spacing * pixel <= GREATEST + 1e-9 else 0.0
+    profiles = spacing >= MIN_ANISOTROPY * across and _beside(some) <= MAX_NEIGHBOUR_SHARE
+    return spacing * pixel if profiles and MIN_GAP - 1e-9 <= spacing * pixel <= MAX_GAP + 1e-9 else 0.0
 
 
 def _rows_between(held: Bool) -> int:
-    """Return the median distance, in rows, to the next pixel with points in the same or next column; 0 if above CLOSE."""
+    """Return the median distance, in rows, to the next pixel in the same or next column; 0 if above MAX_ROW_DISTANCE."""
     near = held.copy()
     near[:, 1:] |= held[:, :-1]
     near[:, :-1] |= held[:, 1:]
-    here = np.arange(0, len(held) - CLOSE, EVERY)
+    here = np.arange(0, len(held) - MAX_ROW_DISTANCE, SAMPLE_INTERVAL)
     followed = np.zeros((len(here), held.shape[1]), np.bool_)
-    for rows in range(1, CLOSE + 1):
+    for rows in range(1, MAX_ROW_DISTANCE + 1):
         followed |= near[here + rows]
         if 2 * np.count_nonzero(held[here] & followed) >= np.count_nonzero(held[here]) > 0:
             return rows

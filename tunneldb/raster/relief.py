@@ -11,13 +11,13 @@ from tunneldb.robust import MAD_TO_SIGMA
 STEP = 0.25
 """Side of the tiles over which deviations are summed, m."""
 
-AROUND = 2.0
+WINDOW = 2.0
 """Distance around a tile that contributes to its relief, m: fixtures cover less than half of it."""
 
-LIMIT = 3.0
+LIMIT_SIGMAS = 3.0
 """Standard deviations within which lining deviates from its planes."""
 
-MOST = 0.25
+MAX_RELIEF = 0.25
 """Maximum deviation of lining, m: blasted rock deviates by as much; beyond it a pixel is a fixture."""
 
 SAMPLES = 5
@@ -31,7 +31,7 @@ def reach(pixel: float) -> int:
 
 
 def relief_limit(distance: Single, pixel: float, corner: tuple[int, int], least: float = 0.0) -> Single:
-    """Return the limit of the lining's deviation from its planes around each pixel: LIMIT standard deviations, m, at most MOST.
+    """Return the limit of the lining's deviation from its planes around each pixel, LIMIT_SIGMAS deviations, m.
 
     It is the median deviation over the tiles around each one, scaled as for a normal distribution: less than half of the tiles
     may show something else.
@@ -62,8 +62,8 @@ def relief_limit(distance: Single, pixel: float, corner: tuple[int, int], least:
     ordered = np.sort(samples, axis=2)  # NaNs come last
     count = np.count_nonzero(~np.isnan(ordered), axis=2)
     median = np.take_along_axis(ordered, np.maximum(count - 1, 0)[:, :, None] // 2, axis=2)[:, :, 0]
-    about = _median_about(np.where(count > 0, median, np.nan), half, least / (LIMIT * MAD_TO_SIGMA))
-    limit = np.minimum(LIMIT * MAD_TO_SIGMA * about, MOST).astype(np.float32)
+    about = _median_about(np.where(count > 0, median, np.nan), half, least / (LIMIT_SIGMAS * MAD_TO_SIGMA))
+    limit = np.minimum(LIMIT_SIGMAS * MAD_TO_SIGMA * about, MAX_RELIEF).astype(np.float32)
     whole = np.repeat(np.repeat(limit, tile, axis=0), tile, axis=1)
     return np.asarray(whole[top : top + rows, left : left + columns])
 
@@ -86,4 +86,4 @@ def _median_about(values: Single, half: int, least: float) -> Single:
 
 def _sides(pixel: float) -> tuple[int, int]:
     """Return the side of a tile, pixels, and the number of tiles to either side."""
-    return max(1, round(STEP / pixel)), max(1, round(AROUND / STEP))
+    return max(1, round(STEP / pixel)), max(1, round(WINDOW / STEP))
