@@ -16,6 +16,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find tunneldb sql migrations -type f -not -name '*.py[co]' -not -name '*.nb[ic]') pyproject.toml README.md LICENSE
 
+# Else the tests are compiled anew in each run.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Tests that may take hours.
 ENDLESS := --timeout 0 -o faulthandler_timeout=0
 

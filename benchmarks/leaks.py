@@ -30,7 +30,7 @@ from benchmarks.leak_set import SET, Case, Truth, prepare
 from benchmarks.scene import Scene
 from benchmarks.wide_set import WIDE_SET
 from tunneldb.database import connect
-from tunneldb.evaluate.measure import HALF, Comparison, compare, figures
+from tunneldb.evaluate.measure import MIN_OVERLAP, Comparison, compare, figures
 from tunneldb.evaluate.survey import read_findings
 from tunneldb.store.survey import get_survey
 
@@ -150,7 +150,7 @@ def values(outcomes: list[Outcome]) -> dict[str, Any]:
     return {
         **asdict(figures(comparison, sum(outcome.seen for outcome in outcomes))),
         "strong": int((sigmas >= STRONG).sum()),
-        "strong_found": int(((sigmas >= STRONG) & (comparison.covered >= HALF)).sum()),
+        "strong_found": int(((sigmas >= STRONG) & (comparison.covered >= MIN_OVERLAP)).sum()),
         "joints": kinds.count("joint"),
         "dark": kinds.count("dark"),
     }
@@ -176,14 +176,14 @@ def lines(outcome: Outcome) -> list[list[str]]:
     """Missed leaks with what was found there, and wrong ones with what is there in truth."""
     c = outcome.comparison()
     out = []
-    for i in np.flatnonzero(c.covered < HALF):
+    for i in np.flatnonzero(c.covered < MIN_OVERLAP):
         drop, sigmas = outcome.truth.drops[c.true[i]], outcome.sigmas()[c.true[i]]
         there = [str(anomaly) for anomaly in outcome.anomalies if anomaly.shape.intersects(c.true_shape[i])]
         out.append(
             ["missed", outcome.name, *_where(c.true_shape[i]), f"{drop:.1f}", f"{sigmas:.1f}", f"{100 * c.covered[i]:.0f} %",
              "; ".join(there) or "nothing"]
         )  # fmt: skip
-    for i in np.flatnonzero(c.right < HALF):
+    for i in np.flatnonzero(c.right < MIN_OVERLAP):
         anomaly = outcome.leaks[c.found[i]]
         word = "wrong" if c.found_group[i] >= 0 else "false"
         contrast = "" if anomaly.contrast is None else f"{anomaly.contrast:.1f}"

@@ -26,7 +26,7 @@ from benchmarks.leak_set import COMMON, KILOMETRE, MARKED
 from benchmarks.leaks import LIST_HEADER, Outcome, lines
 from benchmarks.scene import Scene
 from tunneldb.database import connect
-from tunneldb.evaluate.measure import HALF, figures
+from tunneldb.evaluate.measure import MIN_OVERLAP, figures
 
 SPACINGS = (0.02, 0.1, 0.25, 0.5, 1.0)
 TUNNELS: dict[str, dict[str, Any]] = {
@@ -87,7 +87,7 @@ class Figures:
             for shape, covered in zip(c.true_shape, c.covered, strict=True):
                 if shape.bounds[2] - shape.bounds[0] > 2.0 * spacing:
                     long += 1
-                    hit += covered >= HALF
+                    hit += covered >= MIN_OVERLAP
                     once += int(shapely.intersects(c.found_shape, shape).sum()) == 1
         return cls(
             sum(f.true for f in single), sum(f.found for f in single), sum(f.called for f in single),

@@ -25,7 +25,7 @@ from scipy.spatial.distance import pdist
 from benchmarks.common import print_table, progress, save
 from tunneldb.classification.objects.dbscan import dbscan
 from tunneldb.classification.targets.curvature import CurvedCells
-from tunneldb.classification.targets.detection import LEAST_POINTS, Sphere, confirmed, find_spheres, join
+from tunneldb.classification.targets.detection import MIN_POINTS, Sphere, confirmed, find_spheres, join
 from tunneldb.classification.targets.fit import coverage, distance_error, fit_ratio
 from tunneldb.simulate import Parameters, Simulation
 
@@ -147,7 +147,7 @@ def paper_way(points: Float) -> list[tuple[Float, float, float]]:
     found = []
     for label in range(labels.max(initial=-1) + 1):
         cluster = points[labels == label]
-        if len(cluster) < LEAST_POINTS or np.ptp(cluster, axis=0).max() > 2 * RADIUS + TOLERANCE:
+        if len(cluster) < MIN_POINTS or np.ptp(cluster, axis=0).max() > 2 * RADIUS + TOLERANCE:
             continue
         try:
             width = pdist(cluster[ConvexHull(cluster - cluster[0]).vertices]).max()
@@ -170,7 +170,7 @@ def run(number: int, ours: Tally, free: Tally, paper: Tally) -> int:
     eyes = eyes_of(simulation, np.concatenate([cloud.time for cloud in clouds]), scan)
     truth = np.array([sphere.centre for sphere in simulation.spheres])
     begun = time.perf_counter()
-    curved = CurvedCells(RADIUS, LEAST_POINTS)
+    curved = CurvedCells(RADIUS, MIN_POINTS)
     curved.add(xyz)
     curved.close()
     kept = curved.holds(xyz)

@@ -1,4 +1,4 @@
-"""Types of arrays, by what their elements are."""
+"""Array types, by element type."""
 
 from __future__ import annotations
 
@@ -20,5 +20,5 @@ Whole = Int32 | Int64
 
 
 def known(value: float) -> float | None:
-    """Return a number as Python's own, None where it is not finite: NaN in an array is NULL in the database."""
+    """Return a number as a Python float, or None if it is not finite (NaN in an array is NULL in the database)."""
     return float(value) if np.isfinite(value) else None

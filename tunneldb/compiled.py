@@ -1,7 +1,7 @@
-"""How loops over points and pixels are compiled: the kinds of function that there are.
+"""Decorators for compiled loops over points and pixels.
 
-A kernel is called from Python, on arrays of one type each, so that it is compiled once. It lets other threads run meanwhile
-(`tunneldb.threads.in_blocks` gives each of them a block of the points). What a kernel calls, for each point, is inner.
+Python calls a kernel with arrays of one type each, so that it is compiled once. A kernel releases the interpreter lock
+(`tunneldb.threads.in_blocks` gives each thread a block of points). A kernel calls inner functions, once for each point.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ kernel = njit(cache=True, nogil=True)
 """Decorator of a compiled function that Python calls."""
 
 inner = njit(cache=True, nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-"""Decorator of a compiled function that only compiled functions call: it takes less to compile."""
+"""Decorator of a compiled function that only compiled functions call; it compiles faster."""
 
 point_kernel = njit(cache=True, nogil=True, error_model="numpy")
-"""A kernel that divides for each point or pixel: division by zero is infinite or NaN, so no test for it is in the loop."""
+"""Decorator of a kernel that divides for each point or pixel; x / 0 is infinite or NaN, so the loop needs no test for it."""
 
 point_inner = njit(
     cache=True, nogil=True, error_model="numpy", forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True
 )
-"""What such a kernel calls for each point, put into it whole: several numbers returned cost nothing then."""
+"""Decorator of a function that a point kernel calls for each point; it is always inlined, so tuples are returned at no cost."""
 
 inner_sums = njit(
     cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "nnan"}, no_cpython_wrapper=True, no_cfunc_wrapper=True
 )
-"""What adds up many numbers in any order, several at once."""
+"""Decorator of a function that adds up many numbers in any order (vectorised)."""
 
 
 @inner
 def lower_bound(values: Int64, wanted: int, begin: int, end: int) -> int:  # pragma: no cover - compiled
-    """Place of the first of growing values that is not below the one wanted, looked for from begin on; end if none is."""
+    """Return the index of the first of ascending values not less than ``wanted``, from ``begin`` on; ``end`` if none."""
     while begin < end:
         middle = (begin + end) >> 1
         if values[middle] < wanted:

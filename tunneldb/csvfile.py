@@ -1,7 +1,7 @@
-"""The CSV files of the interface: reading small ones, such as axis, stations, control points, and writing lists.
+"""CSV files: read small ones (axis, stations, control points) and write lists.
 
-In those that are read, columns are separated by commas, or, as programs of the user write them, by semicolons, tabs or spaces:
-whichever the header shows. Where commas do not separate, they may stand for the decimal point.
+Columns of a file that is read are separated by commas, semicolons, tabs or spaces, as its header shows. Where the separator
+is not a comma, a comma may be the decimal point.
 """
 
 from __future__ import annotations
@@ -24,29 +24,29 @@ from tunneldb.errors import InputError
 if TYPE_CHECKING:
     import _csv
 
-LARGEST = 1e12
-"""Greatest size of a number that something was measured to be: seconds since 1970 are less, and so is any coordinate."""
+MAX_MEASUREMENT = 1e12
+"""Greatest measured value that is accepted; seconds since 1970 and coordinates are smaller."""
 
 _SEPARATORS = (";", "\t", ",", " ")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d*(?:[eE][+-]?\d+)?")
-_FORMULA = re.compile(r"'*(?:[=@\t\r]|[+-](?![\d.+-]*$))")  # guarded ones, too: what is taken away was then put there
+_FORMULA = re.compile(r"'*(?:[=@\t\r]|[+-](?![\d.+-]*$))")  # also with apostrophes, so that guarding can be undone
 _GUARD = "'"
 
 
 @dataclass(frozen=True)
 class CsvTable:
-    """Numbers of a CSV file.
+    """Numeric columns of a CSV file.
 
     Attributes
     ----------
     path
-        The file.
+        File that was read.
     names
-        Columns, in the order asked for.
+        Names of the columns, in the order requested.
     values
         (rows, columns), float64, all finite.
     lines
-        (rows,), line in the file of each row, from 1.
+        (rows,), line number of each row in the file, from 1.
     """
 
     path: Path
@@ -67,7 +67,7 @@ class CsvTable:
         return np.ascontiguousarray(self.values[:, [self.names.index(name) for name in names]])
 
     def error(self, row: int, text: str) -> InputError:
-        """Return an error about a row, naming file and line."""
+        """Return an error about a row, with file and line."""
         return InputError(f"{self.path}, line {self.lines[row]}: {text}")
 
     def require_growing(self, name: str) -> None:
@@ -77,14 +77,14 @@ class CsvTable:
         if len(wrong):
             row = int(wrong[0]) + 1
             how = "repeats" if column[row] == column[row - 1] else "is less than"
-            raise self.error(row, f"{name} {column[row]:.15g} {how} that of the row before; sort by {name}, each once")
+            raise self.error(row, f"{name} {column[row]:.15g} {how} that of the row before; sort by {name}, without repeats")
 
 
 def write_csv(names: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
-    """Return rows as CSV under a header; what is None is empty.
+    """Return rows as CSV with a header; None becomes an empty cell.
 
-    Text that a spreadsheet would take for a formula gets an apostrophe before it, by which spreadsheets know text; `read_texts`
-    takes it away again.
+    Text that a spreadsheet would evaluate as a formula gets a leading apostrophe, which marks it as text; `read_texts` removes
+    it again.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -98,32 +98,32 @@ def _guarded(value: object) -> object:
 
 
 def _bare(text: str) -> str:
-    """A cell as it was before `write_csv` guarded it."""
+    """Return a cell without the apostrophe that `write_csv` added."""
     return text[1:] if text.startswith(_GUARD) and _FORMULA.match(text[1:]) else text
 
 
 def read_header(path: Path) -> list[str]:
-    """Names of the columns of a CSV file with any separator, as they stand in its first line.
+    """Return the column names of a CSV file with any separator, as written in its first line.
 
     Raises
     ------
     InputError
-        When the file cannot be read or is empty.
+        If the file cannot be read or is empty.
     """
     with _opened(path) as file:
         header = next(_rows(file)[0], None)
     if header is None:
-        raise InputError(f"{path} is empty; it needs a header that names its columns, such as x,y,z")
+        raise InputError(f"{path} is empty; write a header with its column names, for example x,y,z")
     return [cell.strip() for cell in header]
 
 
 def read_texts(path: Path, name: str) -> list[str]:
-    """Read a column of a CSV file as it stands, stripped; the rows are those of `read_csv`.
+    """Read a column of a CSV file as text, stripped; the rows are those of `read_csv`.
 
     Raises
     ------
     InputError
-        When the file cannot be read or has no such column, or a row is longer or shorter than the header; names file and line.
+        If the file cannot be read, has no such column, or a row is longer or shorter than the header; names file and line.
     """
     with _opened(path) as file:
         rows, _ = _rows(file)
@@ -142,21 +142,21 @@ def read_texts(path: Path, name: str) -> list[str]:
 def read_csv(
     path: Path, names: Sequence[str], default: Mapping[str, float] | None = None, hint: Mapping[str, str] | None = None
 ) -> CsvTable:
-    """Read numeric columns of a CSV file with a header; other columns are left out.
+    """Read numeric columns of a CSV file with a header; other columns are ignored.
 
     Parameters
     ----------
     path, names
-        The file, and the columns.
+        File and columns.
     default
-        Columns that may be missing, with the value that all rows have then.
+        Columns that may be missing, with the value for all rows.
     hint
-        What is said of columns that are missing, where their names do not say it.
+        Text for the message about a missing column, where its name does not explain it.
 
     Raises
     ------
     InputError
-        When the file cannot be read, a column is missing, or a value is not a finite number; names file, line and
+        If the file cannot be read, a column is missing, or a value is not a finite number; names file, line and
         value.
     """
     with _opened(path) as file:
@@ -167,7 +167,7 @@ def read_csv(
 
 @contextmanager
 def _opened(path: Path) -> Iterator[TextIO]:
-    """A text file, with one line for whatever is wrong with it as such."""
+    """Open a text file; raise an error of one line if it cannot be read as text."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             yield file
@@ -180,12 +180,12 @@ def _opened(path: Path) -> Iterator[TextIO]:
 
 
 def _rows(file: Iterable[str]) -> tuple[_csv.Reader, bool]:
-    """Rows of a CSV file, and whether commas may stand for the decimal point in them."""
+    """Return the rows of a CSV file, and whether a comma may be the decimal point."""
     lines = iter(file)
     header = next(lines, "")
     separator = next((one for one in _SEPARATORS if one in header.strip()), ",")
     whole: Iterable[str] = chain([header] if header else [], lines)
-    if separator == " ":  # columns may be lined up by several
+    if separator == " ":  # several spaces may align columns
         whole = (" ".join(line.split()) for line in whole)
     return csv.reader(whole, delimiter=separator), separator != ","
 
@@ -200,7 +200,7 @@ def _read_rows(
 ) -> tuple[list[list[float]], list[int]]:
     header = next(reader, None)
     if header is None:
-        raise InputError(f"{path} is empty; it needs the header {','.join(names)}")
+        raise InputError(f"{path} is empty; write the header {','.join(names)}")
     indices = _indices(path, [cell.strip() for cell in header], names, default, hint)
     rows: list[list[float]] = []
     lines: list[int] = []
@@ -216,8 +216,8 @@ def _read_rows(
 
 
 def _uneven(path: Path, line: int, row: Sequence[str], header: Sequence[str]) -> InputError:
-    """An error about a row that has other columns than the header."""
-    return InputError(f"{path}, line {line}: {len(row)} values under a header of {len(header)} columns")
+    """Return an error about a row whose number of columns differs from the header's."""
+    return InputError(f"{path}, line {line}: {len(row)} values, but the header has {len(header)} columns")
 
 
 def _indices(
@@ -227,7 +227,7 @@ def _indices(
     if missing:
         said = ["separate columns by commas, semicolons, tabs or spaces"] if len(header) == 1 else []
         said += [hint[name] for name in missing if name in hint]
-        raise InputError("; ".join([f"{path} has no column {', '.join(missing)}: its header is {','.join(header)!r}", *said]))
+        raise InputError("; ".join([f"{path} has no column {', '.join(missing)}: the header is {','.join(header)!r}", *said]))
     repeated = [name for name in names if header.count(name) > 1]
     if repeated:
         raise InputError(f"{path} has the column {repeated[0]} twice")
@@ -240,6 +240,6 @@ def _number(path: Path, line: int, name: str, text: str, decimal_comma: bool) ->
         value = float(text.replace(",", ".") if comma else text)
     except ValueError:
         raise InputError(f"{path}, line {line}: {name} is {text.strip()!r}, not a number") from None
-    if not abs(value) <= LARGEST:  # NaN is not, either
-        raise InputError(f"{path}, line {line}: {name} is {text.strip()}, which is no measurement; remove the line")
+    if not abs(value) <= MAX_MEASUREMENT:  # also true for NaN
+        raise InputError(f"{path}, line {line}: {name} is {text.strip()}, not a plausible measurement; remove the line")
     return value

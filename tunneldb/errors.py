@@ -7,10 +7,10 @@ from collections.abc import Iterable
 
 
 class UserError(Exception):
-    """Error that the user can fix.
+    """Invalid input or missing prerequisite that the user can fix.
 
-    The message is one line: what is wrong, where (file, line, value) and what to do. The command line prints it without a
-    traceback and exits with code 2; any other exception is a bug and keeps its traceback.
+    The message is one line: what is wrong, where (file, line, value) and what to do. The command line prints it without
+    a traceback and exits with code 2; every other exception is a bug and keeps its traceback.
     """
 
 
@@ -27,6 +27,6 @@ class BusyError(UserError):
 
 
 def did_you_mean(word: str, words: Iterable[str]) -> str:
-    """Ask for the one of some words that another is closest to, as `` Did you mean 'leaks'?``; empty where none is close."""
+    """Return a question with the closest word, as `` Did you mean 'leaks'?``; empty if no word is close."""
     close = difflib.get_close_matches(word, list(words), n=1)
     return f" Did you mean {close[0]!r}?" if close else ""

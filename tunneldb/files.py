@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, and what they are called together."""
+"""Files written completely or not at all, and common names of several files."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ _PLAIN = re.compile(r"[^A-Za-z0-9_]+")
 
 
 def require_regular(path: Path) -> None:
-    """Refuse a path at which there is something other than a file or a folder: a device, a pipe, a socket.
+    """Refuse a path at which there is a device, a pipe or a socket instead of a file or a folder.
 
     Raises
     ------
     UserError
-        Which says what it is.
+        Names the path and its type.
     """
     try:
         there = path.exists()
-    except OSError as error:  # its name is too long, its folder closed
+    except OSError as error:  # name too long, or no access to the folder
         raise UserError(f"{path.name[:40]}{'…' if len(path.name) > 40 else ''}: {error.strerror}") from None
     if there and not path.is_file() and not path.is_dir():
         kinds = {"a pipe": path.is_fifo(), "a socket": path.is_socket()}
@@ -37,18 +37,21 @@ def require_regular(path: Path) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary path beside ``path`` to write to; it takes the place of ``path`` when the block succeeds.
+    """Yield a temporary path beside ``path`` to write to; it replaces ``path`` when the block succeeds.
 
     The temporary path has the suffix of ``path`` and doesn't exist yet.
 
     Raises
     ------
     UserError
-        If the folder doesn't exist or can't be written to, the disk is full, or there is something that is no file.
+        If the folder doesn't exist or can't be written to, the disk is full, or ``path`` is not a regular file.
     """
     require_regular(path)
     try:
-        with tempfile.TemporaryDirectory(prefix=f".{path.stem[:60]}-", dir=path.parent) as folder, room_told(Path(folder)):
+        with (
+            tempfile.TemporaryDirectory(prefix=f".{path.stem[:60]}-", dir=path.parent) as folder,
+            disk_full_as_oserror(Path(folder)),
+        ):
             temporary = Path(folder) / path.name
             yield temporary
             os.replace(temporary, path)  # noqa: PTH105 - the point is that it is atomic
@@ -57,10 +60,10 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def room_told(folder: Path) -> Iterator[None]:
-    """Raise the system's own error where a library that writes into a folder fails because its disk is full.
+def disk_full_as_oserror(folder: Path) -> Iterator[None]:
+    """Raise the system's own error if a library fails to write into a folder because the disk is full.
 
-    GDAL and SQLite have words of their own for it, and it depends on the format and the moment which.
+    GDAL and SQLite report a full disk with messages of their own, which depend on format and moment.
 
     Raises
     ------
@@ -70,7 +73,7 @@ def room_told(folder: Path) -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        nameless = isinstance(error, OSError) and error.errno is None  # as NumPy's, of bytes that were not written
+        nameless = isinstance(error, OSError) and error.errno is None  # for example NumPy's, about bytes that were not written
         if nameless or type(error).__module__.split(".", 1)[0] in _WRITERS:
             if any(word in str(error) for word in _FULL):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder)) from error
@@ -80,21 +83,21 @@ def room_told(folder: Path) -> Iterator[None]:
 
 _WRITERS = {"lazrs", "pyogrio", "rasterio", "sqlite3"}
 _FULL = ("disk is full", "No space left")
-_ROOM = 1 << 20
-"""Bytes for which there is no room where a file could not be written for want of it."""
+_TEST_BYTES = 1 << 20
+"""Bytes for the test of free space after a file could not be written."""
 
 
 def _require_room(folder: Path) -> None:
-    """Write what is taken away again, for a disk, and a quota, too, show only so whether they are full."""
+    """Write and remove a test file, since only writing shows whether a disk or a quota is full."""
     with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
-        block = memoryview(bytes(_ROOM))
+        block = memoryview(bytes(_TEST_BYTES))
         while block:
             block = block[file.write(block) :]
 
 
 @contextmanager
-def told_to_end() -> Iterator[None]:
-    """Leave by an exception at SIGTERM, as at Ctrl-C, so that what is half-written is removed."""
+def exit_on_sigterm() -> Iterator[None]:
+    """Exit by an exception on SIGTERM, as on Ctrl-C, so that incomplete files are removed."""
 
     def end(number: int, frame: FrameType | None) -> None:
         raise SystemExit(128 + number)
@@ -108,14 +111,14 @@ def told_to_end() -> Iterator[None]:
 
 @contextmanager
 def made_folder(path: Path) -> Iterator[None]:
-    """Make a folder and those above it, if they are not there; take those away again that are empty when the block fails.
+    """Make a folder and its parents if they do not exist; remove those that are empty if the block fails.
 
     Raises
     ------
     UserError
-        If it can't be made.
+        If the folder cannot be made.
     """
-    made = [folder for folder in (path, *path.parents) if not os.path.exists(folder)]  # noqa: PTH110 - fails for no name
+    made = [folder for folder in (path, *path.parents) if not os.path.exists(folder)]  # noqa: PTH110 - never raises
     try:
         try:
             path.mkdir(parents=True, exist_ok=True)
@@ -124,31 +127,31 @@ def made_folder(path: Path) -> Iterator[None]:
         yield
     except BaseException:
         for folder in made:
-            with suppress(OSError):  # it was not made, or holds what was whole by then
+            with suppress(OSError):  # not made, or contains complete files
                 folder.rmdir()
         raise
 
 
 def vector_source(path: Path) -> str:
-    """Return what GDAL is to open for a file of shapes, as the format that its first bytes are of.
+    """Return the source that GDAL is to open for a file of shapes, with the driver that its first bytes show.
 
-    GDAL goes by the content, whatever a file is called: in a.geojson there may be a VRT, or a pipeline of GDAL's own, which
-    reads other files, and what lies on the web.
+    By default GDAL chooses the driver by content, whatever the file's name: a.geojson could contain a VRT or a GDAL pipeline,
+    which reads other files or web addresses.
 
     Raises
     ------
     UserError
-        If it cannot be read, or is none of GeoPackage, GeoJSON, Shapefile and FlatGeobuf.
+        If it cannot be read, or is not a GeoPackage, GeoJSON, Shapefile or FlatGeobuf.
     """
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+        raise UserError(f"{path} cannot be read: {error.strerror}") from None
     if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{"):
         return f"GeoJSON:{path}"
     if not head.startswith((b"SQLite format 3\0", b"fgb\x03", b"\0\0\x27\x0a")):
-        raise UserError(f"{path}: cannot be read: by its content it is no GeoPackage, GeoJSON, Shapefile or FlatGeobuf")
+        raise UserError(f"{path} cannot be read: its content is not a GeoPackage, GeoJSON, Shapefile or FlatGeobuf")
     return str(path)
 
 
@@ -156,14 +159,14 @@ _HEAD = 1024
 
 
 def by_kilometre(path: Path, kilometres: Sequence[int]) -> list[Path]:
-    """Names of files that there is one of for each kilometre: the path itself for a single one, else with its number."""
+    """Return one file name for each kilometre: the path itself for a single one, else with the kilometre's number."""
     if len(kilometres) == 1:
         return [path]
     return [path.with_name(f"{path.stem}-km{km:03d}{path.suffix}") for km in kilometres]
 
 
 def common_name(paths: Sequence[Path]) -> str:
-    """What the names of files begin with, without numbers that tell them apart, in letters that a tunnel's name may have."""
+    """Return the common beginning of file names, without counting numbers, in letters that a tunnel's name may have."""
     stems = [path.name.split(".", 1)[0] for path in paths]
     same = [len(set(letters)) == 1 for letters in zip(*stems, strict=False)]
     common = stems[0][: same.index(False) if False in same else len(same)]

@@ -3,4 +3,4 @@
 from __future__ import annotations
 
 MAD_TO_SIGMA = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation: 1 / Φ⁻¹(3/4)."""
+"""Ratio of standard deviation to median absolute deviation for a normal distribution: 1 / Φ⁻¹(3/4)."""

@@ -1,4 +1,4 @@
-"""How many threads this process computes with."""
+"""Number of threads that this process computes with."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ _chosen: list[int] = []
 def use_threads(count: int) -> None:
     """Let this process compute with ``count`` threads; best called before Numba and NumPy are imported.
 
-    Libraries that are imported later size their pools by it. Of those imported before, Numba follows in the calling
-    thread only.
+    Libraries that are imported later size their thread pools accordingly. Of those already imported, only Numba follows, in the
+    calling thread.
 
     Raises
     ------
@@ -33,20 +33,20 @@ def use_threads(count: int) -> None:
 
 
 def threads() -> int:
-    """Threads that this process computes with: what `use_threads` said, or one a core."""
+    """Return the number of threads that this process computes with: that of `use_threads`, or one per core."""
     return _chosen[0] if _chosen else os.cpu_count() or 1
 
 
 def in_blocks(work: Callable[[int, int], object], count: int, size: int) -> None:
-    """Call ``work(begin, end)`` for each block of ``size`` of ``count`` items, as many at a time as there are threads.
+    """Call ``work(begin, end)`` for each block of ``size`` of ``count`` items, on as many threads as this process has.
 
     Parameters
     ----------
     work : callable
-        Takes the first number of a block and the one after its last. It gains by threads as far as it lets go of Python's
-        lock, as compiled kernels and NumPy do; blocks must not write to the same places.
+        Function of the first index of a block and the one after its last. It must release Python's lock, as compiled kernels
+        and NumPy do, to gain from threads; blocks must not write to the same places.
     count, size : int
-        How many items there are, and how many make a block.
+        Number of items, and of items in a block.
     """
     starts = range(0, count, size)
     many = min(threads(), len(starts))

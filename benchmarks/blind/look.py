@@ -21,7 +21,7 @@ from shapely.geometry.base import BaseGeometry
 from benchmarks.blind.run import Outcome
 from benchmarks.evidence.detection import detect
 from benchmarks.evidence.pictures import names, pictures
-from tunneldb.evaluate.measure import HALF
+from tunneldb.evaluate.measure import MIN_OVERLAP
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.image import LiningImage
 from tunneldb.raster.pixel_state import PixelState
@@ -64,7 +64,7 @@ def draw(picture: LiningImage, outcome: Outcome, box: list[float] | None, path: 
     called = shapely.union_all([outcome.found[k] for k in outcome.leaks])
     _outline(axes, called, BLUE, "-")
     for shape, limit in zip(outcome.true, outcome.limits, strict=True):
-        found = shape.intersection(called).area >= HALF * shape.area
+        found = shape.intersection(called).area >= MIN_OVERLAP * shape.area
         _outline(axes, shape, GREEN if found else RED, ":" if limit else "-")
     axes.set(xlim=box[:2], ylim=box[2:], xlabel="chainage, m", ylabel="arc from the crown, m", aspect="equal")
     axes.set_title(f"{outcome.scene} ({outcome.lining})")

@@ -12,7 +12,7 @@ from shapely import affinity
 
 from benchmarks.blind.run import Outcome
 from benchmarks.blind.statistics import Agreement, compare_classes, looks_for_each, ranks, review_curve, wilson
-from tunneldb.evaluate.measure import HALF, Comparison, Figures, compare, figures
+from tunneldb.evaluate.measure import MIN_OVERLAP, Comparison, Figures, compare, figures
 from tunneldb.geometry.stationing import KILOMETRE
 
 SMALLEST = 0.1
@@ -135,7 +135,7 @@ def by_phenomenon(scored: Scored) -> dict[str, tuple[int, int, float]]:
     for name in sorted(set(names)):
         own = names == name
         share = (c.covered[own] * c.true_area[own]).sum() / c.true_area[own].sum()
-        out[name] = (int(own.sum()), int((c.covered[own] >= HALF).sum()), float(share))
+        out[name] = (int(own.sum()), int((c.covered[own] >= MIN_OVERLAP).sum()), float(share))
     return out
 
 
@@ -217,10 +217,10 @@ def labelled(outcomes: Sequence[Outcome]) -> tuple[np.ndarray, np.ndarray]:
         wet = shapely.union_all(one.true)
         dim = shapely.union_all([shape for shape, limit in zip(one.true, one.limits, strict=True) if limit])
         for shape, probability in zip(one.found, one.probabilities, strict=True):
-            if shape.area < LEAST or shape.intersection(dim).area >= HALF * shape.area:
+            if shape.area < LEAST or shape.intersection(dim).area >= MIN_OVERLAP * shape.area:
                 continue
             p.append(probability)
-            leak.append(shape.intersection(wet).area >= HALF * shape.area)
+            leak.append(shape.intersection(wet).area >= MIN_OVERLAP * shape.area)
     return np.array(p), np.array(leak, np.float64)
 
 
@@ -248,7 +248,7 @@ def review(outcomes: Sequence[Outcome]) -> tuple[float, list[float], float]:
         others = shapely.union_all([shape for shape, wanted in zip(one.true, asked, strict=True) if not wanted])
         for shape, probability in zip(one.found, one.probabilities, strict=True):
             shared = np.flatnonzero(shapely.area(shapely.intersection(demanded, shape)) > 0.0) if demanded else np.empty(0, int)
-            if shape.area < LEAST or (not len(shared) and shape.intersection(others).area >= HALF * shape.area):
+            if shape.area < LEAST or (not len(shared) and shape.intersection(others).area >= MIN_OVERLAP * shape.area):
                 continue
             p.append(probability)
             shows.append((true + shared).tolist())

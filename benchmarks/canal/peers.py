@@ -21,7 +21,7 @@ from benchmarks.canal.literal import paper_pose
 from benchmarks.canal.scenes import Case
 from tunneldb.arrays import Float
 from tunneldb.registration.underwater import SonarCloud
-from tunneldb.registration.underwater.observations import FARTHEST, Pose, cell_keys, find_patches
+from tunneldb.registration.underwater.observations import MAX_RANGE, Pose, cell_keys, find_patches
 from tunneldb.registration.underwater.walls import Walls, find_walls
 from tunneldb.simulate.canal import SonarScan
 
@@ -44,7 +44,7 @@ def compare(case: Case) -> list[dict[str, Any]]:
     out = []
     for cloud, true in zip(case.clouds, case.scene.sonar, strict=True):
         rotation, translation = _start(true, origin, rng)
-        near = cloud.points[np.linalg.norm(cloud.points, axis=1) < FARTHEST]
+        near = cloud.points[np.linalg.norm(cloud.points, axis=1) < MAX_RANGE]
         source = _thin(near, VOXEL)
         of_scan: dict[str, Any] = {"start": _errors(rotation, translation + origin, 1.0, true, 0.0)}
         for name, method in _methods().items():

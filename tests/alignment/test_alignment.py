@@ -196,17 +196,17 @@ assert ALIGNMENT is not None
 SECOND = ALIGNMENT[0].replace('name="○○路線"', 'name="B"')
 BROKEN = [
     (("</Alignments>", f"{SECOND}</Alignments>"), r"holds 2 alignments: '○○路線', 'B'; choose one by --alignment NAME"),
-    (("<ProfAlign ", "<ProfSurf "), r"not a whole XML file"),
+    (("<ProfAlign ", "<ProfSurf "), r"not a complete XML file"),
     (('spiType="clothoid"', 'spiType="bloss"'), r"spiral of type bloss; only clothoids"),
     (('length="62.50000000"', 'length="72.50000000"'), r"distance of its ends of the Spiral .* off by 9\.\d+ m"),
     (('rot="ccw" radius="250.00000000"', 'rot="ccw" radius="251.0"'), r"radius of the Curve .* off by 1\.000 m"),
     (('rot="ccw" radius="250', 'rot="left" radius="250'), r"rotation 'left'; it must be cw or ccw"),
     (("-5764.59435677 -16511.51399200 88.79745221</Start>", "-5764.5 -16511.5</Start>"), r"off by|ends 0\.\d+ m from"),
     (("<Start name=\"BP\">-5851", "<Start name=\"BP\">x-5851"), r"Start of a Line is 'x-5851.* not northing and easting"),
-    (('linearUnit="meter"', 'linearUnit="fathom"'), r"linearUnit 'fathom' is none of"),
+    (('linearUnit="meter"', 'linearUnit="fathom"'), r"linearUnit 'fathom' is not one of"),
     (('staStart="-90.00000000"', 'staStart="minus"'), r"staStart of a Alignment is 'minus', not a number"),
     (("<PVI>-90.00000000 90.90600001</PVI>", "<PVI>-90</PVI>"), r"a PVI of the profile is '-90', not station and height"),
-    (("<PVI>-90.00000000 ", "<PVI>390.00000000 "), r"the profile turns back"),
+    (("<PVI>-90.00000000 ", "<PVI>390.00000000 "), r"the profile reverses"),
     (('<ParaCurve length="80.000000">', '<ParaCurve length="580.0">'), r"curves of the profile overlap by 20\.000 m"),
     (('<ParaCurve length="80.000000">', '<ParaCurve length="-80.0">'), r"length of a ParaCurve is '-80\.0'; it must not"),
     (('length="62.50000000" radiusStart="INF"', 'length="-62.5" radiusStart="INF"'), r"length of a Spiral is '-62\.5'; it"),
@@ -256,7 +256,7 @@ def test_a_parabola_on_one_side_only_is_no_curve(tmp_path: Path) -> None:
 
 def test_no_profile_no_axis(tmp_path: Path) -> None:
     path = edited(tmp_path, "j-landxml.xml", ("<ProfAlign ", "<Nothing "), ("</ProfAlign>", "</Nothing>"))
-    with pytest.raises(UserError, match="has no profile, and a tunnel's axis needs heights"):
+    with pytest.raises(UserError, match="has no profile, but a tunnel's axis needs heights"):
         read_given(path)
 
 
@@ -367,27 +367,27 @@ def test_map_conversion_and_placement_put_the_alignment_on_the_map(ifc: Any, tmp
     c, s = math.cos(math.pi / 6), 0.5
     expected = np.column_stack([400_000 + c * x - s * y, 4_000_000 + s * x + c * y, 500 + z])
     np.testing.assert_allclose(design.position(at), expected, rtol=0, atol=1e-5)
-    assert "the file says its coordinates are EPSG:25830" in design.notes
+    assert "the file states its coordinate system as EPSG:25830" in design.notes
 
 
 def test_a_scaled_map_is_refused(ifc: Any, tmp_path: Path) -> None:
     context = ifc.by_type("IfcGeometricRepresentationContext")[0]
     crs = ifc.createIfcProjectedCRS("EPSG:25830")
     ifc.createIfcMapConversion(context, crs, 0.0, 0.0, 0.0, 1.0, 0.0, 0.9996)
-    with pytest.raises(UserError, match=r"scale 0\.9996, so lengths on the map are not the alignment's"):
+    with pytest.raises(UserError, match=r"scale 0\.9996, so map lengths differ from the alignment's"):
         read_given(written(ifc, tmp_path))
 
 
 def test_other_curves_and_other_schemas_are_refused(ifc: Any, tmp_path: Path) -> None:
     ifc.by_type("IfcAlignmentHorizontalSegment")[2].PredefinedType = "BLOSSCURVE"
     path = written(ifc, tmp_path)
-    with pytest.raises(UserError, match="segment of type BLOSSCURVE; LINE, CIRCULARARC, CLOTHOID are read"):
+    with pytest.raises(UserError, match="segment of type BLOSSCURVE; supported are LINE, CIRCULARARC, CLOTHOID"):
         read_given(path)
     path.write_text(path.read_text().replace("IFC4X3_ADD2", "IFC2X3"))
-    with pytest.raises(UserError, match=r"is of IFC2X3; alignments are read from IFC 4\.3"):
+    with pytest.raises(UserError, match=r"has the schema IFC2X3; alignments need IFC 4\.3"):
         read_given(path)
     path.write_text("ISO-10303-21;\nHEADER;\n")
-    with pytest.raises(UserError, match="its header names no schema"):
+    with pytest.raises(UserError, match="its header states no schema"):
         read_given(path)
 
 

@@ -171,22 +171,22 @@ def test_of_several_one_is_chosen(tmp_path: Path) -> None:
         read_given(path, layer="points")
     assert read_given(path, layer="tube south").xyz[0, 1] == 4_640_020
     path = gis(tmp_path / "b.gpkg", far_apart())
-    with pytest.raises(UserError, match=r"2 lines that don't meet end to end: 1 \(150\.0 m from .*\); 2 \(100\.0 m "):
+    with pytest.raises(UserError, match=r"2 separate lines: 1 \(150\.0 m from .*\); 2 \(100\.0 m "):
         read_given(path)
     assert len(read_given(path, alignment="2").xyz) == 3
-    with pytest.raises(UserError, match="has no line '3'; it holds 2 lines"):
+    with pytest.raises(UserError, match="has no line '3'; it holds 2 separate lines"):
         read_given(path, alignment="3")
 
 
 REFUSED: dict[str, tuple[Callable[[Path], Path], str]] = {
     "other crs": (lambda f: gis(f / "a.gpkg", pieces(), srid=3794), r"system is EPSG:3794 .*, the tunnel's is EPSG:25830"),
     "degrees": (lambda f: gis(f / "a.geojson", [shapely.LineString([(1, 41), (2, 42)])], 4326), r"EPSG:4326 .*25830"),
-    "points": (lambda f: gis(f / "a.gpkg", [shapely.Point(1, 2)], layer="p"), r"holds no lines; its layers: 'p'; an axis is"),
+    "points": (lambda f: gis(f / "a.gpkg", [shapely.Point(1, 2)], layer="p"), "holds no lines; its layers: 'p'; draw the axis"),
     "millimetres": (lambda f: dxf(f / "a.dxf", chain, 4), r"unit is mm \(\$INSUNITS 4\); .* --axis-unit"),
-    "no lines": (lambda f: dxf(f / "a.dxf", lambda space: space.add_circle((0, 0), 5)), "holds no lines; an axis is drawn"),
+    "no lines": (lambda f: dxf(f / "a.dxf", lambda space: space.add_circle((0, 0), 5)), "holds no lines; draw the axis"),
     "turns back": (
         lambda f: gis(f / "a.gpkg", [shapely.LineString([(0, 0, 1), (20, 0, 1), (10, 1, 1)])]),
-        "at 10.00,1.00 the axis turns back here",
+        "at 10.00,1.00 the axis reverses here",
     ),
     "broken dxf": (lambda f: written(f / "a.dxf", b"0\nSECTION\n2\nHEAD"), "cannot be read as DXF"),
     "broken gpkg": (lambda f: written(f / "a.gpkg", b"SQLite format 3\0nothing else"), "cannot be read"),
@@ -194,7 +194,7 @@ REFUSED: dict[str, tuple[Callable[[Path], Path], str]] = {
     "zip": (lambda f: written(f / "a.zip", b"PK\x03\x04...."), "is a ZIP archive or a spreadsheet; unpack it"),
     "dwg": (lambda f: written(f / "a.dwg", b"AC1032...."), "is a DWG drawing; save it as DXF"),
     "scan": (lambda f: written(f / "a.las", b"LASF...."), "is a scan, not an axis; --axis auto"),
-    "no header": (lambda f: written(f / "a.csv", b"500000.0;4640000.0;100\n"), "the first line must name the columns"),
+    "no header": (lambda f: written(f / "a.csv", b"500000.0;4640000.0;100\n"), "the first line must contain column names"),
     "two eastings": (lambda f: written(f / "a.csv", b"e,easting,n,h\n1,2,3,4\n"), "e and easting may both be x"),
 }  # fmt: skip
 
@@ -216,13 +216,13 @@ def test_what_is_refused_is_said_in_one_line(kind: str, tmp_path: Path) -> None:
 
 @pytest.mark.filterwarnings("ignore:'crs' was not provided")
 def test_units_and_systems_that_are_not_stated_are_said(tmp_path: Path) -> None:
-    assert "names no coordinate system" in read_given(gis(tmp_path / "a.shp", pieces(), srid=None), srid=SRID).notes[0]
+    assert "states no coordinate system" in read_given(gis(tmp_path / "a.shp", pieces(), srid=None), srid=SRID).notes[0]
     assert "states no unit" in read_given(dxf(tmp_path / "a.dxf", chain, 0)).notes[0]
     millimetres = read_given(dxf(tmp_path / "b.dxf", lambda s: s.add_polyline3d(1000 * (LINE - LINE[0])), 4), unit="millimeter")
     np.testing.assert_allclose(millimetres.xyz[:, :2], (LINE - LINE[0])[:, :2], atol=1e-6)
     wrong = read_given(dxf(tmp_path / "c.dxf", chain, 1), unit="meter")  # inches: what a template says
     np.testing.assert_allclose(wrong.xyz, LINE, atol=1e-6)
-    assert "as told; the file itself says in" in wrong.notes[0]
+    assert "as given; the file states in" in wrong.notes[0]
 
 
 def test_options_that_mean_nothing_are_refused(tmp_path: Path) -> None:
@@ -230,8 +230,8 @@ def test_options_that_mean_nothing_are_refused(tmp_path: Path) -> None:
         with pytest.raises(UserError, match=message):
             read_given(path, **options)  # type: ignore[arg-type]
 
-    refused("a table of points, for which --axis-layer means nothing", text(tmp_path / "a.csv", ",", False), layer="x")
-    refused("is a map, for which --axis-unit means nothing", gis(tmp_path / "a.gpkg", pieces()), unit="foot")
+    refused("a table of points, for which --axis-layer does not apply", text(tmp_path / "a.csv", ",", False), layer="x")
+    refused("is a map, for which --axis-unit does not apply", gis(tmp_path / "a.gpkg", pieces()), unit="foot")
 
 
 def test_pieces_are_joined_as_far_as_there_is_one_way() -> None:
@@ -251,7 +251,7 @@ def test_a_landxml_says_its_unit_or_is_asked(tmp_path: Path) -> None:
     bare = (Path(__file__).parents[1] / "data" / "j-landxml.xml").read_text()
     begin, end = bare.index("<Units"), bare.index("</Units>") + len("</Units>")
     path.write_text(bare[:begin] + bare[end:])
-    with pytest.raises(UserError, match=r"states no unit of its lengths .* --axis-unit"):
+    with pytest.raises(UserError, match=r"states no unit of lengths .* --axis-unit"):
         read_given(path)
 
     def length(given: GivenAxis) -> float:
@@ -259,7 +259,7 @@ def test_a_landxml_says_its_unit_or_is_asked(tmp_path: Path) -> None:
 
     assert read_given(path, unit="foot").design is not None
     assert length(read_given(path, unit="foot")) == pytest.approx(0.3048 * length(read_given(path, unit="meter")), abs=0.001)
-    assert read_given(path, unit="meter").notes[0].endswith("1 unit is 1 m, as told; the file says nothing")
+    assert read_given(path, unit="meter").notes[0].endswith("1 unit is 1 m, as given; the file states none")
     with pytest.raises(UserError, match="own direction"):
         read_given(path, unit="meter", reverse=True)
 

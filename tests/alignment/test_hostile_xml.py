@@ -26,5 +26,5 @@ def test_entities_are_neither_blown_up_nor_fetched(tmp_path: Path, attack: str) 
     entities, text = FILES[attack]
     entities = entities.replace("{secret}", secret.as_uri())
     path.write_text(f"<!DOCTYPE LandXML [{entities}]>{BODY.format(text)}")
-    with pytest.raises(UserError, match="is not a whole XML file"):
+    with pytest.raises(UserError, match="is not a complete XML file"):
         LandXml(path)

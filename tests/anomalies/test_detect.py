@@ -167,6 +167,7 @@ def split(offset, pixel=PIXEL, corner=(0, 0)):
     return off_plane(distance, recess, pixel), recess
 
 
+@pytest.mark.slow
 def test_appendages_stand_off_from_the_wall_and_niches_lie_behind_it():
     offset, wall, shapes = _wall()
     found, recess = split(offset)

@@ -4,24 +4,28 @@ import importlib.util
 import json
 import math
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from sklearn.ensemble import HistGradientBoostingClassifier
 
 from tunneldb.anomalies.evidence import EvidenceModel, reasons_of, standard_model
 from tunneldb.anomalies.features import FEATURES, NAMES
 
-_spec = importlib.util.spec_from_file_location("fit", Path(__file__).parents[2] / "benchmarks/evidence/fit.py")
-assert _spec is not None
-assert _spec.loader is not None
-fit = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(fit)
-
 ANY = arrays(float, (5, len(FEATURES)), elements=st.floats(-20, 20) | st.just(math.nan))
+
+
+def fitting() -> ModuleType:
+    """The program that fits the model; what it needs takes seconds to import."""
+    spec = importlib.util.spec_from_file_location("fit", Path(__file__).parents[2] / "benchmarks/evidence/fit.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def grown(sign: int, features: np.ndarray, names: set[str]) -> np.ndarray:
@@ -29,14 +33,16 @@ def grown(sign: int, features: np.ndarray, names: set[str]) -> np.ndarray:
     return features + sign * np.isin(NAMES, list(names))
 
 
+@pytest.mark.slow
 def test_trees_are_those_of_the_library_that_fitted_them() -> None:
     rng = np.random.default_rng(3)
     features = rng.normal(0, 2, (900, len(FEATURES)))
     features[rng.random(features.shape) < 0.1] = np.nan
     leak = np.nan_to_num(features[:, 0]) + np.nan_to_num(features[:, 3]) ** 2 + rng.normal(0, 1, 900) > 3
     weights = rng.uniform(0.2, 1.0, 900)
+    fit = fitting()
     ours = fit.fit_model(features, leak, weights, 40, "few", {})
-    theirs: HistGradientBoostingClassifier = fit.boosted(40).fit(features, leak, sample_weight=weights)
+    theirs = fit.boosted(40).fit(features, leak, sample_weight=weights)
     np.testing.assert_allclose(ours.probabilities(features), theirs.predict_proba(features)[:, 1], atol=5e-4)
 
 

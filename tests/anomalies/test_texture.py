@@ -38,6 +38,7 @@ def test_plain_lining_is_not_averaged():
     assert (contrast.sigma == np.float32(NOISE)).all()
 
 
+@pytest.mark.slow
 def test_bricks_are_averaged_until_what_is_told_stands_out():
     contrast = image(wall(1.2, 0.25, 0.075), 1.24)
     half, sigma = contrast.texture.half[:, :32], contrast.sigma[:, :32]
@@ -47,6 +48,7 @@ def test_bricks_are_averaged_until_what_is_told_stands_out():
     assert np.median(sigma) < TYPICAL_DARKENING / 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("spread", "along", "across", "drop"), [(1.2, 0.25, 0.075, 4.0), (1.5, 0.5, 0.3, 6.0)])
 def test_a_leak_in_masonry_is_found_whole(spread, along, across, drop):
     shown = wall(spread, along, across)

@@ -7,7 +7,7 @@ from support.simulated_scenes import exact, scan, share
 from tunneldb.classification.classes import PointClass
 from tunneldb.classification.classify import find_bare_scene, find_scene
 from tunneldb.classification.ground.extraction import GroundSettings, find_ground
-from tunneldb.classification.objects.clusters import CELL, NEAR, Cluster, Lookup, look_up, pieces
+from tunneldb.classification.objects.clusters import CELL, MAX_CELL_DISTANCE, Cluster, Lookup, look_up, pieces
 from tunneldb.classification.objects.objects import ClusterSettings, bars
 from tunneldb.classification.objects.spacing import Spacing
 from tunneldb.classification.scene import Scene
@@ -135,7 +135,11 @@ def test_a_point_finds_the_nearest_cluster() -> None:
         found = [classes_of(at, lookup.first, lookup.last, lookup.keys, lookup.klass) for at in x]
         cells = np.floor(x / CELL).astype(int)
         expected = [
-            PointClass.OBJECT if abs(c) <= min(NEAR, abs(c - 3)) else PointClass.APPENDAGE if abs(c - 3) <= NEAR else 0
+            PointClass.OBJECT
+            if abs(c) <= min(MAX_CELL_DISTANCE, abs(c - 3))
+            else PointClass.APPENDAGE
+            if abs(c - 3) <= MAX_CELL_DISTANCE
+            else 0
             for c in cells
         ]
         assert found == expected

@@ -95,7 +95,7 @@ def test_agreement_counts_points_and_gives_cohens_kappa():
     truth = rng.random(2000) < 0.3
     found = truth ^ (rng.random(2000) < 0.05)
     a = Agreement.of(truth, found)
-    assert (a.ground, a.missed, a.taken, a.other) == (
+    assert (a.ground, a.missed, a.false_ground, a.other) == (
         (truth & found).sum(), (truth & ~found).sum(), (~truth & found).sum(), (~truth & ~found).sum(),
     )  # fmt: skip
     sklearn = pytest.importorskip("sklearn.metrics")

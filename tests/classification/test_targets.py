@@ -95,7 +95,7 @@ def test_nothing_else_is_taken_for_one(name: str, observer: tuple[float, float, 
 def test_balls_of_another_radius_are_refused_with_it(name: str, true: float) -> None:
     _, refused = look(OTHERS[name], 4)
     (reason,) = [refusal.reason for refusal in refused if distance_error(refusal.centre, np.array(AT)) < 0.01]
-    said = re.search(r"radius is ([0-9.]+) ± ([0-9.]+) mm", reason)
+    said = re.search(r"radius ([0-9.]+) ± ([0-9.]+) mm", reason)
     assert said
     assert float(said[1]) == pytest.approx(true, abs=max(4 * float(said[2]), 1.5))
 

@@ -51,7 +51,7 @@ def test_a_stretch_that_begins_where_the_survey_ends(example: str, conn: psycopg
         (("tunnel", "add", "new", "--srid", "25830", "--axis", "/dev/zero"), "/dev/zero is a device, not a file"),
         (
             ("tunnel", "add", "new", "--srid", "25830", "--axis", "AXIS", "--spacing", "1e-8"),
-            "must divide 1000 m, from 0.1 m on",
+            "must divide 1000 m and be 0.1 m or more",
         ),
         (("profile", "add", "demo", "lining", "PIPE"), "is a pipe, not a file"),
         (("survey", "set", "demo-2024", "--reference", "PIPE"), "is a pipe, not a file"),

@@ -88,6 +88,7 @@ def test_with_room_the_same_command_succeeds(disk: SmallDisk, example: str) -> N
     assert disk.files() == ["leaks.gpkg"]
 
 
+@pytest.mark.server
 def test_the_embedded_server_says_so_and_is_whole_with_room(disk: SmallDisk, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without room for the cluster, for WAL, and for rows."""
     home = disk.folder / "home"

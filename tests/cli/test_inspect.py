@@ -146,10 +146,10 @@ def test_lengths_that_are_said_to_be_degrees_are_not_believed(tls: Path, tmp_pat
     said = inspected(path)
     assert said["files"][0]["srid"] is None
     assert "--srid SRID" in said["commands"][1]
-    assert any("EPSG:4326 (WGS 84) is in degrees, which x = " in doubt for doubt in said["doubts"])
+    assert any("EPSG:4326 (WGS 84) is in degrees, but x = " in doubt for doubt in said["doubts"])
     header = read_header(path)
     check_header(header, None, 25830, needs_time=False)
-    assert "can't be read (EPSG:4326 (WGS 84) is in degrees" in str(crs_note(header, 25830))
+    assert "cannot be read (EPSG:4326 (WGS 84) is in degrees" in str(crs_note(header, 25830))
 
 
 def test_what_is_not_in_metres_is_to_be_transformed_first(tls: Path, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from tunneldb.cli.main import main
-from tunneldb.radiometry.range_curve import MOST_UNCERTAIN
+from tunneldb.radiometry.range_curve import MAX_SIGMA
 from tunneldb.simulate import Parameters, Simulation, write
 from tunneldb.simulate.radiometry import range_term
 
@@ -102,7 +102,7 @@ def test_detection_by_a_curve_found_on_the_lining(conn, stations):
     assert np.abs(off - off.mean()).max() < 0.3
     told = conn.execute("SELECT range_from, range_to, range_sigma FROM tunnel_api.radiometry").fetchone()
     assert told == pytest.approx((range_m[there].min(), range_m[there].max(), sigma[there].max()))
-    assert told[2] <= MOST_UNCERTAIN
+    assert told[2] <= MAX_SIGMA
     conn.execute("UPDATE tunnel.range_curve SET intensity_db = array_fill(7.0::float8, ARRAY[cardinality(range_m)])")
     conn.commit()
     _tunneldb("run", "auto", "--from", "detect", *coarse)

@@ -87,7 +87,7 @@ def test_what_is_set_makes_detection_stale_and_nothing_else(folder: Path, conn: 
 
 @pytest.mark.parametrize(
     ("scale", "says"),
-    [(500.0, "are too far from zero to be dB"), (1 / 50.0, "are fractions of 1, and no dB of a lining")],
+    [(500.0, "are too far from zero to be dB"), (1 / 50.0, "are fractions of 1, not dB of a lining")],
     ids=["counts", "unit"],
 )
 def test_values_that_are_no_decibels_are_refused_as_such(

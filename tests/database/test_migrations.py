@@ -256,7 +256,7 @@ def test_a_dump_restored_on_another_server_needs_one_init(example: str, dsn: str
 
 
 def test_init_does_not_wait_for_ever_for_others(conn: psycopg.Connection, dsn: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tunneldb.database.schema._PATIENCE", "100ms")
+    monkeypatch.setattr("tunneldb.database.schema._LOCK_TIMEOUT", "100ms")
     conn.execute("SELECT * FROM tunnel_api.leak")  # and stays in its transaction
     with open_connection(dsn) as connection, pytest.raises(UserError, match="close QGIS"):
         install(connection, STAGES)
@@ -293,7 +293,7 @@ def test_a_newer_or_unreleased_database_is_refused(conn: psycopg.Connection, dsn
 
 
 def test_a_database_without_postgis_or_schema_is_refused(empty_dsn: str) -> None:
-    with pytest.raises(UserError, match="not set up for tunneldb yet: tunneldb init"):
+    with pytest.raises(UserError, match="not set up for tunneldb yet; type tunneldb init"):
         connect(empty_dsn)
     with open_connection(empty_dsn) as connection:
         connection.execute("CREATE EXTENSION postgis")
@@ -308,5 +308,5 @@ def test_a_server_that_is_down_is_one_line(tmp_path: Path) -> None:
 
 
 def test_a_dsn_that_is_none(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="not one that libpq understands"):
+    with pytest.raises(UserError, match="not valid for libpq"):
         connect("this is no dsn")

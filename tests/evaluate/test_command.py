@@ -102,7 +102,7 @@ def test_figures_follow_what_is_changed(conn, survey, tmp_path):
     assert found["true"][2]["area_error"] == pytest.approx(1 - there[2].area / truth[2].area, abs=1e-4)
     text = run("evaluate", survey, tmp_path / "truth.geojson").stdout
     assert "of 0.1 m² and more (--min-area)" in text
-    assert "3.00 false leaks for each 1000 m² of the 1000 m²" in text
+    assert "3.00 false leaks per 1000 m² of the 1000 m²" in text
     assert "missed" in text
 
 
@@ -209,7 +209,7 @@ def test_files_that_are_no_truth_are_refused(conn, survey, tmp_path):
     assert "GeoPackage" in refused(survey, tmp_path / "b.gpkg")
     named = geojson(tmp_path / "named.geojson", there).read_bytes()
     (tmp_path / "named.geojson").write_bytes(named.replace(b"{", b'{"name": "l\xaaak", ', 1))
-    assert "is no UTF-8" in refused(survey, tmp_path / "named.geojson")
+    assert "is not UTF-8" in refused(survey, tmp_path / "named.geojson")
     bow = shapely.Polygon([(12400, 0), (12401, 1), (12401, 0), (12400, 1)])
     assert "leak 101" in refused(survey, gpkg(tmp_path / "bow.gpkg", [bow]))
     assert "LineString" in refused(survey, gpkg(tmp_path / "line.gpkg", [LineString([(12400, 0), (12401, 1)])]))
@@ -240,7 +240,7 @@ def test_surveys_and_kilometres_that_say_nothing(conn, survey, tmp_path):
     assert ".json or .csv" in refused(survey, path, "-o", tmp_path / "x.txt")
     conn.execute("DELETE FROM tunnel.run WHERE stage = 'detect'")
     conn.commit()
-    assert "were sought" in refused(survey, path)
+    assert "no leak detection" in refused(survey, path)
     conn.execute("UPDATE tunnel.survey SET intensity_kind = 'none', intensity_dimension = NULL")
     conn.commit()
     assert "no intensity" in refused(survey, path)

@@ -12,6 +12,8 @@ from tunneldb.measures.change.compute.change import change_regions, significant
 from tunneldb.measures.change.compute.leaks import Leak, groups, state_of, wet_area
 from tunneldb.measures.change.measure import Change, measure_change, rings_apart, section_figures
 
+pytestmark = pytest.mark.slow
+
 RADIUS, LENGTH, PIXEL, NOISE = 4.0, 60.0, 0.02, 0.003
 GRID = CellGrid(0.1, 60.0, -9.0, 600, 180)
 

@@ -52,6 +52,7 @@ def test_equilibrium_cant_needs_no_roll() -> None:
     assert found.roll == pytest.approx([0.0, -0.4 * 0.05 / 1.5])  # to the left, out of a curve to the right
 
 
+@pytest.mark.slow
 def test_margins_are_those_of_shapely_in_a_canted_track_on_a_curve() -> None:
     rng = np.random.default_rng(3)
     n, radius, cant = 4000, 300.0, 0.1

@@ -44,6 +44,7 @@ def test_shape_chord_and_seen_share_are_those_of_the_ellipse() -> None:
     assert np.isnan(unseen.length)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("third", [0.0, 0.002])
 def test_standard_errors_hold_with_three_tenths_of_the_ring_unseen(third: float) -> None:
     """Also of a ring that is not quite an ellipse, which an ellipse alone would follow by millimetres."""

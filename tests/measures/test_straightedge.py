@@ -15,6 +15,7 @@ def beneath(height: np.ndarray) -> np.ndarray:
     return gaps_beneath(np.atleast_2d(height), LENGTH, CELL).gap[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wave", [1.0, 1.6, 2.0, 4.0, 10.0])
 def test_of_a_sinusoid_the_gap_is_that_between_crests_or_of_the_chord(wave: float) -> None:
     """Shorter than the straightedge: from trough to crest; longer: A (1 - cos (π L / λ)), as the chord over the trough has."""

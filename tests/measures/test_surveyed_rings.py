@@ -43,6 +43,7 @@ def measured(files: tuple[Path, Path], rows: list[str], *words: object, header: 
     return rings("--points", files[0], "--axis", files[1], "--diameter", 6, *words)
 
 
+@pytest.mark.slow
 def test_real_rings_are_those_that_were_published(tmp_path: Path) -> None:
     out = tmp_path / "rings.csv"
     done = rings("--points", WRIGGLE / "points.csv", "--axis", WRIGGLE / "axis.csv", "--diameter", 5.8, "-o", out)

@@ -293,7 +293,7 @@ def cli(survey: psycopg.Connection, dsn: str) -> Callable[..., tuple[int, str, s
 def test_command(cli: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
     path = write(tmp_path / "a.laz", tube(980, 1020, 100, seed=1))
     code, out, err = cli(SURVEY, path)
-    assert (code, err) == (0, "a.laz: states no coordinate system: taken to be in the tunnel's, EPSG:25830\n")
+    assert (code, err) == (0, "a.laz: states no coordinate system; using the tunnel's, EPSG:25830\n")
     assert "points/s" in out
     assert "a.laz  loaded" in out
     assert "a.laz  unchanged" in cli(SURVEY, path)[1]

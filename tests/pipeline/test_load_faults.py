@@ -155,7 +155,7 @@ def test_disk_full_during_copy(survey: psycopg.Connection, dsn: str, tmp_path: P
     result = CliRunner().invoke(main, ["--dsn", dsn, "load", SURVEY, str(path)])
     assert result.exit_code == 2
     assert result.stderr.splitlines() == [
-        "tunneldb: the database's disk is full, what was under way is undone:"
+        "tunneldb: the database's disk is full, the current work was rolled back:"
         ' could not extend file "base/1/2": No space left on device'
     ]
     assert (rows(survey), files(survey)) == before

@@ -63,7 +63,7 @@ def scan(path: Path, time: float = 0.0, scan_id: int = 1) -> Path:
         (EPOCH, 200_000.0, "the trajectory seems to be in time since an epoch, the file in seconds of the GPS week"),
         (EPOCH, EPOCH - 1e9, "the trajectory seems to be in GPS time, the file in adjusted GPS time"),
         (EPOCH + 315_964_782, EPOCH, "the trajectory seems to be in Unix time, the file in GPS time"),
-        (EPOCH, EPOCH + 3600, "give the whole trajectory, in the time that the file uses"),
+        (EPOCH, EPOCH + 3600, "give the whole trajectory, in the time system of the file"),
     ],
 )
 def test_clocks(tunnel: Path, trajectory: float, file: float, says: str) -> None:
@@ -105,11 +105,11 @@ def test_points(tunnel: Path, matrix: np.ndarray, says: str) -> None:
 
 def test_scan_numbers(tunnel: Path) -> None:
     twice = np.concatenate([STATIONS, STATIONS[:1] + np.array([0, 20.0, 0, 0])])
-    assert "line 4: scan_id 1 stands above already" in add(tunnel, "--stations", twice, code=2)
+    assert "line 4: scan_id 1 is repeated" in add(tunnel, "--stations", twice, code=2)
     unnamed = table(tunnel / "names.csv", "name,x,y,z", STATIONS)
     said = command(
         "survey", "add", "s", "--tunnel", "t", "--date", "2024-05-04", "--stations", unnamed, "--intensity-kind", "none", code=2
     )
-    assert "names.csv has no column scan_id: its header is 'name,x,y,z'; scan_id is the number" in said
+    assert "names.csv has no column scan_id: the header is 'name,x,y,z'; scan_id is the number" in said
     add(tunnel, "--stations", STATIONS)
     assert "no station for scan_id 7" in command("load", "s", scan(tunnel / "a.laz", scan_id=7), code=2)

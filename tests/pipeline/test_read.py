@@ -73,7 +73,7 @@ def test_what_was_read_waits_until_it_is_loaded(survey: psycopg.Connection, tmp_
     counts = read(survey, path)
     survey.commit()
     assert (counts["file"], counts["state"], counts["kilometres"]) == ("a.laz", "loaded", [0, 1])
-    assert counts["note"] == "states no coordinate system: taken to be in the tunnel's, EPSG:25830"
+    assert counts["note"] == "states no coordinate system; using the tunnel's, EPSG:25830"
     assert waiting(survey) == [("a.laz", 0), ("a.laz", 1)]
     (number,) = survey.execute("SELECT id FROM tunnel.scan_file").fetchone()
     assert [name.split("_f")[1] for name in fragments(survey)] == [f"{number}_km0", f"{number}_km1"]
@@ -253,7 +253,7 @@ def test_settings_are_told_by_parameters() -> None:
 
 def test_a_batch_says_what_it_took_for_granted_as_load_does(survey: psycopg.Connection, dsn: str, tmp_path: Path) -> None:
     paths = [write(tmp_path / f"{n}.laz", tube(*span, 100, seed=n)) for n, span in enumerate(((975, 990), (992, 997)))]
-    told = "0.laz, 1.laz: states no coordinate system: taken to be in the tunnel's, EPSG:25830\n"
+    told = "0.laz, 1.laz: states no coordinate system; using the tunnel's, EPSG:25830\n"
     arguments = ["--dsn", dsn, "batch", SURVEY, *map(str, paths), "--to", "load", "--workers", "1"]
     first = CliRunner().invoke(main, arguments)
     assert first.exit_code == 0, first.output

@@ -151,8 +151,8 @@ def test_what_cannot_be_registered_is_refused_and_nothing_stored(
     canal: tuple[Path, list[Sonar]], conn: psycopg.Connection, tmp_path: Path
 ) -> None:
     folder, _ = canal
-    assert "is --up right?" in register(folder, code=2, up="-z").stderr
-    assert "0.28 m below the water's level" in register(folder, code=2, level=LEVEL + 0.28).stderr
+    assert "check --up" in register(folder, code=2, up="-z").stderr
+    assert "0.28 m below the water level" in register(folder, code=2, level=LEVEL + 0.28).stderr
     assert "no laser point lies within" in register(folder, code=2, level=LEVEL + 20.0).stderr
     ladders = tmp_path / "ladders.csv"
     cases = {
@@ -179,7 +179,7 @@ def test_speed_of_sound_and_place_may_be_told(
     np.savetxt(slow, scans[0].points / 1.05, "%.4f")
     how = ["--ladders", folder / "ladders.csv", "--up", "+z", "--water-level", LEVEL]
     untold = command("register", NAME, slow, *how, "--json", code=1)
-    assert "is the speed of sound right" in untold.stderr
+    assert "check the speed of sound" in untold.stderr
     assert json.loads(untold.stdout)["scans"][0]["state"] == "undetermined"
     start = tmp_path / "start.csv"
     x, y, _ = scans[0].translation
@@ -229,7 +229,7 @@ def test_soundings_in_the_tunnels_system_need_no_pose(
     again = json.loads(command("load", NAME, soundings, *how, "--json").stdout)["files"]
     assert again[0]["state"] == "unchanged"
     np.savetxt(soundings, points[:, :2], "%.4f")
-    assert "2 values where x, y and z are expected" in command("load", NAME, soundings, *how, code=2).stderr
+    assert "2 values, expected x, y and z" in command("load", NAME, soundings, *how, code=2).stderr
     np.savetxt(soundings, points + np.array([5000.0, 0.0, 0.0]), "%.4f")
     assert "lies along the axis" in command("load", NAME, soundings, *how, code=2).stderr
     register(folder)

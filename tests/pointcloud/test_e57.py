@@ -141,10 +141,10 @@ def test_ranges_are_slices_of_the_whole(tmp_path: Path, invalid: bool) -> None:
     parts = read(path, size=128, ranges=ranges)
     for name, values in whole.items():
         np.testing.assert_array_equal(parts[name], np.concatenate([values[a:b] for a, b in ranges]))
-    with pytest.raises(UserError, match="points up to 3002 are wanted"):
+    with pytest.raises(UserError, match="points up to 3002 requested"):
         list(read_chunks(path, None, ranges=[(0, 3002)]))
     if invalid:
-        with pytest.raises(UserError, match=rf"it has {end} valid points, points up to {end + 1} are wanted"):
+        with pytest.raises(UserError, match=rf"{end} valid points, points up to {end + 1} requested"):
             list(read_chunks(path, None, ranges=[(0, end + 1)]))
 
 
@@ -205,9 +205,9 @@ def test_coordinate_system_where_it_is_readable(tmp_path: Path, metadata: str, c
     header = read_header(e57.write(tmp_path / "a.e57", [e57.Scan(cloud())], metadata))
     assert header.crs == crs
     assert crs_note(header, 25830) == {
-        "": "states no coordinate system: taken to be in the tunnel's, EPSG:25830",
-        "site grid, see plan": "states a coordinate system that can't be read ('site grid, see plan'): "
-        "taken to be in the tunnel's, EPSG:25830",
+        "": "states no coordinate system; using the tunnel's, EPSG:25830",
+        "site grid, see plan": "states a coordinate system that cannot be read ('site grid, see plan'); "
+        "using the tunnel's, EPSG:25830",
     }.get(metadata)
 
 
@@ -252,7 +252,7 @@ def test_scan_without_pose_needs_a_csv(tmp_path: Path) -> None:
 def test_two_positions_of_one_station(tmp_path: Path) -> None:
     for name in "ab":
         (tmp_path / f"{name}.csv").write_text(f"scan_id,x,y,z\n1,0,0,{ord(name)}\n")
-    with pytest.raises(UserError, match=r"scan_id 1 has two positions: by .*a\.csv, line 2 and by .*b\.csv, line 2"):
+    with pytest.raises(UserError, match=r"scan_id 1 has two positions: in .*a\.csv, line 2 and in .*b\.csv, line 2"):
         read_stations([tmp_path / "a.csv", tmp_path / "b.csv"])
     (tmp_path / "empty").mkdir()
     with pytest.raises(UserError, match="no E57 or PTX file in this folder"):
@@ -289,7 +289,7 @@ def test_missing_empty_and_odd_files(tmp_path: Path) -> None:
         read_header(e57.write(tmp_path / "b.e57", [e57.Scan(nothing)]))
     with pytest.raises(UserError, match=r"scan 'Scan 1' have no coordinates, only intensity"):
         read_header(e57.write(tmp_path / "c.e57", [e57.Scan({"intensity": np.ones(3)})]))
-    with pytest.raises(UserError, match="the pose of scan 'Scan 1' is no pose"):
+    with pytest.raises(UserError, match="scan 'Scan 1' has an invalid pose"):
         read_header(e57.write(tmp_path / "d.e57", [e57.Scan(cloud(), STATION, (0, 0, 0, 0))]))
     fields = cloud()
     fields["cartesianY"][[3, 8]] = np.nan

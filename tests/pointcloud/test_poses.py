@@ -50,7 +50,7 @@ def test_nothing_is_interpolated_over_a_gap() -> None:
     within = points([4.85, 4.9, 5.0, 8.9, 9.0, 11.0])
     assert model.coverage.known(within).tolist() == [True, True, False, False, True, True]
     assert (model.coverage.faults(within).gap, model.coverage.faults(within).outside) == (2, 0)
-    assert "2 points were measured in gaps" in model.coverage.faults(within).text()
+    assert "2 points lie in gaps" in model.coverage.faults(within).text()
     # a trajectory of a pose each two seconds has no gap of four
     slow = PoseModel.from_trajectory(np.array([0.0, 2, 4, 6, 10, 12]), np.zeros((6, 3)))
     assert len(slow.gaps) == 0

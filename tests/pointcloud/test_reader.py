@@ -120,7 +120,7 @@ def test_a_range_of_a_later_chunk_of_the_file(tmp_path: Path) -> None:
 def test_ranges_of_a_truncated_file(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"a.{suffix}"
     write(path)
-    with pytest.raises(UserError, match="it announces 120000 points, points up to 120001 are wanted"):
+    with pytest.raises(UserError, match="its header states 120000 points, points up to 120001 requested"):
         list(read_chunks(path, None, ranges=[(0, 1), (100_000, 120_001)]))
     data = path.read_bytes()
     path.write_bytes(data[: len(data) // 2])
@@ -245,9 +245,9 @@ def test_a_coordinate_system_that_nobody_can_read_is_told(tmp_path: Path) -> Non
     las.header.global_encoding.wkt = True
     las.write(tmp_path / "b.laz")
     plain, odd = (crs_note(read_header(tmp_path / name), 25830) for name in ("a.laz", "b.laz"))
-    assert plain == "states no coordinate system: taken to be in the tunnel's, EPSG:25830"
+    assert plain == "states no coordinate system; using the tunnel's, EPSG:25830"
     assert odd is not None
-    assert odd.startswith("states a coordinate system that can't be read (Invalid")
+    assert odd.startswith("states a coordinate system that cannot be read (Invalid")
     write(tmp_path / "c.laz", 10, CRS(25830))
     assert crs_note(read_header(tmp_path / "c.laz"), 25830) is None
 
@@ -343,7 +343,7 @@ def test_several_values_a_point_are_no_intensity(tmp_path: Path) -> None:
     las = laspy.LasData(header)
     las.x = las.y = las.z = np.zeros(2)
     las.write(tmp_path / "a.laz")
-    with pytest.raises(UserError, match="Normal has several values a point"):
+    with pytest.raises(UserError, match="Normal has several values per point"):
         list(read_chunks(tmp_path / "a.laz", "Normal"))
 
 
@@ -382,7 +382,7 @@ def test_real_scans() -> None:
     assert sum(map(len, read_chunks(real_scan("extra-bytes.laz"), "Deviation"))) == header.points
     header = read_header(real_scan("lone-star.laz"))
     check_header(header, "intensity", 25830, needs_time=False)
-    assert "EPSG:4326 (WGS 84) is in degrees, which x = 515369, y = 4918340 are not" in str(crs_note(header, 25830))
+    assert "EPSG:4326 (WGS 84) is in degrees, but x = 515369, y = 4918340 are not" in str(crs_note(header, 25830))
 
 
 def test_the_box_of_a_file_is_read_even_when_the_rest_is_gone(tmp_path: Path) -> None:

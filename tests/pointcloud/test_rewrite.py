@@ -204,8 +204,8 @@ class Full:
 
 def test_full_disk_is_told_as_such(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(tmp_path / "a.laz", 6, "1.4")
-    told = laz._Told
-    monkeypatch.setattr(laz, "_Told", lambda file: told(Full(file)))
+    told = laz._ErrorKeepingFile
+    monkeypatch.setattr(laz, "_ErrorKeepingFile", lambda file: told(Full(file)))
     with pytest.raises(OSError, match="No space left"):
         rewrite(tmp_path / "a.laz", tmp_path / "b.laz", parity, NAMES)
 

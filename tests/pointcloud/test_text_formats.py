@@ -190,7 +190,7 @@ def test_ply(tmp_path: Path, order: str) -> None:
 def test_ply_rounded_to_decimetres_is_refused(tmp_path: Path) -> None:
     head = ply_header("binary_little_endian", "float").replace("vertex 1000", "vertex 1")
     (tmp_path / "a.ply").write_bytes(head.encode() + struct.pack("<3fBfd", *FAR, 9, 0.5, 0.0))
-    with pytest.raises(UserError, match=r"steps of 0\.5 m; export them as double"):
+    with pytest.raises(UserError, match=r"resolution is only 0\.5 m so far from the origin; export them as double"):
         read_header(tmp_path / "a.ply")
 
 
@@ -206,7 +206,7 @@ def test_ranges_are_the_points_of_the_whole(tmp_path: Path, name: str) -> None:
     chosen = np.concatenate([np.arange(begin, end) for begin, end in ranges])
     np.testing.assert_array_equal(some.xyz, whole.xyz[chosen])
     np.testing.assert_array_equal(some.intensity, whole.intensity[chosen])
-    with pytest.raises(UserError, match="points up to 1001 are wanted"):
+    with pytest.raises(UserError, match="points up to 1001 requested"):
         read(tmp_path / name, ranges=[(0, 1001)])
 
 
@@ -214,27 +214,27 @@ ONE = ptx([(1, 1, np.eye(3), FAR, ["1 2 3 0.5"])])
 GOOD = "".join(f"{i} 2 3 0.5\n" for i in range(300))
 DAMAGED = {
     "word.pts": (GOOD + "1 2 x 0.5\n", r"word\.pts, line 301: 'x' is not a number"),
-    "short.pts": (GOOD + "1 2\n", r"short\.pts, line 301: 2 values where 4 are expected"),
-    "long.csv": ("x,y,z\n" + "1,2,3\n" * 300 + "1,2,3,4\n", r"long\.csv, line 302: 4 values where 3 are expected"),
+    "short.pts": (GOOD + "1 2\n", r"short\.pts, line 301: 2 values, expected 4"),
+    "long.csv": ("x,y,z\n" + "1,2,3\n" * 300 + "1,2,3,4\n", r"long\.csv, line 302: 4 values, expected 3"),
     "comma.csv": ("x;y;z\n1,5;2,5;3,5\n", r"comma\.csv, line 2: '1,5' is not a number; write decimals with a point"),
-    "count.pts": ("500\n" + GOOD, "truncated: line 1 announces 500 points, 300 follow"),
+    "count.pts": ("500\n" + GOOD, "truncated: line 1 states 500 points, but 300 follow"),
     "none.pts": ("", "holds no points"),
-    "head.csv": ("E,N,H\n1,2,3\n", r"no column x, y, z by its header, which names E, N, H"),
+    "head.csv": ("E,N,H\n1,2,3\n", r"no column x, y, z: its header names E, N, H"),
     "twice.csv": ("x,y,z,X\n1,2,3,4\n", "names the column x twice"),
     "ids.csv": ("x,y,z,scan_id\n1,2,3,1.5\n", r"scan_id of point 1 is 1\.5, not a whole number"),
-    "short.ptx": (ptx([(2, 5, np.eye(3), FAR, ["1 2 3 0.5"] * 9)]), "line 1 announces 2 × 5 points, 9 follow"),
-    "turn.ptx": (ptx([(1, 1, np.eye(3) * 0.3048, FAR, ["1 2 3 0.5"])]), r"line 7: the scan's matrix is no rotation"),
+    "short.ptx": (ptx([(2, 5, np.eye(3), FAR, ["1 2 3 0.5"] * 9)]), "line 1 states 2 × 5 points, but 9 follow"),
+    "turn.ptx": (ptx([(1, 1, np.eye(3) * 0.3048, FAR, ["1 2 3 0.5"])]), r"line 7: the scan's matrix is not a rotation"),
     "head.ptx": (
         ptx([(1, 1, np.eye(3), FAR, ["1 2 3 0.5"])]).replace("1.000000000", "one", 1),
         r"line 4: 'one .* has 3 numbers",
     ),
-    "next.ptx": (ptx([(1, 1, np.eye(3), FAR, ["1 2 3 0.5"] * 2)]), r"line 12: '1 2 3 0\.5' where the header .* a number"),
+    "next.ptx": (ptx([(1, 1, np.eye(3), FAR, ["1 2 3 0.5"] * 2)]), r"line 12: '1 2 3 0\.5', but the header .* a number"),
     "none.ptx": (ptx([(1, 1, np.eye(3), FAR, ["0 0 0 0"])]), "holds no points"),
-    "no.ply": ("plx\n", "is no PLY file"),
+    "no.ply": ("plx\n", "is not a PLY file"),
     "type.ply": ("ply\nformat ascii 1.0\nelement vertex 1\nproperty real x\n", r"type\.ply, line 4: 'property real x'"),
     "face.ply": ("ply\nformat ascii 1.0\nelement face 1\nproperty int x\nend_header\n1\n", "no element vertex; it has face"),
-    "short.ply": (ply_header("ascii", "float") + "1 2 3 9 0.5 1\n", "announces 1000 vertices, 1 lines follow"),
-    "cut.ply": (ply_header("binary_little_endian", "float") + "a" * 25, "1000 vertices and has room for 1"),
+    "short.ply": (ply_header("ascii", "float") + "1 2 3 9 0.5 1\n", "states 1000 vertices, but 1 lines follow"),
+    "cut.ply": (ply_header("binary_little_endian", "float") + "a" * 25, "1000 vertices, but the file has space for 1"),
 }
 
 
@@ -258,7 +258,7 @@ def test_a_point_that_is_none_is_left_out(tmp_path: Path) -> None:
 
 def test_a_file_of_a_name_that_no_format_has_is_told_which_there_are(tmp_path: Path) -> None:
     (tmp_path / "a.pcd").write_text("VERSION .7\n")
-    with pytest.raises(UserError, match=r"a\.pcd: a file of points is known by how its name ends: \.las, \.laz, .*\.ptx"):
+    with pytest.raises(UserError, match=r"a\.pcd: unknown suffix; files of points end with \.las, \.laz, .*\.ptx"):
         read_header(tmp_path / "a.pcd")
 
 

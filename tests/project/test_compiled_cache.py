@@ -16,7 +16,7 @@ def test_a_folder_that_others_may_write_to_is_refused(tmp_path: Path, monkeypatc
     cache.mkdir()
     cache.chmod(mode)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(cache))
-    with pytest.raises(UserError, match=r"NUMBA_CACHE_DIR .* may be written to by others"):
+    with pytest.raises(UserError, match=r"NUMBA_CACHE_DIR .* can be written to by other users"):
         require_own_cache()
     cache.chmod(0o700)
     require_own_cache()
@@ -29,5 +29,5 @@ def test_so_is_one_below_such_a_folder_and_the_default_one(tmp_path: Path, monke
     (tmp_path / ".cache" / "numba").mkdir(parents=True)
     require_own_cache()
     (tmp_path / ".cache").chmod(0o777)
-    with pytest.raises(UserError, match=r"\.cache may be written to by others.* set NUMBA_CACHE_DIR"):
+    with pytest.raises(UserError, match=r"\.cache can be written to by other users.* set NUMBA_CACHE_DIR"):
         require_own_cache()

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 ABORTS = "import os\ndef test_aborts():\n    os.abort()\n"
 SLEEPS = "import time\ndef test_sleeps():\n    time.sleep(60)\n"

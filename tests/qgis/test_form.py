@@ -45,6 +45,7 @@ os._exit(0)  # QGIS's own end is not what is tested
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("style", ["leak", "dark", "leak_3d", "spot", "spot_3d"])
 def test_a_remark_is_what_was_typed_without_the_null_that_stood_there(style: str, tmp_path: Path) -> None:
     if not Path("/usr/lib/python3/dist-packages/qgis").exists():

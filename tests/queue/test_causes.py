@@ -115,11 +115,14 @@ def test_only_what_passes_is_tried_again_as_it_is() -> None:
         "km 2: load: failed: a: tunneldb batch s --retry-failed"
     )
     full = Advice((), "a", "b", CAUSES[0].first).line()
-    assert full == "a: first make room on the database's disk (tunneldb check says how much), then: b"
+    assert full == "a: first free space on the database's disk (tunneldb check says how much), then: b"
 
 
 def test_a_full_disk_of_the_program_is_one_line_too() -> None:
     with pytest.raises(OSError, match="No space") as full, Path("/dev/full").open("wb", buffering=0) as file:
         file.write(b"x")
-    assert describe_failure(full.value) == "No space left on device; what was under way is undone: make room, and run it again"
+    assert (
+        describe_failure(full.value)
+        == "No space left on device; the current work was rolled back: free some space, and run it again"
+    )
     assert describe_failure(io.UnsupportedOperation("seek")) is None

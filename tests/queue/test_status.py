@@ -64,7 +64,7 @@ def batch(conn: psycopg.Connection, example: str) -> str:
     add_job(conn, example, 4, "axis")
     add_file(conn, example, "km-5.laz", 5)
     add_file(conn, example, "km-6.laz", 6, DAMAGED)
-    add_file(conn, example, "notes.laz", None, "/scans/notes.laz is no LAS, LAZ or E57 file")
+    add_file(conn, example, "notes.laz", None, "/scans/notes.laz is not LAS, LAZ or E57")
     conn.commit()
     return example
 
@@ -135,10 +135,10 @@ def test_the_reason_stands_beside_and_what_to_type_below(batch: str) -> None:
     below = lines[lines.index("what to do") :]
     assert "km 6: km-6.laz is damaged after point 1000 of 2000: copy it again" in below
     place = below.index("km 2: axis: failed: too few points") + 1
-    assert below[place].startswith("    first see to the cause: another file")
+    assert below[place].startswith("    first fix the cause: another file")
     assert below[place + 1].strip() == f"tunneldb batch {batch} --retry-failed"
-    place = below.index("notes.laz is no LAS, LAZ or E57 file") + 1
-    assert below[place].strip() == "first copy the file again, or export it anew, then"
+    place = below.index("notes.laz is not LAS, LAZ or E57") + 1
+    assert below[place].strip() == "first copy the file again, or export it again, then"
     assert below[place + 1].strip() == f"tunneldb batch {batch} /scans/notes.laz"
 
 

@@ -7,7 +7,7 @@ from tunneldb.errors import UserError
 from tunneldb.radiometry.cells import IntensitySamples
 from tunneldb.radiometry.dependence import Dependence, class_means
 from tunneldb.radiometry.oren_nayar import incidence_db
-from tunneldb.radiometry.range_curve import USABLE, RangeCurve, estimate_range_curve
+from tunneldb.radiometry.range_curve import MAX_SIGMA_FOR_DETECTION, RangeCurve, estimate_range_curve
 from tunneldb.radiometry.range_spline import RangeSpline, one_maximum
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.simulate import Parameters, simulate
@@ -130,7 +130,7 @@ def test_rings_that_differ_are_in_the_deviation(lining):
 
 
 def test_a_centred_profiler_in_a_round_tunnel_is_refused():
-    with pytest.raises(UserError, match=r"can't be told apart.*4\.00 to 4\.00 m.*scan a target"):
+    with pytest.raises(UserError, match=r"cannot be separated.*4\.00 to 4\.00 m.*scan a target"):
         estimate_range_curve(
             _sight(scanner="profiler", profile_spacing=0.1, profile_points=500, scanner_offset=0.0, scanner_height=2.8)
         )
@@ -172,10 +172,10 @@ def test_an_uncertain_curve_is_remarked_and_a_useless_one_refused(uncertain, rem
     if remarked:
         assert f"uncertain by {uncertain:.2f} dB at {nodes[20]:.1f} m" in found.remark
     if refused:
-        with pytest.raises(UserError, match=r"can't be told apart.*scan a target"):
-            found.require(USABLE)
+        with pytest.raises(UserError, match=r"cannot be separated.*scan a target"):
+            found.require(MAX_SIGMA_FOR_DETECTION)
     else:
-        found.require(USABLE)
+        found.require(MAX_SIGMA_FOR_DETECTION)
 
 
 def test_too_little_lining_is_refused():
@@ -234,7 +234,7 @@ def test_verdict_says_what_is_left():
     # 0.35 dB of range beside a scatter of 1.5 dB
     slope = 0.35 / np.std(range_m)
     small = Dependence.of(range_m, angle, noise, 7.5 * noise + slope * range_m).verdict()
-    assert small.startswith("Good enough for detection")
+    assert small.startswith("Sufficient for detection")
     assert "range (medians differ by 0.3" in small
     left = Dependence.of(range_m, angle, noise, noise - 0.2 * range_m).verdict()
     assert "still depends on range" in left

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.straight_tunnel import straight
 
-from tunneldb.geometry.section_outliers import MOST, SectionOutliers
+from tunneldb.geometry.section_outliers import MAX_GIRTH_SHARE, SectionOutliers
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.radiometry.oren_nayar import incidence_db
@@ -70,7 +70,7 @@ def test_what_is_seen_beyond_the_limits_only_is_not_seen() -> None:
     chainage = GRID.chainages(slice(0, 1200))
     for window, limit in ((scan([30.0], 0.0)[0], RADIUS * np.tan(np.radians(75.0))), (scan([30.0], 0.0, 8.0)[0], 48.0**0.5)):
         columns = slice(150, 1050)
-        state = pixel_states(window, columns, GRID, FLOOR, SectionOutliers.of(ROUND, MOST), 0.03)
+        state = pixel_states(window, columns, GRID, FLOOR, SectionOutliers.of(ROUND, MAX_GIRTH_SHARE), 0.03)
         off = np.abs(chainage[columns] - 30.0)
         assert reach(PIXEL) < 150
         assert (window.weight[:, np.abs(chainage - 30.0) > limit + PIXEL] == 0).all()

@@ -24,7 +24,7 @@ def test_an_image_in_the_database_reads_no_file(tmp_path: Path) -> None:
     vrt = f"""<VRTDataset rasterXSize="10" rasterYSize="10"><VRTRasterBand dataType="Byte" band="1" subClass="VRTRawRasterBand">
     <SourceFilename relativeToVRT="0">{secret}</SourceFilename><ImageOffset>0</ImageOffset><PixelOffset>1</PixelOffset>
     <LineOffset>10</LineOffset></VRTRasterBand></VRTDataset>"""
-    with pytest.raises(UserError, match="is no GeoTIFF, run stage detect again"):
+    with pytest.raises(UserError, match="is not a GeoTIFF; run stage detect again"):
         decode(vrt.encode())
 
 

@@ -12,7 +12,7 @@ from tunneldb.anomalies.geometries import anomaly_geometries
 from tunneldb.classification.ground.model import COLUMN, Ground
 from tunneldb.classification.ground.wall_arcs import foot_arcs
 from tunneldb.geometry.plan_line import PlanLine
-from tunneldb.geometry.section_outliers import MOST, SectionOutliers
+from tunneldb.geometry.section_outliers import MAX_GIRTH_SHARE, SectionOutliers
 from tunneldb.radiometry.edge_normals import Edges
 from tunneldb.raster import appendages as appendage
 from tunneldb.raster import ring_steps as step
@@ -115,7 +115,7 @@ def test_a_section_measured_in_a_niche_or_on_a_box_leaves_the_wall(apart):
     radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
     radius[5, 250:300] += apart
     surface = straight(radius)
-    outliers = SectionOutliers.of(surface, MOST)
+    outliers = SectionOutliers.of(surface, MAX_GIRTH_SHARE)
     at = np.array([20.0, float(surface.chainages[5]), 40.0])
     middle = np.interp(275, np.arange(361), surface.arcs[5])
     edge = np.interp(250, np.arange(361), surface.arcs[5])
@@ -148,7 +148,7 @@ def test_the_back_of_a_niche_is_lining_though_a_section_was_measured_in_it(measu
         image.add(Pixels(row, column, np.ones(len(x), np.int32), offset, nothing, nothing), len(x))
         columns = slice(400, 800)
         window = image.window(columns.start - reach(0.05), columns.stop + reach(0.05))
-        state = pixel_states(window, columns, grid, floor, SectionOutliers.of(surface, MOST), 0.03)
+        state = pixel_states(window, columns, grid, floor, SectionOutliers.of(surface, MAX_GIRTH_SHARE), 0.03)
     inside = (column >= 400) & (column < 800)
     seen = np.zeros(len(x), np.uint8)
     seen[inside] = state[row[inside], column[inside] - 400]
@@ -167,7 +167,9 @@ def test_beyond_the_ends_of_the_section_nothing_is_left_to_be_seen():
     grid = Grid.covering(0, 0.05, -15.0, 15.0)
     floor = Floor.of(0, np.full(61, np.nan), np.full(61, np.nan))
     with Accumulator(grid) as image:
-        state = pixel_states(image.window(0, 1400), slice(200, 1400), grid, floor, SectionOutliers.of(ROUND, MOST), 0.03)
+        state = pixel_states(
+            image.window(0, 1400), slice(200, 1400), grid, floor, SectionOutliers.of(ROUND, MAX_GIRTH_SHARE), 0.03
+        )
     arc, chainage = grid.arcs(), grid.chainages(slice(200, 1400))
     beyond = np.abs(arc) > 4.0 * np.pi + 0.05
     assert (state[beyond] == PixelState.OFF).all()
@@ -180,7 +182,9 @@ def test_below_the_water_lining_is_submerged_not_unseen():
     none = np.full(61, np.nan)
     floor = Floor.of(0, none, np.full(61, 7.0), (np.full(61, -6.0), np.full(61, 8.0)))
     with Accumulator(grid) as image:
-        state = pixel_states(image.window(0, 1400), slice(200, 1400), grid, floor, SectionOutliers.of(ROUND, MOST), 0.03)
+        state = pixel_states(
+            image.window(0, 1400), slice(200, 1400), grid, floor, SectionOutliers.of(ROUND, MAX_GIRTH_SHARE), 0.03
+        )
     arc, chainage = grid.arcs(), grid.chainages(slice(200, 1400)) < LENGTH
     assert (state[arc < -6.05] == PixelState.SUBMERGED).all()
     assert (state[arc > 8.05] == PixelState.SUBMERGED).all()
@@ -242,16 +246,16 @@ def test_what_does_not_go_all_round_is_no_step():
 def test_rock_that_differs_from_section_to_section_is_lining():
     rng = np.random.default_rng(1)
     radius = 4.0 + np.repeat(rng.normal(0, 0.1, (12, 73)), 5, axis=1)[:, :361]
-    assert (SectionOutliers.of(straight(radius), MOST).apart != 0).mean() < 0.03
+    assert (SectionOutliers.of(straight(radius), MAX_GIRTH_SHARE).apart != 0).mean() < 0.03
 
 
 def test_a_wider_stretch_is_no_niche():
     radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
     radius[6:] += 0.5
-    assert not SectionOutliers.of(straight(radius), MOST).apart.any()
+    assert not SectionOutliers.of(straight(radius), MAX_GIRTH_SHARE).apart.any()
     radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
     radius[6] += 0.5
-    assert not SectionOutliers.of(straight(radius), MOST).apart.any()
+    assert not SectionOutliers.of(straight(radius), MAX_GIRTH_SHARE).apart.any()
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 from tunneldb.raster.appendages import distance_from_plane, off_plane, recessed
-from tunneldb.raster.relief import LIMIT, MOST, relief_limit
+from tunneldb.raster.relief import LIMIT_SIGMAS, MAX_RELIEF, relief_limit
 from tunneldb.raster.relief import reach as relief_reach
 
 PIXEL = 0.02
@@ -14,7 +14,7 @@ PIXEL = 0.02
 def test_the_limit_is_three_standard_deviations_of_normal_departures():
     distance = np.random.default_rng(1).normal(0, 0.05, (400, 600)).astype(np.float32)
     limit = relief_limit(distance, PIXEL, (0, 0))
-    np.testing.assert_allclose(limit, LIMIT * 0.05, rtol=0.15)
+    np.testing.assert_allclose(limit, LIMIT_SIGMAS * 0.05, rtol=0.15)
 
 
 def test_appendages_on_less_than_half_of_the_lining_hardly_change_it():
@@ -28,7 +28,7 @@ def test_appendages_on_less_than_half_of_the_lining_hardly_change_it():
 
 def test_what_covers_everything_is_no_relief_of_more_than_a_rock_has():
     distance = np.full((400, 600), 0.4, np.float32)
-    assert (relief_limit(distance, PIXEL, (0, 0)) == np.float32(MOST)).all()
+    assert (relief_limit(distance, PIXEL, (0, 0)) == np.float32(MAX_RELIEF)).all()
 
 
 def test_it_is_zero_where_there_is_nothing():

@@ -6,7 +6,7 @@ import numpy as np
 from support.straight_tunnel import straight
 
 from tests.raster.test_blending import FLOOR
-from tunneldb.geometry.section_outliers import MOST, SectionOutliers
+from tunneldb.geometry.section_outliers import MAX_GIRTH_SHARE, SectionOutliers
 from tunneldb.raster.accumulator import Accumulator
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import lining_image
@@ -24,7 +24,7 @@ def test_no_lining_and_no_points_beyond_the_ends() -> None:
     grid = Grid.covering(0, PIXEL, -12.0, 12.0)
     observer = Observer.of(surface, 0, (0.5, 1.2), None, FLOOR, ends=ENDS)
     with Accumulator(grid) as image:
-        picture = lining_image(image, None, observer, SectionOutliers.of(surface, MOST), 0.02, lambda window: None)
+        picture = lining_image(image, None, observer, SectionOutliers.of(surface, MAX_GIRTH_SHARE), 0.02, lambda window: None)
     unseen = np.flatnonzero((picture.state == PixelState.EMPTY).any(axis=0))
     assert (unseen[0], unseen[-1]) == (FIRST, STOP - 1)
     target = Projector.of(observer, grid, 0.0).target

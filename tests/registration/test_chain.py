@@ -7,7 +7,7 @@ import pytest
 
 from tunneldb.arrays import Float
 from tunneldb.registration.underwater.adjustment import Scan, fit
-from tunneldb.registration.underwater.chain import SURE, bed_likelihood
+from tunneldb.registration.underwater.chain import MIN_LOG_RATIO, bed_likelihood
 from tunneldb.registration.underwater.observations import (
     BEAM_SPREAD,
     Patches,
@@ -83,7 +83,7 @@ def test_beds_are_told_to_be_one_where_they_are_and_nowhere_else() -> None:
     other, second = patches_of(5.0, rng)
     another, _ = patches_of(5.0, rng, phase=2.0)
     rough = 0.03
-    assert bed_likelihood((one, other), (first, second), rough) > SURE
+    assert bed_likelihood((one, other), (first, second), rough) > MIN_LOG_RATIO
     assert bed_likelihood((one, another), (first, second), rough) < 0.0
     for along in (-0.6, 0.6):
         assert bed_likelihood((one, other), (first, moved(second, along)), rough) < 0.0

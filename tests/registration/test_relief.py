@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from tunneldb.registration.underwater.first_pose import LevelScan
-from tunneldb.registration.underwater.relief import NOWHERE, PIXEL, height_difference, likelihood, relief_of
+from tunneldb.registration.underwater.relief import NO_EVIDENCE, PIXEL, height_difference, likelihood, relief_of
 
 WIDTH = 6.0
 
@@ -49,6 +49,7 @@ def test_place_and_height_of_another_scanner_are_found(apart: float, turned: boo
     assert height_difference(one, other.turned() if turned else other, best) == pytest.approx(0.3, abs=0.01)
 
 
+@pytest.mark.slow
 def test_other_beds_are_not_alike_though_both_rise_to_the_walls() -> None:
     """Over many pairs no shift is believed: 200 shifts of either half turn, of which some ten are independent."""
     highest = []
@@ -64,6 +65,6 @@ def test_nothing_is_said_where_nothing_is_shared() -> None:
     one = relief_of(seen_from(bed(3), 30.0, 1.2, turned=False, seed=1))
     assert one is not None
     values = likelihood(one, one)
-    assert values[0] == values[-1] == NOWHERE
+    assert values[0] == values[-1] == NO_EVIDENCE
     empty = LevelScan(np.eye(3), (-3.0, 3.0), (0.0, 0.0), np.zeros((3, 3)), -1.0, np.zeros((0, 3)), 0.0)
     assert relief_of(empty) is None

@@ -45,9 +45,9 @@ PRINT = """
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from tunneldb.files import replacing, told_to_end
+from tunneldb.files import replacing, exit_on_sigterm
 from tunneldb.report.pdf import print_pdf
-with told_to_end(), replacing(Path(sys.argv[2])) as temporary:
+with exit_on_sigterm(), replacing(Path(sys.argv[2])) as temporary:
     print_pdf(sys.argv[1], Path(sys.argv[2]), temporary)
 """
 

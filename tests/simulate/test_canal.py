@@ -15,6 +15,8 @@ from tunneldb.errors import UserError
 from tunneldb.simulate.canal import FALSE, CanalParameters, CanalScene, simulate, write
 from tunneldb.simulate.canal.section import BED, LADDER, WALL
 
+pytestmark = pytest.mark.slow
+
 COARSE = {"length": 24.0, "laser_step": 1.0, "laser_ladder_step": 0.1, "sonar_step": 3.0, "sonar_beams": 64}
 
 

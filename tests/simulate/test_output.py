@@ -222,7 +222,7 @@ def test_full_disk_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         ({"srid": 4326}, "not projected in metres"),
         ({"srid": 2227}, "not projected in metres"),
         ({"srid": 999999}, "SRID 999999 is unknown"),
-        ({"name": "a/b"}, "does not make a file name"),
+        ({"name": "a/b"}, "is not valid in a file name"),
         ({"section": "egg"}, "section 'egg' is unknown"),
         ({"scanner": "drone"}, "scanner 'drone' is unknown"),
         ({"density": 0.0}, "density is 0"),

@@ -48,6 +48,7 @@ def rays(step: float, low: tuple[float, float], high: tuple[float, float]) -> np
     return np.column_stack([np.sin(a) * np.sin(z), np.cos(a) * np.sin(z), np.cos(z), solid])
 
 
+@pytest.mark.slow
 def test_a_rectangle_fills_its_solid_angle():
     half_a, half_b, away = 1.3, 0.7, 4.0
     rows = surface(RECTANGLE, np.array([0.0, away, 0.0]), UPRIGHT, half_a, half_b)[None]

@@ -166,13 +166,13 @@ def test_schemas_come_and_go_with_tunnels(conn: psycopg.Connection, dsn: str, mo
     remove_tunnel(conn, "bench")
     assert "tunnel_local" in schemas(conn)  # what somebody's view rests on stays
     conn.commit()
-    with pytest.raises(UserError, match="mine rest on schema tunnel_api"):
+    with pytest.raises(UserError, match="mine depend on schema tunnel_api"):
         install(conn, STAGES)
     conn.rollback()
     conn.execute("DROP VIEW public.mine")
     conn.execute(sql.SQL("CREATE TABLE {} AS SELECT 1 AS a").format(sql.Identifier(SCHEMA, "kept")))
     conn.commit()
-    with pytest.raises(UserError, match=rf"{SCHEMA}.kept lie in a schema of typed layers"):
+    with pytest.raises(UserError, match=rf"{SCHEMA}.kept are in a schema of typed layers"):
         install(conn, STAGES)
     conn.rollback()
     conn.execute(sql.SQL("DROP TABLE {}").format(sql.Identifier(SCHEMA, "kept")))

@@ -13,7 +13,7 @@ def test_a_failure_of_the_database_is_one_line_without_where_it_was(conn: psycop
     with pytest.raises(psycopg.errors.DiskFull) as full:
         conn.execute("DO $$ BEGIN RAISE EXCEPTION 'could not extend file' USING ERRCODE = 'disk_full'; END $$")
     assert "CONTEXT" in str(full.value)
-    assert describe(full.value) == "the database's disk is full, what was under way is undone: could not extend file"
+    assert describe(full.value) == "the database's disk is full, the current work was rolled back: could not extend file"
     conn.rollback()
     with pytest.raises(psycopg.errors.RaiseException) as raised:
         conn.execute("DO $$ BEGIN RAISE EXCEPTION 'no such vertex'; END $$")

@@ -17,6 +17,8 @@ from support.structure_scene import Pipe, Plate, scan
 
 from tunneldb.cli.main import main
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def plant(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -1,4 +1,4 @@
-"""How far the axis as measured lies from the axis as given."""
+"""Deviation of the measured axis from the given axis."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tunneldb.geometry.stationing import KILOMETRE, Stationing
 
 @dataclass(frozen=True)
 class Part:
-    """An element of the design alignment, as view alignment_element describes it: chainages and radii m, grades %."""
+    """Element of the design alignment, as in the view alignment_element: chainages and radii m, grades %."""
 
     plane: str
     kind: str
@@ -28,7 +28,7 @@ class Part:
 
     @property
     def title(self) -> str:
-        """What it is, for a table: ``arc, R 250 m left``."""
+        """Description for a table: ``arc, R 250 m left``."""
         if self.plane == "vertical":
             return self.kind if self.turn is None else f"{self.kind}, {self.turn}"
         radii = [radius for radius in (self.radius_from, self.radius_to) if radius is not None]
@@ -40,7 +40,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Summary:
-    """Deviation over a stretch; lengths m, of vertices that were measured or placed by hand.
+    """Deviation over a stretch; lengths in m, for vertices that were measured or edited.
 
     ``right_most`` and ``up_most`` are the greatest deviations, with their signs; NaN where no vertex was measured.
     """
@@ -62,19 +62,19 @@ class Deviation:
     Attributes
     ----------
     survey : str
-        Its name.
+        Name of the survey.
     design : str or None
-        File and alignment that the axis was given by.
+        File and alignment of the given axis.
     chainage, to_right, up : (n,) float arrays
         Chainage, deviation to the right looking up-chainage and upwards, m.
     label, source : tuple of str
         Station; measured, interpolated or edited.
     vertices : (n, 3) float array
-        The vertices as measured, tunnel's SRID, m.
+        Measured vertices, tunnel's SRID, m.
     elements : tuple of Part
-        Elements of the design, if there is one.
+        Elements of the design, if any.
     stationing : Stationing
-        Of the tunnel.
+        Stationing of the tunnel.
     """
 
     survey: str
@@ -90,18 +90,18 @@ class Deviation:
 
     @property
     def known(self) -> Bool:
-        """Which vertices were not merely carried along with their neighbours."""
+        """True for vertices that were not interpolated from their neighbours."""
         return np.array(self.source) != "interpolated"
 
     def parts(self, plane: str) -> list[Part]:
-        """Elements of a plane that the vertices reach."""
+        """Return the elements of a plane that have vertices."""
         low, high = self.chainage[0], self.chainage[-1]
         return [
             part for part in self.elements if part.plane == plane and part.chainage_to >= low and part.chainage_from <= high
         ]
 
     def summaries(self) -> list[Summary]:
-        """By element in plan, or by kilometre where there is no design; the last one is of all."""
+        """Return summaries by element in plan, or by kilometre without a design; the last one is the total."""
         parts = self.parts("horizontal")
         if parts:
             ends = [(p.title, p.chainage_from, p.chainage_to, p.label_from, p.label_to) for p in parts]

@@ -17,8 +17,8 @@ from tunneldb.files import vector_source
 from tunneldb.geometry.crs import LOCAL, describe_crs, describe_srid, fits_srid, is_local
 
 CHORD_ERROR = 0.0005  # m, of arcs and splines
-LONGEST_STEP = 1.0  # m between vertices of a drawing with arcs: the spline through them shall keep straights straight
-_LISTED = 8
+MAX_STEP = 1.0  # m between vertices of a drawing with arcs, so that the spline through them keeps straights straight
+_MAX_LISTED = 8
 _ENTITIES = {"LINE", "ARC", "LWPOLYLINE", "POLYLINE", "SPLINE"}
 
 
@@ -29,11 +29,11 @@ class Drawn:
     Attributes
     ----------
     lines : list of (n, 3) float arrays
-        The longest first, m; heights are NaN where the layer has none, or 0 throughout.
+        Lines, the longest first, m; heights are NaN if the layer has none, or 0 throughout.
     layer : str
-        Its name.
+        Name of the layer.
     notes : tuple of str
-        What the user should know about the reading.
+        Notes for the user about the import.
     """
 
     lines: list[Float]
@@ -41,13 +41,13 @@ class Drawn:
     notes: tuple[str, ...] = ()
 
     def choose(self, path: Path, number: str | None) -> Float:
-        """Return the only line, or that with a number of the list, counted from 1."""
+        """Return the only line, or the one with a number in the list, from 1."""
         if number is None and len(self.lines) == 1:
             return self.lines[0]
-        listed = "; ".join(f"{n} ({describe_line(line)})" for n, line in enumerate(self.lines[:_LISTED], start=1))
-        more = len(self.lines) - _LISTED
+        listed = "; ".join(f"{n} ({describe_line(line)})" for n, line in enumerate(self.lines[:_MAX_LISTED], start=1))
+        more = len(self.lines) - _MAX_LISTED
         listed += f"; and {more} shorter ones" if more > 0 else ""
-        count = "1 line" if len(self.lines) == 1 else f"{len(self.lines)} lines that don't meet end to end"
+        count = "1 line" if len(self.lines) == 1 else f"{len(self.lines)} separate lines"
         if number is None:
             raise InputError(f"{path}: layer {self.layer!r} holds {count}: {listed}; choose one by --alignment NUMBER")
         if not number.isdecimal() or not 1 <= int(number) <= len(self.lines):
@@ -56,7 +56,7 @@ class Drawn:
 
 
 def describe_line(line: Float) -> str:
-    """Length and ends of a line, for a message."""
+    """Return length and ends of a line, for a message."""
     length = float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
     (x1, y1), (x2, y2) = line[0, :2], line[-1, :2]
     return f"{length:.1f} m from {x1:.1f},{y1:.1f} to {x2:.1f},{y2:.1f}"
@@ -68,14 +68,14 @@ def read_dxf(path: Path, layer: str | None, unit: float | None) -> Drawn:
     Parameters
     ----------
     layer
-        Which layer; needed where several hold lines.
+        Name of the layer; required if several contain lines.
     unit
-        Metres in a unit of the drawing; None: as the file says.
+        Metres per drawing unit; None for the file's own unit.
 
     Raises
     ------
     InputError
-        If it can't be read, holds no lines, several layers to choose from, or states a unit that isn't the metre.
+        If it can't be read, has no lines, has several layers to choose from, or its unit isn't the metre.
     """
     drawing = open_drawing(path)
     entities = [entity for entity in drawing.modelspace() if entity.dxftype() in _ENTITIES and not _is_mesh(entity)]
@@ -101,7 +101,7 @@ def open_drawing(path: Path) -> Any:
 
     try:
         return filemanagement.readfile(str(path))
-    except Exception as error:  # of a damaged file ezdxf raises StopIteration, OverflowError, whatever comes
+    except Exception as error:  # for damaged files ezdxf raises StopIteration, OverflowError and others
         said = str(error).strip().splitlines() or [f"it is damaged ({type(error).__name__})"]
         raise InputError(f"{path} cannot be read as DXF: {said[0]}") from None
 
@@ -112,14 +112,14 @@ def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
     Parameters
     ----------
     layer
-        Which layer; needed where several hold lines.
+        Name of the layer; required if several contain lines.
     srid
-        EPSG code, or LOCAL, that its coordinates must be in; None: not checked.
+        Required coordinate system, an EPSG code or LOCAL; None: not checked.
 
     Raises
     ------
     InputError
-        If it can't be read, holds no lines, several layers to choose from, or is in another coordinate system.
+        If it can't be read, has no lines, has several layers to choose from, or is in another coordinate system.
     """
     import pyogrio
     import shapely
@@ -137,19 +137,19 @@ def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
         geometries = shapely.get_parts(shapely.get_parts(shapely.from_wkb(wkb, on_invalid="ignore")))
     except shapely.errors.GEOSException as error:
         raise InputError(
-            f"{path}: a geometry of layer {chosen!r} is damaged ({str(error).strip().splitlines()[0]}); mend it (in QGIS: Fix "
+            f"{path}: a geometry of layer {chosen!r} is damaged ({str(error).strip().splitlines()[0]}); fix it (in QGIS: Fix "
             "geometries)"
         ) from None
     geometries = geometries[np.isin(shapely.get_type_id(geometries), (1, 2))]  # lines and rings
     pieces = [shapely.get_coordinates(line, include_z=True) for line in geometries]
     broken = sum(not np.isfinite(piece[:, :2]).all() for piece in pieces)
     if broken:
-        raise InputError(f"{path}: {broken} lines of layer {chosen!r} have coordinates that are no numbers")
+        raise InputError(f"{path}: {broken} lines of layer {chosen!r} have invalid coordinates")
     return _drawn(path, join_pieces(pieces), chosen, notes)
 
 
 def choose_layer(path: Path, names: list[str], wanted: str | None, others: list[str] | None = None) -> str:
-    """Name of the layer that is wanted, or of the only one with lines."""
+    """Return the name of the wanted layer, or of the only one with lines."""
     listed = ", ".join(repr(name) for name in names)
     if wanted is not None:
         if wanted not in names:
@@ -160,7 +160,7 @@ def choose_layer(path: Path, names: list[str], wanted: str | None, others: list[
         return wanted
     if not names:
         held = f"; its layers: {', '.join(map(repr, others))}" if others else ""
-        raise InputError(f"{path} holds no lines{held}; an axis is drawn as a line")
+        raise InputError(f"{path} holds no lines{held}; draw the axis as a line")
     if len(names) > 1:
         raise InputError(f"{path} holds {len(names)} layers of lines: {listed}; choose one by --axis-layer NAME")
     return names[0]
@@ -179,12 +179,12 @@ def _check_crs(path: Path, stated: str | None, srid: int | None) -> tuple[str, .
     if srid is None:
         return ()
     if stated is None:
-        return () if srid == LOCAL else (f"names no coordinate system; its coordinates are taken to be EPSG:{srid}",)
+        return () if srid == LOCAL else (f"states no coordinate system; using the tunnel's, EPSG:{srid}",)
     try:
         own = CRS.from_user_input(stated)
         fits, wanted = fits_srid(own, srid), describe_srid(srid)
     except CRSError as error:
-        raise InputError(f"{path}: SRID {srid} or the file's coordinate system is not known: {error}") from None
+        raise InputError(f"{path}: SRID {srid} or the file's coordinate system is unknown: {error}") from None
     if not fits:
         there = "in the scan's own coordinates" if srid == LOCAL else f"in EPSG:{srid}"
         mend = "--srid local" if is_local(own) else "the line's SRID"
@@ -196,19 +196,19 @@ def _check_crs(path: Path, stated: str | None, srid: int | None) -> tuple[str, .
 
 
 def _dxf_unit(path: Path, code: int, unit: float | None) -> tuple[float, str]:
-    """Metres in a unit of the drawing, and what is to be said of it."""
+    """Return the metres per drawing unit, and a note about it."""
     from ezdxf import units
 
     if unit is not None:
-        says = f"; the file itself says {units.decode(code)}" if code else ""
-        return unit, f"1 unit is taken to be {unit:.9g} m, as told{says}"
+        says = f"; the file states {units.decode(code)}" if code else ""
+        return unit, f"unit: {unit:.9g} m, as given{says}"
     if code == units.M:
         return 1.0, ""
     if code == 0:
-        return 1.0, "states no unit; its lengths are taken to be metres, as the SRID's are"
+        return 1.0, "states no unit; using metres, the unit of the SRID"
     raise InputError(
-        f"{path}: its unit is {units.decode(code)} ($INSUNITS {code}); what are its lengths? Say it by --axis-unit, such "
-        "as --axis-unit meter"
+        f"{path}: its unit is {units.decode(code)} ($INSUNITS {code}); give the unit of its lengths, for "
+        "example --axis-unit meter"
     )
 
 
@@ -218,7 +218,7 @@ def _simple(entity: Any) -> list[Any]:
 
 
 def _vertices(entity: Any, chord_error: float) -> Float:
-    """Vertices (n, 3) along a LINE, an ARC or a SPLINE, in its drawing's unit."""
+    """Return vertices (n, 3) along a LINE, an ARC or a SPLINE, in its drawing's unit."""
     line = entity.dxftype() == "LINE"
     vertices = (entity.dxf.start, entity.dxf.end) if line else entity.flattening(chord_error)
     return np.array([tuple(vertex) for vertex in vertices], dtype=np.float64).reshape(-1, 3)
@@ -229,9 +229,9 @@ def _is_mesh(entity: Any) -> bool:
 
 
 def _densified(line: Float) -> Float:
-    """The same line with vertices at most a metre apart."""
+    """Return the same line with vertices at most 1 m apart."""
     length = np.hypot(*np.diff(line[:, :2], axis=0).T)
-    parts = np.maximum(np.ceil(length / LONGEST_STEP), 1.0).astype(int)
+    parts = np.maximum(np.ceil(length / MAX_STEP), 1.0).astype(int)
     within = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
     at = np.append(np.repeat(np.arange(len(parts)), parts) + within / np.repeat(parts, parts), float(len(parts)))
     return np.column_stack([np.interp(at, np.arange(len(line)), column) for column in line.T])

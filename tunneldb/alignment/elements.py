@@ -1,4 +1,4 @@
-"""Elements of a design alignment and where they lead."""
+"""Elements of a design alignment, with points along them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tunneldb.arrays import Float
 PlanKind = Literal["line", "arc", "clothoid"]
 ProfileKind = Literal["grade", "parabola", "circle"]
 
-# 24-point Gauss-Legendre rule on [0, 1]. The cosine of a quadratic is integrated over a turn of a full circle to 1e-13 of
+# 24-point Gauss-Legendre rule on [0, 1]. It integrates the cosine of a quadratic over a full circle to 1e-13 of
 # the length; a clothoid of a road or a railway turns by a fraction of that.
 _NODE, _WEIGHT = np.polynomial.legendre.leggauss(24)
 _NODE, _WEIGHT = 0.5 * (_NODE + 1.0), 0.5 * _WEIGHT
@@ -21,7 +21,7 @@ _NODE, _WEIGHT = 0.5 * (_NODE + 1.0), 0.5 * _WEIGHT
 
 @dataclass(frozen=True)
 class PlanElement:
-    """An element in plan; its curvature is linear in the distance along it.
+    """Element in plan; its curvature is linear in the distance along it.
 
     Attributes
     ----------
@@ -30,9 +30,9 @@ class PlanElement:
     length : float
         Length in plan, m.
     x, y : float
-        Where it begins, m.
+        Start point, m.
     bearing : float
-        Direction in which it begins, radians from the x axis towards y.
+        Direction at its start, radians from the x axis towards y.
     curvature_from, curvature_to : float
         Curvature at both ends, 1/m, positive to the left.
     """
@@ -46,12 +46,12 @@ class PlanElement:
     curvature_to: float = 0.0
 
     def bearing_at(self, distance: Float) -> Float:
-        """Direction at distances (m) from its beginning, radians from the x axis towards y."""
+        """Return the direction at distances (m) from its start, radians from the x axis towards y."""
         change = (self.curvature_to - self.curvature_from) / self.length
         return self.bearing + distance * (self.curvature_from + 0.5 * change * distance)
 
     def position(self, distance: Float) -> Float:
-        """Points (n, 2) at distances (n,) from its beginning, m; beyond its ends on its continuation."""
+        """Return points (n, 2) at distances (n,) from its start, m; extrapolated beyond its ends."""
         distance = np.asarray(distance, dtype=np.float64)
         bearing = self.bearing_at(distance[:, None] * _NODE)
         return np.column_stack([
@@ -61,24 +61,24 @@ class PlanElement:
 
     @property
     def end(self) -> Float:
-        """Where it ends, (2,), m."""
+        """End point, (2,), m."""
         return self.position(np.array([self.length]))[0]
 
 
 @dataclass(frozen=True)
 class ProfileElement:
-    """An element in profile.
+    """Element in profile.
 
     Attributes
     ----------
     kind : str
         grade (constant), parabola (the grade is linear in the distance) or circle.
     distance : float
-        Where it begins: distance in plan from the beginning of the alignment, m.
+        Start: distance in plan from the start of the alignment, m.
     length : float
         Length in plan, m.
     z : float
-        Height at which it begins, m.
+        Height at its start, m.
     grade_from, grade_to : float
         Rise per metre in plan at both ends.
     """
@@ -91,11 +91,11 @@ class ProfileElement:
     grade_to: float
 
     def height(self, distance: Float) -> Float:
-        """Heights (n,) at distances (n,) in plan from the beginning of the alignment, m."""
+        """Return heights (n,) at distances (n,) in plan from the start of the alignment, m."""
         along = np.asarray(distance, dtype=np.float64) - self.distance
         if self.kind != "circle" or self.grade_from == self.grade_to:
             return self.z + along * (self.grade_from + 0.5 * (self.grade_to - self.grade_from) * along / self.length)
-        # A circle's sine of slope is linear in plan; its height goes with the cosine.
+        # A circle's sine of slope is linear in plan; its height follows from the cosine.
         sine_from, sine_to = (grade / np.hypot(1.0, grade) for grade in (self.grade_from, self.grade_to))
         sine = sine_from + (sine_to - sine_from) * along / self.length
         radius = self.length / (sine_to - sine_from)
@@ -105,11 +105,11 @@ class ProfileElement:
 def clothoid_from_chord(
     start: tuple[float, float], end: tuple[float, float], length: float, curvature_from: float, curvature_to: float
 ) -> tuple[PlanElement, float]:
-    """Clothoid (or arc) of known length and curvatures, turned so that its chord points from start to end.
+    """Return a clothoid (or arc) of given length and curvatures, turned so that its chord points from start to end.
 
     Returns
     -------
-    The element, and how much longer the distance from start to end is than its chord, m.
+    The element, and the distance from start to end minus the length of its chord, m.
     """
     local = PlanElement("clothoid", length, 0.0, 0.0, 0.0, curvature_from, curvature_to)
     reach, given = local.end, np.subtract(end, start)

@@ -1,7 +1,7 @@
-"""The plan of what is roofed over in a cloud, and the way along its middle.
+"""Plan of the roofed area of a cloud, and the path along its middle.
 
-A tunnel's axis is found in the projection of its points onto the plan (Kang et al., 2014). The way along the middle is the
-shortest path where steps far from the edge cost less (Wan et al., 2002).
+A tunnel's axis is found in the projection of its points onto the plan (Kang et al., 2014). The path along the middle is the
+shortest path with greater cost per step near the edge (Wan et al., 2002).
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ from scipy.spatial import cKDTree
 from tunneldb.arrays import Bool, Float, Int64
 
 CELLS = (1.0, 2.0, 4.0)
-"""Edges of a cell of the plan, m: the smallest in which most of the neighbours of a roofed cell are roofed, too."""
+"""Edges of a cell of the plan, m; the smallest for which most neighbours of a roofed cell are roofed is used."""
 
 CLEARANCE = 1.5
-"""Empty height between points one above the other that makes the upper ones a roof, m. Slopes and walls have none."""
+"""Empty height between points above each other from which the upper ones are a roof, m. Slopes and walls have none."""
 
-_REACH = 3.0  # edges: cells closer than this hang together, for profiles may lie apart
+_CONNECTED_WITHIN = 3.0  # edges: distance up to which cells are connected, since profiles have gaps
 _WINDOW = 2  # cells on each side, of the window that fills holes
-_FAR = 1 << 25  # cells; more than any tunnel is long
+_CELL_OFFSET = 1 << 25  # cells; more than the length of any tunnel
 
 
 @dataclass(frozen=True)
 class Footprint:
-    """Cells of the plan under a roof that hang together.
+    """Connected cells of the plan under a roof.
 
     Attributes
     ----------
     cells : (n, 2) float array
-        Their middles, m.
+        Centres of the cells, m.
     depth : (n,) float array
-        Distance of each from the edge of what is roofed over, m.
+        Distance of each cell from the edge of the roofed area, m.
     edge : float
         Edge of a cell, m.
     """
@@ -45,7 +45,7 @@ class Footprint:
     edge: float
 
     def part(self, chosen: Bool) -> Footprint:
-        """Footprint of some of the cells, with the same depths."""
+        """Return the footprint of some of the cells, with the same depths."""
         return Footprint(self.cells[chosen], self.depth[chosen], self.edge)
 
     @property
@@ -55,12 +55,12 @@ class Footprint:
 
 
 def roofed_parts(points: Float) -> list[Footprint]:
-    """Parts of the plan where points have others above them, with nothing between, the largest part first.
+    """Return parts of the plan where points have a roof above them and free height below it, the largest part first.
 
     Parameters
     ----------
     points : (n, 3) float array
-        m, spread evenly.
+        Evenly spread points, m.
     """
     for edge in CELLS:
         roofed = _roofed(points, edge)
@@ -76,26 +76,26 @@ def roofed_parts(points: Float) -> list[Footprint]:
 
 
 def without_side_rooms(part: Footprint) -> Footprint:
-    """Leave out what is narrower than 0.6 of the tunnel: niches, cross passages.
+    """Remove parts narrower than 0.6 of the tunnel's width: niches, cross passages.
 
-    It is the morphological opening of the footprint, with the tunnel's half-width from the longest path through it.
+    This is the morphological opening of the footprint, with the tunnel's half-width from the longest path through it.
     """
     half = half_width(part, longest_path(part))
     core = part.cells[part.depth >= 0.6 * half]
     opened = part.part(cKDTree(core).query(part.cells)[0] <= half)
     label = connected_components(_graph(opened.cells, part.edge), directed=False)[1]
     size = np.bincount(label)
-    # where the tunnel itself is so narrow somewhere, it stays as it is
+    # if the tunnel itself is that narrow somewhere, it stays unchanged
     return opened.part(label == np.argmax(size)) if size.max() > 0.8 * size.sum() else part
 
 
 def half_width(part: Footprint, path: Int64) -> float:
-    """Half the width of what a path runs through, m."""
+    """Return the half-width of the area around a path, m."""
     return float(np.median(part.depth[path]))
 
 
 def longest_path(part: Footprint) -> Int64:
-    """Numbers of the cells along the middle of a part, from one of its ends to the other."""
+    """Return the indices of the cells along the middle of a part, from one of its ends to the other."""
     graph = _graph(part.cells, part.edge).tocsr()
     start = 0
     for _ in range(2):
@@ -109,21 +109,21 @@ def longest_path(part: Footprint) -> Int64:
 
 
 def branches(part: Footprint, path: Int64) -> Float:
-    """Middles (k, 2) of what leaves a path, is as wide as the tunnel and longer than wide, m."""
+    """Return centres (k, 2) of branches of a path that are as wide as the tunnel and longer than wide, m."""
     half = half_width(part, path)
     away = cKDTree(part.cells[path]).query(part.cells)[0]
-    rest = part.part((away > 2.0 * half + _REACH * part.edge) & (part.depth >= 0.6 * half))
+    rest = part.part((away > 2.0 * half + _CONNECTED_WITHIN * part.edge) & (part.depth >= 0.6 * half))
     groups = _groups(rest.cells, part.edge)
     return np.array([g.mean(axis=0) for g in groups if np.hypot(*np.ptp(g, axis=0)) > 2.0 * half]).reshape(-1, 2)
 
 
 def largest_group(cells: Float, edge: float) -> Float:
-    """Those (k, 2) of the cells (n, 2) that hang together, where they are most, m."""
+    """Return the largest connected group (k, 2) of the cells (n, 2), m."""
     return _groups(cells, edge)[0]
 
 
 def _groups(cells: Float, edge: float) -> list[Float]:
-    """Cells that hang together, the most first."""
+    """Return groups of connected cells, the largest first."""
     if not len(cells):
         return []
     label = connected_components(_graph(cells, edge), directed=False)[1]
@@ -131,7 +131,7 @@ def _groups(cells: Float, edge: float) -> list[Float]:
 
 
 def _roofed(points: Float, edge: float) -> Int64:
-    """Cells (n, 2) of the plan with a roof, and the walls beside them."""
+    """Return cells (n, 2) of the plan with a roof, and the walls beside them."""
     key = _key(np.floor(points[:, :2] / edge).astype(np.int64))
     order = np.lexsort((points[:, 2], key))
     key, z = key[order], points[order, 2]
@@ -147,7 +147,7 @@ def _roofed(points: Float, edge: float) -> Int64:
 
 
 def _filled(cell: Int64) -> Int64:
-    """Cells of which half the window is there, whether they are or not: holes are filled, stray cells left out."""
+    """Return cells with at least half of their window occupied, so that holes are filled and isolated cells removed."""
     keys = [_key(cell + step) for step in _steps(_WINDOW)]
     if not len(cell):
         return cell
@@ -156,7 +156,7 @@ def _filled(cell: Int64) -> Int64:
 
 
 def _depth(cell: Int64) -> Float:
-    """Distance of cells from the edge of them all, in edges of a cell."""
+    """Return the distance of cells from the edge of their area, in edges of a cell."""
     key = _key(cell)
     inside = np.ones(len(cell), dtype=bool)
     for step in _steps(1):
@@ -165,14 +165,14 @@ def _depth(cell: Int64) -> Float:
 
 
 def _graph(middle: Float, edge: float) -> coo_array:
-    """Distances of cells from those near them."""
-    pairs = cKDTree(middle).query_pairs(_REACH * edge, output_type="ndarray")
+    """Return the graph of distances of cells from those near them."""
+    pairs = cKDTree(middle).query_pairs(_CONNECTED_WITHIN * edge, output_type="ndarray")
     length = np.hypot(*(middle[pairs[:, 0]] - middle[pairs[:, 1]]).T) if len(pairs) else np.empty(0)
     return coo_array((length, (pairs[:, 0], pairs[:, 1])), shape=(len(middle), len(middle)))
 
 
 def _dear_at_the_edge(graph: csr_array, depth: Float) -> csr_array:
-    """The same graph, its steps weighted by the inverse square of their depth."""
+    """Return the same graph, with steps weighted by the inverse square of their depth."""
     steps = graph.tocoo()
     weight = 0.5 * (depth[steps.row] ** -2.0 + depth[steps.col] ** -2.0)
     return coo_array((steps.data * weight, (steps.row, steps.col)), shape=steps.shape).tocsr()
@@ -184,8 +184,8 @@ def _steps(reach: int) -> Int64:
 
 
 def _key(cell: Int64) -> Int64:
-    return np.asarray(cell[:, 0] * _FAR + cell[:, 1] + _FAR // 2)
+    return np.asarray(cell[:, 0] * _CELL_OFFSET + cell[:, 1] + _CELL_OFFSET // 2)
 
 
 def _cell(key: Int64) -> Int64:
-    return np.column_stack([key // _FAR, key % _FAR - _FAR // 2])
+    return np.column_stack([key // _CELL_OFFSET, key % _CELL_OFFSET - _CELL_OFFSET // 2])

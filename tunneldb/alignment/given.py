@@ -1,4 +1,4 @@
-"""The axis that a tunnel is given: a table of points, lines of a drawing or a map, or a design alignment."""
+"""Given axis of a tunnel: a table of points, lines of a drawing or a map, or a design alignment."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from tunneldb.csvfile import read_csv, read_header
 from tunneldb.errors import InputError, UserError
 
 XYZ = ("x", "y", "z")
-LONGEST_STEP = 1e5
-"""Greatest distance between two vertices of a given axis, m: longer than any tunnel."""
+MAX_STEP = 1e5
+"""Greatest distance between two vertices of a given axis, m; longer than any tunnel."""
 
-STEEPEST = 2.0
-"""Steepest grade of a given axis, m in height for 1 m in plan, beyond a first such metre: chainage is length in plan."""
+MAX_GRADE = 2.0
+"""Greatest grade of a given axis, m of height per m in plan, beyond the first metre of height; chainage is length in plan."""
 
-TRAJECTORY_STEP = 5.0
-"""Least way between two points of a trajectory that become vertices of the axis, m."""
+MIN_TRAJECTORY_STEP = 5.0
+"""Least distance between points of a trajectory that become vertices of the axis, m."""
 
 _SNIFFED = 1024  # bytes
 _HEADERS = {
@@ -34,7 +34,7 @@ _HEADERS = {
     "z": ("z", "h", "height", "elevation"),
 }
 _GIS = (b"SQLite format 3\0", b"\0\0\x27\x0a", b"fgb\x03fgb", b"{")  # GeoPackage, Shapefile, FlatGeobuf, GeoJSON
-_NOT_READ = {
+_OTHER_FORMATS = {
     b"LASF": "is a scan, not an axis; --axis auto FILE... finds the axis in scans",
     b"ASTM-E57": "is a scan, not an axis; --axis auto FILE... finds the axis in scans",
     b"AC10": "is a DWG drawing; save it as DXF",
@@ -46,20 +46,20 @@ Kind = Literal["landxml", "ifc", "dxf", "gis", "csv"]
 
 @dataclass(frozen=True)
 class GivenAxis:
-    """An axis as it was given.
+    """Given axis.
 
     Attributes
     ----------
     xyz : (n, 3) float array
-        Vertices in growing chainage, m; heights are NaN where it has none.
+        Vertices in ascending chainage, m; heights are NaN if it has none.
     start : float
-        Chainage of the first one, m.
+        Chainage of the first vertex, m.
     design : Design or None
-        The alignment that they lie on, where there is one.
+        Alignment of the vertices, if there is one.
     source : str or None
-        File and alignment that it was read from.
+        File and alignment of its origin.
     notes : tuple of str
-        What the user should know about the reading.
+        Notes for the user about the import.
     """
 
     xyz: Float
@@ -70,7 +70,7 @@ class GivenAxis:
 
     @property
     def has_heights(self) -> bool:
-        """Whether it is a line in space, not only in plan."""
+        """True if it is a line in space, not only in plan."""
         return bool(np.isfinite(self.xyz[:, 2]).all())
 
 
@@ -90,34 +90,34 @@ def read_given(
     Parameters
     ----------
     path
-        CSV with x,y,z; GeoPackage, Shapefile, GeoJSON, FlatGeobuf or DXF with lines; LandXML or IFC. Told apart by their
-        content.
+        CSV with x,y,z; GeoPackage, Shapefile, GeoJSON, FlatGeobuf or DXF with lines; LandXML or IFC. The format is detected
+        from the content.
     start
-        Chainage of its beginning, m; by default 0, of a design the alignment's own.
+        Chainage of its start, m; by default 0, or the alignment's own for a design.
     alignment, profile
-        Which of a design's alignments and of its profiles, by name; needed where there are several. Of lines that don't
-        meet end to end the number.
+        Names of a design's alignment and of its profile; required if there are several. For separate lines, the number of
+        the line.
     layer
-        Which layer of a drawing or a map.
+        Layer of a drawing or a map.
     unit
-        Unit of a LandXML's or a drawing's lengths, a name of `tunneldb.alignment.units.UNITS`; None: as the file says.
+        Unit of lengths in a LandXML file or a drawing, a name in `tunneldb.alignment.units.UNITS`; None: as in the file.
     srid
-        EPSG code that the file's coordinate system is held against, where it names one; None: not checked.
+        EPSG code with which the file's coordinate system is compared, if it states one; None: not checked.
     reverse
-        Let chainage grow the other way.
+        True to reverse the direction of chainage.
 
     Raises
     ------
     InputError
-        When the file can't be read, holds no such alignment or several to choose from, or is no line.
+        If the file can't be read, has no such alignment or several to choose from, or does not contain a line.
     """
     kind = _kind(path)
     _refuse_options(path, kind, {"--alignment": alignment, "--profile": profile, "--axis-layer": layer, "--axis-unit": unit})
     if kind in ("landxml", "ifc"):
         if reverse:
             raise InputError(
-                f"{path} is a design alignment, whose chainage has its own direction; a stationing that runs backwards is "
-                "given by --stationing"
+                f"{path} is a design alignment, whose chainage has its own direction; for stations that decrease "
+                "along the alignment use --stationing"
             )
         return _given_design(path, kind, start, alignment, profile, unit)
     if kind == "csv":
@@ -136,7 +136,7 @@ def _kind(path: Path) -> Kind:
             head = file.read(_SNIFFED)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
-    for magic, why in _NOT_READ.items():
+    for magic, why in _OTHER_FORMATS.items():
         if head.startswith(magic):
             raise InputError(f"{path} {why}")
     if head.startswith(b"AutoCAD Binary DXF") or re.match(rb"\s*(999\s|0\s+SECTION\s)", head.removeprefix(b"\xef\xbb\xbf")):
@@ -151,7 +151,7 @@ def _kind(path: Path) -> Kind:
 
 
 def _refuse_options(path: Path, kind: Kind, given: dict[str, str | None]) -> None:
-    """Refuse options that mean nothing for a kind of file."""
+    """Refuse options that do not apply to a kind of file."""
     meant = {
         "csv": ("a table of points", ()),
         "gis": ("a map", ("--alignment", "--axis-layer")),
@@ -162,7 +162,7 @@ def _refuse_options(path: Path, kind: Kind, given: dict[str, str | None]) -> Non
     what, allowed = meant[kind]
     wrong = [option for option, value in given.items() if value is not None and option not in allowed]
     if wrong:
-        raise InputError(f"{path} is {what}, for which {wrong[0]} means nothing; leave it out")
+        raise InputError(f"{path} is {what}, for which {wrong[0]} does not apply; omit it")
 
 
 def _given_design(
@@ -193,13 +193,13 @@ def _read_design(path: Path, kind: Kind, alignment: str | None, profile: str | N
     number = _choose(path, "alignment", file.names, alignment)
     if not file.profiles[number]:
         raise InputError(
-            f"{path}: alignment {file.names[number]!r} has no profile, and a tunnel's axis needs heights: export both together"
+            f"{path}: alignment {file.names[number]!r} has no profile, but a tunnel's axis needs heights; export both together"
         )
     return file.design(number, _choose(path, "profile", file.profiles[number], profile))
 
 
 def _choose(path: Path, what: str, names: list[str], wanted: str | None) -> int:
-    """Place of the one that is wanted, or of the only one there is."""
+    """Return the index of the wanted element, or of the only one."""
     if not names:
         raise InputError(f"{path} holds no {what}")
     listed = ", ".join(repr(name) for name in names)
@@ -214,7 +214,7 @@ def _choose(path: Path, what: str, names: list[str], wanted: str | None) -> int:
 
 
 def _read_points(path: Path) -> GivenAxis:
-    """Read the vertices of an axis file, or a trajectory; it must not turn back on itself."""
+    """Read the vertices of an axis file, or a trajectory; it must not reverse its direction."""
     header = read_header(path)
     columns = [_column(path, header, name) for name in XYZ]
     names = [column for column in columns if column is not None]
@@ -226,32 +226,32 @@ def _read_points(path: Path) -> GivenAxis:
     if "time" in (name.lower() for name in header):
         rows = _thinned(xyz)
         _require_forward(xyz[rows], lambda row, text: table.error(int(rows[row]), text))
-        note = f"a trajectory: of {len(xyz)} points {len(rows)}, {TRAJECTORY_STEP:g} m apart or more, are the axis"
+        note = f"a trajectory: {len(rows)} of its {len(xyz)} points, at least {MIN_TRAJECTORY_STEP:g} m apart, are the axis"
         return GivenAxis(xyz[rows], 0.0, notes=(note,))
     _require_forward(xyz, table.error)
     return GivenAxis(xyz, 0.0)
 
 
 def _column(path: Path, header: list[str], name: str) -> str | None:
-    """Column that holds a coordinate, by its usual names; None where there is no height."""
+    """Return the column of a coordinate, by its usual names; None if there is no height."""
     found = [column for column in header if column.lower() in _HEADERS[name]]
     exact = [column for column in found if column.lower() == name]
     if len(found) > 1 and len(exact) != 1 and len(set(found)) > 1:
-        raise InputError(f"{path}: {' and '.join(found)} may both be {name}; name just one of them {name}")
+        raise InputError(f"{path}: {' and '.join(found)} may both be {name}; rename one of them to {name}")
     if found:
         return exact[0] if exact else found[0]
     if name == "z" and len(header) > 1:
         return None
     numbers = sum(re.fullmatch(r"[+-]?[\d.,]+", column) is not None for column in header)
-    hint = "; the first line must name the columns, such as x,y,z" if numbers > 1 else ""
-    raise InputError(f"{path} has no column {name}: its header is {','.join(header)!r}{hint}")
+    hint = "; the first line must contain column names, for example x,y,z" if numbers > 1 else ""
+    raise InputError(f"{path} has no column {name}: the header is {','.join(header)!r}{hint}")
 
 
 def _thinned(xyz: Float) -> np.ndarray:
-    """Rows of a trajectory at least a step apart in plan; the last of them is the last that moved on."""
+    """Return rows of a trajectory at least one step apart in plan; the last of them is the last that moved."""
     rows = [0]
     for row in range(1, len(xyz)):
-        if np.hypot(*(xyz[row, :2] - xyz[rows[-1], :2])) >= TRAJECTORY_STEP:
+        if np.hypot(*(xyz[row, :2] - xyz[rows[-1], :2])) >= MIN_TRAJECTORY_STEP:
             rows.append(row)
     last = len(xyz) - 1
     if len(rows) > 1 and rows[-1] != last and np.hypot(*(xyz[last, :2] - xyz[rows[-1], :2])) > 0.0:
@@ -260,25 +260,25 @@ def _thinned(xyz: Float) -> np.ndarray:
 
 
 def _leap(xyz: Float) -> tuple[int | None, Float, Float]:
-    """Step (None: none) at which a line rises or falls as no tunnel does; length in plan and rise of each step, m."""
+    """Return the first implausible step in height (None: none), and length in plan and rise of each step, m."""
     plan, rise = np.hypot(*np.diff(xyz[:, :2], axis=0).T), np.abs(np.diff(xyz[:, 2]))
-    steep = np.flatnonzero(rise > STEEPEST * plan + STEEPEST)
+    steep = np.flatnonzero(rise > MAX_GRADE * plan + MAX_GRADE)
     return int(steep[0]) if len(steep) else None, plan, rise
 
 
 def _require_forward(xyz: Float, error: Callable[[int, str], InputError]) -> None:
-    """Raise the error of a row at which a line stands still or turns back in plan, or leaps as none does."""
+    """Raise an error for a row at which a line does not advance or reverses in plan, or has an implausible step."""
     steps = np.diff(xyz[:, :2], axis=0)
     plan = np.hypot(*steps.T)
-    if np.any(far := ~(plan <= LONGEST_STEP)):
+    if np.any(far := ~(plan <= MAX_STEP)):
         row = int(np.argmax(far))
-        raise error(row + 1, f"it lies {plan[row] / 1000.0:.6g} km from the point before; is a decimal point missing?")
+        raise error(row + 1, f"it is {plan[row] / 1000.0:.6g} km from the previous point; is a decimal point missing?")
     standing = np.flatnonzero(~steps.any(axis=1))
     if len(standing):
-        raise error(int(standing[0]) + 1, "the same x,y as the point before; remove one of them")
+        raise error(int(standing[0]) + 1, "the same x,y as the previous point; remove one of them")
     leap, _, rise = _leap(xyz)
     if leap is not None:
-        raise error(leap + 1, f"{plan[leap]:.6g} m on from the point before its z differs by {rise[leap]:.6g} m; is it right?")
+        raise error(leap + 1, f"{plan[leap]:.6g} m after the previous point its z differs by {rise[leap]:.6g} m; check it")
     turns = np.flatnonzero(np.einsum("ij,ij->i", steps[1:], steps[:-1]) <= 0)
     if len(turns):
-        raise error(int(turns[0]) + 2, "the axis turns back here; its points must be in growing chainage")
+        raise error(int(turns[0]) + 2, "the axis reverses here; sort its points by ascending chainage")

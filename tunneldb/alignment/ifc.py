@@ -1,6 +1,6 @@
 """Design alignments from IFC 4.3: the segments of IfcAlignmentHorizontal and IfcAlignmentVertical.
 
-Read are the design parameters, not the geometry that the file may hold beside them. Needs ifcopenshell (the extra ``ifc``).
+Only the design parameters are read, not the file's geometry. Needs ifcopenshell (the extra ``ifc``).
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from tunneldb.errors import InputError, UserError
 PLAN: dict[str, PlanKind] = {"LINE": "line", "CIRCULARARC": "arc", "CLOTHOID": "clothoid"}
 PROFILE: dict[str, ProfileKind] = {"CONSTANTGRADIENT": "grade", "PARABOLICARC": "parabola", "CIRCULARARC": "circle"}
 
-SAME_STATION = 0.001  # m; a station that goes on as before begins no new piece
+STATION_TOLERANCE = 0.001  # m; tolerance for a station that continues the previous piece
 SCHEMAS = ("IFC4X3", "IFC4X3_TC1", "IFC4X3_ADD1", "IFC4X3_ADD2")
-HEADER = 10_000  # characters within which a file names its schema
-ARM = 1e6  # m by which directions on the map are found; a short one would not carry over coordinates of millions
-LARGEST_SCALE = 1e-6  # by which a map scale may differ from 1 before lengths in plan are no longer those of the map
+HEADER = 10_000  # characters at the start of a file that contain its schema
+ARM = 1e6  # m; length for computing directions on the map, long enough for coordinates of millions
+MAX_SCALE_ERROR = 1e-6  # greatest difference of a map scale from 1
 
 
 @dataclass(frozen=True)
 class _Frame:
-    """From the alignment's coordinates (m) to the map's: turn, then shift."""
+    """Transformation from the alignment's coordinates (m) to the map's: rotation, then shift."""
 
     turn: float
     shift: tuple[float, float, float]
@@ -42,14 +42,14 @@ class _Frame:
 
 
 class Ifc:
-    """The alignments of an IFC file.
+    """Alignments of an IFC file.
 
     Attributes
     ----------
     names : list of str
         Names of the alignments, in the file's order.
     profiles : list of list of str
-        Names of the profiles (IfcAlignmentVertical) of each; of child alignments with a profile each, theirs.
+        Names of each alignment's profiles (IfcAlignmentVertical), or of its child alignments with one profile each.
     """
 
     def __init__(self, path: Path) -> None:
@@ -60,11 +60,11 @@ class Ifc:
 
     @contextmanager
     def _whole(self) -> Iterator[None]:
-        """Say that an entity lacks what it must have: ifcopenshell hands out None for it, and checks no types."""
+        """Report an entity without a required attribute, for which ifcopenshell returns None; it does not check types."""
         try:
             yield
         except (AttributeError, TypeError, ValueError, IndexError, OverflowError, RuntimeError) as error:
-            raise InputError(f"{self._path} is damaged, an entity of an alignment lacks what it needs: {error}") from error
+            raise InputError(f"{self._path} is damaged: an alignment entity lacks a required attribute: {error}") from error
 
     def _look(self) -> None:
         from ifcopenshell.util.unit import calculate_unit_scale
@@ -78,7 +78,7 @@ class Ifc:
         self.profiles = [[profile.Name or "" for profile in _verticals(alignment)] for alignment in self._alignments]
 
     def design(self, number: int, profile: int) -> Design:
-        """Return an alignment with one of its profiles, both counted from 0."""
+        """Return an alignment with one of its profiles, both by index from 0."""
         with self._whole():
             return self._design(number, profile)
 
@@ -94,10 +94,10 @@ class Ifc:
                 f"{self._path}: alignment {self.names[number]!r} has no segments in {'profile' if plan else 'plan'}"
             )
         start, pieces = self._stationing(alignment)
-        notes = [] if self._unit == 1.0 else [f"lengths are turned into metres: 1 unit is {self._unit:.9g} m"]
+        notes = [] if self._unit == 1.0 else [f"lengths are converted to metres: 1 unit is {self._unit:.9g} m"]
         crs = self._file.by_type("IfcProjectedCRS")
         if crs and crs[0].Name:
-            notes.append(f"the file says its coordinates are {crs[0].Name}")
+            notes.append(f"the file states its coordinate system as {crs[0].Name}")
         return Design(self.names[number], plan, heights, start, pieces, tuple(notes))
 
     def _plan_element(self, segment: Any, frame: _Frame) -> PlanElement:
@@ -126,10 +126,10 @@ class Ifc:
         )
 
     def _unknown(self, where: str, kind: str, known: dict[str, Any]) -> InputError:
-        return InputError(f"{self._path}: the {where} has a segment of type {kind}; {', '.join(known)} are read")
+        return InputError(f"{self._path}: the {where} has a segment of type {kind}; supported are {', '.join(known)}")
 
     def _frame(self, alignment: Any) -> _Frame:
-        """Where the alignment's coordinates lie on the map: its placement, then the file's map conversion."""
+        """Return the transformation to the map: the alignment's placement, then the file's map conversion."""
         from ifcopenshell.util.geolocation import auto_xyz2enh
         from ifcopenshell.util.placement import get_local_placement
 
@@ -141,15 +141,15 @@ class Ifc:
         origin, aside = (np.array(auto_xyz2enh(self._file, *corner[:3]), dtype=np.float64) * unit for corner in corners)
         step = (aside - origin) / ARM
         scale = float(np.hypot(step[0], step[1]))
-        if abs(scale - 1.0) > LARGEST_SCALE:
+        if abs(scale - 1.0) > MAX_SCALE_ERROR:
             raise InputError(
-                f"{self._path}: its map conversion has the scale {scale:.9g}, so lengths on the map are not the alignment's; "
+                f"{self._path}: its map conversion has the scale {scale:.9g}, so map lengths differ from the alignment's; "
                 "export it in map coordinates"
             )
         return _Frame(float(np.arctan2(step[1], step[0])), (float(origin[0]), float(origin[1]), float(origin[2])))
 
     def _map_unit(self) -> float:
-        """Metres in a unit of the map's coordinates."""
+        """Return the metres per unit of the map's coordinates."""
         conversion = self._file.by_type("IfcCoordinateOperation")
         crs = conversion[0].TargetCRS if conversion else None
         unit = getattr(crs, "MapUnit", None)
@@ -160,7 +160,7 @@ class Ifc:
         return float(get_unit_scale(unit))
 
     def _stationing(self, alignment: Any) -> tuple[float, tuple[StationPiece, ...]]:
-        """Chainage at the beginning, and the pieces of the stationing where that is not the chainage."""
+        """Return the chainage at the start, and the pieces of the stationing if it differs from the chainage."""
         pieces = sorted(self._stations(alignment), key=lambda piece: piece.distance)
         if not pieces:
             return 0.0, ()
@@ -170,14 +170,14 @@ class Ifc:
         for piece in pieces[1:]:
             before = kept[-1]
             expected = before.station + before.direction * (piece.distance - before.distance)
-            if abs(expected - piece.station) > SAME_STATION or piece.direction != before.direction:
+            if abs(expected - piece.station) > STATION_TOLERANCE or piece.direction != before.direction:
                 kept.append(piece)
         if len(kept) == 1 and first.direction == 1:
             return start, ()
         return (start if first.direction == 1 else 0.0), tuple(kept)
 
     def _stations(self, alignment: Any) -> Iterator[StationPiece]:
-        """Stations that referents of the alignment state, with their direction from there on."""
+        """Yield stations stated by referents of the alignment, with their direction from there on."""
         from ifcopenshell.util.element import get_pset
 
         direction = 1
@@ -214,41 +214,41 @@ def _open(path: Path) -> Any:
     try:
         import ifcopenshell
     except ImportError as error:
-        raise UserError('IFC files are read by ifcopenshell, which is not installed: pip install "tunneldb[ifc]"') from error
+        raise UserError('reading IFC needs ifcopenshell, which is not installed: pip install "tunneldb[ifc]"') from error
     schema, text = _schema(path)
     if schema not in SCHEMAS:
-        raise InputError(f"{path} is of {schema}; alignments are read from IFC 4.3 (IFC4X3_ADD2): export it as that")
+        raise InputError(f"{path} has the schema {schema}; alignments need IFC 4.3, so export it as IFC4X3_ADD2")
     try:
-        # The releases of 4.3 differ in nothing that is read here, and ifcopenshell knows the last one.
+        # The releases of 4.3 do not differ in the entities read here, and ifcopenshell supports the last one.
         return ifcopenshell.file.from_string(text.replace(f"'{schema}'", "'IFC4X3_ADD2'", 1))
     except (RuntimeError, ifcopenshell.Error) as error:
         raise InputError(f"{path} cannot be read as IFC: {str(error).strip().splitlines()[0]}") from None
 
 
 def _schema(path: Path) -> tuple[str, str]:
-    """Schema that a STEP file names in its header, and its text."""
+    """Return the schema in the header of a STEP file, and its text."""
     try:
-        text = path.read_text(encoding="latin-1")  # STEP writes other letters by escapes
+        text = path.read_text(encoding="latin-1")  # STEP escapes other letters
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
     found = re.search(r"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'", text[:HEADER])
     if found is None:
-        raise InputError(f"{path} is no IFC file: its header names no schema")
+        raise InputError(f"{path} is not an IFC file: its header states no schema")
     return found[1].upper(), text
 
 
 def _nested(entity: Any, kind: str) -> list[Any]:
-    """Parts of an entity, of a class, in order."""
+    """Return the parts of an entity with a class, in order."""
     return [part for nest in entity.IsNestedBy for part in nest.RelatedObjects or () if part.is_a(kind)]
 
 
 def _verticals(alignment: Any) -> list[Any]:
-    """Profiles of an alignment: its own, or those of its child alignments, which share its plan."""
+    """Return the profiles of an alignment: its own, or those of its child alignments, which share its plan."""
     children = [part for whole in alignment.IsDecomposedBy for part in whole.RelatedObjects or () if part.is_a("IfcAlignment")]
     return [vertical for owner in (alignment, *children) for vertical in _nested(owner, "IfcAlignmentVertical")]
 
 
 def _segments(layout: Any, length: str = "SegmentLength") -> list[Any]:
-    """Design parameters of a layout's segments; the last one may have no length, as a mark of the end."""
+    """Return the design parameters of a layout's segments; the last one may have no length, as an end mark."""
     parameters = [segment.DesignParameters for segment in _nested(layout, "IfcAlignmentSegment")]
     return [segment for segment in parameters if getattr(segment, length) > 0.0]

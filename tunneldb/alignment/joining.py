@@ -1,4 +1,4 @@
-"""Pieces of a line, joined end to end."""
+"""Joining of pieces of a line end to end."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from scipy.spatial import cKDTree
 from tunneldb.arrays import Float, Int32, Intp
 
 SNAP = 0.01
-"""Ends of pieces that lie as near to each other as this are one place, m: files are rounded to millimetres."""
+"""Distance up to which ends of pieces are the same place, m; files are rounded to millimetres."""
 
 
 def join_pieces(pieces: Sequence[Float]) -> list[Float]:
-    """Join pieces whose ends meet, whichever way each of them was drawn.
+    """Join pieces whose ends meet, in either direction.
 
-    A joined line runs the way of most of its length. Where three ends meet or more, lines end.
+    A joined line has the direction of most of its length. Lines end where three or more ends meet.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def join_pieces(pieces: Sequence[Float]) -> list[Float]:
 
     Returns
     -------
-    The lines, (n, 3) each, the longest in plan first; a closed one ends where it begins.
+    Lines, (n, 3) each, the longest in plan first; a closed one ends at its start.
     """
     cleaned = [piece for piece in map(_without_repeats, pieces) if len(piece) > 1]
     if not cleaned:
@@ -40,7 +40,7 @@ def join_pieces(pieces: Sequence[Float]) -> list[Float]:
             ends.setdefault(node, []).append(number)
     left = set(range(len(cleaned)))
     lines = []
-    # first from where lines end, then round what is closed
+    # first from ends of lines, then along closed lines
     order = [n for n in range(len(cleaned)) if (degree[nodes[n]] != 2).any()]
     for first in [*order, *range(len(cleaned))]:
         if first in left:
@@ -58,7 +58,7 @@ def _follow(
     first: int,
     start: int,
 ) -> Float:
-    """Take pieces from those that are left, from a node on, as long as there is one way to go."""
+    """Return a line of the remaining pieces, from a node on, up to an end or a junction."""
     parts: list[Float] = []
     forth = 0.0
     number: int | None = first
@@ -77,7 +77,7 @@ def _follow(
 
 
 def _nodes(pieces: Sequence[Float]) -> Int32:
-    """Number of the place at which each piece begins and ends, (n, 2)."""
+    """Return the number of the node at which each piece begins and ends, (n, 2)."""
     places = np.nan_to_num(np.array([place for piece in pieces for place in (piece[0], piece[-1])]))
     pairs = cKDTree(places).query_pairs(SNAP, output_type="ndarray")
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(places), len(places)))
@@ -85,7 +85,7 @@ def _nodes(pieces: Sequence[Float]) -> Int32:
 
 
 def _without_repeats(piece: Float) -> Float:
-    """Leave out vertices at the place in plan of the one before."""
+    """Remove vertices with the same position in plan as the previous one."""
     return piece[np.append(True, np.any(np.diff(piece[:, :2], axis=0) != 0.0, axis=1))]
 
 

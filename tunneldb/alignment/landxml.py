@@ -1,6 +1,6 @@
-"""Design alignments from LandXML 1.0 to 1.2 and what builds on it (Inframodel, J-LandXML).
+"""Design alignments from LandXML 1.0 to 1.2 and formats based on it (Inframodel, J-LandXML).
 
-Points are written northing first. Lengths are in the file's linear unit. Stations of the profile and ``staInternal`` of station
+Points have northing first. Lengths are in the file's linear unit. Stations of the profile and ``staInternal`` of station
 equations are the alignment's continuous ones, from ``staStart`` on.
 """
 
@@ -17,30 +17,30 @@ from tunneldb.alignment.profile import Pvi, profile_elements
 from tunneldb.alignment.units import UNITS
 from tunneldb.errors import InputError
 
-MISMATCH = 0.02  # m between a length as stated and as the points have it; files are rounded to millimetres or centimetres
+MISMATCH = 0.02  # m between a stated length and that of its points; files are rounded to millimetres or centimetres
 _PVIS = ("PVI", "ParaCurve", "UnsymParaCurve", "CircCurve")
-_KEPT = ("Alignments", "Units", "CoordinateSystem", "CgPoints")
-_DROPPED = ("CrossSects", "CrossSect")  # lie within Alignments, and are most of some files
+_READ_ELEMENTS = ("Alignments", "Units", "CoordinateSystem", "CgPoints")
+_SKIPPED_ELEMENTS = ("CrossSects", "CrossSect")  # inside Alignments; they are most of some files
 
 Point = tuple[float, float]
 
 
 class LandXml:
-    """The alignments of a LandXML file.
+    """Alignments of a LandXML file.
 
     Parameters
     ----------
     path : Path
-        The file.
+        File to read.
     unit : str or None
-        Name of the unit of its lengths, one of `UNITS`; None: as the file says.
+        Unit of its lengths, one of `UNITS`; None: as in the file.
 
     Attributes
     ----------
     names : list of str
         Names of the alignments, in the file's order.
     profiles : list of list of str
-        Names of the profiles (ProfAlign) of each.
+        Names of each alignment's profiles (ProfAlign).
     """
 
     def __init__(self, path: Path, unit: str | None = None) -> None:
@@ -49,9 +49,9 @@ class LandXml:
         stated = self._linear_unit(root)
         name = unit or stated
         if name is None:
-            raise InputError(f"{path} states no unit of its lengths (linearUnit of Units): give --axis-unit meter, foot, ...")
+            raise InputError(f"{path} states no unit of lengths (linearUnit of Units); give it by --axis-unit meter, foot, ...")
         self._unit = UNITS[name]
-        self._told = "" if unit is None or unit == stated else f", as told; the file says {stated or 'nothing'}"
+        self._told = "" if unit is None or unit == stated else f", as given; the file states {stated or 'none'}"
         self._points = {
             point.get("name"): point.text for point in root.iter() if _tag(point) == "CgPoint" and point.get("name")
         }
@@ -61,7 +61,7 @@ class LandXml:
         self.profiles = [[p.get("name", "") for p in self._profiles(element)] for element in self._alignments]
 
     def design(self, number: int, profile: int) -> Design:
-        """Return an alignment with one of its profiles, both counted from 0."""
+        """Return an alignment with one of its profiles, both by index from 0."""
         alignment = self._alignments[number]
         start = self._length(alignment, "staStart", default=0.0)
         geometry = _child(alignment, "CoordGeom")
@@ -74,9 +74,9 @@ class LandXml:
         pvis = list(self._pvis(self._profiles(alignment)[profile], start))
         notes = []
         if self._unit != 1.0 or self._told:
-            notes.append(f"lengths are turned into metres: 1 unit is {self._unit:.9g} m{self._told}")
+            notes.append(f"lengths are converted to metres: 1 unit is {self._unit:.9g} m{self._told}")
         if self._epsg:
-            notes.append(f"the file says its coordinates are EPSG:{self._epsg}")
+            notes.append(f"the file states its coordinate system as EPSG:{self._epsg}")
         return Design(
             self.names[number],
             plan,
@@ -87,12 +87,12 @@ class LandXml:
         )
 
     def _linear_unit(self, root: Element) -> str | None:
-        """Name of the unit that the file states; None where it states none."""
+        """Return the name of the unit stated by the file; None if it states none."""
         for units in (element for element in root.iter() if _tag(element) == "Units"):
             for system in units:
                 unit = system.get("linearUnit")
                 if unit is not None and unit not in UNITS:
-                    raise InputError(f"{self._path}: its linearUnit {unit!r} is none of {', '.join(UNITS)}")
+                    raise InputError(f"{self._path}: its linearUnit {unit!r} is not one of {', '.join(UNITS)}")
                 return unit
         return None
 
@@ -113,7 +113,7 @@ class LandXml:
             return self._curve(element)
         if kind == "Spiral":
             return self._spiral(element)
-        raise InputError(f"{self._path}: the plan has a {kind}; Line, Curve and Spiral are read")
+        raise InputError(f"{self._path}: the plan has a {kind}; supported are Line, Curve and Spiral")
 
     def _line(self, element: Element) -> PlanElement:
         start, end = self._point(element, "Start"), self._point(element, "End")
@@ -123,13 +123,13 @@ class LandXml:
         return PlanElement("line", length, *start, math.atan2(dy, dx))
 
     def _curve(self, element: Element) -> PlanElement:
-        """Arc about its centre: start and end hold, a radius or length that says otherwise is an error."""
+        """Return an arc around its centre, from start to end; a contradicting radius or length is an error."""
         start, end, centre = (self._point(element, name) for name in ("Start", "End", "Center"))
         turn = self._turn(element)
         radius = math.dist(start, centre)
         first, last = (math.atan2(p[1] - centre[1], p[0] - centre[0]) for p in (start, end))
         angle = (turn * (last - first)) % (2.0 * math.pi)
-        if radius * (2.0 * math.pi - angle) < MISMATCH:  # an arc of no length, whose rounded end lies behind its start
+        if radius * (2.0 * math.pi - angle) < MISMATCH:  # an arc without length, whose rounded end is before its start
             angle = 0.0
         length = radius * angle
         self._compare(element, "radius", math.dist(end, centre), radius)
@@ -140,10 +140,10 @@ class LandXml:
         return PlanElement("arc", length, *start, bearing, curvature, curvature)
 
     def _spiral(self, element: Element) -> PlanElement:
-        """Clothoid between two points, whose length and radii say how it bends."""
+        """Return a clothoid between two points, by its length and radii."""
         kind = element.get("spiType", "clothoid")
         if kind != "clothoid":
-            raise InputError(f"{self._path}: the plan has a spiral of type {kind}; only clothoids are read")
+            raise InputError(f"{self._path}: the plan has a spiral of type {kind}; only clothoids are supported")
         turn = self._turn(element)
         length = self._extent(element, "length")
         before, after = (turn * self._curvature(element, name) for name in ("radiusStart", "radiusEnd"))
@@ -173,11 +173,11 @@ class LandXml:
             place = element.find("{*}Start")
             raise InputError(
                 f"{self._path}: the {what} of the {_tag(element)} from {'' if place is None else (place.text or '').strip()} "
-                f"is off by {abs(stated - measured):.3f} m from what its points, radii and length say"
+                f"is off by {abs(stated - measured):.3f} m from its points, radii and length"
             )
 
     def _point(self, element: Element, name: str) -> Point:
-        """Easting and northing of a point, which is given or refers to a CgPoint."""
+        """Return easting and northing of a point, which is given or refers to a CgPoint."""
         place = _child(element, name)
         if place is None:
             raise InputError(f"{self._path}: a {_tag(element)} has no {name}")
@@ -192,14 +192,14 @@ class LandXml:
         return east * self._unit, north * self._unit
 
     def _pvis(self, element: Element, start: float) -> Iterator[Pvi]:
-        """Points of vertical intersection of a ProfAlign, with what rounds them."""
+        """Yield the points of vertical intersection of a ProfAlign, with their roundings."""
         for point in element:
             kind = _tag(point)
             if kind in ("Feature", "Description"):
                 continue
             if kind not in _PVIS:
                 raise InputError(
-                    f"{self._path}: the profile has a {kind}; PVI, ParaCurve, UnsymParaCurve and CircCurve are read"
+                    f"{self._path}: the profile has a {kind}; supported are PVI, ParaCurve, UnsymParaCurve and CircCurve"
                 )
             try:
                 station, height = (_number(value) * self._unit for value in (point.text or "").split())
@@ -217,7 +217,7 @@ class LandXml:
             yield Pvi(station - start, height, before, after, radius)
 
     def _stationing(self, alignment: Element, start: float) -> tuple[StationPiece, ...]:
-        """Pieces of the alignment's own stationing; none where that is its chainage."""
+        """Return the pieces of the alignment's own stationing; none if it equals the chainage."""
         pieces = []
         for element in (e for e in alignment if _tag(e) == "StaEquation"):
             internal, ahead = self._length(element, "staInternal"), self._length(element, "staAhead")
@@ -230,7 +230,7 @@ class LandXml:
         return (*first, *pieces)
 
     def _length(self, element: Element, name: str, default: float | None = None) -> float:
-        """Return an attribute that is a length, m."""
+        """Return the length in an attribute, m."""
         text = element.get(name)
         if text is None and default is not None:
             return default
@@ -240,7 +240,7 @@ class LandXml:
             raise InputError(f"{self._path}: {name} of a {_tag(element)} is {text!r}, not a number") from None
 
     def _extent(self, element: Element, name: str, default: float | None = None) -> float:
-        """Return an attribute that is a length from one place to another, m."""
+        """Return the length between two places in an attribute, m; it must not be negative."""
         length = self._length(element, name, default)
         if length < 0.0:
             raise InputError(f"{self._path}: {name} of a {_tag(element)} is {element.get(name)!r}; it must not be negative")
@@ -248,22 +248,22 @@ class LandXml:
 
 
 def _read(path: Path) -> Element:
-    """Parse a file, without keeping its surfaces and points, which may be hundreds of megabytes."""
+    """Parse a file without keeping its surfaces and points, which may be hundreds of megabytes."""
     stack: list[Element] = []
     kept = 0
     try:
         for event, element in iterparse(path, events=("start", "end")):
             if event == "start":
                 stack.append(element)
-                kept += _tag(element) in _KEPT
+                kept += _tag(element) in _READ_ELEMENTS
                 continue
             stack.pop()
-            if stack and (not kept or _tag(element) in _DROPPED):
+            if stack and (not kept or _tag(element) in _SKIPPED_ELEMENTS):
                 stack[-1].remove(element)
-            kept -= _tag(element) in _KEPT
+            kept -= _tag(element) in _READ_ELEMENTS
     except ParseError as error:
-        raise InputError(f"{path} is not a whole XML file: {error}") from None
-    except (ValueError, LookupError) as error:  # an encoding of several bytes, or one that isn't known
+        raise InputError(f"{path} is not a complete XML file: {error}") from None
+    except (ValueError, LookupError) as error:  # a multi-byte or unknown encoding
         raise InputError(f"{path} cannot be read as XML: {error}; save it as UTF-8") from None
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
@@ -279,7 +279,7 @@ def _tag(element: Element) -> str:
 def _number(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
-        raise ValueError(f"{text} is no place and no length")
+        raise ValueError(f"{text} is neither a position nor a length")
     return value
 
 

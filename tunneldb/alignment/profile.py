@@ -16,12 +16,12 @@ _OVERLAP = 0.001  # m by which rounded files let two curves overlap
 
 @dataclass(frozen=True)
 class Pvi:
-    """A point where two grades meet, and what rounds it: parabolas, or a circle where ``radius`` is not 0.
+    """Point where two grades meet, with its rounding: parabolas, or a circle if ``radius`` is not 0.
 
     Attributes
     ----------
     distance, z : float
-        Distance in plan from the beginning of the alignment, and height, m.
+        Distance in plan from the start of the alignment, and height, m.
     before, after : float
         Length in plan of the parabola before and after the point, m.
     radius : float
@@ -36,7 +36,7 @@ class Pvi:
 
 
 def profile_elements(pvis: Sequence[Pvi], path: Path) -> tuple[ProfileElement, ...]:
-    """Elements of the profile through points of vertical intersection; the first and the last one are its ends.
+    """Return the elements of the profile through points of vertical intersection; the first and the last are its ends.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def profile_elements(pvis: Sequence[Pvi], path: Path) -> tuple[ProfileElement, .
         raise InputError(f"{path}: a profile needs at least 2 points of vertical intersection, this one has {len(pvis)}")
     for low, high in itertools.pairwise(pvis):
         if high.distance <= low.distance:
-            raise InputError(f"{path}: the profile turns back {high.distance:.3f} m from the beginning of its alignment")
+            raise InputError(f"{path}: the profile reverses {high.distance:.3f} m from the start of its alignment")
     grades = [(high.z - low.z) / (high.distance - low.distance) for low, high in itertools.pairwise(pvis)]
     elements: list[ProfileElement] = []
     at, z = pvis[0].distance, pvis[0].z
@@ -68,7 +68,7 @@ def profile_elements(pvis: Sequence[Pvi], path: Path) -> tuple[ProfileElement, .
 
 
 def _curve(pvi: Pvi, grade: float, following: float) -> list[ProfileElement]:
-    """What rounds the meeting of two grades."""
+    """Return the rounding between two grades."""
     if grade == following:
         return []
     if pvi.radius:
@@ -80,7 +80,7 @@ def _curve(pvi: Pvi, grade: float, following: float) -> list[ProfileElement]:
     kind: ProfileKind = "parabola"
     if pvi.before == pvi.after:
         return [ProfileElement(kind, begin, whole, z, grade, following)]
-    # Two parabolas with a common tangent over the point, which is parallel to the chord.
+    # Two parabolas with a common tangent above the point, parallel to the chord.
     middle = grade + (following - grade) * pvi.after / whole
     return [
         ProfileElement(kind, begin, pvi.before, z, grade, middle),

@@ -1,6 +1,6 @@
-"""Where a tunnel's centre lies in sections across a line: halfway between the walls, and between vault and floor.
+"""Centre of a tunnel in sections across a line: midway between the walls, and between vault and floor.
 
-These are the terms by which stage ``axis`` places its vertices (``sql/geometry/axis.sql``), on a thinned cloud.
+The stage ``axis`` places its vertices by the same definition (``sql/geometry/axis.sql``), here on a thinned cloud.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from tunneldb.arrays import Bool, Float, Int64
 
 _CLASS = 5  # ° of an angular class
 _CLASSES = 360 // _CLASS
-_OUTWARD = 0.9  # share of a class's points that lie nearer: what hangs before the lining and stands in the tunnel
-_FREE = 0.8  # share of the sections in which walls are nearer to each other: a train may stand along most of a tunnel
-_UPRIGHT = 0.8  # share of the greatest width that a pair of classes must have to be on the walls of a low, wide tunnel
-_BLOCKED = 0.1  # share by which the walls of a pair of classes may be nearer or farther than usual
-_PROFILES = 0.3  # m; less lies between points of one profile
-_LEAST_GAP = 1.0  # m
-_FEWEST = 3  # classes, or pairs of them, whose median is a wall, a vault or a floor
-_WALL = 25.0  # ° above and below the horizontal, within which there is a wall
-_VAULT = 1.0 / 3.0  # share of the classes overhead that makes a roof
+_LINING_QUANTILE = 0.9  # share of a class's points that are nearer, from fixtures and objects in the tunnel
+_FREE_QUANTILE = 0.8  # share of sections with a reduced wall distance: a train may stand along most of a tunnel
+_MIN_WIDTH_SHARE = 0.8  # share of the greatest width that a pair of classes must have to be on the walls of a low, wide tunnel
+_MAX_WIDTH_DEVIATION = 0.1  # greatest relative deviation of the wall distance of a pair of classes from the usual
+_MIN_PROFILE_GAP = 0.3  # m; greater than gaps between points of one profile
+_MIN_GAP = 1.0  # m
+_MIN_CLASSES = 3  # least number of classes, or pairs, for the median of a wall, a vault or a floor
+_WALL = 25.0  # ° above and below the horizontal in which points are on a wall
+_VAULT = 1.0 / 3.0  # least share of the classes overhead for a roof
 
 
 @dataclass(frozen=True)
 class Frames:
-    """Frames of stations along a line: position, ahead, right and up, each (k, 3)."""
+    """Frames of stations along a line: position, forward, right and up, each (k, 3)."""
 
     position: Float
     ahead: Float
@@ -36,7 +36,7 @@ class Frames:
 
     @classmethod
     def along(cls, line: Float) -> Frames:
-        """Frames at the vertices of a line (k, 3), k ≥ 2."""
+        """Return the frames at the vertices of a line (k, 3), k ≥ 2."""
         ahead = np.gradient(line, axis=0)
         ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
         right = np.column_stack([ahead[:, 1], -ahead[:, 0], np.zeros(len(ahead))])
@@ -46,14 +46,14 @@ class Frames:
 
 @dataclass(frozen=True)
 class Placed:
-    """Points by the station that is nearest to them.
+    """Points in the frames of their nearest stations.
 
     Attributes
     ----------
     station : (n,) int array
-        Number of the station; -1 of points beyond the reach.
+        Index of the station; -1 for points out of reach.
     along, right, up : (n,) float arrays
-        In its frame, m.
+        Coordinates in its frame, m.
     """
 
     station: Int64
@@ -62,7 +62,7 @@ class Placed:
     up: Float
 
     def at(self, chosen: Bool) -> Placed:
-        """Some of the points."""
+        """Return some of the points."""
         return Placed(self.station[chosen], self.along[chosen], self.right[chosen], self.up[chosen])
 
 
@@ -73,9 +73,9 @@ class Centres:
     Attributes
     ----------
     right, up : (k,) float arrays
-        m; NaN where a wall, the vault or the floor is not seen.
+        Shift, m; NaN if a wall, the vault or the floor is not visible.
     width, height : (k,) float arrays
-        Between the walls and from floor to vault, m; NaN likewise.
+        Distance between the walls, and from floor to vault, m; NaN likewise.
     """
 
     right: Float
@@ -85,12 +85,12 @@ class Centres:
 
     @property
     def whole(self) -> Bool:
-        """Which stations have both walls, vault and floor."""
+        """True for stations with both walls, vault and floor."""
         return np.isfinite(self.right) & np.isfinite(self.up)
 
 
 def place_points(points: Float, frames: Frames, reach: float) -> Placed:
-    """Put points (n, 3) into the frames of the stations nearest to them, up to a distance from these (m)."""
+    """Transform points (n, 3) into the frames of the nearest stations, up to a distance from these (m)."""
     distance, station = cKDTree(frames.position).query(points, distance_upper_bound=reach)
     station = np.where(np.isfinite(distance), station, -1)
     away = points - frames.position[station]
@@ -99,11 +99,11 @@ def place_points(points: Float, frames: Frames, reach: float) -> Placed:
 
 
 def section_centres(placed: Placed, count: int, half_width: float) -> Centres:
-    """Shift of each of ``count`` stations to the centre, from the points within half a width (m) of its plane.
+    """Return the shift of each of ``count`` stations to the centre, from the points within half a width (m) of its plane.
 
-    The lining is as far, in a class of 5° about the station, as nine in ten of its points. Where pairs of
-    opposite classes have walls that are as far apart as in the other stations, the others don't count: there a train stands
-    before a wall, or a passage begins.
+    The distance of the lining in a class of 5° around the station is the 90th percentile of its points. If pairs of opposite
+    classes have the same wall distance as in the other stations, the other pairs are ignored: there a train stands in front
+    of a wall, or a passage begins.
     """
     radius = _radii(placed.at((placed.station >= 0) & (np.abs(placed.along) <= half_width)), count)
     angle = (np.arange(_CLASSES) + 0.5) * _CLASS - 180.0
@@ -112,12 +112,12 @@ def section_centres(placed: Placed, count: int, half_width: float) -> Centres:
     a, b = radius[:, side], radius[:, ::-1][:, side]
     shift, apart = (a - b) / 2.0, (a + b) * np.sin(np.radians(angle[side]))
     usual = _usual(apart)
-    upright = usual >= _UPRIGHT * np.nanmax(usual, initial=0.0)  # not vault and floor of a low, wide tunnel
-    free = (np.abs(apart / usual - 1.0) <= _BLOCKED) & upright
+    upright = usual >= _MIN_WIDTH_SHARE * np.nanmax(usual, initial=0.0)  # not vault and floor of a low, wide tunnel
+    free = (np.abs(apart / usual - 1.0) <= _MAX_WIDTH_DEVIATION) & upright
     right, width = (_median(np.where(free, values, np.nan), fewest=1) for values in (shift, apart))
     right, width = np.where(np.isfinite(right), (right, width), (_median(shift[:, upright]), _median(apart[:, upright])))
-    # a roof on posts has no walls at the height of its middle
-    walls = np.isfinite(apart[:, np.abs(angle[side] - 90.0) < _WALL]).sum(axis=1) >= _FEWEST
+    # a roof on posts has no walls at mid-height
+    walls = np.isfinite(apart[:, np.abs(angle[side] - 90.0) < _WALL]).sum(axis=1) >= _MIN_CLASSES
     right, width = np.where(walls, (right, width), np.nan)
     floor, vault = np.abs(angle) > 135, np.abs(angle) < 45
     depth = _median(-radius[:, floor] * cosine[floor])
@@ -128,7 +128,7 @@ def section_centres(placed: Placed, count: int, half_width: float) -> Centres:
 
 
 def vault_gap(placed: Placed, distance: Float) -> float:
-    """Gap along the line beyond which there is no vault, m: half as much again as between most profiles.
+    """Return the gap along the line above which there is no vault, m: 1.5 times that between most profiles.
 
     Parameters
     ----------
@@ -139,12 +139,12 @@ def vault_gap(placed: Placed, distance: Float) -> float:
     """
     overhead = placed.at((placed.station >= 0) & _overhead(placed))
     gaps = np.diff(np.sort(distance[overhead.station] + overhead.along))
-    apart = gaps[gaps > _PROFILES]
-    return 1.5 * max(float(np.quantile(apart, 0.9)) if len(apart) else 0.0, _LEAST_GAP)
+    apart = gaps[gaps > _MIN_PROFILE_GAP]
+    return 1.5 * max(float(np.quantile(apart, 0.9)) if len(apart) else 0.0, _MIN_GAP)
 
 
 def roof_ends(placed: Placed, station: int, way: float, gap: float) -> float:
-    """How far ahead of a station (``way`` 1) or behind it (-1) the vault goes on, with gaps at most so wide, m."""
+    """Return the distance to which the vault extends ahead of a station (``way`` 1) or behind it (-1), across gaps (m)."""
     along = np.sort(way * placed.along[(placed.station == station) & _overhead(placed)])
     along = along[along >= 0.0]
     if not len(along) or along[0] > gap:
@@ -154,12 +154,12 @@ def roof_ends(placed: Placed, station: int, way: float, gap: float) -> float:
 
 
 def _overhead(placed: Placed) -> Bool:
-    """Which points are of the vault's middle; a portal's wings stand beside it."""
+    """Return True for points of the vault's middle part; a portal's wing walls are beside it."""
     return np.asarray(placed.up > 2.0 * np.abs(placed.right))
 
 
 def _radii(placed: Placed, count: int) -> Float:
-    """Distance of the lining in each angular class of each station (count, classes), m; NaN where there is no point."""
+    """Return the distance of the lining in each angular class of each station (count, classes), m; NaN without points."""
     angle = np.degrees(np.arctan2(placed.right, placed.up))
     number = np.clip(np.floor((angle + 180.0) / _CLASS).astype(np.int64), 0, _CLASSES - 1)
     key = placed.station * _CLASSES + number
@@ -168,25 +168,25 @@ def _radii(placed: Placed, count: int) -> Float:
     key, away = key[order], away[order]
     held, first, points = np.unique(key, return_index=True, return_counts=True)
     out = np.full(count * _CLASSES, np.nan)
-    out[held] = away[first + np.floor(_OUTWARD * (points - 1)).astype(np.int64)]
+    out[held] = away[first + np.floor(_LINING_QUANTILE * (points - 1)).astype(np.int64)]
     return out.reshape(count, _CLASSES)
 
 
 def _usual(apart: Float) -> Float:
-    """How far the walls are apart at each height, (classes,), m, where nothing stands before them.
+    """Return the distance between the walls at each height, (classes,), m, where nothing stands in front of them.
 
-    A train may stand along most of a tunnel, but hides no wall up to the vault; niches are more than a wall's width apart.
+    A train may stand along most of a tunnel, but hides no wall up to the vault; with niches the distance is greater.
     """
     known = np.isfinite(apart).any(axis=0)
     out = np.full(apart.shape[1], np.nan)
     if known.any():
-        half, most = np.nanquantile(apart[:, known], (0.5, _FREE), axis=0)
-        out[known] = np.minimum(most, (1.0 + _BLOCKED) * half.max())
+        half, most = np.nanquantile(apart[:, known], (0.5, _FREE_QUANTILE), axis=0)
+        out[known] = np.minimum(most, (1.0 + _MAX_WIDTH_DEVIATION) * half.max())
     return out
 
 
-def _median(values: Float, fewest: int = _FEWEST) -> Float:
-    """Median of each row; NaN where too few are known."""
+def _median(values: Float, fewest: int = _MIN_CLASSES) -> Float:
+    """Return the median of each row; NaN if too few values are known."""
     known = np.isfinite(values).sum(axis=1) >= fewest
     out = np.full(len(values), np.nan)
     if known.any():

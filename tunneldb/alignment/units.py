@@ -1,4 +1,4 @@
-"""Units of length that files of alignments state."""
+"""Units of length in alignment files."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ UNITS = {
     "millimeter": 0.001, "centimeter": 0.01, "meter": 1.0, "kilometer": 1000.0,
     "inch": 0.0254, "foot": 0.3048, "USSurveyFoot": 1200.0 / 3937.0, "mile": 1609.344,
 }  # fmt: skip
-"""Metres in each linear unit of LandXML, by its name there."""
+"""Metres per linear unit of LandXML, by its name there."""

@@ -91,7 +91,7 @@ class Edges:
         self.crown = contrast.grid.bottom + contrast.grid.rows
         self.far = max(1, round(FAR_STEP_DISTANCE / contrast.grid.pixel))
         self.across = max(1, round(STEP_DISTANCE / contrast.grid.pixel))
-        self.aside = max(1, round(SIDE_HALF_WIDTH / contrast.grid.pixel))
+        self.half_width = max(1, round(SIDE_HALF_WIDTH / contrast.grid.pixel))
         self.near = max(1, round(MAX_LINE_DISTANCE / contrast.grid.pixel))
         self.facings = 2 if contrast.spacing else len(FACING)
 
@@ -169,7 +169,7 @@ class Edges:
         """Return the mean darkening inside sides minus that outside, steps of the image; -inf where either is hidden."""
         sums, selected = np.zeros((2, len(sides.label)), np.int64), np.zeros((2, len(sides.label)), np.int64)
         hidden = np.zeros(len(sides.label), np.bool_)
-        for aside in range(-self.aside, self.aside + 1):
+        for aside in range(-self.half_width, self.half_width + 1):
             for k, (along, usable) in enumerate(((1 - self.across, self._interior), (self.across, self._background))):
                 row, column = sides.beyond(along, aside)
                 there = np.flatnonzero(self._inside(row, column))

@@ -1,4 +1,4 @@
-"""Ground, lining, what stands between them, and target spheres (Li et al., 2023)."""
+"""Classification of points: ground, lining, objects and fixtures, and target spheres (Li et al., 2023)."""
 
 import lazy_loader
 

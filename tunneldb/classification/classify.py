@@ -1,4 +1,4 @@
-"""Finding the scene: lining and clusters, with the sections of a survey or without."""
+"""Find the scene: lining and clusters, with or without the sections of a survey."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from tunneldb.geometry.surface import Surface
 def find_scene(
     points: Float, line: PlanLine, surface: Surface, ground: Ground | None, settings: ClusterSettings | None = None
 ) -> Scene:
-    """Find lining and clusters in points of survey density about the surface of the sections.
+    """Find lining and clusters in points of survey density around the surface of the sections.
 
     Parameters
     ----------
     points : (n, 3) float array
         In the tunnel's SRID, m.
     line : PlanLine
-        The axis, along which is chainage.
+        Axis along which chainage is measured.
     surface : Surface
         Surface of the sections.
     ground : Ground or None
@@ -72,19 +72,19 @@ def find_scene(
 
 
 def find_bare_scene(points: Float, line: PlanLine, ground: Ground | None, settings: ClusterSettings | None = None) -> Scene:
-    """Find lining and clusters in a cloud that has no axis and no sections.
+    """Find lining and clusters in a cloud without axis and sections.
 
-    Clusters of the region of interest (Li et al. 2023, eq. 1–4) that are large and whose normals are coherent are lining, and
-    so is, to begin with, all above the region. If they close around the middle of the tunnel, sections are laid through them
-    and the ground, and on these lining, niches, appendages and objects are told as in a survey; what the paper takes for
-    lining above the region is so freed of what hangs there. If they don't, there is no tunnel and no lining.
+    Clusters of the region of interest (Li et al. 2023, eq. 1–4) that are large and whose normals are coherent are lining;
+    initially everything above the region is too. If they close around the middle of the tunnel, sections are fitted to them and
+    to the ground. With these, lining, niches, fixtures and objects are classified as in a survey, which removes the fixtures
+    above the region that the paper classifies as lining. If they do not close, there is no tunnel and no lining.
 
     Parameters
     ----------
     points : (n, 3) float array
-        m; thinned to voxels serves best.
+        m; preferably thinned to voxels.
     line : PlanLine
-        What the cloud follows.
+        Line along the cloud.
     ground : Ground or None
         The ground, if there is one.
     settings : ClusterSettings, optional
@@ -118,9 +118,9 @@ def find_bare_scene(points: Float, line: PlanLine, ground: Ground | None, settin
 
 
 def heights_above_ground(ground: Ground | None, along: Float, across: Float, z: Float) -> Float:
-    """Height of points (n,) above the ground, m, or above the lowest point of their metre where there is no ground.
+    """Return the height of points (n,) above the ground, m, or above the lowest point of their metre without ground.
 
-    Where the ground has a gap, or ends, it goes on level from its nearest place in the row.
+    In gaps and beyond the ends the ground continues level from its nearest place in the row.
     """
     if ground is None or not np.isfinite(ground.height).any():
         return z - _quantile_of_metre(along, z, 0.0)
@@ -129,17 +129,17 @@ def heights_above_ground(ground: Ground | None, along: Float, across: Float, z: 
     whole = replace(ground, height=ground.height[tuple(nearest)])
     rows, columns = ground.height.shape
     inside = np.clip(along, ground.start, ground.start + rows - 1)
-    beside = np.clip(across, ground.first * COLUMN, (ground.first + columns - 1) * COLUMN - 1e-9)
-    return z - whole.height_at(inside, np.maximum(beside, ground.first * COLUMN))
+    clipped = np.clip(across, ground.first * COLUMN, (ground.first + columns - 1) * COLUMN - 1e-9)
+    return z - whole.height_at(inside, np.maximum(clipped, ground.first * COLUMN))
 
 
 def tunnel_heights(along: Float, height: Float) -> Float:
-    """Height of the tunnel at each point (n,), m: that of all but the highest thousandth of points of its metre."""
+    """Return the height of the tunnel at each point (n,), m, without the highest thousandth of the points of its metre."""
     return _quantile_of_metre(along, height, 0.999)
 
 
 def _quantile_of_metre(along: Float, value: Float, share: float) -> Float:
-    """Quantile of the values of each point's metre along the tunnel."""
+    """Return a quantile of the values of each point's metre along the tunnel."""
     if len(along) == 0:
         return np.empty(0)
     metre = np.floor(along).astype(np.int64)

@@ -1,9 +1,8 @@
-"""The lining's relief: where it really lies off the surface of the sections, cell by cell of the unrolled plane.
+"""Relief of the lining: its offset from the surface of the sections, cell by cell of the unrolled plane.
 
-Sections stand metres apart and are smooth; between them a lining, of rock above all, departs from the surface. A plane
-is fitted to the points about each cell (Xu et al., 2018, eq. 21), so robustly that what hangs on the lining and what is
-let into it don't draw it to themselves. Where it has no ground to stand on, in the mouth of a niche or behind something
-large, it is laid across from the cells about it.
+Sections are metres apart and smooth; between them a lining, especially of rock, deviates from the surface. A plane is fitted
+robustly to the points around each cell (Xu et al., 2018, eq. 21), so that fixtures and recesses do not attract it. Cells
+without sufficient lining, in the mouth of a niche or behind a large object, are interpolated from the cells around them.
 """
 
 from __future__ import annotations
@@ -29,24 +28,26 @@ CELL = 0.25
 """Edge of a cell, m."""
 
 REACH = 0.5
-"""Points farther off the surface than this are not looked at, m."""
+"""Maximum distance from the surface of points used, m."""
 
 SIGMAS = 3.0
-"""So many standard deviations of the lining about its plane belong to it."""
+"""Standard deviations about its plane within which points belong to the lining."""
 
-APART = 0.06
-"""Cells that depart from those about them by more are not lining, m, unless the lining's own relief is as rough."""
+MAX_CELL_DEVIATION = 0.06
+"""Maximum deviation of a cell from its surroundings, m, unless the lining's own relief is as rough."""
 
-_PART = 2  # cells to each side whose points the plane is fitted to
+_PART = 2  # cells to each side whose points are used for the plane
 _MIN_POINTS = 6
-_BIN, _BINS, _SMOOTH = 0.02, 25, 2  # of the histogram that finds the level: 2 cm to ±0.5 m, over five bins
-_FINE, _FINES = 0.002, 128  # of the histogram that finds the spread
+_BIN, _BINS, _SMOOTH = 0.02, 25, 2  # of the histogram for the level: 2 cm to ±0.5 m, over five bins
+_FINE, _FINES = 0.002, 128  # of the histogram for the spread
 _TUKEY = 4.685  # Tukey's weights end at so many standard deviations
-_FIRST, _FITS = 0.12, 5  # width of the first fit's weights, m
-_REST = 2e-4  # the fit rests when a cell moves by less, m
-_FLATTEST = 0.05  # determinant of the covariance of x and y, in cells, of points on a line: that of a full part is 4.3
+_FIRST_WIDTH, _FITS = 0.12, 5  # width of the first fit's weights, m
+_CONVERGED = 2e-4  # the fit ends when a cell moves by less, m
+_MIN_DETERMINANT = (
+    0.05  # minimum determinant of the covariance of x and y, in cells: points on a line have less, a full part has 4.3
+)
 _ALONG, _ROUND = 12, 4  # cells to each side that a cell's offset is compared with: 6 m by 2 m
-_SAMPLE = 1024  # points of a part: survey density fills it with 150, but voxels may with more
+_SAMPLE = 1024  # points of a part: survey density gives 150, voxels may give more
 _COLUMNS, _POINTS = 64, 1 << 16  # columns of cells, and points, at a time
 
 
@@ -59,9 +60,9 @@ class Relief:
     cell : float
         Edge of a cell, m.
     column, row : int
-        The first cell stands at chainage ``column * cell`` and arc ``row * cell``.
+        The first cell is at chainage ``column * cell`` and arc ``row * cell``.
     offset : (rows, columns) float32 array
-        Offset of the lining at the cells' middles, m, positive into the tunnel; NaN where there is no lining.
+        Offset of the lining at the cells' middles, m, positive into the tunnel; NaN without lining.
     spread : (rows, columns) float32 array
         Standard deviation of the lining's points about it, m; NaN at the same places.
     """
@@ -81,16 +82,16 @@ class Relief:
         Parameters
         ----------
         chainage, arc, offset : (n,) float arrays
-            Points that are not ground, in the unrolled plane, m; those with NaN are left out.
+            Points that are not ground, in the unrolled plane, m; those with NaN are ignored.
         wall : Wall, optional
-            Where the lining ends above the ground; without it all of the surface is lining.
+            Lower ends of the lining at the ground; without it the whole surface is lining.
         prior : SectionOutliers, optional
-            Where the surface is known to have left the lining.
+            Places where the surface is known to be off the lining.
 
         Returns
         -------
         Relief
-            Of no cells where there are no points near the surface.
+            Without cells if there are no points near the surface.
         """
         with np.errstate(invalid="ignore"):
             kept = np.isfinite(chainage) & (np.abs(offset) <= 2.0 * REACH)
@@ -118,9 +119,9 @@ class Relief:
         return cls(CELL, 0, 0, np.empty((0, 0), np.float32), np.empty((0, 0), np.float32))
 
     def level(self, chainage: Float, arc: Float) -> tuple[Float, Float]:
-        """Offset of the lining at places (n,) of the unrolled plane and its tolerance, m; NaN where there is none.
+        """Return the offset of the lining at places (n,) of the unrolled plane and its tolerance, m; NaN if there is none.
 
-        The tolerance is Xu's δ (3 cm), or three standard deviations of the lining there when that is more.
+        The tolerance is Xu's δ (3 cm), or three standard deviations of the lining there if that is more.
         """
         chainage, arc = np.ascontiguousarray(chainage, np.float64), np.ascontiguousarray(arc, np.float64)
         level, tolerance = np.empty(len(chainage)), np.empty(len(chainage))
@@ -131,12 +132,12 @@ class Relief:
 
 @dataclass(frozen=True)
 class Wall:
-    """Where the lining ends above the ground, on both sides.
+    """Lower ends of the lining at the ground, on both sides.
 
     Attributes
     ----------
     chainage : (k,) float array
-        Places along the tunnel, m, growing, one at least.
+        Places along the tunnel, m, increasing, at least one.
     left, right : (k,) float arrays
         Arc of the left and the right wall's foot, m.
     """
@@ -147,7 +148,7 @@ class Wall:
 
     @classmethod
     def of(cls, ground: Ground | None, line: PlanLine, surface: Surface) -> Wall | None:
-        """Find it by the feet of the walls; None without ground."""
+        """Make it from the feet of the walls; None without ground."""
         if ground is None:
             return None
         arcs = foot_arcs(ground, line, surface)
@@ -156,28 +157,28 @@ class Wall:
         return cls(metres[known], arcs[known, 0], arcs[known, 1]) if known.any() else None
 
     def holds(self, chainage: Float, arc: Float) -> Bool:
-        """Tell which places lie above the ground; (rows,) arcs by (columns,) chainages."""
+        """Return True for places above the ground; (rows,) arcs by (columns,) chainages."""
         left, right = np.interp(chainage, self.chainage, self.left), np.interp(chainage, self.chainage, self.right)
-        # Half a cell farther, so that the last of the wall lies in a cell, too.
+        # Half a cell more, so that the lowest part of the wall is in a cell too.
         return np.asarray((arc[:, None] > left - CELL / 2) & (arc[:, None] < right + CELL / 2))
 
 
 def _apart(found: Float, expected: Float) -> Bool:
-    """Cells whose plane lies apart from those about them: the floor of a shallow niche, the front of a large box."""
+    """Return cells whose plane deviates from those around them: back of a shallow niche, front of a large box."""
     level = _median(found - expected, _ALONG, _ROUND)
     off = np.abs(found - expected - level)
     usual = 5.0 * MAD_TO_SIGMA * _median(off, _ALONG, _ROUND)
     with np.errstate(invalid="ignore"):
-        return np.asarray(off > np.maximum(usual, APART))
+        return np.asarray(off > np.maximum(usual, MAX_CELL_DEVIATION))
 
 
 def _calm(spread: Float) -> Float:
-    """Spread of the lining about each cell: the median of its neighbours', so that no single box or niche makes it wide."""
+    """Return the spread of the lining around each cell: the median of its neighbours', robust against single boxes."""
     return np.asarray(_median(spread, 4, 4))
 
 
 def _whole(found: Float, spread: Float, expected: Float, inside: Bool) -> tuple[Single, Single]:
-    """Lay the relief across cells without one, from those before and after them along the tunnel."""
+    """Interpolate the relief in cells without one, from cells before and behind them along the tunnel."""
     offset, missing = found - expected, np.isnan(found)
     if missing.all():
         return np.full(found.shape, np.nan, np.float32), np.full(found.shape, np.nan, np.float32)
@@ -197,7 +198,7 @@ def _whole(found: Float, spread: Float, expected: Float, inside: Bool) -> tuple[
 
 
 def _median(grid: Float, along: int, across: int) -> Float:
-    """Median of the cells about each, NaN left out; of some of them, evenly chosen, which is enough."""
+    """Return the median of the cells around each, without NaN; an even selection of them is sufficient."""
     rows, columns = grid.shape
     step = max(2, along // 3)
     padded = np.pad(grid, ((across, across), (along, along)), constant_values=np.nan)
@@ -219,7 +220,7 @@ def _median(grid: Float, along: int, across: int) -> Float:
 
 
 def _planes(x: Float, y: Float, z: Float, starts: Int64, expected: Float) -> tuple[Float, Float]:
-    """Offset and spread of each cell; x and y in cells, z and the results in m, NaN where there are too few points."""
+    """Return offset and spread of each cell; x and y in cells, z and the results in m, NaN with too few points."""
     offset, spread = np.full(expected.shape, np.nan), np.full(expected.shape, np.nan)
 
     def work(begin: int, end: int) -> None:
@@ -236,7 +237,7 @@ def _fit_planes(
     x: Float, y: Float, z: Float, starts: Int64, expected: Float, part: Float, counts: Float, fine: Int64,
     offset: Float, spread: Float, begin: int, end: int,
 ) -> None:  # fmt: skip  # pragma: no cover - compiled
-    """Fit the planes of the columns of cells from begin to end; part, counts and fine are room to work in."""
+    """Fit the planes of the columns of cells from begin to end; part, counts and fine are working memory."""
     rows, columns = expected.shape
     for j in range(begin, end):
         left, right = max(j - _PART, 0), min(j + _PART, columns - 1)
@@ -248,7 +249,7 @@ def _fit_planes(
             if total < _MIN_POINTS:
                 continue
             every = 1 + total // _SAMPLE
-            count, seen = np.int64(0), 0  # no literal: what is called with one is compiled for it once more
+            count, seen = np.int64(0), 0  # no literal, to avoid a second compilation of the called function
             for k in range(counts.shape[0]):
                 counts[k] = 0.0
             for m in range(below, above):
@@ -269,8 +270,8 @@ def _fit_planes(
 
 @inner
 def _fit_plane(part: Float, count: int, level: float, fine: Int64) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Height in the middle of the plane through points, fitted from a level on, and their spread about it; NaN: none."""
-    a, b, c, scale, sigma = level, 0.0, 0.0, _FIRST, np.nan
+    """Return the height in the middle of the plane through points, fitted from an initial level, and their spread, or NaN."""
+    a, b, c, scale, sigma = level, 0.0, 0.0, _FIRST_WIDTH, np.nan
     for _ in range(_FITS):
         used, s, sx, sy, sxx, sxy, syy, sz, sxz, syz = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(count):
@@ -292,7 +293,7 @@ def _fit_plane(part: Float, count: int, level: float, fine: Int64) -> tuple[floa
         if used < _MIN_POINTS:
             return np.nan, np.nan
         before, lean, slant = a, b, c
-        a, b, c = plane_of_moments(s, sx, sy, sxx, sxy, syy, sz, sxz, syz, _FLATTEST)
+        a, b, c = plane_of_moments(s, sx, sy, sxx, sxy, syy, sz, sxz, syz, _MIN_DETERMINANT)
         # Standard deviation about the plane, from the median of the distances.
         for f in range(_FINES):
             fine[f] = 0
@@ -308,9 +309,9 @@ def _fit_plane(part: Float, count: int, level: float, fine: Int64) -> tuple[floa
                 sigma = MAD_TO_SIGMA * (f + (0.5 * total - below) / fine[f]) * _FINE
                 break
             below += fine[f]
-        if max(abs(a - before), abs(b - lean), abs(c - slant)) < _REST:
+        if max(abs(a - before), abs(b - lean), abs(c - slant)) < _CONVERGED:
             break
-        scale = min(max(_TUKEY * sigma, DELTA), 2.0 * _FIRST)
+        scale = min(max(_TUKEY * sigma, DELTA), 2.0 * _FIRST_WIDTH)
     return a, sigma
 
 
@@ -318,7 +319,7 @@ def _fit_plane(part: Float, count: int, level: float, fine: Int64) -> tuple[floa
 def level_at(
     chainage: float, arc: float, cell: float, column: int, row: int, relief: Single, spread: Single
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Offset of the lining at one place, between the cells' middles, and its tolerance; NaN where there is none."""
+    """Return the offset of the lining at one place, interpolated between cells, and its tolerance; NaN if there is none."""
     rows, columns = relief.shape
     y, x = arc / cell - row - 0.5, chainage / cell - column - 0.5
     if not (-0.5 <= y <= rows - 0.5 and -0.5 <= x <= columns - 0.5):
@@ -335,7 +336,7 @@ def level_at(
                 total += weight
                 plane += weight * relief[p, q]
                 sigma += weight * spread[p, q]
-    if total < 0.5:  # past the end of the lining by half a cell
+    if total < 0.5:  # beyond the end of the lining by half a cell
         return np.nan, np.nan
     return plane / total, max(DELTA, SIGMAS * sigma / total)
 

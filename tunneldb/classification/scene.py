@@ -1,4 +1,4 @@
-"""The class of every point of a scene: the models of ground, lining, clusters and target spheres put together."""
+"""Class of every point of a scene, from the models of ground, lining, clusters and target spheres."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from tunneldb.geometry.surface import Surface
 from tunneldb.threads import in_blocks
 
 SPHERE_SKIN = 0.01
-"""Points up to this far outside a target sphere are its own, m: three times a scanner's noise."""
+"""Thickness outside a target sphere within which points belong to it, m: three times a scanner's noise."""
 
-BEHIND = (PointClass.NICHE, PointClass.LINING)
-"""Classes of clusters that lie behind the lining's plane."""
+RECESSED_CLASSES = (PointClass.NICHE, PointClass.LINING)
+"""Classes of clusters behind the lining's plane."""
 
 _BLOCK = 1 << 16  # points
 _BOX = 4096  # points whose box is compared with the spheres
@@ -32,20 +32,20 @@ _SPHERE, _NOISE = int(PointClass.SPHERE), int(PointClass.NOISE)
 
 @dataclass(frozen=True)
 class Scene:
-    """What was found in a stretch of tunnel, from which any point of it gets its class.
+    """Models found in a stretch of tunnel, which give the class of any of its points.
 
     Attributes
     ----------
     line : PlanLine
-        Line along the tunnel, in whose frame the ground stands.
+        Line along the tunnel, in whose frame the ground is.
     ground : Ground or None
         The ground, if there is one.
     clusters : sequence of Cluster
-        What stands in the tunnel or hangs on its lining; pieces of lining, too.
+        Objects in the tunnel and fixtures; pieces of lining too.
     surface : Surface or None
         Surface of the sections, if there is one.
     relief : Relief or None
-        The lining about that surface, if there is one.
+        Relief of the lining relative to that surface, if there is one.
     spheres : (k, 4) float array
         Target spheres: x, y, z of the centre and radius, m.
     """
@@ -58,11 +58,11 @@ class Scene:
     spheres: Float = field(default_factory=lambda: np.empty((0, 4)))
 
     def classes(self, xyz: Float) -> UInt8:
-        """Class (:class:`tunneldb.classification.classes.PointClass`) of each point (n, 3) in the tunnel's SRID.
+        """Return the class (:class:`tunneldb.classification.classes.PointClass`) of each point (n, 3) in the tunnel's SRID.
 
-        What is within a target sphere is a sphere; else what the ground model holds is ground; what is near enough to the
-        lining's plane is lining; the rest belongs to the cluster in whose cells it lies, or is noise. Points off the ground
-        that the surface does not reach are unassigned.
+        The first that applies: within a target sphere, sphere; in the ground model, ground; near enough to the lining's plane,
+        lining; in the cells of a cluster, that cluster's class; otherwise noise. Points off the ground that the surface does
+        not reach are unassigned.
         """
         xyz = np.ascontiguousarray(xyz, dtype=np.float64)
         if self.ground is None:
@@ -78,7 +78,7 @@ class Scene:
         return out
 
     def _off_ground(self, xyz: Float) -> UInt8:
-        """Class of points that are not ground; these alone need to be unrolled."""
+        """Return the class of points that are not ground; only these need to be unrolled."""
         if self.surface is None or self.relief is None:
             unrolled, relief = np.zeros((3, len(xyz))), Relief.none()
         else:
@@ -100,10 +100,10 @@ class Scene:
 
     @cached_property
     def _lookups(self) -> tuple[Lookup, Lookup]:
-        """Cells of the clusters before the lining and of those behind it."""
+        """Return the cells of the clusters in front of the lining and of those behind it."""
         if self.relief is None:
             return Lookup.of(list(self.clusters)), Lookup.of([])
-        behind = [cluster for cluster in self.clusters if cluster.klass in BEHIND]
+        behind = [cluster for cluster in self.clusters if cluster.klass in RECESSED_CLASSES]
         return Lookup.of([cluster for cluster in self.clusters if cluster.klass != PointClass.NICHE]), Lookup.of(behind)
 
 
@@ -129,14 +129,14 @@ def _classes(
             klass = look_up(x, y, z, outer_first, outer_last, outer_keys, outer_klass)
         else:
             klass = look_up(x, y, z, inner_first, inner_last, inner_keys, inner_klass)
-        if klass == 0:  # no cluster: of the lining's rough edge, or in the air
+        if klass == 0:  # no cluster: the lining's rough edge, or in the air
             klass = _LINING if abs(off) <= 2.0 else _NOISE
         out[i] = klass
 
 
 @kernel
 def _mark_spheres(xyz: Float, spheres: Float, begin: int, end: int, out: UInt8) -> None:  # pragma: no cover - compiled
-    """Class the points that lie within a target sphere; only spheres that reach into the box of some points are looked at."""
+    """Classify the points within a target sphere; only spheres that reach into the box of some points are tested."""
     for first in range(begin, end, _BOX):
         last = min(first + _BOX, end)
         x0, y0, z0 = xyz[first, 0], xyz[first, 1], xyz[first, 2]
@@ -146,8 +146,8 @@ def _mark_spheres(xyz: Float, spheres: Float, begin: int, end: int, out: UInt8) 
             x1, y1, z1 = max(x1, xyz[i, 0]), max(y1, xyz[i, 1]), max(z1, xyz[i, 2])
         for k in range(spheres.shape[0]):
             x, y, z, reach = spheres[k, 0], spheres[k, 1], spheres[k, 2], spheres[k, 3] + SPHERE_SKIN
-            apart = x + reach < x0 or x - reach > x1 or y + reach < y0 or y - reach > y1 or z + reach < z0 or z - reach > z1
-            if apart:
+            outside = x + reach < x0 or x - reach > x1 or y + reach < y0 or y - reach > y1 or z + reach < z0 or z - reach > z1
+            if outside:
                 continue
             for i in range(first, last):
                 dx, dy, dz = xyz[i, 0] - x, xyz[i, 1] - y, xyz[i, 2] - z

@@ -1,4 +1,4 @@
-"""A scene without an axis: lining, told by clusters and their normals, and a surface of sections laid through it."""
+"""Scene without an axis: lining found by clusters and their normals, and a surface of sections fitted to it."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from tunneldb.geometry.surface import Surface
 from tunneldb.geometry.unrolling import CROWN, NODES
 from tunneldb.threads import in_blocks
 
-COHERENT = 0.8
-"""Cosine of the angle between neighbouring normals that the clusters of a lining reach on the average."""
+MIN_COHERENCE = 0.8
+"""Minimum mean cosine of the angle between neighbouring normals in clusters of lining."""
 
-TALL = 0.5
-"""And the share of the height of the region of interest."""
+MIN_HEIGHT_SHARE = 0.5
+"""Minimum height of these clusters, as a share of the region of interest's height."""
 
-LARGE = 0.02
-"""And the share of its points."""
+MIN_POINT_SHARE = 0.02
+"""Minimum number of their points, as a share of the region of interest's points."""
 
-CLOSED = 0.6
-"""Share of the directions above the ground that a tunnel's lining closes, seen from its middle."""
+MIN_CLOSED_SHARE = 0.6
+"""Minimum share of the directions above the ground that a tunnel's lining closes, seen from its middle."""
 
 VERTICES, SECTIONS = 10.0, 2.5
 """Distance of the vertices of the axis and of the sections, m."""
 
 _DEGREES = 2  # width of an angular class of a section
 _CLASSES = 360 // _DEGREES
-_NOTCH = 5  # classes: 10 degrees, of which what hangs on the wall takes less
-_LEAST = 3  # points that fill a class
+_NOTCH = 5  # classes: 10 degrees; fixtures on the wall are narrower
+_MIN_POINTS = 3  # minimum points of a class
 _NEIGHBOURS = 16  # of a normal
 _BLOCK = 16_384  # points at a time
 
 
 def find_lining(residual: ResidualPoints, spacing: Spacing, settings: ClusterSettings) -> Bool:
-    """Tell which points are lining: clusters of the region by their size and normals, and all above it."""
+    """Select the points of the lining: clusters of the region by their size and normals, and all above it."""
     kept = residual.height >= residual.top
     region = np.flatnonzero(~kept)
     places = np.column_stack([residual.along * spacing.shrink, residual.across, residual.xyz[:, 2]])[region]
@@ -59,16 +59,16 @@ def find_lining(residual: ResidualPoints, spacing: Spacing, settings: ClusterSet
     good = np.zeros(count, np.bool_)
     for k in range(count):
         group = order[bounds[k] : bounds[k + 1]]
-        size = len(group) >= LARGE * len(region)
+        size = len(group) >= MIN_POINT_SHARE * len(region)
         share = residual.height[region[group]] / np.maximum(residual.top[region[group]], 1e-9)
-        if size and np.ptp(share) >= TALL:
-            good[k] = coherence(places[group]) >= COHERENT
+        if size and np.ptp(share) >= MIN_HEIGHT_SHARE:
+            good[k] = coherence(places[group]) >= MIN_COHERENCE
     kept[region] = (labels >= 0) & good[labels]
     return kept
 
 
 def coherence(points: Float) -> float:
-    """Mean cosine of the angle between the normals of neighbouring points (n, 3): 1 on a plane, 0.5 where they are random."""
+    """Return the mean cosine between the normals of neighbouring points (n, 3): 1 on a plane, 0.5 if random."""
     points = points[:: 1 + len(points) // 20_000] if len(points) > 40_000 else points
     near = min(_NEIGHBOURS, len(points))
     if near < 4:
@@ -82,8 +82,8 @@ def coherence(points: Float) -> float:
 
 
 def surface_through(line: PlanLine, along: Float, across: Float, z: Float, wall: Bool) -> Surface | None:
-    """Sections through points in the frame of a line; None where walls and roof (``wall``) don't close around the middle."""
-    if wall.sum() < _LEAST:
+    """Fit sections to points in the frame of a line; None if walls and roof (``wall``) do not close around the middle."""
+    if wall.sum() < _MIN_POINTS:
         return None
     first, last = float(along[wall].min()) - 0.5, float(along[wall].max()) + 0.5
     segments = max(1, round((last - first) / VERTICES))
@@ -95,19 +95,19 @@ def surface_through(line: PlanLine, along: Float, across: Float, z: Float, wall:
     count = max(1, round((last - first) / SECTIONS))
     sections = first + (np.arange(count) + 0.5) * (last - first) / count
     places = _placed(rows, ends, np.column_stack([line.point(along, across), z]))
-    held = np.isfinite(places[:, 0])
-    (along, u, w), wall = places[held].T, wall[held]
+    valid = np.isfinite(places[:, 0])
+    (along, u, w), wall = places[valid].T, wall[valid]
     angle = np.mod(np.degrees(np.arctan2(u, w)) + 180.0, 360.0)
     bins = np.minimum((angle / _DEGREES).astype(np.int64), _CLASSES - 1)
     slab = np.clip(((along - first) * count / (last - first)).astype(np.int64), 0, count - 1)
     key = slab * _CLASSES + bins
     radius = _medians(key, np.hypot(u, w), count * _CLASSES).reshape(count, _CLASSES)
     radius = _without_notches(radius)
-    walls = np.bincount(key[wall], minlength=count * _CLASSES).reshape(count, _CLASSES) >= _LEAST
+    walls = np.bincount(key[wall], minlength=count * _CLASSES).reshape(count, _CLASSES) >= _MIN_POINTS
     floor = np.isfinite(radius) & ~walls
     closed = walls.sum(axis=1) / np.maximum(_CLASSES - floor.sum(axis=1), 1)
     roof = walls[:, _CLASSES // 4 : 3 * _CLASSES // 4].mean(axis=1)
-    if np.median(np.minimum(closed, roof)) < CLOSED:
+    if np.median(np.minimum(closed, roof)) < MIN_CLOSED_SHARE:
         return None
     nodes = _nodes(radius)
     arcs = _arcs(nodes)
@@ -115,16 +115,16 @@ def surface_through(line: PlanLine, along: Float, across: Float, z: Float, wall:
 
 
 def _middles(at: Float, along: Float, across: Float, z: Float, wall: Bool) -> Float:
-    """Middle between the walls and between floor and roof at each vertex: across and z, m.
+    """Return the middle between the walls and between floor and roof at each vertex: across and z, m.
 
-    That of each stretch as long as a section's is taken, and a line laid through those about a vertex.
+    The middles of stretches as long as a section's are computed, and a line is fitted to those around a vertex.
     """
     stretch = np.floor((along - at[0]) / SECTIONS).astype(np.int64)
     order = np.argsort(stretch, kind="stable")
     found = []
     for part in np.split(order, np.flatnonzero(np.diff(stretch[order])) + 1):
         sides = part[wall[part]]
-        if len(sides) >= _LEAST:
+        if len(sides) >= _MIN_POINTS:
             middle = np.mean(np.quantile(across[sides], (0.02, 0.98)))
             height = 0.5 * (np.quantile(z[part], 0.02) + np.quantile(z[sides], 0.98))
             found.append((float(along[part].mean()), float(middle), float(height)))
@@ -139,7 +139,7 @@ def _middles(at: Float, along: Float, across: Float, z: Float, wall: Bool) -> Fl
 
 
 def _placed(segments: Float, ends: Float, points: Float) -> Float:
-    """Chainage of points (n, 3) and their place right and up of the axis, (n, 3), m; NaN beyond its ends."""
+    """Return the chainage of points (n, 3) and their place right of and above the axis, (n, 3), m; NaN beyond its ends."""
     out = np.full((len(points), 3), np.nan)
     number = np.arange(len(segments))
     in_blocks(lambda begin, end: _place(segments, number, ends, points, out, begin, end), len(points), _BLOCK)
@@ -161,38 +161,38 @@ def _place(
 
 
 def _medians(key: Int64, value: Float, count: int) -> Float:
-    """Median of the values of each key below a count; NaN for fewer than ``_LEAST``."""
+    """Return the median of the values of each key below a count; NaN for fewer than ``_MIN_POINTS``."""
     order = np.lexsort((value, key))
     bounds = np.searchsorted(key[order], np.arange(count + 1))
     size = np.diff(bounds)
     at = np.minimum(bounds[:-1] + size // 2, max(len(value) - 1, 0))
-    return np.where(size >= _LEAST, value[order][at], np.nan)
+    return np.where(size >= _MIN_POINTS, value[order][at], np.nan)
 
 
 def _without_notches(radius: Float) -> Float:
-    """Sections freed of what stands in from both its sides by more than δ: a cable or a box on the wall, not the wall."""
+    """Remove from sections what protrudes from both its sides by more than δ: a cable or a box on the wall."""
     filled = np.where(np.isnan(radius), 0.0, radius)
     closed = ndimage.grey_closing(filled, size=(1, _NOTCH), mode="wrap")
     return np.where(closed - radius > DELTA, closed, radius)
 
 
 def _nodes(radius: Float) -> Float:
-    """Radius at each whole degree from those of the classes; gaps are bridged, along the tunnel where they are wide."""
+    """Interpolate the radius at each whole degree from the classes; gaps are bridged, wide ones along the tunnel."""
     centres = (np.arange(_CLASSES) + 0.5) * _DEGREES
     known = np.isfinite(radius).any(axis=0)
     typical = np.interp(centres, centres[known], np.nanmedian(radius[:, known], axis=0), period=360.0)
     out = np.empty((len(radius), NODES))
     for row, classes in zip(out, radius, strict=True):
-        apart = classes - typical
-        full = np.isfinite(apart)
+        deviation = classes - typical
+        full = np.isfinite(deviation)
         if full.any():
-            apart = np.interp(centres, centres[full], apart[full], period=360.0)
-        row[:] = np.interp(np.arange(NODES), centres, typical + np.where(np.isfinite(apart), apart, 0.0), period=360.0)
+            deviation = np.interp(centres, centres[full], deviation[full], period=360.0)
+        row[:] = np.interp(np.arange(NODES), centres, typical + np.where(np.isfinite(deviation), deviation, 0.0), period=360.0)
     return out
 
 
 def _arcs(radius: Float) -> Float:
-    """Length along each section from the crown at each whole degree, m."""
+    """Return the length along each section from the crown at each whole degree, m."""
     angle = np.radians(np.arange(NODES) - 180.0)
     u, w = radius * np.sin(angle), radius * np.cos(angle)
     length = np.concatenate([np.zeros((len(radius), 1)), np.cumsum(np.hypot(np.diff(u), np.diff(w)), axis=1)], axis=1)

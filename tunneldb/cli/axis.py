@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
@@ -46,7 +46,7 @@ def axis(settings: Settings, survey: str, start: str | None, end: str | None, ou
     print_table(header, rows, right=(0, 1, 3, 4, 5, 6, 7))
     if output is not None:
         write_deviation(deviation, output)
-        click.echo(f"deviation to {output}", err=True)
+        notify(f"deviation to {output}")
 
 
 def _millimetres(metres: float) -> str:

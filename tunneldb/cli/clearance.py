@@ -15,7 +15,7 @@ from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import replacing, told_to_end
+from tunneldb.files import exit_on_sigterm, replacing
 from tunneldb.store.survey import get_survey
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def clearance(settings: Settings, /, survey: str, outline: Path, name: str | Non
             tracks = find_tracks(conn, found, options.track_gauge)
         track = _chosen(survey, tracks.names, asked["track"])
         save_gauge(conn, found, gauge, read, str(outline))
-        with told_to_end(), bar("km") as progress:
+        with exit_on_sigterm(), bar("km") as progress:
             made = measure_clearance(
                 conn, found, tracks, track, gauge, read, options, part.low, part.high, step(progress)
             )  # fmt: skip

@@ -16,7 +16,7 @@ from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import by_kilometre, replacing, told_to_end
+from tunneldb.files import by_kilometre, exit_on_sigterm, replacing
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def compare(
         first, second = get_survey(conn, old), get_survey(conn, new)
         part = parse_stretch(conn, first, start, end)
         conn.rollback()
-        with told_to_end(), bar("km") as progress:
+        with exit_on_sigterm(), bar("km") as progress:
             made = bring_up_to_date(conn, first, second, part.low, part.high, cell, length, step(progress))
         rows = {
             view: change_rows(conn, view, first, second, part.low, part.high)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import click
 from rich.console import Console
 
-from tunneldb.cli.output import printable, tell
+from tunneldb.cli.output import notify, printable, tell
 from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.coverage import Coverage
 from tunneldb.store.remarks import Remark
@@ -21,9 +21,9 @@ def say_remarks(remarks: Sequence[Remark], survey: Survey) -> None:
     """Say on stderr what is to be known of the results, and tell it to ``--json``."""
     tell(remarks=remarks)
     for remark in remarks[:MOST_REMARKS]:
-        click.echo(printable(remark.said), err=True)
+        notify(printable(remark.said))
     if len(remarks) > MOST_REMARKS:
-        click.echo(f"and {len(remarks) - MOST_REMARKS} remarks more: tunneldb status {survey.name}", err=True)
+        notify(f"and {len(remarks) - MOST_REMARKS} remarks more: tunneldb status {survey.name}")
 
 
 def say_coverage(coverage: Coverage, survey: Survey, *, on_stdout: bool = False) -> None:
@@ -36,7 +36,7 @@ def say_coverage(coverage: Coverage, survey: Survey, *, on_stdout: bool = False)
         searched_share=coverage.searched_share,
     )
     if survey.intensity_kind == "none":
-        click.echo(f"survey {survey.name} has no intensity: leaks were not sought", err=True)
+        notify(f"survey {survey.name} has no intensity: leaks were not sought")
     elif coverage.statement is not None and on_stdout:
         console = Console()
         if console.is_terminal:  # else there is no width: nothing is to be broken there
@@ -44,13 +44,12 @@ def say_coverage(coverage: Coverage, survey: Survey, *, on_stdout: bool = False)
         else:
             click.echo(coverage.statement)
     elif coverage.statement is not None:
-        click.echo(coverage.statement, err=True)
+        notify(coverage.statement)
 
 
 def say_no_crs(srid: int) -> None:
     """Say on standard error what becomes of local coordinates in GeoJSON, which can't state that they are."""
     if srid == LOCAL:
-        click.echo(
-            "GeoJSON can't say that coordinates are local: programs take them for longitude and latitude; a GeoPackage says it",
-            err=True,
+        notify(
+            "GeoJSON can't say that coordinates are local: programs take them for longitude and latitude; a GeoPackage says it"
         )

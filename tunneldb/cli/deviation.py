@@ -17,7 +17,7 @@ from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import by_kilometre, replacing, told_to_end
+from tunneldb.files import by_kilometre, exit_on_sigterm, replacing
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def deviation(
         found = get_survey(conn, survey)
         part = parse_stretch(conn, found, start, end)
         conn.rollback()
-        with told_to_end(), bar("km") as progress:
+        with exit_on_sigterm(), bar("km") as progress:
             made = measure_deviation(conn, found, layer, part.low, part.high, step(progress))
         whole = volume(conn, found, layer, part.low, part.high, axis_sigma or 0.0)
         if whole is None:

@@ -15,7 +15,7 @@ from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import replacing, told_to_end
+from tunneldb.files import exit_on_sigterm, replacing
 from tunneldb.store.survey import get_survey
 
 
@@ -68,7 +68,7 @@ def evenness(
         found = get_survey(conn, survey)
         part = parse_stretch(conn, found, start, end)
         conn.rollback()
-        with told_to_end(), bar("km") as progress:
+        with exit_on_sigterm(), bar("km") as progress:
             made = measure_evenness(conn, found, layer, length, limit, part.low, part.high, step(progress))
         rows = stretch_rows(conn, found, layer, part.low, part.high, every)
         if not rows:

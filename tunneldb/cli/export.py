@@ -11,14 +11,14 @@ import psycopg
 
 from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.cli.tables import print_classes
 from tunneldb.database import connect
 from tunneldb.errors import NotReadyError, UserError
-from tunneldb.files import made_folder, replacing, told_to_end
+from tunneldb.files import exit_on_sigterm, made_folder, replacing
 from tunneldb.finding_kind import DETECTED
 from tunneldb.stages.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
@@ -105,13 +105,13 @@ def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, st
     from tunneldb.export.exchange import write_survey
 
     coverage = read_coverage(conn, survey, stretch.low, stretch.high)
-    with told_to_end(), replacing(output) as temporary, bar("parts") as progress:
+    with exit_on_sigterm(), replacing(output) as temporary, bar("parts") as progress:
         counts = write_survey(conn, survey, stretch.low, stretch.high, temporary, step(progress))
     tell(survey=survey.name, file=output, layers=counts)
     say_coverage(coverage, survey)
     say_remarks(read_remarks(conn, survey, stretch.low, stretch.high), survey)
     _say_left_out(conn, survey, output, stretch)
-    click.echo(f"{output}: " + ", ".join(f"{name} {count}" for name, count in counts.items() if count), err=True)
+    notify(f"{output}: " + ", ".join(f"{name} {count}" for name, count in counts.items() if count))
 
 
 def _say_left_out(conn: psycopg.Connection[Any], survey: Survey, output: Path, stretch: Stretch) -> None:
@@ -123,10 +123,9 @@ def _say_left_out(conn: psycopg.Connection[Any], survey: Survey, output: Path, s
     ).fetchone() or (0,)
     tell(findings_left_out=left_out)
     if left_out:
-        click.echo(
+        notify(
             f"{output} does not hold {left_out} finding{'s' if left_out > 1 else ''} that {'are' if left_out > 1 else 'is'} no"
-            f" water, such as cracks: tunneldb findings {survey.name} -o FILE.gpkg",
-            err=True,
+            f" water, such as cracks: tunneldb findings {survey.name} -o FILE.gpkg"
         )
 
 
@@ -144,7 +143,7 @@ def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Pat
     conn.rollback()
     files: list[dict[str, Any]] = []
     tell(survey=survey.name, files=files)
-    with told_to_end(), made_folder(output), bar("points") as progress:
+    with exit_on_sigterm(), made_folder(output), bar("points") as progress:
         for file in (export_copc if copc else export_classified)(conn, survey, output, wanted, step(progress)):
             points = int(file.counts.sum())
             rate = points / file.seconds / 1e6

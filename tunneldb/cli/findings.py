@@ -11,7 +11,7 @@ import psycopg
 
 from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import VerbGroup, printable, records, tell
+from tunneldb.cli.output import VerbGroup, notify, printable, records, tell
 from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
@@ -156,7 +156,7 @@ def list_findings(
         else:
             temporary.write_text(as_csv(rows), encoding="utf-8")
     tell(file=output)
-    click.echo(f"{len(rows)} findings to {output}", err=True)
+    notify(f"{len(rows)} findings to {output}")
 
 
 def _print(rows: list[Finding], form: str, geometry: Geometry, survey: Survey) -> None:
@@ -260,7 +260,7 @@ def import_(
     with connect(settings.dsn) as conn:
         done = import_findings(conn, get_survey(conn, survey), file, theirs, ours, layer)
     for line in done.wrong:
-        click.echo(printable(line), err=True)
+        notify(printable(line))
     tell(survey=survey, imported=len(done.ids), kinds=dict(done.kinds), ids=done.ids, wrong=done.wrong)
     if done.wrong:
         raise UserError(f"{file}: {len(done.wrong)} rows are wrong, so nothing was imported")

@@ -12,7 +12,7 @@ from tunneldb.cli.progress import bar, step
 from tunneldb.cli.run import parameter_table
 from tunneldb.cli.tables import print_classes
 from tunneldb.errors import UserError
-from tunneldb.files import told_to_end
+from tunneldb.files import exit_on_sigterm
 from tunneldb.stages.parameters import PARAMETERS, settings
 
 _PREFIXES = ("ground.", "cluster.")
@@ -39,7 +39,7 @@ def ground(file: Path, output: Path, assignments: tuple[str, ...]) -> None:
     values = settings(assignments)
     from tunneldb.export.pointcloud.single_file import classify_file
 
-    with told_to_end(), bar("points") as progress:
+    with exit_on_sigterm(), bar("points") as progress:
         found = classify_file(file, output, values, step(progress))
     tell(file=output, ground=found.ground, lining=found.lining)
     print_classes(found.counts)

@@ -12,7 +12,7 @@ from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.database import connect
 from tunneldb.export.images.image import export_kilometre, image_kilometres
-from tunneldb.files import made_folder, told_to_end
+from tunneldb.files import exit_on_sigterm, made_folder
 from tunneldb.stages.run import nothing_yet, parse_km
 from tunneldb.store.survey import get_survey
 
@@ -45,7 +45,7 @@ def image(settings: Settings, survey: str, output: Path, km: str | None) -> None
         conn.rollback()
         files: list[Path] = []
         tell(survey=survey, files=files)
-        with told_to_end(), made_folder(output), bar("km") as progress:
+        with exit_on_sigterm(), made_folder(output), bar("km") as progress:
             advance = step(progress)("images", len(wanted))
             for number, kilometre in enumerate(wanted, start=1):
                 for path in export_kilometre(conn, found, kilometre, output):

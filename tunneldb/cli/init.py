@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.database import open_connection
 from tunneldb.database.foreign import catalogue_alone
@@ -35,9 +35,9 @@ def init(settings: Settings) -> None:
         connection.rollback()
         change = "created" if before is None else "is up to date" if before == after else f"upgraded from {before}"
         where = "the embedded server" if settings.dsn is None else "the database"
-        click.echo(f"{where}: schema tunnel {change} ({after}), tunnel_api installed", err=True)
+        notify(f"{where}: schema tunnel {change} ({after}), tunnel_api installed")
         with bar("km") as shown:
             kept = keep_missing(connection, step(shown))
     tell(before=before, revision=after, waterproofing=kept)
     if kept:
-        click.echo(f"waterproofing of {kept} kilometres worked out", err=True)
+        notify(f"waterproofing of {kept} kilometres worked out")

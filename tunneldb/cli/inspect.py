@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -52,7 +52,7 @@ def inspect(files: tuple[Path, ...]) -> None:
     found = first_steps(looks, axis_fault)
     tell(files=looks, unreadable=list(map(str, faults)), **dataclasses.asdict(found))
     for fault in faults:
-        click.echo(str(fault), err=True)
+        notify(str(fault))
     _print_steps(found)
     if faults:
         raise SystemExit(1)
@@ -67,7 +67,7 @@ def _print_file(look: FileLook) -> None:
             rows.append([one.name, "", "", "", "", "", "", "", one.fault])
             continue
         values = one.values
-        numbers = [f"{value:.5g}" for value in (values.least, values.low, values.median, values.high, values.most)]
+        numbers = [f"{value:.5g}" for value in (values.minimum, values.low, values.median, values.high, values.maximum)]
         missing = f"{100.0 * values.missing / values.count:.3g} %"
         kind = f"{one.type}, whole" if values.whole and "float" in one.type else one.type
         rows.append([one.name, kind, *numbers, missing, " or ".join(guess.what for guess in one.guesses) or "neither"])

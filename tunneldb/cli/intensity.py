@@ -8,7 +8,7 @@ from typing import cast, get_args
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FINITE, FilePath, file_path
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -69,7 +69,7 @@ def intensity(
     _print(look)
     if output is not None:
         write_figure(look, output)
-        click.echo(f"figure to {output}", err=True)
+        notify(f"figure to {output}")
 
 
 def _diagnose_file(

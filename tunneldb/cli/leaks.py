@@ -15,7 +15,7 @@ from rich.console import Console
 
 from tunneldb.cli.coverage import say_coverage, say_no_crs, say_remarks
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import records, tell, verb
+from tunneldb.cli.output import notify, records, tell, verb
 from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
@@ -152,7 +152,7 @@ def leaks(
                 regions = read_dry_regions(conn, found, low, high) if form == "xlsx" else []
                 _write_file(listed, form, chosen, found, output, regions)
                 say_coverage(coverage, found)
-                click.echo(f"{listed.total} to {output}", err=True)
+                notify(f"{listed.total} to {output}")
             if form == "geojson" and chosen != "unrolled":
                 say_no_crs(found.srid)
             tell(survey=survey, kind=listed.kind, count=listed.count, area=listed.area, listed=len(listed.rows))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
@@ -88,7 +88,7 @@ def _print_plan(plan: Plan) -> None:
         largest=plan.largest,
     )  # fmt: skip
     for line in no_features(plan.without):
-        click.echo(line, err=True)
+        notify(line)
     sorts = ", ".join(f"{count} {sort}" for sort, count in plan.reviews.items())
     click.echo(f"{lesson.reviews} reviews: {sorts}")
     rows = [

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import printable, tell, verb
+from tunneldb.cli.output import notify, printable, tell, verb
 from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -166,11 +166,11 @@ def _summary(connection: psycopg.Connection[Any], survey: Survey, done: list[Loa
         rows.append([file.name, file.state, *map(_number, (file.points, speed, *counts))])
     print_table(["file", "", "points", "points/s", *said], rows, right=range(2, 4 + len(said)))
     if survey.site:
-        click.echo(f"looked through; the points stay in the files: tunneldb members {survey.name}", err=True)
+        notify(f"looked through; the points stay in the files: tunneldb members {survey.name}")
     loaded = {file.name for file in done}
     for remark in read_remarks(connection, survey):
         if remark.file in loaded:
-            click.echo(remark.said, err=True)
+            notify(remark.said)
     connection.rollback()
     say_notes((file.name, file.note) for file in done if file.note)
 
@@ -181,7 +181,7 @@ def say_notes(notes: Iterable[tuple[str, str]]) -> None:
     for name, note in notes:
         noted.setdefault(note, []).append(name)
     for note, names in noted.items():
-        click.echo(printable(f"{_some(names)}: {note}"), err=True)
+        notify(printable(f"{_some(names)}: {note}"))
 
 
 def _some(names: list[str]) -> str:

@@ -1,22 +1,30 @@
-"""The group of all verbs; a verb's module is imported only when the verb is used, so that help is quick."""
+"""The group of all commands. The module of a command is imported when the command is used, which keeps help quick."""
 
 from __future__ import annotations
 
 import importlib
+import logging
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import click
 
 from tunneldb import __version__
-from tunneldb.cli.output import AS_JSON, AT_FAULT, DONE, JSON, error_line, run_as_json, write_lines
+from tunneldb.cli.output import AS_JSON, AT_FAULT, DONE, JSON, QUIET, error_line, exit_code, notify, run_as_json, write_lines
 from tunneldb.errors import UserError, did_you_mean
+from tunneldb.log import MESSAGES, fields, logging_to
+
+_WORDS = "tunneldb.words"
+"""Key in the context's meta: the command line, for the log."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What every verb gets as ``ctx.obj``.
+    """Settings that every command gets as ``ctx.obj``.
 
     Attributes
     ----------
@@ -27,88 +35,98 @@ class Settings:
     dsn: str | None
 
 
-COMMANDS: dict[str, tuple[str, str]] = {
-    "init": ("tunneldb.cli.init:init", "Create or upgrade the schema, the functions and the roles."),
-    "inspect": ("tunneldb.cli.inspect:inspect", "Tell what scan files hold, what is missing, and what to type next."),
-    "tunnel": ("tunneldb.cli.tunnel:tunnel", "Add, list or remove tunnels, and give them a stationing."),
-    "survey": ("tunneldb.cli.survey:survey", "Add, list or remove the scanning campaigns of a tunnel."),
-    "load": ("tunneldb.cli.load:load", "Load scan files into a survey."),
-    "register": ("tunneldb.cli.register:register", "Register sonar scans below the water to the laser's above it."),
-    "run": ("tunneldb.cli.run:run", "Run the stages: axis, segments, sections, ground, detect."),
-    "batch": ("tunneldb.cli.batch:batch", "Bring files to leaks, kilometre by kilometre, on all cores; go on after a stop."),
-    "worker": ("tunneldb.cli.worker:worker", "Do what batches ask for, also of other machines."),
-    "stop": ("tunneldb.cli.worker:stop", "Ask all workers to end what they are at and leave."),
-    "leaks": ("tunneldb.cli.leaks:leaks", "List or export the leaks that were found."),
-    "findings": ("tunneldb.cli.findings:findings", "List, export or import findings of all kinds, detected and drawn."),
-    "learn": ("tunneldb.cli.learn:learn", "Learn from reviews how far evidence of leaks holds in a tunnel."),
-    "evaluate": ("tunneldb.cli.evaluate:evaluate", "Hold the leaks that were found against true ones."),
-    "members": ("tunneldb.cli.members:members", "Find the members of structures, and what differs from its own surface."),
-    "spots": ("tunneldb.cli.spots:spots", "List or export what on members differs from their own surface."),
-    "spheres": ("tunneldb.cli.spheres:spheres", "Find target spheres, and compare them with control points."),
-    "axis": ("tunneldb.cli.axis:axis", "Show how far the measured axis lies from the one given, by element of its design."),
-    "rings": (
-        "tunneldb.cli.rings:rings",
-        "Measure the rings of a lining, scanned or surveyed: deviation from the axis, radius, ovality, steps, chords.",
-    ),
-    "profile": ("tunneldb.cli.profile:profile", "Add, list or remove the design profiles of a tunnel."),
-    "deviation": (
-        "tunneldb.cli.deviation:deviation",
-        "Hold the lining against its design profiles: deviation, overbreak and underbreak.",
-    ),
-    "clearance": (
-        "tunneldb.cli.clearance:clearance",
-        "Hold what stands in a tunnel against an outline about a track: margins and infringements.",
-    ),
-    "compare": (
-        "tunneldb.cli.compare:compare",
-        "Compare two surveys of a tunnel: leaks new, grown, dry again, and where the lining changed.",
-    ),
-    "unroll": ("tunneldb.cli.unroll:unroll", "Turn x,y,z into chainage,arc,offset, or back."),
-    "export": (
-        "tunneldb.cli.export:export",
-        "Write a survey as GeoPackage, DXF, or its scan files with the class of each point.",
-    ),
-    "thickness": ("tunneldb.cli.thickness:thickness", "State what lies between two surveys: thickness and volume."),
-    "evenness": ("tunneldb.cli.evenness:evenness", "Lay a straightedge on the lining, and state the gaps beneath."),
-    "ground": ("tunneldb.cli.ground:ground", "Class the points of a scan file by itself, without a database."),
-    "intensity": ("tunneldb.cli.intensity:intensity", "Show whether intensity depends on range or incidence, and plot it."),
-    "image": ("tunneldb.cli.image:image", "Write the unrolled images as GeoTIFF."),
-    "report": ("tunneldb.cli.report:report", "Write the inspection report, to be handed over and signed."),
-    "qgis": ("tunneldb.cli.qgis:qgis", "Write a QGIS project with styled layers."),
-    "status": ("tunneldb.cli.status:status", "Show what is loaded and how far each kilometre has come."),
-    "check": ("tunneldb.cli.check:check", "Check the server and the database, and say how to mend them."),
-    "prune": ("tunneldb.cli.prune:prune", "Show or delete old runs and jobs that nothing goes by any more."),
-    "vacuum": ("tunneldb.cli.vacuum:vacuum", "Show or free the room of deleted rows."),
-    "psql": ("tunneldb.cli.psql:psql", "Open psql on the database."),
-    "server": ("tunneldb.cli.server:server", "Start, stop or look at the embedded server."),
-    "simulate": ("tunneldb.cli.simulate:simulate", "Make a simulated scan of a tunnel, with its truth."),
-    "simulate-structure": (
-        "tunneldb.cli.simulate_structure:simulate_structure",
-        "Make a simulated scan of a structure, with its truth.",
-    ),
-    "simulate-canal": (
-        "tunneldb.cli.simulate_canal:simulate_canal",
-        "Make simulated scans of a canal tunnel, above and below the water, with their truth.",
-    ),
+GROUPS: dict[str, dict[str, tuple[str, str]]] = {
+    "Set up": {
+        "init": ("tunneldb.cli.init:init", "Create or upgrade schemas, functions and roles of the database."),
+        "inspect": ("tunneldb.cli.inspect:inspect", "Show the contents of scan files, what is missing, and the next command."),
+        "tunnel": ("tunneldb.cli.tunnel:tunnel", "Add, list or remove tunnels; set their stationing."),
+        "survey": ("tunneldb.cli.survey:survey", "Add, list, change, export, import or remove surveys of a tunnel."),
+        "profile": ("tunneldb.cli.profile:profile", "Add, list or remove the design profiles of a tunnel."),
+        "load": ("tunneldb.cli.load:load", "Load scan files into a survey."),
+        "register": ("tunneldb.cli.register:register", "Register sonar scans below the water to the laser scan above it."),
+    },
+    "Process": {
+        "run": ("tunneldb.cli.run:run", "Run the stages: axis, segments, sections, ground, detect."),
+        "batch": ("tunneldb.cli.batch:batch", "Load files and run all stages on all cores; resume after a stop."),
+        "worker": ("tunneldb.cli.worker:worker", "Run queued jobs, on this or another machine."),
+        "stop": ("tunneldb.cli.worker:stop", "Ask all workers to finish their current job and exit."),
+        "members": ("tunneldb.cli.members:members", "Find the members of a structure, and spots on their surfaces."),
+        "ground": ("tunneldb.cli.ground:ground", "Classify the points of one scan file, without a database."),
+    },
+    "Review": {
+        "leaks": ("tunneldb.cli.leaks:leaks", "List or export detected leaks."),
+        "findings": ("tunneldb.cli.findings:findings", "List, export or import findings of all kinds, detected or drawn."),
+        "spots": ("tunneldb.cli.spots:spots", "List or export spots on the members of a structure."),
+        "learn": ("tunneldb.cli.learn:learn", "Adapt leak detection in a tunnel to its reviews."),
+        "evaluate": ("tunneldb.cli.evaluate:evaluate", "Compare detected leaks with reference leaks."),
+        "intensity": (
+            "tunneldb.cli.intensity:intensity",
+            "Plot intensity against range and incidence, before and after correction.",
+        ),
+    },
+    "Measure": {
+        "axis": ("tunneldb.cli.axis:axis", "Compare the measured axis with the design axis."),
+        "rings": ("tunneldb.cli.rings:rings", "Measure lining rings: centre, radius, ovality, steps, chords."),
+        "deviation": ("tunneldb.cli.deviation:deviation", "Measure deviation from design profiles, overbreak and underbreak."),
+        "evenness": ("tunneldb.cli.evenness:evenness", "Measure evenness with a virtual straightedge."),
+        "thickness": ("tunneldb.cli.thickness:thickness", "Compute layer thickness and volume between two surveys."),
+        "clearance": ("tunneldb.cli.clearance:clearance", "Check the clearance around a track."),
+        "compare": ("tunneldb.cli.compare:compare", "Compare two surveys: changes of leaks and of the lining."),
+        "spheres": ("tunneldb.cli.spheres:spheres", "Find target spheres, and compare them with control points."),
+        "unroll": ("tunneldb.cli.unroll:unroll", "Convert x,y,z to chainage,arc,offset, or back."),
+    },
+    "Export": {
+        "image": ("tunneldb.cli.image:image", "Write the unrolled images as GeoTIFF."),
+        "report": ("tunneldb.cli.report:report", "Write the inspection report as HTML or PDF."),
+        "qgis": ("tunneldb.cli.qgis:qgis", "Write a QGIS project with styled layers."),
+        "export": ("tunneldb.cli.export:export", "Write a survey as GeoPackage or DXF, or its classified scan files."),
+    },
+    "Operate": {
+        "status": ("tunneldb.cli.status:status", "Show what is loaded, and the stages done in each kilometre."),
+        "check": ("tunneldb.cli.check:check", "Check server and database, and show how to fix faults."),
+        "prune": ("tunneldb.cli.prune:prune", "Show or delete runs and jobs that are no longer needed."),
+        "vacuum": ("tunneldb.cli.vacuum:vacuum", "Show or free the disk space of deleted rows."),
+        "psql": ("tunneldb.cli.psql:psql", "Open psql on the database."),
+        "server": ("tunneldb.cli.server:server", "Start, stop or show the embedded server."),
+    },
+    "Simulate": {
+        "simulate": ("tunneldb.cli.simulate:simulate", "Write a simulated tunnel scan and its reference data."),
+        "simulate-structure": (
+            "tunneldb.cli.simulate_structure:simulate_structure",
+            "Write a simulated scan of a structure and its reference data.",
+        ),
+        "simulate-canal": (
+            "tunneldb.cli.simulate_canal:simulate_canal",
+            "Write simulated laser and sonar scans of a canal tunnel and their reference data.",
+        ),
+    },
 }
+"""Commands by what they are for: the place of each, and its summary."""
+
+COMMANDS = {name: entry for commands in GROUPS.values() for name, entry in commands.items()}
 
 MANUAL: dict[str, list[tuple[str, str]]] = {
     "Output": [
-        ("stdout", "results; with --json one JSON object, also when the verb fails"),
-        ("stderr", "messages; on a terminal a bar with rate and time left, in a pipe none"),
+        ("stdout", "results; with --json one JSON object, also on failure"),
+        ("stderr", "messages; on a terminal also a progress bar"),
+    ],
+    "Log": [
+        ("--log FILE", "JSON, one object a line: time, level, message, stage, seconds, traceback of each error"),
+        ("-v, -vv", "the same as text on stderr, without the tracebacks or with them"),
     ],
     "Exit codes": [
         ("0", DONE),
-        ("1", "of some verbs: done, and something is wrong, see their help"),
+        ("1", "some commands: done, with problems; see their help"),
         ("2", AT_FAULT),
     ],
     "Environment": [
         ("TUNNELDB_DSN", "database to use, as --dsn"),
-        ("TUNNELDB_HOME", "folder of the embedded server; two folders are two servers"),
-        ("TUNNELDB_BROWSER", "program that prints reports as PDF, if it isn't found: Chromium or Chrome"),
-        ("TMPDIR", "folder for what does not fit into memory"),
-        ("NUMBA_CACHE_DIR", "folder for what is compiled on first use, else beside the program, else in ~/.cache/numba"),
-        ("PGPASSFILE, PGSERVICEFILE", "and the others of libpq, for passwords and services"),
+        ("TUNNELDB_HOME", "folder of the embedded server, one server a folder"),
+        ("TUNNELDB_LOG", "log file, as --log"),
+        ("TUNNELDB_BROWSER", "path of Chromium or Chrome, which prints reports as PDF"),
+        ("TMPDIR", "folder for temporary files"),
+        ("NUMBA_CACHE_DIR", "folder for compiled code; default: next to the program, else ~/.cache/numba"),
+        ("PGPASSFILE, PGSERVICEFILE", "files of passwords and services, and other variables of libpq"),
     ],
 }
 EXAMPLES = (
@@ -123,14 +141,14 @@ EXAMPLES = (
 
 
 class LazyGroup(click.Group):
-    """A click group that knows its verbs' names and help without importing them."""
+    """A click group that knows the names and summaries of its commands without importing them."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in the order in which one uses them."""
+        """Return the commands in the order of the groups."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the verb's module and return its command."""
+        """Import the module of a command and return the command."""
         if cmd_name not in COMMANDS:
             return None
         module, _, attribute = COMMANDS[cmd_name][0].partition(":")
@@ -139,20 +157,23 @@ class LazyGroup(click.Group):
         return command
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the verb; of one that is mistyped ask for the nearest."""
+        """Return the command; suggest the nearest name for one that is unknown."""
         if args[0] not in COMMANDS and (meant := did_you_mean(args[0], COMMANDS)):
             ctx.fail(f"No such command {args[0]!r}.{meant}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the verbs from COMMANDS, without importing them."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+        """List the commands by group, without importing them."""
+        width = max(map(len, COMMANDS))
+        for title, commands in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name.ljust(width), text) for name, (_, text) in commands.items()])
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Note whether JSON is asked for: what is wrong with the rest of the line is to be said in it, too."""
+        """Note if JSON is asked for: errors in the rest of the line are reported in it, too."""
         if strange := next((word for word in args if any("\ud800" <= c <= "\udfff" for c in word)), None):
-            ctx.fail(f"{strange!a} has bytes that are no UTF-8.")
+            ctx.fail(f"{strange!a} is not UTF-8.")
+        ctx.meta[_WORDS] = _without_dsn(args)
         ctx.meta[AS_JSON] = JSON in args and next((word for word in args if word in COMMANDS), None) != "psql"
         try:
             return super().parse_args(ctx, args)
@@ -162,11 +183,14 @@ class LazyGroup(click.Group):
             ctx.exit(run_as_json(ctx, partial(_raise, error), partial(_describe, ctx)))
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a verb; turn the user's errors and the server's into one line and exit code 2."""
-        if ctx.meta[AS_JSON]:
-            return ctx.exit(run_as_json(ctx, lambda: click.Group.invoke(self, ctx), partial(_describe, ctx)))
+        """Run a command; turn errors that the user can fix into one line and exit code 2."""
+        ctx.meta[QUIET] = ctx.params["quiet"]
+        run = partial(_logged, ctx.meta[_WORDS], partial(click.Group.invoke, self, ctx))
         try:
-            return super().invoke(ctx)
+            with logging_to(ctx.params["log_file"], ctx.params["verbosity"]):
+                if ctx.meta[AS_JSON]:
+                    return ctx.exit(run_as_json(ctx, run, partial(_describe, ctx)))
+                return run()
         except Exception as error:
             message = _describe(ctx, error)
             if message is None:
@@ -175,11 +199,43 @@ class LazyGroup(click.Group):
         return ctx.exit(2)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write what holds for all verbs."""
+        """Write what applies to all commands."""
         for title, rows in MANUAL.items():
             with formatter.section(title):
                 formatter.write_dl(rows)
         write_lines(formatter, "Examples", EXAMPLES)
+
+
+def _without_dsn(args: list[str]) -> list[str]:
+    """Return a command line for the log: a DSN may hold a password."""
+    before = ["", *args[:-1]]
+    hidden = [word.partition("=")[0] + "=…" if word.startswith("--dsn=") else word for word in args]
+    return ["…" if previous == "--dsn" else word for previous, word in zip(before, hidden, strict=False)]
+
+
+def _logged(words: list[str], run: Callable[[], Any]) -> Any:
+    """Run a command; log its beginning, its end, and its error with the traceback."""
+    log, began = logging.getLogger("tunneldb.command"), time.monotonic()
+    log.info("tunneldb %s", " ".join(words), extra=fields(version=__version__, words=words))
+    code: int | None = None
+    try:
+        result = run()
+        code = 0
+    except (click.exceptions.Exit, SystemExit) as ended:
+        code = exit_code(ended)
+        raise
+    except click.ClickException as error:
+        code = error.exit_code
+        logging.getLogger(MESSAGES).error("%s", error.format_message(), exc_info=error)
+        raise
+    except Exception as error:
+        code = 2 if isinstance(error, UserError) else None
+        logging.getLogger(MESSAGES).error("%s", error, exc_info=error)
+        raise
+    finally:
+        seconds = round(time.monotonic() - began, 3)
+        log.info("ended after %.1f s", seconds, extra=fields(seconds=seconds, exit_code=code))
+    return result
 
 
 def _raise(error: Exception) -> None:
@@ -187,10 +243,10 @@ def _raise(error: Exception) -> None:
 
 
 def _describe(ctx: click.Context, error: Exception) -> str | None:
-    """Return one line for what is no bug, None for one."""
+    """Return one line for an error that is not a bug, None for a bug."""
     if isinstance(error, RuntimeError) and "no locator available" in str(error):  # Numba, as a module is imported
         return (
-            "what is compiled can be kept nowhere: neither where tunneldb is installed nor in ~/.cache may be written;"
+            "compiled code cannot be stored: neither the folder of tunneldb nor ~/.cache is writable;"
             " set NUMBA_CACHE_DIR to a folder of your own"
         )
     if isinstance(error, UserError):
@@ -212,11 +268,21 @@ def _describe(ctx: click.Context, error: Exception) -> str | None:
     "--dsn",
     envvar="TUNNELDB_DSN",
     metavar="DSN",
-    help="Database to use, as libpq wants it (postgresql://… or host=… dbname=…). "
-    "Without it a private server of your own is started. [env: TUNNELDB_DSN]",
+    help="Connection string of the database (postgresql://… or host=… dbname=…); default: the embedded server."
+    " [env: TUNNELDB_DSN]",
+)
+@click.option("-v", "--verbose", "verbosity", count=True, help="Print what is done; -vv also tracebacks.")
+@click.option("-q", "--quiet", is_flag=True, help="Print results and errors only: no messages, no progress bar.")
+@click.option(
+    "--log",
+    "log_file",
+    type=click.Path(dir_okay=False, path_type=Path),
+    envvar="TUNNELDB_LOG",
+    metavar="FILE",
+    help="File to append the log to, as JSON lines. [env: TUNNELDB_LOG]",
 )
 @click.pass_context
-def main(ctx: click.Context, dsn: str | None) -> None:
+def main(ctx: click.Context, dsn: str | None, verbosity: int, quiet: bool, log_file: Path | None) -> None:
     """From laser scans of tunnels to water leaks, in PostGIS and QGIS."""
     if dsn and ctx.get_parameter_source("dsn") is click.core.ParameterSource.COMMANDLINE:
         _warn_of_password(dsn)
@@ -224,16 +290,15 @@ def main(ctx: click.Context, dsn: str | None) -> None:
 
 
 def _warn_of_password(dsn: str) -> None:
-    """Say so where a password stands on the command line, which all users of the machine can read."""
+    """Warn of a password on the command line, which all users of the machine can read."""
     import psycopg
 
     try:
-        told = psycopg.conninfo.conninfo_to_dict(dsn)
+        given = psycopg.conninfo.conninfo_to_dict(dsn)
     except psycopg.ProgrammingError:
-        return  # said when the connection is opened
-    if told.get("password"):
-        click.echo(
-            "everybody on this machine can read the password in --dsn (ps); put it into ~/.pgpass, or a service into"
-            " ~/.pg_service.conf and --dsn service=NAME",
-            err=True,
+        return  # reported when the connection is opened
+    if given.get("password"):
+        notify(
+            "Warning: all users of this machine can read the password in --dsn (ps). Put it into ~/.pgpass, or define a service"
+            " in ~/.pg_service.conf and give --dsn service=NAME"
         )

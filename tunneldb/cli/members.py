@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, cast, get_args
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath, file_path
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import told_to_end
+from tunneldb.files import exit_on_sigterm
 from tunneldb.radiometry.correction import Kind
 from tunneldb.store.survey import get_survey
 
@@ -123,12 +123,12 @@ def _of_file(
     if geometry is not None and (output is None or output.suffix.lower() != ".gpkg"):
         raise UserError("--geometry is of the polygons of a GeoPackage: add -o out.gpkg")
     inputs = Inputs((file,), intensity, cast(Kind, intensity_kind), stations_for(file, list(stations)), _reference(reference))
-    with told_to_end(), bar("points") as progress:
+    with exit_on_sigterm(), bar("points") as progress:
         found = export_members(inputs, output, step(progress), cast("Geometry", geometry or "3d"))
     _tell(found, output)
     _print(found)
     said = "nothing was written: -o out.gpkg or out.laz does" if output is None else f"written to {output}"
-    click.echo(said, err=True)
+    notify(said)
 
 
 def _reference(given: str | None) -> ReferenceCurve | str | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import logging
 import math
 import os
 import time
@@ -20,12 +21,19 @@ from typing import Any
 
 import click
 
+from tunneldb.log import MESSAGES
+
 JSON = "--json"
 DONE = "done"
 AT_FAULT = "the input, the server or the command line is at fault: one line says what, where, and what to do"
 
 AS_JSON = "tunneldb.json"
-"""Key in the context's meta: whether JSON is asked for."""
+"""Key in the context's meta: True if JSON is asked for."""
+
+QUIET = "tunneldb.quiet"
+"""Key in the context's meta: True if only errors are to be printed."""
+
+log = logging.getLogger(MESSAGES)
 
 _STDOUT = 1
 """Descriptor of standard output, which programs that are started inherit."""
@@ -37,6 +45,19 @@ _VERB = "tunneldb.verb"
 def printable(text: str) -> str:
     """Return text of others, a remark or a name in a file, as a terminal may have it: what would command it, by its code."""
     return "".join(c if c in "\n\t" or _is_shown(c) else c.encode("unicode_escape").decode() for c in text)
+
+
+def notify(text: str) -> None:
+    """Print a message on standard error, unless the command is to be quiet, and log it."""
+    log.info("%s", text)
+    if not is_quiet():
+        click.echo(text, err=True)
+
+
+def is_quiet() -> bool:
+    """Return True if the command is to print errors only (`--quiet`)."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(QUIET))
 
 
 def error_line(message: str) -> str:
@@ -142,7 +163,7 @@ def run_as_json(ctx: click.Context, run: Callable[[], Any], describe: Callable[[
         with _quiet():
             run()
     except (SystemExit, click.exceptions.Exit) as ended:
-        code = _exit_code(ended)
+        code = exit_code(ended)
     except (KeyboardInterrupt, click.Abort):
         code, error = 1, "interrupted"
     except click.ClickException as wrong:
@@ -180,7 +201,8 @@ def _quiet() -> Iterator[None]:
             os.close(kept)
 
 
-def _exit_code(ended: BaseException) -> int:
+def exit_code(ended: BaseException) -> int:
+    """Return the exit code of a command that ended early."""
     code = ended.exit_code if isinstance(ended, click.exceptions.Exit) else getattr(ended, "code", 0)
     return code if isinstance(code, int) else int(code is not None)
 

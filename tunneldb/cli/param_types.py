@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from tunneldb.csvfile import LARGEST
+from tunneldb.csvfile import MAX_MEASUREMENT
 from tunneldb.errors import UserError
 from tunneldb.files import require_regular
 
@@ -45,7 +45,7 @@ def file_path(text: str) -> Path:
 
 
 def _finite(number: float, value: Any, param: click.Parameter | None) -> float:
-    if not math.isfinite(number) or abs(number) > LARGEST or 0.0 < abs(number) < SMALLEST:
+    if not math.isfinite(number) or abs(number) > MAX_MEASUREMENT or 0.0 < abs(number) < SMALLEST:
         name = "" if param is None else f"{param.opts[0]} "
         raise UserError(f"{name}{value}: that is no number which can be meant")
     return number

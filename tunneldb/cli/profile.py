@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import VerbGroup, records, tell
+from tunneldb.cli.output import VerbGroup, notify, records, tell
 from tunneldb.cli.param_types import file_path
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
@@ -74,13 +74,12 @@ def add(
         tunnel=tunnel, name=name, layer=layer, chainage_from=low, chainage_to=high, closed=outline.closed,
         elements=len(outline.elements), length=outline.length, area=outline.area, notes=read.notes,
     )  # fmt: skip
-    click.echo(
+    notify(
         f"{name}: {len(outline.elements)} elements, {outline.length:.3f} m long, "
-        f"{'closed' if outline.closed else 'open below'}, {outline.area:.3f} m²; {layer}, {low:.3f} to {high:.3f} m",
-        err=True,
+        f"{'closed' if outline.closed else 'open below'}, {outline.area:.3f} m²; {layer}, {low:.3f} to {high:.3f} m"
     )
     for note in read.notes:
-        click.echo(f"{file}: {note}", err=True)
+        notify(f"{file}: {note}")
 
 
 @profile.command("list", examples=["tunneldb profile list ringo"])

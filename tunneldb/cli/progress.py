@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tunneldb.cli.output import printable
+from tunneldb.cli.output import is_quiet, log, printable
 
 if TYPE_CHECKING:
     import psycopg
@@ -73,7 +73,7 @@ def bar(unit: str) -> Progress:
         *columns,
         console=console,
         transient=True,
-        disable=not console.is_terminal,
+        disable=not console.is_terminal or is_quiet(),
         speed_estimate_period=_REMEMBERED,
         redirect_stdout=sys.stdout.isatty(),  # else rich would take to the terminal what is meant for the pipe
     )
@@ -129,7 +129,10 @@ def step(progress: Progress) -> Callable[[str, float | None], Callable[[float], 
 
 def say(text: str, *, err: bool = False) -> None:
     """Print a line while a bar is shown: above it. By itself click goes past what rich has put before the terminal."""
-    click.echo(printable(text), file=sys.stderr if err else sys.stdout)
+    if err:
+        log.info("%s", text)
+    if not (err and is_quiet()):
+        click.echo(printable(text), file=sys.stderr if err else sys.stdout)
 
 
 _ENDINGS = ("57P01", "57P02")

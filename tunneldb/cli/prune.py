@@ -10,7 +10,7 @@ import psycopg
 from rich.filesize import decimal
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.survey import DAY
 from tunneldb.cli.tables import print_table
@@ -67,16 +67,16 @@ def prune(settings: Settings, name: str | None, before: dt.datetime | None, yes:
         deleted={"runs": runs, "jobs": jobs},
     )
     for other in left_out:
-        click.echo(f"{other}: left out, a batch is at work on it", err=True)
+        notify(f"{other}: left out, a batch is at work on it")
     if not found:
-        click.echo("nothing to prune", err=True)
+        notify("nothing to prune")
     elif yes:
-        click.echo(f"deleted: {runs} runs and {jobs} jobs; for the room: tunneldb vacuum --yes", err=True)
+        notify(f"deleted: {runs} runs and {jobs} jobs; for the room: tunneldb vacuum --yes")
     else:
         again = " ".join(
             ["tunneldb prune", *([name] if name else []), *([f"--before {before:%Y-%m-%d}"] if before else []), "--yes"]
         )
-        click.echo(f"{sum(row.rows for row in found)} rows, {decimal(freed)}, would go: {again}", err=True)
+        notify(f"{sum(row.rows for row in found)} rows, {decimal(freed)}, would go: {again}")
 
 
 def _delete(connection: psycopg.Connection, found: Sequence[Superseded], before: dt.date | None) -> tuple[int, int, list[str]]:

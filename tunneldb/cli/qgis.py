@@ -10,7 +10,7 @@ import psycopg
 
 from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.database import connect
@@ -18,7 +18,7 @@ from tunneldb.errors import UserError
 from tunneldb.export.images.change import export_change
 from tunneldb.export.images.image import export_filled, export_kilometre, image_kilometres
 from tunneldb.export.qgis import store_project, store_styles, write_project
-from tunneldb.files import made_folder, told_to_end
+from tunneldb.files import exit_on_sigterm, made_folder
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.spots import read_spots
@@ -85,13 +85,13 @@ def qgis(
     if coverage is not None:
         say_coverage(coverage, found)
     if spots.statement and (found.site or spots.face_area):
-        click.echo(f"survey {survey}: {spots.statement}", err=True)
+        notify(f"survey {survey}: {spots.statement}")
     say_remarks(remarks, found)
-    click.echo(f"{', '.join(written)}: {len(images)} images, {styles}", err=True)
+    notify(f"{', '.join(written)}: {len(images)} images, {styles}")
     if settings.dsn is None and service is None:
-        click.echo("the project works while the database runs; after a restart of the machine: tunneldb server start", err=True)
+        notify("the project works while the database runs; after a restart of the machine: tunneldb server start")
     if name is not None and socket:
-        click.echo("QGIS finds projects behind a socket only by an entry of pg_service.conf: docs/howto-qgis.md", err=True)
+        notify("QGIS finds projects behind a socket only by an entry of pg_service.conf: docs/howto-qgis.md")
 
 
 def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> list[Path]:
@@ -99,7 +99,7 @@ def _export_images(conn: psycopg.Connection, survey: Survey, folder: Path) -> li
     kilometres = image_kilometres(conn, survey)
     conn.rollback()
     written: list[Path] = []
-    with told_to_end(), made_folder(folder) if kilometres else nullcontext(), bar("km") as progress:
+    with exit_on_sigterm(), made_folder(folder) if kilometres else nullcontext(), bar("km") as progress:
         advance = step(progress)("images", len(kilometres))
         for km in kilometres:
             written += export_kilometre(conn, survey, km, folder)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -90,11 +90,11 @@ def register(
     _tell(survey, found)
     print_table(HEADER, scan_rows(found), right=range(2, 7))
     for note in found.notes:
-        click.echo(note, err=True)
+        notify(note)
     if report is not None:
         with replacing(report) as temporary:
             temporary.write_text(as_report(survey, found), encoding="utf-8")
-        click.echo(f"report to {report}", err=True)
+        notify(f"report to {report}")
     if any(scan.state != "determined" for scan in found.scans):
         ctx.exit(1)
 

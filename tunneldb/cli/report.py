@@ -11,13 +11,13 @@ import psycopg
 
 from tunneldb.cli.coverage import say_coverage
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import printable, tell, verb
+from tunneldb.cli.output import notify, printable, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import replacing, told_to_end
+from tunneldb.files import exit_on_sigterm, replacing
 from tunneldb.report.owner import Owner, read_owner
 from tunneldb.report.page import CARDS, LISTED, Written, write_html, write_site_html
 from tunneldb.report.pdf import find_browser, print_pdf
@@ -105,7 +105,7 @@ def report(
         stretch = parse_stretch(conn, found, start, end)
         coverage = read_coverage(conn, found, stretch.low, stretch.high)
         conn.rollback()
-        with told_to_end(), replacing(output) as temporary, bar("strips") as shown:
+        with exit_on_sigterm(), replacing(output) as temporary, bar("strips") as shown:
             if browser is None:
                 written = _write(conn, found, stretch, temporary, shown, owner, photos, listed, paper=False)
             else:
@@ -119,9 +119,9 @@ def report(
     tell(missing_photos=missing)
     say_coverage(coverage, found)
     for photo in written.missing:
-        click.echo(printable(f"finding {photo.photo.finding_id}: photo {photo.photo.path}: {photo.trouble}"), err=True)
+        notify(printable(f"finding {photo.photo.finding_id}: photo {photo.photo.path}: {photo.trouble}"))
     sought = leaks or coverage.searched_share
-    click.echo(f"{output}: {leaks} leaks" if sought else f"{output}: leaks were not searched for", err=True)
+    notify(f"{output}: {leaks} leaks" if sought else f"{output}: leaks were not searched for")
 
 
 def _write_site(
@@ -130,7 +130,7 @@ def _write_site(
     """Write the report of a site, of which structures are all there is, and say what it counts."""
     if asked:
         raise UserError(f"{asked}: survey {survey.name} is of a site, which has no chainage: leave --from and --to out")
-    with told_to_end(), replacing(output) as temporary, bar("reports") as shown:
+    with exit_on_sigterm(), replacing(output) as temporary, bar("reports") as shown:
         if browser is None:
             spots = write_site_html(conn, survey, temporary, owner)
         else:
@@ -142,7 +142,7 @@ def _write_site(
                 conn.close()
                 _print(browser, page, temporary, shown)
     tell(survey=survey.name, file=output, spots=spots, bytes=output.stat().st_size)
-    click.echo(f"{output}: {spots} spots", err=True)
+    notify(f"{output}: {spots} spots")
 
 
 def _write(

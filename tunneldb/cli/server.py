@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import VerbGroup, tell
+from tunneldb.cli.output import VerbGroup, notify, tell
 from tunneldb.database.server import Server
 from tunneldb.errors import UserError
 
@@ -35,7 +35,7 @@ def stop() -> None:
     embedded = Server()
     stopped = embedded.stop()
     tell(stopped=stopped, folder=embedded.folder)
-    click.echo(f"{'stopped' if stopped else 'was not running'}: {embedded.folder}", err=True)
+    notify(f"{'stopped' if stopped else 'was not running'}: {embedded.folder}")
 
 
 @server.command(examples=["tunneldb server status"])

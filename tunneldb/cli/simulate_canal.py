@@ -10,7 +10,7 @@ import click
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.param_types import FINITE, SEED, FilePath
 from tunneldb.cli.progress import say
-from tunneldb.files import made_folder, told_to_end
+from tunneldb.files import exit_on_sigterm, made_folder
 from tunneldb.simulate.canal import CanalParameters, simulate, write
 
 
@@ -74,7 +74,7 @@ def simulate_canal(out: Path, **given: Any) -> None:
     Lengths are in metres, angles in degrees.
     """  # noqa: D301 - \b is click's mark for lines to be kept
     parameters = CanalParameters(**{name: value for name, value in given.items() if value is not None})
-    with told_to_end(), made_folder(out):  # that it cannot be written is known before minutes are spent
+    with exit_on_sigterm(), made_folder(out):  # that it cannot be written is known before minutes are spent
         scene = simulate(parameters, lambda what: say(f"scanned: {what}", err=True))
         files = write(scene, out)
     below = sum(len(scan.points) for scan in scene.sonar)

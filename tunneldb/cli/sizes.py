@@ -6,7 +6,7 @@ import click
 from rich.filesize import decimal
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import records, tell, verb
+from tunneldb.cli.output import notify, records, tell, verb
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.store.survey import get_survey
@@ -50,7 +50,7 @@ def sizes(settings: Settings, name: str | None) -> None:
     if name is None:
         click.echo(f"database: {decimal(database[0])}")
     if None in table:
-        click.echo("not told apart: tables that were never analyzed; tunneldb vacuum --yes analyzes them", err=True)
+        notify("not told apart: tables that were never analyzed; tunneldb vacuum --yes analyzes them")
 
 
 def _cell(found: tuple[int, bool] | None) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -113,4 +113,4 @@ def spheres(
     if report is not None:
         with replacing(report) as temporary:
             temporary.write_text(as_report(chosen, stationing, found, radius, tolerance, comparison), encoding="utf-8")
-        click.echo(f"report to {report}", err=True)
+        notify(f"report to {report}")

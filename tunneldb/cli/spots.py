@@ -9,7 +9,7 @@ import click
 
 from tunneldb.cli.coverage import say_no_crs
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
@@ -96,7 +96,7 @@ def spots(
             else:
                 text = as_csv(listed) if form == "csv" else as_geojson(listed, chosen, found.srid)
                 temporary.write_text(text, encoding="utf-8")
-        click.echo(f"{listed.total} to {output}", err=True)
+        notify(f"{listed.total} to {output}")
     if not listed.searched:
         context.exit(1)
 

@@ -11,7 +11,7 @@ from typing import Any, Protocol, TypeVar
 import click
 import psycopg
 
-from tunneldb.csvfile import LARGEST
+from tunneldb.csvfile import MAX_MEASUREMENT
 from tunneldb.errors import UserError
 
 _METRES = re.compile(r"-?\d+(\.\d*)?")
@@ -72,7 +72,7 @@ def parse_stretch(conn: psycopg.Connection[Any], survey: OfTunnel, start: str | 
 def _chainage(conn: psycopg.Connection[Any], survey: OfTunnel, option: str, place: str) -> float:
     """A station may be there twice or not at all; a chainage is one place, and may lie beyond the tunnel's ends."""
     if _METRES.fullmatch(place.strip()):
-        if abs(float(place)) > LARGEST:
+        if abs(float(place)) > MAX_MEASUREMENT:
             raise UserError(f"{option} {place[:20]}…: no tunnel is so long")
         return float(place)
     from tunneldb.store.alignment import station_chainages

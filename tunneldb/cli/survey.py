@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import VerbGroup, records, tell
+from tunneldb.cli.output import VerbGroup, notify, records, tell
 from tunneldb.cli.param_types import FilePath, file_path
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.sizes import sizes
@@ -131,9 +131,9 @@ def add(
     notes = [*positions.notes, *([UNPOSED] if no_poses and intensity is not None else [])]
     tell(survey=name, tunnel=tunnel, date=date.date(), poses=len(positions), notes=notes)
     known = "no scanner positions" if no_poses else f"{len(positions)} {'poses' if trajectory else 'stations'}"
-    click.echo(f"{name}: {known} of {tunnel}, {date:%Y-%m-%d}", err=True)
+    notify(f"{name}: {known} of {tunnel}, {date:%Y-%m-%d}")
     for note in notes:
-        click.echo(f"{name}: {note}", err=True)
+        notify(f"{name}: {note}")
 
 
 @survey.command(
@@ -196,9 +196,9 @@ def set_(
     if stale[0]:
         notes.append(f"{stale[0]} stages are stale: tunneldb run {name} --stale")
     tell(survey=name, notes=notes, reload=reload, stale=stale[0])
-    click.echo(f"{name}: set", err=True)
+    notify(f"{name}: set")
     for note in notes:
-        click.echo(f"{name}: {note}", err=True)
+        notify(f"{name}: {note}")
 
 
 @survey.command(
@@ -229,7 +229,7 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
             connection.rollback()
             remove_site_files(connection, found, names)
             tell(survey=name, files=names)
-            click.echo(f"{name}: removed {', '.join(names)}; find its members anew: tunneldb members {name}", err=True)
+            notify(f"{name}: removed {', '.join(names)}; find its members anew: tunneldb members {name}")
             return
         emptied, work = work_at_stake(connection, found, names)
         connection.rollback()
@@ -261,17 +261,16 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
         stale=stale[0],
     )
     again = f"; read again: {', '.join(removed.reread)}" if removed.reread else ""
-    click.echo(f"{name}: removed {', '.join(names)}{again}", err=True)
+    notify(f"{name}: removed {', '.join(names)}{again}")
     if removed.emptied:
         lost = removed.lost
-        click.echo(
+        notify(
             f"{name}: no points are left in kilometre {', '.join(map(str, removed.emptied))}, and all that was made of them is"
             f" gone: {lost.anomalies} leaks and other dark spots, {lost.reviewed} of them reviewed; {lost.drawn} findings that"
-            " people drew are kept",
-            err=True,
+            " people drew are kept"
         )
     if stale[0]:
-        click.echo(f"{name}: {stale[0]} stages are stale: tunneldb run {name} --stale", err=True)
+        notify(f"{name}: {stale[0]} stages are stale: tunneldb run {name} --stale")
 
 
 @survey.command("list", examples=["tunneldb survey list"])

@@ -7,11 +7,11 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.database import connect
-from tunneldb.files import told_to_end
+from tunneldb.files import exit_on_sigterm
 from tunneldb.store.survey import get_survey
 
 
@@ -27,15 +27,14 @@ def export(settings: Settings, name: str, output: Path) -> None:
     """
     from tunneldb.export.archive.save import save_survey
 
-    with told_to_end(), connect(settings.dsn) as connection, bar("bytes") as progress:
+    with exit_on_sigterm(), connect(settings.dsn) as connection, bar("bytes") as progress:
         saved = save_survey(connection, get_survey(connection, name, site=True), output, step(progress))
     tell(survey=name, file=output, bytes=saved.bytes, kilometres=saved.kilometres, rows=saved.rows)
-    click.echo(
+    notify(
         f"{name}: {sum(saved.rows.values())} rows of {sum(map(bool, saved.rows.values()))} tables, {saved.rows.get('point', 0)}"
-        f" of them points in {len(saved.kilometres)} kilometres: {output}, {saved.bytes / 1e6:.1f} MB",
-        err=True,
+        f" of them points in {len(saved.kilometres)} kilometres: {output}, {saved.bytes / 1e6:.1f} MB"
     )
-    click.echo(f"{name}: to free its room in the database: tunneldb survey remove {name}", err=True)
+    notify(f"{name}: to free its room in the database: tunneldb survey remove {name}")
 
 
 @verb(
@@ -56,7 +55,7 @@ def import_(settings: Settings, file: Path, name: str | None) -> None:
     """
     from tunneldb.export.archive.load import load_survey
 
-    with told_to_end(), connect(settings.dsn) as connection, bar("bytes") as progress:
+    with exit_on_sigterm(), connect(settings.dsn) as connection, bar("bytes") as progress:
         tell_warnings(connection)
         loaded = load_survey(connection, file, name, step(progress))
     notes = list(loaded.notes)
@@ -74,10 +73,9 @@ def import_(settings: Settings, file: Path, name: str | None) -> None:
         notes=notes,
     )
     numbers = "the numbers that they had" if loaded.kept else "new numbers"
-    click.echo(
+    notify(
         f"{loaded.survey}: {sum(loaded.rows.values())} rows, {loaded.rows.get('point', 0)} of them points in"
-        f" {len(loaded.kilometres)} kilometres of {loaded.tunnel}; rows have {numbers}",
-        err=True,
+        f" {len(loaded.kilometres)} kilometres of {loaded.tunnel}; rows have {numbers}"
     )
     for note in notes:
-        click.echo(f"{loaded.survey}: {note}", err=True)
+        notify(f"{loaded.survey}: {note}")

@@ -10,13 +10,13 @@ import click
 import psycopg
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell
+from tunneldb.cli.output import notify, tell
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.stretch import parse_stretch
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import replacing, told_to_end
+from tunneldb.files import exit_on_sigterm, replacing
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
@@ -66,9 +66,9 @@ def survey_rings(
         survey = get_survey(conn, name)
         part = parse_stretch(conn, survey, *ends)
         conn.rollback()
-        with told_to_end(), bar("blocks") as progress:
+        with exit_on_sigterm(), bar("blocks") as progress:
             _define(conn, survey, definition, progress)
-        with told_to_end(), bar("km") as progress:
+        with exit_on_sigterm(), bar("km") as progress:
             made = measure_survey_rings(conn, survey, part.low, part.high, options, step(progress))
         rows = ring_rows(conn, survey, part.low, part.high)
         if not rows:
@@ -96,10 +96,9 @@ def _define(conn: psycopg.Connection[Any], survey: Survey, definition: Definitio
         define_rings(conn, survey, rings, "found")
         missing = int((~joints.seen).sum())
         tell(pitch=joints.pitch, pitch_se=joints.pitch_se, joints=len(joints.seen), joints_missing=missing)
-        click.echo(
+        notify(
             f"rings of {joints.pitch:.4f} m (± {1e3 * joints.pitch_se:.1f} mm);"
-            f" {len(joints.seen)} joints, {missing} of them not seen",
-            err=True,
+            f" {len(joints.seen)} joints, {missing} of them not seen"
         )
     elif definition.length is not None:
         rings = rings_by_length(conn, survey, definition.length, definition.start)
@@ -146,4 +145,4 @@ def _print(rows: list[Row], output: Path | None) -> None:
         kinds = sorted({whence[row["diameter_from"]] for row in told})
         click.echo(f"ovality is a share of the diameter of {' and '.join(kinds)}")
     if output is not None:
-        click.echo(f"written to {output}", err=True)
+        notify(f"written to {output}")

@@ -15,7 +15,7 @@ from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import replacing, told_to_end
+from tunneldb.files import exit_on_sigterm, replacing
 from tunneldb.store.survey import get_survey
 
 
@@ -69,7 +69,7 @@ def thickness(
         old, new = get_survey(conn, before), get_survey(conn, after)
         part = parse_stretch(conn, new, start, end)
         conn.rollback()
-        with told_to_end(), bar("km") as progress:
+        with exit_on_sigterm(), bar("km") as progress:
             made = measure_thickness(conn, old, new, layer, part.low, part.high, step(progress))
         rows = stretch_rows(conn, old, new, layer, part.low, part.high, every, minimum or 0.0, axis_sigma or 0.0)
         if not rows:

@@ -9,13 +9,13 @@ import click
 
 from tunneldb.alignment.units import UNITS
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import VerbGroup, records, tell
+from tunneldb.cli.output import VerbGroup, notify, records, tell
 from tunneldb.cli.param_types import FINITE, FilePath, file_path
 from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import told_to_end
+from tunneldb.files import exit_on_sigterm
 
 if TYPE_CHECKING:
     from tunneldb.alignment.found import FoundAxis
@@ -156,7 +156,7 @@ def add(
     if axis == AUTO:
         if {axis_layer, axis_unit, alignment, profile} != {None}:
             raise UserError("--axis auto reads SCAN files; --axis-layer, --axis-unit, --alignment and --profile are for others")
-        with told_to_end(), bar("points") as progress:
+        with exit_on_sigterm(), bar("points") as progress:
             given, found = found_given(scans, srid, step(progress), start_chainage, reverse)
     else:
         given = read_given(
@@ -170,7 +170,7 @@ def add(
                     f"{axis}: its line has no heights; give the scan files too, which have them: "
                     f"tunneldb tunnel add {name} --srid {srid or 'local'} --axis {axis} SCAN..."
                 )
-            with told_to_end(), bar("points") as progress:
+            with exit_on_sigterm(), bar("points") as progress:
                 given, found = complete(given, scans, srid, step(progress))
     if found is None and axis_out is not None:
         raise UserError("--axis-out is for an axis that is found in SCAN files")
@@ -193,15 +193,15 @@ def add(
         ends_at=given.xyz[-1].tolist(),
         notes=notes,
     )
-    click.echo(f"{name}: {line.end - line.start:.3f} m of axis, chainage {line.start:.3f} to {line.end:.3f} m", err=True)
+    notify(f"{name}: {line.end - line.start:.3f} m of axis, chainage {line.start:.3f} to {line.end:.3f} m")
     turn = "" if given.design is not None else "; --reverse turns it round"
-    click.echo(f"chainage grows over {describe_line(given.xyz)}{turn}", err=True)
+    notify(f"chainage grows over {describe_line(given.xyz)}{turn}")
     if given.design is not None:
         plan, profiles = len(given.design.plan), len(given.design.profile)
         tell(plan_elements=plan, profile_elements=profiles)
-        click.echo(f"{given.source}: {plan} elements in plan, {profiles} in profile", err=True)
+        notify(f"{given.source}: {plan} elements in plan, {profiles} in profile")
     for note in notes:
-        click.echo(f"{axis}: {note}", err=True)
+        notify(f"{axis}: {note}")
 
 
 def _add_site(settings: Settings, name: str, srid: int, given: set[Any]) -> None:
@@ -214,7 +214,7 @@ def _add_site(settings: Settings, name: str, srid: int, given: set[Any]) -> None
         tell_warnings(connection)
         add_site(connection, name, srid)
     tell(tunnel=name, srid=srid, site=True)
-    click.echo(f"{name}: a site, without an axis", err=True)
+    notify(f"{name}: a site, without an axis")
 
 
 @tunnel.command(
@@ -247,10 +247,10 @@ def find_axis(scans: tuple[Path, ...], output: Path | None, picture: Path | None
     from tunneldb.pipeline.axis_search import found_given
 
     name = common_name(scans)
-    with told_to_end(), bar("points") as progress:
+    with exit_on_sigterm(), bar("points") as progress:
         _, found = found_given(scans, None, step(progress), None, reverse)
     _keep(found, output or Path(f"{name}.found-axis.csv"), picture, 0.0, name)
-    click.echo(f"chainage grows over {describe_line(found.xyz)}; --reverse turns it round", err=True)
+    notify(f"chainage grows over {describe_line(found.xyz)}; --reverse turns it round")
 
 
 def _keep(found: FoundAxis, path: Path, picture: Path | None, start: float, title: str) -> None:
@@ -271,7 +271,7 @@ def _keep(found: FoundAxis, path: Path, picture: Path | None, start: float, titl
         whole_sections=int(found.whole.sum()), doubtful=found.doubtful, says=lines,
     )  # fmt: skip
     for line in [*lines, f"axis: {path}, picture to check: {picture}"]:
-        click.echo(line, err=True)
+        notify(line)
 
 
 @tunnel.command(examples=["tunneldb tunnel stationing ringo equations.csv", "tunneldb tunnel stationing ringo --show"])

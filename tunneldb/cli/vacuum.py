@@ -6,7 +6,7 @@ import click
 from rich.filesize import decimal
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -41,20 +41,15 @@ def vacuum(settings: Settings, yes: bool) -> None:
     freed = sum(t.dead_bytes for t in tables)
     tell(tables=tables, dead=sum(t.dead for t in tables), dead_bytes=freed, done=yes, locked=waiting, not_owned=others)
     if not tables:
-        click.echo("nothing to vacuum", err=True)
+        notify("nothing to vacuum")
     elif not yes:
-        click.echo(
-            f"{sum(t.dead for t in tables)} dead rows, {decimal(freed)}, in {len(tables)} tables: tunneldb vacuum --yes",
-            err=True,
-        )
+        notify(f"{sum(t.dead for t in tables)} dead rows, {decimal(freed)}, in {len(tables)} tables: tunneldb vacuum --yes")
     else:
-        click.echo(f"vacuumed {len(tables) - len(others) - len(busy)} tables", err=True)
+        notify(f"vacuumed {len(tables) - len(others) - len(busy)} tables")
     if waiting:
-        click.echo(
-            f"left out, for others are at work on them: {', '.join(waiting)}; again later: tunneldb vacuum --yes", err=True
-        )
+        notify(f"left out, for others are at work on them: {', '.join(waiting)}; again later: tunneldb vacuum --yes")
     if others:
-        click.echo(f"{len(others)} tables are not yours to vacuum, as {others[0]}: ask their owner or the database's", err=True)
+        notify(f"{len(others)} tables are not yours to vacuum, as {others[0]}: ask their owner or the database's")
 
 
 def _show(tables: list[tuple[str, int, int, int, bool]]) -> None:

@@ -1,4 +1,4 @@
-"""Which server, the connection to it, its schema, and COPY."""
+"""Database: server, connections, schema and COPY."""
 
 from tunneldb.database.connection import open_connection, resolve_dsn, sqlalchemy_engine
 from tunneldb.database.copy import PointZ, copy_binary, pack

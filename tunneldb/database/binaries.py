@@ -25,12 +25,12 @@ _FOLDERS = (
 
 @dataclass(frozen=True)
 class Binaries:
-    """One installation of PostgreSQL.
+    """Installation of PostgreSQL.
 
     Attributes
     ----------
     folder
-        Where ``postgres``, ``initdb`` and ``pg_ctl`` are.
+        Folder of ``postgres``, ``initdb`` and ``pg_ctl``.
     major
         Major version.
     """
@@ -44,7 +44,7 @@ class Binaries:
 
     @property
     def has_postgis(self) -> bool:
-        """Whether PostGIS is installed for this version."""
+        """Return True if PostGIS is installed for this version."""
         config = self.folder / "pg_config"
         if config.exists():
             share = subprocess.run([str(config), "--sharedir"], capture_output=True, text=True, check=True).stdout.strip()
@@ -55,32 +55,30 @@ class Binaries:
 
 @cache
 def find_binaries(major: int | None = None) -> Binaries:
-    """Return the newest PostgreSQL that has PostGIS, or the one of a given major version.
+    """Return the newest PostgreSQL that has PostGIS, or the one with a given major version.
 
     Raises
     ------
     UserError
-        When there is none; the message has the command that installs it.
+        If there is none; the message has the command to install it.
     """
     found = {binaries.major: binaries for binaries in map(_inspect, _candidates()) if binaries is not None}
     if major is not None:
         if major not in found:
             raise UserError(
-                f"the embedded server's data are of PostgreSQL {major}, which is not installed: "
+                f"the embedded server's data need PostgreSQL {major}, which is not installed; type "
                 f"sudo apt install postgresql-{major}-postgis-3"
             )
         return found[major]
     new_enough = [found[version] for version in sorted(found, reverse=True) if version >= MINIMUM_POSTGRESQL]
     if not new_enough:
-        older = f" (only {max(found)} is there)" if found else ""
-        raise UserError(
-            f"PostgreSQL {MINIMUM_POSTGRESQL} or newer is not installed{older}: {INSTALL_HINT}, or name a database with --dsn"
-        )
+        older = f" (only {max(found)} is)" if found else ""
+        raise UserError(f"PostgreSQL {MINIMUM_POSTGRESQL} or newer is not installed{older}; type {INSTALL_HINT}, or use --dsn")
     for binaries in new_enough:
         if binaries.has_postgis:
             return binaries
     newest = new_enough[0].major
-    raise UserError(f"PostGIS is not installed for PostgreSQL {newest}: sudo apt install postgresql-{newest}-postgis-3")
+    raise UserError(f"PostGIS is not installed for PostgreSQL {newest}; type sudo apt install postgresql-{newest}-postgis-3")
 
 
 def _candidates() -> list[Path]:
@@ -95,7 +93,7 @@ def _candidates() -> list[Path]:
 
 
 def _inspect(folder: Path) -> Binaries | None:
-    """Return the installation in a folder, None when it is not a server's."""
+    """Return the installation in a folder, None if it is not a server's."""
     if not all((folder / program).exists() for program in ("postgres", "initdb", "pg_ctl")):
         return None
     answer = subprocess.run([str(folder / "postgres"), "--version"], capture_output=True, text=True, check=False)

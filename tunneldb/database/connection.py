@@ -1,4 +1,4 @@
-"""Connections: to the embedded server, or to the database that a DSN names."""
+"""Connections to the embedded server, or to the database of a DSN."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ MINIMUM_POSTGIS = (3, 3)
 
 
 def resolve_dsn(dsn: str | None) -> str:
-    """Return the DSN, or that of the embedded server, which is started if need be."""
+    """Return the DSN, or that of the embedded server, which is started if necessary."""
     return dsn if dsn is not None else Server().start()
 
 
 def open_connection(dsn: str | None) -> psycopg.Connection[Any]:
-    """Connect without looking at the schema.
+    """Connect without checking the schema.
 
     Raises
     ------
     UserError
-        When the server is down, refuses, or is too old.
+        If the server is down, refuses, or is too old.
     """
     try:
         connection = psycopg.connect(
@@ -36,11 +36,11 @@ def open_connection(dsn: str | None) -> psycopg.Connection[Any]:
             application_name="tunneldb",
             client_encoding="UTF8",
             connect_timeout=15,
-            # what is prepared may get a generic plan, which is made for, and locks, every partition of every survey
+            # a prepared statement may get a generic plan, which covers and locks all partitions of all surveys
             prepare_threshold=None,
         )
     except psycopg.ProgrammingError as error:
-        raise UserError(f"the DSN is not one that libpq understands: {first_line(error)}") from None
+        raise UserError(f"the DSN is not valid for libpq: {first_line(error)}") from None
     except psycopg.OperationalError as error:
         full = "; its disk is full" if "could not write init file" in str(error) else ""
         raise UserError(f"cannot connect to the database: {first_line(error)}{full}") from None
@@ -61,7 +61,7 @@ def sqlalchemy_engine(dsn: str | None) -> sqlalchemy.Engine:
 
 
 def engine_on(connection: psycopg.Connection[Any]) -> sqlalchemy.Engine:
-    """Return an engine that uses one connection, which stays the caller's to close; it must be idle."""
+    """Return an engine on one connection, which the caller must close; it must be idle."""
     import sqlalchemy
     from sqlalchemy.pool import StaticPool
 

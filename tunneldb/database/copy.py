@@ -26,12 +26,12 @@ _EWKB_BYTES = 33  # byte order, type, SRID, three coordinates
 
 @dataclass(frozen=True)
 class PointZ:
-    """A column of PostGIS points.
+    """Column of PostGIS points.
 
     Attributes
     ----------
     xyz
-        Coordinates, (n, 3), metres.
+        Coordinates, (n, 3), m.
     srid
         Spatial reference of all of them.
     """
@@ -55,12 +55,12 @@ def pack(columns: Sequence[Column]) -> bytes:
     Returns
     -------
     bytes
-        The rows, to be given to `copy_binary`.
+        Rows for `copy_binary`.
 
     Raises
     ------
     TypeError, ValueError
-        For an array of another type, or of another shape.
+        If an array has another type, or another shape.
     """
     count = len(_values(columns[0]))
     fields: list[tuple[str, Any]] = [("fields", ">i2")]
@@ -71,7 +71,7 @@ def pack(columns: Sequence[Column]) -> bytes:
     for index, column in enumerate(columns):
         if isinstance(column, PointZ):
             rows[f"length{index}"] = _EWKB_BYTES
-            rows[f"order{index}"] = 1  # little-endian, as the coordinates lie in memory
+            rows[f"order{index}"] = 1  # little-endian, like the coordinates in memory
             rows[f"type{index}"] = _EWKB_POINT_Z
             rows[f"srid{index}"] = column.srid
             rows[f"xyz{index}"] = column.xyz
@@ -86,7 +86,7 @@ def _values(column: Column) -> NDArray[Any]:
 
 
 def _field(index: int, column: Column, count: int) -> list[tuple[Any, ...]]:
-    """Return the structured fields that hold one column's payload."""
+    """Return the structured fields for one column's payload."""
     values = _values(column)
     shape = (count, 3) if isinstance(column, PointZ) else (count,)
     if values.shape != shape:
@@ -99,7 +99,7 @@ def _field(index: int, column: Column, count: int) -> list[tuple[Any, ...]]:
             (f"xyz{index}", "<f8", (3,)),
         ]
     if values.dtype.kind not in "ifb" or values.dtype.str[1:] not in ("i2", "i4", "i8", "f4", "f8", "b1"):
-        raise TypeError(f"column {index} has the type {values.dtype}, which PostgreSQL does not know")
+        raise TypeError(f"column {index} has the type {values.dtype}, which PostgreSQL does not have")
     return [(f"value{index}", values.dtype.newbyteorder(">"))]
 
 
@@ -111,16 +111,16 @@ def copy_binary(
     *,
     fresh: bool = False,
 ) -> int:
-    """COPY rows packed by `pack` into a table, and return how many arrived.
+    """COPY rows packed by `pack` into a table, and return the number of rows.
 
-    The rows arrive inside the connection's transaction; if the table was created in the same transaction,
-    the embedded server writes no WAL for them.
+    The rows are copied in the connection's transaction; if the table was created in the same transaction, the embedded
+    server writes no WAL for them.
 
     Parameters
     ----------
     fresh
-        The table was created in the same transaction (and the same savepoint). Its rows are frozen: who reads them first
-        need not mark them committed, which the server would write to the WAL as whole pages, for its checksums.
+        True if the table was created in the same transaction (and the same savepoint). Its rows are frozen: the first reader
+        need not mark them as committed, which the server would write to the WAL as whole pages, for its checksums.
     """
     command = sql.SQL("COPY {} ({}) FROM STDIN (FORMAT binary, FREEZE {})").format(
         table, sql.SQL(", ").join(map(sql.Identifier, columns)), sql.Literal(fresh)
@@ -135,7 +135,7 @@ def copy_binary(
 
 
 def pack_row(fields: Sequence[bytes | None]) -> bytes:
-    """Pack one row of binary COPY, of fields as they are sent; None is NULL. For rows whose arrays differ in length."""
+    """Pack one row of binary COPY from encoded fields; None is NULL. For rows whose arrays differ in length."""
     parts = [struct.pack(">h", len(fields))]
     for value in fields:
         parts.append(struct.pack(">i", -1 if value is None else len(value)))
@@ -145,14 +145,14 @@ def pack_row(fields: Sequence[bytes | None]) -> bytes:
 
 
 def pack_value(value: float | int | None, kind: str) -> bytes | None:
-    """One number as it is sent: ``kind`` is that of `struct`, ``h``, ``i``, ``q`` (int2, int4, int8) or ``d`` (float8)."""
+    """Encode one number: ``kind`` is that of `struct`, ``h``, ``i``, ``q`` (int2, int4, int8) or ``d`` (float8)."""
     return None if value is None else struct.pack(f">{kind}", value)
 
 
 def pack_array(values: Float | Int32) -> bytes:
-    """One array of float8 or int4 as it is sent.
+    """Encode one array of float8 or int4.
 
-    Format: ``array_send`` of PostgreSQL: dimensions, whether there are NULLs, type, length, lower bound, elements.
+    Format: ``array_send`` of PostgreSQL: dimensions, flag for NULLs, type, length, lower bound, elements.
 
     Parameters
     ----------
@@ -161,10 +161,10 @@ def pack_array(values: Float | Int32) -> bytes:
     Raises
     ------
     TypeError
-        For an array of another type.
+        If the array has another type.
     """
     if values.dtype not in _ARRAYS:
-        raise TypeError(f"arrays of {values.dtype} are not sent")
+        raise TypeError(f"arrays of {values.dtype} are not supported")
     kind, oid = _ARRAYS[values.dtype]
     if len(values) == 0:
         return struct.pack(">iii", 0, 0, oid)
@@ -174,7 +174,7 @@ def pack_array(values: Float | Int32) -> bytes:
 
 
 def unpack_array(sent: bytes, dtype: type[np.float64] | type[np.int32]) -> NDArray[Any]:
-    """Array (n,) of what ``array_send`` or ``float8[]``, ``int4[]`` without NULLs gives."""
+    """Decode an array (n,) of ``array_send`` of ``float8[]`` or ``int4[]`` without NULLs."""
     kind, _ = _ARRAYS[np.dtype(dtype)]
     elements = np.frombuffer(sent, [("length", ">i4"), ("value", kind)], offset=20) if len(sent) > 12 else None
     return np.empty(0, dtype) if elements is None else elements["value"].astype(dtype)

@@ -1,6 +1,6 @@
-"""Many rows at once into a NumPy array: the server strings them together, so that Python sees one value.
+"""Fast fetch of many rows into a NumPy array: the server concatenates them, so that Python gets one value.
 
-Row by row, psycopg takes about 5 µs for each; two million rows come four times as fast like this.
+Row by row, psycopg takes about 5 µs for each; two million rows are four times as fast this way.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ def fetch_array(
     Parameters
     ----------
     fields
-        Name, type (``f8``, ``f4``, ``i8``, ``i4`` or ``i2``, the type of the expression exactly) and expression of each
+        Name, type (``f8``, ``f4``, ``i8``, ``i4`` or ``i2``, exactly the type of the expression) and expression of each
         column; none may be NULL.
     source
-        What follows SELECT …: FROM, WHERE; no more than about ten million rows.
+        Rest of the query after SELECT …: FROM, WHERE; at most about ten million rows.
     parameters
         Values of the placeholders.
 
     Returns
     -------
     (n,) structured array
-        In native byte order; the order of the rows is the server's own.
+        Rows in native byte order, in the order of the server.
     """
     packed = sql.SQL(" || ").join(sql.SQL("{}({})").format(sql.SQL(_SEND[kind]), expression) for _, kind, expression in fields)
     query = sql.SQL("SELECT string_agg({}, ''::bytea) {}").format(packed, source)

@@ -1,9 +1,9 @@
-"""What others than tunneldb have put on the tables of schema tunnel that runs with the rights of whoever writes there.
+"""Objects of others on the tables of schema tunnel that run with the rights of whoever writes there.
 
-Operators own the tables. A trigger, also one of a table that refers to one of them, a rule, a policy, a view in a table's
-place, or a function in a check, a default, a generated column or an index runs with the rights of whoever writes: the
-database owner's behind the views and in his own runs.
-A function or an operator in schema public that fits a call better than that of PostgreSQL or PostGIS runs in its place.
+Operators own the tables. A trigger (also on a table that refers to one of them), a rule, a policy, a view in place of a
+table, or a function in a check, a default, a generated column or an index runs with the rights of whoever writes: with those
+of the database's owner behind the views and in the owner's own runs. A function or an operator in schema public that matches a
+call better than that of PostgreSQL or PostGIS is called instead.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import Any
 import psycopg
 
 SUBJECTS = ("triggers", "expressions", "functions")
-"""What is looked at; rules and policies go with the expressions."""
+"""Subjects of the examination; rules and policies belong to the expressions."""
 
-# Roles whose functions may run with the owner's rights: they have those anyway.
+# Roles whose functions may run with the owner's rights, since they have these rights anyway.
 _TRUSTED = """
     SELECT oid FROM pg_roles WHERE rolsuper
     UNION SELECT nspowner FROM pg_namespace WHERE nspname = 'tunnel_api'
@@ -29,7 +29,7 @@ _OF_EXTENSION = "EXISTS (SELECT FROM pg_depend e WHERE e.deptype = 'e' AND e.cla
 
 # Tables of the schema, and all that inherit from them or that they inherit from, wherever they are: a table that is made a
 # partition of another takes its triggers, checks and indexes.
-_HELD = """
+_OWN_TABLES = """
     SELECT c.oid FROM pg_class c
      WHERE c.relnamespace = 'tunnel'::regnamespace AND c.relkind IN ('r', 'p', 'v')
     UNION
@@ -51,7 +51,7 @@ _OWN = (
 _OURS = ", ".join(str(each) for each in _OWN)
 
 _TRIGGERS = f"""
-WITH RECURSIVE trusted AS ({_TRUSTED}), held AS ({_HELD})
+WITH RECURSIVE trusted AS ({_TRUSTED}), held AS ({_OWN_TABLES})
 SELECT format('%s on %s is not tunneldb''s: it runs what %s wrote', quote_ident(t.tgname), t.tgrelid::regclass,
               pg_get_userbyid(p.proowner)),
        format('DROP TRIGGER %I ON %s;', t.tgname, t.tgrelid::regclass)
@@ -77,7 +77,7 @@ SELECT format('%s on tunnel.%s %s', o.trigger, o.held, CASE WHEN t.oid IS NULL T
 
 # Foreign keys of tables elsewhere: what is deleted or renumbered here deletes or changes rows there, and runs their triggers.
 _REFERENCES = f"""
-WITH RECURSIVE held AS ({_HELD})
+WITH RECURSIVE held AS ({_OWN_TABLES})
 SELECT format('foreign key %I of %s is not tunneldb''s: it runs triggers there', k.conname, k.conrelid::regclass),
        format('ALTER TABLE %s DROP CONSTRAINT %I;', k.conrelid::regclass, k.conname)
   FROM pg_constraint k JOIN held ON held.oid = k.confrelid
@@ -88,7 +88,7 @@ SELECT format('foreign key %I of %s is not tunneldb''s: it runs triggers there',
 
 # Rules and policies: tunneldb has none; a view in a table's place is one, too.
 _RULES = f"""
-WITH RECURSIVE held AS ({_HELD})
+WITH RECURSIVE held AS ({_OWN_TABLES})
 SELECT format('rule %I on %s is not tunneldb''s: it runs', r.rulename, r.ev_class::regclass),
        CASE WHEN r.rulename = '_RETURN' THEN format('DROP VIEW %s;', r.ev_class::regclass)
             ELSE format('DROP RULE %I ON %s;', r.rulename, r.ev_class::regclass) END
@@ -103,7 +103,7 @@ SELECT format('policy %I on %s is not tunneldb''s: it runs', y.polname, y.polrel
 # Expressions by what they call: by the numbers of functions, operators and types in their trees, for dependences on what comes
 # with PostgreSQL, such as query_to_xml, are not kept. Those of tunneldb call what is immutable, the clock, and who is there.
 _EXPRESSIONS = f"""
-WITH RECURSIVE trusted AS ({_TRUSTED}), held AS ({_HELD}),
+WITH RECURSIVE trusted AS ({_TRUSTED}), held AS ({_OWN_TABLES}),
 expression (relation, what, tree, mend) AS (
     SELECT k.conrelid, format('check %I', k.conname), k.conbin::text,
            format('ALTER TABLE %s DROP CONSTRAINT %I;', k.conrelid::regclass, k.conname)
@@ -176,9 +176,9 @@ SELECT r.what || ' is not tunneldb''s: it runs in the place of what a call means
 
 @contextmanager
 def catalogue_alone(connection: psycopg.Connection[Any]) -> Iterator[None]:
-    """Let names and operators mean what PostgreSQL has, whatever was planted elsewhere: in a transaction, or a savepoint of it.
+    """Restrict names and operators to those of PostgreSQL, within a transaction or savepoint, whatever else exists.
 
-    An operator of types that PostgreSQL compares by casts only, ``oid = regnamespace``, would otherwise be the one in public.
+    Otherwise an operator for types that PostgreSQL compares only by casts, ``oid = regnamespace``, would be the one in public.
     """
     with connection.transaction():
         before = connection.execute("SELECT pg_catalog.current_setting('search_path')").fetchone()
@@ -189,12 +189,12 @@ def catalogue_alone(connection: psycopg.Connection[Any]) -> Iterator[None]:
 
 
 def foreign_objects(connection: psycopg.Connection[Any]) -> Iterator[tuple[str, str, str]]:
-    """Yield what is not tunneldb's and may run code with the rights of others: on tables of schema tunnel, in schema public.
+    """Yield objects that are not tunneldb's and may run code with the rights of others: on tables of tunnel, and in public.
 
     Yields
     ------
     (str, str, str)
-        One of SUBJECTS; what is where, and with whose rights it runs; the statement that takes it away.
+        One of SUBJECTS; the object, and with whose rights it runs; the statement that removes it.
     """
     for subject, query in (
         ("triggers", _TRIGGERS), ("triggers", _REFERENCES), ("expressions", _RULES), ("expressions", _EXPRESSIONS),
@@ -206,14 +206,14 @@ def foreign_objects(connection: psycopg.Connection[Any]) -> Iterator[tuple[str, 
 
 
 def overloads(connection: psycopg.Connection[Any]) -> list[tuple[str, str]]:
-    """Return which functions and operators in schema public may run in the place of others, each with what takes it away."""
+    """Return functions and operators in schema public that may be called instead of others, with statements to remove them."""
     return _rows(connection, _OVERLOADS)
 
 
 def silent_triggers(connection: psycopg.Connection[Any]) -> list[tuple[str, str]]:
-    """Return which of tunneldb's own triggers are missing or switched off, each with what mends it.
+    """Return tunneldb's own triggers that are missing or disabled, with statements to restore them.
 
-    Without them partitions stay behind, or what is kept of a kilometre is believed although it has changed.
+    Without them partitions are not removed, or cached values of a kilometre are used although it has changed.
     """
     return _rows(connection, _SILENT)
 

@@ -1,4 +1,4 @@
-"""What is right and wrong with the server and the database, and the command that mends it."""
+"""Examination of the server and the database, with commands to fix problems."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ from tunneldb.database.server import Server
 from tunneldb.errors import UserError
 
 ROLES = ("tunnel_viewer", "tunnel_inspector", "tunnel_operator")
-LITTLE_SPACE = 5 * 1024**3  # bytes; a kilometre at survey density takes some 0.5 GB with its rewrite
+MIN_FREE_SPACE = 5 * 1024**3  # bytes; a kilometre at survey density takes some 0.5 GB with its rewrite
 LOCKS_PER_TABLE = 6
-"""Locks that dropping a kilometre takes at most: its table, the one of long values, and indexes."""
+"""Greatest number of locks for dropping a kilometre: its table, its TOAST table, and indexes."""
 LOCKS_OF_A_SESSION = 16
-"""Locks that another session holds meanwhile, about."""
+"""Approximate number of locks of another session meanwhile."""
 GIB = 1024**3
 
 
 @dataclass(frozen=True)
 class CheckResult:
-    """One thing that was looked at.
+    """Result of one check.
 
     Attributes
     ----------
     level
         ``ok``, ``note`` (works, but could be better) or ``wrong``.
     subject, text
-        What was looked at, and how it is.
+        Subject of the check, and its state.
     mend
-        Command or statement that puts it right; empty when nothing needs to.
+        Command or statement to fix it; empty if nothing is wrong.
     """
 
     level: Literal["ok", "note", "wrong"]
@@ -55,14 +55,14 @@ class CheckResult:
 
 
 def examine(dsn: str | None) -> Iterator[CheckResult]:
-    """Look at everything, in the order in which things depend on each other; stop where nothing more can be seen."""
+    """Check everything, in the order of dependence; stop where nothing more can be checked."""
     try:
         connection = open_connection(dsn)
     except UserError as error:
         yield CheckResult("wrong", "server", str(error))
         return
     with connection:
-        with catalogue_alone(connection):  # what was planted in public is looked for, and must not run
+        with catalogue_alone(connection):  # foreign objects in public are searched, and must not run
             sound = yield from _foundations(connection, embedded=dsn is None)
         if not sound:
             return
@@ -78,7 +78,7 @@ def examine(dsn: str | None) -> Iterator[CheckResult]:
 
 
 def _foundations(connection: psycopg.Connection[Any], *, embedded: bool) -> Generator[CheckResult, None, bool]:
-    """Look at what all else rests on; returns whether it can be looked at."""
+    """Check the server, PostGIS and schema; return True if further checks are possible."""
     info = connection.info
     where = "embedded" if embedded else f"{info.host or 'local'}, database {info.dbname}"
     yield CheckResult("ok", "server", f"PostgreSQL {info.parameter_status('server_version')} ({where})")
@@ -155,7 +155,7 @@ def _roles(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
 
 
 def _public(connection: psycopg.Connection[Any]) -> CheckResult:
-    """Who may create in the schema of PostGIS, which is in everybody's search path."""
+    """Check who may create objects in the schema of PostGIS, which is in everybody's search path."""
     rows = connection.execute(
         """
         SELECT CASE a.grantee WHEN 0 THEN 'PUBLIC' ELSE quote_ident(pg_get_userbyid(a.grantee)) END
@@ -174,7 +174,7 @@ def _public(connection: psycopg.Connection[Any]) -> CheckResult:
 
 
 def _audit(connection: psycopg.Connection[Any]) -> CheckResult:
-    """Whether what people change by hand is kept: the table's own trigger is on, and operators don't own the table."""
+    """Check that manual changes are recorded: the table's own trigger is on, and operators don't own the table."""
     row = connection.execute(
         """
         SELECT EXISTS (SELECT FROM pg_trigger t
@@ -199,7 +199,7 @@ def _audit(connection: psycopg.Connection[Any]) -> CheckResult:
 
 
 def _foreign(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
-    """What is not the project's own on the tables and in schema public, and triggers of its own that do not fire."""
+    """Check for foreign objects on the tables and in schema public, and for own triggers that are disabled."""
     found = [("triggers", text, mend) for text, mend in silent_triggers(connection)]
     found += foreign_objects(connection)
     for subject, text, mend in found:
@@ -210,7 +210,7 @@ def _foreign(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
 
 
 def _settings(connection: psycopg.Connection[Any], *, embedded: bool) -> Iterator[CheckResult]:
-    """Settings that make a survey slow; the embedded server has its own."""
+    """Check settings that make a survey slow; the embedded server has its own."""
     if embedded:
         yield CheckResult("ok", "settings", "sized to this machine")
         return
@@ -230,7 +230,7 @@ def _settings(connection: psycopg.Connection[Any], *, embedded: bool) -> Iterato
 
 
 def _locks(connection: psycopg.Connection[Any]) -> CheckResult:
-    """Whether the server has locks for what takes most at once: a dump of all tables, or the removal of the longest survey."""
+    """Check that there are enough locks for a dump of all tables, and for removing the longest survey."""
     row = connection.execute(
         """
         SELECT current_setting('max_locks_per_transaction')::bigint * c.places, c.places, d.dump, d.removal
@@ -265,7 +265,7 @@ SELECT survey, km, stage, outcome, message, stale FROM tunnel_api.stage_status
 
 
 def _work(state: Sequence[tuple[Any, ...]]) -> Iterator[CheckResult]:
-    """Stages that were cut off or failed."""
+    """Report interrupted and failed stages."""
     rows = [row for row in state if row[3] in ("interrupted", "failed")]
     for survey, km, stage, outcome, message, _ in rows:
         why = f": {message.splitlines()[0]}" if message else ""
@@ -276,7 +276,7 @@ def _work(state: Sequence[tuple[Any, ...]]) -> Iterator[CheckResult]:
 
 
 def _queue(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
-    """Files that could not be read, and jobs that nobody takes."""
+    """Report files that could not be read, and jobs without a worker."""
     for survey, name, path, message in connection.execute(
         "SELECT survey, name, path, message FROM tunnel_api.incoming WHERE state = 'failed' ORDER BY survey, name"
     ).fetchall():
@@ -295,7 +295,7 @@ def _queue(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
 
 
 def _remarks(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
-    """What a reader of the results is to know."""
+    """Report notes and limitations of the results."""
     for survey, said in connection.execute(
         "SELECT s.name, r.said FROM tunnel.survey s CROSS JOIN LATERAL tunnel_api.remarks(s.id) WITH ORDINALITY AS"
         " r (file, stage, kilometres, remark, said, n) ORDER BY s.name, r.n"
@@ -304,7 +304,7 @@ def _remarks(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
 
 
 def _stale(state: Sequence[tuple[Any, ...]]) -> Iterator[CheckResult]:
-    """Results that are out of date, a line a survey."""
+    """Report results that are out of date, one line per survey."""
     for survey, rows in groupby((row for row in state if row[5]), key=itemgetter(0)):
         kilometres = [row[1] for row in rows]
         text = f"{survey}: {len(kilometres)} stages of {len(set(kilometres))} kilometres are out of date"
@@ -315,6 +315,6 @@ def _space() -> CheckResult:
     home = Server().home()
     free = shutil.disk_usage(home.state).free
     text = f"{free / GIB:.1f} GB free in {home.state}"
-    if free < LITTLE_SPACE:
+    if free < MIN_FREE_SPACE:
         return CheckResult("note", "disk", text, "free some, or set TUNNELDB_HOME to a folder on a bigger disk")
     return CheckResult("ok", "disk", text)

@@ -1,4 +1,4 @@
-"""Where the embedded server lives, and as which user it runs."""
+"""Folders of the embedded server, and the user that it runs as."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ ROOT_STATE = Path("/var/lib/tunneldb")
 
 @dataclass(frozen=True)
 class Home:
-    """The folders of one embedded server.
+    """Folders of an embedded server.
 
     Attributes
     ----------
     folder
-        TUNNELDB_HOME, or tunneldb in the user's data folder.
+        TUNNELDB_HOME, or the folder tunneldb in the user's data folder.
     state
         Folder of the data and the log: `folder` itself, or for root one below /var/lib/tunneldb when the
         server's user cannot enter `folder`.
     run
         Folder of the socket; short enough for the operating system.
     user
-        System user that the server runs as; None for the present one.
+        System user of the server; None for the current one.
     """
 
     folder: Path
@@ -44,17 +44,17 @@ class Home:
 
     @property
     def cluster(self) -> Path:
-        """PostgreSQL's data folder."""
+        """Data folder of PostgreSQL."""
         return self.state / "cluster"
 
     @property
     def log(self) -> Path:
-        """The server's log."""
+        """Log file of the server."""
         return self.state / "server.log"
 
     @property
     def lock(self) -> Path:
-        """File that is locked while the server is being made, started or stopped."""
+        """Lock file while the server is being created, started or stopped."""
         return self.folder / "lock"
 
 
@@ -65,12 +65,12 @@ def home_folder() -> Path:
 
 
 def prepare_home(folder: Path) -> Home:
-    """Make the folders of an embedded server, with the owner and the mode that PostgreSQL wants.
+    """Make the folders of an embedded server, with the owner and mode that PostgreSQL requires.
 
     Raises
     ------
     UserError
-        When a folder cannot be made, or root finds no user to run the server as.
+        If a folder cannot be made, or root finds no user to run the server as.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -103,7 +103,7 @@ def _link(link: Path, target: Path) -> None:
 
 
 def _server_user(folder: Path) -> pwd.struct_passwd | None:
-    """Return whom root drops to, since PostgreSQL refuses root; None for anybody else."""
+    """Return the user that root changes to, since PostgreSQL refuses root; None for other users."""
     if os.geteuid() != 0:
         return None
     owner = folder.stat().st_uid
@@ -113,7 +113,7 @@ def _server_user(folder: Path) -> pwd.struct_passwd | None:
         return pwd.getpwnam("postgres")
     except KeyError:
         raise UserError(
-            "PostgreSQL refuses to run as root and there is no user postgres to run it as: "
+            "PostgreSQL refuses to run as root, and there is no user postgres to run it as; type "
             "sudo apt install postgresql-15-postgis-3, or use tunneldb as another user"
         ) from None
 
@@ -123,9 +123,9 @@ def _can_enter(folder: Path, user: pwd.struct_passwd) -> bool:
 
 
 def execute(command: list[str], user: pwd.struct_passwd | None) -> subprocess.CompletedProcess[str]:
-    """Run a program to its end, with a user's rights; None means the present one.
+    """Run a program to its end, with a user's rights; None means the current one.
 
-    It sees nothing that libpq and the server would take from the environment, and speaks English.
+    Its environment has no settings of libpq and the server, and its language is English.
     """
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("PG", "LC_", "LANG"))}
     return subprocess.run(
@@ -147,7 +147,7 @@ def _digest(folder: Path) -> str:
 
 
 def _socket_dir(state: Path, user: pwd.struct_passwd | None) -> Path:
-    """Return the socket's folder: beside the data, or one below /tmp when that path is too long or QGIS cannot use it."""
+    """Return the socket's folder: beside the data, or below /tmp if that path is too long or unusable for QGIS."""
     beside = state / "run"
     fits = len(os.fsencode(beside / SOCKET_NAME)) <= SOCKET_PATH_LIMIT - 5  # room for ".lock"
     if fits and not set(" '\\") & set(str(beside)):  # QGIS hands the path to libpq unquoted
@@ -157,15 +157,15 @@ def _socket_dir(state: Path, user: pwd.struct_passwd | None) -> Path:
 
 
 def _make_private(folder: Path, user: pwd.struct_passwd | None) -> None:
-    """Make a folder that only the server's user may enter; refuse one that somebody else has made.
+    """Make a folder that only the server's user may enter; refuse one that another user has made.
 
-    The socket trusts whoever reaches it, so the folder is the lock on the door.
+    The socket trusts every connection, so the folder's mode is its protection.
     """
     owner = os.geteuid() if user is None else user.pw_uid
     with suppress(FileExistsError):
         folder.mkdir(mode=0o700)
     found = folder.lstat()
-    # Root's own is one that another start, still under way or killed, has made and not yet given away.
+    # A folder of root was made by another start, still running or killed, and its owner not yet changed.
     if not stat.S_ISDIR(found.st_mode) or found.st_uid not in {owner, os.geteuid()}:
         raise UserError(f"{folder} is not a folder of the server's user; remove it or set TUNNELDB_HOME")
     if user is not None and found.st_uid != owner:

@@ -1,4 +1,4 @@
-"""The embedded server's settings, sized to the machine."""
+"""Settings of the embedded server, sized to the machine."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def settings(socket_dir: Path) -> dict[str, str]:
     """Return the settings of an embedded server on this machine.
 
     One user, few connections, big scans: a quarter of the memory for shared buffers, generous work_mem. Locks for
-    tens of thousands of kilometres: a dump takes one for each, a survey that is removed six for each of its own.
+    tens of thousands of kilometres: a dump takes one for each, removing a survey takes six for each of its kilometres.
     ``wal_level=minimal`` lets COPY into a table of the same transaction skip the WAL; jit costs more than it
     gains on the short functions of tunnel_api.
     """
@@ -76,7 +76,7 @@ def _mib(size: int, least: int, most: int) -> str:
 
 
 def _shared_memory_type() -> str:
-    """Return how parallel workers share memory: containers often have only 64 MB of /dev/shm."""
+    """Return the method by which parallel workers share memory: containers often have only 64 MB of /dev/shm."""
     try:
         space = os.statvfs("/dev/shm")
     except OSError:

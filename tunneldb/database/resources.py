@@ -1,4 +1,4 @@
-"""Where the SQL files and the migrations are: inside the wheel, or beside the package in a checkout."""
+"""Folders of SQL files and migrations: inside the wheel, or beside the package in a checkout."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def resource_dir(name: Literal["sql", "migrations"]) -> Path:
     Raises
     ------
     FileNotFoundError
-        When neither place has it, which means a broken installation.
+        If neither exists, which means a broken installation.
     """
     package = Path(__file__).resolve().parents[1]
     for folder in (package / f"_{name}", package.parent / name):

@@ -1,4 +1,4 @@
-"""Install and upgrade: migrations of schema `tunnel`, then schemas `tunnel_api` and `tunnel_internal` anew."""
+"""Installation and upgrade: migrations of schema `tunnel`, then schemas `tunnel_api` and `tunnel_internal` from scratch."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ if TYPE_CHECKING:
     from alembic.config import Config
 
 HEAD = "0001"
-"""The newest migration. Known here so that a command whose database is up to date need not import Alembic."""
+"""Newest migration, stated here so that a command need not import Alembic if the database is up to date."""
 
 API_SCHEMAS = ("tunnel_api", "tunnel_internal")
-"""Schemas of the SQL files, dropped and installed whole: what people and QGIS call, and what that calls."""
+"""Schemas of the SQL files, dropped and installed as a whole: functions for users and QGIS, and their helpers."""
 
-_INTERNAL = "Functions and views behind tunnel_api and the program; not to be called by users; made anew by tunneldb init"
+_INTERNAL = "Functions and views behind tunnel_api and the program; not to be called by users; created again by tunneldb init"
 
-_LOCK = 7088630451  # any number: two installations of one database wait for each other
+_LOCK = 7088630451  # arbitrary number; two installations of one database wait for each other
 _LAYERS_LOCK = 7088630452  # the one of tunnel_api.make_layers
-_PATIENCE = "30s"  # how long to wait for others that use what is to be changed
+_LOCK_TIMEOUT = "30s"  # time to wait for other users of the objects to change
 
 
 class StageRow(Protocol):
-    """A row of tunnel.stage: what the table's columns of these names hold."""
+    """Row of tunnel.stage, with the table's columns of the same names."""
 
     @property
     def name(self) -> str: ...  # noqa: D102
@@ -62,7 +62,7 @@ def install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> 
     Raises
     ------
     UserError
-        When PostGIS is missing and cannot be created, or the database is of another version, newer or unreleased.
+        If PostGIS is missing and cannot be created, or the database is of another version, newer or unreleased.
     """
     import sqlalchemy
 
@@ -73,7 +73,7 @@ def install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> 
         if not isinstance(cause, psycopg.errors.LockNotAvailable):
             raise cause from None
         raise UserError(
-            f"other programs have used the database for {_PATIENCE}; close QGIS and let runs end, then tunneldb init again"
+            f"other programs have used the database for {_LOCK_TIMEOUT}; close QGIS, wait for runs, then type tunneldb init"
         ) from None
 
 
@@ -81,13 +81,13 @@ def _install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) ->
     from alembic import command
 
     with engine_on(connection).begin() as session:
-        connection.execute(sql.SQL("SET LOCAL lock_timeout = {}").format(_PATIENCE))
+        connection.execute(sql.SQL("SET LOCAL lock_timeout = {}").format(_LOCK_TIMEOUT))
         with catalogue_alone(connection):
             connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
             _close_public(connection)
             _refuse_planted(connection)
             _require_postgis(connection, create=True)
-        _refuse_planted(connection)  # now also by the names that PostGIS has
+        _refuse_planted(connection)  # now also with the names of PostGIS
         present = schema_revision(connection)
         if present is not None and present not in revisions():
             raise UserError(_unknown(present))
@@ -97,19 +97,19 @@ def _install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) ->
 
 
 def _close_public(connection: psycopg.Connection[Any]) -> None:
-    """Let nobody but its owner create in the schema of PostGIS. Before PostgreSQL 15 everybody might."""
+    """Allow only its owner to create objects in the schema of PostGIS; before PostgreSQL 15 everybody could."""
     try:
         with connection.transaction():
             connection.execute("REVOKE CREATE ON SCHEMA public FROM PUBLIC")
     except psycopg.errors.InsufficientPrivilege:
-        pass  # its owner's to do: tunneldb check says so
+        pass  # only its owner can; tunneldb check reports it
 
 
 def _refuse_planted(connection: psycopg.Connection[Any]) -> None:
-    """Refuse to go on with what was planted in the schema of PostGIS.
+    """Refuse to continue with foreign functions or operators in the schema of PostGIS.
 
-    It is in everybody's search path: a function there that fits a call better than PostgreSQL's own of that name runs in its
-    place, with the rights of whoever calls.
+    It is in everybody's search path: a function there that matches a call better than PostgreSQL's function of that name is
+    called instead, with the rights of the caller.
     """
     planted = overloads(connection)
     if planted:
@@ -128,7 +128,7 @@ def _fill_stages(connection: psycopg.Connection[Any], stages: Sequence[StageRow]
                 for step, stage in enumerate(stages, 1)
             ],
         )
-    # Of a table that was never analysed the planner expects a thousand rows: status and queue then take seconds.
+    # For a table that was never analysed the planner expects a thousand rows: status and queue then take seconds.
     connection.execute("ANALYZE tunnel.stage")
 
 
@@ -143,7 +143,7 @@ def install_api(connection: psycopg.Connection[Any]) -> None:
     Raises
     ------
     UserError
-        When something outside of these schemas was built on them, which the drop would take along.
+        If objects outside of these schemas depend on them, which the drop would remove.
     """
     connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LAYERS_LOCK])
     _refuse_dependents(connection)
@@ -171,7 +171,7 @@ def sql_files() -> list[Path]:
     Raises
     ------
     ValueError
-        When install.txt and the folder do not name the same files.
+        If install.txt and the folder do not list the same files.
     """
     folder = resource_dir("sql")
     lines = (folder / "install.txt").read_text("utf-8").splitlines()
@@ -183,7 +183,7 @@ def sql_files() -> list[Path]:
 
 
 def api_version() -> str:
-    """Return what the comment on schema tunnel_api says: the program's version and a digest of the files."""
+    """Return the comment for schema tunnel_api: the program's version and a digest of the files."""
     digest = hashlib.sha256()
     for path in sql_files():
         digest.update(path.read_bytes())
@@ -191,7 +191,7 @@ def api_version() -> str:
 
 
 def installed_api_version(connection: psycopg.Connection[Any]) -> str | None:
-    """Return the comment on the database's schema tunnel_api, None when one of API_SCHEMAS is missing."""
+    """Return the comment on the database's schema tunnel_api, None if one of API_SCHEMAS is missing."""
     row = connection.execute(
         "SELECT obj_description(to_regnamespace('tunnel_api'), 'pg_namespace')"
         " WHERE to_regnamespace('tunnel_internal') IS NOT NULL"
@@ -210,14 +210,14 @@ def alembic_config(session: sqlalchemy.Connection | None = None) -> Config:
 
 
 def revisions() -> set[str]:
-    """Return all migrations that this program knows."""
+    """Return all migrations of this program."""
     from alembic.script import ScriptDirectory
 
     return {script.revision for script in ScriptDirectory.from_config(alembic_config()).walk_revisions()}
 
 
 def schema_revision(connection: psycopg.Connection[Any]) -> str | None:
-    """Return the revision of the database's schema `tunnel`, None when it has none."""
+    """Return the revision of the database's schema `tunnel`, None if it has none."""
     there = connection.execute("SELECT to_regclass('tunnel.alembic_version')").fetchone()
     if there is None or there[0] is None:
         return None
@@ -226,35 +226,35 @@ def schema_revision(connection: psycopg.Connection[Any]) -> str | None:
 
 
 def postgis_version(connection: psycopg.Connection[Any]) -> str | None:
-    """Return the version of PostGIS in this database, None when it has none."""
+    """Return the version of PostGIS in this database, None if it has none."""
     row = connection.execute("SELECT extversion FROM pg_extension WHERE extname = 'postgis'").fetchone()
     return row[0] if row else None
 
 
 def postgis_schema(connection: psycopg.Connection[Any]) -> str | None:
-    """Return the schema in which PostGIS is, None when it is not."""
+    """Return the schema of PostGIS, None if it is missing."""
     row = connection.execute("SELECT extnamespace::regnamespace::text FROM pg_extension WHERE extname = 'postgis'").fetchone()
     return row[0] if row else None
 
 
 def require_current_schema(connection: psycopg.Connection[Any]) -> None:
-    """Raise a UserError unless PostGIS and this program's schema are there."""
+    """Raise a UserError unless PostGIS and this program's schema exist."""
     _require_postgis(connection, create=False)
     revision = schema_revision(connection)
     if revision == HEAD:
         if installed_api_version(connection) is None:
-            raise UserError("schema tunnel_api or tunnel_internal is missing: tunneldb init")
+            raise UserError("schema tunnel_api or tunnel_internal is missing; type tunneldb init")
         return
     if revision is None:
-        raise NotReadyError("the database has no schema tunnel yet: tunneldb init")
+        raise NotReadyError("the database has no schema tunnel yet; type tunneldb init")
     if revision in revisions():
-        raise UserError(f"the database's schema is older ({revision}) than this program: tunneldb init upgrades it")
+        raise UserError(f"the database's schema is older ({revision}) than this program; type tunneldb init to upgrade it")
     raise UserError(_unknown(revision))
 
 
 def _unknown(revision: str) -> str:
     return (
-        f"the database's schema {revision} is unknown to tunneldb {__version__}. It is of a newer version "
+        f"the database's schema {revision} is unknown to tunneldb {__version__}; it is of a newer version "
         "(pip install --upgrade tunneldb) or of a development version before 0.1.0 (create a new database and load the "
         "scans again)"
     )
@@ -263,19 +263,19 @@ def _unknown(revision: str) -> str:
 def _require_postgis(connection: psycopg.Connection[Any], *, create: bool) -> None:
     version = postgis_version(connection)
     if version is None and not create:
-        raise NotReadyError("the database is not set up for tunneldb yet: tunneldb init")
+        raise NotReadyError("the database is not set up for tunneldb yet; type tunneldb init")
     if version is None:
         try:
             with connection.transaction():
                 connection.execute("CREATE EXTENSION IF NOT EXISTS postgis SCHEMA public")
         except psycopg.errors.InsufficientPrivilege:
             raise UserError(
-                "the database has no PostGIS and this user may not create it; a superuser can: CREATE EXTENSION postgis"
+                "the database has no PostGIS, and this user may not create it; ask a superuser to: CREATE EXTENSION postgis"
             ) from None
         except (psycopg.errors.UndefinedFile, psycopg.errors.FeatureNotSupported):
             major = connection.info.server_version // 10000
             raise UserError(
-                f"PostGIS is not installed on the database's server: sudo apt install postgresql-{major}-postgis-3"
+                f"PostGIS is not installed on the database's server; type sudo apt install postgresql-{major}-postgis-3"
             ) from None
         version = postgis_version(connection)
     assert version is not None
@@ -287,13 +287,13 @@ def _require_postgis(connection: psycopg.Connection[Any], *, create: bool) -> No
         )
     if postgis_schema(connection) != "public":
         raise UserError(
-            f"PostGIS is in schema {postgis_schema(connection)}; tunneldb, like QGIS, looks for it in public: "
+            f"PostGIS is in schema {postgis_schema(connection)}; tunneldb, like QGIS, expects it in public: "
             "use a database of its own"
         )
 
 
 def _layer_schemas(connection: psycopg.Connection[Any]) -> list[str]:
-    """Return the schemas of typed layers: `tunnel_api.layer_schemas`, which may not be there (yet, or any more)."""
+    """Return the schemas of typed layers: `tunnel_api.layer_schemas`, which may not exist (yet, or any more)."""
     rows = connection.execute(
         "SELECT n.nspname FROM pg_namespace n"
         " WHERE n.nspname ~ '^tunnel_([0-9]{1,9}|local)$'"
@@ -305,7 +305,7 @@ def _layer_schemas(connection: psycopg.Connection[Any]) -> list[str]:
 
 
 def _refuse_guests(connection: psycopg.Connection[Any]) -> None:
-    """Refuse to drop schemas of typed layers in which somebody keeps something else."""
+    """Refuse to drop schemas of typed layers that contain other objects."""
     listed = connection.execute("SELECT to_regprocedure('tunnel_api.layer_types()') IS NOT NULL").fetchone()
     types = "SELECT layer FROM tunnel_api.layer_types()" if listed is not None and listed[0] else "SELECT c.relname"
     rows = connection.execute(
@@ -320,7 +320,7 @@ def _refuse_guests(connection: psycopg.Connection[Any]) -> None:
     ).fetchall()
     if rows:
         names = ", ".join(row[0] for row in rows)
-        raise UserError(f"{names} lie in a schema of typed layers, which is made anew: move them to another schema")
+        raise UserError(f"{names} are in a schema of typed layers, which is created again; move them to another schema")
 
 
 def _refuse_dependents(connection: psycopg.Connection[Any]) -> None:
@@ -350,7 +350,7 @@ def _refuse_dependents(connection: psycopg.Connection[Any]) -> None:
     if rows:
         names = ", ".join(row[0] for row in rows)
         raise UserError(
-            f"{names} rest on schema tunnel_api, which is made anew: drop them, run tunneldb init, create them again"
+            f"{names} depend on schema tunnel_api, which is created again; drop them, type tunneldb init, and create them again"
         )
 
 

@@ -1,7 +1,7 @@
-"""The embedded server: a private PostgreSQL cluster of the user's own, that starts by itself.
+"""Embedded server: a private PostgreSQL cluster of the user, started automatically.
 
-It listens on a Unix socket only, in a folder that nobody else may enter, and goes on when the command that
-started it has ended; `tunneldb server stop` stops it.
+It listens only on a Unix socket, in a folder that no other user may enter. It continues to run after the command that
+started it; `tunneldb server stop` stops it.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ State = Literal["absent", "stopped", "running"]
 
 
 class Server:
-    """An embedded server in a folder.
+    """Embedded server in a folder.
 
     Parameters
     ----------
     folder
-        The server's folder; TUNNELDB_HOME or the user's data folder when None.
+        Folder of the server; TUNNELDB_HOME or the user's data folder if None.
     settings
-        PostgreSQL settings on top of those sized to the machine.
+        PostgreSQL settings in addition to those sized to the machine.
     """
 
     def __init__(self, folder: Path | None = None, settings: Mapping[str, str] | None = None) -> None:
@@ -52,12 +52,12 @@ class Server:
         self._extra = dict(settings or {})
 
     def start(self) -> str:
-        """Start the server unless it runs, make what it lacks, and return the DSN of its database.
+        """Start the server unless it is running, create missing parts, and return the DSN of its database.
 
         Raises
         ------
         UserError
-            When PostgreSQL or PostGIS is not installed, or the server does not start.
+            If PostgreSQL or PostGIS is not installed, or the server does not start.
         """
         home = prepare_home(self.folder)
         if not _accepts(home):
@@ -69,7 +69,7 @@ class Server:
         return _prepare_database(home)
 
     def stop(self) -> bool:
-        """Stop the server, and return whether it ran. Connections are closed, their transactions undone."""
+        """Stop the server, and return True if it was running. Connections are closed, their transactions rolled back."""
         if self.state() != "running":
             return False
         home = prepare_home(self.folder)
@@ -78,18 +78,18 @@ class Server:
         return True
 
     def state(self) -> State:
-        """Return whether the server was ever made, is stopped, or runs."""
+        """Return the state of the server: absent, stopped or running."""
         if not (self.folder / "cluster" / "PG_VERSION").exists():
             return "absent"
         return "running" if _accepts(prepare_home(self.folder)) else "stopped"
 
     def home(self) -> Home:
-        """Return the server's folders, made if need be."""
+        """Return the server's folders, made if necessary."""
         return prepare_home(self.folder)
 
     def crash(self) -> str | None:
-        """Return what the server last said before it went down of itself, if that was just now, as of a disk without room."""
-        log = (self.folder / "cluster").resolve().parent / "server.log"  # beside the data, which may lie elsewhere
+        """Return the server's last message before a crash in the last minute, for example because of a full disk."""
+        log = (self.folder / "cluster").resolve().parent / "server.log"  # beside the data, which may be elsewhere
         try:
             if time.time() - log.stat().st_mtime > _JUST_NOW:
                 return None
@@ -101,7 +101,7 @@ class Server:
         return next((line.split(_PANIC, 1)[1].strip() for line in reversed(lines) if _PANIC in line), None)
 
     def _write_settings(self, home: Home) -> None:
-        lines = ["# Written anew at each start, from the machine's size. Your own settings: postgresql.conf"]
+        lines = ["# Rewritten at each start, from the machine's size. Your own settings: postgresql.conf"]
         lines += [f"{name} = {value}" for name, value in (machine.settings(home.run) | self._extra).items()]
         path = home.cluster / _SETTINGS_FILE
         with replacing(path) as temporary:
@@ -111,18 +111,18 @@ class Server:
 
 _PANIC = "PANIC:"
 _JUST_NOW = 60.0  # seconds
-_TAIL = 1 << 16  # bytes of the log that are looked at
+_TAIL = 1 << 16  # bytes of the log that are read
 
 
 def _give(path: Path, home: Home) -> None:
-    """Let the server's user own a file that root has made."""
+    """Make the server's user the owner of a file made by root."""
     if home.user is not None:
         os.chown(path, home.user.pw_uid, home.user.pw_gid)
 
 
 @contextmanager
 def _locked(home: Home) -> Iterator[None]:
-    """Hold the server's lock, so that two commands do not make or start it at once."""
+    """Hold the server's lock, so that two commands do not create or start it at once."""
     with home.lock.open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
@@ -133,7 +133,7 @@ def _dsn(home: Home, database: str, user: str) -> str:
 
 
 def _accepts(home: Home) -> bool:
-    """Return whether the server answers; while it starts or stops, wait until it has made up its mind."""
+    """Return True if the server accepts connections; while it starts or stops, wait for the outcome."""
     deadline = time.monotonic() + _START_SECONDS
     while True:
         answer = pq.PGconn.ping(_dsn(home, "postgres", _SUPERUSER).encode())
@@ -151,11 +151,11 @@ def _pg_ctl(home: Home, binaries: Binaries, *arguments: str) -> subprocess.Compl
 
 
 def _initialise(home: Home) -> Binaries:
-    """Make the cluster unless it is there, and return the programs that fit it."""
+    """Create the cluster unless it exists, and return the matching programs."""
     if (home.cluster / "PG_VERSION").exists():
         return find_binaries(_major(home))
     binaries = find_binaries()
-    # A cluster that was cut off while being made has no PG_VERSION yet, and initdb wants an empty folder.
+    # A cluster whose creation was interrupted has no PG_VERSION yet, and initdb requires an empty folder.
     _empty(home.cluster)
     command = [binaries["initdb"], "-D", str(home.cluster), "-U", _SUPERUSER, "-A", "trust"]
     command += ["--data-checksums", "--encoding=UTF8", "--locale=C"]
@@ -165,8 +165,8 @@ def _initialise(home: Home) -> Binaries:
         raise UserError(f"initdb failed in {home.cluster}: {_reason(result.stderr)}")
     try:
         with (home.cluster / "postgresql.conf").open("a") as settings:
-            settings.write(f"\ninclude '{_SETTINGS_FILE}'\n# Your own settings below win over those of tunneldb:\n")
-    except OSError as error:  # a cluster without that line would be started with settings that are not ours
+            settings.write(f"\ninclude '{_SETTINGS_FILE}'\n# Your own settings below override those of tunneldb:\n")
+    except OSError as error:  # a cluster without that line would start with other settings
         _empty(home.cluster)
         raise UserError(f"{home.cluster}: cannot be written: {error.strerror}") from error
     return binaries
@@ -196,14 +196,14 @@ def _launch(home: Home, binaries: Binaries) -> None:
         with home.log.open(errors="replace") as log:
             log.seek(begin)
             said = log.read()
-        # After a crash of the server's first process, a query may still run: it ends by itself.
+        # After a crash of the server's first process, a query may still be running; it ends by itself.
         if "pre-existing shared memory block" not in said or time.monotonic() > deadline:
             raise UserError(f"the embedded server does not start: {_reason(said)}; see {home.log}")
         time.sleep(0.5)
 
 
 def _reason(log: str) -> str:
-    """Return why the server, or initdb, says that it does not start; of a wrong setting, which."""
+    """Return the reason of the server, or of initdb, for not starting; for a wrong setting, its name."""
     marks = ("invalid value for parameter", "unrecognized configuration parameter", "FATAL:", "PANIC:", "error:")
     lines = log.splitlines()
     found = (line for mark in marks for line in lines if mark in line)
@@ -216,10 +216,10 @@ def _last_line(text: str) -> str:
 
 
 def _clear_stale_pid(home: Home) -> None:
-    """Remove the pid file of a crashed server when its number has gone to another program.
+    """Remove the pid file of a crashed server if its number now belongs to another program.
 
-    PostgreSQL itself removes one whose process is gone. It is kept while any process is at home in the data
-    folder: an orphan of the crashed server may still write there.
+    PostgreSQL itself removes one whose process is gone. It is kept while any process has the data folder as its working
+    directory: an orphan of the crashed server may still write there.
     """
     pid_file = home.cluster / "postmaster.pid"
     try:
@@ -240,7 +240,7 @@ def _clear_stale_pid(home: Home) -> None:
 
 
 def _prepare_database(home: Home) -> str:
-    """Make the database and the present user's role unless they are there; return the DSN."""
+    """Create the database and the current user's role unless they exist; return the DSN."""
     user = getpass.getuser()
     dsn = _dsn(home, DATABASE, user)
     try:

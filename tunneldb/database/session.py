@@ -1,4 +1,4 @@
-"""Sessions of workers: they end soon when the other side is cut off, and leave the other cores to other workers."""
+"""Sessions of workers: they end soon after a lost connection, and leave the other cores to other workers."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ CONNECT: dict[str, Any] = {
     "keepalives_count": 3,
     "tcp_user_timeout": 25_000,
 }
-"""For libpq: a server that is cut off is noticed within 25 s."""
+"""Parameters for libpq: a lost server is noticed within 25 s."""
 
 SETTINGS: LiteralString = """
     SELECT set_config('tcp_keepalives_idle', '10', false), set_config('tcp_keepalives_interval', '5', false),
            set_config('tcp_keepalives_count', '3', false), set_config('tcp_user_timeout', '25s', false),
            set_config('client_connection_check_interval', '10s', false)
 """
-"""The same for the server: a session whose worker is cut off ends, and its locks are free."""
+"""The same settings for the server: a session of a lost worker ends, and its locks are released."""
 
 
 @contextmanager
 def worker_session(dsn: str | None) -> Iterator[psycopg.Connection[Any]]:
-    """Connect for one job; None means the embedded server, which is started if need be.
+    """Connect for one job; None means the embedded server, which is started if necessary.
 
     Raises
     ------
@@ -57,12 +57,12 @@ def connect(dsn: str | None) -> psycopg.Connection[Any]:
     Returns
     -------
     psycopg.Connection
-        In a transaction of its own (no autocommit), idle.
+        Connection in transaction mode (no autocommit), idle.
 
     Raises
     ------
     UserError
-        When the server is down, has no PostGIS, or its schema is absent, older or newer than this program's.
+        If the server is down, has no PostGIS, or its schema is missing, older or newer than this program's.
     """
     from tunneldb.database.schema import require_current_schema
 
@@ -78,7 +78,7 @@ def connect(dsn: str | None) -> psycopg.Connection[Any]:
 
 @contextmanager
 def snapshot(connection: psycopg.Connection[Any]) -> Iterator[None]:
-    """Read what the database holds at one moment, for the length of a with block: what others commit meanwhile is not seen.
+    """Read the database as of one moment within a with block; later commits of others are not visible.
 
     The connection must be idle.
     """

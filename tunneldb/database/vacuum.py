@@ -1,4 +1,4 @@
-"""Room that deleted and replaced rows take until a VACUUM, and the VACUUM."""
+"""Space of deleted and replaced rows, and VACUUM."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from psycopg.rows import class_row
 from tunneldb.errors import UserError
 
 _LOCKED = psycopg.errors.LockNotAvailable.sqlstate
-_MAINTAIN = 170000  # version of PostgreSQL from which on somebody else than the owner may be given the right
+_MAINTAIN = 170000  # first version of PostgreSQL in which others than the owner can have the right
 
 
 @dataclass(frozen=True)
 class DeadRows:
-    """A table with rows that nobody can see any more, or without statistics.
+    """Table with dead rows, or without statistics.
 
     Attributes
     ----------
     schema, table : str
     live, dead : int
-        Rows, as the server's statistics have them; dead ones with those of long values.
+        Numbers of rows, by the server's statistics; dead ones include those of long values.
     dead_bytes : int
-        What the dead rows take, at the mean length of the table's rows.
+        Size of the dead rows, at the mean length of the table's rows.
     bytes : int
-        The whole table on disk, with indexes and long values.
+        Size of the whole table on disk, with indexes and long values.
     analyzed : bool
-        Whether it has statistics for the planner.
+        True if it has statistics for the planner.
     allowed : bool
-        Whether who is connected may vacuum it.
+        True if the current user may vacuum it.
     """
 
     schema: str
@@ -47,7 +47,7 @@ class DeadRows:
 
 
 def tables_to_vacuum(conn: psycopg.Connection[Any]) -> list[DeadRows]:
-    """Tables of the schemas with dead rows, or never analyzed though not empty; those that take most first."""
+    """Return tables of the schemas with dead rows, or non-empty ones never analyzed; the largest amounts first."""
     maintain = " OR has_table_privilege(c.oid, 'MAINTAIN')" if conn.info.server_version >= _MAINTAIN else ""
     query = sql.SQL(
         """
@@ -78,16 +78,16 @@ def tables_to_vacuum(conn: psycopg.Connection[Any]) -> list[DeadRows]:
 def vacuum(
     conn: psycopg.Connection[Any], tables: Sequence[DeadRows], begin: Callable[[str, float | None], Callable[[float], None]]
 ) -> list[DeadRows]:
-    """VACUUM (ANALYZE) tables one by one; return those that others had locked, which are left as they are.
+    """VACUUM (ANALYZE) tables one by one; return those locked by others, which are left unchanged.
 
     Parameters
     ----------
     conn : Connection
-        Idle; VACUUM runs in no transaction, so the connection commits each by itself from now on.
+        Idle connection; VACUUM runs outside transactions, so the connection is in autocommit mode from now on.
     tables : sequence of DeadRows
-        Those that are not allowed are left out.
+        Tables; those that are not allowed are skipped.
     begin : callable
-        Takes a text and the bytes of all tables, and returns what is given the bytes of each when it is done.
+        Function of a text and the bytes of all tables; it returns a function of the bytes of each completed table.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def vacuum(
     own = [table for table in tables if table.allowed]
     if tables and not own:
         raise UserError(
-            f"{conn.info.user} owns none of the {len(tables)} tables, and only owners may vacuum: ask the database's owner, or"
+            f"{conn.info.user} owns none of the {len(tables)} tables, and only owners may vacuum; ask the database's owner, or"
             " for the role tunnel_operator"
         )
     conn.autocommit = True

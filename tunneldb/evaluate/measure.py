@@ -1,4 +1,4 @@
-"""Found leaks against true ones, as polygons of the unrolled plane: pure arithmetic."""
+"""Comparison of detected leaks with reference leaks as polygons of the unrolled plane, without input or output."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from shapely.geometry.base import BaseGeometry
 
 from tunneldb.arrays import Bool, Float, Int64
 
-HALF = 0.5
-"""A true leak is found if so much of its area is, and a found one is right if so much of its area is true: the overlap that
-PASCAL VOC (Everingham et al., 2010) and COCO (Lin et al., 2014) ask for, each way by itself, since detection may divide a leak
+MIN_OVERLAP = 0.5
+"""Share of its area from which a true leak counts as found, or a found leak as right. This is the overlap of PASCAL VOC
+(Everingham et al., 2010) and COCO (Lin et al., 2014), applied in each direction separately, since detection may divide a leak
 or join two."""
 
 STEP = 0.01
-"""Distance of the points on outlines at which the distance of edges is taken, m."""
+"""Distance between points on outlines at which the distance of edges is measured, m."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """True leaks that are demanded (n) and found leaks that count (m), each with what it has in common with the others.
+    """Required true leaks (n) and found leaks that count (m), each with its overlap with the others.
 
     Attributes
     ----------
     true, found : (n,) and (m,) int arrays
-        Their numbers in what was given.
+        Their indices in the input.
     true_shape, found_shape : (n,) and (m,) arrays of polygons
-        Within the stretch; found ones without what lies on true leaks too small to be demanded.
+        Shapes within the stretch; found ones without the parts on true leaks that are too small to be required.
     true_area, found_area : (n,) and (m,) float arrays
-        m².
+        Areas, m².
     covered, right : (n,) and (m,) float arrays
-        Share of a true leak that is found, and of a found leak that is true, 0 to 1.
+        Share of a true leak that is found, and share of a found leak that is true, 0 to 1.
     true_group, found_group : (n,) and (m,) int arrays
-        Leaks that touch, from one to the next, are of one group; -1 for those that touch none.
+        Group of connected leaks that touch each other; -1 for leaks that touch none.
     iou : (n,) float array
-        Intersection over union of the leak's group; 0 for a leak that none touches.
+        Intersection over union of the leak's group; 0 for a leak that touches none.
     area_error : (n,) float array
-        |found - true| / true area of the leak's group; NaN for a leak that none touches.
+        |found - true| / true area of the leak's group; NaN for a leak that touches none.
     edges : list of float arrays
-        For each group, distances between the outlines of its found and its true leaks, both ways, m.
+        Distances between the outlines of found and true leaks of each group, in both directions, m.
     """
 
     true: Int64
@@ -64,28 +64,28 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Figures:
-    """What a detection is worth; NaN where there is nothing to take a figure of.
+    """Figures of merit of a detection; NaN if undefined.
 
     Attributes
     ----------
     true, touched, found : int
-        True leaks; those that any found leak touches; those at least half of which is found.
+        Numbers of true leaks; of those that touch a found leak; of those found by at least half.
     called, right, false : int
-        Found leaks; those at least half of which is true; those that touch no true leak at all.
+        Numbers of found leaks; of those that are true by at least half; of those that touch no true leak.
     recall, precision, f1 : float
         found / true, right / called, and their harmonic mean.
     iou : float
-        Mean over the true leaks of the intersection over union of their groups; 0 for a leak that none touches.
+        Mean over the true leaks of the intersection over union of their groups; 0 for a leak that touches none.
     true_area, found_area : float
         Area of the union of all true and of all found leaks, m².
     area_recall, area_precision, area_f1, area_iou : float
-        Share of the true area that is found, share of the found area that is true, and F1 and IoU that follow from the two.
+        Share of the true area that is found, share of the found area that is true, and F1 and IoU derived from these.
     area_error, area_error_p95 : float
-        Median and 95 % quantile of |found - true| / true area, over the leaks that are touched.
+        Median and 95 % quantile of |found - true| / true area, over the touched leaks.
     edge, edge_p95 : float
-        Median and 95 % quantile of the distance between found and true outlines, both ways, m.
+        Median and 95 % quantile of the distance between found and true outlines, in both directions, m.
     false_per_1000 : float
-        False leaks for each 1000 m² of lining that was seen; NaN in groups of leaks, whose lining is not known.
+        Number of false leaks per 1000 m² of inspected lining; NaN for groups of leaks, whose lining is unknown.
     """
 
     true: int
@@ -119,25 +119,25 @@ def compare(
     progress: Callable[[float], None] = lambda count: None,
     asked: Bool | None = None,
 ) -> Comparison:
-    """Hold found leaks, or what else is found, against true ones.
+    """Compare found leaks (or other found objects) with true ones.
 
-    True leaks smaller than ``min_area`` are neither demanded nor do they harm: what is found of them is left out, and so is
-    a found leak that touches only such ones. A found leak smaller than ``min_area`` counts only where it touches a leak that
-    is demanded. Leaks that touch are of one group: one that was found in pieces with its pieces, and two that were found as
-    one with it. Area and edges are compared group by group.
+    True leaks smaller than ``min_area`` are not required: the found area on them is ignored, and so is a found leak that
+    touches only such leaks. A found leak smaller than ``min_area`` counts only if it touches a required leak. Leaks that touch
+    are one group, for example a leak found in several pieces, or two leaks found as one. Area and edges are compared group by
+    group.
 
     Parameters
     ----------
     true, found : sequences of Polygon or MultiPolygon
-        Valid, in the unrolled plane, m. A leak of several parts is one.
+        Valid polygons in the unrolled plane, m. A leak of several parts is one polygon.
     min_area : float
-        m².
+        Least area of a required leak, m².
     stretch : Polygon or MultiPolygon, optional
-        Leaks are cut to it. Its own edges are no edges of leaks.
+        Area to which leaks are cut. Its own edges are not edges of leaks.
     progress : callable
-        Given how many leaks, of both, were compared since it was called last; all of them in the end.
+        Function of the number of leaks compared since the last call; the total is the number of all leaks.
     asked : (n,) bool array, optional
-        Which true leaks may be demanded, as far as ``min_area`` goes; the others are treated as too small.
+        True for true leaks that may be required, subject to ``min_area``; others are treated as too small.
     """
     whole, called = _cut(true, stretch), _cut(found, stretch)
     areas, called_areas = shapely.area(whole), shapely.area(called)
@@ -173,21 +173,21 @@ def compare(
 
 
 def figures(comparison: Comparison, seen: float = np.nan, true: Bool | None = None, found: Bool | None = None) -> Figures:
-    """Sum a comparison up.
+    """Return the figures of a comparison.
 
     Parameters
     ----------
     comparison : Comparison
-        Of n true and m found leaks.
+        Comparison of n true and m found leaks.
     seen : float
-        Lining that was seen, m².
+        Inspected lining, m².
     true, found : (n,) and (m,) bool arrays, optional
-        Only these leaks; each is still held against all of the others.
+        Leaks to include; each is still compared with all of the others.
     """
     c = comparison
     own = np.ones(len(c.true), np.bool_) if true is None else true
     theirs = np.ones(len(c.found), np.bool_) if found is None else found
-    hit, right = own & (c.covered >= HALF), theirs & (c.right >= HALF)
+    hit, right = own & (c.covered >= MIN_OVERLAP), theirs & (c.right >= MIN_OVERLAP)
     false = theirs & (c.found_group < 0)
     all_true, all_found = shapely.union_all(c.true_shape), shapely.union_all(c.found_shape)
     demanded, called = shapely.union_all(c.true_shape[own]), shapely.union_all(c.found_shape[theirs])
@@ -224,7 +224,7 @@ def figures(comparison: Comparison, seen: float = np.nan, true: Bool | None = No
 
 
 def _cut(shapes: Sequence[BaseGeometry], stretch: BaseGeometry | None) -> NDArray[np.object_]:
-    """Polygons within a stretch; empty ones where nothing of them is."""
+    """Return polygons cut to a stretch; empty ones outside it."""
     out = np.empty(len(shapes), dtype=object)
     out[:] = list(shapes)
     if stretch is None:
@@ -237,14 +237,14 @@ def _cut(shapes: Sequence[BaseGeometry], stretch: BaseGeometry | None) -> NDArra
 
 
 def _touching(one: NDArray[np.object_], other: NDArray[np.object_]) -> tuple[Int64, Int64]:
-    """Pairs that have some area in common: numbers in the first and in the second."""
+    """Return pairs with a common area: indices in the first and in the second."""
     b, a = shapely.STRtree(one).query(other, predicate="intersects") if len(one) else np.empty((2, 0), np.int64)
     shared = shapely.area(shapely.intersection(one[a], other[b])) > 0.0
     return a[shared], b[shared]
 
 
 def _shares(shapes: NDArray[np.object_], others: NDArray[np.object_], a: Int64, b: Int64) -> Float:
-    """Share of each polygon's area that the others of its pairs cover."""
+    """Return the share of each polygon's area that the others of its pairs cover."""
     share = np.zeros(len(shapes))
     for k in np.unique(a):
         shared = shapely.intersection(shapes[k], shapely.union_all(others[b[a == k]]))
@@ -253,7 +253,7 @@ def _shares(shapes: NDArray[np.object_], others: NDArray[np.object_], a: Int64, 
 
 
 def _groups(true: int, found: int, t: Int64, f: Int64) -> tuple[int, Int64, Int64]:
-    """How many groups of leaks that touch there are, and the number of each leak's, -1 for one that touches none."""
+    """Return the number of groups of leaks that touch, and the group of each leak, -1 for one that touches none."""
     _, label = connected_components(coo_array((np.ones(len(t)), (t, true + f)), shape=(true + found,) * 2), directed=False)
     kept = np.unique(label[t])
     number = np.where(np.isin(label, kept), np.searchsorted(kept, label), -1).astype(np.int64)
@@ -261,9 +261,9 @@ def _groups(true: int, found: int, t: Int64, f: Int64) -> tuple[int, Int64, Int6
 
 
 def _edges(true: BaseGeometry, found: BaseGeometry, small: NDArray[np.object_], stretch: BaseGeometry | None) -> Float:
-    """Distances of points of the found outline from the true one, and the other way round, m.
+    """Return the distances of points of the found outline from the true one, and vice versa, m.
 
-    Where the found leak reaches over one that is too small to be demanded, that one's outline serves, too.
+    Where the found leak extends over one that is too small to be required, that one's outline is used, too.
     """
     near = shapely.union_all([true, *small[shapely.intersects(small, found)]])
     here, there = _points(found.boundary), _points(true.boundary)
@@ -273,7 +273,7 @@ def _edges(true: BaseGeometry, found: BaseGeometry, small: NDArray[np.object_], 
 
 
 def _points(outline: BaseGeometry) -> NDArray[np.object_]:
-    """Points along the rings of an outline, evenly."""
+    """Return evenly spaced points along the rings of an outline."""
     parts = []
     for ring in shapely.get_parts(outline):
         count = max(round(ring.length / STEP), 1)
@@ -286,7 +286,7 @@ def _ratio(part: float, whole: float) -> float:
 
 
 def _harmonic(a: float, b: float) -> float:
-    """F1 of recall and precision: 0 where either is 0 or has nothing to be taken of, NaN where both have nothing."""
+    """Return F1 of recall and precision: 0 if either is 0 or undefined, NaN if both are undefined."""
     if np.isnan(a) and np.isnan(b):
         return np.nan
     return 2.0 * a * b / (a + b) if a > 0.0 and b > 0.0 else 0.0

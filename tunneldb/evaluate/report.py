@@ -13,10 +13,10 @@ import shapely
 
 from tunneldb.arrays import Float
 from tunneldb.csvfile import write_csv
-from tunneldb.evaluate.measure import HALF, Comparison, Figures, figures
+from tunneldb.evaluate.measure import MIN_OVERLAP, Comparison, Figures, figures
 
 DISTANCES = (5.0, 10.0)
-"""Limits between groups of leaks by the distance from the nearest scanner position, m."""
+"""Limits of groups of leaks by distance from the nearest scanner position, m."""
 
 COUNT_HEADER = ("true", "touched", "found", "recall", "called", "right", "false", "precision", "F1", "IoU")
 AREA_HEADER = (
@@ -26,22 +26,22 @@ AREA_HEADER = (
 
 @dataclass(frozen=True)
 class Subject:
-    """What is held against a truth, and how it is told.
+    """Objects that are compared with reference data, with their terms.
 
     Attributes
     ----------
     name : str
-        Of several.
+        Name of several objects, plural.
     surface : str
-        On what they are sought.
+        Name of the surface on which they are detected.
     square_metres : int
-        Area to which false ones are told.
+        Reference area for the number of false ones, m².
     sizes : tuple of float
-        Limits between groups by area, m².
+        Limits of groups by area, m².
     decimals : int
-        Of areas, m².
+        Decimals of areas in m².
     place : dict of str to (str, str)
-        Heading and format of what tells the place of one.
+        Heading and format of each column that gives the place.
     """
 
     name: str
@@ -53,12 +53,12 @@ class Subject:
 
     @property
     def count_header(self) -> tuple[str, ...]:
-        """Headings of `count_rows`."""
+        """Column headings of `count_rows`."""
         return (self.name, *COUNT_HEADER)
 
     @property
     def list_header(self) -> tuple[str, ...]:
-        """Headings of `list_rows`."""
+        """Column headings of `list_rows`."""
         return ("", "id", *(heading for heading, _ in self.place.values()), "area m²", "of it", "distance m")
 
 
@@ -68,25 +68,25 @@ SPOTS = Subject("spots", "faces", 100, (0.03, 0.1), 4, {"member": ("member", "d"
 
 @dataclass(frozen=True)
 class Item:
-    """A leak or spot that was held against the others.
+    """Leak or spot that was compared with the others.
 
     Attributes
     ----------
     id : str
-        What its file or the database calls it.
+        Identifier in its file or in the database.
     place : dict
-        Where it is: of a leak chainage and arc of a point inside it, m; of a spot member and face, None where it lies on none,
-        and x, y and z of a point inside it, m.
+        Place: for a leak, chainage and arc of a point inside it, m; for a spot, member and face (None if it is on none), and x,
+        y and z of a point inside it, m.
     area : float
-        m².
+        Area, m².
     share : float
-        Share of it that is found, of a true leak, or that is true, of a found one.
+        Share that is found, for a true leak; share that is true, for a found one.
     touched : bool
-        Whether it touches any of the others.
+        True if it touches any of the others.
     iou, area_error : float or None
-        Of the true leak's group; None where it has none.
+        Values of the true leak's group; None if it has none.
     distance : float or None
-        From the nearest scanner position, m.
+        Distance from the nearest scanner position, m.
     """
 
     id: str
@@ -101,16 +101,16 @@ class Item:
 
 @dataclass(frozen=True)
 class Report:
-    """An evaluation.
+    """Result of an evaluation.
 
     Attributes
     ----------
     groups : dict of str to Figures
-        Of all leaks under ``all``, then by size, then by distance.
+        Figures of all leaks under ``all``, then by size, then by distance.
     true, found : list of Item
-        True leaks that are demanded and found leaks that count.
+        Required true leaks, and found leaks that count.
     seen : float
-        Lining that was seen, m².
+        Inspected lining, m².
     subject : Subject
     """
 
@@ -122,13 +122,13 @@ class Report:
 
     @property
     def missed(self) -> list[Item]:
-        """True leaks of which less than half was found."""
-        return [leak for leak in self.true if leak.share < HALF]
+        """True leaks that were found by less than half."""
+        return [leak for leak in self.true if leak.share < MIN_OVERLAP]
 
     @property
     def wrong(self) -> list[Item]:
-        """Found leaks of which less than half is true; those that touch no true leak are false."""
-        return [leak for leak in self.found if leak.share < HALF]
+        """Found leaks that are true by less than half; those that touch no true leak are false."""
+        return [leak for leak in self.found if leak.share < MIN_OVERLAP]
 
 
 def make_report(
@@ -141,24 +141,24 @@ def make_report(
     subject: Subject = LEAKS,
     places: tuple[Sequence[dict[str, Any]], Sequence[dict[str, Any]]] | None = None,
 ) -> Report:
-    """Sum a comparison up, for all leaks and by groups.
+    """Return the figures of a comparison, for all leaks and by groups.
 
     Parameters
     ----------
     comparison : Comparison
-        Of n true and m found leaks.
+        Comparison of n true and m found leaks.
     true_ids, found_ids : sequences of str
-        Of all leaks that were given to the comparison.
+        Identifiers of all leaks that were compared.
     distances : two float arrays
-        Of the n true and the m found leaks from the nearest scanner position, m.
+        Distances of the n true and the m found leaks from the nearest scanner position, m.
     min_area : float
-        m²; the first group by size begins there.
+        Lower limit of the first group by size, m².
     seen : float
-        Lining that was seen, m².
+        Inspected lining, m².
     subject : Subject
-        What they are; here they are called leaks.
+        Kind of the objects; called leaks here.
     places : two sequences of dict, optional
-        Of the n true and the m found leaks; by default chainage and arc, of shapes in the unrolled plane.
+        Places of the n true and the m found leaks; by default chainage and arc of shapes in the unrolled plane.
     """
     c = comparison
     if places is None:
@@ -189,7 +189,7 @@ def make_report(
 
 
 def _ranges(first: float, limits: Sequence[float], unit: str) -> list[tuple[str, float, float]]:
-    """Names and limits of groups from a first value on; the first group takes in what is less."""
+    """Return names and limits of groups from a first value on; the first group includes smaller values."""
     edges = [first, *(limit for limit in limits if limit > first)]
     ends = [*edges[1:], math.inf]
     return [
@@ -213,7 +213,7 @@ def _item(
 
 
 def count_rows(report: Report) -> list[list[str]]:
-    """How many leaks were found, group by group."""
+    """Return the numbers of found leaks, group by group."""
     return [
         [name, str(f.true), str(f.touched), str(f.found), _share(f.recall), str(f.called), str(f.right), str(f.false),
          _share(f.precision), _share(f.f1), _share(f.iou)]
@@ -222,7 +222,7 @@ def count_rows(report: Report) -> list[list[str]]:
 
 
 def area_rows(report: Report) -> list[list[str]]:
-    """How much of their area was found, and how near to their edges, group by group."""
+    """Return the found area and the accuracy of edges, group by group."""
     size = report.subject.decimals
     return [
         [name, f"{f.true_area:.{size}f}", f"{f.found_area:.{size}f}", _share(f.area_recall), _share(f.area_precision),
@@ -233,7 +233,7 @@ def area_rows(report: Report) -> list[list[str]]:
 
 
 def list_rows(report: Report) -> list[list[str]]:
-    """True leaks that were missed, and found ones that are wrong."""
+    """Return the true leaks that were missed, and the found ones that are wrong."""
     rows, subject = [], report.subject
     for what, leaks in (("missed", report.missed), ("wrong", report.wrong)):
         for leak in leaks:
@@ -245,19 +245,19 @@ def list_rows(report: Report) -> list[list[str]]:
 
 
 def false_line(report: Report) -> str:
-    """Say how many false leaks there are for each 1000 m² of lining, or what else they are and lie on."""
+    """Return the number of false leaks per 1000 m² of lining, or of other objects on another surface."""
     of_all, subject = report.groups["all"], report.subject
     if not math.isfinite(of_all.false_per_1000):
-        return f"{of_all.false} false {subject.name}; how much {subject.surface} was seen is not known"
+        return f"{of_all.false} false {subject.name}; the inspected area of {subject.surface} is unknown"
     false = of_all.false_per_1000 * subject.square_metres / 1000.0
     return (
-        f"{false:.2f} false {subject.name} for each {subject.square_metres} m² of the {report.seen:.0f} m² of"
-        f" {subject.surface} that were seen"
+        f"{false:.2f} false {subject.name} per {subject.square_metres} m² of the {report.seen:.0f} m² of"
+        f" inspected {subject.surface}"
     )
 
 
 def as_values(report: Report, about: dict[str, Any]) -> dict[str, Any]:
-    """Return all figures, and each leak, as plain values; what can't be told is None."""
+    """Return all figures, and each leak, as plain values; undefined values are None."""
     return {
         **about,
         "seen_m2": _known(report.seen),
@@ -268,12 +268,12 @@ def as_values(report: Report, about: dict[str, Any]) -> dict[str, Any]:
 
 
 def as_json(report: Report, about: dict[str, Any]) -> str:
-    """Write all figures, and each leak, as JSON; what can't be told is null."""
+    """Return all figures, and each leak, as JSON; undefined values are null."""
     return json.dumps(as_values(report, about), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
 
 
 def as_csv(report: Report) -> str:
-    """Write the figures as CSV, a row for each group; what can't be told is empty."""
+    """Return the figures as CSV, a row per group; undefined values are empty."""
     names = ["group", *(field.name for field in fields(Figures))]
     return write_csv(names, ([name, *_plain(of).values()] for name, of in report.groups.items()))
 

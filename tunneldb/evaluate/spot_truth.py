@@ -1,4 +1,4 @@
-"""True spots of a structure from a file: polygons in space, or what ``simulate-structure`` writes."""
+"""Reference spots of a structure from a file: polygons in space, or the output of ``simulate-structure``."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from tunneldb.evaluate.truth import read_polygons
 from tunneldb.geometry.crs import LOCAL, srid_name
 from tunneldb.store.survey import Survey
 
-FEWEST, STEEPEST = 100, 75.0
-"""Simulated spots of fewer points, or seen at more degrees of incidence in the median, are not demanded."""
+MIN_POINTS, MAX_INCIDENCE = 100, 75.0
+"""Limits for required simulated spots: least number of points, and greatest median angle of incidence, degrees."""
 
 
 @dataclass(frozen=True)
 class SpotTruth:
-    """True spots.
+    """Reference spots.
 
     Attributes
     ----------
     ids : list of str
     shapes : list of Polygon or MultiPolygon
-        With Z, in the survey's system, m.
+        Polygons with Z, in the survey's system, m.
     asked : (n,) bool array
-        Which of them can be demanded: of a simulated one it is known how it was seen.
+        True for spots that can be required; for simulated ones the visibility is known.
     """
 
     ids: list[str]
@@ -41,12 +41,12 @@ class SpotTruth:
 
 
 def read_spot_truth(survey: Survey, path: Path, layer: str | None = None) -> SpotTruth:
-    """Read true spots from a ``.truth.json`` of ``simulate-structure``, or 3D polygons from a GeoPackage or GeoJSON file.
+    """Read reference spots from a ``.truth.json`` of ``simulate-structure``, or 3D polygons from GeoPackage or GeoJSON.
 
     Parameters
     ----------
     survey : Survey
-        In whose system they lie.
+        Survey whose coordinate system they must have.
     path : Path
     layer : str, optional
         Layer to read; by default the only one, or ``spot``.
@@ -54,41 +54,41 @@ def read_spot_truth(survey: Survey, path: Path, layer: str | None = None) -> Spo
     Raises
     ------
     InputError
-        The file can't be read or holds no polygon, they are in another coordinate system or have no heights.
+        If the file can't be read or has no polygon, or polygons are in another coordinate system or have no heights.
     """
     simulated = _simulated(path)
     if simulated is not None:
         try:
             return _of_simulation(survey, path, simulated)
         except (LookupError, TypeError, ValueError, AttributeError, shapely.errors.ShapelyError) as error:
-            raise InputError(f"{path} is no truth of simulate-structure: {error!r}") from error
+            raise InputError(f"{path} is not a truth file of simulate-structure: {error!r}") from error
     given = read_polygons(path, survey, layer, "spot")
     if not given.in_space and survey.srid != LOCAL:
-        raise InputError(f"{given.where} has no coordinate system: polygons of spots must be 3D, in {srid_name(survey.srid)}")
+        raise InputError(f"{given.where} has no coordinate system; polygons of spots must be 3D, in {srid_name(survey.srid)}")
     for key, shape in zip(given.ids, given.shapes, strict=True):
         if not shape.has_z:
-            raise InputError(f"{given.naming(key)} has no heights: polygons of spots must be 3D, on their surface")
+            raise InputError(f"{given.naming(key)} has no heights; polygons of spots must be 3D, on their surface")
     return SpotTruth(given.ids, list(given.shapes), np.ones(len(given.ids), np.bool_))
 
 
 def _simulated(path: Path) -> dict[str, Any] | None:
-    """Content of a truth that ``simulate-structure`` wrote; None for other files."""
+    """Return the content of a truth file of ``simulate-structure``; None for other files."""
     if path.suffix.lower() != ".json" or not path.is_file():
         return None
     try:
         content = json.loads(path.read_text("utf-8"))
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is no JSON: {error}") from None
+        raise InputError(f"{path} is not JSON: {error}") from None
     return content if isinstance(content, dict) and "anomalies" in content and "parameters" in content else None
 
 
 def _of_simulation(survey: Survey, path: Path, content: dict[str, Any]) -> SpotTruth:
     srid = content["parameters"]["srid"]
     if survey.srid not in (srid, LOCAL):
-        raise InputError(f"{path} is in EPSG:{srid}, survey {survey.name} in {srid_name(survey.srid)}")
+        raise InputError(f"{path} is in EPSG:{srid}, but survey {survey.name} in {srid_name(survey.srid)}")
     rows = [row for row in content["anomalies"] if row["points"]]
     if not rows:
-        raise InputError(f"{path} has no anomaly that the scanner saw: there is nothing to compare with")
-    asked = [row["points"] >= FEWEST and row["incidence"][1] <= STEEPEST for row in rows]
+        raise InputError(f"{path} has no anomaly visible to the scanner; there is nothing to compare with")
+    asked = [row["points"] >= MIN_POINTS and row["incidence"][1] <= MAX_INCIDENCE for row in rows]
     shapes = [shapely.force_3d(Polygon(row["outline_3d"])) for row in rows]
     return SpotTruth([str(row["id"]) for row in rows], list(shapes), np.array(asked, np.bool_))

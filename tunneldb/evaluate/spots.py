@@ -1,4 +1,4 @@
-"""The spots of a survey held against true ones."""
+"""Comparison of the spots of a survey with reference spots."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from tunneldb.store.survey import Survey
 
 @dataclass(frozen=True)
 class SpotEvaluation:
-    """The spots of a survey held against true ones.
+    """Comparison of the spots of a survey with reference spots.
 
     Attributes
     ----------
     report : Report
     not_asked : int
-        True spots that were seen too little to be demanded.
+        Number of true spots that were not visible enough to be required.
     true_area, on_faces : float
-        Area of all true spots, and what of it lies on faces that were found, m².
+        Area of all true spots, and of their part on detected faces, m².
     statement : str or None
-        For what the list of spots can't be vouched for.
+        Limitation of the list of spots.
     """
 
     report: Report
@@ -49,28 +49,28 @@ class SpotEvaluation:
 def evaluate_spots(
     conn: psycopg.Connection[Any], survey: Survey, path: Path, layer: str | None, min_area: float
 ) -> SpotEvaluation:
-    """Hold the spots that were found last, or confirmed, and not rejected against those of a file.
+    """Compare spots of the last run, or confirmed ones, that are not rejected with those of a file.
 
-    All are laid on the faces that were found, and compared there.
+    All are projected onto the detected faces, and compared there.
 
     Parameters
     ----------
     conn, survey
-        Where from.
+        Database and survey.
     path, layer
-        The truth; see `read_spot_truth`.
+        Reference data; see `read_spot_truth`.
     min_area : float
-        Smaller true spots are neither demanded nor do they harm, m².
+        Least area of a required spot; smaller ones are ignored, m².
 
     Raises
     ------
     UserError
-        If spots were not searched for, or the truth can't be used.
+        If spots were not searched for, or the reference data can't be used.
     """
     truth = read_spot_truth(survey, path, layer)
     listed = read_spots(conn, survey, "3d")
     if not listed.searched and not listed.face_area:
-        raise NotReadyError(f"spots were not searched for in survey {survey.name}: tunneldb members {survey.name}")
+        raise NotReadyError(f"spots were not searched for in survey {survey.name}; type tunneldb members {survey.name}")
     rows = [row for row in listed.rows if row.review != "rejected"]
     origin = np.floor(shapely.get_coordinates(truth.shapes, include_z=True).mean(axis=0))
     faces = _read_faces(conn, survey, origin)
@@ -100,7 +100,7 @@ def evaluate_spots(
 
 
 def _read_faces(conn: psycopg.Connection[Any], survey: Survey, origin: Float) -> list[FoundFace]:
-    """Faces of a survey, with models that count from an origin."""
+    """Read the faces of a survey, with models relative to an origin."""
     rows = conn.execute(
         "SELECT number, member, origin, axis, radius, inside, across, public.ST_AsBinary(outline) FROM tunnel_api.face"
         " WHERE survey_id = %s ORDER BY number",
@@ -114,7 +114,7 @@ def _read_faces(conn: psycopg.Connection[Any], survey: Survey, origin: Float) ->
 
 
 def _lay_found(rows: list[ListedSpot], faces: list[FoundFace], origin: Float) -> list[Laid]:
-    """Found spots on their faces; one that an inspector confirmed and the last run did not find again where it lies."""
+    """Project found spots onto their faces; a confirmed one that the last run did not find again keeps its place."""
     at = {face.number: k for k, face in enumerate(faces)}
     out = []
     for row in rows:
@@ -128,7 +128,7 @@ def _lay_found(rows: list[ListedSpot], faces: list[FoundFace], origin: Float) ->
 
 
 def _place(laid: Laid, faces: list[FoundFace], xyz: Float) -> dict[str, Any]:
-    """Member, face and coordinates of a spot."""
+    """Return member, face and coordinates of a spot."""
     k = max(laid.parts, key=lambda one: one[1].area)[0]
     face = None if k is None else faces[k]
     x, y, z = (round(float(value), 3) for value in xyz)

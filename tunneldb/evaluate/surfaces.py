@@ -1,4 +1,4 @@
-"""Polygons in space laid on the faces that they lie on, and all faces on one plane, to be compared there: pure arithmetic."""
+"""Projection of polygons in space onto faces, and of all faces onto one plane for comparison, without input or output."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from tunneldb.arrays import Float
 from tunneldb.structures.models import RADIUS, to_space, unroll
 from tunneldb.structures.reconcile import NEAR
 
-BESIDE = 0.005
-"""Of faces one behind the other it lies on the nearest, and on those that are no more than this farther off, m."""
+MAX_FACE_DISTANCE = 0.005
+"""Distance behind the nearest face up to which a polygon is on a face, too, m."""
 
-_LEAST = 1e-6  # m²; what is smaller comes of rounding
-_APART = 1.0  # m between faces on the plane
+_MIN_AREA = 1e-6  # m²; smaller areas are rounding errors
+_FACE_SPACING = 1.0  # m between faces on the plane
 
 
 @dataclass(frozen=True)
 class FoundFace:
-    """A face that was found.
+    """Detected face.
 
     Attributes
     ----------
     number, member : int
-        As in the survey.
+        Numbers in the survey.
     model : (11,) float array
-        See `structures.models`, m.
+        Model as in `structures.models`, m.
     outline : MultiPolygon
-        Unrolled, m.
+        Unrolled outline, m.
     """
 
     number: int
@@ -45,14 +45,14 @@ class FoundFace:
 
 @dataclass(frozen=True)
 class Laid:
-    """A polygon laid on faces.
+    """Polygon projected onto faces.
 
     Attributes
     ----------
     parts : list of (int or None, geometry)
-        On which face, by its place in the list, and its part there in unrolled coordinates, m; None for a plane of its own.
+        Index of the face, and the part on it in unrolled coordinates, m; None for a plane of its own.
     on_faces : float
-        Area of what lies within the outlines of faces, m².
+        Area within the outlines of faces, m².
     """
 
     parts: list[tuple[int | None, BaseGeometry]]
@@ -60,19 +60,19 @@ class Laid:
 
 
 def lay_on_face(shape: BaseGeometry, face: FoundFace) -> BaseGeometry:
-    """Unroll a polygon in space on a face, whatever its distance from it; m."""
+    """Unroll a polygon in space on a face, at any distance from it; m."""
     return shapely.union_all([_unrolled(part, face.model) for part in shapely.get_parts(shape)])
 
 
 def lay_on_faces(shape: BaseGeometry, faces: Sequence[FoundFace]) -> Laid:
-    """Lay a polygon in space on those faces whose outlines it reaches into.
+    """Project a polygon in space onto the faces whose outlines it overlaps.
 
-    What of it lies on no face stays with the face that it has most in common with; a polygon on none gets a plane of its own.
+    A part outside all faces stays with the face that shares most of the polygon; a polygon on no face gets its own plane.
 
     Parameters
     ----------
     shape : Polygon or MultiPolygon
-        With Z, m, in the models' coordinates.
+        Polygon with Z, m, in the models' coordinates.
     faces : sequence of FoundFace
     """
     at = shapely.get_coordinates(shape, include_z=True)
@@ -83,29 +83,29 @@ def lay_on_faces(shape: BaseGeometry, faces: Sequence[FoundFace]) -> Laid:
             continue
         flat = lay_on_face(shape, face)
         shared = shapely.intersection(flat, face.outline)
-        if shared.area > _LEAST:
+        if shared.area > _MIN_AREA:
             near.append((float(np.median(off)), k, flat, shared))
     if not near:
         return Laid([(None, _own_plane(shape))], 0.0)
     near.sort(key=lambda one: one[:2])
-    near = [one for one in near if one[0] <= near[0][0] + BESIDE]
+    near = [one for one in near if one[0] <= near[0][0] + MAX_FACE_DISTANCE]
     home = max(near, key=lambda one: one[3].area)
     parts: dict[int, BaseGeometry] = {}
     covered: BaseGeometry = Polygon()
     for _, k, _, shared in near:
         own = shared if covered.is_empty else shapely.difference(shared, _moved(covered, faces[home[1]], faces[k]))
-        if own.area > _LEAST:
+        if own.area > _MIN_AREA:
             parts[k] = own
             covered = shapely.union(covered, _moved(own, faces[k], faces[home[1]]))
     on_faces = float(sum(part.area for part in parts.values()))
     rest = shapely.difference(home[2], covered)
-    if rest.area > _LEAST:
+    if rest.area > _MIN_AREA:
         parts[home[1]] = shapely.union(parts.get(home[1], Polygon()), rest)
     return Laid(list(parts.items()), on_faces)
 
 
 def on_one_plane(laid: Sequence[Sequence[tuple[int | None, BaseGeometry]]]) -> list[BaseGeometry]:
-    """Polygons from their parts on faces, the faces side by side on one plane; areas stay."""
+    """Return polygons from their parts on faces, with the faces side by side on one plane; areas are preserved."""
     bounds: dict[int | tuple[int, int], list[tuple[float, ...]]] = {}
     for n, parts in enumerate(laid):
         for k, part in parts:
@@ -115,7 +115,7 @@ def on_one_plane(laid: Sequence[Sequence[tuple[int | None, BaseGeometry]]]) -> l
     for key, boxes in bounds.items():
         low, high = min(box[0] for box in boxes), max(box[2] for box in boxes)
         shift[key] = end - low
-        end += high - low + _APART
+        end += high - low + _FACE_SPACING
     return [
         _polygons(shapely.union_all([translate(part, shift[(n, -1) if k is None else k]) for k, part in parts]))
         for n, parts in enumerate(laid)
@@ -123,7 +123,7 @@ def on_one_plane(laid: Sequence[Sequence[tuple[int | None, BaseGeometry]]]) -> l
 
 
 def place_of(parts: Sequence[tuple[int | None, BaseGeometry]], faces: Sequence[FoundFace], shape: BaseGeometry) -> Float:
-    """A point in space inside the largest part of a polygon; m."""
+    """Return a point in space inside the largest part of a polygon; m."""
     k, part = max(parts, key=lambda one: one[1].area)
     if k is None:
         return np.asarray(shapely.get_coordinates(shape, include_z=True).mean(axis=0))
@@ -132,7 +132,7 @@ def place_of(parts: Sequence[tuple[int | None, BaseGeometry]], faces: Sequence[F
 
 
 def _moved(shape: BaseGeometry, face: FoundFace, to: FoundFace) -> BaseGeometry:
-    """A shape unrolled on a face, unrolled on another one."""
+    """Return a shape unrolled on a face, unrolled on another face."""
     if face is to:
         return shape
 
@@ -144,7 +144,7 @@ def _moved(shape: BaseGeometry, face: FoundFace, to: FoundFace) -> BaseGeometry:
 
 
 def _unrolled(part: Polygon, model: Float) -> BaseGeometry:
-    """A polygon unrolled; on a cylinder also where it goes over the cut."""
+    """Return an unrolled polygon; on a cylinder also across the cut."""
     radius = float(model[RADIUS])
     turn = 2.0 * math.pi * radius
 
@@ -152,7 +152,7 @@ def _unrolled(part: Polygon, model: Float) -> BaseGeometry:
         u, v, _ = unroll(model, ring)
         if radius > 0.0:
             v = radius * np.unwrap(v / radius)
-            if start is not None:  # a hole lies in the turn of its outline
+            if start is not None:  # a hole is in the same turn as its outline
                 v += turn * np.round((start - v[0]) / turn)
         return np.column_stack([u, v])
 
@@ -167,7 +167,7 @@ def _unrolled(part: Polygon, model: Float) -> BaseGeometry:
 
 
 def _own_plane(shape: BaseGeometry) -> BaseGeometry:
-    """A polygon in the plane that lies best in its vertices."""
+    """Return a polygon in the plane that best fits its vertices."""
     at = shapely.get_coordinates(shape, include_z=True)
     middle = at.mean(axis=0)
     directions = np.linalg.svd(at - middle, full_matrices=False)[2]

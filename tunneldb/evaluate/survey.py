@@ -1,4 +1,4 @@
-"""What a survey says about its leaks: where they were sought, what was found, how much lining was seen, and from how near."""
+"""Detected leaks of a survey: kilometres, shapes, inspected lining and distance from the scanner."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from tunneldb.store.poses import load_poses
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
-WIDE = 1e4  # m of arc, more than any section has
+MAX_ARC = 1e4  # m of arc, more than any section has
 
 
 @dataclass(frozen=True)
 class Findings:
-    """Leaks that a survey found.
+    """Detected leaks of a survey.
 
     Attributes
     ----------
     kilometres : list of int
-        Where they were sought.
+        Kilometres in which leaks were detected.
     ids : list of int
-        Their keys.
+        Keys of the leaks.
     shapes : list of Polygon
-        In the unrolled plane, m.
+        Polygons in the unrolled plane, m.
     seen : float
-        Lining that was seen, m².
+        Inspected lining, m².
     """
 
     kilometres: list[int]
@@ -48,28 +48,28 @@ class Findings:
 
     @property
     def stretch(self) -> BaseGeometry:
-        """The unrolled plane between the ends of the kilometres."""
-        boxes = [shapely.box(km * KILOMETRE, -WIDE, (km + 1) * KILOMETRE, WIDE) for km in self.kilometres]
+        """Unrolled plane between the ends of the kilometres."""
+        boxes = [shapely.box(km * KILOMETRE, -MAX_ARC, (km + 1) * KILOMETRE, MAX_ARC) for km in self.kilometres]
         return shapely.union_all(boxes)
 
 
 def read_findings(conn: psycopg.Connection[Any], survey: Survey, km: str | None = None) -> Findings:
-    """Read the leaks that were found last, or confirmed, and not rejected; kinds are those after judging.
+    """Read leaks of the last run, or confirmed ones, that are not rejected; kinds are those after review.
 
     Parameters
     ----------
     conn, survey
-        Where from.
+        Database and survey.
     km : str, optional
-        Only these kilometres, such as ``511`` or ``511-513``; by default all where leaks were sought.
+        Kilometres to read, for example ``511`` or ``511-513``; by default all with leak detection.
 
     Raises
     ------
     UserError
-        If leaks were not sought there.
+        If leaks were not detected there.
     """
     if survey.intensity_kind == "none":
-        raise UserError(f"survey {survey.name} has no intensity: no leaks were sought in it")
+        raise UserError(f"survey {survey.name} has no intensity, so leaks cannot be detected")
     detected = [
         row[0]
         for row in conn.execute(
@@ -78,12 +78,12 @@ def read_findings(conn: psycopg.Connection[Any], survey: Survey, km: str | None 
         )
     ]
     if not detected:
-        raise NotReadyError(f"no leaks were sought in survey {survey.name} yet: tunneldb run {survey.name}")
+        raise NotReadyError(f"no leak detection in survey {survey.name} yet; type tunneldb run {survey.name}")
     kilometres = detected
     if km is not None:
         kilometres = parse_km(km, loaded_kilometres(conn, survey))
         if left := sorted(set(kilometres) - set(detected)):
-            raise NotReadyError(f"no leaks were sought in kilometre {left[0]} yet: tunneldb run {survey.name} --km {left[0]}")
+            raise NotReadyError(f"no leak detection in kilometre {left[0]} yet; type tunneldb run {survey.name} --km {left[0]}")
     rows = conn.execute(
         "SELECT id, public.ST_AsBinary(unrolled) FROM tunnel_api.leak"
         " WHERE survey_id = %s AND (detected OR review = 'confirmed') AND review <> 'rejected'"
@@ -95,7 +95,7 @@ def read_findings(conn: psycopg.Connection[Any], survey: Survey, km: str | None 
 
 
 def _seen(conn: psycopg.Connection[Any], survey: Survey, kilometres: Sequence[int]) -> float:
-    """Lining that was seen in kilometres, m²: their coverage, or what the ledger counts; NaN where one has neither."""
+    """Return the inspected lining of kilometres, m², from their coverage or from the ledger; NaN if one has neither."""
     row = conn.execute(
         """
         SELECT CASE WHEN bool_and(t.seen IS NOT NULL) THEN sum(t.seen) END
@@ -110,7 +110,7 @@ def _seen(conn: psycopg.Connection[Any], survey: Survey, kilometres: Sequence[in
 
 
 def scanner_distance(conn: psycopg.Connection[Any], survey: Survey, shapes: Sequence[BaseGeometry]) -> Float:
-    """Distance of a point inside each leak (n,) from the nearest scanner position, m; NaN off the tunnel."""
+    """Return the distance of a point inside each leak (n,) from the nearest scanner position, m; NaN off the tunnel."""
     if not len(shapes):
         return np.zeros(0)
     inside = shapely.get_coordinates(shapely.point_on_surface(np.asarray(shapes, dtype=object)))
@@ -119,7 +119,7 @@ def scanner_distance(conn: psycopg.Connection[Any], survey: Survey, shapes: Sequ
 
 
 def distance_from_scanner(points: Float, poses: PoseModel) -> Float:
-    """Distance of points (n, 3) from the nearest station, or from the trajectory between its rows, m; NaN where they are."""
+    """Return the distance of points (n, 3) from the nearest station or from the trajectory, m; NaN stays NaN."""
     if poses.empty:
         return np.full(len(points), np.nan)
     track = poses.track if poses.mobile else poses.station
@@ -134,7 +134,7 @@ def distance_from_scanner(points: Float, poses: PoseModel) -> Float:
 
 
 def _from_segment(points: Float, a: Float, b: Float) -> Float:
-    """Distance of points from segments a-b, row by row, all (n, 3), m."""
+    """Return the distance of points from segments a-b, row by row, all (n, 3), m."""
     along = b - a
     square = (along**2).sum(axis=1)
     share = ((points - a) * along).sum(axis=1) / np.where(square > 0.0, square, 1.0)

@@ -1,4 +1,4 @@
-"""True leaks from a file, in the unrolled plane."""
+"""Reference leaks from a file, in the unrolled plane."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from tunneldb.store.survey import Survey
 
 @dataclass(frozen=True)
 class Truth:
-    """True leaks.
+    """Reference leaks.
 
     Attributes
     ----------
     ids : list of str
-        What the file calls them: its column ``id``, else the number of the row, from 1.
+        Identifiers in the file: its column ``id``, else the row number, from 1.
     shapes : list of Polygon or MultiPolygon
-        Valid, in the unrolled plane, m.
+        Valid polygons in the unrolled plane, m.
     """
 
     ids: list[str]
@@ -41,25 +41,24 @@ class Truth:
 
 
 def read_truth(conn: psycopg.Connection[Any], survey: Survey, path: Path, layer: str | None = None) -> Truth:
-    """Read true leaks from a GeoPackage or GeoJSON file.
+    """Read reference leaks from a GeoPackage or GeoJSON file.
 
-    Polygons without a coordinate system are taken for (chainage, arc); 3D polygons in the tunnel's system are carried over
-    to the unrolled plane.
+    Polygons without a coordinate system are in (chainage, arc); 3D polygons in the tunnel's system are unrolled.
 
     Parameters
     ----------
     conn, survey
-        On whose surface they lie.
+        Database and survey, for the surface.
     path : Path
-        The file.
+        File to read.
     layer : str, optional
         Layer to read; by default the only one, or ``leak``.
 
     Raises
     ------
     InputError
-        The file can't be read, has no such layer or no polygon, another coordinate system, or a geometry that is no valid
-        polygon or lies off the tunnel.
+        If the file can't be read, has no such layer, no polygon or another coordinate system, or a geometry is not a valid
+        polygon or is off the tunnel.
     """
     given = read_polygons(path, survey, layer, "leak")
     ids, shapes = given.ids, given.shapes
@@ -67,9 +66,7 @@ def read_truth(conn: psycopg.Connection[Any], survey: Survey, path: Path, layer:
         shapes = [_unrolled(conn, survey, shape, given.naming(key)) for key, shape in zip(ids, shapes, strict=True)]
     for key, shape in zip(ids, shapes, strict=True):
         if not shape.is_valid:
-            raise InputError(
-                f"{given.naming(key)} is no valid polygon ({shapely.is_valid_reason(shape)}): mend it, and try again"
-            )
+            raise InputError(f"{given.naming(key)} is not a valid polygon ({shapely.is_valid_reason(shape)}); fix it")
     return Truth(ids, shapes)
 
 
@@ -82,11 +79,11 @@ class Polygons:
     where : str
         File and layer, for messages.
     noun : str
-        What one of them is.
+        Name of one polygon's kind.
     ids : list of str
     shapes : list of Polygon or MultiPolygon
     in_space : bool
-        Whether they are in the tunnel's system; else they have none.
+        True if they are in the tunnel's system; else they have none.
     """
 
     where: str
@@ -96,17 +93,17 @@ class Polygons:
     in_space: bool
 
     def naming(self, key: str) -> str:
-        """What a message calls one of them."""
+        """Return the name of one of them for a message."""
         return f"{self.where}, {self.noun} {key}"
 
 
 def read_polygons(path: Path, survey: Survey, layer: str | None, noun: str) -> Polygons:
-    """Read the polygons of a layer, by default of the only one or of that called ``noun``.
+    """Read the polygons of a layer, by default of the only one or of the one named ``noun``.
 
     Raises
     ------
     InputError
-        See `read_truth`.
+        As for `read_truth`.
     """
     chosen = _layer(path, layer, noun)
     where = f"{path}, layer {chosen}"
@@ -115,29 +112,29 @@ def read_polygons(path: Path, survey: Survey, layer: str | None, noun: str) -> P
     except (DataSourceError, DataLayerError, RuntimeError, UnicodeDecodeError) as error:
         raise InputError(f"{where}: cannot be read: {_line(error)}") from None
     if wkb is None or not len(wkb):
-        raise InputError(f"{where} is empty: it needs at least one polygon; without a {noun} there is nothing to compare with")
+        raise InputError(f"{where} is empty; at least one {noun} is needed for a comparison")
     ids = _ids(meta, columns, len(wkb))
     return Polygons(where, noun, ids, _polygons(wkb, ids, where, noun), _in_space(path, meta["crs"], survey, where, noun))
 
 
 def _layer(path: Path, wanted: str | None, noun: str) -> str:
-    """Layer of a file that is to be read."""
+    """Return the layer of a file to read."""
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
+        raise InputError(f"{path}: no such file")
     source = vector_source(path)
     try:
-        there = [str(name) for name, kind in pyogrio.list_layers(source) if kind is not None]  # a table is no layer
+        there = [str(name) for name, kind in pyogrio.list_layers(source) if kind is not None]  # not tables
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: the name of a layer is no UTF-8: {_line(error)}") from None
+        raise InputError(f"{path}: a layer name is not UTF-8: {_line(error)}") from None
     except DataSourceError:
-        raise InputError(f"{path} is neither GeoPackage nor GeoJSON: write the truth as one of these") from None
+        raise InputError(f"{path} is neither GeoPackage nor GeoJSON; convert it to one of these") from None
     listed = ", ".join(there) or "none"
     if wanted is not None:
         if wanted not in there:
             raise InputError(f"{path} has no layer {wanted}; it has {listed}")
         return wanted
     if len(there) != 1 and noun not in there:
-        raise InputError(f"{path} has the layers {listed}: say by --layer which holds the true {noun}s")
+        raise InputError(f"{path} has the layers {listed}: choose the one with the true {noun}s by --layer")
     return noun if noun in there else there[0]
 
 
@@ -147,24 +144,24 @@ def _ids(meta: dict[str, Any], columns: list[NDArray[Any]], count: int) -> list[
 
 
 def _polygons(wkb: NDArray[np.object_], ids: list[str], where: str, noun: str) -> list[Polygon | MultiPolygon]:
-    """Geometries, each of which must be a polygon, or several."""
+    """Parse geometries, each of which must be a polygon or a multipolygon."""
     shapes = []
     for key, data in zip(ids, wkb, strict=True):
         try:
             shape = None if data is None else shapely.from_wkb(data, on_invalid="ignore")
         except shapely.errors.GEOSException as error:
-            raise InputError(f"{where}, {noun} {key} is no valid polygon ({_line(error)}): mend it, and try again") from None
+            raise InputError(f"{where}, {noun} {key} is not a valid polygon ({_line(error)}); fix it") from None
         if not isinstance(shape, Polygon | MultiPolygon) or shape.is_empty:
             kind = "nothing" if shape is None or shape.is_empty else shape.geom_type
-            raise InputError(f"{where}, {noun} {key} is {kind}: each {noun} must be a polygon")
+            raise InputError(f"{where}, {noun} {key} is {kind}; each {noun} must be a polygon")
         if not np.isfinite(shapely.get_coordinates(shape)).all():
-            raise InputError(f"{where}, {noun} {key} has a coordinate that is no number: mend it, and try again")
+            raise InputError(f"{where}, {noun} {key} has an invalid coordinate; fix it")
         shapes.append(shape)
     return shapes
 
 
 def _in_space(path: Path, given: str | None, survey: Survey, where: str, noun: str) -> bool:
-    """Whether the polygons are in the tunnel's system, and not in the unrolled plane, which has none."""
+    """Return True if the polygons are in the tunnel's system, False if in the unrolled plane, which has none."""
     if given is None or _bare_geojson(path):
         return False
     try:
@@ -180,13 +177,13 @@ def _in_space(path: Path, given: str | None, survey: Survey, where: str, noun: s
     name = crs.name if crs is not None else given
     if noun == "spot":
         system = "without a coordinate system" if local else f"in EPSG:{survey.srid}"
-        raise InputError(f"{where} is in {name}: polygons of spots must be 3D, {system}")
+        raise InputError(f"{where} is in {name}; polygons of spots must be 3D, {system}")
     space = "" if local else f", or 3D in the tunnel's, EPSG:{survey.srid}"
-    raise InputError(f"{where} is in {name}: polygons must be in the unrolled plane, without a coordinate system{space}")
+    raise InputError(f"{where} is in {name}; polygons must be in the unrolled plane, without a coordinate system{space}")
 
 
 def _bare_geojson(path: Path) -> bool:
-    """Whether a file is GeoJSON without a ``crs`` member; GDAL takes such a one for longitude and latitude."""
+    """Return True for GeoJSON without a ``crs`` member, which GDAL reads as longitude and latitude."""
     if path.suffix.lower() not in (".geojson", ".json"):
         return False
     try:
@@ -199,9 +196,9 @@ def _bare_geojson(path: Path) -> bool:
 def _unrolled(
     conn: psycopg.Connection[Any], survey: Survey, shape: Polygon | MultiPolygon, where: str
 ) -> Polygon | MultiPolygon:
-    """A leak in space, in the unrolled plane."""
+    """Return a leak in space, unrolled."""
     if not shape.has_z:
-        raise InputError(f"{where} has no heights: polygons in EPSG:{survey.srid} must be 3D, on the lining")
+        raise InputError(f"{where} has no heights; polygons in EPSG:{survey.srid} must be 3D, on the lining")
     parts = []
     for part in shapely.get_parts(shape):
         row = conn.execute(
@@ -209,7 +206,7 @@ def _unrolled(
             (survey.id, shapely.to_wkb(part), survey.srid),
         ).fetchone()
         if row is None or row[0] is None:
-            raise InputError(f"{where} lies off the tunnel of survey {survey.name}, or where it has no sections")
+            raise InputError(f"{where} is off the tunnel of survey {survey.name}, or where it has no sections")
         parts.append(shapely.from_wkb(bytes(row[0])))
     return parts[0] if len(parts) == 1 else MultiPolygon(parts)
 

@@ -1,4 +1,4 @@
-"""The given axis of a tunnel, as stations at constant spacing."""
+"""Given axis of a tunnel, as stations at constant spacing."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy  # its parts when they are used: they take long to import
+import scipy  # its modules are imported on first use: they take long
 
 from tunneldb.arrays import Float, Int32, Int64
 from tunneldb.compiled import point_kernel
@@ -17,30 +17,30 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.threads import in_blocks
 
 BLOCK = 1 << 14
-"""Points that are located at a time."""
+"""Number of points located at a time."""
 
 MILLIMETRE = 0.001
-CLOSEST = 0.1
-"""Axis vertices are no nearer to each other, m: points of a scan say no more."""
+MIN_SPACING = 0.1
+"""Least distance between axis vertices, m; scan points do not resolve more."""
 
-DENSE = 2.0  # m between vertices
+MAX_DENSE_SPACING = 2.0  # m; distance between vertices below which a line is dense
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """The given axis: stations at whole multiples of the spacing, with tangents.
+    """Given axis: stations at whole multiples of the spacing, with tangents.
 
     Attributes
     ----------
     spacing : float
         Distance between stations in plan, m.
     number : (n,) int array
-        Station numbers; station ``k`` stands at chainage ``k * spacing``.
+        Station numbers; station ``k`` is at chainage ``k * spacing``.
     vertices : (n, 3) float array
         Stations in the tunnel's SRID, m.
     start, end : float
-        Chainage of the first and of the last vertex given, m. The first and the last station lie up to one spacing
-        outside, on the straight continuation.
+        Chainage of the first and of the last given vertex, m. The first and the last station are up to one spacing outside,
+        on the straight continuation.
     """
 
     spacing: float
@@ -51,14 +51,14 @@ class Alignment:
 
     @classmethod
     def from_polyline(cls, xyz: Float, start_chainage: float, spacing: float = 10.0) -> Alignment:
-        """Lay a smooth curve through the given vertices and set stations on it.
+        """Fit a smooth curve through the given vertices, with stations on it.
 
         The curve is a cubic spline over the chord length in plan; chainage is its length in plan, as stationing is.
 
         Parameters
         ----------
         xyz : (n, 3) float array
-            Vertices in growing chainage, m, n ≥ 2, no two consecutive ones at the same plan position.
+            Vertices in ascending chainage, m, n ≥ 2; consecutive ones differ in plan.
         start_chainage : float
             Chainage of the first vertex, m.
         spacing : float
@@ -72,12 +72,14 @@ class Alignment:
         xyz = np.asarray(xyz, dtype=np.float64)
         if len(xyz) < 2:
             raise UserError(f"an axis needs at least 2 points, this one has {len(xyz)}")
-        if spacing < CLOSEST or abs(KILOMETRE / spacing - round(KILOMETRE / spacing)) > 1e-9:
-            raise UserError(f"the spacing of axis vertices must divide 1000 m, from {CLOSEST} m on: {spacing:g} m does not")
+        if spacing < MIN_SPACING or abs(KILOMETRE / spacing - round(KILOMETRE / spacing)) > 1e-9:
+            raise UserError(
+                f"the spacing of axis vertices must divide 1000 m and be {MIN_SPACING} m or more, not {spacing:g} m"
+            )
         chord = np.hypot(*np.diff(xyz[:, :2], axis=0).T)
         if np.any(chord == 0):
             row = int(np.argmin(chord)) + 2
-            raise UserError(f"axis point {row} has the same plan position as the one before it: remove one of them")
+            raise UserError(f"axis point {row} has the same plan position as the previous one; remove one of them")
         parameter, chainage, position = _curve(xyz, chord)
         end = start_chainage + float(chainage[-1])
         first, last = int(np.floor(start_chainage / spacing)), int(np.ceil((end - MILLIMETRE) / spacing))
@@ -91,22 +93,22 @@ class Alignment:
         return cls(spacing, number, stations, start_chainage, end)
 
     def chainage(self, points: Float) -> Float:
-        """Chainage of points, m, by the planes of the stations; NaN beyond the first and last vertex given."""
+        """Return the chainage of points, m, by the planes of the stations; NaN beyond the first and last given vertex."""
         return self.locate(points)[0]
 
     def distance(self, points: Float) -> Float:
-        """Distance of points from the axis in their plane, m; NaN beyond the ends."""
+        """Return the distance of points from the axis in their plane, m; NaN beyond the ends."""
         return self.locate(points)[1]
 
     def locate(self, points: Float) -> tuple[Float, Float]:
-        """Chainage and distance from the axis of points (n, 3), both (n,), m; NaN beyond the ends."""
+        """Return chainage and distance from the axis of points (n, 3), both (n,), m; NaN beyond the ends."""
         chainage, distance, _ = self._located(points)
         return chainage, distance
 
     def across(self, points: Float) -> Float:
-        """Chainage of points (n, 3), and where they lie in the plane across the axis there, right and up: (n, 3), m.
+        """Return chainage of points (n, 3), and their position right and up in the plane across the axis there, (n, 3), m.
 
-        NaN beyond the ends. Right is level, up is at right angles to it and to the axis.
+        NaN beyond the ends. Right is horizontal, up is at right angles to it and to the axis.
         """
         chainage, _, segment = self._located(points)
         held = np.flatnonzero(np.isfinite(chainage))
@@ -123,7 +125,7 @@ class Alignment:
         return segment_rows(self.vertices, tangents(self.vertices))
 
     def _located(self, points: Float) -> tuple[Float, Float, Int32]:
-        """Chainage and distance from the axis, m, NaN beyond the ends, and place of the segment, each (n,)."""
+        """Return chainage and distance from the axis, m, NaN beyond the ends, and index of the segment, each (n,)."""
         segments = self._segments
         points = np.ascontiguousarray(points, np.float64)
         start, segment = np.full(len(points), -1, np.int32), np.empty(len(points), np.int32)
@@ -143,19 +145,19 @@ class Alignment:
         return chainage, distance, segment
 
     def places(self, points: Float) -> tuple[Float, Float]:
-        """Chainage of points (n, 3), and their place right of the axis in plan, both (n,), m; NaN beyond the ends."""
+        """Return chainage of points (n, 3), and distance right of the axis in plan, both (n,), m; NaN beyond the ends."""
         chainage = self.chainage(points)
         on_axis, along = self._plan(chainage)
         away = points[:, :2] - on_axis
         return chainage, away[:, 0] * along[:, 1] - away[:, 1] * along[:, 0]
 
     def plan_points(self, chainage: Float, across: Float) -> Float:
-        """Points in plan (n, 2), m, at chainages and places right of the axis (n,), m: the inverse of `places`."""
+        """Return points in plan (n, 2), m, at chainages and distances right of the axis (n,), m: the inverse of `places`."""
         on_axis, along = self._plan(chainage)
         return on_axis + across[:, None] * np.column_stack([along[:, 1], -along[:, 0]])
 
     def _plan(self, chainage: Float) -> tuple[Float, Float]:
-        """Points on the axis in plan, and unit vectors along it, both (n, 2), at chainages (n,), m."""
+        """Return points on the axis in plan, and unit vectors along it, both (n, 2), at chainages (n,), m."""
         stations = self.number * self.spacing
         slope = np.gradient(self.vertices[:, :2], stations, axis=0)
         on_axis, along = (
@@ -165,11 +167,11 @@ class Alignment:
 
 
 def _curve(xyz: Float, chord: Float) -> tuple[Float, Float, Callable[..., Float]]:
-    """Spline over the chord length, with a table of its parameter against its length in plan."""
+    """Return a spline over the chord length, with a table of its parameter by length in plan."""
     knots = np.concatenate([[0.0], np.cumsum(chord)])
     position = scipy.interpolate.CubicSpline(knots, xyz)
-    # A design alignment has a vertex a metre, between which the curve hardly bends.
-    steps = np.where(chord > DENSE, 64, 4)
+    # A design alignment has a vertex every metre, between which the curve is nearly straight.
+    steps = np.where(chord > MAX_DENSE_SPACING, 64, 4)
     within = np.arange(steps.sum()) - np.repeat(np.cumsum(steps) - steps, steps)
     parameter = np.append(np.repeat(knots[:-1], steps) + within * np.repeat(chord / steps, steps), knots[-1])
     slope = position(parameter, 1)
@@ -190,21 +192,21 @@ def locate_points(
     distance: Float,
     segment: Int32,
 ) -> None:  # pragma: no cover - compiled
-    """Find where along the axis a block of points lies.
+    """Locate a block of points along the axis.
 
     Parameters
     ----------
     segments, number, spacing
         Rows of :func:`tunneldb.geometry.frame.segment_rows`, their numbers, and their length in plan, m.
     points : (n, 3) float array
-        m.
+        Points, m.
     start : (n,) int32 array
-        Segment from which to look for each point; -1 for that of the point before.
+        Segment at which the search begins for each point; -1 for that of the previous point.
     chainage, distance : (n,) float arrays
-        Overwritten: chainage and distance from the axis in the point's plane, m; beyond the ends those of the nearest end,
-        infinitely far. No distances are computed where the array is empty.
+        Overwritten: chainage and distance from the axis in the point's plane, m. Beyond the ends: the chainage of the nearest
+        end, and infinity. No distances are computed if the array is empty.
     segment : (n,) int32 array
-        Overwritten: place of the segment, beyond the ends of the nearest one.
+        Overwritten: index of the segment, beyond the ends of the nearest one.
     """
     k = np.int64(-1)
     for i in range(points.shape[0]):

@@ -1,4 +1,4 @@
-"""The centreline of a tunnel in plan, found from the points alone."""
+"""Centreline of a tunnel in plan, found from points only."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.geometry.smoothing import smooth_line
 
 _CELL = 1.0  # m in plan
-_REACH = 3.0  # cells closer than this are neighbours, m: profiles may lie apart
-SHORT = 40.0
-"""Length below which a tunnel may be wider than long, and its projection tells its direction, m."""
+_REACH = 3.0  # distance up to which cells are neighbours, m, since profiles have gaps
+MAX_SHORT_LENGTH = 40.0
+"""Length below which a tunnel may be wider than long, and its direction is found by projection, m."""
 
 _STEP = 5.0  # m between vertices
 _SAMPLE = 10_000  # points that are projected in all directions
 _PIXEL = 0.2  # edge of a cell of the projection, m
 _SLICE = 1.0  # m, across the line
-_HELD = 10  # cells that make a slice
-_OUTLYING = 0.02  # of a slice's cells may lie beyond each wall
-_FAR = 1 << 24  # cells; more than any tunnel is long
+_MIN_CELLS = 10  # least number of cells in a slice
+_MAX_OUTLIER_SHARE = 0.02  # greatest share of a slice's cells beyond each wall
+_CELL_OFFSET = 1 << 24  # cells; more than the length of any tunnel
 
 
 def centreline_through(points: ArrayLike) -> PlanLine:
-    """Line that a bare cloud of a tunnel follows, of any direction, straight or curved; from 0.
+    """Return a line along a tunnel's point cloud, in any direction, straight or curved; its distance begins at 0.
 
     Parameters
     ----------
     points : (n, 3) array
-        m, the tunnel's surface without other things farther off; thinned evenly serves best.
+        Points on the tunnel's surface, m, without distant objects; preferably evenly thinned.
 
     Raises
     ------
     ValueError
-        No points, or points that lie far apart.
+        If there are no points, or they are far apart.
     """
     vertices = centreline(np.asarray(points, dtype=np.float64))
     steps = np.hypot(*np.diff(vertices, axis=0).T)
@@ -47,33 +47,33 @@ def centreline_through(points: ArrayLike) -> PlanLine:
 
 
 def centreline(points: Float) -> Float:
-    """Vertices (k, 2) of a line along a tunnel, from the end that lies farther west.
+    """Return the vertices (k, 2) of a line along a tunnel, from its western end.
 
     A long tunnel's points are ordered by the shortest path to one of its ends, through neighbouring cells of the plan.
-    A short piece is projected in all directions: along the tunnel its points fill the fewest cells. The line is then
+    A short piece is projected in all directions: along the tunnel, its points occupy the fewest cells. The line is then
     moved to the middle between the walls and smoothed.
 
     Parameters
     ----------
     points : (n, 3) array
-        m; those that are not finite are ignored.
+        Points, m; those that are not finite are ignored.
 
     Raises
     ------
     ValueError
-        No points, or points that lie far apart.
+        If there are no points, or they are far apart.
     """
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
-        raise ValueError("there are no points to lay a line through")
+        raise ValueError("there are no points to fit a line to")
     origin = np.floor(points.mean(axis=0))
     local = points - origin
     cells = _connected_cells(local[:, :2])
     path = _path_lengths(cells)
-    vertices = _vertices_along_path(cells, path) if path.max() > SHORT else ends_by_projection(local)
+    vertices = _vertices_along_path(cells, path) if path.max() > MAX_SHORT_LENGTH else ends_by_projection(local)
     if vertices[-1, 0] < vertices[0, 0]:
         vertices = vertices[::-1]
-    # Spread evenly: a scanner's own surroundings would outweigh the walls.
+    # Spread evenly: otherwise dense points around a scanner would dominate.
     spaced = _occupied_cells(local[:, :2], _PIXEL)
     for _ in range(3):
         vertices = _between_walls(vertices, spaced)
@@ -81,17 +81,17 @@ def centreline(points: Float) -> Float:
 
 
 def _connected_cells(plan: Float) -> Float:
-    """Middles (m, 2) of the plan's cells that hold points and hang together; single stray points don't count."""
+    """Return the centres (m, 2) of occupied cells of the plan that are connected, without isolated points."""
     middle = _occupied_cells(plan, _CELL)
     _, label = connected_components(_graph(middle), directed=False)
     return np.asarray(middle[label == np.argmax(np.bincount(label))], dtype=np.float64)
 
 
 def _occupied_cells(plan: Float, edge: float) -> Float:
-    """Middles (m, 2) of the cells of the plan that hold points, but for those that hold far fewer than most."""
+    """Return the centres (m, 2) of occupied cells of the plan, without those that have far fewer points than most."""
     key = np.floor(plan / edge).astype(np.int64)
-    key, count = np.unique(key[:, 0] * _FAR + key[:, 1] + _FAR // 2, return_counts=True)
-    cells = np.column_stack([key // _FAR, key % _FAR - _FAR // 2])[count >= 0.1 * np.median(count)]
+    key, count = np.unique(key[:, 0] * _CELL_OFFSET + key[:, 1] + _CELL_OFFSET // 2, return_counts=True)
+    cells = np.column_stack([key // _CELL_OFFSET, key % _CELL_OFFSET - _CELL_OFFSET // 2])[count >= 0.1 * np.median(count)]
     return np.asarray((cells + 0.5) * edge, dtype=np.float64)
 
 
@@ -102,7 +102,7 @@ def _graph(middle: Float) -> coo_array:
 
 
 def _path_lengths(cells: Float) -> Float:
-    """Length of the path from one end of the cells to each of them, m."""
+    """Return the length of the path from one end of the cells to each of them, m."""
     graph = _graph(cells).tocsr()
     start = 0
     for _ in range(2):
@@ -111,7 +111,7 @@ def _path_lengths(cells: Float) -> Float:
 
 
 def _vertices_along_path(cells: Float, path: Float) -> Float:
-    """Mean of the cells of every 5 m of the path; the fronts of the first and last ones are skew."""
+    """Return the mean of the cells of every 5 m of the path; the first and last ones are not cut square."""
     count = max(2, int(path.max() / (2 * _STEP)))
     piece = np.minimum((path / path.max() * count).astype(int), count - 1)
     number = np.bincount(piece, minlength=count)
@@ -124,17 +124,17 @@ def _vertices_along_path(cells: Float, path: Float) -> Float:
 
 
 def _end_of_cells(cells: Float, at: Float, unit: Float) -> Float:
-    """Where the cells end, straight on from a place."""
+    """Return the end of the cells, straight ahead of a position."""
     near = cells - at
     near = near[np.hypot(*near.T) < 6 * _STEP]
     return np.asarray(at + max(float((near @ unit).max()), 0.5) * unit)
 
 
 def ends_by_projection(local: Float) -> Float:
-    """Both ends of a short piece: along the direction in which its points fill the fewest cells of the projection."""
-    local = local[np.abs(local - np.median(local, axis=0)).max(axis=1) < SHORT]
+    """Return both ends of a short piece, in the direction of projection in which its points occupy the fewest cells."""
+    local = local[np.abs(local - np.median(local, axis=0)).max(axis=1) < MAX_SHORT_LENGTH]
     if not len(local):
-        raise ValueError(f"no points lie within {SHORT:g} m of their middle: they are no piece of a tunnel")
+        raise ValueError(f"no points within {MAX_SHORT_LENGTH:g} m of their centre: not a piece of a tunnel")
     sample = local[:: max(1, len(local) // _SAMPLE)]
     sample = sample - sample.mean(axis=0)
     best, step = 0.0, np.pi / 90
@@ -154,14 +154,14 @@ def ends_by_projection(local: Float) -> Float:
 
 
 def _cells_in_projection(sample: Float, angle: float) -> int:
-    """How many cells of 0.2 m the points fill, projected in a direction of the plan."""
+    """Return the number of cells of 0.2 m that the points occupy, projected in a direction of the plan."""
     across = sample[:, 0] * np.sin(angle) - sample[:, 1] * np.cos(angle)
     column, row = (np.floor((v - v.min()) / _PIXEL).astype(np.int64) for v in (across, sample[:, 2]))
     return int(np.count_nonzero(np.bincount(column * (row.max() + 1) + row)))
 
 
 def _between_walls(vertices: Float, plan: Float) -> Float:
-    """The line again, with vertices every 5 m, in the middle between the walls, and smooth."""
+    """Return the line with vertices every 5 m, in the middle between the walls, smoothed."""
     step = np.hypot(*np.diff(vertices, axis=0).T)
     line = PlanLine.of(vertices, np.concatenate([[0.0], np.cumsum(step)]))
     length = float(line.distance[-1])
@@ -171,7 +171,7 @@ def _between_walls(vertices: Float, plan: Float) -> Float:
     at = np.linspace(0.0, length, count + 1)
     walls = _walls(*line.place(plan), math.ceil(length / _SLICE))
     slices = (np.arange(len(walls)) + 0.5) * _SLICE
-    # The median of the slices about a vertex: a niche widens some of them only.
+    # Median of the slices around a vertex: a niche widens only some of them.
     near = [walls[np.abs(slices - place) <= _STEP] for place in at]
     middle = np.array([np.nanmedian(w, axis=0).mean() if np.isfinite(w).any() else np.nan for w in near])
     seen = np.isfinite(middle)
@@ -179,14 +179,14 @@ def _between_walls(vertices: Float, plan: Float) -> Float:
 
 
 def _walls(along: Float, across: Float, count: int) -> Float:
-    """Where the walls stand (count, 2), m to the right of the line, in slices across it; NaN where there are no points."""
+    """Return the positions of the walls (count, 2), m right of the line, in slices across it; NaN where there are no points."""
     number = np.floor(along / _SLICE).astype(np.int64)
     order = np.lexsort((across, number))
     number, across = number[order], across[order]
     first, stop = (np.searchsorted(number, np.arange(count), side=side) for side in ("left", "right"))
     walls = np.full((count, 2), np.nan)
-    held = stop - first >= _HELD
-    spare = np.floor(_OUTLYING * (stop - first - 1)).astype(np.int64)
+    held = stop - first >= _MIN_CELLS
+    spare = np.floor(_MAX_OUTLIER_SHARE * (stop - first - 1)).astype(np.int64)
     walls[held, 0] = across[(first + spare)[held]]
     walls[held, 1] = across[(stop - 1 - spare)[held]]
     return walls

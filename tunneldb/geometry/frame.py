@@ -1,13 +1,13 @@
-r"""The ruled planes of the axis: tangents, segments, and the frame at any chainage.
+r"""Planes across the axis: tangents, segments, and the frame at any chainage.
 
-A segment lies between two planes, each perpendicular to the axis at a vertex (Gonçalves et al., 2012, stage 3).
-Inside the segment the plane turns steadily from the first to the second: the plane at the fraction ``f`` is
+A segment is between two planes, each perpendicular to the axis at a vertex (Gonçalves et al., 2012, stage 3).
+Within the segment the plane turns linearly from the first to the second: the plane at the fraction ``f`` is
 
 .. math:: (1-f)\,(p-v_a)\cdot t_a = f\,(v_b-p)\cdot t_b
 
-so that a point's fraction is ``d_a / (d_a + d_b)``, its distances from the two planes. It is 0 and 1 on them, hence
-continuous across segments whatever the point's distance from the axis, and differs from the angle on a true circular
-arc of radius 300 m by less than 0.2 mm in a segment of 10 m. The same formulas stand in ``sql/geometry/unroll.sql``.
+so that a point's fraction is ``d_a / (d_a + d_b)``, its distances from the two planes. It is 0 and 1 on them, and so
+continuous across segments at any distance from the axis. It differs from the angle on a true circular arc of radius 300 m
+by less than 0.2 mm in a segment of 10 m. ``sql/geometry/unroll.sql`` has the same formulas.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from tunneldb.compiled import inner, point_inner
 
 
 def tangents(vertices: Float) -> Float:
-    """Unit tangents at equally spaced vertices of an axis.
+    """Return unit tangents at equally spaced vertices of an axis.
 
     The direction at a vertex is that from its predecessor to its successor (Gonçalves et al., 2012, fig. 5), which on a
-    circular arc is the tangent itself. The two ends take the parabola through the three nearest vertices, exact to the
-    same order; of two vertices, the chord.
+    circular arc is the tangent itself. The two ends have the tangents of the parabola through the three nearest vertices, exact
+    to the same order; an axis of two vertices has the chord.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def tangents(vertices: Float) -> Float:
 
 
 def plan_lengths(vertices: Float, tangent: Float) -> Float:
-    """Plan length of the axis between consecutive vertices, taking each piece as a circular arc.
+    """Return the plan length of the axis between consecutive vertices, each piece as a circular arc.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def plan_lengths(vertices: Float, tangent: Float) -> Float:
     Returns
     -------
     (n - 1,) float array
-        Chord × (φ/2) / sin(φ/2), φ being the angle in plan between the two tangents; m.
+        Chord × (φ/2) / sin(φ/2), with φ the angle in plan between the two tangents; m.
     """
     chord = np.hypot(*(vertices[1:, :2] - vertices[:-1, :2]).T)
     azimuth = np.arctan2(tangent[:, 0], tangent[:, 1])
@@ -65,7 +65,7 @@ def plan_lengths(vertices: Float, tangent: Float) -> Float:
 
 @point_inner
 def fraction(segments: Float, k: int, x: float, y: float, z: float) -> float:
-    """Fraction of segment ``k`` at which a point lies; below 0 before it, 1 or more after it.
+    """Return the fraction of segment ``k`` for a point; below 0 before the segment, 1 or more after it.
 
     A segment is a row of 12: vertex_from, vertex_to, tangent_from, tangent_to.
     """
@@ -84,9 +84,9 @@ def fraction(segments: Float, k: int, x: float, y: float, z: float) -> float:
 
 @point_inner
 def frame_of(segments: Float, k: int, f: float) -> tuple[float, float, float, float, float, float, float, float]:
-    """Plane at fraction ``f`` of segment ``k``: its origin (3), tangent (3) and the horizontal direction to the right (2).
+    """Return the plane at fraction ``f`` of segment ``k``: origin (3), tangent (3) and horizontal direction to the right (2).
 
-    The origin is where the cubic Hermite curve through the two vertices meets the plane. The direction up is
+    The origin is the intersection of the cubic Hermite curve through the two vertices with the plane. The direction up is
     (uy nz, -ux nz, ux ny - uy nx).
     """
     g = 1.0 - f
@@ -98,7 +98,7 @@ def frame_of(segments: Float, k: int, f: float) -> tuple[float, float, float, fl
     flat = 1.0 / np.sqrt(flat)
     ux, uy = ny * flat, -nx * flat
     nx, ny, nz = nx * scale, ny * scale, nz * scale
-    # From the first vertex on: coordinates of millions of metres would cost digits.
+    # Relative to the first vertex: coordinates of millions of metres would lose digits.
     cx, cy, cz = segments[k, 3] - segments[k, 0], segments[k, 4] - segments[k, 1], segments[k, 5] - segments[k, 2]
     length = np.sqrt(cx * cx + cy * cy + cz * cz)
     h10, h01, h11 = f * g * g * length, f * f * (3.0 - 2.0 * f), -f * f * g * length
@@ -113,21 +113,21 @@ def frame_of(segments: Float, k: int, f: float) -> tuple[float, float, float, fl
 
 
 def frames_at(segments: Float, segment: Intp | Int64, f: Float) -> Float:
-    """Origin, tangent, right and up, (n, 4, 3), of the planes at fractions (n,) of segments, given by their places (n,)."""
-    x, y, z, nx, ny, nz, ux, uy = frame_of.py_func(segments, segment, f)  # its formulas hold for arrays, too
+    """Return origin, tangent, right and up, (n, 4, 3), of the planes at fractions (n,) of segments with indices (n,)."""
+    x, y, z, nx, ny, nz, ux, uy = frame_of.py_func(segments, segment, f)  # its formulas are valid for arrays, too
     level = np.zeros_like(x)
     frames = [x, y, z, nx, ny, nz, ux, uy, level, uy * nz, -ux * nz, ux * ny - uy * nx]
     return np.stack(frames, axis=-1).reshape(-1, 4, 3)
 
 
 def segment_rows(vertices: Float, tangent: Float) -> Float:
-    """Rows of 12 (vertex_from, vertex_to, tangent_from, tangent_to) of the segments between consecutive vertices."""
+    """Return rows of 12 (vertex_from, vertex_to, tangent_from, tangent_to) of the segments between consecutive vertices."""
     return np.ascontiguousarray(np.hstack([vertices[:-1], vertices[1:], tangent[:-1], tangent[1:]]))
 
 
 @inner
 def nearest_segment(segments: Float, x: float, y: float, z: float) -> int:
-    """Index of the segment whose middle is nearest to a point."""
+    """Return the index of the segment whose midpoint is nearest to a point."""
     best, which = np.inf, 0
     for k in range(segments.shape[0]):
         dx = 0.5 * (segments[k, 0] + segments[k, 3]) - x
@@ -141,9 +141,9 @@ def nearest_segment(segments: Float, x: float, y: float, z: float) -> int:
 
 @point_inner
 def locate(segments: Float, number: Int64, start: int, x: float, y: float, z: float) -> tuple[int, float]:
-    """Segment that holds a point and the fraction in it, walking from the segment ``start``; (-1, 0) if none does.
+    """Return the segment that contains a point and the fraction in it, searching from ``start``; (-1, 0) if none does.
 
-    ``number`` are the segments' numbers, growing; the walk doesn't cross a gap in them.
+    ``number`` are the segments' numbers, ascending; the search doesn't cross a gap in them.
     """
     k = start
     for _ in range(segments.shape[0] + 1):

@@ -1,9 +1,9 @@
-"""Why coordinates lie far from where they should: what people mix up most, tried out."""
+"""Reasons why coordinates are far from their expected place: common mistakes, tested one by one."""
 
 from __future__ import annotations
 
 import numpy as np
-import scipy  # its parts when they are used: they take long to import
+import scipy  # its modules are imported on first use: they take long
 
 from tunneldb.arrays import Float
 
@@ -11,16 +11,16 @@ _FOOT = 0.3048  # m
 
 
 def explain_misplacement(xyz: Float, vertices: Float, reach: float) -> str | None:
-    """What would bring most places near a line, said as a guess; None if nothing that is tried does.
+    """Return a guess which change of coordinates brings most points near a line; None if none of those tested does.
 
     Parameters
     ----------
     xyz : (n, 3) float array
-        Places that lie far from the line, finite.
+        Points that are far from the line, finite.
     vertices : (k, 3) float array
-        Points of the line, m.
+        Vertices of the line, m.
     reach : float
-        How near is near, in plan, m; no less than the distance of the vertices.
+        Greatest distance of near points, in plan, m; at least the distance between vertices.
     """
     tree = scipy.spatial.cKDTree(vertices[:, :2])
     tried = (

@@ -1,4 +1,4 @@
-"""Planes of small neighbourhoods: their normals and how flat they are, from second moments (principal components)."""
+"""Planes of small neighbourhoods: normals and flatness from second moments (principal components)."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from tunneldb.compiled import inner, kernel
 
 
 def principal_planes(near: Float) -> tuple[Float, Float]:
-    """Planes through neighbourhoods by their principal components.
+    """Fit planes through neighbourhoods by their principal components.
 
     Parameters
     ----------
     near : (n, k, 3) float array
-        The k points of each of n neighbourhoods, m.
+        Coordinates of the k points of each of n neighbourhoods, m.
 
     Returns
     -------
     values : (n, 3) float array
-        Eigenvalues of the scatter matrix (sum of squares about the mean) of each, the least first, m².
+        Eigenvalues of the scatter matrix (sum of squares about the mean) of each, ascending, m².
     normals : (n, 3) float array
-        Unit normals, of either sign.
+        Unit normals, with arbitrary sign.
     """
     near = near - near.mean(axis=1, keepdims=True)
     values, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))
@@ -31,7 +31,7 @@ def principal_planes(near: Float) -> tuple[Float, Float]:
 
 
 def least_eigenvalues(moments: Float) -> Float:
-    """Least eigenvalue (n,) of symmetric matrices, rows (n, 6) of xx, yy, zz, xy, xz and yz."""
+    """Return the least eigenvalue (n,) of symmetric matrices, rows (n, 6) of xx, yy, zz, xy, xz and yz."""
     out = np.empty(len(moments))
     _least_eigenvalues(np.ascontiguousarray(moments), out)
     return out
@@ -41,7 +41,7 @@ def least_eigenvalues(moments: Float) -> Float:
 def eigenvalues(
     xx: float, yy: float, zz: float, xy: float, xz: float, yz: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Eigenvalues of a symmetric 3 × 3 matrix, least first (Smith, 1961, Communications of the ACM 4(4))."""
+    """Return the eigenvalues of a symmetric 3 × 3 matrix, ascending (Smith, 1961, Communications of the ACM 4(4))."""
     mean = (xx + yy + zz) / 3.0
     off = xy * xy + xz * xz + yz * yz
     spread = math.sqrt(((xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2.0 * off) / 6.0)
@@ -60,7 +60,7 @@ def eigenvalues(
 def normal(
     xx: float, yy: float, zz: float, xy: float, xz: float, yz: float, least: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Unit eigenvector of the least eigenvalue, by the longest cross product of two rows; zero where it isn't one direction."""
+    """Return the unit eigenvector of the least eigenvalue, by the longest cross product of two rows; zero if ambiguous."""
     a, b, c = xx - least, yy - least, zz - least
     nx, ny, nz = xy * yz - xz * b, xz * xy - a * yz, a * b - xy * xy  # first and second row
     longest = nx * nx + ny * ny + nz * nz

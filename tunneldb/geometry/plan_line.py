@@ -1,4 +1,4 @@
-"""A line in plan that a tunnel follows: distance along it and to its right of any point."""
+"""Line in plan along a tunnel, with distances of points along it and to its right."""
 
 from __future__ import annotations
 
@@ -13,60 +13,60 @@ from tunneldb.compiled import point_kernel
 from tunneldb.threads import in_blocks
 
 _APRON = 30.0  # m around the line in which the search begins at the nearest segment
-_MOST_CELLS = 1 << 20
+_MAX_CELLS = 1 << 20
 _BLOCK = 1 << 16  # points
 
 
 @dataclass(frozen=True)
 class PlanLine:
-    """A polyline in plan whose points are told by the distance along it and to its right.
+    """Polyline in plan, with distances of points along it and to its right.
 
-    Neighbouring segments meet in the bisector of their angle, where both distances agree: along and across are
-    continuous on both sides of a bend. Before the first vertex and beyond the last the line runs straight on.
+    Neighbouring segments meet in the bisector of their angle, where both distances agree: both are continuous on either side
+    of a bend. The line continues straight before the first vertex and beyond the last.
 
     Attributes
     ----------
     vertices : (k, 2) float array
-        m.
+        Vertices in plan, m.
     distance : (k,) float array
-        Distance along the line at each vertex, growing, m.
+        Distance along the line at each vertex, ascending, m.
     """
 
     vertices: Float
     distance: Float
     _segments: Float = field(repr=False)  # x, y, direction (2), length, shear at both ends, along at both ends
-    _grid: Int32 = field(repr=False)  # segment nearest to each cell's middle
+    _grid: Int32 = field(repr=False)  # segment nearest to each cell's centre
     _corner: Float = field(repr=False)  # x, y of the grid and the edge of a cell
 
     @classmethod
     def of(cls, vertices: ArrayLike, along: ArrayLike) -> PlanLine:
-        """Line through given vertices.
+        """Return the line through given vertices.
 
         Parameters
         ----------
         vertices : (k, 2 or 3) array
             At least two, m; heights are ignored.
         along : (k,) array
-            Distance along the line at each of them (in a survey the chainage), growing, m.
+            Distance along the line at each of them (the chainage in a survey), ascending, m.
 
         Raises
         ------
         ValueError
-            Fewer than two vertices, two in the same place, or distances that don't grow.
+            If there are fewer than two vertices, two in the same place, or distances that are not ascending.
         """
         at = np.array(vertices, dtype=np.float64)[:, :2]
         distance = np.array(along, dtype=np.float64)
         if len(at) < 2 or at.shape[0] != distance.shape[0] or not (np.isfinite(at).all() and np.isfinite(distance).all()):
-            raise ValueError("a line needs two vertices or more, each with a distance along it")
+            raise ValueError("a line needs at least two vertices, each with a distance along it")
         step = np.diff(at, axis=0)
         length = np.hypot(step[:, 0], step[:, 1])
         if length.min() < 1e-9 or np.diff(distance).min() <= 0.0:
-            raise ValueError("vertices of a line must lie apart and their distances grow")
+            raise ValueError("vertices of a line must differ, and their distances must ascend")
         segments = np.zeros((len(step), 9))
         segments[:, 0:2] = at[:-1]
         segments[:, 2:4] = t = step / length[:, None]
         segments[:, 4] = length
-        # tan of half the bend: how far the bisector runs ahead for each metre to the right.
+        # tan of half the bend: advance of the bisector per metre to the right.
         shear = (t[:-1, 0] * t[1:, 1] - t[:-1, 1] * t[1:, 0]) / (1.0 + (t[:-1] * t[1:]).sum(axis=1))
         segments[1:, 5] = -shear
         segments[:-1, 6] = shear
@@ -75,7 +75,7 @@ class PlanLine:
         return cls(at, distance, segments, grid, corner)
 
     def place(self, xyz: Float) -> tuple[Float, Float]:
-        """Distance along the line and to its right, (n,) each, of points (n, 2 or 3), m."""
+        """Return the distances along the line and to its right, (n,) each, of points (n, 2 or 3), m."""
         points = np.ascontiguousarray(xyz, dtype=np.float64)
         along, across = np.empty(len(points)), np.empty(len(points))
 
@@ -87,7 +87,7 @@ class PlanLine:
         return along, across
 
     def point(self, along: ArrayLike, across: ArrayLike) -> Float:
-        """Coordinates (n, 2) of places on or beside the line, m: the inverse of :meth:`place`."""
+        """Return coordinates (n, 2) of places on or beside the line, m: the inverse of :meth:`place`."""
         a, x = (np.atleast_1d(v).astype(np.float64) for v in np.broadcast_arrays(along, across))
         s = self._segments
         i = np.clip(np.searchsorted(self.distance, a, side="right") - 1, 0, len(s) - 1)
@@ -98,9 +98,9 @@ class PlanLine:
 
 
 def _nearest_segments(vertices: Float, length: Float) -> tuple[Int32, Float]:
-    """Which segment is the nearest to the middle of each cell of a grid around the line, and where the grid lies."""
+    """Return the segment nearest to the centre of each cell of a grid around the line, and the position of the grid."""
     low, high = vertices.min(axis=0) - _APRON, vertices.max(axis=0) + _APRON
-    edge = max(5.0, float(np.sqrt((high - low).prod() / _MOST_CELLS)))
+    edge = max(5.0, float(np.sqrt((high - low).prod() / _MAX_CELLS)))
     shape = np.ceil((high - low) / edge).astype(int)
     x, y = (low[k] + edge * (np.arange(shape[k]) + 0.5) for k in range(2))
     cells = np.column_stack([g.ravel() for g in np.meshgrid(x, y, indexing="xy")])
@@ -117,7 +117,7 @@ def _nearest_segments(vertices: Float, length: Float) -> tuple[Int32, Float]:
 def _place(
     s: Float, grid: Int32, corner: Float, points: Float, along: Float, across: Float
 ) -> None:  # pragma: no cover - compiled
-    """Place points: from the segment nearest to the cell of each to the one between whose ends it lies."""
+    """Locate points, searching from the segment nearest to the centre of each one's cell."""
     last = s.shape[0] - 1
     for n in range(points.shape[0]):
         x, y = points[n, 0], points[n, 1]

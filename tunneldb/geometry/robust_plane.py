@@ -1,4 +1,4 @@
-"""Planes of a lining, fitted so that what hangs on it and what is let into it does not draw them to itself."""
+"""Robust planes of a lining, not affected by fixtures in front of it or recesses in it."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ DELTA = 0.03
 
 @inner
 def central_mode(counts: Float, classes: int, reach: int) -> int:  # pragma: no cover - compiled
-    """Class about which most of a histogram lies, those near its middle counting more; -1 if it is empty.
+    """Return the class at the centre of most of a histogram, with more weight near its middle; -1 if it is empty.
 
     Parameters
     ----------
     counts : (classes,) array
-        Histogram; at its two ends a class counts half as much as in its middle.
+        Histogram; classes at its two ends have half the weight of those in its middle.
     classes : int
         Number of classes, odd.
     reach : int
-        Classes to each side that are counted together.
+        Number of classes on each side that are counted together.
     """
     half = classes // 2
     best, mode = 0.0, -1
@@ -38,14 +38,14 @@ def central_mode(counts: Float, classes: int, reach: int) -> int:  # pragma: no 
 def plane_of_moments(
     s: float, sx: float, sy: float, sxx: float, sxy: float, syy: float, sz: float, sxz: float, syz: float, least: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Plane z = a + b x + c y of weighted least squares, from the sums of the weights and of their products.
+    """Fit the plane z = a + b x + c y by weighted least squares, from the sums of the weights and of their products.
 
     Parameters
     ----------
     s, sx, sy, sxx, sxy, syy, sz, sxz, syz : float
-        Σw, Σwx, Σwy, Σwx², Σwxy, Σwy², Σwz, Σwxz and Σwyz; s above 0.
+        Σw, Σwx, Σwy, Σwx², Σwxy, Σwy², Σwz, Σwxz and Σwyz; s > 0.
     least : float
-        Determinant of the covariance of x and y up to which the points are taken to lie on a line: the plane is level then.
+        Determinant of the covariance of x and y up to which the points are treated as collinear: the plane is then level.
 
     Returns
     -------

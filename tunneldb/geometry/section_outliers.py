@@ -1,4 +1,4 @@
-"""Sections that stand apart from those beside them, because they were measured in a niche or on something hung on the wall."""
+"""Sections that deviate from neighbouring ones, because they were measured in a niche or on fixtures on the wall."""
 
 from __future__ import annotations
 
@@ -11,27 +11,26 @@ from scipy import ndimage
 from tunneldb.arrays import Bool, Float, Single
 from tunneldb.geometry.surface import Surface
 
-MOST = 0.4
-"""Where a larger share of a section's girth does, it may be the tunnel that has another shape."""
+MAX_GIRTH_SHARE = 0.4
+"""Share of a section's girth above which a deviation may be a real change of the tunnel's shape."""
 
-OFF_WALL = 0.03
-"""Where the surface leaves the wall by more than this within a few degrees, it bends, m."""
+MIN_BEND = 0.03
+"""Deviation of the surface from the wall, within a few degrees, above which it bends, m."""
 
 
 @dataclass(frozen=True)
 class SectionOutliers:
-    """Where the surface leaves the wall, because a section was measured in a niche or on something hung on the wall.
+    """Deviations of the surface from the wall, where a section was measured in a niche or on fixtures on the wall.
 
-    Such a section stands apart from those beside it, and between them the surface departs from the wall as it does from
-    their course.
+    Such a section deviates from neighbouring ones, and around it the surface deviates from the wall in the same way.
 
     Attributes
     ----------
     surface : Surface
-        The tunnel.
+        Surface of the tunnel.
     apart : (k, 361) float array
-        How far each section stands apart from those beside it, m, outwards positive, at each whole degree; 0 where it is
-        on the wall.
+        Deviation of each section from neighbouring ones, m, positive outwards, at each whole degree; 0 where it is on the
+        wall.
     """
 
     surface: Surface
@@ -39,28 +38,28 @@ class SectionOutliers:
 
     @classmethod
     def of(cls, surface: Surface, most: float = 1.0) -> SectionOutliers:
-        """Take the sections that stand apart from those beside them (:meth:`Surface.section_outliers`).
+        """Find the sections that deviate from neighbouring ones (:meth:`Surface.section_outliers`).
 
-        Those that do over a larger share of their girth than ``most`` (0 to 1) are left out. On simulated tunnels that
-        matters between 0.4 and 0.5 only: a section that is wider or narrower over half of its girth and more stands apart
-        nowhere. There MOST finds more lining where one side of the tunnel is wider for a few metres, and 1 keeps the back of
-        a niche as large from being taken for lining.
+        Sections that deviate over a larger share of their girth than ``most`` (0 to 1) are ignored. On simulated tunnels this
+        matters only between 0.4 and 0.5: a section that is wider or narrower over at least half of its girth has no deviation
+        at all. MAX_GIRTH_SHARE finds more lining where one side of the tunnel is wider for a few metres, and 1 prevents the
+        back of a niche of that size from being classified as lining.
         """
         apart = surface.section_outliers()
         apart[(apart != 0.0).mean(axis=1) > most] = 0.0
         return cls(surface, apart)
 
     def offset(self, chainage: Float, arc: Float) -> Float:
-        """Offset of the wall from the surface, m; (rows,) arcs by (columns,) chainages."""
+        """Return the offset of the wall from the surface, m; (rows,) arcs by (columns,) chainages."""
         out = np.zeros((len(arc), len(chainage)))
         for column, nodes, apart in self._columns(chainage):
             out[:, column] = np.interp(arc, nodes, apart)
         return out
 
     def offset_and_bends(self, chainage: Float, arc: Float) -> tuple[Single, Bool] | None:
-        """Offset of the wall from the surface, m, and where it bends; (rows,) arcs by (columns,) chainages; None: nowhere.
+        """Return offset (m) and bends of the wall relative to the surface, (rows,) arcs by (columns,) chainages; None if none.
 
-        Where it bends, at the edges of the niche, the surface's normals are not those of the wall.
+        At bends, on the edges of the niche, the surface's normals differ from those of the wall.
         """
         columns = list(self._columns(chainage))
         if not columns:
@@ -69,11 +68,11 @@ class SectionOutliers:
         for column, nodes, apart in columns:
             bend = ndimage.maximum_filter1d(apart, 7) - ndimage.minimum_filter1d(apart, 7)
             offset[:, column] = np.interp(arc, nodes, apart)
-            bent[:, column] = np.interp(arc, nodes, bend) > OFF_WALL
+            bent[:, column] = np.interp(arc, nodes, bend) > MIN_BEND
         return offset, bent
 
     def _columns(self, chainage: Float) -> Iterator[tuple[int, Float, Float]]:
-        """Places of chainages near sections that stand apart; arcs of the section's nodes there, and how far each is apart."""
+        """Yield indices of chainages near deviating sections, the arcs of the section's nodes there, and their deviations."""
         at = self.surface.chainages
         if len(at) < 2 or not self.apart.any():
             return

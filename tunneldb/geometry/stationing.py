@@ -1,4 +1,4 @@
-"""Stationing: what places along a tunnel are called, as in ``sql/geometry/stationing.sql``."""
+"""Stationing: labels of places along a tunnel, as in ``sql/geometry/stationing.sql``."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from typing import NamedTuple
 
 
 class Equation(NamedTuple):
-    """Where a piece of stationing begins.
+    """Start of a piece of stationing.
 
     Attributes
     ----------
     chainage : float
-        Distance along the axis from which it holds, m; the first of a tunnel holds before that, too.
+        Distance along the axis from which it is valid, m; the first of a tunnel is valid before that, too.
     station : float
         Station there, m.
     direction : int
-        1 where stations grow with chainage, -1 where they run backwards.
+        1 if stations grow with chainage, -1 if they decrease.
     """
 
     chainage: float
@@ -28,12 +28,12 @@ class Equation(NamedTuple):
 
 @dataclass(frozen=True)
 class Stationing:
-    """A tunnel's own stationing.
+    """Stationing of a tunnel.
 
     Attributes
     ----------
     equations : sequence of Equation
-        In growing chainage; without any, stations are chainages.
+        In ascending chainage; if empty, stations are chainages.
     """
 
     equations: Sequence[Equation] = ()

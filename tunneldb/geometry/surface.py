@@ -1,4 +1,4 @@
-"""The surface of a tunnel: segments and sections, and the way between space and the unrolled plane."""
+"""Surface of a tunnel: segments and sections, and transformations between space and the unrolled plane."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.threads import in_blocks
 
 BLOCK = 1 << 14
-"""Points that are unrolled, or brought back, at a time."""
+"""Number of points that are transformed at a time."""
 
 COLUMNS = 250
-"""Columns of pixels that are placed at a time."""
+"""Number of columns of pixels that are transformed at a time."""
 
 _ANYWHERE = np.full(3, -np.inf), np.full(3, np.inf)
 
-APART = 0.06
-"""A section that stands apart from those beside it by more was not measured on the wall, m."""
+MIN_SECTION_DEVIATION = 0.06
+"""Deviation of a section from its neighbours above which it was not measured on the wall, m."""
 
 MIN_SECTIONS = 4
-"""With fewer sections there is nothing to compare with."""
+"""Least number of sections for a comparison."""
 
 
 @dataclass(frozen=True)
 class Unrolled:
-    """Points in the unrolled plane; NaN where a point lies off the tunnel.
+    """Points in the unrolled plane; NaN if a point is off the tunnel.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Surface:
     radius, arcs : (k, 361) float arrays
         Distance from the axis and length from the crown at each whole degree from -180° to 180°, m.
     reach : float
-        Sections farther apart than this leave a hole in the surface, m: one spacing of the axis' vertices.
+        Distance between sections above which the surface has a gap, m: one spacing of the axis vertices.
     """
 
     number: Int64
@@ -78,7 +78,7 @@ class Surface:
             raise ValueError(f"sections must have {NODES} nodes, one per degree")
 
     def unroll(self, points: Float) -> Unrolled:
-        """Chainage, arc, offset and surface normal of points (n, 3) in the tunnel's SRID."""
+        """Return chainage, arc, offset and surface normal of points (n, 3) in the tunnel's SRID."""
         points = np.ascontiguousarray(points, dtype=np.float64)
         unrolled, normal = np.empty_like(points), np.empty_like(points)
         in_blocks(
@@ -90,11 +90,11 @@ class Surface:
 
     @property
     def arrays(self) -> tuple[Float, Int64, Float, Float, Float, Float, float]:
-        """What :func:`tunneldb.geometry.unrolling.to_plane` takes of the surface."""
+        """Return the arguments of :func:`tunneldb.geometry.unrolling.to_plane` for the surface."""
         return self.segments, self.number, self.ends, self.chainages, self.radius, self.arcs, self.reach
 
     def to_space(self, chainage: Float, arc: Float, offset: Float) -> Float:
-        """Points (n, 3) of coordinates in the unrolled plane (n,); NaN where they lie off the tunnel."""
+        """Return points (n, 3) of coordinates in the unrolled plane (n,); NaN off the tunnel."""
         unrolled = np.column_stack(np.broadcast_arrays(chainage, arc, offset)).astype(np.float64, copy=False)
         which = self.segment_index(unrolled[:, 0])
         points = np.empty_like(unrolled)
@@ -106,14 +106,14 @@ class Surface:
         return points
 
     def section_points(self, chainage: Float, arc: Float, offset: Single) -> tuple[Float, Float]:
-        """Where pixels lie in the planes of their columns: right of the axis and above it, both (columns, rows), m.
+        """Return the positions of pixels in the planes of their columns: right of the axis and above it, (columns, rows), m.
 
         Parameters
         ----------
         chainage, arc : (columns,), (rows,) float arrays
-            Of columns and rows, m.
+            Coordinates of columns and rows, m.
         offset : (rows, columns) float32 array
-            From the surface, m; NaN where nothing is seen.
+            Offset from the surface, m; NaN where not measured.
         """
         right, up = (np.empty((len(chainage), len(arc))) for _ in range(2))
 
@@ -127,13 +127,13 @@ class Surface:
         return right, up
 
     def segment_index(self, chainage: Float) -> Int64:
-        """Index of the segment at each chainage, -1 where there is none."""
+        """Return the index of the segment at each chainage, -1 if there is none."""
         index = np.searchsorted(self.ends[:, 0], chainage, side="right") - 1
         held = (index >= 0) & (chainage <= self.ends[index, 1])
         return np.where(held, index, -1).astype(np.int64)
 
     def frames(self, chainage: Float) -> Float:
-        """Origin, tangent, right and up, (n, 4, 3), of the plane at each chainage (n,); NaN where there is no segment."""
+        """Return origin, tangent, right and up, (n, 4, 3), of the plane at each chainage (n,); NaN if there is no segment."""
         index = self.segment_index(np.asarray(chainage, dtype=np.float64))
         held = index >= 0
         k, at = index[held], np.asarray(chainage, dtype=np.float64)[held]
@@ -142,7 +142,7 @@ class Surface:
         return frames
 
     def arc_range(self, chainage: Float) -> tuple[Float, Float]:
-        """Arcs (n,) at the two ends of the sections at places along the axis (n,), straight below the axis (-180° and 180°), m.
+        """Return the arcs (n,) at both ends of the sections at chainages (n,), straight below the axis (-180° and 180°), m.
 
         NaN where there is no section.
         """
@@ -151,14 +151,14 @@ class Surface:
         return np.where(a >= 0, low, np.nan), np.where(a >= 0, high, np.nan)
 
     def waterline(self, chainage: Float, level: float) -> tuple[Float, Float]:
-        """Arcs at which the surface meets the water on the left and on the right, at places along the axis (n,), m.
+        """Return the arcs at which the surface meets the water on the left and on the right, at chainages (n,), m.
 
-        NaN where there is no section, or where it does not reach down to the water.
+        NaN if there is no section, or if it does not extend down to the water.
 
         Parameters
         ----------
         chainage : (n,) float array
-            m.
+            Chainages, m.
         level : float
             Height of the water in the tunnel's SRID, m.
         """
@@ -177,11 +177,11 @@ class Surface:
         return _crossing(left, arcs[:, crown::-1]), _crossing(right, arcs[:, crown:])
 
     def section_outliers(self) -> Float:
-        """How far each section stands apart from those beside it, (k, 361), m; 0 where it is on the lining.
+        """Return the deviation of each section from its neighbours, (k, 361), m; 0 where it is on the lining.
 
-        A section that was measured in a niche or on something hung on the wall does. Each is compared with the median of the
-        three before and the three after it; it must differ by more than the lining does there from section to section
-        anyway, as rock does.
+        Sections in a niche or on fixtures on the wall deviate. Each is compared with the median of the three before and the
+        three after it; the deviation must exceed the usual variation of the lining from section to section there, which is
+        large for rock.
         """
         count = len(self.chainages)
         if count < MIN_SECTIONS:
@@ -190,11 +190,11 @@ class Surface:
         beside = np.array([[n for n in range(f, f + min(7, count)) if n != k] for k, f in enumerate(first.tolist())])
         apart = self.radius - np.median(self.radius[beside], axis=1)
         usual = 3.0 * MAD_TO_SIGMA * np.median(np.abs(apart), axis=1)
-        return np.where(np.abs(apart) > np.maximum(usual, APART)[:, None], apart, 0.0)
+        return np.where(np.abs(apart) > np.maximum(usual, MIN_SECTION_DEVIATION)[:, None], apart, 0.0)
 
 
 def _crossing(above: Float, arcs: Float) -> Float:
-    """Arc (n,) at which the heights above the water (n, k) of nodes first fall below zero; NaN where they never do."""
+    """Return the arc (n,) at which the heights of nodes above the water (n, k) first become negative; NaN if they never do."""
     under = above < 0.0
     after = np.maximum(under.argmax(axis=1), 1)[:, None]
     high, low = (np.take_along_axis(above, at, axis=1)[:, 0] for at in (after - 1, after))

@@ -1,10 +1,10 @@
 """Unrolling of points and its inverse (Gonçalves et al., 2012, stage 5); the same steps as ``sql/geometry/unroll.sql``.
 
 A section is a closed curve of 361 nodes, one per degree from -180° to 180°, each at ``radius`` from the axis and with
-``arc``, its length along the section from the crown. Between two sections the nodes, and the arcs, are blended linearly
-in chainage, so the surface is continuous along the whole tunnel; the arcs so blended are the weighted average of eq. 1.
-Along a section the normal is blended between the nodes too, so each point near the surface has one foot, and the way
-back is exact.
+``arc``, its length along the section from the crown. Between two sections the nodes and arcs are interpolated linearly
+in chainage, so the surface is continuous along the whole tunnel; interpolated arcs are the weighted average of eq. 1.
+Along a section the normal is also interpolated between the nodes, so each point near the surface has exactly one foot, and
+the inverse is exact.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tunneldb.geometry.frame import frame_of, frames_at, locate, nearest_segment
 NODES = 361
 CROWN = 180
 MAX_OUTSIDE = 3.0
-"""Farther outside the surface than this, m, a point is off the tunnel (a refuge niche is up to 2-3 m deep)."""
+"""Distance outside the surface above which a point is off the tunnel, m (a refuge niche is up to 2-3 m deep)."""
 
 _STEPS = 180
 _RADIAN = np.pi / 180.0
@@ -27,25 +27,25 @@ _COS = np.cos(np.radians(np.arange(NODES) - 180.0))
 
 
 def sections_about(chainages: Float, chainage: Float, reach: float) -> tuple[Intp, Intp, Float]:
-    """Sections before and after places along the axis, and the weight of the second.
+    """Return the sections before and after places along the axis, and the weight of the second.
 
-    Two sections bound a stretch when at most ``reach`` apart; beyond the last one it goes on unchanged for half of that.
+    Two sections bound a stretch if at most ``reach`` apart; the surface extends beyond the last one by half of that.
 
     Parameters
     ----------
     chainages : (k,) float array
-        Of the sections, growing, m.
+        Chainages of the sections, ascending, m.
     chainage : (n,) float array
-        The places, m.
+        Chainages of the places, m.
     reach : float
-        m.
+        Greatest distance between sections, m.
 
     Returns
     -------
     before, after : (n,) int arrays
-        Numbers of sections; -1 where none is near.
+        Indices of sections; -1 if none is near.
     weight : (n,) float array
-        Of the section after the place, 0 to 1.
+        Weight of the section after the place, 0 to 1.
     """
     count = len(chainages)
     if count == 0:
@@ -68,7 +68,7 @@ def sections_about(chainages: Float, chainage: Float, reach: float) -> tuple[Int
 def _sections_about(
     chainages: Float, chainage: float, reach: float, hint: int
 ) -> tuple[int, int, float]:  # pragma: no cover - compiled
-    """What :func:`sections_about` says of one place; ``hint`` is where to look first for the section before."""
+    """Return the result of :func:`sections_about` for one place; ``hint`` is the first guess for the section before."""
     count = chainages.shape[0]
     if 0 <= hint < count - 1 and chainages[hint] <= chainage < chainages[hint + 1]:
         before = hint
@@ -95,7 +95,7 @@ def _sections_about(
 
 @point_inner
 def _node(radius: Float, a: int, b: int, g: float, k: int) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Node ``k`` (-1 to 361, taken round the circle) of the blended section: right and up, m."""
+    """Return node ``k`` (-1 to 361, modulo the circle) of the interpolated section: right and up, m."""
     if k < 0:
         k += 360
     elif k >= 360:
@@ -106,7 +106,7 @@ def _node(radius: Float, a: int, b: int, g: float, k: int) -> tuple[float, float
 
 @point_inner
 def _degree(u: float, w: float, hint: int) -> int:  # pragma: no cover - compiled
-    """Interval (its first node, 0-359) whose angles hold the direction of (u, w), looked for near a hint."""
+    """Return the interval (its first node, 0-359) whose angles contain the direction of (u, w), searched from a hint on."""
     k = hint
     for _ in range(4):
         if u * _COS[k] - w * _SIN[k] < 0.0:
@@ -122,15 +122,15 @@ def _degree(u: float, w: float, hint: int) -> int:  # pragma: no cover - compile
 def _foot(
     radius: Float, a: int, b: int, g: float, u: float, w: float, k: int
 ) -> tuple[int, float, float, float, float, float]:  # pragma: no cover - compiled
-    """Place on the blended section whose normal passes through (u, w), looked for from interval ``k`` on.
+    """Find the place on the interpolated section whose normal passes through (u, w), searching from interval ``k`` on.
 
-    Returns the interval (its first node, 0-359), the share of it, the point (u, w) and the inward unit normal there.
+    Return the interval (its first node, 0-359), the fraction of it, the point (u, w) and the inward unit normal there.
     """
     u0, w0 = _node(radius, a, b, g, k)
     u1, w1 = _node(radius, a, b, g, k + 1)
     ub, wb = _node(radius, a, b, g, k - 1)
     ua, wa = _node(radius, a, b, g, k + 2)
-    # How far (u, w) lies ahead of the interval's nodes along the section's direction there; only the signs count yet.
+    # Distance of (u, w) ahead of the interval's nodes along the section's direction; only the signs matter here.
     here = (u - u0) * (u1 - ub) + (w - w0) * (w1 - wb)
     following = (u - u1) * (ua - u0) + (w - w1) * (wa - w0)
     for _ in range(_STEPS):
@@ -168,7 +168,7 @@ def _foot(
     if here >= 0.0 and following < 0.0 and c1 < 0.0 and root >= 0.0:
         s = 2.0 * c0 / (np.sqrt(root) - c1)
     else:
-        # Far from the surface there may be no root: Newton's steps end at an end.
+        # Far from the surface there may be no root: Newton's method then stops at an end.
         s = 0.5
         for _ in range(6):
             slope = c1 + 2.0 * c2 * s
@@ -198,8 +198,8 @@ def to_plane(
 ) -> None:  # pragma: no cover - compiled
     """Unroll a block of points.
 
-    What is known of the point before (segment, section, degree) shortens the search for the next and does not change what is
-    found.
+    The previous point's result (segment, section, degree) only speeds up the search for the next point; it does not change
+    the result.
 
     Parameters
     ----------
@@ -208,12 +208,12 @@ def to_plane(
     low, high : (3,) float arrays
         Points outside this box count as off the tunnel, m.
     points : (n, 3) float array
-        m.
+        Points, m.
     unrolled, normals : (n, 3) float arrays
         Overwritten: chainage, arc and offset, m, and the unit normal of the surface at the point's foot, into the tunnel;
         NaN off the tunnel.
     """
-    k, section, degree = np.int64(-1), np.int64(-1), np.int64(0)  # not literals, with which what is called compiles twice
+    k, section, degree = np.int64(-1), np.int64(-1), np.int64(0)  # not literals: called functions would compile twice
     i = 0
     while i < points.shape[0]:
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
@@ -265,7 +265,7 @@ def to_plane(
         if not found:
             k = np.int64(-1)
             if not afresh:
-                continue  # the same point again, looked for everywhere
+                continue  # the same point again, with a search over all segments
             for axis in range(3):
                 unrolled[i, axis] = normals[i, axis] = np.nan
         i += 1
@@ -283,20 +283,20 @@ def section_points(
     right: Float,
     up: Float,
 ) -> None:  # pragma: no cover - compiled
-    """Where pixels lie in the planes of their columns; the same steps as `to_space`.
+    """Return positions of pixels in the planes of their columns; the same steps as `to_space`.
 
     Parameters
     ----------
     chainages, radius, arcs, reach
         The surface, see :class:`tunneldb.geometry.surface.Surface`.
     chainage : (c,) float array
-        Of the columns, m.
+        Chainages of the columns, m.
     arc : (r,) float array
-        Of the rows, m.
+        Arcs of the rows, m.
     offset : (r, c) float32 array
-        From the surface, m.
+        Offset from the surface, m.
     right, up : (c, r) float arrays
-        Overwritten: place from the axis, m; NaN without an offset or off the surface.
+        Overwritten: position relative to the axis, m; NaN without an offset or off the surface.
     """
     section, node = np.int64(-1), np.int64(0)
     for j in range(chainage.shape[0]):
@@ -339,7 +339,7 @@ def to_space(
     reach: float,
     unrolled: Float,
 ) -> Float:
-    """Points (n, 3) of (chainage, arc, offset) rows (n, 3), each in the segment ``which``; NaN off the tunnel (-1)."""
+    """Return points (n, 3) of (chainage, arc, offset) rows (n, 3), each in the segment ``which``; NaN off the tunnel (-1)."""
     points = np.full((len(unrolled), 3), np.nan)
     a, b, g = sections_about(chainages, unrolled[:, 0], reach)
     held = np.flatnonzero((which >= 0) & (a >= 0))
@@ -370,7 +370,7 @@ def to_space(
 
 
 def _nodes(radius: Float, a: Intp, b: Intp, g: Float, k: Intp) -> tuple[Float, Float]:
-    """Nodes (n,) of blended sections, taken round the circle: right and up, m."""
+    """Return nodes (n,) of interpolated sections, modulo the circle: right and up, m."""
     k = k % 360
     r = (1.0 - g) * radius[a, k] + g * radius[b, k]
     return r * _SIN[k], r * _COS[k]

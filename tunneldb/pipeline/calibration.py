@@ -15,12 +15,12 @@ from tunneldb.errors import UserError
 from tunneldb.pointcloud.points import Points
 from tunneldb.radiometry.cells import IntensitySamples
 from tunneldb.radiometry.correction import Observations, range_span
-from tunneldb.radiometry.range_curve import USABLE, RangeCurve, estimate_range_curve
+from tunneldb.radiometry.range_curve import MAX_SIGMA_FOR_DETECTION, RangeCurve, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.radiometry.robust_statistics import DryLevel, plain_statistics
 from tunneldb.radiometry.roughness import (
-    STEEPEST,
-    TELLING,
+    MAX_INCIDENCE,
+    SIGNIFICANT_CHANGE,
     Roughness,
     automatic_regions,
     drawn_regions,
@@ -159,7 +159,7 @@ def calibrate(points: Points, observer: Observer, drawn: list[Polygon], survey: 
         return Calibration(observer, view, roughness_of(view, drawn), None)
     try:
         found = find_range_curve(view, observer)
-        found.require(USABLE)
+        found.require(MAX_SIGMA_FOR_DETECTION)
     except UserError as error:
         raise UserError(f"survey {survey}, kilometre {observer.km}: {error}; {BORROW}") from None
     observer = replace(observer, radiometer=replace(observer.radiometer, reference=found.curve))
@@ -194,12 +194,12 @@ def _roughness_found(view: Sample, found: RangeCurve) -> Roughness:
     angle = np.degrees(np.arccos(view.observations.cosine[view.telling]))
     return Roughness(
         found.roughness,
-        found.roughness_sigma < TELLING,
+        found.roughness_sigma < SIGNIFICANT_CHANGE,
         False,
         float("nan"),
         float("nan"),
         found.cells,
-        *(float(a) for a in np.quantile(angle[angle <= STEEPEST], (0.001, 0.999))),
+        *(float(a) for a in np.quantile(angle[angle <= MAX_INCIDENCE], (0.001, 0.999))),
     )
 
 

@@ -19,7 +19,7 @@ from tunneldb.anomalies.sparse import least_density, leave_out_sparse
 from tunneldb.arrays import UInt8
 from tunneldb.errors import NotReadyError, UserError
 from tunneldb.finding_kind import FindingKind
-from tunneldb.geometry.section_outliers import MOST, SectionOutliers
+from tunneldb.geometry.section_outliers import MAX_GIRTH_SHARE, SectionOutliers
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.calibration import UNKNOWN, Calibration, calibrate, dry_sigma
@@ -29,7 +29,7 @@ from tunneldb.pointcloud.reader import ScanSource
 from tunneldb.radiometry.correction import Kind, needs_reference
 from tunneldb.radiometry.robust_statistics import DryLevel
 from tunneldb.raster.accumulator import Accumulator, Window
-from tunneldb.raster.floor import HIDDEN, Floor
+from tunneldb.raster.floor import MAX_HIDDEN_LENGTH, Floor
 from tunneldb.raster.geotiff import KINDS
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import halo, halo_of_profiles, lining_image
@@ -226,7 +226,7 @@ def compute_detection(
     observer, view, roughness = calibration.observer, calibration.view, calibration.roughness
     with Accumulator(inputs.grid) as image:
         counts = _gather(observer, inputs.files, image, roughness.sigma, progress)
-        outliers = SectionOutliers.of(observer.surface, MOST)
+        outliers = SectionOutliers.of(observer.surface, MAX_GIRTH_SHARE)
         gaps = find_gaps(image, values["image.spacing"])
         lining = lining_image(image, gaps, observer, outliers, values["appendage.distance"], save_block)
     if gaps is not None:
@@ -331,7 +331,7 @@ def load_floor(conn: psycopg.Connection[Any], survey: Survey, surface: Surface, 
     if done is None:
         raise NotReadyError(f"the ground of kilometre {km} is unknown: tunneldb run {survey.name} --km {km} --from ground")
     # Far enough for both kilometres to see the ground on both sides of a gap at their border.
-    beyond = int(np.ceil(halo)) + HIDDEN
+    beyond = int(np.ceil(halo)) + MAX_HIDDEN_LENGTH
     first, last = int(km * KILOMETRE) - beyond, int((km + 1) * KILOMETRE) + beyond
     level = water_level(conn, survey, km)
     water = None if level is None else surface.waterline(np.arange(first, last + 1, dtype=np.float64), level)

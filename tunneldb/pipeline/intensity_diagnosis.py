@@ -25,7 +25,7 @@ from tunneldb.radiometry.correction import Kind, needs_reference, to_decibel
 from tunneldb.radiometry.diagnosis import Diagnosis, pool
 from tunneldb.radiometry.incidence import incidence_cosine
 from tunneldb.radiometry.oren_nayar import incidence_db
-from tunneldb.radiometry.range_curve import USABLE, RangeCurve, estimate_range_curve
+from tunneldb.radiometry.range_curve import MAX_SIGMA_FOR_DETECTION, RangeCurve, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.raster.observation import Observer
 from tunneldb.store.images import load_reference, load_regions
@@ -261,7 +261,7 @@ def _attempt(find: Callable[[], RangeCurve], raw: NDArray[np.floating]) -> tuple
     except UserError as error:
         return None, str(error)
     try:
-        found.require(USABLE)
+        found.require(MAX_SIGMA_FOR_DETECTION)
     except UserError as error:
         return found if found.worst[0] < float(np.std(raw)) else None, str(error)
     return found, found.remark

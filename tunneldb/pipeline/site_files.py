@@ -19,7 +19,7 @@ from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.pose_coverage import PoseCoverage, PoseFaults
 from tunneldb.pointcloud.reader import CHUNK, ScanHeader, check_header, crs_note
-from tunneldb.pointcloud.selection import SAMPLED, FilterCounts
+from tunneldb.pointcloud.selection import SAMPLE_STEP, FilterCounts
 from tunneldb.radiometry.intensity_kind import doubt
 from tunneldb.stages.ledger import stage_run
 from tunneldb.store.poses import load_pose_coverage
@@ -138,7 +138,7 @@ def _look_through(survey: Survey, header: ScanHeader, poses: PoseCoverage, max_l
             faults += poses.faults(points)
             np.minimum(low, points.xyz.min(axis=0), out=low)
             np.maximum(high, points.xyz.max(axis=0), out=high)
-            counts.intensities.append(points.intensity[::SAMPLED].copy())
+            counts.intensities.append(points.intensity[::SAMPLE_STEP].copy())
     counts.unposed = faults.points
     invalid = "coordinates, times or intensities that are no numbers; mend the file"
     for count, reason in ((counts.invalid, invalid), (counts.unposed, faults.text())):

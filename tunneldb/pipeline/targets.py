@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tunneldb.arrays import Bool, Float
 from tunneldb.classification.targets.curvature import CurvedCells
-from tunneldb.classification.targets.detection import LEAST_POINTS, Refusal, Sphere, confirmed, find_spheres, join
+from tunneldb.classification.targets.detection import MIN_POINTS, Refusal, Sphere, confirmed, find_spheres, join
 from tunneldb.database import snapshot
 from tunneldb.errors import NotReadyError, UserError
 from tunneldb.geometry.alignment import Alignment
@@ -201,7 +201,7 @@ class _Kilometre:
 
     def search(self, begin: Callable[[str, int], Progress]) -> tuple[list[TargetObservation], list[tuple[int, Refusal]]]:
         total = sum(file.points for file in self.files)
-        curved = CurvedCells(self.radius, LEAST_POINTS)
+        curved = CurvedCells(self.radius, MIN_POINTS)
         step = begin(f"km {self.km}: what isn't flat", total)
         for points in self._chunks():
             curved.add(points.xyz)

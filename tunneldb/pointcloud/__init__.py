@@ -1,4 +1,4 @@
-"""Laser scans on disk: reading, scanner positions, noise filter and thinning."""
+"""Laser scan files: reading, scanner positions, noise filter and thinning."""
 
 import lazy_loader
 

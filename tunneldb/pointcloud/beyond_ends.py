@@ -1,4 +1,4 @@
-"""Points that lie where a tunnel would go on beyond the ends of its given axis."""
+"""Points beyond the ends of a given axis, where the tunnel may continue."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ import numpy as np
 from tunneldb.arrays import Float, Int64
 from tunneldb.geometry.alignment import Alignment
 
-FARTHEST = 200  # m beyond an end that are looked at
-NEARLY_ALL = 0.99  # of the points there lie within what is called their reach, so that one stray does not make it
+MAX_DISTANCE = 200  # m beyond an end within which points are counted
+REACH_SHARE = 0.99  # share of the points there that lie within their reach; a single stray does not extend it
 
 
 class BeyondEnds:
-    """Points before the beginning and after the end of an axis, counted by metres.
+    """Counts of points before the start and after the end of an axis, by metre.
 
     Parameters
     ----------
     alignment : Alignment
-        The given axis, drawn on straight.
+        Given axis, continued straight.
     limit : float
-        Points farther than this from it lie elsewhere, m.
+        Greatest distance of counted points from the axis, m.
     """
 
     def __init__(self, alignment: Alignment, limit: float) -> None:
         self.limit = limit
-        # Vertices stand at whole spacings, the first and the last beyond the line that was given.
+        # Vertices lie at whole spacings; the first and the last are beyond the given line.
         line, chainage = alignment.vertices, alignment.number * alignment.spacing
         self.ends = tuple(
             (a + (b - a) * (end - at) / (next_ - at), (b - a) / np.linalg.norm(b - a))
@@ -33,28 +33,28 @@ class BeyondEnds:
                 (line[-2], line[-1], chainage[-2], chainage[-1], alignment.end),
             )
         )
-        self.metres: Int64 = np.zeros((2, FARTHEST), np.int64)
+        self.metres: Int64 = np.zeros((2, MAX_DISTANCE), np.int64)
 
     def add(self, xyz: Float) -> None:
-        """Count points (n, 3), m, of which it is known that they lie outside."""
+        """Count points (n, 3), m, that are known to lie outside."""
         for metres, (end, outwards) in zip(self.metres, self.ends, strict=True):
             apart = xyz - end
             beyond = apart @ outwards
             aside = np.sqrt(np.maximum((apart**2).sum(axis=1) - beyond**2, 0.0))
-            held = (beyond > 0.0) & (beyond < FARTHEST) & (aside <= self.limit)
-            metres += np.bincount(beyond[held].astype(np.int64), minlength=FARTHEST)
+            held = (beyond > 0.0) & (beyond < MAX_DISTANCE) & (aside <= self.limit)
+            metres += np.bincount(beyond[held].astype(np.int64), minlength=MAX_DISTANCE)
 
     @property
     def points(self) -> tuple[int, int]:
-        """How many lie before the beginning, and how many after the end."""
+        """Number of points before the start, and after the end."""
         return int(self.metres[0].sum()), int(self.metres[1].sum())
 
     @property
     def reach(self) -> tuple[float, float]:
-        """How far from there nearly all of them lie, m; 0 where there is none."""
+        """Distances beyond start and end within which nearly all of them lie, m; 0 where there are none."""
         before, after = (self._reach(metres) for metres in self.metres)
         return before, after
 
     def _reach(self, metres: Int64) -> float:
         total = int(metres.sum())
-        return float(np.searchsorted(np.cumsum(metres), NEARLY_ALL * total)) + 1.0 if total else 0.0
+        return float(np.searchsorted(np.cumsum(metres), REACH_SHARE * total)) + 1.0 if total else 0.0

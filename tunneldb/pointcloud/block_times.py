@@ -1,4 +1,4 @@
-"""When the points of a file were measured, block by block."""
+"""Times at which the points of a file were measured, block by block."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 
 from tunneldb.arrays import Float
 
-LATEST = 2.0**62
-"""Greatest time that is told apart, s: one beyond is spoilt, and whole seconds up to it are numbers of eight bytes."""
+MAX_TIME = 2.0**62
+"""Greatest valid time, s: greater times are invalid, and whole seconds up to it fit into eight bytes."""
 
 
 class BlockTimes:
-    """The least and the greatest time of each block of points of a file, which comes chunk by chunk.
+    """Least and greatest time of each block of points of a file that is read in chunks.
 
     Parameters
     ----------
     block : int
-        Points in a block.
+        Number of points in a block.
     """
 
     def __init__(self, block: int) -> None:
@@ -26,7 +26,7 @@ class BlockTimes:
         self.low, self.high = np.empty(0), np.empty(0)
 
     def add(self, first: int, time: Float) -> None:
-        """Look at the times (n,) of the points from this number on, s; those that are not finite are passed over."""
+        """Add the times (n,) of points from index ``first`` on, s; times that are not finite are ignored."""
         if not len(time):
             return
         time = np.where(np.isfinite(time), time, np.nan)
@@ -38,12 +38,12 @@ class BlockTimes:
         self.high[blocks] = np.fmax(self.high[blocks], np.fmax.reduceat(time, starts))
 
     def seconds(self, ranges: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-        """Between which whole seconds, half-open and apart, the times of blocks lie that these ranges of numbers touch."""
+        """Return disjoint half-open intervals of whole seconds that hold the times of the blocks in these index ranges."""
         blocks = np.concatenate([np.arange(begin // self.block, (end - 1) // self.block + 1) for begin, end in ranges])
         blocks = blocks[np.isfinite(self.low[blocks])]
         found: list[tuple[int, int]] = []
         for k in blocks[np.argsort(self.low[blocks], kind="stable")].tolist():
-            begin, end = (int(np.floor(np.clip(time, -LATEST, LATEST))) for time in (self.low[k], self.high[k]))
+            begin, end = (int(np.floor(np.clip(time, -MAX_TIME, MAX_TIME))) for time in (self.low[k], self.high[k]))
             if found and begin <= found[-1][1]:
                 found[-1] = (found[-1][0], max(found[-1][1], end + 1))
             else:

@@ -1,4 +1,4 @@
-"""Where along the axis the points of a chunk are, found out cell by cell of space and not point by point."""
+"""Chainage of the points of a chunk, looked up by cells of space instead of point by point."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.spool import BINS_PER_METRE, ROW, Rows
 from tunneldb.pointcloud.voxels import CellCounts
 
-# A distance in space is at most this many times as long in chainage: a point 25 m inside a curve of 75 m radius.
+# Greatest ratio of a difference in chainage to the distance in space: a point 25 m inside a curve of 75 m radius.
 STRETCHING = 1.5
 
-_BLOCK = 8192  # points whose rows are filled at a time: they stay in the processor's cache
+_BLOCK = 8192  # points whose rows are filled at a time; they fit into the processor's cache
 
 
 class ChainageLookup:
-    """Chainage of the cells of space, and of points in them.
+    """Chainage of cells of space, and of the points in them.
 
     Parameters
     ----------
     alignment : Alignment
-        The given axis.
+        Given axis.
     limit : float
-        Points farther than this from it are outside, m.
+        Distance from the axis beyond which points are outside, m.
     edge : float
         Edge of a cell, m.
     """
@@ -36,7 +36,7 @@ class ChainageLookup:
         self.alignment = alignment
         self.limit = limit
         self.segments = segment_rows(alignment.vertices, tangents(alignment.vertices))
-        # How far a point may be from the centre of its cell.
+        # Greatest distance of a point from the centre of its cell.
         self.slack = edge * np.sqrt(3.0) / 2.0 * STRETCHING
         self.chainage = np.empty(0)
         self.bin = np.empty(0, np.int64)
@@ -45,7 +45,7 @@ class ChainageLookup:
         self.whole = np.empty(0, np.bool_)
 
     def update(self, cells: CellCounts) -> None:
-        """Look at the cells that are new."""
+        """Locate the cells that are new."""
         known, centres = len(self.chainage), cells.centres
         if known == len(centres):
             return
@@ -58,12 +58,12 @@ class ChainageLookup:
         self.bin = np.concatenate([self.bin, np.floor(chainage * BINS_PER_METRE).astype(np.int64)])
         self.segment = np.concatenate([self.segment, segment])
         self.near = np.concatenate([self.near, near])
-        # Whether all points of the cell are in one kilometre.
+        # True if all points of the cell are in one kilometre.
         first, last = ((chainage + slack) // KILOMETRE for slack in (-self.slack, self.slack))
         self.whole = np.concatenate([self.whole, first == last])
 
     def outside(self, points: Points, cell: Int32) -> Intp:
-        """Numbers of the points that lie beyond the ends of the axis or too far from it."""
+        """Return the indices of points beyond the ends of the axis or too far from it."""
         doubtful = np.flatnonzero(~self.near[cell])
         if len(doubtful) == 0:
             return doubtful
@@ -73,11 +73,11 @@ class ChainageLookup:
 
     @property
     def bins_off(self) -> int:
-        """How many bins of chainage a point may be from where its cell is."""
+        """Greatest number of chainage bins between a point and its cell."""
         return int(np.ceil(self.slack * BINS_PER_METRE)) + 1
 
     def span(self, number: Int64, cell: Int32, block: int) -> tuple[Int64, Float, Float]:
-        """Blocks of so many point numbers that points with growing numbers (n,) lie in, and chainage from and to of each, m."""
+        """Return the blocks of ``block`` point numbers that points with ascending numbers (n,) lie in, with chainages, m."""
         found = np.arange(number[0] // block, number[-1] // block + 1)
         starts = np.searchsorted(number, found * block)
         found, starts = found[(held := np.diff(starts, append=len(number)) > 0)], starts[held]
@@ -86,7 +86,7 @@ class ChainageLookup:
         return found, low - self.slack, high + self.slack
 
     def rows(self, points: Points, cell: Int32, picked: Int32, tag: Int32) -> Rows:
-        """Rows of the picked points (k,), with their chainage, m, and these tags (k,)."""
+        """Return rows of the picked points (k,), with their chainage, m, and their tags (k,)."""
         rows: Rows = np.empty(len(picked), ROW)
         for begin in range(0, len(picked), _BLOCK):
             part, chosen = rows[begin : begin + _BLOCK], picked[begin : begin + _BLOCK]
@@ -100,7 +100,7 @@ class ChainageLookup:
         return rows
 
     def _located(self, xyz: Float, start: Int32, distances: bool) -> tuple[Float, Float, Int32]:
-        """Chainage, distance from the axis (if wanted) and segment of points (n, 3), looked for from segments (n,) on."""
+        """Return chainage, distance from the axis (optional) and segment of points (n, 3); search from ``start`` on."""
         chainage, distance, segment = np.empty(len(xyz)), np.empty(len(xyz) if distances else 0), np.empty(len(xyz), np.int32)
         a = self.alignment
         locate_points(self.segments, a.number, float(a.spacing), xyz, start, chainage, distance, segment)
@@ -117,7 +117,7 @@ def _fill(
     x: Float, y: Float, z: Float, chainage: Float, time: Float, intensity: Single, scan_id: Int32, classification: UInt8,
     tag: Int32,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Write the fields of rows: what was worked out of each, and what the chosen points have."""
+    """Write the fields of rows: computed values, and those of the chosen points."""
     for i in range(chosen.shape[0]):
         k = chosen[i]
         x[i], y[i], z[i] = xyz[i, 0], xyz[i, 1], xyz[i, 2]

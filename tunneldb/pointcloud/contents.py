@@ -1,4 +1,4 @@
-"""What a scan file holds, found in one pass over it, and a random share of its points to judge it by."""
+"""Contents of a scan file, found in one pass, and a random sample of its points."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.table import format_of
 from tunneldb.pointcloud.points import CHUNK, Raw, on_earth
 
-SAMPLE = 400_000  # points, up to twice as many
-PLACES, RUN = 20, 50_000  # runs of points of which values are looked at, and points of each: a chunk of LAZ
+SAMPLE = 400_000  # points; the sample has at most twice as many
+RUNS, RUN_POINTS = 20, 50_000  # runs of points whose values are examined, and points of a run (a chunk of LAZ)
 
 
 class UniformSample:
-    """A random share of points that come chunk by chunk, each with the same chance; never more than twice `most`.
+    """Random sample of points that are read in chunks, all with the same probability; at most twice `most` points.
 
     Attributes
     ----------
     share : float
-        Share of all points that is kept.
+        Share of all points that is in the sample.
     """
 
     def __init__(self, most: int = SAMPLE) -> None:
@@ -35,7 +35,7 @@ class UniformSample:
         self._count = 0
 
     def add(self, raw: Raw, first: int) -> None:
-        """Add a chunk, whose points are numbered from `first` on."""
+        """Add a chunk whose points are numbered from `first` on."""
         chance = self._random.random(len(raw))
         chosen = np.flatnonzero(chance < self.share)
         xyz = np.column_stack([np.asarray(stored)[chosen] for stored in (raw.x, raw.y, raw.z)]) * raw.scales + raw.offsets
@@ -49,39 +49,39 @@ class UniformSample:
 
     @property
     def xyz(self) -> Float:
-        """Coordinates (n, 3), m."""
+        """Coordinates of the sample (n, 3), m."""
         return np.concatenate([np.empty((0, 3)), *(kept[1] for kept in self._kept)])
 
     @property
     def numbers(self) -> Int64:
-        """Numbers (n,) of the points in the file."""
+        """Indices (n,) of the sampled points in the file."""
         return np.concatenate([np.empty(0, np.int64), *(kept[2] for kept in self._kept)])
 
 
 @dataclass(frozen=True)
 class Contents:
-    """What a scan file holds.
+    """Contents of a scan file.
 
     Attributes
     ----------
     points : int
-        Points that are valid.
+        Number of valid points.
     misplaced : int
-        How many of them have a coordinate that is NaN or infinite.
+        Number of valid points with a coordinate that is NaN or infinite.
     low, high : (3,) float64 array
-        Box of the others, in the file's unit.
+        Bounding box of the other points, in the file's unit.
     times : (float, float) or None
-        First and last ``gps_time``; None where the file has none, or all are the same.
+        First and last ``gps_time``; None if the file has none, or all are equal.
     untimed : int
-        Points whose time is NaN or infinite.
+        Number of points whose time is NaN or infinite.
     scans : dict of int to int
-        Points of each scan number.
+        Number of points of each scan number.
     xyz : (n, 3) float64 array
-        A random share of the points.
+        Random sample of the points.
     numbers : (n,) int64 array
-        Their numbers in the file.
+        Their indices in the file.
     share : float
-        How large a share that is.
+        Share of the points that is in the sample.
     """
 
     points: int
@@ -103,7 +103,7 @@ def read_contents(path: Path, progress: Callable[[int], None] = lambda count: No
     ----------
     path : Path
     progress : callable
-        Takes the number of points of each chunk.
+        Function of the number of points of each chunk.
 
     Raises
     ------
@@ -135,50 +135,50 @@ def read_contents(path: Path, progress: Callable[[int], None] = lambda count: No
             first, last = min(first, float(good.min(initial=np.inf))), max(last, float(good.max(initial=-np.inf)))
         progress(len(raw))
     if points == misplaced:
-        raise InputError(f"{path}: none of its {points} points has coordinates")
+        raise InputError(f"{path}: none of its {points} points has valid coordinates")
     times = (first, last) if timed and first < last else None
     return Contents(points, misplaced, low, high, times, untimed, scans, sample.xyz, sample.numbers, sample.share)
 
 
 def _least(values: NDArray[Any]) -> float:
-    """Least of the values that are finite; infinity if none is."""
+    """Return the least finite value; infinity if none is finite."""
     finite = values[np.isfinite(values)]
     return float(finite.min()) if len(finite) else np.inf
 
 
 def read_values(path: Path, dimension: str, points: int) -> NDArray[Any]:
-    """Values of a dimension in runs of points spread evenly over a file, NaN among them; all where they are few.
+    """Read values of a dimension, NaN included, in runs of points spread evenly over a file; all values of a small file.
 
     Parameters
     ----------
     path : Path
     dimension : str
     points : int
-        How many the file has.
+        Number of points in the file.
 
     Raises
     ------
     InputError
-        If they cannot be read as one number a point.
+        If they cannot be read as one number per point.
     """
-    runs = -(-points // RUN)
-    chosen = np.unique(np.linspace(0, runs - 1, min(runs, PLACES)).astype(int)) * RUN
-    ranges = [(int(begin), min(int(begin) + RUN, points)) for begin in chosen]
+    runs = -(-points // RUN_POINTS)
+    chosen = np.unique(np.linspace(0, runs - 1, min(runs, RUNS)).astype(int)) * RUN_POINTS
+    ranges = [(int(begin), min(int(begin) + RUN_POINTS, points)) for begin in chosen]
     parts = [np.array(raw.intensity) for raw in format_of(path).read(path, dimension, CHUNK, ranges)]
     return np.concatenate(parts)
 
 
 def read_near(path: Path, contents: Contents, near: NDArray[np.bool_]) -> Float:
-    """Coordinates (n, 3), m, of runs of points in which most of some points of the random share lie: these at full density.
+    """Read coordinates (n, 3), m, at full density in the runs of points that hold most of some points of the sample.
 
     Parameters
     ----------
     near : (n,) bool array
-        Which points of the share they are.
+        True for these points of the sample.
     """
-    runs, counts = np.unique(contents.numbers[near] // RUN, return_counts=True)
-    chosen = np.sort(runs[np.argsort(-counts, kind="stable")[:PLACES]]) * RUN
-    ranges = [(int(begin), min(int(begin) + RUN, contents.points)) for begin in chosen]
+    runs, counts = np.unique(contents.numbers[near] // RUN_POINTS, return_counts=True)
+    chosen = np.sort(runs[np.argsort(-counts, kind="stable")[:RUNS]]) * RUN_POINTS
+    ranges = [(int(begin), min(int(begin) + RUN_POINTS, contents.points)) for begin in chosen]
     parts = [
         np.column_stack([np.asarray(stored) for stored in (raw.x, raw.y, raw.z)]) * raw.scales + raw.offsets
         for raw in format_of(path).read(path, None, CHUNK, ranges)

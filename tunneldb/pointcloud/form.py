@@ -1,4 +1,4 @@
-"""What a cloud of a tunnel looks like before anything is known of it: its size, its density, its profiles."""
+"""Form of a tunnel's point cloud without any other information: size, density, profile spacing."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from tunneldb.arrays import Float
 from tunneldb.geometry.centreline import centreline_through
 from tunneldb.geometry.plan_line import PlanLine
 
-BALL = 1.0  # m; wider than profiles lie apart, smaller than a tunnel
+BALL = 1.0  # m; greater than the profile spacing, smaller than a tunnel
 BALLS = 400
-WINDOW = 5.0  # m along the tunnel in which profiles are looked for
-REGULAR = 0.3
-"""Half of a length along which points of random places lie is in gaps that differ by 1.0 of their median; gaps between
-profiles differ by less than this."""
+WINDOW = 5.0  # m along the tunnel in which profiles are searched
+MAX_GAP_SPREAD = 0.3
+"""Greatest relative spread of gaps between profiles. For points at random places, half of the length is in gaps that differ by
+1.0 of their median; gaps between profiles differ by less than 0.3."""
 
-_EVEN = 0.25  # m; edge of the voxels of which a point each tells the line
+_EVEN = 0.25  # m; voxel edge; one point of each voxel is used to find the line
 _SLICE = 5.0  # m
-_LEAST = 20  # points of a slice, and gaps of a spacing
-_MOST_BINS = 500
+_MIN_COUNT = 20  # least number of points in a slice, and of gaps for a spacing
+_MAX_BINS = 500
 _NEAREST = 2000
 
 
 @dataclass(frozen=True)
 class TunnelForm:
-    """Size of a tunnel, in the file's unit, and the line that it follows.
+    """Size of a tunnel, in the file's unit, and its line.
 
     Attributes
     ----------
     line : PlanLine
     length : float
-        Along the line.
+        Length along the line.
     width, height : float
-        Medians of what sections 5 m long measure from the 1st to the 99th percentile.
+        Medians over sections 5 m long, from the 1st to the 99th percentile.
     """
 
     line: PlanLine
@@ -45,7 +45,7 @@ class TunnelForm:
 
 
 def tunnel_form(xyz: Float) -> TunnelForm | None:
-    """Size of the tunnel that points (n, 3) are of; None where no line runs through them."""
+    """Return the size of the tunnel that points (n, 3) were measured in; None if no line runs through them."""
     even = xyz[_one_a_voxel(xyz, _EVEN)]
     try:
         line = centreline_through(even)
@@ -61,7 +61,7 @@ def tunnel_form(xyz: Float) -> TunnelForm | None:
     slices = np.searchsorted(edges, along) - 1
     for number in range(len(edges) - 1):
         inside = slices == number
-        if inside.sum() >= _LEAST:
+        if inside.sum() >= _MIN_COUNT:
             sizes.append([np.subtract(*np.percentile(values[inside], [99.0, 1.0])) for values in (across, even[:, 2])])
     if not sizes:
         return None
@@ -70,12 +70,12 @@ def tunnel_form(xyz: Float) -> TunnelForm | None:
 
 
 def surface_density(xyz: Float, share: float) -> tuple[float, float, float]:
-    """Points per square unit of surface, of a random share of all points (n, 3): 10th percentile, median, 90th.
+    """Return the points per square unit of surface, from a random sample (n, 3): 10th percentile, median, 90th percentile.
 
-    About each of 400 places, chosen so that no part of the surface has more for being denser, the share's points within
-    1 m are counted, and divided by the share and by π m², as if the surface there were a plane: in corners it is up to
-    twice as much, on a vault hardly more, and at the cloud's ends half of it. A metre holds several profiles, so what is
-    between them counts. The median is good to a fifth.
+    Points of the sample within 1 m are counted around each of 400 places, and divided by the share of the sample and by π m²,
+    as if the surface were a plane. The places are chosen independently of the density. In corners the density is up to twice
+    too high, on a vault hardly, and at the cloud's ends it is half. A metre holds several profiles, so gaps between profiles
+    are included. The median is accurate to 20 %.
     """
     seeds = _one_a_voxel(xyz, BALL)
     chosen = np.random.default_rng(1).permutation(seeds)[:BALLS]
@@ -85,17 +85,17 @@ def surface_density(xyz: Float, share: float) -> tuple[float, float, float]:
 
 
 def profile_spacing(along: Float, across: Float, z: Float) -> float | None:
-    """Distance of a profiler's profiles along the tunnel, of all points of a few metres of it; None where it can't be told.
+    """Return the spacing of a profiler's profiles along the tunnel, from all points of a few metres; None if there is none.
 
-    Seen in a narrow strip along the wall, the points of profiles follow each other in steps that are alike; those of a
-    scanner that stood still, or of several passes, in steps of any length.
+    In a narrow strip along the wall, points of profiles follow each other at even steps; points of a static scanner, or of
+    several passes, at steps of any length.
 
     Parameters
     ----------
     along, across, z : (n,) float arrays
         Distance along the tunnel and to the right of its line, height, m.
     """
-    if len(along) < _LEAST:
+    if len(along) < _MIN_COUNT:
         return None
     places = np.column_stack([along, across, z])
     some = np.unique(np.linspace(0, len(places) - 1, _NEAREST).astype(int))
@@ -107,24 +107,24 @@ def profile_spacing(along: Float, across: Float, z: Float) -> float | None:
     radius = float(np.median(np.hypot(u, w)))
     width = 3.0 * float(np.median(near))
     strips = np.floor(np.arctan2(u, w) * radius / width).astype(np.int64)
-    chosen = np.random.default_rng(1).permutation(np.unique(strips))[:_MOST_BINS]
+    chosen = np.random.default_rng(1).permutation(np.unique(strips))[:_MAX_BINS]
     kept = np.isin(strips, chosen)
     order = np.lexsort([along[kept], strips[kept]])
     strip, ordered = strips[kept][order], along[kept][order]
     gaps = np.diff(ordered)[np.diff(strip) == 0]
     gaps = np.sort(gaps[gaps > 0.0])
-    # Half of the length lies in gaps below the median: points within a profile hardly count.
+    # Half of the length is in gaps below the median: points within a profile have little weight.
     lengths = np.cumsum(gaps)
-    if len(gaps) < _LEAST:
+    if len(gaps) < _MIN_COUNT:
         return None
     low, median, high = (float(gaps[np.searchsorted(lengths, part * lengths[-1])]) for part in (0.25, 0.5, 0.75))
-    if high - low > REGULAR * median:
+    if high - low > MAX_GAP_SPREAD * median:
         return None
     return median
 
 
 def _one_a_voxel(xyz: Float, edge: float) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Numbers of points, the first in each voxel."""
+    """Return the index of the first point in each voxel."""
     cells = np.floor((xyz - xyz.min(axis=0)) / edge).astype(np.int64)
     size = cells.max(axis=0) + 1
     keys = (cells[:, 0] * size[1] + cells[:, 1]) * size[2] + cells[:, 2]

@@ -1,22 +1,22 @@
 """The noise filter of Xu et al. (2018, section II-D), with a search radius that follows the scan's density.
 
-Xu et al. judge a point to be noise when fewer than 5 points lie within a neighbourhood of 0.05 m diameter. That is
-meant for a scan of a few millimetres; a sparser one would lose its walls. Here the radius is
+Xu et al. classify a point as noise if fewer than 5 points lie within a neighbourhood of 0.05 m diameter. That suits a scan
+with a few millimetres between points; a sparser scan would lose its walls. Here the radius is
 
     r = max(0.025 m, √(m / (π ρ))),   m = 20,
 
-where ρ is the areal density of the surface near the point: a circle of this radius then holds 20 points on average,
-so that a wall keeps its points (fewer than 5 of 20 expected: once in 60 000) while a stray point, with nothing near,
-goes. From a density of about one point a square centimetre upwards r is 0.025 m, and the filter is the paper's.
+where ρ is the areal density of the surface near the point. A circle of this radius contains 20 points on average. So a wall
+keeps its points (fewer than 5 of 20 expected: once in 60 000), and an isolated point is removed. From a density of about one
+point per square centimetre upwards r is 0.025 m, and the filter is that of the paper.
 
-ρ is measured in cubic cells of 0.5 m, as ρ = n / a² for a cell of edge a with n points. A plane cuts at most √2 a² out
-of a cell, so ρ is too high by 1.4 at worst and the circle still holds 14 points; where the plane cuts off a corner
-only, ρ is too low and the filter more lenient. Cells of 0.5 m also hold some points of each scanned profile where
-profiles are that far apart, so that points lying closely along profiles survive too. A stray point in an otherwise
-empty cell would by this rule get a wide radius and find the wall; therefore no radius exceeds the one of the density
-that 5 % of the points of the same stretch of tunnel fall below (cells with fewer than 5 points, which hold no
-surface, left out), nor one cell edge. Between static stations 40 m apart the density within 5 m of tunnel differs by
-a factor of 4, which moves that limit by less than the Poisson noise of the cells.
+ρ is measured in cubic cells of 0.5 m, as ρ = n / a² for a cell of edge a with n points. A plane has at most √2 a² within a
+cell, so ρ is at most 1.4 times too high, and the circle still contains 14 points. If the plane cuts only a corner of the
+cell, ρ is too low and the filter is more lenient. Cells of 0.5 m also contain points of every scanned profile if profiles
+are that far apart, so points that are dense along profiles are kept, too. An isolated point in an otherwise empty cell
+would get a wide radius by this rule and reach the wall. Therefore no radius exceeds that for the density that 5 % of the
+points of the same stretch of tunnel fall below (without cells of fewer than 5 points, which contain no surface), nor one
+cell edge. Between static stations 40 m apart, the density within 5 m of tunnel varies by a factor of 4, which moves that
+limit by less than the Poisson noise of the cells.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.compiled import kernel
 from tunneldb.pointcloud.voxels import CellCounts, column_hash
 
-EXPECTED = 20
+EXPECTED_NEIGHBOURS = 20
 SPARSE_SHARE = 0.05
 
-SELECTIVE = 4  # with this many times as many points as are to be judged it pays to leave out those far from them
+MIN_POINT_RATIO = 4  # ratio of all points to points to be classified from which it pays to leave out distant points
 
 POINTS = 5
 DIAMETER = 0.05
@@ -41,18 +41,18 @@ DIAMETER = 0.05
 def search_radii(
     counts: Int64, edge: float, points: int = POINTS, diameter: float = DIAMETER, stretch: Int64 | None = None
 ) -> Float:
-    """Search radius of the points of each cell.
+    """Return the search radius of the points of each cell.
 
     Parameters
     ----------
     counts : (k,) int64 array
-        Points in each cell.
+        Number of points in each cell.
     edge : float
         Edge of a cell, m.
     points, diameter : int and float
         The filter's parameters at full density; diameter in m.
     stretch : (k,) int64 array, optional
-        Number of the stretch of tunnel that each cell belongs to; the widest radius is found for each by itself.
+        Number of the stretch of tunnel that contains each cell; the widest radius is found for each stretch separately.
 
     Returns
     -------
@@ -75,9 +75,10 @@ def search_radii(
 
 
 def typical_density(counts: Int64, edge: float) -> float:
-    """Points per m² of surface about half of the points or more, from the points in each cell (k,) of an edge, m; 0 of none.
+    """Return the points per m² of surface that about half of the points or more have around them; 0 without points.
 
-    A point's cell holds, beside itself, as many points on average as any place like it does.
+    The points in each cell (k,) of an edge (m) are given. A point's cell contains, beside itself, as many points on average as
+    any place like it.
     """
     ascending = np.sort(counts[counts > 0])
     if not len(ascending):
@@ -92,13 +93,13 @@ def is_noise(cloud: Float, xyz: Float, radius: Float, points: int = POINTS) -> B
     Parameters
     ----------
     cloud : (m, 3) float64 array
-        Coordinates of all points near those to be judged, themselves included, m.
+        Coordinates of all points near those to be classified, including these, m.
     xyz : (n, 3) float64 array
-        Points to be judged, m.
+        Points to be classified, m.
     radius : (n,) float64 array
         Search radius of each, m.
     points : int
-        Least number of points in the neighbourhood of a good one.
+        Least number of neighbours of a point that is not noise.
 
     Returns
     -------
@@ -110,7 +111,7 @@ def is_noise(cloud: Float, xyz: Float, radius: Float, points: int = POINTS) -> B
         return noise
     cloud, xyz, radius = (np.ascontiguousarray(part, np.float64) for part in (cloud, xyz, radius))
     widest = float(radius.max())
-    if SELECTIVE * len(xyz) < len(cloud):
+    if MIN_POINT_RATIO * len(xyz) < len(cloud):
         near = np.empty(len(cloud), np.bool_)
         marks = np.zeros(1 << max(8, math.ceil(math.log2(32 * len(xyz)))), np.bool_)
         _mark_near(cloud, xyz, radius, 2.0 * widest, marks, near)
@@ -121,9 +122,9 @@ def is_noise(cloud: Float, xyz: Float, radius: Float, points: int = POINTS) -> B
 
 
 def noise_filter(xyz: Float, points: int = POINTS, diameter: float = DIAMETER) -> Bool:
-    """Find the noise of a whole cloud (n, 3) held in memory; (n,) bool, True for noise.
+    """Return True for the noise of a whole cloud (n, 3) in memory, (n,) bool.
 
-    Source: Xu et al. (2018), section II-D; the radius as at the head of this module.
+    Source: Xu et al. (2018), section II-D; radius as described in this module's docstring.
     """
     cells = CellCounts()
     number = cells.add(np.ascontiguousarray(xyz, np.float64))
@@ -134,11 +135,11 @@ def noise_filter(xyz: Float, points: int = POINTS, diameter: float = DIAMETER) -
 
 def _radius(density: Float) -> Float:
     with np.errstate(divide="ignore"):
-        return np.sqrt(EXPECTED / (np.pi * density))
+        return np.sqrt(EXPECTED_NEIGHBOURS / (np.pi * density))
 
 
 def _sort_by_cell(xyz: Float, edge: float) -> tuple[Float, Int32, Float]:
-    """Order the points by the bucket of their cell; start[b] is the first place of bucket b. Also the cells' origin."""
+    """Sort the points by the bucket of their cell; start[b] is the first index of bucket b. Also return the cells' origin."""
     origin = xyz.min(axis=0)
     buckets = 1 << max(8, math.ceil(math.log2(len(xyz) + 1)))
     bucket, ordered = np.empty(len(xyz), np.int32), np.empty((len(xyz), 3))
@@ -147,14 +148,14 @@ def _sort_by_cell(xyz: Float, edge: float) -> tuple[Float, Int32, Float]:
     return ordered, start[:-1], origin
 
 
-# Cells above each other get buckets beside each other: the three of a column are one run of memory.
+# Cells above each other have consecutive buckets: three cells of a column are contiguous in memory.
 
 
 @kernel
 def _bucket_sort(
     xyz: Float, origin: Float, scale: float, bucket: Int32, start: Int32, ordered: Float
 ) -> None:  # pragma: no cover - compiled
-    """Sort points by their bucket; of start, two longer than there are buckets and 0, the first entry of each is made."""
+    """Sort points by bucket; ``start`` (two entries more than buckets, initially 0) gets the first index of each bucket."""
     mask = start.shape[0] - 3
     for i in range(xyz.shape[0]):
         ix = math.floor((xyz[i, 0] - origin[0]) * scale)
@@ -165,7 +166,7 @@ def _bucket_sort(
         start[b + 2] += 1
     for b in range(2, start.shape[0]):
         start[b] += start[b - 1]
-    # Where the next point of bucket b goes is start[b + 1], which in the end is where the bucket after it begins.
+    # start[b + 1] is the index for the next point of bucket b; at the end it is the first index of bucket b + 1.
     for i in range(xyz.shape[0]):
         k = start[bucket[i] + 1]
         ordered[k, 0], ordered[k, 1], ordered[k, 2] = xyz[i, 0], xyz[i, 1], xyz[i, 2]
@@ -176,14 +177,14 @@ def _bucket_sort(
 def _mark_near(
     cloud: Float, xyz: Float, radius: Float, edge: float, marks: Bool, near: Bool
 ) -> None:  # pragma: no cover - compiled
-    """Tell which points of a cloud lie in cells that the spheres around points reach into; some others share their hash.
+    """Mark points of a cloud in cells that the spheres around points reach; some other points share their hash.
 
-    The edge of the cells is at least a diameter; marks are those of the cells, by their hash, and False to begin with.
+    The edge of the cells is at least a diameter; ``marks`` are those of the cells, by hash, initially False.
     """
     mask = marks.shape[0] - 1
     scale = 1.0 / edge
     for i in range(xyz.shape[0]):
-        r = radius[i] * (1.0 + 1e-9) + 1e-9  # rounding must not leave out a neighbour
+        r = radius[i] * (1.0 + 1e-9) + 1e-9  # rounding must not exclude a neighbour
         for ix in range(math.floor((xyz[i, 0] - r) * scale), math.floor((xyz[i, 0] + r) * scale) + 1):
             for iy in range(math.floor((xyz[i, 1] - r) * scale), math.floor((xyz[i, 1] + r) * scale) + 1):
                 column = column_hash(ix, iy)
@@ -200,7 +201,7 @@ def _mark_near(
 def _count_neighbours(
     cloud: Float, xyz: Float, radius: Float, start: Int32, edge: float, origin: Float, points: int, noise: Bool
 ) -> None:  # pragma: no cover - compiled
-    """Mark points with fewer neighbours than wanted; as soon as there are enough, no more are looked for."""
+    """Mark points with too few neighbours; the search ends as soon as there are enough."""
     mask = start.shape[0] - 2
     scale = 1.0 / edge
     for i in range(xyz.shape[0]):
@@ -211,7 +212,7 @@ def _count_neighbours(
         limit = radius[i] * radius[i]
         found = 0
         for c in range(9):
-            # The point's own column of cells first: on a dense wall it holds enough already.
+            # The point's own column of cells first: on a dense wall it already has enough.
             dx, dy = (c + 1) % 3 - 1, (c // 3 + 1) % 3 - 1
             dx, dy = (0, 0) if c == 0 else ((1, 1) if dx == 0 and dy == 0 else (dx, dy))
             column = column_hash(ix + dx, iy + dy)
@@ -221,7 +222,7 @@ def _count_neighbours(
                     ex, ey, ez = cloud[j, 0] - x, cloud[j, 1] - y, cloud[j, 2] - z
                     if ex * ex + ey * ey + ez * ez > limit:
                         continue
-                    # Other cells may share the bucket: count a neighbour in its own cell only.
+                    # Other cells may share the bucket: count a neighbour only in its own cell.
                     if (
                         math.floor((cloud[j, 0] - origin[0]) * scale) == ix + dx
                         and math.floor((cloud[j, 1] - origin[1]) * scale) == iy + dy

@@ -1,8 +1,8 @@
-"""Points in the nodes of an octree: each node holds an even sample of what lies in it, the nodes below it hold the rest.
+"""Points in the nodes of an octree: each node has an even sample of the points in its cube, the nodes below have the rest.
 
-Done in pieces of bounded size. The points are counted by cells of a metre; cubes of the octree with few enough points are the
-pieces, *tiles*, which come one after the other, depth first. A node above the tiles is complete when the last tile below it
-has gone by, and its sample is never larger than its grid has cells.
+It is built in pieces of bounded size. The points are counted by cells of one metre; cubes of the octree with few enough
+points are the pieces (*tiles*), processed depth first. A node above the tiles is complete after the last tile below it. Its
+sample is never larger than the number of cells in its grid.
 
 Sampling by one point for each cell of a grid of 128³ is what COPC calls the spacing of a node (COPC 1.0, section *info VLR*).
 """
@@ -17,35 +17,35 @@ import numpy as np
 from tunneldb.arrays import Float, Int64, Intp, UInt8
 
 CELL = 1.0
-"""Edge of the cells that points are counted in, m; a power of two, so that the edges of nodes are exact."""
+"""Edge of the cells in which points are counted, m; a power of two, so that the edges of nodes are exact."""
 
 TILE = 1_000_000
-"""Points of a tile, unless those of a single cell are more."""
+"""Greatest number of points of a tile, unless a single cell has more."""
 
 LEAF = 50_000
-"""A node with no more points than this keeps them all, and has none below it."""
+"""Greatest number of points of a node that keeps all its points and has no nodes below it."""
 
 GRID = 7  # a node's sample has one point for each cell of a grid of 2**GRID to each side
-_BITS = 21  # of a place within a tile, to each side: three make one number of 64 bits
-_DEEPEST = _BITS - GRID
-_LONG, _SHORT = 24, 15  # bits of a cell's number in plan, and in height
+_BITS = 21  # bits of a position within a tile, per axis: three fit into 64 bits
+_MAX_LEVELS = _BITS - GRID
+_PLAN_BITS, _HEIGHT_BITS = 24, 15  # bits of a cell's index in plan, and in height
 
 Key = tuple[int, int, int, int]
-"""Level of a node, 0 for the root, and its place there in x, y and z."""
+"""Level of a node, 0 for the root, and its index there in x, y and z."""
 
 
 class CellCounts:
-    """How many points each cell of space holds.
+    """Number of points in each cell of space.
 
     Parameters
     ----------
     origin : (3,) float array
-        Somewhere near the points, m.
+        A position near the points, m.
 
     Attributes
     ----------
     numbers, counts : (c,) int64 arrays
-        Packed numbers of the cells, growing, and how many points are in each.
+        Packed numbers of the cells, ascending, and their numbers of points.
     """
 
     def __init__(self, origin: Float) -> None:
@@ -59,7 +59,7 @@ class CellCounts:
         Raises
         ------
         ValueError
-            If one lies so far from the origin that its cell has no number: 8388 km in plan, 16 km in height.
+            If a point is too far from the origin for a cell number: 8388 km in plan, 16 km in height.
         """
         found, counts = np.unique(self.number(xyz), return_counts=True)
         numbers, inverse = np.unique(np.concatenate([self.numbers, found]), return_inverse=True)
@@ -67,34 +67,38 @@ class CellCounts:
         self.numbers = numbers
 
     def number(self, xyz: Float) -> Int64:
-        """Packed numbers (n,) of the cells that points (n, 3) lie in."""
+        """Return the packed numbers (n,) of the cells that contain points (n, 3)."""
         cell = np.floor(xyz / CELL).astype(np.int64) - self.origin
-        half = np.array([1 << (_LONG - 1), 1 << (_LONG - 1), 1 << (_SHORT - 1)])
+        half = np.array([1 << (_PLAN_BITS - 1), 1 << (_PLAN_BITS - 1), 1 << (_HEIGHT_BITS - 1)])
         cell += half
         if len(cell) and (cell.min() < 0 or (cell >= 2 * half).any()):
-            raise ValueError("its points lie more than 16 km apart in height, or thousands of kilometres in plan")
-        return (cell[:, 0] << (_LONG + _SHORT)) | (cell[:, 1] << _SHORT) | cell[:, 2]
+            raise ValueError("its points are more than 16 km apart in height, or thousands of kilometres in plan")
+        return (cell[:, 0] << (_PLAN_BITS + _HEIGHT_BITS)) | (cell[:, 1] << _HEIGHT_BITS) | cell[:, 2]
 
     def cells(self) -> Int64:
-        """Cells (c, 3) of the numbers: their lower corners are these × CELL, m."""
-        x, y, z = self.numbers >> (_LONG + _SHORT), self.numbers >> _SHORT & (1 << _LONG) - 1, self.numbers & (1 << _SHORT) - 1
-        half = np.array([1 << (_LONG - 1), 1 << (_LONG - 1), 1 << (_SHORT - 1)])
+        """Return the cells (c, 3) of the numbers; their lower corners are these × CELL, m."""
+        x, y, z = (
+            self.numbers >> (_PLAN_BITS + _HEIGHT_BITS),
+            self.numbers >> _HEIGHT_BITS & (1 << _PLAN_BITS) - 1,
+            self.numbers & (1 << _HEIGHT_BITS) - 1,
+        )
+        half = np.array([1 << (_PLAN_BITS - 1), 1 << (_PLAN_BITS - 1), 1 << (_HEIGHT_BITS - 1)])
         return np.column_stack([x, y, z]) - half + self.origin
 
 
 @dataclass(frozen=True)
 class Tile:
-    """A cube of the octree whose points are brought into nodes together.
+    """Cube of the octree whose points are put into nodes together.
 
     Attributes
     ----------
     level : int
     place : tuple of three int
-        As of a `Key`.
+        As in `Key`.
     low : (3,) float array
         Lower corner, m.
     edge : float
-        m.
+        Edge of the cube, m.
     points : int
     """
 
@@ -105,21 +109,21 @@ class Tile:
     points: int
 
     def above(self, level: int) -> Key:
-        """The node of a level, no lower than the tile, that it lies in."""
+        """Return the node of a level (not below the tile) that contains the tile."""
         x, y, z = (place >> (self.level - level) for place in self.place)
         return level, x, y, z
 
 
 @dataclass(frozen=True)
 class Tiling:
-    """The cube about all points, and its tiles, depth first.
+    """Cube around all points, and its tiles, depth first.
 
     Attributes
     ----------
     low : (3,) float array
         Lower corner of the cube, m.
     edge : float
-        m.
+        Edge of the cube, m.
     tiles : tuple of Tile
     """
 
@@ -131,7 +135,7 @@ class Tiling:
 
     @classmethod
     def of(cls, counts: CellCounts, most: int = TILE) -> Tiling:
-        """Divide space into tiles of no more than so many points, or of one cell."""
+        """Divide space into tiles of at most ``most`` points, or of one cell."""
         cells = counts.cells()
         corner = cells.min(axis=0)
         relative = cells - corner
@@ -158,32 +162,32 @@ class Tiling:
         return cls(corner * CELL, CELL * 2.0**depth, tiles, counts, renumbered[tile_of])
 
     def tiles_of(self, xyz: Float) -> Intp:
-        """In which tile each of these points (n, 3) lies, (n,); all are among those that were counted."""
+        """Return the index of the tile of each of these points (n, 3), (n,); all must have been counted."""
         return self._tile_of[np.searchsorted(self._counts.numbers, self._counts.number(xyz))]
 
 
 def _octants(tile: Tile, depth: int) -> list[int]:
-    """The way down to a tile's first cell."""
+    """Return the path of octants down to a tile's first cell."""
     x, y, z = (place << (depth - tile.level) for place in tile.place)
     return [(x >> bit & 1) << 2 | (y >> bit & 1) << 1 | z >> bit & 1 for bit in reversed(range(depth))]
 
 
 class Nodes:
-    """Nodes of an octree, made of the points of one tile after the other, in the order of the tiling."""
+    """Nodes of an octree, built from the points of one tile after the other, in the order of the tiling."""
 
     def __init__(self) -> None:
-        self.above: list[tuple[Key, list[UInt8]]] = []  # nodes above the tile at hand, from the root down
-        self.occupied: dict[int, tuple[int, int, int]] = {}  # by level, the last cell larger than a tile that has its point
+        self.above: list[tuple[Key, list[UInt8]]] = []  # nodes above the current tile, from the root down
+        self.occupied: dict[int, tuple[int, int, int]] = {}  # per level, the last cell larger than a tile that has its point
 
     def add(self, tile: Tile, xyz: Float, records: UInt8) -> Iterator[tuple[Key, UInt8]]:
-        """Bring the points of a tile into nodes; gives those nodes that are complete.
+        """Put the points of a tile into nodes; yield the nodes that are complete.
 
         Parameters
         ----------
         xyz : (n, 3) float array
-            m.
+            Coordinates, m.
         records : (n, size) uint8 array
-            What is kept of each point; in a node they stay in this order.
+            Records of the points; in a node they stay in this order.
         """
         yield from self._leave(tile)
         code = _morton(np.clip((xyz - tile.low) / tile.edge * 2.0**_BITS, 0, 2**_BITS - 1).astype(np.int64))
@@ -200,11 +204,11 @@ class Nodes:
             yield (tile.level + level, x, y, z), records[np.sort(order[chosen])]
 
     def close(self) -> Iterator[tuple[Key, UInt8]]:
-        """The nodes that are still open."""
+        """Yield the nodes that are still open."""
         yield from self._complete(0)
 
     def _leave(self, tile: Tile) -> Iterator[tuple[Key, UInt8]]:
-        """Give the nodes that the tile doesn't lie in, and open those that it does."""
+        """Yield the nodes that don't contain the tile, and open those that do."""
         same = 0
         while same < min(len(self.above), tile.level) and self.above[same][0] == tile.above(same):
             same += 1
@@ -219,11 +223,11 @@ class Nodes:
         del self.above[level:]
 
     def _sample_above(self, tile: Tile, level: int, code: Int64) -> Intp:
-        """Which points of the tile belong to the node of a level above it."""
+        """Return the indices of the tile's points that belong to the node of a level above it."""
         finer = level + GRID - tile.level
         if finer >= 0:
             return _middles(code >> 3 * (_BITS - finer))
-        # A cell of the node's grid holds several tiles, which come together.
+        # A cell of the node's grid contains several consecutive tiles.
         x, y, z = (place >> -finer for place in tile.place)
         if self.occupied.get(level) == (x, y, z) or not len(code):
             return np.empty(0, np.intp)
@@ -232,15 +236,15 @@ class Nodes:
 
 
 def _below(code: Int64) -> Iterator[tuple[int, tuple[int, int, int], Intp]]:
-    """Nodes within a tile: level below it, place there, and which of the points, whose codes (n,) grow, are in each."""
+    """Yield nodes within a tile: level below it, index there, and indices of their points, whose codes (n,) ascend."""
     index = np.arange(len(code))
-    for level in range(_DEEPEST + 1):
+    for level in range(_MAX_LEVELS + 1):
         if not len(code):
             return
         node = code >> 3 * (_BITS - level)
         starts = _starts(node)
         ends = np.append(starts[1:], len(node))
-        whole = (ends - starts <= LEAF) | (level == _DEEPEST)
+        whole = (ends - starts <= LEAF) | (level == _MAX_LEVELS)
         chosen = np.repeat(whole, ends - starts)
         chosen[_middles(code >> 3 * (_BITS - level - GRID))] = True
         for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
@@ -249,17 +253,17 @@ def _below(code: Int64) -> Iterator[tuple[int, tuple[int, int, int], Intp]]:
 
 
 def _starts(key: Int64) -> Intp:
-    """Where runs of equal numbers begin."""
+    """Return the first index of each run of equal numbers."""
     return np.flatnonzero(np.concatenate([np.ones(min(1, len(key)), np.bool_), key[1:] != key[:-1]]))
 
 
 def _middles(key: Int64) -> Intp:
-    """The middle one of each run of equal numbers."""
+    """Return the middle index of each run of equal numbers."""
     starts = _starts(key)
     return (starts + np.append(starts[1:], len(key))[: len(starts)]) // 2
 
 
-# Shifts that leave two free bits before each of 21, with the masks of what belongs there after them.
+# Shifts that put two free bits before each of 21, with the masks to apply after them.
 _SPREAD = (
     (32, 0x1F00000000FFFF),
     (16, 0x1F0000FF0000FF),
@@ -270,7 +274,7 @@ _SPREAD = (
 
 
 def _morton(cell: Int64) -> Int64:
-    """Bits of x, y and z (n, 3) taken in turn; what lies together in a cube has the same first bits."""
+    """Interleave the bits of x, y and z (n, 3); positions in the same cube have the same first bits."""
     code = np.zeros(len(cell), np.int64)
     for column in range(3):
         bits = cell[:, column].copy()
@@ -281,7 +285,7 @@ def _morton(cell: Int64) -> Int64:
 
 
 def _place(code: int) -> tuple[int, int, int]:
-    """X, y and z of a number that `_morton` made."""
+    """Return x, y and z of a number made by `_morton`."""
     bits = range((code.bit_length() + 2) // 3)
     x, y, z = (sum((code >> (3 * bit + 2 - column) & 1) << bit for bit in bits) for column in range(3))
     return x, y, z

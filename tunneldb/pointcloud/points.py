@@ -1,4 +1,4 @@
-"""Scanned points, and what a scan file says of itself."""
+"""Scanned points, and the header of a scan file."""
 
 from __future__ import annotations
 
@@ -16,41 +16,41 @@ from tunneldb.arrays import Bool, Float, Int32, Single, UInt8, UInt16
 CHUNK = 500_000
 
 Ranges = Sequence[tuple[int, int]]
-"""Half-open ranges of point numbers, from 0, in the order in which they are to be read."""
+"""Half-open ranges of point indices, from 0, in the order of reading."""
 
 
-FARTHEST = 1e11
-"""Greatest coordinate of a point: no projected system has one, in millimetres even."""
+MAX_COORDINATE = 1e11
+"""Greatest plausible coordinate; projected systems have smaller ones, even in millimetres."""
 
 
 def on_earth(values: Float) -> Bool:
-    """Which coordinates are finite, and such as a coordinate system has."""
-    return np.asarray(np.abs(values) <= FARTHEST)
+    """Return True for coordinates that are finite and plausible for a coordinate system."""
+    return np.asarray(np.abs(values) <= MAX_COORDINATE)
 
 
 @dataclass(frozen=True)
 class Raw:
-    """A chunk of points as the file stores them, mostly as views of its records.
+    """Chunk of points as stored in the file, mostly as views of its records.
 
-    The arrays may have any stride and alignment; they are only good to read from.
+    The arrays may have any stride and alignment and must not be written to.
 
     Attributes
     ----------
     x, y, z : (n,) int32 or float64 arrays
-        Stored coordinates: `xyz` = stored × `scales` + `offsets`. int32 of LAS, float64 of E57.
+        Stored coordinates: `xyz` = stored × `scales` + `offsets`. int32 for LAS, float64 for E57.
     scales, offsets : (3,) float64 arrays
-        m.
+        Resolution and offsets of the stored coordinates, m.
     time : (n,) float64 array or None
-        ``gps_time``, s; None where the file has none.
+        ``gps_time``, s; None if the file has none.
     scan_id : (n,) integer array
         Number of the scan: ``point_source_id`` of LAS, `tunneldb.pointcloud.formats.e57.scan_number` of E57.
     intensity : (n,) array of any number type, or None
-        The chosen dimension in its own unit, with the scale and offset that the file gives it; None when none was chosen.
+        Chosen dimension in its own unit, with the scale and offset of the file; None if none was chosen.
     classification : (n,) uint8 array or None
-        Class code; None where the file has none.
+        Class code; None if the file has none.
     colour : (n, 3) uint16 array or None
-        Red, green, blue as the file has them, black where a point has none; None where they were not asked for, or the file
-        has none.
+        Red, green, blue as in the file, black for a point without colour; None if colours were not requested, or the file has
+        none.
     """
 
     x: NDArray[Any]
@@ -68,7 +68,7 @@ class Raw:
         return len(self.x)
 
     def part(self, begin: int, end: int) -> Raw:
-        """Points begin to end, half-open, of the chunk."""
+        """Return points begin to end, half-open, of the chunk."""
         chosen = slice(begin, end)
         return replace(
             self,
@@ -85,22 +85,22 @@ class Raw:
 
 @dataclass(frozen=True)
 class Points:
-    """A chunk of scanned points, in file order.
+    """Chunk of scanned points, in file order.
 
     Attributes
     ----------
     xyz : (n, 3) float64 array
         Coordinates in the file's frame, m.
     time : (n,) float64 array
-        ``gps_time``, s; 0 where the file has none.
+        ``gps_time``, s; 0 if the file has none.
     scan_id : (n,) int32 array
         Number of the scan: ``point_source_id`` of LAS, `tunneldb.pointcloud.formats.e57.scan_number` of E57.
     intensity : (n,) float32 array
-        The raw values of the chosen dimension, in its own unit; 0 when none was chosen.
+        Raw values of the chosen dimension, in its own unit; 0 if none was chosen.
     classification : (n,) uint8 array
-        Class code of the file; 0 where it has none.
+        Class code of the file; 0 if it has none.
     colour : (n, 3) uint16 array or None
-        As of `Raw`.
+        As in `Raw`.
     """
 
     xyz: Float
@@ -114,19 +114,19 @@ class Points:
         return len(self.xyz)
 
     def some(self, chosen: NDArray[Any]) -> Points:
-        """The chosen points, by number or by mask."""
+        """Return the chosen points, by index or by mask."""
         return Points(
             self.xyz[chosen], self.time[chosen], self.scan_id[chosen], self.intensity[chosen], self.classification[chosen],
             None if self.colour is None else self.colour[chosen],
         )  # fmt: skip
 
     def finite(self, *, time: bool, intensity: bool) -> Bool | None:
-        """Which points have coordinates on earth, and a finite time and intensity where asked for; None if all have."""
+        """Return True for points with plausible coordinates, and finite time and intensity if requested; None if all are."""
         wanted: list[Float | Single] = [self.xyz]
         wanted += [self.time] if time else []
         wanted += [self.intensity] if intensity else []
         with np.errstate(over="ignore", invalid="ignore"):
-            if -FARTHEST <= self.xyz.min(initial=0.0) <= self.xyz.max(initial=0.0) <= FARTHEST and all(
+            if -MAX_COORDINATE <= self.xyz.min(initial=0.0) <= self.xyz.max(initial=0.0) <= MAX_COORDINATE and all(
                 np.isfinite(values.sum()) for values in wanted
             ):
                 return None
@@ -137,7 +137,7 @@ class Points:
 
     @classmethod
     def of(cls, raw: Raw) -> Points:
-        """Scaled coordinates, and each array in its own memory."""
+        """Return points with scaled coordinates, and each array in its own memory."""
         count = len(raw)
         xyz = np.empty((count, 3))
         for column, stored in enumerate((raw.x, raw.y, raw.z)):
@@ -155,22 +155,22 @@ class Points:
 
 @dataclass(frozen=True)
 class ScanHeader:
-    """What a scan file says of itself.
+    """Header of a scan file.
 
     Attributes
     ----------
     path : Path
-        The file.
+        File that was read.
     points : int
-        Number of points that the header announces; an E57 file may mark some of them invalid, which are left out.
+        Number of points by the header; an E57 file may mark some of them as invalid, which are not read.
     dimensions : tuple of str
         Names of the dimensions of a point.
     crs : CRS or None
-        Coordinate reference system, None when the file states none.
+        Coordinate reference system, None if the file states none.
     low, high : (3,) float64 array
-        Box of the coordinates by the header, m; not checked.
+        Bounding box of the coordinates by the header, m; not checked.
     unread_crs : str
-        What the file has for a coordinate system that nobody can read, and why; empty if there is nothing of the kind.
+        Text of a coordinate system that cannot be read, and the reason; empty if there is none.
     """
 
     path: Path

@@ -1,4 +1,4 @@
-"""Whether scanner positions can be those of a scan of a tunnel: what lies elsewhere is an error of the list."""
+"""Plausibility of scanner positions: positions far from the tunnel, or impossibly fast, are errors of the list."""
 
 from __future__ import annotations
 
@@ -7,52 +7,52 @@ import numpy as np
 from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.alignment import Alignment
 
-FARTHEST_ASIDE = 25.0
-"""A scanner stands no farther from the axis, m: as far as the points that are loaded, unless that is set otherwise."""
+MAX_AXIS_DISTANCE = 25.0
+"""Greatest distance of a scanner from the axis, m: the default distance up to which points are loaded."""
 
-FARTHEST_BEYOND = 500.0
-"""Nor farther from the nearest vertex of the axis where it stands beyond its ends, m: from there it does not see in."""
+MAX_END_DISTANCE = 500.0
+"""Greatest distance of a scanner beyond the ends of the axis, m; from farther away it cannot see into the tunnel."""
 
-FASTEST = 50.0
-"""Nor does it move faster, m/s; a measuring train drives 120 km/h."""
+MAX_SPEED = 50.0
+"""Greatest speed of a scanner, m/s; a measuring train drives 120 km/h."""
 
-JUMP = 1.0
-"""What is nearer to where its neighbours lead is no jump, however short the time between, m."""
+MIN_JUMP = 1.0
+"""Greatest deviation from the neighbours' line that is not a jump, m, however short the time between."""
 
 
 def far_from_axis(xyz: Float, alignment: Alignment) -> Float:
-    """How far positions that cannot be those of a scanner in the tunnel are from the axis.
+    """Return the distance from the axis of positions that cannot be those of a scanner in the tunnel.
 
     Parameters
     ----------
     xyz : (n, 3) float array
         Positions, in the tunnel's frame, m.
     alignment : Alignment
-        The given axis.
+        Given axis.
 
     Returns
     -------
     (n,) float array
-        m; 0 for positions that can be.
+        Distance, m; 0 for plausible positions.
     """
     aside = alignment.distance(xyz)
     beyond = np.isnan(aside)
     distance = np.where(beyond, 0.0, aside)
-    limit = np.where(beyond, FARTHEST_BEYOND, FARTHEST_ASIDE)
+    limit = np.where(beyond, MAX_END_DISTANCE, MAX_AXIS_DISTANCE)
     ends = alignment.vertices[[0, -1]]
     distance[beyond] = np.linalg.norm(xyz[beyond, None] - ends, axis=2).min(axis=1)
     return np.where(distance > limit, distance, 0.0)
 
 
 def jumps(time: Float, xyz: Float) -> Bool:
-    """Which poses (n,) of a trajectory lie off where those before and after lead, farther than a scanner can have moved.
+    """Return True for poses (n,) of a trajectory that deviate from their neighbours by more than a scanner can have moved.
 
     Parameters
     ----------
     time : (n,) float array
-        Growing, s.
+        Time, ascending, s.
     xyz : (n, 3) float array
-        m.
+        Positions, m.
     """
     found = np.zeros(len(time), np.bool_)
     if len(time) < 3:
@@ -60,6 +60,6 @@ def jumps(time: Float, xyz: Float) -> Bool:
     share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None]
     between = xyz[:-2] + share * (xyz[2:] - xyz[:-2])
     speed = np.linalg.norm(np.diff(xyz, axis=0), axis=1) / np.diff(time)
-    off = np.linalg.norm(xyz[1:-1] - between, axis=1) > JUMP
-    found[1:-1] = off & (speed[:-1] > FASTEST) & (speed[1:] > FASTEST)
+    off = np.linalg.norm(xyz[1:-1] - between, axis=1) > MIN_JUMP
+    found[1:-1] = off & (speed[:-1] > MAX_SPEED) & (speed[1:] > MAX_SPEED)
     return found

@@ -1,4 +1,4 @@
-"""Of which points it is known where the scanner stood."""
+"""Coverage of points by known scanner positions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.pointcloud.points import Points
 
-# Times in a CSV are rounded; beyond the ends of the trajectory they may be off by this much, s.
+# Tolerance for times beyond the ends of the trajectory, s: times in a CSV are rounded.
 TIME_TOLERANCE = 0.001
 
 _WEEK = 604_800.0  # s
@@ -18,20 +18,20 @@ _UNIX_TO_GPS = 315_964_800.0  # s from 1970 to the beginning of GPS time, withou
 
 @dataclass
 class PoseFaults:
-    """Points whose scanner position is unknown; add those of several chunks with `+`.
+    """Points with unknown scanner position; faults of several chunks are added with `+`.
 
     Attributes
     ----------
     outside : int
         Number of points whose time lies outside the trajectory.
     gap : int
-        Number of points in its gaps.
+        Number of points in gaps of the trajectory.
     before, after : float
-        How far the worst of them lie before its start and after its end, s.
+        Greatest time before its start and after its end, s.
     unknown : dict of int to int
-        Number of points of each scan_id that has no station.
+        Number of points of each scan_id without a station.
     guess : str
-        Why the times may differ.
+        Guess why the times differ.
     """
 
     outside: int = 0
@@ -43,7 +43,7 @@ class PoseFaults:
 
     @property
     def points(self) -> int:
-        """All of them."""
+        """Total number of these points."""
         return self.outside + self.gap + sum(self.unknown.values())
 
     def __bool__(self) -> bool:
@@ -63,13 +63,13 @@ class PoseFaults:
         )
 
     def text(self) -> str:
-        """What is wrong and what to do, for the user."""
+        """Return the message for the user: the fault and what to do."""
         if self.unknown:
             scans = ", ".join(f"{scan} ({count} points)" for scan, count in sorted(self.unknown.items())[:10])
             more = f" and {len(self.unknown) - 10} more" if len(self.unknown) > 10 else ""
             return (
-                f"no station for scan_id {scans}{more}; add them to the stations of the survey "
-                "(scan_id is a LAS file's point_source_id; an E57 or PTX file brings its own: survey add … --stations FILE.e57)"
+                f"no station for scan_id {scans}{more}; add them to the survey's stations "
+                "(scan_id is a LAS file's point_source_id; E57 and PTX files have their own: survey add … --stations FILE.e57)"
             )
         where = [
             f"up to {seconds:.3f} s {side}"
@@ -77,22 +77,22 @@ class PoseFaults:
             if seconds > 0
         ]
         lost = [f"gps_time of {self.outside} points is outside the trajectory, {' and '.join(where)}"] if self.outside else []
-        lost += [f"{self.gap} points were measured in gaps of the trajectory"] if self.gap else []
-        return f"{' and '.join(lost)}; {self.guess or 'give the whole trajectory, in the time that the file uses'}"
+        lost += [f"{self.gap} points lie in gaps of the trajectory"] if self.gap else []
+        return f"{' and '.join(lost)}; {self.guess or 'give the whole trajectory, in the time system of the file'}"
 
 
 @dataclass(frozen=True)
 class PoseCoverage:
-    """What scanner positions there are: those of some scans, or a trajectory from end to end but for its gaps; or none at all.
+    """Available scanner positions: stations of some scans, a trajectory with gaps, or none.
 
     Attributes
     ----------
     scan_id : (k,) int64 array
-        Scans that have a station, growing; empty for a mobile scanner.
+        Scans that have a station, ascending; empty for a mobile scanner.
     ends : (float, float) or None
-        Times at which the trajectory begins and ends, s; None for a static scanner.
+        Start and end time of the trajectory, s; None for a static scanner.
     gaps : (g, 2) float64 array
-        Times from and to, growing, s.
+        Start and end times of gaps, ascending, s.
     """
 
     scan_id: Int64
@@ -101,12 +101,12 @@ class PoseCoverage:
 
     @property
     def empty(self) -> bool:
-        """Whether it is known of no point where the scanner was, and so is nothing that any of them lacks."""
+        """True if no scanner position is known for any point, so that none is required."""
         return not self.mobile and not len(self.scan_id)
 
     @property
     def mobile(self) -> bool:
-        """Whether positions come from a trajectory."""
+        """True if positions come from a trajectory."""
         return self.ends is not None
 
     def faults(self, points: Points) -> PoseFaults:
@@ -124,7 +124,7 @@ class PoseCoverage:
         return PoseFaults(unknown=dict(zip(scans[~known].tolist(), counts[~known].tolist(), strict=True)))
 
     def known(self, points: Points) -> Bool:
-        """Which points' scanner position is known; all, where none is asked for."""
+        """Return True for points with a known scanner position; all True if none is required."""
         if self.empty:
             return np.ones(len(points), np.bool_)
         if self.ends is not None:
@@ -137,23 +137,23 @@ def _covers(ends: tuple[float, float], time: Float) -> Bool:
 
 
 def _in_gap(gaps: Float, time: Float) -> Bool:
-    """Which times (n,) lie in gaps, of which there may be thousands."""
+    """Return True for times (n,) in gaps, of which there may be thousands."""
     if not len(gaps):
         return np.zeros(len(time), np.bool_)
-    last = np.searchsorted(gaps[:, 0] + TIME_TOLERANCE, time) - 1  # of those that begin before
+    last = np.searchsorted(gaps[:, 0] + TIME_TOLERANCE, time) - 1  # last gap that begins before
     return np.asarray((last >= 0) & (time < gaps[last, 1] - TIME_TOLERANCE))
 
 
 def _clocks(ends: tuple[float, float], points: Float) -> str:
-    """Which clocks a trajectory with these ends and points outside of it seem to have, where these are others; a guess."""
+    """Guess which time systems a trajectory with these ends and the points outside it have, if they differ."""
     one, other = sum(ends) / 2.0, float(np.median(points))
     in_week = [0.0 <= time <= _WEEK for time in (one, other)]
     if in_week[0] != in_week[1]:
         names = ("seconds of the GPS week", "time since an epoch")
-        return f"the trajectory seems to be in {names[in_week[1]]}, the file in {names[in_week[0]]}: bring them to one"
+        return f"the trajectory seems to be in {names[in_week[1]]}, the file in {names[in_week[0]]}; convert one of them"
     for seconds, names in ((1e9, ("adjusted GPS time", "GPS time")), (_UNIX_TO_GPS, ("GPS time", "Unix time"))):
         if abs(abs(other - one) - seconds) < _WEEK:
-            return f"the trajectory seems to be in {names[one > other]}, the file in {names[other > one]}: bring them to one"
+            return f"the trajectory seems to be in {names[one > other]}, the file in {names[other > one]}; convert one of them"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""Work done ahead of who wants it, in threads, a few pieces at a time."""
+"""Work done ahead in threads, a few pieces at a time."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ T = TypeVar("T")
 
 
 def prefetch(items: Iterable[T], ahead: int = 1) -> Generator[T, None, None]:
-    """Make the next items in a thread of their own while the present one is worked on.
+    """Yield items while a thread makes the next ones.
 
-    To be closed by whoever may leave before the end (`contextlib.closing`), which also ends the thread.
+    A caller that may leave before the end must close it (`contextlib.closing`), which also ends the thread.
     """
     queue: Queue[tuple[bool, T | BaseException | None]] = Queue(ahead)
     stopped = Event()
@@ -50,7 +50,7 @@ def prefetch(items: Iterable[T], ahead: int = 1) -> Generator[T, None, None]:
 
 
 def in_order(count: int, work: Callable[[int, int], T], parts: Iterable[tuple[int, int]]) -> Iterator[T]:
-    """Results of parts in their order, worked on by so many threads; few more are under way than are asked for."""
+    """Yield the results of parts in their order, computed by ``count`` threads only slightly ahead of the caller."""
     if count == 1:
         yield from (work(*part) for part in parts)
         return

@@ -17,35 +17,35 @@ from tunneldb.pointcloud.points import CHUNK, Points, Ranges, ScanHeader
 
 __all__ = ["CHUNK", "Points", "ScanHeader", "check_header", "read_chunks", "read_header"]
 
-_DEGREES = 360.0  # of longitude; coordinates beyond are lengths
+_DEGREES = 360.0  # of longitude; greater coordinates are lengths
 
 
 def read_header(path: Path) -> ScanHeader:
-    """Read the header of a scan file; of PLY, PTX and other text its points too, once for each version of the file.
+    """Read the header of a scan file; also the points of PLY, PTX and other text, once for each version of the file.
 
     Raises
     ------
     InputError
-        If the file is missing, is none of its kind, or holds no points.
+        If the file is missing, is not of its format, or holds no points.
     """
     require_known(path)
     return _without_wrong_crs(format_of(path).header(path))
 
 
 def _without_wrong_crs(header: ScanHeader) -> ScanHeader:
-    """Take a coordinate system in degrees for none where the coordinates can't be: exporters write one that they don't know."""
+    """Remove a coordinate system in degrees if the coordinates can't be degrees: exporters write a default system."""
     if header.crs is None or not horizontal(header.crs).is_geographic:
         return header
     corners = np.array([header.low[:2], header.high[:2]])
     if not np.isfinite(corners).all() or np.abs(corners).max() <= _DEGREES:
         return header
     x, y = header.low[:2]
-    said = f"{describe_crs(header.crs)} is in degrees, which x = {x:.0f}, y = {y:.0f} are not"
+    said = f"{describe_crs(header.crs)} is in degrees, but x = {x:.0f}, y = {y:.0f} are not"
     return replace(header, crs=None, unread_crs=said)
 
 
 def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_time: bool) -> None:
-    """Check a file against its survey, before any of its points is read.
+    """Check a file against its survey before reading its points.
 
     Parameters
     ----------
@@ -56,12 +56,12 @@ def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_tim
     srid : int
         EPSG code of the tunnel, or LOCAL.
     needs_time : bool
-        Whether scanner positions come from a trajectory, by ``gps_time``.
+        True if scanner positions come from a trajectory, by ``gps_time``.
 
     Raises
     ------
     InputError
-        If the dimension or ``gps_time`` is missing, or the horizontal coordinate system is another one.
+        If the dimension or ``gps_time`` is missing, or the horizontal coordinate system differs.
     """
     require_dimension(header.path, dimension, header.dimensions, "the survey's intensity")
     require_dimension(header.path, "gps_time" if needs_time else None, header.dimensions, "the trajectory")
@@ -74,14 +74,14 @@ def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_tim
 
 
 def crs_note(header: ScanHeader, srid: int) -> str | None:
-    """Say that a file's coordinates are taken to be the tunnel's (EPSG code, LOCAL) without its saying so; None if it does.
+    """Return a note that a file is assumed to be in the tunnel's system (EPSG code, LOCAL); None if it states it.
 
-    Of local coordinates a file that states no system says enough.
+    Local coordinates need no note if the file states no system.
     """
     if header.crs is not None or (srid == LOCAL and not header.unread_crs):
         return None
-    said = f"a coordinate system that can't be read ({header.unread_crs})" if header.unread_crs else "no coordinate system"
-    return f"states {said}: taken to be in the tunnel's, {srid_name(srid)}"
+    said = f"a coordinate system that cannot be read ({header.unread_crs})" if header.unread_crs else "no coordinate system"
+    return f"states {said}; using the tunnel's, {srid_name(srid)}"
 
 
 def read_chunks(
@@ -94,7 +94,7 @@ def read_chunks(
     Yields
     ------
     Points
-        In file order within a range; those without finite coordinates are left out.
+        In file order within a range; points without finite coordinates are skipped.
     """
     for points in map(Points.of, read_raw(path, dimension, size, ranges, colours=colours)):
         finite = points.finite(time=False, intensity=False)
@@ -103,14 +103,14 @@ def read_chunks(
 
 @dataclass(frozen=True)
 class ScanSource:
-    """What a kilometre needs of a scan file that was read.
+    """Part of a scan file that a kilometre needs.
 
     Attributes
     ----------
     path : Path
-        Where it lay then.
+        Path at the time of reading.
     ranges : list of (int, int)
-        Point numbers, from 0, half-open, among which are all the file's points of the kilometre and 10 m to both sides.
+        Half-open ranges of point indices, from 0, that contain all points of the kilometre and 10 m on both sides.
     dimension : str or None
         The survey's intensity dimension.
     """
@@ -121,5 +121,5 @@ class ScanSource:
 
     @property
     def points(self) -> int:
-        """Points to read."""
+        """Number of points to read."""
         return sum(end - begin for begin, end in self.ranges)

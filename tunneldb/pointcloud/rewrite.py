@@ -1,8 +1,8 @@
-"""Scan files written again with other classes or further dimensions, as LAZ 1.4, in chunks of constant memory.
+"""Copying of scan files with other classes or additional dimensions, as LAZ 1.4, in chunks of constant memory.
 
-Nothing else of a point changes: coordinates, scales and offsets, all other dimensions, extra bytes, coordinate
-system, records and dates are the input's. Where its point format has no room for classes over 31, the next one that holds
-the same takes its place.
+Nothing else of a point changes: coordinates, scales and offsets, all other dimensions, extra bytes, coordinate system,
+records and dates are those of the input. If its point format has no space for classes over 31, the next format with the
+same fields is used.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from tunneldb.pointcloud.points import CHUNK
 from tunneldb.threads import threads
 
 Classes = Callable[[Float], UInt8]
-"""Gives points (n, 3) their classes (n,)."""
+"""Function that returns the classes (n,) of points (n, 3)."""
 
 
 _EVERYTHING = DecompressionSelection.all()
@@ -38,7 +38,7 @@ _EVERYTHING = DecompressionSelection.all()
 
 @dataclass(frozen=True)
 class Source:
-    """What is to be written: what surrounds the points, the points in chunks, what of the header is known only afterwards."""
+    """Data to write: header and records, points in chunks, and the header values that are known only afterwards."""
 
     head: Head
     chunks: Iterator[UInt8]
@@ -53,28 +53,28 @@ def rewrite(
     progress: Callable[[int], None] = lambda count: None,
     size: int = CHUNK,
 ) -> Int64:
-    """Write a scan file again, each point with the class that it is given.
+    """Copy a scan file with the given class for each point.
 
     Parameters
     ----------
     source : Path
-        Scan file. Of E57, what `tunneldb.pointcloud.formats.e57_records.E57Records` says, of PTX, PTS, PLY and other
-        tables `tunneldb.pointcloud.formats.raw_records.RawRecords`.
+        Scan file. E57 is converted as described in `tunneldb.pointcloud.formats.e57_records.E57Records`, PTX, PTS, PLY and
+        other tables as in `tunneldb.pointcloud.formats.raw_records.RawRecords`.
     target : Path
         LAZ file to write; it must not exist.
     classes : callable
-        Called with each chunk's coordinates (n, 3), m, in the order of the file.
+        Function of each chunk's coordinates (n, 3), m, in the order of the file.
     names : mapping of int to str
-        Names of the classes, for whoever opens the file.
+        Names of the classes, stored in the file.
     progress : callable
-        Takes the number of points of each chunk that is written.
+        Function of the number of points of each chunk that is written.
     size : int
         Greatest number of points of a chunk.
 
     Returns
     -------
     (256,) int64 array
-        How many points each class has.
+        Number of points of each class.
 
     Raises
     ------
@@ -105,21 +105,21 @@ def rewrite_with_numbers(
     progress: Callable[[int], None] = lambda count: None,
     size: int = CHUNK,
 ) -> None:
-    """Write a scan file again, each point with further whole numbers.
+    """Copy a scan file with additional integer dimensions.
 
     Parameters
     ----------
     source, target, progress, size
-        As of `rewrite`.
+        As for `rewrite`.
     numbers : iterable of sequences of (n,) arrays
-        The numbers of the points in the order of the file, an array for each name; in pieces of any length.
+        Numbers of the points in the order of the file, an array for each name; in pieces of any length.
     names : mapping of str to str
-        Names of the dimensions, and what they are.
+        Names of the dimensions, with descriptions.
 
     Raises
     ------
     InputError
-        As of `rewrite`, and if the file has a dimension of that name.
+        As for `rewrite`, and if the file already has a dimension of that name.
     OSError
         If the target cannot be written.
     """
@@ -127,7 +127,7 @@ def rewrite_with_numbers(
     try:
         head = what.head.with_numbers(names, record_size(what.head.point_format))
     except ValueError as error:
-        raise InputError(f"{source}: it has a dimension {str(error)!r} already; write it without") from None
+        raise InputError(f"{source}: it already has a dimension {str(error)!r}; write it without that option") from None
     values = _Pieces(numbers)
     with writing(target, head) as writer:
         for records in what.chunks:
@@ -138,14 +138,14 @@ def rewrite_with_numbers(
 
 
 class _Pieces:
-    """Arrays that come in pieces, taken by so many elements."""
+    """Arrays that arrive in pieces, taken by number of elements."""
 
     def __init__(self, pieces: Iterable[Sequence[UInt32]]) -> None:
         self.pieces = iter(pieces)
         self.rest: list[UInt32] = []
 
     def take(self, count: int) -> list[UInt32]:
-        """So many elements of each."""
+        """Return the next ``count`` elements of each array."""
         while not self.rest or len(self.rest[0]) < count:
             piece = next(self.pieces)
             self.rest = [np.concatenate(pair) for pair in zip(self.rest, piece, strict=True)] if self.rest else list(piece)
@@ -155,7 +155,7 @@ class _Pieces:
 
 
 def records_of(path: Path, size: int = CHUNK, only: Collection[int] | None = None) -> Source:
-    """Points of a scan file as records of LAS with room for classes, to be read once.
+    """Return the points of a scan file as LAS records with space for classes, to be read once.
 
     Parameters
     ----------
@@ -163,18 +163,18 @@ def records_of(path: Path, size: int = CHUNK, only: Collection[int] | None = Non
     size : int
         Greatest number of points of a chunk.
     only : collection of int
-        Numbers of the chunks that are wanted, from 0; those of LAS between them are not read.
+        Indices of the requested chunks, from 0; chunks of LAS between them are not read.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or holds waveforms; while it is read, if it is cut off.
+        If the file cannot be read, or holds waveforms; while reading, if it is truncated.
     """
     return _of_las(path, size, only) if format_of(path).is_las else _of_others(path, size, only)
 
 
 def read_coordinates(path: Path, size: int = CHUNK) -> Iterator[Float]:
-    """Read the coordinates (n, 3) of a scan file's points, m, chunk by chunk, and nothing else of them.
+    """Read only the coordinates (n, 3) of a scan file's points, m, chunk by chunk.
 
     Raises
     ------
@@ -198,9 +198,9 @@ def _of_las(path: Path, size: int, only: Collection[int] | None) -> Source:
     with decoding(path, KIND):
         head = read_head(path)
     if head.holds_waveforms:
-        raise InputError(f"{path}: its waveforms would be lost: write it without them, or with them in a separate file")
+        raise InputError(f"{path}: it holds waveforms, which would be lost; export it without them, or to a separate file")
     if head.points != header.points:
-        raise InputError(f"{path}: its header announces {head.points} and {header.points} points; mend the file")
+        raise InputError(f"{path}: its header states both {head.points} and {header.points} points; export the file again")
     before = head.point_format
     after = FORMAT_OF[before]
     head = head.with_points(after, record_size(after) + head.record_size - record_size(before)).with_crs(header.crs)
@@ -229,7 +229,7 @@ def _read(
                     las.seek(done)
                 array = las.read_points(size).array
             if len(array) == 0:
-                raise InputError(f"{path}: truncated: {done} points read of the {count} that its header announces")
+                raise InputError(f"{path}: truncated: {done} points read, but its header states {count}")
             done += len(array)
             at = done
             yield array.view(np.uint8).reshape(len(array), -1)

@@ -1,9 +1,9 @@
-"""A tube beside the tunnel in the same scan, told by the empty ground between the two, seen from above.
+"""Detection of a second tube beside the tunnel in the same scan, by the empty ground between the two in plan.
 
-The points are sorted by stretches of chainage and by how far right of the axis they lie. About the axis lie the tunnel's own
-points, without a gap: floor and vault close it where walls are hidden. Beyond a gap as wide as a pillar, what has a floor
-and a roof over some metres, along several stretches, is a second tube. A niche touches its wall, a train stands below the
-vault, a cross passage is shorter along the tunnel, and beside an open cut there is ground without a roof.
+The points are sorted by stretches of chainage and by their distance right of the axis. Points around the axis without a gap
+are the tunnel's own: floor and vault are continuous even where walls are hidden. Points beyond a gap of a pillar's width,
+with a floor and a roof over some metres and along several stretches, are a second tube. A niche touches its wall, a train is
+below the vault, a cross passage is shorter along the tunnel, and beside an open cut the ground has no roof.
 """
 
 from __future__ import annotations
@@ -22,45 +22,45 @@ from tunneldb.geometry.stationing import KILOMETRE, chainage_label
 from tunneldb.pointcloud.spool import Rows
 
 STRETCH = 5.0
-"""m of chainage looked at together."""
+"""Length of a stretch of chainage, m."""
 
 _STRETCHES = round(KILOMETRE / STRETCH)
 
 CELL = 0.25
-"""m across the axis."""
+"""Width of a cell across the axis, m."""
 
 REACH = 50.0
-"""m from the axis; farther points are not told apart."""
+"""Distance from the axis up to which tubes are distinguished, m."""
 
-PILLAR = 1.5
-"""Tubes are farther apart, and no two neighbouring parts of one tunnel are, seen from above, m."""
+MIN_PILLAR_WIDTH = 1.5
+"""Least distance between tubes in plan, m; neighbouring parts of one tunnel are closer."""
 
-NARROWEST = 2.0
-"""A tube is as wide and as high, m."""
+MIN_TUBE_SIZE = 2.0
+"""Least width and height of a tube, m."""
 
-ROOFED = 0.5
-"""Share of a tube's cells that have points at heights so far apart that they are floor and roof."""
+MIN_ROOFED_SHARE = 0.5
+"""Least share of a tube's cells with points so far apart in height that they are floor and roof."""
 
-FAINT = 0.02
-"""Cells with a smaller share of what others of their stretch hold have strays only."""
+MIN_DENSITY_RATIO = 0.02
+"""Ratio to the typical count of a stretch's cells below which a cell has only stray points."""
 
-LONGEST_PASSAGE = 20.0
-"""Along the tunnel, m: over so much the pillar is taken to go on; a second tube is seen along more than a passage."""
+MAX_PASSAGE_LENGTH = 20.0
+"""Greatest length of a cross passage along the tunnel, m; the pillar is assumed to continue over it."""
 
-SHORTEST = 10.0
-"""A second tube is seen along more of the tunnel, m: cross passages are narrower."""
+MIN_TUBE_LENGTH = 10.0
+"""Least length of a second tube along the tunnel, m; cross passages are narrower."""
 
 
 @dataclass(frozen=True)
 class SecondTubes:
-    """Where the tunnel ends to its sides, because another tube begins.
+    """Lateral limits of the tunnel where another tube begins.
 
     Attributes
     ----------
     km : int
     limits : (2, k) float array
-        Least and greatest distance right of the axis of what is the tunnel's own, m, in each stretch; infinite where there
-        is no second tube.
+        Least and greatest distance right of the axis of the tunnel's own points, m, in each stretch; infinite if there is no
+        second tube.
     """
 
     km: int
@@ -68,24 +68,24 @@ class SecondTubes:
 
     @property
     def any(self) -> bool:
-        """Whether there is a second tube."""
+        """True if there is a second tube."""
         return bool(np.isfinite(self.limits).any())
 
     def own(self, rows: Rows, alignment: Alignment) -> Bool:
-        """Which rows are the tunnel's own."""
+        """Return True for rows of the tunnel itself."""
         away, stretch = np.empty(len(rows)), np.empty(len(rows), np.int32)
         _place(rows["x"], rows["y"], rows["chainage"], *_axis(alignment), self.km * KILOMETRE, away, stretch)
         return np.asarray((away >= self.limits[0, stretch]) & (away <= self.limits[1, stretch]))
 
     def note(self, points: int) -> str:
-        """What is to be known of so many points that were left out."""
+        """Return a note about the number of points that were left out."""
         places = []
         for side, limits in zip(("left", "right"), self.limits, strict=True):
             held = np.flatnonzero(np.isfinite(limits))
             if len(held):
                 low, high = (self.km * KILOMETRE + STRETCH * end for end in (held[0], held[-1] + 1))
                 places.append(f"to the {side} between {chainage_label(low, 0)} and {chainage_label(high, 0)}")
-        return f"{points} points of a second tube left out, {' and '.join(places)}: what is told is of the tube about the axis"
+        return f"{points} points of a second tube left out, {' and '.join(places)}; results are for the tube around the axis"
 
 
 def find_second_tubes(parts: Iterable[Rows], alignment: Alignment, km: int) -> SecondTubes:
@@ -96,7 +96,7 @@ def find_second_tubes(parts: Iterable[Rows], alignment: Alignment, km: int) -> S
     parts : iterable of rows
         Rows of the kilometre, in any order.
     alignment : Alignment
-        The given axis.
+        Given axis.
     km : int
     """
     shape = _STRETCHES, round(2 * REACH / CELL)
@@ -108,8 +108,8 @@ def find_second_tubes(parts: Iterable[Rows], alignment: Alignment, km: int) -> S
         _sort_in(rows["z"], away, which, count, low, high)
     limits = np.full((2, shape[0]), np.nan)
     for stretch in np.flatnonzero(count.any(axis=1)):
-        held = count[stretch] > max(1.0, FAINT * float(np.median(count[stretch][count[stretch] > 0])))
-        roofed = held & (high[stretch] - low[stretch] >= NARROWEST)
+        held = count[stretch] > max(1.0, MIN_DENSITY_RATIO * float(np.median(count[stretch][count[stretch] > 0])))
+        roofed = held & (high[stretch] - low[stretch] >= MIN_TUBE_SIZE)
         limits[1, stretch] = _pillar(held, roofed)
         limits[0, stretch] = -_pillar(held[::-1], roofed[::-1])
     for side in limits:
@@ -118,8 +118,8 @@ def find_second_tubes(parts: Iterable[Rows], alignment: Alignment, km: int) -> S
 
 
 def _pillar(held: Bool, roofed: Bool) -> float:
-    """How far right of the axis a pillar is with a tube behind it, m; NaN without one."""
-    middle, gap = len(held) // 2, round(PILLAR / CELL)
+    """Return the distance right of the axis of a pillar with a tube behind it, m; NaN without one."""
+    middle, gap = len(held) // 2, round(MIN_PILLAR_WIDTH / CELL)
     places = np.flatnonzero(held) - middle
     if not len(places) or np.abs(places).min() > gap:
         return np.nan
@@ -129,17 +129,17 @@ def _pillar(held: Bool, roofed: Bool) -> float:
         return np.nan
     end, begin = right[wide[0]], right[wide[0] + 1]
     beyond = right[wide[0] + 1 :] + middle
-    if np.count_nonzero(roofed[beyond]) < max(ROOFED * len(beyond), NARROWEST / CELL):
+    if np.count_nonzero(roofed[beyond]) < max(MIN_ROOFED_SHARE * len(beyond), MIN_TUBE_SIZE / CELL):
         return np.nan
     return float(CELL * (end + 1 + begin) / 2.0)
 
 
 def _bridge(limits: Float) -> None:
-    """Carry a pillar on over passages through it; forget those that are too short for a tube."""
+    """Continue a pillar over passages through it; remove those that are too short for a tube."""
     known = np.flatnonzero(np.isfinite(limits))
-    breaks = np.flatnonzero(np.diff(known) > 1 + LONGEST_PASSAGE / STRETCH)
+    breaks = np.flatnonzero(np.diff(known) > 1 + MAX_PASSAGE_LENGTH / STRETCH)
     for run in np.split(known, breaks + 1):
-        if len(run) * STRETCH <= SHORTEST:
+        if len(run) * STRETCH <= MIN_TUBE_LENGTH:
             limits[run] = np.nan
         else:
             within = np.arange(run[0], run[-1] + 1)
@@ -147,7 +147,7 @@ def _bridge(limits: Float) -> None:
 
 
 def _axis(alignment: Alignment) -> tuple[Float, float, float]:
-    """Place and direction of each vertex in plan, (n, 4), the number of the first, and their spacing, m."""
+    """Return position and direction of each vertex in plan, (n, 4), the number of the first, and their spacing, m."""
     along = np.column_stack([alignment.vertices[:, :2], tangents(alignment.vertices)[:, :2]])
     return along, float(alignment.number[0]), float(alignment.spacing)
 
@@ -156,7 +156,7 @@ def _axis(alignment: Alignment) -> tuple[Float, float, float]:
 def _place(
     x: Float, y: Float, chainage: Float, axis: Float, first: float, spacing: float, start: float, away: Float, stretch: Int32
 ) -> None:  # pragma: no cover - compiled
-    """Write how far right of the axis points lie, in plan, m, and in which stretch of the kilometre that begins at start."""
+    """Write the distance of points right of the axis in plan, m, and their stretch of the kilometre from ``start`` on."""
     last = axis.shape[0] - 1
     for i in range(away.shape[0]):
         along = chainage[i] / spacing - first
@@ -173,7 +173,7 @@ def _place(
 def _sort_in(
     z: Float, away: Float, stretch: Int32, count: Int64, low: Float, high: Float
 ) -> None:  # pragma: no cover - compiled
-    """Count points, and note the lowest and highest, in cells of stretch and distance right of the axis."""
+    """Count points, with the lowest and highest, in cells of stretch and distance right of the axis."""
     for i in range(away.shape[0]):
         cell = math.floor((away[i] + REACH) / CELL)
         if 0 <= cell < count.shape[1]:

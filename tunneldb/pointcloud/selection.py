@@ -1,9 +1,9 @@
-"""One scan file, from its points to those that go into the database.
+"""Selection of the points of one scan file for the database.
 
-A point is looked at closely only where it may get a row. Of each voxel of thinning and each chunk of the file the point
-nearest to the voxel's centre is a candidate; on a dense wall enough of the chunk's points lie around it to tell that
-it is no noise, and the others of the voxel can be left out at once. Where that is not so they all stay candidates until
-the whole file is read; then those nearer to the centre than the nearest certain one are judged.
+Only points that may get a row are examined closely. Of each voxel of thinning and each chunk of the file, the point nearest
+to the voxel's centre is a candidate. On a dense wall, enough points of the chunk lie around it to show that it is not noise;
+the other points of the voxel can then be skipped at once. Otherwise all of them stay candidates until the whole file is
+read; then those nearer to the centre than the nearest certain point are classified.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import scipy  # its parts when they are used: they take long to import
+import scipy  # its modules are imported on first use: they take long
 
 from tunneldb.arrays import Bool, Float, Int32, Int64, Intp, Single
 from tunneldb.errors import InputError
@@ -37,33 +37,33 @@ from tunneldb.threads import threads
 
 Progress = Callable[[int], None]
 
-MEMORY = 192 << 20  # bytes of rows that each spool holds before it goes to disk
-WINDOW = 500_000  # points whose neighbourhoods are looked at at a time by each thread
-CROWDED = 4_000_000  # from this many points in one window on, one thread, for the sake of memory
-BLOCK = 50_000  # points of a LAZ file that can be decoded by themselves
-MARGIN = 10.0  # m beyond its ends that a kilometre is looked up in a file for what happens at its end
-FEW = 150  # points in a cell up to which hardly any has enough around it to be certain to be no noise
-SAMPLED = 1000  # one in so many intensities is kept, to be looked at
-STRETCH = 5.0  # m of tunnel for which the noise filter's widest radius is found
-CERTAIN = -1  # tag of a candidate that is certain to be no noise; the others have the number of their cell
+MEMORY = 192 << 20  # bytes of rows that each spool keeps in memory before it uses the disk
+WINDOW = 500_000  # points whose neighbourhoods a thread examines at a time
+MAX_PARALLEL_POINTS = 4_000_000  # points of a window from which one thread is used, to limit memory
+BLOCK = 50_000  # points of a LAZ file that can be decoded separately
+MARGIN = 10.0  # m beyond the ends of a kilometre that are also read from a file
+MAX_SPARSE_POINTS = 150  # points in a cell up to which hardly any has enough neighbours to be certain not to be noise
+SAMPLE_STEP = 1000  # one in this many intensities is kept as a sample
+STRETCH = 5.0  # m of tunnel for which the noise filter's widest radius is computed
+CERTAIN_TAG = -1  # tag of a candidate that is certain not to be noise; others have the number of their cell
 
 
 @dataclass(frozen=True)
 class FilterSettings:
-    """How the points of a file are chosen.
+    """Parameters of the selection of points.
 
     Attributes
     ----------
     density : float or None
-        Survey density, points per m²; None keeps every point.
+        Survey density, points per m²; None to keep every point.
     noise_points : int
-        A point with fewer points than this in its neighbourhood, itself included, is noise.
+        Least number of points in the neighbourhood of a point, itself included, that is not noise.
     noise_diameter : float
         Diameter of the neighbourhood at full density, m.
     max_distance : float
-        Points farther than this from the given axis are outside, m.
+        Distance from the given axis beyond which points are outside, m.
     max_left_out : float
-        Share of the points near the axis that may be invalid or without a scanner position.
+        Greatest share of the points near the axis that may be invalid or without a scanner position.
     """
 
     density: float | None = 100.0
@@ -74,35 +74,35 @@ class FilterSettings:
 
     @property
     def edge(self) -> float | None:
-        """Voxel edge of thinning, m; None when every point is kept."""
+        """Voxel edge for thinning, m; None if every point is kept."""
         return None if self.density is None else voxel_edge(self.density)
 
 
 @dataclass
 class FilterCounts:
-    """What became of the points of a file: points = invalid + outside + unposed + noise + thinned + kept.
+    """Counts of the points of a file: points = invalid + outside + unposed + noise + thinned + kept.
 
     Attributes
     ----------
     points, invalid, outside, unposed, noise, kept : int
-        Points read; without a finite coordinate, or a finite time or intensity that is needed; beyond the ends of the axis or
-        too far from it; of unknown scanner position; noise; kept after thinning.
+        Points read; without a finite coordinate, or a required finite time or intensity; beyond the ends of the axis or too
+        far from it; with unknown scanner position; noise; kept after thinning.
     chainage : (float, float)
-        Least and greatest chainage of the points kept, m; infinite while there is none.
+        Least and greatest chainage of the points kept, m; infinite if there is none.
     extent : (6,) float64 array
         Least and greatest x, y, z of the points kept: x0, y0, z0, x1, y1, z1, m.
     beyond : (int, int)
-        Of the points outside, those that lie before the beginning of the axis, and after its end, where the tunnel may go on.
+        Points outside before the start of the axis, and after its end, where the tunnel may continue.
     beyond_reach : (float, float)
-        How far beyond nearly all of these lie, m.
+        Distance beyond the ends within which nearly all of these lie, m.
     intensities : list of float32 arrays
-        Raw intensities of some points near the axis.
+        Sample of raw intensities near the axis.
     ranges : dict of int to list of (int, int)
-        Where in the file the points of each kilometre and MARGIN beyond are: ranges of point numbers from 0.
+        Ranges of point indices, from 0, that contain the points of each kilometre and of MARGIN beyond it.
     seconds : dict of int to list of (int, int)
-        Between which whole seconds, half-open, all finite times of the points in these ranges lie.
+        Half-open ranges of whole seconds that contain all finite times of the points in these ranges.
     density : float
-        Points per m² of surface about half of the points near the axis or more, noise included.
+        Points per m² of surface that about half of the points near the axis have around them, noise included.
     """
 
     points: int = 0
@@ -127,11 +127,11 @@ class FilterCounts:
 
     @property
     def thinned(self) -> int:
-        """Points that thinning left out."""
+        """Number of points removed by thinning."""
         return self.points - self.invalid - self.outside - self.unposed - self.noise - self.kept
 
     def locate(self, blocks: Int64, low: Float, high: Float) -> None:
-        """Note where in the file kilometres are: blocks of BLOCK points, with the chainage from and to of each, m."""
+        """Record the places of kilometres in the file: blocks of BLOCK points, with start and end chainage of each, m."""
         lowest, highest = (np.floor(ends / KILOMETRE).astype(int).tolist() for ends in (low - MARGIN, high + MARGIN))
         for block, first, last in zip(blocks.tolist(), lowest, highest, strict=True):
             for km in range(first, last + 1):
@@ -164,35 +164,35 @@ def filter_file(
     memory: int = MEMORY,
     chunk: int = CHUNK,
 ) -> FilterCounts:
-    """Read a scan file at full density and set aside the points worth a row.
+    """Read a scan file at full density and store the points selected for the database.
 
-    The whole file is read before the first point is judged, so the result does not depend on the order of its points.
+    The whole file is read before points are classified, so the result does not depend on the order of its points.
 
     Parameters
     ----------
     path, dimension : Path and str or None
-        The file and its intensity dimension.
+        File and its intensity dimension.
     alignment : Alignment
-        The given axis, which gives the chainage.
+        Given axis, which defines the chainage.
     poses : PoseCoverage
-        What scanner positions there are.
+        Available scanner positions.
     settings : FilterSettings
-        Noise filter, thinning, and how far from the axis the tunnel reaches.
+        Parameters of noise filter and thinning, and greatest distance from the axis.
     survivors : Spool
-        Gets the points that stay, with `tag`; thinned within the file up to the borders of its parts, so they have
-        to be thinned once more as a whole.
+        Receives the selected points, with `tag`; they are thinned within the file up to the borders of its parts, and must be
+        thinned once more together with other files.
     tag : int
         Number of the file.
     progress : callable
-        Called with a number of points; the whole comes to twice the number of points of the file.
+        Function of a number of points; the total is twice the number of points of the file.
     memory, chunk : int
-        Bytes of rows held in memory; points read at a time.
+        Bytes of rows in memory; points read at a time.
 
     Raises
     ------
     InputError
-        If the file cannot be read, no point lies near the axis (says how far they are), all near it are noise, or of more
-        points near the axis than ``max_left_out`` allows a number is invalid or the scanner position unknown.
+        If the file cannot be read, no point is near the axis (states their distance), all near it are noise, or the share of
+        points near the axis that are invalid or without scanner position exceeds ``max_left_out``.
     """
     with _Filter(path, dimension, alignment, poses, settings, memory) as work:
         work.read(progress, chunk)
@@ -207,12 +207,12 @@ def filter_file(
 
 
 def voxel_reach(edge: float) -> float:
-    """Greatest difference of chainage between two points of one voxel, m."""
+    """Return the greatest difference of chainage between two points of one voxel, m."""
     return edge * math.sqrt(3.0) * STRETCHING
 
 
 class _Filter:
-    """A file under way: its candidates for a row, and the places of all its points, by chainage."""
+    """File in progress: its candidates, and the places of all its points by chainage."""
 
     def __init__(
         self,
@@ -240,7 +240,7 @@ class _Filter:
         self.cloud.close()
 
     def read(self, progress: Progress, chunk: int) -> None:
-        """Read the file, and set aside what the noise filter has to look at."""
+        """Read the file, and store the points that the noise filter has to examine."""
         counts, nearest, guess = self.counts, math.inf, None
         with closing(prefetch(map(Points.of, read_raw(self.path, self.dimension, chunk)))) as chunks:
             for points in chunks:
@@ -259,13 +259,13 @@ class _Filter:
         if counts.outside and counts.outside + counts.invalid == counts.points:
             check = "check the axis, the file's coordinates and the tunnel's SRID"
             raise InputError(
-                f"{self.path}: no points near the axis: the nearest is about {nearest:.0f} m from it and the limit is "
+                f"{self.path}: no points near the axis: the nearest is about {nearest:.0f} m from it, the limit is "
                 f"{self.settings.max_distance:g} m; {guess or check}"
             )
         self._require_most()
 
     def _require_most(self) -> None:
-        """Refuse the file where too many of its points near the axis are left out."""
+        """Refuse the file if too many of its points near the axis are left out."""
         counts = self.counts
         near = counts.points - counts.outside
         nothing = counts.invalid + counts.unposed == near
@@ -277,7 +277,7 @@ class _Filter:
                 )
 
     def _set_aside(self, points: Points) -> None:
-        """Set the points of a chunk aside that lie near the axis and whose scanner position is known."""
+        """Store the points of a chunk that are near the axis and have a known scanner position."""
         self.times.add(self.counts.points, points.time)
         number = np.arange(self.counts.points, self.counts.points + len(points))
         self.counts.points += len(points)
@@ -300,31 +300,31 @@ class _Filter:
             self.counts.unposed += faults.points
             number, cell, points = self._drop(number, cell, points, np.flatnonzero(~self.poses.known(points)))
         if len(points):
-            self.counts.intensities.append(points.intensity[::SAMPLED].copy())
+            self.counts.intensities.append(points.intensity[::SAMPLE_STEP].copy())
             self.counts.locate(*self.places.span(number, cell, BLOCK))
             picked, certain = self._pick(points, cell)
-            tag = np.where(certain, np.int32(CERTAIN), cell[picked])
+            tag = np.where(certain, np.int32(CERTAIN_TAG), cell[picked])
             self.rows.add(self.places.rows(points, cell, picked, tag))
             self.cloud.add(points.xyz.view(PLACE).ravel(), self.places.bin[cell])
 
     def _drop(self, number: Int64, cell: Int32, points: Points, dropped: Intp) -> tuple[Int64, Int32, Points]:
-        """Leave out some points of a chunk, as if they had never been in their cells."""
+        """Remove some points from a chunk and from the counts of their cells."""
         self.cells.remove(cell[dropped])
         kept = np.delete(np.arange(len(points)), dropped)
         return number[kept], cell[kept], points.some(kept)
 
     def _note_invalid(self, points: Points, number: Int64, finite: Bool) -> None:
-        """Count the points of a chunk that are not finite, and keep which number of the first it is."""
+        """Count the points of a chunk that are not finite, and record the number of the first."""
         self.counts.invalid += int(np.count_nonzero(~finite))
         if not self.invalid:
             first = int(np.argmin(finite))
             which = ("a coordinate" if not on_earth(points.xyz[first]).all()
                      else "gps_time" if not np.isfinite(points.time[first]) and self.poses.mobile
                      else self.dimension)  # fmt: skip
-            self.invalid = f"{which} is NaN or infinite, first at point {number[first] + 1}; mend the file"
+            self.invalid = f"{which} is NaN or infinite, first at point {number[first] + 1}; remove the point"
 
     def _pick(self, points: Points, cell: Int32) -> tuple[Int32, Bool]:
-        if self.settings.edge is None or self.cells.counts[cell].mean() < FEW:
+        if self.settings.edge is None or self.cells.counts[cell].mean() < MAX_SPARSE_POINTS:
             return np.arange(len(points), dtype=np.int32), np.zeros(len(points), np.bool_)
         return pick(
             points.xyz, points.time, points.intensity, points.scan_id, points.classification, self.places.whole[cell],
@@ -332,17 +332,17 @@ class _Filter:
         )  # fmt: skip
 
     def judge(self, progress: Progress) -> Iterator[Rows]:
-        """Rows that stay, thinned within the file, a window of chainage after the other."""
+        """Yield the rows that are kept, thinned within the file, one window of chainage after the other."""
         counts, cells, settings = self.counts, self.cells, self.settings
         stretch = np.floor(self.places.chainage / STRETCH).astype(np.int64)
         counts.density = typical_density(cells.counts, cells.edge)
         radii = search_radii(cells.counts, cells.edge, settings.noise_points, settings.noise_diameter, stretch)
         widest = _widest(stretch, radii)
         first, bins = self.cloud.counts()
-        # A point's bin may be some farther than its cell's.
+        # A point's bin may differ from its cell's by some bins.
         bins, first = np.pad(bins, self.places.bins_off), first - self.places.bins_off
         parts = list(windows(first, bins, WINDOW))
-        crowded = max(int(bins[low - first : high - first].sum()) for low, high in parts) > CROWDED
+        crowded = max(int(bins[low - first : high - first].sum()) for low, high in parts) > MAX_PARALLEL_POINTS
 
         def work(low: int, high: int) -> tuple[int, Rows]:
             return self._judge(low, high, _reach(low, high, widest), radii)
@@ -355,13 +355,13 @@ class _Filter:
         progress(counts.points - counts.noise - counts.kept - counts.thinned)
 
     def _judge(self, low: int, high: int, reach: int, radii: Float) -> tuple[int, Rows]:
-        """Noise of a window, counted, and the rows that stay."""
+        """Return the number of noise points of a window, and the rows that are kept."""
         edge = self.settings.edge
         margin = 0 if edge is None else math.ceil(voxel_reach(edge) * BINS_PER_METRE)
-        begin = math.floor(low / BINS_PER_KM) * BINS_PER_KM  # each kilometre is thinned by itself
+        begin = math.floor(low / BINS_PER_KM) * BINS_PER_KM  # each kilometre is thinned separately
         rows = self.rows.read(max(low - margin, begin), min(high + margin, begin + BINS_PER_KM))
         wide = margin + reach + self.places.bins_off
-        good = rows["tag"] == CERTAIN
+        good = rows["tag"] == CERTAIN_TAG
 
         def judge(doubtful: Bool) -> None:
             chosen = np.flatnonzero(doubtful)
@@ -374,7 +374,7 @@ class _Filter:
             judge(~good)
             stays, noise = good, ~good
         else:
-            # The first of each voxel is mostly good, and the others need not be looked at.
+            # The first point of each voxel is mostly good; then the others need not be examined.
             front, _ = first_of_voxels(rows, edge, np.ones(len(rows), np.bool_))
             judge(front & ~good)
             stays, noise = first_of_voxels(rows, edge, good)
@@ -389,7 +389,7 @@ class _Filter:
 
 
 def _widest(stretch: Int64, radii: Float) -> tuple[int, Float]:
-    """Widest radius in each stretch from the first on."""
+    """Return the widest radius in each stretch from the first on."""
     first = int(stretch.min())
     widest = np.zeros(int(stretch.max()) - first + 1)
     np.maximum.at(widest, stretch - first, radii)
@@ -397,7 +397,7 @@ def _widest(stretch: Int64, radii: Float) -> tuple[int, Float]:
 
 
 def _reach(low: int, high: int, widest: tuple[int, Float]) -> int:
-    """Bins beyond a window in which its points may have neighbours."""
+    """Return the number of bins beyond a window in which its points may have neighbours."""
     first, radii = widest
     # A point's cell may have its centre in the next stretch.
     begin = math.floor(low / BINS_PER_METRE / STRETCH) - 1 - first

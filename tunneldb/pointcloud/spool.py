@@ -1,4 +1,4 @@
-"""Points of a file or of a kilometre set aside by chainage, in memory and beyond that on disk."""
+"""Temporary storage of the points of a file or of a kilometre by chainage, in memory and then on disk."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tunneldb.arrays import Float, Int64, Intp
 from tunneldb.compiled import kernel
 from tunneldb.errors import UserError
 
-# One row a point. `tag` is the noise filter's cell while a file is filtered, its file's number afterwards.
+# One row per point. `tag` is the noise filter's cell while a file is filtered, its file's number afterwards.
 ROW = np.dtype(
     [
         ("x", "<f8"),
@@ -33,21 +33,21 @@ ROW = np.dtype(
     ]
 )
 Rows = NDArray[Any]
-PLACE = np.dtype([("xyz", "f8", (3,))])  # a point that only counts as a neighbour
+PLACE = np.dtype([("xyz", "f8", (3,))])  # a point that is used only as a neighbour
 
-# Points are found again by bins of 1/8 m of chainage: fine enough for a bin of the densest scan to fit in memory, and
+# Points are indexed by bins of 1/8 m of chainage: small enough for a bin of the densest scan to fit in memory, and
 # a power of two, so that a bin never straddles a kilometre.
 BINS_PER_METRE = 8
 BINS_PER_KM = 1000 * BINS_PER_METRE
 
 
 def bin_of(chainage: Float) -> Int64:
-    """Bin of each chainage (m)."""
+    """Return the bin of each chainage (m)."""
     return np.floor(chainage * BINS_PER_METRE).astype(np.int64)
 
 
 def rows_xyz(rows: Rows, chosen: Intp) -> Float:
-    """Coordinates (n, 3) of the chosen rows (n,)."""
+    """Return the coordinates (n, 3) of the chosen rows (n,)."""
     xyz = np.empty((len(chosen), 3))
     for column, name in enumerate("xyz"):
         xyz[:, column] = rows[name][chosen]
@@ -56,7 +56,7 @@ def rows_xyz(rows: Rows, chosen: Intp) -> Float:
 
 @dataclass
 class _Run:
-    """Rows in order of their bins: bin first + k begins at start[k]."""
+    """Rows sorted by bin: bin first + k begins at start[k]."""
 
     first: int
     start: Int64
@@ -65,7 +65,7 @@ class _Run:
 
 
 class Spool:
-    """Rows that can be had back by bins of chainage, whatever order they came in.
+    """Storage of rows that can be read back by bins of chainage, in whatever order they were added.
 
     Each call of `add` makes a run sorted by bin; runs beyond the memory allowed go to a temporary file (in TMPDIR),
     from which a range of bins is one read a run.
@@ -73,9 +73,9 @@ class Spool:
     Parameters
     ----------
     memory : int
-        Bytes of rows held in memory.
+        Bytes of rows kept in memory.
     dtype : dtype
-        Of a row.
+        Type of a row.
     """
 
     def __init__(self, memory: int, dtype: np.dtype[Any] = ROW) -> None:
@@ -93,13 +93,13 @@ class Spool:
         self.close()
 
     def close(self) -> None:
-        """Let go of all rows."""
+        """Release all rows."""
         if self._file is not None:
             self._file.close()
         self._runs.clear()
 
     def add(self, rows: Rows, bins: Int64 | None = None) -> None:
-        """Set rows aside, in these bins; without, in those of their chainage.
+        """Store rows in these bins; by default in those of their chainage.
 
         Raises
         ------
@@ -118,7 +118,7 @@ class Spool:
         self._runs.append(run)
 
     def counts(self) -> tuple[int, Int64]:
-        """First bin, and the number of rows in each bin from it on."""
+        """Return the first bin, and the number of rows in each bin from it on."""
         if not self._runs:
             return 0, np.zeros(0, np.int64)
         first = min(run.first for run in self._runs)
@@ -129,7 +129,7 @@ class Spool:
         return first, total
 
     def counts_of(self, low: int, high: int) -> Int64:
-        """Number of rows in each of the bins low ≤ bin < high."""
+        """Return the number of rows in each of the bins low ≤ bin < high."""
         first, counts = self.counts()
         found = np.zeros(high - low, np.int64)
         begin, end = max(low, first), min(high, first + len(counts))
@@ -138,7 +138,7 @@ class Spool:
         return found
 
     def kilometres(self) -> dict[int, int]:
-        """Number of rows in each kilometre that has any."""
+        """Return the number of rows in each kilometre that has any."""
         first, counts = self.counts()
         place = np.flatnonzero(counts)
         kms, inverse = np.unique((first + place) // BINS_PER_KM, return_inverse=True)
@@ -146,7 +146,7 @@ class Spool:
         return dict(zip(kms.tolist(), held.tolist(), strict=True))
 
     def read(self, low: int, high: int) -> Rows:
-        """Rows of the bins low ≤ bin < high; runs in order of `add`, each in order of bins. They may be the spool's own."""
+        """Read the rows of bins low ≤ bin < high, in order of `add` and then of bins; they may be the spool's own arrays."""
         parts = [part for run in self._runs if len(part := self._slice(run, low, high))]
         if len(parts) == 1:
             return parts[0]
@@ -161,7 +161,7 @@ class Spool:
         assert self._file is not None
         rows: Rows = np.empty(end - begin, self.dtype)
         if end > begin:
-            # preadv and not seek and read: two threads read at once.
+            # preadv instead of seek and read: two threads may read at once.
             _read_at(self._file.fileno(), rows, run.offset + begin * self.dtype.itemsize)
         return rows
 
@@ -175,7 +175,7 @@ class Spool:
             if error.errno not in (errno.ENOSPC, errno.EDQUOT):
                 raise
             raise UserError(
-                f"no space left for temporary files in {tempfile.gettempdir()}, what was under way is undone; "
+                f"no space left for temporary files in {tempfile.gettempdir()}, the current job is rolled back; "
                 "free some or set TMPDIR to a folder on a larger disk"
             ) from error
         run.offset, run.rows = self._spilt, None
@@ -183,21 +183,21 @@ class Spool:
 
 
 def windows(first: int, counts: Int64, limit: int) -> Iterator[tuple[int, int]]:
-    """Cut a range of bins into windows.
+    """Divide a range of bins into windows.
 
     Parameters
     ----------
     first : int
         First bin.
     counts : (n,) int64 array
-        Rows in each bin from `first` on.
+        Number of rows in each bin from `first` on.
     limit : int
         Number of rows at which a window ends.
 
     Yields
     ------
     low, high : int
-        Windows low ≤ bin < high that hold rows, in order; none straddles a kilometre.
+        Windows low ≤ bin < high with rows, in order; none crosses a kilometre boundary.
     """
     before = np.concatenate([[0], np.cumsum(counts)])
     low, end = first, first + len(counts)
@@ -231,7 +231,7 @@ def _write_all(file: IO[bytes], view: memoryview) -> None:
 
 
 def _sort_by_bin(rows: Rows, bins: Int64) -> tuple[Rows, int, Int64]:
-    """Rows in order of their bins; the first bin, and where each one from it on begins."""
+    """Sort rows by bin; return the first bin, and the start index of each bin from it on."""
     first = int(bins.min())
     start = np.zeros(int(bins.max()) - first + 3, np.int64)
     ordered = np.empty_like(rows)
@@ -241,12 +241,12 @@ def _sort_by_bin(rows: Rows, bins: Int64) -> tuple[Rows, int, Int64]:
 
 @kernel
 def _move_rows(rows: Rows, bins: Int64, first: int, start: Int64, ordered: Rows) -> None:  # pragma: no cover - compiled
-    """Move rows to where their bins begin; of start, two longer than there are bins and 0, the first entry of each is made."""
+    """Sort rows by bin; ``start`` has two entries more than bins, initially 0, and gets the first index of each bin."""
     for i in range(bins.shape[0]):
         start[bins[i] - first + 2] += 1
     for b in range(2, start.shape[0]):
         start[b] += start[b - 1]
-    # Where the next row of bin b goes is start[b + 1], which in the end is where the bin after it begins.
+    # start[b + 1] is the index for the next row of bin b; at the end it is the first index of bin b + 1.
     for i in range(bins.shape[0]):
         b = bins[i] - first + 1
         ordered[start[b]] = rows[i]

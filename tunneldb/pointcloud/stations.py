@@ -14,8 +14,8 @@ from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.table import has_scans, posed_scans
 
 SCAN_ID_LIMIT = 1 << 31  # point_source_id of LAS has 16 bits, the numbers of E57 scans have 31
-SCAN_ID = "scan_id is the number by which points name their scan, their point_source_id: tunneldb inspect lists those of a file"
-SAME_PLACE = 0.001  # m; one station that comes from two files
+SCAN_ID = "scan_id is the number of a point's scan, its point_source_id; tunneldb inspect FILE lists them"
+PLACE_TOLERANCE = 0.001  # m; greatest distance between positions of one station in two files
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Stations:
     Attributes
     ----------
     scan_id : (n,) int32 array
-        Number of the scan, each once.
+        Number of the scan, without repeats.
     xyz : (n, 3) float64 array
         Position, m.
     """
@@ -47,13 +47,13 @@ def read_stations(paths: Sequence[Path]) -> Stations:
     Parameters
     ----------
     paths : sequence of Path
-        CSV files with scan_id,x,y,z; E57 and PTX files, whose scans are stations where their poses say; folders, for all
-        such files in them. A scan of an E57 file that has no pose must be in a CSV file, by its number.
+        CSV files with scan_id,x,y,z; E57 and PTX files, whose scans with poses are stations; folders, for all such files in
+        them. A scan of an E57 file without a pose must be in a CSV file, by its number.
 
     Raises
     ------
     InputError
-        If a file cannot be read or holds no station, a number is none, a scan has no position, or one number has two.
+        If a file cannot be read or holds no station, a number is invalid, a scan has no position, or a scan has two.
     """
     known: dict[int, _Station] = {}
     placeless = []
@@ -63,12 +63,12 @@ def read_stations(paths: Sequence[Path]) -> Stations:
                 placeless.append(station)
                 continue
             other = known.setdefault(station.scan_id, station)
-            if other.place is not None and np.linalg.norm(other.place - station.place) > SAME_PLACE:
-                raise InputError(f"scan_id {station.scan_id} has two positions: by {other.origin} and by {station.origin}")
+            if other.place is not None and np.linalg.norm(other.place - station.place) > PLACE_TOLERANCE:
+                raise InputError(f"scan_id {station.scan_id} has two positions: in {other.origin} and in {station.origin}")
     for station in placeless:
         if station.scan_id not in known:
             raise InputError(
-                f"{station.origin} has no pose, so it is not known where the scanner stood; "
+                f"{station.origin} has no pose, so the scanner position is unknown; "
                 f"give it in a CSV file: --stations FILE, scan_id {station.scan_id}"
             )
     return Stations(np.array(list(known), np.int32), np.array([station.place for station in known.values()], np.float64))
@@ -101,6 +101,6 @@ def _of_csv(path: Path) -> Iterator[_Station]:
     _, first = np.unique(ids, return_index=True)
     repeated = np.setdiff1d(np.arange(len(ids)), first)
     if len(repeated):
-        raise table.error(int(repeated[0]), f"scan_id {ids[repeated[0]]:g} stands above already; each station once")
+        raise table.error(int(repeated[0]), f"scan_id {ids[repeated[0]]:g} is repeated; list each station once")
     for row, place in enumerate(table.columns(("x", "y", "z"))):
         yield _Station(int(ids[row]), place, f"{path}, line {table.lines[row]}")

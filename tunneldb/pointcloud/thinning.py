@@ -1,13 +1,13 @@
-"""Thinning to survey density: one point a voxel.
+"""Thinning to survey density: one point per voxel.
 
-A plane with unit normal n cuts (|nx| + |ny| + |nz|) / h² voxels of edge h per square metre: 1/h² when it lies along
-the grid, √3/h² at the steepest, and 1.5/h² on average over all orientations. So h = √(1.5 / density) keeps, on a
-tunnel's lining that faces all ways, the wanted number of points per square metre; walls along the grid get two thirds
+A plane with unit normal n cuts (|nx| + |ny| + |nz|) / h² voxels of edge h per square metre: 1/h² if it is parallel to
+the grid, √3/h² at the steepest, and 1.5/h² on average over all orientations. So h = √(1.5 / density) keeps the requested
+number of points per square metre on a tunnel's lining, which faces all directions; walls parallel to the grid get two thirds
 of it.
 
-Of each voxel the measured point nearest to its centre stays. Voxels lie at whole multiples of h of the absolute
-coordinates and ties fall by the points' own values, so which points stay depends only on which points there are: not
-on their order, nor on whether they were thinned in parts before.
+The measured point nearest to the centre of each voxel is kept. Voxels lie at whole multiples of h of the absolute
+coordinates, and ties are decided by the points' own values. So the selection depends only on the set of points: not on
+their order, nor on whether they were thinned in parts before.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from tunneldb.pointcloud.voxels import CellCounts
 
 CUTS = 1.5
 TIES = ("x", "y", "z", "time", "intensity", "scan_id", "classification", "tag")
-"""What decides between rows that are equally near to the centre of their voxel: the lowest, of these one after the other."""
+"""Sort keys for rows equally near to the centre of their voxel: the lowest row by these, one after the other, is kept."""
 
 Columns = Sequence[NDArray[Any]]
 
 
 def voxel_edge(density: float) -> float:
-    """Voxel edge, m, for a mean density of points per m² on surfaces of all orientations."""
+    """Return the voxel edge, m, for a mean density of points per m² on surfaces of all orientations."""
     return math.sqrt(CUTS / density)
 
 
@@ -49,7 +49,7 @@ def thin(xyz: Float, edge: float) -> Bool:
     Returns
     -------
     (n,) bool array
-        True for the points that stay, one in each occupied voxel.
+        True for the points that are kept, one in each occupied voxel.
     """
     rows: Rows = np.zeros(len(xyz), ROW)
     for column, name in enumerate("xyz"):
@@ -63,7 +63,7 @@ def first_of_voxels(rows: Rows, edge: float, good: Bool) -> tuple[Bool, Bool]:
     Parameters
     ----------
     rows : (n,) array of ROW
-        Between rows at the same place time, intensity, scan, class and tag decide, the lowest first.
+        Rows at the same place are ordered by time, intensity, scan, class and tag, the lowest first.
     edge : float
         Voxel edge, m.
     good : (n,) bool array
@@ -72,9 +72,9 @@ def first_of_voxels(rows: Rows, edge: float, good: Bool) -> tuple[Bool, Bool]:
     Returns
     -------
     chosen : (n,) bool array
-        One of each voxel that holds a good row.
+        One row of each voxel that has a good row.
     before : (n,) bool array
-        Rows that are not good and would have stood before it; all of a voxel without good rows.
+        Rows that are not good and would precede it; all rows of a voxel without good rows.
     """
     xyz = np.empty((len(rows), 3))
     for column, name in enumerate("xyz"):
@@ -94,19 +94,19 @@ def pick(
     xyz: Float, time: Float, intensity: Single, scan_id: Int32, classification: UInt8,
     whole: Bool, edge: float, limit: float, points: int,
 ) -> tuple[Int32, Bool]:  # fmt: skip
-    """Of a chunk of points, those that may be the first good one of their voxel.
+    """Choose the points of a chunk that may be the first good one of their voxel.
 
-    The point of a voxel that stands before the others of the chunk is certain to be no noise when `points` of them,
-    itself included, lie within the distance whose square is `limit`: no radius is less, and the file holds no fewer
-    points than the chunk. Then it alone is picked, else all; all, too, that are not `whole`: what happens to their voxels
-    is not known here, for a kilometre may end in them.
+    The first point of a voxel is certain not to be noise if `points` points, itself included, lie within the distance whose
+    square is `limit`: no search radius is less, and the file has at least the points of the chunk. Then only this point is
+    picked, otherwise all points of the voxel. All points that are not `whole` are picked, too, since a kilometre may end in
+    their voxels.
 
     Returns
     -------
     picked : (k,) int32 array
-        Numbers of points.
+        Indices of points.
     certain : (k,) bool array
-        Which of them are certain to be no noise.
+        True for those that are certain not to be noise.
     """
     voxel, count = _voxels(xyz, edge)
     voxel[~whole] = -1
@@ -122,29 +122,29 @@ def pick(
 
 
 def _voxels(xyz: Float, edge: float) -> tuple[Int32, int]:
-    """Number of the voxel of each point, (n,), and how many voxels there are."""
+    """Return the index of the voxel of each point, (n,), and the number of voxels."""
     voxels = CellCounts(edge, max(1024, len(xyz) // 2))
     return voxels.add(xyz), len(voxels.counts)
 
 
 def _leaders(xyz: Float, voxel: Int32, count: int, edge: float, good: Bool, ties: Columns) -> tuple[Float, Float, Int64]:
-    """Good point nearest to the centre of each voxel.
+    """Find the good point nearest to the centre of each voxel.
 
     Parameters
     ----------
     xyz, voxel, good : (n, 3), (n,), (n,) arrays
-        Points, m, the number of the voxel of each, below the count (-1: none), and which may lead.
+        Points, m; index of the voxel of each, less than the count (-1: none); True for points that may lead.
     ties : sequence of (n,) arrays
-        What decides between points equally near.
+        Sort keys for points equally near.
 
     Returns
     -------
     distance : (n,) float array
-        From the centre of the voxel, squared, m².
+        Distance from the centre of the voxel, squared, m².
     least : (count,) float array
-        Least distance of the good points of each voxel; infinite where there is none.
+        Least distance of the good points of each voxel; infinite if there is none.
     leader : (count,) int array
-        Number of the point; -1 for none.
+        Index of the point; -1 for none.
     """
     distance, least = np.empty(len(xyz)), np.full(count, np.inf)
     _find_nearest(xyz, voxel, edge, good, distance, least)
@@ -152,16 +152,16 @@ def _leaders(xyz: Float, voxel: Int32, count: int, edge: float, good: Bool, ties
     several = np.bincount(voxel[first], minlength=count)[voxel[first]] > 1
     if several.any():
         tied = first[several]
-        # The last key counts most, and of equal ones the first stays first.
+        # The last key is the primary one; equal elements keep their order.
         tied = tied[np.lexsort([column[tied] for column in reversed(ties)])]
         first = np.concatenate([tied, first[~several]])
     leader = np.full(count, -1, np.int64)
-    leader[voxel[first[::-1]]] = first[::-1]  # of several the last one stays: the first of the order
+    leader[voxel[first[::-1]]] = first[::-1]  # the last assignment wins: the first in order
     return distance, least, leader
 
 
 def _is_lower(ties: Columns, one: Intp, other: Intp) -> Bool:
-    """Tell which points stand before others by what decides between points equally near."""
+    """Return True for points that precede others by the sort keys."""
     lower, equal = np.zeros(len(one), np.bool_), np.ones(len(one), np.bool_)
     for column in ties:
         a, b = column[one], column[other]
@@ -174,7 +174,7 @@ def _is_lower(ties: Columns, one: Intp, other: Intp) -> Bool:
 def _find_nearest(
     xyz: Float, voxel: Int32, edge: float, good: Bool, distance: Float, least: Float
 ) -> None:  # pragma: no cover - compiled
-    """Write the squared distance of each point from the centre of its voxel, and the least of the good ones of each."""
+    """Write the squared distance of each point from the centre of its voxel, and the least of the good points of each voxel."""
     for i in range(voxel.shape[0]):
         x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
         cx, cy, cz = (

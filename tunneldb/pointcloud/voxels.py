@@ -1,7 +1,7 @@
-"""Voxels and cells of space: which of them a point lies in, found in a hash table, and what each of them holds.
+"""Voxels and cells of space: index of the cell of each point, found by hashing, and contents of each cell.
 
-`CellCounts` numbers the cells of a cloud of any extent and counts their points. `Voxels` keeps an even, thin picture of a
-cloud in one pass (Li et al., 2023, section 2.1). Both take the cloud chunk by chunk.
+`CellCounts` numbers the cells of a cloud of any extent and counts their points. `Voxels` computes an even, thinned version
+of a cloud in one pass (Li et al., 2023, section 2.1). Both take the cloud chunk by chunk.
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ from tunneldb.threads import in_blocks
 CELL = 0.5
 """Edge of the cells in which the density of a scan is measured, m."""
 
-_BITS = 21  # of a voxel's number along each axis
-_HALF = 1 << (_BITS - 1)
-_FINE = 1024  # steps of a voxel's edge in which places are summed: exact whole numbers
-_MOST = (1 << 22) - 1  # points of a voxel that are summed; more would not move its centroid
-_ROOM = 1 << 16  # voxels, to begin with
+_BITS = 21  # bits of a voxel's index along each axis
+_INDEX_OFFSET = 1 << (_BITS - 1)
+_STEPS_PER_EDGE = 1024  # steps of a voxel's edge for the sums of positions, which are integers
+_MAX_SUMMED = (1 << 22) - 1  # greatest number of points summed per voxel; more would not move its centroid
+_INITIAL_VOXELS = 1 << 16  # initial number of voxels
 _EMPTY = np.uint32(0xFFFFFFFF)
 _BLOCK = 1 << 16  # points at a time
 
 
 class CellCounts:
-    """Number of points in each cubic cell of space, gathered chunk by chunk.
+    """Number of points in each cubic cell of space, counted chunk by chunk.
 
     Parameters
     ----------
     edge : float
         Edge of a cell, m; cells lie at whole multiples of it.
     room : int
-        Cells to begin with.
+        Initial number of cells.
 
     Attributes
     ----------
     edge : float
-        As given, m.
+        Edge of a cell, m.
     """
 
     def __init__(self, edge: float = CELL, room: int = 1024) -> None:
@@ -50,16 +50,16 @@ class CellCounts:
         self._table = _table(4 * room)
 
     def add(self, xyz: Float) -> Int32:
-        """Count points (n, 3); returns the number of the cell of each, (n,), good for `counts` and `centres`."""
+        """Count points (n, 3); return the index of the cell of each, (n,), for `counts` and `centres`."""
         return self._number(xyz, True)
 
     def find(self, xyz: Float) -> Int32:
-        """Number of the cell of each point (n, 3), (n,); -1 where none was ever counted."""
+        """Return the index of the cell of each point (n, 3), (n,); -1 for cells without counted points."""
         return self._number(xyz, False)
 
     @property
     def counts(self) -> Int64:
-        """Points in each cell, (k,)."""
+        """Number of points in each cell, (k,)."""
         return self._counts[: self._used]
 
     @property
@@ -68,7 +68,7 @@ class CellCounts:
         return np.asarray(np.multiply(self._cells[: self._used] + 0.5, self.edge, dtype=np.float64))
 
     def remove(self, numbers: Int32) -> None:
-        """Take points out of the count of their cells (n,)."""
+        """Subtract points from the counts of their cells (n,)."""
         np.subtract.at(self._counts, numbers, 1)
 
     def _number(self, xyz: Float, adding: bool) -> Int32:
@@ -89,7 +89,7 @@ class CellCounts:
         self._cells = np.empty((size, 3), np.int64)
         self._table = _table(4 * size)
         counts = np.zeros(size, np.int64)
-        # The cells enter the larger table as points in their middles would.
+        # Cells are entered into the larger table like points at their centres.
         _number(known, 1.0, True, 0, 0, self._cells, counts, self._table, np.empty(len(known), np.int32))
         counts[: self._used] = self.counts
         self._counts = counts
@@ -101,10 +101,10 @@ def _table(least: int) -> Int32:
 
 
 class Voxels:
-    """Voxels of a cloud that comes chunk by chunk; what they hold does not depend on the chunks.
+    """Voxels of a cloud that is read in chunks; the result does not depend on the chunks.
 
-    They stand at whole multiples of their edge. Sums are whole numbers of edge / 1024, so that no order of
-    summation shows. A voxel takes 32 bytes and 5 to 11 of the table that finds it.
+    They lie at whole multiples of their edge. Sums are integers in edge / 1024, so the order of summation does not matter. A
+    voxel takes 32 bytes, and 5 to 11 in the hash table.
 
     Parameters
     ----------
@@ -114,26 +114,26 @@ class Voxels:
 
     def __init__(self, edge: float) -> None:
         if not edge > 0.0:
-            raise ValueError(f"edge of a voxel is {edge:g} m: it must be above 0")
+            raise ValueError(f"the edge of a voxel is {edge:g} m, but must be above 0")
         self.edge = float(edge)
         self._base: Int64 | None = None
         self._size = 0
-        self._key = np.empty(_ROOM, np.int64)
-        self._count = np.zeros(_ROOM, np.uint32)
-        self._sum = np.zeros((_ROOM, 3), np.uint32)
-        self._square = np.zeros(_ROOM, np.uint64)
-        self._table = np.full(2 * _ROOM, _EMPTY, np.uint32)
+        self._key = np.empty(_INITIAL_VOXELS, np.int64)
+        self._count = np.zeros(_INITIAL_VOXELS, np.uint32)
+        self._sum = np.zeros((_INITIAL_VOXELS, 3), np.uint32)
+        self._square = np.zeros(_INITIAL_VOXELS, np.uint64)
+        self._table = np.full(2 * _INITIAL_VOXELS, _EMPTY, np.uint32)
 
     def __len__(self) -> int:
         return self._size
 
     def add(self, xyz: Float) -> None:
-        """Add points (n, 3), m; those that are not finite are left out.
+        """Add points (n, 3), m; points that are not finite are skipped.
 
         Raises
         ------
         ValueError
-            A point lies more than a million voxels from the first.
+            If a point lies more than a million voxels from the first.
         """
         points = np.ascontiguousarray(xyz, dtype=np.float64)
         if self._base is None:
@@ -147,36 +147,36 @@ class Voxels:
                 points[begin:], self.edge, self._base, self._size, self._key, self._count, self._sum, self._square, self._table
             )
             if done < 0:
-                raise ValueError("points lie farther apart than a million voxels: part them, or take larger voxels")
+                raise ValueError("points are more than a million voxels apart; divide them, or use larger voxels")
             begin += done
             if begin < len(points):
                 self._grow()
 
     def centroids(self) -> Float:
-        """Mean of the points in each voxel, (n, 3), m, in the order in which the voxels were first met."""
+        """Return the mean of the points in each voxel, (n, 3), m, in the order in which the voxels were first occupied."""
         n = self._size
         out = np.empty((n, 3))
         if self._base is not None:
-            count, mask = np.minimum(self._count[:n], np.uint32(_MOST)), (1 << _BITS) - 1
+            count, mask = np.minimum(self._count[:n], np.uint32(_MAX_SUMMED)), (1 << _BITS) - 1
             for axis in range(3):
-                cell = ((self._key[:n] >> (_BITS * (2 - axis))) & mask) - _HALF + self._base[axis]
-                out[:, axis] = (cell + (self._sum[:n, axis] / count + 0.5) / _FINE) * self.edge
+                cell = ((self._key[:n] >> (_BITS * (2 - axis))) & mask) - _INDEX_OFFSET + self._base[axis]
+                out[:, axis] = (cell + (self._sum[:n, axis] / count + 0.5) / _STEPS_PER_EDGE) * self.edge
         return out
 
     def counts(self) -> Int64:
-        """Number of points in each voxel, (n,)."""
+        """Return the number of points in each voxel, (n,)."""
         return self._count[: self._size].astype(np.int64)
 
     def spread(self) -> Float:
-        """Standard deviation of the heights of the points in each voxel, (n,), m."""
+        """Return the standard deviation of the heights of the points in each voxel, (n,), m."""
         n = self._size
-        count = np.minimum(self._count[:n], _MOST).astype(np.float64)
+        count = np.minimum(self._count[:n], _MAX_SUMMED).astype(np.float64)
         mean = self._sum[:n, 2] / count
         variance = self._square[:n] / count - mean * mean
-        return np.asarray(np.sqrt(np.maximum(variance, 0.0)) * (self.edge / _FINE))
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)) * (self.edge / _STEPS_PER_EDGE))
 
     def index(self, xyz: Float) -> Int64:
-        """Number of the voxel that holds each of the points (n, 3), -1 where there is none."""
+        """Return the index of the voxel of each of the points (n, 3), -1 if there is none."""
         points = np.ascontiguousarray(xyz, dtype=np.float64)
         out = np.full(len(points), -1, np.int64)
         if (base := self._base) is not None:
@@ -202,7 +202,7 @@ class Voxels:
 
 
 def value_table(keys: Int64, values: UInt8) -> tuple[Int64, UInt8]:
-    """Slots for keys (n,), all different and not negative, and their values (n,): `key_slot` finds a key at one glance."""
+    """Return slots for keys (n,), all different and not negative, and their values (n,), for look-up by `key_slot`."""
     slots = np.full(1 << max(10, (2 * len(keys)).bit_length()), -1, np.int64)
     held = np.zeros(len(slots), np.uint8)
     _enter_values(keys, values, slots, held)
@@ -211,7 +211,7 @@ def value_table(keys: Int64, values: UInt8) -> tuple[Int64, UInt8]:
 
 @inner
 def column_hash(ix: int, iy: int) -> int:  # pragma: no cover - compiled
-    """Hash of a column of cells (Teschner et al., 2003)."""
+    """Return the hash of a column of cells (Teschner et al., 2003)."""
     return (ix * 73856093) ^ (iy * 19349663)
 
 
@@ -219,9 +219,9 @@ def column_hash(ix: int, iy: int) -> int:  # pragma: no cover - compiled
 def _number(
     xyz: Float, edge: float, adding: bool, done: int, used: int, cells: Int64, counts: Int64, table: Int32, numbers: Int32
 ) -> tuple[int, int]:  # pragma: no cover - compiled
-    """Number the cells of points from `done` on, and count them, until the list of cells is full; how far it came.
+    """Find or add the cells of points from `done` on, and count them, until the list of cells is full; return the progress.
 
-    If nothing is to be added, points of cells that aren't there get -1, and nothing is counted.
+    Without adding, points in cells that don't exist get -1, and nothing is counted.
     """
     mask = table.shape[0] - 1
     last = -1
@@ -252,29 +252,33 @@ def _number(
 
 @inner
 def _key_of(x: float, y: float, z: float, base: Int64) -> int:  # pragma: no cover - compiled
-    """Number of the voxel of a place, in edges; -1 beyond what can be numbered, -2 where the place is not finite."""
+    """Return the number of the voxel of a position, in edges; -1 if out of range, -2 if the position is not finite."""
     if not (abs(x) < np.inf and abs(y) < np.inf and abs(z) < np.inf):
         return -2
-    i, j, k = math.floor(x) - base[0] + _HALF, math.floor(y) - base[1] + _HALF, math.floor(z) - base[2] + _HALF
-    if min(i, j, k) < 0 or max(i, j, k) >= 2 * _HALF:
+    i, j, k = (
+        math.floor(x) - base[0] + _INDEX_OFFSET,
+        math.floor(y) - base[1] + _INDEX_OFFSET,
+        math.floor(z) - base[2] + _INDEX_OFFSET,
+    )
+    if min(i, j, k) < 0 or max(i, j, k) >= 2 * _INDEX_OFFSET:
         return -1
     return (i << (2 * _BITS)) | (j << _BITS) | k
 
 
 @inner
 def _number_slot(key: int, keys: Int64, table: UInt32) -> int:  # pragma: no cover - compiled
-    """Slot of a table that holds the place of a key among keys, or the empty one where it belongs."""
+    """Return the slot of a table that has the index of a key, or the empty slot for it."""
     mask = np.uint64(table.shape[0] - 1)
     h = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
     at = (h ^ (h >> np.uint64(32))) & mask
     while table[at] != _EMPTY and keys[table[at]] != key:
         at = (at + np.uint64(1)) & mask
-    return np.int64(at)  # type: ignore[return-value]  # to Numba it is an int
+    return np.int64(at)  # type: ignore[return-value]  # an int for Numba
 
 
 @inner
 def key_slot(key: int, slots: Int64) -> np.int64:  # pragma: no cover - compiled
-    """Slot that holds a key, or the empty one (-1) where it belongs."""
+    """Return the slot of a key, or the empty one (-1) for it."""
     mask = slots.shape[0] - 1
     slot = np.int64((np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(32)) & mask
     while slots[slot] >= 0 and slots[slot] != key:
@@ -294,7 +298,7 @@ def _add(
     points: Float, edge: float, base: Int64, size: int, keys: Int64, count: UInt32, total: UInt32,
     square: UInt64, table: UInt32,
 ) -> tuple[int, int]:  # pragma: no cover - compiled  # fmt: skip
-    """Add points until there is no room for another voxel: how many, and the number of voxels; -1: out of bounds."""
+    """Add points until there is no space for another voxel; return how many, and the number of voxels; -1: out of bounds."""
     for n in range(points.shape[0]):
         x, y, z = points[n, 0] / edge, points[n, 1] / edge, points[n, 2] / edge
         key = _key_of(x, y, z, base)
@@ -311,12 +315,12 @@ def _add(
             size += 1
         i = table[slot]
         count[i] += np.uint32(1)
-        if count[i] > _MOST:
+        if count[i] > _MAX_SUMMED:
             continue
-        last = _FINE - 1
-        total[i, 0] += np.uint32(min(int((x - math.floor(x)) * _FINE), last))
-        total[i, 1] += np.uint32(min(int((y - math.floor(y)) * _FINE), last))
-        up = min(int((z - math.floor(z)) * _FINE), last)
+        last = _STEPS_PER_EDGE - 1
+        total[i, 0] += np.uint32(min(int((x - math.floor(x)) * _STEPS_PER_EDGE), last))
+        total[i, 1] += np.uint32(min(int((y - math.floor(y)) * _STEPS_PER_EDGE), last))
+        up = min(int((z - math.floor(z)) * _STEPS_PER_EDGE), last)
         total[i, 2] += np.uint32(up)
         square[i] += np.uint64(up * up)
     return points.shape[0], size

@@ -1,4 +1,4 @@
-"""Batches: what is wanted, the jobs that follow from it, the workers that do them, and how far they have come."""
+"""Batches: requested work, the resulting jobs, workers, and progress."""
 
 import lazy_loader
 

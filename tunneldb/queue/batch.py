@@ -1,4 +1,4 @@
-"""What a batch asks for: files to be read, kilometres and the stage up to which each is to be brought."""
+"""Request of a batch: files to read, kilometres, and the stage to which each is processed."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from tunneldb.store.survey import Survey
 
 @dataclass(frozen=True)
 class Incoming:
-    """A file that a batch names, as its header has it.
+    """File named by a batch, with data from its header.
 
     Attributes
     ----------
     name : str
-        Its name without the folder, by which the survey knows it.
+        Name without the folder, which identifies it in the survey.
     path : Path
-        Where it lies, absolute.
+        Absolute path.
     bytes, points : int
-        Its size, and how many points its header announces; 0 points if that is unreadable.
+        Size, and number of points by the header; 0 points if it is unreadable.
     km_from, km_to : int or None
-        First and last kilometre that it may touch; None if not even its box is readable, or it touches none.
+        First and last kilometre that it may touch; None if its box is unreadable, or it touches none.
     error : str or None
-        Why it can't be read.
+        Reason why it can't be read.
     there : bool
-        Whether it was read already and has not been touched since, by its path, size and times.
+        True if it was already read and is unchanged, by path, size and times.
     """
 
     name: str
@@ -59,20 +59,20 @@ class Incoming:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a batch asks for, before anything is done.
+    """Request of a batch, before anything is done.
 
     Attributes
     ----------
     files : tuple of Incoming
         All files that it names, within its kilometres.
     kilometres : tuple of int
-        Kilometres that are wanted.
+        Requested kilometres.
     stage : str or None
-        Stage up to which they are to be brought; None where it stays as it was asked for before.
+        Last stage to run; None for the stage requested before.
     parameters : dict
-        Parameters that differ from the defaults, by name, those of reading and loading included.
+        Parameters that differ from the defaults, by name, including those of reading and loading.
     reading : dict
-        Parameters of reading and loading, all of them.
+        All parameters of reading and loading.
     """
 
     files: tuple[Incoming, ...]
@@ -93,30 +93,30 @@ def plan(
     parameters: Mapping[str, float] | None = None,
     retry: bool = False,
 ) -> Plan:
-    """Look at the headers of files, and see which kilometres they and the options ask for; changes nothing.
+    """Read the headers of files, and find the requested kilometres; this changes nothing.
 
     Parameters
     ----------
     conn : Connection
     survey : Survey
     paths : sequence of Path
-        Scan files; none to go on with what is wanted and with what is loaded.
+        Scan files; none to continue with the requested and loaded ones.
     kilometres : range, optional
-        Only these.
+        Kilometres to include.
     stage : str, optional
-        Stage up to which they are to be brought; the last one by default.
+        Last stage to run; by default the last of all.
     reading : mapping, optional
-        Parameters of reading and loading (``load.density`` and so on) that differ from their defaults. The density is the
-        one that the survey has, if it has one.
+        Parameters of reading and loading (for example ``load.density``) that differ from their defaults. If the survey has a
+        density, it is used.
     parameters : mapping, optional
-        Those of the stages that are set.
+        Parameters of the stages.
     retry : bool
-        Whether to look again at files that have failed before; one that is gone stays failed.
+        True to read failed files again; a missing one stays failed.
 
     Raises
     ------
     UserError
-        If a file is missing, two have the same name, or there is nothing to be done.
+        If a file is missing, two have the same name, or there is nothing to do.
     """
     named = [path.resolve() for path in paths]
     _require_files(named)
@@ -134,7 +134,7 @@ def plan(
     chosen = {km for km in wanted if kilometres is None or km in kilometres}
     if not chosen and not any(file.error for file in files) and not _awaits(conn, survey):
         where = "" if kilometres is None else f" in kilometres {kilometres[0]}-{kilometres[-1]}"
-        raise UserError(f"survey {survey.name} has nothing to be done{where}: tunneldb batch {survey.name} FILES")
+        raise UserError(f"survey {survey.name} has nothing to do{where}; type tunneldb batch {survey.name} FILES")
     return Plan(tuple(files), tuple(sorted(chosen)), stage, dict(parameters or {}), how)
 
 
@@ -142,10 +142,10 @@ def _require_files(paths: Sequence[Path]) -> None:
     names: dict[str, Path] = {}
     for path in paths:
         if not path.is_file():
-            what = "is a folder: give the files in it" if path.is_dir() else "there is no such file"
+            what = "is a folder; pass the files in it" if path.is_dir() else "there is no such file"
             raise UserError(f"{path}: {what}; nothing was registered")
         if path.name in names:
-            raise UserError(f"{path} and {names[path.name]} have the same name: a survey's files are known by their names")
+            raise UserError(f"{path} and {names[path.name]} have the same name; names must be unique in a survey: rename one")
         names[path.name] = path
 
 
@@ -191,7 +191,7 @@ def _headers(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path
             continue
         touched = header_kilometres(header, alignment, reach)
         if not touched:
-            off = f"{path}: its points lie off the given axis of tunnel {survey.tunnel}: is it a file of this tunnel?"
+            off = f"{path}: its points lie off the given axis of tunnel {survey.tunnel}; does the file belong to this tunnel?"
             files.append(Incoming(path.name, path, size, points, error=off))
             continue
         there = path.name in read and _untouched(path, size, *read[path.name])
@@ -200,7 +200,7 @@ def _headers(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path
 
 
 def _near_damaged(conn: psycopg.Connection[Any], survey: Survey, files: Sequence[Incoming], reach: float) -> set[int]:
-    """Kilometres that files that can't be read may touch: wanted as those of good ones, for when they are put right."""
+    """Return the kilometres that unreadable files may touch; they are requested like those of readable files."""
     damaged = [header for file in files if file.error and (header := _damaged_header(file.path)) is not None]
     if not damaged:
         return set()
@@ -209,41 +209,41 @@ def _near_damaged(conn: psycopg.Connection[Any], survey: Survey, files: Sequence
 
 
 def _damaged_header(path: Path) -> ScanHeader | None:
-    """What is known of a file that can't be read: its box, if that is there."""
+    """Return the header of an unreadable file with its box, if that is readable."""
     box = header_box(path) if format_of(path).is_las else None
     return None if box is None else ScanHeader(path, 0, (), None, np.array(box[0]), np.array(box[1]))
 
 
 def _damaged_kilometres(path: Path, alignment: Alignment, reach: float) -> range:
-    """Kilometres that fail with a file that can't be read: those of its box, if that is there."""
+    """Return the kilometres that fail with an unreadable file: those of its box, if that is readable."""
     header = _damaged_header(path)
     return range(0) if header is None else _inner_kilometres(header, alignment, reach)
 
 
 def _inner_kilometres(header: ScanHeader, alignment: Alignment, reach: float) -> range:
-    """Kilometres in which the axis runs through the box of a file, not just past its ends; empty if none."""
+    """Return the kilometres in which the axis crosses the box of a file, not just near its ends; empty if none."""
     ends = extent(header, alignment, reach)
     return range(0) if ends is None else range(int(ends[0] // KILOMETRE), int(ends[1] // KILOMETRE) + 1)
 
 
 def extent(header: ScanHeader, alignment: Alignment, reach: float) -> tuple[float, float] | None:
-    """From where to where a file goes along the axis, by its box; rather too short than too long.
+    """Return the first and last chainage of a file, by its box; rather too short than too long.
 
-    Of where the axis is within the reach of the box, the reach is taken off at both ends, half as much again since the
-    box may stand askew to the axis, and a step of the axis.
+    The part of the axis within the reach of the box is shortened at both ends by 1.5 times the reach, since the box may be
+    oblique to the axis, and by one step of the axis.
 
     Parameters
     ----------
     header : ScanHeader
     alignment : Alignment
-        The given axis.
+        Given axis.
     reach : float
-        How far from the axis the tunnel reaches, m.
+        Greatest distance of the tunnel from the axis, m.
 
     Returns
     -------
     tuple or None
-        Two chainages, m; None if the file is not at the axis.
+        Two chainages, m; None if the file is not near the axis.
     """
     chainage = chainages_near(header, alignment, reach)
     if not len(chainage):
@@ -253,9 +253,9 @@ def extent(header: ScanHeader, alignment: Alignment, reach: float) -> tuple[floa
 
 
 def give_up_file(conn: psycopg.Connection[Any], survey: Survey, name: str) -> None:
-    """Let a file that has failed fail only the kilometres that hold its points, not those that it just touches.
+    """Restrict the effect of a failed file to the kilometres that contain its points, without those that it just touches.
 
-    Does nothing for a file that has not failed for good, or of which not even the box can be read.
+    Does nothing for a file that has not finally failed, or whose box is unreadable.
     """
     with conn.transaction():
         conn.execute("SELECT tunnel_internal.queue_lock(%s)", [survey.id])
@@ -276,7 +276,7 @@ def give_up_file(conn: psycopg.Connection[Any], survey: Survey, name: str) -> No
 
 
 def _untouched(path: Path, size: int, known_path: str, known_size: int, read_at: dt.datetime) -> bool:
-    """Whether a file is the one that was read: its checksum is looked at only if path, size or times say otherwise."""
+    """Return True if a file is the one that was read; its checksum is computed only if path, size or times differ."""
     stat = path.stat()
     return str(path) == known_path and size == known_size and max(stat.st_mtime, stat.st_ctime) < read_at.timestamp()
 
@@ -298,15 +298,16 @@ def _awaits(conn: psycopg.Connection[Any], survey: Survey) -> bool:
 
 
 def register(conn: psycopg.Connection[Any], survey: Survey, asked: Plan, *, retry: bool = False) -> int:
-    """Put on record what a batch asks for, and defer the jobs that are ready, in one transaction; returns how many.
+    """Record the request of a batch, and defer the jobs that are ready, in one transaction; return their number.
 
-    What was asked for before stays: a kilometre is brought to the later one of two stages, and parameters that are not
+    Earlier requests stay: a kilometre is processed to the later one of two stages, and parameters that are not set keep their
+    values.
     set keep their values.
 
     Parameters
     ----------
     retry : bool
-        Whether stages that have failed are to be tried again; files that have are those of the plan.
+        True to run failed stages again; the failed files are those of the plan.
     """
     with conn.transaction():
         conn.execute("SELECT tunnel_internal.queue_lock(%s)", [survey.id])
@@ -372,7 +373,7 @@ def _goal(survey: Survey, km: int, asked: Plan) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a kilometre: ``state`` is that of its first stage that is not done, or ``done``."""
+    """Result of a kilometre: ``state`` of its first stage that is not done, or ``done``."""
 
     km: int
     stage: str
@@ -381,7 +382,7 @@ class Result:
 
 
 def results(conn: psycopg.Connection[Any], survey: Survey) -> list[Result]:
-    """What became of each kilometre that is wanted, from the first on; those that hold no points are left out."""
+    """Return the result of each requested kilometre, in order; those without points are omitted."""
     with conn.cursor(row_factory=class_row(Result)) as cursor:
         cursor.execute(
             """
@@ -394,7 +395,7 @@ def results(conn: psycopg.Connection[Any], survey: Survey) -> list[Result]:
 
 
 def failed_files(conn: psycopg.Connection[Any], survey: Survey) -> list[tuple[str, str]]:
-    """Files that could not be read, and why."""
+    """Return the files that could not be read, with the reasons."""
     return conn.execute(
         "SELECT name, message FROM tunnel.incoming WHERE survey_id = %s AND failed_at IS NOT NULL ORDER BY km_from, name",
         [survey.id],
@@ -402,7 +403,7 @@ def failed_files(conn: psycopg.Connection[Any], survey: Survey) -> list[tuple[st
 
 
 def notes_of_files(conn: psycopg.Connection[Any], survey: Survey, since: dt.datetime) -> list[tuple[str, str]]:
-    """What was noted of files as they were read since a moment: name and note, as in what was taken for granted of them."""
+    """Return notes about files read since a moment, for example about assumptions: name and note."""
     return conn.execute(
         """
         SELECT DISTINCT ON (r.counts ->> 'file') r.counts ->> 'file', r.counts ->> 'note'

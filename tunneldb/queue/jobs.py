@@ -1,4 +1,4 @@
-"""The queue: procrastinate's, in schema tunnel_queue, whose jobs end in the transaction of the stage that they run."""
+"""Queue of procrastinate, in schema tunnel_queue; jobs end in the transaction of the stage that they run."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ log = logging.getLogger("tunneldb.worker")
 
 
 class GoneError(Exception):
-    """What a job is about is not there any more."""
+    """Error for a job whose subject no longer exists."""
 
 
 class Manager(JobManager):
-    """Leaves the ends of jobs to the transactions of their stages, and puts a worker on record as it registers.
+    """Job manager that leaves the end of jobs to the transactions of their stages, and records each worker.
 
     Parameters
     ----------
     connector : BaseConnector
     registered : callable
-        Called with the worker's number before it takes a job.
+        Function of the worker's number, called before it takes a job.
     unsettled : callable
-        Called when a job could neither be ended nor put back.
+        Function called if a job could neither be ended nor put back.
     """
 
     def __init__(
@@ -51,13 +51,13 @@ class Manager(JobManager):
         self._unsettled = unsettled
 
     async def register_worker(self) -> int:
-        """Register the worker and put it on record."""
+        """Register the worker and record it."""
         worker = await super().register_worker()
         await self._registered(worker)
         return worker
 
     async def finish_job(self, job: QueueJob, status: Status, delete_job: bool) -> None:
-        """End a job of a kind that this program does not know; others have ended, or their worker leaves."""
+        """End a job of a kind unknown to this program; others have ended already, or their worker exits."""
         if job.task_name not in ("read", "stage"):
             await super().finish_job(job, status, delete_job)
         elif status != Status.SUCCEEDED:
@@ -72,11 +72,11 @@ def make_app(
     Parameters
     ----------
     dsn : str
-        Where the queue is.
+        Database of the queue.
     home : str or None
-        Where jobs are to connect: None for the embedded server, which they start again if it is down.
+        Database for jobs to connect to: None for the embedded server, which they start if it is down.
     registered, unsettled : callable
-        See `Manager`.
+        As for `Manager`.
     """
 
     async def configure(conn: psycopg.AsyncConnection[Any]) -> None:
@@ -102,7 +102,7 @@ def make_app(
 
 
 def _run(dsn: str | None, context: JobContext, work: Callable[[psycopg.Connection[Any], Job], None]) -> None:
-    """Do a job to its end, which its stage has recorded, or for one that did not come so far is recorded here."""
+    """Run a job; if its stage did not record its end, record it here."""
     assert context.job.id is not None
     assert context.job.worker_id is not None
     job = Job(context.job.id, context.job.worker_id, context.job.attempts)
@@ -119,12 +119,12 @@ def _run(dsn: str | None, context: JobContext, work: Callable[[psycopg.Connectio
 
 
 def end_job(dsn: str | None, job: Job, error: Exception) -> None:
-    """End or put back a job that its stage has left, by a session of its own.
+    """End or put back a job that its stage has left, in a session of its own.
 
     Raises
     ------
     psycopg.OperationalError
-        If there is none to be had; the job is taken over when the worker has left.
+        If there is no connection; the job is taken over after the worker has exited.
     """
     with worker_session(dsn) as conn:
         held = conn.execute("SELECT tunnel_internal.queue_hold(%s, %s)", [job.id, job.worker]).fetchone()
@@ -156,7 +156,7 @@ def _read(conn: psycopg.Connection[Any], job: Job, survey_id: int, name: str) ->
     ).fetchone()
     conn.rollback()
     if row is None:
-        raise GoneError(f"{name} is not to be read any more")
+        raise GoneError(f"{name} is no longer requested")
     path, parameters = row
     try:
         with stage_run(conn, survey_id, None, "read", {**parameters, "file": name}, job) as run:

@@ -1,4 +1,4 @@
-"""Worker processes of one command: started, started again when they die, asked to leave."""
+"""Worker processes of one command: start, restart after a crash, and exit."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from types import FrameType
 from tunneldb.errors import UserError
 from tunneldb.queue.worker import Orders
 
-_PATIENCE = 30.0  # a worker that dies sooner is started again after a while only
+_MIN_LIFETIME = 30.0  # s; a worker that dies sooner is restarted with a delay
 
 
 @dataclass
@@ -29,14 +29,14 @@ class _Member:
 
 @dataclass
 class WorkerPool:
-    """Worker processes.
+    """Pool of worker processes.
 
     Parameters
     ----------
     orders : Orders
-        What each is told.
+        Orders for each worker.
     size : int
-        How many there are.
+        Number of workers.
     """
 
     orders: Orders
@@ -49,12 +49,12 @@ class WorkerPool:
         self.members = [_Member(self._launch(), time.monotonic()) for _ in range(self.size)]
 
     def tend(self) -> bool:
-        """Start those again that died; returns whether any is still there.
+        """Restart workers that died; return True if any is still running.
 
         Raises
         ------
         UserError
-            When a worker gave up, for a reason that it has said.
+            If a worker gave up, for a reason that it has printed.
         """
         for member in list(self.members):
             code = member.process.poll()
@@ -67,13 +67,13 @@ class WorkerPool:
                     raise UserError("a worker gave up, see above")
                 continue
             lived = time.monotonic() - member.started
-            if lived > min(2.0**member.falls, _PATIENCE):
-                falls = 0 if lived > _PATIENCE else member.falls + 1
+            if lived > min(2.0**member.falls, _MIN_LIFETIME):
+                falls = 0 if lived > _MIN_LIFETIME else member.falls + 1
                 self.members[self.members.index(member)] = _Member(self._launch(), time.monotonic(), falls)
         return bool(self.members)
 
     def leave(self) -> None:
-        """Ask the workers to end what they are at, and leave; asked again, they leave at once."""
+        """Ask the workers to finish their current job and exit; if asked again, they exit at once."""
         for member in self.members:
             if member.process.poll() is None:
                 member.process.send_signal(signal.SIGKILL if self.leaving else signal.SIGTERM)
@@ -83,7 +83,7 @@ class WorkerPool:
         told = json.dumps({"threads": self.orders.threads, "survey": self.orders.survey})
         environment = dict(os.environ)
         environment["TUNNELDB_DSN"] = self.orders.dsn or ""
-        # The pipe stays open as long as this process lives; a session of its own keeps the terminal's Ctrl-C off.
+        # The pipe stays open while this process runs; a session of its own protects it from the terminal's Ctrl-C.
         process = subprocess.Popen(
             [sys.executable, "-m", "tunneldb.queue.worker", told],
             stdin=subprocess.PIPE,
@@ -97,7 +97,7 @@ class WorkerPool:
 
 
 def _pass_on(process: subprocess.Popen[bytes]) -> None:
-    """Say what a worker says, by this process' own stderr, which a table on the terminal gives way to."""
+    """Forward a worker's messages to this process's stderr, so that a table on the terminal makes way for them."""
     assert process.stdout is not None
     for line in process.stdout:
         print(line.decode(errors="replace"), end="", file=sys.stderr, flush=True)
@@ -105,7 +105,7 @@ def _pass_on(process: subprocess.Popen[bytes]) -> None:
 
 @contextmanager
 def interrupts(team: WorkerPool) -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM ask the team to leave, the second time at once."""
+    """Let Ctrl-C and SIGTERM ask the workers to exit, at once on the second signal."""
 
     def ask(number: int, frame: FrameType | None) -> None:
         team.leave()

@@ -1,6 +1,6 @@
-"""What a batch would do, before it begins: where files leave gaps, room that it needs, time that it takes.
+"""Preview of a batch: gaps between files, disk space and time.
 
-The constants are measured; docs/howto-operate.md (Before it starts) says with what.
+The constants are measured; docs/howto-operate.md (Before it starts) states how.
 """
 
 from __future__ import annotations
@@ -25,36 +25,36 @@ from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
 ROW_BYTES = 118.0
-"""Of the points' table with its index, per row."""
+"""Bytes per row of the points' table, with its index."""
 
 FRAGMENT_BYTES = 51.0
-"""Of what was read and waits to be loaded, per row."""
+"""Bytes per row of points that were read but not yet loaded."""
 
 PIXEL_BYTES = 3.5
-"""Of the three images, per pixel of lining."""
+"""Bytes per pixel of lining, for the three images."""
 
 KILOMETRE_BYTES = 17e6
-"""Of axis, segments, sections, ground, lining, clusters and leaks, per kilometre."""
+"""Bytes per kilometre for axis, segments, sections, ground, lining, clusters and leaks."""
 
 GIRTH = 25.0
-"""Length around a cross-section that is taken for a tunnel of which nothing is known yet, m: 8 m in diameter."""
+"""Assumed length around a cross-section of an unknown tunnel, m: 8 m in diameter."""
 
-SMALLEST_GAP = 100.0
-"""Stretches without a file that are shorter are not told, m: ends of files are known to some 30 m by their boxes."""
+MIN_GAP = 100.0
+"""Least length of a reported stretch without a file, m: the box of a file gives its ends to about 30 m."""
 
 
 @dataclass(frozen=True)
 class Disk:
-    """Bytes that a batch needs.
+    """Disk space for a batch, bytes.
 
     Attributes
     ----------
     points, images, others : float
-        What stays: rows of points, images, and axis, segments, sections, ground, lining, clusters and leaks.
+        Permanent data: rows of points, images, and axis, segments, sections, ground, lining, clusters and leaks.
     passing : float
-        What goes again: points that were read and wait to be loaded, and the kilometres that are being rewritten.
+        Temporary data: points that were read but not yet loaded, and kilometres that are being rewritten.
     wal : float
-        The write-ahead log, at its greatest.
+        Greatest size of the write-ahead log.
     """
 
     points: float
@@ -65,13 +65,13 @@ class Disk:
 
     @property
     def total(self) -> float:
-        """All of them, at the worst moment."""
+        """Total at the worst moment."""
         return self.points + self.passing + self.images + self.others + self.wal
 
 
 @dataclass(frozen=True)
 class Speed:
-    """How fast a stage went in this database: mean time of a kilometre, or of a point of a file (``read``), s."""
+    """Speed of a stage in this database: mean time of a kilometre, or of a point of a file (``read``), s."""
 
     stage: str
     seconds: float
@@ -80,34 +80,34 @@ class Speed:
 
 @dataclass(frozen=True)
 class Preview:
-    """What a batch would do.
+    """Preview of a batch.
 
     Attributes
     ----------
     plan : Plan
     stretches : dict
-        Of each readable file, by its name, from where to where it goes along the axis, m.
+        First and last chainage of each readable file, by its name, m.
     covered : tuple of int
-        Kilometres in which files hold points.
+        Kilometres with points of files.
     missing : tuple of int
-        Those between the first and the last, or asked for, of which no file holds any.
+        Kilometres without points between the first and the last one, or requested by number.
     gaps : tuple of (float, float)
-        Stretches of covered kilometres that no file covers, chainages, m.
+        Stretches of covered kilometres without a file, chainages, m.
     points : int
-        Points of the files that are to be read.
+        Number of points of the files to read.
     rows : float
-        Rows expected in the database of them; at most so many where ``kept`` is None.
+        Expected rows in the database; an upper limit if ``kept`` is None.
     kept : float or None
-        Share of points that this survey, or another of the same density, has kept so far; None if there is none.
+        Share of points that this survey, or another of the same density, has kept so far; None if unknown.
     disk : Disk
     free : int or None
-        Bytes that are free where the database lies; None where it can't be seen.
+        Free bytes on the database's disk; None if unknown.
     folder : Path or None
-        Where that is.
+        Folder of the database.
     speeds : tuple of Speed
-        Of the stages that were ever measured in this database.
+        Speeds of the stages measured in this database.
     seconds : float or None
-        Time expected with ``workers`` workers; None if a stage was never measured.
+        Expected time with ``workers`` workers; None if a stage was never measured.
     workers : int
     """
 
@@ -128,25 +128,25 @@ class Preview:
 
     @property
     def fits(self) -> bool:
-        """Whether there is room, as far as can be seen."""
+        """True if there is enough space, as far as known."""
         return self.free is None or self.disk.total <= self.free
 
 
 def preview(
     conn: psycopg.Connection[Any], survey: Survey, plan: Plan, kilometres: range | None, embedded: bool, workers: int
 ) -> Preview:
-    """Look at what a batch would do; changes nothing.
+    """Return a preview of a batch; this changes nothing.
 
     Parameters
     ----------
     plan : Plan
-        What it asks for.
+        Request of the batch.
     kilometres : range or None
-        Kilometres that were asked for by number.
+        Kilometres requested by number.
     embedded : bool
-        Whether the database is the embedded server's.
+        True for the embedded server's database.
     workers : int
-        How many are to be started.
+        Number of workers to start.
     """
     of_files = _stretches(conn, survey, plan)
     stretches = sorted(of_files.values())
@@ -180,7 +180,7 @@ def preview(
 
 
 def kilometres_of(stretch: tuple[float, float]) -> range:
-    """Kilometres that a stretch from one chainage to another, m, lies in."""
+    """Return the kilometres of a stretch from one chainage to another, m."""
     return range(int(stretch[0] // KILOMETRE), math.ceil(stretch[1] / KILOMETRE))
 
 
@@ -194,7 +194,7 @@ def _stretches(conn: psycopg.Connection[Any], survey: Survey, plan: Plan) -> dic
 def _union(stretches: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
     joined: list[tuple[float, float]] = []
     for low, high in stretches:
-        if joined and low <= joined[-1][1] + SMALLEST_GAP:
+        if joined and low <= joined[-1][1] + MIN_GAP:
             joined[-1] = (joined[-1][0], max(joined[-1][1], high))
         else:
             joined.append((low, high))
@@ -207,13 +207,13 @@ def _gaps(stretches: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def _whole(gap: tuple[float, float], missing: Sequence[int]) -> bool:
-    """Whether a gap is told already as missing kilometres: it reaches little beyond them."""
-    inside = [km for km in missing if gap[0] <= 1000 * km + SMALLEST_GAP and gap[1] >= 1000 * (km + 1) - SMALLEST_GAP]
-    return bool(inside) and gap[1] - gap[0] <= 1000 * len(inside) + 2 * SMALLEST_GAP
+    """Return True if a gap is already reported as missing kilometres: it extends little beyond them."""
+    inside = [km for km in missing if gap[0] <= 1000 * km + MIN_GAP and gap[1] >= 1000 * (km + 1) - MIN_GAP]
+    return bool(inside) and gap[1] - gap[0] <= 1000 * len(inside) + 2 * MIN_GAP
 
 
 def _kept(conn: psycopg.Connection[Any], survey: Survey, plan: Plan) -> float | None:
-    """Share of points kept of files that were loaded at this density: of this survey, or else of all."""
+    """Return the share of points kept of files loaded at this density: of this survey, else of all."""
     row = conn.execute(
         """
         WITH file AS (
@@ -254,7 +254,7 @@ def _disk(conn: psycopg.Connection[Any], plan: Plan, rows: float, length: float,
 
 
 def _speeds(conn: psycopg.Connection[Any]) -> tuple[Speed, ...]:
-    """Mean times of the stages, of all surveys of the database."""
+    """Return the mean times of the stages, over all surveys of the database."""
     rows = conn.execute(
         """
         SELECT stage,
@@ -271,7 +271,7 @@ def _speeds(conn: psycopg.Connection[Any]) -> tuple[Speed, ...]:
 
 
 def _time(speeds: Sequence[Speed], plan: Plan, points: int, workers: int) -> float | None:
-    """Time of all work, shared by the workers; None if one of the stages was never measured."""
+    """Return the time of all work, shared by the workers; None if one of the stages was never measured."""
     steps = STAGE_NAMES[: STAGE_NAMES.index(plan.stage or STAGE_NAMES[-1]) + 1]
     mean = {speed.stage: speed.seconds for speed in speeds}
     if not {*steps, *(("read",) if points else ())} <= mean.keys():

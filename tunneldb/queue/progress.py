@@ -1,4 +1,4 @@
-"""How far a survey has come: each stage of each kilometre, files that wait or failed, workers, speed and time left."""
+"""Progress of a survey: stages of kilometres, waiting and failed files, workers, speed and time left."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from tunneldb.queue.worker import STALLED
 from tunneldb.stages.registry import STAGE_NAMES
 
 TO_DO = ("queued", "waits", "running")
-"""States of a step that is done without anybody typing anything, as long as there are workers."""
+"""States of a step that workers will run without user action."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A stage of a kilometre.
+    """Stage of a kilometre.
 
     Attributes
     ----------
     state : str
-        ``done``, ``running``, ``queued`` (a worker takes it next), ``waits`` (for what it needs), ``failed``, ``stale``,
-        ``interrupted``, ``never`` or ``empty`` (the kilometre holds no points and awaits none).
+        ``done``, ``running``, ``queued`` (next for a worker), ``waits`` (for its input), ``failed``, ``stale``,
+        ``interrupted``, ``never`` or ``empty`` (the kilometre has no points and expects none).
     reason : str or None
-        Why it failed or is stale.
+        Reason for failed and stale.
     worker : str or None
-        Machine and process that it runs on.
+        Machine and process of its worker.
     since : datetime or None
-        When it began to run.
+        Start time.
     """
 
     state: str
@@ -43,7 +43,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class File:
-    """A file that a batch is to read; ``state`` is ``waiting``, ``running`` or ``failed``."""
+    """File of a batch; ``state`` is ``waiting``, ``running`` or ``failed``."""
 
     name: str
     path: str
@@ -56,7 +56,7 @@ class File:
 
 @dataclass(frozen=True)
 class Worker:
-    """A worker; ``silent`` is the age of its last heartbeat, s, ``busy`` how long it has been at what it does, s."""
+    """Worker; ``silent`` is the age of its last heartbeat, s, ``busy`` the time since the start of its job, s."""
 
     host: str
     pid: int
@@ -68,35 +68,35 @@ class Worker:
 
     @property
     def lost(self) -> bool:
-        """Whether it has been silent for so long that its job is taken over."""
+        """True if it has been silent so long that its job is taken over."""
         return self.silent > STALLED
 
 
 @dataclass(frozen=True)
 class Overview:
-    """How far a survey has come at a moment.
+    """Progress of a survey at a moment.
 
     Attributes
     ----------
     survey : str
     now : datetime
-        The moment, by the server's clock.
+        Time of the server's clock.
     kilometres : dict
-        Of each kilometre that is loaded, was worked on or is wanted, the cell of each stage.
+        Cell of each stage of each kilometre that is loaded, was processed or is requested.
     targets : dict
-        Stage up to which each kilometre is wanted by a batch.
+        Last requested stage of each kilometre.
     files : tuple of File
     workers : tuple of Worker
-        All that serve the database, whichever survey they are at.
+        All workers of the database, for any survey.
     done, total : int
-        Steps that are done, and all: stages of kilometres that are wanted.
+        Number of completed steps, and of all: stages of requested kilometres.
     share : float or None
-        Share of the work that is done since the last unfinished batch was called, 0 to 1; each step counts by the time that
-        its stage takes in this survey. None as long as a stage that is still to be done has never been measured.
+        Share of the work completed since the last unfinished batch was started, 0 to 1; each step is weighted by the time of
+        its stage in this survey. None while a remaining stage has never been measured.
     rate : float or None
-        Points of the files per second since the last batch was called that is not finished.
+        Points of the files per second since the last unfinished batch was started.
     left : float or None
-        Time left, s; None when unknown.
+        Remaining time, s; None if unknown.
     """
 
     survey: str
@@ -113,14 +113,14 @@ class Overview:
 
     @property
     def active(self) -> bool:
-        """Whether something is left that is done without anybody typing anything."""
+        """True if steps remain that workers will run without user action."""
         return any(file.state != "failed" for file in self.files) or any(
             cell.state in TO_DO for cells in self.kilometres.values() for cell in cells.values()
         )
 
     @property
     def live(self) -> int:
-        """Number of workers that were heard of lately."""
+        """Number of workers with a recent heartbeat."""
         return sum(not worker.lost for worker in self.workers)
 
 
@@ -147,7 +147,7 @@ class _Run(NamedTuple):
 
 
 class _Known(NamedTuple):
-    """What the database knows of each stage of each kilometre, by kilometre and stage."""
+    """Records of stages of kilometres in the database, by kilometre and stage."""
 
     statuses: dict[tuple[int, str], _Status]
     plans: dict[tuple[int, str], _Plan]
@@ -156,14 +156,14 @@ class _Known(NamedTuple):
 
 
 def overview(conn: psycopg.Connection[Any], survey: str) -> Overview:
-    """Look at a survey; needs the rights of a viewer only.
+    """Return the progress of a survey; needs only the rights of a viewer.
 
     Parameters
     ----------
     conn : Connection
-        Its transaction is left open: what was seen is of one moment if it began with this call.
+        Connection; its transaction stays open, so that the data are of one moment if it began with this call.
     survey : str
-        Name of a survey that exists.
+        Name of an existing survey.
     """
     now = conn.execute("SELECT clock_timestamp()").fetchone()
     assert now is not None
@@ -269,12 +269,12 @@ def _cell(km: int, stage: str, known: _Known) -> Cell:
     if status.outcome == "failed":
         return Cell("failed", status.message)
     if status.outcome == "interrupted":
-        return Cell("interrupted", "the program that ran it, or its connection, is gone")
+        return Cell("interrupted", "the program that ran it, or its connection, has ended")
     return Cell("stale", status.reason) if status.outcome == "done" and status.stale else Cell(status.outcome)
 
 
 def _mark_failed_files(kilometres: dict[int, dict[str, Cell]], files: tuple[File, ...]) -> None:
-    """Show a file that failed at the kilometres that it touches, where none of them is at work."""
+    """Show a failed file at the kilometres that it touches, unless one of their stages is running."""
     for file in files:
         for cells in [kilometres[km] for km in _touched((file,)) if file.state == "failed"]:
             if cells["load"].state not in ("running", "queued"):

@@ -1,4 +1,4 @@
-"""How fast a survey is worked off: measured times of its stages, and what follows from them for what is still to be done."""
+"""Throughput of a survey: measured times of its stages, and the time for the remaining work."""
 
 from __future__ import annotations
 
@@ -10,38 +10,37 @@ from typing import Any
 import psycopg
 
 Steps = Sequence[Sequence[tuple[str, dt.datetime | None]]]
-"""Of each kilometre the stages that are still to be done, each with when it began, if it has."""
+"""Remaining stages of each kilometre, each with its start time, if it has begun."""
 
 
 @dataclass(frozen=True)
 class Throughput:
-    """Times of a survey so far.
+    """Measured times of a survey.
 
     Attributes
     ----------
     mean : mapping
-        Mean time that a stage of a kilometre, or the reading of a file (``read``), has taken, s; only of those that were
-        done at least once.
+        Mean time of a stage of a kilometre, or of reading a file (``read``), s; only for stages completed at least once.
     runs : sequence of (datetime, float)
-        End of each run that was done, and the time that it took, s.
+        End of each completed run, and its duration, s.
     """
 
     mean: Mapping[str, float]
     runs: Sequence[tuple[dt.datetime, float]]
 
     def knows(self, steps: Steps, to_read: int) -> bool:
-        """Whether each stage that is still to be done has been measured."""
+        """Return True if each remaining stage has been measured."""
         return {stage for row in steps for stage, _ in row} | ({"read"} if to_read else set()) <= self.mean.keys()
 
     def share(self, steps: Steps, to_read: int, since: dt.datetime) -> float | None:
-        """Share of the work since a moment that is done, 0 to 1, each step by its time; None when unknown.
+        """Return the share of the work since a moment that is complete, 0 to 1, weighted by time; None if unknown.
 
         Parameters
         ----------
         steps, to_read
-            What is still to be done: stages of kilometres, and number of files.
+            Remaining work: stages of kilometres, and number of files.
         since : datetime
-            When it was asked for.
+            Time of the request.
         """
         if not self.knows(steps, to_read):
             return None
@@ -50,9 +49,9 @@ class Throughput:
         return behind / (behind + ahead) if behind + ahead > 0.0 else None
 
     def left(self, steps: Steps, to_read: int, workers: int, now: dt.datetime) -> float | None:
-        """Time that workers need for the rest, s; None when unknown, or when there is no worker.
+        """Return the remaining time, s; None if unknown, or if there is no worker.
 
-        It is not less than the longest chain of stages of one kilometre, which are done one after the other.
+        It is at least the longest chain of stages of one kilometre, which run one after the other.
         """
         if not workers or not self.knows(steps, to_read):
             return None
@@ -66,7 +65,7 @@ class Throughput:
 def measure(conn: psycopg.Connection[Any], survey: str) -> Throughput:
     """Return the throughput of a survey, from its ledger.
 
-    Only runs of a kilometre count, and the reading of a file; loads by ``tunneldb load`` of several files at once do not.
+    Only runs of a kilometre, and the reading of a file, are included; ``tunneldb load`` of several files at once is not.
     """
     taken: dict[str, list[float]] = {}
     runs = conn.execute(
@@ -86,17 +85,17 @@ def measure(conn: psycopg.Connection[Any], survey: str) -> Throughput:
 def points_per_second(
     conn: psycopg.Connection[Any], survey: str, share: float, since: dt.datetime, now: dt.datetime
 ) -> float | None:
-    """Return the points of the files asked for since a moment that have been brought through, per second.
+    """Return the completed points per second, of the files requested since a moment.
 
     Parameters
     ----------
     share : float
-        Share of the work that is done, 0 to 1; so much of the points counts as brought through.
+        Share of the work that is complete, 0 to 1; the same share of the points counts as complete.
 
     Returns
     -------
     float or None
-        None when no file was asked for since.
+        None if no file was requested since then.
     """
     row = conn.execute(
         """

@@ -1,6 +1,6 @@
-"""A worker: one process that takes jobs from the queue, one after the other, until it is told to leave.
+"""Worker: a process that runs jobs of the queue, one after the other, until it is asked to exit.
 
-``python -m tunneldb.queue.worker`` is what `tunneldb.queue.pool` starts; it ends with its parent.
+`tunneldb.queue.pool` starts ``python -m tunneldb.queue.worker``; it ends with its parent.
 """
 
 from __future__ import annotations
@@ -18,41 +18,43 @@ import threading
 import time
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import psycopg
 
 from tunneldb.database.failures import first_line
 from tunneldb.errors import UserError
+from tunneldb.log import VARIABLE, logging_to
 from tunneldb.threads import use_threads
 
 if TYPE_CHECKING:
     from procrastinate.worker import Worker
 
 HEARTBEAT = 5.0
-"""Seconds between two heartbeats, and between two looks for lost workers."""
+"""Interval between two heartbeats, and between two searches for lost workers, s."""
 
 STALLED = 25.0
-"""A worker without a heartbeat for so many seconds is lost."""
+"""Time without a heartbeat after which a worker is lost, s."""
 
 GIVE_UP = 900.0
-"""Seconds for which a worker waits for a server that is away."""
+"""Time for which a worker waits for an unavailable server, s."""
 
 log = logging.getLogger("tunneldb.worker")
 
 
 @dataclass(frozen=True)
 class Orders:
-    """What a worker is told.
+    """Orders for a worker.
 
     Attributes
     ----------
     dsn : str or None
-        None for the embedded server.
+        Database; None for the embedded server.
     threads : int
-        How many threads it computes with.
+        Number of threads to compute with.
     survey : int or None
-        Leave when there is nothing left to be done of this survey.
+        Survey after whose completion the worker exits; None to run on.
     """
 
     dsn: str | None
@@ -61,7 +63,7 @@ class Orders:
 
 
 class _Leave:
-    """Whether to leave, and what is to be told of it."""
+    """Request to exit, and the worker of the queue to stop."""
 
     def __init__(self) -> None:
         self._wanted = asyncio.Event()
@@ -75,23 +77,23 @@ class _Leave:
         self.pause()
 
     async def wait(self, seconds: float) -> None:
-        """Wait, but not if it is time to leave."""
+        """Wait, or return early if it is time to exit."""
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._wanted.wait(), seconds)
 
     def pause(self) -> None:
-        """End the present connection to the queue after the job that is under way."""
+        """End the present connection to the queue after the current job."""
         if self.worker is not None:
             self.worker.stop()  # type: ignore[no-untyped-call]
 
 
 def work(orders: Orders) -> None:
-    """Serve the queue until told to leave; a server that is away is waited for.
+    """Serve the queue until asked to exit; wait for an unavailable server.
 
     Raises
     ------
     UserError
-        If the server stays away, or its schema is not this program's.
+        If the server stays unavailable, or its schema is of another version.
     """
     use_threads(orders.threads)
     asyncio.run(_work(orders))
@@ -108,7 +110,7 @@ async def _work(orders: Orders) -> None:
         try:
             async with _connected(orders) as (dsn, presence):
                 if away_since is not None:
-                    log.warning("the database is back")
+                    log.warning("the database is available again")
                 away_since, wait = None, 0.5
                 await _serve(orders, leave, dsn, presence)
         except _AWAY as error:
@@ -116,16 +118,16 @@ async def _work(orders: Orders) -> None:
                 return
             if away_since is None:
                 away_since = time.monotonic()
-                log.warning("the database is away, waiting for it: %s", _line(error))
+                log.warning("the database is unavailable, waiting for it: %s", _line(error))
             if time.monotonic() - away_since > GIVE_UP:
-                raise UserError(f"the database has been away for {GIVE_UP / 60:.0f} minutes: {_line(error)}") from None
+                raise UserError(f"the database has been unavailable for {GIVE_UP / 60:.0f} minutes: {_line(error)}") from None
         await leave.wait(wait * random.uniform(0.7, 1.3))
         wait = min(2 * wait, 15.0)
 
 
 @contextlib.asynccontextmanager
 async def _connected(orders: Orders) -> AsyncIterator[tuple[str, psycopg.AsyncConnection[Any]]]:
-    """The session that shows that the worker lives, and the DSN of the queue."""
+    """Yield the DSN of the queue, and the session for the worker's heartbeat."""
     from tunneldb.database.connection import resolve_dsn
     from tunneldb.database.schema import require_current_schema
     from tunneldb.database.session import CONNECT, SETTINGS
@@ -146,7 +148,7 @@ async def _connected(orders: Orders) -> AsyncIterator[tuple[str, psycopg.AsyncCo
 
 
 async def _serve(orders: Orders, leave: _Leave, dsn: str, presence: psycopg.AsyncConnection[Any]) -> None:
-    """Take jobs until told to leave, or the connection to the queue is lost."""
+    """Run jobs until asked to exit, or until the connection to the queue is lost."""
     from procrastinate.worker import Worker
 
     from tunneldb.queue.jobs import QUEUE, make_app
@@ -181,7 +183,7 @@ async def _serve(orders: Orders, leave: _Leave, dsn: str, presence: psycopg.Asyn
 
 
 async def _tend(orders: Orders, leave: _Leave, worker: int, presence: psycopg.AsyncConnection[Any]) -> None:
-    """Show that the worker lives, also while it ends its last job; take over what others have lost; look whether to leave."""
+    """Send heartbeats, also during the last job; take over jobs of lost workers; check for requests to exit."""
     beat = 0.0
     try:
         while True:
@@ -201,7 +203,7 @@ async def _tend(orders: Orders, leave: _Leave, worker: int, presence: psycopg.As
             stopped, idle, forgotten = row
             if stopped or idle:
                 leave.now()
-            elif forgotten:  # it was silent for too long: register anew
+            elif forgotten:  # it was silent for too long; register again
                 leave.pause()
             await asyncio.sleep(1.0)
     except psycopg.OperationalError:
@@ -222,7 +224,7 @@ _AWAY = _away()
 
 
 def _end_with_parent() -> None:
-    """End at once when the parent does: its end of the pipe on our standard input is closed then."""
+    """Exit at once with the parent, whose end closes its side of the pipe on our standard input."""
 
     def watch() -> None:
         while os.read(0, 1):
@@ -233,14 +235,17 @@ def _end_with_parent() -> None:
 
 
 def main() -> int:
-    """Run as a process of its own; orders come as JSON in the first argument, the DSN in TUNNELDB_DSN."""
+    """Run as a separate process; orders are JSON in the first argument, the DSN is in TUNNELDB_DSN."""
     told = json.loads(sys.argv[1])
     _end_with_parent()
-    logging.basicConfig(format="%(asctime)s worker %(process)d: %(message)s", datefmt="%H:%M:%S", level=logging.WARNING)
+    logging.basicConfig(format="%(asctime)s worker %(process)d: %(message)s", datefmt="%H:%M:%S")
+    logging.getLogger().handlers[0].setLevel(logging.WARNING)  # the log file, if there is one, has what is done, too
     logging.getLogger("procrastinate").setLevel(logging.CRITICAL + 1)
     logging.getLogger("psycopg.pool").setLevel(logging.CRITICAL + 1)
+    file = os.environ.get(VARIABLE)
     try:
-        work(Orders(os.environ.get("TUNNELDB_DSN") or None, told["threads"], told["survey"]))
+        with logging_to(Path(file) if file else None):
+            work(Orders(os.environ.get("TUNNELDB_DSN") or None, told["threads"], told["survey"]))
     except UserError as error:
         log.error("%s", error)
         return 2

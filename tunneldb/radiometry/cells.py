@@ -1,4 +1,4 @@
-"""Cells of the lining as they are seen: the units of which a range curve is made."""
+"""Cells of the lining with their views: the units of the range-curve regression."""
 
 from __future__ import annotations
 
@@ -12,43 +12,43 @@ from tunneldb.radiometry.oren_nayar import incidence_db
 from tunneldb.radiometry.range_spline import RangeSpline
 
 CELL = 0.5
-"""Side of a cell, m: the lining in it is of one reflectance."""
+"""Side of a cell, m: its lining is assumed to have one reflectance."""
 
 RING = 2.0
-"""Length of the rings within which what is left of views may hang together in any way, m."""
+"""Length of the rings within which residuals of views may be correlated in any way, m."""
 
 STRETCH = 5.0
 """Length of the stretches that may differ in reflectance in any way, m: at most half a block of in-situ lining."""
 
-ENOUGH = 4
-"""Points of a view beyond so many don't make it surer: what is left is the surface's texture."""
+MAX_VIEW_POINTS = 4
+"""Maximum number of points that make a view more certain: the rest is the surface's texture."""
 
 
 ROUGHNESS = np.arange(0.0, 60.1, 2.5)
-"""Roughnesses that are tried, degrees; between two of them the effect of incidence follows from the nearest three."""
+"""Tested roughnesses, degrees; between two of them the effect of incidence is interpolated from the nearest three."""
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Cells of the lining, each seen by one scan or several; arrays (n, …) have an element for each view.
+    """Cells of the lining, each seen by one or several scans; arrays (n, …) have an element for each view.
 
     Attributes
     ----------
     cell : (n,) int array
-        Number of its cell, 0 to count - 1.
+        Number of the cell, 0 to count - 1.
     basis : (n, p) float array
         Means of the functions of range.
     incidence : (n, s) float array
         Means of the effect of incidence, dB, for each of ROUGHNESS.
     level : (n,) float array
         Mean intensity, dB.
-    aside : (n,) float array
-        How far from the middle of its cell a view's points lie around the section, on average, m; 0 without an unrolled plane.
+    side_offset : (n,) float array
+        Mean distance of a view's points from the middle of its cell, around the section, m; 0 without an unrolled plane.
     weight : (n,) float array
-        Points, at most ENOUGH.
+        Number of points, at most MAX_VIEW_POINTS.
     stretch, ring, alike : (count,) int arrays
-        Numbers from 0 of the stretch that holds each cell, of the ring (a stretch where there is no unrolled plane), and of
-        the strip of its stretch, one cell wide, in which cells are compared with each other (likewise).
+        Numbers from 0 of each cell's stretch, of its ring (a stretch without an unrolled plane), and of the strip of its
+        stretch, one cell wide, in which cells are compared with each other (likewise).
     row, column : (count,) int arrays
         Place of each cell in the unrolled plane, in cells from the first along and across; -1 without one.
     """
@@ -57,7 +57,7 @@ class Cells:
     basis: Float
     incidence: Float
     level: Float
-    aside: Float
+    side_offset: Float
     weight: Float
     stretch: Int64
     ring: Int64
@@ -76,7 +76,7 @@ class Cells:
         return int(np.count_nonzero(np.bincount(self.cell) > 1))
 
     def incidence_at(self, roughness: float) -> Float:
-        """Means (n,) of the effect of incidence, dB, for a roughness, degrees."""
+        """Return the mean effect of incidence (n,), dB, for a roughness, degrees."""
         k = int(np.clip(np.rint((roughness - ROUGHNESS[0]) / (ROUGHNESS[1] - ROUGHNESS[0])), 1, len(ROUGHNESS) - 2))
         x = (roughness - ROUGHNESS[k]) / (ROUGHNESS[1] - ROUGHNESS[0])
         return np.asarray(self.incidence[:, k - 1 : k + 2] @ np.array([0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)]))
@@ -84,14 +84,14 @@ class Cells:
 
 @dataclass(frozen=True)
 class IntensitySamples:
-    """Points as seen.
+    """Points with range, incidence and intensity.
 
     Attributes
     ----------
     place : (n, 2) or (n, 3) float array
         Chainage and arc, or coordinates in space, m.
     scan : (n,) int array
-        Number of the scan that each is of.
+        Scan number of each point.
     range_m, cosine : (n,) float arrays
         Range, m, and cosine of the incidence angle.
     level : (n,) float array
@@ -105,14 +105,14 @@ class IntensitySamples:
     level: Float
 
     def some(self, chosen: Bool) -> IntensitySamples:
-        """The chosen points."""
+        """Return the selected points."""
         return IntensitySamples(
             self.place[chosen], self.scan[chosen], self.range_m[chosen], self.cosine[chosen], self.level[chosen]
         )
 
 
 def group(samples: IntensitySamples, spline: RangeSpline, *, unrolled: bool) -> Cells:
-    """Gather points into cells; ``unrolled`` says that places are in the unrolled plane of a tunnel."""
+    """Group points into cells; ``unrolled`` is True for places in the unrolled plane of a tunnel."""
     at = np.floor(samples.place / CELL).astype(np.int64)
     number, first = _number(np.column_stack([at, samples.scan.astype(np.int64)]))
     points = np.bincount(number)
@@ -130,7 +130,7 @@ def group(samples: IntensitySamples, spline: RangeSpline, *, unrolled: bool) -> 
         np.column_stack([mean(incidence_db(samples.cosine, roughness)) for roughness in ROUGHNESS]),
         mean(samples.level),
         mean(samples.place[:, 1] - (at[:, 1] + 0.5) * CELL) if unrolled else np.zeros(len(points)),
-        np.minimum(points, ENOUGH).astype(np.float64),
+        np.minimum(points, MAX_VIEW_POINTS).astype(np.float64),
         stretch,
         _number(np.floor(where[:, :1] / RING).astype(np.int64))[0] if unrolled else stretch,
         _number(np.column_stack([stretch, column]))[0] if unrolled else stretch,
@@ -145,10 +145,10 @@ def _places(along: Float) -> Int64:
 
 
 def _number(keys: Int64) -> tuple[Int64, Int64]:
-    """Number of each row's (n, m) like among all different ones, from 0, and one row of each."""
+    """Return the number of each row (n, m) among all unique ones, from 0, and one row of each."""
     if len(keys) == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    # All columns in one integer: sorting rows is slow.
+    # All columns in one integer, because sorting rows is slow.
     low = keys.min(axis=0)
     packed = np.zeros(len(keys), np.int64)
     for column, least, most in zip(keys.T, low, keys.max(axis=0), strict=True):

@@ -1,4 +1,4 @@
-"""Whether intensity depends on range or incidence: its course over classes of either."""
+"""Dependence of intensity on range and incidence, as medians over classes of either."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from tunneldb.arrays import Float, Int64, Intp
 from tunneldb.radiometry.roughness import NOTICEABLE
 
 CLASSES = 40
-"""Classes over the range of values, at the most; each of at least FEWEST points."""
+"""Maximum number of classes over the range of values; each has at least MIN_CLASS_POINTS points."""
 
-FEWEST = 30
-"""Points of a class that is counted."""
+MIN_CLASS_POINTS = 30
+"""Minimum number of points of a class."""
 
-ENDS = (0.001, 0.999)
-"""Shares of the points between whose values the classes lie."""
+END_QUANTILES = (0.001, 0.999)
+"""Quantiles of the points that limit the classes."""
 
-SMALL = 1.0 / 3.0
-"""What is left of the dependence is small when it is less of the lining's scatter: it raises that by 5 % then."""
+SMALL_SHARE = 1.0 / 3.0
+"""Residual dependence, relative to the lining's scatter, below which it is small: it then raises the scatter by 5 %."""
 
-STEEP = 10.0
-"""Slopes over incidence are given for so many degrees."""
+SLOPE_ANGLE = 10.0
+"""Angle for which slopes over incidence are given, degrees."""
 
 
 @dataclass(frozen=True)
 class ClassMeans:
-    """Intensity over classes of range or incidence; arrays (k,), of classes that hold enough points.
+    """Intensity over classes of range or incidence; arrays (k,), of classes with enough points.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class ClassMeans:
     low, middle, high : float arrays
         Quartiles of intensity, dB.
     points : int array
-        How many points.
+        Number of points.
     """
 
     at: Float
@@ -47,7 +47,7 @@ class ClassMeans:
 
     @property
     def slope(self) -> float:
-        """Slope of a straight line through the classes' medians, weighted by their points, dB per m or degree."""
+        """Return the slope of a straight line through the classes' medians, weighted by their points, dB per m or degree."""
         if len(self.at) < 2:
             return float("nan")
         away = self.at - np.average(self.at, weights=self.points)
@@ -55,7 +55,7 @@ class ClassMeans:
 
     @property
     def spread(self) -> float:
-        """Standard deviation of the classes' medians, weighted by their points, dB."""
+        """Return the standard deviation of the classes' medians, weighted by their points, dB."""
         if len(self.at) == 0:
             return float("nan")
         away = self.middle - np.average(self.middle, weights=self.points)
@@ -63,20 +63,20 @@ class ClassMeans:
 
 
 def class_means(at: Float, level: Float) -> ClassMeans:
-    """Course of intensity (n,), dB, over range, m, or incidence, degrees; NaNs are left out."""
+    """Compute intensity (n,), dB, over classes of range, m, or incidence, degrees; NaNs are ignored."""
     known = np.isfinite(at) & np.isfinite(level)
     at, level = at[known], level[known]
     none = ClassMeans(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, np.int64))
-    if len(at) < FEWEST:
+    if len(at) < MIN_CLASS_POINTS:
         return none
-    first, last = np.quantile(at, ENDS)
+    first, last = np.quantile(at, END_QUANTILES)
     if last <= first:
         return none
     edges = np.linspace(first, last, CLASSES + 1)
     number = np.searchsorted(edges, at, side="right") - 1
     rows = []
     for k, values in _by_class(number, level):
-        if 0 <= k < CLASSES and len(values) >= FEWEST:
+        if 0 <= k < CLASSES and len(values) >= MIN_CLASS_POINTS:
             rows.append([0.5 * (edges[k] + edges[k + 1]), *np.quantile(values, (0.25, 0.5, 0.75)), len(values)])
     if not rows:
         return none
@@ -92,16 +92,16 @@ def _by_class(number: Intp, level: Float) -> list[tuple[int, Float]]:
 
 @dataclass(frozen=True)
 class Dependence:
-    """Courses over range and incidence, before and after correction.
+    """Dependence on range and incidence, before and after correction.
 
     Attributes
     ----------
     raw_range, raw_incidence : ClassMeans
-        Of intensity as measured.
+        Classes of measured intensity.
     range, incidence : ClassMeans
-        Of corrected intensity.
+        Classes of corrected intensity.
     scatter : float
-        Half the distance between the quartiles of corrected intensity as a standard deviation, dB.
+        Robust standard deviation of corrected intensity, from the interquartile range, dB.
     """
 
     raw_range: ClassMeans
@@ -112,7 +112,7 @@ class Dependence:
 
     @classmethod
     def of(cls, range_m: Float, angle: Float, raw: Float, corrected: Float) -> Dependence:
-        """Look at points (n,): range, m, incidence, degrees, raw and corrected intensity, dB."""
+        """Evaluate points (n,): range, m, incidence, degrees, raw and corrected intensity, dB."""
         known = corrected[np.isfinite(corrected)]
         low, high = np.quantile(known, (0.25, 0.75)) if len(known) else (np.nan, np.nan)
         return cls(
@@ -124,11 +124,11 @@ class Dependence:
         )
 
     def rows(self) -> list[list[str]]:
-        """Lines of a table: over what, slopes before and after, deviations of the medians before and after."""
+        """Return table rows: variable, slopes before and after, deviations of the medians before and after."""
         lines = []
         for name, unit, before, after, by in (
             ("range", "dB/m", self.raw_range, self.range, 1.0),
-            ("incidence", f"dB/{STEEP:g}°", self.raw_incidence, self.incidence, STEEP),
+            ("incidence", f"dB/{SLOPE_ANGLE:g}°", self.raw_incidence, self.incidence, SLOPE_ANGLE),
         ):
             line = [name]
             line += [f"{by * c.slope:+.3f} {unit}" if len(c.at) > 1 else "" for c in (before, after)]
@@ -137,19 +137,19 @@ class Dependence:
         return lines
 
     def verdict(self) -> str:
-        """One line that says what of the dependence is left."""
+        """Return one line on the remaining dependence."""
         if not len(self.range.at):
             return "Intensity could not be corrected."
         parts = [("range", self.range.spread), ("incidence", self.incidence.spread)]
         left = [f"{name} (medians differ by {spread:.2f} dB)" for name, spread in parts if spread > NOTICEABLE]
-        if left and max(spread for _, spread in parts) < SMALL * self.scatter:
+        if left and max(spread for _, spread in parts) < SMALL_SHARE * self.scatter:
             return (
-                f"Good enough for detection: corrected intensity still depends on {' and '.join(left)}, but that is less than a"
-                f" third of what lining scatters by anyway, {self.scatter:.2f} dB."
+                f"Sufficient for detection: corrected intensity still depends on {' and '.join(left)}, but by less than a"
+                f" third of the scatter of the lining, {self.scatter:.2f} dB."
             )
         if left:
-            return f"Corrected intensity still depends on {' and '.join(left)}; lining scatters by {self.scatter:.2f} dB."
+            return f"Corrected intensity still depends on {' and '.join(left)}; scatter of the lining {self.scatter:.2f} dB."
         return (
             f"Corrected intensity depends neither on range nor on incidence: medians differ by {parts[0][1]:.2f} and"
-            f" {parts[1][1]:.2f} dB, under {NOTICEABLE:g} dB; lining scatters by {self.scatter:.2f} dB."
+            f" {parts[1][1]:.2f} dB, under {NOTICEABLE:g} dB; scatter of the lining {self.scatter:.2f} dB."
         )

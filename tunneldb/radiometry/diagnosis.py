@@ -1,4 +1,4 @@
-"""What is looked at to see whether intensity depends on range or incidence."""
+"""Data for diagnosing the dependence of intensity on range and incidence."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from tunneldb.radiometry.reference_curve import ReferenceCurve
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Points as seen, and what their intensity was corrected with.
+    """Points with range, incidence and intensity, and the correction used.
 
     Attributes
     ----------
     title : str
-        What is looked at.
+        Name of the data.
     range_m, angle : (n,) float arrays
         Range, m, and incidence, degrees.
     raw, corrected : (n,) float arrays
-        Intensity, dB; corrected NaN where it could not be.
+        Intensity, dB; corrected is NaN if not possible.
     roughness : tuple of float
-        Roughnesses that were used, degrees: of each kilometre.
+        Roughness of each kilometre, degrees.
     found : tuple of RangeCurve
-        Range curves found on the surfaces themselves.
+        Range curves estimated from the surfaces themselves.
     measured : ReferenceCurve or None
         Curve measured on a target.
     notes : tuple of str
-        What was used, and what was refused.
+        Remarks on what was used and what was refused.
     """
 
     title: str
@@ -46,12 +46,12 @@ class Diagnosis:
 
     @property
     def dependence(self) -> Dependence:
-        """Courses over range and incidence."""
+        """Return the dependence on range and incidence."""
         return Dependence.of(self.range_m, self.angle, self.raw, self.corrected)
 
 
 def pool(title: str, looks: list[Diagnosis]) -> Diagnosis:
-    """Put looks at several kilometres of one survey together."""
+    """Combine the diagnoses of several kilometres of one survey."""
 
     def all_of(name: str) -> Float:
         return np.concatenate([getattr(look, name) for look in looks])

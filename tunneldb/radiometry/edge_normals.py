@@ -1,9 +1,8 @@
 """Surface normals along edges, where wall and ceiling, or wall and floor, meet.
 
-A section is a smooth curve, so along an edge its normal turns from one face to the other over a decimetre or
-two. The lining there still lies on one face or the other, and its incidence angle is that of its face. Where
-the surface bends sharply, a point takes the normal of the face, a little to the left or a little to the
-right, whose plane it lies nearer to.
+A section is a smooth curve, so along an edge its normal turns from one face to the other over a decimetre or two. The lining
+there is still on one face or the other, and its incidence angle is that of its face. Where the surface bends sharply, a point
+takes the normal of the nearer face, to the left or to the right.
 """
 
 from __future__ import annotations
@@ -16,8 +15,8 @@ from tunneldb.arrays import Bool, Float, Intp
 from tunneldb.compiled import point_inner
 from tunneldb.geometry.surface import Surface, Unrolled
 
-BEND = np.cos(np.radians(25.0))
-"""The surface bends sharply where its normals 0.3 m to the left and to the right differ by more than 25°."""
+BEND_COSINE = np.cos(np.radians(25.0))
+"""Cosine of the angle between the normals 0.3 m to the left and right from which the surface bends sharply (25°)."""
 
 _ALONG, _ACROSS, _SIDE = 1.0, 0.05, 6
 
@@ -31,9 +30,9 @@ class Edges:
     start, first : float
         Chainage and arc of the grid's first node, m.
     feet, normals : (k, m, 3) float arrays
-        Points of the surface, m, and unit normals there, into the tunnel; NaN where there is no surface.
+        Points of the surface, m, and unit normals there, into the tunnel; NaN without a surface.
     sharp : (k, m) bool array
-        Where the surface bends sharply.
+        True where the surface bends sharply.
     """
 
     start: float
@@ -44,10 +43,10 @@ class Edges:
 
     @classmethod
     def of(cls, surface: Surface, start: float, stop: float) -> Edges:
-        """Lay the grid over a surface between two chainages, m."""
+        """Make the grid for a surface between two chainages, m."""
         lowest, highest = float(surface.arcs[:, 0].min()), float(surface.arcs[:, -1].max())
         chainage = np.arange(start, stop + _ALONG, _ALONG)
-        # Whole multiples, so that the nodes lie at the same places for the kilometres on both sides of a border.
+        # Whole multiples, so that the nodes of both kilometres at a border coincide.
         arc = np.arange(np.floor(lowest / _ACROSS), np.ceil(highest / _ACROSS) + 1) * _ACROSS
         c, a = (grid.ravel() for grid in np.meshgrid(chainage, arc, indexing="ij"))
         feet = surface.to_space(c, a, np.zeros(len(c)))
@@ -56,11 +55,11 @@ class Edges:
         sharp = np.zeros(shape[:2], np.bool_)
         with np.errstate(invalid="ignore"):
             turn = np.einsum("kmi,kmi->km", normals[:, : -2 * _SIDE], normals[:, 2 * _SIDE :])
-            sharp[:, _SIDE:-_SIDE] = turn < BEND
+            sharp[:, _SIDE:-_SIDE] = turn < BEND_COSINE
         return cls(start, float(arc[0]), feet.reshape(shape), normals, sharp)
 
     def normals_of(self, points: Float, unrolled: Unrolled) -> Float:
-        """Normals (n, 3) of points (n, 3): that of the surface, or of the nearer face where it bends sharply."""
+        """Return the normals (n, 3) of points (n, 3): of the surface, or of the nearer face where it bends sharply."""
         if not self.sharp.any():
             return unrolled.normal
         with np.errstate(invalid="ignore"):
@@ -76,7 +75,7 @@ class Edges:
         return out
 
     def _above(self, points: Float, k: Intp, m: Intp) -> Float:
-        """Distance (n,) of points (n, 3) from the planes at nodes of the grid, m, positive into the tunnel."""
+        """Return the distance (n,) of points (n, 3) from the planes at nodes of the grid, m, positive into the tunnel."""
         x, y, z = ((points - self.feet[k, m]) * self.normals[k, m]).T
         return np.asarray(x + y + z)
 
@@ -85,7 +84,7 @@ class Edges:
 def face_at(
     start: float, first: float, sharp: Bool, chainage: float, arc: float
 ) -> tuple[int, int]:  # pragma: no cover - compiled
-    """Node of the grid nearest to a place of the unrolled plane, (-1, -1) where the surface doesn't bend sharply."""
+    """Return the grid node nearest to a place of the unrolled plane, or (-1, -1) where the surface does not bend sharply."""
     k = int(np.floor((chainage - start) / _ALONG + 0.5))
     m = int(np.floor((arc - first) / _ACROSS + 0.5))
     if k < 0 or k >= sharp.shape[0] or m < 0 or m >= sharp.shape[1] or not sharp[k, m]:
@@ -97,7 +96,7 @@ def face_at(
 def face_normal(
     feet: Float, normals: Float, k: int, m: int, x: float, y: float, z: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Normal of the face, to the left or to the right of a node, whose plane a point lies nearer to."""
+    """Return the normal of the face, left or right of a node, whose plane is nearer to a point."""
     one, other = m - _SIDE, m + _SIDE
     left = (
         (x - feet[k, one, 0]) * normals[k, one, 0]

@@ -1,4 +1,4 @@
-"""Range and incidence in a scan by itself, without a tunnel: normals from neighbouring points."""
+"""Range and incidence of a single scan without a tunnel: normals from neighbouring points."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from tunneldb.arrays import Float
 from tunneldb.geometry.normals import principal_planes
 
 NEIGHBOURS = 20
-"""Points to which a plane is fitted, itself included."""
+"""Number of points for a plane, the point itself included."""
 
-FLAT = 0.01
-"""Largest surface variation (Pauly et al., 2002: least eigenvalue by the sum of all) of a surface whose normal is used."""
+MAX_SURFACE_VARIATION = 0.01
+"""Maximum surface variation (Pauly et al., 2002: least eigenvalue divided by their sum) for a usable normal."""
 
 BLOCK = 100_000
-"""Points at a time."""
+"""Number of points at a time."""
 
 
 def incidence_cosine(xyz: Float, scanner: Float) -> Float:
-    """Cosine of the incidence angle at points (n, 3), seen from positions (n, 3); NaN where the surface isn't flat.
+    """Return the cosine of the incidence angle at points (n, 3), seen from positions (n, 3); NaN if not flat.
 
-    The normal is that of the plane through the nearest neighbours; its side is the one that was seen.
+    The normal is that of the plane through the nearest neighbours, on the side of the scanner.
     """
     cosine = np.full(len(xyz), np.nan)
     if len(xyz) < NEIGHBOURS:
@@ -34,7 +34,7 @@ def incidence_cosine(xyz: Float, scanner: Float) -> Float:
         towards = scanner[part] - at
         towards = towards / np.linalg.norm(towards, axis=1, keepdims=True)
         seen = np.abs(np.einsum("ni,ni->n", normals, towards))
-        # Points on a line, as of a single profile, have no normal.
-        flat = (values[:, 0] <= FLAT * values.sum(axis=1)) & (values[:, 1] > 10.0 * values[:, 0])
+        # Collinear points, for example of a single profile, have no normal.
+        flat = (values[:, 0] <= MAX_SURFACE_VARIATION * values.sum(axis=1)) & (values[:, 1] > 10.0 * values[:, 0])
         cosine[part] = np.where(flat, seen, np.nan)
     return cosine

@@ -1,16 +1,16 @@
-"""What the values of an intensity can be: dB of one kind or the other, counts, or nothing; a guess, with its reasons.
+"""Guess of the kind of an intensity from its values (dB of two kinds, counts, or nothing), with reasons.
 
-The values alone decide, so an answer is never more than a guess: who knows the scanner knows better. Limits come from what
-the kinds are, and from how much of it a tunnel can show:
+The values alone decide, so a result is only a guess; knowledge of the scanner takes precedence. Limits follow from the kinds
+themselves, and from the part of their range that a tunnel can show:
 
 - dB are logarithms. Over a tunnel's ranges (1 to 50 m) the inverse square is 34 dB, reflectance of 2 to 90 % is 17 dB,
-  incidence up to 80° is 8 dB: about 60 dB from the faintest lining to the brightest, retroreflecting targets left out.
-  So what spreads over more is none.
-- Values that all lie in 0 … 1 are fractions of full scale: as dB they were a lining that is even to 1 dB and, as an amplitude,
+  incidence up to 80° is 8 dB: about 60 dB from the faintest lining to the brightest, without retroreflecting targets.
+  Values with a larger spread are not dB.
+- Values all in 0 … 1 are fractions of full scale: as dB they would be a lining uniform to 1 dB and, as an amplitude,
   all within 1 dB of the detection limit.
-- *Amplitude* is dB above the weakest echo that counts (RIEGL), so it is hardly ever negative. *Reflectance* is dB of a
-  white diffuse target at the same range, so lining (2 to 90 %) lies at −17 to −0.5 dB, and only retroreflectors above 0.
-- Counts are whole, mostly of 8, 11, 12 or 16 bits, or brought to 0 … 1; they are powers, so never negative. Leica's
+- *Amplitude* is dB above the weakest detectable echo (RIEGL), so it is rarely negative. *Reflectance* is dB of a
+  white diffuse target at the same range, so lining (2 to 90 %) is at −17 to −0.5 dB, and only retroreflectors above 0.
+- Counts are whole numbers, mostly of 8, 11, 12 or 16 bits, or scaled to 0 … 1; as powers they are never negative. Leica's
   exchange formats may shift 12 bits to −2048 … 2047.
 
 Source: RIEGL, *LAS extrabytes implementation*, 2017 (amplitude, reflectance); Höfle & Pfeifer, *ISPRS J. Photogramm.
@@ -25,20 +25,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-WIDEST_DB = 60.0
-"""Most that lining spreads in a tunnel, dB, between its 1st and 99th percentile."""
+MAX_SPREAD_DB = 60.0
+"""Maximum spread of lining in a tunnel, dB, between the 1st and 99th percentile."""
 
-FARTHEST_DB = 150.0
-"""Size of a level in dB that no scanner tells: 10¹⁵ times the reference."""
+MAX_LEVEL_DB = 150.0
+"""Absolute level in dB that no scanner reports: 10¹⁵ times the reference."""
 
-SATURATED = 0.01
-"""Share of the values that are the greatest of all from which it is said that a scan is saturated …"""
+MIN_SATURATED_SHARE = 0.01
+"""Share of values equal to the maximum from which a scan is reported as saturated …"""
 
-STOP = 3.0
-"""… if they are so many times as many as those of the next value below: coarse steps hold many values each."""
+SATURATION_RATIO = 3.0
+"""… if they are also so many times as frequent as the next lower value: coarse steps have many values each."""
 
-LEAST_DOUBTED = 30
-"""Of fewer values nothing is said."""
+MIN_VALUES = 30
+"""Minimum number of values for a remark."""
 
 _BITS = (8, 11, 12, 16)
 _SHIFTED = (-2048.0, 2047.0)  # 12 bits, as Leica's PTS has them
@@ -46,45 +46,45 @@ _SHIFTED = (-2048.0, 2047.0)  # 12 bits, as Leica's PTS has them
 
 @dataclass(frozen=True)
 class ValueRange:
-    """How the values of a dimension are spread.
+    """Spread of the values of a dimension.
 
     Attributes
     ----------
     count, missing : int
-        Values looked at, and how many of them are NaN or infinite.
-    least, low, median, high, most : float
-        Minimum, 1st percentile, median, 99th percentile, maximum of those that are finite; NaN if none is.
+        Number of values, and of these the number of NaN or infinite ones.
+    minimum, low, median, high, maximum : float
+        Minimum, 1st percentile, median, 99th percentile, maximum of the finite values; NaN if there are none.
     whole : bool
-        Whether all finite ones are whole numbers.
+        True if all finite values are whole numbers.
     """
 
     count: int
     missing: int
-    least: float
+    minimum: float
     low: float
     median: float
     high: float
-    most: float
+    maximum: float
     whole: bool
 
     @property
     def spread(self) -> float:
-        """From the 1st to the 99th percentile."""
+        """Difference between the 99th and the 1st percentile."""
         return self.high - self.low
 
 
 @dataclass(frozen=True)
 class KindGuess:
-    """What an intensity may be.
+    """Possible kind of an intensity.
 
     Attributes
     ----------
     kind : {'amplitude', 'reflectance', 'linear', 'none'}
-        As `tunneldb survey add --intensity-kind` takes it.
+        Value for `tunneldb survey add --intensity-kind`.
     what : str
-        In words: ``16-bit counts: linear``.
+        Description: ``16-bit counts: linear``.
     reason : str
-        Why.
+        Reason.
     """
 
     kind: str
@@ -93,7 +93,7 @@ class KindGuess:
 
 
 def value_range(values: NDArray[Any]) -> ValueRange:
-    """Return how values, in the file's own unit, are spread."""
+    """Return the spread of values, in the file's own unit."""
     numbers = np.asarray(values, np.float64).ravel()
     finite = numbers[np.isfinite(numbers)]
     missing = len(numbers) - len(finite)
@@ -104,27 +104,27 @@ def value_range(values: NDArray[Any]) -> ValueRange:
 
 
 def guess_kind(values: NDArray[Any] | ValueRange, name: str = "") -> list[KindGuess]:
-    """Guess what an intensity is.
+    """Guess the kind of an intensity.
 
     Parameters
     ----------
     values : (n,) array of any number type, or ValueRange
-        A sample of the dimension, in the file's own unit, with the scale and offset that the file gives it.
+        Sample of the dimension, in the file's own unit, with the scale and offset of the file.
     name : str
-        Name of the dimension; where the values leave both kinds of dB open, a name that says one of them comes first.
+        Name of the dimension; if the values allow both kinds of dB, a name with one of them puts that first.
 
     Returns
     -------
     list of KindGuess
-        What the values can be, the likeliest first; empty if they can be none of it (negative and far from any dB).
+        Possible kinds, the likeliest first; empty if there is none (negative and far from any dB).
     """
     found = values if isinstance(values, ValueRange) else value_range(values)
     if not np.isfinite(found.median):
         return [KindGuess("none", "no intensity", "no value is a number")]
-    if found.least == found.most:
-        return [KindGuess("none", "no intensity", f"all values are {found.least:g}")]
+    if found.minimum == found.maximum:
+        return [KindGuess("none", "no intensity", f"all values are {found.minimum:g}")]
     guesses = [guess for guess in (_linear(found), *_decibels(found)) if guess is not None]
-    # Fractions of a dB are how dB come; whole numbers, and all that fits into 0 … 1, are how powers come.
+    # dB usually have fractions; powers are usually whole numbers, or all within 0 … 1.
     if not found.whole and found.high > 1.0:
         guesses.sort(key=lambda guess: guess.kind == "linear")
     said = [guess for guess in guesses if guess.kind in name.lower()]
@@ -132,7 +132,7 @@ def guess_kind(values: NDArray[Any] | ValueRange, name: str = "") -> list[KindGu
 
 
 def contradiction(kind: str, values: NDArray[Any] | ValueRange) -> str | None:
-    """Tell why values cannot be an intensity of the kind that they were declared to be.
+    """Return the reason why values cannot be an intensity of the declared kind.
 
     Parameters
     ----------
@@ -142,15 +142,15 @@ def contradiction(kind: str, values: NDArray[Any] | ValueRange) -> str | None:
     Returns
     -------
     str or None
-        A phrase for an error's line, without the name of file or dimension; None where they can be.
+        Phrase for an error message, without the name of file or dimension; None if they can be.
     """
     found = values if isinstance(values, ValueRange) else value_range(values)
     if kind == "none":
         return None
     if not np.isfinite(found.median):
         return "no value is a number"
-    if found.least == found.most:
-        return f"all values are {found.least:g}"
+    if found.minimum == found.maximum:
+        return f"all values are {found.minimum:g}"
     reason = _not_linear(found) if kind == "linear" else _not_decibels(found)
     if reason is None:
         return None
@@ -159,72 +159,74 @@ def contradiction(kind: str, values: NDArray[Any] | ValueRange) -> str | None:
 
 
 def doubt(kind: str, values: NDArray[Any]) -> str | None:
-    """Tell what about values that can be of a kind is strange all the same: to be said, not refused.
+    """Return a remark on unusual values of a kind, which are not an error.
 
     Parameters
     ----------
     kind : {'amplitude', 'reflectance', 'linear', 'none'}
     values : (n,) array of any number type
-        A sample, in the file's own unit.
+        Sample, in the file's own unit.
 
     Returns
     -------
     str or None
-        A phrase for a remark; None where there is nothing to be said.
+        Phrase for a remark; None if there is nothing to report.
     """
     finite = np.asarray(values, np.float64)
     finite = finite[np.isfinite(finite)]
-    if kind == "none" or len(finite) < LEAST_DOUBTED:
+    if kind == "none" or len(finite) < MIN_VALUES:
         return None
     said = []
     steps, counts = np.unique(finite, return_counts=True)
-    if len(steps) > 1 and counts[-1] >= SATURATED * len(finite) and counts[-1] > STOP * counts[-2]:
+    if len(steps) > 1 and counts[-1] >= MIN_SATURATED_SHARE * len(finite) and counts[-1] > SATURATION_RATIO * counts[-2]:
         said.append(
             f"{100 * counts[-1] / len(finite):.2g} % of the intensities are the greatest value, {steps[-1]:g}: the scan is"
-            " saturated, and what of it is darker than its surroundings may not show"
+            " saturated, so that darker areas may not show"
         )
     found = value_range(finite)
     likeliest = guess_kind(found)[0]
     if kind == "linear" and likeliest.kind != "linear":
         said.append(
-            f"the intensities, declared linear, look like {likeliest.what} ({likeliest.reason}): is it"
-            f" --intensity-kind {likeliest.kind}?"
+            f"the intensities, declared linear, look like {likeliest.what} ({likeliest.reason}); if so, use"
+            f" --intensity-kind {likeliest.kind}"
         )
     if kind == "reflectance" and found.low > 0.0:
         said.append(
-            f"the intensities, declared reflectance, lie at {found.low:.4g} to {found.high:.4g} dB (1 to 99 %), and lining lies"
-            " below 0, which is a white target's: is it --intensity-kind amplitude?"
+            f"the intensities, declared reflectance, range from {found.low:.4g} to {found.high:.4g} dB (1 to 99 %), but"
+            " lining is below 0 dB, the level of a white target; check whether --intensity-kind amplitude is right"
         )
     return "; ".join(said) or None
 
 
 def _not_linear(found: ValueRange) -> str | None:
     if found.low < 0.0:
-        return f"values go below zero ({found.least:g}), and a power is never negative"
+        return f"values go below zero ({found.minimum:g}), but linear intensity is never negative"
     return None
 
 
 def _not_decibels(found: ValueRange) -> str | None:
-    if max(abs(found.low), abs(found.high)) > FARTHEST_DB:
+    if max(abs(found.low), abs(found.high)) > MAX_LEVEL_DB:
         return f"values from {found.low:g} to {found.high:g} (1 to 99 %) are too far from zero to be dB"
-    if found.spread > WIDEST_DB:
-        return f"values spread over {found.spread:g} (1 to 99 %), and lining in a tunnel over {WIDEST_DB:g} dB at most"
+    if found.spread > MAX_SPREAD_DB:
+        return (
+            f"values spread over {found.spread:g} (1 to 99 %); dB of lining in a tunnel spread over at most {MAX_SPREAD_DB:g}"
+        )
     if found.low >= 0.0 and found.high <= 1.0:
-        return f"values from {found.low:.3g} to {found.high:.3g} (1 to 99 %) are fractions of 1, and no dB of a lining"
+        return f"values from {found.low:.3g} to {found.high:.3g} (1 to 99 %) are fractions of 1, not dB of a lining"
     return None
 
 
 def _linear(found: ValueRange) -> KindGuess | None:
-    limits = f"from {found.least:g} to {found.most:g}"
+    limits = f"from {found.minimum:g} to {found.maximum:g}"
     if _not_linear(found) is None:
         if not found.whole:
             what = "0–1 float: linear" if found.high <= 1.0 else "linear"
             return KindGuess("linear", what, f"fractions {limits}")
-        bits = next((bits for bits in _BITS if found.most < 2**bits), None)
+        bits = next((bits for bits in _BITS if found.maximum < 2**bits), None)
         what = "counts: linear" if bits is None else f"{bits}-bit counts: linear"
         return KindGuess("linear", what, f"whole numbers {limits}")
-    if found.whole and found.spread > WIDEST_DB and _SHIFTED[0] <= found.least and found.most <= _SHIFTED[1]:
-        what = "12-bit counts, shifted below zero: linear when 2048 was added to each"
+    if found.whole and found.spread > MAX_SPREAD_DB and _SHIFTED[0] <= found.minimum and found.maximum <= _SHIFTED[1]:
+        what = "12-bit counts, shifted below zero: linear after adding 2048 to each"
         return KindGuess("linear", what, f"whole numbers {limits}")
     return None
 
@@ -237,5 +239,5 @@ def _decibels(found: ValueRange) -> list[KindGuess]:
     if found.median >= 0.0:
         guesses.append(KindGuess("amplitude", "dB amplitude", f"{spread}, mostly above zero, as above a detection limit"))
     if found.low < 0.0:
-        guesses.append(KindGuess("reflectance", "dB reflectance", f"{spread}, below zero, as what is darker than white"))
+        guesses.append(KindGuess("reflectance", "dB reflectance", f"{spread}, below zero, as for targets darker than white"))
     return guesses if found.median >= 0.0 else guesses[::-1]

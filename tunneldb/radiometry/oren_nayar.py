@@ -1,4 +1,4 @@
-"""The effect of the incidence angle on a rough surface (Oren & Nayar, 1994; Xu et al., 2018, eq. 13–15).
+"""Effect of the incidence angle on a rough surface (Oren & Nayar, 1994; Xu et al., 2018, eq. 13–15).
 
 Roughness is the standard deviation σ of the facets' slope angles. It is in degrees everywhere outside the
 formulas of this module.
@@ -12,7 +12,7 @@ from tunneldb.arrays import Float
 
 
 def coefficients(roughness: float) -> tuple[float, float]:
-    """Coefficients A and B of eq. 14.
+    """Return the coefficients A and B of eq. 14.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def coefficients(roughness: float) -> tuple[float, float]:
 
 
 def incidence_db(cosine: Float, roughness: float) -> Float:
-    """Loss by incidence, F₂ of eq. 15.
+    """Return the loss by incidence, F₂ of eq. 15.
 
     Written as 10·lg(A cos θ + B sin² θ), the same as eq. 15 but finite up to 90° when the surface is rough.
 

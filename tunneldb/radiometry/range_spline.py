@@ -1,4 +1,4 @@
-"""Intensity over range as a spline, of one maximum."""
+"""Intensity over range as a spline with one maximum."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from scipy.optimize import nnls
 from tunneldb.arrays import Float
 
 STEP = np.log(1.35)
-"""Distance of knots over ln R: the course of a scanner's intensity (Xu et al., 2018, Fig. 3) bends over a factor of 5."""
+"""Distance of knots over ln R: a scanner's intensity (Xu et al., 2018, Fig. 3) bends over a factor of 5."""
 
-BEND = 1.0
-"""Standard deviation of the second differences of coefficients before anything was measured, dB. The radar equation has
-none; the curve of Xu et al. (2018), Fig. 3, 0.7 dB."""
+BEND_SIGMA = 1.0
+"""Prior standard deviation of the second differences of coefficients, dB. The radar equation has none; the curve of Xu et al.
+(2018), Fig. 3, has 0.7 dB."""
 
 _DEGREE = 3
 
 
 @dataclass(frozen=True)
 class RangeSpline:
-    """Cubic B-splines over ln R, going on as straight lines beyond their ends.
+    """Cubic B-splines over ln R, linear beyond their ends.
 
     Attributes
     ----------
     knots : (m,) float array
-        Over ln R (R in m), those at the ends fourfold.
+        Over ln R (R in m); the end knots are fourfold.
     """
 
     knots: Float
 
     @classmethod
     def over(cls, nearest: float, farthest: float) -> RangeSpline:
-        """Lay the knots between two ranges, m."""
+        """Place the knots between two ranges, m."""
         low, high = np.log(nearest), np.log(farthest)
         inner = np.linspace(low, high, max(1, int(np.ceil((high - low) / STEP))) + 1)
         return cls(np.concatenate([np.full(_DEGREE, low), inner, np.full(_DEGREE, high)]))
@@ -44,7 +44,7 @@ class RangeSpline:
         return len(self.knots) - _DEGREE - 1
 
     def __call__(self, range_m: Float) -> Float:
-        """Values of the functions, (n, len), at ranges (n,), m; each row's sum is 1."""
+        """Return the basis functions, (n, len), at ranges (n,), m; the sum of each row is 1."""
         x = np.log(range_m)
         inside = np.clip(x, self.knots[0], self.knots[-1])
         values = BSpline.design_matrix(inside, self.knots, _DEGREE).toarray()
@@ -54,21 +54,21 @@ class RangeSpline:
         return np.asarray(values)
 
     def bending(self) -> Float:
-        """Information (len, len) that coefficients lie on a line over ln R, with a deviation of BEND."""
-        # Where the coefficients would lie on a straight line (Greville), which is closer at the ends than inside.
+        """Return the prior information (len, len) that coefficients are on a line over ln R, with a deviation of BEND_SIGMA."""
+        # Abscissae (Greville) for which coefficients of a straight line are linear; closer at the ends than inside.
         at = np.array([self.knots[i + 1 : i + 1 + _DEGREE].mean() for i in range(len(self))])
         slope = np.diff(np.eye(len(self)), axis=0) / np.diff(at)[:, None]
         second = np.diff(slope, axis=0) * np.diff(at)[0:-1, None]
-        return np.asarray(second.T @ second / BEND**2)
+        return np.asarray(second.T @ second / BEND_SIGMA**2)
 
 
 def one_maximum(matrix: Float, right: Float) -> Float:
-    """Coefficients of least loss that rise to one maximum and fall from there; such is the spline then.
+    """Return the coefficients of least loss that rise to one maximum and then fall; so does the spline.
 
     Parameters
     ----------
     matrix, right : (p, p) and (p,) float arrays
-        Of the loss ½ bᵀ·matrix·b − right·b.
+        Matrix and vector of the loss ½ bᵀ·matrix·b − right·b.
     """
     free: Float = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
     if _has_one_maximum(free):

@@ -2,10 +2,10 @@
 
 Views of one cell are compared with each other (fixed effects), and so are the cells of one strip along the tunnel within a
 stretch, as far as their reflectance is alike (fixed effects of strips, random ones of cells: Swamy and Arora, 1972). Cells
-side by side around the section are never compared: there soot and grime go with range and incidence. Outliers – leaks,
-joints, what hangs on the lining – lose their weight (Tukey's biweight). The covariance is a sandwich (Liang and Zeger,
-1986): of views clustered by rings of the lining, of cells by the covariance of what all of the section has in common at
-some distance along the tunnel, as rings and blocks have, and of neighbours.
+beside each other around the section are never compared: there soot and grime vary with range and incidence. Outliers – leaks,
+joints, fixtures – lose their weight (Tukey's biweight). The covariance is a sandwich (Liang and Zeger, 1986): views are
+clustered by rings of the lining; for cells it uses the covariance of what the whole section has in common at some distance
+along the tunnel, such as rings and blocks, and that of neighbours.
 """
 
 from __future__ import annotations
@@ -22,39 +22,38 @@ from tunneldb.radiometry.range_spline import RangeSpline, one_maximum
 from tunneldb.robust import MAD_TO_SIGMA
 
 TUKEY = 4.685
-"""Residuals of so many standard deviations have no weight: 95 % efficient on normal ones (Holland and Welsch, 1977)."""
+"""Standard deviations from which residuals have no weight: 95 % efficient on normal ones (Holland and Welsch, 1977)."""
 
 ROUNDS = 8
-"""Rounds of weighting."""
+"""Number of reweighting rounds."""
 
-NEAR = 6.0
-"""Distance beyond which cells are no longer taken for neighbours, m."""
+NEIGHBOUR_DISTANCE = 6.0
+"""Distance beyond which cells are not treated as neighbours, m."""
 
-APART = 2.0 * STRETCH
-"""Distance along the tunnel up to which what all of the section has in common may go on, m: as long as blocks of in-situ
-lining are."""
+MAX_LAG = 2.0 * STRETCH
+"""Maximum distance along the tunnel of what the whole section has in common, m: as long as blocks of in-situ lining."""
 
 
-NOTHING = 1e6
-"""Design effect of a comparison that is to decide about nothing."""
+NO_INFLUENCE = 1e6
+"""Design effect of a comparison that must have no influence."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """What was found.
+    """Result of the regression.
 
     Attributes
     ----------
     coefficients : (p,) float array
-        Of the range spline, dB.
+        Coefficients of the range spline, dB.
     covariance : (p, p) float array
-        Theirs, of which only what is left without a constant means anything.
+        Their covariance, which has a meaning only without a constant.
     level : float
-        Median of what is left of the cells, dB.
+        Median residual of the cells, dB.
     roughness, roughness_sigma : float
         σ and its standard deviation, degrees.
     noise, lining : float
-        Standard deviation of a view of ENOUGH points, and of cells, dB.
+        Standard deviation of a view with ENOUGH points, and of cells, dB.
     weight : (n,) float array
         Weights of the views, 0 of outliers.
     """
@@ -76,11 +75,11 @@ class _Weights:
     Attributes
     ----------
     view, cell : (n,), (count,) float arrays
-        Of each view, in points, and robust ones of each cell.
+        Weight of each view, in points, and robust weight of each cell.
     noise, lining : float
-        Variance of a view of one point, and of cells, dB².
+        Variance of a view with one point, and of cells, dB².
     design : float
-        By how much less cells compared with each other say than if each stood for itself.
+        Factor by which comparisons between cells are less informative than if cells were independent.
     """
 
     view: Float
@@ -100,10 +99,10 @@ def fit(cells: Cells, spline: RangeSpline, *, among: bool) -> Fit:
     spline : RangeSpline
         Functions of range.
     among : bool
-        Whether cells are compared with each other too, not only the views of each.
+        True to compare also cells with each other, not only the views of each.
     """
     problem = _Problem(cells, spline)
-    weights = _Weights(cells.weight, np.ones(cells.count), 1.0, 1.0, 1.0 if among else NOTHING)
+    weights = _Weights(cells.weight, np.ones(cells.count), 1.0, 1.0, 1.0 if among else NO_INFLUENCE)
     solution = problem.solve(weights)
     for k in range(ROUNDS):
         weights = problem.reweighted(solution, weights)
@@ -126,7 +125,7 @@ def fit(cells: Cells, spline: RangeSpline, *, among: bool) -> Fit:
 
 @dataclass(frozen=True)
 class _Solution:
-    """Coefficients (p,) at the best roughness, degrees, and at all (s, p) that are tried, with the loss (s,) of each."""
+    """Coefficients (p,) at the best roughness, degrees, and at all tested ones (s, p), with the loss (s,) of each."""
 
     coefficients: Float
     roughness: float
@@ -147,21 +146,21 @@ class _Problem:
         self.views = np.bincount(cells.cell, minlength=cells.count)
 
     def cell_means(self, values: Float, weight: Float) -> Float:
-        """Weighted means (count, …) over the views of each cell of values (n, …)."""
+        """Return weighted means (count, …) over the views of each cell of values (n, …)."""
         return _sums(self.cells.cell, values, weight, self.cells.count) / _per(
             np.maximum(_sums(self.cells.cell, np.ones(len(weight)), weight, self.cells.count), 1e-9), values
         )
 
     def _parts(self, weights: _Weights, columns: Float) -> tuple[Float, Float, Float, Float]:
-        """Columns less their cell's mean, means, and the weights of both in the loss."""
+        """Return columns minus their cell's mean, means, and the weights of both in the loss."""
         total = _sums(self.cells.cell, np.ones(len(weights.view)), weights.view, self.cells.count)
         means = self.cell_means(columns, weights.view)
         between = weights.cell / (weights.lining + weights.noise / np.maximum(total, 1e-9)) / weights.design
         between = np.where(total > 0, between, 0.0)
-        aside = self.cell_means(self.cells.aside, weights.view)
+        side_offset = self.cell_means(self.cells.side_offset, weights.view)
         return (
             columns - means[self.cells.cell],
-            _within(self.cells.alike, means, aside, between),
+            _within(self.cells.alike, means, side_offset, between),
             weights.view / weights.noise,
             between,
         )
@@ -181,23 +180,23 @@ class _Problem:
             tried.append(b)
             losses.append(float(mixed @ along - 2.0 * b @ along[:p] + b @ matrix @ b))
         roughness = _lowest(ROUGHNESS, np.array(losses))
-        # Between two roughnesses coefficients are no straight line, so those at the best are solved for.
+        # Between two roughnesses coefficients are not linear, so those at the best are solved for.
         level = (self.cells.level - self.cells.incidence_at(roughness))[:, None]
         rest, among, _, _ = self._parts(weights, level)
         right = within[:, :p].T @ (rest[:, 0] * one) + means[:, :p].T @ (among[:, 0] * other)
         return _Solution(one_maximum(matrix, right), roughness, np.array(tried), np.array(losses))
 
     def _tie(self, products: Float) -> Float:
-        """Information that holds the curve's constant, which nothing tells, near 0."""
+        """Return the information that keeps the curve's constant, which is not determined, near 0."""
         return 1e-7 * float(np.trace(products)) * np.full(products.shape, 1.0 / self.terms)
 
     def residuals(self, solution: _Solution) -> Float:
-        """Intensity less range and incidence, (n,), dB."""
+        """Return intensity minus range and incidence effects, (n,), dB."""
         incidence = self.cells.incidence_at(solution.roughness)
         return np.asarray(self.cells.level - self.basis @ solution.coefficients - incidence)
 
     def reweighted(self, solution: _Solution, weights: _Weights) -> _Weights:
-        """Robust weights and variances of what is left."""
+        """Return robust weights and variances of the residuals."""
         cells, residual = self.cells, self.residuals(solution)
         means = self.cell_means(residual, weights.view)
         several = self.views[cells.cell] > 1
@@ -213,14 +212,14 @@ class _Problem:
         return _Weights(view, _tukey(away / max(among, 1e-3)), noise, max(among**2 - typical, 0.0), weights.design)
 
     def design_effect(self, solution: _Solution, weights: _Weights) -> float:
-        """By how much the score of cells among each other varies more than if each stood for itself, on average."""
+        """Return the mean ratio of the variance of cells' scores to that of independent cells."""
         _, means, _, between = self._parts(replace(weights, design=1.0), self.basis)
         information = means.T @ (means * between[:, None])
         spread = self._spread(self._left(solution, weights), weights, means, between)
         return max(1.0, float(np.trace(np.linalg.pinv(information, rcond=1e-6) @ spread)) / (self.terms - 1))
 
     def covariance(self, solution: _Solution, weights: _Weights) -> tuple[Float, float]:
-        """Covariance (p, p) of the coefficients, that of the roughness in it, and the roughness's deviation."""
+        """Return the covariance (p, p) of the coefficients, the roughness's part of it, and the roughness's deviation."""
         p = self.terms
         step = ROUGHNESS[1] - ROUGHNESS[0]
         sides = np.clip([solution.roughness - step, solution.roughness + step], ROUGHNESS[0], ROUGHNESS[-1])
@@ -234,7 +233,7 @@ class _Problem:
             one,
             self.cells.count,
         )
-        # Joints run around the section, and a scan's rows of points cross them alike all around.
+        # Joints run around the section, and a scan's rows of points cross them similarly all around.
         clusters = int(self.cells.ring.max()) + 1
         spread = _outer(_sums(self.cells.ring, scores)) * clusters / max(clusters - p - 1, 1)
         spread += self._spread(self._left(solution, weights), weights, means, between)
@@ -244,7 +243,7 @@ class _Problem:
         inverse = np.linalg.inv(information[:p, :p] + self._tie(information[:p, :p]))
         whole = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
         excess = (whole @ spread @ whole)[p, p] / max(whole[p, p], 1e-300)
-        # Loss and coefficients between the roughnesses tried: what is known may be finer than their steps.
+        # Loss and coefficients between tested roughnesses: the result may be finer than their steps.
         fine = np.linspace(ROUGHNESS[0], ROUGHNESS[-1], 50 * (len(ROUGHNESS) - 1) + 1)
         loss = CubicSpline(ROUGHNESS, solution.loss)(fine)
         chance = np.exp(-0.5 * (loss - loss.min()) / max(excess, 1.0))
@@ -254,10 +253,10 @@ class _Problem:
         return covariance, float(np.sqrt(chance @ (fine - solution.roughness) ** 2))
 
     def _left(self, solution: _Solution, weights: _Weights) -> Float:
-        """What is left of each cell within its strip, dB; 0 of outliers.
+        """Return the residual of each cell within its strip, dB; 0 for outliers.
 
-        It is what differs from the strip as a whole, not from its stretch: few cells less their mean would seem more
-        alike than they are, and scores, which hold no more than differences within stretches, let the rest go.
+        It is the difference from the whole strip, not from its stretch: few cells minus their mean would seem more similar than
+        they are. Scores contain only differences within stretches, so the rest cancels.
         """
         means = self.cell_means(self.residuals(solution), weights.view)
         strip = self.cells.column if self.unrolled else self.cells.stretch
@@ -265,7 +264,7 @@ class _Problem:
         return np.asarray((means - middles[strip]) * weights.cell)
 
     def _spread(self, left: Float, weights: _Weights, means: Float, between: Float) -> Float:
-        """Variance of the scores (Conley, 1999): what all of the section has in common, and neighbouring cells besides."""
+        """Return the variance of the scores (Conley, 1999): common effects of the section, and neighbouring cells."""
         cells = self.cells
         scores = means * between[:, None]
         if not self.unrolled:
@@ -286,45 +285,48 @@ class _Problem:
         return _positive(spread)
 
 
-def _within(number: Int64, values: Float, aside: Float, weight: Float) -> Float:
-    """Values (n, m) less what a constant and a slope over ``aside`` (n,) say of those of the same number.
+def _within(number: Int64, values: Float, side_offset: Float, weight: Float) -> Float:
+    """Return values (n, m) minus a constant and a slope over ``side_offset`` (n,) of those with the same number.
 
-    So nothing is left of a reflectance that depends on the place in the section, constant along a strip: not even by where
-    in its cells the points of a strip happen to lie.
+    So a reflectance that depends on the place in the section, constant along a strip, leaves no residual, even where the points
+    of a strip are unevenly placed in its cells.
     """
     total = np.maximum(_sums(number, weight), 1e-12)
 
     def centred(of: Float) -> Float:
         return np.asarray(of - (_sums(number, of, weight) / _per(total, of))[number])
 
-    values, aside = centred(values), centred(aside)
-    slope = _sums(number, values * aside[:, None], weight) / np.maximum(_sums(number, aside**2, weight), 1e-12)[:, None]
-    return np.asarray(values - slope[number] * aside[:, None])
+    values, side_offset = centred(values), centred(side_offset)
+    slope = (
+        _sums(number, values * side_offset[:, None], weight) / np.maximum(_sums(number, side_offset**2, weight), 1e-12)[:, None]
+    )
+    return np.asarray(values - slope[number] * side_offset[:, None])
 
 
 def _positive(matrix: Float) -> Float:
-    """The nearest covariance: symmetric, of no negative variance."""
+    """Return the nearest covariance: symmetric, without negative variance."""
     values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
     return np.asarray(vectors * np.maximum(values, 0.0) @ vectors.T)
 
 
 def _covariances(left: Float, there: Float) -> tuple[Float, Float]:
-    """Covariance, dB², of cells of a plane: by their distance along the tunnel alone, and what neighbours have besides.
+    """Return the covariance, dB², of cells of a plane: by distance along the tunnel, and in addition between neighbours.
 
     Parameters
     ----------
     left, there : (rows, columns) float arrays
-        What is left, times the weights, and the weights; 0 where there is no cell.
+        Residuals times the weights, and the weights; 0 without a cell.
 
     Returns
     -------
     along : (2m + 1,) float array
-        Of cells more than NEAR apart around the section, for each shift of up to m = APART / CELL rows. From what is left of
-        the farthest: the rest changes too slowly to say anything within a stretch.
+        For cells more than NEIGHBOUR_DISTANCE apart around the section, for each shift of up to m = MAX_LAG / CELL rows.
+        Relative to the farthest: anything else changes too slowly to matter within a stretch.
     near : (2k + 1, 2k + 1) float array
-        What neighbours have more, by their distance, up to k = NEAR / CELL and no farther than it is positive.
+        Additional covariance of neighbours, by their distance, up to k = NEIGHBOUR_DISTANCE / CELL and only where it is
+        positive.
     """
-    k, m = int(NEAR / CELL), int(APART / CELL)
+    k, m = int(NEIGHBOUR_DISTANCE / CELL), int(MAX_LAG / CELL)
 
     def shifted(values: Float) -> Float:
         padded = np.pad(values, ((m, m), (k, k)))
@@ -339,7 +341,7 @@ def _covariances(left: Float, there: Float) -> tuple[Float, Float]:
     products, pairs = shifted(left), shifted(there)
     others = np.maximum(rows(there) - pairs.sum(axis=1), 0.0)
     along = np.where(others > 0.5, (rows(left) - products.sum(axis=1)) / np.maximum(others, 0.5), 0.0)
-    # Shares of noise among many lags: what is common doesn't grow with the distance.
+    # Many lags share noise: the common part must not grow with distance.
     half = np.minimum.accumulate(along[m:])
     half = np.maximum(half - half[-1], 0.0)
     along = np.concatenate([half[:0:-1], half])
@@ -355,7 +357,7 @@ def _covariances(left: Float, there: Float) -> tuple[Float, Float]:
 
 
 def _sums(number: Int64, values: Float, weight: Float | None = None, count: int = 0) -> Float:
-    """Sums (count, …) of values (n, …), times their weights (n,), of each number."""
+    """Sum values (n, …), times their weights (n,), by number: (count, …)."""
     if values.ndim == 1:
         return np.asarray(np.bincount(number, values if weight is None else values * weight, minlength=count), np.float64)
     return np.column_stack([_sums(number, column, weight, count) for column in values.T])
@@ -366,7 +368,7 @@ def _per(values: Float, like: Float) -> Float:
 
 
 def _medians(number: Int64, values: Float) -> Float:
-    """Median (n,) of the values of each one's number."""
+    """Return the median (n,) of all values with the same number."""
     order = np.argsort(number, kind="stable")
     there, first = np.unique(number[order], return_index=True)
     medians = np.zeros(int(there.max()) + 1)
@@ -379,7 +381,7 @@ def _outer(rows: Float) -> Float:
 
 
 def _deviation(values: Float) -> float:
-    """Standard deviation by the median deviation from 0."""
+    """Return the standard deviation from the median deviation from 0."""
     return MAD_TO_SIGMA * float(np.median(np.abs(values)))
 
 
@@ -388,7 +390,7 @@ def _tukey(scaled: Float) -> Float:
 
 
 def _lowest(at: Float, values: Float) -> float:
-    """Where a parabola through the lowest value and its neighbours is lowest, within the given places."""
+    """Return the minimum of a parabola through the lowest value and its neighbours, within the given places."""
     k = int(np.clip(np.argmin(values), 1, len(at) - 2))
     before, middle, after = values[k - 1 : k + 2]
     bend = before - 2.0 * middle + after

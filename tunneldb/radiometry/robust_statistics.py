@@ -1,4 +1,4 @@
-"""Statistics of dry lining among wet (Xu et al., 2018, eq. 19), robust against what is not dry."""
+"""Statistics of dry lining (Xu et al., 2018, eq. 19), robust against parts that are not dry."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from tunneldb.robust import MAD_TO_SIGMA
 
 SHORTH = 0.4
-"""Share of all values in the shortest interval that marks where dry lining lies."""
+"""Share of all values in the shortest interval, which locates dry lining."""
 
 CLIP = 1.5
-"""Values within so many standard deviations of the mean are taken for dry."""
+"""Standard deviations from the mean within which values count as dry."""
 
 CLIPPED_SIGMA = 0.7426
 """Standard deviation of a standard normal distribution clipped at ±CLIP."""
@@ -21,7 +21,7 @@ CLIPPED_SIGMA = 0.7426
 
 @dataclass(frozen=True)
 class DryLevel:
-    """Mean and standard deviation of dry lining (eq. 19), dB, and from how many values."""
+    """Mean and standard deviation of dry lining (eq. 19), dB, and the number of values."""
 
     mean: float
     sigma: float
@@ -34,7 +34,7 @@ class DryLevel:
 
 
 def plain_statistics(values: NDArray[np.floating]) -> DryLevel:
-    """Mean and standard deviation (eq. 19) of values that are known to be dry; NaNs are left out."""
+    """Compute mean and standard deviation (eq. 19) of values that are known to be dry; NaNs are ignored."""
     values = np.asarray(values, dtype=np.float64)
     values = values[np.isfinite(values)]
     if len(values) == 0:
@@ -43,21 +43,20 @@ def plain_statistics(values: NDArray[np.floating]) -> DryLevel:
 
 
 def robust_statistics(values: NDArray[np.floating], shorth: float = SHORTH, *, two_sided: bool = False) -> DryLevel:
-    """Mean and standard deviation of the dry part of values of which up to about 30 % are wet.
+    """Compute mean and standard deviation of the dry part of values of which up to about 30 % are wet.
 
-    Wet lining is darker, so that it pulls mean, median and standard deviation. The shortest interval that
-    holds 40 % of the values lies within the dry part; above its middle there is hardly anything wet, so that
-    the median deviation there gives a first σ. Values within 1.5σ of the mean are then averaged until mean and
-    σ stand still, the clipping being allowed for as in a normal distribution.
+    Wet lining is darker, so that it shifts mean, median and standard deviation. The shortest interval with 40 % of the values
+    is within the dry part. Above its middle hardly anything is wet, so the median deviation there gives a first σ. Values
+    within 1.5σ of the mean are then averaged until mean and σ converge, corrected for the clipping of a normal distribution.
 
     Parameters
     ----------
     values : float array
-        Corrected intensity, dB; NaNs are left out.
+        Corrected intensity, dB; NaNs are ignored.
     shorth : float
-        Share of all values in the shortest interval: less where more of them may be something else.
+        Share of all values in the shortest interval: smaller if more of them may not be dry.
     two_sided : bool
-        Whether what is something else may be brighter, too: the first σ is then that of the narrower side.
+        True if the other values may also be brighter: the first σ is then that of the narrower side.
     """
     ordered = np.asarray(values, dtype=np.float64).ravel()
     ordered = np.sort(ordered[np.isfinite(ordered)])
@@ -88,5 +87,5 @@ def robust_statistics(values: NDArray[np.floating], shorth: float = SHORTH, *, t
 
 
 def _middle(ordered: NDArray[np.floating]) -> NDArray[np.floating]:
-    """The one or two values in the middle of growing ones: their mean is the median."""
+    """Return the one or two middle values of increasing ones: their mean is the median."""
     return ordered[(len(ordered) - 1) // 2 : len(ordered) // 2 + 1]

@@ -1,9 +1,8 @@
 """Roughness of the lining from small homogeneous regions (Xu et al., 2018, eq. 17–18).
 
-Regions of the same material seen at different incidence angles must come out with the same corrected
-intensity: the roughness is the σ at which they differ least. Where all of the lining is seen at nearly the
-same incidence (a profiler near the middle of a round tunnel), no σ is better than another, and none matters;
-the result says so.
+Regions of the same material seen at different incidence angles must have the same corrected intensity: the roughness is the σ
+at which they differ least. If all of the lining is seen at nearly the same incidence (a profiler near the middle of a round
+tunnel), all σ are equivalent, and none matters; the result says so.
 """
 
 from __future__ import annotations
@@ -24,33 +23,33 @@ CLASS_WIDTH = 2.5
 """Width of an incidence class, degrees."""
 
 CLASS_CELLS = 40
-"""At most so many regions are taken from an incidence class."""
+"""Maximum number of regions of an incidence class."""
 
 MIN_CLASS_CELLS = 10
-"""A class with fewer regions is left out."""
+"""Minimum number of regions of a class."""
 
 MIN_CELL_POINTS = 2
-"""A cell with fewer points is left out."""
+"""Minimum number of points of a cell."""
 
-STEEPEST = 75.0
-"""Lining seen more slantingly, degrees, is left out: there an error of 1° in the normal is 0.3 dB."""
+MAX_INCIDENCE = 75.0
+"""Maximum incidence of lining used, degrees: beyond it an error of 1° in the normal is 0.3 dB."""
 
-TELLING = 3.0
-"""A roughness is determined when a change by so many degrees shows, by more than NOTICEABLE."""
+SIGNIFICANT_CHANGE = 3.0
+"""Change of roughness that must exceed NOTICEABLE for the roughness to be determined, degrees."""
 
 NOTICEABLE = 0.1
-"""Smallest change of the intensity's course over the incidence angles that is taken for real, dB."""
+"""Smallest change of intensity over the incidence angles that is significant, dB."""
 
-TYPICAL = 9.0
-"""Roughness of a concrete lining (Xu et al., 2018, fig. 5), degrees: taken where the lining's own can't be told."""
+TYPICAL_ROUGHNESS = 9.0
+"""Roughness of a concrete lining (Xu et al., 2018, fig. 5), degrees: used if the lining's own is not determined."""
 
-ROUGHEST = 60.0
-"""No lining is rougher, degrees: where more comes out, something else than incidence, soot or damp, makes intensity change."""
+MAX_ROUGHNESS = 60.0
+"""Maximum roughness of a lining, degrees: a larger result has another cause than incidence, such as soot or damp."""
 
 
 @dataclass(frozen=True)
 class Regions:
-    """Homogeneous regions, all (m,): mean cosine of incidence, mean distance-corrected dB, points."""
+    """Homogeneous regions, all (m,): mean cosine of incidence, mean distance-corrected dB, number of points."""
 
     cosine: Float
     distance_db: Float
@@ -63,24 +62,25 @@ class Regions:
 
 @dataclass(frozen=True)
 class Roughness:
-    """A roughness and how well it is founded.
+    """Roughness and its reliability.
 
     Attributes
     ----------
     sigma : float
-        σ at the objective's minimum, or TYPICAL, degrees.
+        σ at the objective's minimum, or TYPICAL_ROUGHNESS, degrees.
     determined : bool
-        False when the regions' incidence angles are too much alike to tell one σ from another; correcting
-        with ``sigma`` is then as good as with any other near it.
+        False if the regions' incidence angles are too similar to determine σ; correcting with ``sigma`` is then as good as
+        with any other near it.
     assumed : bool
-        Whether ``sigma`` is TYPICAL, since no roughness explains what the regions show, or there are none; not determined then.
+        True if ``sigma`` is TYPICAL_ROUGHNESS, because no roughness explains the regions, or there are none; not determined
+        then.
     objective : float
-        The objective for it, √dB.
+        Value of the objective for it, √dB.
     contrast : float
-        By how much the correction at the steepest incidence would change against that at the flattest, if σ
-        were 3° less or more, dB: the objective's flatness.
+        Change of the correction at the steepest incidence relative to that at the flattest, for a σ smaller or larger by 3°,
+        dB: the objective's flatness.
     regions : int
-        Regions used.
+        Number of regions used.
     incidence_from, incidence_to : float
         Smallest and largest incidence angle of the regions, degrees.
     """
@@ -96,31 +96,31 @@ class Roughness:
 
     @classmethod
     def unsought(cls) -> Roughness:
-        """Stand for none, where incidence is not known, and so not corrected."""
+        """Make a placeholder for unknown, and so uncorrected, incidence."""
         return cls(0.0, False, False, np.nan, np.nan, 0, np.nan, np.nan)
 
     @property
     def note(self) -> str | None:
-        """What is to be said about it, if anything."""
+        """Return a remark on it, if there is any."""
         if not self.regions and not self.assumed:
             return None
         if self.assumed:
             return (
-                f"no roughness explains how intensity changes with incidence (something else changes along with it, soot"
-                f" perhaps): {self.sigma:g}° is taken, that of concrete"
+                f"roughness could not be estimated (intensity does not follow incidence; soot or another effect may mask it):"
+                f" using {self.sigma:g}°, that of concrete"
                 if self.regions >= 2
-                else f"too little is seen of the lining to tell its roughness: {self.sigma:g}° is taken, that of concrete"
+                else f"roughness could not be estimated (too little lining was seen): using {self.sigma:g}°, that of concrete"
             )
         if not self.determined:
             return (
-                "the lining is seen at too similar incidence angles to tell its roughness;"
-                " whichever is taken hardly changes the corrected intensity"
+                "roughness could not be estimated (incidence angles of the lining are too similar);"
+                " its value hardly changes the corrected intensity"
             )
         return None
 
 
 def objective(regions: Regions, roughness: float) -> float:
-    """Objective O(σ) of eq. 17: root of the mean absolute difference between regions corrected with σ, √dB.
+    """Return the objective O(σ) of eq. 17: root of the mean absolute difference between regions corrected with σ, √dB.
 
     Computed from the sorted values, so that M regions cost M lg M, not M².
     """
@@ -131,24 +131,27 @@ def objective(regions: Regions, roughness: float) -> float:
 
 
 def find_roughness(regions: Regions) -> Roughness:
-    """Find the σ of the least objective (eq. 18): 0° to 90° in steps of 1°, then of 0.02° about the best.
+    """Find the σ of the least objective (eq. 18): 0° to 90° in steps of 1°, then of 0.02° around the best.
 
-    One above ROUGHEST is no roughness of a lining; TYPICAL is taken in its place, as it is where there are fewer than two
-    regions.
+    A result above MAX_ROUGHNESS is no roughness of a lining; TYPICAL_ROUGHNESS is used instead, and also if there are fewer
+    than two regions.
     """
     if len(regions) < 2:
-        return Roughness(TYPICAL, False, True, float("nan"), 0.0, len(regions), float("nan"), float("nan"))
+        return Roughness(TYPICAL_ROUGHNESS, False, True, float("nan"), 0.0, len(regions), float("nan"), float("nan"))
     coarse = np.arange(0.0, 91.0)
     best = coarse[np.argmin([objective(regions, s) for s in coarse])]
     fine = np.clip(best + np.arange(-50, 51) * 0.02, 0.0, 90.0)
     values = [objective(regions, s) for s in fine]
     sigma = float(fine[np.argmin(values)])
     least = min(values)
-    if assumed := sigma > ROUGHEST:
-        sigma, least = TYPICAL, objective(regions, TYPICAL)
+    if assumed := sigma > MAX_ROUGHNESS:
+        sigma, least = TYPICAL_ROUGHNESS, objective(regions, TYPICAL_ROUGHNESS)
     flattest, steepest = float(regions.cosine.max()), float(regions.cosine.min())
     ends = np.array([flattest, steepest])
-    course = [float(np.diff(incidence_db(ends, float(np.clip(s, 0, 90))))[0]) for s in (sigma - TELLING, sigma + TELLING)]
+    course = [
+        float(np.diff(incidence_db(ends, float(np.clip(s, 0, 90))))[0])
+        for s in (sigma - SIGNIFICANT_CHANGE, sigma + SIGNIFICANT_CHANGE)
+    ]
     contrast = abs(course[1] - course[0])
     return Roughness(
         sigma=sigma,
@@ -171,16 +174,16 @@ def automatic_regions(
 ) -> Regions:
     """Choose small homogeneous regions of dry lining, spread over the incidence angles.
 
-    Cells of 0.2 m, one for each scanner position and incidence class. Cells whose points differ more than
-    usual (edges, joints) go; of each incidence class the cells nearest to its dry level stay, so that leaks,
-    dark or bright patches, which stand off from it, don't count, and no class outweighs the others.
+    Cells are 0.2 m wide, one for each scanner position and incidence class. Cells whose points vary more than usual (edges,
+    joints) are removed. In each incidence class the cells nearest to its dry level stay, so that leaks, dark or bright patches
+    do not count, and no class dominates the others.
 
     Parameters
     ----------
     chainage, arc : (n,) float arrays
-        Where the lining points lie, m.
+        Places of the lining points, m.
     view : (n,) int array
-        Scanner position (scan id); points of different views don't share a cell.
+        Scanner position (scan id); points of different views do not share a cell.
     cosine : (n,) float array
         Cosine of the incidence angle.
     distance_db : (n,) float array
@@ -189,10 +192,10 @@ def automatic_regions(
     Returns
     -------
     Regions
-        Empty when there are no lining points that serve.
+        Empty if there are no usable lining points.
     """
     angle = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
-    usable = np.isfinite(distance_db) & (angle <= STEEPEST) & np.isfinite(chainage) & np.isfinite(arc)
+    usable = np.isfinite(distance_db) & (angle <= MAX_INCIDENCE) & np.isfinite(chainage) & np.isfinite(arc)
     incidence_class = np.floor(angle[usable] / CLASS_WIDTH).astype(np.int64)
     cell = [np.floor(along[usable] / CELL).astype(np.int64) for along in (chainage, arc)]
     keys = np.column_stack([incidence_class, view[usable].astype(np.int64), *cell])
@@ -214,12 +217,12 @@ def drawn_regions(
     cosine: NDArray[np.floating],
     distance_db: NDArray[np.floating],
 ) -> Regions:
-    """Take the regions that the user drew, one for each scanner position and incidence class that sees one.
+    """Use the regions that the user drew, one for each scanner position and incidence class that sees it.
 
     Parameters
     ----------
     region : (n,) int array
-        Number of the drawn polygon that holds the point, -1 for none.
+        Number of the drawn polygon around the point, -1 for none.
     view, cosine, distance_db : (n,) arrays
         As in :func:`automatic_regions`.
     """
@@ -232,7 +235,7 @@ def drawn_regions(
 
 
 def _group(keys: Int64, cosine: NDArray[np.floating], level: NDArray[np.floating]) -> tuple[Intp, Regions, Float]:
-    """Average points of the same key; return one point of each group, the groups, and each one's spread."""
+    """Average points with the same key; return one point of each group, the groups, and the spread of each."""
     count = len(keys)
     order = np.lexsort(keys.T[::-1])
     start = np.flatnonzero(np.concatenate([np.ones(min(count, 1), bool), np.any(np.diff(keys[order], axis=0) != 0, axis=1)]))
@@ -251,7 +254,7 @@ def _take(regions: Regions, index: Intp) -> Regions:
 
 
 def _nearest_to_dry_level(cells: Intp, level: Float) -> Intp:
-    """Of the cells of one incidence class those nearest to its dry level."""
+    """Return those cells of one incidence class that are nearest to its dry level."""
     if len(cells) < MIN_CLASS_CELLS:
         return cells[:0]
     away = np.abs(level[cells] - robust_statistics(level[cells]).mean)

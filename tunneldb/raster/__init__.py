@@ -1,4 +1,4 @@
-"""The unrolled image: points projected, gathered by pixel, and what each pixel shows."""
+"""Unrolled image: projection of points, sums by pixel, and the state of each pixel."""
 
 import lazy_loader
 

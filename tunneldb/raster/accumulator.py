@@ -1,7 +1,7 @@
-"""The unrolled image of a kilometre, gathered from points in any order in bounded memory.
+"""Unrolled image of a kilometre, accumulated from points in any order in limited memory.
 
-A pixel holds weighted sums over the points that fall into it: several stations are blended by the weights of their views
-(:func:`tunneldb.raster.projection.pixel_weight`). Only the blocks used last lie in memory; the others in a file of the
+A pixel has weighted sums over its points: several stations are blended by the weights of their views
+(:func:`tunneldb.raster.projection.pixel_weight`). Only the blocks used last are in memory; the others are in a file in the
 temporary folder.
 """
 
@@ -28,30 +28,30 @@ MEMORY = 400_000_000
 """Bytes of memory for sums."""
 
 CHANNELS = 4
-"""Sums a pixel holds: weight and, weighted, offset, raw and corrected intensity."""
+"""Number of sums of a pixel: weight and, weighted, offset, raw and corrected intensity."""
 
 OFFSET, LEVEL = 2.0**-11, 2.0**-7
-"""Offset (m) and intensity (dB) of a point are summed in whole multiples of these, half a millimetre and less than a stored
+"""Steps of offset (m) and intensity (dB) for summing whole numbers, half a millimetre and less than a stored
 step."""
 
-GREATEST = 2**14 - 1
-"""Multiples at most that a point adds for each unit of its weight: 8 m, 128 dB."""
+MAX_STEPS = 2**14 - 1
+"""Maximum number of steps that a point adds per unit of its weight: 8 m, 128 dB."""
 
-FULL = 2**17 - WEIGHT
-"""A pixel whose weights add up to more takes no more points: then no sum passes 2³¹. These are 2,047 points seen straight on
-from near by, 0.4 mm apart in a pixel of 2 cm. Pixels larger than that have sums of 64 bits and are never full."""
+MAX_WEIGHT_SUM = 2**17 - WEIGHT
+"""Sum of weights from which a pixel accepts no more points, so that no sum exceeds 2³¹. It is 2,047 points seen at right
+angles from nearby, 0.4 mm apart in a pixel of 2 cm. Larger pixels have 64-bit sums and are never full."""
 
 
 @dataclass(frozen=True)
 class Window:
-    """Weighted means over a few columns of the image; (rows, columns) arrays, NaN where no point fell.
+    """Weighted means over a few columns of the image; (rows, columns) arrays, NaN in pixels without a point.
 
     Attributes
     ----------
     columns : slice
         Columns of the grid.
     weight : int array
-        Weights of the points in the pixel, 0 where no point fell.
+        Weights of the points in the pixel, 0 without a point.
     offset : float32 array
         Mean offset from the section surface, m.
     raw, corrected : float32 arrays
@@ -65,7 +65,7 @@ class Window:
     corrected: Single
 
     def cut(self, columns: slice) -> Window:
-        """Those of the columns that lie in a slice of the grid's columns."""
+        """Return the part of the columns within a slice of the grid's columns."""
         here = slice(columns.start - self.columns.start, columns.stop - self.columns.start)
         return Window(columns, self.weight[:, here], self.offset[:, here], self.raw[:, here], self.corrected[:, here])
 
@@ -73,14 +73,14 @@ class Window:
 class Accumulator:
     """Sums of all points of a kilometre by pixel.
 
-    Use it as a context manager: the file that holds what memory doesn't goes at the end.
+    Use it as a context manager: it deletes its file at the end.
 
     Parameters
     ----------
     grid : Grid
         The pixels.
     memory : int
-        Bytes of memory for sums, at least one block's.
+        Bytes of memory for sums, at least those of one block.
     """
 
     def __init__(self, grid: Grid, memory: int = MEMORY) -> None:
@@ -88,7 +88,7 @@ class Accumulator:
         self._shape = (grid.rows, grid.block_columns, CHANNELS)
         small = grid.pixel < 0.0201
         self._type = np.dtype(np.int32 if small else np.int64)
-        self._full = FULL if small else np.iinfo(np.int64).max
+        self._full = MAX_WEIGHT_SUM if small else np.iinfo(np.int64).max
         self._bytes = self._type.itemsize * int(np.prod(self._shape))
         self._room = max(1, memory // self._bytes)
         self._blocks: OrderedDict[int, Whole] = OrderedDict()
@@ -102,7 +102,7 @@ class Accumulator:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        """Give memory and file back."""
+        """Free memory and file."""
         self._blocks.clear()
         if self._file:
             self._file.close()
@@ -110,33 +110,33 @@ class Accumulator:
     def add(self, pixels: Pixels, count: int) -> None:
         """Add points.
 
-        Offset and intensity are rounded to OFFSET and LEVEL and summed as whole numbers, so sums are exact, and the same in
-        whatever order points come, as long as no pixel is FULL.
+        Offset and intensity are rounded to OFFSET and LEVEL and summed as whole numbers. So sums are exact, and independent of
+        the order of the points, as long as no pixel is MAX_WEIGHT_SUM.
 
         Parameters
         ----------
         pixels : Pixels
-            Where the points fall and what they add; those with column -1 are passed over.
+            Pixels and values of the points; those with column -1 are skipped.
         count : int
-            How many of its points to add.
+            Number of its points to add.
 
         Raises
         ------
         UserError
-            If the temporary folder has no room for what memory doesn't hold.
+            If the temporary folder has no space for the blocks that do not fit in memory.
         """
         pixels = pixels.first(count)
         width = self.grid.block_columns
         marked = np.zeros(self.grid.columns // width, np.bool_)
         _touched(pixels.column, width, marked)
         touched = np.flatnonzero(marked).tolist()
-        # Blocks in memory first, lest fetching another one puts them out.
+        # Blocks in memory first, before fetching another one removes them.
         for block in sorted(touched, key=lambda b: b not in self._blocks):
             self._add(block, pixels)
             self._changed.add(block)
 
     def _add(self, block: int, pixels: Pixels) -> None:
-        """Add the points that fall into a block; each thread has rows of its own."""
+        """Add the points of a block; each thread has its own rows."""
         sums, first, parts = self._fetch(block), block * self.grid.block_columns, threads()
 
         def rows(part: int, _: int) -> None:
@@ -145,35 +145,35 @@ class Accumulator:
         in_blocks(rows, parts, 1)
 
     def blocks(self) -> list[int]:
-        """Blocks, counted from 0, that hold points."""
+        """Return the blocks, counted from 0, that have points."""
         return sorted(self._spilled | self._blocks.keys())
 
     def inner_blocks(self) -> list[int]:
-        """Blocks of the kilometre itself that hold points."""
+        """Return the blocks of the kilometre itself that have points."""
         width, inner = self.grid.block_columns, self.grid.inner
         return [block for block in self.blocks() if inner.start <= block * width < inner.stop]
 
     def window(self, start: int, stop: int) -> Window:
-        """Means over the columns from ``start`` up to ``stop``; columns outside the grid are cut off."""
+        """Return the means over the columns from ``start`` up to ``stop``, limited to the grid."""
         start, stop = max(start, 0), min(stop, self.grid.columns)
         width = self.grid.block_columns
-        held = set(self.blocks())
+        selected = set(self.blocks())
         weight = np.zeros((self.grid.rows, stop - start), self._type)
         means = np.empty((CHANNELS - 1, *weight.shape), np.float32)
         for block in range(start // width, (stop - 1) // width + 1):
             first, last = max(block * width, start), min((block + 1) * width, stop)
-            if block in held:
+            if block in selected:
                 _means(self._fetch(block), first - block * width, weight, means, first - start, last - start)
             else:
                 means[:, :, first - start : last - start] = np.nan
         return Window(slice(start, stop), weight, *means)
 
-    def held(self, block: int) -> Bool:
-        """Tell which pixels (rows, columns) of a block hold points."""
+    def has_points(self, block: int) -> Bool:
+        """Return True for pixels (rows, columns) of a block that have points."""
         return np.asarray(self._fetch(block)[:, :, 0] > 0, dtype=np.bool_)
 
     def _fetch(self, block: int) -> Whole:
-        """Sums of a block, brought into memory, from the file or new."""
+        """Return the sums of a block, loaded into memory, from the file or new."""
         if block in self._blocks:
             self._blocks.move_to_end(block)
             return self._blocks[block]
@@ -188,7 +188,7 @@ class Accumulator:
         return sums
 
     def _put_out(self, block: int, sums: Whole) -> None:
-        """Write a block that leaves memory to the file, unless it is there already."""
+        """Write a block that leaves memory to the file, unless it is already there."""
         if block not in self._changed:
             return
         try:
@@ -202,8 +202,8 @@ class Accumulator:
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
             raise UserError(
-                f"no room for the image of km {self.grid.km} in {tempfile.gettempdir()}: {error.strerror}; it may need"
-                f" {self._bytes * self.grid.blocks / 1e9:.1f} GB; set TMPDIR to a folder with more"
+                f"not enough space for the image of km {self.grid.km} in {tempfile.gettempdir()}: {error.strerror}; it may need"
+                f" {self._bytes * self.grid.blocks / 1e9:.1f} GB; set TMPDIR to a folder with more space"
             ) from error
         self._changed.discard(block)
         self._spilled.add(block)
@@ -211,8 +211,8 @@ class Accumulator:
 
 @kernel
 def _touched(column: Int32, width: int, touched: Bool) -> None:  # pragma: no cover - compiled
-    """Mark the blocks that points fall into."""
-    first, stop = 0, 0  # columns of the block that the point before fell into
+    """Mark the blocks with points."""
+    first, stop = 0, 0  # columns of the block of the previous point
     for i in range(column.shape[0]):
         c = int(column[i])
         if c >= 0 and not first <= c < stop:
@@ -235,7 +235,7 @@ def _add(
     part: int,
     parts: int,
 ) -> None:  # pragma: no cover - compiled
-    """Add the points that fall into a block, into every ``parts``-th of its rows."""
+    """Add the points of a block, into every ``parts``-th of its rows."""
     width = sums.shape[1]
     for i in range(row.shape[0]):
         r, c = row[i], column[i] - first
@@ -248,7 +248,7 @@ def _add(
 
 @point_inner
 def _multiple(value: np.float32) -> np.int32:  # pragma: no cover - compiled
-    most = np.float32(GREATEST)
+    most = np.float32(MAX_STEPS)
     return np.int32(np.rint(most if value > most else (value if value > -most else -most)))
 
 

@@ -1,4 +1,4 @@
-"""Appendages: what stands off from the plane of the lining about it (Xu et al., 2018, eq. 21–23); and recesses of the lining.
+"""Fixtures: pixels off the plane of the lining around them (Xu et al., 2018, eq. 21–23); and recesses of the lining.
 
 The planes are fitted to the offset image, where a curved lining is flat.
 """
@@ -13,45 +13,44 @@ from tunneldb.geometry.robust_plane import DELTA, central_mode, plane_of_moments
 from tunneldb.threads import in_blocks
 
 PART = 2.0
-"""Side of the part of the lining that a plane is fitted to, m: signs and boxes are smaller than half of it."""
+"""Side of the part of the lining for one plane, m: signs and boxes are smaller than half of it."""
 
 STEP = 0.25
-"""Side of the middle of a part, for which its plane is used, m."""
+"""Side of the middle of a part, to which its plane is applied, m."""
 
 MIN_PIXELS = 12
-"""A part with fewer pixels on its plane takes the section surface for its plane."""
+"""Minimum number of pixels on the plane of a part; with fewer the section surface is used as its plane."""
 
 SCALES = np.array([0.06, 0.05, 0.04, 0.03, 0.03])
-"""Distances from the plane, m, beyond which a pixel has no weight, fit after fit."""
+"""Distances from the plane, m, beyond which a pixel has no weight, in successive fits."""
 
 _BIN, _BINS, _REACH = 0.01, 8, 2
-_SAMPLES = 6  # pixels of each row of a part that are taken, in slanting lines: some hundred are enough for three numbers
-_NONE = np.float32(1e9)  # an offset that no plane comes near
-_SUPPORT = 0.15  # share of the pixels about one in a recess that must lie at its depth: one profile's, less an outlier
+_SAMPLES = 6  # samples of each row of a part, in oblique lines: some hundred suffice for three numbers
+_NONE = np.float32(1e9)  # an offset far from any plane
+_SUPPORT = 0.15  # minimum share of pixels around a recessed one at its depth: one profile, minus an outlier
 
 
 def distance_from_plane(offset: Single, pixel: float, corner: tuple[int, int] = (0, 0)) -> Single:
-    """Distance of each pixel from the local plane of the lining (eq. 22), signed.
+    """Return the signed distance of each pixel from the local plane of the lining (eq. 22).
 
-    Each plane is fitted by reweighted least squares (Tukey's weights, ever narrower), so that appendages and
-    niches don't draw it to themselves. It begins level, at the offset within 0.08 m of the section surface
-    where most pixels lie; of two such offsets the one nearer to the surface is preferred: that is where the
-    lining is.
+    Each plane is fitted by reweighted least squares (Tukey's weights of decreasing width), so that fixtures and niches do not
+    attract it. It starts level, at the offset within 0.08 m of the section surface with most pixels; of two such offsets the
+    one nearer to the surface is preferred, because the lining is there.
 
     Parameters
     ----------
     offset : (rows, columns) float32 array
-        Offset image, m, NaN where there is no point.
+        Offset image, m, NaN without a point.
     pixel : float
         Side of a pixel, m.
     corner : (int, int)
-        Row and column of its first pixel in an image of which this is a part. A pixel farther than :func:`reach` from the
-        part's edges has the same distance whichever part it is seen in.
+        Row and column of its first pixel in a larger image. A pixel farther than :func:`reach` from the part's edges has the
+        same distance in any part.
 
     Returns
     -------
     (rows, columns) float32 array
-        m, positive into the tunnel, NaN where there is no point.
+        m, positive into the tunnel, NaN without a point.
     """
     step, margin = _sides(pixel)
     every, side = _every(pixel), step + 2 * margin
@@ -78,15 +77,15 @@ def distance_from_plane(offset: Single, pixel: float, corner: tuple[int, int] = 
 
 
 def recessed(offset: Single, distance: Single, pixel: float, delta: float = DELTA) -> Bool:
-    """Mark pixels behind their plane that lie on a surface there: the back of a niche or of a bolt pocket.
+    """Mark pixels on a surface behind their plane: the back of a niche or of a bolt pocket.
 
-    About such a pixel, over 0.1 m, those with points lie on one slope of up to 45°, within δ; one may be an outlier. So
-    neither its edges are recesses, with the mixed pixels there, nor what lies scattered behind the wall.
+    Around such a pixel, over 0.1 m, those with points are on one slope of up to 45°, within δ; one may be an outlier. So edges,
+    with their mixed pixels, are not recesses, nor are scattered points behind the wall.
 
     Parameters
     ----------
     offset, distance : (rows, columns) float32 arrays
-        Offset image, m, and what :func:`distance_from_plane` returned for it.
+        Offset image, m, and the result of :func:`distance_from_plane` for it.
     pixel : float
         Side of a pixel, m.
     delta : float
@@ -98,14 +97,14 @@ def recessed(offset: Single, distance: Single, pixel: float, delta: float = DELT
 
 
 def off_plane(distance: Single, recess: Bool, pixel: float, delta: float = DELTA) -> Bool:
-    """Mark pixels that lie neither on their plane (eq. 23) nor in a recess, grown to swallow the mixed pixels of their edges.
+    """Mark pixels neither on their plane (eq. 23) nor in a recess, dilated to include the mixed pixels of their edges.
 
     Parameters
     ----------
     distance : (rows, columns) float32 array
-        What :func:`distance_from_plane` returned.
+        Result of :func:`distance_from_plane`.
     recess : (rows, columns) bool array
-        What :func:`recessed` returned.
+        Result of :func:`recessed`.
     pixel : float
         Side of a pixel, m.
     delta : float
@@ -117,37 +116,37 @@ def off_plane(distance: Single, recess: Bool, pixel: float, delta: float = DELTA
 
 
 def reach(pixel: float) -> int:
-    """How far, in pixels, what a pixel is judged by lies from it at most."""
+    """Return the maximum distance, in pixels, of data that a pixel's result depends on."""
     step, margin = _sides(pixel)
     return step + margin + _growth(pixel) + _thin(pixel)
 
 
 def _sides(pixel: float) -> tuple[int, int]:
-    """Side of the middle of a part and width of what lies about it, pixels."""
+    """Return the side of the middle of a part and the width around it, pixels."""
     return max(1, round(STEP / pixel)), max(1, round((PART - STEP) / 2 / pixel))
 
 
 def _every(pixel: float) -> int:
-    """Of the pixels of a row one in so many is taken."""
+    """Return the interval of the sampled pixels of a row."""
     step, margin = _sides(pixel)
     return max(1, (step + 2 * margin) // _SAMPLES)
 
 
 def _growth(pixel: float) -> int:
-    """Pixels by which an appendage is grown: two of 2 cm, fewer of larger ones."""
+    """Return the number of pixels by which a fixture is dilated: two of 2 cm, fewer of larger ones."""
     return max(1, round(0.04 / pixel))
 
 
 def _thin(pixel: float) -> int:
-    """Pixels to either side in which a pixel of a thin cable has another one, though profiles are apart: 0.1 m."""
+    """Return the number of pixels to either side for another pixel of a thin cable, if profiles are apart: 0.1 m."""
     return max(1, round(0.1 / pixel))
 
 
 def _samples(offset: Single, skip_rows: int, skip_columns: int, rows: int, columns: int, slant: int, every: int) -> Single:
-    """Every n-th pixel of each row, in slanting lines, with a margin; _NONE where there is no point."""
+    """Return every n-th pixel of each row, in oblique lines, with a margin; _NONE without a point."""
     samples = np.full((rows, columns // every + 2), _NONE, np.float32)
     for i in range(min(every, len(offset))):
-        # The columns whose number is that of the row, but for multiples of n; the same for every n-th row.
+        # The columns whose number is that of the row, modulo n; the same for every n-th row.
         shift = (i + slant + skip_columns) % every - skip_columns
         skip = max(0, -(shift // every))
         values = offset[i::every, shift + every * skip :: every][:, : samples.shape[1] - skip]
@@ -157,7 +156,7 @@ def _samples(offset: Single, skip_rows: int, skip_columns: int, rows: int, colum
 
 
 def _places(side: int, every: int) -> tuple[Single, Single]:
-    """Where the samples of a part lie in it, for each phase: x (every, n) and y (n,), in sides from its middle."""
+    """Return the places of a part's samples for each phase: x (every, n) and y (n,), in sides from its middle."""
     each = side // every
     room = (side * each + 63) // 64 * 64  # whole vectors
     x, y = np.zeros((every, room), np.float32), np.zeros(room, np.float32)
@@ -173,7 +172,7 @@ def _distance(
     offset: Single, samples: Single, x: Single, y: Single, scales: Single, step: int, margin: int, every: int,
     row: int, column: int, down: int, across: int, wide: int, begin: int, end: int, z: Single, counts: Int32, out: Single,
 ) -> None:  # fmt: skip  # pragma: no cover - compiled
-    """Write the distances of rows of tiles; ``z`` is room for the samples of a part, ``counts`` for two histograms of them."""
+    """Write the distances of rows of tiles; ``z`` is memory for a part's samples, ``counts`` for two histograms of them."""
     rows, columns = offset.shape
     side = step + 2 * margin
     each = side // every
@@ -185,24 +184,24 @@ def _distance(
         for tile in range(wide):
             left = (across + tile) * step - column
             c0, c1 = left if left > 0 else 0, left + step if left + step < columns else columns
-            held = False
+            selected = False
             for i in range(r0, r1):
                 for j in range(c0, c1):
-                    held |= not np.isnan(offset[i, j])
-                if held:
+                    selected |= not np.isnan(offset[i, j])
+                if selected:
                     break
-            if not held:
+            if not selected:
                 continue
             for k in range(2 * _BINS + 2):
                 counts[0, k] = counts[1, k] = 0
             phase = (top + row - left - column) % every
             for i in range(side):
-                # Where the row's first sample in the part lies among all its samples.
+                # Index of the row's first sample in the part among all its samples.
                 first = (tile * step + (phase + i) % every) // every
                 for k in range(each):
                     value = samples[tile_row * step + i, first + k]
                     z[i * each + k] = value
-                    # Class of 1 cm, the last one for what lies nowhere near the section surface.
+                    # Class of 1 cm; the last one is for samples far from the section surface.
                     place = value * per_bin + half
                     counts[k & 1, int(place) - 1 if 1.0 <= place < 2 * _BINS + 2.0 else 2 * _BINS + 1] += 1
             for k in range(2 * _BINS + 1):
@@ -220,7 +219,7 @@ def _distance(
 def _plane(
     x: Single, y: Single, z: Single, level: float, scales: Single
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Plane a + b x + c y through points, fitted from a level on."""
+    """Fit a plane a + b x + c y to points, starting from a level."""
     a, b, c = level, 0.0, 0.0
     for k in range(scales.shape[0]):
         used, s0, sx, sy, sxx, sxy, syy, sz, sxz, syz = _moments(
@@ -233,12 +232,12 @@ def _plane(
     return a, b, c
 
 
-# Sums may be taken in any order, so that several are taken at once.
+# Sums may be computed in any order, so that several are computed at once.
 @inner_sums
 def _moments(
     x: Single, y: Single, z: Single, a: np.float32, b: np.float32, c: np.float32, per_scale: np.float32
 ) -> tuple[float, ...]:  # pragma: no cover - compiled
-    """Sums over points weighted by their distance from a plane (Tukey): how many have weight, weight, and its moments."""
+    """Return sums over points weighted by their distance from a plane (Tukey): number, weight, and moments."""
     one, zero = np.float32(1.0), np.float32(0.0)
     used, s0, sx, sy, sxx, sxy, syy, sz, sxz, syz = zero, zero, zero, zero, zero, zero, zero, zero, zero, zero
     for k in range(x.shape[0]):
@@ -277,7 +276,7 @@ def _recessed(
                 down = (offset[i + half, j] - offset[i - half, j]) / (2.0 * half)
             if half <= j < columns - half:
                 along = (offset[i, j + half] - offset[i, j - half]) / (2.0 * half)
-            down = down if abs(down) <= steepest else 0.0  # nor where it is unknown
+            down = down if abs(down) <= steepest else 0.0  # nor if unknown
             along = along if abs(along) <= steepest else 0.0
             alike, other = 0, 0
             for m in range(_from(i - half), _until(i + half + 1, rows)):
@@ -294,7 +293,7 @@ def _recessed(
 def _grow(
     distance: Single, recess: Bool, delta: float, growth: int, thin: int, out: Bool
 ) -> None:  # pragma: no cover - compiled
-    """Mark pixels off the plane, and those about them; a pixel alone is an outlier, which has no edge."""
+    """Mark pixels off the plane, and those around them; a single pixel is an outlier without an edge."""
     rows, columns = distance.shape
     for i in range(rows):
         for j in range(columns):
@@ -305,7 +304,7 @@ def _grow(
             for m in range(_from(i - 1), _until(i + 2, rows)):
                 for n in range(_from(j - 1), _until(j + 2, columns)):
                     beside += abs(distance[m, n]) >= delta
-            # One that has others before or behind it, or above or below, that stand off alike is of a cable.
+            # With similar pixels before or behind it, or above or below, it belongs to a cable.
             for turn in range(2 if beside == 1 else 0):
                 tall, wide = (1, thin) if turn == 0 else (thin, 1)
                 alike = 0
@@ -314,7 +313,7 @@ def _grow(
                         alike += abs(distance[m, n]) >= delta and abs(distance[m, n] - distance[i, j]) < delta
                 if alike > 1:
                     beside = 2
-            # From the edge the growth reaches as far as from within.
+            # From the edge the dilation reaches as far as from within.
             if 1 < beside < 9:
                 for m in range(_from(i - growth), _until(i + growth + 1, rows)):
                     for n in range(_from(j - growth), _until(j + growth + 1, columns)):

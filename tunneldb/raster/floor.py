@@ -1,4 +1,4 @@
-"""Where the floor begins in the unrolled plane, along the tunnel, and where the water does."""
+"""Edges of the floor and of the water in the unrolled plane, along the tunnel."""
 
 from __future__ import annotations
 
@@ -10,28 +10,27 @@ from scipy import ndimage
 
 from tunneldb.arrays import Bool, Float, Int64
 
-HIDDEN = 25
-"""So many metres of ground may be hidden by what stands on it, and the floor goes on beneath."""
+MAX_HIDDEN_LENGTH = 25
+"""Length of hidden ground over which the floor continues, m."""
 
 FLOOR_EDGE = 0.02
-"""So much of the wall above the floor goes with it, m: its foot, found from points of survey density, is known no better."""
+"""Height of the wall above the floor that counts as floor, m: its foot, from survey-density points, is no more accurate."""
 
 
 @dataclass(frozen=True)
 class Floor:
-    """Where the floor begins, on both sides, each metre along the tunnel: at the foot of the walls, or at the water.
+    """Edges of the floor on both sides, each metre along the tunnel: at the foot of the walls, or at the water.
 
-    All that lies beyond, rails or whatever stands there, belongs to it. Where the tunnel has no ground and no water that is
-    known nothing does.
+    Everything beyond belongs to the floor, rails and objects included. Without a known ground or water there is no floor.
 
     Attributes
     ----------
     start : int
         Chainage of the first place, m.
     left, right : (k,) float arrays
-        Arc at which the floor begins at each metre from there on, m; infinite where it doesn't.
+        Arc of the floor's edge at each metre from there, m; infinite without one.
     water_left, water_right : (k,) float arrays
-        The same of the water, under which the laser sees nothing.
+        Arc of the water's edge likewise; the laser sees nothing under water.
     """
 
     start: int
@@ -49,9 +48,9 @@ class Floor:
         start : int
             Chainage of the first place, m.
         left, right : (k,) float arrays
-            Arcs of the walls' feet at each metre from there on, m, NaN for none.
+            Arcs of the walls' feet at each metre from there, m, NaN for none.
         water : two (k,) float arrays, optional
-            Arcs at which the water begins, left and right, NaN for none.
+            Arcs of the water's edges, left and right, NaN for none.
         """
         left, right = _bridged(left), _bridged(right)
         none = np.isnan(left), np.isnan(right)
@@ -63,12 +62,12 @@ class Floor:
         return cls(start, np.maximum(left, water_left), np.minimum(right, water_right), water_left, water_right)
 
     def bounds(self, chainage: Float) -> tuple[Float, Float]:
-        """Arc at which the floor begins on the left and on the right, m."""
+        """Return the arcs of the floor's left and right edges, m."""
         row = self._row(chainage)
         return self.left[row], self.right[row]
 
     def waterline(self, chainage: Float) -> tuple[Float, Float]:
-        """Arc at which the water begins on the left and on the right, m; infinite where there is none that is known."""
+        """Return the arcs of the water's left and right edges, m; infinite if not known."""
         row = self._row(chainage)
         return self.water_left[row], self.water_right[row]
 
@@ -77,23 +76,23 @@ class Floor:
         return np.clip(np.rint(place - self.start).astype(np.int64), 0, len(self.left) - 1)
 
     def covers(self, chainage: Float, arc: Float, above: float = 0.0) -> Bool:
-        """Tell which places in the unrolled plane are floor, or wall so far ``above`` it; arrays that broadcast, m."""
+        """Return True for places on the floor, or on the wall up to ``above`` it; arrays that broadcast, m."""
         left, right = self.bounds(chainage)
         with np.errstate(invalid="ignore"):
             return np.asarray((arc <= left + above) | (arc >= right - above), dtype=np.bool_)
 
 
 def _steady(arcs: Float) -> Float:
-    """Arcs of the foot, no more than FLOOR_EDGE beyond those beside: of a section measured off the wall arcs are longer."""
+    """Limit arcs of the foot to FLOOR_EDGE beyond their neighbours: a section measured off the wall has longer arcs."""
     beside = ndimage.minimum_filter1d(arcs, 3, mode="nearest")
     return np.minimum(arcs, beside + FLOOR_EDGE)
 
 
 def _bridged(arcs: Float) -> Float:
-    """Fill gaps of up to HIDDEN metres between places."""
+    """Fill gaps of up to MAX_HIDDEN_LENGTH metres between places."""
     out = arcs.copy()
     known = np.flatnonzero(np.isfinite(arcs))
     for before, after in pairwise(known.tolist()):
-        if after - before <= HIDDEN:
+        if after - before <= MAX_HIDDEN_LENGTH:
             out[before : after + 1] = np.linspace(arcs[before], arcs[after], after - before + 1)
     return out

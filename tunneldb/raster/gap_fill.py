@@ -1,7 +1,7 @@
-"""Gaps between profiles, closed in what is only looked at: previews, the lining in QGIS and in the report.
+"""Gaps between profiles, filled for display only: previews, the lining in QGIS and in the report.
 
-Where profiles lie far apart, an image has gaps between them. A pixel without a point takes the value of the nearest one within
-0.3 m, so that profiles up to 0.6 m apart join. Nobody measured there: what is filled says so, and nothing is computed from it.
+If profiles are far apart, an image has gaps between them. A pixel without a point takes the value of the nearest one within
+0.3 m, so that profiles up to 0.6 m apart join. Filled values are marked, and nothing is computed from them.
 """
 
 from __future__ import annotations
@@ -13,38 +13,38 @@ from scipy import ndimage
 
 from tunneldb.arrays import Single
 
-FILL = 0.3
-"""Gaps are filled from values at most so far away, m."""
+MAX_FILL_DISTANCE = 0.3
+"""Maximum distance of the value used to fill a gap, m."""
 
-TOLD = f"gaps up to {2 * FILL:g} m filled"
-"""How an image says it."""
+FILL_NOTE = f"gaps up to {2 * MAX_FILL_DISTANCE:g} m filled"
+"""Note on a filled image."""
 
 
 def fill_gaps(values: Single, reach: float) -> Single:
-    """Give pixels without a value, NaN, that of the nearest one within ``reach`` pixels."""
+    """Fill pixels without a value, NaN, with that of the nearest one within ``reach`` pixels."""
     empty = np.isnan(values)
     if empty.all() or not empty.any():
         return values
     distance, (row, column) = ndimage.distance_transform_edt(empty, return_indices=True)
     filled = values[row, column]
-    filled[distance > reach + 1e-6] = np.nan  # 0.3 m may be a hair less than three pixels of 0.1 m
+    filled[distance > reach + 1e-6] = np.nan  # 0.3 m may be slightly less than three pixels of 0.1 m
     return np.asarray(filled, dtype=np.float32)
 
 
 def fill_blocks(blocks: Iterable[tuple[int, Single]], reach: float) -> Iterator[tuple[int, Single]]:
-    """Fill the gaps of blocks of columns one after another, also those that a border between two of them crosses.
+    """Fill the gaps of consecutive blocks of columns, including gaps across a border between two of them.
 
     Parameters
     ----------
     blocks : iterable of (int, (rows, columns) float32 array)
-        First column and values of each block, in growing order; they need not touch. All have the same rows.
+        First column and values of each block, in increasing order, not necessarily adjacent. All have the same rows.
     reach : float
-        As in :func:`fill_gaps`, pixels.
+        Maximum distance as in :func:`fill_gaps`, pixels.
 
     Yields
     ------
     (int, (rows, columns) float32 array)
-        The same blocks, filled; three of them lie in memory.
+        The same blocks, filled; three of them are in memory.
     """
     edge = int(np.ceil(reach))
     before: tuple[int, Single] | None = None
@@ -60,7 +60,7 @@ def fill_blocks(blocks: Iterable[tuple[int, Single]], reach: float) -> Iterator[
 def _filled(
     before: tuple[int, Single] | None, here: tuple[int, Single], after: tuple[int, Single] | None, edge: int, reach: float
 ) -> Single:
-    """Fill a block, knowing so many columns of those beside it if they touch it."""
+    """Fill a block, with some columns of its neighbours if they are adjacent."""
     column, values = here
     parts, left = [values], 0
     if before is not None and before[0] + before[1].shape[1] == column:

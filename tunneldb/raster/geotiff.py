@@ -18,23 +18,23 @@ from tunneldb.compiled import kernel
 from tunneldb.errors import UserError
 
 KINDS = ("raw", "corrected", "offset")
-"""What the images of a kilometre show: raw and corrected intensity (dB), offset from the surface (m)."""
+"""Kinds of the images of a kilometre: raw and corrected intensity (dB), offset from the surface (m)."""
 
 DEVIATION_KINDS = {
     "lining": "deviation_lining",
     "shotcrete": "deviation_shotcrete",
     "excavation": "deviation_excavation",
 }
-"""Images of the deviation (m) from the design profiles of each layer, which are there where they were asked for."""
+"""Images of the deviation (m) from the design profiles of each layer, if computed."""
 
 CHANGE = "change"
-"""Image of the change (m) since an older survey, positive inwards, which is there where two surveys were compared."""
+"""Image of the change (m) since an older survey, positive inwards, if two surveys were compared."""
 
 STEP = {
     "raw": 0.01, "corrected": 0.01, "offset": 0.001, "state": 1.0, CHANGE: 1e-4, "lod": 1e-4,
     **dict.fromkeys(DEVIATION_KINDS.values(), 0.001),
 }  # fmt: skip
-"""Value of one step of the stored whole numbers: dB, dB, m, of the state of pixels itself, m."""
+"""Size of one stored step: dB, dB, m; of the state of pixels itself, m."""
 
 UNIT = {
     "raw": "dB", "corrected": "dB", "offset": "m", "state": "", CHANGE: "m", "lod": "m",
@@ -46,7 +46,7 @@ NODATA = -32768
 
 @dataclass(frozen=True)
 class Raster:
-    """Values of an image, NaN where there is no point, and where they lie.
+    """Values of an image, NaN without a point, and their position.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Raster:
     transform: Affine
 
     def places(self) -> tuple[Float, Float]:
-        """Chainage of the columns and arc of the rows, middles, m."""
+        """Return the chainage of the columns and the arc of the rows, middles, m."""
         rows, columns = self.values.shape
         place = self.transform
         chainage = np.asarray(place.c + (np.arange(columns) + 0.5) * place.a, dtype=np.float64)
@@ -68,7 +68,7 @@ class Raster:
 
 
 def whole(values: Single, kind: str) -> Int16:
-    """Values (rows, columns) in steps of :data:`STEP`, NODATA for NaN."""
+    """Convert values (rows, columns) to steps of :data:`STEP`, NODATA for NaN."""
     steps = np.empty(values.shape, np.int16)
     _whole(np.ascontiguousarray(values), 1.0 / STEP[kind], steps)
     return steps
@@ -77,7 +77,7 @@ def whole(values: Single, kind: str) -> Int16:
 def encode(raster: Raster, kind: str) -> bytes:
     """Write an image as a GeoTIFF of 16-bit whole numbers, with its scale, unit and nodata value.
 
-    Measured noise fills the lowest bits: what is quick makes no larger files, and differences of neighbours do.
+    The lowest bits are measured noise: fast compression is as good as slow, and differences of neighbours help.
     """
     rows, columns = raster.values.shape
     profile: dict[str, Any] = {
@@ -105,12 +105,12 @@ def encode(raster: Raster, kind: str) -> bytes:
 def decode(tiff: bytes) -> Raster:
     """Read an image that :func:`encode` wrote.
 
-    Bytes of another origin, as of an archive, are taken as GeoTIFF alone: a VRT would have GDAL read other files.
+    Bytes of other origin, for example from an archive, are read as GeoTIFF only: a VRT could make GDAL read other files.
 
     Raises
     ------
     UserError
-        If it is none.
+        If it is not a GeoTIFF.
     """
     with warnings.catch_warnings(), _told():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)
@@ -125,11 +125,11 @@ def _told() -> Iterator[None]:
     try:
         yield
     except RasterioIOError as error:
-        raise UserError(f"an image in the database is no GeoTIFF, run stage detect again: {error}") from error
+        raise UserError(f"an image in the database is not a GeoTIFF; run stage detect again: {error}") from error
 
 
 def laid(raster: Raster, like: Raster) -> Single:
-    """Values of a block in the rows of another one with the same pixels."""
+    """Return the values of a block in the rows of another one with the same pixels."""
     down = round((like.transform.f - raster.transform.f) / like.transform.a)
     values = np.full((len(like.values), raster.values.shape[1]), np.nan, np.float32)
     rows = slice(max(down, 0), min(down + len(raster.values), len(values)))
@@ -144,6 +144,6 @@ def _whole(values: Single, per_step: float, steps: Int16) -> None:  # pragma: no
             step = np.rint(values[i, j] * per_step)
             if step > 32767.0:
                 step = 32767.0
-            elif not step > NODATA:  # also where it is NaN
+            elif not step > NODATA:  # also if it is NaN
                 step = NODATA + 1.0 if step <= NODATA else float(NODATA)
             steps[i, j] = np.int16(step)

@@ -1,4 +1,4 @@
-"""Grey in which intensity is drawn."""
+"""Grey scale of intensity images."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from tunneldb.arrays import Float, Single
 
 
 def grey_range(values: Float | Single) -> tuple[float, float]:
-    """Return the intensities, dB, that are drawn black and white, for a sample of all, dB.
+    """Return the intensities, dB, for black and white, from a sample of all values, dB.
 
-    The lining, which is most of an image, becomes a light grey, and a leak, darker by some decibels, stands out from its
-    noise and from soot: black is the 2 % quantile or lower, at least 4 dB below the median; white 98 %, at least 1.6 dB
-    above it.
+    The lining, most of an image, becomes light grey, so that a leak, darker by some decibels, stands out from noise and soot.
+    Black is the 2 % quantile or lower, at least 4 dB below the median; white is the 98 % quantile or higher, at least 1.6 dB
+    above the median.
     """
     if not len(values):
         return 0.0, 1.0

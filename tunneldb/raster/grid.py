@@ -15,7 +15,7 @@ BLOCK = 50.0
 """Length of a block of the image along the tunnel, m."""
 
 BLOCKS = round(KILOMETRE / BLOCK)
-"""Blocks of a kilometre."""
+"""Number of blocks of a kilometre."""
 
 
 class PixelGrid:
@@ -52,7 +52,7 @@ class PixelGrid:
 
     @property
     def inner(self) -> slice:
-        """Columns that are judged; the others are those by which they are."""
+        """Columns with results; the others only provide context."""
         return slice(0, self.columns)
 
     @property
@@ -61,35 +61,35 @@ class PixelGrid:
         return self.first_column * self.pixel
 
     def transform(self, column: int = 0) -> Affine:
-        """Transform from pixels, counted from a column, to unrolled coordinates."""
+        """Return the transform from pixels, counted from a column, to unrolled coordinates."""
         return Affine(
             self.pixel, 0.0, self.west + column * self.pixel, 0.0, -self.pixel, (self.bottom + self.rows) * self.pixel
         )
 
     def place(self, chainage: Float, arc: Float) -> tuple[Int32, Int32]:
-        """Row and column of places (n,) in the unrolled plane, m; column -1 outside the grid."""
+        """Return row and column of places (n,) in the unrolled plane, m; column -1 outside the grid."""
         with np.errstate(invalid="ignore"):
             column = np.floor((chainage - self.west) / self.pixel)
             row = self.rows - 1 - (np.floor(arc / self.pixel) - self.bottom)
-            held = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
-        return np.where(held, row, 0).astype(np.int32), np.where(held, column, -1).astype(np.int32)
+            selected = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
+        return np.where(selected, row, 0).astype(np.int32), np.where(selected, column, -1).astype(np.int32)
 
     def pick(self, mask: Bool, chainage: Float, arc: Float) -> Bool:
-        """Value of a mask (rows, columns) at places (n,) in the unrolled plane; False outside the grid."""
+        """Return the values of a mask (rows, columns) at places (n,) in the unrolled plane; False outside the grid."""
         row, column = self.place(chainage, arc)
         return np.asarray((column >= 0) & mask[row, column], dtype=np.bool_)
 
 
 @dataclass(frozen=True)
 class FaceGrid(PixelGrid):
-    """Pixels of one face, all of which are judged.
+    """Pixels of one face, all with results.
 
     Attributes
     ----------
     pixel, bottom, rows
-        As of any grid.
+        As for any grid.
     left, width : int
-        Number of the first column, counted from where the first coordinate is 0, and how many there are.
+        Number of the first column, counted from where the first coordinate is 0, and number of columns.
     """
 
     pixel: float
@@ -113,9 +113,9 @@ class FaceGrid(PixelGrid):
 class Grid(PixelGrid):
     """Pixels of one kilometre in the unrolled plane: columns along the chainage, rows from the greatest arc.
 
-    With a halo the grid has a block more before the kilometre and one after it, so that pixels at its ends can be judged by
-    what lies about them. Rows and columns of the grids of all kilometres line up. Where a tunnel begins or ends within the
-    kilometre, the grid covers the blocks in which it lies.
+    With a halo the grid has one more block before and after the kilometre, as context for pixels at its ends. Rows and columns
+    of the grids of all kilometres are aligned. If a tunnel begins or ends within the kilometre, the grid covers only the blocks
+    of the tunnel.
 
     Attributes
     ----------
@@ -128,9 +128,9 @@ class Grid(PixelGrid):
     rows : int
         Number of rows.
     halo : int
-        Columns beyond each end of the kilometre that take points, at most a block; 0 for the kilometre alone.
+        Columns beyond each end of the kilometre that accept points, at most a block; 0 for the kilometre alone.
     covered : pair of int
-        The first block of the kilometre that is covered, and the one after the last.
+        First covered block of the kilometre, and one after the last.
     """
 
     km: int
@@ -150,15 +150,15 @@ class Grid(PixelGrid):
         halo: int = 0,
         chainages: tuple[float, float] = (-np.inf, np.inf),
     ) -> Grid:
-        """Make the grid that covers the given arcs, m, a halo, pixels, and the blocks between two chainages, m; all by default.
+        """Make the grid for the given arcs, m, a halo, pixels, and the blocks between two chainages, m; all by default.
 
         Raises
         ------
         UserError
-            If the pixel is smaller than 2 mm or doesn't divide 50 m.
+            If the pixel is smaller than 2 mm or does not divide 50 m.
         """
         if not pixel >= 0.002 or abs(BLOCK / pixel - round(BLOCK / pixel)) > 1e-6:
-            raise UserError(f"image.pixel must be at least 0.002 m and divide 50 m: {pixel:g} m does not")
+            raise UserError(f"image.pixel is {pixel:g} m; it must be at least 0.002 m and divide 50 m")
         bottom, top = int(np.floor(arc_min / pixel)), int(np.ceil(arc_max / pixel))
         west, east = np.array(chainages) / BLOCK - km * BLOCKS
         first = int(np.clip(np.floor(west), 0, BLOCKS - 1))
@@ -187,16 +187,16 @@ class Grid(PixelGrid):
 
     @property
     def inner(self) -> slice:
-        """Columns of the kilometre itself that are covered."""
+        """Covered columns of the kilometre itself."""
         return slice(self._ahead * self.block_columns, (self.blocks - self._ahead) * self.block_columns)
 
     @property
     def near(self) -> slice:
-        """Columns that take points: the kilometre's and those of the halo."""
+        """Columns that accept points: the kilometre's and those of the halo."""
         return slice(self.inner.start - self.halo, self.inner.stop + self.halo)
 
     def columns_between(self, low: float, high: float) -> slice:
-        """Columns that lie wholly between two chainages, m, which may be infinite."""
+        """Return the columns entirely between two chainages, m, which may be infinite."""
         first, stop = np.clip((np.array([low, high]) - self.west) / self.pixel, 0.0, self.columns)
         begin = int(np.ceil(first - 1e-6))
         return slice(begin, max(int(np.floor(stop + 1e-6)), begin))
@@ -217,9 +217,9 @@ class Grid(PixelGrid):
         return self.first_block * BLOCK
 
     def chainages(self, columns: slice) -> Float:
-        """Chainage of the centres of columns, m."""
+        """Return the chainage of the centres of columns, m."""
         return np.asarray(self.west + (np.arange(columns.start, columns.stop) + 0.5) * self.pixel)
 
     def arcs(self) -> Float:
-        """Arc of the centres of the rows, m."""
+        """Return the arc of the centres of the rows, m."""
         return np.asarray((self.bottom + self.rows - np.arange(self.rows) - 0.5) * self.pixel)

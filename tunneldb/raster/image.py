@@ -1,4 +1,4 @@
-"""What the image of a kilometre shows, pixel by pixel: state and corrected intensity, from its sums block by block."""
+"""State and corrected intensity of each pixel of a kilometre, from its sums block by block."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from tunneldb.raster.pixel_state import PixelState, pixel_states, reach
 from tunneldb.raster.profiles import ProfileGaps, farthest
 
 WET_EDGE = 3
-"""Pixels about a wet one that don't count as dry lining."""
+"""Number of pixels around a wet one that do not count as dry lining."""
 
 
 @dataclass(frozen=True)
 class LiningImage:
-    """State and intensity of all pixels of a kilometre and of those beyond its ends by which they are judged.
+    """State and intensity of all pixels of a kilometre and of the context beyond its ends.
 
     Attributes
     ----------
@@ -32,9 +32,9 @@ class LiningImage:
     state : (rows, columns) uint8 array
         Values of :class:`tunneldb.raster.pixel_state.PixelState`.
     level : (rows, columns) int16 array
-        Corrected intensity in steps of the stored image, NODATA where there is no point.
+        Corrected intensity in steps of the stored image, NODATA without a point.
     gaps : ProfileGaps or None
-        Gaps between profiles, in which ``state`` is that of the nearest profile; None where profiles lie as close as pixels.
+        Gaps between profiles, in which ``state`` is that of the nearest profile; None if profiles are as close as pixels.
     """
 
     grid: Grid
@@ -43,7 +43,7 @@ class LiningImage:
     gaps: ProfileGaps | None = None
 
     def measured(self) -> LiningImage:
-        """The same without what is taken from a profile nearby."""
+        """Return the same image without values taken from a nearby profile."""
         if self.gaps is None:
             return self
         between = (self.level == NODATA) & ((self.state == PixelState.LINING) | (self.state == PixelState.RECESS))
@@ -51,17 +51,17 @@ class LiningImage:
 
 
 def halo(pixel: float) -> int:
-    """Columns beyond the ends of a kilometre without whose points its own pixels would be judged otherwise."""
+    """Return the number of columns beyond the ends of a kilometre whose points affect its own pixels."""
     return _judged() + reach(pixel)
 
 
 def halo_of_profiles(pixel: float) -> int:
-    """As many for profiles as far apart as they may be: what is taken from the nearest one reaches farther."""
+    """Return the same for profiles at their maximum distance: values from the nearest profile reach farther."""
     return halo(pixel) + 2 * farthest(pixel)
 
 
 def _judged() -> int:
-    """Columns beyond the ends whose state counts: half a median filter about the wet pixels next to the last dry one."""
+    """Return the columns beyond the ends whose state matters: half a median filter around pixels next to the last dry one."""
     return MAX_MEDIAN // 2 + WET_EDGE
 
 
@@ -78,27 +78,27 @@ def lining_image(
     Parameters
     ----------
     image : Accumulator
-        The sums of all points.
+        Sums of all points.
     gaps : ProfileGaps or None
         Gaps between profiles that are to be closed.
     observer : Observer
-        Where the floor begins, and where the survey does and ends: beyond there is no lining.
+        Edges of the floor, and ends of the survey, beyond which there is no lining.
     outliers : SectionOutliers
-        Where the surface leaves the wall.
+        Places where the surface is off the wall.
     delta : float
-        Distance from the lining's plane from which a pixel is an appendage, m.
+        Distance from the lining's plane from which a pixel is a fixture, m.
     keep : callable
-        Takes the means of each block of the kilometre itself.
+        Receives the means of each block of the kilometre itself.
     """
     grid = image.grid
     state = np.full((grid.rows, grid.columns), PixelState.OFF, np.uint8)
     level = np.full((grid.rows, grid.columns), NODATA, np.int16)
     beyond = 0 if gaps is None else int(gaps.longest.max())
-    judged, about = min(_judged() + beyond, grid.halo), reach(grid.pixel) + beyond
+    verdicts, about = min(_judged() + beyond, grid.halo), reach(grid.pixel) + beyond
     inner = set(image.inner_blocks())
     for block in sorted({*image.blocks(), *_with_surface(grid, outliers.surface)}):
-        first = max(block * grid.block_columns, grid.inner.start - judged)
-        columns = slice(first, min((block + 1) * grid.block_columns, grid.inner.stop + judged))
+        first = max(block * grid.block_columns, grid.inner.start - verdicts)
+        columns = slice(first, min((block + 1) * grid.block_columns, grid.inner.stop + verdicts))
         if columns.start >= columns.stop:
             continue
         window = image.window(columns.start - about, columns.stop + about)
@@ -114,7 +114,7 @@ def lining_image(
 
 
 def _with_surface(grid: Grid, surface: Surface) -> range:
-    """Blocks in which the tunnel lies: what was not scanned there is unseen lining."""
+    """Return the blocks that contain the tunnel: unscanned parts of them are lining not inspected."""
     west, east = surface.chainages[[0, -1]] + (-surface.reach, surface.reach)
     first, last = np.floor((np.array([west, east]) - grid.west) / BLOCK).astype(int)
     return range(max(int(first), 0), min(int(last), grid.blocks - 1) + 1)

@@ -13,10 +13,10 @@ from tunneldb.arrays import Bool
 from tunneldb.raster.grid import PixelGrid
 
 SIMPLIFY = 0.75
-"""Tolerance of the simplification, pixels: enough to straighten the stairs of a slanting edge."""
+"""Tolerance of the simplification, pixels: enough to straighten the stairs of an oblique edge."""
 
-LEAST_HOLE = 0.01
-"""Smaller holes are closed, m²: noise makes some in weak leaks, and a patch of 10 cm is no place that stayed dry."""
+MIN_HOLE_AREA = 0.01
+"""Minimum area of holes that are kept, m²: noise makes smaller ones in weak leaks."""
 
 
 def outline(mask: Bool, column: int, row: int, pixel: float) -> Polygon:
@@ -25,7 +25,7 @@ def outline(mask: Bool, column: int, row: int, pixel: float) -> Polygon:
     Parameters
     ----------
     mask : (rows, columns) bool array
-        Its pixels, the first row at the lowest arc; they hang together by their sides.
+        Its pixels, the first row at the lowest arc; connected by their sides.
     column, row : int
         Chainage and arc of the mask's lowest corner, pixels.
     pixel : float
@@ -34,12 +34,12 @@ def outline(mask: Bool, column: int, row: int, pixel: float) -> Polygon:
     Returns
     -------
     Polygon
-        Of (chainage, arc), m; valid, exterior counter-clockwise.
+        Polygon of (chainage, arc), m; valid, exterior counter-clockwise.
     """
     image = np.ascontiguousarray(mask[::-1], dtype=np.uint8)
     ((shape, _),) = rasterio.features.shapes(image, mask=image.astype(bool), connectivity=4)
-    pixels = _straighten(_without_specks(shapely.geometry.shape(shape), LEAST_HOLE / pixel**2))
-    # Whole pixels to the last: the outline of a region must not depend on the kilometre that it lies in.
+    pixels = _straighten(_without_specks(shapely.geometry.shape(shape), MIN_HOLE_AREA / pixel**2))
+    # Whole pixels until the end: the outline of a region must not depend on its kilometre.
     corner, down = np.array([column, row + len(mask)]), np.array([1, -1])
     moved = shapely.transform(pixels, lambda at: (corner + np.round(at) * down) * pixel)
     return shapely.geometry.polygon.orient(shapely.normalize(moved))
@@ -50,13 +50,13 @@ def _without_specks(stairs: Polygon, least: float) -> Polygon:
 
 
 def _straighten(stairs: Polygon) -> Polygon:
-    """Simplify a polygon by less than the tolerance; one that would fall apart keeps its stairs."""
+    """Simplify a polygon by less than the tolerance; keep its stairs if it would fall apart."""
     simple = shapely.simplify(stairs, SIMPLIFY, preserve_topology=True)
     return simple if isinstance(simple, Polygon) and not simple.is_empty and simple.is_valid else stairs
 
 
 def mask_of_polygons(grid: PixelGrid, polygons: Sequence[Polygon]) -> Iterator[tuple[slice, Bool]]:
-    """Columns of each block that a polygon reaches, with a mask (rows, columns) of the pixels whose centres lie in one."""
+    """Yield the columns of each block that a polygon reaches, with a mask (rows, columns) of pixels with centres in one."""
     for start in range(0, grid.columns, grid.block_columns):
         columns = slice(start, start + grid.block_columns)
         transform, shape = grid.transform(start), (grid.rows, grid.block_columns)

@@ -1,4 +1,4 @@
-"""From scan files at full density to the sums of a kilometre's image."""
+"""Rasterise scan files at full density into the sums of a kilometre's image."""
 
 from __future__ import annotations
 
@@ -31,31 +31,31 @@ from tunneldb.threads import threads
 Counts = dict[str, Any]
 
 CHUNK = 50_000
-"""Points read at a time by one thread: a chunk of most LAZ files, and few enough to stay in the processor's cache."""
+"""Number of points read at a time by one thread: a chunk of most LAZ files, small enough for the processor's cache."""
 
 
 def rasterize(
     observer: Observer, files: list[ScanSource], image: Accumulator, roughness: float, progress: Callable[[float], None]
 ) -> Counts:
-    """Read the files and put their points into the image.
+    """Read the files and add their points to the image.
 
     Parameters
     ----------
     observer : Observer
-        The kilometre, and how its points are seen.
+        Kilometre, and the observation of its points.
     files : list of ScanSource
-        What to read.
+        Files to read.
     image : Accumulator
-        Gets the points.
+        Image that receives the points.
     roughness : float
-        Of the lining, degrees.
+        Roughness of the lining, degrees.
     progress : callable
-        Takes the share that is done, 0 to 0.9.
+        Called with the completed share, 0 to 0.9.
 
     Raises
     ------
     UserError
-        If a file can't be read, too much of the lining lies outside the reference curve, or no point lies on the lining.
+        If a file cannot be read, too much of the lining is outside the reference curve, or no point is on the lining.
     """
     total, read, used, lost = sum(file.points for file in files), 0, 0, 0
     span = RangeSpan()
@@ -92,7 +92,7 @@ def _chunks(files: list[ScanSource]) -> Iterator[Points]:
 
 @dataclass
 class Projector:
-    """What the kernel needs, prepared once for a kilometre; `project` takes chunk after chunk."""
+    """Input of the kernel, prepared once for a kilometre; `project` processes chunk after chunk."""
 
     shape: SurfaceArrays
     faces: EdgeArrays
@@ -103,7 +103,7 @@ class Projector:
 
     @classmethod
     def of(cls, observer: Observer, grid: Grid, roughness: float) -> Projector:
-        """Prepare it for an image; ``roughness`` in degrees."""
+        """Prepare the projector for an image; ``roughness`` in degrees."""
         s, edges, floor = observer.surface, observer.edges, observer.floor
         scanned = grid.columns_between(*observer.ends)
         return cls(
@@ -132,7 +132,7 @@ class Projector:
         )
 
     def project(self, points: Points) -> tuple[Pixels, ProjectionCounts]:
-        """Find the pixels of a chunk of points; what is returned is overwritten by the next chunk."""
+        """Find the pixels of a chunk of points; the result is overwritten by the next chunk."""
         if len(self.pixels.row) < len(points):
             self.pixels = Pixels.empty(len(points))
         tally = project(

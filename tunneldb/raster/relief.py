@@ -1,4 +1,4 @@
-"""Relief of the lining itself, by which it departs from the planes laid through it: rock, sprayed concrete, masonry."""
+"""Relief of the lining itself, its deviation from fitted planes: rock, sprayed concrete, masonry."""
 
 from __future__ import annotations
 
@@ -9,43 +9,43 @@ from tunneldb.arrays import Single
 from tunneldb.robust import MAD_TO_SIGMA
 
 STEP = 0.25
-"""Side of the tiles in which departures are summed up, m."""
+"""Side of the tiles over which deviations are summed, m."""
 
-AROUND = 2.0
-"""Departures of so much about a tile tell its relief, m: appendages cover less than half of that."""
+WINDOW = 2.0
+"""Distance around a tile that contributes to its relief, m: fixtures cover less than half of it."""
 
-LIMIT = 3.0
-"""Lining departs from its planes by no more than so many standard deviations."""
+LIMIT_SIGMAS = 3.0
+"""Standard deviations within which lining deviates from its planes."""
 
-MOST = 0.25
-"""What stands off by more is an appendage whatever the lining is, m: blasted rock departs by so much."""
+MAX_RELIEF = 0.25
+"""Maximum deviation of lining, m: blasted rock deviates by as much; beyond it a pixel is a fixture."""
 
 SAMPLES = 5
-"""Of the rows and columns of a tile about so many are looked at."""
+"""Approximate number of rows and columns of a tile that are sampled."""
 
 
 def reach(pixel: float) -> int:
-    """How far, in pixels, what tells the relief lies from a pixel at most."""
+    """Return the maximum distance, in pixels, of data that the relief at a pixel depends on."""
     tile, half = _sides(pixel)
     return (2 * half + 1) * tile
 
 
 def relief_limit(distance: Single, pixel: float, corner: tuple[int, int], least: float = 0.0) -> Single:
-    """By how much the lining departs from its planes about each pixel: LIMIT standard deviations, m, at most MOST.
+    """Return the limit of the lining's deviation from its planes around each pixel, LIMIT_SIGMAS deviations, m.
 
-    The median departure over the tiles about each one, times that of a normal distribution: less than half of the tiles may
-    show something else.
+    It is the median deviation over the tiles around each one, scaled as for a normal distribution: less than half of the tiles
+    may show something else.
 
     Parameters
     ----------
     distance : (rows, columns) float32 array
-        Distance from the planes, m; NaN where there is no point.
+        Distance from the planes, m; NaN without a point.
     pixel : float
         Side of a pixel, m.
     corner : (int, int)
-        Row and column of its first pixel in an image of which this is a part; tiles lie alike in all parts.
+        Row and column of its first pixel in a larger image; tiles are at the same places in all parts.
     least : float
-        What is less than this, m, need not be known: if all is, zeros are returned.
+        Limit below which values do not matter, m: if all are below, zeros are returned.
 
     Returns
     -------
@@ -62,16 +62,16 @@ def relief_limit(distance: Single, pixel: float, corner: tuple[int, int], least:
     ordered = np.sort(samples, axis=2)  # NaNs come last
     count = np.count_nonzero(~np.isnan(ordered), axis=2)
     median = np.take_along_axis(ordered, np.maximum(count - 1, 0)[:, :, None] // 2, axis=2)[:, :, 0]
-    about = _median_about(np.where(count > 0, median, np.nan), half, least / (LIMIT * MAD_TO_SIGMA))
-    limit = np.minimum(LIMIT * MAD_TO_SIGMA * about, MOST).astype(np.float32)
+    about = _median_about(np.where(count > 0, median, np.nan), half, least / (LIMIT_SIGMAS * MAD_TO_SIGMA))
+    limit = np.minimum(LIMIT_SIGMAS * MAD_TO_SIGMA * about, MAX_RELIEF).astype(np.float32)
     whole = np.repeat(np.repeat(limit, tile, axis=0), tile, axis=1)
     return np.asarray(whole[top : top + rows, left : left + columns])
 
 
 def _median_about(values: Single, half: int, least: float) -> Single:
-    """Median of the tiles about each one; of unknown ones the nearest that is known counts, if it is about them.
+    """Return the median of the tiles around each one; unknown tiles use the nearest known one, if it is close enough.
 
-    Zeros if no median is greater than the least: smooth lining is most of all that there is, and medians take long.
+    Zeros if no median is greater than ``least``: most lining is smooth, and medians are slow.
     """
     known = np.isfinite(values)
     if not known.any():
@@ -85,5 +85,5 @@ def _median_about(values: Single, half: int, least: float) -> Single:
 
 
 def _sides(pixel: float) -> tuple[int, int]:
-    """Side of a tile, pixels, and tiles to either side of one."""
-    return max(1, round(STEP / pixel)), max(1, round(AROUND / STEP))
+    """Return the side of a tile, pixels, and the number of tiles to either side."""
+    return max(1, round(STEP / pixel)), max(1, round(WINDOW / STEP))

@@ -1,4 +1,4 @@
-"""How coordinates of scans lie to those of others: control points and rigid motions."""
+"""Registration of scans to each other: control points and rigid motions."""
 
 import lazy_loader
 

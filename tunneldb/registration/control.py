@@ -1,4 +1,4 @@
-"""Target spheres against control points: which is which, how far apart they are, and the motion that would join them best."""
+"""Comparison of target spheres with control points: correspondences, distances, and the best rigid motion."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from scipy.spatial.transform import Rotation
 
 from tunneldb.arrays import Float, Int64
 
-WITHIN = 0.1
-"""A control point belongs to the sphere within this distance of it, by default, m."""
+MAX_DISTANCE = 0.1
+"""Default greatest distance between a control point and its sphere, m."""
 
-CONGRUENT = 0.02
-"""Distances between spheres and between control points that differ by no more may be the same distance, m."""
+MAX_DISTANCE_DIFFERENCE = 0.02
+"""Greatest difference between a distance of spheres and a distance of control points that are the same, m."""
 
-BASES = 3000  # pairs of spheres that are tried as a beginning, the longest first
+MAX_BASES = 3000  # pairs of spheres that are tried as a start, the longest first
 
-TURN_LIMIT = math.radians(1.0)
-"""A rotation about a line whose standard deviation is greater is not determined."""
+MAX_TURN_SIGMA = math.radians(1.0)
+"""Standard deviation of a rotation about a line above which the rotation is not determined."""
 
-LEAST_NOISE = 0.001  # m; residuals of a few points say little: no centre is taken to be known better
+MIN_NOISE = 0.001  # m; least standard deviation of a centre, since residuals of few points are uncertain
 
 
 @dataclass(frozen=True)
 class Match:
-    """Which sphere is which control point.
+    """Correspondence of spheres and control points.
 
     Attributes
     ----------
     pairs : (k, 2) int array
-        Numbers of sphere and control point, from 0.
+        Indices of sphere and control point, from 0.
     how : str
-        ``place`` (they lie near each other), ``distances`` (they don't, but their distances among themselves agree),
-        ``ambiguous`` (so, but in several ways) or ``none``.
+        ``place`` (they are near each other), ``distances`` (they are not, but their mutual distances agree),
+        ``ambiguous`` (mutual distances agree in several ways) or ``none``.
     """
 
     pairs: Int64
@@ -44,24 +44,24 @@ class Match:
 
 @dataclass(frozen=True)
 class Motion:
-    """Rigid motion q = rotation · (p − pivot) + pivot + shift that brings points nearest to others.
+    """Rigid motion q = rotation · (p − pivot) + pivot + shift that minimises the distances between points.
 
     Attributes
     ----------
     rotation : (3, 3) float64 array
     pivot, shift : (3,) float64 arrays
-        Centre of gravity of the points that were moved, and how far it moves, m.
+        Centre of gravity of the moved points, and its translation, m.
     angles : (3,) float64 array
-        Rotations about the x, the y and the z axis, one after the other, degrees.
+        Successive rotations about the x, y and z axes, degrees.
     rms_before, rms_after : float
         Root mean square distance of the pairs, m.
     freedom : int
-        Coordinates more than unknowns.
+        Number of coordinates minus number of unknowns.
     determined : str
-        ``all``; ``line`` (points on a line: the turn about it is not known, none is made), ``shift`` (one point: no
-        rotation is known).
+        ``all``; ``line`` (points on a line: the rotation about it is unknown and set to 0), ``shift`` (one point: the
+        rotation is unknown).
     turn_sigma : float
-        Standard deviation of the rotation that is least certain, degrees; NaN where it isn't determined.
+        Standard deviation of the least certain rotation, degrees; NaN if it isn't determined.
     """
 
     rotation: Float
@@ -75,23 +75,23 @@ class Motion:
     turn_sigma: float
 
     def apply(self, points: Float) -> Float:
-        """Points (n, 3) moved, m."""
+        """Return points (n, 3) moved, m."""
         moved: Float = (points - self.pivot) @ self.rotation.T + self.pivot + self.shift
         return moved
 
 
-def match(spheres: Float, control: Float, within: float = WITHIN) -> Match:
-    """Tell which sphere is which control point.
+def match(spheres: Float, control: Float, within: float = MAX_DISTANCE) -> Match:
+    """Find the correspondence of spheres and control points.
 
-    By place, if three pairs or all that there can be lie within the distance; the sum of distances is the least. Else by
-    congruence: distances do not change with the frame that they are measured in. Three pairs at least, and only one way.
+    By place, if three pairs, or all possible pairs, are within the distance; the sum of distances is minimal. Otherwise by
+    congruence: mutual distances do not depend on the frame. At least three pairs are required, and only one solution.
 
     Parameters
     ----------
     spheres, control : (n, 3) and (m, 3) float64 arrays
-        m.
+        Centres of spheres, and control points, m.
     within : float
-        m.
+        Greatest distance of a pair, m.
     """
     near = _by_place(spheres, control, within)
     if len(near) >= min(3, len(spheres), len(control)) and len(near):
@@ -105,7 +105,7 @@ def match(spheres: Float, control: Float, within: float = WITHIN) -> Match:
 
 
 def best_motion(points: Float, onto: Float) -> Motion:
-    """Rotation and shift, without scale, that bring points (n, 3) nearest to others (n, 3), n ≥ 1, by least squares.
+    """Return rotation and shift, without scale, from points (n, 3) to others (n, 3), n ≥ 1, by least squares.
 
     Source: Kabsch (1976), Acta Crystallographica A32; Umeyama (1991), IEEE PAMI 13(4), for the sign that rules out a mirror.
     """
@@ -117,11 +117,11 @@ def best_motion(points: Float, onto: Float) -> Motion:
     rotation = left @ sign @ right
     rms_before = _rms(onto - points)
     freedom = 3 * count - 6
-    noise = max(_rms(b - a @ rotation.T) * math.sqrt(count / max(freedom, 1)), LEAST_NOISE)
+    noise = max(_rms(b - a @ rotation.T) * math.sqrt(count / max(freedom, 1)), MIN_NOISE)
     across = float(np.linalg.svd(a, compute_uv=False)[1]) if count > 1 else 0.0
     if count == 1:
         determined, rotation, freedom = "shift", np.eye(3), 0
-    elif across == 0.0 or noise / across > TURN_LIMIT:
+    elif across == 0.0 or noise / across > MAX_TURN_SIGMA:
         determined, rotation, freedom = "line", _turn(_direction(a), _direction(b), a, b), 3 * count - 5
     else:
         determined = "all"
@@ -132,7 +132,7 @@ def best_motion(points: Float, onto: Float) -> Motion:
 
 
 def _by_place(spheres: Float, control: Float, within: float) -> Int64:
-    """Pairs within a distance; those that lie farther apart cost the same as being left alone."""
+    """Return the pairs within a distance; a pair farther apart costs the same as two unpaired points."""
     if len(spheres) == 0 or len(control) == 0:
         return np.zeros((0, 2), np.int64)
     gap = np.linalg.norm(spheres[:, None] - control[None], axis=2)
@@ -142,7 +142,7 @@ def _by_place(spheres: Float, control: Float, within: float) -> Int64:
 
 
 def _by_distances(spheres: Float, control: Float) -> tuple[Int64, int]:
-    """Largest set of pairs whose distances agree, and in how many ways one as large can be had (0: none of three)."""
+    """Return the largest set of pairs whose distances agree, and the number of sets of that size (0: no three agree)."""
     if min(len(spheres), len(control)) < 3:
         return np.zeros((0, 2), np.int64), 0
     ours = np.linalg.norm(spheres[:, None] - spheres[None], axis=2)
@@ -152,12 +152,12 @@ def _by_distances(spheres: Float, control: Float) -> tuple[Int64, int]:
     begins, ends = begins[order], ends[order]
     length = theirs[begins, ends]
     i, j = np.triu_indices(len(spheres), 1)
-    longest = np.argsort(-ours[i, j], kind="stable")[:BASES]
+    longest = np.argsort(-ours[i, j], kind="stable")[:MAX_BASES]
     best: dict[tuple[tuple[int, int], ...], Int64] = {}
     size = 2
     for base in longest:
         one, two = int(i[base]), int(j[base])
-        low, high = np.searchsorted(length, ours[one, two] + np.array([-CONGRUENT, CONGRUENT]))
+        low, high = np.searchsorted(length, ours[one, two] + np.array([-MAX_DISTANCE_DIFFERENCE, MAX_DISTANCE_DIFFERENCE]))
         for other in range(low, high):
             pairs = _grow(spheres, control, ours, theirs, (one, two), (int(begins[other]), int(ends[other])))
             if len(pairs) < max(size, 3):
@@ -174,36 +174,36 @@ def _by_distances(spheres: Float, control: Float) -> tuple[Int64, int]:
 
 
 def _grow(spheres: Float, control: Float, ours: Float, theirs: Float, base: tuple[int, int], onto: tuple[int, int]) -> Int64:
-    """Pairs that agree with two of them: a third by its distances from both, then all that the motion brings together."""
+    """Return the pairs that agree with two given ones: a third by its distances, then all that the motion brings together."""
     best = np.zeros((0, 2), np.int64)
-    fits = (np.abs(ours[base[0]][:, None] - theirs[onto[0]][None]) <= CONGRUENT) & (
-        np.abs(ours[base[1]][:, None] - theirs[onto[1]][None]) <= CONGRUENT
+    fits = (np.abs(ours[base[0]][:, None] - theirs[onto[0]][None]) <= MAX_DISTANCE_DIFFERENCE) & (
+        np.abs(ours[base[1]][:, None] - theirs[onto[1]][None]) <= MAX_DISTANCE_DIFFERENCE
     )
     fits[list(base)] = False
     fits[:, list(onto)] = False
     for third, point in np.argwhere(fits):
         if len(best) and (best == [third, point]).all(axis=1).any():
-            continue  # already among those that an earlier third brought
+            continue  # already in a set found from an earlier third pair
         motion = best_motion(spheres[[*base, third]], control[[*onto, point]])
-        if motion.rms_after > CONGRUENT:
+        if motion.rms_after > MAX_DISTANCE_DIFFERENCE:
             continue
-        pairs = _by_place(motion.apply(spheres), control, 2.0 * CONGRUENT)
+        pairs = _by_place(motion.apply(spheres), control, 2.0 * MAX_DISTANCE_DIFFERENCE)
         if len(pairs) >= 3:
             refined = best_motion(spheres[pairs[:, 0]], control[pairs[:, 1]])
-            pairs = _by_place(refined.apply(spheres), control, 2.0 * CONGRUENT)
+            pairs = _by_place(refined.apply(spheres), control, 2.0 * MAX_DISTANCE_DIFFERENCE)
         if len(pairs) > len(best):
             best = pairs
     return best
 
 
 def _direction(centred: Float) -> Float:
-    """Direction (3,) of the line that points (n, 3) about their middle lie along."""
+    """Return the direction (3,) of a line through centred points (n, 3)."""
     direction: Float = np.linalg.svd(centred)[2][0]
     return direction
 
 
 def _turn(one: Float, other: Float, a: Float, b: Float) -> Float:
-    """Least rotation that brings one direction to another, in the sense in which the points run."""
+    """Return the least rotation from one direction to another, with the same order of the points."""
     if float((a @ one) @ (b @ other)) < 0.0:
         other = -other
     axis = np.cross(one, other)

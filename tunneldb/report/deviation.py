@@ -17,7 +17,7 @@ from psycopg.rows import dict_row
 from tunneldb.arrays import Single, UInt8
 from tunneldb.export.images.preview import shrink
 from tunneldb.measures.deviation.rows import layers_held
-from tunneldb.raster.gap_fill import FILL, fill_gaps
+from tunneldb.raster.gap_fill import MAX_FILL_DISTANCE, fill_gaps
 from tunneldb.raster.geotiff import DEVIATION_KINDS
 from tunneldb.raster.grid import BLOCK
 from tunneldb.report.data import label_chainages
@@ -212,7 +212,7 @@ class DeviationChapter:
             down, along = round((top - north) / side), (number - first) * columns
             canvas[down : down + len(values), along : along + columns] = values[:, :columns]
         held = np.flatnonzero(np.isfinite(canvas).any(axis=1))
-        canvas = fill_gaps(canvas[held[0] : held[-1] + 1] if len(held) else canvas[:1], FILL / side)
+        canvas = fill_gaps(canvas[held[0] : held[-1] + 1] if len(held) else canvas[:1], MAX_FILL_DISTANCE / side)
         out = io.BytesIO()
         Image.fromarray(_colours(canvas, self.limit)).save(out, self._form, quality=QUALITY[self._form])
         labels = label_chainages(self._conn, self._survey, [first * BLOCK, (first + count) * BLOCK])

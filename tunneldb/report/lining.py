@@ -16,7 +16,7 @@ from scipy import ndimage
 from tunneldb.anomalies.threshold import filter_size, seen_lining
 from tunneldb.anomalies.windows import on_lining
 from tunneldb.arrays import Bool, Intp, Single, UInt8
-from tunneldb.raster.gap_fill import FILL, fill_gaps
+from tunneldb.raster.gap_fill import MAX_FILL_DISTANCE, fill_gaps
 from tunneldb.raster.geotiff import Raster, decode
 from tunneldb.raster.grey import grey_range
 from tunneldb.raster.grid import BLOCK
@@ -174,7 +174,7 @@ class Lining:
 
     def _offset(self, window: Window, side: float) -> Single:
         """Offset of a window, m, NaN for none, with gaps filled from what lies in it and about it."""
-        edge = int(np.ceil(FILL / side))
+        edge = int(np.ceil(MAX_FILL_DISTANCE / side))
         about = Window(*(end + way * edge * side for end, way in zip(astuple(window), (-1, 1, -1, 1), strict=True)))
         sums = np.zeros((2, round(about.height / side), round(about.width / side)), np.float32)
         for number in range(int(np.floor(about.west / BLOCK)), int(np.ceil(about.east / BLOCK))):
@@ -184,7 +184,7 @@ class Lining:
             place = _Place.of(block, np.zeros(block.state.shape, np.bool_), about, side)
             if place is not None:
                 sums[:, *place.there] += place.sums()[:2]
-        return fill_gaps(_ratio(sums[1], sums[0]), FILL / side)[edge:-edge, edge:-edge]
+        return fill_gaps(_ratio(sums[1], sums[0]), MAX_FILL_DISTANCE / side)[edge:-edge, edge:-edge]
 
     def _block(self, number: int) -> _Block:
         if number in self._kept:

@@ -18,7 +18,7 @@ from tunneldb.database import snapshot
 from tunneldb.errors import NotReadyError
 from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, STATES, UNCOUNTED
 from tunneldb.export.tables.leaks import clock_label
-from tunneldb.raster.gap_fill import TOLD
+from tunneldb.raster.gap_fill import FILL_NOTE
 from tunneldb.report import data, text
 from tunneldb.report.change import CHANGE_WORDS, read_change
 from tunneldb.report.clearance import read_clearance
@@ -263,7 +263,7 @@ class _Report:
             "kilometres": self._kilometres(),
             "files": data.read_files(conn, survey, low, high),
             "remarks": read_remarks(conn, survey, low, high),
-            "filled": TOLD,
+            "filled": FILL_NOTE,
             "stale": text.stale(data.read_stale(conn, survey, low, high)),
             "runs": runs,
             "versions": text.versions(runs),

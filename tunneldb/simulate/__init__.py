@@ -1,4 +1,4 @@
-"""Synthetic laser-scanned tunnels with truth, for the demo, tests and benchmarks.
+"""Synthetic laser-scanned tunnels with reference data, for the demo, tests and benchmarks.
 
 >>> from tunneldb.simulate import Parameters, Simulation, simulate
 >>> cloud = simulate(Parameters(length=30, radius=300, scanner="profiler", profile_spacing=0.2, leaks=2))

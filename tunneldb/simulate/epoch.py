@@ -1,4 +1,4 @@
-"""A later scan of the same tunnel: other noise, leaks grown, dried and new, lining that moved, and an error of the poses."""
+"""Later scan of the same tunnel: other noise, grown, dried and new leaks, deformed lining, and pose errors."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 if TYPE_CHECKING:
     from tunneldb.simulate.parameters import Parameters
 
-GROWN = 2.0
-"""Area of a leak that grew, over what it was."""
+GROWTH_RATIO = 2.0
+"""Ratio of the area of a grown leak to its former area."""
 
 WALL = (0.55, 0.7), (0.35, 0.75)
-"""Where the wall moves: shares of the length, and of the arc from the crown to the floor on the right."""
+"""Moved part of the wall: shares of the length, and of the arc from the crown to the floor on the right."""
 
 RING = 0.3
-"""Where the ring is squeezed: share of the length at which it begins; it is as long as the rings, or 1.5 m."""
+"""Start of the squeezed ring, as a share of the length; it is as long as a ring, or 1.5 m."""
 
 BULGE = 1.0
 """Side of a bulge, m."""
 
 _RING = 1.5  # m
-_APART = 0.5  # m between the faces of the lining and what hangs on it and moves with it
+_FIXTURE_MARGIN = 0.5  # m between the lining and fixtures that move with it
 _DEGREES = 2.0  # order of an ovalisation
 
 
 @dataclass(frozen=True)
 class Deformation:
-    """Lining that moved: outline in the unrolled plane (m), kind (wall, ring, bulge), and its greatest change, m inwards."""
+    """Deformed lining: outline in the unrolled plane (m), kind (wall, ring, bulge), and greatest change, m inwards."""
 
     outline: Polygon
     kind: str
@@ -45,21 +45,21 @@ class Deformation:
 
 @dataclass(frozen=True)
 class Epoch:
-    """What became of a tunnel until a later scan."""
+    """State of a tunnel at a later scan."""
 
     parameters: Parameters
     tunnel: Tunnel
     deformations: list[Deformation]
 
     def moved(self, xyz: Float, chainage: Float, arc: Float, offset: Float) -> tuple[Float, Float]:
-        """Points (n, 3) as they lie now and as the scan places them, in the tunnel's local frame, and their offset now."""
+        """Return points (n, 3) at the later scan as they are and as placed by it, in the local frame, and their offset."""
         p, tunnel = self.parameters, self.tunnel
-        change = np.where(np.abs(offset) < _APART, self.change(chainage, arc), 0.0)
+        change = np.where(np.abs(offset) < _FIXTURE_MARGIN, self.change(chainage, arc), 0.0)
         frame = tunnel.line.frame(chainage)
         normal = np.asarray(tunnel.section.point(arc)[1])  # right and up, into the tunnel
         xyz = xyz + change[:, None] * (normal[:, :1] * frame.u + normal[:, 1:] * frame.w)
         if p.pose_error or p.pose_turn:
-            # A shift that wanders about the true place, and turns the scan by no more than asked; and a turn about the axis.
+            # A shift that varies around the true place, with limited rotation of the scan, and a rotation about the axis.
             turn = math.radians(p.pose_turn)
             phase = (chainage - tunnel.line.start) * (turn / p.pose_error if p.pose_error else 0.0)
             away = xyz - (frame.position - tunnel.line.origin)
@@ -70,13 +70,13 @@ class Epoch:
         return xyz, offset + change
 
     def change(self, chainage: Float, arc: Float) -> Float:
-        """Movement of the lining along its normal, m, positive inwards."""
+        """Return the movement of the lining along its normal, m, positive inwards."""
         change = np.zeros(len(chainage))
         for one in self.deformations:
             west, south, east, north = one.outline.bounds
             held = (chainage >= west) & (chainage < east) & (arc >= south) & (arc < north)
             if one.kind == "ring":
-                # Both walls come nearer, and the crown rises, by half of what the width loses.
+                # Both walls move inwards, and the crown rises, by half of the loss of width.
                 angle = arc[held] / self.parameters.section_radius
                 change[held] -= one.change * np.cos(_DEGREES * angle)
             else:
@@ -85,7 +85,7 @@ class Epoch:
 
 
 def epoch(parameters: Parameters, tunnel: Tunnel) -> Epoch | None:
-    """What became of the lining; None of the first scan."""
+    """Return the changes of the lining; None for the first scan."""
     p, line, edge = parameters, tunnel.line, tunnel.section.floor_arc
     if not p.epoch:
         return None
@@ -99,7 +99,7 @@ def epoch(parameters: Parameters, tunnel: Tunnel) -> Epoch | None:
         west = line.start + round(RING * length / ring) * ring
         found.append(Deformation(box(west, -edge, west + ring, edge), "ring", p.squeezed_ring / 2.0))
     for k in range(p.bulges):
-        # Evenly along the tunnel, by turns left, above and right of it, out of the wall's way.
+        # Evenly along the tunnel, alternately left, above and right, away from the moved wall.
         west = line.start + (k + 0.5) * length / p.bulges - BULGE / 2.0
         arc = (-0.5, 0.0, 0.3)[k % 3] * edge
         found.append(Deformation(box(west, arc, west + BULGE, arc + BULGE), "bulge", p.bulge))
@@ -107,7 +107,7 @@ def epoch(parameters: Parameters, tunnel: Tunnel) -> Epoch | None:
 
 
 def leaks_since(parameters: Parameters, tunnel: Tunnel, room: Room, leaks: list[Leak]) -> list[Leak]:
-    """Leaks of a later scan: the largest grow, the smallest dry up, and new ones have numbers of their own."""
+    """Return the leaks of a later scan: the largest grow, the smallest dry up, and new ones get new numbers."""
     p = parameters
     by_size = [leak.id for leak in sorted(leaks, key=lambda leak: -leak.area)]
     grown, dried = by_size[: p.grown_leaks], by_size[len(by_size) - p.dried_leaks :]
@@ -119,7 +119,7 @@ def leaks_since(parameters: Parameters, tunnel: Tunnel, room: Room, leaks: list[
 
 
 def _grown(leak: Leak, limit: float) -> Leak:
-    side = math.sqrt(GROWN)
+    side = math.sqrt(GROWTH_RATIO)
     outline = affinity.scale(leak.polygon, side, side).intersection(
         box(leak.polygon.bounds[0] - 100.0, -limit, leak.polygon.bounds[2] + 100.0, limit)
     )

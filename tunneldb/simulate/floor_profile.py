@@ -1,4 +1,4 @@
-"""Cross profile of the floor over the flat floor of the section: camber, walkway, kerb, second carriageway."""
+"""Cross profile of the floor above the flat floor of the section: camber, walkway, kerb, second carriageway."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ WALKWAY = 0.9  # width along the left wall, m
 KERB = 0.4  # width along the right wall, m
 # The raised carriageway begins right of the rails, or at this share of half the width.
 CARRIAGEWAY = (1.0, 0.3)
-# How far a slab reaches into the wall, m, at most its width, so that no gap is left where the wall leans outward.
+# Overlap of a slab with the wall, m, at most its width, so that there is no gap where the wall leans outwards.
 INTO_WALL = 0.5
 
 
 def _slabs(parameters: Parameters, section: Section) -> list[tuple[str, float, float, float]]:
-    """Kind, from and to (across, m), height (m) of what lies along the floor; later ones lie on top."""
+    """Return kind, start and end (across, m), and height (m) of slabs on the floor; later ones lie on top."""
     half, slabs = section.half_width, []
     if parameters.carriageway:
         slabs.append(("carriageway", max(CARRIAGEWAY[0], CARRIAGEWAY[1] * half), half, parameters.carriageway))
@@ -30,11 +30,11 @@ def _slabs(parameters: Parameters, section: Section) -> list[tuple[str, float, f
 
 
 def rise(parameters: Parameters, section: Section, across: Float) -> Float:
-    """Height of the ground over the section's floor at (n,) m right of the axis, m; without ballast and sleepers.
+    """Return the height of the ground above the section's floor (n,) m right of the axis, m; without ballast and sleepers.
 
-    This is the truth of a ground model: the floor of the section lies at w = ``section.floor``.
+    This is the reference for a ground model: the floor of the section is at w = ``section.floor``.
     """
-    # What lies along a wall goes on behind the corner where the wall leans outward.
+    # Slabs along a wall continue behind the corner where the wall leans outwards.
     u = np.clip(np.asarray(across, float), -section.half_width, section.half_width)
     height = parameters.camber / 100.0 * (section.half_width - np.abs(u))
     for _, low, high, top in _slabs(parameters, section):
@@ -43,7 +43,7 @@ def rise(parameters: Parameters, section: Section, across: Float) -> Float:
 
 
 def slabs(parameters: Parameters, tunnel: Tunnel) -> list[Appendage]:
-    """Walkway, kerb and second carriageway as bars along the tunnel."""
+    """Return walkway, kerb and second carriageway as bars along the tunnel."""
     line, section = tunnel.line, tunnel.section
     bars = []
     for kind, low, high, top in _slabs(parameters, section):
@@ -51,7 +51,7 @@ def slabs(parameters: Parameters, tunnel: Tunnel) -> list[Appendage]:
         low = low - hidden if low <= -section.half_width else low
         high = high + hidden if high >= section.half_width else high
         middle = 0.5 * (low + high)
-        # On the floor, arc runs from the corner towards the middle.
+        # On the floor, arc increases from the corner towards the middle.
         arc = np.copysign(section.half_perimeter - abs(middle), middle)
         bars.append(Appendage(kind, line.start, line.end, float(arc), 0.5 * top, high - low, top, 2.0))
     return bars

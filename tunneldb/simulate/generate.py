@@ -1,4 +1,4 @@
-"""A synthetic survey: the tunnel with its contents, and its points block by block."""
+"""Synthetic survey: the tunnel with its contents, and its points block by block."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 @dataclass(frozen=True)
 class Cloud:
-    """Points with truth, all arrays of n in file order.
+    """Points with reference data, all arrays of n in file order.
 
     Attributes
     ----------
@@ -59,15 +59,15 @@ class Cloud:
     intensity : (n,)
         Linear counts.
     chainage, arc, offset : (n,)
-        Of the point as stored, m.
+        Coordinates of the stored point, m.
     klass : (n,)
         0 lining, 1 floor, 2 appendage, 3 niche, 4 outlier, 5 rail, 6 object, 7 target sphere.
     leak : (n,)
-        Id of the leak that the laser met, -1 for none.
+        Id of the leak at the point, -1 for none.
     thing : (n,)
-        Number of the free-standing thing that it lies on, for a target sphere the sphere's; 0 for none.
+        Number of the free-standing object at the point, for a target sphere that of the sphere; 0 for none.
     range, incidence : (n,)
-        Distance from the scanner to the spot met, m, and angle to its normal, rad; without noise.
+        Distance from the scanner to the surface point, m, and angle to its normal, rad; without noise.
     """
 
     xyz: Float
@@ -90,7 +90,7 @@ class Cloud:
 
 
 class Simulation:
-    """A synthetic survey, ready to be scanned.
+    """Synthetic survey, ready to be scanned.
 
     Attributes
     ----------
@@ -98,33 +98,33 @@ class Simulation:
     tunnel : Tunnel
         Exact geometry.
     appendages, niches, leaks, marks, blotches : list
-        What is in it.
+        Contents of the tunnel.
     rings : Rings
-        How the lining is put together.
+        Rings or blocks of the lining.
     ring_steps : (n,) float array
-        How far each ring of the lining stands in, m.
+        Inward displacement of each ring of the lining, m.
     ring_shape : RingShape
-        How each departs from the section besides.
+        Other deviations of each ring from the section.
     masonry : Masonry
-        Its bricks or stones.
+        Bricks or stones of the lining.
     reflectance : Reflectance or None
-        How bright it is from place to place; None: plain.
+        Variation of the lining's reflectance; None: uniform.
     things : list of Primitive
-        What stands or hangs free, thing i with number i + 1.
+        Free-standing and hanging objects; object i has number i + 1.
     spheres : list of TargetSphere
-        Target spheres; sphere i is thing i.
+        Target spheres; sphere i is object i.
     scanner : Scanner
-        Poses.
+        Poses of the scanner.
     instrument : Instrument
-        Its own part in the intensity.
+        Errors of the instrument in the intensity.
     epoch : Epoch or None
-        What became of the lining until a later scan; its offsets hold it, its chainages and arcs are those of the first.
+        Changes of the lining before a later scan; its offsets include them, its chainages and arcs are those of the first scan.
     """
 
     def __init__(self, parameters: Parameters) -> None:
         self.parameters = parameters
         self.tunnel: Tunnel = parameters.tunnel()
-        # Later streams come behind, so that a seed keeps its points.
+        # Later streams are appended, so that a seed keeps its points.
         streams = np.random.SeedSequence(parameters.seed).spawn(22)
         furniture, wet, reference, self._seed, free, loose, built = streams[:7]
         marked, coated, joints, refuge, drips, moved, hung = streams[7:14]
@@ -185,9 +185,9 @@ class Simulation:
         drips: np.random.SeedSequence,
         sited: np.random.SeedSequence,
     ) -> list[Leak]:
-        """Leaks on the wall, along joints, in niches, at particular places, numbered in this order.
+        """Return leaks on the wall, along joints, in niches, and at particular places, numbered in this order.
 
-        The last have the first choice of place, as some need a whole ring.
+        The last are placed first, since some need a whole ring.
         """
         p, tunnel = self.parameters, self.tunnel
         at_sites = site_leaks(p, tunnel, self.rings, self.appendages, room, sited)
@@ -198,7 +198,7 @@ class Simulation:
         return with_drips(leaks, p.drip_gap, room, drips) if p.drips else leaks
 
     def make(self, plan: BlockPlan) -> Cloud:
-        """Points of one block; the same for the same seed and index, whenever it is made."""
+        """Return the points of one block, reproducible by seed and index."""
         p = self.parameters
         sequence = np.random.SeedSequence(self._seed.entropy, spawn_key=(*self._seed.spawn_key, plan.index))
         rng = np.random.default_rng(sequence)
@@ -211,7 +211,7 @@ class Simulation:
         if p.beam > 0.0:
 
             def again(index: Int64, direction: Float) -> Echoes:
-                """Without noise, and with numbers that make no stray points."""
+                """Trace without noise, and with numbers that make no stray points."""
                 many = len(index)
                 return tracer.trace(rays.origin[index], direction, rays.hint[index], np.zeros(many), np.ones((many, 2)))
 
@@ -219,7 +219,7 @@ class Simulation:
         if p.ghosts > 0.0:
 
             def by_floor(origin: Float, direction: Float, hint: Float) -> Echoes:
-                """Without noise and stray points."""
+                """Trace without noise and stray points."""
                 return tracer.trace(origin, direction, hint, np.zeros(len(hint)), np.ones((len(hint), 2)))
 
             found = mirror(found, rays, p.ghosts, p.max_range, by_floor, self.tunnel, rng)
@@ -268,7 +268,7 @@ class Simulation:
         )
 
     def blocks(self, workers: int | None = None) -> Iterator[tuple[BlockPlan, Cloud]]:
-        """Blocks in file order, made a few ahead by threads (the kernels release the interpreter's lock)."""
+        """Yield blocks in file order, made a few ahead by threads (the kernels release the interpreter's lock)."""
         count = workers or os.cpu_count() or 1
         waiting: deque[tuple[BlockPlan, Future[Cloud]]] = deque()
         with ThreadPoolExecutor(count) as pool:
@@ -283,6 +283,6 @@ class Simulation:
 
 
 def simulate(parameters: Parameters) -> Cloud:
-    """All points of a synthetic survey at once; for small ones."""
+    """Return all points of a synthetic survey at once, for small ones."""
     clouds = [cloud for _, cloud in Simulation(parameters).blocks()]
     return Cloud(**{f.name: np.concatenate([getattr(c, f.name) for c in clouds]) for f in fields(Cloud)})

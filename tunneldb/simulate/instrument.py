@@ -1,4 +1,4 @@
-"""What a scanner adds to its intensities that no surface has: gain by time and line, saturation, noise growing with range."""
+"""Errors of a scanner's intensities: gain by time and line, saturation, noise that grows with range."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from tunneldb.simulate.noise_field import normal_field, smooth_field
 from tunneldb.simulate.parameters import Parameters
 
 DRIFT_TIME = 40.0  # s: half the wavelength of drift
-# The gain steps between these shares of the survey's time.
+# Limits of the time of the gain step, as shares of the survey's time.
 STEP_BETWEEN = (0.35, 0.65)
 NOISE_RANGE = 10.0  # m
 
 
 @dataclass(frozen=True)
 class Instrument:
-    """A scanner's own part in the intensity.
+    """Errors of the scanner in the intensity.
 
     Attributes
     ----------
@@ -29,9 +29,9 @@ class Instrument:
     saturation : float or None
         Greatest amplitude, dB.
     noise_growth : float
-        By which share of itself noise has grown at 10 m; it grows with the square of the range.
+        Relative growth of the noise at 10 m; it grows with the square of the range.
     salt : int
-        Of the gains.
+        Salt of the random gains.
     """
 
     banding: float
@@ -44,14 +44,14 @@ class Instrument:
 
     @classmethod
     def of(cls, parameters: Parameters, begin: float, end: float, seed: np.random.SeedSequence) -> Instrument:
-        """The scanner of a survey that takes from ``begin`` to ``end``, s."""
+        """Return the scanner of a survey from ``begin`` to ``end``, s."""
         p = parameters
         share = float(np.random.default_rng(seed).uniform(*STEP_BETWEEN))
         salt = int(seed.generate_state(1)[0])
         return cls(p.banding, p.drift, p.gain_step, begin + share * (end - begin), p.saturation, p.noise_growth, salt)
 
     def gain(self, time: Float, line: Int64) -> Float:
-        """Gain at times (n,), s, in lines (n,) of the scan, dB."""
+        """Return the gain at times (n,), s, in lines (n,) of the scan, dB."""
         total = np.zeros(len(time))
         if self.banding:
             total += self.banding * normal_field(line, np.zeros_like(line), self.salt)
@@ -62,10 +62,10 @@ class Instrument:
         return total
 
     def capped(self, amplitude: Float) -> Float:
-        """Amplitudes as a receiver gives them that can give no more, dB."""
+        """Return amplitudes limited by saturation of the receiver, dB."""
         return amplitude if self.saturation is None else np.minimum(amplitude, self.saturation)
 
 
 def noise_scale(growth: float, distance: Float) -> Float:
-    """By how much noise is greater at ranges (n,), m, than without growth."""
+    """Return the factor of the noise at ranges (n,), m, relative to no growth."""
     return 1.0 + growth * (distance / NOISE_RANGE) ** 2

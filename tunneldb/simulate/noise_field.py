@@ -1,4 +1,4 @@
-"""Pseudo-random fields over a plane: the same place has the same value, whenever it is asked for."""
+"""Pseudo-random fields over a plane, reproducible at each position."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SPREAD = 26.0 / 35.0 / math.sqrt(3.0)
 
 @inner
 def mix(i: int, j: int, salt: int) -> np.uint64:
-    """Scramble a cell's numbers (splitmix64)."""
+    """Hash a cell's indices (splitmix64)."""
     h = np.uint64(i) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(j) * np.uint64(0xC2B2AE3D27D4EB4F) + np.uint64(salt)
     h = (h ^ (h >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     h = (h ^ (h >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -27,7 +27,7 @@ def mix(i: int, j: int, salt: int) -> np.uint64:
 
 @inner
 def value_noise(x: float, y: float, salt: int) -> float:
-    """Smooth field of mean 0 and standard deviation 1 over a plane whose cells are squares of side 1 (value noise)."""
+    """Return a smooth field of mean 0 and standard deviation 1 over a plane with unit cells (value noise)."""
     i, j = math.floor(x), math.floor(y)
     tx, ty = x - i, y - j
     tx, ty = tx * tx * (3.0 - 2.0 * tx), ty * ty * (3.0 - 2.0 * ty)
@@ -46,7 +46,7 @@ def _value_noise(x: Float, y: Float, salt: int, out: Float) -> None:
 
 
 def smooth_field(x: Float, y: Float, salt: int) -> Float:
-    """Field of :func:`value_noise` at places (n,), in sides of a cell."""
+    """Return the field of :func:`value_noise` at positions (n,), in sides of a cell."""
     out = np.empty(x.size)
     _value_noise(x, y, salt, out)
     return out
@@ -62,7 +62,7 @@ def _normal(i: Int64, j: Int64, salt: int, out: Float) -> None:
 
 
 def normal_field(i: Int64, j: Int64, salt: int) -> Float:
-    """Numbers of cells (n,), of the standard normal distribution (Box and Muller, 1958)."""
+    """Return numbers of cells (n,), of the standard normal distribution (Box and Muller, 1958)."""
     out = np.empty(i.size)
     _normal(i, j, salt, out)
     return out

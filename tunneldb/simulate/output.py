@@ -1,4 +1,4 @@
-"""Files of a synthetic survey: LAZ, poses, reference curve, axis and truth."""
+"""Files of a synthetic survey: LAZ, poses, reference curve, axis and reference data."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from shapely.geometry import mapping
 import tunneldb
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.files import made_folder, room_told
+from tunneldb.files import disk_full_as_oserror, made_folder
 from tunneldb.simulate.generate import Cloud, Simulation
 from tunneldb.simulate.ring_truth import write_ring_truth
 from tunneldb.simulate.truth import leaks_as_built, write_truth
@@ -28,7 +28,7 @@ from tunneldb.simulate.truth import leaks_as_built, write_truth
 # Resolution of the stored coordinates, m; as scanner makers export.
 SCALE = 0.00025
 AXIS_SPACING = 20.0
-# A fixed day, so that the same seed gives the same bytes.
+# A fixed date, so that the same seed gives the same bytes.
 CREATED = date(2024, 5, 4)
 
 TRUTH: dict[str, np.dtype[Any]] = {
@@ -38,14 +38,14 @@ TRUTH: dict[str, np.dtype[Any]] = {
     "klass": np.dtype(np.uint8),
     "leak": np.dtype(np.int32),
 }
-# Only where something stands free.
+# Only with free-standing objects.
 THING = {"thing": np.dtype(np.uint16)}
 TRUTH_NAMES = {"klass": "class"}
 
 
 @dataclass
 class Files:
-    """What :func:`write` made."""
+    """Files written by :func:`write`."""
 
     clouds: list[Path] = field(default_factory=list)
     truth: list[Path] = field(default_factory=list)
@@ -81,7 +81,7 @@ class Files:
 
 
 class _TruthWriter:
-    """Columns of truth, streamed to an .npz without holding them."""
+    """Writer of the columns of reference data to an .npz file, without keeping them in memory."""
 
     def __init__(self, path: Path, scratch: Path, columns: dict[str, np.dtype[Any]]) -> None:
         self.path = path
@@ -133,7 +133,7 @@ def _record(header: laspy.LasHeader, cloud: Cloud) -> laspy.ScaleAwarePointRecor
     record = laspy.ScaleAwarePointRecord.zeros(len(cloud), header=header)
     cells = np.rint((cloud.xyz - header.offsets) / header.scales)
     if np.abs(cells).max(initial=0.0) >= 2**31:
-        raise UserError("the tunnel is too long for one coordinate offset in LAS: make it shorter than 500 km")
+        raise UserError("the tunnel is too long for one coordinate offset in LAS; make it shorter than 500 km")
     for i, name in enumerate("XYZ"):
         record[name] = cells[:, i].astype(np.int32)
     record["intensity"] = cloud.intensity
@@ -152,7 +152,7 @@ def _csv(path: Path, columns: str, rows: Float, formats: list[str]) -> Path:
 
 
 def _spheres(simulation: Simulation, path: Path) -> Path | None:
-    """Centres of the target spheres, as control points are given."""
+    """Write the centres of the target spheres, in the format of control points."""
     if not simulation.spheres:
         return None
     lines = (f"{k.id},{k.centre[0]:.5f},{k.centre[1]:.5f},{k.centre[2]:.5f},{k.radius:g},{k.kind}" for k in simulation.spheres)
@@ -235,7 +235,7 @@ def _sidecars(simulation: Simulation, folder: Path, files: Files) -> None:
 
 
 class _Sink:
-    """Writers of the file that is being filled: points, and truth where wanted."""
+    """Writers of the current file: points, and reference data if requested."""
 
     def __init__(self, header: laspy.LasHeader, folder: Path, base: str, columns: dict[str, np.dtype[Any]]) -> None:
         self.header = header
@@ -262,27 +262,27 @@ def write(
     truth: bool = True,
     progress: Callable[[float, int], None] | None = None,
 ) -> Files:
-    """Scan a simulation into ``folder``, one LAZ up to 1 km of tunnel, else one each kilometre of chainage.
+    """Scan a simulation into ``folder``, one LAZ file up to 1 km of tunnel, else one per kilometre of chainage.
 
-    Files appear in the folder when all are complete.
+    Files appear in the folder only when all are complete.
 
     Parameters
     ----------
     truth : bool
-        Also write the truth of each point (21 bytes a point, 23 where something stands free).
+        True to write reference data of each point (21 bytes per point, 23 with free-standing objects).
     progress : callable, optional
-        Called with the share done (0 to 1) and the points written after each block.
+        Function of the completed share (0 to 1) and the number of points written, called after each block.
 
     Raises
     ------
     UserError
-        The folder cannot be written, or the disk is full.
+        If the folder cannot be written to, or the disk is full.
     """
     try:
         with (
             made_folder(folder),
             TemporaryDirectory(dir=folder, prefix=".simulate-") as scratch,
-            room_told(Path(scratch)),
+            disk_full_as_oserror(Path(scratch)),
         ):
             files = _scan(simulation, Path(scratch), truth, progress)
             _sidecars(simulation, Path(scratch), files)
@@ -292,7 +292,7 @@ def write(
 
 
 def _scan(simulation: Simulation, folder: Path, truth: bool, progress: Callable[[float, int], None] | None) -> Files:
-    """Write points and their truth."""
+    """Write points and their reference data."""
     p, line = simulation.parameters, simulation.tunnel.line
     files = Files()
     header = _header(simulation)

@@ -1,4 +1,4 @@
-"""What a synthetic survey is made of."""
+"""Parameters of a synthetic survey."""
 
 from __future__ import annotations
 
@@ -107,19 +107,19 @@ CHOICES: dict[str, tuple[str, ...]] = {
 }
 # Usual lengths of the blocks of cast lining and of rings of segments, m.
 RINGS = {"cast": 10.0, "segments": 1.5}
-MOST_OVALITY = 5.0  # %
-# Pairs of growing numbers, and the least that they may be.
+MAX_OVALITY = 5.0  # %
+# Pairs of ascending numbers, with their lower limit.
 PAIRS = {"ovality": 0.0, "leak_area": 1e-3, "leak_drop": 0.1, "drip_gap": 0.01, "patch_level": -15.0, "stripe_width": 0.01}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters:
-    """A synthetic tunnel, its contents and its survey; lengths in m, angles in degrees, levels in dB.
+    """Synthetic tunnel, its contents and its survey; lengths in m, angles in degrees, levels in dB.
 
     Raises
     ------
     UserError
-        A value is out of its range, or the values do not go together.
+        If a value is out of range, or values contradict each other.
     """
 
     name: str = "tunnel"
@@ -245,7 +245,7 @@ class Parameters:
                 shown = f"{value:g}" if abs(value) < 1e15 else f"{str(value)[:12]}…"  # whole numbers may have any length
                 raise UserError(f"{name.replace('_', ' ')} is {shown}: give {low:g} to {high:g} {unit}")
         if not self.name or any(c in self.name for c in "/\\\0") or self.name.startswith("."):
-            raise UserError(f"name {self.name!r} does not make a file name: use letters, digits, - and _")
+            raise UserError(f"name {self.name!r} is not valid in a file name: use letters, digits, - and _")
         for name, names in CHOICES.items():
             if getattr(self, name) not in names:
                 *others, last = names
@@ -263,32 +263,32 @@ class Parameters:
         for name, floor in PAIRS.items():
             low, high = getattr(self, name)
             if not floor <= low <= high:
-                raise UserError(f"{name.replace('_', ' ')} is {low:g} to {high:g}: give two growing numbers from {floor:g}")
+                raise UserError(f"{name.replace('_', ' ')} is {low:g} to {high:g}: give two ascending numbers from {floor:g}")
         needs = {
             "joint_leaks": "need joints", "ring_step": "needs rings", "ring_shift": "needs rings", "ovality": "needs rings",
             "chamfers": "need joints",
         }  # fmt: skip
         for name, what in needs.items():
             if getattr(self, name) not in (0, (0.0, 0.0)) and not self.ring_length():
-                text = f"{name.replace('_', ' ')} {what}, and lining {self.lining} has none"
+                text = f"{name.replace('_', ' ')} {what}, but lining {self.lining} has none"
                 raise UserError(f"{text}: use lining cast or segments")
         if self.pocket_leaks and self.lining != "segments":
-            raise UserError(f"pocket leaks need bolt pockets, and lining {self.lining} has none: use lining segments")
+            raise UserError(f"pocket leaks need bolt pockets, but lining {self.lining} has none: use lining segments")
         if self.segment_step and self.lining != "segments":
-            raise UserError(f"segment step needs segments, and lining {self.lining} has none: use lining segments")
-        if self.ovality[1] > MOST_OVALITY:
-            raise UserError(f"ovality is {self.ovality[0]:g} to {self.ovality[1]:g}: give 0 to {MOST_OVALITY:g} %")
+            raise UserError(f"segment step needs segments, but lining {self.lining} has none: use lining segments")
+        if self.ovality[1] > MAX_OVALITY:
+            raise UserError(f"ovality is {self.ovality[0]:g} to {self.ovality[1]:g}: give 0 to {MAX_OVALITY:g} %")
         if (self.ovality[1] or self.ring_shift) and self.section != "circular":
-            raise UserError(f"ovality and ring shift are of round rings, and the section is a {self.section}: use circular")
+            raise UserError(f"ovality and ring shift need round rings, but the section is {self.section}: use circular")
         later = ("grown_leaks", "dried_leaks", "new_leaks", "moved_wall", "squeezed_ring", "bulges", "pose_error", "pose_turn")
         if not self.epoch and (asked := next((name for name in later if getattr(self, name)), None)):
-            raise UserError(f"--{asked.replace('_', '-')} is of a later scan of the same tunnel: give --epoch 1, too")
+            raise UserError(f"--{asked.replace('_', '-')} applies to a later scan of the same tunnel: add --epoch 1")
         if 0.0 < self.mesh < 0.02:
             raise UserError(f"mesh is {self.mesh:g} m: give 0 for none, or 0.02 m and more between wires")
         if self.banding and self.density is not None:
-            raise UserError("banding is from line to line, and evenly spread points have none: leave out --density")
+            raise UserError("banding needs scan lines, but --density gives evenly spread points: omit --density")
         if self.niche_leaks and not self.niches:
-            raise UserError("niche leaks need niches: leave out --no-niches")
+            raise UserError("niche leaks need niches: omit --no-niches")
         self.crs()
         tunnel = self.tunnel()
         height = tunnel.section.floor + self.scanner_height
@@ -296,11 +296,11 @@ class Parameters:
         if offset[0] < 0.5:
             raise UserError(
                 f"the scanner, {self.scanner_height:g} m above the floor and {self.scanner_offset:g} m off the"
-                " middle, stands less than 0.5 m from the lining: change its height or offset"
+                " middle, is less than 0.5 m from the lining: change its height or offset"
             )
 
     def crs(self) -> pyproj.CRS:
-        """Coordinate system; projected, in metres."""
+        """Return the coordinate system; projected, in metres."""
         try:
             crs = pyproj.CRS.from_epsg(self.srid)
         except CRSError:
@@ -310,7 +310,7 @@ class Parameters:
         return crs
 
     def tunnel(self) -> Tunnel:
-        """Geometry of the tunnel."""
+        """Return the geometry of the tunnel."""
         if self.section == "circular":
             shape = section.circular(self.section_radius, self.invert)
         elif self.section == "horseshoe":
@@ -332,24 +332,24 @@ class Parameters:
         return Tunnel(line, shape)
 
     def radiometry(self) -> Radiometry:
-        """Material of the surfaces."""
+        """Return the material of the surfaces."""
         return Radiometry(roughness=self.roughness, near_loss=self.range_curve == "near_loss")
 
     def ring_length(self) -> float:
-        """Distance between the joints of the lining, m; 0: it has none."""
+        """Return the distance between the joints of the lining, m; 0: none."""
         usual = RINGS.get(self.lining, 0.0)
         return self.ring if usual and self.ring is not None else usual
 
     def leak_count(self) -> int:
-        """Number of leaks: as asked, else one every 12 m."""
+        """Return the number of leaks: as requested, else one every 12 m."""
         return max(1, round(self.length / 12.0)) if self.leaks is None else self.leaks
 
     def as_dict(self) -> dict[str, Any]:
-        """All parameters, for the record."""
+        """Return all parameters, for the record."""
         return asdict(self)
 
 
-# Named starting points; every value can be overridden.
+# Named presets; every value can be overridden.
 PRESETS: dict[str, dict[str, Any]] = {
     # about 12 million points
     "demo": {

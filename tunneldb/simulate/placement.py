@@ -1,6 +1,6 @@
-"""Where things stand free in a tunnel: people, equipment, lamps and target spheres, clear of each other and the scanner.
+"""Positions of free-standing objects: people, equipment, lamps and target spheres, apart from each other and the scanner.
 
-Every kind has random numbers of its own, spheres come first: asking for more people moves no sphere.
+Each kind has its own random numbers, and spheres are placed first, so that more people move no sphere.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.scanner import Scanner
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
-# How much of the floor around its middle a thing takes, m.
-ROOM = {"person": 0.40, "case": 0.55, "trolley": 0.80, "tripod": 0.50, "bollard": 0.15, "globe": 0.25, "sphere": 0.45}
-# Nothing stands nearer to the scanner's way or a station, m.
-CLEAR = 0.9
-# Nearer to the tunnel's ends nothing stands, m.
-END = 2.0
+# Radius of the floor that an object occupies, m.
+FLOOR_RADIUS = {"person": 0.40, "case": 0.55, "trolley": 0.80, "tripod": 0.50, "bollard": 0.15, "globe": 0.25, "sphere": 0.45}
+# Least distance from the scanner's path or a station, m.
+MIN_SCANNER_DISTANCE = 0.9
+# Least distance from the tunnel's ends, m.
+MIN_END_DISTANCE = 2.0
 TRIES = 400
-# Lamps differ from the target spheres by this share of the radius at least.
-UNLIKE = 0.2
+# Least relative difference of radius between lamps and target spheres.
+MIN_RADIUS_DIFFERENCE = 0.2
 
 
 @dataclass
 class _Floor:
-    """The floor and what is taken of it: rows of chainage, across, radius."""
+    """Floor with its occupied places: rows of chainage, across, radius."""
 
     parameters: Parameters
     tunnel: Tunnel
@@ -42,54 +42,57 @@ class _Floor:
     taken: Float
 
     def place(self, chainage: float, across: float) -> Place:
-        """Spot on the ground."""
+        """Return a position on the ground."""
         frame = self.tunnel.line.frame(np.array([chainage]))
         height = self.tunnel.section.floor + float(rise(self.parameters, self.tunnel.section, np.array([across]))[0])
         spot = frame.position[0] + across * frame.u[0] + height * frame.w[0]
         return Place(spot, np.array([frame.t[0], frame.u[0], frame.w[0]]))
 
     def take(self, chainage: float, across: float, room: float) -> None:
-        """Keep others away."""
+        """Reserve a place."""
         self.taken = np.vstack([self.taken, [chainage, across, room]])
 
     def is_free(self, chainage: float, across: float, room: float) -> bool:
-        """Whether something of that size can stand there: level, clear of others and of the scanner."""
+        """Return True if an object of that size can stand there: level, away from others and from the scanner."""
         p = self.parameters
         level = rise(p, self.tunnel.section, np.linspace(across - room, across + room, 9))
         if np.ptp(level) > 2.0 * room * p.camber / 100.0 + 1e-9:
             return False
         if p.scanner == "profiler":
-            if abs(across - p.scanner_offset) < CLEAR + room:
+            if abs(across - p.scanner_offset) < MIN_SCANNER_DISTANCE + room:
                 return False
         else:
             gap = np.hypot(self.scanner.station_chainage - chainage, self.scanner.station_offset - across)
-            if gap.min() < CLEAR + room:
+            if gap.min() < MIN_SCANNER_DISTANCE + room:
                 return False
         gap = np.hypot(self.taken[:, 0] - chainage, self.taken[:, 1] - across)
         return bool(np.all(gap > self.taken[:, 2] + room))
 
     def find(self, kind: str, rng: np.random.Generator) -> tuple[float, float]:
-        """Chainage and across of a free spot, which is then taken."""
-        line, room = self.tunnel.line, ROOM[kind]
+        """Find and reserve a free place; return its chainage and across."""
+        line, room = self.tunnel.line, FLOOR_RADIUS[kind]
         half = self.tunnel.section.half_width - room
         for _ in range(TRIES if half > 0.0 else 0):
-            s, u = float(rng.uniform(line.start + END, line.end - END)), float(rng.uniform(-half, half))
+            s, u = (
+                float(rng.uniform(line.start + MIN_END_DISTANCE, line.end - MIN_END_DISTANCE)),
+                float(rng.uniform(-half, half)),
+            )
             if self.is_free(s, u, room):
                 self.take(s, u, room)
                 return s, u
-        raise UserError(f"no room on the floor for another {kind}: ask for fewer things or a longer tunnel")
+        raise UserError(f"no room on the floor for another {kind}; use fewer objects or a longer tunnel")
 
 
 def _wall_spot(
     floor: _Floor, furniture: list[Appendage], niches: list[Niche], reach: float, rng: np.random.Generator
 ) -> tuple[float, float]:
-    """Chainage and arc of a piece of wall 1.2 to 2.4 m above the floor, clear of what is on it and stands before it."""
+    """Return chainage and arc of a free piece of wall 1.2 to 2.4 m above the floor, without objects on it or in front."""
     tunnel = floor.tunnel
     line, section = tunnel.line, tunnel.section
     arcs = np.linspace(0.0, section.floor_arc, 2001)
     points = section.point(arcs)[0]
     for _ in range(TRIES):
-        s = float(rng.uniform(line.start + END, line.end - END))
+        s = float(rng.uniform(line.start + MIN_END_DISTANCE, line.end - MIN_END_DISTANCE))
         k = int(np.argmin(np.abs(points[:, 1] - section.floor - rng.uniform(1.2, 2.4)) + 10.0 * (points[:, 0] <= 0.0)))
         side = 1.0 if rng.random() < 0.5 else -1.0
         arc = side * float(arcs[k])
@@ -107,11 +110,11 @@ def _wall_spot(
         ):
             floor.take(s, across, 0.4)
             return s, arc
-    raise UserError("no room on the walls for another target sphere or lamp: ask for fewer or a longer tunnel")
+    raise UserError("no room on the walls for another target sphere or lamp; use fewer or a longer tunnel")
 
 
 def _hiding_cable(floor: _Floor, s: float, centre: Float, wall: Float, radius: float) -> Primitive:
-    """A cable along the tunnel that covers the upper half of a sphere from where the scanner stands."""
+    """Return a cable along the tunnel that hides the upper half of a sphere from the scanner."""
     p, scanner, line = floor.parameters, floor.scanner, floor.tunnel.line
     if p.scanner == "static":
         k = int(np.argmin(np.abs(scanner.station_chainage - s)))
@@ -136,7 +139,7 @@ def _hiding_cable(floor: _Floor, s: float, centre: Float, wall: Float, radius: f
 def _spheres(
     floor: _Floor, furniture: list[Appendage], niches: list[Niche], rng: np.random.Generator
 ) -> tuple[list[TargetSphere], list[Primitive]]:
-    """Target spheres on tripods and wall brackets in turn; the third touches the wall, the fourth is half hidden."""
+    """Return target spheres on tripods and wall brackets in turn; the third touches the wall, the fourth is half hidden."""
     p, tunnel = floor.parameters, floor.tunnel
     radius = p.sphere_radius
     spheres: list[TargetSphere] = []
@@ -163,7 +166,7 @@ def _spheres(
 def _globe_radius(p: Parameters, rng: np.random.Generator) -> float:
     while True:
         radius = float(rng.uniform(0.05, 0.15))
-        if abs(radius - p.sphere_radius) > UNLIKE * p.sphere_radius:
+        if abs(radius - p.sphere_radius) > MIN_RADIUS_DIFFERENCE * p.sphere_radius:
             return radius
 
 
@@ -175,12 +178,12 @@ def stand(
     niches: list[Niche],
     seed: np.random.SeedSequence,
 ) -> tuple[list[Primitive], list[TargetSphere]]:
-    """Everything that stands free, numbered from 1, and the target spheres, which have the first numbers.
+    """Return all free-standing objects, numbered from 1, and the target spheres, which have the first numbers.
 
     Raises
     ------
     UserError
-        There is no room for as many.
+        If there is no space for all.
     """
     p = parameters
     floor = _Floor(p, tunnel, scanner, np.empty((0, 3)))

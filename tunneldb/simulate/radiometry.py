@@ -14,7 +14,7 @@ import numpy as np
 
 from tunneldb.arrays import Bool, Float, UInt16
 
-# Near-range loss 1 - exp(-(R / NEAR_RANGE)**NEAR_POWER): with the inverse square it peaks at 10 m and climbs by
+# Near-range loss 1 - exp(-(R / NEAR_RANGE)**NEAR_POWER): with the inverse square, the curve peaks at 10 m and rises by
 # 0.6 dB/m at 4 m, as the curve of the VZ-400i in Xu et al. (2018), Fig. 3.
 NEAR_RANGE = 13.3
 NEAR_POWER = 2.57
@@ -25,7 +25,7 @@ FULL_SCALE = 50_000.0
 
 
 def range_term(distance: Float, near_loss: bool = True) -> Float:
-    """F1: change of amplitude with range (m) of a fixed target, dB: the inverse square, with the loss of near ranges."""
+    """Return F1, the change of amplitude with range (m) of a fixed target, dB: inverse square with near-range loss."""
     r = np.asarray(distance, dtype=float)
     if not near_loss:
         return np.asarray(-20.0 * np.log10(r))
@@ -34,15 +34,15 @@ def range_term(distance: Float, near_loss: bool = True) -> Float:
 
 
 def oren_nayar_coefficients(roughness: float) -> tuple[float, float]:
-    """A and B of Oren-Nayar for a standard deviation of facet slope in degrees (Xu et al., 2018, eq. 14)."""
+    """Return A and B of Oren-Nayar for a standard deviation of facet slope in degrees (Xu et al., 2018, eq. 14)."""
     square = math.radians(roughness) ** 2
     return 1.0 - 0.5 * square / (square + 0.33), 0.45 * square / (square + 0.09)
 
 
 def oren_nayar(cosine: Float, roughness: float) -> Float:
-    """F2 for the cosine of incidence, dB (Xu et al., 2018, eq. 15).
+    """Return F2 for the cosine of incidence, dB (Xu et al., 2018, eq. 15).
 
-    cos * (A + B sin tan) is written A cos + B sin², which stands at grazing incidence too.
+    cos * (A + B sin tan) is written A cos + B sin², which is finite at grazing incidence, too.
     """
     a, b = oren_nayar_coefficients(roughness)
     c = np.asarray(cosine, dtype=float)
@@ -50,7 +50,7 @@ def oren_nayar(cosine: Float, roughness: float) -> Float:
 
 
 def counts(amplitude: Float, near_loss: bool = True) -> UInt16:
-    """Linear intensity: power in counts, scaled so that a white target at the best range is at full scale."""
+    """Return the linear intensity: power in counts, with a white target at the best range at full scale."""
     best = np.linspace(5.0, 15.0, 101) if near_loss else np.array([1.0])
     peak = SYSTEM_CONSTANT + float(range_term(best, near_loss).max())
     linear = FULL_SCALE * 10.0 ** ((np.asarray(amplitude, dtype=float) - peak) / 10.0)
@@ -68,7 +68,7 @@ class Radiometry:
     lining, floor : float
         Reflectance (0 to 1) of concrete walls and of the floor.
     near_loss : bool
-        Whether the scanner loses near ranges; else its range term is the inverse square.
+        True for a scanner with near-range loss; otherwise its range term is the inverse square.
     """
 
     roughness: float = 12.0
@@ -77,12 +77,12 @@ class Radiometry:
     near_loss: bool = True
 
     def reflectance(self, cosine: Float, floor: Bool, drop: Float) -> Float:
-        """Range-free part, dB: incidence, material and drop (dB, positive is darker)."""
+        """Return the range-independent part, dB: incidence, material and darkening (dB, positive is darker)."""
         material = np.where(floor, 10.0 * math.log10(self.floor), 10.0 * math.log10(self.lining))
         return oren_nayar(cosine, self.roughness) + material - drop
 
     def amplitude(self, distance: Float, reflectance: Float) -> Float:
-        """Amplitude, dB, from range (m) and the range-free part (dB)."""
+        """Return the amplitude, dB, from range (m) and the range-independent part (dB)."""
         return SYSTEM_CONSTANT + range_term(distance, self.near_loss) + reflectance
 
 
@@ -91,9 +91,9 @@ TARGET_REFLECTANCE = 0.30
 
 
 def reference_curve(furthest: float, rng: np.random.Generator, near_loss: bool = True) -> Float:
-    """Amplitudes of the reference target every metre from 1 m beyond ``furthest`` m; (n, 2): range m, dB.
+    """Return amplitudes of the reference target at every metre from 1 m to beyond ``furthest`` m; (n, 2): range m, dB.
 
-    Averages over a target, so their noise is small (0.02 dB).
+    They are averages over a target, so their noise is small (0.02 dB).
     """
     r = np.arange(1.0, math.ceil(furthest) + 2.0)
     level = SYSTEM_CONSTANT + 10.0 * math.log10(TARGET_REFLECTANCE)

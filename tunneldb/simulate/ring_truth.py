@@ -1,6 +1,6 @@
-"""Truth of the rings of a lining: where each lies, what shape it has, its greatest step and lip.
+"""Reference data of the rings of a lining: position, shape, greatest step and lip of each.
 
-Centre, radius and ovality are those of the ellipse of least squares through the ring as it is built, above the floor.
+Centre, radius and ovality are those of the least-squares ellipse through the ring as built, above the floor.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ COLUMNS = (
     "number", "chainage_from", "chainage_to", "centre_right", "centre_up", "radius", "ovality", "largest_clock",
     "step_greatest", "step_greatest_arc", "lip", "lip_arc",
 )  # fmt: skip
-"""Of the file; the first three are those that ``tunneldb rings --rings`` reads."""
+"""Columns of the file; the first three are those that ``tunneldb rings --rings`` reads."""
 
-FINE = 0.05
-"""Distance between the arcs at which steps are looked for, m."""
+ARC_STEP = 0.05
+"""Distance between the arcs at which steps are searched, m."""
 
 
 @kernel
@@ -37,7 +37,7 @@ def _heights(rings: Rings, shape: RingShape, arc: Float, out: Float) -> None:
 
 
 def ring_heights(simulation: Simulation, arc: Float) -> Float:
-    """Height of each ring over the nominal section at arcs (k,), m, positive into the tunnel, (n, k)."""
+    """Return the height of each ring above the nominal section at arcs (k,), m, positive into the tunnel, (n, k)."""
     rings, wider = simulation.rings, wider_from(simulation.tunnel)
     begin = rings.first + rings.length * np.arange(rings.level.size)
     out = np.repeat(simulation.ring_steps[:, None], len(arc), axis=1)
@@ -47,7 +47,7 @@ def ring_heights(simulation: Simulation, arc: Float) -> Float:
 
 
 def lips(simulation: Simulation, ring: int) -> tuple[Float, Float]:
-    """Arcs of the joints between the segments of a ring above the floor, and by how much what follows stands in, m."""
+    """Return arcs of the joints between the segments of a ring above the floor, and the inward step at each, m."""
     rings, stand = simulation.rings, simulation.ring_shape.stand[ring]
     edge = simulation.tunnel.section.floor_arc
     turn = np.arange(-len(stand), len(stand) + 1)
@@ -58,12 +58,12 @@ def lips(simulation: Simulation, ring: int) -> tuple[Float, Float]:
 
 
 def write_ring_truth(simulation: Simulation, path: Path) -> Path | None:
-    """Write the rings that the tunnel holds, whole or in part; None of a lining without rings."""
+    """Write the rings in the tunnel, whole or in part; return None for a lining without rings."""
     rings, line = simulation.rings, simulation.tunnel.line
     if rings.length == 0.0:
         return None
     edge = simulation.tunnel.section.floor_arc
-    arc = np.arange(-edge, edge, FINE)
+    arc = np.arange(-edge, edge, ARC_STEP)
     heights = ring_heights(simulation, arc)
     lines = [",".join(COLUMNS)]
     for i in range(rings.level.size):
@@ -79,11 +79,11 @@ def write_ring_truth(simulation: Simulation, path: Path) -> Path | None:
 
 
 def _of_segments(rings: Rings, shape: RingShape, ring: int, edge: float) -> Float:
-    """What segments that stand in or out change in the ellipse of least squares: centre (2), radius, p, q, m.
+    """Return the effect of displaced segments on the least-squares ellipse: centre (2), radius, p, q, m.
 
-    The third harmonic is fitted with it, as rings of many points are; above the floor, with equal weight.
+    The third harmonic is fitted, too, as for rings with many points; above the floor, with equal weights.
     """
-    arc = np.arange(-edge, edge, 0.2 * FINE)
+    arc = np.arange(-edge, edge, 0.2 * ARC_STEP)
     out = np.zeros((1, len(arc)))
     only = RingShape(shape.radius, np.zeros((1, 4)), shape.stand[ring : ring + 1])
     _heights(rings._replace(shift=rings.shift[ring : ring + 1]), only, arc, out)
@@ -98,7 +98,7 @@ def _greatest(arc: Float, values: Float) -> tuple[str, str]:
 
 
 def _ellipse(simulation: Simulation, ring: int) -> list[str]:
-    """Centre, radius, ovality, and direction of the largest diameter if there is one; empty of a section that is not round."""
+    """Return centre, radius, ovality, and direction of the largest diameter if there is one; empty for non-round sections."""
     parameters, rings = simulation.parameters, simulation.rings
     if parameters.section != "circular":
         return [""] * 5

@@ -1,7 +1,7 @@
-"""Where a scanner stands and which rays it shoots, block by block.
+"""Positions of a scanner and its rays, block by block.
 
-A block is a few hundred thousand rays that are made and written together, so that memory stays bounded. Every
-block has random numbers of its own, by its index: the result does not depend on which thread makes it or when.
+A block is a few hundred thousand rays that are made and written together, so that memory is bounded. Every block has its own
+random numbers, by its index, so that the result does not depend on the thread or the time.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from tunneldb.arrays import Float, Int64, UInt16
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
-RAYS = 400_000  # a block
+RAYS = 400_000  # per block
 START_TIME = 300_000.0  # GPS seconds of the week
 STATION_TIME = 300.0  # between the starts of two stations, s
 TRAJECTORY_STEP = 0.1  # s
-# Scanners cannot look through their own tripod.
-LOWEST_ZENITH = 150.0
+# Greatest zenith angle, degrees: the tripod hides directions below.
+MAX_ZENITH = 150.0
 
 
 class Rays(NamedTuple):
-    """Rays from the line's origin: origins and unit directions (n, 3), chainage of the scanner, time (s), scan id.
+    """Rays relative to the line's origin: origins and unit directions (n, 3), chainage of the scanner, time (s), scan id.
 
     ``line`` is the number of the scan line: the turn of a profiler's mirror, the column of a station; 0 for even points.
     """
@@ -42,10 +42,10 @@ class Rays(NamedTuple):
 
 @dataclass(frozen=True)
 class BlockPlan:
-    """A block before it is made: its index, chainage (which file), and what is meant by ``first`` to ``last``.
+    """Block before it is made: index, chainage (for the file), and range ``first`` to ``last``.
 
-    For static stations these are azimuth indices of station ``station``; for a profiler, indices of shots; for
-    uniform sampling, ``first`` and ``last`` are unused and chainages given.
+    For static stations these are azimuth indices of station ``station``; for a profiler, indices of shots; for uniform
+    sampling, ``first`` and ``last`` are unused and the chainages are given.
     """
 
     index: int
@@ -57,7 +57,7 @@ class BlockPlan:
 
 
 class Scanner:
-    """A static scanner on stations or a profiler on a trolley in a tunnel."""
+    """Static scanner on stations, or profiler on a trolley, in a tunnel."""
 
     def __init__(self, parameters: Parameters, tunnel: Tunnel) -> None:
         self.parameters = parameters
@@ -67,25 +67,25 @@ class Scanner:
         count = max(1, math.ceil((line.end - line.start) / p.station_spacing - 1e-9))
         gap = (line.end - line.start) / count
         self.station_chainage: Float = line.start + gap * (np.arange(count, dtype=np.float64) + 0.5)
-        # Tripods stand where there is room, not in the middle: alternately to both sides.
+        # Tripods are beside the middle, alternately on both sides.
         self.station_offset = p.scanner_offset * np.where(np.arange(count) % 2 == 0, 1.0, -1.0)
 
     def _at(self, chainage: Float, offset: Float | float) -> Float:
-        """Scanner positions from the line's origin, (n, 3)."""
+        """Return scanner positions relative to the line's origin, (n, 3)."""
         f = self.tunnel.line.frame(chainage)
         across = np.broadcast_to(offset, chainage.shape)[:, None]
         return f.position - self.tunnel.line.origin + across * f.u + self.height * f.w
 
     def stations(self) -> Float:
-        """Positions of static stations, (n, 3); station i has scan id i + 1."""
+        """Return the positions of static stations, (n, 3); station i has scan id i + 1."""
         return self._at(self.station_chainage, self.station_offset) + self.tunnel.line.origin
 
     def time_at(self, chainage: Float) -> Float:
-        """GPS time at which the trolley passes a chainage."""
+        """Return the GPS time at which the trolley passes a chainage."""
         return START_TIME + (chainage - self.tunnel.line.start) / self.parameters.speed
 
     def trajectory(self) -> Float:
-        """Trolley poses from a second before the start to a second after the end; (n, 4): time, x, y, z."""
+        """Return trolley poses from a second before the start to a second after the end; (n, 4): time, x, y, z."""
         line, speed = self.tunnel.line, self.parameters.speed
         duration = (line.end - line.start) / speed
         time = np.arange(-1.0, duration + 1.0 + TRAJECTORY_STEP, TRAJECTORY_STEP)
@@ -93,7 +93,7 @@ class Scanner:
         return np.column_stack([START_TIME + time, position])
 
     def plans(self) -> Iterator[BlockPlan]:
-        """Blocks in the order in which they are written, chainage growing."""
+        """Yield blocks in the order of writing, by ascending chainage."""
         p, line = self.parameters, self.tunnel.line
         if p.density is not None:
             yield from self._uniform_plans(p.density)
@@ -120,14 +120,14 @@ class Scanner:
                     index += 1
 
     def times(self) -> tuple[float, float]:
-        """GPS times at which the survey begins and ends, s."""
+        """Return the GPS times of the start and end of the survey, s."""
         if self.parameters.scanner == "static":
             return START_TIME, START_TIME + STATION_TIME * self.station_chainage.size
         begin, end = self.time_at(np.array([self.tunnel.line.start, self.tunnel.line.end])).tolist()
         return begin, end
 
     def _file_edges(self) -> Float:
-        """Start, kilometre marks, end."""
+        """Return start, kilometre marks and end."""
         line = self.tunnel.line
         marks = 1000.0 * np.arange(math.floor(line.start / 1000.0) + 1, math.ceil(line.end / 1000.0))
         return np.concatenate([[line.start], marks, [line.end]])
@@ -144,12 +144,12 @@ class Scanner:
                 index += 1
 
     def _grid(self) -> tuple[int, int]:
-        """Rows (zenith) and columns (azimuth) of a static scan."""
+        """Return the numbers of rows (zenith) and columns (azimuth) of a static scan."""
         step = self.parameters.angular_step
-        return int(LOWEST_ZENITH / step), round(360.0 / step)
+        return int(MAX_ZENITH / step), round(360.0 / step)
 
     def rays(self, plan: BlockPlan, rng: np.random.Generator) -> Rays:
-        """Rays of a block."""
+        """Return the rays of a block."""
         if self.parameters.density is not None:
             return self._uniform_rays(plan, rng, self.parameters.density)
         if self.parameters.scanner == "static":
@@ -180,19 +180,19 @@ class Scanner:
         )
 
     def _profiler_rays(self, plan: BlockPlan) -> Rays:
-        """Mirror turning evenly while the trolley moves: each profile is one turn of a helix."""
+        """Return rays of a rotating mirror on the moving trolley: each profile is one turn of a helix."""
         p, line = self.parameters, self.tunnel.line
         shot = np.arange(plan.first, plan.last)
         s: Float = line.start + shot * np.float64(p.profile_spacing / p.profile_points)
         f = line.frame(s)
         origin = f.position - line.origin + p.scanner_offset * f.u + self.height * f.w
         angle = 2.0 * np.pi / p.profile_points * ((shot % p.profile_points) + 0.5)
-        # From the floor round by the left wall, so that the seam of a profile lies on the floor.
+        # Clockwise from the floor over the left wall, so that the seam of a profile is on the floor.
         direction = -np.sin(angle)[:, None] * f.u - np.cos(angle)[:, None] * f.w
         return Rays(origin, direction, s, self.time_at(s), np.ones(s.size, dtype=np.uint16), shot // p.profile_points)
 
     def _uniform_rays(self, plan: BlockPlan, rng: np.random.Generator, density: float) -> Rays:
-        """Rays to points spread evenly over the surface, from the trolley beside them or the nearest station."""
+        """Return rays to points uniformly spread over the surface, from the trolley beside them or the nearest station."""
         p, line, half = self.parameters, self.tunnel.line, self.tunnel.section.half_perimeter
         n = round(density * 2.0 * half * (plan.chainage_to - plan.chainage))
         s = np.sort(rng.uniform(plan.chainage, plan.chainage_to, n))

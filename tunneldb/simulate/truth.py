@@ -1,4 +1,4 @@
-"""Truth of the lining as polygons: what is wet, and what is dark but dry."""
+"""Reference data of the lining as polygons: wet areas, and dry dark areas."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from tunneldb.simulate.generate import Simulation
 
 
-STEP = 1.0  # m between the vertices of soot
-FINE = 0.005  # m between the places by which arcs on a wider section are measured
+SOOT_STEP = 1.0  # m between the vertices of soot
+ARC_STEP = 0.005  # m between points for measuring arcs on a wider section
 
 
 class Dry(NamedTuple):
-    """Something dark on the lining that is no leak: outline in the unrolled plane (m), kind, drop (dB)."""
+    """Dry dark area on the lining: outline in the unrolled plane (m), kind, darkening (dB)."""
 
     outline: Polygon
     kind: str
@@ -39,12 +39,12 @@ class Dry(NamedTuple):
 
 
 def as_built(simulation: Simulation) -> Callable[[BaseGeometry], BaseGeometry]:
-    """What lays outlines on the nominal lining out on the one that was built: where the section is wider, arcs are longer."""
+    """Return a function that maps outlines on the nominal lining to the built one, whose arcs are longer where it is wider."""
     parameters, tunnel = simulation.parameters, simulation.tunnel
     if not parameters.radius_step:
         return lambda outline: outline
     wider = wider_from(tunnel)
-    half = np.linspace(0.0, tunnel.section.floor_arc, math.ceil(tunnel.section.floor_arc / FINE) + 1)
+    half = np.linspace(0.0, tunnel.section.floor_arc, math.ceil(tunnel.section.floor_arc / ARC_STEP) + 1)
 
     def length(arc: Float) -> Float:
         point, normal = tunnel.section.point(arc)
@@ -61,13 +61,13 @@ def as_built(simulation: Simulation) -> Callable[[BaseGeometry], BaseGeometry]:
 
 
 def leaks_as_built(simulation: Simulation) -> list[Leak]:
-    """Leaks with their outlines where they came to lie."""
+    """Return leaks with their outlines on the built lining."""
     lay = as_built(simulation)
     return [replace(leak, polygon=lay(leak.polygon)) for leak in simulation.leaks]
 
 
 def joints(rings: Rings, start: float, end: float, lowest: float) -> list[Dry]:
-    """Joints of the lining and bolt pockets from chainage ``start`` to ``end``, up to ``lowest`` m from the crown."""
+    """Return joints of the lining and bolt pockets from chainage ``start`` to ``end``, up to ``lowest`` m from the crown."""
     dry = []
     n, m = rings.seam_width.shape
     half = 0.5 * m * rings.period
@@ -93,11 +93,11 @@ def joints(rings: Rings, start: float, end: float, lowest: float) -> list[Dry]:
 
 
 def soot(reflectance: Reflectance, start: float, end: float) -> list[Dry]:
-    """Where soot darkens by half of what was asked or more; its drop is the mean over that."""
+    """Return areas darkened by at least half of the requested soot; the darkening is the mean over the area."""
     asked, middle, width = reflectance.soot.tolist()
     if asked == 0.0:
         return []
-    s = np.linspace(start, end, max(2, math.ceil((end - start) / STEP) + 1))
+    s = np.linspace(start, end, max(2, math.ceil((end - start) / SOOT_STEP) + 1))
     amount = soot_amount(reflectance, s)
     half = width * np.sqrt(np.log(np.maximum(2.0 * amount, 1.0 + 1e-9)))
     outline = Polygon(np.vstack([np.column_stack([s, middle - half]), np.column_stack([s, middle + half])[::-1]]))
@@ -107,7 +107,7 @@ def soot(reflectance: Reflectance, start: float, end: float) -> list[Dry]:
 
 
 def grime(reflectance: Reflectance, start: float, end: float) -> list[Dry]:
-    """Where grime darkens by half of its most or more, on average along the tunnel; the drop is the mean over that."""
+    """Return areas darkened by at least half of the greatest grime, on average along the tunnel, with their mean darkening."""
     dry = []
     for side, edge, fade, drop in reflectance.grime.tolist():
         low, high = sorted((side * (edge - 0.5 * GRIME_RISE), side * (edge + fade * math.log(2.0))))
@@ -116,7 +116,7 @@ def grime(reflectance: Reflectance, start: float, end: float) -> list[Dry]:
 
 
 def _painted(simulation: Simulation) -> list[tuple[BaseGeometry, str, float]]:
-    """Outline on the lining, kind and level (dB) of marks and blotches."""
+    """Return outline on the lining, kind and level (dB) of marks and blotches."""
     line, lowest = simulation.tunnel.line, simulation.tunnel.section.floor_arc
     lining = box(line.start, -lowest, line.end, lowest)
     all_of_them = [(m.polygon(), m.kind, m.level) for m in simulation.marks]
@@ -126,7 +126,7 @@ def _painted(simulation: Simulation) -> list[tuple[BaseGeometry, str, float]]:
 
 
 def dry_features(simulation: Simulation) -> list[Dry]:
-    """Everything on the lining that is dark but dry."""
+    """Return all dry dark areas on the lining."""
     line, lowest = simulation.tunnel.line, simulation.tunnel.section.floor_arc
     dry = joints(simulation.rings, line.start, line.end, lowest)
     dry += [Dry(outline, kind, -level) for outline, kind, level in _painted(simulation) if level < 0.0]
@@ -136,15 +136,15 @@ def dry_features(simulation: Simulation) -> list[Dry]:
 
 
 def bright_features(simulation: Simulation) -> list[Dry]:
-    """Marks and blotches that are brighter than the lining; their drop is negative."""
+    """Return marks and blotches brighter than the lining; their darkening is negative."""
     return [Dry(outline, kind, -level) for outline, kind, level in _painted(simulation) if level > 0.0]
 
 
 def write_truth(simulation: Simulation, path: Path) -> None:
-    """Write leaks and what is dark but dry as layers ``leak`` and ``dry`` of a GeoPackage, in the unrolled plane as built.
+    """Write leaks and dry dark areas as layers ``leak`` and ``dry`` of a GeoPackage, in the unrolled plane as built.
 
-    What is bright comes in a layer ``bright`` of the same columns, where there is any; lining that moved since the first scan
-    in a layer ``deformation``.
+    Bright areas, if any, are in a layer ``bright`` with the same columns; lining that was deformed since the first scan is in a
+    layer ``deformation``.
     """
     lay, leaks = as_built(simulation), leaks_as_built(simulation)
     dry, bright = ([d._replace(outline=lay(d.outline)) for d in f(simulation)] for f in (dry_features, bright_features))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import datetime as dt
+import logging
 import os
 import platform
 import random
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -18,6 +20,9 @@ from psycopg.types.json import Jsonb
 from tunneldb import __version__
 from tunneldb.database.failures import describe_failure, first_line
 from tunneldb.errors import BusyError, UserError
+from tunneldb.log import fields
+
+log = logging.getLogger(__name__)
 
 _LIBRARIES = ("numpy", "scipy", "numba", "laspy", "lazrs", "shapely", "rasterio", "psycopg")
 
@@ -92,15 +97,21 @@ def stage_run(
         When another worker has the job now.
     """
     run = _begin(conn, survey_id, km, stage, parameters, job)
+    began, what = time.monotonic(), {"run": run.id, "survey_id": survey_id, "km": km, "stage": stage}
+    name = stage if km is None else f"{stage} of kilometre {km}"
+    log.info("%s begins", name, extra=fields(**what))
     try:
         with conn.transaction():
             lock(conn, survey_id, km, shared=job is not None)
             yield run
             _finish(conn, survey_id, run, job)
     except BaseException as error:
+        log.info("%s failed: %s", name, describe(error), exc_info=error, extra=fields(**what))
         _fail(conn, survey_id, run, job, error)
         raise
     conn.commit()
+    seconds = round(time.monotonic() - began, 3)
+    log.info("%s done in %.1f s", name, seconds, extra=fields(**what, seconds=seconds, counts=run.counts))
 
 
 def _begin(

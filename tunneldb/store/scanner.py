@@ -19,7 +19,7 @@ from tunneldb.database.copy import PointZ, copy_binary, pack
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.misplacement import explain_misplacement
-from tunneldb.pointcloud.pose_checks import FARTHEST_ASIDE, FARTHEST_BEYOND, far_from_axis, jumps
+from tunneldb.pointcloud.pose_checks import MAX_AXIS_DISTANCE, MAX_END_DISTANCE, far_from_axis, jumps
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.stations import read_stations
 
@@ -86,8 +86,8 @@ def read_positions(
             raise UserError(
                 f"{', '.join(map(str, paths))}: the station of scan_id {stations.scan_id[worst]} lies {far[worst]:.0f} m"
                 f" from the axis of {tunnel!r}{others}; no scanner stands more than"
-                f" {FARTHEST_ASIDE:g} m aside of it or {FARTHEST_BEYOND:g} m beyond its ends: mend the position, or take the"
-                " row out, and the points of that scan are left out"
+                f" {MAX_AXIS_DISTANCE:g} m aside of it or {MAX_END_DISTANCE:g} m beyond its ends: mend the position, or take"
+                " the row out, and the points of that scan are left out"
             )
         return Positions(False, stations.scan_id, stations.xyz)
     table = _read_trajectory(paths[0])
@@ -100,8 +100,9 @@ def read_positions(
     if wild.mean() > MOST_WILD:
         raise table.error(
             int(np.argmax(wild)),
-            f"this pose and {np.count_nonzero(wild) - 1} others ({100 * wild.mean():.2g} %) lie more than {FARTHEST_ASIDE:g} m"
-            f" aside of the axis of {tunnel!r}, {FARTHEST_BEYOND:g} m beyond its ends, or jump; mend the trajectory",
+            f"this pose and {np.count_nonzero(wild) - 1} others ({100 * wild.mean():.2g} %) lie more than"
+            f" {MAX_AXIS_DISTANCE:g} m aside of the axis of {tunnel!r}, {MAX_END_DISTANCE:g} m beyond its ends, or jump;"
+            " mend the trajectory",
         )
     notes = []
     if wild.any():

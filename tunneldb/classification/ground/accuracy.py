@@ -1,4 +1,4 @@
-"""How a filter's ground agrees with the true one (Li et al. 2023, eq. 9 to 13; errors of the ISPRS)."""
+"""Agreement of a filter's ground with reference ground (Li et al. 2023, eq. 9 to 13; errors of the ISPRS)."""
 
 from __future__ import annotations
 
@@ -10,66 +10,67 @@ from numpy.typing import ArrayLike
 
 @dataclass(frozen=True)
 class Agreement:
-    """Counts of points by what they are and what they were taken for.
+    """Confusion counts of ground points.
 
     Attributes
     ----------
     ground, missed : int
-        True ground that was found (a0), and that was not (b0).
-    taken, other : int
-        Other points taken for ground (c0), and not (d0).
+        True ground points that were found (a0) and missed (b0).
+    false_ground, other : int
+        Other points classified as ground (c0) and as other (d0).
     """
 
     ground: int
     missed: int
-    taken: int
+    false_ground: int
     other: int
 
     @classmethod
     def of(cls, truth: ArrayLike, found: ArrayLike) -> Agreement:
-        """Compare arrays (n,) that tell which points are ground."""
-        true, held = np.asarray(truth, dtype=np.bool_), np.asarray(found, dtype=np.bool_)
-        if true.shape != held.shape:
-            raise ValueError(f"truth of {true.shape} and result of {held.shape} points don't fit")
-        both = int(np.count_nonzero(true & held))
-        missed, taken = int(np.count_nonzero(true)) - both, int(np.count_nonzero(held)) - both
-        return cls(both, missed, taken, true.size - both - missed - taken)
+        """Compare arrays (n,) that are True for ground points."""
+        true, selected = np.asarray(truth, dtype=np.bool_), np.asarray(found, dtype=np.bool_)
+        if true.shape != selected.shape:
+            raise ValueError(f"reference of {true.shape} and result of {selected.shape} points do not match")
+        both = int(np.count_nonzero(true & selected))
+        missed, false_ground = int(np.count_nonzero(true)) - both, int(np.count_nonzero(selected)) - both
+        return cls(both, missed, false_ground, true.size - both - missed - false_ground)
 
     def __add__(self, more: Agreement) -> Agreement:
-        """Counts of both together."""
+        """Return the sum of both."""
         return Agreement(
-            self.ground + more.ground, self.missed + more.missed, self.taken + more.taken, self.other + more.other
+            self.ground + more.ground, self.missed + more.missed, self.false_ground + more.false_ground, self.other + more.other
         )  # fmt: skip
 
     @property
     def type_one(self) -> float:
-        """Share of the true ground that was missed (eq. 9); NaN without any."""
+        """Return the missed share of the true ground (eq. 9); NaN without any."""
         return _share(self.missed, self.ground + self.missed)
 
     @property
     def type_two(self) -> float:
-        """Share of the other points that were taken for ground (eq. 10); NaN without any."""
-        return _share(self.taken, self.taken + self.other)
+        """Return the share of the other points classified as ground (eq. 10); NaN without any."""
+        return _share(self.false_ground, self.false_ground + self.other)
 
     @property
     def total(self) -> float:
-        """Share of all points that were wrong (eq. 11); NaN without any."""
-        return _share(self.missed + self.taken, self._all)
+        """Return the share of all points classified wrongly (eq. 11); NaN without any."""
+        return _share(self.missed + self.false_ground, self._all)
 
     @property
     def kappa(self) -> float:
-        """Agreement beyond that of chance (eq. 12, 13): 1 is perfect; NaN where chance alone agrees fully."""
+        """Return the agreement beyond chance (eq. 12, 13): 1 is perfect; NaN if chance alone agrees fully."""
         if not self._all:
             return float("nan")
         agreed = (self.ground + self.other) / self._all
         chance = (
-            (self.ground + self.missed) * (self.ground + self.taken) + (self.taken + self.other) * (self.missed + self.other)
+            (self.ground + self.missed) * (self.ground + self.false_ground)
+            + (self.false_ground + self.other) * (self.missed + self.other)
         ) / self._all**2
         return _share(agreed - chance, 1.0 - chance)
 
     @property
     def _all(self) -> int:
-        return self.ground + self.missed + self.taken + self.other
+        return self.ground + self.missed + self.false_ground + self.other
 
 
 def _share(part: float, whole: float) -> float:

@@ -1,4 +1,4 @@
-"""The ground of a tunnel, found from its points (Li et al. 2023, section 2.1, segment by segment)."""
+"""Extract the ground of a tunnel from its points (Li et al. 2023, section 2.1, segment by segment)."""
 
 from __future__ import annotations
 
@@ -25,32 +25,32 @@ from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.pointcloud.voxels import Voxels
 
 MARGIN = 32
-"""Rows depend on no points farther than this along the line, m: what is found of two stretches agrees where they overlap."""
+"""Maximum distance along the line on which a row depends, m: results of overlapping stretches agree."""
 
 _STEP = 4  # of the segments along, m
-_LEAST_VOXELS = 12
-_SPREADS = 3.5  # γ in standard deviations of the ground
-_LEAST_GAMMA = 0.01  # m
+_MIN_VOXELS = 12
+_GAMMA_SPREADS = 3.5  # γ in standard deviations of the ground
+_MIN_GAMMA = 0.01  # m
 _PASSES = 3
-_TOUCHED = 2  # columns at the walls
+_WALL_COLUMNS = 2  # columns at the walls
 
 
 @dataclass(frozen=True)
 class GroundSettings:
-    """How the ground is looked for.
+    """Parameters of the ground search.
 
     Attributes
     ----------
     voxel : float
-        Edge of the voxels that the points are thinned to, m.
+        Edge of the voxels to which points are thinned, m.
     distance : float
-        τ: points nearer to a plane lie on it, m.
+        τ: maximum distance of a point on a plane, m.
     angle : float
-        δ: normals of the ground depart less from the vertical, degrees.
+        δ: maximum deviation of the ground's normals from the vertical, degrees.
     gamma : float
-        The largest γ: ground is not thicker above its height, m.
+        Upper limit of γ, the thickness of the ground above its height, m.
     radius : float
-        R: points so near make a normal, m.
+        R: radius of the neighbourhood of a normal, m.
     """
 
     voxel: float = 0.1
@@ -61,7 +61,7 @@ class GroundSettings:
 
     @classmethod
     def of(cls, values: Mapping[str, float]) -> GroundSettings:
-        """Settings of the parameters ``ground.*``."""
+        """Make settings from the parameters ``ground.*``."""
         return cls(*(values[f"ground.{name}"] for name in ("voxel", "distance", "angle", "gamma", "radius")))
 
 
@@ -85,28 +85,28 @@ def find_ground(
 ) -> Ground | None:
     """Find the ground of a tunnel.
 
-    Points are thinned to voxels (step 1). Each 4 m a plane is found in the lower 40 % of the tunnel by RANSAC with
-    checked normals (steps 2, 3). About it, column by column, the level is sought that is seen along the segment:
-    carriageways, walkways and camber, but not what stands on them. Levels pass evenly from segment to segment and
-    follow the points about them; γ (step 4) is 3.5 times their spread. Walls are fitted just above.
+    Points are thinned to voxels (step 1). Every 4 m a plane is found in the lower 40 % of the tunnel by RANSAC with checked
+    normals (steps 2, 3). Around it, column by column, the level seen along the segment is found: carriageways, walkways and
+    camber, but not objects on them. Levels are blended from segment to segment and follow the points around them; γ (step 4) is
+    3.5 times the standard deviation of the points. Walls are fitted just above.
 
     Parameters
     ----------
     points : (n, 3) float array
-        m; those not finite are left out.
+        m; points that are not finite are ignored.
     line : PlanLine
-        What the tunnel follows.
+        Line along the tunnel.
     settings : GroundSettings
         Parameters.
     seed : int
-        Start of the random numbers; the result depends on it alone, not on the order of the points.
+        Seed of the random numbers; the result depends only on it, not on the order of the points.
     spread : (n,) float array, optional
-        Standard deviation of the heights that each point stands for, m, where it is the centroid of others.
+        Standard deviation of the heights that each point represents, m, if it is the centroid of others.
 
     Returns
     -------
     Ground or None
-        None where there is no ground: too few points, or a tunnel without a floor.
+        None without ground: too few points, or a tunnel without a floor.
     """
     lower = _lower_part(points, line, settings, spread)
     if lower is None:
@@ -127,13 +127,13 @@ def find_ground(
 
 
 def _lower_part(points: Float, line: PlanLine, settings: GroundSettings, spread: Float | None) -> _Points | None:
-    """Keep the lower part of each segment's points, thin them, place them and sort them."""
+    """Return the lower part of each segment's points, thinned and sorted into rows and columns."""
     points = np.asarray(points, dtype=np.float64)
     kept = in_lower_part(*line.place(points), points[:, 2], float(_STEP))
     points = points[kept]
     voxels = Voxels(settings.voxel)
     voxels.add(points)
-    if len(voxels) < _LEAST_VOXELS:
+    if len(voxels) < _MIN_VOXELS:
         return None
     xyz, within = voxels.centroids(), voxels.spread()
     if spread is not None:
@@ -145,7 +145,7 @@ def _lower_part(points: Float, line: PlanLine, settings: GroundSettings, spread:
     first = math.floor(across.min() / COLUMN + 0.5) - 1
     columns = math.floor(across.max() / COLUMN + 0.5) + 2 - first
     cell = (np.floor(along).astype(np.int64) - start) * columns + np.floor(across / COLUMN + 0.5).astype(np.int64) - first
-    # In an order that is the points' own: sums and random draws don't depend on how they came.
+    # In an order of the points themselves: sums and random draws do not depend on the input order.
     order = np.lexsort((xyz[:, 2], along, cell))
     cells = np.zeros((stop - start) * columns + 1, np.int64)
     np.cumsum(np.bincount(cell, minlength=len(cells) - 1), out=cells[1:])
@@ -155,7 +155,7 @@ def _lower_part(points: Float, line: PlanLine, settings: GroundSettings, spread:
 
 
 def _segment_planes(lower: _Points, settings: GroundSettings, seed: int) -> tuple[Float, Float]:
-    """Middle of each segment, at multiples of 4 m, and its plane."""
+    """Return the middle of each segment, at multiples of 4 m, and its plane."""
     number = np.arange(lower.start // _STEP, (lower.start + lower.rows - 1) // _STEP + 1)
     metre = np.clip(np.stack([number * _STEP, (number + 1) * _STEP], axis=1) - lower.start, 0, lower.rows)
     bounds = lower.cells[metre * lower.columns]
@@ -168,14 +168,14 @@ def _segment_planes(lower: _Points, settings: GroundSettings, seed: int) -> tupl
 
 
 def _segment_levels(lower: _Points, centres: Float, coefficients: Float, settings: GroundSettings) -> Float:
-    """Levels of the ground about each segment's plane, column by column."""
+    """Return the levels of the ground around each segment's plane, column by column."""
     found = level_profiles(
         lower.along, lower.across, lower.z, lower.cells, lower.start, lower.columns,
         centres, coefficients, float(_STEP), settings.distance,
     )  # fmt: skip
     slope = math.tan(math.radians(settings.angle))
     columns = (lower.first + np.arange(lower.columns)) * COLUMN
-    # A floor that ends for a few metres only is not a tunnel without floor: two of three segments say it.
+    # A floor missing for a few metres is still a floor: two of three segments decide.
     bare = np.array([is_round(plane[2] * columns + level, slope) for plane, level in zip(coefficients, found, strict=True)])
     bare = ndimage.median_filter(bare.astype(np.uint8), 3, mode="nearest") > 0
     for k, level in enumerate(found):
@@ -184,21 +184,21 @@ def _segment_levels(lower: _Points, centres: Float, coefficients: Float, setting
 
 
 def _refine(lower: _Points, height: Float, settings: GroundSettings) -> tuple[Float, Float]:
-    """Heights that follow the points, and γ."""
+    """Return heights that follow the points, and γ."""
     gamma = np.full(len(height), min(settings.gamma, settings.distance))
     for _ in range(_PASSES):
-        # What stands on the ground spoils both less and less.
+        # Objects on the ground have less and less influence.
         height, number, square = refine_heights(
             lower.along, lower.across, lower.z, lower.spread, lower.cells, lower.start, lower.first, height, gamma
         )
-        height = extrapolate_edges(height, _TOUCHED)
+        height = extrapolate_edges(height, _WALL_COLUMNS)
         spread = np.sqrt(square / np.maximum(number, 1.0))
-        gamma = np.where(number > 0, np.clip(_SPREADS * spread, _LEAST_GAMMA, settings.gamma), settings.gamma)
+        gamma = np.where(number > 0, np.clip(_GAMMA_SPREADS * spread, _MIN_GAMMA, settings.gamma), settings.gamma)
     return height, gamma
 
 
 def _extended_to_walls(height: Float, columns: Float, foot: Float, gamma: Float) -> Float:
-    """Carry the heights on to the walls, or end them there."""
+    """Extend the heights to the walls, or end them there."""
     out = height.copy()
     for i, row in enumerate(out):
         known = np.flatnonzero(np.isfinite(row))

@@ -1,4 +1,4 @@
-"""Heights of the ground row by row: levels of the segments blended, then refined by the points about them."""
+"""Heights of the ground row by row: blended levels of the segments, refined by the points around them."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ import numpy as np
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.classification.ground.model import COLUMN
 
-_LOWER = 0.4  # share of the height in which the ground lies
-_LEAST_LOWER = 1.0  # m
-_OUTERMOST = 0.005  # share of points below and above all others that are no measure of the height
+_LOWER_SHARE = 0.4  # share of the height that contains the ground
+_MIN_LOWER = 1.0  # m
+_OUTLIER_SHARE = 0.005  # share of the lowest and highest points that is ignored for the height
 _BIN = 0.05  # of the heights, m
-_MOST_BINS = 100_000
-_WIDEST = 30.0  # m
+_MAX_BINS = 100_000
+_MAX_WIDTH = 30.0  # m
 _ALONG = 1.0  # half of the window of a row's points, m
-_PRIOR = 4.0  # points that the segments' level counts for
-_STEP = 0.02  # between columns, m, that is no slope
-_SLOPE = 4  # columns that tell the slope at the edge
-_GAP = 20  # columns across which a hidden floor is filled in
+_PRIOR = 4.0  # weight of the segments' level, in points
+_STEP = 0.02  # maximum step between columns of a slope, m
+_SLOPE = 4  # columns for the slope at the edge
+_MAX_GAP_COLUMNS = 20  # maximum columns of hidden floor that are filled
 
 
 def in_lower_part(along: Float, across: Float, z: Float, step: float) -> Bool:
-    """Tell which points lie in the lower 40 % of the heights of their segment (Li et al. 2023, eq. 1), or its lowest metre.
+    """Select points in the lower 40 % of the heights of their segment (Li et al. 2023, eq. 1), or in its lowest metre.
 
     Parameters
     ----------
     along, across, z : (n,) float arrays
-        Points, m; those not finite, or farther than 30 m from the line, are not kept.
+        Points, m; not selected if not finite, or farther than 30 m from the line.
     step : float
         Length of a segment, m.
     """
-    kept = np.abs(across) < _WIDEST
+    kept = np.abs(across) < _MAX_WIDTH
     kept &= np.isfinite(along) & np.isfinite(z)
     if not kept.any():
         return kept
@@ -44,35 +44,35 @@ def in_lower_part(along: Float, across: Float, z: Float, step: float) -> Bool:
 
 
 def _tops_of_lower_parts(segment: Int64, z: Float) -> Float:
-    """Height of each segment up to which a point lies low, m, by histograms; the outermost 0.5 % of points don't count."""
+    """Return the height of the top of each segment's lower part, m, from histograms without the outermost 0.5 % of points."""
     number = np.bincount(segment)
     low, high = np.full(len(number), np.inf), np.full(len(number), -np.inf)
     np.minimum.at(low, segment, z)
     np.maximum.at(high, segment, z)
-    held = number > 0
-    # On whole multiples of a bin, so that what lies farther off does not move them.
-    low = np.floor(np.where(held, low, 0.0) / _BIN) * _BIN
-    bins = np.where(held, np.minimum((np.where(held, high, 0.0) - low) / _BIN, _MOST_BINS).astype(np.int64) + 1, 0)
+    selected = number > 0
+    # On whole multiples of a bin, so that distant points do not shift them.
+    low = np.floor(np.where(selected, low, 0.0) / _BIN) * _BIN
+    bins = np.where(selected, np.minimum((np.where(selected, high, 0.0) - low) / _BIN, _MAX_BINS).astype(np.int64) + 1, 0)
     first = np.concatenate([[0], np.cumsum(bins)])
     level = np.minimum((z - low[segment]) / _BIN, bins[segment] - 1).astype(np.int64)
     below = np.concatenate([[0], np.cumsum(np.bincount(first[segment] + level, minlength=first[-1]))])
-    few = (_OUTERMOST * number).astype(np.int64)
+    few = (_OUTLIER_SHARE * number).astype(np.int64)
     begin, end = first[:-1], first[1:]
     lowest = np.searchsorted(below[1:], below[begin] + few, side="right")
     highest = np.maximum(np.searchsorted(below, below[end] - few, side="left") - 1, lowest)
     bottom = low + (lowest - begin) * _BIN
-    return np.asarray(bottom + np.maximum(_LOWER * (highest + 1 - lowest) * _BIN, _LEAST_LOWER))
+    return np.asarray(bottom + np.maximum(_LOWER_SHARE * (highest + 1 - lowest) * _BIN, _MIN_LOWER))
 
 
 def blend_segments(rows: Float, columns: Float, centres: Float, planes: Float, level: Float, step: float) -> Float:
-    """Heights (rows, columns) of the segments' levels, passing evenly from each segment's middle to the next.
+    """Return heights (rows, columns) of the segments' levels, blended from each segment's middle to the next.
 
     Parameters
     ----------
     rows, columns : (r,), (c,) float arrays
         Distance along the line and to its right, m.
     centres, planes, level : (g,), (g, 3), (g, c) float arrays
-        Segments, ``step`` m apart: middle, plane, and level about it; NaN where there is none.
+        Segments, ``step`` m apart: middle, plane, and level above it; NaN if there is none.
     """
     height = planes[:, :1] + planes[:, 2:] * columns + level
     place = (rows - centres[0]) / step
@@ -83,7 +83,7 @@ def blend_segments(rows: Float, columns: Float, centres: Float, planes: Float, l
         at = np.clip(k, 0, len(centres) - 1)
         here = height[at] + (planes[at, 1] * (rows - centres[at]))[:, None]
         share = np.where(inside, 1.0 - np.abs(place - k), 0.0)
-        # A level that only one of both segments has goes to the end of the other's part.
+        # A level that only one of both segments has continues to the end of the other's part.
         share = np.maximum(share, np.where(inside, 1e-9, 0.0))[:, None] * np.isfinite(here)
         total += share * np.nan_to_num(here)
         weight += share
@@ -97,15 +97,15 @@ def fill_gaps(height: Float) -> Float:
     for row in out:
         known = np.flatnonzero(np.isfinite(row))
         for left, right in pairwise(known.tolist()):
-            if 1 < right - left <= _GAP:
+            if 1 < right - left <= _MAX_GAP_COLUMNS:
                 row[left + 1 : right] = np.interp(np.arange(left + 1, right), [left, right], row[[left, right]])
     return out
 
 
 def extrapolate_edges(height: Float, count: int) -> Float:
-    """Replace the outermost columns of each row, which the wall may touch, by those inside them, carried straight on.
+    """Replace the outermost columns of each row, which the wall may touch, by extrapolation of the inner ones.
 
-    They keep the slope of the four columns inside, unless there is a step.
+    The slope of the four inner columns continues, unless there is a step.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def extrapolate_edges(height: Float, count: int) -> Float:
 
 
 def _extrapolate_left(height: Float, out: Float, count: int) -> None:
-    """Carry the heights of each row on to its first ``count`` known columns."""
+    """Extrapolate the heights of each row to its first ``count`` known columns."""
     columns = height.shape[1]
     known = np.isfinite(height)
     edge = known.argmax(axis=1)
@@ -145,18 +145,18 @@ def _extrapolate_left(height: Float, out: Float, count: int) -> None:
 def refine_heights(
     along: Float, across: Float, z: Float, spread: Float, cells: Int64, start: int, first: int, height: Float, gate: Float
 ) -> tuple[Float, Float, Float]:
-    """Heights moved to the mean of the points about them; of each row the number and sum of squares of what is left.
+    """Move heights to the mean of the points around them; also return number and sum of squared residuals of each row.
 
     Parameters
     ----------
     along, across, z, spread : (n,) float arrays
-        Points in rows and columns, and the standard deviation of the heights that each stands for.
+        Points in rows and columns, and the standard deviation of the heights that each represents.
     cells : (metres * columns + 1,) int array
         First point of each cell.
     height : (metres + 1, columns) float array
-        m; row i stands at ``start + i``, where the cells of row i begin.
+        m; row i is at ``start + i``, where the cells of row i begin.
     gate : (metres + 1,) float array
-        Points farther off than this don't count, m.
+        Maximum distance of points that count, m.
     """
     rows, columns = height.shape
     cell = np.repeat(np.arange(len(cells) - 1), np.diff(cells))
@@ -183,21 +183,21 @@ def refine_heights(
     near = np.flatnonzero(np.abs(rise) < gate.max())
     metre, column, rise = metre[near], column[near], rise[near]
     off, left = np.abs(rise), rise * rise + spread[near] ** 2
-    # What a point must be nearer than, by rows and columns; 0 beside a step, before the first row and beyond the last.
+    # Maximum distance of points by rows and columns; 0 beside a step, before the first row and beyond the last.
     even = np.zeros((rows + 2, columns), np.bool_)
     even[1:-1, 1:-1] = ~(np.abs(out[:, 2:] - out[:, :-2]) > 2.0 * _STEP)
     limit = even * np.pad(gate, 1)[:, None]
     number, square = np.zeros(rows + 2), np.zeros(rows + 2)
     for before in (2, 1, 0, -1):  # rows up to 2 m ahead of a metre, and up to 1 m behind it
         i = metre + before + 1
-        held = off < limit[i, column]
-        number += np.bincount(i[held], minlength=rows + 2)
-        square += np.bincount(i[held], left[held], rows + 2)
+        selected = off < limit[i, column]
+        number += np.bincount(i[selected], minlength=rows + 2)
+        square += np.bincount(i[selected], left[selected], rows + 2)
     return out, number[1:-1], square[1:-1]
 
 
 def _between(height: Float, row: Float, column: Float) -> Float:
-    """Height at places (n,) between rows and columns, m; beside a missing one that of the other column."""
+    """Interpolate the height at places (n,) between rows and columns, m; beside a missing column use the other one."""
     i = np.clip(row.astype(np.int64), 0, height.shape[0] - 2)
     j = np.clip(np.floor(column).astype(np.int64), 0, height.shape[1] - 2)
     g, f = row - i, column - j

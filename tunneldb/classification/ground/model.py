@@ -1,4 +1,4 @@
-"""The ground of a tunnel: heights on a grid along and across, and where the walls meet it."""
+"""Ground of a tunnel: heights on a grid along and across, and the feet of the walls."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from tunneldb.compiled import inner, point_kernel
 from tunneldb.threads import in_blocks
 
 COLUMN = 0.1
-"""Distance of the columns, m; rows stand 1 m apart."""
+"""Distance of the columns, m; rows are 1 m apart."""
 
 _BLOCK = 1 << 16  # points
 
 
 @dataclass(frozen=True)
 class Ground:
-    """Heights of the ground; between rows and columns they are interpolated.
+    """Heights of the ground, interpolated between rows and columns.
 
     Attributes
     ----------
     start : int
-        Distance along the line of the first row, m; rows stand at whole metres.
+        Distance along the line of the first row, m; rows are at whole metres.
     first : int
-        The first column stands ``first * 0.1`` m to the right of the line.
+        The first column is ``first * 0.1`` m to the right of the line.
     height : (rows, columns) float array
-        Height of the ground, m; NaN where there is none.
+        Height of the ground, m; NaN if there is none.
     gamma : (rows,) float array
         Points up to this height above it are ground, m.
     foot : (rows, 2) float array
-        Where the left and the right wall meet it, m to the right of the line; NaN where no wall was seen.
+        Places of the left and the right wall's foot, m to the right of the line; NaN if no wall was seen.
     lean : (rows, 2) float array
-        How far the left and the right wall lean to the right for each metre up, just above the foot.
+        Lean of the left and the right wall to the right per metre up, just above the foot.
     """
 
     start: int
@@ -45,15 +45,15 @@ class Ground:
     lean: Float
 
     def height_at(self, along: Float, across: Float) -> Float:
-        """Height of the ground at places (n,), m; NaN where there is none."""
+        """Return the height of the ground at places (n,), m; NaN if there is none."""
         return self._at(along, across, np.full(len(along), np.nan))[0]
 
     def is_ground(self, along: Float, across: Float, z: Float) -> Bool:
-        """Tell which points (n,) are ground (Li et al. 2023, section 2.1, step 4).
+        """Return True for points (n,) on the ground (Li et al. 2023, section 2.1, step 4).
 
-        They lie up to γ above the ground's height and no more than γ below; beside a step (a kerb)
-        the step's face belongs to it. In the corner before a wall a point belongs to that of both
-        surfaces to which it is nearer; what lies beyond a wall by more than γ is no ground.
+        They are up to γ above the ground's height and no more than γ below; beside a step (a kerb) the step's face is ground
+        too. In the corner at a wall a point belongs to the nearer of both surfaces; points beyond a wall by more than γ are not
+        ground.
 
         Parameters
         ----------
@@ -63,7 +63,7 @@ class Ground:
         return self._at(along, across, z)[1]
 
     def _at(self, along: Float, across: Float, z: Float) -> tuple[Float, Bool]:
-        """Height of the ground at points (n,), and which of them are ground."""
+        """Return the height of the ground at points (n,), and True for ground points."""
         a, x, h = (np.ascontiguousarray(v, dtype=np.float64) for v in (along, across, z))
         grids = [np.ascontiguousarray(v) for v in (self.height, self.gamma, self.foot, self.lean)]
         height, ground = np.empty(len(a)), np.empty(len(a), np.bool_)
@@ -76,7 +76,7 @@ class Ground:
         return height, ground
 
     def rows(self, first: int, stop: int) -> Ground:
-        """The rows at ``first`` m and beyond, before ``stop`` m."""
+        """Return the rows at ``first`` m and beyond, before ``stop`` m."""
         low = min(max(first - self.start, 0), len(self.height))
         kept = slice(low, max(min(stop - self.start, len(self.height)), low))
         return Ground(
@@ -86,7 +86,7 @@ class Ground:
 
 @inner
 def _mix(one: float, two: float, share: float) -> float:  # pragma: no cover - compiled
-    """Between two numbers; one of them where the other is missing, unless it alone counts."""
+    """Interpolate between two numbers; use one of them if the other is missing and has not the full weight."""
     if np.isnan(one):
         return two if share > 0.0 else np.nan
     if np.isnan(two):
@@ -99,7 +99,7 @@ def _compare(
     start: int, first: int, height: Float, gamma: Float, foot: Float, lean: Float,
     along: Float, across: Float, z: Float, out: Float, ground: Bool,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Height of the ground at points (n,), NaN where there is none, and whether they are ground."""
+    """Return the height of the ground at points (n,), NaN if there is none, and whether they are ground."""
     rows, columns = height.shape
     for n in range(along.shape[0]):
         out[n] = np.nan
@@ -115,8 +115,8 @@ def _compare(
         if np.isnan(mean) or np.isnan(z[n]):
             continue
         gate = _mix(gamma[i], gamma[after], g)
-        # Its own height, or from foot to top of a step beside it: the face of a kerb stands somewhere in the column that
-        # holds it, and so up to a column beyond the place's own.
+        # Its own height, or from foot to top of a step beside it: the face of a kerb is somewhere in its column, and so up to a
+        # column beyond the place's own.
         low, high = mean, mean
         for k in range(max(j - 1, 0), min(j + 3, columns)):
             level = _mix(height[i, k], height[after, k], g)
@@ -127,7 +127,7 @@ def _compare(
         if not (z[n] <= high + gate and z[n] >= low - gate):
             continue
         up = z[n] - mean
-        held = True
+        selected = True
         for side in range(2):
             at = _mix(foot[i, side], foot[after, side], g)
             if np.isnan(at):
@@ -137,5 +137,5 @@ def _compare(
             if side == 1:
                 inside = -inside
             if inside < -gate or abs(inside) < abs(up):
-                held = False
-        ground[n] = held
+                selected = False
+        ground[n] = selected

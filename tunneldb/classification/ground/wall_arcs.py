@@ -1,4 +1,4 @@
-"""Where the ground begins in the unrolled plane: the feet of the walls, unrolled."""
+"""Limits of the ground in the unrolled plane: the unrolled feet of the walls."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from tunneldb.geometry.surface import Surface
 
 
 def foot_arcs(ground: Ground | None, line: PlanLine, surface: Surface) -> Float:
-    """Arcs at which the ground begins on the left and on the right, at each of its whole metres of chainage.
+    """Return the arcs of the ground's left and right limits, at each of its whole metres of chainage.
 
-    The feet are lines in space; both their coordinates change when they are unrolled, so that the arcs at whole metres are
-    laid between them. Where a wall is missing for a stretch, as at a niche, it is thought on from its neighbours; if it is
-    missing everywhere, the ground begins where it is last seen.
+    The feet are lines in space. Both their coordinates change when unrolled, so that arcs are interpolated to whole metres.
+    Where a wall is missing for a stretch, for example at a niche, it is interpolated from its neighbours; if it is missing
+    everywhere, the ground ends where it was last seen.
 
     Returns
     -------
     (rows, 2) float array
-        m; NaN where there is no ground, or no surface.
+        m; NaN without ground, or without surface.
     """
     if ground is None:
         return np.empty((0, 2))
@@ -36,7 +36,7 @@ def foot_arcs(ground: Ground | None, line: PlanLine, surface: Surface) -> Float:
         if not np.isfinite(across[there]).any():
             across = (ground.first + last[:, side]) * COLUMN
         rows = np.flatnonzero(there & np.isfinite(across))
-        # the ground reaches to the foot or a cell less far
+        # the ground reaches to the foot or up to a cell less
         column = np.clip(np.rint(across[rows] / COLUMN).astype(np.intp) - ground.first, last[rows, 0], last[rows, 1])
         height = _nearest_height(ground.height[rows], column)
         unrolled = surface.unroll(np.column_stack([line.point(metres[rows], across[rows]), height]))
@@ -48,7 +48,7 @@ def foot_arcs(ground: Ground | None, line: PlanLine, surface: Surface) -> Float:
 
 
 def _nearest_height(height: Float, column: Intp) -> Float:
-    """Height in each row at the column, or at the nearest one that has any."""
+    """Return the height in each row at the column, or at the nearest one with a height."""
     away = np.abs(np.arange(height.shape[1])[None, :] - column[:, None]).astype(np.float64)
     away[np.isnan(height)] = np.inf
     return np.asarray(height[np.arange(len(height)), away.argmin(axis=1)])

@@ -1,4 +1,4 @@
-"""Where the walls meet the ground, and how they lean just above it."""
+"""Feet of the walls on the ground, and the walls' lean just above them."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from tunneldb.arrays import Float, Int64
 from tunneldb.classification.ground.model import COLUMN
 from tunneldb.classification.ground.ransac import best_plane
 
-_HIGH = 0.6  # points of the wall are looked for up to this height, m
-_INWARD, _OUTWARD = 0.35, 0.9  # and so far from where the ground ends, m
-_ALONG = 2  # and so many metres before and after a row
-_WITHIN = 0.02  # of the wall's plane, m
+_MAX_HEIGHT = 0.6  # maximum height of points of the wall, m
+_INWARD, _OUTWARD = 0.35, 0.9  # and their distance from the ground's edge, m
+_ALONG = 2  # and their distance before and behind a row, m
+_PLANE_TOLERANCE = 0.02  # of the wall's plane, m
 _TRIALS = 60
-_LEAST = 15
-_SLANT_ALONG, _SLANT_UP = 0.15, 3.0  # of a wall, to the right for each metre along and up, at the most
+_MIN_POINTS = 15
+_MAX_SLOPE_ALONG, _MAX_SLOPE_UP = 0.15, 3.0  # maximum slope of a wall, to the right for each metre along and up
 _FITS = 5  # with Tukey's weights
 _NEIGHBOURS = 9  # rows whose median a foot must be near
-_APART = 0.05  # m
+_FOOT_TOLERANCE = 0.05  # m
 
 
 def fit_walls(
     along: Float, across: Float, z: Float, cells: Int64, start: int, height: Float, low: Float, seed: int
 ) -> tuple[Float, Float]:
-    """Foot and lean of the left and the right wall at each row, (rows, 2) each; NaN where no wall is seen.
+    """Fit foot and lean of the left and the right wall at each row, (rows, 2) each; NaN where no wall is seen.
 
-    The wall is the plane in which, by RANSAC, most of the points lie that stand just above the outermost ground;
-    then a surface curved in height that is fitted to them by least squares.
+    The wall is the plane that has, by RANSAC, most of the points just above the outermost ground; a surface curved in height is
+    then fitted to these by least squares.
 
     Parameters
     ----------
@@ -38,9 +38,9 @@ def fit_walls(
     height : (rows, columns) float array
         Ground, m.
     low : (rows,) float array
-        Height above the ground from which a point belongs to the wall for sure, m.
+        Height above the ground from which a point certainly belongs to the wall, m.
     seed : int
-        Start of the random numbers.
+        Seed of the random numbers.
     """
     rows, columns = height.shape
     metres = (len(cells) - 1) // columns
@@ -55,18 +55,18 @@ def fit_walls(
             left, right = (edge - outward, edge + inward) if side == 0 else (edge - inward, edge + outward)
             begin, end = cells[near * columns + max(left, 0)], cells[near * columns + min(right + 1, columns)]
             count = end - begin
-            if count.sum() < _LEAST:
+            if count.sum() < _MIN_POINTS:
                 continue
             at = np.repeat(begin - (np.cumsum(count) - count), count) + np.arange(count.sum())
             metre = np.repeat(near, count)
             share = along[at] - start - metre
             up = z[at] - (height[metre, edge] * (1.0 - share) + height[metre + 1, edge] * share)
-            kept = (up > low[i]) & (up < _HIGH)
-            if np.count_nonzero(kept) < _LEAST:
+            kept = (up > low[i]) & (up < _MAX_HEIGHT)
+            if np.count_nonzero(kept) < _MIN_POINTS:
                 continue
             near_wall = np.column_stack([along[at] - start - i, up, across[at]])[kept]
             draw = seed + 2 * (i + start + 1_000_000) + side
-            plane, number = best_plane(near_wall, draw, _reach, _TRIALS, least=_LEAST)
+            plane, number = best_plane(near_wall, draw, _reach, _TRIALS, min_inliers=_MIN_POINTS)
             if number:
                 walls.append(2 * i + side)
                 planes.append(plane)
@@ -79,22 +79,22 @@ def fit_walls(
 
 
 def _fitted(points: list[Float], planes: Float) -> Float:
-    """Surfaces across = c0 + c1 along + c2 up + c3 up², (w, 4), fitted to the points of some walls with Tukey's weights.
+    """Fit surfaces across = c0 + c1 along + c2 up + c3 up², (w, 4), to the points of some walls with Tukey's weights.
 
     Parameters
     ----------
     points : list of (n, 3) float arrays
-        Of each wall: along, up, across.
+        Points of each wall: along, up, across.
     planes : (w, 3) float array
-        Where to begin.
+        Initial planes.
     """
     count = len(points)
     wall = np.repeat(np.arange(count), [len(p) for p in points])
     along, up, across = np.concatenate(points).T
     terms = [np.ones(len(up)), along, up, up**2, across]
     surface = np.column_stack([planes, np.zeros(count)])
-    reach = (1.5 * _WITHIN * np.sqrt(1.0 + planes[:, 2] ** 2))[wall]
-    held = np.diag([1e-9, 1e-9, 1e-9, 0.01 + 1e-9])  # no curvature where the points don't show any
+    reach = (1.5 * _PLANE_TOLERANCE * np.sqrt(1.0 + planes[:, 2] ** 2))[wall]
+    selected = np.diag([1e-9, 1e-9, 1e-9, 0.01 + 1e-9])  # no curvature unless the points show one
     for _ in range(_FITS):
         e = across - sum(c[wall] * term for c, term in zip(surface.T, terms[:4], strict=True))
         weight = np.maximum(1.0 - (e / reach) ** 2, 0.0) ** 2
@@ -104,26 +104,26 @@ def _fitted(points: list[Float], planes: Float) -> Float:
                 normal[:, i, j] = np.bincount(wall, weight * terms[i] * terms[j], count)
                 if j < 4:
                     normal[:, j, i] = normal[:, i, j]
-        surface = np.linalg.solve(normal[:, :, :4] + held, normal[:, :, 4:])[:, :, 0]
+        surface = np.linalg.solve(normal[:, :, :4] + selected, normal[:, :, 4:])[:, :, 0]
     return np.asarray(surface, dtype=np.float64)
 
 
 def _reach(planes: Float) -> Float:
-    """How far across an inlier may lie from each wall (t, 3), m; 0 for one that runs or leans too much askew."""
-    possible = (np.abs(planes[:, 1]) <= _SLANT_ALONG) & (np.abs(planes[:, 2]) <= _SLANT_UP)
-    return np.where(possible, _WITHIN * np.sqrt(1.0 + planes[:, 2] ** 2), 0.0)
+    """Return the maximum distance across of an inlier from each wall (t, 3), m; 0 for a wall too oblique or leaning."""
+    possible = (np.abs(planes[:, 1]) <= _MAX_SLOPE_ALONG) & (np.abs(planes[:, 2]) <= _MAX_SLOPE_UP)
+    return np.where(possible, _PLANE_TOLERANCE * np.sqrt(1.0 + planes[:, 2] ** 2), 0.0)
 
 
 def replace_outliers(foot: Float, lean: Float) -> tuple[Float, Float]:
-    """Feet and leans of the walls, (rows, 2) each, without those of niches, doors and objects by the wall.
+    """Remove feet and leans of the walls, (rows, 2) each, at niches, doors and objects by the wall.
 
-    A foot that lies off the running median of the rows is replaced by it; leans are the running median of the others'.
+    A foot far from the running median of the rows is replaced by it; leans are the running median of the remaining ones.
     """
     foot, lean = foot.copy(), lean.copy()
     for side in range(2):
         median = _running_median(foot[:, side])
         with np.errstate(invalid="ignore"):
-            outlier = ~(np.abs(foot[:, side] - median) < _APART)
+            outlier = ~(np.abs(foot[:, side] - median) < _FOOT_TOLERANCE)
         leaning = _running_median(np.where(outlier, np.nan, lean[:, side]))
         foot[outlier, side] = median[outlier]
         lean[:, side] = leaning
@@ -131,7 +131,7 @@ def replace_outliers(foot: Float, lean: Float) -> tuple[Float, Float]:
 
 
 def _running_median(values: Float) -> Float:
-    """Median of each value and those beside it that are known; NaN where fewer than three are."""
+    """Return the running median of known values; NaN if fewer than three are known."""
 
     def middle(window: Float) -> float:
         known = window[np.isfinite(window)]

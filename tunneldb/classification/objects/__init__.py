@@ -1,1 +1,1 @@
-"""What is neither ground nor lining: clusters of points, their classes and the cells they fill."""
+"""Points that are neither ground nor lining: clusters, their classes and the cells they fill."""

@@ -1,4 +1,4 @@
-"""Clusters: what stands in the tunnel or hangs on its lining, and the cells that it fills."""
+"""Clusters: objects in the tunnel or fixtures on its lining, and the cells that they fill."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ from tunneldb.pointcloud.voxels import key_slot, value_table
 CELL = 0.1
 """Edge of a cell, m."""
 
-PIECE = 10.0
-"""What is longer along the tunnel is kept in pieces of this length, m, at whole multiples of it: they divide a kilometre."""
+MAX_CLUSTER_LENGTH = 10.0
+"""Maximum length of clusters along the tunnel, m; longer ones are split at whole multiples, which divide a kilometre."""
 
-NEAR = 2
-"""A point belongs to the cell within so many cells: points of survey density leave cells of a surface empty."""
+MAX_CELL_DISTANCE = 2
+"""Distance, in cells, within which a point belongs to a cell: points of survey density leave cells of a surface empty."""
 
 _SQUARE = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
 
 
 @dataclass(frozen=True)
 class Cluster:
-    """Something in the tunnel, or a piece of it.
+    """Object or fixture in the tunnel, or a piece of it.
 
     Attributes
     ----------
     klass : int
         Class of its points, see :class:`tunneldb.classification.classes.PointClass`.
     cells : (m, 3) int32 array
-        Cells that its points fill: floor(xyz / 0.1 m), each once, sorted.
+        Cells with its points: floor(xyz / 0.1 m), without duplicates, sorted.
     points : int
-        How many points it was found from.
+        Number of points it was found from.
     along_from, along_to : float
         First and last place along the tunnel, m.
     height_from, height_to : float or None
-        Lowest and highest point above the ground, m; None where there is no ground.
+        Lowest and highest point above the ground, m; None without ground.
     hull : (k, 2) float array
         Convex hull of the cells in plan, x and y of its corners counter-clockwise, not closed, m.
     """
@@ -55,7 +55,7 @@ class Cluster:
 
     @classmethod
     def of(cls, klass: int, xyz: Float, along: Float, height: Float) -> Cluster:
-        """Make one of its points (n, 3), n ≥ 1, their places along the tunnel and heights above the ground (n,; NaN: none)."""
+        """Make a cluster of points (n, 3), n ≥ 1, their places along the tunnel and heights above ground (n,); NaN: none."""
         cells = _distinct(np.floor(xyz / CELL).astype(np.int32))
         known = height[np.isfinite(height)]
         low, high = (float(known.min()), float(known.max())) if len(known) else (None, None)
@@ -63,15 +63,15 @@ class Cluster:
 
 
 def pieces(klass: int, xyz: Float, along: Float, height: Float) -> list[Cluster]:
-    """Make a cluster, or the pieces of one that is longer than ``PIECE``; arguments as for :meth:`Cluster.of`."""
-    if along.max() - along.min() <= PIECE:
+    """Make a cluster, or the pieces of one longer than ``MAX_CLUSTER_LENGTH``; arguments as for :meth:`Cluster.of`."""
+    if along.max() - along.min() <= MAX_CLUSTER_LENGTH:
         return [Cluster.of(klass, xyz, along, height)]
-    piece = np.floor(along / PIECE)
+    piece = np.floor(along / MAX_CLUSTER_LENGTH)
     return [Cluster.of(klass, xyz[m], along[m], height[m]) for m in (piece == p for p in np.unique(piece))]
 
 
 def _distinct(cells: Int32) -> Int32:
-    """Cells (n, 3) once each, sorted: as whole numbers, for rows of an array are compared slowly."""
+    """Return the unique cells (n, 3), sorted; as whole numbers, because array rows compare slowly."""
     low = cells.min(axis=0)
     width = (cells.max(axis=0) - low).astype(np.int64) + 1
     number = (cells[:, 0] - low[0]).astype(np.int64)
@@ -87,9 +87,9 @@ def _distinct(cells: Int32) -> Int32:
 
 
 def _hull(cells: Int32) -> Float:
-    """Convex hull in plan of cells, each a square, so that it always has an area."""
+    """Return the convex hull in plan of cells as squares, so that it always has an area."""
     flat = cells[np.r_[True, (np.diff(cells[:, :2], axis=0) != 0).any(axis=1)], :2]  # sorted by x and y
-    # From a corner on: millions of metres would cost the hull its digits.
+    # Relative to a corner: millions of metres would cost precision.
     corners = (flat - flat[0] + _SQUARE[:, None]).reshape(-1, 2)
     ring = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(corners)))[:-1]
     x, y = ring.T
@@ -100,14 +100,14 @@ def _hull(cells: Int32) -> Float:
 
 @dataclass(frozen=True)
 class Lookup:
-    """Cells of clusters in a hash table, so that a point finds the class of the cluster that it lies in.
+    """Cells of clusters in a hash table, for finding the class of the cluster that contains a point.
 
     Attributes
     ----------
     first, last : (3,) int arrays
-        The box that holds all cells.
+        Box around all cells.
     keys : (slots,) int array
-        Numbers of the cells in the box, where `tunneldb.pointcloud.voxels.key_slot` finds them; -1 for an empty slot.
+        Numbers of the cells in the box, at the slot given by `tunneldb.pointcloud.voxels.key_slot`; -1 for an empty slot.
     klass : (slots,) uint8 array
         Their classes.
     """
@@ -119,9 +119,9 @@ class Lookup:
 
     @classmethod
     def of(cls, clusters: list[Cluster]) -> Lookup:
-        """Fill the table with the cells of clusters and those within ``NEAR`` of them, each with the nearest's class.
+        """Fill the table with the cells of clusters and those within ``MAX_CELL_DISTANCE``, each with the nearest class.
 
-        Of two classes equally near the lower one is taken, so the order of the clusters does not matter.
+        Of two classes equally near the lower one is used, so the order of the clusters does not matter.
         """
         ordered = sorted(clusters, key=lambda cluster: cluster.klass)
         cells = np.concatenate([np.empty((0, 3), np.int64), *(cluster.cells.astype(np.int64) for cluster in ordered)])
@@ -130,7 +130,7 @@ class Lookup:
         )
         if len(cells) == 0:
             return cls(np.zeros(3, np.int64), np.full(3, -1, np.int64), *value_table(np.empty(0, np.int64), klass))
-        first, last = cells.min(axis=0) - NEAR, cells.max(axis=0) + NEAR
+        first, last = cells.min(axis=0) - MAX_CELL_DISTANCE, cells.max(axis=0) + MAX_CELL_DISTANCE
         _, wide, tall = last - first + 1
         place = cells - first
         keys, lowest = np.unique((place[:, 0] * wide + place[:, 1]) * tall + place[:, 2], return_index=True)
@@ -145,18 +145,18 @@ class Lookup:
 
 
 def _shells() -> list[Int64]:
-    """Steps (k, 3) to the cells within ``NEAR``, those of one length together, the shortest first."""
-    side = np.arange(-NEAR, NEAR + 1)
+    """Return steps (k, 3) to the cells within ``MAX_CELL_DISTANCE``, grouped by length, the shortest first."""
+    side = np.arange(-MAX_CELL_DISTANCE, MAX_CELL_DISTANCE + 1)
     steps = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
     length = (steps**2).sum(axis=1)
-    return [steps[length == square] for square in range(1, NEAR**2 + 1)]
+    return [steps[length == square] for square in range(1, MAX_CELL_DISTANCE**2 + 1)]
 
 
 @inner
 def look_up(
     x: float, y: float, z: float, first: Int64, last: Int64, keys: Int64, klass: UInt8
 ) -> int:  # pragma: no cover - compiled
-    """Class of the cluster that a point lies in; 0 for none."""
+    """Return the class of the cluster that contains a point; 0 if none does."""
     cx, cy, cz = math.floor(x / CELL), math.floor(y / CELL), math.floor(z / CELL)
     if not (first[0] <= cx <= last[0] and first[1] <= cy <= last[1] and first[2] <= cz <= last[2]):
         return 0

@@ -1,8 +1,8 @@
 """DBSCAN: clusters of points by their density (Ester et al., 1996; Li et al., 2023, eq. 2–4).
 
-Neighbours are looked up when they are needed and never kept, so memory grows with the number of points alone, whatever
-their density. Points are sorted into cells whose diagonal is the radius: all core points of a cell belong together, so
-clusters are joined cell by cell, and one pair of core points near enough joins two cells.
+Neighbours are looked up when needed and not stored, so memory grows only with the number of points, whatever their density.
+Points are sorted into cells whose diagonal is the radius: all core points of a cell belong together. So clusters are joined
+cell by cell, and one pair of core points near enough joins two cells.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from tunneldb.compiled import inner, kernel, lower_bound
 from tunneldb.threads import in_blocks
 
 _EDGE = 0.577  # of the radius: a little less than 1/√3, the edge of a cube whose diagonal is the radius
-_NEAR = 2  # cells to each side that can hold a neighbour
-_RUNS = (2 * _NEAR + 1) ** 2  # runs of cells about a cell
+_NEIGHBOUR_CELLS = 2  # cells to each side that can hold a neighbour
+_RUNS = (2 * _NEIGHBOUR_CELLS + 1) ** 2  # runs of cells about a cell
 _BLOCK = 4096  # cells at a time
 
 
 def dbscan(points: Float, radius: float, min_points: int) -> Int64:
     """Label the clusters of points.
 
-    A core point has ``min_points`` points, itself included, within the radius (eq. 2). Core points within the radius of
-    each other are one cluster (eq. 4); what is no core point joins the cluster of the nearest core point within the radius,
-    the first of equals, or none (eq. 3). So clusters do not depend on the order of the points.
+    A core point has ``min_points`` points, itself included, within the radius (eq. 2). Core points within the radius of each
+    other form one cluster (eq. 4). Any other point joins the cluster of the nearest core point within the radius, the first of
+    equals, or none (eq. 3). So clusters do not depend on the order of the points.
 
     Parameters
     ----------
     points : (n, 3) float array
-        Coordinates, m, without NaN. Where the spacing differs with the direction, scale them before.
+        Coordinates, m, without NaN. If the spacing differs with direction, scale them first.
     radius : float
         R, m, above 0.
     min_points : int
@@ -43,10 +43,10 @@ def dbscan(points: Float, radius: float, min_points: int) -> Int64:
     Raises
     ------
     ValueError
-        For a radius or a number of points out of bounds, or points that are not (n, 3).
+        If the radius or the number of points is out of bounds, or points are not (n, 3).
     """
     if not radius > 0.0 or min_points < 1:
-        raise ValueError(f"a radius above 0 and at least 1 point are needed, not {radius} and {min_points}")
+        raise ValueError(f"radius must be above 0 and min_points at least 1, not {radius} and {min_points}")
     points = np.asarray(points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"points must be (n, 3), not {points.shape}")
@@ -80,26 +80,26 @@ def dbscan(points: Float, radius: float, min_points: int) -> Int64:
 
 
 def _keys(points: Float, low: Float, edge: float) -> tuple[Int64, int, int]:
-    """Number of the cell of each point (n,), and by how much it grows from a row and from a layer of cells to the next."""
+    """Return the number of the cell of each point (n,), and its increments from a row and from a layer to the next."""
     keys = np.zeros(len(points), np.int64)
     steps = []
     for axis in (2, 1, 0):
-        place = ((points[:, axis] - low[axis]) / edge).astype(np.int64) + _NEAR
-        steps.append(int(place.max()) + 1 + _NEAR)
+        place = ((points[:, axis] - low[axis]) / edge).astype(np.int64) + _NEIGHBOUR_CELLS
+        steps.append(int(place.max()) + 1 + _NEIGHBOUR_CELLS)
         keys = keys * steps[-1] + place
     return keys, steps[2], steps[2] * steps[1]
 
 
 def _runs() -> Int64:
-    """Room for the runs of cells about a cell."""
+    """Return working memory for the runs of cells around a cell."""
     return np.empty((_RUNS, 2), np.int64)
 
 
 def _in_order(labels: Int64, count: int) -> Int64:
-    """Number the clusters (labels below a count, -1 for none) in the order of their first points."""
+    """Renumber the clusters (labels below a count, -1 for none) in the order of their first points."""
     members = np.flatnonzero(labels >= 0)
     first = np.full(count, len(labels), np.int64)
-    first[labels[members[::-1]]] = members[::-1]  # of several the last one stays: the first point
+    first[labels[members[::-1]]] = members[::-1]  # the last assignment remains: the first point
     number = np.empty(count, np.int64)
     number[np.argsort(first, kind="stable")] = np.arange(count)
     labels[members] = number[labels[members]]
@@ -108,14 +108,14 @@ def _in_order(labels: Int64, count: int) -> Int64:
 
 @inner
 def _neighbours(cells: Int64, row: int, layer: int, c: int, runs: Int64) -> int:  # pragma: no cover - compiled
-    """Write the first and last + 1 of the runs of filled cells about a cell, itself included; how many runs there are."""
-    count, first = 0, np.int64(0)  # no literal: what is called with one is compiled for it once more
-    for dz in range(-_NEAR, _NEAR + 1):
-        for dy in range(-_NEAR, _NEAR + 1):
+    """Write the first and last + 1 of the runs of filled cells around a cell, itself included, and return their number."""
+    count, first = 0, np.int64(0)  # no literal, to avoid a second compilation of the called function
+    for dz in range(-_NEIGHBOUR_CELLS, _NEIGHBOUR_CELLS + 1):
+        for dy in range(-_NEIGHBOUR_CELLS, _NEIGHBOUR_CELLS + 1):
             key = cells[c] + dz * layer + dy * row
-            first = lower_bound(cells, key - _NEAR, first, cells.shape[0])
+            first = lower_bound(cells, key - _NEIGHBOUR_CELLS, first, cells.shape[0])
             last = first
-            while last < cells.shape[0] and cells[last] <= key + _NEAR:
+            while last < cells.shape[0] and cells[last] <= key + _NEIGHBOUR_CELLS:
                 last += 1
             if last > first:
                 runs[count, 0], runs[count, 1] = first, last
@@ -164,7 +164,7 @@ def _join_cells(
         if parent[c] < 0:
             continue
         for k in range(_neighbours(cells, row, layer, c, runs)):
-            for other in range(runs[k, 0], min(runs[k, 1], c)):  # the pairs with later cells are theirs
+            for other in range(runs[k, 0], min(runs[k, 1], c)):  # later cells handle their own pairs
                 if parent[other] < 0:
                     continue
                 a, b = _root(parent, c), _root(parent, other)
@@ -192,7 +192,7 @@ def _label(
     placed: Float, order: Int64, starts: Int64, cells: Int64, row: int, layer: int, limit: float, runs: Int64,
     core: Bool, roots: Int64, found: Int64, begin: int, end: int,
 ) -> None:  # fmt: skip  # pragma: no cover - compiled
-    """Write the first cell of each point's cluster, for the points of the cells from begin to end; noise is left as it is."""
+    """Write the first cell of each point's cluster, for the points of the cells from begin to end; noise stays unchanged."""
     for c in range(begin, end):
         count = -1
         for i in range(starts[c], starts[c + 1]):

@@ -1,4 +1,4 @@
-"""What is neither ground nor lining: rails, niches, and clusters that stand in the tunnel or hang on its lining."""
+"""Points that are neither ground nor lining: rails, niches, and clusters on the ground or in front of the lining."""
 
 from __future__ import annotations
 
@@ -17,36 +17,36 @@ from tunneldb.classification.objects.dbscan import dbscan
 from tunneldb.classification.objects.spacing import Spacing
 
 RAIL_TOP = 0.35
-"""Bars along the ground are no higher than this above it, m: a rail of 0.17 m on a sleeper, with a guard rail's play."""
+"""Maximum height of bars along the ground, m: a rail of 0.17 m on a sleeper, with tolerance for a guard rail."""
 
 RAIL_WIDTH = 0.35
-"""And no wider, m, seen in columns of 0.1 m."""
+"""Maximum width of bars, m, in columns of 0.1 m."""
 
 RAIL_LENGTH = 5.0
-"""And no shorter, m."""
+"""Minimum length of bars, m."""
 
-FLAT = 0.35
-"""What hangs on the wall lies within this of it, m; what reaches farther out and stands on the ground is an object."""
+MAX_FIXTURE_DEPTH = 0.35
+"""Maximum distance of fixtures from the wall, m; clusters that reach farther and stand on the ground are objects."""
 
-RECESS = 0.3
-"""A recess behind the lining is no smaller than this, m, in two directions: less is the lining's own roughness."""
+MIN_RECESS_SIZE = 0.3
+"""Minimum size of a recess behind the lining in two directions, m: less is the lining's own roughness."""
 
 _COLUMN = 0.1
-_FILLED = 0.7  # share of the metres of a bar that hold points of it
+_MIN_FILLED_SHARE = 0.7  # minimum share of the metres of a bar that have points of it
 
 
 @dataclass(frozen=True)
 class ClusterSettings:
-    """How clusters are found.
+    """Parameters of the cluster search.
 
     Attributes
     ----------
     radius : float
-        R of eq. 2, in spacings of the points.
+        R of eq. 2, in point spacings.
     min_points : int
         P_min of eq. 2.
     region : float
-        t of eq. 1: the region of interest reaches up to this share of the tunnel's height.
+        t of eq. 1: upper limit of the region of interest, as a share of the tunnel's height.
     """
 
     radius: float = 3.0
@@ -55,7 +55,7 @@ class ClusterSettings:
 
     @classmethod
     def of(cls, values: Mapping[str, float]) -> ClusterSettings:
-        """Settings of the parameters ``cluster.*``."""
+        """Make settings from the parameters ``cluster.*``."""
         return cls(values["cluster.radius"], int(values["cluster.min_points"]), values["cluster.region"])
 
 
@@ -70,9 +70,9 @@ class ResidualPoints:
     along, across : (n,) float arrays
         In the frame of the line, m.
     height : (n,) float array
-        Above the ground, m; above the lowest point of the tunnel there where there is no ground.
+        Height above the ground, m; above the lowest point of the tunnel if there is no ground.
     depth : (n,) float array
-        Distance from the lining's plane, m, positive into the tunnel; NaN where there is no lining.
+        Distance from the lining's plane, m, positive into the tunnel; NaN without lining.
     top : (n,) float array
         Height of the region of interest there (H of eq. 1), m.
     """
@@ -92,20 +92,20 @@ class ResidualPoints:
         return ResidualPoints(*(part[chosen] for part in parts))
 
     def clusters(self, klass: int, known: bool) -> list[Cluster]:
-        """One cluster, or pieces of it, of all these points; ``known``: the heights are those above a ground."""
+        """Make one cluster, or its pieces, of all points; ``known``: True if heights refer to a ground."""
         return pieces(klass, self.xyz, self.along, self.height if known else np.full(len(self), np.nan))
 
 
 def find_clusters(
     residual: ResidualPoints, spacing: Spacing, settings: ClusterSettings, ground: Ground | None
 ) -> list[Cluster]:
-    """Clusters of the points that are neither ground nor lining, each with its class; noise is left out.
+    """Find clusters of points that are neither ground nor lining, with their classes; noise is left out.
 
-    Behind the lining's plane a cluster wide enough is a niche. Before it bars along the ground are taken out first, for
-    whatever stands on rails is no rail. DBSCAN (eq. 2–4) does the rest: what does not touch the ground and either touches
-    the wall or lies above the region of interest (eq. 1) is an appendage, what stands on the ground or is free in the
-    region is an object. What touches both the ground and the wall is an appendage if it is flat; else it is parted into
-    what is on the wall and what is off it.
+    Behind the lining's plane, a cluster wide enough is a niche. In front of it, bars along the ground are removed first, so
+    that objects on rails are not classified as rails. DBSCAN (eq. 2–4) finds the rest. A cluster that does not touch the ground
+    and touches the wall, or is above the region of interest (eq. 1), is a fixture. A cluster that stands on the ground, or is
+    free in the region, is an object. A cluster that touches both ground and wall is a fixture if it is flat; else it is split
+    into the part on the wall and the part off it.
     """
     with np.errstate(invalid="ignore"):
         behind = residual.depth < 0.0
@@ -121,7 +121,7 @@ def find_clusters(
 def sort_clusters(
     residual: ResidualPoints, spacing: Spacing, settings: ClusterSettings, ground: Ground | None
 ) -> list[Cluster]:
-    """Clusters of points that are neither ground nor behind the lining: rails, objects and appendages."""
+    """Classify clusters of points that are neither ground nor behind the lining: rails, objects and fixtures."""
     known = ground is not None
     found: list[Cluster] = []
     rails = bars(residual.along, residual.across, residual.height) if known else np.zeros(len(residual), np.bool_)
@@ -134,9 +134,9 @@ def sort_clusters(
 
 
 def bars(along: Float, across: Float, height: Float) -> Bool:
-    """Tell which points belong to rails and other long, thin, low bars along the ground.
+    """Return True for points of rails and other long, thin, low bars along the ground.
 
-    Columns of 0.1 m are looked at, metre by metre: a bar fills a column, or its neighbours, for most of 5 m, and it is thin.
+    Columns of 0.1 m are examined metre by metre: a bar fills a column, or its neighbours, for most of 5 m, and it is thin.
 
     Parameters
     ----------
@@ -161,14 +161,14 @@ def bars(along: Float, across: Float, height: Float) -> Bool:
     wide = ndimage.maximum_filter1d(filled, 3, axis=1)
     share = ndimage.uniform_filter1d(wide.astype(np.float64), metres, axis=0, mode="constant")
     reach = ndimage.uniform_filter1d(np.ones(shape), metres, axis=0, mode="constant")
-    # A bar shows in its column and in those beside it; the run of such columns is three wider than it at the most.
-    steady = share / reach >= _FILLED
+    # A bar shows in its column and in those beside it; the run of such columns is at most three wider than the bar.
+    steady = share / reach >= _MIN_FILLED_SHARE
     runs = ndimage.label(steady, structure=[[0, 0, 0], [1, 1, 1], [0, 0, 0]])[0]
     widths = np.bincount(runs.ravel())
     widths[0] = 0
     thin = (runs > 0) & (widths[runs] <= round(RAIL_WIDTH / _COLUMN) + 2)
     bar = _long(thin, metres)[i[low] - row, j[low] - column]
-    # What stands on a bar or beside it is higher than the bar is elsewhere.
+    # Objects on a bar or beside it are higher than the bar is elsewhere.
     top = ndimage.labeled_comprehension(height[low], bar, np.arange(bar.max() + 1), _highest, np.float64, 0.0)
     top[0] = 0.0
     out[low] = height[low] <= top[bar]
@@ -176,19 +176,19 @@ def bars(along: Float, across: Float, height: Float) -> Bool:
 
 
 def _highest(height: Float) -> float:
-    """Height of most points of a bar, and a little more."""
+    """Return the height of most points of a bar, plus a margin."""
     return float(np.quantile(height, 0.9)) + 0.02
 
 
 def _long(thin: Bool, metres: int) -> Int64:
-    """Number of each bar that is long enough, 0 for none; it may shift by a column from one metre to the next."""
+    """Assign numbers to bars that are long enough, 0 for none; a bar may shift by a column from one metre to the next."""
     labels, count = ndimage.label(thin, structure=np.ones((3, 3)))
     lengths = np.array([0, *(rows.stop - rows.start for rows, _ in ndimage.find_objects(labels, count))])
     return np.where(lengths[labels] >= metres, labels, 0).astype(np.int64)
 
 
 def _groups(residual: ResidualPoints, spacing: Spacing, settings: ClusterSettings) -> list[ResidualPoints]:
-    """Clusters by DBSCAN, distances along shrunk to the spacing across."""
+    """Cluster by DBSCAN, with distances along shrunk to the spacing across."""
     if len(residual) == 0:
         return []
     places = np.column_stack([residual.along * spacing.shrink, residual.across, residual.xyz[:, 2]])
@@ -199,13 +199,13 @@ def _groups(residual: ResidualPoints, spacing: Spacing, settings: ClusterSetting
 
 
 def _is_wide(group: ResidualPoints) -> bool:
-    """Tell whether a cluster is larger than ``RECESS`` in two directions."""
+    """Return True if a cluster is larger than ``MIN_RECESS_SIZE`` in two directions."""
     extent = np.ptp(np.column_stack([group.along, group.across, group.xyz[:, 2]]), axis=0)
-    return int((extent >= RECESS).sum()) >= 2
+    return int((extent >= MIN_RECESS_SIZE).sum()) >= 2
 
 
 def _sorted(group: ResidualPoints, radius: float, spacing: Spacing, settings: ClusterSettings, known: bool) -> list[Cluster]:
-    """Classed clusters of one group of points before the lining."""
+    """Classify the clusters of one group of points in front of the lining."""
     depth = np.where(np.isnan(group.depth), np.inf, group.depth)
     on_wall = float(depth.min()) <= radius
     if not _stands(group, radius):
@@ -213,7 +213,7 @@ def _sorted(group: ResidualPoints, radius: float, spacing: Spacing, settings: Cl
         return group.clusters(PointClass.OBJECT if free else PointClass.APPENDAGE, known)
     if not on_wall:
         return group.clusters(PointClass.OBJECT, known)
-    if (depth <= FLAT).mean() >= 0.95:
+    if (depth <= MAX_FIXTURE_DEPTH).mean() >= 0.95:
         return group.clusters(PointClass.APPENDAGE, known)
     off = depth > radius
     parted = group[off]
@@ -230,6 +230,6 @@ def _sorted(group: ResidualPoints, radius: float, spacing: Spacing, settings: Cl
 
 
 def _stands(group: ResidualPoints, radius: float) -> bool:
-    """Tell whether a cluster reaches down to the ground."""
+    """Return True if a cluster reaches down to the ground."""
     with np.errstate(invalid="ignore"):
         return bool((group.height <= radius).any())

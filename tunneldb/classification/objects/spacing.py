@@ -1,4 +1,4 @@
-"""Spacing of points in a cloud, along the tunnel and across: a profiler's profiles may stand far apart."""
+"""Spacing of points in a cloud, along the tunnel and across: profiles of a profiler may be far apart."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Spacing:
 
     @classmethod
     def of(cls, places: Float) -> Spacing | None:
-        """Measure it on points; None without two different places.
+        """Measure the spacing on points; None without two different places.
 
-        Of each of some points that neighbour is taken that is the nearest among those more along than across of it, and the
-        nearest among the others; the medians of their distances, rounded to steps of a tenth, so that two stretches of the
-        same survey have the same, are the spacings.
+        For each point of a sample, the nearest neighbour in the more longitudinal directions and the nearest in the others are
+        used. The spacings are the medians of their distances, rounded to steps of a tenth, so that two stretches of the same
+        survey have the same spacing.
 
         Parameters
         ----------
@@ -42,15 +42,15 @@ class Spacing:
         if len(places) < 2:
             return None
         chosen = places[np.unique(np.linspace(0, len(places) - 1, _SAMPLES).astype(np.int64))]
-        # Built in a third of the time: it is asked but a little.
+        # Takes a third of the time to build; few queries follow.
         _, near = cKDTree(places, leafsize=64, compact_nodes=False, balanced_tree=False).query(
             chosen, k=min(_NEIGHBOURS, len(places))
         )
         step = np.abs(places[near] - chosen[:, None, :])
-        beside = np.linalg.norm(step[..., 1:], axis=-1)
-        length = np.hypot(step[..., 0], beside)
+        crosswise = np.linalg.norm(step[..., 1:], axis=-1)
+        length = np.hypot(step[..., 0], crosswise)
         length[length == 0.0] = np.inf
-        ahead = step[..., 0] > beside
+        ahead = step[..., 0] > crosswise
         found = [np.where(mask, length, np.inf).min(axis=1) for mask in (ahead, ~ahead)]
         medians = [float(np.median(f[np.isfinite(f)])) if np.isfinite(f).any() else np.inf for f in found]
         shortest = min(medians)
@@ -60,10 +60,10 @@ class Spacing:
 
     @property
     def shrink(self) -> float:
-        """Number that distances along are multiplied by to be as close as those across; 1 where they are no wider."""
+        """Return the factor on distances along that makes them as dense as those across; 1 if they are no wider."""
         return min(1.0, self.across / self.along)
 
 
 def _rounded(length: float) -> float:
-    """Nearest of the lengths that grow by a tenth."""
+    """Round a length to a geometric series with steps of a tenth."""
     return float(1.1 ** round(np.log(length) / np.log(1.1)))

@@ -1,1 +1,1 @@
-"""Target spheres in scans: where points are curved, candidates by votes, refinement, fit and check."""
+"""Target spheres in scans: curved cells, candidates by votes, refinement, fit and check."""

@@ -1,9 +1,8 @@
-"""Cells of space whose points don't lie on a plane: all that need be kept of a scan in which spheres are sought.
+"""Cells of space whose points are not on a plane: the only part of a scan needed for finding spheres.
 
-Walls and floor make up nine tenths of a scan. A window of 2 × 2 × 2 cells with edges of one diameter holds every sphere
-whole, wherever it stands; what lies in it beside a sphere, or a sphere by itself, is far from flat. Only cells of such
-windows are kept. Sums are enough to tell, so one pass through the files does it, in memory that grows with the surface
-and not with the points.
+Walls and floor make up nine tenths of a scan. A window of 2 × 2 × 2 cells with edges of one diameter contains every sphere
+completely, wherever it is; a sphere with or without its surroundings is far from flat. Only cells of such windows are kept.
+Sums are sufficient, so one pass through the files is enough, in memory that grows with the surface and not with the points.
 """
 
 from __future__ import annotations
@@ -17,23 +16,23 @@ from tunneldb.compiled import kernel
 from tunneldb.geometry.normals import least_eigenvalues
 from tunneldb.pointcloud.voxels import CellCounts
 
-FLAT = 0.08
-"""Windows whose points scatter less about their best plane, in radii, hold no sphere: a fifth of one scatters by 0.11."""
+MIN_SCATTER = 0.08
+"""Minimum scatter of a window's points about their best plane, in radii: a fifth of a sphere scatters by 0.11."""
 
-MOST = 1 << 16  # points of a cell that are summed up: more would say nothing new, and single precision tires
+MAX_CELL_POINTS = 1 << 16  # maximum points of a cell that are summed: more add nothing and lose single precision
 _BLOCK = 1 << 13  # windows at a time
 _CORNERS = list(np.ndindex(2, 2, 2))  # cells of a window
 
 
 class CurvedCells:
-    """Where a scan is not flat; add all points, `close` it, then ask `holds` for each point.
+    """Cells of a scan that are not flat; add all points, `close` it, then ask `holds` for each point.
 
     Parameters
     ----------
     radius : float
-        Of the spheres, m.
+        Radius of the spheres, m.
     points : int
-        Windows with fewer points hold none.
+        Minimum number of points of a window.
     """
 
     def __init__(self, radius: float, points: int) -> None:
@@ -44,7 +43,7 @@ class CurvedCells:
         self._kept = np.empty(0, np.bool_)
 
     def add(self, xyz: Float) -> None:
-        """Take points (n, 3) into account, m."""
+        """Add points (n, 3), m."""
         xyz = np.ascontiguousarray(xyz, np.float64)
         numbers = self.cells.add(xyz)
         used = len(self.cells.counts)
@@ -55,22 +54,22 @@ class CurvedCells:
         _add(xyz, numbers, self.cells.edge, self._sums)
 
     def close(self) -> None:
-        """Find the cells that are to be kept."""
+        """Find the cells to keep."""
         counts, sums = self.cells.counts, self._sums[: len(self.cells.counts)]
         place = np.rint(self.cells.centres / self.cells.edge - 0.5).astype(np.int64)
         order = np.lexsort((place[:, 2], place[:, 1], place[:, 0]))
         low = place.min(axis=0) if len(place) else np.zeros(3, np.int64)
         self._kept = np.zeros(len(counts), np.bool_)
-        self._kept[order] = _curved(place[order] - low, sums[order], self.points, (FLAT / 2.0) ** 2)
+        self._kept[order] = _curved(place[order] - low, sums[order], self.points, (MIN_SCATTER / 2.0) ** 2)
 
     def holds(self, xyz: Float) -> Bool:
-        """Whether points (n, 3) lie in cells that are kept, (n,)."""
+        """Return True for points (n, 3) in cells to keep, (n,)."""
         number = self.cells.find(xyz)
         return np.asarray((number >= 0) & self._kept[number])
 
 
 def _keys(place: Int64) -> tuple[Int64, int, int, int]:
-    """One number of each cell, in the order of x, y, z, and by how much it grows along each.
+    """Return one number for each cell, in the order of x, y, z, and its increments along each.
 
     Two more cells fit at each end of a column.
     """
@@ -79,7 +78,7 @@ def _keys(place: Int64) -> tuple[Int64, int, int, int]:
 
 
 def _curved(place: Int64, sums: Single, points: int, limit: float) -> Bool:
-    """Tell which cells (n,) are in a window that is not flat.
+    """Return True for cells (n,) in a window that is not flat.
 
     Parameters
     ----------
@@ -88,13 +87,13 @@ def _curved(place: Int64, sums: Single, points: int, limit: float) -> Bool:
     sums : (n, 10) float array
         Sums of x, y, z, x², y², z², xy, xz, yz about the middle of each cell, in edges, and of 1, over its points.
     points : int
-        Windows with fewer points are flat.
+        Windows with fewer points count as flat.
     limit : float
         Least eigenvalue of the covariance, in edges squared, up to which a window is flat.
     """
     key, *steps = _keys(place)
     shifts = [int(np.dot(corner, steps)) for corner in _CORNERS]
-    # A window is known by the cell at its low corner, filled or not.
+    # A window is identified by the cell at its low corner, filled or not.
     windows = np.unique(np.concatenate([key - shift for shift in shifts]))
     kept = np.zeros(len(key) + 1, np.bool_)
     moments: Float = np.hstack([sums.T.astype(np.float64), np.zeros((10, 1))])  # the last: a cell without points
@@ -115,7 +114,7 @@ def _curved(place: Int64, sums: Single, points: int, limit: float) -> Bool:
 
 
 def _moved(sums: Float, by: Float) -> Float:
-    """Sums (10, n) about a place, from those about another one that lies apart from it by some edges (3,)."""
+    """Return sums (10, n) about a place, from those about another one at a distance of some edges (3,)."""
     out = sums.copy()
     m = sums[9]
     for axis, other, row in ((0, 0, 3), (1, 1, 4), (2, 2, 5), (0, 1, 6), (0, 2, 7), (1, 2, 8)):
@@ -133,7 +132,7 @@ def _add(xyz: Float, numbers: Int32, edge: float, sums: Single) -> None:  # prag
     """Add points to the sums of their cells."""
     for i in range(numbers.shape[0]):
         k = numbers[i]
-        if sums[k, 9] >= MOST:
+        if sums[k, 9] >= MAX_CELL_POINTS:
             continue
         x, y, z = xyz[i, 0] / edge, xyz[i, 1] / edge, xyz[i, 2] / edge
         x, y, z = x - math.floor(x) - 0.5, y - math.floor(y) - 0.5, z - math.floor(z) - 0.5

@@ -1,8 +1,8 @@
-"""Fitting a sphere to points, and how far it is one (Li et al., 2023, eq. 8 and 14-16).
+"""Fit of a sphere to points, and its quality (Li et al., 2023, eq. 8 and 14-16).
 
-The centre comes from a fit whose radius is held at the nominal one. A free radius draws the centre along the line of sight:
-on half a sphere at 3 mm of range noise, it is two to three times as far off, the more the smaller the cap that is seen.
-The free radius serves to tell a target from a ball of another size.
+The centre comes from a fit with the radius fixed at the nominal one. A free radius shifts the centre along the line of sight:
+on half a sphere with 3 mm of range noise, the error is two to three times as large, and more on a smaller visible cap. The free
+radius serves to distinguish a target from a ball of another size.
 """
 
 from __future__ import annotations
@@ -16,49 +16,50 @@ from scipy.optimize import least_squares
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.robust import MAD_TO_SIGMA
 
-GRAZING = 0.25
-"""Cosine of incidence (75.5°) below which a point isn't used where the scanner's place is known: at the limb of a sphere
-a beam measures a range between that of the sphere and that of what is behind it."""
+GRAZING_COSINE = 0.25
+"""Cosine of incidence (75.5°) below which a point is not used if the scanner position is known: at the limb of a sphere
+a beam measures a range between that of the sphere and that of the background."""
 
-BEHIND = -0.1
-"""Cosine of incidence below which a point can't lie on the sphere: the sphere itself would hide it."""
+HIDDEN_COSINE = -0.1
+"""Cosine of incidence below which a point cannot be on the sphere: the sphere itself would hide it."""
 
-SLANT = 0.6
-"""The distance of a point from the sphere scatters by the noise of the range × the cosine of incidence, so points seen
-slantingly weigh more; no more than at this cosine, since beyond the sphere's curvature over the noise makes it untrue."""
+MIN_WEIGHT_COSINE = 0.6
+"""Lower limit of the cosine of incidence in weights. The distance of a point from the sphere scatters by range noise × the
+cosine of incidence, so oblique points have more weight; beyond this limit the sphere's curvature over the noise makes that
+untrue."""
 
 BAND = 3.0  # standard deviations from the sphere within which points are on it
-LEAST_SPREAD = 0.0005  # m; files round to as much
+MIN_SPREAD = 0.0005  # m; rounding of files
 
-SOFT = 1.5  # standard deviations beyond which a residual draws less than in proportion
+SOFT_LIMIT = 1.5  # standard deviations beyond which the influence of a residual grows less than in proportion
 STEPS = 25
 
 BANDS, SECTORS = 8, 6
-"""Coverage is counted on cells of equal area: bands across the direction to the scanner, and sectors around it."""
+"""Cells of equal area for coverage: bands across the direction to the scanner, and sectors around it."""
 
 
 @dataclass(frozen=True)
 class SphereFit:
-    """A sphere of the nominal radius through points.
+    """Sphere of the nominal radius through points.
 
     Attributes
     ----------
     centre : (3,) float64 array
         m.
     covariance : (3, 3) float64 array
-        Of the centre, m².
+        Covariance of the centre, m².
     free_centre : (3,) float64 array
-        Of the best sphere of any radius, m.
+        Centre of the best sphere with free radius, m.
     radius, radius_sigma : float
-        Of that sphere, and its standard deviation, m.
+        Radius of that sphere, and its standard deviation, m.
     rms : float
         Root mean square of the distances of the points from the sphere of the nominal radius, m.
     expected : float
-        What `rms` would be if ranges had a standard deviation of 1, by the incidence; 1 where that is not known.
+        Value of `rms` for ranges with a standard deviation of 1, from the incidence; 1 if that is not known.
     on : (n,) bool array
-        Points that lie on the sphere, grazing ones included.
+        True for points on the sphere, grazing ones included.
     used : (n,) bool array
-        Those that it was fitted to.
+        True for points used by the fit.
     """
 
     centre: Float
@@ -80,40 +81,40 @@ class SphereFit:
 def fit_sphere(points: Float, observers: Float, start: Float, radius: float, widest: float) -> SphereFit | None:
     """Fit a sphere of known radius.
 
-    Points within three standard deviations of the sphere are on it; the standard deviation is that of the points found so,
-    from their median (so what else is near does not count), and the two are brought to agree by turns.
+    Points within three standard deviations of the sphere are on it. The standard deviation is that of these points, from their
+    median, so that other points nearby do not count. Both are iterated until they agree.
 
     Parameters
     ----------
     points, observers : (n, 3) float64 arrays
-        What is near the sphere, and where the scanner stood for each, m; NaN where that is not known.
+        Points near the sphere, and the scanner position for each, m; NaN if not known.
     start : (3,) float64 array
-        Where its centre is, to a fifth of the radius, m.
+        Approximate centre, to a fifth of the radius, m.
     radius : float
         m.
     widest : float
-        Points farther from the sphere are never on it, m.
+        Maximum distance from the sphere of points on it, m.
 
     Returns
     -------
     SphereFit or None
-        None if fewer than 6 points are on it, or the fit leads away from the start by a radius.
+        None if fewer than 6 points are on it, or the fit moves away from the start by a radius.
 
     Notes
     -----
-    scipy's least squares with its soft L1 loss; residuals are distances from the sphere in units of their standard deviation.
+    scipy's least squares with its soft L1 loss; residuals are distances from the sphere in their standard deviations.
     """
     centre, band = start, widest
     for _ in range(STEPS):
         before = centre
         distance, cosine = _seen(points, observers, centre, radius)
-        near = (np.abs(distance) <= widest) & ~(cosine < GRAZING)
-        # From all that is near, not only from what is within the band: that would be less from turn to turn.
-        spread = max(MAD_TO_SIGMA * float(np.median(np.abs(distance[near]))), LEAST_SPREAD) if near.any() else widest
+        near = (np.abs(distance) <= widest) & ~(cosine < GRAZING_COSINE)
+        # From all nearby points, not only those within the band: these would decrease with each iteration.
+        spread = max(MAD_TO_SIGMA * float(np.median(np.abs(distance[near]))), MIN_SPREAD) if near.any() else widest
         used = near & (np.abs(distance) <= band)
         if used.sum() < 6:
             return None
-        scale = spread * np.clip(cosine[used], SLANT, 1.0)
+        scale = spread * np.clip(cosine[used], MIN_WEIGHT_COSINE, 1.0)
         scale[np.isnan(scale)] = spread
         centre = _step(points[used], scale, centre, radius)
         if not np.linalg.norm(centre - start) < radius:
@@ -124,7 +125,7 @@ def fit_sphere(points: Float, observers: Float, start: Float, radius: float, wid
         band = narrower
     centre, covariance = _solve(points[used], scale, centre, radius, free=False)
     distance, cosine = _seen(points, observers, centre, radius)
-    on = (np.abs(distance) <= band) & ~(cosine < BEHIND)
+    on = (np.abs(distance) <= band) & ~(cosine < HIDDEN_COSINE)
     solution, wider = _solve(points[used], scale, np.append(centre, radius), radius, free=True)
     radius_sigma = math.sqrt(wider[3, 3]) if wider[3, 3] > 0.0 else math.inf  # a plane has no radius
     expected = _rms(np.nan_to_num(cosine[used], nan=1.0))
@@ -138,7 +139,7 @@ def _rms(values: Float) -> float:
 
 
 def _seen(points: Float, observers: Float, centre: Float, radius: float) -> tuple[Float, Float]:
-    """Distance of each point from the sphere, outwards positive, and cosine of incidence there (NaN without an observer)."""
+    """Return the distance of each point from the sphere, outwards positive, and its cosine of incidence, or NaN."""
     out = points - centre
     far = np.maximum(np.linalg.norm(out, axis=1), 1e-9)
     sight = observers - points
@@ -149,18 +150,18 @@ def _seen(points: Float, observers: Float, centre: Float, radius: float) -> tupl
 
 
 def _step(points: Float, scale: Float, centre: Float, radius: float) -> Float:
-    """One Gauss-Newton step with the weights of the soft L1 loss."""
+    """Make one Gauss-Newton step with the weights of the soft L1 loss."""
     out = points - centre
     far = np.linalg.norm(out, axis=1)
     residual = (far - radius) / scale
-    weight = 1.0 / np.sqrt(1.0 + (residual / SOFT) ** 2)
+    weight = 1.0 / np.sqrt(1.0 + (residual / SOFT_LIMIT) ** 2)
     slope = out / (far * scale)[:, None]
     stepped: Float = centre + np.linalg.lstsq((slope.T * weight) @ slope, (slope.T * weight) @ residual, rcond=1e-9)[0]
     return stepped
 
 
 def _solve(points: Float, scale: Float, start: Float, radius: float, free: bool) -> tuple[Float, Float]:
-    """Best centre (and radius) and its covariance; ``scale`` is the standard deviation of each point's distance."""
+    """Return the best centre (and radius) and its covariance; ``scale`` is the standard deviation of each distance."""
     middle = points.mean(axis=0)
     near = points - middle
     begin = np.array(start, float)
@@ -178,15 +179,15 @@ def _solve(points: Float, scale: Float, start: Float, radius: float, free: bool)
         slope = -out / (far * scale)[:, None]
         return np.column_stack([slope, -1.0 / scale]) if free else slope
 
-    result = least_squares(residuals, begin, slopes, method="trf", loss="soft_l1", f_scale=SOFT, xtol=1e-10)
-    # Variance of robust estimates (Huber, 1981, section 7.6): the influence of each residual, and how fast it changes.
+    result = least_squares(residuals, begin, slopes, method="trf", loss="soft_l1", f_scale=SOFT_LIMIT, xtol=1e-10)
+    # Variance of robust estimates (Huber, 1981, section 7.6): influence of each residual, and its derivative.
     r = residuals(result.x)
     jacobian = slopes(result.x)
-    bend = 1.0 + (r / SOFT) ** 2
+    bend = 1.0 + (r / SOFT_LIMIT) ** 2
     influence, rate = r / np.sqrt(bend), bend**-1.5
     inverse = np.linalg.pinv(jacobian.T @ (jacobian * rate[:, None]))
     freedom = max(len(r) - len(begin), 1)
-    # As if residuals were alike in all directions: their own size in each would say less of it than of chance.
+    # As if residuals were alike in all directions: their own size in each direction would be mostly chance.
     inner = (jacobian.T @ jacobian) * float(influence @ influence) / freedom
     solution = result.x.copy()
     solution[:3] += middle
@@ -194,7 +195,7 @@ def _solve(points: Float, scale: Float, start: Float, radius: float, free: bool)
 
 
 def coverage(points: Float, centre: Float, towards: Float) -> float:
-    """Share of a sphere's surface that is seen: of 48 cells of equal area, those that hold a point; half for a hemisphere.
+    """Return the seen share of a sphere's surface: of 48 cells of equal area, those with a point; half for a hemisphere.
 
     Parameters
     ----------
@@ -203,21 +204,21 @@ def coverage(points: Float, centre: Float, towards: Float) -> float:
     centre : (3,) float64 array
         m.
     towards : (3,) float64 array
-        Direction that the cells are laid out by, to the scanner: 8 bands of equal height across it, so that the hemisphere
-        that faces it is 4 bands, each cut into 6 sectors of 60°.
+        Direction to the scanner, which orients the cells: 8 bands of equal height across it, so that the facing hemisphere has
+        4 bands, each divided into 6 sectors of 60°.
     """
     return len(np.unique(cells_of(points - centre, towards))) / (BANDS * SECTORS)
 
 
 def cells_of(out: Float, towards: Float) -> Int64:
-    """Cell of each point (n,), 0 to 47, as `coverage` counts them.
+    """Return the cell of each point (n,), 0 to 47, as `coverage` counts them.
 
     Parameters
     ----------
     out : (n, 3) float array
-        Points, from the centre of their sphere.
+        Points, relative to the centre of their sphere.
     towards : (3,) or (n, 3) float array
-        Direction that the cells are laid out by.
+        Direction that orients the cells.
     """
     axis = towards / np.linalg.norm(towards, axis=-1, keepdims=True)
     # Any direction across the axis, and the one across both.
@@ -231,17 +232,17 @@ def cells_of(out: Float, towards: Float) -> Int64:
 
 
 def distance_error(centre: Float, truth: Float) -> float:
-    """E_distance (eq. 14): distance of a centre from the true one, m."""
+    """Return E_distance (eq. 14): distance of a centre from the true one, m."""
     return float(np.linalg.norm(np.asarray(centre) - np.asarray(truth)))
 
 
 def fit_ratio(distance: float, radius: float, true_radius: float) -> float:
-    """R_fit (eq. 15 and 16): share of the true sphere's volume that the fitted one has in common with it, 0 to 1.
+    """Return R_fit (eq. 15 and 16): share of the true sphere's volume that the fitted one overlaps, 0 to 1.
 
     Parameters
     ----------
     distance : float
-        Of the two centres, m.
+        Distance of the two centres, m.
     radius, true_radius : float
         m.
     """
@@ -249,7 +250,7 @@ def fit_ratio(distance: float, radius: float, true_radius: float) -> float:
     whole = 4.0 / 3.0 * math.pi * true_radius**3
     if distance >= smaller + larger:
         return 0.0
-    if distance <= larger - smaller:  # one lies within the other: eq. 16 has no angle then
+    if distance <= larger - smaller:  # one is inside the other: eq. 16 has no angle then
         return 4.0 / 3.0 * math.pi * smaller**3 / whole
     alpha = (radius**2 + distance**2 - true_radius**2) / (2.0 * radius * distance)
     beta = (true_radius**2 + distance**2 - radius**2) / (2.0 * true_radius * distance)

@@ -1,9 +1,8 @@
-"""Where spheres of a known radius may be: each point votes for the place one radius behind the surface that it lies on.
+"""Candidate positions of spheres of a known radius: each point votes for the place one radius behind its surface.
 
-The normal of a small neighbourhood, followed inwards by the radius, ends at the centre of the sphere that the neighbourhood
-lies on; the votes of a sphere meet, those of walls, cables and people scatter (Hough, 1962; Ballard, 1981, Pattern
-Recognition 13(2), for shapes of known size). Thereby a sphere is told from the wall that it touches or the tripod under
-it, with which it makes one cluster.
+The normal of a small neighbourhood, followed inwards by the radius, ends at the centre of its sphere. The votes of a sphere
+coincide, those of walls, cables and people scatter (Hough, 1962; Ballard, 1981, Pattern Recognition 13(2), for shapes of known
+size). This separates a sphere from the wall that it touches or the tripod under it, with which it forms one cluster.
 """
 
 from __future__ import annotations
@@ -18,21 +17,21 @@ from tunneldb.geometry.normals import eigenvalues, normal
 from tunneldb.threads import in_blocks
 
 # In radii of the spheres:
-REACH = 0.6  # of the neighbourhood that gives a normal
+REACH = 0.6  # radius of the neighbourhood for a normal
 VOTE = 1.0 / 6.0  # edge of the cells of votes
-NEAR = 1.35  # around a centre, what can lie on the sphere or tell that it is none
+NEIGHBOURHOOD = 1.35  # radius around a centre of the points that decide about the sphere
 
-VOTERS = 8  # points that vote, of each cell of REACH: as many as a sphere of 60 points needs; more say the same again
-NEIGHBOURS = 128  # points looked at around one, about
-LEAST_NEIGHBOURS = 6
-GRAZING = 0.25  # cosine of incidence below which a neighbourhood says nothing of the noise
-VOTES = 12  # that make a candidate; a fifth of a sphere of 60 points has as many
+VOTERS = 8  # voting points in each cell of REACH: as many as a sphere of 60 points needs; more are redundant
+NEIGHBOURS = 128  # approximate number of points examined around one
+MIN_NEIGHBOURS = 6
+GRAZING_COSINE = 0.25  # cosine of incidence below which a neighbourhood is not used for the noise
+MIN_VOTES = 12  # minimum votes of a candidate; a fifth of a sphere of 60 points has as many
 _BLOCK = 1024  # cells at a time
-SHARE = 0.25  # of the voters near a candidate that have voted for it; of a plane 0.14 do
+MIN_VOTER_SHARE = 0.25  # minimum share of the voters near a candidate that voted for it; on a plane it is 0.14
 
 
 class PointGrid:
-    """Points in order of the cells that they lie in, so that those near a place are found at once.
+    """Points in order of their cells, for finding those near a place quickly.
 
     Parameters
     ----------
@@ -44,9 +43,9 @@ class PointGrid:
     Attributes
     ----------
     order : (n,) int array
-        Where each of the points in order comes from.
+        Index of each ordered point in the input.
     xyz : (n, 3) array
-        The points in order, from `low`.
+        Points in order, relative to `low`.
     key : (n,) int array
         Number of the cell of each, in the order of x, y, z; `span` cells fit along each axis, two of them at each end empty.
     start : (k,) int array
@@ -67,23 +66,23 @@ class PointGrid:
 
     @property
     def bounds(self) -> Int64:
-        """First point of each filled cell, and the number of all points behind them."""
+        """Return the first point of each filled cell, and the number of all points at the end."""
         return np.append(self.start, len(self.key))
 
     def around(self, places: Float, reach: float) -> tuple[Int64, Int64]:
-        """Points within a distance of places (k, 3).
+        """Find points within a distance of places (k, 3).
 
         Returns
         -------
         points, place : (m,) int arrays
-            Numbers of points in order, and of the place that each is near to; place by place, growing.
+            Numbers of points in order, and of their places; place by place, increasing.
         """
         places = places - self.low
         low = np.maximum(np.floor((places - reach) / self.edge).astype(np.int64), -2)
         high = np.minimum(np.floor((places + reach) / self.edge).astype(np.int64), self.span - 3)
         steps = (high - low).max(axis=0, initial=-1) + 1
         ix, iy = (np.arange(n) for n in steps[:2].clip(min=0))
-        # Columns of cells about each place: (k, steps along x, steps along y).
+        # Columns of cells around each place: (k, steps along x, steps along y).
         x, y = low[:, 0, None, None] + ix[:, None], low[:, 1, None, None] + iy
         column = ((x + 2) * self.span[1] + y + 2) * self.span[2] + 2
         begin = np.searchsorted(self.key, column + low[:, 2, None, None])
@@ -97,31 +96,31 @@ class PointGrid:
 
 
 def ranges(begin: Int64, end: Int64) -> tuple[Int64, Int64]:
-    """Whole numbers of ranges (n,), one range after the other, and the number of the range that each is of."""
+    """Return whole numbers of ranges (n,), one range after the other, and the number of the range of each."""
     length = np.maximum(end - begin, 0)
     owner = np.repeat(np.arange(len(begin)), length)
     return np.arange(len(owner)) + np.repeat(begin - np.cumsum(length) + length, length), owner
 
 
 def hough_candidates(points: PointGrid, observers: Float, radius: float) -> tuple[Float, float]:
-    """Places where the centre of a sphere may be.
+    """Find possible centres of spheres.
 
     Parameters
     ----------
     points : PointGrid
-        One scan's points, in cells of `REACH` radii.
+        Points of one scan, in cells of `REACH` radii.
     observers : (n, 3) float64 array
-        Where the scanner stood for each point, as they were given, m; NaN where it is not known.
+        Scanner position for each point, in input order, m; NaN if not known.
     radius : float
-        Of the spheres, m.
+        Radius of the spheres, m.
 
     Returns
     -------
     centres : (k, 3) float64 array
-        By falling number of votes, m.
+        By decreasing number of votes, m.
     noise : float
-        Standard deviation of a range, m, where surfaces are smooth: that which a quarter of the neighbourhoods stay below,
-        by their distances from their planes and the incidence. Infinite where nothing tells.
+        Standard deviation of a range on smooth surfaces, m: the lower quartile of the neighbourhoods, from their distances from
+        their planes and the incidence. Infinite if not known.
     """
     if len(points.key) == 0:
         return np.zeros((0, 3)), math.inf
@@ -129,18 +128,18 @@ def hough_candidates(points: PointGrid, observers: Float, radius: float) -> tupl
     scatter = scatter[np.isfinite(scatter)]
     noise = float(np.quantile(scatter, 0.25)) if len(scatter) else math.inf
     votes, places = votes[np.isfinite(votes[:, 0])], points.xyz[voters]
-    if len(votes) < VOTES:
+    if len(votes) < MIN_VOTES:
         return np.zeros((0, 3)), math.inf
     centres, counts = _peaks(PointGrid(votes, VOTE * radius))
     _, near = PointGrid(places, radius).around(centres, (1.0 + 2.0 * VOTE) * radius)
-    good = counts >= SHARE * np.bincount(near, minlength=len(centres))
+    good = counts >= MIN_VOTER_SHARE * np.bincount(near, minlength=len(centres))
     centres, counts = centres[good], counts[good]
     order = np.lexsort((*centres.T, -counts))
     return centres[order] + points.low, noise
 
 
 def _votes(points: PointGrid, observers: Float, radius: float) -> tuple[Float, Int64, Float]:
-    """Votes (2m, 3), NaN where there is none, who cast them (m,), and the noise of the ranges there (m,), NaN for unknown."""
+    """Return votes (2m, 3), NaN if there is none, their voters (m,), and the range noise there (m,), NaN if unknown."""
     bounds = points.bounds
     first = np.append(0, np.cumsum(np.minimum(np.diff(bounds), VOTERS)))
     votes = np.full((2 * first[-1], 3), np.nan)
@@ -160,17 +159,17 @@ def _votes(points: PointGrid, observers: Float, radius: float) -> tuple[Float, I
 
 
 def _peaks(votes: PointGrid) -> tuple[Float, Int64]:
-    """Mean of the votes in the 27 cells around each cell with more votes there than its neighbours have, and their number."""
+    """Return the mean of the votes in the 27 cells around each local maximum, and their number."""
     bounds = votes.bounds
     keys = votes.key[votes.start]
     columns = [(x * votes.span[1] + y) * votes.span[2] for x in (-1, 0, 1) for y in (-1, 0, 1)]
     begin = np.stack([np.searchsorted(keys, keys + column - 1) for column in columns], axis=1)
     end = np.stack([np.searchsorted(keys, keys + column + 1, side="right") for column in columns], axis=1)
     total = (bounds[end] - bounds[begin]).sum(axis=1)
-    chosen = np.flatnonzero(total >= VOTES)
+    chosen = np.flatnonzero(total >= MIN_VOTES)
     neighbours, run = ranges(begin[chosen].ravel(), end[chosen].ravel())
     own = chosen[run // len(columns)]
-    # Of equal ones the first.
+    # The first of equal ones.
     beaten = (total[neighbours] > total[own]) | ((total[neighbours] == total[own]) & (neighbours < own))
     chosen = np.setdiff1d(chosen, own[beaten])
     cast, run = ranges(bounds[begin[chosen]].ravel(), bounds[end[chosen]].ravel())
@@ -184,7 +183,7 @@ def _vote(
     xyz: Float, observers: Float, key: Int64, bounds: Int64, first: Int64, row: int, layer: int, reach: float, radius: float,
     columns: Int64, votes: Float, voters: Int64, scatter: Float, begin: int, end: int,
 ) -> None:  # fmt: skip  # pragma: no cover - compiled
-    """Let points of the cells from begin to end vote; columns is room for the columns of cells about one."""
+    """Let points of the cells from begin to end vote; columns is working memory for the columns of cells around one."""
     for c in range(begin, end):
         at, there = np.int64(0), 0
         for column in range(9):
@@ -195,9 +194,9 @@ def _vote(
             columns[column, 1] = at
             there += at - columns[column, 0]
         stride = max(1, there // NEIGHBOURS)
-        held, asked = bounds[c + 1] - bounds[c], first[c + 1] - first[c]
+        selected, asked = bounds[c + 1] - bounds[c], first[c + 1] - first[c]
         for v in range(asked):
-            i = bounds[c] + v * held // asked
+            i = bounds[c] + v * selected // asked
             voters[first[c] + v] = i
             x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
             n = 0
@@ -211,22 +210,22 @@ def _vote(
                     sx, sy, sz = sx + dx, sy + dy, sz + dz
                     xx, yy, zz = xx + dx * dx, yy + dy * dy, zz + dz * dz
                     xy, xz, yz = xy + dx * dy, xz + dx * dz, yz + dy * dz
-            if n < LEAST_NEIGHBOURS:
+            if n < MIN_NEIGHBOURS:
                 continue
             sx, sy, sz = sx / n, sy / n, sz / n
             xx, yy, zz = xx / n - sx * sx, yy / n - sy * sy, zz / n - sz * sz
             xy, xz, yz = xy / n - sx * sy, xz / n - sx * sz, yz / n - sy * sz
             least, middle, greatest = eigenvalues(xx, yy, zz, xy, xz, yz)
-            # A thread of points has no normal, a heap of them neither.
+            # A line of points has no normal, nor has a cluster.
             if middle < 0.05 * greatest or least > 0.25 * middle:
                 continue
             nx, ny, nz = normal(xx, yy, zz, xy, xz, yz, least)
-            # The middle of a cap lies below its top, by half of what its points lie from the axis, squared, over the radius.
+            # The middle of a cap is below its top, by half of the squared distance of its points from the axis over the radius.
             deep = radius - (middle + greatest) / (2.0 * radius)
             ox, oy, oz = observers[i, 0] - x, observers[i, 1] - y, observers[i, 2] - z
             side = nx * ox + ny * oy + nz * oz
             cosine = 1.0 if math.isnan(side) else abs(side) / math.sqrt(ox * ox + oy * oy + oz * oz)
-            if n > 3 and cosine > GRAZING:
+            if n > 3 and cosine > GRAZING_COSINE:
                 scatter[first[c] + v] = math.sqrt(max(least, 0.0) * n / (n - 3)) / cosine
             at = 2 * (first[c] + v)
             if not side > 0.0:

@@ -1,4 +1,4 @@
-"""Moving candidates to where a sphere of the radius fits best, all at once and quickly; most lead nowhere."""
+"""Refine candidates quickly, all together, to the best fit of a sphere of the radius; most are rejected."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.classification.targets.fit import BANDS, SECTORS, cells_of
-from tunneldb.classification.targets.hough import NEAR, PointGrid
+from tunneldb.classification.targets.hough import NEIGHBOURHOOD, PointGrid
 from tunneldb.threads import in_blocks
 
 # In radii of the spheres:
-WIDE = 0.25  # points so near the sphere draw at first,
-NARROW = 0.1  # and at last
+FIRST_REACH = 0.25  # distance from the sphere of points with weight at first,
+LAST_REACH = 0.1  # and at the end
 PASSES = 12
 
 _BLOCK = 256  # candidates at a time
@@ -21,21 +21,21 @@ _CELLS = BANDS * SECTORS
 
 
 class RefinedSpheres(NamedTuple):
-    """Where candidates have come to, k of them.
+    """Refined candidates, k of them.
 
     Attributes
     ----------
     centres : (k, 3) float64 array
-        NaN where it led away by a radius or there was nothing to fit to, m.
+        NaN if the centre moved away by a radius or had no points, m.
     on : (k,) int array
-        Points within `NARROW` radii of the sphere.
+        Number of points within `LAST_REACH` radii of the sphere.
     share : (k,) float64 array
-        Of the points in and near the sphere, in the directions in which it is seen, those on it.
+        Share on the sphere of the points in and near it, in the directions in which it is seen.
     seen : (k,) float64 array
-        Share of its surface that is seen, as `tunneldb.classification.targets.fit.coverage` has it, about the mean direction of
-        the points on it.
+        Seen share of its surface, as `tunneldb.classification.targets.fit.coverage`, about the mean direction of the points on
+        it.
     radius, radius_sigma : (k,) float64 arrays
-        Of the best sphere of any radius there, and its standard deviation, m; infinite where there is none.
+        Radius of the best sphere with free radius, and its standard deviation, m; infinite if there is none.
     """
 
     centres: Float
@@ -47,7 +47,7 @@ class RefinedSpheres(NamedTuple):
 
 
 def refine_spheres(points: PointGrid, centres: Float, radius: float) -> RefinedSpheres:
-    """Fit spheres of a radius (m) to candidates (k, 3) by Gauss-Newton steps with Tukey's weights, whose reach shrinks."""
+    """Fit spheres of a radius (m) to candidates (k, 3) by Gauss-Newton steps with Tukey's weights of decreasing reach."""
     count = len(centres)
     found = RefinedSpheres(
         np.full((count, 3), np.nan), np.zeros(count, np.int64), np.zeros(count), np.zeros(count),
@@ -56,10 +56,10 @@ def refine_spheres(points: PointGrid, centres: Float, radius: float) -> RefinedS
 
     def work(begin: int, end: int) -> None:
         start = centres[begin:end]
-        near, candidate = points.around(start, (NEAR + WIDE) * radius)
+        near, candidate = points.around(start, (NEIGHBOURHOOD + FIRST_REACH) * radius)
         xyz, start = points.xyz[near], start - points.low
         centre, kept = _fit_centres(xyz, candidate, start, radius)
-        # Of those that are kept, the points and the numbers.
+        # Points and numbers of the remaining candidates.
         chosen = kept[candidate]
         xyz, candidate = xyz[chosen], (np.cumsum(kept) - 1)[candidate[chosen]]
         number, centre = begin + np.flatnonzero(kept), centre[kept]
@@ -74,23 +74,23 @@ def refine_spheres(points: PointGrid, centres: Float, radius: float) -> RefinedS
 def _equations(
     xyz: Float, candidate: Int64, centre: Float, radius: Float, reach: Float, free: bool
 ) -> tuple[Float, Float, Int64, Float]:
-    """Normal equations of spheres by Tukey's weights.
+    """Build the normal equations of spheres with Tukey's weights.
 
     Parameters
     ----------
     xyz, candidate : (n, 3) and (n,) arrays
-        Points, and which of the k spheres each is near to.
+        Points, and for each the number of its sphere.
     centre, radius, reach : (k, 3), (k,) and (k,) arrays
-        Spheres, and how far from them points draw, m.
+        Spheres, and the maximum distance of points with weight, m.
     free : bool
-        Whether the radius is unknown, too.
+        True if the radius is unknown too.
 
     Returns
     -------
     matrix, vector : (k, m, m) and (k, m) arrays
         m is 3, or 4 with the radius.
     count, squares : (k,) arrays
-        Points that draw, and the weighted sum of the squares of their distances, m².
+        Number of points with weight, and the weighted sum of their squared distances, m².
     """
     out = xyz - centre[candidate]
     far = np.sqrt(out[:, 0] * out[:, 0] + out[:, 1] * out[:, 1] + out[:, 2] * out[:, 2])
@@ -110,31 +110,31 @@ def _equations(
 
 
 def _fit_centres(xyz: Float, candidate: Int64, start: Float, radius: float) -> tuple[Float, Bool]:
-    """Centres (k, 3) of spheres of a radius, from a start on, and which of them are worth keeping."""
+    """Return fitted centres (k, 3) of spheres of a radius, and True for those worth keeping."""
     centre, kept = start.copy(), np.ones(len(start), np.bool_)
     for step in range(PASSES):
-        reach = radius * max(NARROW, WIDE * 0.85**step)
+        reach = radius * max(LAST_REACH, FIRST_REACH * 0.85**step)
         alike = np.full(len(start), radius), np.full(len(start), reach)
         matrix, vector, _, _ = _equations(xyz, candidate, centre, *alike, free=False)
         trace = np.trace(matrix, axis1=1, axis2=2)
         kept &= trace >= 4.0
         if not kept.any():
             break
-        # Across a nearly flat patch nothing holds the centre: let it stay there.
+        # Across a nearly flat patch the centre is not determined: it stays there.
         matrix = matrix[kept] + 1e-3 * trace[kept, None, None] * np.eye(3)
         centre[kept] += np.linalg.solve(matrix, vector[kept, :, None])[..., 0]
         kept &= ((centre - start) ** 2).sum(axis=1) <= radius * radius
-        held = kept[candidate]
-        xyz, candidate = xyz[held], candidate[held]
+        selected = kept[candidate]
+        xyz, candidate = xyz[selected], candidate[selected]
     return centre, kept
 
 
 def _fit_radii(xyz: Float, candidate: Int64, centre: Float, radius: float) -> tuple[Float, Float]:
-    """Radius of the best sphere of any radius near each of some, and its standard deviation; infinite where there is none."""
+    """Return the radius of the best sphere with free radius, and its standard deviation; infinite if there is none."""
     count = len(centre)
     state = np.column_stack([centre, np.full(count, radius)])
     sigma, lost = np.full(count, np.inf), np.zeros(count, np.bool_)
-    reach = np.full(count, WIDE * radius)
+    reach = np.full(count, FIRST_REACH * radius)
     for step in range(PASSES):
         matrix, vector, drawing, squares = _equations(xyz, candidate, state[:, :3], state[:, 3], reach, free=True)
         lost |= drawing < 6
@@ -143,7 +143,7 @@ def _fit_radii(xyz: Float, candidate: Int64, centre: Float, radius: float) -> tu
         kept = np.flatnonzero(~lost)
         state[kept] += np.linalg.solve(matrix[kept], vector[kept, :, None])[..., 0]
         lost |= ~((state[:, 3] > 0.2 * radius) & (state[:, 3] < 5.0 * radius))
-        reach = np.maximum(0.9 * reach, NARROW * radius)
+        reach = np.maximum(0.9 * reach, LAST_REACH * radius)
         if step == PASSES - 1:
             kept = np.flatnonzero(~lost)
             sigma[kept] = np.sqrt(np.linalg.inv(matrix[kept])[:, 3, 3] * squares[kept] / matrix[kept, 3, 3])
@@ -151,19 +151,19 @@ def _fit_radii(xyz: Float, candidate: Int64, centre: Float, radius: float) -> tu
 
 
 def _extent(xyz: Float, candidate: Int64, centre: Float, radius: float) -> tuple[Int64, Float, Float]:
-    """Points on each sphere, their share of those near it where it is seen, and the share of its surface that is seen."""
+    """Return the points on each sphere, their share of those near it where it is seen, and the seen share of its surface."""
     count = len(centre)
     out = xyz - centre[candidate]
     far = np.sqrt(out[:, 0] * out[:, 0] + out[:, 1] * out[:, 1] + out[:, 2] * out[:, 2])
-    on = np.abs(far - radius) <= NARROW * radius
+    on = np.abs(far - radius) <= LAST_REACH * radius
     number = np.bincount(candidate[on], minlength=count)
     towards = np.column_stack([np.bincount(candidate[on], out[on, axis], minlength=count) for axis in range(3)])
     known = (number > 0) & (np.linalg.norm(towards, axis=1) > 0.0)
-    near = (far <= NEAR * radius) & (far > 0.0) & known[candidate]
+    near = (far <= NEIGHBOURHOOD * radius) & (far > 0.0) & known[candidate]
     sphere, held_by = candidate[near], on[near]
     cell = sphere * _CELLS + cells_of(out[near], towards[sphere])
     there = np.bincount(cell, minlength=count * _CELLS).reshape(count, _CELLS)
-    held = np.bincount(cell[held_by], minlength=count * _CELLS).reshape(count, _CELLS) > 0
-    among = np.where(held, there, 0).sum(axis=1)
+    selected = np.bincount(cell[held_by], minlength=count * _CELLS).reshape(count, _CELLS) > 0
+    among = np.where(selected, there, 0).sum(axis=1)
     share = np.where(known, number, 0) / np.maximum(among, 1)
-    return np.where(known, number, 0), share, held.mean(axis=1)
+    return np.where(known, number, 0), share, selected.mean(axis=1)

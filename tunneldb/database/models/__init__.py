@@ -1,4 +1,4 @@
-"""The tables of schemas `tunnel` and `tunnel_audit`, as SQLAlchemy knows them.
+"""Tables of schemas `tunnel` and `tunnel_audit`, as SQLAlchemy models.
 
 Alembic compares these with the database; `migrations/baseline/tables.sql` is written from them. Units: metres,
 decibels, seconds, square metres, unless a comment says otherwise.

@@ -1,4 +1,4 @@
-"""What all models share: the base class, names of constraints, types and common columns."""
+"""Common parts of all models: base class, names of constraints, types and common columns."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Reals = Annotated[list[float], mapped_column(ARRAY(REAL))]
 
 
 class Base(DeclarativeBase):
-    """Base of all models; gives the types and the constraints' names."""
+    """Base of all models; defines types and names of constraints."""
 
     metadata = MetaData(schema=SCHEMA, naming_convention=_NAMES)
     type_annotation_map = {  # noqa: RUF012
@@ -42,18 +42,18 @@ class Base(DeclarativeBase):
 
 
 def geometry(kind: str) -> Geometry:
-    """Return a geometry type without SRID: tunnels differ in theirs, so each value carries its own."""
+    """Return a geometry type without SRID: the SRID differs between tunnels, so each value has its own."""
     return Geometry(kind, spatial_index=False)
 
 
 def one_of(column: str, *values: str) -> CheckConstraint:
-    """Return the constraint that a column holds one of these."""
+    """Return the constraint that a column has one of these values."""
     listed = ", ".join(f"'{value}'" for value in values)
     return CheckConstraint(f"{column} IN ({listed})", name=column)
 
 
 def parent(table: str) -> ForeignKey:
-    """Return the reference to a row of another table, with which this one goes."""
+    """Return the reference to a row of another table, with whose deletion this row is deleted."""
     return ForeignKey(f"{SCHEMA}.{table}.id", ondelete="CASCADE")
 
 
@@ -65,7 +65,7 @@ CLOCK = text("clock_timestamp()")
 
 
 class Review:
-    """What an inspector says of a finding, and whether the last detection found it; a mixin of tables of findings."""
+    """Review of a finding by an inspector, and whether the last detection found it; a mixin of tables of findings."""
 
     review: Mapped[str] = mapped_column(server_default=text("'open'"), comment="open, confirmed or rejected, by an inspector")
     reviewed_by: Mapped[str | None] = mapped_column(comment="Who reviewed it")

@@ -1,4 +1,4 @@
-"""Tunnels and their alignments, surveys and where their scanners were."""
+"""Tunnels and their alignments, surveys and scanner positions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tunneldb.database.models.base import NOW, SURVEY, TUNNEL, Base, geometry, o
 
 
 class Tunnel(Base):
-    """A structure with its given axis; a site has none."""
+    """Structure with its given axis; a site has none."""
 
     __tablename__ = "tunnel"
     __table_args__ = (
@@ -47,7 +47,7 @@ class Tunnel(Base):
 
 
 class AlignmentElement(Base):
-    """An element of a tunnel's design alignment."""
+    """Element of a tunnel's design alignment."""
 
     __tablename__ = "alignment_element"
     __table_args__ = (
@@ -78,7 +78,7 @@ class AlignmentElement(Base):
 
 
 class StationEquation(Base):
-    """A piece of a tunnel's own stationing."""
+    """Piece of a tunnel's own stationing."""
 
     __tablename__ = "station_equation"
     __table_args__ = (
@@ -142,7 +142,7 @@ class Survey(Base):
 
 
 class Pose(Base):
-    """The scanner's trajectory."""
+    """Pose of the scanner's trajectory."""
 
     __tablename__ = "pose"
     __table_args__ = {"comment": "Trajectory of a mobile scanner"}  # noqa: RUF012
@@ -153,7 +153,7 @@ class Pose(Base):
 
 
 class Station(Base):
-    """Where a static scanner stood."""
+    """Position of a static scanner."""
 
     __tablename__ = "station"
     __table_args__ = {"comment": "Stations of a static scanner"}  # noqa: RUF012
@@ -166,7 +166,7 @@ class Station(Base):
 
 
 class Reference(Base):
-    """The scanner's intensity over range."""
+    """Intensity of the scanner by range."""
 
     __tablename__ = "reference"
     __table_args__ = {"comment": "Reference curve of the scanner: intensity over range (Xu et al. 2018)"}  # noqa: RUF012

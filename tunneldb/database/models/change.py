@@ -1,4 +1,4 @@
-"""What changed between two surveys of a tunnel; rows belong to the later survey, and go with either."""
+"""Changes between two surveys of a tunnel; rows belong to the later survey, and are deleted with either."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from tunneldb.database.models.base import KM, SURVEY, Base, Reals, geometry, one
 
 OLD = "Survey that it is compared with"
 STATES = ("new", "grown", "shrunk", "same", "dry", "kind", "unseen")
-"""What became of leaks: there is no other."""
+"""Results of the comparison of leaks."""
 
 
 class ChangeSection(Base):
-    """What a section of lining did as a whole, and what is left of its change."""
+    """Movement of a section of lining as a whole, and its remaining change."""
 
     __tablename__ = "change_section"
     __table_args__ = (
@@ -90,7 +90,7 @@ class ChangeImage(Base):
 
 
 class ChangeRegion(Base):
-    """Lining that changed significantly."""
+    """Area of lining with a significant change."""
 
     __tablename__ = "change_region"
     __table_args__ = (
@@ -122,7 +122,7 @@ class ChangeRegion(Base):
 
 
 class LeakChange(Base):
-    """Leaks of one place in both surveys."""
+    """Leaks at one place in both surveys."""
 
     __tablename__ = "leak_change"
     __table_args__ = (

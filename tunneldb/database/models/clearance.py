@@ -1,4 +1,4 @@
-"""Clearance outlines of tunnels, and what stands how near to them in surveys."""
+"""Clearance outlines of tunnels, and distances of objects from them in surveys."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tunneldb.database.models.base import CLOCK, KM, SURVEY, TUNNEL, Base, Float
 
 
 class Gauge(Base):
-    """An outline that is to be clear about each track."""
+    """Outline that must be clear around each track."""
 
     __tablename__ = "gauge"
     __table_args__ = (UniqueConstraint("tunnel_id", "name"), {"comment": "Outlines that are to be clear about tracks or lanes"})
@@ -29,7 +29,7 @@ class Gauge(Base):
 
 
 class ClearanceSection(Base):
-    """A metre of a track against an outline."""
+    """Metre of a track compared with an outline."""
 
     __tablename__ = "clearance_section"
     __table_args__ = (
@@ -69,7 +69,7 @@ class ClearanceSection(Base):
 
 
 class ClearanceInfringement(Base):
-    """A group of points inside an outline."""
+    """Group of points inside an outline."""
 
     __tablename__ = "clearance_infringement"
     __table_args__ = (

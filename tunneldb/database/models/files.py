@@ -1,4 +1,4 @@
-"""Scan files, and the points that were kept of them."""
+"""Scan files, and the points kept from them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tunneldb.database.models.base import CLOCK, KM, NOW, SURVEY, Base, geometry
 
 
 class ScanFile(Base):
-    """One loaded file."""
+    """Loaded file."""
 
     __tablename__ = "scan_file"
     __table_args__ = (
@@ -63,7 +63,7 @@ class ScanFile(Base):
 
 
 class FileKm(Base):
-    """A kilometre that a file touches."""
+    """Kilometre that a file touches."""
 
     __tablename__ = "file_km"
     __table_args__ = {  # noqa: RUF012
@@ -88,7 +88,7 @@ class FileKm(Base):
 
 
 class Incoming(Base):
-    """A file that waits to be read."""
+    """File that waits to be read."""
 
     __tablename__ = "incoming"
     __table_args__ = {"comment": "Files that a batch is to read, until they are read"}  # noqa: RUF012

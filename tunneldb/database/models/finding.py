@@ -18,7 +18,7 @@ _SUMMED = ["kind", "kind_override", "review", "detected", "area", "wet", "supers
 
 
 class FindingKind(Base):
-    """A kind of finding."""
+    """Kind of finding."""
 
     __tablename__ = "finding_kind"
     __table_args__ = (
@@ -40,7 +40,7 @@ class FindingKind(Base):
 
 
 class Severity(Base):
-    """A degree of severity."""
+    """Degree of severity."""
 
     __tablename__ = "severity"
     __table_args__ = (
@@ -54,7 +54,7 @@ class Severity(Base):
 
 
 class FindingSum(Base):
-    """By how much a change of findings changed their sums."""
+    """Change of the sums of findings by a change of findings."""
 
     __tablename__ = "finding_sum"
     __table_args__ = (
@@ -80,7 +80,7 @@ class FindingSum(Base):
 
 
 class FeatureList(Base):
-    """An order of features."""
+    """Order of features."""
 
     __tablename__ = "feature_list"
     __table_args__ = {"comment": "In which order the features of findings are stored: versions of the program differ"}  # noqa: RUF012
@@ -92,7 +92,7 @@ class FeatureList(Base):
 
 
 class Finding(Review, Base):
-    """A finding: a leak, a joint, a dry dark area, or what people drew."""
+    """Finding: a leak, a joint, a dry dark area, or what people drew."""
 
     __tablename__ = "finding"
     __table_args__ = (
@@ -231,7 +231,7 @@ class Finding(Review, Base):
 
 
 class Photo(Base):
-    """A photo of a finding."""
+    """Photo of a finding."""
 
     __tablename__ = "photo"
     __table_args__ = (
@@ -249,7 +249,7 @@ class Photo(Base):
 
 
 class BoundaryRegion(Base):
-    """A dark region that reaches an end of its kilometre."""
+    """Dark region that reaches an end of its kilometre."""
 
     __tablename__ = "boundary_region"
     __table_args__ = (

@@ -12,7 +12,7 @@ from tunneldb.database.models.base import KM, SURVEY, Base, Floats, geometry, on
 
 
 class AxisVertex(Base):
-    """A vertex of the averaged axis."""
+    """Vertex of the averaged axis."""
 
     __tablename__ = "axis_vertex"
     __table_args__ = (
@@ -40,7 +40,7 @@ class AxisVertex(Base):
 
 
 class Segment(Base):
-    """The tunnel between two vertices."""
+    """Part of the tunnel between two vertices."""
 
     __tablename__ = "segment"
     __table_args__ = (
@@ -67,7 +67,7 @@ class Segment(Base):
 
 
 class Section(Base):
-    """A cross-section."""
+    """Cross-section."""
 
     __tablename__ = "section"
     __table_args__ = (
@@ -99,7 +99,7 @@ class Section(Base):
 
 
 class SectionClass(Base):
-    """An angular class of a section."""
+    """Angular class of a section."""
 
     __tablename__ = "section_class"
     __table_args__ = (

@@ -13,7 +13,7 @@ from tunneldb.database.models.base import KM, NOW, SURVEY, Base, Floats, geometr
 
 
 class Ground(Base):
-    """The ground across the tunnel at a metre of it."""
+    """Ground across the tunnel at a metre of it."""
 
     __tablename__ = "ground"
     __table_args__ = (
@@ -43,7 +43,7 @@ class Ground(Base):
 
 
 class Lining(Base):
-    """Where the lining lies in a kilometre, off the surface of the sections."""
+    """Offset of the lining from the surface of the sections in a kilometre."""
 
     __tablename__ = "lining"
     __table_args__ = {  # noqa: RUF012
@@ -63,7 +63,7 @@ class Lining(Base):
 
 
 class Cluster(Base):
-    """Points that lie together and are neither ground nor lining."""
+    """Connected points that are neither ground nor lining."""
 
     __tablename__ = "cluster"
     __table_args__ = (
@@ -89,7 +89,7 @@ class Cluster(Base):
 
 
 class TargetSphere(Base):
-    """A target sphere as one scan saw it."""
+    """Target sphere in one scan."""
 
     __tablename__ = "target_sphere"
     __table_args__ = (

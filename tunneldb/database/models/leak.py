@@ -1,4 +1,4 @@
-"""Intensity, images, what was seen of the lining, and what was learned from reviews."""
+"""Intensity, images, inspected lining, and models adapted to reviews."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tunneldb.database.models.base import CLOCK, KM, NOW, SURVEY, Base, Floats, 
 
 
 class Radiometry(Base):
-    """How the intensity of a kilometre was corrected."""
+    """Correction of the intensity of a kilometre."""
 
     __tablename__ = "radiometry"
     __table_args__ = {"comment": "Correction of the intensity, per kilometre (Xu et al. 2018)"}  # noqa: RUF012
@@ -34,7 +34,7 @@ class Radiometry(Base):
 
 
 class RangeCurve(Base):
-    """The range curve of a kilometre, found on its lining."""
+    """Range curve of a kilometre, estimated from its lining."""
 
     __tablename__ = "range_curve"
     __table_args__ = {"comment": "Range curve found on the lining of a kilometre, of surveys whose reference is auto"}  # noqa: RUF012
@@ -47,7 +47,7 @@ class RangeCurve(Base):
 
 
 class Coverage(Base):
-    """What detection saw of the lining of a kilometre."""
+    """Lining of a kilometre inspected by detection."""
 
     __tablename__ = "coverage"
     __table_args__ = {"comment": "Lining of a kilometre, what was seen of it and what is dark, by steps of chainage"}  # noqa: RUF012
@@ -75,7 +75,7 @@ class Coverage(Base):
 
 
 class Waterproof(Base):
-    """What is kept of a kilometre's waterproofing, or a note that something changed there."""
+    """Cached waterproofing of a kilometre, or a note that something has changed there."""
 
     __tablename__ = "waterproof"
     __table_args__ = (
@@ -109,7 +109,7 @@ class Waterproof(Base):
 
 
 class Region(Base):
-    """A region drawn by the user."""
+    """Region drawn by the user."""
 
     __tablename__ = "region"
     __table_args__ = (
@@ -135,7 +135,7 @@ class Region(Base):
 
 
 class Image(Base):
-    """A block of an unrolled image."""
+    """Block of an unrolled image."""
 
     __tablename__ = "image"
     __table_args__ = (
@@ -162,7 +162,7 @@ class Image(Base):
 
 
 class LearnedModel(Base):
-    """What the model of evidence learned from the reviews of a tunnel."""
+    """Model of evidence adapted to the reviews of a tunnel."""
 
     __tablename__ = "learned_model"
     __table_args__ = (

@@ -8,11 +8,11 @@ from sqlalchemy.orm import Mapped, mapped_column
 from tunneldb.database.models.base import KM, SURVEY, Base, Reals, one_of, parent
 
 ORIGINS = ("length", "file", "found")
-"""How the rings of a survey were given."""
+"""Sources of the rings of a survey."""
 
 
 class Ring(Base):
-    """A ring of a lining, from one joint around the tunnel to the next."""
+    """Ring of a lining, from one joint around the tunnel to the next."""
 
     __tablename__ = "ring"
     __table_args__ = (
@@ -82,7 +82,7 @@ class Ring(Base):
 
 
 class RingChord(Base):
-    """A chord of a ring between two clock positions."""
+    """Chord of a ring between two clock positions."""
 
     __tablename__ = "ring_chord"
     __table_args__ = (

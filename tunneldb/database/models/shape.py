@@ -1,4 +1,4 @@
-"""Design profiles of tunnels, and how far the linings of surveys deviate from them."""
+"""Design profiles of tunnels, and deviations of the linings of surveys from them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from sqlalchemy.orm import Mapped, mapped_column
 from tunneldb.database.models.base import CLOCK, KM, SURVEY, TUNNEL, Base, Floats, Reals, one_of, parent
 
 LAYERS = ("lining", "shotcrete", "excavation")
-"""Layers that profiles are of, from inside."""
+"""Layers of profiles, from inside."""
 
 
 class DesignProfile(Base):
-    """An outline that holds from one chainage to another."""
+    """Outline that is valid from one chainage to another."""
 
     __tablename__ = "design_profile"
     __table_args__ = (
@@ -40,7 +40,7 @@ class DesignProfile(Base):
 
 
 class DeviationSection(Base):
-    """The lining of a step of chainage against its design."""
+    """Lining of a step of chainage compared with its design."""
 
     __tablename__ = "deviation_section"
     __table_args__ = (

@@ -13,7 +13,7 @@ from tunneldb.database.models.base import KM, NOW, SURVEY, Base, Floats, geometr
 
 
 class SonarScan(Base):
-    """A sonar scan and its pose."""
+    """Sonar scan with its pose."""
 
     __tablename__ = "sonar_scan"
     __table_args__ = (
@@ -51,7 +51,7 @@ class SonarScan(Base):
 
 
 class RegistrationResidual(Base):
-    """What is left between a sonar scan and what it was fitted to."""
+    """Residual between a sonar scan and an object of its fit."""
 
     __tablename__ = "registration_residual"
     __table_args__ = (
@@ -70,7 +70,7 @@ class RegistrationResidual(Base):
 
 
 class Ladder(Base):
-    """A ladder in the water, as the laser sees it."""
+    """Ladder in the water, as seen by the laser."""
 
     __tablename__ = "ladder"
     __table_args__ = (
@@ -89,7 +89,7 @@ class Ladder(Base):
 
 
 class SonarPoint(Base):
-    """A point of a sonar scan, thinned."""
+    """Point of a sonar scan, thinned."""
 
     __tablename__ = "sonar_point"
     __table_args__ = (
@@ -112,7 +112,7 @@ class SonarPoint(Base):
 
 
 class Bed(Base):
-    """A cell of the bed, 1 m along and 0.1 m across."""
+    """Cell of the bed, 1 m along and 0.1 m across."""
 
     __tablename__ = "bed"
     __table_args__ = (
@@ -133,7 +133,7 @@ class Bed(Base):
 
 
 class WaterLevel(Base):
-    """The water in a kilometre, and since when what sonar scans saw of it is as it is."""
+    """Water in a kilometre, with the time since which its sonar results are unchanged."""
 
     __tablename__ = "water_level"
     __table_args__ = (

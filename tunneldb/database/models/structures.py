@@ -11,7 +11,7 @@ from tunneldb.database.models.base import SURVEY, Base, Floats, Review, geometry
 
 
 class Member(Base):
-    """A beam, a pipe, a plate: faces that belong together."""
+    """Beam, pipe or plate: connected faces."""
 
     __tablename__ = "member"
     __table_args__ = (
@@ -38,7 +38,7 @@ class Member(Base):
 
 
 class Face(Base):
-    """A plane or a cylinder of a member."""
+    """Plane or cylinder of a member."""
 
     __tablename__ = "face"
     __table_args__ = (
@@ -79,7 +79,7 @@ class Face(Base):
 
 
 class Spot(Review, Base):
-    """What differs from its own surface."""
+    """Area that differs from its own surface."""
 
     __tablename__ = "spot"
     __table_args__ = (

@@ -1,4 +1,4 @@
-"""What lies between the linings of two surveys, and how even a lining is."""
+"""Layers between the linings of two surveys, and evenness of a lining."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tunneldb.database.models.shape import LAYERS
 
 
 class ThicknessSection(Base):
-    """What lies between the linings of two surveys, of a step of chainage."""
+    """Layer between the linings of two surveys, for a step of chainage."""
 
     __tablename__ = "thickness_section"
     __table_args__ = (
@@ -48,7 +48,7 @@ class ThicknessSection(Base):
 
 
 class EvennessSection(Base):
-    """Gaps beneath a straightedge laid on the lining of a step of chainage."""
+    """Gaps beneath a virtual straightedge on the lining, for a step of chainage."""
 
     __tablename__ = "evenness_section"
     __table_args__ = (
@@ -91,7 +91,7 @@ class EvennessSection(Base):
 
 
 class EvennessArea(Base):
-    """Where the gap beneath a straightedge is greater than the limit."""
+    """Area where the gap beneath a straightedge exceeds the limit."""
 
     __tablename__ = "evenness_area"
     __table_args__ = (

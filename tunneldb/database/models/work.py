@@ -1,4 +1,4 @@
-"""What is wanted, who works on it, what was done, and what people changed by hand."""
+"""Requested work, workers, runs, and manual changes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tunneldb.database.models.base import AUDIT_SCHEMA, CLOCK, KM, SURVEY, Base,
 
 
 class Stage(Base):
-    """A stage of a kilometre."""
+    """Stage of a kilometre."""
 
     __tablename__ = "stage"
     __table_args__ = {"comment": "Stages of a kilometre, in their order; tunneldb init fills it anew"}  # noqa: RUF012
@@ -27,7 +27,7 @@ class Stage(Base):
 
 
 class Goal(Base):
-    """What is wanted of a kilometre."""
+    """Requested stage of a kilometre."""
 
     __tablename__ = "goal"
     __table_args__ = {"comment": "What batches want of each kilometre"}  # noqa: RUF012
@@ -41,7 +41,7 @@ class Goal(Base):
 
 
 class Worker(Base):
-    """A worker."""
+    """Worker process."""
 
     __tablename__ = "worker"
     __table_args__ = {"comment": "Workers that serve the queue"}  # noqa: RUF012
@@ -67,7 +67,7 @@ END, '')"""
 
 
 class Run(Base):
-    """One run of a stage."""
+    """Run of a stage."""
 
     __tablename__ = "run"
     __table_args__ = (
@@ -107,7 +107,7 @@ class Run(Base):
 
 
 class Audit(Base):
-    """A row that somebody changed by hand."""
+    """Row changed manually."""
 
     __tablename__ = "entry"
     __table_args__ = (

@@ -22,7 +22,7 @@ from tunneldb.export.images.palette import PALETTES
 from tunneldb.export.images.underwater import export_bed, export_submerged
 from tunneldb.files import replacing
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.raster.gap_fill import FILL, TOLD, fill_blocks
+from tunneldb.raster.gap_fill import FILL_NOTE, MAX_FILL_DISTANCE, fill_blocks
 from tunneldb.raster.geotiff import DEVIATION_KINDS, KINDS, laid
 from tunneldb.raster.grid import BLOCK
 from tunneldb.store.alignment import load_stationing
@@ -97,9 +97,9 @@ def _export_filled(conn: psycopg.Connection, survey: Survey, km: int, kind: str,
                 yield (block - blocks[0]) * columns, preview.shrink(pixels, factor)
 
     path = folder / f"{survey.name}-km{km:03d}-{kind}-filled.tif"
-    filled = fill_blocks(shrunk(), FILL / extent.transform.a)
+    filled = fill_blocks(shrunk(), MAX_FILL_DISTANCE / extent.transform.a)
     with replacing(path) as temporary:
-        write_cog(temporary, kind, extent, (b for b in filled if 0 <= b[0] < extent.columns), f"{kind}, {TOLD}")
+        write_cog(temporary, kind, extent, (b for b in filled if 0 <= b[0] < extent.columns), f"{kind}, {FILL_NOTE}")
     return path
 
 

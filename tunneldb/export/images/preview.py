@@ -17,7 +17,7 @@ from tunneldb.arrays import Single, UInt8
 from tunneldb.classification.classes import PointClass
 from tunneldb.export.images.palette import PALETTES
 from tunneldb.geometry.stationing import Stationing
-from tunneldb.raster.gap_fill import FILL, fill_gaps
+from tunneldb.raster.gap_fill import MAX_FILL_DISTANCE, fill_gaps
 from tunneldb.raster.geotiff import DEVIATION_KINDS
 
 STRIP = 100.0
@@ -134,7 +134,7 @@ def draw(
     _head(pen, title, kind, strips, (low, high), large)
     for number, strip in enumerate(strips):
         y = _HEAD + number * (height + _GAP)
-        colours = _colours(kind, _filled(kind, strip.values, FILL / pixel), low, high)
+        colours = _colours(kind, _filled(kind, strip.values, MAX_FILL_DISTANCE / pixel), low, high)
         sheet.paste(Image.fromarray(colours), (_MARGIN, y))
         _ticks(pen, strip, stationing, (_MARGIN, y), (width, height), top, pixel, small)
         for leak in leaks:

@@ -12,7 +12,7 @@ from tunneldb.export.qgis.layout_items import PAGE, PAGE_ITEM, item, label
 from tunneldb.export.qgis.raster import OFFSET_COLOURS
 from tunneldb.export.qgis.sheet import scale_bar, strip_map, strip_scale
 from tunneldb.export.qgis.sheet_tables import FOOT, MARGIN, ON_PAGE, TOP
-from tunneldb.raster.gap_fill import TOLD
+from tunneldb.raster.gap_fill import FILL_NOTE
 from tunneldb.raster.geotiff import DEVIATION_KINDS
 from tunneldb.store.survey import Survey
 
@@ -78,7 +78,7 @@ def _texts(survey: Survey, scale: int, layer: str | None, bars: str) -> list[ET.
     of_design = f" of layer {layer}" if layer else ""
     sums = f"Overbreak {volume('overbreak')} m³, underbreak {volume('underbreak')} m³, of what was seen"
     how = (
-        f"Deviation from the design{of_design}, 1:{scale} on A4; up it arc from the crown, m, right wall above; {TOLD}."
+        f"Deviation from the design{of_design}, 1:{scale} on A4; up it arc from the crown, m, right wall above; {FILL_NOTE}."
         " White: not seen. Bars: overbreak below, underbreak above, 1 m for each m². Outlined: uneven beneath a straightedge."
     )
     what = f"Tunnel {survey.tunnel}, survey {survey.name} of {survey.date:%Y-%m-%d}"

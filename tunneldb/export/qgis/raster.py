@@ -11,7 +11,7 @@ import rasterio
 
 from tunneldb.arrays import Float
 from tunneldb.export.images.palette import PALETTES, hexadecimal
-from tunneldb.raster.gap_fill import TOLD
+from tunneldb.raster.gap_fill import FILL_NOTE
 from tunneldb.raster.geotiff import CHANGE, DEVIATION_KINDS
 from tunneldb.raster.grey import grey_range
 
@@ -23,14 +23,14 @@ BED, SUBMERGED = "bed", "submerged"
 
 KINDS = {
     "corrected": "Intensity, corrected",
-    f"corrected{FILLED}": f"Intensity, corrected, {TOLD}",
+    f"corrected{FILLED}": f"Intensity, corrected, {FILL_NOTE}",
     "raw": "Intensity, raw",
     "offset": "Offset",
-    f"offset{FILLED}": f"Offset, {TOLD}",
+    f"offset{FILLED}": f"Offset, {FILL_NOTE}",
     **{
         f"{kind}{end}": f"Deviation from the design, {layer}{said}"
         for layer, kind in DEVIATION_KINDS.items()
-        for end, said in (("", ""), (FILLED, f", {TOLD}"))
+        for end, said in (("", ""), (FILLED, f", {FILL_NOTE}"))
     },
     CHANGE: "Change since an older survey",
     "state": "States: seen, unseen, dark",

@@ -24,7 +24,7 @@ from tunneldb.export.qgis.sheet_tables import (
     table_width,
 )
 from tunneldb.finding_kind import DETECTED
-from tunneldb.raster.gap_fill import TOLD
+from tunneldb.raster.gap_fill import FILL_NOTE
 from tunneldb.store.survey import Survey
 
 LENGTH = 50.0
@@ -154,7 +154,7 @@ def _texts(survey: Survey, scale: int, goes_on: Sequence[str]) -> list[ET.Elemen
         f"Lining [% coalesce(format_number({lining}, 0) || ' m², ' || format_number(100 * {seen}, 1) || ' % of it seen',"
         f" 'not seen yet') %]; leaks [% coalesce({leaks} || ', ' || format_number({wet}, 2) || ' m²', 'not searched for') %]"
     )
-    how = f"Unrolled lining from inside, 1:{scale} on A4; up it arc from the crown, m, right wall above; {TOLD}. "
+    how = f"Unrolled lining from inside, 1:{scale} on A4; up it arc from the crown, m, right wall above; {FILL_NOTE}. "
     if survey.intensity_kind == "none":
         sums = "No intensity: leaks were not sought"
         how += "Red: inwards, blue: outwards."

@@ -1,1 +1,1 @@
-"""Scan files: LAS, LAZ, E57 and raw coordinates, their headers and what is wrong with them."""
+"""Formats of scan files: LAS, LAZ, E57 and raw coordinates, their headers and faults."""

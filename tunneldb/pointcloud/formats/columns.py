@@ -1,4 +1,4 @@
-"""What the columns of a text file of points are: by its header, or by a file of column names beside it."""
+"""Columns of a text file of points, from its header or from a file of column names beside it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tunneldb.errors import InputError
 
 COORDINATES = ("x", "y", "z")
 SKIPPED = "-"
-"""Name of a column that is left out, as it holds no numbers."""
+"""Name of a column that is skipped because it holds no numbers."""
 
 SUFFIX = ".columns"
 
@@ -25,10 +25,10 @@ _METRES = re.compile(r"\s*[\[(]m[\])]$", re.IGNORECASE)
 
 
 def meaning_of(name: str) -> str:
-    """Name that a column goes by: ``x``, ``y``, ``z``, ``gps_time``, ``scan_id``, ``classification``, or its own.
+    """Return the canonical name of a column: ``x``, ``y``, ``z``, ``gps_time``, ``scan_id``, ``classification`` or its own.
 
-    Capitals, underscores, a unit ``[m]`` and the ``scalar_`` of CloudCompare make no difference to these; all others, which
-    may hold an intensity, keep their name to the letter.
+    Capitals, underscores, a unit ``[m]`` and CloudCompare's prefix ``scalar_`` are ignored for these names. Other columns,
+    which may hold an intensity, keep their exact names.
     """
     own = name.strip().strip('"').strip()
     bare = re.sub(r"[ _]", "", _METRES.sub("", own).lower())
@@ -37,27 +37,27 @@ def meaning_of(name: str) -> str:
 
 
 def columns_of(path: Path, names: Sequence[str], source: str) -> tuple[str, ...]:
-    """Meanings of a file's columns.
+    """Return the canonical names of a file's columns.
 
     Parameters
     ----------
     path : Path
     names : sequence of str
-        As the header, or the file of column names, has them.
+        Names in the header or in the file of column names.
     source : str
-        Where they stand, for the error's line.
+        Origin of the names, for the error message.
 
     Raises
     ------
     InputError
-        If one of x, y and z is missing, or a name stands twice.
+        If one of x, y and z is missing, or a name is repeated.
     """
     columns = tuple(name if name == SKIPPED else meaning_of(name) for name in names)
     missing = [name for name in COORDINATES if name not in columns]
     if missing:
         raise InputError(
-            f"{path}: no column {', '.join(missing)} by {source}, which names {', '.join(names)}; "
-            f"name the columns, x, y and z among them, in {own_names(path)}"
+            f"{path}: no column {', '.join(missing)}: {source} names {', '.join(names)}; "
+            f"write the column names, with x, y and z, to {own_names(path)}"
         )
     repeated = [name for name in columns if name != SKIPPED and columns.count(name) > 1]
     if repeated:
@@ -66,12 +66,12 @@ def columns_of(path: Path, names: Sequence[str], source: str) -> tuple[str, ...]
 
 
 def own_names(path: Path) -> Path:
-    """File of column names beside a text file, for it alone."""
+    """Return the path of the file of column names for one text file."""
     return path.with_name(path.name + SUFFIX)
 
 
 def names_file(path: Path) -> Path | None:
-    """File that names the columns of a text file: its own, or that of all with its suffix in the folder; None if none is."""
+    """Return the file of column names of a text file: its own, or that for its suffix in the folder; None if there is none."""
     for found in (own_names(path), path.with_name(path.suffix.lower().lstrip(".") + SUFFIX)):
         if found.is_file():
             return found
@@ -79,12 +79,12 @@ def names_file(path: Path) -> Path | None:
 
 
 def given_names(path: Path) -> tuple[list[str], str] | None:
-    """Names by `names_file`, and that file's name; None if there is none.
+    """Return the names in `names_file` and that file's name; None if there is none.
 
     Raises
     ------
     InputError
-        If it cannot be read or names nothing.
+        If it cannot be read or is empty.
     """
     file = names_file(path)
     if file is None:
@@ -92,15 +92,15 @@ def given_names(path: Path) -> tuple[list[str], str] | None:
     try:
         text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: cannot be read as names of columns: {error}") from None
+        raise InputError(f"{file}: cannot be read as column names: {error}") from None
     names = split_names(text)
     if not names:
-        raise InputError(f"{file}: names no column; write them in one line: x y z intensity")
+        raise InputError(f"{file}: contains no column names; write them on one line: x y z intensity")
     return names, str(file)
 
 
 def split_names(text: str) -> list[str]:
-    """Names in a line, divided by what divides columns: semicolon, comma, tab, else blanks."""
+    """Split a line of names at semicolons, commas or tabs, else at blanks."""
     line = text.strip().lstrip("#/").strip()
     for mark in (";", ",", "\t"):
         if mark in line:

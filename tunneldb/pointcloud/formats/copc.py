@@ -1,7 +1,7 @@
 """Cloud Optimized Point Clouds: LAZ whose chunks are the nodes of an octree.
 
-The chunks are compressed by lazrs, as those of all LAZ files here; what makes a COPC of them is a record in front, which says
-where the octree lies, and one behind, which says in which chunk each node is.
+lazrs compresses the chunks, as in every LAZ file. A record before the points states the octree's cube, and a record after
+them states the chunk of each node.
 
 Source: COPC 1.0 (https://copc.io), sections *info VLR* and *hierarchy VLR*; ASPRS LAS 1.4 R15, table 3.
 """
@@ -21,25 +21,25 @@ import numpy as np
 from tunneldb.arrays import Float, UInt8
 from tunneldb.pointcloud.formats.las_header import HEADER_SIZE, Head, Record
 from tunneldb.pointcloud.formats.las_records import coordinates, fields, record_size
-from tunneldb.pointcloud.formats.laz import told
+from tunneldb.pointcloud.formats.laz import write_errors_raised
 
 FORMATS = (6, 7, 8)
-"""Point formats that a COPC may have."""
+"""Point formats that a COPC file may have."""
 
 _INFO_SIZE = 160
 _VLR_HEAD, _EVLR_HEAD = 54, 60
-_AT_ONCE = 1_000_000  # points that are compressed together, a thread for each node
+_AT_ONCE = 1_000_000  # points that are compressed together, one thread per node
 
 
 class CopcWriter:
-    """Writes the nodes of one file, in any order.
+    """Writer of the nodes of a COPC file, in any order.
 
     Parameters
     ----------
     file : binary file
-        Empty, open for writing.
+        Empty file, open for writing.
     head : Head
-        What comes around the points, of a format of `FORMATS`.
+        Header and records around the points, for a format of `FORMATS`.
     low : (3,) float array
         Lower corner of the octree's cube, m.
     edge : float
@@ -68,7 +68,7 @@ class CopcWriter:
         self.returns = np.zeros(16, np.int64)
 
     def write(self, key: tuple[int, int, int, int], records: UInt8) -> None:
-        """Add a node with its points (n, size), n > 0."""
+        """Write a node with its points (n, size), n > 0."""
         stored = fields(records, self.head.point_format)
         xyz = coordinates(records, self.head.scales, self.head.offsets)
         self.low, self.high = np.minimum(self.low, xyz.min(axis=0)), np.maximum(self.high, xyz.max(axis=0))
@@ -80,7 +80,7 @@ class CopcWriter:
             self._compress()
 
     def close(self) -> None:
-        """End the file: its hierarchy, and what of header and info is known only now."""
+        """Complete the file: write the hierarchy, and update header and info record."""
         self._compress()
         self.compressor.done()
         self.file.flush()
@@ -109,7 +109,7 @@ class CopcWriter:
             self.pending = []
 
     def _hierarchy(self) -> bytes:
-        """Where each node is: key, place and length of its chunk, points."""
+        """Return the hierarchy: key, offset and length of the chunk, and number of points of each node."""
         self.file.seek(self.begin)
         table = np.array(lazrs.read_chunk_table(self.file, self.vlr), np.int64).reshape(-1, 2)
         entries = np.zeros(len(self.nodes), np.dtype([("key", "<4i4"), ("place", "<u8"), ("size", "<i4"), ("points", "<i4")]))
@@ -121,14 +121,14 @@ class CopcWriter:
 
 @contextmanager
 def writing_copc(path: Path, head: Head, low: Float, edge: float, spacing: float) -> Iterator[CopcWriter]:
-    """Write a new file, which is complete when the block succeeds; arguments as of `CopcWriter`.
+    """Write a new file, which is complete when the block succeeds; parameters as for `CopcWriter`.
 
     Raises
     ------
     OSError
-        If the disk is full, or fails.
+        If the disk is full or fails.
     """
-    with path.open("x+b") as plain, told(plain) as file:
+    with path.open("x+b") as plain, write_errors_raised(plain) as file:
         writer = CopcWriter(file, head, low, edge, spacing)
         yield writer
         writer.close()

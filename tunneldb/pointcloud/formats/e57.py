@@ -1,6 +1,6 @@
-"""E57 files: their scans, with pose, read in chunks of constant memory.
+"""E57 files: their scans with poses, read in chunks of constant memory.
 
-Needs pye57 (the extra ``e57``), of which only the binding to libE57Format is used: its own reading takes a scan whole.
+Needs pye57 (the extra ``e57``). Only its binding to libE57Format is used, since pye57 itself reads whole scans.
 
 Source: ASTM E2807-11, Standard Specification for 3D Imaging Data Exchange, Version 1.0.
 """
@@ -32,31 +32,31 @@ CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 COLOURS = ("colorRed", "colorGreen", "colorBlue")
 NO_COLOUR = "isColorInvalid"
 SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
-FARTHEST = 1e8  # m; bounds beyond are those of an exporter that had none
+MAX_BOUND = 1e8  # m; greater bounds are placeholders of an exporter
 
 
 @dataclass(frozen=True)
 class Scan:
-    """One scan of an E57 file, as its header has it.
+    """One scan of an E57 file, from its header.
 
     Attributes
     ----------
     index : int
-        Place in the file, from 0.
+        Index in the file, from 0.
     name : str
-        As the exporter called it.
+        Name given by the exporter.
     number : int
-        By `scan_number`.
+        Result of `scan_number`.
     records : int
-        Points, invalid ones included.
+        Number of points, invalid ones included.
     fields : frozenset of str
-        What a point has.
+        Fields of a point.
     rotation : (3, 3) float64 array
-        Of the scan's own frame to the file's.
+        Rotation from the scan's own frame to the file's.
     position : (3,) float64 array or None
-        Origin of the scan's own frame, where the scanner stood, in the file's, m; None where the scan has no pose.
+        Scanner position (origin of the scan's own frame) in the file's frame, m; None if the scan has no pose.
     start : float or None
-        When it began, s of GPS time; None where it is not said.
+        Start of the scan, s of GPS time; None if not stated.
     """
 
     index: int
@@ -70,15 +70,15 @@ class Scan:
 
     @property
     def has_time(self) -> bool:
-        """Whether its points have a GPS time."""
+        """True if its points have a GPS time."""
         return "timeStamp" in self.fields and self.start is not None
 
     def has(self, dimension: str) -> bool:
-        """Whether its points have a dimension, under the name that the file's header is given here."""
+        """Return True if its points have a dimension, under its name in the scan header."""
         return self.has_time if dimension == "gps_time" else dimension in self.fields
 
     def flags(self, dimension: str | None) -> list[str]:
-        """Fields that are 0 for the points that are good."""
+        """Return the flag fields, which are 0 for valid points."""
         names = ["cartesianInvalidState" if self._cartesian else "sphericalInvalidState"]
         if dimension == "intensity":
             names.append("isIntensityInvalid")
@@ -86,12 +86,12 @@ class Scan:
 
     @property
     def has_colours(self) -> bool:
-        """Whether its points have a colour."""
+        """True if its points have a colour."""
         return self.fields.issuperset(COLOURS)
 
     @property
     def coordinates(self) -> tuple[str, str, str]:
-        """Fields of the coordinates."""
+        """Names of the coordinate fields."""
         return CARTESIAN if self._cartesian else SPHERICAL
 
     @property
@@ -100,12 +100,12 @@ class Scan:
 
 
 def is_e57(path: Path) -> bool:
-    """Whether a file is one by its name."""
+    """Return True if the suffix of a file is that of E57."""
     return path.suffix.lower() == ".e57"
 
 
 def read_e57_scans(path: Path) -> list[Scan]:
-    """Scans of an E57 file that hold points.
+    """Read the scans of an E57 file that contain points.
 
     Raises
     ------
@@ -119,8 +119,8 @@ def read_e57_scans(path: Path) -> list[Scan]:
 def read_e57_header(path: Path) -> ScanHeader:
     """Read the header of an E57 file; see `tunneldb.pointcloud.reader.read_header`.
 
-    Its dimensions are ``intensity``, ``gps_time`` and the fields of extensions, as ``rlms:reflectance``, where every scan has
-    them. Where a scan's bounds are missing, its points are read.
+    The dimensions are ``intensity``, ``gps_time`` and fields of extensions (for example ``rlms:reflectance``) that all scans
+    have. If a scan has no bounds, its points are read.
     """
     with open_e57(path) as image, decoding(path, KIND):
         scans = scans_of(path, image)
@@ -138,7 +138,7 @@ def read_e57_header(path: Path) -> ScanHeader:
 
 
 def _dimensions(scans: Sequence[Scan]) -> list[str]:
-    """Dimensions that every scan has beside coordinates: those of the standard, then those of extensions (PREFIX:NAME)."""
+    """Return the dimensions, beside coordinates, that every scan has: those of the standard, then extensions (PREFIX:NAME)."""
     extensions = sorted(name for name in scans[0].fields if ":" in name)
     return [name for name in ("intensity", "gps_time", *extensions) if all(scan.has(name) for scan in scans)]
 
@@ -148,8 +148,8 @@ def read_e57(
 ) -> Iterator[Raw]:
     """Read the valid points of an E57 file chunk by chunk; see `tunneldb.pointcloud.formats.raw.read_raw`.
 
-    Points are numbered through all scans, invalid ones left out. A scan before a range is passed over, for libE57Format
-    cannot seek a point inside a scan: what lies before it there is decoded.
+    Points are numbered through all scans, without invalid ones. A scan before a range is skipped. Points before the range
+    within a scan are decoded, for libE57Format cannot seek inside a scan.
     """
     with open_e57(path) as image:
         with decoding(path, KIND):
@@ -157,7 +157,7 @@ def read_e57(
         names = _dimensions(scans)
         require_dimension(path, dimension, names)
         if dimension == "gps_time":
-            raise InputError(f"{path}: gps_time is no intensity; the file has {', '.join(names)}")
+            raise InputError(f"{path}: gps_time cannot be the intensity; the file has {', '.join(names)}")
         records = sum(scan.records for scan in scans)
         wanted = check_ranges(path, ranges, records)
         cursor = _Cursor(path, image, scans, dimension, size, colours)
@@ -169,17 +169,17 @@ def read_e57(
 
 
 class _Cursor:
-    """Reads good points by their number, going on from the last one where it can."""
+    """Reader of valid points by index, which continues from the last one where possible."""
 
     def __init__(self, path: Path, image: Any, scans: Sequence[Scan], dimension: str | None, size: int, colours: bool) -> None:
         self.colours = colours
         self.path, self.image, self.scans, self.dimension, self.size = path, image, scans, dimension, size
         self.stream: Iterator[Raw] = iter(())
         self.piece: Raw | None = None
-        self.at = self.stop = 0  # numbers of the points of the piece
+        self.at = self.stop = 0  # indices of the points of the piece
 
     def all(self) -> Iterator[Raw]:
-        """Whole file."""
+        """Read the whole file."""
         good = 0
         for raw in self._from(0):
             good += len(raw)
@@ -187,7 +187,7 @@ class _Cursor:
         require_good(self.path, self.scans, good)
 
     def read(self, begin: int, end: int) -> Iterator[Raw]:
-        """Points begin to end, half-open."""
+        """Read points begin to end, half-open."""
         if begin < end:
             self._go_to(begin)
         while begin < end:
@@ -199,7 +199,7 @@ class _Cursor:
             self.at = self.stop
             self.piece = next(self.stream, None)
             if self.piece is None:
-                raise InputError(f"{self.path}: changed: it has {self.at} valid points, points up to {end} are wanted")
+                raise InputError(f"{self.path}: the file has changed: {self.at} valid points, points up to {end} requested")
             self.stop = self.at + len(self.piece)
 
     def _go_to(self, number: int) -> None:
@@ -224,25 +224,25 @@ class _Cursor:
 
 @cache
 def _count_good(path: Path, version: tuple[int, int], scan: int, flags: tuple[str, ...]) -> int:
-    """Good points of a scan; `version` tells contents of the file apart."""
+    """Count the valid points of a scan; `version` identifies the file's contents."""
     with open_e57(path) as image, decoding(path, KIND):
         one = scans_of(path, image)[scan]
         return sum(int(good_of(fields, flags).sum()) for fields in read_fields(image, one, flags, CHUNK))
 
 
 def good_of(fields: dict[str, NDArray[Any]], flags: Sequence[str]) -> Bool:
-    """Tell which points are good: those that no flag speaks against."""
+    """Return True for points without a set flag."""
     return np.logical_and.reduce([fields[flag] == 0 for flag in flags])
 
 
 def require_good(path: Path, scans: Sequence[Scan], good: int) -> None:
-    """Refuse a file of whose points, read to the end, none was good."""
+    """Raise a UserError if none of the points read was valid."""
     if not good:
         raise InputError(f"{path}: all {sum(scan.records for scan in scans)} points are marked as invalid")
 
 
 def _read_scan(image: Any, scan: Scan, dimension: str | None, size: int, colours: bool = False) -> Iterator[Raw]:
-    """Points of a scan, turned into the file's frame; their position is added by the offsets."""
+    """Read points of a scan, rotated into the file's frame; the position is in the offsets."""
     coloured = colours and scan.has_colours
     limits = _colour_limits(image, scan) if coloured else np.ones(3)
     flags = scan.flags(dimension)
@@ -272,7 +272,7 @@ def _read_scan(image: Any, scan: Scan, dimension: str | None, size: int, colours
 
 
 def _colours(fields: dict[str, NDArray[Any]], limits: Float) -> UInt16:
-    """Colours (n, 3) of 16 bits; black of points that have none."""
+    """Return 16-bit colours (n, 3); black for points that have none."""
     colour = np.column_stack([fields[name] for name in COLOURS]) * (65535.0 / limits)
     if NO_COLOUR in fields:
         colour[fields[NO_COLOUR] != 0] = 0.0
@@ -280,27 +280,27 @@ def _colours(fields: dict[str, NDArray[Any]], limits: Float) -> UInt16:
 
 
 def _colour_limits(image: Any, scan: Scan) -> Float:
-    """Greatest red, green and blue of a scan; 255 where its header does not say."""
+    """Return the greatest red, green and blue of a scan; 255 if its header does not state them."""
     node = image.root()["data3D"][scan.index]
     limits = [value_of(node, f"colorLimits/{name}Maximum", 255.0) for name in COLOURS]
     return np.array([limit if limit and limit > 0.0 else 255.0 for limit in limits], np.float64)
 
 
 def own_coordinates(scan: Scan, fields: dict[str, NDArray[Any]]) -> Float:
-    """Coordinates (n, 3) in the scan's own frame, m."""
+    """Return coordinates (n, 3) in the scan's own frame, m."""
     own = np.column_stack([fields[name] for name in scan.coordinates])
     return _to_cartesian(own) if scan.coordinates is SPHERICAL else own
 
 
 def _to_cartesian(rae: Float) -> Float:
-    """Range, azimuth and elevation (m, rad) to x, y, z (m)."""
+    """Convert range, azimuth and elevation (m, rad) to x, y, z (m)."""
     distance, azimuth, elevation = rae.T
     plan = distance * np.cos(elevation)
     return np.column_stack([plan * np.cos(azimuth), plan * np.sin(azimuth), distance * np.sin(elevation)])
 
 
 def read_fields(image: Any, scan: Scan, names: Sequence[str], size: int) -> Iterator[dict[str, NDArray[Any]]]:
-    """Fields of a scan's points, as views of buffers that the next chunk overwrites."""
+    """Read fields of a scan's points, as views of buffers that the next chunk overwrites."""
     libe57 = _libe57()
     count = min(size, scan.records)
     arrays = {name: np.empty(count) for name in names}
@@ -322,7 +322,7 @@ def read_fields(image: Any, scan: Scan, names: Sequence[str], size: int) -> Iter
 
 @contextmanager
 def open_e57(path: Path) -> Iterator[Any]:
-    """Open a file with libE57Format, for the length of a with block."""
+    """Open a file with libE57Format as a context."""
     libe57 = _libe57()
     with decoding(path, KIND):
         with path.open("rb") as file:
@@ -340,12 +340,12 @@ def _libe57() -> Any:
     try:
         from pye57 import libe57
     except ImportError as error:
-        raise UserError('E57 files are read by pye57, which is not installed: pip install "tunneldb[e57]"') from error
+        raise UserError('reading E57 needs pye57, which is not installed: pip install "tunneldb[e57]"') from error
     return libe57
 
 
 def scans_of(path: Path, image: Any) -> list[Scan]:
-    """Scans of an open file that hold points."""
+    """Return the scans of an open file that contain points."""
     root = image.root()
     nodes = root["data3D"] if root.isDefined("data3D") else []
     if len(nodes) == 0:
@@ -359,7 +359,7 @@ def scans_of(path: Path, image: Any) -> list[Scan]:
                 f"{path}: the points of scan {scan.name!r} have no coordinates, only {', '.join(sorted(scan.fields))}"
             )
         if scan.position is not None and not np.isfinite([*scan.position, *scan.rotation.ravel()]).all():
-            raise InputError(f"{path}: the pose of scan {scan.name!r} is no pose; mend the file")
+            raise InputError(f"{path}: scan {scan.name!r} has an invalid pose; export it again")
     return scans
 
 
@@ -383,7 +383,7 @@ def _pose(node: Any) -> tuple[Float, Float | None]:
 
 
 def _rotation(quaternion: Float) -> Float:
-    """Matrix of a quaternion w, x, y, z; NaN of one without length."""
+    """Return the matrix of a quaternion w, x, y, z; NaN if its length is 0."""
     with np.errstate(invalid="ignore", divide="ignore"):
         w, x, y, z = quaternion / np.linalg.norm(quaternion)
     return np.array(
@@ -396,7 +396,7 @@ def _rotation(quaternion: Float) -> Float:
 
 
 def value_of(node: Any, name: str, missing: float | None = None) -> float | None:
-    """Number at a path below a node."""
+    """Return the number at a path below a node."""
     if not node.isDefined(name):
         return missing
     for part in name.split("/"):
@@ -405,11 +405,11 @@ def value_of(node: Any, name: str, missing: float | None = None) -> float | None
 
 
 def _box(image: Any, scan: Scan) -> tuple[Float, Float]:
-    """Box of a scan in the file's frame."""
+    """Return the bounding box of a scan in the file's frame."""
     node = image.root()["data3D"][scan.index]
     limits = [[value_of(node, f"cartesianBounds/{axis}{end}", np.nan) for axis in "xyz"] for end in ("Minimum", "Maximum")]
     low, high = np.array(limits, np.float64)
-    if not np.all(np.abs([low, high]) < FARTHEST):
+    if not np.all(np.abs([low, high]) < MAX_BOUND):
         boxes = [(xyz.min(axis=0), xyz.max(axis=0)) for xyz in map(_xyz, _read_scan(image, scan, None, CHUNK))]
         if not boxes:
             return np.full(3, np.inf), np.full(3, -np.inf)
@@ -427,7 +427,7 @@ def _xyz(raw: Raw) -> Float:
 
 
 def _crs(image: Any) -> tuple[CRS | None, str]:
-    """Coordinate system that the file names, or what it has in its place; exporters write all sorts of things there."""
+    """Return the coordinate system that the file states, or else its text; exporters write various texts there."""
     root = image.root()
     text = root["coordinateMetadata"].value().strip() if root.isDefined("coordinateMetadata") else ""
     if not text:

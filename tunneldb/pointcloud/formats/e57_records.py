@@ -1,4 +1,4 @@
-"""Points of E57 files as records of LAS, for who writes them as LAZ.
+"""Points of E57 files as LAS records, for writing LAZ.
 
 Source: ASTM E2807-11 (fields of a point); ASPRS LAS 1.4 R15, tables 3, 16 (format 7), 26 (extra bytes).
 """
@@ -40,16 +40,16 @@ _EXTRAS = (("intensity", "e57_intensity", "f4"), ("rowIndex", "row_index", "i4")
 _TYPE_NUMBER = {"f4": 9, "i4": 6, "f8": 10}
 _COLOURS = (("colorRed", "red"), ("colorGreen", "green"), ("colorBlue", "blue"))
 _GPS_EPOCH = dt.datetime(1980, 1, 6)
-_ADJUSTED = 1e9  # s that LAS takes off a GPS time
+_ADJUSTED = 1e9  # s that LAS subtracts from GPS time
 _STANDARD_TIME_FLAG = 1
 
 
 class E57Records:
-    """The valid points of an E57 file as records of LAS format 7, with the pose of their scan applied.
+    """Valid points of an E57 file as records of LAS format 7, with the pose of their scan applied.
 
-    The intensity is spread over 16 bits by its limits in the file; as it was, it lies in the extra bytes `e57_intensity`,
-    and the place in the scanner's grid in `row_index` and `column_index`. `point_source_id` is the place of the scan in
-    the file, from 1.
+    The intensity is scaled to 16 bits by its limits in the file; the original value is in the extra bytes `e57_intensity`, and
+    the place in the scanner's grid in `row_index` and `column_index`. `point_source_id` is the number of the scan in the
+    file, from 1.
 
     Parameters
     ----------
@@ -84,12 +84,12 @@ class E57Records:
         self.returns = np.zeros(15, np.uint64)
 
     def read(self, size: int) -> Iterator[UInt8]:
-        """Read the points, no more than `size` at a time; once.
+        """Read the points once, in chunks of at most `size`.
 
         Raises
         ------
         InputError
-            If they cannot be read, one has no place, or all are marked as invalid.
+            If they cannot be read, a point has no coordinates, or all are marked as invalid.
         """
         with open_e57(self.path) as image:
             with decoding(self.path, KIND):
@@ -100,7 +100,7 @@ class E57Records:
         require_good(self.path, scans, self.count)
 
     def patches(self) -> tuple[int, bytes]:
-        """Where in the header, and what stands there, that is known once all points were read: box and counts."""
+        """Return place and bytes of the part of the header that is known after reading all points: bounding box and counts."""
         corners = np.column_stack([self.high, self.low]).ravel() if self.count else np.zeros(6)
         middle = bytes(247 - 227)  # no waveforms, no extended records
         return 179, struct.pack("<6d", *corners) + middle + struct.pack("<Q15Q", self.count, *map(int, self.returns))
@@ -120,10 +120,10 @@ class E57Records:
         if scan.position is not None:
             xyz += scan.position
         if not np.isfinite(xyz).all():
-            raise InputError(f"{self.path}: a coordinate of scan {scan.name!r} is NaN or infinite; mend the file")
+            raise InputError(f"{self.path}: a coordinate of scan {scan.name!r} is NaN or infinite; export the file again")
         stored = np.rint((xyz - self.offsets) / self.scale)
         if np.abs(stored).max() >= 2**31:
-            raise InputError(f"{self.path}: scan {scan.name!r} lies outside of the bounds in its header; mend the file")
+            raise InputError(f"{self.path}: scan {scan.name!r} lies outside the bounds in its header; export the file again")
         before = record_size(FORMAT)
         out: UInt8 = np.zeros((len(xyz), before + 4 * len(self.extras)), np.uint8)
         point = fields(out, FORMAT)
@@ -157,7 +157,7 @@ def _names() -> Iterator[str]:
 
 
 def _limits(node: Any, name: str, values: Float) -> tuple[float, float]:
-    """Least and greatest value by the header; without those 0 to 1, 8 or 16 bits, whichever holds them."""
+    """Return limits from the header; without them 0 to 1, 8 or 16 bits, the smallest range that holds the values."""
     low, high = (value_of(node, f"{name}{end}") for end in ("Minimum", "Maximum"))
     if low is not None and high is not None and high > low:
         return low, high
@@ -166,13 +166,13 @@ def _limits(node: Any, name: str, values: Float) -> tuple[float, float]:
 
 
 def spread(values: Float, low: float, high: float) -> UInt16:
-    """Values from low to high over 16 bits; what is no number is 0."""
+    """Scale values from low to high to 16 bits; NaN becomes 0."""
     share = np.nan_to_num((values - low) / (high - low), nan=0.0, posinf=1.0, neginf=0.0)
     return np.rint(np.clip(share, 0.0, 1.0) * (2**16 - 1)).astype(np.uint16)
 
 
 def new_header(scale: float, offsets: Float, date: dt.datetime | None, point_format: int, size: int, timed: bool) -> bytes:
-    """Header of a LAS file of version 1.4, without box and counts; `timed`: times are adjusted standard GPS time."""
+    """Return a LAS 1.4 header without bounding box and counts; `timed`: times are adjusted standard GPS time."""
     header = bytearray(HEADER_SIZE)
     flags = _STANDARD_TIME_FLAG if timed else 0
     struct.pack_into("<4sHH16sBB32s32s", header, 0, b"LASF", 0, flags, bytes(16), 1, 4, b"OTHER", b"tunneldb")
@@ -184,7 +184,7 @@ def new_header(scale: float, offsets: Float, date: dt.datetime | None, point_for
 
 
 def extra_bytes(extras: Sequence[tuple[str, str, str]], source: str) -> Record:
-    """What describes extra bytes, each a name in the source, its own and its type: table 26."""
+    """Return the record that describes extra bytes (table 26), each given as name in the source, own name and type."""
     data = b"".join(
         struct.pack(
             "<2sBB32s4s120s32s", b"", _TYPE_NUMBER[kind], 0, name.encode(), b"", b"", f"{field} of {source}".encode()[:32]

@@ -1,6 +1,6 @@
-"""The XML section of an E57 file, looked at before libE57Format takes it: that has no limits of its own.
+"""Check of the XML section of an E57 file before libE57Format reads it, since that has no limits of its own.
 
-It takes a time that grows with the square of how deep elements are nested, and of how many children a Structure has.
+Its time grows with the square of the nesting depth of elements, and of the number of children of a Structure.
 """
 
 from __future__ import annotations
@@ -12,23 +12,23 @@ from xml.parsers import expat
 
 _HEADER = struct.Struct("<8sIIQQQQ")  # ASTM E2807, 6.4: signature, versions, length, XML's offset and length, page size
 _CHECKSUM = 4  # bytes at the end of each page
-_SMALLEST, _LARGEST = 64, 1 << 20  # bytes of a page; files have 1024
+_MIN_PAGE, _MAX_PAGE = 64, 1 << 20  # bytes of a page; usually 1024
 _BLOCK = 1024  # pages
 
-DEEPEST = 50
-"""Levels of elements: the standard's own structures have nine."""
+MAX_DEPTH = 50
+"""Greatest nesting depth of elements; the standard's own structures have nine levels."""
 
-MOST_CHILDREN = 1000
-"""Children of an element that is no Vector: the standard's own structures have some thirty, and extensions add to them."""
+MAX_CHILDREN = 1000
+"""Greatest number of children of an element other than a Vector; the standard's structures have about thirty."""
 
 
 def require_bounded_xml(path: Path) -> None:
-    """Refuse an XML section with a document type, or one nested too deep or too wide; what else is wrong libE57Format says.
+    """Refuse an XML section with a document type, or with too deep or too wide nesting; libE57Format reports other faults.
 
     Raises
     ------
     ValueError
-        Which says what it has.
+        Names the fault.
     """
     parser = expat.ParserCreate()
     children: list[int] = []
@@ -36,14 +36,14 @@ def require_bounded_xml(path: Path) -> None:
     def begin(name: str, attributes: dict[str, str]) -> None:
         if children:
             children[-1] += 1
-            if children[-1] > MOST_CHILDREN:
-                raise ValueError(f"an element of its XML has more than {MOST_CHILDREN} children")
-        children.append(-(1 << 62) if attributes.get("type") == "Vector" else 0)  # of which there may be any number
-        if len(children) > DEEPEST:
-            raise ValueError(f"its XML is nested more than {DEEPEST} deep")
+            if children[-1] > MAX_CHILDREN:
+                raise ValueError(f"an element of its XML has more than {MAX_CHILDREN} children")
+        children.append(-(1 << 62) if attributes.get("type") == "Vector" else 0)  # which may have any number
+        if len(children) > MAX_DEPTH:
+            raise ValueError(f"its XML is nested more than {MAX_DEPTH} deep")
 
     def refuse(*declared: object) -> None:
-        raise ValueError("its XML declares a document type, and E57 has none")
+        raise ValueError("its XML declares a document type, which E57 does not allow")
 
     parser.StartElementHandler = begin
     parser.EndElementHandler = lambda name: children.pop()
@@ -56,13 +56,13 @@ def require_bounded_xml(path: Path) -> None:
 
 
 def _section(path: Path) -> Iterator[bytes]:
-    """Blocks of the XML section, without the checksums of pages; nothing if the header is none."""
+    """Yield blocks of the XML section, without page checksums; nothing if the header is invalid."""
     with path.open("rb") as file:
         head = file.read(_HEADER.size)
         if len(head) < _HEADER.size:
             return
         _, _, _, _, offset, length, page = _HEADER.unpack(head)
-        if not _SMALLEST <= page <= _LARGEST or offset >= path.stat().st_size:
+        if not _MIN_PAGE <= page <= _MAX_PAGE or offset >= path.stat().st_size:
             return
         within = offset % page
         file.seek(offset - within)

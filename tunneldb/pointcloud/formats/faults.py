@@ -1,4 +1,4 @@
-"""Faults of scan files, each told in one line."""
+"""Faults of scan files, each as one line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tunneldb.pointcloud.points import Ranges
 
 @contextmanager
 def decoding(path: Path, kind: str) -> Iterator[None]:
-    """Turn whatever the decoder raises on the file's bytes into one line; `kind` is what the file should be."""
+    """Turn any error of the decoder into a UserError of one line; `kind` is the expected format."""
     try:
         yield
     except UserError:
@@ -25,22 +25,22 @@ def decoding(path: Path, kind: str) -> Iterator[None]:
     except Exception as error:
         raise InputError(f"{path}: truncated, corrupt or not {kind} file: {line_of(error)}") from error
     except BaseException as error:
-        if type(error).__name__ != "PanicException":  # how a panic of the LAZ decoder's Rust arrives
+        if type(error).__name__ != "PanicException":  # a panic of the LAZ decoder, written in Rust
             raise
         raise InputError(f"{path}: truncated or corrupt: {line_of(error)}") from error
 
 
 def line_of(error: BaseException) -> str:
-    """First line of an error's text, or its name."""
+    """Return the first line of an error's text, or its name."""
     return str(error).strip().split("\n", 1)[0] or type(error).__name__
 
 
 def require_dimension(
     path: Path, dimension: str | None, dimensions: Collection[str], use: str | None = None, mend: str | None = None
 ) -> None:
-    """Raise a InputError that lists the file's dimensions, unless `dimension`, needed for `use`, is one of them.
+    """Raise a InputError that lists the file's dimensions unless `dimension`, needed for `use`, is one of them.
 
-    What to type is `mend` with the dimension that is meant.
+    `mend` with the most similar dimension is the command to type.
     """
     if dimension is None or dimension in dimensions:
         return
@@ -54,18 +54,18 @@ def require_dimension(
 
 
 def check_ranges(path: Path, ranges: Ranges | None, count: int) -> Ranges:
-    """Ranges to read: the whole file when none are given.
+    """Return the ranges to read: the whole file if none are given.
 
     Raises
     ------
     InputError
-        If a range reaches beyond the file's points.
+        If a range extends beyond the file's points.
     """
     if ranges is None:
         return [(0, count)]
     for begin, end in ranges:
         if not 0 <= begin <= end:
-            raise ValueError(f"({begin}, {end}) is no range of point numbers")
+            raise ValueError(f"({begin}, {end}) is not a range of point numbers")
         if end > count:
-            raise InputError(f"{path}: truncated or changed: it announces {count} points, points up to {end} are wanted")
+            raise InputError(f"{path}: truncated or changed: its header states {count} points, points up to {end} requested")
     return ranges

@@ -28,20 +28,20 @@ KIND = "a LAS or LAZ"
 class ExtraBytes:
     """A dimension in the extra bytes of a point.
 
-    laspy looks at the first record of extra bytes only, and files of some makers have a record for each dimension;
-    so the records are read here.
+    laspy reads only the first record of extra bytes, but files of some makers have a record for each dimension; so the
+    records are read here.
 
     Attributes
     ----------
     name : str
     dtype : dtype
-        As stored; several values a point make a subarray.
+        Stored type; several values per point make a subarray.
     at : int
-        Place in the extra bytes of a point, bytes.
+        Offset in the extra bytes of a point, bytes.
     scale, offset : float
         Value = stored × scale + offset.
     no_data : number or None
-        Stored value that stands for none.
+        Stored value that means no data.
     """
 
     name: str
@@ -52,7 +52,7 @@ class ExtraBytes:
     no_data: Any = None
 
     def stored(self, array: NDArray[Any], before: int) -> NDArray[Any]:
-        """View of the dimension in an array of records with this many bytes before the extra ones."""
+        """Return a view of the dimension in an array of records that have ``before`` bytes before the extra ones."""
         return np.ndarray(array.shape, self.dtype, array.data, before + self.at, array.strides)
 
 
@@ -77,7 +77,7 @@ def read_las_header(path: Path) -> ScanHeader:
 
 
 def read_las_facts(path: Path) -> tuple[str, str | None]:
-    """Version and point format of a LAS or LAZ file, and what its header says that times are; None where it has none."""
+    """Return version and point format of a LAS or LAZ file, and the kind of its times by the header; None if it has none."""
     with decoding(path, KIND):
         check_envelope(path)
         las = laspy.open(path)
@@ -96,8 +96,8 @@ def read_las(
 ) -> Iterator[Raw]:
     """Read a LAS or LAZ file chunk by chunk; see `tunneldb.pointcloud.formats.raw.read_raw`.
 
-    Of compressed points, only what is wanted of them is decoded where the point format allows it, in one thread or in
-    several as `tunneldb.threads.threads` says.
+    If the point format allows it, only the needed parts of compressed points are decoded, in as many threads as
+    `tunneldb.threads.threads` states.
     """
     with decoding(path, KIND):
         check_envelope(path)
@@ -117,9 +117,7 @@ def read_las(
                 with decoding(path, KIND):
                     raw = take(next(records))
                 if len(raw) == 0:
-                    raise InputError(
-                        f"{path}: truncated: {done} points read of the {header.point_count} that its header announces"
-                    )
+                    raise InputError(f"{path}: truncated: {done} points read, but its header states {header.point_count}")
                 done += len(raw)
                 yield raw
 
@@ -132,7 +130,7 @@ def _read(las: laspy.LasReader, begin: int, end: int, size: int) -> Iterator[las
 
 
 class _Taker:
-    """Takes the wanted dimensions out of records."""
+    """Reader of the requested dimensions of records."""
 
     def __init__(self, path: Path, header: laspy.LasHeader, dimension: str | None, colours: bool) -> None:
         self.path = path
@@ -142,10 +140,10 @@ class _Taker:
         self.before = header.point_format.size - header.point_format.num_extra_bytes
         self.extra = next((extra for extra in _extra_bytes(header) if extra.name == dimension), None)
         if self.extra is not None and self.extra.dtype.subdtype is not None:
-            raise InputError(f"{path}: {dimension} has several values a point; an intensity is one number")
+            raise InputError(f"{path}: {dimension} has several values per point; an intensity is one number")
 
     def selection(self) -> DecompressionSelection:
-        """What of a point is decompressed; the extra bytes come all or none."""
+        """Return the parts of a point to decompress; extra bytes are decompressed all or not at all."""
         every = DecompressionSelection
         wanted = every.base() | every.Z | every.CLASSIFICATION | every.POINT_SOURCE_ID | every.GPS_TIME
         if self.coloured:
@@ -182,7 +180,7 @@ class _Taker:
             if missing:
                 raise InputError(
                     f"{self.path}: {missing} points of a chunk have no {self.dimension}: their value is {self.extra.no_data}, "
-                    "which the file's header says stands for none; remove these points, or that entry of the header"
+                    "the header's no-data value; remove these points, or the no-data entry of the header"
                 )
         if self.extra.scale == 1.0 and self.extra.offset == 0.0:
             return stored
@@ -190,7 +188,7 @@ class _Taker:
 
 
 def _extra_bytes(header: laspy.LasHeader) -> list[ExtraBytes]:
-    """Dimensions in the extra bytes, in the order of the bytes, as far as the header describes them."""
+    """Return the dimensions in the extra bytes that the header describes, in the order of the bytes."""
     found: list[ExtraBytes] = []
     at = 0
     for record in (record for record in header.vlrs if isinstance(record, laspy.vlrs.known.ExtraBytesVlr)):
@@ -222,7 +220,7 @@ def _check_scales(path: Path, scales: Float, offsets: Float) -> None:
     if not (np.all(np.isfinite(farthest)) and np.all(scales > 0)):
         raise InputError(
             f"{path}: the header's scale {_row(scales)} or offset {_row(offsets)} is not a usable number, "
-            "so its coordinates would not be either"
+            "so the coordinates are invalid"
         )
 
 

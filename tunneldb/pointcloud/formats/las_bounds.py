@@ -1,7 +1,7 @@
-"""The few numbers of a LAS or LAZ file that a decoder believes before it looks at the bytes they speak of.
+"""Check of the counts and offsets of a LAS or LAZ file that a decoder uses before it reads the data.
 
-Where one of them is damaged, the LAZ decoder may ask for more memory than there is, and that ends the process
-without an error that could be caught. So they are compared with the size of the file first.
+If one of them is damaged, the LAZ decoder may request more memory than the machine has, which ends the process without
+an error that can be caught. So they are first compared with the size of the file.
 
 Source: ASPRS LAS 1.4 R15, tables 3 and 24; LASzip's layout of the chunk table.
 """
@@ -15,19 +15,19 @@ from pathlib import Path
 _VLR_BYTES = 54
 _LASZIP_ID = 22204
 _VARIABLE_CHUNKS = 0xFFFFFFFF
-_STREAMED = -1  # the place of the chunk table stands in the file's last 8 bytes
-_LARGEST_CHUNK = 1 << 32  # bytes
+_STREAMED = -1  # the offset of the chunk table is in the file's last 8 bytes
+_MAX_CHUNK = 1 << 32  # bytes
 _BOX_AT = 179
 _BOX = struct.Struct("<6d")  # max x, min x, max y, min y, max z, min z
 
 
 def header_box(path: Path) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:
-    """Read least and greatest coordinates from the header of a LAS or LAZ file of which the rest may be damaged.
+    """Read least and greatest coordinates from the header of a LAS or LAZ file, even if the rest is damaged.
 
     Returns
     -------
     tuple or None
-        Two corners (x, y, z), m; None if the file is no LAS or LAZ, too short, or its box is none.
+        Two corners (x, y, z), m; None if the file is not LAS or LAZ, too short, or its box is invalid.
     """
     with path.open("rb") as file:
         head = file.read(_BOX_AT + _BOX.size)
@@ -45,7 +45,7 @@ def check_envelope(path: Path) -> None:
     Raises
     ------
     ValueError, struct.error
-        If the file is shorter than they say, or they contradict each other.
+        If the file is too short for them, or they contradict each other.
     OSError
         If the file cannot be read.
     """
@@ -59,10 +59,10 @@ def check_envelope(path: Path) -> None:
         if head[25] >= 4:  # minor version
             (count,) = struct.unpack_from("<Q", head, 247)
         if not header_size + vlrs * _VLR_BYTES <= points_at <= size:
-            raise ValueError(f"its header speaks of {vlrs} records before byte {points_at}, the file has {size} bytes")
+            raise ValueError(f"its header states {vlrs} records before byte {points_at}, but the file has {size} bytes")
         if point_format < 128:  # not compressed
             if points_at + count * record > size:
-                raise ValueError(f"its header announces {count} points, the file has room for {(size - points_at) // record}")
+                raise ValueError(f"its header states {count} points, but the file has space for {(size - points_at) // record}")
             return
         place = header_size
         for _ in range(vlrs):
@@ -76,7 +76,7 @@ def check_envelope(path: Path) -> None:
                 (items,) = struct.unpack_from("<H", body, 32)
                 if sum(struct.unpack_from("<HHH", body, 34 + 6 * item)[1] for item in range(items)) != record:
                     raise ValueError(f"the items of its points do not make up {record} bytes")
-                if chunk != _VARIABLE_CHUNKS and chunk * record > _LARGEST_CHUNK:
+                if chunk != _VARIABLE_CHUNKS and chunk * record > _MAX_CHUNK:
                     raise ValueError(f"its chunks would have {chunk} points")
             place += length
         file.seek(points_at)
@@ -85,7 +85,7 @@ def check_envelope(path: Path) -> None:
             file.seek(size - 8)
             (table_at,) = struct.unpack("<q", file.read(8))
         if not points_at + 8 <= table_at <= size - 8:
-            raise ValueError(f"its chunk table would be at byte {table_at}, the file has {size} bytes")
+            raise ValueError(f"its chunk table would be at byte {table_at}, but the file has {size} bytes")
         file.seek(table_at)
         version, chunks = struct.unpack("<II", file.read(8))
         if version != 0 or chunks > max(count, 1):

@@ -1,7 +1,7 @@
-"""What surrounds the points of a LAS file: its header and its variable length records, taken over byte by byte.
+"""Header and variable length records of a LAS file, copied byte by byte.
 
-laspy reads and writes them too, but turns them into objects on the way: records that it knows are written anew, those of
-extra bytes from the first one alone. A file that only gets other classes is to keep what it brought along.
+laspy converts them into objects: it writes known records anew, and those of extra bytes from the first one only. A file
+that is only reclassified should keep all its records.
 
 Source: ASPRS LAS 1.4 R15, tables 3 (header), 24 and 25 (variable length records), 31 (classification lookup).
 """
@@ -35,7 +35,7 @@ _COPC = b"copc"
 
 @dataclass(frozen=True)
 class Record:
-    """A variable length record: who defined it, its number, what it says of itself, and its data."""
+    """Variable length record: user, number, description and data."""
 
     user: bytes
     number: int
@@ -45,11 +45,11 @@ class Record:
 
     @property
     def key(self) -> tuple[bytes, int]:
-        """User and number, which say what it is."""
+        """User and number, which identify its type."""
         return self.user.rstrip(b"\0"), self.number
 
     def pack(self, *, extended: bool = False) -> bytes:
-        """Bytes of it, in a file."""
+        """Return its bytes as stored in a file."""
         head = struct.pack("<2s16sH", self.reserved, self.user, self.number)
         return head + struct.pack("<Q32s" if extended else "<H32s", len(self.data), self.description) + self.data
 
@@ -61,15 +61,15 @@ class Head:
     Attributes
     ----------
     header : bytes
-        375 bytes or more.
+        At least 375 bytes.
     records : tuple of Record
-        Before the points.
+        Records before the points.
     padding : bytes
-        Between them and the points.
+        Bytes between the records and the points.
     extended : tuple of Record
-        Behind the points.
+        Records after the points.
     timed : bool
-        Whether the points were given with times; the later formats have a place for one in any case.
+        True if the original points have times; formats 6 and later always have a field for them.
     """
 
     header: bytes
@@ -85,7 +85,7 @@ class Head:
 
     @property
     def record_size(self) -> int:
-        """Bytes of a point."""
+        """Size of a point, bytes."""
         return int(struct.unpack_from("<H", self.header, 105)[0])
 
     @property
@@ -95,22 +95,22 @@ class Head:
 
     @property
     def scales(self) -> tuple[float, float, float]:
-        """Steps of the stored coordinates, m."""
+        """Resolution of the stored coordinates, m."""
         return struct.unpack_from("<3d", self.header, 131)
 
     @property
     def offsets(self) -> tuple[float, float, float]:
-        """Added to the stored coordinates, m."""
+        """Offsets of the stored coordinates, m."""
         return struct.unpack_from("<3d", self.header, 155)
 
     @property
     def holds_waveforms(self) -> bool:
-        """Whether packets of waveforms lie in the file itself, behind the points."""
+        """True if waveform packets are in the file itself, after the points."""
         return bool(struct.unpack_from("<H", self.header, 6)[0] & _INTERNAL_WAVEFORMS)
 
     @property
     def crs(self) -> CRS | None:
-        """Coordinate system that its WKT tells; None if it has none that can be read."""
+        """Coordinate system of its WKT; None if it has none that can be read."""
         for record in self.records + self.extended:
             if record.key == WKT:
                 try:
@@ -120,13 +120,13 @@ class Head:
         return None
 
     def with_points(self, point_format: int, record_size: int) -> Head:
-        """With points of this format and size."""
+        """Return a copy with points of this format and size."""
         header = bytearray(self.header)
         struct.pack_into("<BH", header, 104, point_format, record_size)
         return replace(self, header=bytes(header))
 
     def with_crs(self, crs: CRS | None) -> Head:
-        """With the coordinate system as WKT, which formats 6 and later ask for, if it has none and one is known."""
+        """Return a copy with the coordinate system as WKT, required by formats 6 and later, if it has none and one is known."""
         has = any(record.key == WKT for record in self.records + self.extended)
         text = None if has or crs is None else _wkt(crs)
         if not has and text is None:
@@ -137,25 +137,25 @@ class Head:
         return replace(self, header=bytes(header), records=(*self.records, *added))
 
     def with_classes(self, names: Mapping[int, str]) -> Head:
-        """With the names of the classes, up to 15 ASCII characters each, in the place of those that it brought."""
+        """Return a copy with these class names, up to 15 ASCII characters each, instead of its own."""
         table = b"".join(struct.pack("<B15s", code, names.get(code, "").encode("ascii", "replace")) for code in range(256))
         kept = tuple(record for record in self.records if record.key != _LOOKUP)
         return replace(self, records=(*kept, Record(_LOOKUP[0], _LOOKUP[1], b"Classes", table)))
 
     def with_numbers(self, names: Mapping[str, str], before: int) -> Head:
-        """With further dimensions behind all others, whole numbers of 32 bits.
+        """Return a copy with additional dimensions after all others, 32-bit integers.
 
         Parameters
         ----------
         names : mapping of str to str
-            Their names, and what they are, up to 32 ASCII characters each.
+            Names and descriptions, up to 32 ASCII characters each.
         before : int
-            Bytes of a point's standard fields.
+            Size of a point's standard fields, bytes.
 
         Raises
         ------
         ValueError
-            If a dimension is of one of these names already; it is what the error says.
+            If a dimension already has one of these names; the message is that name.
         """
         described = b"".join(record.data for record in self.records if record.key == EXTRA_BYTES)
         entries = [_EXTRA.unpack_from(described, at) for at in range(0, len(described) - _EXTRA.size + 1, _EXTRA.size)]
@@ -177,7 +177,7 @@ class Head:
         return replace(self, records=(*kept, record)).with_points(self.point_format, self.record_size + 4 * len(names))
 
     def before_points(self, laszip: bytes) -> bytes:
-        """All that comes before the compressed points; `laszip` says how they are compressed."""
+        """Return all bytes before the compressed points; `laszip` is the record of the compression."""
         records = [*self.records, Record(_LASZIP[0], _LASZIP[1], b"by laszip of LAStools", laszip)]
         packed = b"".join(record.pack() for record in records) + self.padding
         header = bytearray(self.header)
@@ -186,20 +186,20 @@ class Head:
         return bytes(header) + packed
 
     def place_of_extended(self, place: int) -> tuple[int, bytes]:
-        """Where in the header the place and number of the extended records stand, and what is to stand there."""
+        """Return the place in the header of the offset and number of extended records, and the bytes to write there."""
         return 235, struct.pack("<QI", place if self.extended else 0, len(self.extended))
 
 
 def size_of(kind: int, options: int) -> int:
-    """Bytes of a dimension of extra bytes, by its type and options."""
+    """Return the size of a dimension of extra bytes, by its type and options, bytes."""
     # Types 11 to 30 are two or three values of 1 to 10.
     return options if kind == 0 else _SIZE_OF[(kind - 1) % 10 + 1] * ((kind - 1) // 10 + 1)
 
 
 def read_head(path: Path) -> Head:
-    """Read header and records of a LAS or LAZ file, as those of version 1.4.
+    """Read header and records of a LAS or LAZ file, converted to version 1.4.
 
-    What says how points are compressed or ordered (LASzip, COPC) is left out.
+    Records about the compression or order of points (LASzip, COPC) are omitted.
 
     Raises
     ------
@@ -209,13 +209,13 @@ def read_head(path: Path) -> Head:
     with path.open("rb") as file:
         head = file.read(_SIZES[0])
         if head[:4] != SIGNATURE or head[25] not in _SIZES:
-            raise ValueError(f"it is no LAS of a version from 1.0 to 1.5: {head[:4]!r}, 1.{head[25]}")
+            raise ValueError(f"it is not LAS 1.0 to 1.5: {head[:4]!r}, 1.{head[25]}")
         size, points_at, count = struct.unpack_from("<HII", head, 94)
         file.seek(0)
         header = file.read(size)
         records = _read_records(file, count)
         if points_at < file.tell() and header[25] > 0:
-            raise ValueError(f"its points begin at byte {points_at}, its records end at {file.tell()}")
+            raise ValueError(f"its points begin at byte {points_at}, but its records end at {file.tell()}")
         padding = file.read(points_at - file.tell()) if header[25] > 0 else b""
         extended: tuple[Record, ...] = ()
         if header[25] >= 4:
@@ -234,7 +234,7 @@ def _read_records(file: BinaryIO, count: int, *, extended: bool = False) -> tupl
         reserved, user, number, length, description = layout.unpack(file.read(layout.size))
         data = file.read(length)
         if len(data) < length:
-            raise ValueError(f"record {user.rstrip(bytes(1))!r} {number} is cut off")
+            raise ValueError(f"record {user.rstrip(bytes(1))!r} {number} is truncated")
         records.append(Record(user, number, description, data, reserved))
     return tuple(records)
 
@@ -244,16 +244,16 @@ def _kept(records: tuple[Record, ...]) -> tuple[Record, ...]:
 
 
 def _of_version_4(header: bytes) -> bytes:
-    """Header of an older version as one of 1.4, with what its maker had added at its end."""
+    """Convert a header of an older version to 1.4, with the bytes that its maker added at its end."""
     minor, own = header[25], _SIZES[header[25]]
     if len(header) < own:
-        raise ValueError(f"the header of LAS 1.{minor} has {own} bytes, this one {len(header)}")
+        raise ValueError(f"the header of LAS 1.{minor} has {own} bytes, but this one has {len(header)}")
     out = bytearray(header)
     if minor < 4:
         out = bytearray(header[:own].ljust(HEADER_SIZE, b"\0") + header[own:])
         out[25] = 4
         if minor == 0:
-            out[4:8] = bytes(4)  # reserved then, a number and flags now
+            out[4:8] = bytes(4)  # reserved in older versions, a number and flags in 1.4
         count, *returns = struct.unpack_from("<I5I", header, 107)
         struct.pack_into("<QI", out, 235, 0, 0)
         struct.pack_into("<Q5Q", out, 247, count, *returns)
@@ -263,7 +263,7 @@ def _of_version_4(header: bytes) -> bytes:
 
 
 def _wkt(crs: CRS) -> str | None:
-    """WKT 1, as LAS asks for; WKT 2 of what cannot be said in it."""
+    """Return WKT 1, as LAS requires; WKT 2 where WKT 1 cannot express the system."""
     for version in ("WKT1_GDAL", "WKT2_2019"):
         try:
             return crs.to_wkt(version)

@@ -1,4 +1,4 @@
-"""Points of several LAS files in one: a point format, scales and extra bytes that hold what all of them do.
+"""Merging of several LAS files: a common point format, scales and extra bytes.
 
 Source: ASPRS LAS 1.4 R15, tables 3 (header), 15 to 17 (formats 6 to 8), 26 (extra bytes).
 """
@@ -18,19 +18,19 @@ from tunneldb.pointcloud.formats.las_records import coordinates, fields, record_
 _ENTRY = 192  # bytes that describe a dimension of extra bytes
 _NAME = slice(4, 36)
 _HAS_LIMITS = 0b110
-_GEOTIFF = (34735, 34736, 34737)  # what a coordinate system was said by before WKT
+_GEOTIFF = (34735, 34736, 34737)  # records of a coordinate system before WKT
 _STANDARD_TIME = 1
 
 
 @dataclass(frozen=True)
 class Placement:
-    """How the points of one of the files become those of the whole.
+    """Conversion of the points of one file to those of the merged file.
 
     Attributes
     ----------
     source, target : Head
     extras : tuple of (int, int, int)
-        Where in a record each dimension of extra bytes lies in the file, and in the whole, and how many bytes it has.
+        Offset of each dimension of extra bytes in a record of the file, in one of the merged file, and its size, bytes.
     """
 
     source: Head
@@ -38,14 +38,14 @@ class Placement:
     extras: tuple[tuple[int, int, int], ...]
 
     def records(self, records: UInt8) -> UInt8:
-        """Bring records (n, size) of the file into the form of the whole; the same array where that is their own.
+        """Convert records (n, size) of the file to those of the merged file; the same array if nothing differs.
 
-        Coordinates move by half a step at most, and not at all where scales and offsets are those of the whole.
+        Coordinates move by half a resolution step at most, and not at all if scales and offsets are equal.
 
         Raises
         ------
         ValueError
-            If a coordinate is too far from the offsets of the whole.
+            If a coordinate is too far from the offsets of the merged file.
         """
         if self._keeps_coordinates and self.source.point_format == self.target.point_format and self._keeps_extras:
             return records
@@ -62,12 +62,12 @@ class Placement:
         return out
 
     def coordinates(self, xyz: Float) -> Float:
-        """Coordinates (n, 3) of the file as the whole holds them, m.
+        """Return coordinates (n, 3) of the file as stored in the merged file, m.
 
         Raises
         ------
         ValueError
-            As of `records`.
+            As for `records`.
         """
         if self._keeps_coordinates:
             return xyz
@@ -85,26 +85,26 @@ class Placement:
     def _stored(self, xyz: Float) -> Float:
         stored = np.rint((xyz - np.array(self.target.offsets)) / np.array(self.target.scales))
         if len(stored) and np.abs(stored).max() >= 2**31:
-            raise ValueError("its points lie too far from those of the other files for the digits they are given in")
+            raise ValueError("its points are too far from those of the other files for their coordinate resolution")
         return stored
 
 
 def merge_heads(heads: Sequence[Head]) -> tuple[Head, list[Placement]]:
-    """Find what holds the points of all files, whose formats are 6, 7 or 8.
+    """Return a header for the points of all files, whose formats are 6, 7 or 8, and their placements.
 
-    Header and coordinate system are those of the first file, scales the finest; dimensions of extra bytes are the same where
-    name, type, scale and offset are, and get a number after their names where only the names are; other records are kept once.
-    GPS time is counted as in the files that have it.
+    Header and coordinate system are those of the first file, scales the finest. Dimensions of extra bytes are the same if name,
+    type, scale and offset are; if only the names are equal, a number is appended. Other records are stored once. GPS time is of
+    the kind of the files that have it.
 
     Raises
     ------
     ValueError
-        If the files count GPS time in different ways.
+        If the files have different kinds of GPS time.
     """
     first = heads[0]
     kinds = {head.header[6] & _STANDARD_TIME for head in heads if head.timed}
     if len(kinds) > 1:
-        raise ValueError("some of its files count GPS time by weeks, others don't")
+        raise ValueError("some files have GPS time by weeks, others adjusted standard GPS time")
     records: list[Record] = []
     for head in heads:
         for record in (*head.records, *head.extended):
@@ -141,14 +141,14 @@ def merge_heads(heads: Sequence[Head]) -> tuple[Head, list[Placement]]:
 
 
 def _is_geotiff(record: Record, head: Head) -> bool:
-    """Whether a record tells the coordinate system that a record of WKT of the same file tells, too."""
+    """Return True if a GeoTIFF record repeats the coordinate system of a WKT record in the same file."""
     if record.key[0] != WKT[0] or record.number not in _GEOTIFF:
         return False
     return any(other.key == WKT for other in (*head.records, *head.extended))
 
 
 def _dimensions(head: Head) -> list[tuple[bytes, int, int]]:
-    """Description, place in a record, and bytes of each dimension of extra bytes; those that are not described under names."""
+    """Return description, offset in a record, and size (bytes) of each dimension of extra bytes; names for undescribed ones."""
     data = b"".join(record.data for record in (*head.records, *head.extended) if record.key == EXTRA_BYTES)
     place, found = record_size(head.point_format), []
     for at in range(0, len(data) - _ENTRY + 1, _ENTRY):

@@ -1,6 +1,6 @@
-"""Points of LAS as the bytes of their records, brought into the formats whose class has 8 bits.
+"""LAS points as record bytes, converted to the formats with an 8-bit class.
 
-Source: ASPRS LAS 1.4 R15, tables 7 to 17 (point formats) and section 1.1 (what the older formats become).
+Source: ASPRS LAS 1.4 R15, tables 7 to 17 (point formats) and section 1.1 (conversion of older formats).
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from numpy.typing import NDArray
 from tunneldb.arrays import Float, UInt8
 
 FORMAT_OF = {0: 6, 1: 6, 2: 7, 3: 7, 4: 9, 5: 10, 6: 6, 7: 7, 8: 8, 9: 9, 10: 10}
-"""Point format with 8 bits for the class that holds all that each format does."""
+"""Point format with an 8-bit class that holds all fields of each format."""
 
-_OVERLAP = 12  # a class of formats 0 to 5, a flag of the later ones
+_OVERLAP = 12  # a class in formats 0 to 5, a flag in later ones
 _DEGREE = 0.006  # unit of the later formats' scan angle
 
 
 def record_size(point_format: int) -> int:
-    """Bytes of a point without extra bytes."""
+    """Return the size of a point without extra bytes, bytes."""
     return int(POINT_FORMATS_DTYPE[point_format].itemsize)
 
 
 def fields(records: UInt8, point_format: int) -> NDArray[np.void]:
-    """View of records (n, size) by the names of their standard fields; extra bytes are behind them."""
+    """Return a view of records (n, size) by the names of their standard fields; extra bytes follow them."""
     standard: np.dtype[np.void] = POINT_FORMATS_DTYPE[point_format]
     layout = np.dtype(
         {
@@ -40,7 +40,7 @@ def fields(records: UInt8, point_format: int) -> NDArray[np.void]:
 
 
 def coordinates(records: UInt8, scales: Sequence[float], offsets: Sequence[float]) -> Float:
-    """Coordinates (n, 3) of records of any format, m, by the scales and offsets of the header."""
+    """Return coordinates (n, 3) of records of any format, m, by the scales and offsets of the header."""
     stored = fields(records, 0)
     xyz = np.empty((len(records), 3))
     for column, axis in enumerate("XYZ"):
@@ -50,7 +50,7 @@ def coordinates(records: UInt8, scales: Sequence[float], offsets: Sequence[float
 
 
 def upgraded(records: UInt8, point_format: int) -> UInt8:
-    """Records in the format that `FORMAT_OF` names, with all that they held; the same array where that is their own.
+    """Convert records to the format in `FORMAT_OF` without loss; the same array if they already have it.
 
     Parameters
     ----------
@@ -61,8 +61,8 @@ def upgraded(records: UInt8, point_format: int) -> UInt8:
     Returns
     -------
     (n, size') uint8 array
-        The scan angle in its new unit of 0.006°; class 12 (overlap) as the flag that it became; no time where there was
-        none (0); extra bytes behind the standard fields as before.
+        Scan angle in the new unit of 0.006°; class 12 (overlap) as the overlap flag; time 0 if there was none; extra bytes
+        after the standard fields as before.
     """
     target = FORMAT_OF[point_format]
     if target == point_format:

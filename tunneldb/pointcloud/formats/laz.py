@@ -17,14 +17,14 @@ from tunneldb.threads import threads
 
 
 class LazWriter:
-    """Writes the points of one file.
+    """Writer of the points of one LAZ file.
 
     Parameters
     ----------
     file : binary file
-        Empty, open for writing.
+        Empty file, open for writing.
     head : Head
-        What comes around the points; its point format is the one that they have.
+        Header and records around the points; its point format is that of the points.
     """
 
     def __init__(self, file: BinaryIO, head: Head) -> None:
@@ -35,11 +35,11 @@ class LazWriter:
         self.compressor = (lazrs.LasZipCompressor if threads() == 1 else lazrs.ParLasZipCompressor)(file, vlr)
 
     def write(self, records: UInt8) -> None:
-        """Add points (n, size)."""
+        """Write points (n, size)."""
         self.compressor.compress_many(np.ascontiguousarray(records).reshape(-1))
 
     def close(self, patch: tuple[int, bytes] | None = None) -> None:
-        """End the points, write what comes behind them, and put into the header what is known only now."""
+        """End the points, write the records after them, and update the header."""
         self.compressor.done()
         self.file.seek(0, 2)
         at, packed = self.head.place_of_extended(self.file.tell())
@@ -57,30 +57,30 @@ def writing(path: Path, head: Head) -> Iterator[LazWriter]:
     Raises
     ------
     OSError
-        If the disk is full, or fails.
+        If the disk is full or fails.
     """
-    with path.open("xb") as plain, told(plain) as file:
+    with path.open("xb") as plain, write_errors_raised(plain) as file:
         yield LazWriter(file, head)
 
 
 @contextmanager
-def told(plain: BinaryIO) -> Iterator[BinaryIO]:
-    """Give a file to compress into; what the block raises is why it could not be written to.
+def write_errors_raised(plain: BinaryIO) -> Iterator[BinaryIO]:
+    """Yield a file to compress into; an error of the block is raised as the cause of the failed write.
 
     Raises
     ------
     OSError
-        If the disk is full, or fails.
+        If the disk is full or fails.
     """
-    file = _Told(plain)
+    file = _ErrorKeepingFile(plain)
     try:
-        yield file  # type: ignore[misc]  # all that is needed of a file
+        yield file  # type: ignore[misc]  # has all methods that are needed
     except lazrs.LazrsError as error:
         raise file.error or error from error
 
 
-class _Told:
-    """A file that remembers why it could not be written to: the compressor only says that it could not."""
+class _ErrorKeepingFile:
+    """File that stores the error of a failed write, which the compressor does not pass on."""
 
     def __init__(self, file: BinaryIO) -> None:
         self.file = file

@@ -1,7 +1,7 @@
-"""LAZ files whose chunks vary in size, as those of COPC do.
+"""LAZ files with chunks of variable size, for example COPC.
 
-lazrs reads them in order, but its `seek` lands on wrong points (seen in 0.8.2, one thread and several); so the chunks
-that hold what is wanted are found here by the file's own table of chunks.
+lazrs reads them in order, but its `seek` arrives at wrong points (version 0.8.2, one thread and several). So the chunks
+with the requested points are found here by the file's chunk table.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 
 
 class VariedChunks:
-    """The chunks of a LAZ file.
+    """Chunks of a LAZ file.
 
     Parameters
     ----------
     source : binary file
-        Open for reading; not closed here.
+        File open for reading; it is not closed here.
     header : LasHeader
-        Of the file, with its LASzip record.
+        Header of the file, with its LASzip record.
     selection : DecompressionSelection
-        What is decompressed of each point.
+        Parts of a point to decompress.
     """
 
     def __init__(self, source: BinaryIO, header: laspy.LasHeader, selection: DecompressionSelection) -> None:
@@ -38,20 +38,20 @@ class VariedChunks:
         self.points = np.concatenate([[0], np.cumsum(table[:, 0])])
         self.places = header.offset_to_point_data + 8 + np.concatenate([[0], np.cumsum(table[:, 1])])
         if self.points[-1] != header.point_count:
-            raise ValueError(f"its chunks hold {self.points[-1]} points, its header announces {header.point_count}")
+            raise ValueError(f"its chunks hold {self.points[-1]} points, but its header states {header.point_count}")
 
     @staticmethod
     def has(header: laspy.LasHeader) -> bool:
-        """Whether a file's chunks vary in size."""
+        """Return True if a file's chunks vary in size."""
         if not header.are_points_compressed:
             return False
         return bool(lazrs.LazVlr(header.vlrs.get("LasZipVlr")[0].record_data).uses_variable_size_chunks())
 
     def read(self, begin: int, end: int, size: int) -> Iterator[laspy.ScaleAwarePointRecord]:
-        """Read points begin to end (half-open), no more than `size` at a time."""
+        """Read points begin to end (half-open), in chunks of at most `size`."""
         chunk = int(np.searchsorted(self.points, begin, side="right")) - 1
         while begin < end:
-            last = chunk + 1  # whole chunks that together hold no more than `size` points, or one chunk
+            last = chunk + 1  # whole chunks with at most `size` points in total, or one chunk
             while last < len(self.sizes) and self.points[last] < end and self.points[last + 1] - self.points[chunk] <= size:
                 last += 1
             array = self._decompress(chunk, last)

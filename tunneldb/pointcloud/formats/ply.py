@@ -23,31 +23,31 @@ from tunneldb.pointcloud.formats.text_lines import TextLines
 from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
 
 KIND = "a PLY"
-COARSEST = 0.01
-"""Most by which coordinates may be rounded, m: more, and sections and outlines are those of the rounding."""
+MAX_ROUNDING = 0.01
+"""Greatest rounding of coordinates, m; coarser rounding would show in sections and outlines."""
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2",
     "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-_LONGEST_HEADER = 10_000  # lines
+_MAX_HEADER_LINES = 10_000  # lines
 
 
 @dataclass(frozen=True)
 class Vertices:
-    """The vertices of a PLY file.
+    """Vertices of a PLY file.
 
     Attributes
     ----------
     order : str
-        Of bytes, as NumPy writes it; empty of ascii.
+        Byte order in NumPy's notation; empty for ascii.
     names : tuple of str
-        Properties, by `columns.meaning_of`.
+        Names of the properties, by `columns.meaning_of`.
     types : tuple of str
     count : int
     offset : int
-        Where they begin in a binary file, bytes.
+        Start of the vertices in a binary file, bytes.
     """
 
     order: str
@@ -58,25 +58,25 @@ class Vertices:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """A vertex of a binary file."""
+        """NumPy type of a vertex of a binary file."""
         return np.dtype([(name, self.order + kind) for name, kind in zip(self.names, self.types, strict=True)])
 
     @property
     def dimensions(self) -> tuple[str, ...]:
-        """What a vertex has beside coordinates."""
+        """Dimensions of a vertex, without coordinates."""
         return tuple(name for name in self.names if name not in COORDINATES)
 
 
 def read_ply_header(path: Path) -> ScanHeader:
-    """Read the header of a PLY file, and the box from its points; see `tunneldb.pointcloud.reader.read_header`."""
+    """Read the header of a PLY file, and the bounding box from its points; see `tunneldb.pointcloud.reader.read_header`."""
     with decoding(path, KIND):
         status = path.stat()
     found, _, low, high = _look_through(path, (status.st_size, status.st_mtime_ns))
     step = _step(found, low, high)
-    if step > COARSEST:
+    if step > MAX_ROUNDING:
         raise InputError(
-            f"{path}: its coordinates are numbers of 32 bits, which so far from the origin come in steps of {step:.3g} m; "
-            "export them as double, or nearer to the origin"
+            f"{path}: its coordinates are 32-bit numbers, whose resolution is only {step:.3g} m so far from the origin; "
+            "export them as double, or closer to the origin"
         )
     return ScanHeader(path, found.count, found.dimensions, None, low, high)
 
@@ -109,7 +109,7 @@ def read_ply(path: Path, dimension: str | None, size: int, ranges: Ranges | None
 
 @lru_cache(maxsize=64)
 def _look_through(path: Path, version: tuple[int, int]) -> tuple[Vertices, TextCloud | None, Float, Float]:
-    """Vertices, where their lines stand in an ascii file, and their box; a file is read once for each version of it."""
+    """Return vertices, their lines in an ascii file, and their bounding box; read once for each version of a file."""
     with decoding(path, KIND), TextLines(path) as lines:
         found = _read_header(path, lines)
         if not found.order:
@@ -117,7 +117,7 @@ def _look_through(path: Path, version: tuple[int, int]) -> tuple[Vertices, TextC
         size = path.stat().st_size
         if size < found.offset + found.count * found.dtype.itemsize:
             raise InputError(
-                f"{path}: truncated: it announces {found.count} vertices and has room for "
+                f"{path}: truncated: its header states {found.count} vertices, but the file has space for "
                 f"{(size - found.offset) // found.dtype.itemsize}"
             )
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -132,7 +132,7 @@ def _ascii(path: Path, lines: TextLines, found: Vertices) -> tuple[Vertices, Tex
     builder = CloudBuilder(path, lines)
     count = builder.add(TextScan(found.names, None), found.count)
     if count < found.count:
-        raise InputError(f"{path}: truncated: it announces {found.count} vertices, {count} lines follow")
+        raise InputError(f"{path}: truncated: its header states {found.count} vertices, but {count} lines follow")
     cloud = builder.cloud()
     return found, cloud, cloud.low, cloud.high
 
@@ -141,12 +141,12 @@ def _read(path: Path, found: Vertices, first: int, count: int) -> NDArray[Any]:
     dtype = found.dtype
     vertices: NDArray[Any] = np.fromfile(path, dtype, count, offset=found.offset + first * dtype.itemsize)
     if len(vertices) != count:
-        raise InputError(f"{path}: it was changed while it was read")
+        raise InputError(f"{path}: the file was changed while it was read")
     return vertices
 
 
 def _step(found: Vertices, low: Float, high: Float) -> float:
-    """Step of the coarsest coordinate at the box's farthest corner, m."""
+    """Return the resolution of the coarsest coordinate at the bounding box's farthest corner, m."""
     farthest = np.fmax(np.abs(low), np.abs(high))
     kinds = [found.types[found.names.index(name)] for name in COORDINATES]
     steps = [np.spacing(np.float32(value)) for value, kind in zip(farthest, kinds, strict=True) if kind == "f4"]
@@ -155,10 +155,10 @@ def _step(found: Vertices, low: Float, high: Float) -> float:
 
 def _read_header(path: Path, lines: TextLines) -> Vertices:
     if lines.text() != "ply":
-        raise InputError(f"{path}: it does not begin with ply, so it is no PLY file")
+        raise InputError(f"{path}: it does not begin with ply, so it is not a PLY file")
     order: str | None = None
     elements: list[tuple[str, int, list[tuple[str, str]]]] = []
-    for _ in range(_LONGEST_HEADER):
+    for _ in range(_MAX_HEADER_LINES):
         words = (lines.text() or "").split()
         match words:
             case ["format", name, _] if name in _ORDERS:
@@ -174,9 +174,9 @@ def _read_header(path: Path, lines: TextLines) -> Vertices:
             case ["end_header"]:
                 break
             case _:
-                raise InputError(f"{path}, line {lines.line - 1}: {' '.join(words)[:60]!r} is nothing that a PLY header has")
+                raise InputError(f"{path}, line {lines.line - 1}: {' '.join(words)[:60]!r} is not a line of a PLY header")
     if order is None:
-        raise InputError(f"{path}: its header names no format: ascii, binary_little_endian or binary_big_endian")
+        raise InputError(f"{path}: its header states no format; expected ascii, binary_little_endian or binary_big_endian")
     return _vertices(path, order, elements, lines)
 
 
@@ -184,7 +184,7 @@ def _vertices(path: Path, order: str, elements: list[tuple[str, int, list[tuple[
     offset = lines.offset
     for element, count, properties in elements:
         if any(not kind for _, kind in properties):
-            raise InputError(f"{path}: its element {element} has a list, before or in the vertices; export the points alone")
+            raise InputError(f"{path}: element {element} has a list before or in the vertices; export only the points")
         if element == "vertex":
             break
         offset += count * sum(np.dtype(kind).itemsize for _, kind in properties)

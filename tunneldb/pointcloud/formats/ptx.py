@@ -1,8 +1,8 @@
-"""PTX files: scans as the scanner took them, ray by ray, each with its pose.
+"""PTX files: scans ray by ray, as the scanner recorded them, with their poses.
 
-A scan is ten lines, then a line a ray: its number of columns and of rows; position and axes of the scanner; the matrix by
-which its points are turned and moved, for points as rows. Rays without an echo are 0, 0, 0. The scanner stands where the
-matrix brings 0, 0, 0.
+A scan has ten header lines, then one line per ray. The header has the numbers of columns and rows, position and axes of the
+scanner, and the matrix that transforms the points (as row vectors). Rays without an echo are 0, 0, 0. The scanner position
+is the image of 0, 0, 0 under the matrix.
 
 Source: Leica Geosystems, *Cyclone PTX export format*; P. Bourke, *ptx plain text data format*, 2015.
 """
@@ -23,17 +23,17 @@ from tunneldb.pointcloud.formats.text_lines import TextLines
 from tunneldb.pointcloud.formats.xyz import LEICA
 
 KIND = "a PTX"
-_HEADER = (1, 1, 3, 3, 3, 3, 4, 4, 4, 4)  # numbers in each of its lines
-_SKEW = 1e-3  # most by which a rotation that was written with few digits is none
+_HEADER = (1, 1, 3, 3, 3, 3, 4, 4, 4, 4)  # numbers in each line
+_MAX_SKEW = 1e-3  # greatest deviation from a rotation, for matrices written with few digits
 
 
 def read_ptx(path: Path) -> TextCloud:
-    """What a PTX file holds.
+    """Read a PTX file.
 
     Raises
     ------
     InputError
-        If it is missing, damaged or holds no points; with file and line.
+        If it is missing, damaged or has no points; names file and line.
     """
     with decoding(path, KIND):
         status = path.stat()
@@ -41,13 +41,13 @@ def read_ptx(path: Path) -> TextCloud:
 
 
 def read_ptx_scans(path: Path) -> list[PosedScan]:
-    """Scans of a PTX file, in its order."""
+    """Return the scans of a PTX file, in its order."""
     return [scan.pose for scan in read_ptx(path).scans if scan.pose is not None]
 
 
 @lru_cache(maxsize=64)
 def _read_ptx(path: Path, version: tuple[int, int]) -> TextCloud:
-    """Read a file once for each version of it."""
+    """Read a file, once for each version of it."""
     with decoding(path, KIND), TextLines(path) as lines:
         builder = CloudBuilder(path, lines)
         seen: dict[bytes, int] = {}
@@ -68,12 +68,12 @@ def _read_ptx(path: Path, version: tuple[int, int]) -> TextCloud:
             scan = TextScan(LEICA[width], None, pose, matrix[:3, :3].T, True)
             found = builder.add(scan, columns * rows)
             if found < columns * rows:
-                raise InputError(f"{path}: truncated: line {line} announces {columns} × {rows} points, {found} follow")
+                raise InputError(f"{path}: truncated: line {line} states {columns} × {rows} points, but {found} follow")
         return builder.cloud()
 
 
 def _read_head(path: Path, lines: TextLines) -> tuple[int, int, int, Float] | None:
-    """Line, columns, rows and matrix (4, 4) of the scan that begins next; None at the end of the file."""
+    """Return line, columns, rows and matrix (4, 4) of the next scan; None at the end of the file."""
     text = lines.text()
     while text == "":
         text = lines.text()
@@ -90,16 +90,16 @@ def _read_head(path: Path, lines: TextLines) -> tuple[int, int, int, Float] | No
             numbers = []
         if len(numbers) != count or not np.isfinite(numbers).all():
             what = "a number" if count == 1 else f"{count} numbers"
-            raise InputError(f"{path}, line {lines.line - 1}: {text[:60]!r} where the header of a scan has {what}")
+            raise InputError(f"{path}, line {lines.line - 1}: {text[:60]!r}, but the header of a scan has {what} here")
         values.append(numbers)
         if len(values) < len(_HEADER):
             text = lines.text()
     (columns,), (rows,) = values[:2]
     if min(columns, rows) < 1 or columns != int(columns) or rows != int(rows):
-        raise InputError(f"{path}, line {begin}: a scan of {columns:g} × {rows:g} points is none")
+        raise InputError(f"{path}, line {begin}: invalid scan size {columns:g} × {rows:g}")
     matrix = np.array(values[6:])
-    if not np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=_SKEW):
+    if not np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=_MAX_SKEW):
         raise InputError(
-            f"{path}, line {begin + 6}: the scan's matrix is no rotation (is it scaled?); export it with its pose, in metres"
+            f"{path}, line {begin + 6}: the scan's matrix is not a rotation (is it scaled?); export it with its pose, in metres"
         )
     return begin, int(columns), int(rows), matrix

@@ -1,4 +1,4 @@
-"""Points of scan files as they are stored, for who works through all of them."""
+"""Points of scan files as stored, for processing all of them."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from tunneldb.pointcloud.points import CHUNK, Ranges, Raw
 def read_raw(
     path: Path, dimension: str | None, size: int = CHUNK, ranges: Ranges | None = None, *, colours: bool = False
 ) -> Iterator[Raw]:
-    """Read a scan file chunk by chunk, without turning its numbers into others.
+    """Read a scan file chunk by chunk, without converting its numbers.
 
     Parameters
     ----------
     path : Path
-        Scan file, of the format that its suffix says; a COPC file is read as the LAZ file that it is.
+        Scan file, of the format of its suffix; a COPC file is read as LAZ.
     dimension : str or None
-        Name of the dimension taken as intensity; None takes none.
+        Name of the dimension used as intensity; None for none.
     size : int
         Greatest number of points of a chunk.
     ranges : sequence of (int, int), or None
-        Half-open ranges of point numbers, from 0, that are read, in this order; None reads the whole file. The numbers
-        are those that counting the points of the whole file gives. What lies between ranges is skipped without
-        decoding, to the bounds of the file's own chunks (LAZ: 50 000 points by default; E57: the scans; text: blocks of lines).
+        Half-open ranges of point numbers, from 0, to read in this order; None for the whole file. Points are numbered as in
+        the whole file. Points between ranges are skipped without decoding, up to the bounds of the file's own chunks (LAZ:
+        50 000 points by default; E57: scans; text: blocks of lines).
     colours : bool
-        Whether colours are wanted, of the formats whose colours are read (LAS, LAZ, E57).
+        True to read colours, from the formats that have them (LAS, LAZ, E57).
 
     Yields
     ------
     Raw
-        In file order within a range. `size` points each but the last of a range; fewer where the file comes in
-        pieces of varying size (COPC, E57, text).
+        In file order within a range, with `size` points each except the last of a range; fewer if the file has chunks of
+        variable size (COPC, E57, text).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Points of files that are neither LAS nor E57 as records of LAS, for who writes them as LAZ.
+"""Points of files other than LAS and E57 as LAS records, for writing LAZ.
 
 Source: ASPRS LAS 1.4 R15, tables 3, 15 and 16 (formats 6 and 7), 26 (extra bytes).
 """
@@ -22,15 +22,15 @@ from tunneldb.pointcloud.formats.table import format_of
 _SCALE = 1e-4  # m; finer than any scanner measures, and an int32 of it reaches 214 km
 _COLOURS = ("red", "green", "blue")
 _STANDARD = ("gps_time", "scan_id", "classification")
-_SHORT = 2**16
+_SCAN_ID_LIMIT = 2**16
 
 
 class RawRecords:
-    """The points of a PTX, PTS, PLY or other table of points as records of LAS format 6, or 7 where they have a colour.
+    """Points of a PTX, PTS, PLY or other table of points as records of LAS format 6, or 7 if they have a colour.
 
-    `point_source_id` is the scan number, or where that has more than 16 bits the place of the scan in the file, from 1. All
-    other columns lie in extra bytes, as 64-bit floats by their own names, the intensity as `source_intensity`; colours are
-    spread over 16 bits.
+    `point_source_id` is the scan number, or, if that has more than 16 bits, the number of the scan in the file, from 1. All
+    other columns are stored in extra bytes, as 64-bit floats under their own names, the intensity as `source_intensity`;
+    colours are scaled to 16 bits.
 
     Parameters
     ----------
@@ -64,24 +64,24 @@ class RawRecords:
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
 
     def read(self, size: int) -> Iterator[UInt8]:
-        """Read the points, no more than `size` at a time; once.
+        """Read the points once, in chunks of at most `size`.
 
         Raises
         ------
         InputError
-            If they cannot be read, or one has no place.
+            If they cannot be read, or a point has no coordinates.
         """
-        # A pass for each column: readers give one at a time, and tables have few.
+        # One pass for each column: readers return one at a time, and tables have few.
         passes = [read_raw(self.path, name, size) for name in self.columns] or [read_raw(self.path, None, size)]
         before = record_size(self.format)
         for parts in zip(*passes, strict=True):
             raw = parts[0]
             xyz = np.column_stack([raw.x, raw.y, raw.z]) * raw.scales + raw.offsets
             if not np.isfinite(xyz).all():
-                raise InputError(f"{self.path}: a coordinate is NaN or infinite; mend the file")
+                raise InputError(f"{self.path}: a coordinate is NaN or infinite; remove the point")
             stored = np.rint((xyz - self.offsets) / self.scale)
             if np.abs(stored).max() >= 2**31:
-                raise InputError(f"{self.path}: it was changed while it was read")
+                raise InputError(f"{self.path}: the file was changed while it was read")
             out: UInt8 = np.zeros((len(raw), before + 8 * len(self.extras)), np.uint8)
             point = fields(out, self.format)
             for column, axis in enumerate("XYZ"):
@@ -102,7 +102,7 @@ class RawRecords:
             yield out
 
     def patches(self) -> tuple[int, bytes]:
-        """Where in the header, and what stands there, that is known once all points were read: box and counts."""
+        """Return place and bytes of the part of the header that is known after reading all points: bounding box and counts."""
         corners = np.column_stack([self.high, self.low]).ravel()
         returns = [self.count, *[0] * 14]
         return 179, struct.pack("<6d", *corners) + bytes(247 - 227) + struct.pack("<Q15Q", self.count, *returns)
@@ -111,7 +111,7 @@ class RawRecords:
         scans, places = np.unique(scan_id, return_inverse=True)
         for scan in scans.tolist():
             self.scans.setdefault(scan, len(self.scans) + 1)
-        found = [scan if scan < _SHORT else min(self.scans[scan], _SHORT - 1) for scan in scans.tolist()]
+        found = [scan if scan < _SCAN_ID_LIMIT else min(self.scans[scan], _SCAN_ID_LIMIT - 1) for scan in scans.tolist()]
         return np.array(found, np.float64)[places]
 
     def _count(self, stored: Float) -> None:
@@ -125,7 +125,7 @@ def _extra_name(name: str) -> str:
 
 
 def _limits(values: Float) -> tuple[float, float]:
-    """Limits of 0–1, 8 bits or 16 bits, whichever holds values; 12 bits may be shifted below zero, as Leica's are."""
+    """Return the range of 0–1, 8 bits or 16 bits that holds the values; 12 bits may be shifted below zero, as by Leica."""
     most = float(np.nanmax(values, initial=0.0))
     if float(np.nanmin(values, initial=0.0)) < 0.0:
         return -2048.0, 2047.0

@@ -1,4 +1,4 @@
-"""Scans of a file that says where each was taken from."""
+"""Scans of a file that states the scanner position of each."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from dataclasses import dataclass
 
 from tunneldb.arrays import Float
 
-FIRST_NUMBER = 65536  # scan numbers of LAS lie below
+FIRST_NUMBER = 65536  # scan numbers of LAS are smaller
 
 
 @dataclass(frozen=True)
 class PosedScan:
-    """A scan and where the scanner stood.
+    """Scan with its scanner position.
 
     Attributes
     ----------
     index : int
-        Place in the file, from 0.
+        Index in the file, from 0.
     name : str
-        What to call it.
+        Displayed name.
     number : int
-        `scan_number`.
+        Result of `scan_number`.
     position : (3,) float64 array or None
-        Where the scanner stood, in the file's frame, m; None where the scan has no pose.
+        Scanner position in the file's frame, m; None if the scan has no pose.
     """
 
     index: int
@@ -34,9 +34,9 @@ class PosedScan:
 
 
 def scan_number(guid: str, position: Float | None) -> int:
-    """Number of a scan, the same in whichever file and place among the scans: a hash of its GUID and position.
+    """Return the number of a scan, a hash of its GUID and position, so that it does not depend on the file.
 
-    From 65536 to 2³¹ − 1, so never one of a LAS file. A scan that was registered anew has another number.
+    It is between 65536 and 2³¹ − 1, so never a number of a LAS file. A scan that is registered again has another number.
     """
     place = b"" if position is None else struct.pack("<3d", *(position + 0.0))
     digest = hashlib.blake2b(guid.strip().lower().encode() + place, digest_size=8).digest()

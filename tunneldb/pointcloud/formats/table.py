@@ -1,4 +1,4 @@
-"""The formats of scan files, by the suffix of their names."""
+"""Formats of scan files, by file suffix."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from tunneldb.pointcloud.points import Raw, ScanHeader
 
 @dataclass(frozen=True)
 class Format:
-    """A format of scan files.
+    """Format of scan files.
 
     Attributes
     ----------
     name : str
-        As users know it.
+        Name for users.
     header : callable
         See `tunneldb.pointcloud.reader.read_header`.
     read : callable
         See `tunneldb.pointcloud.formats.raw.read_raw`.
     scans : callable or None
-        Gives the scans of a file with their positions; None where the format has none.
+        Function that returns the scans of a file with their positions; None if the format has no scans.
     is_las : bool
-        Whether it is LAS or LAZ.
+        True for LAS and LAZ.
     has_colours : callable or None
-        Tells whether the points of a file have colours; ``read`` then takes as one more argument whether they are wanted. None
-        where they are not read.
+        Function that returns True if the points of a file have colours; ``read`` then takes one more argument, True to read
+        them. None if colours are not read.
     """
 
     name: str
@@ -48,12 +48,12 @@ class Format:
 
 
 def format_of(path: Path) -> Format:
-    """Format of a file, by the suffix of its name; LAS or LAZ where that is no other's."""
+    """Return the format of a file by its suffix; LAS or LAZ if no other format has that suffix."""
     return _FORMATS.get(path.suffix.lower(), _LAS)
 
 
 def require_known(path: Path) -> None:
-    """Refuse a file whose suffix is that of no format, and that is no LAS either.
+    """Refuse a file whose suffix is of no format and that is not LAS.
 
     Raises
     ------
@@ -64,38 +64,38 @@ def require_known(path: Path) -> None:
     with path.open("rb") as file:
         if file.read(len(SIGNATURE)) != SIGNATURE:
             known = ", ".join(scan_suffixes())
-            raise InputError(f"{path}: a file of points is known by how its name ends: {known}")
+            raise InputError(f"{path}: unknown suffix; files of points end with {known}")
 
 
 def scan_suffixes() -> tuple[str, ...]:
-    """How names of scan files end, lower-case."""
+    """Return the suffixes of scan files, lower-case."""
     return (*_SUFFIXES_OF_LAS, *_FORMATS)
 
 
 def has_scans(path: Path) -> bool:
-    """Whether a file is of a format whose scans bring their poses, by its name."""
+    """Return True if a file's suffix is of a format whose scans have poses."""
     return format_of(path).scans is not None
 
 
 def posed_scans(path: Path) -> list[PosedScan]:
-    """Scans of a file with the positions that it gives them; none of a format that has no scans.
+    """Return the scans of a file with their positions; none for a format without scans.
 
     Raises
     ------
     InputError
-        If the file cannot be read or holds no points.
+        If the file cannot be read or contains no points.
     """
     scans = format_of(path).scans
     return [] if scans is None else list(scans(path))
 
 
 def has_colours(path: Path) -> bool:
-    """Whether the points of a file have colours that are read.
+    """Return True if the points of a file have colours that can be read.
 
     Raises
     ------
     InputError
-        If the file cannot be read or holds no points.
+        If the file cannot be read or contains no points.
     """
     told = format_of(path).has_colours
     return told is not None and told(path)

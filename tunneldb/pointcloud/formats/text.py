@@ -1,4 +1,4 @@
-"""Points in lines of text: where they stand, found in one pass, and read from there in chunks of constant memory."""
+"""Points in text lines: located in one pass, then read in chunks of constant memory."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ _LIMITS = {"scan_id": 1 << 31, "classification": 256}
 
 @dataclass(frozen=True)
 class TextScan:
-    """Lines of points that stand together: all of a file, or one of its scans.
+    """Consecutive lines of points: a whole file, or one of its scans.
 
     Attributes
     ----------
     columns : tuple of str
-        What a line holds, by `columns.meaning_of`.
+        Names of the values in a line, by `columns.meaning_of`.
     divider : str or None
-        What divides its values; None for blanks and tabs.
+        Separator of values; None for blanks and tabs.
     pose : PosedScan or None
-        Number and position of the scan, where the format has them.
+        Number and position of the scan, if the format has them.
     rotation : (3, 3) float64 array
-        Of the scan's own frame to the file's.
+        Rotation from the scan's own frame to the file's.
     empty_rays : bool
-        Whether a point at the scan's own 0, 0, 0 stands for a ray without an echo.
+        True if a point at the scan's own 0, 0, 0 means a ray without an echo.
     """
 
     columns: tuple[str, ...]
@@ -48,11 +48,11 @@ class TextScan:
 
     @property
     def position(self) -> Float:
-        """What is added to turned coordinates, m."""
+        """Offset of rotated coordinates, m."""
         return np.zeros(3) if self.pose is None or self.pose.position is None else self.pose.position
 
     def table(self, path: Path, block: bytes, line: int) -> TextTable:
-        """Points of a block of lines that begins with this one; rays without an echo are left out."""
+        """Return the points of a block of lines that begins at ``line``, without rays that have no echo."""
         used = tuple(place for place, name in enumerate(self.columns) if name != SKIPPED)
         values = parse(path, block, line, self.divider, len(self.columns), used)
         table = TextTable(self, tuple(self.columns[place] for place in used), values)
@@ -61,7 +61,7 @@ class TextScan:
 
 @dataclass(frozen=True)
 class TextTable:
-    """Numbers (n, k) of a scan's lines, and what their columns are."""
+    """Numbers (n, k) of a scan's lines, with the names of their columns."""
 
     scan: TextScan
     names: tuple[str, ...]
@@ -71,25 +71,25 @@ class TextTable:
         return len(self.values)
 
     def some(self, chosen: Bool) -> TextTable:
-        """Chosen rows."""
+        """Return the chosen rows."""
         return replace(self, values=self.values[chosen])
 
     def column(self, name: str) -> Float | None:
-        """Column of that name; None if there is none."""
+        """Return the column of that name; None if there is none."""
         return self.values[:, self.names.index(name)] if name in self.names else None
 
     def own(self) -> Float:
-        """Coordinates in the scan's own frame (n, 3), m."""
+        """Return coordinates in the scan's own frame (n, 3), m."""
         return self.values[:, [self.names.index(name) for name in COORDINATES]]
 
     def turned(self) -> Float:
-        """Coordinates turned into the file's frame, less the scan's position (n, 3), m."""
+        """Return coordinates rotated into the file's frame, without the scan's position (n, 3), m."""
         return self.own() @ self.scan.rotation.T
 
 
 @dataclass(frozen=True)
 class Block:
-    """Where points stand: number and count of them, place and length in the file (bytes), first line, scan by its place."""
+    """Place of some points: first index and count, offset and length in the file (bytes), first line, index of the scan."""
 
     point: int
     points: int
@@ -101,15 +101,15 @@ class Block:
 
 @dataclass(frozen=True)
 class TextCloud:
-    """What a text file holds, found by reading it once.
+    """Contents of a text file, found by reading it once.
 
     Attributes
     ----------
     scans : tuple of TextScan
     blocks : tuple of Block
-        In the order of the file.
+        Blocks in file order.
     low, high : (3,) float64 array
-        Box of the coordinates, m.
+        Bounding box of the coordinates, m.
     """
 
     path: Path
@@ -125,17 +125,17 @@ class TextCloud:
 
     @property
     def dimensions(self) -> tuple[str, ...]:
-        """What every scan has beside coordinates."""
+        """Dimensions of every scan, without coordinates."""
         first = [name for name in self.scans[0].columns if name not in (*COORDINATES, SKIPPED)]
         return tuple(name for name in first if all(name in scan.columns for scan in self.scans))
 
     def header(self) -> ScanHeader:
-        """What the file says of itself."""
+        """Return the scan header of the file."""
         return ScanHeader(self.path, self.points, self.dimensions, None, self.low, self.high)
 
 
 class CloudBuilder:
-    """Makes a `TextCloud`, scan by scan."""
+    """Builder of a `TextCloud`, scan by scan."""
 
     def __init__(self, path: Path, lines: TextLines) -> None:
         self.path, self.lines = path, lines
@@ -145,7 +145,7 @@ class CloudBuilder:
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
 
     def add(self, scan: TextScan, count: int | None) -> int:
-        """Take the lines of a scan, `count` of them or all to the end; returns how many there were."""
+        """Add the lines of a scan, `count` of them or all to the end; return how many there were."""
         taken = 0
         while count is None or taken < count:
             line, offset = self.lines.line, self.lines.offset
@@ -165,7 +165,7 @@ class CloudBuilder:
         return taken
 
     def cloud(self) -> TextCloud:
-        """Return what was found.
+        """Return the completed cloud.
 
         Raises
         ------
@@ -200,7 +200,7 @@ def _read_block(cloud: TextCloud, block: Block, dimension: str | None) -> Raw:
     scan = cloud.scans[block.scan]
     table = scan.table(cloud.path, data, block.line)
     if len(table) != block.points:
-        raise InputError(f"{cloud.path}: it was changed while it was read")
+        raise InputError(f"{cloud.path}: the file was changed while it was read")
     turned = table.turned()
     numbers = _whole(cloud.path, table, block, "scan_id")
     classes = _whole(cloud.path, table, block, "classification")

@@ -1,4 +1,4 @@
-"""Lines of numbers, read in blocks of constant memory, with the line in which something is wrong."""
+"""Lines of numbers, read in blocks of constant memory; errors state the line."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.columns import SKIPPED
 
 BLOCK_BYTES = 1 << 24
-LONGEST = 1 << 16  # bytes of a line; nothing that is text has longer ones
+MAX_LINE_BYTES = 1 << 16  # bytes of a line; text files do not have longer ones
 
 
 class TextLines:
-    """Whole lines of a file, a block at a time, and where they stand.
+    """Whole lines of a file, block by block, with their place in the file.
 
     Attributes
     ----------
     line, offset : int
-        Number, from 1, and place in the file, bytes, of the line that comes next.
+        Number, from 1, and offset (bytes) of the next line.
     """
 
     def __init__(self, path: Path) -> None:
@@ -32,8 +32,8 @@ class TextLines:
         self.line, self.offset = 1, 0
         self._file = path.open("rb")
         self._held = b""
-        self._ends = np.empty(0, np.int64)  # places behind the ends of the lines that are held
-        self._at = 0  # lines of these that were taken
+        self._ends = np.empty(0, np.int64)  # offsets after the ends of the lines in memory
+        self._at = 0  # number of these lines already taken
 
     def __enter__(self) -> Self:
         return self
@@ -42,7 +42,7 @@ class TextLines:
         self._file.close()
 
     def take(self, count: int) -> tuple[bytes, int]:
-        """Next lines, `count` at most, and how many they are; none at the end of the file."""
+        """Return the next lines, `count` at most, and their number; none at the end of the file."""
         if self._at == len(self._ends) and not self._fill():
             return b"", 0
         taken = min(count, len(self._ends) - self._at)
@@ -54,28 +54,28 @@ class TextLines:
         return self._held[begin:end], taken
 
     def text(self) -> str | None:
-        """Next line, without its end; None at the end of the file.
+        """Return the next line, without its end; None at the end of the file.
 
         Raises
         ------
         InputError
-            If it is no text.
+            If it is not text.
         """
         data, count = self.take(1)
         if not count:
             return None
         if b"\0" in data:
-            raise InputError(f"{self.path}, line {self.line - 1}: it is no text file")
+            raise InputError(f"{self.path}, line {self.line - 1}: not a text file")
         return data.decode("utf-8-sig", "replace").strip()
 
     def skip(self, count: int) -> None:
-        """Pass over lines."""
+        """Skip lines."""
         while count > 0:
             _, taken = self.take(count)
             count -= taken or count
 
     def back(self) -> None:
-        """Give the line back that was taken last; once, and before anything else is taken."""
+        """Put back the line that was taken last; only once, and before another line is taken."""
         begin = int(self._ends[self._at - 2]) if self._at > 1 else 0
         self.offset -= int(self._ends[self._at - 1]) - begin
         self._at -= 1
@@ -89,18 +89,18 @@ class TextLines:
         self._held = rest + data
         self._ends = np.flatnonzero(np.frombuffer(self._held, np.uint8) == ord("\n")) + 1
         self._at = 0
-        if self._held and (not len(self._ends) or self._ends[0] > LONGEST):
-            raise InputError(f"{self.path}, line {self.line}: no line of text ends within {LONGEST} bytes: it is no text file")
+        if self._held and (not len(self._ends) or self._ends[0] > MAX_LINE_BYTES):
+            raise InputError(f"{self.path}, line {self.line}: no line end within {MAX_LINE_BYTES} bytes: not a text file")
         return bool(len(self._ends))
 
 
 def divider_of(line: str) -> str | None:
-    """What divides the values of a line: a semicolon, a comma, or None for blanks and tabs."""
+    """Return the separator of the values of a line: semicolon, comma, or None for blanks and tabs."""
     return next((mark for mark in (";", ",") if mark in line), None)
 
 
 def are_numbers(line: str, columns: Sequence[str] = ()) -> bool:
-    """Whether all values of a line are numbers, and there are some; those of columns that are left out may be words."""
+    """Return True if a line has values and all are numbers; values of skipped columns may be words."""
     values = line.split(divider_of(line))
     if len(values) == len(columns):
         values = [value for value, name in zip(values, columns, strict=True) if name != SKIPPED]
@@ -112,22 +112,22 @@ def are_numbers(line: str, columns: Sequence[str] = ()) -> bool:
 
 
 def parse(path: Path, block: bytes, first: int, divider: str | None, width: int, used: tuple[int, ...]) -> Float:
-    """Numbers of a block of lines; blank ones are left out.
+    """Parse the numbers of a block of lines; blank lines are ignored.
 
     Parameters
     ----------
     path : Path
-        For the error's line.
+        File name for error messages.
     block : bytes
         Whole lines.
     first : int
-        Number of the first one in the file.
+        Number of the first line in the file.
     divider : str or None
         See `divider_of`.
     width : int
-        Values of a line.
+        Number of values in a line.
     used : tuple of int
-        Which of them are wanted.
+        Indices of the values to return.
 
     Returns
     -------
@@ -136,19 +136,19 @@ def parse(path: Path, block: bytes, first: int, divider: str | None, width: int,
     Raises
     ------
     InputError
-        If a line has more or fewer values, or one that is wanted is no number.
+        If a line has more or fewer values, or a requested value is not a number.
     """
     if not block.strip():
         return np.empty((0, len(used)))
     try:
         text = io.StringIO(block.decode("ascii"))
-        # All columns are read where all are numbers, for then a line with more values is noticed, too.
+        # If all columns are numbers, all are read, so that lines with more values are detected.
         chosen = None if used == tuple(range(width)) else used
         values = np.loadtxt(text, np.float64, comments=None, delimiter=divider, ndmin=2, usecols=chosen)
     except (ValueError, UnicodeDecodeError) as error:
         raise _fault(path, block, first, divider, width, used) or InputError(f"{path}: {error}") from None
     if chosen is None and values.shape[1] != width:
-        raise _fault(path, block, first, divider, width, used) or InputError(f"{path}: lines of {values.shape[1]} values")
+        raise _fault(path, block, first, divider, width, used) or InputError(f"{path}: lines have {values.shape[1]} values")
     return values
 
 
@@ -158,7 +158,7 @@ def _fault(path: Path, block: bytes, first: int, divider: str | None, width: int
             continue
         values = line.split(divider)
         if len(values) != width:
-            return InputError(f"{path}, line {number}: {len(values)} values where {width} are expected: {_short(line)!r}")
+            return InputError(f"{path}, line {number}: {len(values)} values, expected {width}: {_short(line)!r}")
         for place in used:
             try:
                 float(values[place])

@@ -1,7 +1,7 @@
-"""Tables of points: PTS, and XYZ, TXT, ASC or CSV whose columns are named.
+"""Tables of points: PTS, and XYZ, TXT, ASC or CSV with named columns.
 
-Of PTS the columns are those of the format: coordinates, intensity, colour. Of all others they are named: in the first line,
-or in a file beside it; a file ``.xyz`` of just three columns holds what its suffix says. Nothing else is guessed.
+PTS has the columns of its format: coordinates, intensity, colour. All others need column names, in the first line or in a
+file beside them; a file ``.xyz`` with exactly three columns has coordinates. Nothing else is guessed.
 
 Source: Leica Geosystems, *Cyclone* (PTS: a line with the number of points, then x, y, z, intensity and red, green, blue).
 """
@@ -24,18 +24,18 @@ LEICA = {
     6: (*COORDINATES, *COLOURS),
     7: (*COORDINATES, "intensity", *COLOURS),
 }
-"""Columns of PTS and PTX by how many there are."""
+"""Columns of PTS and PTX, by their number."""
 
-_MOST_COMMENTS = 1000
+_MAX_COMMENTS = 1000
 
 
 def read_table(path: Path) -> TextCloud:
-    """What a file of points in lines holds.
+    """Read a text file of points.
 
     Raises
     ------
     InputError
-        If it is missing or damaged, holds no points, or its columns are not named; with file and line.
+        If it is missing or damaged, has no points, or its columns have no names; names file and line.
     """
     with decoding(path, KIND):
         status = path.stat()
@@ -46,7 +46,7 @@ def read_table(path: Path) -> TextCloud:
 
 @lru_cache(maxsize=64)
 def _read_table(path: Path, version: tuple[int, int], named: tuple[Path, int] | None) -> TextCloud:
-    """Read a file once for each version of it and of the names of its columns."""
+    """Read a file, once for each version of it and of its column names."""
     with decoding(path, KIND), TextLines(path) as lines:
         builder = CloudBuilder(path, lines)
         if path.suffix.lower() == ".pts":
@@ -57,7 +57,7 @@ def _read_table(path: Path, version: tuple[int, int], named: tuple[Path, int] | 
 
 
 def _read_pts(builder: CloudBuilder) -> None:
-    """Pieces of a PTS file, each after a line with its number of points; without one the file is one piece."""
+    """Read the pieces of a PTS file, each after a line with its number of points; without such a line the file is one piece."""
     path, lines = builder.path, builder.lines
     while (text := lines.text()) is not None:
         if not text:
@@ -74,18 +74,18 @@ def _read_pts(builder: CloudBuilder) -> None:
             raise InputError(f"{path}, line {lines.line}: {width} values; a line of PTS has {', '.join(map(str, LEICA))}")
         found = builder.add(TextScan(LEICA[width], None), count)
         if count is not None and found < count:
-            raise InputError(f"{path}: truncated: line {at} announces {count} points, {found} follow")
+            raise InputError(f"{path}: truncated: line {at} states {count} points, but {found} follow")
 
 
 def _layout(path: Path, lines: TextLines) -> TextScan:
-    """Columns of a table; the lines before its points are taken."""
+    """Return the columns of a table, and consume the lines before its points."""
     given = given_names(path)
     remarks: list[str] = []
     header: str | None = None
     while (text := lines.text()) is not None:
         if not text:
             continue
-        if text.startswith(("#", "//")) and len(remarks) < _MOST_COMMENTS:
+        if text.startswith(("#", "//")) and len(remarks) < _MAX_COMMENTS:
             remarks.append(text)
         elif header is None and not are_numbers(text, () if given is None else given[0]):
             header = text
@@ -120,7 +120,7 @@ def _columns(
         return COORDINATES
     if not names:
         raise InputError(
-            f"{path}: its {width} columns have no names (line {line}: {first[:60]}); say what they are: "
+            f"{path}: its {width} columns have no names (line {line}: {first[:60]}); name them: "
             f"echo 'x y z …' > {own_names(path)}"
         )
     if len(names) != width:

@@ -1,4 +1,4 @@
-"""Sonar scans from below the water, registered to the laser's points above it."""
+"""Registration of underwater sonar scans to the laser's points above the water."""
 
 import lazy_loader
 

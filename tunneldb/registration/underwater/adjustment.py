@@ -1,8 +1,8 @@
 """Joint robust adjustment of all sonar scans: poses, scales, ladders and the walls' batter below the water.
 
-Gauss-Newton with weights by Geman and McClure; rows of one group (a stretch of wall, a rung) err together, which the
-covariance takes into account (Liang and Zeger, 1986, the sandwich of groups; Bell and
-McCaffrey, 2002, for few of them).
+Gauss-Newton with Geman-McClure weights. Rows of one group (a stretch of wall, a rung) have correlated errors, which the
+covariance takes into account (Liang and Zeger, 1986, cluster-robust sandwich estimate; Bell and McCaffrey, 2002, for few
+groups).
 """
 
 from __future__ import annotations
@@ -28,46 +28,46 @@ from tunneldb.registration.underwater.observations import (
 )
 from tunneldb.registration.underwater.walls import Walls
 
-SCALE_SIGMA = 0.01  # of the range scale before anything is known: 15 m/s of 1480
-BATTER_SIGMA = 0.01  # of the change of batter at the water
-# Share of a bar's radius by which its echo comes from behind its near surface: the mean of Lambert's law over a round bar,
-# 1 - (4/3) / (pi/2); and by how much another law may shift it.
+SCALE_SIGMA = 0.01  # prior standard deviation of the range scale: 15 m/s of 1480
+BATTER_SIGMA = 0.01  # prior standard deviation of the change of batter at the water
+# Share of a bar's radius between its near surface and the origin of its echo: the mean of Lambert's law over a round bar,
+# 1 - (4/3) / (pi/2); and its uncertainty under other laws.
 DEPTH_SHARE, DEPTH_SPREAD = 1.0 - (4.0 / 3.0) / (np.pi / 2.0), 0.2
-WATERLINE_SIGMA = 0.03  # m: of what edges of walls have in common, by which they lie above or below the water
-# Of the sonar's zero on masonry, and of what its beam hears there of stones and joints, m: some of RELIEF. Walls tell it apart
-# from scale as little as ladders do, so it is held, and what it may be goes into the covariance alone.
-ZERO_SIGMA, ZERO_HELD = 0.0015, 0.0003
-# Slant of walls and of the bed (nearer_by_slant), between none and that of the cell with the most power on what is smooth.
+WATERLINE_SIGMA = 0.03  # m: common offset of wall edges above or below the water
+# Prior standard deviations of the sonar's zero on masonry, from stones and joints in its beam, m: some of RELIEF. Walls
+# separate it from scale as poorly as ladders do, so it is nearly fixed, and its uncertainty enters the covariance only.
+ZERO_SIGMA, ZERO_PRIOR_SIGMA = 0.0015, 0.0003
+# Slant effect of walls and of the bed (nearer_by_slant): between none and that of the strongest cell on a smooth surface.
 SLANT_USUAL, SLANT_SIGMA = 1.5, 1.0
-NEARER_SIGMA = (0.0005, 0.002)  # of the shares by which relief of walls and of the bed seems nearer along than it is
-# Parameters common to all scans but for the ladders: changes of batter of either side, depth behind a bar's near surface,
-# height of the waterline, zero on masonry, two slants, two of those shares
+NEARER_SIGMA = (0.0005, 0.002)  # of the shares by which relief of walls and of the bed seems nearer along the canal
+# Parameters common to all scans except those of ladders: changes of batter of either side, depth behind a bar's near
+# surface, height of the waterline, zero on masonry, two slants, two of those shares
 COMMON = 9
 LADDER_TURN, LADDER_SHIFT = 0.0005, 0.002  # least standard deviations of a ladder by the laser, rad and m
-# rad: what slanting beams on a rough wall hear in common, 0.6 mm over 2 m of its height; no scan shows that by itself
+# rad: common error of slanting beams on a rough wall, 0.6 mm over 2 m of its height; not visible in a single scan
 SLANT = 0.0003
-CUT = 3.0  # standard deviations at which a row has a quarter of its weight
-REACHES = (0.3, 0.2, 0.15, 0.12, *[0.1] * 30)  # within which rows are sought, round by round, m
-SETTLED = 1e-5
-SURROUNDINGS = 0.6  # m about a ladder: farther than a first pose may be off
-HELD = 1e8  # precision of what stays where it is
-SINGULAR = 1e-12  # share of the largest eigenvalue up to which a direction is not known
-UNKNOWN = 1e4  # variance of such a direction
+QUARTER_WEIGHT_SIGMA = 3.0  # standard deviations at which the weight of a row is a quarter
+REACHES = (0.3, 0.2, 0.15, 0.12, *[0.1] * 30)  # greatest distance of rows, round by round, m
+MAX_CHANGE = 1e-5
+SURROUNDINGS = 0.6  # m around a ladder, more than the error of a first pose
+FIXED_PRECISION = 1e8  # precision of fixed parameters
+MAX_SINGULAR_SHARE = 1e-12  # share of the largest eigenvalue up to which a direction is undetermined
+UNKNOWN_VARIANCE = 1e4  # variance of such a direction
 
 
 @dataclass(frozen=True)
 class Scan:
-    """A scan to be adjusted.
+    """Sonar scan to be adjusted.
 
     Attributes
     ----------
     patches, smooth : Patches
-        Compared with the walls, and with other scans.
+        Patches for the comparison with walls, and with other scans.
     edges : (k, 3) float64 array
-        Where its walls end, at the water's level, file's axes.
+        Upper edges of its walls, at the water level, file's axes.
     pose : Pose
     ladders : mapping of int to (n, 3) float64 array
-        Points about each of the ladders that it sees, file's axes.
+        Points around each ladder that it sees, file's axes.
     """
 
     patches: Patches
@@ -86,7 +86,7 @@ def scan_of(
     ladders: Iterable[int],
     found: Sequence[LaserLadder],
 ) -> Scan:
-    """Keep of a scan's points (n, 3) those about some of the ladders found."""
+    """Return a scan with those of its points (n, 3) that are near some of the ladders found."""
     space = pose.apply(points)
     near = {}
     for k in ladders:
@@ -99,21 +99,21 @@ def scan_of(
 
 @dataclass(frozen=True)
 class Adjusted:
-    """Outcome.
+    """Result of the adjustment.
 
     Attributes
     ----------
     poses : tuple of Pose
     covariance : (s, 7, 7) float64 array
-        Of each pose's changes.
+        Covariance of the changes of each pose.
     information : (s, 7, 7) float64 array
-        What the rows alone say of each pose, without what was assumed beforehand, other poses held.
+        Information of the rows alone about each pose, without prior, other poses fixed.
     rows : tuple of Rows
-        As last compared.
+        Rows of the last comparison.
     ladders : tuple of PlacedLadder
-        The laser's, as last adjusted.
+        Ladders of the laser, after the adjustment.
     batter : tuple of float
-        Change of each side's batter below the water.
+        Change of the batter of each side below the water.
     """
 
     poses: tuple[Pose, ...]
@@ -126,7 +126,7 @@ class Adjusted:
 
 @dataclass(frozen=True)
 class Fitted:
-    """Scans fitted, as `Adjusted` but without covariance; common parameters, normal matrix, precision of what was assumed."""
+    """Fitted scans, as in `Adjusted` but without covariance; common parameters, normal matrix, precision of the prior."""
 
     poses: tuple[Pose, ...]
     rows: tuple[Rows, ...]
@@ -137,11 +137,11 @@ class Fitted:
 
 
 def adjust(scans: Sequence[Scan], walls: Walls, ladders: Sequence[LaserLadder], pairs: Sequence[tuple[int, int]]) -> Adjusted:
-    """Adjust scans to walls and ladders, and to each other where ``pairs`` says that they overlap."""
+    """Adjust scans to walls and ladders, and to each other for overlapping ``pairs``."""
     fitted = fit(scans, walls, ladders, pairs, REACHES)
-    spread = fitted.precision.copy()  # of what was known beforehand, by what it is worth
+    spread = fitted.precision.copy()  # precision of the prior, for the covariance
     zero = POSE * len(scans) + 4
-    spread[zero, zero] *= (ZERO_SIGMA / ZERO_HELD) ** 2
+    spread[zero, zero] *= (ZERO_SIGMA / ZERO_PRIOR_SIGMA) ** 2
     covariance = _sandwich(fitted.rows, fitted.normal, fitted.precision, spread)
     blocks = [slice(POSE * i, POSE * (i + 1)) for i in range(len(scans))]
     for block in blocks:
@@ -167,9 +167,9 @@ def fit(
     *,
     hold_height: bool = False,
 ) -> Fitted:
-    """Fit scans to walls, ladders and each other, within some reaches, round by round.
+    """Fit scans to walls, ladders and each other, within decreasing distances, round by round.
 
-    The first ``held`` of them stay where they are; the next keeps its height if that is to be held.
+    The first ``held`` scans are fixed; the next keeps its height if ``hold_height`` is set.
     """
     poses = [scan.pose for scan in scans]
     placed = [ladder.placed for ladder in ladders]
@@ -184,7 +184,7 @@ def fit(
         leaning = replace(walls, batter=walls.batter + common[walls.side])
         rows = _all_rows(scans, poses, leaning, placed, common, pairs, reach, held)
         normal, right = _normal_equations(rows, count)
-        normal[stay, stay] += HELD
+        normal[stay, stay] += FIXED_PRECISION
         offset = _prior_offset(poses, placed, ladders, common - usual)
         offset[stay] = 0.0
         change = -_inverse(normal + precision, 0.0) @ (right + precision @ offset)
@@ -195,7 +195,7 @@ def fit(
         for k in range(len(placed)):
             first = POSE * len(scans) + COMMON + 6 * k
             placed[k] = placed[k].moved(change[first : first + 3], change[first + 3 : first + 6])
-        if reach == reaches[-1] and np.abs(change).max() < SETTLED:
+        if reach == reaches[-1] and np.abs(change).max() < MAX_CHANGE:
             break
     return Fitted(tuple(poses), tuple(rows), tuple(placed), common, normal, precision)
 
@@ -228,7 +228,7 @@ def _all_rows(
 
 
 def _design(rows: Rows) -> tuple[Float, Int64]:
-    """Design matrix of rows over those columns (c,) that they have."""
+    """Return the design matrix of rows over the columns (c,) that they have."""
     parts = [rows.poses]
     columns = [POSE * rows.scan + np.arange(POSE)]
     if rows.other is not None and rows.other_poses is not None:
@@ -240,12 +240,12 @@ def _design(rows: Rows) -> tuple[Float, Int64]:
 
 
 def weights_of(rows: Rows) -> Float:
-    """Weights (n,) of rows, 1/m²: by Geman and McClure."""
-    return np.asarray(1.0 / (1.0 + (_deviation(rows) / CUT) ** 2) ** 2 / rows.sigma**2)
+    """Return the weights (n,) of rows, 1/m², by Geman and McClure."""
+    return np.asarray(1.0 / (1.0 + (_deviation(rows) / QUARTER_WEIGHT_SIGMA) ** 2) ** 2 / rows.sigma**2)
 
 
 def _deviation(rows: Rows) -> Float:
-    """Residuals (n,) in standard deviations; those of a point across and along the beam together."""
+    """Return the residuals (n,) in standard deviations; those of a point across and along the beam are combined."""
     z = np.abs(rows.residual / rows.sigma)
     if rows.kind == "ladder":
         half = len(z) // 2
@@ -264,7 +264,7 @@ def _normal_equations(rows: Sequence[Rows], count: int) -> tuple[Float, Float]:
 
 
 def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
-    """Precision of what is known beforehand: scales, what is common, ladders."""
+    """Return the precision of the prior: scales, common parameters, ladders."""
     sigma = np.full(POSE * scans + COMMON + 6 * len(ladders), np.inf)
     sigma[POSE - 1 : POSE * scans : POSE] = SCALE_SIGMA
     sigma[POSE * scans : POSE * scans + COMMON] = (
@@ -272,7 +272,7 @@ def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
         BATTER_SIGMA,
         max(DEPTH_SPREAD * radius, 1e-4),
         WATERLINE_SIGMA,
-        ZERO_HELD,
+        ZERO_PRIOR_SIGMA,
         SLANT_SIGMA,
         SLANT_SIGMA,
         *NEARER_SIGMA,
@@ -287,7 +287,7 @@ def _prior(scans: int, ladders: Sequence[LaserLadder], radius: float) -> Float:
 def _prior_offset(
     poses: Sequence[Pose], placed: Sequence[PlacedLadder], ladders: Sequence[LaserLadder], common: Float
 ) -> Float:
-    """How far scales, batters and ladders have come from what was known of them beforehand."""
+    """Return the difference of scales, batters and ladders from their prior values."""
     out = np.zeros(POSE * len(poses) + COMMON + 6 * len(placed))
     for i, pose in enumerate(poses):
         out[POSE * (i + 1) - 1] = pose.scale - 1.0
@@ -305,7 +305,7 @@ def _moved(pose: Pose, change: Float) -> Pose:
 
 
 def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float, spread: Float) -> Float:
-    """Covariance of all parameters, by the spread of the groups' sums, each as if it had not been adjusted to."""
+    """Return the covariance of all parameters from the spread of the groups' sums, corrected for their own influence."""
     inverse = _inverse(normal + precision, 0.0)
     keys, sums = [], []
     for place, one in enumerate(rows):
@@ -327,13 +327,13 @@ def _sandwich(rows: Sequence[Rows], normal: Float, precision: Float, spread: Flo
     np.add.at(total, [order[key] for key in keys], np.array(sums).reshape(-1, 2, len(normal)))
     flat = total.reshape(-1, len(normal))
     middle = spread + flat.T @ flat
-    unknown = _inverse(normal + precision, UNKNOWN) - inverse
+    unknown = _inverse(normal + precision, UNKNOWN_VARIANCE) - inverse
     return np.asarray(inverse @ middle @ inverse + unknown)
 
 
 def _inverse(matrix: Float, unknown: float) -> Float:
-    """Inverse of a symmetric matrix, in which directions that nothing is known of get a variance of ``unknown``."""
+    """Return the inverse of a symmetric matrix; undetermined directions get the variance ``unknown``."""
     value, vector = np.linalg.eigh(matrix)
-    known = value > SINGULAR * value[-1]
+    known = value > MAX_SINGULAR_SHARE * value[-1]
     inverse = np.where(known, 1.0 / np.where(known, value, 1.0), unknown)
     return np.asarray((vector * inverse) @ vector.T)

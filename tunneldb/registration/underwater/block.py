@@ -1,7 +1,7 @@
 """Registration of sonar scans below the water to the laser's model above it.
 
-After Moisan et al. (2015), with other means: walls, ladders and overlaps are adjusted jointly, and each direction that the
-geometry leaves open is named.
+After Moisan et al. (2015), with other methods: walls, ladders and overlaps are adjusted jointly, and each direction that the
+geometry does not determine is reported.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.adjustment import LADDER_SHIFT, Adjusted, adjust, scan_of
-from tunneldb.registration.underwater.chain import OVERLAP
+from tunneldb.registration.underwater.chain import MAX_OVERLAP_DISTANCE
 from tunneldb.registration.underwater.determined import judge
 from tunneldb.registration.underwater.laser_ladders import LaserLadder, find_laser_ladders
 from tunneldb.registration.underwater.observations import Pose, Rows, cell_keys
@@ -24,8 +24,8 @@ from tunneldb.registration.underwater.starting import start_all
 from tunneldb.registration.underwater.walls import Walls, find_walls, lower_edge
 
 WALL_VOXEL = 0.03  # m
-MOVED = 2.5  # standard deviations by which a ladder stands elsewhere for the sonar
-DRY_WALL = 0.1  # m: walls that the laser sees so far below the water's level, as it was said, are not under water
+MIN_MOVEMENT_SIGMA = 2.5  # standard deviations from which a ladder has moved between laser and sonar
+MAX_DRY_WALL = 0.1  # m: if the laser sees walls this far below the given water level, the level is wrong
 
 
 def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladder], water_level: float) -> Registration:
@@ -34,33 +34,33 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
     Parameters
     ----------
     laser : (n, 3) float64 array
-        Points about the water's level and above, in the tunnel's frame, m.
+        Points around the water level and above, in the tunnel's frame, m.
     clouds : sequence of SonarCloud
     ladders : sequence of Ladder
-        Those that stand in the water.
+        Ladders that stand in the water.
     water_level : float
-        Height of the water, m.
+        Height of the water level, m.
 
     Raises
     ------
     UserError
-        Nothing can be said of any scan: there are no walls at the water, or a scan shows none.
+        If no scan can be registered: there are no walls at the water, or a scan shows none.
     """
     origin = np.array([*np.floor(np.median(laser[:, :2], axis=0)), water_level])
     local = laser - origin
     thin = local[np.unique(cell_keys(local, WALL_VOXEL), return_index=True)[1]]
     walls = find_walls(thin)
     edge = lower_edge(thin, walls)
-    if edge < -DRY_WALL:
-        raise UserError(f"the laser sees the walls {-edge:.2f} m below the water's level and more: is --water-level right?")
+    if edge < -MAX_DRY_WALL:
+        raise UserError(f"the laser sees walls {-edge:.2f} m below the water level and lower; check --water-level")
     found = find_laser_ladders(local, walls, ladders)
     scans, faults = _prepare([_local(cloud, origin) for cloud in clouds], walls)
     seen = {one.placed.ladder.name for one in found}
     started, reasons = start_all(scans, walls, found, several=len(ladders) > 1)
     notes = []
-    if edge > DRY_WALL:
-        notes.append(f"the laser sees the walls from {edge:.2f} m above the water on: is --water-level right?")
-    notes += [f"ladder {one.name} is not seen by the laser, or has other gaps" for one in ladders if one.name not in seen]
+    if edge > MAX_DRY_WALL:
+        notes.append(f"the laser sees walls only from {edge:.2f} m above the water; check --water-level")
+    notes += [f"ladder {one.name} is not in the laser scan, or has other gaps" for one in ladders if one.name not in seen]
     known = sorted(started)
     adjusted = _adjust_all(scans, started, known, walls, found)
     moved = () if adjusted is None else _moved(found, adjusted)
@@ -81,13 +81,9 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
                 open_directions, residuals,
             )
         )  # fmt: skip
+    notes += [f"ladder {one.placed.ladder.name}: its gaps also fit {_shifts(one)} m higher" for one in found if one.ties]
     notes += [
-        f"ladder {one.placed.ladder.name}: by its gaps it may as well stand {_shifts(one)} m higher"
-        for one in found
-        if one.ties
-    ]
-    notes += [
-        f"ladder {found[k].placed.ladder.name} does not stand where the laser saw it: was it moved, or the tripod?"
+        f"ladder {found[k].placed.ladder.name} is not where the laser saw it; the ladder or the tripod may have moved"
         for k in moved
     ]
     why = [f"{clouds[i].path.name} has no pose: {reason}" for i, reason in reasons.items()]
@@ -96,14 +92,14 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
 
 
 def _local(cloud: SonarCloud, origin: Float) -> SonarCloud:
-    """The cloud with its rough place in the local frame."""
+    """Return the cloud with its approximate place in the local frame."""
     if cloud.near is None:
         return cloud
     return replace(cloud, near=replace(cloud.near, place=cloud.near.place - origin[:2]))
 
 
 def _prepare(clouds: Sequence[SonarCloud], walls: Walls) -> tuple[dict[int, PreparedScan], list[str]]:
-    """Level scans, by their places in the list, and say what is wrong with those that cannot be."""
+    """Level scans, by their index in the list, and return the errors of those that cannot be levelled."""
     scans, faults = {}, []
     for i, cloud in enumerate(clouds):
         try:
@@ -130,24 +126,27 @@ def _adjust_all(
         scans.append(scan_of(scan.cloud.points, scan.patches, scan.smooth, scan.edges, one.pose, one.ladders, found))
     place = np.array([scan.pose.translation for scan in scans])
     pairs = [
-        (a, b) for a in range(len(scans)) for b in range(a + 1, len(scans)) if np.linalg.norm(place[a] - place[b]) < OVERLAP
+        (a, b)
+        for a in range(len(scans))
+        for b in range(a + 1, len(scans))
+        if np.linalg.norm(place[a] - place[b]) < MAX_OVERLAP_DISTANCE
     ]
     return adjust(scans, walls, found, pairs)
 
 
 def _moved(found: Sequence[LaserLadder], adjusted: Adjusted) -> tuple[int, ...]:
-    """Ladders that the sonar sees aside of where the laser saw them, or higher or lower, by more than can be by chance."""
+    """Return the ladders whose place or height differs between sonar and laser by more than chance."""
     out = []
     for k, (before, now) in enumerate(zip(found, adjusted.ladders, strict=True)):
         axes = before.placed.axes[:2]
         sigma = np.sqrt(np.diag(axes @ before.covariance[3:6, 3:6] @ axes.T) + LADDER_SHIFT**2)
-        if (np.abs(axes @ (now.origin - before.placed.origin)) > MOVED * sigma).any():
+        if (np.abs(axes @ (now.origin - before.placed.origin)) > MIN_MOVEMENT_SIGMA * sigma).any():
             out.append(k)
     return tuple(out)
 
 
 def _along(walls: Walls, pose: Pose) -> Float:
-    """Direction along the canal at a scanner, (2,)."""
+    """Return the direction along the canal at a scanner, (2,)."""
     _, piece = walls.tree.query(pose.translation[:2])
     normal = walls.normal[piece]
     return np.array([-normal[1], normal[0]])

@@ -1,4 +1,4 @@
-"""Poses of sonar scans that see no ladder, beside others whose poses are known: by the relief of the bed that they see."""
+"""Poses of sonar scans that see no ladder, from the bed's relief that they share with scans of known pose."""
 
 from __future__ import annotations
 
@@ -12,69 +12,71 @@ from tunneldb.arrays import Float
 from tunneldb.registration.underwater.adjustment import Scan, fit
 from tunneldb.registration.underwater.first_pose import LevelScan
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
-from tunneldb.registration.underwater.observations import UPRIGHT, Patches, Pose, overlap_rows
-from tunneldb.registration.underwater.relief import NOWHERE, PIXEL, Relief, height_difference, likelihood, relief_of
-from tunneldb.registration.underwater.single import SOME_EDGES, PreparedScan, StartedScan, misses, sees
+from tunneldb.registration.underwater.observations import MIN_BED_COSINE, Patches, Pose, overlap_rows
+from tunneldb.registration.underwater.relief import NO_EVIDENCE, PIXEL, Relief, height_difference, likelihood, relief_of
+from tunneldb.registration.underwater.single import MIN_EDGES, PreparedScan, StartedScan, misses, sees
 from tunneldb.registration.underwater.walls import Walls
 
-OVERLAP = 15.0  # m between scanners whose scans are compared
-LOOSE = 4  # pixels along by which poses may be off
-PEAKS = 5  # of a pair's likelihood that are followed
-TRIED = 4  # places, the likeliest by the bed's relief, that are looked at closely
-LESS = float(np.log(100.0))  # and by how much a place may be less likely than the first of them
-AHEAD = float(np.log(20.0))  # likelihood of a place over that of the next best, from which it is taken
-SAID = float(np.log(5.0))  # likelihood from which two scans agree, or contradict each other
+MAX_OVERLAP_DISTANCE = 15.0  # m between scanners whose scans are compared
+POSE_TOLERANCE = 4  # pixels along the canal: tolerance of poses
+MAX_PEAKS = 5  # peaks of a pair's likelihood that are examined
+MAX_PLACES = 4  # most likely places, by the bed's relief, that are fitted
+MAX_LOG_RATIO = float(np.log(100.0))  # greatest log likelihood ratio of the most likely place to another
+MIN_LEAD = float(np.log(20.0))  # likelihood ratio to the next best place from which a place is accepted
+MIN_AGREEMENT = float(np.log(5.0))  # likelihood ratio from which two scans agree, or contradict each other
 REACHES = (0.3, 0.25, 0.2, 0.15, 0.1, 0.1)
-WITHIN = 0.3  # m of each other: patches that are compared there
-BESIDE = 3  # known scans that it is adjusted with
-MOST_MOVED = 1.0  # m along by which that may move it: farther, it has slid to another place
-SLIDES = np.arange(-6, 7) * 0.1  # m along, at which a fitted scan is tried again
-SURE = float(np.log(30.0 * TRIED * len(SLIDES)))  # likelihood over that of none, of the best of so many tried
-SAME_PLACE = 0.1  # m: of two poses that are one
-ODD = 0.05  # share of a bed's patches that show something else than another scan: objects, false echoes
-PROFILE = 0.5  # m across, in which the bed is as high all along
+MAX_PATCH_DISTANCE = 0.3  # m; greatest distance between compared patches
+MAX_NEIGHBOURS = 3  # known scans that a scan is adjusted with
+MAX_SHIFT = 1.0  # m along the canal: greatest shift by the fit; beyond it, the scan has slid to another place
+SLIDES = np.arange(-6, 7) * 0.1  # m along the canal: shifts at which a fitted scan is tried again
+MIN_LOG_RATIO = float(
+    np.log(30.0 * MAX_PLACES * len(SLIDES))
+)  # required likelihood ratio of the best of so many trials to no match
+PLACE_TOLERANCE = 0.1  # m between two poses that are the same
+OUTLIER_SHARE = 0.05  # share of a bed's patches that differ from another scan: objects, false echoes
+STRIP_WIDTH = 0.5  # m across: width of strips in which the bed has one height along the canal
 
 
 @dataclass
 class Reliefs:
-    """Reliefs of scans, by their places in the list, and how well pairs of them agree, worked out when they are asked for."""
+    """Reliefs of scans, by their index in the list, and agreement of pairs of them, computed on demand."""
 
     scans: Mapping[int, PreparedScan]
     _reliefs: dict[int, Relief | None] = field(default_factory=dict)
     _pairs: dict[tuple[int, int, bool], Float] = field(default_factory=dict)
 
     def of(self, i: int) -> Relief | None:
-        """Relief of a scan."""
+        """Return the relief of a scan."""
         if i not in self._reliefs:
             self._reliefs[i] = relief_of(self.scans[i].flat)
         return self._reliefs[i]
 
     def likelihood(self, known: int, i: int, *, turned: bool) -> Float:
-        """That of each shift along of scan ``i``, or of it ``turned`` by half a turn, in the level frame of scan ``known``."""
+        """Return the likelihood of each shift of scan ``i``, optionally ``turned`` by 180°, in the level frame of ``known``."""
         if (known, i, turned) not in self._pairs:
             one, other = self.of(known), self.of(i)
             if one is None or other is None:
-                self._pairs[known, i, turned] = np.full(1, NOWHERE)
+                self._pairs[known, i, turned] = np.full(1, NO_EVIDENCE)
             else:
                 self._pairs[known, i, turned] = likelihood(one, other.turned() if turned else other)
         return self._pairs[known, i, turned]
 
     def may_overlap(self, one: int, other: int) -> bool:
-        """Whether two scans speak for seeing the same bed at any shift."""
+        """Return True if two scans may show the same bed at some shift."""
         return any(bool((self.likelihood(one, other, turned=turned) > 0.0).any()) for turned in (False, True))
 
     def near(self, known: int, i: int, shift: float, *, turned: bool) -> Float:
-        """Likelihoods at shifts LOOSE pixels either way about one, m; 0 where nothing can be said."""
+        """Return the likelihoods at shifts within POSE_TOLERANCE pixels of ``shift``, m; 0 where undefined."""
         values = self.likelihood(known, i, turned=turned)
-        at = round(shift / PIXEL) + len(values) // 2 + np.arange(-LOOSE, LOOSE + 1)
+        at = round(shift / PIXEL) + len(values) // 2 + np.arange(-POSE_TOLERANCE, POSE_TOLERANCE + 1)
         inside = (at >= 0) & (at < len(values))
-        found = np.where(inside, values[np.clip(at, 0, len(values) - 1)], NOWHERE)
-        return np.where(found > NOWHERE, found, 0.0)
+        found = np.where(inside, values[np.clip(at, 0, len(values) - 1)], NO_EVIDENCE)
+        return np.where(found > NO_EVIDENCE, found, 0.0)
 
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a scan may stand: beside scan ``known``, ``shift`` m along, ``turned`` or not; and the likelihood of that."""
+    """Possible place of a scan: next to scan ``known``, ``shift`` m along, ``turned`` or not; with its likelihood."""
 
     known: int
     shift: float
@@ -84,11 +86,11 @@ class _Place:
     likelihood: float
 
     def is_at(self, other: _Place) -> bool:
-        """Whether it is the same place, but for what poses may be off, and the same way round."""
-        return self.along(other) <= LOOSE * PIXEL and float(self.direction @ other.direction) > 0.0
+        """Return True if it is the same place, within the tolerance of poses, with the same orientation."""
+        return self.along(other) <= POSE_TOLERANCE * PIXEL and float(self.direction @ other.direction) > 0.0
 
     def along(self, other: _Place) -> float:
-        """Distance to another place along the canal, m."""
+        """Return the distance to another place along the canal, m."""
         return abs(float((self.point - other.point) @ self.direction))
 
 
@@ -99,47 +101,49 @@ def place_beside(
     walls: Walls,
     found: Sequence[LaserLadder],
 ) -> tuple[StartedScan, float] | None:
-    """Pose of scan ``i`` beside those started that it shares the bed with, and its likelihood; None if it isn't sure."""
+    """Return the pose of scan ``i`` relative to started scans of the same bed, and its likelihood; None if uncertain."""
     tried = (_settled(i, place, reliefs, started, walls) for place in _likeliest(_places(i, reliefs, started)))
     settled = sorted((one for one in tried if one is not None), key=lambda one: -one[1])
-    if not settled or settled[0][1] < SURE:
+    if not settled or settled[0][1] < MIN_LOG_RATIO:
         return None
     pose, likelihood = settled[0]
     for other, less in settled[1:]:
-        if less > likelihood - AHEAD and np.linalg.norm(other.translation - pose.translation) > SAME_PLACE:
+        if less > likelihood - MIN_LEAD and np.linalg.norm(other.translation - pose.translation) > PLACE_TOLERANCE:
             return None
     seen = sees(reliefs.scans[i], pose, found)
     return None if misses(pose, seen, found) else (StartedScan(pose, seen), likelihood)
 
 
 def _likeliest(places: Sequence[_Place]) -> list[_Place]:
-    """Those of some places that are worth a closer look, each once."""
+    """Return the places that are worth fitting, without repeats."""
     out: list[_Place] = []
     for one in sorted(places, key=lambda one: -one.likelihood):
-        if out and one.likelihood < out[0].likelihood - LESS:
+        if out and one.likelihood < out[0].likelihood - MAX_LOG_RATIO:
             break
         if not any(one.is_at(other) for other in out):
             out.append(one)
-    return out[:TRIED]
+    return out[:MAX_PLACES]
 
 
 def _settled(
     i: int, place: _Place, reliefs: Reliefs, started: Mapping[int, StartedScan], walls: Walls
 ) -> tuple[Pose, float] | None:
-    """Pose of a scan fitted from a place to those beside it, and its likelihood by the bed; None if it slides away."""
+    """Return the pose fitted from a place to neighbouring scans, and its likelihood by the bed; None if it slides away."""
     scans = reliefs.scans
     pose = _pose(i, place, reliefs, started, walls)
     if pose is None:
         return None
-    beside = sorted(started, key=lambda k: float(np.linalg.norm(started[k].pose.translation - pose.translation)))[:BESIDE]
+    beside = sorted(started, key=lambda k: float(np.linalg.norm(started[k].pose.translation - pose.translation)))[
+        :MAX_NEIGHBOURS
+    ]
     own, others = _levelled(scans[i], pose), [_levelled(scans[k], started[k].pose) for k in beside]
     found, likelihood = _fitted_beside(own, others, walls, place.direction)
     moved = abs(float((found.translation - pose.translation)[:2] @ place.direction))
-    return (found, likelihood) if moved < MOST_MOVED else None
+    return (found, likelihood) if moved < MAX_SHIFT else None
 
 
 def _fitted_beside(own: Scan, others: Sequence[Scan], walls: Walls, direction: Float) -> tuple[Pose, float]:
-    """Pose of a scan fitted to others that stay, tried again along the canal, and the likelihood of it by the bed."""
+    """Return the pose of a scan fitted to fixed scans, tried at several shifts along the canal, and its likelihood."""
     pairs = [(k, len(others)) for k in range(len(others))]
 
     def fitted(start: Pose, reaches: Sequence[float]) -> Pose:
@@ -160,21 +164,21 @@ def _fitted_beside(own: Scan, others: Sequence[Scan], walls: Walls, direction: F
 
 
 def _tells_water(scan: PreparedScan | Scan) -> bool:
-    """Whether it shows where its walls end, at the water: it is level, while slopes that err add up from scan to scan."""
-    return len(scan.edges) >= SOME_EDGES
+    """Return True if it shows the upper edges of its walls, at the water: it is level, while errors of slope accumulate."""
+    return len(scan.edges) >= MIN_EDGES
 
 
 def _levelled(scan: PreparedScan, pose: Pose) -> Scan:
-    """The scan without ladders, as high as the water says."""
+    """Return the scan without ladders, at the height given by the water."""
     if _tells_water(scan):
         pose = replace(pose, translation=np.array([*pose.translation[:2], -scan.flat.top]))
     return Scan(scan.patches, scan.smooth, scan.edges, pose, {})
 
 
 def _roughness(patches: Patches, pose: Pose, direction: Float) -> float:
-    """Spread of the bed's height about what is the same all along the canal, m, as a scan's patches show it."""
-    place = pose.apply(patches.centre)[(patches.normal @ pose.rotation.T)[:, 2] > UPRIGHT]
-    across = np.floor((place[:, :2] @ [-direction[1], direction[0]]) / PROFILE).astype(np.int64)
+    """Return the spread of the bed's height, m, about the part that is constant along the canal, from a scan's patches."""
+    place = pose.apply(patches.centre)[(patches.normal @ pose.rotation.T)[:, 2] > MIN_BED_COSINE]
+    across = np.floor((place[:, :2] @ [-direction[1], direction[0]]) / STRIP_WIDTH).astype(np.int64)
     order = np.lexsort([place[:, 2], across])
     _, begin, number, count = np.unique(across[order], return_index=True, return_inverse=True, return_counts=True)
     height = place[order, 2]
@@ -183,31 +187,31 @@ def _roughness(patches: Patches, pose: Pose, direction: Float) -> float:
 
 
 def bed_likelihood(patches: tuple[Patches, Patches], poses: tuple[Pose, Pose], roughness: float) -> float:
-    """Logarithm of the likelihood that the bed of two scans is the same where they overlap, over that of its being another.
+    """Return the log likelihood ratio that two scans show the same bed where they overlap, or different beds.
 
-    Heights of one bed differ by what patches are off, those of two by the bed's own roughness too; the patches of a stretch say
-    the same, so that their mean counts.
+    Heights of the same bed differ by errors of patches, those of different beds also by the bed's roughness. The patches of a
+    stretch are correlated, so their mean counts.
     """
-    rows = overlap_rows(*patches, poses, np.zeros(4), (0, 1), np.arange(4), WITHIN)
+    rows = overlap_rows(*patches, poses, np.zeros(4), (0, 1), np.arange(4), MAX_PATCH_DISTANCE)
     if rows is None:
         return 0.0
-    bed = rows.poses[:, 5] > UPRIGHT
+    bed = rows.poses[:, 5] > MIN_BED_COSINE
     square, same = rows.residual[bed] ** 2, rows.sigma[bed] ** 2
     other = same + 2.0 * roughness**2
     ratio = 0.5 * (np.log(other / same) - square / same + square / other)
-    told = np.log((1.0 - ODD) * np.exp(ratio) + ODD)
+    told = np.log((1.0 - OUTLIER_SHARE) * np.exp(ratio) + OUTLIER_SHARE)
     _, stretch, count = np.unique(rows.group[bed], return_inverse=True, return_counts=True)
     return float((np.bincount(stretch, told) / count).sum())
 
 
 def _direction(scan: PreparedScan, pose: Pose) -> Float:
-    """Way (2,) in which the x axis of a scan's level frame points in the tunnel."""
+    """Return the direction (2,) of the x axis of a scan's level frame in the tunnel."""
     along = (pose.rotation @ scan.flat.rotation.T)[:2, 0]
     return np.asarray(along / np.linalg.norm(along))
 
 
 def _places(i: int, reliefs: Reliefs, started: Mapping[int, StartedScan]) -> list[_Place]:
-    """Places where scan ``i`` may stand, by each pair of it, with what all scans about them say."""
+    """Return possible places of scan ``i``, from each of its pairs, with the likelihood by all scans around them."""
     stand = {k: one.pose.translation[:2] for k, one in started.items()}
     look = {k: _direction(reliefs.scans[k], one.pose) for k, one in started.items()}
     out = []
@@ -215,14 +219,14 @@ def _places(i: int, reliefs: Reliefs, started: Mapping[int, StartedScan]) -> lis
         for turned in (False, True):
             values = reliefs.likelihood(k, i, turned=turned)
             peaks, _ = find_peaks(values, height=0.0)
-            for peak in peaks[np.argsort(-values[peaks])][:PEAKS]:
+            for peak in peaks[np.argsort(-values[peaks])][:MAX_PEAKS]:
                 shift = (int(peak) - len(values) // 2) * PIXEL
                 point, direction = stand[k] + shift * look[k], look[k] * (-1.0 if turned else 1.0)
                 if not reliefs.scans[i].cloud.may_stand(point):
                     continue
-                total = np.zeros(2 * LOOSE + 1)
+                total = np.zeros(2 * POSE_TOLERANCE + 1)
                 for other in started:
-                    if np.linalg.norm(point - stand[other]) < OVERLAP:
+                    if np.linalg.norm(point - stand[other]) < MAX_OVERLAP_DISTANCE:
                         along = float((point - stand[other]) @ look[other])
                         same = float(direction @ look[other]) > 0.0
                         near = reliefs.near(other, i, along, turned=not same)
@@ -232,10 +236,10 @@ def _places(i: int, reliefs: Reliefs, started: Mapping[int, StartedScan]) -> lis
 
 
 def _pose(i: int, place: _Place, reliefs: Reliefs, started: Mapping[int, StartedScan], walls: Walls) -> Pose | None:
-    """Pose of a level scan at a place: as far from its wall as it sees it to be, as high as the bed says."""
+    """Return the pose of a level scan at a place, at its own distance from the wall and at the bed's height."""
     flat: LevelScan = reliefs.scans[i].flat
     across = np.array([-place.direction[1], place.direction[0]])
-    facing = np.flatnonzero(walls.normal @ across > 0.0)  # those behind the scanner, where y is least
+    facing = np.flatnonzero(walls.normal @ across > 0.0)  # walls behind the scanner, where y is least
     if len(facing) == 0:
         return None
     piece = facing[np.argmin(np.linalg.norm(walls.foot[facing, :2] - place.point, axis=1))]
@@ -253,18 +257,18 @@ def _pose(i: int, place: _Place, reliefs: Reliefs, started: Mapping[int, Started
 
 
 def agreement(one: int, other: int, poses: tuple[Pose, Pose], reliefs: Reliefs, walls: Walls) -> int:
-    """Whether two scans show the same bed where their poses say that they see the same: 1 yes, -1 no, 0 it can't be told.
+    """Compare the bed of two scans where their poses overlap: 1 the same, -1 different, 0 undecided.
 
-    Where the relief at large does not tell, the second is fitted to the first from where it is said to stand.
+    If the relief is not sufficient, the second scan is fitted to the first from its given pose.
     """
     first, second = poses
     look = _direction(reliefs.scans[one], first)
     same = float(look @ _direction(reliefs.scans[other], second)) > 0.0
     along = float((second.translation - first.translation)[:2] @ look)
     said = float(reliefs.near(one, other, along, turned=not same).max())
-    if abs(said) > SAID:
+    if abs(said) > MIN_AGREEMENT:
         return int(np.sign(said))
     scans = reliefs.scans
     own, beside = _levelled(scans[other], second), _levelled(scans[one], first)
     _, closely = _fitted_beside(own, [beside], walls, look)
-    return int(np.sign(closely)) if abs(closely) > SURE else 0
+    return int(np.sign(closely)) if abs(closely) > MIN_LOG_RATIO else 0

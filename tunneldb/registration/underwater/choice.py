@@ -1,7 +1,7 @@
-"""Which of two poses a scan speaks for: by how well walls and ladders explain each of its points under either.
+"""Choice between two poses of a scan: how well walls and ladders explain each of its points under either.
 
-The points are the same under both, so their differences are compared in pairs, cell by cell: neighbouring points err
-together (Vuong, 1989, for models that are not nested; cells as its independent observations).
+The points are the same under both poses, so their differences are compared in pairs, cell by cell: errors of neighbouring
+points are correlated (Vuong, 1989, for models that are not nested; cells are its independent observations).
 """
 
 from __future__ import annotations
@@ -12,24 +12,24 @@ import numpy as np
 
 from tunneldb.arrays import Float
 from tunneldb.registration.underwater.ladder_shape import PlacedLadder, nearest_element
-from tunneldb.registration.underwater.observations import BEAM_SIGMA, FARTHEST, RANGE_NOISE, RELIEF, Pose, cell_keys
+from tunneldb.registration.underwater.observations import BEAM_SIGMA, MAX_RANGE, RANGE_NOISE, RELIEF, Pose, cell_keys
 from tunneldb.registration.underwater.walls import Walls
 
-CUT = 3.0  # standard deviations at which a point is half explained
+HALF_EXPLAINED_SIGMA = 3.0  # standard deviations at which a point is explained by half
 CELL = 0.25  # m
-REACH = 0.15  # of a ladder's surroundings, m
-DECIDED = 3.0  # standard deviations
+REACH = 0.15  # m around a ladder
+MIN_MARGIN = 3.0  # standard deviations
 
 
 def explained(points: Float, pose: Pose, walls: Walls, ladders: Sequence[PlacedLadder]) -> Float:
-    """How well walls or ladders explain each point (n, 3), file's axes: log likelihood over that of being astray, (n,).
+    """Return the log likelihood ratio (n,) that walls or ladders explain each point (n, 3), file's axes, or an outlier.
 
-    NaN where it can't be said: too far, or where the laser shows no wall.
+    NaN if undefined: the point is too far away, or the laser shows no wall there.
     """
     space = pose.apply(points)
     reach = np.linalg.norm(space - pose.translation, axis=1)
     best = np.full(len(points), np.inf)
-    usable = reach < FARTHEST
+    usable = reach < MAX_RANGE
     away, piece = walls.tree.query(space[:, :2], distance_upper_bound=1.0)
     known = np.isfinite(away)
     best[known] = (walls.distance(space[known], piece[known]) / np.hypot(RANGE_NOISE, RELIEF)) ** 2
@@ -40,11 +40,13 @@ def explained(points: Float, pose: Pose, walls: Walls, ladders: Sequence[PlacedL
         near &= (own[:, 1] > low) & (own[:, 1] < high)
         if near.any():
             best[near] = np.minimum(best[near], _ladder_deviation(own[near], placed, pose))
-    return np.where(usable & np.isfinite(best), CUT**2 / (2.0 * (1.0 + best / CUT**2)), np.nan)
+    return np.where(
+        usable & np.isfinite(best), HALF_EXPLAINED_SIGMA**2 / (2.0 * (1.0 + best / HALF_EXPLAINED_SIGMA**2)), np.nan
+    )
 
 
 def _ladder_deviation(own: Float, placed: PlacedLadder, pose: Pose) -> Float:
-    """Squared distances (n,) of points in the ladder's axes from it, in standard deviations along and across the beam."""
+    """Return squared distances (n,) of points in the ladder's axes from it, in standard deviations of beam and range."""
     which, away = nearest_element(own, placed)
     ray = own - placed.to_ladder(pose.translation[None])
     reach = np.linalg.norm(ray, axis=1)
@@ -58,9 +60,9 @@ def _ladder_deviation(own: Float, placed: PlacedLadder, pose: Pose) -> Float:
 
 
 def margin(points: Float, one: Float, other: Float) -> float:
-    """By how many standard deviations points (n, 3) are better explained (n,) by one pose than by another.
+    """Return by how many standard deviations one pose explains points (n, 3) better than another.
 
-    Only those count of which both say something: walls that are known farther one way are no evidence.
+    Only points that both poses explain (n,) are included: walls that are known farther along under one pose are no evidence.
     """
     both = np.isfinite(one) & np.isfinite(other)
     _, number = np.unique(cell_keys(points[both], CELL), return_inverse=True)

@@ -1,4 +1,4 @@
-"""Which directions of a pose are known well, which badly, and which not at all."""
+"""Classification of the directions of a pose: determined, weak or undetermined."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ import numpy as np
 
 from tunneldb.arrays import Float
 
-WEAK, OPEN = 0.05, 0.5  # standard deviations of a place from which it is weak, and not known, m
-WEAK_TURN, OPEN_TURN = np.radians(0.2), np.radians(3.0)
-WEAK_SCALE = 0.005
+MIN_WEAK_SHIFT, MIN_OPEN_SHIFT = 0.05, 0.5  # standard deviations of a position from which it is weak, and undetermined, m
+MIN_WEAK_TURN, MIN_OPEN_TURN = np.radians(0.2), np.radians(3.0)
+MIN_WEAK_SCALE = 0.005
 
 
 def judge(covariance: Float, along: Float) -> tuple[str, tuple[str, ...]]:
-    """State of a pose, and its badly known directions in words.
+    """Return the state of a pose, and the names of its badly determined directions.
 
     Parameters
     ----------
     covariance : (7, 7) float64 array
-        See `results.PARAMETERS`.
+        Covariance of `results.PARAMETERS`.
     along : (2,) float64 array
         Direction of the canal in plan.
 
     Returns
     -------
     state : str
-        See `results.SonarPose`.
+        As in `results.SonarPose`.
     directions : tuple of str
     """
     ahead = np.array([along[0], along[1], 0.0])
@@ -32,13 +32,13 @@ def judge(covariance: Float, along: Float) -> tuple[str, tuple[str, ...]]:
     up = np.array([0.0, 0.0, 1.0])
     turn, place = covariance[:3, :3], covariance[3:6, 3:6]
     checks = [
-        ("along the tunnel", ahead @ place @ ahead, WEAK, OPEN),
-        ("across the tunnel", across @ place @ across, WEAK, OPEN),
-        ("height", up @ place @ up, WEAK, OPEN),
-        ("roll", ahead @ turn @ ahead, WEAK_TURN, OPEN_TURN),
-        ("pitch", across @ turn @ across, WEAK_TURN, OPEN_TURN),
-        ("yaw", up @ turn @ up, WEAK_TURN, OPEN_TURN),
-        ("range scale", covariance[6, 6], WEAK_SCALE, np.inf),
+        ("along the tunnel", ahead @ place @ ahead, MIN_WEAK_SHIFT, MIN_OPEN_SHIFT),
+        ("across the tunnel", across @ place @ across, MIN_WEAK_SHIFT, MIN_OPEN_SHIFT),
+        ("height", up @ place @ up, MIN_WEAK_SHIFT, MIN_OPEN_SHIFT),
+        ("roll", ahead @ turn @ ahead, MIN_WEAK_TURN, MIN_OPEN_TURN),
+        ("pitch", across @ turn @ across, MIN_WEAK_TURN, MIN_OPEN_TURN),
+        ("yaw", up @ turn @ up, MIN_WEAK_TURN, MIN_OPEN_TURN),
+        ("range scale", covariance[6, 6], MIN_WEAK_SCALE, np.inf),
     ]
     named, state = [], "determined"
     for name, variance, weak, unknown in checks:

@@ -1,8 +1,8 @@
-"""Where a sonar scan may lie, before anything is fitted: levelled by walls and bed, turned along the canal, set to a ladder.
+"""First pose of a sonar scan, before any fit: levelled by walls and bed, turned along the canal, matched to a ladder.
 
-The walls leave half a turn, the place along the canal and the height. These are sought as the place in the scan, seen from
-across the canal, that looks most like what a ladder must look like below the water (Lewis, 1995, normalised
-cross-correlation), for each ladder of the laser's and either half turn.
+The walls leave a half turn, the place along the canal and the height open. They are found by template matching with the
+expected image of a ladder below the water, seen across the canal (Lewis, 1995, normalised cross-correlation), for each
+ladder of the laser and either orientation.
 """
 
 from __future__ import annotations
@@ -21,41 +21,41 @@ from tunneldb.registration.underwater.walls import Walls
 from tunneldb.registration.underwater.waterline import find_waterline
 from tunneldb.robust import MAD_TO_SIGMA
 
-NEAR = 12.0  # m from the scanner
+MAX_RANGE = 12.0  # m from the scanner
 BIN = 0.05  # m, across
 ANGLES = np.radians(np.arange(0.0, 180.0, 1.0))
 WIDTH_TOLERANCE = 0.15  # share, before the scan is level
 PIXEL = 0.03  # m
 BLUR = 0.045  # m: half a degree at 5 m
 WALL_MARGIN = 0.07  # m: four standard deviations of a sonar's range
-SLAB = 0.15  # before and behind the ladder's plane, m
-STEEPEST_TILT = np.radians(15.0)
-PEAKS = 4  # of each ladder and half turn
+SLAB = 0.15  # in front of and behind the ladder's plane, m
+MAX_TILT = np.radians(15.0)
+MAX_PEAKS = 4  # peaks for each ladder and orientation
 LEVEL_ROUNDS = 3
-LEAST_BED = 10  # cells of 0.5 m
-HIGHEST = 95.0  # percentile of heights
+MIN_BED_CELLS = 10  # cells of 0.5 m
+TOP_PERCENTILE = 95.0  # percentile of heights
 
 
 @dataclass(frozen=True)
 class LevelScan:
-    """A scan turned level and along the canal.
+    """Scan turned level and along the canal.
 
     Attributes
     ----------
     rotation : (3, 3) float64 array
         From the file's axes to: x along the canal, y across, z up.
     walls : tuple of float
-        Places y of the walls, at the scanner's height, m.
+        Positions y of the walls, at the scanner's height, m.
     slopes : tuple of float
-        Of the walls: y grows by this much per metre of height.
+        Slopes of the walls: change of y per metre of height.
     points : (n, 3) float64 array
-        Turned.
+        Rotated points.
     bed : float
         Median height of the bed, m.
     edges : (k, 3) float64 array
-        Where its walls end, at the water's level; see `find_waterline`.
+        Upper edges of its walls, at the water level; see `find_waterline`.
     top : float
-        Their height, m, or that of its highest points where there are none.
+        Height of the edges, m, or of the highest points if there are none.
     """
 
     rotation: Float
@@ -69,7 +69,7 @@ class LevelScan:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A pose that may be: ``rotation @ point + translation``, what it rests on and how alike that looks (0 to 1)."""
+    """Possible pose: ``rotation @ point + translation``, the ladder it is based on, and the similarity to it (0 to 1)."""
 
     rotation: Float
     translation: Float
@@ -78,27 +78,27 @@ class Candidate:
 
 
 def level(points: Float, up: int, width: float) -> LevelScan:
-    """Level a scan (n, 3), file's axes, between walls about ``width`` m apart.
+    """Level a scan (n, 3), file's axes, between walls ``width`` m apart.
 
     Raises
     ------
     UserError
-        Two walls at about that distance are not seen, or no bed between them.
+        If it shows no two walls at about that distance, or no bed between them.
     """
-    rotation = np.diag([1.0, float(up), float(up)])  # half a turn about x where z points down
+    rotation = np.diag([1.0, float(up), float(up)])  # half a turn about x if z points down
     turned = points @ rotation.T
-    near = np.linalg.norm(turned[:, :2], axis=1) < NEAR
+    near = np.linalg.norm(turned[:, :2], axis=1) < MAX_RANGE
     angle, low, high = _parallel_walls(turned[near], width)
     rotation = _about_z(-angle) @ rotation
     slopes = (0.0, 0.0)
     bed = 0.0
     for _ in range(LEVEL_ROUNDS):
         turned = points @ rotation.T
-        near = np.linalg.norm(turned[:, :2], axis=1) < NEAR
+        near = np.linalg.norm(turned[:, :2], axis=1) < MAX_RANGE
         first = _wall_plane(turned[near], low)
         second = _wall_plane(turned[near], high)
         pitch, bed = _bed_slope(turned[near], low, high)
-        # Walls that lean alike are a scan that is not level; those that lean apart are battered.
+        # Walls that lean the same way mean that the scan is not level; walls that lean apart are battered.
         roll = (first[2] + second[2]) / 2.0
         yaw = (first[1] + second[1]) / 2.0
         low, high = first[0], second[0]
@@ -107,10 +107,10 @@ def level(points: Float, up: int, width: float) -> LevelScan:
         left, _, right = np.linalg.svd(turn)
         rotation = left @ right @ rotation
     turned = points @ rotation.T
-    if np.degrees(np.arccos(np.clip(rotation[2, 2] * up, -1.0, 1.0))) > np.degrees(STEEPEST_TILT):
-        raise UserError("the scan lies more than 15° from level: is --up right?")
+    if np.degrees(np.arccos(np.clip(rotation[2, 2] * up, -1.0, 1.0))) > np.degrees(MAX_TILT):
+        raise UserError("the scan is tilted by more than 15°; check --up")
     edges = find_waterline(turned, (low, high), slopes)
-    top = float(np.median(edges[:, 2])) if len(edges) else float(np.percentile(turned[:, 2], HIGHEST))
+    top = float(np.median(edges[:, 2])) if len(edges) else float(np.percentile(turned[:, 2], TOP_PERCENTILE))
     return LevelScan(rotation, (low, high), slopes, turned, bed, edges, top)
 
 
@@ -120,28 +120,28 @@ def _about_z(angle: float) -> Float:
 
 
 def _parallel_walls(points: Float, width: float) -> tuple[float, float, float]:
-    """Direction in plan in which two walls about ``width`` apart run, rad, and their places square to it, m."""
+    """Return the direction in plan, rad, of two parallel walls ``width`` apart, and their offsets across it, m."""
     weight = np.minimum(np.linalg.norm(points[:, :2], axis=1) ** 2, 50.0)  # rays fan out
     best = (-1.0, 0.0, 0.0, 0.0)
     lags = np.arange(int(width * (1.0 - WIDTH_TOLERANCE) / BIN), int(width * (1.0 + WIDTH_TOLERANCE) / BIN) + 1)
     for angle in ANGLES:
         across = -np.sin(angle) * points[:, 0] + np.cos(angle) * points[:, 1]
-        k = np.floor((across + NEAR) / BIN).astype(np.int64)
-        histogram = np.bincount(np.clip(k, 0, int(2 * NEAR / BIN)), weights=weight, minlength=int(2 * NEAR / BIN) + 1)
+        k = np.floor((across + MAX_RANGE) / BIN).astype(np.int64)
+        histogram = np.bincount(np.clip(k, 0, int(2 * MAX_RANGE / BIN)), weights=weight, minlength=int(2 * MAX_RANGE / BIN) + 1)
         smooth = np.convolve(histogram, np.ones(3), mode="same")
         for lag in lags:
             both = np.minimum(smooth[:-lag], smooth[lag:])
             i = int(np.argmax(both))
             if both[i] > best[0]:
-                best = (float(both[i]), float(angle), (i + 0.5) * BIN - NEAR, (i + lag + 0.5) * BIN - NEAR)
+                best = (float(both[i]), float(angle), (i + 0.5) * BIN - MAX_RANGE, (i + lag + 0.5) * BIN - MAX_RANGE)
     score, angle, low, high = best
     if score <= 0.0 or not low < 0.0 < high:
-        raise UserError(f"no two walls {width:.1f} m apart, as the laser's are, stand about the scanner: is it in metres?")
+        raise UserError(f"no two walls {width:.1f} m apart (as in the laser scan) around the scanner; is the file in metres?")
     return angle, low, high
 
 
 def _wall_plane(points: Float, place: float) -> tuple[float, float, float]:
-    """Robust y = a + b x + c z of the points within some decimetres of a wall."""
+    """Fit y = a + b x + c z robustly to the points within some decimetres of a wall."""
     mine = points[np.abs(points[:, 1] - place) < 0.4]
     design = np.column_stack([np.ones(len(mine)), mine[:, 0], mine[:, 2]])
     answer = np.array([place, 0.0, 0.0])
@@ -155,7 +155,7 @@ def _wall_plane(points: Float, place: float) -> tuple[float, float, float]:
 
 
 def _bed_slope(points: Float, low: float, high: float) -> tuple[float, float]:
-    """Slope along the canal of the lowest surface between the walls, and its median height, m."""
+    """Return the slope along the canal of the lowest surface between the walls, and its median height, m."""
     margin = 0.25 * (high - low)
     mine = points[(points[:, 1] > low + margin) & (points[:, 1] < high - margin)]
     cell = np.floor(mine[:, :2] / 0.5).astype(np.int64)
@@ -163,11 +163,11 @@ def _bed_slope(points: Float, low: float, high: float) -> tuple[float, float]:
     order = np.lexsort([mine[:, 2], number])
     begin = np.searchsorted(number[order], np.arange(len(cells) + 1))
     count = np.diff(begin)
-    # The lower quartile of a cell is its bed; rays to the water's underside and their images lie above.
+    # The lower quartile of a cell is its bed; echoes of the water surface from below and their images are above it.
     low_of = mine[order[begin[:-1] + count // 4], 2][count >= 5]
     centre = np.array([mine[order[b], 0] for b in begin[:-1]])[count >= 5]
-    if len(low_of) < LEAST_BED:
-        raise UserError("no bed is seen between its walls: is it a scan of the sonar?")
+    if len(low_of) < MIN_BED_CELLS:
+        raise UserError("no bed between its walls; is it a sonar scan?")
     slope, middle = 0.0, float(np.median(low_of))
     for _ in range(10):
         residual = low_of - middle - slope * centre
@@ -179,19 +179,19 @@ def _bed_slope(points: Float, low: float, high: float) -> tuple[float, float]:
 
 
 def candidates(scan: LevelScan, walls: Walls, ladders: Sequence[PlacedLadder], uncertain: float) -> list[Candidate]:
-    """Poses at which the scan looks as if it saw one of the ladders, the likeliest first.
+    """Return poses at which the scan may show one of the ladders, the most likely first.
 
     Parameters
     ----------
     scan : LevelScan
     walls, ladders
-        By the laser, local frame with the water at zero.
+        Walls and ladders of the laser, local frame with the water at zero.
     uncertain : float
-        How far the water may be from the top of the scan's walls, m.
+        Greatest height difference between the water and the top of the scan's walls, m.
     """
     found: list[Candidate] = []
     for placed in ladders:
-        foot = placed.origin - placed.axes[1] * (placed.origin[2] / placed.axes[1, 2])  # where it meets the water's level
+        foot = placed.origin - placed.axes[1] * (placed.origin[2] / placed.axes[1, 2])  # its intersection with the water level
         _, piece = walls.tree.query(foot[:2])
         normal = walls.normal[piece]
         along = np.array([normal[1], -normal[0]])  # (along, normal, up) is right-handed
@@ -204,7 +204,7 @@ def candidates(scan: LevelScan, walls: Walls, ladders: Sequence[PlacedLadder], u
             slope = -scan.slopes[1] if flip else scan.slopes[0]
             for x, h, score in _correlate(turned, place, slope, scan, placed, basis, base, uncertain):
                 rotation = basis @ turn @ scan.rotation
-                # at the water's level the scan's wall and the laser's are one
+                # at the water level the scan's wall and the laser's coincide
                 shift = basis @ np.array([x, -(place - slope * h), h]) + base
                 found.append(Candidate(rotation, shift, score, placed.ladder.name))
     return sorted(found, key=lambda one: -one.score)
@@ -220,7 +220,7 @@ def _correlate(
     base: Float,
     uncertain: float,
 ) -> list[tuple[float, float, float]]:
-    """Shifts along and up (m) at which points before a wall look like the ladder, and how alike (-1 to 1)."""
+    """Return shifts along and up (m) at which points in front of a wall match the ladder, and the correlation (-1 to 1)."""
     begin, end = (((placed.to_space(ends) - base) @ basis) for ends in placed.elements())
     share = np.linspace(0.0, 1.0, 80)
     dots = (begin[:, None] + share[None, :, None] * (end - begin)[:, None]).reshape(-1, 3)
@@ -231,17 +231,17 @@ def _correlate(
     if len(dots) < 50:
         return []
     off = points[:, 1] - place - slope * points[:, 2]
-    # Before the wall by as much as the ladder, which may lean: its plane at a height is known when the water's height is.
+    # At the ladder's distance from the wall; it may lean: its plane at a height follows from the water's height.
     height = points[:, 2] - scan.top
     lean = np.polyfit(dots[:, 2], dots[:, 1], 1)
     expected = np.polyval(lean, height)
     mine = (np.abs(off - expected) < SLAB) & (off > WALL_MARGIN) & (height < uncertain) & (height > -depth - uncertain)
-    mine &= np.abs(points[:, 0]) < NEAR
+    mine &= np.abs(points[:, 0]) < MAX_RANGE
     own = points[mine]
     if len(own) < 50:
         return []
-    low = np.array([-NEAR - 1.0, own[:, 2].min() - 1.0])
-    shape = np.ceil((np.array([2.0 * NEAR + 2.0, np.ptp(own[:, 2]) + 2.0])) / PIXEL).astype(int)
+    low = np.array([-MAX_RANGE - 1.0, own[:, 2].min() - 1.0])
+    shape = np.ceil((np.array([2.0 * MAX_RANGE + 2.0, np.ptp(own[:, 2]) + 2.0])) / PIXEL).astype(int)
     k = np.floor((own[:, [0, 2]] - low) / PIXEL).astype(np.int64)
     weight = (own**2).sum(axis=1)
     image = np.bincount(k[:, 0] * shape[1] + k[:, 1], weights=weight, minlength=shape[0] * shape[1]).reshape(shape)
@@ -260,12 +260,12 @@ def _correlate(
     square = fftconvolve(image**2, ones, mode="valid")
     spread = np.sqrt(np.maximum(square - total**2 / template.size, 1e-6 * float(image.max()) ** 2 * template.size))
     alike = fftconvolve(image, template[::-1, ::-1], mode="valid") / spread
-    # a template at pixel (i, j) puts its corner at low + (i, j) * PIXEL: shift = where it is expected less where it is seen
+    # a template at pixel (i, j) puts its corner at low + (i, j) * PIXEL: shift = expected minus observed position
     along = corner[0] - (low[0] + np.arange(alike.shape[0]) * PIXEL)
     up = corner[1] - (low[1] + np.arange(alike.shape[1]) * PIXEL)
     alike[:, np.abs(up + scan.top) > uncertain] = -1.0
     out = []
-    for _ in range(PEAKS):
+    for _ in range(MAX_PEAKS):
         i, j = np.unravel_index(int(np.argmax(alike)), alike.shape)
         if alike[i, j] <= 0.1:
             break
@@ -275,12 +275,12 @@ def _correlate(
 
 
 def likeness(points: Float, scanner: Float, placed: PlacedLadder) -> float:
-    """How much points (n, 3) about a ladder look like it below the water, seen square to its plane (-1 to 1).
+    """Return the similarity of points (n, 3) to a ladder below the water, seen square to its plane (-1 to 1).
 
     Parameters
     ----------
     points, scanner, placed
-        In the local frame, the water at zero.
+        In the local frame, with the water at zero.
     """
     own = placed.to_ladder(points)
     begin, end = placed.elements()
@@ -300,7 +300,7 @@ def likeness(points: Float, scanner: Float, placed: PlacedLadder) -> float:
 
 
 def _image(places: Float, weight: Float, low: Float, size: Float, blur: float) -> Float:
-    """Root of the density of weighted places (n, 2) in pixels from ``low`` on, blurred."""
+    """Return the blurred square root of the density of weighted positions (n, 2), in pixels from ``low`` on."""
     k = np.minimum(np.floor((places - low) / PIXEL).astype(np.int64), np.asarray(size) - 1)
     image = np.bincount(k[:, 0] * size[1] + k[:, 1], weights=weight, minlength=size[0] * size[1]).reshape(tuple(size))
     return np.asarray(np.sqrt(gaussian_filter(image, blur)))

@@ -1,7 +1,7 @@
-"""Ladders as cylinders: where their axes lie, and how far points are from them.
+"""Ladders as cylinders: positions of their axes, and distances of points from them.
 
-A ladder's own axes: across (along the rungs), up (along the stiles), out (from the wall to the water); its origin is the
-middle between the stiles at height zero.
+A ladder's own axes: across (along the rungs), up (along the stiles), out (from the wall to the water). Its origin is the
+midpoint between the stiles at height zero.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from scipy.spatial.transform import Rotation
 from tunneldb.arrays import Float, Int64
 from tunneldb.registration.underwater.results import Ladder
 
-BEYOND = 0.15  # of the stiles beyond the outermost rungs, m: half a gap, for what they end in is not stated
+STILE_OVERHANG = 0.15  # m of the stiles beyond the outermost rungs: half a gap, since their ends are not given
 
 
 @dataclass(frozen=True)
 class PlacedLadder:
-    """A ladder where it stands.
+    """Ladder with its position.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class PlacedLadder:
     axes : (3, 3) float64 array
         Rows: across, up, out.
     gap : float
-        Between the middles of the stiles, m.
+        Distance between the stiles' axes, m.
     """
 
     ladder: Ladder
@@ -37,22 +37,22 @@ class PlacedLadder:
     gap: float
 
     def to_ladder(self, points: Float) -> Float:
-        """Points (n, 3) in the ladder's own axes."""
+        """Return points (n, 3) in the ladder's own axes."""
         return np.asarray((points - self.origin) @ self.axes.T)
 
     def to_space(self, points: Float) -> Float:
-        """Inverse of `to_ladder`."""
+        """Return points in space, the inverse of `to_ladder`."""
         return np.asarray(points @ self.axes + self.origin)
 
     def moved(self, turn: Float, shift: Float, wider: float = 0.0) -> PlacedLadder:
-        """Turned by a rotation vector (3,) about its origin, then shifted (3,), with a gap that is wider by some metres."""
+        """Return it turned by a rotation vector (3,) about its origin, then shifted (3,), with a gap wider by ``wider`` m."""
         axes = np.asarray(Rotation.from_rotvec(turn).apply(self.axes))
         return replace(self, origin=self.origin + shift, axes=axes, gap=self.gap + wider)
 
     def elements(self) -> tuple[Float, Float]:
-        """Ends (r + 2, 3) and (r + 2, 3) of the axes of the stiles, then of the rungs, in the ladder's own axes."""
+        """Return the ends (r + 2, 3), (r + 2, 3) of the axes of the stiles, then of the rungs, in the ladder's own axes."""
         height, half = self.ladder.height, self.gap / 2.0
-        low, high = height[0] - BEYOND, height[-1] + BEYOND
+        low, high = height[0] - STILE_OVERHANG, height[-1] + STILE_OVERHANG
         zero = np.zeros(len(height))
         begin = np.vstack([[-half, low, 0.0], [half, low, 0.0], np.column_stack([zero - half, height, zero])])
         end = np.vstack([[-half, high, 0.0], [half, high, 0.0], np.column_stack([zero + half, height, zero])])
@@ -60,15 +60,15 @@ class PlacedLadder:
 
 
 def nearest_element(own: Float, placed: PlacedLadder) -> tuple[Int64, Float]:
-    """Which axis each point (n, 3), in the ladder's own axes, is nearest to, and the vector (n, 3) from there to it.
+    """Return the axis nearest to each point (n, 3), in the ladder's own axes, and the vector (n, 3) from there to it.
 
     Elements are numbered as in `PlacedLadder.elements`.
     """
     height, half = placed.ladder.height, placed.gap / 2.0
     x, y, z = own.T
     side = np.where(x < 0.0, -half, half)
-    rung = np.searchsorted(0.5 * (height[1:] + height[:-1]), y)  # of all rungs that at the nearest height
-    along_stile = y - np.clip(y, height[0] - BEYOND, height[-1] + BEYOND)
+    rung = np.searchsorted(0.5 * (height[1:] + height[:-1]), y)  # the rung at the nearest height
+    along_stile = y - np.clip(y, height[0] - STILE_OVERHANG, height[-1] + STILE_OVERHANG)
     to_stile = np.column_stack([x - side, along_stile, z])
     to_rung = np.column_stack([x - np.clip(x, -half, half), y - height[rung], z])
     stile = (to_stile[:, :2] ** 2).sum(axis=1) <= (to_rung[:, :2] ** 2).sum(axis=1)

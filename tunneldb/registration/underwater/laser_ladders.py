@@ -1,7 +1,7 @@
-"""Ladders in the laser's points above the water: found before the walls, numbered by their rungs' gaps, fitted.
+"""Ladders in the laser's points above the water: found before the walls, numbered by the gaps of their rungs, and fitted.
 
-Moisan et al. (2015), section 5.3, fit a plane, then stiles and rungs by Parzen windows, then lines. Here the peaks only start
-a fit of the whole ladder, whose rungs' heights are known, by its six parameters and its width.
+Moisan et al. (2015), section 5.3, fit a plane, then stiles and rungs by Parzen windows, then lines. Here the peaks only give
+initial values for a fit of the whole ladder, with known rung heights, by its six parameters and its width.
 """
 
 from __future__ import annotations
@@ -22,44 +22,44 @@ from tunneldb.registration.underwater.observations import cell_keys
 from tunneldb.registration.underwater.results import Ladder
 from tunneldb.registration.underwater.walls import Walls
 
-OFF_WALL = (0.05, 1.2)  # where a ladder stands before its wall, m
-HIGHEST = 2.5  # above the water, m
-DRY = 0.03  # above the water, below which waves and mirror images mix in, m
-LINK = 0.06  # between neighbouring points of a ladder, m
-AROUND, LEAST_AROUND = 0.08, 6  # m: two diameters of a bar; points in it
-FLATTEST = 0.5  # ratio of variances on a bar, also where two meet: on a surface they are alike
-LEAST_HEIGHT = 0.3  # of a ladder above the water, m
-MOST_POINTS = 4000
-TRIED_POINTS = 600  # of a first fit
+WALL_DISTANCE = (0.05, 1.2)  # distance of a ladder from its wall, m
+MAX_HEIGHT = 2.5  # above the water, m
+MIN_HEIGHT = 0.03  # m above the water; below that, waves and mirror images disturb
+MAX_LINK = 0.06  # m between neighbouring points of a ladder
+NEIGHBOUR_RADIUS, MIN_NEIGHBOURS = 0.08, 6  # m: two diameters of a bar; points in it
+MAX_FLATNESS = 0.5  # ratio of variances on a bar, also where two bars meet; on a surface the variances are similar
+MIN_LADDER_HEIGHT = 0.3  # of a ladder above the water, m
+MAX_POINTS = 4000
+FIRST_FIT_POINTS = 600  # points of a first fit
 LEANING = np.radians(np.arange(-15.0, 15.1, 0.5))  # sideways
 BIN = 0.005  # m
-NOISE = 0.004  # of laser points from a cylinder, m: what the fit takes for usual
+NOISE = 0.004  # expected noise of laser points on a cylinder, m
 STARTS = 8
-TIE = float(np.log(100.0))  # likelihood of a way over that of another up to which they are not told apart
-STONES = 5.0  # points whose errors are independent, one of so many
-MOSTLY = 0.5  # share of what points that are astray cost, from which a first fit is of no ladder
-RUNGS_OFF = 0.01  # m off where rungs should be, median of the points between the stiles, from which it has other gaps
-ASTRAY = 5.0  # standard deviations off, by which a point is no ladder's
+MAX_TIE_LOG_RATIO = float(np.log(100.0))  # likelihood ratio up to which two solutions are ambiguous
+POINTS_PER_OBSERVATION = 5.0  # one point in this many has an independent error
+MAX_COST_SHARE = 0.5  # share of the cost of outliers from which a first fit is not a ladder
+MAX_RUNG_ERROR = 0.01  # m; median distance of points between the stiles from expected rungs, above which the gaps differ
+OUTLIER_SIGMA = 5.0  # standard deviations from which a point does not belong to the ladder
 
 
 @dataclass(frozen=True)
 class LaserLadder:
-    """A ladder fitted to the laser's points.
+    """Ladder fitted to the laser's points.
 
     Attributes
     ----------
     placed : PlacedLadder
     rms : float
-        Of the points from its surface, robust, m.
+        Robust distance of the points from its surface, m.
     rungs : tuple of int
-        Numbers of the rungs that were seen.
+        Numbers of the visible rungs.
     points : int
     cost : float
-        Of the points of its cluster, as if each of STONES were one: half of the robust sum of squares.
+        Half of the robust sum of squares of its cluster's points, with one independent point in POINTS_PER_OBSERVATION.
     covariance : (7, 7) float64 array
-        Of turn (3) rad, shift (3) m and gap m.
+        Covariance of turn (3) rad, shift (3) m and gap m.
     ties : tuple of float
-        Heights along the ladder by which it may be shifted instead, for its gaps fit as well, m.
+        Other shifts along the ladder at which its gaps fit as well, m.
     """
 
     placed: PlacedLadder
@@ -72,12 +72,12 @@ class LaserLadder:
 
 
 def find_laser_ladders(points: Float, walls: Walls, ladders: Sequence[Ladder]) -> list[LaserLadder]:
-    """Find and fit ladders in laser points (n, 3), local frame with the water at zero; those not found are left out."""
+    """Find and fit ladders in laser points (n, 3), local frame with the water at zero; ladders not found are omitted."""
     clusters = _clusters(points, walls)
     fits = [[_fit_cluster(cluster, out, ladder) for ladder in ladders] for cluster, out in clusters]
     if not fits:
         return []
-    # what is explained as a ladder, over its points' being astray
+    # evidence for a ladder, relative to outliers
     gain = [
         [0.0 if fit is None else _astray(len(cluster)) - fit.cost for fit in row]
         for (cluster, _), row in zip(clusters, fits, strict=True)
@@ -88,43 +88,43 @@ def find_laser_ladders(points: Float, walls: Walls, ladders: Sequence[Ladder]) -
 
 
 def _astray(points: int) -> float:
-    """Cost of points of which none is a ladder's."""
-    return 0.5 * min(points, MOST_POINTS) * float(np.log1p(ASTRAY**2)) / STONES
+    """Return the cost of points that are all outliers."""
+    return 0.5 * min(points, MAX_POINTS) * float(np.log1p(OUTLIER_SIGMA**2)) / POINTS_PER_OBSERVATION
 
 
 def _clusters(points: Float, walls: Walls) -> list[tuple[Float, Float]]:
-    """Clusters before the walls that may be ladders: points (n, 3), and the direction (3,) to the water."""
-    near = points[(points[:, 2] > DRY) & (points[:, 2] < HIGHEST)]
-    away, piece = walls.tree.query(near[:, :2], distance_upper_bound=OFF_WALL[1] + 0.5)
+    """Return clusters in front of the walls that may be ladders: points (n, 3), and the direction (3,) to the water."""
+    near = points[(points[:, 2] > MIN_HEIGHT) & (points[:, 2] < MAX_HEIGHT)]
+    away, piece = walls.tree.query(near[:, :2], distance_upper_bound=WALL_DISTANCE[1] + 0.5)
     known = np.isfinite(away)
-    near, piece = _thin(near[known], piece[known], LINK / 3.0)
+    near, piece = _thin(near[known], piece[known], MAX_LINK / 3.0)
     off = walls.distance(near, piece)
-    beside = (off > -AROUND) & (off < OFF_WALL[1] + AROUND)
+    beside = (off > -NEIGHBOUR_RADIUS) & (off < WALL_DISTANCE[1] + NEIGHBOUR_RADIUS)
     near, piece, off = near[beside], piece[beside], off[beside]
-    bars = (off > OFF_WALL[0]) & (off < OFF_WALL[1])
+    bars = (off > WALL_DISTANCE[0]) & (off < WALL_DISTANCE[1])
     bars[bars] = _elongated(near, bars)
     near, piece = near[bars], piece[bars]
     if len(near) == 0:
         return []
-    pairs = cKDTree(near).query_pairs(LINK, output_type="ndarray")
+    pairs = cKDTree(near).query_pairs(MAX_LINK, output_type="ndarray")
     count = len(near)
     _, label = connected_components(coo_array((np.ones(len(pairs)), pairs.T), (count, count)), directed=False)
     out = []
     for number in np.flatnonzero(np.bincount(label) >= 30):
         mine = label == number
-        if np.ptp(near[mine, 2]) >= LEAST_HEIGHT:
+        if np.ptp(near[mine, 2]) >= MIN_LADDER_HEIGHT:
             normal = walls.normal[piece[mine]].mean(axis=0)
             out.append((near[mine], np.array([*normal, 0.0]) / np.linalg.norm(normal)))
     return out
 
 
 def _elongated(points: Float, which: Bool) -> Bool:
-    """Whether some of the points (n, 3) lie on bars and not on surfaces: by the principal axes of what is about each.
+    """Return True for some of the points (n, 3) if they lie on bars rather than surfaces, by the principal axes around each.
 
-    A vault or a boat before the wall would else be one cluster with the ladder that leans on it.
+    Otherwise a vault or a boat in front of the wall would be one cluster with the ladder that leans on it.
     """
     tree = cKDTree(points)
-    pairs = cKDTree(points[which]).sparse_distance_matrix(tree, AROUND, output_type="coo_matrix")
+    pairs = cKDTree(points[which]).sparse_distance_matrix(tree, NEIGHBOUR_RADIUS, output_type="coo_matrix")
     count = int(which.sum())
     about = coo_array((np.ones(pairs.nnz), (pairs.row, pairs.col)), (count, len(points))).tocsr()
     number = np.asarray(about.sum(axis=1))
@@ -133,27 +133,27 @@ def _elongated(points: Float, which: Bool) -> Bool:
     square = (centred[:, :, None] * centred[:, None]).reshape(-1, 9)
     spread = (about @ square / number[:, None]).reshape(-1, 3, 3) - mean[:, :, None] * mean[:, None]
     size = np.linalg.eigvalsh(spread)
-    return np.asarray((number >= LEAST_AROUND) & (size[:, 1] < FLATTEST * size[:, 2]))
+    return np.asarray((number >= MIN_NEIGHBOURS) & (size[:, 1] < MAX_FLATNESS * size[:, 2]))
 
 
 def _thin(points: Float, piece: Int64, edge: float) -> tuple[Float, Int64]:
-    """One point of each voxel."""
+    """Return one point of each voxel."""
     _, first = np.unique(cell_keys(points, edge), return_index=True)
     return points[first], piece[first]
 
 
 def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | None:
-    """Fit a ladder to a cluster; None if it is none."""
+    """Fit a ladder to a cluster; return None if it is not a ladder."""
     start = _stiles(cluster, out, ladder)
     if start is None:
         return None
     order = np.random.default_rng(0).permutation(len(cluster))
-    few, cluster = cluster[order[:TRIED_POINTS]], cluster[order[:MOST_POINTS]]
+    few, cluster = cluster[order[:FIRST_FIT_POINTS]], cluster[order[:MAX_POINTS]]
     tried: list[tuple[float, PlacedLadder]] = []
     for shift in _shifts(start.to_ladder(cluster), ladder, start.gap):
         cost, fitted, _ = _refine(few, start.moved(np.zeros(3), start.axes[1] * shift), 10)
         tried.append((cost, fitted))
-    if min((cost for cost, _ in tried), default=np.inf) > MOSTLY * _astray(len(few)):
+    if min((cost for cost, _ in tried), default=np.inf) > MAX_COST_SHARE * _astray(len(few)):
         return None
     tried.sort(key=lambda one: one[0])
     refined = sorted((_refine(cluster, start, 40) for _, start in tried), key=lambda one: one[0])
@@ -166,14 +166,14 @@ def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | No
         return None
     inside = np.abs(own[:, 0]) < placed.gap / 2.0 - ladder.diameter
     between = close & inside
-    if not inside.any() or float(np.median(np.abs(residual[inside]))) > RUNGS_OFF:  # its gaps are others
+    if not inside.any() or float(np.median(np.abs(residual[inside]))) > MAX_RUNG_ERROR:  # its gaps differ
         return None
     counts = np.bincount(which[between], minlength=len(ladder.height) + 2)
     seen = np.flatnonzero(counts[2:] >= 5)
     if len(seen) < 2:
         return None
     rms = float(np.sqrt(np.mean(residual[close] ** 2)))
-    tie = TIE * (rms / NOISE) ** 2  # the noise is that which there is
+    tie = MAX_TIE_LOG_RATIO * (rms / NOISE) ** 2  # scaled to the observed noise
     ties = tuple(
         float((other.origin - placed.origin) @ placed.axes[1])
         for other_cost, other, _ in refined[1:]
@@ -183,11 +183,11 @@ def _fit_cluster(cluster: Float, out: Float, ladder: Ladder) -> LaserLadder | No
 
 
 def _stiles(cluster: Float, out: Float, ladder: Ladder) -> PlacedLadder | None:
-    """Plane and stiles: the lean sideways, and the place across, at which two peaks stand a ladder's width apart."""
+    """Fit plane and stiles: the sideways lean and the position at which two peaks are a ladder's width apart."""
     middle = np.median(cluster, axis=0)
     keep = np.ones(len(cluster), np.bool_)
     normal = out
-    for _ in range(8):  # the plane that most of the cluster lies in, upright or leaning towards the wall
+    for _ in range(8):  # plane of most of the cluster, upright or leaning towards the wall
         _, _, axes = np.linalg.svd(cluster[keep] - cluster[keep].mean(axis=0), full_matrices=False)
         normal = axes[2] * np.sign(axes[2] @ out)
         off = (cluster - cluster[keep].mean(axis=0)) @ normal
@@ -226,7 +226,7 @@ def _stiles(cluster: Float, out: Float, ladder: Ladder) -> PlacedLadder | None:
 
 
 def _shifts(own: Float, ladder: Ladder, gap: float) -> list[float]:
-    """Heights at which the ladder's zero may lie so that its rungs meet the points between the stiles, likeliest first."""
+    """Return possible heights of the ladder's zero at which rungs match the points between the stiles, most likely first."""
     inside = np.abs(own[:, 0]) < gap / 2.0 - ladder.diameter
     if inside.sum() < 10:
         return []
@@ -249,7 +249,7 @@ def _shifts(own: Float, ladder: Ladder, gap: float) -> list[float]:
 
 
 def _refine(cluster: Float, start: PlacedLadder, most: int) -> tuple[float, PlacedLadder, Float]:
-    """Fit turn, shift and gap by robust least squares; the cost, the ladder and the covariance."""
+    """Fit turn, shift and gap by robust least squares; return cost, ladder and covariance."""
     radius = start.ladder.diameter / 2.0
 
     def compared(change: Float) -> tuple[PlacedLadder, Float, Int64, Float]:
@@ -262,7 +262,7 @@ def _refine(cluster: Float, start: PlacedLadder, most: int) -> tuple[float, Plac
         return np.asarray((np.linalg.norm(away, axis=1) - radius) / NOISE)
 
     def derivatives(change: Float) -> Float:
-        """Of the residuals: what a bar's axis moves towards a point takes from the distance."""
+        """Return the derivatives of the residuals: movement of a bar's axis towards a point reduces its distance."""
         placed, own, which, away = compared(change)
         towards = away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
         turn, shift = np.cross(own - away, towards) @ placed.axes, towards @ placed.axes
@@ -274,4 +274,8 @@ def _refine(cluster: Float, start: PlacedLadder, most: int) -> tuple[float, Plac
     )
     information = found.jac.T @ found.jac
     covariance = np.linalg.pinv(information, rcond=1e-12)
-    return float(found.cost) / STONES, start.moved(found.x[:3], found.x[3:6], float(found.x[6])), np.asarray(covariance)
+    return (
+        float(found.cost) / POINTS_PER_OBSERVATION,
+        start.moved(found.x[:3], found.x[3:6], float(found.x[6])),
+        np.asarray(covariance),
+    )

@@ -1,6 +1,6 @@
-"""What ties a sonar scan to the laser's model and to other scans, as linear equations of small changes of the poses.
+"""Observations between a sonar scan, the laser's model and other scans, as linear equations of small changes of the poses.
 
-A pose's changes are those of `results.PARAMETERS`: a turn about the tunnel's axes through the scanner, a shift of the
+The changes of a pose are those of `results.PARAMETERS`: a turn about the tunnel's axes through the scanner, a shift of the
 scanner, and a change of scale.
 """
 
@@ -19,34 +19,36 @@ from tunneldb.registration.underwater.walls import Walls
 POSE = 7  # parameters of a pose
 RANGE_NOISE = 0.015  # m, of a BV5000 (Moisan et al., 2015, section 3)
 BEAM = np.radians(1.0)  # width of a beam there
-BEAM_SIGMA = BEAM / np.sqrt(12.0)  # an echo comes from anywhere in it
-BEAM_SPREAD = BEAM / np.sqrt(8.0 * np.log(2.0))  # of its power, taken for a normal distribution
+BEAM_SIGMA = BEAM / np.sqrt(12.0)  # an echo comes from anywhere in the beam
+BEAM_SPREAD = BEAM / np.sqrt(8.0 * np.log(2.0))  # of its power, assumed normally distributed
 STRETCH = 2.0  # m of wall or bed: its relief is the same for all scans
-SHARED = 0.002  # m: of a stretch of wall or bed, by relief and slanting beams
-BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: those that hear it overlap
-WATERLINE_NOISE = 0.025  # m: half a bin, and half of what is left of half a beam
+SHARED = 0.002  # m: common error of a stretch of wall or bed, by relief and slanting beams
+BARS_BEAMS = 4.0  # beams across a bar whose errors are independent: beams that hit it overlap
+WATERLINE_NOISE = 0.025  # m: half a bin, and half of the rest of half a beam
 WATERLINE_SHARED = 0.01  # m
-FACING = 0.9  # least cosine between the normals of what is compared
+MIN_FACING_COSINE = 0.9  # least cosine between the normals of compared patches
 WALL_DEPTH = 3.0  # m below the water
-WALL_TOP = 0.05  # below the water, m: nearer to it, echoes by way of the surface mix in
-RELIEF = 0.012  # m: how far a patch of stones may lie from its wall's plane
-GRAZING = 0.35  # least cosine of incidence of what is compared
-LEAST_AWAY = 0.5  # m from a surface, from which on slanting beams' echoes are taken to come nearer
-FARTHEST = 12.0  # m
-UPRIGHT = 0.6  # least cosine between the vertical and the normal of what is taken for bed
-STILES_SIDE = 0.05  # m from a stile's axis, nearer to which an echo is the stile's
+WALL_TOP = 0.05  # m below the water; closer to it, echoes by way of the surface disturb
+RELIEF = 0.012  # m: distance of a patch of stones from its wall's plane
+MIN_INCIDENCE_COSINE = 0.35  # least cosine of incidence of compared patches
+MIN_SLANT_DISTANCE = 0.5  # m from a surface from which echoes of slanting beams come from nearer
+MAX_RANGE = 12.0  # m
+MIN_BED_COSINE = 0.6  # least cosine between the vertical and the normal of the bed
+STILES_SIDE = 0.05  # m from a stile's axis within which an echo is from the stile
 MIXTURE_ROUNDS = 10
-LEAST_TOLD = 0.02  # share of a rung's information that is left where rungs are hardly told from what is between them
-FURTHEST_OFF = 4.0  # standard deviations of an echo from the ladder that it comes from
+MIN_INFORMATION_SHARE = (
+    0.02  # least share of a rung's information, where rungs are hardly separable from the space between them
+)
+MAX_LADDER_DISTANCE = 4.0  # greatest distance of an echo from its ladder, standard deviations
 PATCH = 0.3  # m
 PATCH_POINTS = 8
-FLAT = 0.035  # m: spread of a patch across its plane
-SMOOTH_PATCH = 0.2  # m, of patches that are compared with another scan's
+MAX_PATCH_SPREAD = 0.035  # m: spread of a patch across its plane
+SMOOTH_PATCH = 0.2  # m; size of patches for the comparison of two scans
 SMOOTH_POINTS = 3
-ABOUT = 0.4  # m: their normals are those of planes through the patches so near
-MOST_ABOUT, FEWEST_ABOUT = 13, 6  # of them
-NEIGHBOUR = 0.3  # m between the middles of two scans' patches that are compared
-SMOOTH_GRAZING = 0.2  # least cosine of incidence by those normals
+NORMAL_RADIUS = 0.4  # m: radius of the patches whose plane gives the normal
+MAX_NORMAL_PATCHES, MIN_NORMAL_PATCHES = 13, 6  # of these patches
+MAX_PATCH_DISTANCE = 0.3  # m between the centres of compared patches of two scans
+MIN_SMOOTH_COSINE = 0.2  # least cosine of incidence by those normals
 
 
 @dataclass(frozen=True)
@@ -58,11 +60,11 @@ class Pose:
     scale: float
 
     def apply(self, points: Float) -> Float:
-        """Points (n, 3) of the file in the tunnel's axes."""
+        """Return points (n, 3) of the file in the tunnel's axes."""
         return np.asarray(self.scale * points @ self.rotation.T + self.translation)
 
     def to_file(self, points: Float) -> Float:
-        """Points (n, 3) of the tunnel's axes in those of the file."""
+        """Return points (n, 3) of the tunnel's axes in those of the file."""
         return np.asarray((points - self.translation) @ self.rotation / self.scale)
 
 
@@ -73,21 +75,21 @@ class Rows:
     Attributes
     ----------
     residual : (n,) float64 array
-        m.
+        Residuals, m.
     sigma : (n,) float64 array
         Standard deviations, m.
     poses : (n, 7) float64 array
-        Derivatives by the changes of the pose of scan ``scan``.
+        Derivatives with respect to the changes of the pose of scan ``scan``.
     scan : int
     other : int or None
-        A second scan, whose derivatives are ``other_poses``.
+        Second scan, with derivatives ``other_poses``.
     common : (n, c) float64 array
-        Derivatives by the parameters ``columns`` that are common to all scans.
+        Derivatives with respect to the common parameters ``columns``.
     columns : (c,) int64 array
     group : (n,) int64 array
-        Rows of one group err together; those of walls and of overlaps, places in plan, also with the rows of other scans.
+        Groups of correlated rows; rows of walls and of overlaps (places in plan) are also correlated with those of other scans.
     shared : (n,) float64 array
-        Standard deviation of what they have in common, m.
+        Standard deviation of the common error of a group, m.
     kind, name : str
     """
 
@@ -106,18 +108,18 @@ class Rows:
 
 
 def cell_keys(points: Float, edge: float) -> Int64:
-    """Numbers (n,) of the cubic cells that points (n, 3) within some kilometres lie in."""
+    """Return the numbers (n,) of the cubic cells that contain points (n, 3) within some kilometres."""
     cell = np.floor(points / edge).astype(np.int64) + (1 << 20)
     return np.asarray((cell[:, 0] << 42) | (cell[:, 1] << 21) | cell[:, 2])
 
 
 def _stretches(points: Float) -> Int64:
-    """Numbers (n,) of the stretches of wall or bed that points (n, 3) lie in, whatever their height."""
+    """Return the numbers (n,) of the stretches of wall or bed that contain points (n, 3), at any height."""
     return cell_keys(np.where([True, True, False], points, 0.0), STRETCH)
 
 
 def pose_derivatives(points: Float, pose: Pose, normal: Float) -> Float:
-    """Derivatives (n, 7) of points (n, 3), in the tunnel's axes, along normals (n, 3)."""
+    """Return the derivatives (n, 7) of points (n, 3), in the tunnel's axes, along normals (n, 3)."""
     arm = points - pose.translation
     scale = (arm * normal).sum(axis=1)[:, None] / pose.scale
     return np.hstack([np.cross(arm, normal), normal, scale])
@@ -134,47 +136,49 @@ class Patches:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Of their middles."""
+        """Search tree of their centres."""
         return cKDTree(self.centre)
 
 
 def find_patches(points: Float) -> Patches:
-    """Cells of a scan whose points lie on a plane that is not seen at a grazing angle, with that plane's normal."""
+    """Return cells of a scan whose points lie on a plane, not at grazing incidence, with that plane's normal."""
     centre, count, value, vector = _cells(points, PATCH)
     normal = _towards_scanner(vector[:, :, 0], centre)
     spread = np.sqrt(np.maximum(value[:, 0], 0.0))
-    keep = (count >= PATCH_POINTS) & (spread < FLAT) & (value[:, 1] > (PATCH / 8.0) ** 2)
-    keep &= _cosine(normal, centre) > GRAZING
+    keep = (count >= PATCH_POINTS) & (spread < MAX_PATCH_SPREAD) & (value[:, 1] > (PATCH / 8.0) ** 2)
+    keep &= _cosine(normal, centre) > MIN_INCIDENCE_COSINE
     return Patches(centre[keep], normal[keep], count[keep], spread[keep])
 
 
 def find_smooth_patches(points: Float) -> Patches:
-    """Smaller cells, with the normals of planes through the middles of those about.
+    """Return smaller cells, with the normals of planes through the centres of neighbouring cells.
 
-    A beam's echoes lie on an arc about the scanner, so that the points of one patch lean towards it, the more the farther it
-    is; and they are few. Two scans whose patches are compared along such normals draw each other nearer.
+    A beam's echoes lie on an arc around the scanner, so that the points of one patch lean towards it, the more the farther away
+    it is; and they are few. Two scans whose patches are compared along such normals attract each other.
     """
     centre, count, value, _ = _cells(points, SMOOTH_PATCH)
     spread = np.sqrt(np.maximum(value[:, 0], 0.0))
-    keep = (count >= SMOOTH_POINTS) & (spread < FLAT) & (value[:, 1] > (SMOOTH_PATCH / 8.0) ** 2)
+    keep = (count >= SMOOTH_POINTS) & (spread < MAX_PATCH_SPREAD) & (value[:, 1] > (SMOOTH_PATCH / 8.0) ** 2)
     centre, count, spread = centre[keep], count[keep], spread[keep]
-    if len(centre) < MOST_ABOUT:
+    if len(centre) < MAX_NORMAL_PATCHES:
         return Patches(centre[:0], centre[:0], count[:0], spread[:0])
-    reach, about = cKDTree(centre).query(centre, MOST_ABOUT, distance_upper_bound=ABOUT)
+    reach, about = cKDTree(centre).query(centre, MAX_NORMAL_PATCHES, distance_upper_bound=NORMAL_RADIUS)
     there = np.isfinite(reach)[..., None]
     number = there.sum(axis=1)
     away = np.where(there, centre[np.where(there[..., 0], about, 0)] - centre[:, None], 0.0)
     away = np.where(there, away - (away.sum(axis=1) / number)[:, None], 0.0)
     value, vector = np.linalg.eigh(np.swapaxes(away, 1, 2) @ away / number[..., None])
     normal = _towards_scanner(vector[:, :, 0], centre)
-    keep = (number[:, 0] >= FEWEST_ABOUT) & (value[:, 0] < FLAT**2) & (value[:, 1] > (SMOOTH_PATCH / 3.0) ** 2)
-    keep &= _cosine(normal, centre) > SMOOTH_GRAZING
+    keep = (
+        (number[:, 0] >= MIN_NORMAL_PATCHES) & (value[:, 0] < MAX_PATCH_SPREAD**2) & (value[:, 1] > (SMOOTH_PATCH / 3.0) ** 2)
+    )
+    keep &= _cosine(normal, centre) > MIN_SMOOTH_COSINE
     return Patches(centre[keep], normal[keep], count[keep], spread[keep])
 
 
 def _cells(points: Float, edge: float) -> tuple[Float, Int64, Float, Float]:
-    """Of cubic cells, middles of their points (k, 3), points (k,), and variances (k, 3) and axes (k, 3, 3) of their spread."""
-    near = points[np.linalg.norm(points, axis=1) < FARTHEST]
+    """Return centroids (k, 3), numbers of points (k,), variances (k, 3) and axes (k, 3, 3) of the points in cubic cells."""
+    near = points[np.linalg.norm(points, axis=1) < MAX_RANGE]
     _, number, count = np.unique(cell_keys(near, edge), return_inverse=True, return_counts=True)
     centre = np.column_stack([np.bincount(number, near[:, k]) for k in range(3)]) / count[:, None]
     away = near - centre[number]
@@ -191,29 +195,29 @@ def _towards_scanner(normal: Float, centre: Float) -> Float:
 
 
 def _cosine(normal: Float, centre: Float) -> Float:
-    """Cosines of incidence (k,) of beams on patches."""
+    """Return the cosines of incidence (k,) of beams on patches."""
     return np.asarray(-(normal * centre).sum(axis=1) / np.maximum(np.linalg.norm(centre, axis=1), 1e-9))
 
 
 def nearer_by_slant(points: Float, scanner: Float, normal: Float) -> Float:
-    """How far (n,), m, in front of a surface of normals (n, 3) a beam's strongest echo seems to lie if its slant is 1.
+    """Return the offset (n,), m, of a beam's strongest echo in front of a surface with normals (n, 3) if its slant is 1.
 
-    A beam that meets a surface slantingly hears its nearer side more loudly, so that the echo comes from a direction off the
-    beam's middle by ``slant * spread² / tan(elevation over the surface)``: 1 for the power of Lambert's law alone, 3 if the
-    cell of range with the most of it is taken, less on what is rough, where a stone that faces the beam decides.
+    On a slanting surface the nearer side of a beam echoes more strongly, so that the echo comes from a direction off the beam's
+    centre by ``slant * spread² / tan(elevation over the surface)``. The slant is 1 for the power of Lambert's law alone, 3 if
+    the strongest range cell is used, and less on a rough surface, where stones that face the beam dominate.
     """
     arm = scanner - points
-    over = np.maximum((arm * normal).sum(axis=1), LEAST_AWAY)
+    over = np.maximum((arm * normal).sum(axis=1), MIN_SLANT_DISTANCE)
     return np.asarray(BEAM_SPREAD**2 * np.maximum((arm**2).sum(axis=1) - over**2, 0.0) / over)
 
 
 def wall_rows(
     patches: Patches, pose: Pose, walls: Walls, common: Float, scan: int, columns: Int64, within: float
 ) -> list[Rows]:
-    """Compare a scan's patches with the walls, at most ``within`` m off.
+    """Compare a scan's patches with walls at most ``within`` m away.
 
-    ``common`` are how far in front of where the laser sees it a sonar hears masonry, m, and the slant (`nearer_by_slant`).
-    ``columns`` are the places among the common parameters of the changes of batter of either side, and of these two.
+    ``common`` are the offset of sonar ranges in front of masonry relative to the laser, m, and the slant (`nearer_by_slant`).
+    ``columns`` are the indices, among the common parameters, of the changes of batter of either side, and of these two.
     """
     zero, slant = common
     centre = pose.apply(patches.centre)
@@ -222,7 +226,7 @@ def wall_rows(
     piece = np.where(wet, piece, 0)
     normal = walls.normals(piece)
     off = walls.distance(centre, piece)
-    facing = ((patches.normal @ pose.rotation.T) * normal).sum(axis=1) > FACING
+    facing = ((patches.normal @ pose.rotation.T) * normal).sum(axis=1) > MIN_FACING_COSINE
     keep = wet & facing & (np.abs(off) < within)
     centre, piece, normal, off = centre[keep], piece[keep], normal[keep], off[keep]
     sigma = np.sqrt(
@@ -248,7 +252,7 @@ def wall_rows(
 
 
 def waterline_rows(edges: Float, pose: Pose, bias: float, scan: int, column: int) -> Rows | None:
-    """Heights of the edges (k, 3) of a scan's walls, file's axes, over the water; ``bias`` m is common to all scans."""
+    """Return heights of the edges (k, 3) of a scan's walls, file's axes, over the water; ``bias`` m is common to all scans."""
     if len(edges) == 0:
         return None
     place = pose.apply(edges)
@@ -269,17 +273,17 @@ def ladder_rows(
     columns: tuple[int, int],
     within: float,
 ) -> Rows | None:
-    """Distances of a scan's points (n, 3), file's axes, from a ladder's axes below the water, across and along the beam.
+    """Return distances of a scan's points (n, 3), file's axes, from a ladder's axes below the water, across and along the beam.
 
-    A sonar hears the near surface of a bar, or a little behind it, ``depth`` m. ``columns`` are the places among the common
-    parameters of that depth, and of the first of the ladder's turn and shift.
+    A sonar detects the near surface of a bar, or ``depth`` m behind it. ``columns`` are the indices, among the common
+    parameters, of that depth, and of the first of the ladder's turn and shift.
     """
     depth_column, first_column = columns
     space = pose.apply(points)
     own = placed.to_ladder(space)
     ladder = placed.ladder
     reach = np.linalg.norm(space - pose.translation, axis=1)
-    room = np.maximum(within, FURTHEST_OFF * BEAM_SIGMA * reach)
+    room = np.maximum(within, MAX_LADDER_DISTANCE * BEAM_SIGMA * reach)
     box = (np.abs(own[:, 0]) < placed.gap / 2.0 + room) & (np.abs(own[:, 2]) < room)
     box &= (own[:, 1] > ladder.height[0] - 0.3) & (own[:, 1] < ladder.height[-1] + 0.3)
     space, own, reach = space[box], own[box], reach[box]
@@ -295,7 +299,7 @@ def ladder_rows(
     along, across = (vector * ray).sum(axis=1), (vector * side).sum(axis=1)
     sigma_along = np.full(len(own), np.hypot(RANGE_NOISE, 0.005))
     sigma_across = np.hypot(BEAM_SIGMA * reach, 0.005)
-    near = np.hypot(along / sigma_along, across / sigma_across) < max(within / RANGE_NOISE / 4.0, FURTHEST_OFF)
+    near = np.hypot(along / sigma_along, across / sigma_across) < max(within / RANGE_NOISE / 4.0, MAX_LADDER_DISTANCE)
     if near.sum() < 30:
         return None
     arm = space[near] - placed.origin
@@ -304,7 +308,7 @@ def ladder_rows(
         poses.append(pose_derivatives(space[near], pose, direction))
         common.append(np.hstack([np.full((len(arm), 1), behind), -np.cross(arm, direction), -direction]))
     bar = which[near]
-    told = np.bincount(bar, _told(own[near], bar, away[near], sigma_across[near], placed))[bar]
+    told = np.bincount(bar, _information_share(own[near], bar, away[near], sigma_across[near], placed))[bar]
     return Rows(
         np.concatenate([along[near], across[near]]),
         np.concatenate([sigma_along[near], sigma_across[near]]),
@@ -316,14 +320,14 @@ def ladder_rows(
     )  # fmt: skip
 
 
-def _told(own: Float, which: Int64, away: Float, sigma: Float, placed: PlacedLadder) -> Float:
-    """Share (n,) of its information across the beam that each point has; 1 for those of stiles.
+def _information_share(own: Float, which: Int64, away: Float, sigma: Float, placed: PlacedLadder) -> Float:
+    """Return the share (n,) of its information across the beam that each point has; 1 for points of stiles.
 
-    Far off and at a slant the stiles' echoes drown the rungs', and what lies between the stiles says little of where rungs
-    are: a mixture of echoes of rungs and of others, evenly spread, by expectation and maximisation (McLachlan and Peel, 2000,
-    section 2.8; the information in what is left open is that of Louis, 1982).
+    At long range and at a slant, echoes of stiles mask those of rungs, and echoes from between the stiles carry little
+    information about rungs. The model is a mixture of echoes of rungs and of uniformly distributed others, by expectation
+    maximisation (McLachlan and Peel, 2000, section 2.8; the information of incomplete data is that of Louis, 1982).
     """
-    share = np.where(which < 2, 1.0, LEAST_TOLD)
+    share = np.where(which < 2, 1.0, MIN_INFORMATION_SHARE)
     inside = (which >= 2) & (np.abs(own[:, 0]) < placed.gap / 2.0 - STILES_SIDE)
     if not inside.any():
         return share
@@ -335,7 +339,7 @@ def _told(own: Float, which: Int64, away: Float, sigma: Float, placed: PlacedLad
         mine = rungs * echo / (rungs * echo + (1.0 - rungs) * even)
         rungs = float(mine.mean())
     told = float((mine - mine * (1.0 - mine) * off).sum() / mine.sum())
-    share[inside] = np.maximum(mine * told, LEAST_TOLD)
+    share[inside] = np.maximum(mine * told, MIN_INFORMATION_SHARE)
     return share
 
 
@@ -348,19 +352,19 @@ def overlap_rows(
     columns: Int64,
     within: float,
 ) -> Rows | None:
-    """Distances between smooth patches of two scans that lie beside each other and face the same way.
+    """Return distances between smooth patches of two scans that are close to each other and face the same way.
 
     ``common`` are the slants of walls and of the bed (`nearer_by_slant`), and the shares by which the relief of either seems
-    nearer to a scanner than it is, along: of a crest or a stone the near face is heard. ``columns`` are their places among the
-    common parameters.
+    nearer to a scanner along the canal, since the near face of a crest or a stone echoes. ``columns`` are their indices among
+    the common parameters.
     """
     first, second = poses
     place = first.apply(one.centre)
     low = np.flatnonzero(place[:, 2] < -WALL_TOP)  # images above the water move with the scanner
-    reach, k = other.tree.query(second.to_file(place[low]), distance_upper_bound=max(NEIGHBOUR, within))
+    reach, k = other.tree.query(second.to_file(place[low]), distance_upper_bound=max(MAX_PATCH_DISTANCE, within))
     i, k = low[np.isfinite(reach)], k[np.isfinite(reach)]
     normal, beside_normal = one.normal[i] @ first.rotation.T, other.normal[k] @ second.rotation.T
-    same = (normal * beside_normal).sum(axis=1) > FACING
+    same = (normal * beside_normal).sum(axis=1) > MIN_FACING_COSINE
     i, k, normal, beside_normal = i[same], k[same], normal[same], beside_normal[same]
     if len(i) < 20:
         return None
@@ -368,7 +372,7 @@ def overlap_rows(
     mean = normal + beside_normal
     mean /= np.linalg.norm(mean, axis=1)[:, None]
     nearer = nearer_by_slant(place, first.translation, mean) - nearer_by_slant(beside, second.translation, mean)
-    bed = mean[:, 2] > UPRIGHT
+    bed = mean[:, 2] > MIN_BED_COSINE
     apart = (second.translation - first.translation) * [1.0, 1.0, 0.0]
     design = np.column_stack(
         [

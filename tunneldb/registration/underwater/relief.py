@@ -1,8 +1,8 @@
-"""The bed's relief as a sonar scan sees it, and how much two scans speak for seeing the same of it at a shift along the canal.
+"""Relief of the bed in a sonar scan, and the evidence that two scans show the same bed at a shift along the canal.
 
-Each scan's relief is an image in its own level frame, without what is the same all along the canal. Two images are compared
-at all shifts at once by masked correlation (Padfield, 2012); what a correlation is worth is told by how many independent
-places the images hold (Dutilleul, 1993): relief that is wide has few.
+Each scan's relief is an image in its own level frame, without the part that is constant along the canal. Two images are
+compared at all shifts at once by masked correlation (Padfield, 2012). The significance of a correlation depends on the
+number of independent places in the images (Dutilleul, 1993): wide relief has few.
 """
 
 from __future__ import annotations
@@ -21,30 +21,30 @@ from tunneldb.registration.underwater.first_pose import LevelScan
 PIXEL = 0.1  # m
 REACH = 10.0  # m along, from the scanner
 MARGIN = 0.3  # m from the walls
-FINE = 2.5  # m: relief that is wider says nothing of the place
-STEPS = 0.6  # m: farther from the bed's height are objects and false echoes
-LEAST_CELLS = 500  # that both scans must see
-MOST_ALIKE = 0.9  # correlation that two scans of one bed have at most: they see it from either side, past other crests
-CORRELATED = 30  # pixels within which relief may be correlated
-FEWEST = 3.0  # independent places, of which a correlation says nothing
-CERTAIN = 0.99  # highest correlation that is believed
-NOWHERE = -1e3  # instead of a likelihood where nothing is shared
+MAX_RELIEF_WIDTH = 2.5  # m: wider relief carries no information about the place
+MAX_HEIGHT_STEP = 0.6  # m: greater differences from the bed's height are objects and false echoes
+MIN_CELLS = 500  # that both scans must see
+MAX_SAME_BED_CORRELATION = 0.9  # greatest correlation of two scans of one bed, which they see from different sides
+MAX_CORRELATION_LENGTH = 30  # pixels within which relief may be correlated
+MIN_INDEPENDENT_PLACES = 3.0  # number of independent places up to which a correlation is meaningless
+MAX_CORRELATION = 0.99  # greatest correlation, to limit the evidence
+NO_EVIDENCE = -1e3  # log likelihood where nothing is shared
 
 
 @dataclass(frozen=True)
 class Relief:
-    """The bed about a scanner.
+    """Bed around a scanner.
 
     Attributes
     ----------
     height : (2 n, m) float64 array
-        Of the bed in pixels along (x from -REACH on) and across (symmetric about the canal's middle), m, level frame.
+        Height of the bed in pixels along (x from -REACH on) and across (symmetric about the canal's centre), m, level frame.
     fine : (2 n, m) float64 array
-        Without what is wide, and what is the same all along; 0 where nothing is seen.
+        Height without wide relief and without the part that is constant along the canal; 0 where not measured.
     seen : (2 n, m) float64 array
-        1 where the bed is seen.
+        1 where the bed was measured.
     likeness : (c, d) float64 array
-        Correlation of ``fine`` with itself at shifts of up to CORRELATED pixels either way.
+        Correlation of ``fine`` with itself at shifts of up to MAX_CORRELATION_LENGTH pixels in either direction.
     """
 
     height: Float
@@ -53,17 +53,17 @@ class Relief:
     likeness: Float
 
     def turned(self) -> Relief:
-        """The same for half a turn of the scanner."""
+        """Return the relief after half a turn of the scanner."""
         return Relief(self.height[::-1, ::-1], self.fine[::-1, ::-1], self.seen[::-1, ::-1], self.likeness)
 
 
 def relief_of(scan: LevelScan) -> Relief | None:
-    """Relief that a level scan sees; None if it is too little."""
+    """Return the relief of a level scan; None if there is too little."""
     low, high = scan.walls
     width = high - low
     across = scan.points[:, 1] - 0.5 * (low + high)
     near = (np.abs(scan.points[:, 0]) < REACH) & (np.abs(across) < 0.5 * width - MARGIN)
-    if near.sum() < LEAST_CELLS:
+    if near.sum() < MIN_CELLS:
         return None
     half = int(np.ceil(0.5 * width / PIXEL))
     shape = (round(2.0 * REACH / PIXEL), 2 * half)
@@ -71,77 +71,78 @@ def relief_of(scan: LevelScan) -> Relief | None:
     cell = np.floor(place / PIXEL).astype(np.int64)
     key = cell[:, 0] * shape[1] + cell[:, 1]
     height = scan.points[near, 2]
-    on_bed = np.abs(height - float(np.percentile(height, 20))) < STEPS
+    on_bed = np.abs(height - float(np.percentile(height, 20))) < MAX_HEIGHT_STEP
     key, height = key[on_bed], height[on_bed]
     order = np.lexsort([height, key])
     places, begin, count = np.unique(key[order], return_index=True, return_counts=True)
     grid, seen = np.zeros(shape), np.zeros(shape)
     grid.ravel()[places] = height[order][begin + count // 2]
     seen.ravel()[places] = 1.0
-    if seen.sum() < LEAST_CELLS:
+    if seen.sum() < MIN_CELLS:
         return None
     wide = _smooth(grid * seen) / np.maximum(_smooth(seen), 1e-6)
     fine = (grid - wide) * seen
-    usual = fine.sum(axis=0) / np.maximum(seen.sum(axis=0), 1.0)  # as the silt's rise to the foot of the walls
+    usual = fine.sum(axis=0) / np.maximum(seen.sum(axis=0), 1.0)  # for example silt rising to the foot of the walls
     fine = (fine - usual) * seen
     return Relief(grid, fine, seen, _autocorrelation(fine, seen))
 
 
 def _smooth(grid: Float) -> Float:
-    return np.asarray(gaussian_filter(grid, FINE / PIXEL))
+    return np.asarray(gaussian_filter(grid, MAX_RELIEF_WIDTH / PIXEL))
 
 
 def _autocorrelation(fine: Float, seen: Float) -> Float:
     product = fftconvolve(fine, fine[::-1, ::-1])
     shared = fftconvolve(seen, seen[::-1, ::-1])
     variance = float((fine**2).sum() / seen.sum())
-    alike = np.where(shared > LEAST_CELLS, product / np.maximum(shared, 1.0) / variance, 0.0)
+    alike = np.where(shared > MIN_CELLS, product / np.maximum(shared, 1.0) / variance, 0.0)
     middle = np.array(fine.shape) - 1
-    reach = np.minimum(CORRELATED, middle)
+    reach = np.minimum(MAX_CORRELATION_LENGTH, middle)
     return np.asarray(alike[middle[0] - reach[0] : middle[0] + reach[0] + 1, middle[1] - reach[1] : middle[1] + reach[1] + 1])
 
 
 def likelihood(one: Relief, other: Relief) -> Float:
-    """How much two scans speak for seeing the same bed, at each shift along of ``other`` against ``one``.
+    """Return the evidence that two scans show the same bed, at each shift of ``other`` relative to ``one`` along the canal.
 
     Returns
     -------
     (4 n - 1,) float64 array
-        Logarithm of the likelihood that they do over that of not, at shifts from -(2 n - 1) pixels on: x in ``one`` is x in
-        ``other`` plus the shift. Where they share too little NOWHERE.
+        Log likelihood ratio of the same bed to different beds, at shifts from -(2 n - 1) pixels on: x in ``one`` is x in
+        ``other`` plus the shift. NO_EVIDENCE where they share too little.
     """
     columns = min(one.fine.shape[1], other.fine.shape[1])
     a, b = _middle(one, columns), _middle(other, columns)
     shared = _over(a.seen, b.seen)
     product = _over(a.fine, b.fine)
     squares = _over(a.fine**2, b.seen) * _over(a.seen, b.fine**2)
-    correlation = np.clip(product / np.sqrt(np.maximum(squares, 1e-12)), -CERTAIN, CERTAIN)
-    patch = max(float((_middle_of(one.likeness, other.likeness)).sum()), 1.0)  # pixels of an independent place
-    weight = np.sqrt(np.maximum(shared / patch - FEWEST, 0.0))
-    told = (shared > LEAST_CELLS) & (weight > 0.0)
-    return np.where(told, _log_ratio(np.arctanh(correlation) * weight, np.where(told, weight, 1.0)), NOWHERE)
+    correlation = np.clip(product / np.sqrt(np.maximum(squares, 1e-12)), -MAX_CORRELATION, MAX_CORRELATION)
+    patch = max(float((_middle_of(one.likeness, other.likeness)).sum()), 1.0)  # pixels per independent place
+    weight = np.sqrt(np.maximum(shared / patch - MIN_INDEPENDENT_PLACES, 0.0))
+    told = (shared > MIN_CELLS) & (weight > 0.0)
+    return np.where(told, _log_ratio(np.arctanh(correlation) * weight, np.where(told, weight, 1.0)), NO_EVIDENCE)
 
 
 def _log_ratio(score: Float, weight: Float) -> Float:
-    """Logarithm of the likelihood of scores (n,), each with a standard deviation of 1, of one bed over that of two.
+    """Return the log likelihood ratio of scores (n,), with standard deviation 1, for one bed and for two.
 
-    How alike two scans of one bed are is not known beforehand: any correlation up to MOST_ALIKE is as likely, by Fisher's z.
+    The similarity of two scans of one bed is not known in advance: all correlations up to MAX_SAME_BED_CORRELATION are
+    equally likely, in Fisher's z.
     """
-    most = np.arctanh(MOST_ALIKE) * weight
+    most = np.arctanh(MAX_SAME_BED_CORRELATION) * weight
     high, low = log_ndtr(score), log_ndtr(score - most)
     mean = high + np.log1p(-np.exp(np.minimum(low - high, -1e-12))) - np.log(most)
     return np.asarray(mean + 0.5 * score**2 + 0.5 * np.log(2.0 * np.pi))
 
 
 def _middle(relief: Relief, columns: int) -> Relief:
-    """Its middle columns: widths of scans may differ by a pixel or two."""
+    """Return its middle columns: widths of scans may differ by a pixel or two."""
     first = (relief.fine.shape[1] - columns) // 2
     part = slice(first, first + columns)
     return Relief(relief.height[:, part], relief.fine[:, part], relief.seen[:, part], relief.likeness)
 
 
 def _middle_of(one: Float, other: Float) -> Float:
-    """Product of two autocorrelations where both are known."""
+    """Return the product of two autocorrelations where both are known."""
     rows, columns = np.minimum(one.shape, other.shape)
 
     def part(of: Float) -> Float:
@@ -152,14 +153,14 @@ def _middle_of(one: Float, other: Float) -> Float:
 
 
 def _over(one: Float, other: Float) -> Float:
-    """Sums of products of two images at all shifts along, none across: the walls have settled that."""
+    """Return sums of products of two images at all shifts along the canal; the walls already determine those across."""
     size = next_fast_len(one.shape[0] + other.shape[0] - 1, real=True)
     spectrum = (rfft(one, size, axis=0) * rfft(other[::-1], size, axis=0)).sum(axis=1)
     return np.asarray(irfft(spectrum, size)[: one.shape[0] + other.shape[0] - 1])
 
 
 def height_difference(one: Relief, other: Relief, shift: int) -> float:
-    """Median of heights of ``one`` over those of ``other`` where both see the bed at a shift, pixels."""
+    """Return the median height of ``one`` over ``other`` where both show the bed at a shift, pixels."""
     columns = min(one.fine.shape[1], other.fine.shape[1])
     a, b = _middle(one, columns), _middle(other, columns)
     size = len(a.seen)

@@ -1,7 +1,7 @@
-"""What a registration of sonar scans takes and gives.
+"""Input and results of a registration of sonar scans.
 
-Frames: a sonar's file has axes of its own, m, origin at the transducer; the tunnel's is that of its SRID, z up, m. A point
-of a file lies in the tunnel at ``rotation @ (scale * point) + translation``.
+Frames: a sonar's file has its own axes, m, with the origin at the transducer; the tunnel's frame is that of its SRID, z up,
+m. A point of a file is in the tunnel's frame at ``rotation @ (scale * point) + translation``.
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ import numpy as np
 from tunneldb.arrays import Float
 
 GIVEN = "given"
-"""State of a scan whose file is in the tunnel's system already."""
+"""State of a scan whose file is already in the tunnel's system."""
 
 PARAMETERS = ("turn x", "turn y", "turn z", "shift x", "shift y", "shift z", "scale")
 
 
 @dataclass(frozen=True)
 class Ladder:
-    """A ladder as it was measured before it was put into the water.
+    """Ladder as measured before it was placed in the water.
 
     Attributes
     ----------
     name : str
     number : tuple of int
-        Numbers of its rungs, in growing height.
+        Numbers of its rungs, by ascending height.
     height : (r,) float64 array
-        Heights of the rungs' middles along the ladder from any zero, growing, m.
+        Heights of the rungs' axes along the ladder from any zero, ascending, m.
     stile_gap : float
-        Between the middles of its two stiles, m.
+        Distance between the axes of its two stiles, m.
     diameter : float
-        Of rungs and stiles, m.
+        Diameter of rungs and stiles, m.
     """
 
     name: str
@@ -45,19 +45,19 @@ class Ladder:
 
 @dataclass(frozen=True)
 class Near:
-    """Where a sonar stood, roughly: a place (2,) in the tunnel's plan, and within how far of it, m."""
+    """Approximate place of a sonar: (2,) in the tunnel's plan, and its greatest error, m."""
 
     place: Float
     within: float
 
     def holds(self, place: Float) -> bool:
-        """Whether a place (2,) or (3,) lies there."""
+        """Return True if a place (2,) or (3,) is within the error."""
         return bool(np.linalg.norm(place[:2] - self.place) <= self.within)
 
 
 @dataclass(frozen=True)
 class SonarCloud:
-    """A sonar scan as its file has it: points (n, 3), m, whether its z axis points up (1) or down (-1), and where it stood."""
+    """Sonar scan as in its file: points (n, 3), m, z axis up (1) or down (-1), and approximate place."""
 
     path: Path
     points: Float
@@ -65,24 +65,24 @@ class SonarCloud:
     near: Near | None = None
 
     def may_stand(self, place: Float) -> bool:
-        """Whether the sonar may have stood at a place (2,) or (3,)."""
+        """Return True if the sonar may have been at a place (2,) or (3,)."""
         return self.near is None or self.near.holds(place)
 
 
 @dataclass(frozen=True)
 class Residual:
-    """What is left between a sonar scan and something that it was fitted to.
+    """Residuals of a sonar scan relative to something that it was fitted to.
 
     Attributes
     ----------
     kind : str
         ``wall``, ``ladder``, ``waterline`` or ``scan`` (the overlap with another sonar scan).
     name : str
-        Which one: the ladder's name, the other scan's file, or the side of the wall.
+        Name of the ladder, of the other scan's file, or of the wall's side.
     count : int
-        Points or patches that were used.
+        Number of points or patches used.
     median, p95 : float
-        Of the absolute distances, m.
+        Median and 95th percentile of the absolute distances, m.
     """
 
     kind: str
@@ -100,13 +100,13 @@ class SonarPose:
     ----------
     path : Path
     rotation, translation, scale
-        See the module; (3, 3), (3,) m, and a number near 1.
+        As in this module's docstring; (3, 3), (3,) m, and a number near 1.
     covariance : (7, 7) float64 array
-        Of PARAMETERS: turns about the tunnel's axes through the scanner, rad, shifts of the scanner, m, and scale.
+        Covariance of PARAMETERS: turns about the tunnel's axes through the scanner, rad, shifts of the scanner, m, and scale.
     state : str
-        ``determined``, ``weak`` (some direction is known worse than it should be) or ``undetermined`` (one is not known).
+        ``determined``, ``weak`` (a direction is less certain than required) or ``undetermined`` (a direction is unknown).
     undetermined : tuple of str
-        Directions in words, as ``along the tunnel``, ``height``, ``yaw``; of weak ones too; ``ladders disagree``.
+        Names of undetermined and weak directions, as ``along the tunnel``, ``height``, ``yaw``; ``ladders disagree``.
     residuals : tuple of Residual
     """
 
@@ -122,21 +122,21 @@ class SonarPose:
 
 @dataclass(frozen=True)
 class LadderFit:
-    """Where a ladder stands, by the laser.
+    """Place of a ladder in the laser scan.
 
     Attributes
     ----------
     name : str
     origin : (3,) float64 array
-        Middle between the stiles at height zero of the ladder, m.
+        Midpoint between the stiles at height zero of the ladder, m.
     up, across, out : (3,) float64 arrays
-        Unit vectors along the stiles upwards, along the rungs, and from the wall to the water.
+        Unit vectors up along the stiles, along the rungs, and from the wall to the water.
     rms : float
-        Of the laser's points from it, m.
+        Root mean square distance of the laser's points from it, m.
     rungs : tuple of int
-        Numbers of the rungs that the laser saw.
+        Numbers of the rungs in the laser scan.
     scans : tuple of str
-        Names of the sonar files that saw it.
+        Names of the sonar files that show it.
     """
 
     name: str
@@ -151,7 +151,7 @@ class LadderFit:
 
 @dataclass(frozen=True)
 class Registration:
-    """Outcome for all scans at once; water_level is the height of the water, m."""
+    """Result for all scans; ``water_level`` is the height of the water, m."""
 
     scans: tuple[SonarPose, ...]
     ladders: tuple[LadderFit, ...]

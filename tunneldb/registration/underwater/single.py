@@ -1,4 +1,4 @@
-"""Pose of a sonar scan by itself: from the ladders that it sees."""
+"""Pose of a single sonar scan, from the ladders that it sees."""
 
 from __future__ import annotations
 
@@ -10,44 +10,47 @@ import numpy as np
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.adjustment import fit, scan_of
-from tunneldb.registration.underwater.choice import DECIDED, explained, margin
+from tunneldb.registration.underwater.choice import MIN_MARGIN, explained, margin
 from tunneldb.registration.underwater.first_pose import Candidate, LevelScan, candidates, level, likeness
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
 from tunneldb.registration.underwater.observations import Patches, Pose, find_patches, find_smooth_patches
 from tunneldb.registration.underwater.results import SonarCloud
 from tunneldb.registration.underwater.walls import Walls
 
-HEIGHT_TOLERANCE = 0.45  # between the top of a scan's walls and the water, m
-TRIED = 8  # candidates of a scan that are fitted
-TRIED_POINTS = 60_000
-LEVEL_POINTS = 120_000  # of a scan that are levelled, and compared with ladders and with other scans'
+HEIGHT_TOLERANCE = 0.45  # m between the top of a scan's walls and the water
+MAX_CANDIDATES = 8  # candidates of a scan that are fitted
+FIT_POINTS = 60_000
+LEVEL_POINTS = 120_000  # points of a scan that are levelled and compared with ladders and other scans
 FIRST_REACHES = (0.35, 0.25, 0.2, 0.15, 0.12)
-LEAST_LIKENESS = 0.35  # of a ladder that is taken for one
-TIE = 0.92  # of the best likelihood, from which rungs are not told apart
-MOST_SCALE = 0.03  # by which sound may be faster or slower than the sonar took it to be: 45 m/s
-OTHER_PLACE = 0.6  # of the best likelihood, under which another place is none: of two ladders it sees one
-WATERLINE_SIGMA = 0.15  # of the top of a scan's walls, m
-SOME_EDGES, MOST_OFF_WATER = 6, 0.2  # edges of walls that tell where the water is, and by how much less than a rung, m
-SAME_PLACE, SAME_TURN = 0.15, np.radians(3.0)  # of two candidates that came to the same pose
-AIR, MOST_IN_AIR = 0.2, 0.15  # above the water, m: share of a scan that echoes by way of the surface may put there
-FARTHEST_LADDER = 12.0  # m from the scanner
-IN_SIGHT = 7.0  # m: a ladder nearer than that is seen, or the pose is wrong: each of its bars is two beams off the next
+MIN_LIKENESS = 0.35  # least similarity to a ladder
+MIN_TIE_RATIO = 0.92  # share of the best likelihood from which rungs are ambiguous
+MAX_SCALE_ERROR = 0.03  # greatest relative error of the sonar's speed of sound: 45 m/s
+MIN_OTHER_PLACE_RATIO = 0.6  # share of the best likelihood below which another place is rejected
+WATERLINE_SIGMA = 0.15  # standard deviation of the top of a scan's walls, m
+MIN_EDGES, MAX_WATER_ERROR = 6, 0.2  # least number of wall edges; greatest error of the water level, m (less than a rung)
+PLACE_TOLERANCE, TURN_TOLERANCE = 0.15, np.radians(3.0)  # differences of two candidates with the same pose
+MIN_AIR_HEIGHT, MAX_AIR_SHARE = (
+    0.2,
+    0.15,
+)  # height above the water, m, and share of a scan's points there by echoes off the surface
+MAX_LADDER_RANGE = 12.0  # m from the scanner
+SIGHT_RANGE = 7.0  # m: a closer ladder must be visible, or the pose is wrong: its bars are two beams apart
 
 
 @dataclass(frozen=True)
 class PreparedScan:
-    """A scan, level and thinned.
+    """Scan, level and thinned.
 
     Attributes
     ----------
     cloud : SonarCloud
     flat : LevelScan
     thin : (n, 3) float64 array
-        Some of its points, evenly, file's axes.
+        Evenly thinned points, file's axes.
     patches, smooth : Patches
-        Of all of its points.
+        Patches of all of its points.
     edges : (k, 3) float64 array
-        Where its walls end, at the water's level, file's axes.
+        Upper edges of its walls, at the water level, file's axes.
     """
 
     cloud: SonarCloud
@@ -60,7 +63,7 @@ class PreparedScan:
 
 @dataclass(frozen=True)
 class StartedScan:
-    """A scan's first pose, and the ladders that it sees, by their places in the list of those found."""
+    """First pose of a scan, and the ladders that it sees, by their index in the list of those found."""
 
     pose: Pose
     ladders: tuple[int, ...]
@@ -68,14 +71,14 @@ class StartedScan:
 
 @dataclass(frozen=True)
 class NotStarted:
-    """Why a scan has no first pose."""
+    """Reason why a scan has no first pose."""
 
     reason: str
 
 
 @dataclass(frozen=True)
 class _Fitted:
-    """A fitted candidate: the ladders that it sees, how many in sight it does not, how like ladders they look."""
+    """Fitted candidate: visible ladders, number of ladders in sight that are missing, and their similarity."""
 
     pose: Pose
     ladders: tuple[int, ...]
@@ -83,7 +86,7 @@ class _Fitted:
     likeness: float
 
     def likelihood(self, top: float) -> float:
-        """Likeness, the less the farther the water is from the top ``top`` of the scan's walls above the sonar, m."""
+        """Return the similarity, reduced by the distance of the water from the ``top`` of the walls, m above the sonar."""
         return self.likeness * float(np.exp(-0.5 * ((self.pose.translation[2] + top) / WATERLINE_SIGMA) ** 2))
 
 
@@ -93,69 +96,69 @@ def prepare(cloud: SonarCloud, walls: Walls) -> PreparedScan:
     Raises
     ------
     UserError
-        It shows no two walls as far apart as the laser's.
+        If it shows no two walls at the distance of the laser's.
     """
-    every = max(1, len(cloud.points) // TRIED_POINTS)
+    every = max(1, len(cloud.points) // FIT_POINTS)
     flat = level(cloud.points[:: max(1, len(cloud.points) // LEVEL_POINTS)], cloud.up, walls.width)
     patches, smooth = find_patches(cloud.points), find_smooth_patches(cloud.points)
     return PreparedScan(cloud, flat, cloud.points[::every], patches, smooth, flat.edges @ flat.rotation)
 
 
 def start(scan: PreparedScan, walls: Walls, found: Sequence[LaserLadder]) -> StartedScan | NotStarted:
-    """Most likely pose of a scan by itself; none if no ladder is seen, or more than one pose fits as well.
+    """Return the most likely pose of a single scan; none if it sees no ladder, or several poses fit equally well.
 
     Raises
     ------
     UserError
-        It is upside down.
+        If it is upside down.
     """
     cloud, flat, thin = scan.cloud, scan.flat, scan.thin
     placed = [one.placed for one in found if _in_reach(cloud, one)]
     may_be = candidates(flat, walls, placed, HEIGHT_TOLERANCE)
-    tried = [one for one in may_be if cloud.may_stand(one.translation)][:TRIED]
+    tried = [one for one in may_be if cloud.may_stand(one.translation)][:MAX_CANDIDATES]
     patches = find_patches(thin)
     fitted = [one for one in (_try(thin, patches, one, walls, found) for one in tried) if one.ladders]
     if not fitted:
-        return NotStarted("it shows no ladder that the laser sees")
-    high = float(np.median([(one.pose.apply(thin)[:, 2] > AIR).mean() for one in fitted]))
-    if high > MOST_IN_AIR:
-        raise UserError(f"{cloud.path}: {100.0 * high:.0f} % of its points would lie above the water: is --up right?")
-    scaled = [one for one in fitted if abs(one.pose.scale - 1.0) < MOST_SCALE]
+        return NotStarted("it shows no ladder of the laser scan")
+    high = float(np.median([(one.pose.apply(thin)[:, 2] > MIN_AIR_HEIGHT).mean() for one in fitted]))
+    if high > MAX_AIR_SHARE:
+        raise UserError(f"{cloud.path}: {100.0 * high:.0f} % of its points would be above the water; check --up")
+    scaled = [one for one in fitted if abs(one.pose.scale - 1.0) < MAX_SCALE_ERROR]
     best = max(scaled, key=lambda one: one.likelihood(flat.top), default=None)
     if best is None:
         off = 100.0 * (float(np.median([one.pose.scale for one in fitted])) - 1.0)
-        return NotStarted(f"its ranges would be {-off:+.1f} % off: is the speed of sound right (--sound-speed)?")
-    if len(flat.edges) >= SOME_EDGES and abs(best.pose.translation[2] + flat.top) > MOST_OFF_WATER:
-        return NotStarted("by its ladder the water is not where its walls end")
+        return NotStarted(f"its ranges would be wrong by {-off:+.1f} %; check the speed of sound (--sound-speed)")
+    if len(flat.edges) >= MIN_EDGES and abs(best.pose.translation[2] + flat.top) > MAX_WATER_ERROR:
+        return NotStarted("its ladder and its walls disagree about the water level")
     if best.missed:
-        return NotStarted("where it seems to stand a ladder would be in sight that it does not show")
+        return NotStarted("at its likely place it should show another ladder")
     for other in scaled:
         if other.missed or _same(best.pose, other.pose):
             continue
         less = other.likelihood(flat.top) / best.likelihood(flat.top)
-        # a wall is as good a wall a rung lower; elsewhere, or turned the other way, it is another
+        # a wall fits as well one rung lower; elsewhere, or turned by 180°, it is another wall
         if _same_place(best.pose, other.pose):
-            if less > TIE:
+            if less > MIN_TIE_RATIO:
                 return NotStarted("two of its ladder's rungs fit as well")
-        elif less > OTHER_PLACE:
+        elif less > MIN_OTHER_PLACE_RATIO:
             explanations = (_explained(thin, one.pose, walls, found) for one in (best, other))
-            if margin(thin, *explanations) < DECIDED:
-                return NotStarted("two places, or two ways round, fit as well: --start may tell them apart")
+            if margin(thin, *explanations) < MIN_MARGIN:
+                return NotStarted("two places, or two orientations, fit equally well; give its place by --start")
     return StartedScan(best.pose, best.ladders)
 
 
 def _try(points: Float, patches: Patches, candidate: Candidate, walls: Walls, found: Sequence[LaserLadder]) -> _Fitted:
-    """Fit a candidate, and tell how like the ladders look then."""
+    """Fit a candidate, and compute its similarity to the ladders."""
     pose = Pose(candidate.rotation, candidate.translation, 1.0)
     first = tuple(k for k, one in enumerate(found) if one.placed.ladder.name == candidate.ladder)
-    no_edges = np.zeros((0, 3))  # the height is to come from the ladder alone, to be compared with the water's
+    no_edges = np.zeros((0, 3))  # the height comes from the ladder only, and is then compared with the water's
     pose = fit([scan_of(points, patches, patches, no_edges, pose, first, found)], walls, found, [], FIRST_REACHES).poses[0]
     near = _near(pose, found)
     pose = fit([scan_of(points, patches, patches, no_edges, pose, near, found)], walls, found, [], FIRST_REACHES[-3:]).poses[0]
     space = pose.apply(points)
     likenesses = [(likeness(space, pose.translation, found[k].placed), k) for k in near]
-    seen = tuple(k for value, k in likenesses if value > LEAST_LIKENESS)
-    alike = sum(value for value, k in likenesses if value > LEAST_LIKENESS or k in first)
+    seen = tuple(k for value, k in likenesses if value > MIN_LIKENESS)
+    alike = sum(value for value, k in likenesses if value > MIN_LIKENESS or k in first)
     missed = misses(pose, seen, found)
     return _Fitted(pose, seen, missed, alike)
 
@@ -165,39 +168,39 @@ def _explained(points: Float, pose: Pose, walls: Walls, found: Sequence[LaserLad
 
 
 def misses(pose: Pose, seen: Sequence[int], found: Sequence[LaserLadder]) -> int:
-    """How many ladders that are in sight of a pose are not among those seen."""
-    return sum(k not in seen and _away(pose, found[k]) < IN_SIGHT for k in _near(pose, found))
+    """Return the number of ladders in sight of a pose that are not among those seen."""
+    return sum(k not in seen and _away(pose, found[k]) < SIGHT_RANGE for k in _near(pose, found))
 
 
 def _same(one: Pose, other: Pose) -> bool:
     turn = np.arccos(np.clip((np.trace(one.rotation @ other.rotation.T) - 1.0) / 2.0, -1.0, 1.0))
-    return bool(np.linalg.norm(one.translation - other.translation) < SAME_PLACE and turn < SAME_TURN)
+    return bool(np.linalg.norm(one.translation - other.translation) < PLACE_TOLERANCE and turn < TURN_TOLERANCE)
 
 
 def _same_place(one: Pose, other: Pose) -> bool:
-    """Whether two poses are the same but for the height."""
+    """Return True if two poses are the same except for the height."""
     return _same(one, Pose(other.rotation, np.array([*other.translation[:2], one.translation[2]]), other.scale))
 
 
 def sees(scan: PreparedScan, pose: Pose, found: Sequence[LaserLadder]) -> tuple[int, ...]:
-    """Which ladders a scan with this pose sees."""
+    """Return the ladders that a scan with this pose sees."""
     near = _near(pose, found)
     placed = pose.apply(scan.thin)
-    return tuple(k for k in near if likeness(placed, pose.translation, found[k].placed) > LEAST_LIKENESS)
+    return tuple(k for k in near if likeness(placed, pose.translation, found[k].placed) > MIN_LIKENESS)
 
 
 def _near(pose: Pose, found: Sequence[LaserLadder]) -> tuple[int, ...]:
-    return tuple(k for k, one in enumerate(found) if _away(pose, one) < FARTHEST_LADDER)
+    return tuple(k for k, one in enumerate(found) if _away(pose, one) < MAX_LADDER_RANGE)
 
 
 def _in_reach(cloud: SonarCloud, ladder: LaserLadder) -> bool:
-    """Whether a ladder may be near enough to where the scanner stood."""
+    """Return True if a ladder may be near enough to the scanner's place."""
     if cloud.near is None:
         return True
     away = float(np.linalg.norm(ladder.placed.origin[:2] - cloud.near.place))
-    return away < cloud.near.within + FARTHEST_LADDER
+    return away < cloud.near.within + MAX_LADDER_RANGE
 
 
 def _away(pose: Pose, ladder: LaserLadder) -> float:
-    """Distance in plan between a scanner and a ladder, m."""
+    """Return the distance in plan between a scanner and a ladder, m."""
     return float(np.linalg.norm(ladder.placed.origin[:2] - pose.translation[:2]))

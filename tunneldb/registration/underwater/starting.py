@@ -1,4 +1,4 @@
-"""First poses of all scans: by the ladders that each sees, and beside those that have one, without those that contradict."""
+"""First poses of all scans: from visible ladders, then relative to other scans, without those that contradict each other."""
 
 from __future__ import annotations
 
@@ -7,34 +7,34 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tunneldb.errors import UserError
-from tunneldb.registration.underwater.chain import OVERLAP, Reliefs, agreement, place_beside
+from tunneldb.registration.underwater.chain import MAX_OVERLAP_DISTANCE, Reliefs, agreement, place_beside
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
 from tunneldb.registration.underwater.single import PreparedScan, StartedScan, start
 from tunneldb.registration.underwater.walls import Walls
 
-FIRST = 0.5  # of the likelihood (its logarithm) of the surest of a round: less sure ones wait for the next
+MIN_ROUND_SHARE = 0.5  # share of the best log likelihood of a round; less certain scans wait for the next round
 
 
 def start_all(
     scans: Mapping[int, PreparedScan], walls: Walls, found: Sequence[LaserLadder], *, several: bool
 ) -> tuple[dict[int, StartedScan], dict[int, str]]:
-    """First poses: by the ladders that a scan sees, then beside scans that have one, as far as that leads.
+    """Find first poses from the ladders that a scan sees, then relative to scans that have one, as far as possible.
 
     Parameters
     ----------
     several : bool
-        Whether more than one ladder stands in the water, seen by the laser or not.
+        True if more than one ladder stands in the water, visible to the laser or not.
 
     Returns
     -------
     dict of int to StartedScan
     dict of int to str
-        Why each of the others has none.
+        Reason why each of the others has none.
 
     Raises
     ------
     UserError
-        At least as many of those that see a ladder are upside down as are not.
+        If at least half of the scans that see a ladder are upside down.
     """
     started: dict[int, StartedScan] = {}
     reasons, upside_down = {}, []
@@ -49,7 +49,7 @@ def start_all(
             started[i] = one
         else:
             reasons[i] = one.reason
-    # one alone may have taken one ladder for another
+    # a single scan may have confused two ladders
     if upside_down and len(upside_down) >= len(started):
         raise upside_down[0]
     reliefs = Reliefs(scans)
@@ -62,9 +62,9 @@ def start_all(
             if any(reliefs.may_overlap(k, i) for k in new):
                 at = place_beside(i, reliefs, started, walls, found)
                 beside = {k: one for k, one in beside.items() if k != i} | ({} if at is None else {i: at})
-        # what is less sure, farther off, may become so beside those that come first
+        # less certain, more distant scans may become certain next to the first ones
         most = max((likelihood for _, likelihood in beside.values()), default=0.0)
-        new = [i for i, (_, likelihood) in beside.items() if likelihood >= FIRST * most]
+        new = [i for i, (_, likelihood) in beside.items() if likelihood >= MIN_ROUND_SHARE * most]
         started |= {i: beside.pop(i)[0] for i in new}
         left = [i for i in left if i not in started]
     reasons = {i: reason for i, reason in reasons.items() if i not in started}
@@ -79,17 +79,17 @@ def _agreeing(
     *,
     several: bool,
 ) -> dict[int, StartedScan]:
-    """Those of the scans that do not contradict each other where they see the same bed: one ladder looks like another.
+    """Return the scans that do not contradict each other where they see the same bed, since ladders look alike.
 
-    Of the others ``reasons`` is told why. Where there are ``several`` ladders, a scan that sees one alone may have taken it
-    for another: it needs another scan's word, or the operator's of where it stood.
+    ``reasons`` gets the reasons for the others. With ``several`` ladders, a scan that sees only one may have confused it with
+    another: its pose needs confirmation by another scan, or by the place given by the operator.
     """
     kept = dict(started)
     said = {
         (a, b): agreement(a, b, (started[a].pose, started[b].pose), reliefs, walls)
         for a in started
         for b in started
-        if a < b and np.linalg.norm(started[a].pose.translation - started[b].pose.translation) < OVERLAP
+        if a < b and np.linalg.norm(started[a].pose.translation - started[b].pose.translation) < MAX_OVERLAP_DISTANCE
     }
 
     def votes(i: int) -> tuple[int, int]:
@@ -103,10 +103,10 @@ def _agreeing(
         worst = min(for_it - no for for_it, no in against.values())
         for i in [i for i, (for_it, no) in against.items() if for_it - no == worst]:
             del kept[i]
-            reasons[i] = "its bed is another than that which other scans show there"
+            reasons[i] = "its bed differs from the bed that other scans show there"
     if several:
         alone = [i for i, one in kept.items() if len(one.ladders) < 2 and reliefs.scans[i].cloud.near is None]
         for i in [i for i in alone if not votes(i)[0]]:
             del kept[i]
-            reasons[i] = "it sees one ladder, which may be another than it seems: --start may tell"
+            reasons[i] = "it sees only one ladder, which may be confused with another; give its place by --start"
     return kept

@@ -17,18 +17,18 @@ from tunneldb.arrays import Bool, Float, Int64
 from tunneldb.errors import UserError
 from tunneldb.robust import MAD_TO_SIGMA
 
-SPACING = 0.5  # of anchors along a wall, m
-REACH = 0.8  # half of the length of wall that an anchor is fitted to, m
-FOOT, HEAD = 0.02, 1.5  # heights between which a wall is fitted, m
-LEAST_HEIGHT = 0.25  # of what is fitted, m
-STEEPEST = 0.3  # batter, tangent
-ROUGHEST = 0.04  # m
-LEAST_POINTS = 20
-NARROWEST, WIDEST = 2.0, 40.0  # canal, m
+SPACING = 0.5  # m between anchors along a wall
+REACH = 0.8  # half length of wall fitted at an anchor, m
+FOOT, HEAD = 0.02, 1.5  # heights, m, between which a wall is fitted
+MIN_HEIGHT = 0.25  # least height of the fitted points, m
+MAX_BATTER = 0.3  # batter, tangent
+MAX_ROUGHNESS = 0.04  # m
+MIN_POINTS = 20
+MIN_WIDTH, MAX_WIDTH = 2.0, 40.0  # canal, m
 TUKEY = 4.685
-ON_WALL = 0.05  # m
+MAX_WALL_DISTANCE = 0.05  # m
 EDGE_BIN = 0.02  # m of height, for the lower edge of the walls
-USUAL = (0.1, 0.6)  # heights between which walls are seen as they usually are, m
+USUAL_HEIGHTS = (0.1, 0.6)  # heights, m, between which walls have their usual point density
 
 
 @dataclass(frozen=True)
@@ -38,15 +38,15 @@ class Walls:
     Attributes
     ----------
     foot : (k, 3) float64 array
-        Points of the walls at the water's level, m.
+        Points of the walls at the water level, m.
     normal : (k, 2) float64 array
         Horizontal unit normals, towards the water.
     batter : (k,) float64 array
-        How far the wall leans back per metre of height: it lies at ``-batter * z`` along the normal.
+        Inclination of the wall, backwards per metre of height: it lies at ``-batter * z`` along the normal.
     sigma, sigma_batter : (k,) float64 arrays
         Standard deviations of the foot along the normal, m, and of the batter.
     side : (k,) int64 array
-        Which wall a piece belongs to.
+        Index of the wall that a piece belongs to.
     """
 
     foot: Float
@@ -58,22 +58,22 @@ class Walls:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Of the feet in plan."""
+        """Search tree of the feet in plan."""
         return cKDTree(self.foot[:, :2])
 
     def some(self, keep: Bool) -> Walls:
-        """Those of a mask (k,)."""
+        """Return the pieces of a mask (k,)."""
         return Walls(
             self.foot[keep], self.normal[keep], self.batter[keep], self.sigma[keep], self.sigma_batter[keep], self.side[keep]
         )
 
     def distance(self, points: Float, piece: Int64) -> Float:
-        """Distance (n,) m of points (n, 3) in front of the pieces (n,), square to the wall."""
+        """Return the distance (n,), m, of points (n, 3) in front of the pieces (n,), square to the wall."""
         away = ((points[:, :2] - self.foot[piece, :2]) * self.normal[piece]).sum(axis=1) + self.batter[piece] * points[:, 2]
         return np.asarray(away / np.sqrt(1.0 + self.batter[piece] ** 2))
 
     def normals(self, piece: Int64) -> Float:
-        """Unit normals (n, 3) of pieces (n,), towards the water."""
+        """Return the unit normals (n, 3) of pieces (n,), towards the water."""
         out = np.column_stack([self.normal[piece], self.batter[piece]])
         return np.asarray(out / np.linalg.norm(out, axis=1)[:, None])
 
@@ -89,10 +89,10 @@ def find_walls(points: Float) -> Walls:
     Raises
     ------
     UserError
-        There is no wall down to the water, or only on one side.
+        If no wall reaches down to the water, or only on one side.
     """
     near = points[(points[:, 2] > FOOT) & (points[:, 2] < HEAD)]
-    low = near[near[:, 2] < LEAST_HEIGHT]
+    low = near[near[:, 2] < MIN_HEIGHT]
     cells = np.unique(np.floor(low[:, :2] / SPACING), axis=0)
     found = []
     if len(cells):
@@ -103,7 +103,7 @@ def find_walls(points: Float) -> Walls:
                 found.append(piece)
     if not found:
         raise UserError(
-            "no wall reaches down to the water in the laser's points: is --water-level right, and in the tunnel's heights?"
+            "no wall reaches down to the water in the laser's points; check --water-level (in the tunnel's height system)"
         )
     table = np.array(found)
     foot, normal = table[:, :3], table[:, 3:5]
@@ -112,25 +112,25 @@ def find_walls(points: Float) -> Walls:
 
 
 def lower_edge(points: Float, walls: Walls) -> float:
-    """Height down to which laser points (n, 3) show the walls, m: above it they are at least half as dense as higher up.
+    """Return the height, m, down to which laser points (n, 3) show the walls, at half their usual density or more.
 
-    Nothing below ``points`` is looked at; images of the walls in the water are fewer.
+    Only ``points`` are examined; mirror images of the walls in the water are fewer.
     """
-    low = points[points[:, 2] < USUAL[1]]
+    low = points[points[:, 2] < USUAL_HEIGHTS[1]]
     away, piece = walls.tree.query(low[:, :2], distance_upper_bound=2.0 * SPACING)
     known = np.isfinite(away)
     low, piece = low[known], piece[known]
-    height = low[np.abs(walls.distance(low, piece)) < ON_WALL, 2]
-    bins = np.arange(np.floor(height.min() / EDGE_BIN), USUAL[1] / EDGE_BIN + 0.5) * EDGE_BIN
+    height = low[np.abs(walls.distance(low, piece)) < MAX_WALL_DISTANCE, 2]
+    bins = np.arange(np.floor(height.min() / EDGE_BIN), USUAL_HEIGHTS[1] / EDGE_BIN + 0.5) * EDGE_BIN
     count, _ = np.histogram(height, bins)
-    usual = float(np.median(count[bins[:-1] > USUAL[0]]))
+    usual = float(np.median(count[bins[:-1] > USUAL_HEIGHTS[0]]))
     return float(bins[int(np.argmax(count > 0.5 * usual))])
 
 
 def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Float) -> list[float] | None:
-    """Line and batter about a place in plan: foot (3), normal (2), batter and their standard deviations; None if no wall."""
+    """Fit a line with batter around a place in plan: foot (3), normal (2), batter, standard deviations; None if no wall."""
     around = low[low_tree.query_ball_point(centre, REACH)]
-    if len(around) < LEAST_POINTS:
+    if len(around) < MIN_POINTS:
         return None
     middle = around[:, :2].mean(axis=0)
     _, _, axes = np.linalg.svd(around[:, :2] - middle, full_matrices=False)
@@ -138,7 +138,7 @@ def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Floa
     along = (mine[:, :2] - middle) @ axes[0]
     across = (mine[:, :2] - middle) @ axes[1]
     design = np.column_stack([np.ones(len(mine)), along, mine[:, 2]])
-    weight = (mine[:, 2] < LEAST_HEIGHT).astype(np.float64)  # what begins higher, as behind a towpath, is no start
+    weight = (mine[:, 2] < MIN_HEIGHT).astype(np.float64)  # not points that begin higher, as behind a towpath
     answer, scale = np.zeros(3), np.inf
     for _ in range(12):
         normal_matrix = design.T @ (design * weight[:, None])
@@ -149,11 +149,11 @@ def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Floa
         scale = max(MAD_TO_SIGMA * float(np.median(np.abs(residual[weight > 0.1]))), 1e-3)
         weight = np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0, None) ** 2
     used = mine[weight > 0.1]
-    if len(used) < LEAST_POINTS or np.ptp(used[:, 2]) < LEAST_HEIGHT or np.ptp(along[weight > 0.1]) < SPACING:
+    if len(used) < MIN_POINTS or np.ptp(used[:, 2]) < MIN_HEIGHT or np.ptp(along[weight > 0.1]) < SPACING:
         return None
-    if scale > ROUGHEST or abs(answer[2]) > STEEPEST:
+    if scale > MAX_ROUGHNESS or abs(answer[2]) > MAX_BATTER:
         return None
-    # Stones are some decimetres: their relief is not averaged by points, but by as many stones as there are.
+    # Stones are some decimetres wide: their relief averages out with the number of stones, not of points.
     stones = max(np.ptp(used[:, 2]) * np.ptp(along[weight > 0.1]) / 0.3**2, 1.0)
     covariance = np.linalg.inv(design.T @ (design * weight[:, None])) * len(used) * scale**2 / stones
     line = np.array([1.0, answer[1]]) / np.hypot(1.0, answer[1])
@@ -166,23 +166,23 @@ def _fit(near: Float, low: Float, tree: cKDTree, low_tree: cKDTree, centre: Floa
 
 
 def _opposite(foot: Float, normal: Float) -> tuple[Float, Bool]:
-    """Distance to the wall opposite, m (median over those seen), of each piece along its normal, and whether there is one."""
+    """Return the median distance, m, of each piece to the opposite wall along its normal, and whether there is one."""
     away = foot[None, :, :2] - foot[:, None, :2]
     ahead = (away * normal[:, None]).sum(axis=2)
     beside = np.abs(away[..., 0] * -normal[:, None, 1] + away[..., 1] * normal[:, None, 0])
-    facing = (ahead > NARROWEST) & (ahead < WIDEST) & (beside < 2.0 * SPACING)
+    facing = (ahead > MIN_WIDTH) & (ahead < MAX_WIDTH) & (beside < 2.0 * SPACING)
     distance = np.where(facing, ahead, np.inf).min(axis=1)
     return distance, np.isfinite(distance)
 
 
 def _orient(walls: Walls) -> Walls:
-    """Turn normals to the water, keep the pieces that face each other, and name the sides."""
+    """Turn normals to the water, keep the pieces that face each other, and assign the sides."""
     ahead, some_ahead = _opposite(walls.foot, walls.normal)
     behind, some_behind = _opposite(walls.foot, -walls.normal)
     turn = np.where(behind < ahead, -1.0, 1.0)
     keep = some_ahead | some_behind
     if not keep.any():
-        raise UserError("the laser's points show the wall of one side only at the water: both are needed")
+        raise UserError("the laser's points show only one of the two walls at the water; both are needed")
     turned = Walls(
         walls.foot, walls.normal * turn[:, None], walls.batter * turn, walls.sigma, walls.sigma_batter, walls.side
     ).some(keep)
@@ -191,12 +191,12 @@ def _orient(walls: Walls) -> Walls:
     links = pairs[same]
     count = len(turned.foot)
     _, label = connected_components(coo_array((np.ones(len(links)), links.T), (count, count)), directed=False)
-    # Pieces parted by a gap are of one side if they face the same way along the canal.
+    # Pieces separated by a gap are on the same side if they face the same way.
     main = np.linalg.svd(turned.foot[:, :2] - turned.foot[:, :2].mean(axis=0), full_matrices=False)[2][0]
     left = turned.normal @ np.array([-main[1], main[0]]) > 0.0
     sizes = np.bincount(label)
     keep = sizes[label] >= 3
     if not (keep & left).any() or not (keep & ~left).any():
-        raise UserError("the laser's points show the wall of one side only at the water: both are needed")
+        raise UserError("the laser's points show only one of the two walls at the water; both are needed")
     named = Walls(turned.foot, turned.normal, turned.batter, turned.sigma, turned.sigma_batter, left.astype(np.int64))
     return named.some(keep)

@@ -1,7 +1,7 @@
-"""Where the walls of a sonar scan end: the water's level, seen from below.
+"""Upper edges of the walls of a sonar scan, which are at the water level, seen from below.
 
-Above it a scan shows only echoes by way of the water's surface, which are fewer. Each metre of either wall gives an edge; a
-beam whose axis passes less than half its width above the edge still meets the wall, which is taken off.
+Above them a scan shows only echoes off the water's surface, which are fewer. Each metre of either wall gives an edge. A beam
+whose axis passes less than half its width above the edge still hits the wall; this is corrected.
 """
 
 from __future__ import annotations
@@ -11,33 +11,33 @@ import numpy as np
 from tunneldb.arrays import Float
 
 STRIP = 1.0  # m along a wall
-NEAREST, FARTHEST = 2.0, 9.0  # m along, from the sonar
-THICK = 0.1  # of a wall, m
+MIN_DISTANCE, MAX_DISTANCE = 2.0, 9.0  # m along the canal, from the sonar
+WALL_THICKNESS = 0.1  # of a wall, m
 BIN = 0.05  # m of height
-LEAST_POINTS = 60  # of a strip
-SMOOTH = 3  # bins
-FAN_MARGIN = np.radians(2.0)  # below the fan's upper end, nearer to which an edge may be that of the fan
+MIN_POINTS = 60  # of a strip
+SMOOTHING_BINS = 3  # bins
+FAN_MARGIN = np.radians(2.0)  # below the fan's upper end; closer edges may be those of the fan
 BEAM = np.radians(1.0)
 
 
 def find_waterline(points: Float, walls: tuple[float, float], slopes: tuple[float, float]) -> Float:
-    """Edges (k, 3) of the walls of a level scan (n, 3), in its axes: x along the canal, y across, z up.
+    """Return the edges (k, 3) of the walls of a level scan (n, 3), in its axes: x along the canal, y across, z up.
 
     Parameters
     ----------
     walls, slopes
-        Places y of the two walls at z = 0, and by how much y grows per metre of height.
+        Positions y of the two walls at z = 0, and change of y per metre of height.
     """
     reach = np.linalg.norm(points, axis=1)
     elevation = points[:, 2] / np.maximum(reach, 1e-6)
     fan = float(np.percentile(elevation[reach > 1.0], 99.8)) if (reach > 1.0).any() else 0.0
     edges = []
     for place, slope in zip(walls, slopes, strict=True):
-        wall = points[np.abs(points[:, 1] - place - slope * points[:, 2]) < THICK]
+        wall = points[np.abs(points[:, 1] - place - slope * points[:, 2]) < WALL_THICKNESS]
         strip = np.floor(wall[:, 0] / STRIP).astype(np.int64)
         for k in np.unique(strip):
             middle = (k + 0.5) * STRIP
-            if not NEAREST < abs(middle) < FARTHEST:
+            if not MIN_DISTANCE < abs(middle) < MAX_DISTANCE:
                 continue
             height = _edge(wall[strip == k, 2])
             if height is None:
@@ -50,13 +50,13 @@ def find_waterline(points: Float, walls: tuple[float, float], slopes: tuple[floa
 
 
 def _edge(height: Float) -> float | None:
-    """Height above which a strip of wall has less than half as many points as below; None if it has no such edge."""
-    if len(height) < LEAST_POINTS:
+    """Return the height above which a strip of wall has less than half as many points as below; None if there is none."""
+    if len(height) < MIN_POINTS:
         return None
     low = float(height.min())
     histogram = np.bincount(((height - low) / BIN).astype(np.int64)).astype(np.float64)
-    smooth = np.convolve(histogram, np.ones(SMOOTH) / SMOOTH, mode="same")
+    smooth = np.convolve(histogram, np.ones(SMOOTHING_BINS) / SMOOTHING_BINS, mode="same")
     usual = float(np.median(smooth[smooth > 0.2 * smooth.max()]))
     above = np.flatnonzero(smooth > 0.5 * usual)
-    # between the last bin that has half of it and the next
+    # between the last bin with at least half and the next
     return low + (float(above[-1]) + 1.0) * BIN

@@ -1,4 +1,4 @@
-"""Synthetic canal tunnels with truth: a laser's scans above the water, a sonar's below it.
+"""Synthetic canal tunnels with reference data: laser scans above the water, sonar scans below it.
 
 >>> from tunneldb.simulate.canal import CanalParameters, simulate
 >>> scene = simulate(CanalParameters(seed=3))

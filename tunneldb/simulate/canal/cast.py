@@ -1,4 +1,4 @@
-"""Rays that meet the canal's surfaces: steps of the clearance (sphere tracing; Hart, 1996), closed formulas for ladders.
+"""Ray casting in a canal: sphere tracing by clearance (Hart, 1996), closed formulas for ladders.
 
 A ray ends on the first surface, on the water, or nowhere: beyond its limit or outside the canal's ends.
 """
@@ -17,13 +17,13 @@ from tunneldb.simulate.canal.section import LADDER, WATER, Section, clearance
 from tunneldb.threads import in_blocks
 
 _STEPS = 800
-_SHARE = 0.85  # of the clearance that a step goes
-_LEAST = 0.001  # m of a step; what it passes is found by bisection
-_CLOSE = 1e-4  # m
+_STEP_SHARE = 0.85  # share of the clearance per step
+_MIN_STEP = 0.001  # m least step; skipped surfaces are found by bisection
+_TOLERANCE = 1e-4  # m
 _HALVINGS = 14
-_NORMAL = 0.01  # m between the places that give a normal
+_NORMAL_STEP = 0.01  # m between the points for a normal
 _BLOCK = 20_000  # rays
-NOTHING = -1
+NO_HIT = -1
 # Cylinders: one end, unit axis, length, radius, ladder x 100 + rung (stiles: rung 0).
 CYLINDER_COLUMNS = 9
 # Frames: middle, three unit axes, half sizes along them, first cylinder and the one after the last.
@@ -31,7 +31,7 @@ FRAME_COLUMNS = 17
 
 
 class Scene(NamedTuple):
-    """All that rays can meet: section, solids (n, 10), cylinders (n, 9) of ladders, and a frame (n, 17) about each ladder."""
+    """All objects for rays: section, solids (n, 10), cylinders (n, 9) of ladders, and a frame (n, 17) around each ladder."""
 
     section: Section
     solids: Float
@@ -41,7 +41,7 @@ class Scene(NamedTuple):
 
 @inner
 def _passes(f: Float, k: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float) -> bool:  # pragma: no cover
-    """Whether a ray passes through the frame of a ladder (slabs; Kay and Kajiya, 1986)."""
+    """Return True if a ray crosses the frame of a ladder (slabs; Kay and Kajiya, 1986)."""
     near, far = 0.0, 1e9
     wx, wy, wz = ox - f[k, 0], oy - f[k, 1], oz - f[k, 2]
     for a in range(3):
@@ -64,7 +64,7 @@ def _passes(f: Float, k: int, ox: float, oy: float, oz: float, dx: float, dy: fl
 def _cylinder(
     r: Float, k: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Range to a cylinder from outside (1e9: missed) and cosine of incidence."""
+    """Return range to a cylinder from outside (1e9: missed) and cosine of incidence."""
     wx, wy, wz = ox - r[k, 0], oy - r[k, 1], oz - r[k, 2]
     along = wx * r[k, 3] + wy * r[k, 4] + wz * r[k, 5]
     slope = dx * r[k, 3] + dy * r[k, 4] + dz * r[k, 5]
@@ -88,8 +88,8 @@ def _cylinder(
 def first_hit(
     scene: Scene, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, limit: float
 ) -> tuple[float, int, int, float]:  # pragma: no cover - compiled
-    """Range, kind, part of a ladder and cosine of incidence where a local ray ends first; kind -1: nowhere."""
-    end, kind, part, cosine = limit, NOTHING, 0, 0.0
+    """Return range, kind, part of a ladder and cosine of incidence at the first hit of a local ray; kind -1: nowhere."""
+    end, kind, part, cosine = limit, NO_HIT, 0, 0.0
     if oz * dz < 0.0 and -oz / dz < end:
         end, kind, cosine = -oz / dz, WATER, abs(dz)
     for k in range(scene.frames.shape[0]):
@@ -102,7 +102,7 @@ def first_hit(
     for _ in range(_STEPS):
         x, y, z = ox + t * dx, oy + t * dy, oz + t * dz
         free, surface = clearance(scene.section, scene.solids, x, y, z)
-        if free < _CLOSE:
+        if free < _TOLERANCE:
             if free < 0.0:
                 low, high = last, t
                 for _ in range(_HALVINGS):
@@ -116,19 +116,19 @@ def first_hit(
                 return end, kind, part, cosine
             x, y, z = ox + t * dx, oy + t * dy, oz + t * dz
             if abs(stationed(scene.section.radius, x, y)[0]) > scene.section.half_length:
-                return limit, NOTHING, 0, 0.0
+                return limit, NO_HIT, 0, 0.0
             free = clearance(scene.section, scene.solids, x, y, z)[0]
-            gx = clearance(scene.section, scene.solids, x + _NORMAL, y, z)[0] - free
-            gy = clearance(scene.section, scene.solids, x, y + _NORMAL, z)[0] - free
-            gz = clearance(scene.section, scene.solids, x, y, z + _NORMAL)[0] - free
+            gx = clearance(scene.section, scene.solids, x + _NORMAL_STEP, y, z)[0] - free
+            gy = clearance(scene.section, scene.solids, x, y + _NORMAL_STEP, z)[0] - free
+            gz = clearance(scene.section, scene.solids, x, y, z + _NORMAL_STEP)[0] - free
             size = math.sqrt(gx * gx + gy * gy + gz * gz)
             slant = abs(gx * dx + gy * dy + gz * dz) / max(size, 1e-12)
             return t, surface, 0, slant
         last = t
-        t += max(_SHARE * free, _LEAST)
+        t += max(_STEP_SHARE * free, _MIN_STEP)
         if last >= end:
             return end, kind, part, cosine
-    return limit, NOTHING, 0, 0.0
+    return limit, NO_HIT, 0, 0.0
 
 
 @kernel
@@ -149,7 +149,7 @@ def _cast(
 
 
 class Hits(NamedTuple):
-    """Where rays ended, arrays of n: range m, kind (-1: nowhere), part of a ladder (100 x ladder + rung), cosine."""
+    """Ends of rays, arrays of n: range m, kind (-1: nowhere), part of a ladder (100 x ladder + rung), cosine."""
 
     range: Float
     kind: Int32
@@ -158,7 +158,7 @@ class Hits(NamedTuple):
 
 
 def cast(scene: Scene, origin: Float, direction: Float, limit: Float | float) -> Hits:
-    """Follow local rays (unit directions (n, 3)) from their origins ((3,) or (n, 3)) up to a range."""
+    """Cast local rays (unit directions (n, 3)) from their origins ((3,) or (n, 3)) up to a range."""
     count = len(direction)
     start = np.ascontiguousarray(np.broadcast_to(origin, (count, 3)), dtype=float)
     ends = np.ascontiguousarray(np.broadcast_to(limit, (count,)), dtype=float)

@@ -1,4 +1,4 @@
-"""A synthetic canal tunnel and all its scans."""
+"""Synthetic canal tunnel with all its scans."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ VERTEX_SPACING = 5.0  # of the given axis, m
 
 @dataclass(frozen=True)
 class CanalScene:
-    """A canal tunnel with its scans and their truth; points and places in the tunnel's frame, m.
+    """Canal tunnel with its scans and reference data; points and positions in the tunnel's frame, m.
 
     Attributes
     ----------
@@ -46,25 +46,25 @@ class CanalScene:
 
     @property
     def ladders(self) -> tuple[TrueLadder, ...]:
-        """Ladders that stand in the water."""
+        """Ladders in the water."""
         return self.layout.ladders
 
     @property
     def section(self) -> Section:
-        """Cross-section, as compiled functions take it."""
+        """Return the cross-section for compiled functions."""
         return self.layout.scene.section
 
     def distance(self, points: Float) -> Float:
-        """Distance (n,) of points (n, 3) from the nearest surface, or a little less, m; negative behind it; no ladders."""
+        """Return the distance (n,) of points (n, 3) from the nearest surface (a lower bound), m; negative behind; no ladder."""
         return clearances(self.section, self.layout.scene.solids, self.line.to_local(points))[0]
 
     def bed_height(self, chainage: Float, across: Float) -> Float:
-        """Height (n,) of the bed in the tunnel's frame at chainages and places right of the axis (n,), m."""
+        """Return the height (n,) of the bed in the tunnel's frame at chainages and distances right of the axis (n,), m."""
         stations = np.asarray(chainage, float) - 0.5 * self.parameters.length
         return self.parameters.water_level + bed_heights(self.section, stations, -np.asarray(across, float))
 
     def bed_volume(self, start: float, stop: float, height: float, half_width: float) -> float:
-        """Volume of the bed above a height between two chainages, half_width m to both sides, m³; by cells of 5 cm."""
+        """Return the volume of the bed above a height between two chainages, ``half_width`` m either side, m³ (5 cm cells)."""
         step = 0.05
         x, y = np.meshgrid(np.arange(start + step / 2, stop, step), np.arange(-half_width + step / 2, half_width, step))
         above = self.bed_height(x.ravel(), y.ravel()) - height
@@ -73,7 +73,7 @@ class CanalScene:
 
 
 def simulate(parameters: CanalParameters, progress: Callable[[str], None] = lambda what: None) -> CanalScene:
-    """Make a canal tunnel and scan it; ``progress`` is told what was done."""
+    """Make a canal tunnel and scan it; ``progress`` receives descriptions of completed steps."""
     line = Centreline.of(parameters)
     layout = lay_out(parameters, line)
     points, number = scan_by_laser(parameters, layout)

@@ -1,4 +1,4 @@
-"""Where ladders, piers, niches, objects, boat and scanners stand in a synthetic canal tunnel."""
+"""Positions of ladders, piers, niches, objects, boat and scanners in a synthetic canal tunnel."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ OVERHANG = 0.12  # m of the stiles beyond the first and the last rung
 
 @dataclass(frozen=True)
 class TrueLadder:
-    """A ladder that stands in the water.
+    """Ladder in the water.
 
     Attributes
     ----------
     name : str
     origin : (3,) float array
-        Middle between the stiles at height zero along the ladder, tunnel's frame, m.
+        Midpoint between the stiles at height zero along the ladder, tunnel's frame, m.
     axes : (3, 3) float array
         Unit vectors along the rungs, along the stiles upwards, and from the wall to the water, in rows.
     heights : (r,) float array
-        Of the rungs' middles along the ladder, as measured before it was put there, m.
+        Heights of the rungs' axes along the ladder, as measured before it was placed, m.
     hidden : tuple of int
-        Places in ``heights`` of rungs that no scan sees.
+        Indices in ``heights`` of rungs that no scan shows.
     """
 
     name: str
@@ -59,7 +59,7 @@ class TrueLadder:
 
 
 class Tripod(NamedTuple):
-    """Where a sonar stands: place (3,) in the local frame, m, and rotation (3, 3) of its upright axes to the local ones."""
+    """Position of a sonar: (3,) in the local frame, m, and rotation (3, 3) of its upright axes to the local ones."""
 
     place: Float
     rotation: Float
@@ -67,7 +67,7 @@ class Tripod(NamedTuple):
 
 @dataclass(frozen=True)
 class Layout:
-    """All that stands in the canal, and the scanners' places; ``lasers`` (n, 3) in the local frame, m."""
+    """All objects in the canal, and the scanner positions; ``lasers`` (n, 3) in the local frame, m."""
 
     scene: Scene
     ladders: tuple[TrueLadder, ...]
@@ -76,7 +76,7 @@ class Layout:
 
 
 def lay_out(parameters: CanalParameters, line: Centreline) -> Layout:
-    """Place everything by chance; the same seed places it alike."""
+    """Place everything at random, reproducibly by seed."""
     rng = np.random.default_rng([parameters.seed, 1])
     cut = section(parameters)
     stations = _stations(parameters.sonar_stations, parameters.sonar_spacing)
@@ -110,7 +110,7 @@ def _stations(count: int, spacing: float) -> Float:
 
 
 def _ladder_stations(parameters: CanalParameters, stations: Float, rng: np.random.Generator) -> Float:
-    """Evenly over the sonars' stretch, from its middle on, at least a spacing of theirs apart."""
+    """Return stations spread evenly over the sonars' stretch, from its middle, at least one sonar spacing apart."""
     step = max(parameters.sonar_spacing, 3.0)
     order = np.array([0.5 * (-1.0) ** k * (k + (k + 1) % 2) for k in range(parameters.ladders)])
     middle = float(stations.mean()) if len(stations) else 0.0
@@ -123,7 +123,7 @@ def _ladder_stations(parameters: CanalParameters, stations: Float, rng: np.rando
 def _ladder(
     parameters: CanalParameters, line: Centreline, k: int, station: float, side: float, first: int, rng: np.random.Generator
 ) -> tuple[TrueLadder, Float, Float]:
-    """A ladder, its bars as cylinders, and the frame about it, in the local frame."""
+    """Return a ladder, its bars as cylinders, and the frame around it, in the local frame."""
     p = parameters
     heights = np.concatenate([[0.0], np.cumsum(rng.normal(GAP, GAP_SPREAD, RUNGS - 1))])
     along, left, up = line.axes(station)
@@ -136,7 +136,7 @@ def _ladder(
     out /= np.linalg.norm(out)
     across = np.cross(rise, out)
     submerged = rng.uniform(*p.ladder_submerged)
-    # its upper end stands before the wall, or rests on it
+    # its upper end is in front of the wall, or rests on it
     top = (heights[-1] + OVERHANG - submerged) * (math.tan(lean) - math.tan(math.radians(p.batter)))
     standoff = max(rng.uniform(*p.ladder_standoff), top + DIAMETER)
     water = line.local(np.array([station, side * (0.5 * p.width - standoff), 0.0]))[0]
@@ -172,7 +172,7 @@ def _ladder(
 def _solids(
     parameters: CanalParameters, cut: Section, stations: list[float], ladders: list[float], rng: np.random.Generator
 ) -> Float:
-    """Piers and niches along both walls, where no ladder stands, objects on the bed, and a boat at a wall."""
+    """Return piers and niches along both walls away from ladders, objects on the bed, and a boat at a wall."""
     p, half = parameters, 0.5 * parameters.width
     reach = 0.5 * p.length - 1.5
     rows = []

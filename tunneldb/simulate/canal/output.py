@@ -1,4 +1,4 @@
-"""Files of a synthetic canal tunnel: the laser's points, stations, sonar scans, ladders, axis, and truth."""
+"""Files of a synthetic canal tunnel: laser points, stations, sonar scans, ladders, axis and reference data."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 import tunneldb
 from tunneldb.errors import UserError
-from tunneldb.files import made_folder, room_told
+from tunneldb.files import disk_full_as_oserror, made_folder
 from tunneldb.simulate.canal.generate import CanalScene
 from tunneldb.simulate.canal.layout import TrueLadder
 from tunneldb.simulate.canal.section import KINDS
@@ -23,7 +23,7 @@ from tunneldb.simulate.output import CREATED, SCALE
 
 @dataclass(frozen=True)
 class CanalFiles:
-    """What :func:`write` made."""
+    """Files written by :func:`write`."""
 
     laser: Path
     stations: Path
@@ -34,19 +34,19 @@ class CanalFiles:
 
 
 def write(scene: CanalScene, folder: Path) -> CanalFiles:
-    """Write a scene's files into ``folder``; they appear there when all are complete.
+    """Write a scene's files into ``folder``; they appear there only when all are complete.
 
     Raises
     ------
     UserError
-        The folder cannot be written, or the disk is full.
+        If the folder cannot be written to, or the disk is full.
     """
     name = scene.parameters.name
     try:
         with (
             made_folder(folder),
             TemporaryDirectory(dir=folder, prefix=".simulate-") as scratch,
-            room_told(Path(scratch)),
+            disk_full_as_oserror(Path(scratch)),
         ):
             _write(scene, Path(scratch), name)
             for path in sorted(Path(scratch).iterdir()):

@@ -1,4 +1,4 @@
-"""What a synthetic canal tunnel is made of, and how it is scanned above and below the water."""
+"""Parameters of a synthetic canal tunnel, and of its scans above and below the water."""
 
 from __future__ import annotations
 
@@ -44,92 +44,92 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "sound_speed_scan_spread": (0.0, 0.01, "of the range"),
     "sonar_settling": (0.0, 0.5, "m"),
     "false_share": (0.0, 0.5, "of the points"),
-    "water_surface_share": (0.0, 1.0, "of the beams that meet it"),
+    "water_surface_share": (0.0, 1.0, "of the beams that hit it"),
     "laser_stations": (0, 40, "stations"),
     "laser_step": (0.02, 2.0, "degrees"),
     "laser_ladder_step": (0.01, 2.0, "degrees"),
     "laser_noise": (0.0, 0.05, "m"),
-    "laser_mirror_share": (0.0, 1.0, "of the rays that meet the water"),
+    "laser_mirror_share": (0.0, 1.0, "of the rays that hit the water"),
 }
 
 
 @dataclass(frozen=True, kw_only=True)
 class CanalParameters:
-    """A synthetic canal tunnel and its scans; lengths in m, angles in degrees, heights over the water where not said otherwise.
+    """Synthetic canal tunnel and its scans; lengths in m, angles in degrees, heights above the water unless stated otherwise.
 
     Attributes
     ----------
     seed : int
-        Decides relief, places, poses and noise.
+        Random seed for relief, positions, poses and noise.
     origin : (float, float)
-        Easting and northing of the middle of the canal at half its length.
+        Easting and northing of the axis at half the canal's length.
     azimuth : float
         Grid azimuth of the axis there, clockwise from north.
     radius : float
-        Of the axis in plan: positive curves to the left, negative to the right, 0 is straight.
+        Radius of the axis in plan: positive curves to the left, negative to the right, 0 is straight.
     water_level : float
         Height of the water surface in the tunnel's frame.
     width, depth : float
-        Of the canal at the water; of the bed's middle below it, without relief.
+        Width of the canal at the water; depth of the bed's middle below it, without relief.
     springing, vault_radius : float
-        Height where the vault begins, and its radius; made larger where it could not span walls and towpath.
+        Height of the springing, and radius of the vault, increased if it could not span walls and towpath.
     batter, batter_below : float
-        Angle of the walls to the vertical above and below the water; the canal is narrower at its foot.
+        Angle of the walls to the vertical above and below the water; the canal is narrower at its bottom.
     roughness, roughness_length : float
         Standard deviation and correlation length of the relief of stones.
     joint_depth : float
-        Of the joints, in courses of 0.3 m.
+        Depth of the joints, in courses of 0.3 m.
     bed_relief, bed_length, bed_rise : float
-        Standard deviation and correlation length of the silt's relief; its rise to the foot of the walls.
+        Standard deviation and correlation length of the silt's relief; its rise towards the walls.
     towpath : str
-        left, right or none: a ledge over one bank, whose retaining wall is the canal's wall.
+        left, right or none: ledge along one bank, whose retaining wall is the canal's wall.
     piers, niches, objects : int
-        Buttresses before the walls, recesses in them, and spheres and boxes on the bed.
+        Numbers of buttresses in front of the walls, recesses in them, and spheres and boxes on the bed.
     boat : bool
-        A boat is moored at a wall.
+        True for a boat moored at a wall.
     ladders : int
-        Alternately on both banks, between the sonar's stations.
+        Number of ladders, alternately on both banks, between the sonar's stations.
     ladder_standoff, ladder_lean, ladder_sideways : (float, float)
-        Least and greatest distance to the wall, angle towards the wall, and angle along the wall (either way).
+        Limits of the distance to the wall, of the lean towards the wall, and of the lean along the wall (either way).
     ladder_submerged : (float, float)
-        Least and greatest length under water.
+        Limits of the length under water.
     hidden_rungs : int
-        Rungs of each ladder that no scan sees; they are listed as all others.
+        Number of rungs of each ladder that no scan shows; they are listed like all others.
     sonar_stations, sonar_spacing : int, float
-        Along the axis, centred.
+        Number of stations and their spacing along the axis, centred.
     sonar_tilts : tuple of float
-        Elevations of the middle of the fan; each is a scan of its own at each station.
+        Elevations of the middle of the fan; each is a separate scan at each station.
     sonar_depth, sonar_offset : (float, float)
-        Least and greatest depth below the water, and distance from the canal's middle (either way).
+        Limits of the depth below the water, and of the distance from the canal's middle (either way).
     sonar_tripod_tilt : float
         Standard deviation of the inclination of the tripod about both horizontal axes.
     sonar_z_down : bool
-        The files' z axis points down (x stays, y is reversed with it: both frames are right-handed).
+        True if the files' z axis points down (x is unchanged, y is reversed: both frames are right-handed).
     sonar_step, sonar_beams, sonar_swath, sonar_beam_width : float, int, float, float
-        Step of azimuth, beams of a fan, the fan's height and a beam's width at half of its power (two-way). The device's are
-        0.18, 256, 45 and 1; the step's default is four times that, so that a scan has about 110 000 points.
+        Step of azimuth, beams of a fan, the fan's height and a beam's two-way half-power width. The values of the device are
+        0.18, 256, 45 and 1; the default step is four times larger, so that a scan has about 110 000 points.
     sub_rays : int
-        Rays cast in a beam: 1, 7, 13 or 19.
+        Rays per beam: 1, 7, 13 or 19.
     sonar_resolution, sonar_noise, sonar_maximum_range : float
-        Length of the pulse in range; standard deviation of a range; no range beyond.
+        Length of the pulse in range; standard deviation of a range; greatest range.
     sound_speed_error : float or None
-        Of the session: true range is the file's times 1 + error. None: uniform within ± ``sound_speed_spread``.
+        Relative error of the session: true range is the file's times 1 + error. None: uniform within ± ``sound_speed_spread``.
     sound_speed_scan_spread : float
-        Greatest further error of each scan.
+        Greatest additional error of each scan.
     sonar_settling : float
-        Distance that the tripod has moved by during the second half of each rotation; 0: stands.
+        Movement of the tripod during the second half of each rotation; 0: none.
     false_share : float
-        False echoes among a scan's points: random, by the water surface, between walls, by side lobes.
+        Share of false echoes in a scan: random, by the water surface, between walls, by side lobes.
     water_surface_share : float
-        Of the beams that meet the water surface and nothing else, those that return its echo.
+        Share of the beams to the water surface only that return its echo.
     laser_stations, laser_spacing : int, float
-        Along the axis, centred.
+        Number of stations and their spacing along the axis, centred.
     laser_step, laser_ladder_step : float
-        Between rays, over all and about ladders (there not below 2.5 mm at the ladder).
+        Steps between rays, in the overview and around ladders (there at least 2.5 mm at the ladder).
     laser_noise : float
         Standard deviation of a range.
     laser_mirror_share : float
-        Of the rays that meet the water, those that return a mirror image of what is above.
+        Share of the rays to the water that return a mirror image of objects above it.
     """
 
     name: str = "canal"
@@ -207,16 +207,16 @@ class CanalParameters:
         for name in ("ladder_standoff", "ladder_lean", "ladder_sideways", "ladder_submerged", "sonar_depth", "sonar_offset"):
             low, high = getattr(self, name)
             if not 0.0 <= low <= high:
-                raise UserError(f"{name.replace('_', '-')} is {low:g} to {high:g}: give two growing values from 0 on")
+                raise UserError(f"{name.replace('_', '-')} is {low:g} to {high:g}: give two ascending values from 0 on")
         if self.sonar_depth[1] >= self.depth:
             raise UserError(f"sonar-depth is up to {self.sonar_depth[1]:g} m: the canal is {self.depth:g} m deep")
 
     def towpath_side(self) -> int:
-        """1: on the left bank (offsets above 0), -1: on the right, 0: none."""
+        """Return 1 for the left bank (offsets above 0), -1 for the right, 0 for none."""
         return {"none": 0, "left": 1, "right": -1}[self.towpath]
 
     def crs(self) -> pyproj.CRS:
-        """Coordinate system; projected, in metres."""
+        """Return the coordinate system; projected, in metres."""
         try:
             crs = pyproj.CRS.from_epsg(self.srid)
         except CRSError:
@@ -226,5 +226,5 @@ class CanalParameters:
         return crs
 
     def as_dict(self) -> dict[str, Any]:
-        """All parameters, for the record."""
+        """Return all parameters, for the record."""
         return asdict(self)

@@ -1,4 +1,4 @@
-"""The canal's surfaces as one implicit function: clearance of a place from walls, vault, towpath, bed, piers, objects and boat.
+"""Surfaces of a canal as one implicit function: clearance from walls, vault, towpath, bed, piers, objects and boat.
 
 Clearance is the distance to the nearest surface or less, m; 0 on a surface, negative behind it.
 """
@@ -19,8 +19,8 @@ from tunneldb.simulate.noise_field import value_noise
 BED, WALL, VAULT, TOWPATH, LADDER, PIER, OBJECT, BOAT, WATER = range(9)
 KINDS = ("bed", "wall", "vault", "towpath", "ladder", "pier or niche", "object", "boat", "water surface")
 
-_PEAK = 2.34  # of value noise, in standard deviations
-_COURSE, _STONE = 0.30, 0.60  # height of a course, length of a stone, m
+_MAX_NOISE_SIGMA = 2.34  # of value noise, in standard deviations
+_COURSE_HEIGHT, _STONE_LENGTH = 0.30, 0.60  # height of a course, length of a stone, m
 _JOINT = 0.012  # half width of a joint, m
 # Solids: kind of solid, kind of surface, middle (s, o, z), half sizes, cosine and sine of the turn about the vertical.
 BOX, RECESS, BALL, HULL = 0.0, 1.0, 2.0, 3.0
@@ -28,7 +28,7 @@ SOLID_COLUMNS = 10
 
 
 class Section(NamedTuple):
-    """Cross-section and relief, as compiled functions take them; lengths in m, heights over the water.
+    """Cross-section and relief for compiled functions; lengths in m, heights above the water.
 
     ``radius`` is that of the axis; ``half`` the canal's half width at the water; ``slope`` and ``slope_below`` tangents of the
     batter; ``vault`` the offset and height of the vault's centre and its radius; ``side`` that of the towpath (0: none).
@@ -56,7 +56,7 @@ class Section(NamedTuple):
 
 
 def section(parameters: CanalParameters) -> Section:
-    """Cross-section that parameters describe."""
+    """Return the cross-section for some parameters."""
     p = parameters
     slope = math.tan(math.radians(p.batter))
     side = p.towpath_side()
@@ -88,7 +88,7 @@ def section(parameters: CanalParameters) -> Section:
 
 @inner
 def bed_height(c: Section, s: float, o: float) -> float:  # pragma: no cover - compiled
-    """Height of the silt at a station and offset."""
+    """Return the height of the silt at a station and offset."""
     across = min(abs(o) / c.half, 1.2)
     z = -c.depth + c.bed_rise * across * across * across * across
     if c.bed_relief > 0.0:
@@ -103,7 +103,7 @@ def bed_height(c: Section, s: float, o: float) -> float:  # pragma: no cover - c
 
 @inner
 def _stones(c: Section, s: float, v: float, face: int) -> float:  # pragma: no cover - compiled
-    """Relief of masonry towards the canal, at a station and a place along the section."""
+    """Return the relief of masonry towards the canal, at a station and a position along the section."""
     height = 0.0
     if c.roughness > 0.0:
         a, b = s / c.roughness_length, v / c.roughness_length
@@ -111,18 +111,18 @@ def _stones(c: Section, s: float, v: float, face: int) -> float:  # pragma: no c
             0.9 * value_noise(a, b, c.salt + 8 + face) + 0.43 * value_noise(4.0 * a, 4.0 * b, c.salt + 16 + face)
         )
     if c.joint_depth > 0.0:
-        row = math.floor(v / _COURSE)
-        up = v - row * _COURSE
-        along = s / _STONE + 0.5 * (row % 2)
-        along = (along - math.floor(along)) * _STONE
-        away = min(min(up, _COURSE - up), min(along, _STONE - along))
+        row = math.floor(v / _COURSE_HEIGHT)
+        up = v - row * _COURSE_HEIGHT
+        along = s / _STONE_LENGTH + 0.5 * (row % 2)
+        along = (along - math.floor(along)) * _STONE_LENGTH
+        away = min(min(up, _COURSE_HEIGHT - up), min(along, _STONE_LENGTH - along))
         height -= c.joint_depth * max(0.0, 1.0 - away / _JOINT)
     return height
 
 
 @inner
 def _solid(solids: Float, k: int, s: float, o: float, z: float) -> float:  # pragma: no cover - compiled
-    """Distance to a solid from outside, or a bound of it; to a recess's bounds from inside where it is negative."""
+    """Return the distance to a solid from outside, or a bound of it; if negative, to a recess's bounds from inside."""
     ds, do, dz = s - solids[k, 2], o - solids[k, 3], z - solids[k, 4]
     if solids[k, 0] == BALL:
         return math.sqrt(ds * ds + do * do + dz * dz) - solids[k, 5]
@@ -138,14 +138,14 @@ def _solid(solids: Float, k: int, s: float, o: float, z: float) -> float:  # pra
 
 @inner
 def clearance(c: Section, solids: Float, x: float, y: float, z: float) -> tuple[float, int]:  # pragma: no cover - compiled
-    """Clearance of a local place, and the kind of the surface that it is nearest to.
+    """Return the clearance of a local position, and the kind of the nearest surface.
 
-    Relief is computed only near its surface; elsewhere its greatest height is taken off.
+    Relief is computed only near its surface; elsewhere its greatest height is subtracted.
     """
     s, o = stationed(c.radius, x, y)
     slope = c.slope if z > 0.0 else c.slope_below
     cosine = 1.0 / math.sqrt(1.0 + slope * slope)
-    most = 1.33 * _PEAK * c.roughness
+    most = 1.33 * _MAX_NOISE_SIGMA * c.roughness
     best, kind = 1e9, WALL
     for face in range(2):
         side = 1.0 if face == 0 else -1.0
@@ -175,7 +175,7 @@ def clearance(c: Section, solids: Float, x: float, y: float, z: float) -> tuple[
         d -= _stones(c, s, c.vault_radius * math.atan2(across, up), 5) if d < 2.0 * most + 0.05 else most
         if d < best:
             best, kind = d, VAULT
-    top = 1.38 * _PEAK * c.bed_relief + 2.0 * c.bed_rise
+    top = 1.38 * _MAX_NOISE_SIGMA * c.bed_relief + 2.0 * c.bed_rise
     d = z + c.depth - top
     if d < 0.25 * top + 0.05:
         d = 0.85 * (z - bed_height(c, s, o))
@@ -196,7 +196,7 @@ def _clearances(c: Section, solids: Float, xyz: Float, out: Float, kind: Int32) 
 
 
 def clearances(c: Section, solids: Float, local: Float) -> tuple[Float, Int32]:
-    """Clearance (n,) m and kind of the nearest surface (n,) of local points (n, 3); ladders are not among them."""
+    """Return clearance (n,) m and kind of the nearest surface (n,) of local points (n, 3), without ladders."""
     out, kind = np.empty(len(local)), np.empty(len(local), dtype=np.int32)
     _clearances(c, solids, np.ascontiguousarray(local, dtype=float), out, kind)
     return out, kind
@@ -209,7 +209,7 @@ def _beds(c: Section, s: Float, o: Float, out: Float) -> None:  # pragma: no cov
 
 
 def bed_heights(c: Section, s: Float, o: Float) -> Float:
-    """Height (n,) of the silt over the water (negative) at stations and offsets (n,), objects not counted."""
+    """Return the height (n,) of the silt above the water (negative) at stations and offsets (n,), without objects."""
     out = np.empty(len(s))
     _beds(c, np.ascontiguousarray(s, dtype=float), np.ascontiguousarray(o, dtype=float), out)
     return out

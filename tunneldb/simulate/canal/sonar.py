@@ -1,7 +1,8 @@
-"""A mechanical profiling sonar's scans below the water of a synthetic canal tunnel.
+"""Scans of a mechanical profiling sonar below the water of a synthetic canal tunnel.
 
-A fan of narrow beams turns about the tripod's axis. Of each beam the strongest echo is taken, of all that its cone meets in
-one length of the pulse: on a wall that it meets slantingly not the middle, before an edge the nearer or the stronger side.
+A fan of narrow beams turns about the tripod's axis. The strongest echo of each beam is recorded, among all surfaces in its cone
+within one pulse length. So on a slanting wall it is not from the beam's middle, and at an edge it is from the nearer or the
+stronger side.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int32
-from tunneldb.simulate.canal.cast import NOTHING, Hits, Scene, cast
+from tunneldb.simulate.canal.cast import NO_HIT, Hits, Scene, cast
 from tunneldb.simulate.canal.laser import directions
 from tunneldb.simulate.canal.layout import Layout, Tripod
 from tunneldb.simulate.canal.parameters import CanalParameters
@@ -20,28 +21,28 @@ from tunneldb.simulate.canal.section import BED, BOAT, LADDER, OBJECT, PIER, TOW
 FALSE = -2
 """Kind of a false echo."""
 
-# Strength of the echo at right angles, relative to masonry; mud swallows some of it, a bar's round face returns much.
+# Strength of the echo at normal incidence, relative to masonry; mud absorbs some of it, round bars reflect strongly.
 _STRENGTH = {BED: 0.6, WALL: 1.0, VAULT: 1.0, TOWPATH: 1.0, LADDER: 1.5, PIER: 1.0, OBJECT: 1.2, BOAT: 1.5}
-_LAMBERT = 1.0  # power of the cosine, besides that by which a beam covers more of a slanting surface
+_LAMBERT = 1.0  # power of the cosine, in addition to the larger area of a beam on a slanting surface
 _RINGS = {1: ((1, 0.0),), 7: ((1, 0.0), (6, 0.4)), 13: ((1, 0.0), (6, 0.35), (6, 0.7)), 19: ((1, 0.0), (6, 0.3), (12, 0.65))}
 _BLOCK = 20_000  # beams
-# Shares of the false echoes: by way of the water's surface, by a second wall, by side lobes; the others are noise.
+# Shares of the false echoes: via the water surface, via a second wall, via side lobes; the others are noise.
 _BY_SURFACE, _BY_WALL, _BY_LOBES = 0.4, 0.2, 0.2
-_NEAREST = 0.4  # m
+_MIN_RANGE = 0.4  # m
 
 
 @dataclass(frozen=True)
 class SonarScan:
-    """A scan, as its file has it, with its truth.
+    """Scan as in its file, with its reference data.
 
     Attributes
     ----------
     points : (n, 3) float array
         File's axes, m.
     intensity : (n,) float array
-        dB above the weakest.
+        Intensity above the weakest echo, dB.
     kind : (n,) int array
-        Of the surface (tunneldb.simulate.canal.section), WATER or FALSE.
+        Kind of the surface (tunneldb.simulate.canal.section), WATER or FALSE.
     rotation, translation, scale
         A point of the tunnel = rotation @ (scale * point of the file) + translation: (3, 3), (3,) m, and a number.
     tilt : float
@@ -60,7 +61,7 @@ class SonarScan:
 
 @dataclass(frozen=True)
 class _Echoes:
-    """Of each beam the range, m, and strength of the strongest echo, and what returned it."""
+    """Range, m, strength and source of the strongest echo of each beam."""
 
     range: Float
     strength: Float
@@ -70,16 +71,16 @@ class _Echoes:
 def scan_by_sonar(
     parameters: CanalParameters, layout: Layout, tripod: Tripod, number: int, tilt: float, to_tunnel: Float, origin: Float
 ) -> SonarScan:
-    """One rotation from a tripod.
+    """Simulate one rotation from a tripod.
 
     Parameters
     ----------
     number : int
-        Of the scan, from 1; it decides its noise.
+        Number of the scan, from 1; it seeds its noise.
     tilt : float
         Elevation of the middle of the fan, degrees.
     to_tunnel, origin : (3, 3), (3,) float arrays
-        Rotation and place of the local frame in the tunnel's.
+        Rotation and position of the local frame in the tunnel's.
     """
     p = parameters
     rng = np.random.default_rng([p.seed, 3, number])
@@ -93,7 +94,7 @@ def scan_by_sonar(
     place = np.broadcast_to(tripod.place, beams.shape).copy()
     place[turn > np.pi] += p.sonar_settling * np.append(directions(rng.uniform(0.0, 2.0 * np.pi, 1), np.zeros(1))[0, :2], 0.0)
     echoes = _echoes(p, layout.scene, place, beams, tripod.rotation)
-    seen = (echoes.kind != NOTHING) & (echoes.range > _NEAREST) & (echoes.range < p.sonar_maximum_range)
+    seen = (echoes.kind != NO_HIT) & (echoes.range > _MIN_RANGE) & (echoes.range < p.sonar_maximum_range)
     seen &= (echoes.kind != WATER) | (rng.random(len(beams)) < p.water_surface_share)
     reach, kind, strength = echoes.range.copy(), echoes.kind.copy(), echoes.strength.copy()
     false = _false_echoes(p, layout.scene, place, beams @ tripod.rotation.T, echoes, seen, rng)
@@ -111,7 +112,7 @@ def scan_by_sonar(
 
 
 def _cone(parameters: CanalParameters) -> tuple[Float, Float]:
-    """Angles (k, 2) of a beam's rays off its middle, rad, and their weights (k,), two-way."""
+    """Return the angles (k, 2) of a beam's rays from its middle, rad, and their two-way weights (k,)."""
     angles = []
     for count, radius in _RINGS[parameters.sub_rays]:
         around = 2.0 * np.pi * (np.arange(count) + 0.5 * (radius > 0.5)) / count
@@ -122,11 +123,11 @@ def _cone(parameters: CanalParameters) -> tuple[Float, Float]:
 
 
 def _echoes(parameters: CanalParameters, scene: Scene, place: Float, beams: Float, rotation: Float) -> _Echoes:
-    """Strongest echo of beams (n, 3), file's axes but upright, from places (n, 3), local frame."""
+    """Return the strongest echo of beams (n, 3), file's axes but upright, from positions (n, 3), local frame."""
     off, weight = _cone(parameters)
     table = np.zeros(max(_STRENGTH) + 2)
     table[list(_STRENGTH)] = list(_STRENGTH.values())
-    out = _Echoes(np.full(len(beams), np.inf), np.zeros(len(beams)), np.full(len(beams), NOTHING, np.int32))
+    out = _Echoes(np.full(len(beams), np.inf), np.zeros(len(beams)), np.full(len(beams), NO_HIT, np.int32))
     for begin in range(0, len(beams), _BLOCK):
         part = slice(begin, begin + _BLOCK)
         middle = beams[part]
@@ -142,10 +143,10 @@ def _echoes(parameters: CanalParameters, scene: Scene, place: Float, beams: Floa
 
 
 def _strongest(parameters: CanalParameters, hits: Hits, table: Float, weight: Float, out: _Echoes, part: slice) -> None:
-    """Take of each beam the range cell with the most energy; its echo is the mean of what lies in it."""
+    """Select the range cell with the most energy of each beam; its echo is the mean of the rays in it."""
     shape = (-1, len(weight))
     reach, kind, cosine = (column.reshape(shape) for column in (hits.range, hits.kind, hits.cosine))
-    solid = (kind != NOTHING) & (kind != WATER)
+    solid = (kind != NO_HIT) & (kind != WATER)
     power = np.where(solid, table[np.where(solid, kind, 0)] * weight * cosine**_LAMBERT, 0.0)
     within = (reach[:, None, :] >= reach[:, :, None]) & (reach[:, None, :] < reach[:, :, None] + parameters.sonar_resolution)
     energy = (within * power[:, None, :]).sum(axis=2)
@@ -159,13 +160,13 @@ def _strongest(parameters: CanalParameters, hits: Hits, table: Float, weight: Fl
     strongest = kind[row, chosen.argmax(axis=1)]
     out.range[part] = np.where(met, mean, np.where(water, reach[:, 0], np.inf))
     out.strength[part] = np.where(met, total, 0.05)
-    out.kind[part] = np.where(met, strongest, np.where(water, WATER, NOTHING))
+    out.kind[part] = np.where(met, strongest, np.where(water, WATER, NO_HIT))
 
 
 def _false_echoes(
     parameters: CanalParameters, scene: Scene, place: Float, ways: Float, echoes: _Echoes, seen: Bool, rng: np.random.Generator
 ) -> list[tuple[Int32, Float]]:
-    """Beams whose echo is false, and their ranges, m; ``ways`` (n, 3) are the beams in the local frame."""
+    """Return the beams whose echo is false, and their ranges, m; ``ways`` (n, 3) are the beams in the local frame."""
     count = round(parameters.false_share * int(seen.sum()))
     by_surface, by_wall, by_lobes = (round(share * count) for share in (_BY_SURFACE, _BY_WALL, _BY_LOBES))
     out = []
@@ -176,7 +177,7 @@ def _false_echoes(
     out.append(_bounced(scene, start, ways[beam] * [1.0, 1.0, -1.0], echoes.range[beam], beam))
     walls = np.flatnonzero(seen & (echoes.kind == WALL))
     beam = rng.choice(walls, min(by_wall, len(walls)), replace=False)
-    # off a wall and back from the other one: the walls are taken for mirrors that are upright and along the axis
+    # off a wall and back from the other one: the walls are treated as vertical mirrors along the axis
     start = place[beam] + 0.98 * echoes.range[beam, None] * ways[beam]
     out.append(_bounced(scene, start, ways[beam] * [1.0, -1.0, 1.0], echoes.range[beam], beam))
     held = np.flatnonzero(seen)
@@ -185,12 +186,12 @@ def _false_echoes(
     known = np.isfinite(echoes.range[lobe])
     out.append((beam[known].astype(np.int32), echoes.range[lobe][known]))
     beam = rng.choice(held, min(max(count - sum(len(b) for b, _ in out), 0), len(held)), replace=False)
-    out.append((beam.astype(np.int32), rng.uniform(_NEAREST, min(15.0, parameters.sonar_maximum_range), len(beam))))
+    out.append((beam.astype(np.int32), rng.uniform(_MIN_RANGE, min(15.0, parameters.sonar_maximum_range), len(beam))))
     return out
 
 
 def _bounced(scene: Scene, start: Float, ways: Float, before: Float, beam: Float) -> tuple[Int32, Float]:
-    """Beams (n,) that went on from places (n, 3) after so many metres (n,) and met something, and their ranges."""
+    """Return beams (n,) that continued from positions (n, 3) after ``before`` (n,) m and hit something, and their ranges."""
     hits = cast(scene, start, ways, 15.0)
-    met = (hits.kind != NOTHING) & (hits.kind != WATER) & (hits.range > 0.3)
+    met = (hits.kind != NO_HIT) & (hits.kind != WATER) & (hits.range > 0.3)
     return beam[met].astype(np.int32), before[met] + hits.range[met]

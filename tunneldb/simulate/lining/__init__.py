@@ -1,1 +1,1 @@
-"""What the lining and the floor of a synthetic tunnel are like: rings, relief, reflectance, marks, leaks, ballast."""
+"""Lining and floor of a synthetic tunnel: rings, relief, reflectance, marks, leaks, ballast."""

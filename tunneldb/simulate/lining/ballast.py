@@ -1,7 +1,7 @@
-"""Unevenness: camber and ballast, a field of stones, over the flat floor of the section; relief of the lining.
+"""Unevenness: camber and ballast, a field of stones, above the flat floor of the section; relief of the lining.
 
-Ballast is a height over plan coordinates, so that a ray meets the same stones from wherever it comes. A stone is a dome
-in each cell of a grid, displaced, its size and its height by chance (Worley, 1996, with paraboloids).
+Ballast is a height over plan coordinates, so that rays from all directions hit the same stones. A stone is a randomly
+displaced dome of random size and height in each cell of a grid (Worley, 1996, with paraboloids).
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.section import Section
 from tunneldb.simulate.tunnel.tunnel import foot, gradient
 
-CELL = 0.045  # m: one stone a cell
+CELL = 0.045  # m; one stone per cell
 STONE = (0.015, 0.030)  # radii of stones, m: stones of 3 to 6 cm
-GAP = -1.0  # between stones, in heights of a dome
-HIGHEST = 1.5
+GAP_HEIGHT = -1.0  # between stones, in heights of a dome
+MAX_HEIGHT = 1.5
 
 
 class Ground(NamedTuple):
-    """Heights over the section's floor for the kernels.
+    """Heights above the section's floor, for the kernels.
 
-    ``scale`` and ``level`` turn the field of stones into metres (0: none), ``camber`` is the fall of the floor from its
-    middle to both walls (m/m), ``low`` and ``high`` bound the height, ``floor`` is the section's.
+    ``scale`` and ``level`` convert the field of stones to metres (0: none), ``camber`` is the fall of the floor from its
+    middle to both walls (m/m), ``low`` and ``high`` bound the height, ``floor`` is that of the section.
     """
 
     scale: float
@@ -44,9 +44,9 @@ class Ground(NamedTuple):
 
 @inner
 def stones(x: float, y: float, salt: int) -> float:
-    """Height of the stones at a place, in heights of a dome: -1 to 1.5."""
+    """Return the height of the stones at a position, in heights of a dome: -1 to 1.5."""
     fx, fy = math.floor(x / CELL), math.floor(y / CELL)
-    best = GAP
+    best = GAP_HEIGHT
     part = 1.0 / 65535.0
     mask = np.uint64(0xFFFF)
     for i in range(-1, 2):
@@ -69,7 +69,7 @@ def _many(x: Float, y: Float, salt: int, out: Float) -> None:
 
 @lru_cache(maxsize=1)
 def _moments() -> tuple[float, float]:
-    """Mean and standard deviation of the field of stones, from a million places."""
+    """Return mean and standard deviation of the field of stones, from a million positions."""
     x, y = np.random.default_rng(0).uniform(0.0, 1000.0, (2, 1_000_000))
     out = np.empty(x.size)
     _many(x, y, 0, out)
@@ -77,7 +77,7 @@ def _moments() -> tuple[float, float]:
 
 
 def lay(parameters: Parameters, section: Section, salt: int) -> Ground | None:
-    """Camber and ballast as asked; ballast's mean height is 0 and its standard deviation ``parameters.ballast``."""
+    """Return the requested camber and ballast; ballast has mean height 0 and standard deviation ``parameters.ballast``."""
     if parameters.ballast == 0.0 and parameters.camber == 0.0:
         return None
     mean, spread = _moments() if parameters.ballast > 0.0 else (0.0, 1.0)
@@ -91,14 +91,14 @@ def lay(parameters: Parameters, section: Section, salt: int) -> Ground | None:
         camber,
         section.half_width,
         section.floor,
-        (GAP - mean) * scale,
-        (HIGHEST - mean) * scale + rise,
+        (GAP_HEIGHT - mean) * scale,
+        (MAX_HEIGHT - mean) * scale + rise,
     )
 
 
 @inner
 def height(ground: Ground, x: float, y: float, u: float) -> float:
-    """Height over the section's floor at plan coordinates from the line's origin, ``u`` m right of the axis."""
+    """Return the height above the section's floor at plan coordinates from the line's origin, ``u`` m right of the axis."""
     h = ground.camber * (ground.half_width - abs(u))
     if ground.scale > 0.0:
         h += ground.scale * stones(x, y, ground.salt) + ground.level
@@ -109,15 +109,15 @@ def height(ground: Ground, x: float, y: float, u: float) -> float:
 def intersect_ground(
     ground: Ground, plan: Float, profile: Float, origin: Float, direction: Float, found: Float, on_floor: Bool
 ) -> None:
-    """Where rays (n, 3) that meet the section meet ballast or a cambered floor.
+    """Intersect rays (n, 3) that hit the section with ballast or a cambered floor.
 
     Parameters
     ----------
     found : (6, n)
-        Range and chainage where they meet the section, rows as of :func:`intersect_lining`; range and cosine of those that
-        meet the ground or the wall's foot beneath the section's corner are replaced.
+        Range and chainage of the hit on the section, rows as of :func:`intersect_lining`; range and cosine are replaced for
+        hits on the ground, or on the wall below the section's corner.
     on_floor : (n,)
-        Whether they meet the section's floor; then whether what they meet is floor.
+        In: True for hits on the section's floor; out: True for hits on the floor.
     """
     for i in range(origin.shape[0]):
         r = found[0, i]
@@ -129,7 +129,7 @@ def intersect_ground(
             plan, profile, ox + r * dx, oy + r * dy, origin[i, 2] + r * dz, found[1, i], 0.0, np.int64(1)
         )
         gx, gy, gz = gradient(0.0, 1.0, u, w, c, n, k, g, q, det)
-        # Near its end the tunnel's frame hardly turns along a ray: it moves by du and dw a metre.
+        # Near its end the tunnel's frame hardly turns along a ray: it moves by du and dw per metre.
         dw = gx * dx + gy * dy + gz * dz
         du = dx * n - dy * c
         above = w - ground.floor
@@ -144,7 +144,7 @@ def intersect_ground(
         while t <= end:
             v = u + t * du
             if on_floor[i] and abs(v) > ground.half_width and v * du > 0.0:
-                is_wall = True  # below the corner of the section the wall goes on
+                is_wall = True  # below the corner of the section the wall continues
                 found[0, i] = r + (math.copysign(ground.half_width, v) - u) / du
                 found[3, i] = abs(du)
                 on_floor[i] = False
@@ -153,7 +153,7 @@ def intersect_ground(
                 break
             before = t
             t += step
-        if is_wall or t > end:  # or it passes over the ground to the wall
+        if is_wall or t > end:  # or it passes above the ground to the wall
             continue
         for _ in range(16):
             middle = 0.5 * (before + t)
@@ -188,7 +188,7 @@ def _bumps(s: Float, arc: Float, size: float, out: Float) -> None:
 
 
 def bumps(s: Float, arc: Float, size: float) -> Float:
-    """Smooth pseudo-random relief, -1 to 1, at places (n,), with a wavelength of about two ``size`` m (value noise)."""
+    """Return smooth pseudo-random relief, -1 to 1, at positions (n,), of wavelength about two ``size`` m (value noise)."""
     out = np.empty(s.size)
     _bumps(s, arc, size, out)
     return out

@@ -1,7 +1,7 @@
-"""What lies on the lining with an outline of any shape: salts, fringes of leaks, halos of grime, half rings of another shade.
+"""Irregular spots on the lining: salts, fringes of leaks, halos of grime, half rings of another shade.
 
-Outlines are drawn without regard to how they could be found. Salts are a Boolean model: spots thrown at random, so many that
-their union covers the share asked for (Chiu et al., Stochastic Geometry and its Applications, 2013, 3.1).
+Outlines do not depend on the detection method. Salts are a Boolean model: spots thrown at random until their expected union
+covers the requested share (Chiu et al., Stochastic Geometry and its Applications, 2013, 3.1).
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 TRIES = 600
-# Limits of the area of a spot of salts, m²; width over which its level rises, m.
+# Limits of the area of a spot of salts, m²; width of the rise of its level, m.
 SALT_AREA, SALT_RISE = (0.01, 0.5), 0.02
 # Fringes: limits of their level, as a share of that of salts.
 FRINGE_LEVEL = (0.5, 1.0)
-# Grime shaped as a leak: limits of its area, m², and its drop, dB; width of its halo, m.
+# Grime shaped like a leak: limits of its area, m², and darkening, dB; width of its halo, m.
 HALO_AREA, HALO_DROP, HALO = (0.1, 1.5), (1.5, 5.0), 0.25
 # Lengths of lining of one shade where there are no rings, m.
 SHADE_LENGTH = (2.0, 8.0)
-CLEAR = 0.1  # between halos, and between a halo and a leak, m
+MIN_CLEARANCE = 0.1  # between halos, and between a halo and a leak, m
 
 
 @dataclass(frozen=True)
 class Blotch:
-    """A spot on the lining: kind (salts, fringe, halo, shade), outline in the unrolled plane (m), level added inside (dB).
+    """Spot on the lining: kind (salts, fringe, halo, shade), outline in the unrolled plane (m), level added inside (dB).
 
     From the outline inwards the level rises over ``rise`` m.
     """
@@ -51,12 +51,12 @@ class Blotch:
     rise: float
 
     def polygon(self) -> Polygon | MultiPolygon:
-        """Where at least half of the level is added."""
+        """Return the area with at least half of the level."""
         return self.outline.buffer(-0.5 * self.rise) if self.rise else self.outline
 
 
 class BlotchTable(NamedTuple):
-    """Blotches for the kernel: edges and the first of each, rows of bounds (4), level and rise, and both by chainage."""
+    """Blotches for the kernel: edges and the first edge of each, rows of bounds (4), level and rise, and both by chainage."""
 
     edges: Float
     first: Int64
@@ -66,7 +66,7 @@ class BlotchTable(NamedTuple):
 
 
 def blotch_table(blotches: list[Blotch], tunnel: Tunnel) -> BlotchTable:
-    """Lay blotches out for the kernel."""
+    """Arrange blotches for the kernel."""
     rows = np.array([[*b.outline.bounds, b.level, b.rise] for b in blotches]).reshape(-1, 6)
     edges, first = outline_edges([b.outline for b in blotches])
     return BlotchTable(edges, first, rows, *bins(rows[:, 0], rows[:, 2], tunnel.line.start, tunnel.line.end))
@@ -74,7 +74,7 @@ def blotch_table(blotches: list[Blotch], tunnel: Tunnel) -> BlotchTable:
 
 @kernel
 def add_blotches(table: BlotchTable, start: float, s: Float, arc: Float, out: Float) -> None:
-    """Add the levels of blotches at places (n,), dB; ``start`` is the chainage of the tunnel's start, m."""
+    """Add the levels of blotches at positions (n,), dB; ``start`` is the chainage of the tunnel's start, m."""
     for i in range(s.shape[0]):
         x, y = s[i], arc[i]
         b = bin_of(x, start, table.bins)
@@ -89,19 +89,19 @@ def add_blotches(table: BlotchTable, start: float, s: Float, arc: Float, out: Fl
 
 
 def _spot(area: float, s: float, arc: float, rng: np.random.Generator) -> Polygon:
-    """A spot of irregular shape about a place."""
+    """Return a spot of irregular shape around a position."""
     shape = star(rng, float(rng.uniform(0.6, 2.5)))
     scale = math.sqrt(area / shape.area)
     return affinity.translate(affinity.scale(shape, scale, scale, origin=(0.0, 0.0)), s, arc)
 
 
 def _polygons(shape: BaseGeometry) -> list[Polygon]:
-    """Polygons of a shape."""
+    """Return the polygons of a shape."""
     return [part for part in getattr(shape, "geoms", [shape]) if isinstance(part, Polygon) and part.area > 1e-4]
 
 
 def _salts(p: Parameters, lining: Polygon, taken: BaseGeometry, rng: np.random.Generator) -> list[Blotch]:
-    """Bright salts over a share of the lining, none on leaks."""
+    """Return bright salts over a share of the lining, away from leaks."""
     if p.salts == 0.0:
         return []
     low, high = (math.log(area) for area in SALT_AREA)
@@ -117,7 +117,7 @@ def _salts(p: Parameters, lining: Polygon, taken: BaseGeometry, rng: np.random.G
 
 
 def _fringes(p: Parameters, lining: Polygon, leaks: list[Leak], wet: BaseGeometry, rng: np.random.Generator) -> list[Blotch]:
-    """Bright salts round each leak, where its water dries."""
+    """Return bright salts around each leak, where its water dries."""
     fringes = []
     for leak in leaks if p.salt_fringe else []:
         if leak.kind == "niche":
@@ -129,24 +129,24 @@ def _fringes(p: Parameters, lining: Polygon, leaks: list[Leak], wet: BaseGeometr
 
 
 def _halos(p: Parameters, lining: Polygon, taken: BaseGeometry, rng: np.random.Generator) -> list[Blotch]:
-    """Grime shaped as leaks are, fading over a wide halo."""
+    """Return grime shaped like leaks, fading over a wide halo."""
     halos: list[Blotch] = []
     left, bottom, right, top = lining.bounds
     for number in range(p.halos):
         for _ in range(TRIES):
             area = math.exp(rng.uniform(math.log(HALO_AREA[0]), math.log(HALO_AREA[1])))
             spot = _spot(area, rng.uniform(left, right), rng.uniform(bottom, top), rng).buffer(HALO)
-            apart = spot.buffer(CLEAR)
+            apart = spot.buffer(MIN_CLEARANCE)
             if lining.contains(spot) and not apart.intersects(taken) and not any(apart.intersects(h.outline) for h in halos):
                 break
         else:
-            raise UserError(f"no room on the lining for halo {number + 1} of {p.halos}: ask for fewer halos or leaks")
+            raise UserError(f"no room on the lining for halo {number + 1} of {p.halos}; use fewer halos or leaks")
         halos.append(Blotch("halo", spot, -float(rng.uniform(*HALO_DROP)), HALO))
     return halos
 
 
 def _shades(p: Parameters, tunnel: Tunnel, rings: Rings, rng: np.random.Generator) -> list[Blotch]:
-    """Half rings, from the crown down, each darker or brighter than its neighbours by a step."""
+    """Return half rings, from the crown down, each darker or brighter than its neighbours by a step."""
     if p.shade == 0.0:
         return []
     line, lowest = tunnel.line, tunnel.section.floor_arc
@@ -170,12 +170,12 @@ def place_blotches(
     taken: list[BaseGeometry],
     seed: np.random.SeedSequence,
 ) -> list[Blotch]:
-    """Salts, fringes, halos and shades as asked, clear of leaks; halos clear of all that is ``taken``.
+    """Return the requested salts, fringes, halos and shades, away from leaks; halos also avoid ``taken``.
 
     Raises
     ------
     UserError
-        There is no room for as many halos.
+        If there is no space for all halos.
     """
     p, line, lowest = parameters, tunnel.line, tunnel.section.floor_arc
     streams = [np.random.default_rng(s) for s in seed.spawn(4)]

@@ -1,4 +1,4 @@
-"""Leaks where tunnels leak most: across cables, at the foot, along the springline, at bolts, over a ring or a panel."""
+"""Leaks at typical places: across cables, at the foot, along the springline, at bolts, over a ring or a panel."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 TRIES = 600
-# A leak across a cable is wet this far to either side of it, m, and has this area at least, m².
-BEYOND, CROSSING_AREA = 0.1, 0.1
+# Extent of a leak across a cable on either side, m, and its least area, m².
+CROSSING_MARGIN, CROSSING_AREA = 0.1, 0.1
 # At the foot: limits of the length along the floor and the height up the wall, m.
 FOOT_LENGTH, FOOT_HEIGHT = (0.5, 4.0), (0.1, 0.8)
 # Wet joint along the springline: limits of length and width, m.
 SPRING_LENGTH, SPRING_WIDTH = (5.0, 8.0), (0.1, 0.2)
-# Below a weeping pocket: limits of the streak's length and width, m; how far the pocket's surroundings are wet, m.
-STREAK_LENGTH, STREAK_WIDTH, WEEPING = (0.1, 1.2), (0.04, 0.12), (0.01, 0.06)
+# Below a weeping pocket: limits of the streak's length and width, m; limits of the wet margin around the pocket, m.
+STREAK_LENGTH, STREAK_WIDTH, POCKET_MARGIN = (0.1, 1.2), (0.04, 0.12), (0.01, 0.06)
 # Wet ring where the lining has no rings of segments: limits of its width, m. Panel where it has none: of its sides, m.
 RING_WIDTH, PANEL = (0.2, 1.5), (0.8, 2.5)
 SEAM = 0.01  # between a wet segment and its joints, m
 
-# An outline, or none where the try fails.
+# Function that returns an outline, or None if the attempt fails.
 Make = Callable[[np.random.Generator], Polygon | None]
 
 
 class _Sites:
-    """Outlines of leaks of each kind, at random places of a tunnel."""
+    """Generator of outlines of leaks of each kind, at random places of a tunnel."""
 
     def __init__(self, parameters: Parameters, tunnel: Tunnel, rings: Rings, appendages: Sequence[Appendage]) -> None:
         self.p, self.tunnel, self.rings = parameters, tunnel, rings
@@ -46,7 +46,7 @@ class _Sites:
         self.left, self.right = (self._foot(side) for side in (-1.0, 1.0))
 
     def _foot(self, side: float) -> float:
-        """Arc at which the wall meets the floor, or the walkway on it, m."""
+        """Return the arc at which the wall meets the floor, or the walkway on it, m."""
         section = self.tunnel.section
         arcs = np.linspace(0.0, section.floor_arc, 4001)
         height = section.point(arcs)[0][:, 1] - section.floor
@@ -58,7 +58,7 @@ class _Sites:
         low, high = (math.log(max(a, CROSSING_AREA)) for a in self.p.leak_area)
         patch = wet_patch(rng, math.exp(rng.uniform(low, high)), 1 if run.arc >= 0.0 else -1, False)
         patch = affinity.translate(patch, rng.uniform(self.start, self.end), run.arc + rng.uniform(-0.3, 0.3))
-        half = 0.5 * run.width + BEYOND
+        half = 0.5 * run.width + CROSSING_MARGIN
         crosses = patch.bounds[1] < run.arc - half and patch.bounds[3] > run.arc + half
         return patch if crosses else None
 
@@ -78,7 +78,7 @@ class _Sites:
         return affinity.translate(band, rng.uniform(self.start, self.end), arc)
 
     def _segment(self, rng: np.random.Generator) -> tuple[int, int, float]:
-        """A ring, a segment of it, and the arc at which that begins."""
+        """Return a ring, a segment of it, and the arc of its start."""
         rings = self.rings
         i, m = int(rng.integers(rings.level.size)), rings.seam_width.shape[1]
         k, half = int(rng.integers(m)), 0.5 * m * rings.period
@@ -88,7 +88,7 @@ class _Sites:
         i, _, seam = self._segment(rng)
         s = self.rings.first + i * self.rings.length + POCKET_FROM_JOINT
         arc = seam + POCKETS[int(rng.integers(len(POCKETS)))] * self.rings.period
-        around = float(rng.uniform(*WEEPING))
+        around = float(rng.uniform(*POCKET_MARGIN))
         wet = box(s - 0.5 * POCKET[0], arc - 0.5 * POCKET[1], s + 0.5 * POCKET[0], arc + 0.5 * POCKET[1]).buffer(around)
         length, width = rng.uniform((STREAK_LENGTH[0], STREAK_WIDTH[0]), (STREAK_LENGTH[1], STREAK_WIDTH[1])).tolist()
         bottom = arc + math.copysign(0.5 * POCKET[1] + length, arc)
@@ -128,16 +128,16 @@ def site_leaks(
     room: Room,
     seed: np.random.SeedSequence,
 ) -> list[Leak]:
-    """Leaks at particular places, the largest kinds first, numbered from 1. All may lie behind what runs along the wall.
+    """Return leaks at particular places, the largest kinds first, numbered from 1; all may be behind fixtures along the wall.
 
     Raises
     ------
     UserError
-        There is no room for as many, or no cable to lie across.
+        If there is no space for all, or no cable to cross.
     """
     p, sites = parameters, _Sites(parameters, tunnel, rings, appendages)
     if p.cable_leaks and not sites.runs:
-        raise UserError("cable leaks need cables along the wall: leave out --no-appendages, or ask for --clutter")
+        raise UserError("cable leaks need cables along the wall; omit --no-appendages, or add --clutter")
     kinds: list[tuple[str, int, Make]] = [
         ("ring", p.ring_leaks, sites.ring),
         ("panel", p.panel_leaks, sites.panel),
@@ -155,7 +155,7 @@ def site_leaks(
                 if outline is not None and room.holds(outline, across=True):
                     break
             else:
-                raise UserError(f"no room for {kind} leak {number + 1} of {count}: ask for fewer leaks or a longer tunnel")
+                raise UserError(f"no room for {kind} leak {number + 1} of {count}; use fewer leaks or a longer tunnel")
             room.take(outline)
             inside = outline.representative_point()
             factor = float(tunnel.area_factor(np.array([inside.x]), np.array([inside.y]))[0])

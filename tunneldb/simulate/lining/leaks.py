@@ -17,7 +17,7 @@ from tunneldb.compiled import inner
 from tunneldb.errors import UserError
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
-# Width of the edge over which a patch goes from dry to wet, m.
+# Width of a patch's transition from dry to wet, m.
 EDGE = 0.008
 # Least distance of a leak to the tunnel's ends, to the floor, to obstacles, to other leaks, m.
 END, FLOOR_MARGIN, OBSTACLE_MARGIN, LEAK_MARGIN = 1.0, 0.3, 0.25, 0.3
@@ -25,10 +25,10 @@ END, FLOOR_MARGIN, OBSTACLE_MARGIN, LEAK_MARGIN = 1.0, 0.3, 0.25, 0.3
 
 @dataclass(frozen=True)
 class Leak:
-    """A wet patch: id, outline in the unrolled plane (m), area on the surface (m²), drop (dB).
+    """Wet patch: id, outline in the unrolled plane (m), area on the surface (m²), darkening (dB).
 
-    ``kind`` is wall, joint (along one), niche (on its back wall), or where it was put: cable (across something that runs along
-    the wall), foot (beside the floor), springline, pocket (a bolt's), ring (from foot to foot) or panel. With drips the outline
+    ``kind`` is wall, joint (along one), niche (on its back wall), or a particular place: cable (across fixtures along the
+    wall), foot (beside the floor), springline, pocket (a bolt's), ring (from foot to foot) or panel. With drips the outline
     has several parts.
     """
 
@@ -45,7 +45,7 @@ class Leak:
 
 
 def star(rng: np.random.Generator, elongation: float) -> Polygon:
-    """A closed curve around the origin, its radius perturbed by a few harmonics; longer along arc."""
+    """Return a closed curve around the origin, its radius perturbed by a few harmonics; longer along arc."""
     angle = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
     radius = np.ones_like(angle)
     for k in range(2, 9):
@@ -55,7 +55,7 @@ def star(rng: np.random.Generator, elongation: float) -> Polygon:
 
 
 def wet_patch(rng: np.random.Generator, area: float, down: int, holed: bool) -> Polygon:
-    """A patch of the given area around the origin; drips run ``down`` (+1 or -1 in arc) from large ones."""
+    """Return a patch of the given area around the origin; large ones have drips in the direction ``down`` (+1 or -1 in arc)."""
     patch: BaseGeometry = star(rng, float(rng.uniform(0.8, 1.8)))
     if area > 0.3:
         for _ in range(int(rng.integers(1, 4))):
@@ -76,9 +76,9 @@ def wet_patch(rng: np.random.Generator, area: float, down: int, holed: bool) -> 
 
 
 class Room:
-    """Where leaks may lie on the lining: clear of obstacles, floor, tunnel ends and each other.
+    """Free area for leaks on the lining, away from obstacles, floor, tunnel ends and other leaks.
 
-    What runs along the tunnel, walls and floor, is passed by ``runs``: a leak may be asked to lie across it.
+    ``runs`` are the fixtures along the tunnel, walls and floor, which a leak may be allowed to cross.
     """
 
     def __init__(self, tunnel: Tunnel, obstacles: list[Polygon], runs: Sequence[Polygon] = ()) -> None:
@@ -91,19 +91,19 @@ class Room:
         self._leaks: list[BaseGeometry] = []
 
     def holds(self, outline: BaseGeometry, across: bool = False) -> bool:
-        """Whether a leak can lie there; ``across``: down to the floor too, and across what runs along the tunnel."""
+        """Return True if a leak fits there; with ``across`` it may extend to the floor and cross fixtures along the tunnel."""
         left, low, right, high = outline.bounds
         lowest, taken = (self._foot, self._taken) if across else (self.lowest, self._taken + self._runs)
         inside = low >= -lowest and high <= lowest and left > self.start and right < self.end
         return inside and outline.is_valid and not any(t.intersects(outline) for t in taken)
 
     def take(self, outline: BaseGeometry) -> None:
-        """Keep others away."""
+        """Reserve an area."""
         self._leaks.append(outline)
         self._taken.append(prep(outline.buffer(LEAK_MARGIN)))
 
     def bears(self, drip: BaseGeometry, leak: BaseGeometry) -> bool:
-        """Whether a drip can lie there: on the lining, apart from its own leak and from all others."""
+        """Return True if a drip fits there: on the lining, separate from its own leak and from all others."""
         others = [k for k in self._leaks if k is not leak]
         low, high = drip.bounds[1::2]
         inside = low > -self.lowest and high < self.lowest
@@ -118,10 +118,10 @@ def place(
     drop: tuple[float, float],
     rng: np.random.Generator,
 ) -> list[Leak]:
-    """Put ``count`` patches on the lining where there is room.
+    """Place ``count`` patches on free areas of the lining.
 
-    Areas are log-uniform between the limits (m²), drops uniform (dB); every third patch of 0.5 m² or more has
-    a hole. The largest are placed first, so that a crowded tunnel takes them.
+    Areas are log-uniform between the limits (m²), darkenings uniform (dB); every third patch of 0.5 m² or more has
+    a hole. The largest are placed first, so that they fit into a crowded tunnel.
     """
     line = tunnel.line
     sizes = np.sort(np.exp(rng.uniform(math.log(area[0]), math.log(area[1]), count)))[::-1]
@@ -132,14 +132,14 @@ def place(
             s = float(rng.uniform(line.start + end_margin, line.end - end_margin))
             arc = float(rng.uniform(-room.lowest, room.lowest))
             polygon = wet_patch(rng, float(size), 1 if arc >= 0 else -1, number % 3 == 0 and size >= 0.5)
-            for _ in range(2):  # simplifying moved the area a little
+            for _ in range(2):  # simplification changed the area slightly
                 factor = math.sqrt(size / polygon.area)
                 polygon = affinity.scale(polygon, factor, factor, origin=(0.0, 0.0))
             polygon = affinity.translate(polygon, s, arc)
             if room.holds(polygon):
                 break
         else:
-            raise UserError(f"no room on the lining for leak {number + 1} of {count} ({size:.2f} m²): ask for fewer or smaller")
+            raise UserError(f"no room on the lining for leak {number + 1} of {count} ({size:.2f} m²); use fewer or smaller")
         room.take(polygon)
         centre = polygon.representative_point()
         factor = float(tunnel.area_factor(np.array([centre.x]), np.array([centre.y]))[0])
@@ -149,7 +149,7 @@ def place(
 
 
 def outline_edges(outlines: Sequence[Polygon | MultiPolygon]) -> tuple[Float, Int64]:
-    """Rows of edges (x1, y1, x2, y2) of outlines with their holes, and the first edge of each outline (n+1,)."""
+    """Return rows of edges (x1, y1, x2, y2) of outlines with their holes, and the first edge of each outline (n+1,)."""
     edges, first = [np.empty((0, 4))], [0]
     for outline in outlines:
         own = []
@@ -163,7 +163,7 @@ def outline_edges(outlines: Sequence[Polygon | MultiPolygon]) -> tuple[Float, In
 
 
 def edge_table(leaks: list[Leak]) -> tuple[Float, Int64, Float]:
-    """Rows of edges (x1, y1, x2, y2), first edge of each leak (n+1,), and per leak: bounds (4) and drop."""
+    """Return rows of edges (x1, y1, x2, y2), first edge of each leak (n+1,), and per leak: bounds (4) and darkening."""
     rows = np.zeros((len(leaks), 5))
     for row, leak in zip(rows, leaks, strict=True):
         row[:4], row[4] = leak.polygon.bounds, leak.drop
@@ -172,7 +172,7 @@ def edge_table(leaks: list[Leak]) -> tuple[Float, Int64, Float]:
 
 @inner
 def depth_inside(edges: Float, begin: int, end: int, x: float, y: float) -> float:
-    """Distance of a point to the edges of a polygon, m, positive inside (holes are outside)."""
+    """Return the distance of a point to the edges of a polygon, m, positive inside (holes are outside)."""
     best = 1e300
     inside = False
     for i in range(begin, end):

@@ -1,4 +1,4 @@
-"""Rectangles on the lining that are darker or brighter than it: repairs, painted numbers and stripes."""
+"""Darker or brighter rectangles on the lining: repairs, painted numbers and stripes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 TRIES = 600
-CLEAR = 0.15  # between marks, and between a mark and a leak, m
+MIN_CLEARANCE = 0.15  # between marks, and between a mark and a leak, m
 DIGIT = (0.18, 0.30)  # width and height, m
 # Strokes of the digits as on a seven-segment display: ends in shares of the width and the height.
 _STROKES = {
@@ -30,7 +30,7 @@ _DIGITS = ("abcdef", "bc", "abged", "abgcd", "fgbc", "afgcd", "afgedc", "abc", "
 
 @dataclass(frozen=True)
 class Mark:
-    """A rectangle about the line from ``one`` to ``other`` (chainage, arc), ``width`` m wide, with square ends.
+    """Rectangle around the line from ``one`` to ``other`` (chainage, arc), ``width`` m wide, with square ends.
 
     ``kind`` is patch, paint (a stroke of a number), stripe or chamfer, ``level`` is added to the reflectance, dB.
     """
@@ -42,12 +42,12 @@ class Mark:
     level: float
 
     def polygon(self) -> Polygon:
-        """Outline in the unrolled plane."""
+        """Return the outline in the unrolled plane."""
         return LineString([self.one, self.other]).buffer(0.5 * self.width, cap_style="flat")
 
 
 def mark_table(marks: list[Mark]) -> Float:
-    """Rows for the kernel: chainage from, to; middle (2), unit direction (2), half length, half width, level."""
+    """Return rows for the kernel: chainage from, to; centre (2), unit direction (2), half length, half width, level."""
     rows = np.empty((len(marks), 9))
     for row, mark in zip(rows, marks, strict=True):
         one, other = np.array(mark.one), np.array(mark.other)
@@ -58,7 +58,7 @@ def mark_table(marks: list[Mark]) -> Float:
 
 
 def _patch(p: Parameters, s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
-    """A repaired rectangle, turned by what is asked either way."""
+    """Return a repaired rectangle, turned by up to the requested angle."""
     (low, high), turn = p.patch_level, math.radians(p.patch_turn)
     length, width, level = rng.uniform((0.5, 0.5, low), (2.0, 2.0, high)).tolist()
     if turn and rng.random() < 0.5:
@@ -68,7 +68,7 @@ def _patch(p: Parameters, s: float, arc: float, rng: np.random.Generator) -> lis
 
 
 def _stripe(p: Parameters, s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
-    """A painted line along the tunnel."""
+    """Return a painted line along the tunnel."""
     length, level = rng.uniform((2.0, -4.0), (10.0, 4.0)).tolist()
     low, high = p.stripe_width
     width = float(rng.uniform(low, high)) if high > low else low
@@ -76,10 +76,10 @@ def _stripe(p: Parameters, s: float, arc: float, rng: np.random.Generator) -> li
 
 
 def _number(p: Parameters, s: float, arc: float, rng: np.random.Generator) -> list[Mark]:
-    """Two to four painted digits, upright on the wall, to be read from inside the tunnel."""
+    """Return two to four painted digits, upright on the wall, readable from inside the tunnel."""
     width, level = rng.uniform((0.03, -4.0), (0.05, 4.0)).tolist()
     up = -math.copysign(1.0, arc)
-    ahead = -up  # facing the right wall one reads against the chainage
+    ahead = -up  # on the right wall, text reads against the chainage
     strokes = []
     for i, digit in enumerate(rng.integers(0, 10, int(rng.integers(2, 5))).tolist()):
         for stroke in _DIGITS[digit]:
@@ -90,25 +90,25 @@ def _number(p: Parameters, s: float, arc: float, rng: np.random.Generator) -> li
 
 
 def place_marks(parameters: Parameters, tunnel: Tunnel, taken: list[BaseGeometry], seed: np.random.SeedSequence) -> list[Mark]:
-    """Patches, and numbers and stripes in turn, on the lining, clear of what is ``taken`` and of each other.
+    """Place patches, and numbers and stripes in turn, on the lining, away from ``taken`` and from each other.
 
     Raises
     ------
     UserError
-        There is no room for as many.
+        If there is no space for all.
     """
     p, line = parameters, tunnel.line
     patches, paints = (np.random.default_rng(s) for s in seed.spawn(2))
     wanted = [(_patch, patches)] * p.patches + [((_number, _stripe)[i % 2], paints) for i in range(p.paint)]
     lowest = tunnel.section.floor_arc - 0.1
-    shapes = [t.buffer(CLEAR) for t in taken]
+    shapes = [t.buffer(MIN_CLEARANCE) for t in taken]
     marks: list[Mark] = []
     for number, (make, rng) in enumerate(wanted):
         tree = STRtree(shapes)
         for _ in range(TRIES):
             s = float(rng.uniform(line.start + 1.0, line.end - 1.0))
             arc = float(rng.uniform(-lowest, lowest))
-            if make is _number:  # where one reads it
+            if make is _number:  # at a readable height
                 arc = math.copysign(float(rng.uniform(0.55, 0.9)) * lowest, arc)
             made = make(p, s, arc, rng)
             outline = unary_union([m.polygon() for m in made])
@@ -117,14 +117,14 @@ def place_marks(parameters: Parameters, tunnel: Tunnel, taken: list[BaseGeometry
             if inside and not len(tree.query(outline, predicate="intersects")):
                 break
         else:
-            raise UserError(f"no room on the lining for mark {number + 1} of {len(wanted)}: ask for fewer patches, less paint")
-        shapes.append(outline.buffer(CLEAR))
+            raise UserError(f"no room on the lining for mark {number + 1} of {len(wanted)}; use fewer patches or less paint")
+        shapes.append(outline.buffer(MIN_CLEARANCE))
         marks += made
     return marks
 
 
 def chamfers(parameters: Parameters, tunnel: Tunnel, rings: Rings) -> list[Mark]:
-    """Broken edges of the ring joints: dark bands across the whole lining, each a little askew."""
+    """Return the chamfered edges of ring joints: dark, slightly oblique bands across the whole lining."""
     line, lowest = tunnel.line, tunnel.section.floor_arc
     joints = rings.first + np.arange(rings.askew.size) * rings.length
     return [

@@ -1,7 +1,7 @@
-"""Bricks and stones in courses along the tunnel: where each lies, how far it stands out, and the mortar between.
+"""Bricks and stones in courses along the tunnel: positions, heights, and the mortar between.
 
-A course runs along the tunnel, every other one is shifted by half a unit. Ends of stones are displaced by chance, so that they
-differ in length. Relief and reflectance are made from the same units.
+Every other course is shifted by half a unit. Ends of stones are displaced at random, so that their lengths differ. Relief and
+reflectance are based on the same units.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ _MASK = np.uint64(0xFFFF)
 
 
 class Sizes(NamedTuple):
-    """Limits of what a kind of masonry is drawn from.
+    """Limits of the random parameters of a kind of masonry.
 
-    Length and height of a unit, width and depth of the mortar joint, standard deviation of how far units stand out, m; standard
-    deviation of their level and level of the mortar, dB; displacement of their ends as a share of the length.
+    Length and height of a unit, width and depth of the mortar joint, standard deviation of the heights of units, m; standard
+    deviation of their level, and level of the mortar, dB; displacement of their ends as a share of the length.
     """
 
     length: tuple[float, float]
@@ -45,7 +45,7 @@ KINDS = {
 
 
 class Masonry(NamedTuple):
-    """One masonry, drawn from its :class:`Sizes`; ``length`` 0: there is none. ``face`` bounds how far units stand out, m."""
+    """One masonry, drawn from its :class:`Sizes`; ``length`` 0: none. ``face`` bounds the heights of units, m."""
 
     length: float
     height: float
@@ -59,13 +59,13 @@ class Masonry(NamedTuple):
 
 
 def lay_courses(parameters: Parameters, seed: np.random.SeedSequence) -> Masonry:
-    """Masonry of the lining, if it is of bricks or stones."""
+    """Return the masonry of the lining, if it is of bricks or stones."""
     sizes = KINDS.get(parameters.lining)
     if sizes is None:
         return Masonry(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
     rng = np.random.default_rng(seed)
     length, height, joint, depth, face, level, mortar = (float(rng.uniform(*limits)) for limits in sizes[:7])
-    # Even numbers between the bounds have their standard deviation times the root of 3 at most.
+    # Uniform numbers are at most √3 standard deviations from their mean.
     return Masonry(
         length, height, joint, depth, math.sqrt(3.0) * face, level, mortar, sizes.jitter, int(seed.generate_state(1)[0])
     )
@@ -73,13 +73,13 @@ def lay_courses(parameters: Parameters, seed: np.random.SeedSequence) -> Masonry
 
 @inner
 def _end(masonry: Masonry, i: int, j: int) -> float:
-    """Where unit i of course j begins, in lengths."""
+    """Return the start of unit i of course j, in lengths."""
     return i + masonry.jitter * (_PART * float(mix(i, j, masonry.salt) & _MASK) - 0.5)
 
 
 @inner
 def unit_at(masonry: Masonry, s: float, arc: float) -> tuple[int, int, float]:
-    """Number in the course and course of the unit at a place, and the distance to its edge (the joint's middle), m."""
+    """Return index in the course and course of the unit at a position, and the distance to its edge (the joint's middle), m."""
     y = arc / masonry.height
     j = math.floor(y)
     x = s / masonry.length + 0.5 * (j & 1)
@@ -94,7 +94,7 @@ def unit_at(masonry: Masonry, s: float, arc: float) -> tuple[int, int, float]:
 
 @inner
 def unit_height(masonry: Masonry, s: float, arc: float) -> float:
-    """Height of masonry over the nominal lining, m: units stand out or back, mortar lies deeper."""
+    """Return the height of masonry above the nominal lining, m: units are in front or behind, mortar is deeper."""
     i, j, edge = unit_at(masonry, s, arc)
     if edge < 0.5 * masonry.joint:
         return -masonry.depth
@@ -108,7 +108,7 @@ def _units(masonry: Masonry, s: Float, arc: Float, column: Int64, course: Int64,
 
 
 def unit_level(masonry: Masonry, s: Float, arc: Float) -> Float:
-    """Level of units and mortar at places (n,), dB."""
+    """Return the level of units and mortar at positions (n,), dB."""
     column, course, edge = np.empty(s.size, dtype=np.int64), np.empty(s.size, dtype=np.int64), np.empty(s.size)
     _units(masonry, s, arc, column, course, edge)
     own = masonry.level * normal_field(column, course, masonry.salt + 1)

@@ -1,4 +1,4 @@
-"""How bright the lining is from place to place: its make, soot, grime, marks and blotches, in dB added to the reflectance."""
+"""Variation of the lining's reflectance, dB: material, soot, grime, marks and blotches."""
 
 from __future__ import annotations
 
@@ -23,38 +23,38 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 FORMWORK, FORMWORK_SIZE = 0.2, (1.0, 2.0)
 # Texture of shotcrete: limits of its standard deviation, dB, and of its correlation length, m.
 SHOTCRETE, SHOTCRETE_SIZE = (0.3, 0.5), (0.2, 0.8)
-# Texture of other linings alike.
+# Texture of other linings, likewise.
 TEXTURES = {
     "rough_shotcrete": ((0.3, 1.0), (0.1, 1.0)),
     "stone": ((0.2, 0.8), (0.1, 0.5)),
     "brick": ((0.1, 0.5), (0.2, 1.0)),
     "rock": ((0.5, 1.5), (0.2, 1.5)),
 }
-# Tiles: limits of their size, m; standard deviation from tile to tile, dB; width, m, and drop, dB, of the grout.
+# Tiles: limits of their size, m; standard deviation from tile to tile, dB; width, m, and darkening, dB, of the grout.
 TILE, TILE_LEVEL, GROUT, GROUT_DROP = (0.15, 0.30), 0.2, 0.005, 1.0
 # Soot: width as a share of the lining's half arc (the level falls as a Gauss curve); length of its changes along the
 # tunnel, m, and their standard deviation as a share; limits of the amount as a share.
 SOOT_WIDTH, SOOT_LENGTH, SOOT_CHANGE, SOOT_RANGE = (0.15, 0.25), 15.0, 0.35, (0.2, 1.6)
-# Grime beneath what runs along the wall: limits of the length over which it fades downwards, rise above, length of its
+# Grime beneath fixtures along the wall: limits of the length of its fading downwards, rise above, length of its
 # changes along the tunnel, m, and their standard deviation as a share.
 GRIME_FADE, GRIME_RISE, GRIME_LENGTH, GRIME_CHANGE = (0.1, 0.3), 0.04, 3.0, 0.25
 
 
 class Reflectance(NamedTuple):
-    """Levels of a lining.
+    """Reflectance levels of a lining.
 
     Attributes
     ----------
     rings : Rings
     masonry : Masonry
     salt : int
-        Of the fields.
+        Salt of the random fields.
     texture : (2,)
         Standard deviation, dB, and size, m; 0 dB: none.
     tile : float
         Side of the tiles, m; 0: none.
     soot : (3,)
-        dB, arc of the middle, width, m.
+        Darkening dB, arc of the middle, width, m.
     grime : (k, 4)
         Bands: side (+1, -1), distance of the upper edge from the crown along the arc, m, length of fading, m, dB.
     marks, mark_bins, mark_list
@@ -88,7 +88,7 @@ def lining_reflectance(
     blotches: list[Blotch],
     seed: np.random.SeedSequence,
 ) -> Reflectance | None:
-    """Levels as asked; None: the lining is plain."""
+    """Return the requested levels; None: the lining is uniform."""
     p, line, half = parameters, tunnel.line, tunnel.section.floor_arc
     if p.lining == "plain" and not (p.soot or p.grime or marks or blotches):
         return None
@@ -122,13 +122,13 @@ def lining_reflectance(
 
 
 def soot_amount(reflectance: Reflectance, s: Float) -> Float:
-    """Soot in the middle at chainages (n,), as a share of what was asked."""
+    """Return the soot in the middle at chainages (n,), as a share of the requested amount."""
     change = smooth_field(s / SOOT_LENGTH, np.full(s.size, 0.5), reflectance.salt + 2)
     return np.minimum(np.maximum(1.0 + SOOT_CHANGE * change, SOOT_RANGE[0]), SOOT_RANGE[1])
 
 
 def _grime(reflectance: Reflectance, s: Float, arc: Float) -> Float:
-    """Grime at places (n,), dB: the most that any band gives."""
+    """Return the grime at positions (n,), dB: the greatest value of all bands."""
     most = np.zeros(s.size)
     for i, (side, edge, fade, drop) in enumerate(reflectance.grime.tolist()):
         below = arc * side - edge
@@ -142,7 +142,7 @@ def _grime(reflectance: Reflectance, s: Float, arc: Float) -> Float:
 
 @kernel
 def _mark_level(marks: Float, bins: Int64, listed: Int64, start: float, s: Float, arc: Float, out: Float) -> None:
-    """Add the level of the mark at places (n,), dB. Strokes of a number overlap and are painted once."""
+    """Add the level of the mark at positions (n,), dB. Strokes of a number overlap and are painted once."""
     for i in range(s.shape[0]):
         b = bin_of(s[i], start, bins)
         for j in range(bins[b], bins[b + 1]):
@@ -155,7 +155,7 @@ def _mark_level(marks: Float, bins: Int64, listed: Int64, start: float, s: Float
 
 
 def _tiles(reflectance: Reflectance, s: Float, arc: Float) -> Float:
-    """Level of tiles and of the grout between them at places (n,), dB."""
+    """Return the level of tiles and of the grout between them at positions (n,), dB."""
     x, y = s / reflectance.tile, arc / reflectance.tile
     i, j = np.floor(x), np.floor(y)
     level = TILE_LEVEL * normal_field(i.astype(np.int64), j.astype(np.int64), reflectance.salt + 1)
@@ -164,7 +164,7 @@ def _tiles(reflectance: Reflectance, s: Float, arc: Float) -> Float:
 
 
 def level(reflectance: Reflectance, s: Float, arc: Float) -> Float:
-    """Level of the lining at chainages and arcs (n,), dB added to the reflectance."""
+    """Return the level of the lining at chainages and arcs (n,), dB added to the reflectance."""
     own = reflectance
     total = ring_level(own.rings, s, arc)
     texture, size = own.texture.tolist()

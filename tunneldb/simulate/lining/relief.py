@@ -1,7 +1,7 @@
-"""Where the lining departs from its nominal section: lips and chamfers of rings, changes of radius, bolt pockets, roughness.
+"""Deviation of the lining from its nominal section: lips and chamfers of rings, changes of radius, bolt pockets, roughness.
 
-The surface lies ``height`` m off the nominal one along its normal, into the tunnel. A ray is marched from where the
-highest place could be met, so that what it meets, and what that hides, is right for deep pockets and slanting rays too.
+The surface is ``height`` m off the nominal one along its normal, into the tunnel. A ray is marched from the first possible hit
+on, so that hits and occlusions are also right for deep pockets and slanting rays.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.section import nearest
 from tunneldb.simulate.tunnel.tunnel import Tunnel, foot, gradient
 
-# Relief by lining: wavelengths and standard deviations of smooth fields, m, which lie within 2.4 standard deviations.
+# Relief by lining: wavelengths and standard deviations of smooth fields, m, limited to 2.4 standard deviations.
 ROUGH = {
     "shotcrete": ((0.25, 0.006), (0.08, 0.002)),
     "rough_shotcrete": ((0.6, 0.025), (0.2, 0.010), (0.06, 0.004)),
@@ -29,19 +29,19 @@ ROUGH = {
     "stone": ((0.15, 0.004), (0.05, 0.0015)),
     "rock": ((0.05, 0.003),),
 }
-ROUGH_MOST = 2.4
+MAX_ROUGH_SIGMA = 2.4
 # Facets of unlined rock: sizes and greatest heights, m.
 FACETS = {"rock": ((0.8, 0.15), (0.25, 0.04))}
-# By how much that of a tunnel differs from these.
-ROUGHER = {"rough_shotcrete": (0.5, 1.5), "brick": (0.3, 2.0), "stone": (0.3, 2.0), "rock": (0.4, 1.6)}
+# Limits of the factor of a tunnel's relief to these.
+ROUGHNESS_FACTOR = {"rough_shotcrete": (0.5, 1.5), "brick": (0.3, 2.0), "stone": (0.3, 2.0), "rock": (0.4, 1.6)}
 _PART = 1.0 / 65535.0
 _MASK = np.uint64(0xFFFF)
 # Least and greatest step of the march, m; share of the gap to the surface that a step takes.
-SHORTEST, LONGEST, SHARE = 0.002, 0.02, 0.9
+MIN_STEP, MAX_STEP, STEP_SHARE = 0.002, 0.02, 0.9
 HALVINGS = 17
-CLOSE = 1e-6  # m
-# A surface passed by more than this is met from the side, m.
-SIDE = 5e-4
+TOLERANCE = 1e-6  # m
+# Depth behind a surface above which it is hit from the side, m.
+SIDE_DEPTH = 5e-4
 
 
 class LiningRelief(NamedTuple):
@@ -53,7 +53,7 @@ class LiningRelief(NamedTuple):
     step : (n,)
         Height of each ring, m.
     shape : RingShape
-        How rings depart from the section besides.
+        Other deviations of rings from the section.
     wider : (2,)
         Chainage from which the section is wider, and by how much, m.
     rough : (k, 2)
@@ -62,11 +62,11 @@ class LiningRelief(NamedTuple):
         Sizes and greatest heights of facets, m.
     masonry : Masonry
     salt : int
-        Of the fields.
+        Salt of the random fields.
     low, high : float
         Bounds of the height, m.
     floor_arc, floor : float
-        Arc of the section's corner and height of its floor, m: below, nothing is moved.
+        Arc of the section's corner and height of its floor, m: the floor has no relief.
     """
 
     rings: Rings
@@ -84,7 +84,7 @@ class LiningRelief(NamedTuple):
 
 
 def wider_from(tunnel: Tunnel) -> float:
-    """Chainage from which on the section is wider, where it is, m."""
+    """Return the chainage from which the section is wider, if it is, m."""
     return 0.5 * (tunnel.line.start + tunnel.line.end)
 
 
@@ -96,16 +96,16 @@ def lining_relief(
     masonry: Masonry,
     seed: np.random.SeedSequence,
 ) -> LiningRelief | None:
-    """Relief as asked; None: the surface is the nominal one."""
+    """Return the requested relief; None: the surface is the nominal one."""
     p = parameters
     if not (p.lining in ROUGH or rings.pocket_depth or p.chamfers or p.ring_step or p.radius_step) and shape.plain:
         return None
     rng = np.random.default_rng(seed)
     step = np.clip(rng.standard_normal(rings.level.size), -3.0, 3.0) * p.ring_step
-    scale = np.array([1.0, float(rng.uniform(*ROUGHER[p.lining])) if p.lining in ROUGHER else 1.0])
+    scale = np.array([1.0, float(rng.uniform(*ROUGHNESS_FACTOR[p.lining])) if p.lining in ROUGHNESS_FACTOR else 1.0])
     rough = np.array(ROUGH.get(p.lining, ())).reshape(-1, 2) * scale
     facets = np.array(FACETS.get(p.lining, ())).reshape(-1, 2) * scale
-    most = ROUGH_MOST * float(rough[:, 1].sum()) + float(facets[:, 1].sum()) + masonry.face
+    most = MAX_ROUGH_SIGMA * float(rough[:, 1].sum()) + float(facets[:, 1].sum()) + masonry.face
     reach = np.hypot(*shape.ellipse[:, :2].T) + np.hypot(*shape.ellipse[:, 2:].T)
     away = float((reach + np.abs(shape.stand).max(axis=1, initial=0.0)).max(initial=0.0))
     grooves = masonry.depth + (CHAMFER_DEPTH if p.chamfers else 0.0)
@@ -127,13 +127,13 @@ def lining_relief(
 
 @inner
 def _node(i: int, j: int, salt: int) -> float:
-    """Height of a node, -1 to 1."""
+    """Return the height of a node, -1 to 1."""
     return 2.0 * _PART * float((mix(i, j, salt) >> np.uint64(32)) & _MASK) - 1.0
 
 
 @inner
 def facet(x: float, y: float, salt: int) -> float:
-    """Surface of plane triangles over a plane, -1 to 1: nodes are a grid of side 1, each cell is cut along either diagonal."""
+    """Return a surface of plane triangles, -1 to 1: nodes on a unit grid, each cell divided along either diagonal."""
     i, j = math.floor(x), math.floor(y)
     tx, ty = x - i, y - j
     a, b, c, d = _node(i, j, salt), _node(i + 1, j, salt), _node(i, j + 1, salt), _node(i + 1, j + 1, salt)
@@ -148,7 +148,7 @@ def facet(x: float, y: float, salt: int) -> float:
 
 @inner
 def _rough(relief: LiningRelief, s: float, arc: float) -> float:
-    """Height of a rough surface without steps, m."""
+    """Return the height of a rough surface without steps, m."""
     total = -chamfer_depth(relief.rings, s, arc)
     for i in range(relief.rough.shape[0]):
         size = relief.rough[i, 0]
@@ -161,7 +161,7 @@ def _rough(relief: LiningRelief, s: float, arc: float) -> float:
 
 @inner
 def height(relief: LiningRelief, s: float, arc: float) -> float:
-    """Height of the lining over the nominal section at a chainage and an arc, m, positive into the tunnel."""
+    """Return the height of the lining above the nominal section at a chainage and an arc, m, positive into the tunnel."""
     if abs(arc) > relief.floor_arc:
         return 0.0
     total = -relief.wider[1] if s > relief.wider[0] else 0.0
@@ -179,7 +179,7 @@ def height(relief: LiningRelief, s: float, arc: float) -> float:
 def _gap(
     relief: LiningRelief, plan: Float, profile: Float, parts: Float, x: float, y: float, z: float, s: float
 ) -> tuple[float, float, float, float, tuple[float, ...]]:
-    """Arc of a place, its distance to the lining along the normal, gradient (u, w) of its offset; :func:`foot` of it."""
+    """Return arc, distance to the lining along the normal, gradient (u, w) of the offset, and :func:`foot` of a position."""
     found = foot(plan, profile, x, y, z, s, 1e-3, np.int64(2))
     arc, offset, gu, gw = nearest(parts, found[2], found[3])
     return arc, offset - height(relief, found[0], arc), gu, gw, found
@@ -197,10 +197,10 @@ def intersect_relief(
     found: Float,
     is_floor: Bool,
 ) -> None:
-    """Where some ``rays`` (m,) that meet the nominal section meet the lining.
+    """Intersect some ``rays`` (m,) that hit the nominal section with the lining.
 
-    Replaces range, chainage, arc and cosine in ``found`` (6, n), rows as of :func:`intersect_lining`; ``is_floor`` (m,) says
-    of each whether it meets the floor that goes on where the lining stands back.
+    Replaces range, chainage, arc and cosine in ``found`` (6, n), rows as of :func:`intersect_lining`; ``is_floor`` (m,) is set
+    for rays that hit the floor where it continues below a receding lining.
     """
     for m in range(rays.shape[0]):
         i = rays[m]
@@ -208,26 +208,26 @@ def intersect_relief(
         dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
         r, s = found[0, i], found[1, i]
         slant = max(found[3, i], 0.1)
-        back = relief.high / slant + SHORTEST
-        end = r + 2.0 * (SHORTEST - relief.low) / slant + 0.2
+        back = relief.high / slant + MIN_STEP
+        end = r + 2.0 * (MIN_STEP - relief.low) / slant + 0.2
         t = r
         for _ in range(7):
             t = r - back
             arc, gap, gu, gw, at = _gap(relief, plan, profile, parts, x + t * dx, y + t * dy, z + t * dz, s)
             if gap > 0.0:
                 break
-            back *= 2.0  # the section bends away: begin farther back
+            back *= 2.0  # the section curves away: begin farther back
         before, above = t, gap
         while gap > 0.0 and at[3] > relief.floor and t < end:
             before, above = t, gap
-            t += min(max(SHARE * gap / slant, SHORTEST), LONGEST)
+            t += min(max(STEP_SHARE * gap / slant, MIN_STEP), MAX_STEP)
             arc, gap, gu, gw, at = _gap(relief, plan, profile, parts, x + t * dx, y + t * dy, z + t * dz, at[0])
         for j in range(HALVINGS):
-            if t - before < CLOSE or (-CLOSE < gap <= 0.0):
+            if t - before < TOLERANCE or (-TOLERANCE < gap <= 0.0):
                 break
-            # A smooth surface is found where the chord crosses it, a step in it by halving.
+            # A smooth surface is found by the secant method, a step by bisection.
             share = above / (above - gap) if j < 3 and gap < 0.0 else 0.5
-            middle = before + share * (t - before) + (0.5 * CLOSE if j < 3 else 0.0)
+            middle = before + share * (t - before) + (0.5 * TOLERANCE if j < 3 else 0.0)
             there = _gap(relief, plan, profile, parts, x + middle * dx, y + middle * dy, z + middle * dz, at[0])
             if there[1] > 0.0 and there[4][3] > relief.floor:
                 before, above = middle, there[1]
@@ -248,11 +248,11 @@ def intersect_relief(
             continue
         nx, ny, nz = nx / norm, ny / norm, nz / norm
         tx, ty, tz = c / q, n / q, g / q
-        # Into the direction of growing arc.
+        # In the direction of increasing arc.
         ax, ay, az = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
-        if gap < -SIDE:
+        if gap < -SIDE_DEPTH:
             beside = _gap(relief, plan, profile, parts, x + before * dx, y + before * dy, z + before * dz, s)
-            is_end = abs(height(relief, s, beside[0]) - height(relief, beside[4][0], beside[0])) > SIDE
+            is_end = abs(height(relief, s, beside[0]) - height(relief, beside[4][0], beside[0])) > SIDE_DEPTH
             if is_end:
                 ax, ay, az = tx, ty, tz
             found[3, i] = abs(ax * dx + ay * dy + az * dz)

@@ -1,4 +1,4 @@
-"""How a lining is put together along the tunnel: blocks cast in place, or rings of segments with bolt pockets."""
+"""Construction of a lining along the tunnel: blocks cast in place, or rings of segments with bolt pockets."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 SEGMENTS = 6  # of a ring
 # Standard deviation of the level of a block, a ring and a segment, dB.
 BLOCK_LEVEL, RING_LEVEL, SEGMENT_LEVEL = 0.4, 0.8, 0.3
-# Least and greatest width (m) and drop (dB) of joints.
+# Limits of width (m) and darkening (dB) of joints.
 CAST_WIDTH, CAST_DROP = (0.010, 0.020), (2.0, 4.0)
 SEAM_WIDTH, SEAM_DROP = (0.005, 0.012), (2.0, 5.0)
 # Bolt pockets: size along the tunnel and the arc, distance of the middle from the ring joint, m; shares of a
-# segment's length where they lie; limits of depth (m) and of drop (dB).
+# segment's length at which they lie; limits of depth (m) and of darkening (dB).
 POCKET = (0.15, 0.20)
 POCKET_FROM_JOINT = 0.25
 POCKETS = (0.25, 0.75)
@@ -29,9 +29,9 @@ CHAMFER, CHAMFER_DEPTH, CHAMFER_SLANT = 0.05, 0.015, (0.2, 1.5)
 
 
 class Rings(NamedTuple):
-    """Rings (or blocks) of a lining, ring i from ``first + i * length`` on; n of them, of m segments each.
+    """Rings (or blocks) of a lining, ring i from ``first + i * length`` on; n of them, with m segments each.
 
-    Segment k of ring i begins at arc ``shift[i] + k * period``, the arc's whole circle being ``m * period``; blocks
+    Segment k of ring i begins at arc ``shift[i] + k * period``; the full circle of the arc is ``m * period``; blocks
     cast in one piece have m = 0. A lining without rings has ``length`` 0.
 
     Attributes
@@ -39,21 +39,21 @@ class Rings(NamedTuple):
     first, length : float
         Chainage of the first joint and distance between joints, m.
     level : (n,)
-        dB added to the ring.
+        Level added to the ring, dB.
     joint_width, joint_drop : (n + 1,)
-        Ring joints: m, dB.
+        Width of ring joints, m, and their darkening, dB.
     period : float
         Length of a segment along the arc, m.
     shift : (n,)
         Arc of a joint between segments, m.
     segment_level, seam_width, seam_drop : (n, m)
-        Of a segment, dB, and of the joint at its beginning, m and dB.
+        Level of a segment, dB; width, m, and darkening, dB, of the joint at its start.
     pocket_drop : (n, m, 2)
-        Of the bolt pockets of a segment, dB.
+        Darkening of the bolt pockets of a segment, dB.
     pocket_depth : float
-        m; 0: there are none.
+        Depth of bolt pockets, m; 0: none.
     askew : (n + 1,)
-        Chamfers of ring joints: chainage that they gain with arc, m/m; none where joints are sharp.
+        Chamfers of ring joints: chainage gained with arc, m/m; empty if joints are sharp.
     """
 
     first: float
@@ -72,7 +72,7 @@ class Rings(NamedTuple):
 
 
 def build(parameters: Parameters, tunnel: Tunnel, seed: np.random.SeedSequence, chamfered: np.random.SeedSequence) -> Rings:
-    """Rings of a lining as asked; chamfers have random numbers of their own."""
+    """Return the requested rings of a lining; chamfers have their own random numbers."""
     p, line = parameters, tunnel.line
     shape = np.random.default_rng(seed)
     length = p.ring_length()
@@ -105,13 +105,13 @@ def build(parameters: Parameters, tunnel: Tunnel, seed: np.random.SeedSequence, 
 
 
 def _askew(count: int, rng: np.random.Generator) -> Float:
-    """How much chamfers gain in chainage with arc, m/m, either way."""
+    """Return the gain of chamfers in chainage with arc, m/m, either way."""
     return np.tan(np.radians(rng.uniform(*CHAMFER_SLANT, count))) * rng.choice([-1.0, 1.0], count)
 
 
 @inner
 def chamfer_depth(rings: Rings, s: float, arc: float) -> float:
-    """Depth of the chamfer of a ring joint at a place, m: a groove with plane sides; 0: there is none."""
+    """Return the depth of the chamfer of a ring joint at a position, m: a groove with plane sides; 0: none."""
     if rings.askew.shape[0] == 0:
         return 0.0
     nearest = math.floor((s - rings.first) / rings.length + 0.5)
@@ -124,13 +124,13 @@ def chamfer_depth(rings: Rings, s: float, arc: float) -> float:
 
 @inner
 def ring_of(rings: Rings, s: float) -> int:
-    """Number of the ring at a chainage, the first or last one beyond the ends."""
+    """Return the index of the ring at a chainage, the first or last one beyond the ends."""
     return min(max(math.floor((s - rings.first) / rings.length), 0), rings.level.shape[0] - 1)
 
 
 @inner
 def pocket_drop(rings: Rings, s: float, arc: float) -> float:
-    """Drop of the bolt pocket at a place, dB; 0: there is none."""
+    """Return the darkening of the bolt pocket at a position, dB; 0: none."""
     if rings.pocket_depth == 0.0:
         return 0.0
     i = ring_of(rings, s)
@@ -164,7 +164,7 @@ def _ring_level(rings: Rings, s: Float, arc: Float, out: Float) -> None:
 
 
 def ring_level(rings: Rings, s: Float, arc: Float) -> Float:
-    """Level of rings, segments, joints and pockets at places (n,) of the lining, dB."""
+    """Return the level of rings, segments, joints and pockets at positions (n,) of the lining, dB."""
     out = np.zeros(s.size)
     if rings.length > 0.0:
         _ring_level(rings, s, arc, out)

@@ -1,4 +1,4 @@
-"""Leaks of special places: along joints, on the back walls of niches, and drips that have come off a leak."""
+"""Leaks at special places: along joints, on the back walls of niches, and drips separate from a leak."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 TRIES = 600
 # Wet bands along joints: limits of width and length, m.
 BAND_WIDTH, BAND_LENGTH = (0.1, 0.4), (0.5, 3.0)
-# Of the joint leaks of segments, the share along joints between rings (the rest: between segments).
+# Share of the joint leaks of segments along joints between rings (the rest: between segments).
 ALONG_RINGS = 0.7
 # Leaks in niches: limits of area, m², and distance to the edges of the back wall, m.
 NICHE_AREA, NICHE_MARGIN = (0.05, 0.8), 0.1
-# Drips: leaks from this area on (m²) have them with this probability; limits of their length and width, m.
-DRIPPING, DRIP_SHARE = 0.1, 0.7
+# Drips: least area of leaks with drips (m²), and their probability; limits of their length and width, m.
+MIN_DRIP_AREA, DRIP_SHARE = 0.1, 0.7
 DRIP_LENGTH, DRIP_WIDTH = (0.03, 0.30), (0.02, 0.06)
 
 
 def band_of(length: float, width: float, rng: np.random.Generator) -> Polygon:
-    """A band about the x axis, of uneven width, narrower at its ends."""
+    """Return a band around the x axis, of uneven width, narrower at its ends."""
     x = np.linspace(-1.0, 1.0, 25)
     sides = []
     for side in (1.0, -1.0):
@@ -41,12 +41,12 @@ def band_of(length: float, width: float, rng: np.random.Generator) -> Polygon:
 
 
 def joint_leaks(parameters: Parameters, tunnel: Tunnel, rings: Rings, room: Room, seed: np.random.SeedSequence) -> list[Leak]:
-    """Wet bands along joints of the lining, numbered from 1.
+    """Return wet bands along joints of the lining, numbered from 1.
 
     Raises
     ------
     UserError
-        There is no room for as many.
+        If there is no space for all.
     """
     p, rng = parameters, np.random.default_rng(seed)
     lowest = tunnel.section.floor_arc
@@ -68,7 +68,7 @@ def joint_leaks(parameters: Parameters, tunnel: Tunnel, rings: Rings, room: Room
             if room.holds(band):
                 break
         else:
-            raise UserError(f"no room for joint leak {len(leaks) + 1} of {p.joint_leaks}: ask for fewer leaks")
+            raise UserError(f"no room for joint leak {len(leaks) + 1} of {p.joint_leaks}; use fewer leaks")
         room.take(band)
         factor = float(tunnel.area_factor(np.array([s]), np.array([arc]))[0])
         leaks.append(Leak(len(leaks) + 1, band, band.area * factor, float(rng.uniform(*p.leak_drop)), "joint"))
@@ -76,15 +76,15 @@ def joint_leaks(parameters: Parameters, tunnel: Tunnel, rings: Rings, room: Room
 
 
 def niche_leaks(parameters: Parameters, tunnel: Tunnel, niches: list[Niche], seed: np.random.SeedSequence) -> list[Leak]:
-    """Leaks on the back walls of niches, in turn, numbered from 1.
+    """Return leaks on the back walls of niches, in turn, numbered from 1.
 
-    The polygon is where the wet points lie in the unrolled plane: their chainage and the arc of the section's nearest
-    point; ``area_surface`` is the area on the back wall.
+    The polygon contains the wet points in the unrolled plane (their chainage and the arc of the section's nearest point);
+    ``area_surface`` is the area on the back wall.
 
     Raises
     ------
     UserError
-        There is no room for as many.
+        If there is no space for all.
     """
     p, rng = parameters, np.random.default_rng(seed)
     rows = niche_table(tunnel, niches)
@@ -105,7 +105,7 @@ def niche_leaks(parameters: Parameters, tunnel: Tunnel, niches: list[Niche], see
             if inside and all(patch.distance(t) > 0.2 for t in taken[k]):
                 break
         else:
-            raise UserError(f"no room for niche leak {len(leaks) + 1} of {p.niche_leaks}: ask for fewer or a longer tunnel")
+            raise UserError(f"no room for niche leak {len(leaks) + 1} of {p.niche_leaks}; use fewer or a longer tunnel")
         taken[k].append(patch)
         x, z = np.asarray(patch.segmentize(0.02).exterior.coords).T
         space = row[2:5] + x[:, None] * row[5:8] + row[16] * row[8:11] + z[:, None] * row[11:14]
@@ -116,7 +116,7 @@ def niche_leaks(parameters: Parameters, tunnel: Tunnel, niches: list[Niche], see
 
 
 def _drip(leak: Polygon | MultiPolygon, down: float, gaps: tuple[float, float], rng: np.random.Generator) -> Polygon | None:
-    """A drop or a streak on the wall below a leak, apart from it; None: the leak is not above the place tried."""
+    """Return a drop or a streak on the wall below a leak, separate from it; None: the leak is not above the position tried."""
     left, low, right, high = leak.bounds
     x = float(rng.uniform(0.8 * left + 0.2 * right, 0.2 * left + 0.8 * right))
     across = leak.intersection(LineString([(x, low - 0.1), (x, high + 0.1)]))
@@ -129,7 +129,7 @@ def _drip(leak: Polygon | MultiPolygon, down: float, gaps: tuple[float, float], 
 
 
 def with_drips(leaks: list[Leak], gaps: tuple[float, float], room: Room, seed: np.random.SeedSequence) -> list[Leak]:
-    """The leaks, those of some size with one to three drips below them that belong to their truth.
+    """Return the leaks, larger ones with one to three drips below them, which belong to their reference outline.
 
     ``gaps`` are the limits of the distance between a drip and its leak, m.
     """
@@ -137,7 +137,7 @@ def with_drips(leaks: list[Leak], gaps: tuple[float, float], room: Room, seed: n
     for leak, sequence in zip(leaks, seed.spawn(len(leaks)), strict=True):
         rng = np.random.default_rng(sequence)
         down = math.copysign(1.0, leak.polygon.centroid.y)
-        if leak.kind == "niche" or leak.area < DRIPPING or rng.random() > DRIP_SHARE:
+        if leak.kind == "niche" or leak.area < MIN_DRIP_AREA or rng.random() > DRIP_SHARE:
             dripping.append(leak)
             continue
         drips = [_drip(leak.polygon, down, gaps, rng) for _ in range(int(rng.integers(1, 4)))]

@@ -1,1 +1,1 @@
-"""What is fixed to the lining of a synthetic tunnel, let into it, hangs in the tunnel or stands in it."""
+"""Objects of a synthetic tunnel: fixtures on the lining, recesses in it, hanging and standing objects."""

@@ -1,6 +1,6 @@
-"""Shapes of what stands free in a tunnel, built of balls, rods and bricks.
+"""Shapes of free-standing objects in a tunnel, built of balls, rods and bricks.
 
-Each takes a :class:`Place`, the spot on the ground where it stands.
+Each takes a :class:`Place`, its position on the ground.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True)
 class Place:
-    """A spot on the ground: coordinates (3,), unit vectors along, right and up of the floor there (3, 3)."""
+    """Position on the ground: coordinates (3,), unit vectors along, right and up of the floor there (3, 3)."""
 
     spot: Float
     axes: Float
 
     def turned(self, angle: float) -> Float:
-        """The floor's axes, turned by ``angle`` (rad) about its normal."""
+        """Return the floor's axes, turned by ``angle`` (rad) about its normal."""
         c, s = math.cos(angle), math.sin(angle)
         t, u, w = self.axes
         return np.array([c * t + s * u, c * u - s * t, w])
@@ -38,7 +38,7 @@ def _horizontal(angle: float) -> Float:
 
 
 def person(place: Place, rng: np.random.Generator) -> Primitive:
-    """Someone standing upright, 1.6 to 1.9 m tall: legs, trunk, arms, head."""
+    """Return a person standing upright, 1.6 to 1.9 m tall: legs, trunk, arms, head."""
     size = rng.uniform(1.6, 1.9) / 1.75
     ahead = _horizontal(rng.uniform(0.0, 2.0 * math.pi))
     side = np.cross(UP, ahead)
@@ -60,14 +60,14 @@ def person(place: Place, rng: np.random.Generator) -> Primitive:
 
 
 def case(place: Place, rng: np.random.Generator) -> Primitive:
-    """A closed box on the ground, 0.3 to 0.9 m."""
+    """Return a closed box on the ground, 0.3 to 0.9 m."""
     size = rng.uniform((0.4, 0.3, 0.25), (0.9, 0.6, 0.7))
     middle = place.spot + (0.5 * size[2] - 0.01) * place.axes[2]
     return Primitive("case", OBJECT, 4.0, np.array([brick(middle, size.tolist(), place.turned(rng.uniform(0.0, math.pi)))]))
 
 
 def trolley(place: Place, rng: np.random.Generator) -> Primitive:
-    """A flat car along the tunnel: deck on four legs, a handle, a load."""
+    """Return a flat car along the tunnel: deck on four legs, a handle, a load."""
     t, u, w = axes = place.turned(rng.normal(0.0, 0.05))
     deck = rng.uniform(0.35, 0.6)
     parts = [brick(place.spot + deck * w, (1.2, 0.7, 0.06), axes)]
@@ -85,7 +85,7 @@ def trolley(place: Place, rng: np.random.Generator) -> Primitive:
 
 
 def _legs(place: Place, top: Float, spread: float, turn: float) -> list[Float]:
-    """Three legs from the ground to ``top``, rods."""
+    """Return three legs from the ground to ``top``, as rods."""
     feet = [
         place.spot + spread * (math.cos(a) * place.axes[0] + math.sin(a) * place.axes[1]) for a in turn + np.arange(3) * 2.0944
     ]
@@ -93,7 +93,7 @@ def _legs(place: Place, top: Float, spread: float, turn: float) -> list[Float]:
 
 
 def tripod(place: Place, rng: np.random.Generator) -> Primitive:
-    """A tripod with an instrument on it, 1.4 to 1.8 m high."""
+    """Return a tripod with an instrument on it, 1.4 to 1.8 m high."""
     head = place.spot + rng.uniform(1.1, 1.4) * UP
     turn = rng.uniform(0.0, 2.0 * math.pi)
     axes = np.array([_horizontal(turn), _horizontal(turn + 0.5 * math.pi), UP])
@@ -102,31 +102,31 @@ def tripod(place: Place, rng: np.random.Generator) -> Primitive:
 
 
 def bollard(place: Place, rng: np.random.Generator) -> Primitive:
-    """A round-topped post, 0.7 to 1.1 m high, 8 to 16 cm thick."""
+    """Return a round-topped post, 0.7 to 1.1 m high, 8 to 16 cm thick."""
     radius = rng.uniform(0.04, 0.08)
     top = place.spot + (rng.uniform(0.7, 1.1) - radius) * UP
     return Primitive("bollard", OBJECT, -1.0, np.array([rod(place.spot - 0.1 * UP, top, radius)]))
 
 
 def globe_on_post(place: Place, radius: float, rng: np.random.Generator) -> Primitive:
-    """A lamp: a globe on a post 1.5 to 2.2 m high."""
+    """Return a lamp: a globe on a post 1.5 to 2.2 m high."""
     top = place.spot + rng.uniform(1.5, 2.2) * UP
     return Primitive("globe", OBJECT, -2.0, np.array([rod(place.spot - 0.1 * UP, top, 0.025), ball(top + radius * UP, radius)]))
 
 
 def globe_on_wall(wall: Float, normal: Float, radius: float) -> Primitive:
-    """A lamp: a globe on a stem out of the lining."""
+    """Return a lamp: a globe on a stem on the lining."""
     stem = wall + 0.1 * normal
     return Primitive("globe", APPENDAGE, -2.0, np.array([rod(wall, stem, 0.02), ball(stem + radius * normal, radius)]))
 
 
 def sphere(centre: Float, radius: float) -> Primitive:
-    """A target sphere, white."""
+    """Return a white target sphere."""
     return Primitive("sphere", SPHERE, -3.0, np.array([ball(centre, radius)]))
 
 
 def sphere_tripod(place: Place, centre: Float, radius: float, rng: np.random.Generator) -> Primitive:
-    """What carries a target sphere above the ground: three legs to a pin under it."""
+    """Return the support of a target sphere on the ground: three legs to a pin under it."""
     low = centre - radius * UP
     head = low - 0.05 * UP
     parts = [*_legs(place, head, 0.4, rng.uniform(0.0, 2.0 * math.pi)), rod(head, low, 0.008)]
@@ -134,7 +134,7 @@ def sphere_tripod(place: Place, centre: Float, radius: float, rng: np.random.Gen
 
 
 def sphere_bracket(wall: Float, centre: Float, radius: float) -> Primitive:
-    """What carries a target sphere on the wall: an arm from the lining to its back."""
+    """Return the support of a target sphere on the wall: an arm from the lining to its back."""
     arm = centre - wall
     length = float(np.linalg.norm(arm))
     return Primitive("bracket", APPENDAGE, 4.0, np.array([rod(wall, wall + arm * (1.0 - radius / length), 0.01)]))

@@ -1,7 +1,7 @@
-"""What hangs on the lining or is let into it: cables, trays, boxes, lamps, rails, refuge niches.
+"""Fixtures on the lining and recesses in it: cables, trays, boxes, lamps, rails, refuge niches.
 
-An appendage is a tube or a bar swept along the tunnel: its cross-section lies fixed in (u, w) between two
-chainages. A niche is a rectangular recess, straight (not bent with the tunnel), floor and all.
+An appendage is a tube or a bar swept along the tunnel: its cross-section is constant in (u, w) between two
+chainages. A niche is a rectangular recess, straight (not curved with the tunnel), including its floor.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 TUBE, BAR = 0.0, 1.0
 LINING, FLOOR, APPENDAGE, NICHE, OUTLIER, RAIL, OBJECT, SPHERE = 0, 1, 2, 3, 4, 5, 6, 7
 
-# Chainages are looked up in bins this long; what lies within REACH of a bin is listed in it.
+# Length of chainage bins, m; objects within REACH of a bin are listed in it.
 BIN = 2.0
 REACH = 1.0
 
 
 @dataclass(frozen=True)
 class Appendage:
-    """Something on the lining.
+    """Fixture on the lining.
 
     Attributes
     ----------
@@ -35,13 +35,13 @@ class Appendage:
     start, end : float
         Chainage, m.
     arc : float
-        Where on the section its middle is, m.
+        Arc of its middle on the section, m.
     standoff : float
-        From the surface to its middle, m.
+        Distance of its middle from the surface, m.
     width, depth : float
-        Along the section and away from the surface, m; a tube's diameter is both.
+        Size along the section and away from the surface, m; both are the diameter of a tube.
     drop : float
-        How much darker than the lining, dB.
+        Darkening relative to the lining, dB.
     """
 
     kind: str
@@ -55,27 +55,27 @@ class Appendage:
 
     @property
     def is_tube(self) -> bool:
-        """Whether it is round."""
+        """True if it is round."""
         return self.kind in ("cable", "pipe")
 
     @property
     def is_run(self) -> bool:
-        """Whether it runs along the wall from end to end."""
+        """True if it extends along the wall from end to end."""
         return self.kind in ("cable", "pipe", "tray", "duct", "trunking")
 
     @property
     def klass(self) -> int:
-        """Class of its points: what one walks or drives on is floor."""
+        """Class of its points; surfaces for walking or driving are floor."""
         return {"rail": RAIL, "walkway": FLOOR, "kerb": FLOOR, "carriageway": FLOOR}.get(self.kind, APPENDAGE)
 
     def footprint(self) -> Polygon:
-        """What it covers of the unrolled plane, seen along the normal."""
+        """Return the area of the unrolled plane that it covers, seen along the normal."""
         return box(self.start, self.arc - 0.5 * self.width, self.end, self.arc + 0.5 * self.width)
 
 
 @dataclass(frozen=True)
 class Niche:
-    """A refuge in the wall: middle chainage, side (+1 right), width, height above the floor, depth; m."""
+    """Refuge in the wall: middle chainage, side (+1 right), width, height above the floor, depth; m."""
 
     chainage: float
     side: int
@@ -84,7 +84,7 @@ class Niche:
     depth: float = 0.9
 
     def footprint(self, tunnel: Tunnel) -> Polygon:
-        """Its opening in the unrolled plane."""
+        """Return its opening in the unrolled plane."""
         section = tunnel.section
         arcs = np.linspace(0.0, section.floor_arc, 2001)
         w = section.point(arcs)[0][:, 1]
@@ -99,7 +99,7 @@ SILL = 0.05
 
 
 def appendage_table(tunnel: Tunnel, items: list[Appendage]) -> Float:
-    """Rows for the ray kernel: kind, chainage from/to, middle u/w, tangent u/w, half width/depth, class, drop."""
+    """Return rows for the ray kernel: kind, chainage from/to, middle u/w, tangent u/w, half width/depth, class, darkening."""
     rows = np.zeros((len(items), 11))
     for row, item in zip(rows, items, strict=True):
         point, normal = tunnel.section.point(np.array([item.arc]))
@@ -121,9 +121,9 @@ def appendage_table(tunnel: Tunnel, items: list[Appendage]) -> Float:
 
 
 def niche_table(tunnel: Tunnel, niches: list[Niche]) -> Float:
-    """Rows: chainage from/to, origin (3, from the line's origin), t (3), outward (3), up (3), half width, height, depth.
+    """Return rows: chainage from/to, origin (3, from the line's origin), t (3), outward (3), up (3), half width, height, depth.
 
-    The origin lies on the axis above the sill; depth is measured from the axis to the back wall.
+    The origin is on the axis above the sill; depth is measured from the axis to the back wall.
     """
     rows = np.zeros((len(niches), 17))
     for row, niche in zip(rows, niches, strict=True):
@@ -143,7 +143,7 @@ def niche_table(tunnel: Tunnel, niches: list[Niche]) -> Float:
 
 
 def bins(low: Float, high: Float, start: float, end: float) -> tuple[Int64, Int64]:
-    """List by chainage bin which intervals [low, high] come within REACH: (offsets (b+1,), indices)."""
+    """List by chainage bin the intervals [low, high] within REACH: (offsets (b+1,), indices)."""
     count = max(1, math.ceil((end - start) / BIN))
     lists = []
     for b in range(count):
@@ -155,12 +155,12 @@ def bins(low: Float, high: Float, start: float, end: float) -> tuple[Int64, Int6
 
 @inner
 def bin_of(s: float, start: float, offsets: Int64) -> int:
-    """Bin of a chainage, the first or last one beyond the ends."""
+    """Return the bin of a chainage, the first or last one beyond the ends."""
     return min(max(math.floor((s - start) / BIN), 0), offsets.shape[0] - 2)
 
 
 def listed_pairs(s: Float, start: float, offsets: Int64, listed: Int64) -> tuple[Int64, Int64]:
-    """Places at chainages (n,) and what is listed in their bins, as pairs: numbers of the place, and of what is listed."""
+    """Return pairs of positions at chainages (n,) and the items in their bins: indices of the position, and of the item."""
     b = np.clip(np.floor((s - start) / BIN), 0, len(offsets) - 2).astype(np.int64)
     count = offsets[b + 1] - offsets[b]
     place = np.repeat(np.arange(len(s)), count)
@@ -169,7 +169,7 @@ def listed_pairs(s: Float, start: float, offsets: Int64, listed: Int64) -> tuple
 
 @inner
 def distance(items: Float, k: int, s: float, u: float, w: float) -> float:
-    """Signed distance to row k of :func:`appendage_table`, positive outside; m in (chainage, u, w)."""
+    """Return the signed distance to row k of :func:`appendage_table`, positive outside; m in (chainage, u, w)."""
     half = 0.5 * (items[k, 2] - items[k, 1])
     a = abs(s - items[k, 1] - half) - half
     du, dw = u - items[k, 3], w - items[k, 4]
@@ -187,7 +187,7 @@ def distance(items: Float, k: int, s: float, u: float, w: float) -> float:
 
 
 def furnish(tunnel: Tunnel, rng: np.random.Generator) -> list[Appendage]:
-    """Cables, a tray, boxes and lamps as a railway tunnel has them, rails on the floor."""
+    """Return typical fixtures of a railway tunnel: cables, a tray, boxes and lamps, rails on the floor."""
     line, section = tunnel.line, tunnel.section
     start, end = line.start, line.end
     lining = section.floor_arc
@@ -206,7 +206,7 @@ def furnish(tunnel: Tunnel, rng: np.random.Generator) -> list[Appendage]:
 
 
 def refuges(tunnel: Tunnel, spacing: float = 60.0) -> list[Niche]:
-    """Refuge niches on alternating sides; one at least, in the middle of a short tunnel."""
+    """Return refuge niches on alternating sides; at least one, in the middle of a short tunnel."""
     start, end = tunnel.line.start, tunnel.line.end
     places = np.arange(start + 0.5 * spacing, end - 3.0, spacing)
     if places.size == 0 and end - start > 10.0:

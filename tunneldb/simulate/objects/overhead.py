@@ -1,4 +1,4 @@
-"""What hangs free along the tunnel, cables off the wall and a contact line, and the sleepers under the rails."""
+"""Cables and a contact line along the tunnel, away from the wall, and the sleepers under the rails."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SLEEPER_TOP = 0.04  # above the floor, m
 
 
 def _wire(tunnel: Tunnel, chainage: Float, across: Float | float, up: Float | float, radius: float) -> list[Float]:
-    """Rods through points (across, up) from the axis, m."""
+    """Return rods through points (across, up) from the axis, m."""
     frame = tunnel.line.frame(chainage)
     u, w = np.broadcast_to(across, chainage.shape)[:, None], np.broadcast_to(up, chainage.shape)[:, None]
     points = frame.position + u * frame.u + w * frame.w
@@ -31,7 +31,7 @@ def _wire(tunnel: Tunnel, chainage: Float, across: Float | float, up: Float | fl
 
 
 def _sag(chainage: Float, supports: Float, depth: float) -> Float:
-    """How far a wire hangs below its supports, m: a parabola of ``depth`` between each two."""
+    """Return the sag of a wire below its supports, m: a parabola of ``depth`` between each two."""
     k = np.clip(np.searchsorted(supports, chainage, "right") - 1, 0, supports.size - 2)
     share = (chainage - supports[k]) / (supports[k + 1] - supports[k])
     return np.asarray(4.0 * depth * share * (1.0 - share))
@@ -42,7 +42,7 @@ def _supports(start: float, end: float, spacing: float) -> Float:
 
 
 def _free_cable(tunnel: Tunnel, rng: np.random.Generator) -> Primitive:
-    """A cable on hangers 0.35 to 0.9 m off the lining, 4 to 8 m long spans of it sagging by 5 to 25 cm."""
+    """Return a cable on hangers 0.35 to 0.9 m off the lining; its spans of 4 to 8 m sag by 5 to 25 cm."""
     line, section = tunnel.line, tunnel.section
     supports = _supports(line.start, line.end, HANGERS)
     arc = float(rng.uniform(0.3, 0.7) * rng.choice([-1.0, 1.0])) * section.floor_arc
@@ -57,7 +57,7 @@ def _free_cable(tunnel: Tunnel, rng: np.random.Generator) -> Primitive:
 
 
 def _contact_line(tunnel: Tunnel) -> Primitive:
-    """Contact wire and messenger over the track, droppers between them, arms from the crown."""
+    """Return contact wire and messenger above the track, droppers between them, arms from the crown."""
     line, section = tunnel.line, tunnel.section
     crown = float(section.point(np.array([0.0]))[0][0, 1])
     wire = min(section.floor + 5.3, crown - 0.9)
@@ -77,7 +77,7 @@ def _contact_line(tunnel: Tunnel) -> Primitive:
 
 
 def overhead(parameters: Parameters, tunnel: Tunnel, seed: np.random.SeedSequence, first: int) -> list[Primitive]:
-    """Free cables and the contact line, numbered from ``first``."""
+    """Return free cables and the contact line, numbered from ``first``."""
     things = [_free_cable(tunnel, np.random.default_rng(s)) for s in seed.spawn(parameters.free_cables)]
     if parameters.catenary:
         things.append(_contact_line(tunnel))
@@ -85,7 +85,7 @@ def overhead(parameters: Parameters, tunnel: Tunnel, seed: np.random.SeedSequenc
 
 
 def sleepers(parameters: Parameters, tunnel: Tunnel) -> list[Primitive]:
-    """Sleepers along the track; they are floor and have no number."""
+    """Return sleepers along the track; they are floor and have no number."""
     if not parameters.sleepers:
         return []
     line, section = tunnel.line, tunnel.section

@@ -1,7 +1,7 @@
-"""Things that stand free in the tunnel, made of balls, rods and bricks: people, equipment, target spheres, loose cables.
+"""Free-standing objects made of balls, rods and bricks: people, equipment, target spheres, loose cables.
 
-A ball is a sphere, a rod a straight tube with round ends, a brick an oriented box. They lie in space, not in the
-frame of the tunnel, so that a sphere is a sphere in a curve too, and rays meet them by closed formulas.
+A ball is a sphere, a rod a straight tube with round ends, a brick an oriented box. They are defined in space, not in the
+frame of the tunnel, so that a sphere is also a sphere in a curve. Rays hit them by closed formulas.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ BALL, ROD, BRICK = 0.0, 1.0, 2.0
 #   rod:   one end (1:4), other end (4:7), radius (7)
 #   brick: centre (1:4), half sizes (4:7), unit axes (8:17)
 COLUMNS = 17
-# Half the width of the beam, m: nearer to the outline than this, part of it passes.
+# Half the width of the beam, m: closer to the outline, part of the beam passes.
 BEAM = 0.004
 
 
 def ball(centre: Float, radius: float) -> Float:
-    """Part: a sphere; coordinates and radius, m."""
+    """Return a part that is a sphere; coordinates and radius, m."""
     row = np.zeros(COLUMNS)
     row[0], row[1:4], row[7] = BALL, centre, radius
     return row
 
 
 def rod(one: Float, other: Float, radius: float) -> Float:
-    """Part: a tube with round ends from ``one`` to ``other``, m."""
+    """Return a part that is a tube with round ends from ``one`` to ``other``, m."""
     row = np.zeros(COLUMNS)
     row[0], row[1:4], row[4:7], row[7] = ROD, one, other, radius
     return row
 
 
 def brick(centre: Float, size: Sequence[float], axes: Float) -> Float:
-    """Part: a box of whole ``size`` (3) along unit ``axes`` (3, 3; a row each), m."""
+    """Return a part that is a box of full ``size`` (3) along unit ``axes`` (3, 3; one per row), m."""
     row = np.zeros(COLUMNS)
     row[0], row[1:4], row[4:7], row[8:] = BRICK, centre, 0.5 * np.asarray(size), np.ravel(axes)
     return row
@@ -51,7 +51,7 @@ def brick(centre: Float, size: Sequence[float], axes: Float) -> Float:
 
 @dataclass(frozen=True)
 class Primitive:
-    """Something that stands or hangs free.
+    """Object that stands or hangs free.
 
     Attributes
     ----------
@@ -60,11 +60,11 @@ class Primitive:
     klass : int
         Class of its points.
     drop : float
-        How much darker than the lining, dB.
+        Darkening relative to the lining, dB.
     parts : (n, 17) array
         Balls, rods and bricks in coordinates of the tunnel.
     number : int
-        Number of the thing in the truth, from 1; 0: it has none.
+        Number of the object in the reference data, from 1; 0: none.
     """
 
     kind: str
@@ -74,7 +74,7 @@ class Primitive:
     number: int = 0
 
     def extent(self) -> tuple[Float, Float]:
-        """Middles (n, 3) and radii (n,) of balls around its parts."""
+        """Return centres (n, 3) and radii (n,) of balls around its parts."""
         p = self.parts
         is_rod = p[:, :1] == ROD
         middle = np.where(is_rod, 0.5 * (p[:, 1:4] + p[:, 4:7]), p[:, 1:4])
@@ -82,7 +82,7 @@ class Primitive:
         return middle, half + p[:, 7]
 
     def middle(self) -> Float:
-        """Middle of the box around it, (3,)."""
+        """Return the centre of the box around it, (3,)."""
         middle, radius = self.extent()
         low, high = (middle - radius[:, None]).min(axis=0), (middle + radius[:, None]).max(axis=0)
         return np.asarray(0.5 * (low + high))
@@ -90,7 +90,7 @@ class Primitive:
 
 @dataclass(frozen=True)
 class TargetSphere:
-    """A target sphere: number of its points in the truth, centre (3,), radius, m, and how it stands."""
+    """Target sphere: number of its points in the reference data, centre (3,), radius, m, and kind of support."""
 
     id: int
     centre: Float
@@ -99,7 +99,7 @@ class TargetSphere:
 
 
 class Parts(NamedTuple):
-    """Parts of all things for the kernels, from the line's origin, listed by chainage."""
+    """Parts of all objects for the kernels, relative to the line's origin, listed by chainage."""
 
     rows: Float
     hulls: Float  # middle (3) and radius of a ball around each part
@@ -109,7 +109,7 @@ class Parts(NamedTuple):
 
 
 def parts_table(tunnel: Tunnel, things: Sequence[Primitive]) -> Parts:
-    """Lay the parts of things out for the kernels."""
+    """Arrange the parts of objects for the kernels."""
     line = tunnel.line
     rows = np.vstack([np.empty((0, COLUMNS)), *(t.parts for t in things)])
     hulls = np.empty((len(rows), 4))
@@ -129,7 +129,7 @@ def parts_table(tunnel: Tunnel, things: Sequence[Primitive]) -> Parts:
 
 @inner
 def _intersect_ball(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, radius: float) -> tuple[float, float]:
-    """Range to a sphere about 0 from (ox, oy, oz) (1e300: missed), and distance of the ray inside its outline."""
+    """Return range to a sphere about 0 from (ox, oy, oz) (1e300: missed), and distance of the ray inside its outline."""
     b = ox * dx + oy * dy + oz * dz
     past = ox * ox + oy * oy + oz * oz - b * b
     root = radius * radius - past
@@ -142,7 +142,7 @@ def _intersect_ball(ox: float, oy: float, oz: float, dx: float, dy: float, dz: f
 def _intersect_rod(
     rows: Float, k: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float
 ) -> tuple[float, float, float]:
-    """Range to a rod (1e300: missed), distance inside its outline, cosine there."""
+    """Return range to a rod (1e300: missed), distance inside its outline, cosine there."""
     radius = rows[k, 7]
     bx, by, bz = rows[k, 4] - rows[k, 1], rows[k, 5] - rows[k, 2], rows[k, 6] - rows[k, 3]
     ax, ay, az = ox - rows[k, 1], oy - rows[k, 2], oz - rows[k, 3]
@@ -184,7 +184,7 @@ def _intersect_rod(
 def _intersect_brick(
     rows: Float, k: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float
 ) -> tuple[float, float, float]:
-    """Range to a brick (1e300: missed), distance inside its outline, cosine there."""
+    """Return range to a brick (1e300: missed), distance inside its outline, cosine there."""
     enter = -1e300
     leave = 1e300
     cosine = 0.0
@@ -207,7 +207,7 @@ def _intersect_brick(
         leave = min(leave, far)
     if enter > leave:
         return 1e300, 0.0, 0.0
-    # Near the outline a ray passes but little of it.
+    # Near the outline a ray is only slightly inside it.
     return enter, 0.5 * (leave - enter), cosine
 
 
@@ -215,20 +215,20 @@ def _intersect_brick(
 def intersect_parts(
     parts: Parts, start: float, origin: Float, direction: Float, found: Float, r: Float, which: Int64, inside: Float
 ) -> None:
-    """The first part that rays (n, 3) meet before they meet something else.
+    """Find the first part that rays (n, 3) hit before anything else.
 
     Parameters
     ----------
     start : float
         Chainage of the tunnel's start, m.
     found : (6, n)
-        What the rays meet without parts, rows as of :func:`intersect_lining`; the cosine is replaced.
+        Hits of the rays without parts, rows as of :func:`intersect_lining`; the cosine is replaced.
     r : (n,)
-        Range to it, replaced.
+        Range to the hit, replaced.
     which : (n,)
-        Which part; left alone where none is met.
+        Index of the part; unchanged if none is hit.
     inside : (n,)
-        Distance of the ray inside the part's outline, m; left alone where none is met.
+        Distance of the ray inside the part's outline, m; unchanged if none is hit.
     """
     for i in range(origin.shape[0]):
         if found[4, i] <= 0.0:

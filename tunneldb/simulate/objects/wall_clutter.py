@@ -1,4 +1,4 @@
-"""What else hangs close to the wall: bundles of cables, pipes, signs, junction boxes."""
+"""More objects close to the wall: bundles of cables, pipes, signs, junction boxes."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 TRIES = 400
-# Limits, m: diameter of cables; distance of their side that is seen from the wall; cables of a bundle.
-CABLE, SEEN_SIDE, BUNDLE = (0.02, 0.08), (0.03, 0.30), (2, 5)
+# Limits, m: diameter of cables; distance of their visible side from the wall; cables of a bundle.
+CABLE, VISIBLE_SIDE, BUNDLE = (0.02, 0.08), (0.03, 0.30), (2, 5)
 PIPE, PIPE_GAP = (0.10, 0.20), (0.0, 0.08)
 # Side of signs, their distance from the wall, their thickness; size and depth of junction boxes, m.
 SIGN, SIGN_GAP, SIGN_THICK = (0.3, 0.8), (0.03, 0.06), 0.004
 BOX, BOX_DEPTH = (0.15, 0.40), (0.08, 0.20)
 SPACING = 10.0  # m between signs and between boxes
-APART = 0.1  # m between what hangs there
-# Nothing hangs nearer to the crown than this share of the lining's half arc, or to the floor.
-BETWEEN = (0.15, 0.93)
+MIN_SPACING = 0.1  # m between objects
+# Limits of arcs, as shares of the lining's half arc: clear of the crown and of the floor.
+ARC_LIMITS = (0.15, 0.93)
 
 
 def _run(kind: str, arc: float, start: float, end: float, rng: np.random.Generator) -> list[Appendage]:
-    """A cable, a bundle of them side by side, or a pipe, from end to end of the tunnel."""
+    """Return a cable, a bundle of cables side by side, or a pipe, from end to end of the tunnel."""
     if kind == "pipe":
         (thick, gap, drop) = rng.uniform((PIPE[0], PIPE_GAP[0], 1.0), (PIPE[1], PIPE_GAP[1], 6.0)).tolist()
         return [Appendage("pipe", start, end, arc, gap + 0.5 * thick, thick, thick, drop)]
     count = int(rng.integers(BUNDLE[0], BUNDLE[1] + 1)) if kind == "bundle" else 1
-    seen = float(rng.uniform(*SEEN_SIDE))
+    seen = float(rng.uniform(*VISIBLE_SIDE))
     cables = []
     for _ in range(count):
         thick, drop = rng.uniform((CABLE[0], 3.0), (CABLE[1], 7.0)).tolist()
@@ -41,7 +41,7 @@ def _run(kind: str, arc: float, start: float, end: float, rng: np.random.Generat
 
 
 def _plate(kind: str, s: float, arc: float, rng: np.random.Generator) -> list[Appendage]:
-    """A sign off the wall or a junction box on it."""
+    """Return a sign off the wall or a junction box on it."""
     if kind == "sign":
         length, width, gap, drop = rng.uniform(
             (SIGN[0], SIGN[0], SIGN_GAP[0], -3.0), (SIGN[1], SIGN[1], SIGN_GAP[1], 5.0)
@@ -52,9 +52,9 @@ def _plate(kind: str, s: float, arc: float, rng: np.random.Generator) -> list[Ap
 
 
 def is_free(items: list[Appendage], hung: list[Appendage]) -> bool:
-    """Whether there is room for items beside what hangs there."""
+    """Return True if there is space for items beside the existing ones."""
     return all(
-        min(a.end, b.end) + APART < max(a.start, b.start) or abs(a.arc - b.arc) > 0.5 * (a.width + b.width) + APART
+        min(a.end, b.end) + MIN_SPACING < max(a.start, b.start) or abs(a.arc - b.arc) > 0.5 * (a.width + b.width) + MIN_SPACING
         for a in items
         for b in hung
     )
@@ -63,12 +63,12 @@ def is_free(items: list[Appendage], hung: list[Appendage]) -> bool:
 def clutter(
     parameters: Parameters, tunnel: Tunnel, furniture: list[Appendage], seed: np.random.SeedSequence
 ) -> list[Appendage]:
-    """Cables, bundles and pipes in turn, as many as asked, and with them signs and junction boxes along the tunnel.
+    """Return the requested number of cables, bundles and pipes in turn, with signs and junction boxes along the tunnel.
 
     Raises
     ------
     UserError
-        There is no room on the walls for as many.
+        If there is no space on the walls for all.
     """
     line, lowest = tunnel.line, tunnel.section.floor_arc
     runs, plates = (np.random.default_rng(s) for s in seed.spawn(2))
@@ -76,7 +76,7 @@ def clutter(
     own: list[Appendage] = []
 
     def arc(rng: np.random.Generator) -> float:
-        return math.copysign(float(rng.uniform(*BETWEEN)) * lowest, float(rng.uniform(-1.0, 1.0)))
+        return math.copysign(float(rng.uniform(*ARC_LIMITS)) * lowest, float(rng.uniform(-1.0, 1.0)))
 
     for i in range(parameters.clutter):
         for _ in range(TRIES):
@@ -84,7 +84,7 @@ def clutter(
             if is_free(made, hung + own):
                 break
         else:
-            raise UserError(f"no room on the walls for run {i + 1} of {parameters.clutter}: ask for less clutter")
+            raise UserError(f"no room on the walls for run {i + 1} of {parameters.clutter}; use less clutter")
         own += made
     for s in np.arange(line.start + 2.0, line.end - 3.0, SPACING).tolist() if parameters.clutter else []:
         for kind in ("sign", "box"):

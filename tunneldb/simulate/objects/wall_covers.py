@@ -1,4 +1,4 @@
-"""What lies on the wall along the whole tunnel, trunking and bundles of thin cables, and sheets that hang before it."""
+"""Objects on the wall along the whole tunnel, trunking and bundles of thin cables, and sheets in front of it."""
 
 from __future__ import annotations
 
@@ -8,34 +8,34 @@ import numpy as np
 
 from tunneldb.errors import UserError
 from tunneldb.simulate.objects.fixtures import Appendage
-from tunneldb.simulate.objects.wall_clutter import BETWEEN, is_free
+from tunneldb.simulate.objects.wall_clutter import ARC_LIMITS, is_free
 from tunneldb.simulate.parameters import Parameters
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 TRIES = 400
-# Trunking: limits of width and depth, m, and of drop, dB.
+# Trunking: limits of width and depth, m, and of darkening, dB.
 TRUNK_WIDTH, TRUNK_DEPTH, TRUNK_DROP = (0.10, 0.60), (0.10, 0.40), (-3.0, 6.0)
-# Thin cables on the wall: limits of their number side by side; of their thickness, m (the thinnest are lost in the noise of
-# ranges), and of their drop, dB; share of runs that are flat ducts.
-THIN_BUNDLE, THIN, THIN_DROP, FLAT = (1, 10), (0.003, 0.025), (2.0, 7.0), 0.5
+# Thin cables on the wall: limits of their number side by side; of their thickness, m (the thinnest vanish in the noise of
+# ranges), and of their darkening, dB; share of runs that are flat ducts.
+THIN_BUNDLE, THIN, THIN_DROP, FLAT_SHARE = (1, 10), (0.003, 0.025), (2.0, 7.0), 0.5
 FLAT_WIDTH = (0.02, 0.15)  # m
-# Sheets: limits of length and of height along the wall, of their distance from it, m, and of drop, dB; their thickness and the
-# width of the strips by which they follow the section, m.
+# Sheets: limits of length and of height along the wall, of their distance from it, m, of darkening, dB; thickness,
+# width of the strips that follow the section, m.
 SHEET_LENGTH, SHEET_HEIGHT, SHEET_GAP, SHEET_DROP = (1.0, 8.0), (0.8, 4.0), (0.04, 0.20), (-3.0, 4.0)
 SHEET_THICK, STRIP = 0.003, 0.2
 
 
 def _trunking(start: float, end: float, arc: float, rng: np.random.Generator) -> list[Appendage]:
-    """A closed box along the tunnel, flush with the wall."""
+    """Return a closed box along the tunnel, flush with the wall."""
     low, high = np.array([TRUNK_WIDTH, TRUNK_DEPTH, TRUNK_DROP]).T
     width, depth, drop = rng.uniform(low, high).tolist()
     return [Appendage("trunking", start, end, arc, 0.5 * depth, width, depth, drop)]
 
 
 def _thin_cables(start: float, end: float, arc: float, rng: np.random.Generator) -> list[Appendage]:
-    """Cables side by side on the wall, or a flat duct."""
+    """Return cables side by side on the wall, or a flat duct."""
     thick = math.exp(rng.uniform(math.log(THIN[0]), math.log(THIN[1])))
-    if rng.random() < FLAT:
+    if rng.random() < FLAT_SHARE:
         width, drop = rng.uniform(*np.array([FLAT_WIDTH, THIN_DROP]).T).tolist()
         return [Appendage("duct", start, end, arc, 0.5 * thick, width, thick, drop)]
     count = int(rng.integers(THIN_BUNDLE[0], THIN_BUNDLE[1] + 1))
@@ -44,7 +44,7 @@ def _thin_cables(start: float, end: float, arc: float, rng: np.random.Generator)
 
 
 def _sheet(start: float, end: float, arc: float, rng: np.random.Generator) -> list[Appendage]:
-    """A sheet before the wall, in flat strips along the tunnel."""
+    """Return a sheet in front of the wall, in flat strips along the tunnel."""
     low, high = np.array([SHEET_LENGTH, SHEET_HEIGHT, SHEET_GAP, SHEET_DROP]).T
     length, height, gap, drop = rng.uniform(low, high).tolist()
     s = float(rng.uniform(start, max(start, end - length)))
@@ -55,12 +55,12 @@ def _sheet(start: float, end: float, arc: float, rng: np.random.Generator) -> li
 
 
 def covers(parameters: Parameters, tunnel: Tunnel, furniture: list[Appendage], seed: np.random.SeedSequence) -> list[Appendage]:
-    """Trunking, thin cables and sheets, as many as asked, clear of what hangs there.
+    """Return the requested trunking, thin cables and sheets, away from existing objects.
 
     Raises
     ------
     UserError
-        There is no room on the walls for as many.
+        If there is no space on the walls for all.
     """
     p, line, lowest = parameters, tunnel.line, tunnel.section.floor_arc
     hung = [a for a in furniture if abs(a.arc) < lowest]
@@ -70,12 +70,12 @@ def covers(parameters: Parameters, tunnel: Tunnel, furniture: list[Appendage], s
         rng = np.random.default_rng(stream)
         for number in range(count):
             for _ in range(TRIES):
-                arc = math.copysign(float(rng.uniform(*BETWEEN)) * lowest, float(rng.uniform(-1.0, 1.0)))
+                arc = math.copysign(float(rng.uniform(*ARC_LIMITS)) * lowest, float(rng.uniform(-1.0, 1.0)))
                 made = make(line.start, line.end, arc, rng)
                 inside = all(abs(a.arc) + 0.5 * a.width < lowest for a in made)
                 if inside and is_free(made, hung + own):
                     break
             else:
-                raise UserError(f"no room on the walls for {name} {number + 1} of {count}: ask for less on the walls")
+                raise UserError(f"no room on the walls for {name} {number + 1} of {count}; use fewer objects on the walls")
             own += made
     return own

@@ -1,1 +1,1 @@
-"""Rays from the scanner: what they meet in the tunnel, and what is measured there."""
+"""Rays of the scanner: their hits in the tunnel, and the measured values."""

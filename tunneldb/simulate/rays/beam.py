@@ -1,8 +1,8 @@
-"""The beam's footprint: where the edge of a thing, a recess or a step passes through it, the echo is a mixture of two surfaces.
+"""Footprint of the beam: at the edge of an object, a recess or a step, the echo is a mixture of two surfaces.
 
-A second ray is shot at random within the footprint of each. Where it meets another surface, the edge between is found by
-halving, and the footprint's share beyond it is that of a circle's segment. The echo is the mean of both by power, as a
-phase-shift scanner or one that does not tell close echoes apart has it.
+A second ray is cast at random within the footprint of each ray. If it hits another surface, the edge between them is found by
+bisection, and the share of the footprint beyond the edge is that of a circular segment. The echo is the mean of both by
+power, as in a phase-shift scanner or one that does not separate close echoes.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 # Echoes of rays (by index) in other directions, without noise and stray points.
 Shoot = Callable[[Int64, Float], Echoes]
 
-EXIT = 0.006  # diameter of the beam at the scanner, m
-STEP = 0.005  # least difference of range between two surfaces, m
-LEAST = 0.02  # least share of the footprint that changes an echo
+EXIT_DIAMETER = 0.006  # m; diameter of the beam at the scanner
+MIN_STEP = 0.005  # least difference of range between two surfaces, m
+MIN_SHARE = 0.02  # least share of the footprint that changes an echo
 HALVINGS = 5
 
 
 def aside(direction: Float, rng: np.random.Generator) -> tuple[Float, Float]:
-    """Places within footprints, even over the disc: vectors across the rays (n, 3), 1 at the rim, and their lengths (n,)."""
+    """Return uniform random places in footprints: vectors across the rays (n, 3), 1 at the rim, and their lengths (n,)."""
     other = np.where(np.abs(direction[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     one = np.cross(direction, other)
     one /= np.linalg.norm(one, axis=1)[:, None]
@@ -39,13 +39,13 @@ def aside(direction: Float, rng: np.random.Generator) -> tuple[Float, Float]:
 
 
 def segment_share(distance: Float) -> Float:
-    """Share of a circle's area beyond a chord at a distance (in radii) from its centre."""
+    """Return the share of a circle's area beyond a chord at a distance (in radii) from its centre."""
     x = np.clip(distance, 0.0, 1.0)
     return np.asarray((np.arccos(x) - x * np.sqrt(1.0 - x * x)) / np.pi)
 
 
 class _Spot(NamedTuple):
-    """What a ray meets, (n,) each: range (NaN: no echo), cosine of incidence, class, drop."""
+    """Hits of rays, (n,) each: range (NaN: no echo), cosine of incidence, class, darkening."""
 
     range: Float
     cosine: Float
@@ -53,12 +53,12 @@ class _Spot(NamedTuple):
     drop: Float
 
     def amplitude(self, radiometry: Radiometry) -> Float:
-        """Amplitude of the echo, dB."""
+        """Return the amplitude of the echo, dB."""
         is_ground = (self.klass == FLOOR) | (self.klass == RAIL)
         return radiometry.amplitude(self.range, radiometry.reflectance(self.cosine, is_ground, self.drop))
 
     def take(self, rows: Int64 | Bool) -> _Spot:
-        """Some of them."""
+        """Return some of them."""
         return _Spot(*(column[rows] for column in self))
 
 
@@ -76,20 +76,20 @@ def blur(
     Parameters
     ----------
     echoes : Echoes
-        Of single rays.
+        Echoes of single rays.
     rays : Rays
         All rays.
     divergence : float
         Full angle of the beam, mrad.
     shoot : callable
-        Shoots rays in other directions.
+        Function that casts rays in other directions.
     """
     direction = rays.direction[echoes.ray]
     across, beside = aside(direction, rng)
-    radius = 0.5 * (EXIT + 1e-3 * divergence * echoes.range)
+    radius = 0.5 * (EXIT_DIAMETER + 1e-3 * divergence * echoes.range)
 
     def at(rows: Int64, share: Float | float) -> _Spot:
-        """Shoot towards a share of the way to the place beside the middle."""
+        """Cast rays towards a share of the way from the centre to the second ray."""
         turned = direction[rows] * echoes.range[rows, None] + np.reshape(share, (-1, 1)) * radius[rows, None] * across[rows]
         there = shoot(echoes.ray[rows], turned / np.linalg.norm(turned, axis=1)[:, None])
         spots = np.full((4, len(rows)), np.nan)
@@ -100,7 +100,7 @@ def blur(
     second = at(candidates, 1.0)
     slant = np.minimum(echoes.cosine[candidates], second.cosine)
     plane = 1.5 * radius[candidates] * np.sqrt(1.0 - slant**2) / slant
-    is_edge = np.abs(second.range - echoes.range[candidates]) > STEP + plane  # False without an echo
+    is_edge = np.abs(second.range - echoes.range[candidates]) > MIN_STEP + plane  # False without an echo
     rows, second = candidates[is_edge], second.take(is_edge)
     if not len(rows):
         return echoes
@@ -111,7 +111,7 @@ def blur(
         is_first = np.abs(there - echoes.range[rows]) < np.abs(there - second.range)
         low, high = np.where(is_first, middle, low), np.where(is_first, high, middle)
     share = segment_share(0.5 * (low + high) * beside[rows])
-    mixed = share >= LEAST
+    mixed = share >= MIN_SHARE
     rows, second, share = rows[mixed], second.take(mixed), share[mixed]
     before = echoes.take(rows)
     first = _Spot(before.range, before.cosine, before.klass.astype(float), before.drop)

@@ -1,7 +1,7 @@
-"""Multipath: rays that the wet floor mirrors, so that the wall is seen a second time below the ground.
+"""Multipath: rays reflected by the wet floor, so that the wall appears a second time below the ground.
 
-The pulse goes by the floor to the wall and back the same way. Its range is the length of the way to the floor and from there
-to the wall, along the direction in which it was sent: the wall's mirror image.
+The pulse travels via the floor to the wall and back the same way. Its range is the length of the path to the floor and from
+there to the wall, in the direction in which it was sent: the wall's mirror image.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from tunneldb.simulate.rays.trace import Echoes
 from tunneldb.simulate.scanner import Rays
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
-# Limits of what is lost by two reflections, dB.
+# Limits of the loss by two reflections, dB.
 LOSS = (3.0, 12.0)
-ABOVE = 1e-5  # m: the mirrored ray starts off the floor
+FLOOR_OFFSET = 1e-5  # m: the mirrored ray starts off the floor
 
 # Echoes of rays from places (n, 3) in directions (n, 3), near chainages (n,), without noise and stray points.
 Shoot = Callable[[Float, Float, Float], Echoes]
@@ -27,13 +27,13 @@ Shoot = Callable[[Float, Float, Float], Echoes]
 def mirror(
     echoes: Echoes, rays: Rays, share: float, furthest: float, shoot: Shoot, tunnel: Tunnel, rng: np.random.Generator
 ) -> Echoes:
-    """Turn a share of the echoes of the floor into ghosts, where the mirrored ray meets something within range."""
+    """Turn a share of the echoes of the floor into ghosts, if the reflected ray hits something within range."""
     chosen = np.flatnonzero((echoes.klass == FLOOR) & (rng.random(len(echoes.ray)) < share))
     loss = rng.uniform(*LOSS, len(chosen))
     direction = rays.direction[echoes.ray[chosen]]
     up = tunnel.line.frame(echoes.chainage[chosen]).w
     mirrored = direction - 2.0 * np.sum(direction * up, axis=1)[:, None] * up
-    spot = rays.origin[echoes.ray[chosen]] + echoes.range[chosen, None] * direction + ABOVE * up
+    spot = rays.origin[echoes.ray[chosen]] + echoes.range[chosen, None] * direction + FLOOR_OFFSET * up
     there = shoot(spot, mirrored, echoes.chainage[chosen])
     rows, whole = chosen[there.ray], echoes.range[chosen[there.ray]] + there.range
     within = whole <= furthest

@@ -1,8 +1,8 @@
-"""Where rays meet the lining of a synthetic tunnel, what is fixed to it, its niches and its floor, and how wet it is there.
+"""Intersection of rays with the lining of a synthetic tunnel, fixtures, niches and floor, and the wetness there.
 
-The offset of the swept section is a nearly concave function along a ray, so that Newton's method, started where the
-offset falls, finds the lining in a few steps from beyond. Appendages stand within a known distance of the lining;
-only the last part of the ray is marched through their signed distances. Niches are straight boxes.
+The offset of the swept section is a nearly concave function along a ray. So Newton's method, started where the offset
+decreases, finds the lining from outside in a few steps. Fixtures are within a known distance of the lining; only
+the last part of the ray is marched through their signed distances. Niches are straight boxes.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from tunneldb.simulate.tunnel.section import LINE, nearest
 from tunneldb.simulate.tunnel.tunnel import foot, gradient
 
 RANGE, CHAINAGE, ARC, COSINE, START_OFFSET, START_CHAINAGE = range(6)
-"""Rows of what :func:`intersect_lining` finds: range, chainage, arc and cosine of incidence where a ray meets the lining,
-offset and chainage where it starts."""
+"""Row numbers of the result of :func:`intersect_lining`: range, chainage, arc and cosine of incidence at the hit on the
+lining, and offset and chainage at the ray's start."""
 
 # A Newton step for chainage leaves an error of its square times the curvature, in chainage, u and w: after a step
-# of this many metres the next iteration of the ray corrects what is left.
-LOOSE = 0.05
+# of at most this many metres, the next iteration of the ray corrects the rest.
+CHAINAGE_TOLERANCE = 0.05
 
 
 @inner
 def _straight(parts: Float, u: float, w: float, du: float, dw: float) -> float:
-    """Range at which a ray of a section's plane leaves the section, as in a straight tunnel.
+    """Return the range at which a ray in a section's plane leaves the section, as in a straight tunnel.
 
-    A convex section lies inside all its lines; where their first crossing is outside, an arc is met before.
+    A convex section is inside all its lines; if their first crossing is outside, an arc is hit before.
     """
     flat = 1e300
     round_ = 1e300
@@ -60,9 +60,9 @@ def _straight(parts: Float, u: float, w: float, du: float, dw: float) -> float:
 def intersect_lining(
     plan: Float, profile: Float, parts: Float, origin: Float, direction: Float, hint: Float, furthest: float, found: Float
 ) -> None:
-    """Where rays (n, 3) meet the swept section, into ``found`` (6, n): RANGE, CHAINAGE and so on.
+    """Intersect rays (n, 3) with the swept section, into ``found`` (6, n): RANGE, CHAINAGE and so on.
 
-    ``hint`` (n,) are chainages near the origins, m. The range is NaN when nothing is met within ``furthest`` m.
+    ``hint`` (n,) are chainages near the origins, m. The range is NaN if nothing is hit within ``furthest`` m.
     """
     for i in range(origin.shape[0]):
         x, y, z = origin[i, 0], origin[i, 1], origin[i, 2]
@@ -74,7 +74,7 @@ def intersect_lining(
         arc = 0.0
         r = 0.0
         for j in range(80):
-            s, step, u, w, c, n, k, g, q, det = foot(plan, profile, x, y, z, s, LOOSE, np.int64(2))
+            s, step, u, w, c, n, k, g, q, det = foot(plan, profile, x, y, z, s, CHAINAGE_TOLERANCE, np.int64(2))
             arc, offset, gu, gw = nearest(parts, u, w)
             nx, ny, nz = gradient(gu, gw, u, w, c, n, k, g, q, det)
             slope = nx * dx + ny * dy + nz * dz
@@ -114,33 +114,33 @@ def intersect_appendages(
     r: Float,
     which: Int64,
 ) -> None:
-    """March the last part of rays to the lining: where they meet an appendage.
+    """March the last part of rays to the lining, and find hits on fixtures.
 
     Parameters
     ----------
     start, reach : float
-        Chainage of the tunnel's start; how far appendages reach off the lining, m.
+        Chainage of the tunnel's start; greatest distance of fixtures from the lining, m.
     items, bins, listed
         Rows of :func:`appendage_table`, by chainage.
     found : (6, n)
-        What rays meet without appendages; the cosine is replaced.
+        Hits of rays without fixtures; the cosine is replaced.
     r : (n,)
         Their ranges, replaced.
     which : (n,)
-        Row of the appendage, left alone where none is met.
+        Row of the fixture, unchanged if none is hit.
     """
     for i in range(origin.shape[0]):
         wall = found[0, i]
         if math.isnan(wall) or found[4, i] <= 0.0:
             continue
         dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
-        # The offset is concave along the ray, so it cannot fall below the appendages' reach before here.
+        # The offset is concave along the ray, so it cannot be less than the fixtures' reach before this point.
         begin = wall * max(0.0, 1.0 - reach / found[4, i])
         s = found[5, i] + (found[1, i] - found[5, i]) * begin / wall
         at = begin
         for _ in range(200):
             x, y, z = origin[i, 0] + at * dx, origin[i, 1] + at * dy, origin[i, 2] + at * dz
-            s, _, u, w, c, n, k, g, q, det = foot(plan, profile, x, y, z, s, LOOSE, np.int64(2))
+            s, _, u, w, c, n, k, g, q, det = foot(plan, profile, x, y, z, s, CHAINAGE_TOLERANCE, np.int64(2))
             b = bin_of(s, start, bins)
             gap = 0.8  # below the REACH of a bin's list
             nearby = np.int64(-1)
@@ -171,9 +171,9 @@ def intersect_appendages(
 def intersect_niches(
     scene: Scene, origin: Float, direction: Float, rays: Int64, s: Float, r: Float
 ) -> tuple[Int64, Float, Float, Bool]:
-    """Where some ``rays`` (m,), that pass the lining at chainages and ranges (m,), meet the inside of a niche behind.
+    """Intersect some ``rays`` (m,), which cross the lining at chainages and ranges (m,), with the inside of a niche behind.
 
-    Returns which of the m do, their ranges and cosines there, and whether it is the back wall.
+    Return the indices of hits among the m, their ranges and cosines there, and True for hits on the back wall.
     """
     passing, niche = listed_pairs(s, scene.ends[0], scene.niche_bins, scene.niche_list)
     row, t = scene.niches[niche], r[passing]
@@ -222,7 +222,7 @@ def _wetness(
 
 
 def wetness(scene: Scene, s: Float, arc: Float) -> tuple[Int64, Float]:
-    """Numbers (n,) of the leaks that hold places of the lining (-1: none) and drops there, dB."""
+    """Return the leak numbers (n,) at positions on the lining (-1: none), and the darkening there, dB."""
     leak, drop = np.empty(s.size, dtype=np.int64), np.empty(s.size)
     _wetness(
         scene.edges, scene.edge_first, scene.leaks, scene.leak_bins, scene.leak_list, scene.ends[0], scene.ends[4], s, arc,

@@ -1,4 +1,4 @@
-"""A synthetic tunnel and what is in it, as flat arrays for the kernels."""
+"""Synthetic tunnel and its contents, as flat arrays for the kernels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 
 class Scene(NamedTuple):
-    """A tunnel and what is in it, as flat arrays for the kernels."""
+    """Tunnel and its contents, as flat arrays for the kernels."""
 
     plan: Float
     profile: Float
@@ -35,7 +35,7 @@ class Scene(NamedTuple):
 
 
 def scene(tunnel: Tunnel, items: list[Appendage], niches: list[Niche], leaks: list[Leak], edge: float = EDGE) -> Scene:
-    """Lay a tunnel and its contents out for the kernels; leaks go from dry to wet over ``edge`` m."""
+    """Arrange a tunnel and its contents for the kernels; leaks change from dry to wet over ``edge`` m."""
     line = tunnel.line
     item_rows, niche_rows = appendage_table(tunnel, items), niche_table(tunnel, niches)
     edges, first, leak_rows = edge_table(leaks)

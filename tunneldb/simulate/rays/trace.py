@@ -1,4 +1,4 @@
-"""Rays from a scanner to the first thing they meet in a synthetic tunnel, and what is measured there."""
+"""Rays from a scanner to their first hits in a synthetic tunnel, and the measured values."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from tunneldb.simulate.rays.intersect import intersect_appendages, intersect_lin
 from tunneldb.simulate.rays.scene import Scene
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
-# Beyond this incidence the echo is lost, as scanners lose it.
+# Cosine of incidence below which a scanner receives no echo.
 MINIMUM_COSINE = 0.087
-# Share of the rays past an edge of a free-standing thing that give a mixed pixel.
-MIXED = 0.1
+# Share of the rays near an edge of a free-standing object that give a mixed pixel.
+MIXED_SHARE = 0.1
 # Least range of the scanner, m.
-NEAREST = 1.0
+MIN_RANGE = 1.0
 PIECE = 1 << 16  # rays that are traced at a time
 BUMP = 0.12  # half the wavelength of the small-scale relief, m
 
 
 class Echoes(NamedTuple):
-    """What rays measure that come back, (m,) each.
+    """Measurements of the rays with an echo, (m,) each.
 
     Attributes
     ----------
@@ -39,21 +39,21 @@ class Echoes(NamedTuple):
     measured
         Range with its error, m.
     xyz : (m, 3)
-        The stored point, from the line's origin, m.
+        Stored point, relative to the line's origin, m.
     chainage, arc, offset
-        Of the stored point, m.
+        Coordinates of the stored point, m.
     klass
-        Class of what the laser met.
+        Class of the hit surface.
     leak
-        Number of the leak that it met, -1 for none.
+        Number of the leak at the hit, -1 for none.
     drop
-        How much darker the spot is, dB.
+        Darkening at the hit, dB.
     cosine
-        Of incidence.
+        Cosine of incidence.
     range
-        Without error, m.
+        Range without error, m.
     thing
-        Number of the free-standing thing that it met, 0 for none.
+        Number of the free-standing object at the hit, 0 for none.
     """
 
     ray: Int64
@@ -70,33 +70,33 @@ class Echoes(NamedTuple):
     thing: Int64
 
     def take(self, rows: Int64) -> Echoes:
-        """Some of them."""
+        """Return some of them."""
         return Echoes(*(column[rows] for column in self))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
 class Tracer:
-    """A tunnel with its contents, and what a scanner measures of it.
+    """Tunnel with its contents, and measurement by a scanner.
 
     Attributes
     ----------
     tunnel, scene
-        The tunnel, what is fixed to it and how wet it is.
+        Tunnel, fixtures, and leaks.
     parts, ground, reflectance, lining_relief
-        What stands free, the uneven floor, how bright the lining is from place to place, and where it departs from
-        the section; None: nothing, level, plain, nowhere.
+        Free-standing objects, uneven floor, variation of the lining's reflectance, and its deviation from the section;
+        None: none, level, uniform, none.
     outliers : float
         Share of rays that become isolated points.
     stray : float
-        1: a fixed share of the rays at appendages and edges give mixed pixels; 0: none, the beam's footprint does.
+        1: a fixed share of the rays at fixtures and edges gives mixed pixels; 0: none, the beam's footprint gives them.
     relief : float
         Height of small-scale relief of the lining, m.
     furthest : float
         Greatest range, m.
     mesh : Mesh or None
-        Wires before the lining.
+        Wires in front of the lining.
     noise_growth : float
-        How the error of ranges grows with them (:func:`noise_scale`).
+        Growth of the error of ranges with range (:func:`noise_scale`).
     """
 
     tunnel: Tunnel
@@ -113,18 +113,18 @@ class Tracer:
     noise_growth: float = 0.0
 
     def trace(self, origin: Float, direction: Float, hint: Float, noise: Float, chance: Float) -> Echoes:
-        """Shoot rays.
+        """Cast rays.
 
         Parameters
         ----------
         origin, direction : (n, 3)
-            From the line's origin, m; unit vectors.
+            Origins relative to the line's origin, m; unit vectors.
         hint : (n,)
             Chainage near each origin, m.
         noise : (n,)
             Range error, m.
         chance : (n, 2)
-            Uniform numbers that decide on outliers and where they fall.
+            Uniform random numbers for outliers and their positions.
         """
         pieces = []
         for begin in range(0, max(len(origin), 1), PIECE):
@@ -134,7 +134,7 @@ class Tracer:
         return Echoes(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
 
     def _trace(self, origin: Float, direction: Float, hint: Float, noise: Float, chance: Float) -> Echoes:
-        """Shoot rays, as many at a time as their arrays stay in the processor's cache."""
+        """Cast rays, in pieces whose arrays fit into the processor's cache."""
         scene, n = self.scene, len(origin)
         start, end, floor_arc, reach, _, _ = scene.ends.tolist()
         shape = scene.plan, scene.profile, scene.parts
@@ -189,7 +189,7 @@ class Tracer:
             kind, darker, number = self.parts.labels[which[met]].T
             klass[met], drop[met], thing[met] = kind, darker, number
             is_open &= which < 0
-        # Not the contrary of both: where incidence is undefined, the echo is kept.
+        # Written with NOT: if the incidence is undefined (NaN), the echo is kept.
         keep = np.flatnonzero(inside & ~is_open & ~((r > self.furthest) | (cosine < MINIMUM_COSINE)))
         true = r[keep]
         noise = noise[keep] * noise_scale(self.noise_growth, true)
@@ -216,7 +216,7 @@ class Tracer:
             true,
             thing,
         )
-        within = (measured >= NEAREST) & (measured <= self.furthest) & (place.chainage >= start) & (place.chainage <= end)
+        within = (measured >= MIN_RANGE) & (measured <= self.furthest) & (place.chainage >= start) & (place.chainage <= end)
         return echoes if within.all() else echoes.take(np.flatnonzero(within))
 
     def _niches(
@@ -230,7 +230,7 @@ class Tracer:
         leak: Int64,
         drop: Float,
     ) -> Int64:
-        """Take the rays through the lining that meet niches, among those that meet it; return the others."""
+        """Replace hits of rays that enter niches, among those without other hits; return the other rays."""
         wall, s, _, cosine, _, _ = found
         into, hit, c, is_back = intersect_niches(self.scene, origin, direction, bare, s[bare], wall[bare])
         rays = bare[into]
@@ -242,17 +242,17 @@ class Tracer:
         return np.delete(bare, into)
 
     def _stray(self, measured: Float, klass: Int64, thing: Int64, behind: Float, edge: Float, chance: Float) -> Int64:
-        """Move isolated points and mixed pixels; return their numbers."""
-        candidates = np.flatnonzero(chance[:, 0] < self.outliers + max(MIXED, 0.01) * self.stray)
+        """Move isolated points and mixed pixels; return their indices."""
+        candidates = np.flatnonzero(chance[:, 0] < self.outliers + max(MIXED_SHARE, 0.01) * self.stray)
         u, v = chance[candidates].T
         is_isolated = u < self.outliers
         kind, number = klass[candidates], thing[candidates]
         is_mixed = (kind == APPENDAGE) & (number == 0) & (u < self.outliers + 0.01 * self.stray)
         is_mixed |= (number > 0) & (edge[candidates] < BEAM)
         r = measured[candidates]
-        # Most isolated points hang in the air, some lie behind the wall (multipath).
-        isolated = np.where(v < 0.7, NEAREST + v / 0.7 * (0.95 * r - NEAREST), r * (1.0 + 0.5 * (v - 0.7)))
-        # A mixed pixel: the beam meets an edge and what lies behind it.
+        # Most isolated points are in the air, some behind the wall (multipath).
+        isolated = np.where(v < 0.7, MIN_RANGE + v / 0.7 * (0.95 * r - MIN_RANGE), r * (1.0 + 0.5 * (v - 0.7)))
+        # A mixed pixel: the beam hits an edge and the surface behind it.
         mixed = r + v * (behind[candidates] - r)
         measured[candidates] = np.where(is_isolated, isolated, np.where(is_mixed, mixed, r))
         return candidates[is_isolated | is_mixed]

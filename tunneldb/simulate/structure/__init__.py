@@ -1,4 +1,4 @@
-"""Synthetic scans of steel and concrete structures with truth: profiles, pipes, walls and what differs on their surfaces.
+"""Synthetic scans of steel and concrete structures with reference data: profiles, pipes, walls, and surface anomalies.
 
 >>> from tunneldb.simulate.structure import StructureParameters, StructureScan
 >>> scan = StructureScan(StructureParameters(seed=3))

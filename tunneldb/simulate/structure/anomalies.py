@@ -1,4 +1,4 @@
-"""What differs on a face: rust, stains, cracks and bright flakes, as outlines on the unrolled face."""
+"""Anomalies of a face: rust, stains, cracks and bright flakes, as outlines on the unrolled face."""
 
 from __future__ import annotations
 
@@ -13,32 +13,32 @@ from tunneldb.arrays import Float
 from tunneldb.simulate.structure.materials import MATERIALS, RUST
 from tunneldb.simulate.structure.shapes import Face
 
-# The incidence at which the level of rust is set, against the face that it is on: its own law rules beside it.
-RUST_AT = math.cos(math.radians(30.0))
-SHARES = (0.02, 0.60)  # of the face
-LARGEST = 1.0  # m²
-NARROWEST = 0.02  # m, of what is seen of a face
+# Cosine of the incidence at which the nominal level of rust relative to its face is defined; rust has its own law.
+RUST_COSINE = math.cos(math.radians(30.0))
+AREA_SHARES = (0.02, 0.60)  # of the face
+MAX_AREA = 1.0  # m²
+MIN_WIDTH = 0.02  # m; least visible width of a face
 
 
 @dataclass
 class Anomaly:
-    """An anomaly of a face.
+    """Anomaly of a face.
 
     Attributes
     ----------
     id : int
-        From 1.
+        Number, from 1.
     face : Face
     kind : str
         rust, stain, crack or flake.
     outline : shapely geometry
         On the unrolled face, m.
     shift : float
-        Nominal change of level, dB; negative: darker. That of rust holds at 30° of incidence.
+        Nominal change of level, dB; negative: darker. For rust, at 30° of incidence.
     width : float
-        Of a crack, m; 0 for others.
+        Width of a crack, m; 0 for others.
     line : shapely geometry or None
-        Middle line of a crack.
+        Centre line of a crack.
     """
 
     id: int
@@ -50,16 +50,16 @@ class Anomaly:
     line: LineString | None = None
 
     def level(self, cosine: Float) -> Float:
-        """Change of level (n,) in dB at the cosines of incidence (n,)."""
+        """Return the change of level (n,) in dB at the cosines of incidence (n,)."""
         if self.kind != "rust":
             return np.full(len(cosine), self.shift)
         own = MATERIALS[self.face.material]
-        at = np.array([RUST_AT])
+        at = np.array([RUST_COSINE])
         return np.asarray(self.shift + (RUST.level(cosine) - RUST.level(at)) - (own.level(cosine) - own.level(at)))
 
 
 def blob(area: float, longer: float, turn: float, rng: np.random.Generator) -> Polygon:
-    """Star-shaped outline about 0 of about an area, ``longer`` times as long as wide, m."""
+    """Return a star-shaped outline around 0 of about an area, ``longer`` times as long as wide, m."""
     angle = np.linspace(0.0, 2.0 * math.pi, 72, endpoint=False)
     radius = np.ones(72)
     for k in range(2, 6):
@@ -72,7 +72,7 @@ def blob(area: float, longer: float, turn: float, rng: np.random.Generator) -> P
 
 
 def crack(length: float, turn: float, rng: np.random.Generator) -> LineString:
-    """Wandering line about 0, m."""
+    """Return an irregular line around 0, m."""
     many = max(4, round(length / 0.05))
     heading = turn + np.cumsum(rng.normal(0.0, 0.25, many))
     at = np.cumsum(length / many * np.column_stack([np.cos(heading), np.sin(heading)]), axis=0)
@@ -80,7 +80,7 @@ def crack(length: float, turn: float, rng: np.random.Generator) -> LineString:
 
 
 def face_outline(face: Face, seen: Float) -> BaseGeometry:
-    """Where anomalies of a face may lie: the box of its seen places (n, 2), m."""
+    """Return the area for anomalies of a face: the box of its visible places (n, 2), m."""
     low, high = np.percentile(seen, [0.5, 99.5], axis=0)
     u, v = face.size()
     if face.kind == "plane":
@@ -89,7 +89,7 @@ def face_outline(face: Face, seen: Float) -> BaseGeometry:
 
 
 def place(number: int, face: Face, seen: Float, contrast: tuple[float, float], rng: np.random.Generator) -> Anomaly | None:
-    """Place an anomaly about one of the seen places (n, 2) of a face; None: it would be too small."""
+    """Place an anomaly around one of the visible places (n, 2) of a face; None: it would be too small."""
     inside = face_outline(face, seen)
     mineral = face.material in ("concrete", "brick")
     kind = str(rng.choice(["crack", "stain", "stain", "flake"] if mineral else ["rust", "rust", "rust", "flake", "stain"]))
@@ -105,14 +105,14 @@ def place(number: int, face: Face, seen: Float, contrast: tuple[float, float], r
         if not isinstance(line, LineString) or line.length < 0.2:
             return None
         return Anomaly(number, face, kind, line.buffer(0.5 * width, cap_style="flat"), -drop, width, line)
-    share = math.exp(rng.uniform(math.log(SHARES[0]), math.log(SHARES[1])))
-    area = min(share * inside.area, LARGEST * float(rng.uniform(0.05, 1.0)))
+    share = math.exp(rng.uniform(math.log(AREA_SHARES[0]), math.log(AREA_SHARES[1])))
+    area = min(share * inside.area, MAX_AREA * float(rng.uniform(0.05, 1.0)))
     if kind == "flake":
         area = min(area, 0.1)
-    # A narrow face is crossed rather than filled by a thread.
+    # An anomaly crosses a narrow face instead of extending along it as a thread.
     low, high = np.array(inside.bounds[:2]), np.array(inside.bounds[2:])
     narrow = float((high - low).min())
-    if narrow < NARROWEST:
+    if narrow < MIN_WIDTH:
         return None
     longer = max(float(rng.uniform(1.0, 2.5)), area / narrow**2)
     if area > 0.3 * narrow**2:

@@ -1,6 +1,6 @@
-"""Rays of a station that meet surfaces: each ray is tried with those that lie in its part of the view.
+"""Ray casting from a station: each ray is tested with the surfaces in its part of the view.
 
-The view is cut into tiles of azimuth and zenith; a tile lists the surfaces of which some ball that covers them is seen in it.
+The view is divided into tiles of azimuth and zenith; a tile lists the surfaces whose covering balls are visible in it.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from tunneldb.threads import in_blocks
 
 TILE = math.radians(1.0)
 MARGIN = math.radians(0.1)  # more than a beam's half width
-_STEPS = 64  # of sphere tracing a bend
-_CLOSE = 2e-6  # m
+_STEPS = 64  # steps of sphere tracing for a bend
+_TOLERANCE = 2e-6  # m
 
 
 class View(NamedTuple):
-    """What a station may see: tiles from ``low`` (azimuth, zenith, rad) on, and the surfaces listed in each."""
+    """Possible view of a station: tiles from ``low`` (azimuth, zenith, rad) on, and the surfaces listed in each."""
 
     low: Float
     columns: int
@@ -65,7 +65,7 @@ def view(rows: Float, station: Float) -> View:
 
 @inner
 def _bend(x: float, y: float, z: float, dx: float, dy: float, dz: float, major: float, minor: float, angle: float) -> float:
-    """Range to a bend from (x, y, z) in its frame (1e300: missed): steps of the distance to its arc (Hart, 1996)."""
+    """Return the range to a bend from (x, y, z) in its frame (1e300: missed), by sphere tracing of its arc (Hart, 1996)."""
     reach = major + minor
     b = x * dx + y * dy + z * dz
     root = b * b - (x * x + y * y + z * z - reach * reach)
@@ -77,11 +77,11 @@ def _bend(x: float, y: float, z: float, dx: float, dy: float, dz: float, major: 
         px, py, pz = x + t * dx, y + t * dy, z + t * dz
         ring = math.hypot(px, py) - major
         gap = math.sqrt(ring * ring + pz * pz) - minor
-        if gap < _CLOSE:
+        if gap < _TOLERANCE:
             at = math.atan2(py, px)
             if 0.0 <= at <= angle:
                 return t
-            gap = max(minor, 1e-3)  # on the part of the torus that is not there
+            gap = max(minor, 1e-3)  # on the missing part of the torus
         t += gap
         if t > -b + root:
             break
@@ -90,7 +90,7 @@ def _bend(x: float, y: float, z: float, dx: float, dy: float, dz: float, major: 
 
 @inner
 def _hit(rows: Float, k: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float) -> float:
-    """Range to a surface (1e300: missed)."""
+    """Return the range to a surface (1e300: missed)."""
     wx, wy, wz = ox - rows[k, 1], oy - rows[k, 2], oz - rows[k, 3]
     x = wx * rows[k, 4] + wy * rows[k, 5] + wz * rows[k, 6]
     y = wx * rows[k, 7] + wy * rows[k, 8] + wz * rows[k, 9]
@@ -142,7 +142,7 @@ def _cast(
 
 
 def cast(rows: Float, seen: View, station: Float, direction: Float) -> tuple[Float, Int32]:
-    """Range (n,) m (inf: none) and surface (n,) (-1: none) that unit rays (n, 3) of a station meet first."""
+    """Return range (n,) m (inf: none) and surface (n,) (-1: none) of the first hits of unit rays (n, 3) of a station."""
     azimuth = np.arctan2(direction[:, 0], direction[:, 1])
     zenith = np.arccos(np.clip(direction[:, 2], -1.0, 1.0))
     column = np.clip(((azimuth - seen.low[0]) / TILE).astype(np.int64), 0, seen.columns - 1)

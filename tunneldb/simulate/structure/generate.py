@@ -1,4 +1,4 @@
-"""A synthetic scan of a structure: members, anomalies on their faces, and the points of each station."""
+"""Synthetic scan of a structure: members, anomalies on their faces, and the points of each station."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from tunneldb.simulate.structure.materials import MATERIALS
 from tunneldb.simulate.structure.parameters import StructureParameters
 from tunneldb.simulate.structure.shapes import TUBE, Structure, normals
 
-RAYS = 400_000  # a block
-SCOUT = math.radians(0.2)  # between the rays that find what is seen, for places of anomalies
-LOWEST_ZENITH = math.radians(150.0)  # scanners cannot look through their own tripod
-FURTHEST = 60.0  # m
-MOST_SLANT = math.cos(math.radians(88.0))  # beyond, no echo
-EXIT = 0.0021  # diameter of the beam at the scanner, m
-LEAST_SHARE = 0.3  # of the footprint that makes an echo
-ASIDE = 0.003  # m: an echo at an edge that lies further off its face belongs to none
-SOFT = 0.004  # m over which rust and stains fade, beside the footprint
-LEAST_PLACES = 40  # seen by the scout, for an anomaly
+RAYS = 400_000  # per block
+SCOUT_STEP = math.radians(0.2)  # between the rays that find visible places for anomalies
+MAX_ZENITH = math.radians(150.0)  # the tripod hides directions below
+MAX_RANGE = 60.0  # m
+MIN_COSINE = math.cos(math.radians(88.0))  # at greater incidence there is no echo
+EXIT_DIAMETER = 0.0021  # diameter of the beam at the scanner, m
+MIN_SHARE = 0.3  # least share of the footprint for an echo
+MAX_FACE_DISTANCE = 0.003  # m: greatest distance of an echo at an edge from its face
+FADE_WIDTH = 0.004  # m over which rust and stains fade, in addition to the footprint
+MIN_PLACES = 40  # least number of visible places for an anomaly
 SUN = np.array([0.4, -0.7, 0.6]) / np.linalg.norm([0.4, -0.7, 0.6])
 START_TIME, STATION_TIME = 300_000.0, 300.0  # s
 
-# The middle of the beam and six places about it, of even shares of its area.
+# Centre of the beam and six places around it, with equal shares of its area.
 _SAMPLES = np.array([(0.0, 0.0)] + [(0.72 * math.cos(k * math.pi / 3), 0.72 * math.sin(k * math.pi / 3)) for k in range(6)])
 
 
 class StructureCloud(NamedTuple):
-    """Points with truth, arrays of n in file order.
+    """Points with reference data, arrays of n in file order.
 
     ``face``, ``member``, ``anomaly`` are ids, 0 for none (a mixed pixel belongs to no face); ``incidence`` is in degrees;
     ``rgb`` (n, 3) is None by night. Levels are dB, ``time`` s, ``xyz`` m.
@@ -58,7 +58,7 @@ class StructureCloud(NamedTuple):
 
 
 class _Echoes(NamedTuple):
-    """What rays met: direction (n, 3), range and level (dB) without noise, surface, cosine, face (0: none), column and line."""
+    """Hits of rays: direction (n, 3), range and level (dB) without noise, surface, cosine, face (0: none), column and line."""
 
     direction: Float
     range: Float
@@ -69,7 +69,7 @@ class _Echoes(NamedTuple):
     shot: Int64
 
     def take(self, rows: Bool) -> _Echoes:
-        """Some of them."""
+        """Return some of them."""
         return _Echoes(
             self.direction[rows],
             self.range[rows],
@@ -82,7 +82,7 @@ class _Echoes(NamedTuple):
 
 
 class StructureScan:
-    """A synthetic structure, ready to be scanned.
+    """Synthetic structure, ready to be scanned.
 
     Attributes
     ----------
@@ -112,17 +112,17 @@ class StructureScan:
         self.anomalies: list[Anomaly] = self._place(np.random.default_rng(differs))
 
     def _window(self, station: int, step: float) -> tuple[Float, Float]:
-        """Azimuths and zeniths of a station's rays."""
+        """Return azimuths and zeniths of a station's rays."""
         seen = self._views[station]
-        last = np.minimum(seen.low + np.array([seen.columns, seen.lines]) * TILE, [math.pi, LOWEST_ZENITH])
+        last = np.minimum(seen.low + np.array([seen.columns, seen.lines]) * TILE, [math.pi, MAX_ZENITH])
         azimuth = np.arange(seen.low[0] + 0.5 * step, last[0], step)
         return azimuth, np.arange(seen.low[1] + 0.5 * step, last[1], step)
 
     def _place(self, rng: np.random.Generator) -> list[Anomaly]:
-        """Anomalies about places that are seen, at most one on a face but for walls and floors."""
+        """Place anomalies around visible places, at most one per face except for walls and floors."""
         seen: dict[int, list[Float]] = {}
         for k, station in enumerate(self.stations):
-            direction = _directions(*self._window(k, SCOUT))
+            direction = _directions(*self._window(k, SCOUT_STEP))
             distance, which = cast(self._rows, self._views[k], station, direction)
             owner = np.where(which >= 0, self._owner[which], 0)
             xyz = station + np.where(np.isfinite(distance), distance, 0.0)[:, None] * direction
@@ -130,14 +130,12 @@ class StructureScan:
                 seen.setdefault(face, []).append(self.structure.faces[face - 1].unroll(xyz[owner == face]))
         places = {face: np.vstack(parts) for face, parts in seen.items()}
         faces = [
-            f
-            for f in self.structure.faces
-            if f.row[0] <= TUBE and f.surfaces == 1 and len(places.get(f.id, ())) >= LEAST_PLACES
+            f for f in self.structure.faces if f.row[0] <= TUBE and f.surfaces == 1 and len(places.get(f.id, ())) >= MIN_PLACES
         ]
         out: list[Anomaly] = []
         if not faces:
             return out
-        # More often on faces of which more is seen, yet on small ones too.
+        # More often on faces with a larger visible part, but also on small ones.
         weight = np.sqrt([len(places[f.id]) for f in faces])
         for _ in range(20 * self.parameters.anomalies):
             if len(out) == self.parameters.anomalies:
@@ -152,7 +150,7 @@ class StructureScan:
         return out
 
     def blocks(self) -> Iterator[StructureCloud]:
-        """Points, station by station, azimuth growing."""
+        """Yield points, station by station, by ascending azimuth."""
         step = math.radians(self.parameters.angular_step)
         for k in range(len(self.stations)):
             azimuth, zenith = self._window(k, step)
@@ -163,7 +161,7 @@ class StructureScan:
                 yield self._make(k, azimuth, zenith, first, min(first + wide, len(azimuth)), rng)
 
     def _make(self, k: int, azimuth: Float, zenith: Float, first: int, last: int, rng: np.random.Generator) -> StructureCloud:
-        """Points of the columns ``first`` to ``last`` of a station."""
+        """Return the points of the columns ``first`` to ``last`` of a station."""
         p = self.parameters
         found = self._echoes(k, azimuth, zenith, first, last)
         many = len(found.range)
@@ -190,7 +188,7 @@ class StructureScan:
         )
 
     def _echoes(self, k: int, azimuth: Float, zenith: Float, first: int, last: int) -> _Echoes:
-        """Echoes of a block of columns; where neighbours meet other surfaces, of the whole footprint."""
+        """Return echoes of a block of columns; of the whole footprint where neighbours hit other surfaces."""
         low, high = max(first - 1, 0), min(last + 1, len(azimuth))
         lines = len(zenith)
         direction = _directions(azimuth[low:high], zenith)
@@ -215,11 +213,11 @@ class StructureScan:
         found = _Echoes(direction, distance, level, which, cosine, face, shot)
         if self.parameters.beam > 0.0:
             self._mix(k, found, np.flatnonzero(edge))
-        good = np.isfinite(found.range) & (found.range < FURTHEST) & (found.cosine > MOST_SLANT)
+        good = np.isfinite(found.range) & (found.range < MAX_RANGE) & (found.cosine > MIN_COSINE)
         return found.take(good)
 
     def _levels(self, k: int, direction: Float, distance: Float, which: Int32) -> tuple[Float, Float]:
-        """Level (dB) and cosine of incidence of rays; -inf and 0 without an echo."""
+        """Return level (dB) and cosine of incidence of rays; -inf and 0 without an echo."""
         level, cosine = np.full(len(distance), -np.inf), np.zeros(len(distance))
         hit = np.flatnonzero(which >= 0)
         xyz = self.stations[k] + distance[hit, None] * direction[hit]
@@ -232,13 +230,13 @@ class StructureScan:
         return level, cosine
 
     def _mix(self, k: int, found: _Echoes, rows: Int64) -> None:
-        """Put the mean over the footprint, by power, in place of single rays at edges."""
+        """Replace single rays at edges by the mean over the footprint, by power."""
         if not len(rows):
             return
         direction = found.direction[rows]
         distance = found.range[rows]
         reach = np.where(np.isfinite(distance), distance, self.parameters.distance)
-        radius = 0.5 * (EXIT + 1e-3 * self.parameters.beam * reach) / reach
+        radius = 0.5 * (EXIT_DIAMETER + 1e-3 * self.parameters.beam * reach) / reach
         one = np.cross(direction, [0.0, 0.0, 1.0])
         one /= np.linalg.norm(one, axis=1)[:, None]
         two = np.cross(direction, one)
@@ -251,19 +249,19 @@ class StructureScan:
             far = np.where(which >= 0, far, 1.0)
             part = np.where(which >= 0, 10.0 ** (0.1 * (level + range_term(far))), 0.0)
             power, moment, hits = power + part, moment + part * far, hits + (which >= 0)
-        gone = hits < LEAST_SHARE * len(_SAMPLES)
+        gone = hits < MIN_SHARE * len(_SAMPLES)
         mean = np.where(gone, np.inf, moment / np.maximum(power, 1e-300))
         kept = np.where(gone, 1.0, mean)
         away = np.abs(kept - np.where(np.isfinite(distance), distance, 1e9)) * found.cosine[rows]
-        is_mixed = ~np.isfinite(distance) | (away > ASIDE)
+        is_mixed = ~np.isfinite(distance) | (away > MAX_FACE_DISTANCE)
         found.range[rows] = mean
         found.face[rows[is_mixed]] = 0
         found.level[rows] = 10.0 * np.log10(np.maximum(power, 1e-300) / len(_SAMPLES)) - range_term(kept)
-        # An echo beside all that its middle ray meets has the slant of none.
+        # An echo beside all hits of its central ray has no incidence.
         found.cosine[rows[~np.isfinite(distance)]] = 1.0
 
     def _differences(self, found: _Echoes, met: Float) -> tuple[Float, Float, Int64, Float]:
-        """Change of level (dB), share of the footprint on an anomaly, its id where the middle lies on it, and its colour."""
+        """Return change of level (dB), share of the footprint on an anomaly, its id if the centre is on it, and its colour."""
         many = len(found.range)
         shift, share, number = np.zeros(many), np.zeros(many), np.zeros(many, dtype=np.int64)
         colour = np.zeros((many, 3))
@@ -278,7 +276,7 @@ class StructureScan:
             kind = MATERIALS[face.material]
             shift[rows] += kind.mottle * smooth_field(uv[:, 0] / kind.cell, uv[:, 1] / kind.cell, self._salt + face.id)
             for anomaly in on.get(face.id, ()):
-                spot = EXIT + 1e-3 * self.parameters.beam * found.range[rows]
+                spot = EXIT_DIAMETER + 1e-3 * self.parameters.beam * found.range[rows]
                 part, inside = covered(anomaly, uv, spot)
                 touched = np.flatnonzero(part > 0.0)
                 mine = rows[touched]
@@ -289,7 +287,7 @@ class StructureScan:
         return shift, share, number, colour
 
     def _colours(self, found: _Echoes, met: Float, share: Float, colour: Float, rng: np.random.Generator) -> UInt16:
-        """RGB by day: the material's in the sun and the sky's light."""
+        """Return RGB by day: the material's colour in sunlight and skylight."""
         many = len(found.range)
         base = np.full((many, 3), 0.4)
         light = np.full(many, 0.6)
@@ -313,17 +311,17 @@ _COLOURS = {
 
 
 def covered(anomaly: Anomaly, uv: Float, spot: Float) -> tuple[Float, Bool]:
-    """Share of each footprint on an anomaly, and whether its middle lies on it.
+    """Return the share of each footprint on an anomaly, and True if its centre is on it.
 
     Parameters
     ----------
     uv : (n, 2) array
-        Middles of the footprints on the anomaly's face, m.
+        Centres of the footprints on the anomaly's face, m.
     spot : (n,) array
         Diameter of the footprints, m.
     """
     share, inside = np.zeros(len(uv)), np.zeros(len(uv), dtype=bool)
-    fade = float(spot.max()) + SOFT if len(spot) else 0.0
+    fade = float(spot.max()) + FADE_WIDTH if len(spot) else 0.0
     low, high = np.reshape(anomaly.outline.bounds, (2, 2)) + np.array([[-fade], [fade]])
     near = np.flatnonzero(((uv >= low) & (uv <= high)).all(axis=1))
     points = shapely.points(uv[near])
@@ -335,13 +333,13 @@ def covered(anomaly: Anomaly, uv: Float, spot: Float) -> tuple[Float, Bool]:
         share[near] = np.clip(overlap / spot[near], 0.0, 1.0)
         return share, inside
     away = shapely.distance(shapely.boundary(anomaly.outline), points) * np.where(inside[near], 1.0, -1.0)
-    edge = spot[near] + (SOFT if anomaly.kind in ("rust", "stain") else 0.0)
+    edge = spot[near] + (FADE_WIDTH if anomaly.kind in ("rust", "stain") else 0.0)
     share[near] = np.clip(0.5 + away / edge, 0.0, 1.0)
     return share, inside
 
 
 def _directions(azimuth: Float, zenith: Float) -> Float:
-    """Unit rays (n, 3), the lines of a column one after the other."""
+    """Return unit rays (n, 3), the lines of a column one after the other."""
     out = np.empty((len(azimuth), len(zenith), 3))
     out[:, :, 0] = np.sin(azimuth)[:, None] * np.sin(zenith)
     out[:, :, 1] = np.cos(azimuth)[:, None] * np.sin(zenith)
@@ -350,5 +348,5 @@ def _directions(azimuth: Float, zenith: Float) -> Float:
 
 
 def _pair(grid: NDArray[Any], axis: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Neighbours along an axis, as views."""
+    """Return neighbours along an axis, as views."""
     return (grid[:-1], grid[1:]) if axis == 0 else (grid[:, :-1], grid[:, 1:])

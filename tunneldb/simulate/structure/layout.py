@@ -1,4 +1,4 @@
-"""Where the members of a synthetic plant stand: wall and floor, columns, beams, pipes, trays, gratings, front objects."""
+"""Positions of the members of a synthetic plant: wall and floor, columns, beams, pipes, trays, gratings, front objects."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ STEELS = ("painted steel", "grey paint", "white paint", "bare steel", "rusty ste
 STATION_HEIGHT = 1.6
 WALL, PIPES, BEAMS = 2.2, 1.1, 0.35  # depths behind the columns, m
 HEIGHT = 4.0
-NORTH = np.array([X, Z, -Y])  # axes of what faces the stations
+NORTH = np.array([X, Z, -Y])  # axes of surfaces that face the stations
 
 
 def build(parameters: StructureParameters, rng: np.random.Generator) -> Structure:
@@ -44,7 +44,7 @@ def build(parameters: StructureParameters, rng: np.random.Generator) -> Structur
 
 
 def stations(parameters: StructureParameters, rng: np.random.Generator) -> Float:
-    """Scanner positions (n, 3), on an arc in front of the structure."""
+    """Return scanner positions (n, 3), on an arc in front of the structure."""
     count = parameters.stations
     spread = np.radians(60.0) * (np.arange(count) - 0.5 * (count - 1)) / max(count - 1, 1)
     angle = spread + np.radians(rng.uniform(-12.0, 12.0, count))
@@ -54,7 +54,7 @@ def stations(parameters: StructureParameters, rng: np.random.Generator) -> Float
 
 
 def _wall_and_floor(structure: Structure, front: float, half: float, rng: np.random.Generator) -> None:
-    """Two materials in one plane behind, the floor, and plates on the wall."""
+    """Add two materials in one plane at the back, the floor, and plates on the wall."""
     wide = half + 0.6
     cut = float(rng.uniform(-0.4, 0.4)) * half
     member = structure.member("wall")
@@ -70,7 +70,7 @@ def _wall_and_floor(structure: Structure, front: float, half: float, rng: np.ran
 
 
 def _columns(structure: Structure, front: float, half: float, rng: np.random.Generator) -> None:
-    """I-, U-, L-profiles and boxes upright, in turn from a random one on, turned about their axes."""
+    """Add upright I-, U-, L-profiles and boxes, in turn from a random one on, turned about their axes."""
     first = int(rng.integers(4))
     for k, x in enumerate(np.arange(-half + 0.3, half - 0.2, 1.5)):
         size, thick = float(rng.uniform(0.16, 0.30)), float(rng.uniform(0.008, 0.016))
@@ -87,7 +87,7 @@ def _columns(structure: Structure, front: float, half: float, rng: np.random.Gen
 
 
 def _beams(structure: Structure, front: float, half: float, rng: np.random.Generator) -> None:
-    """Two beams behind the columns, which split them."""
+    """Add two beams behind the columns, which divide them."""
     for z in (0.6, 3.1):
         size, thick = float(rng.uniform(0.18, 0.28)), float(rng.uniform(0.008, 0.014))
         kind, section = (
@@ -103,7 +103,7 @@ def _beams(structure: Structure, front: float, half: float, rng: np.random.Gener
 
 
 def _pipes(structure: Structure, front: float, half: float, rng: np.random.Generator) -> None:
-    """Pipes one over the other from the floor up, of 2 to 30 cm radius, with flanges, elbows at the end of some."""
+    """Add pipes above each other from the floor up, of 2 to 30 cm radius, with flanges, and elbows at the end of some."""
     z = 0.35
     radii = rng.permutation(np.concatenate([np.exp(rng.uniform(np.log(0.02), np.log(0.30), 4)), [0.05, 0.12]]))
     for k, radius in enumerate(radii.tolist()):
@@ -124,7 +124,7 @@ def _pipes(structure: Structure, front: float, half: float, rng: np.random.Gener
 
 
 def _fronts(structure: Structure, parameters: StructureParameters, front: float, half: float, rng: np.random.Generator) -> None:
-    """Posts and pipes that hide strips of what stands behind."""
+    """Add posts and pipes in front that hide strips of the structure."""
     for k in range(parameters.fronts):
         x, y = float(rng.uniform(-0.9, 0.9)) * half, front - 0.7 - 0.2 * k
         material = str(rng.choice(STEELS))

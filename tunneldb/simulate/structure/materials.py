@@ -1,7 +1,7 @@
-"""How materials send a scanner's light back, and what colour they have.
+"""Reflectance and colour of materials.
 
-A surface's level is 10 lg(d ON(θ) + s B(θ)): a diffuse part by Oren and Nayar (1994), and the lobe of a smooth rough surface
-seen along the light, B = exp(-tan²θ / m²) / cos⁵θ with the slope m of its facets (Beckmann's distribution; Hodgson's and
+A surface's level is 10 lg(d ON(θ) + s B(θ)): a diffuse part by Oren and Nayar (1994), and the lobe of a glossy rough surface
+observed along the light, B = exp(-tan²θ / m²) / cos⁵θ with the slope m of its facets (Beckmann's distribution; Hodgson's and
 Cook and Torrance's, 1982, eq. 5 without shadowing).
 """
 
@@ -31,7 +31,7 @@ class Material:
     colour: tuple[float, float, float]
 
     def level(self, cosine: Float) -> Float:
-        """Level (n,) in dB at the cosines of incidence (n,)."""
+        """Return the level (n,) in dB at the cosines of incidence (n,)."""
         c = np.clip(cosine, 0.01, 1.0)
         diffuse = self.diffuse * 10.0 ** (0.1 * oren_nayar(c, self.roughness))
         square = 1.0 / (c * c) - 1.0

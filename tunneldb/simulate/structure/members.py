@@ -15,7 +15,7 @@ Section = tuple[list[tuple[float, float]], list[tuple[float, float, float, float
 
 
 def i_section(depth: float, width: float, web: float, flange: float) -> Section:
-    """Section of an I-profile, its web along q; outer sizes and thicknesses, m."""
+    """Return the section of an I-profile, its web along q; outer sizes and thicknesses, m."""
     b, h, w, f = 0.5 * width, 0.5 * depth, 0.5 * web, 0.5 * depth - flange
     half = [(b, -h), (b, -f), (w, -f), (w, f), (b, f), (b, h)]
     corners = half + [(-p, -q) for p, q in half]
@@ -23,7 +23,7 @@ def i_section(depth: float, width: float, web: float, flange: float) -> Section:
 
 
 def u_section(depth: float, width: float, thick: float) -> Section:
-    """Section of a U-profile, open towards +p."""
+    """Return the section of a U-profile, open towards +p."""
     b, h, t = 0.5 * width, 0.5 * depth, thick
     corners = [(-b, -h), (b, -h), (b, -h + t), (-b + t, -h + t), (-b + t, h - t), (b, h - t), (b, h), (-b, h)]
     return corners, [
@@ -34,14 +34,14 @@ def u_section(depth: float, width: float, thick: float) -> Section:
 
 
 def l_section(depth: float, width: float, thick: float) -> Section:
-    """Section of an L-profile, its corner at the least p and q."""
+    """Return the section of an L-profile, its corner at the least p and q."""
     b, h, t = 0.5 * width, 0.5 * depth, thick
     corners = [(-b, -h), (b, -h), (b, -h + t), (-b + t, -h + t), (-b + t, h), (-b, h)]
     return corners, [(0.0, 0.5 * t - h, b, 0.5 * t), (0.5 * t - b, 0.5 * t, 0.5 * t, h - 0.5 * t)]
 
 
 def box_section(depth: float, width: float) -> Section:
-    """Section of a box or a solid bar."""
+    """Return the section of a box or a solid bar."""
     b, h = 0.5 * width, 0.5 * depth
     return [(b, -h), (b, h), (-b, h), (-b, -h)], [(0.0, 0.0, b, h)]
 
@@ -81,9 +81,9 @@ def pipe(
     after: float,
     flanges: list[float],
 ) -> Member:
-    """Add a pipe from ``start`` along ``direction``; with ``turn``, an elbow leads into that direction and ``after`` m on.
+    """Add a pipe from ``start`` along ``direction``; with ``turn``, an elbow leads into that direction for ``after`` m.
 
-    ``flanges`` are the places of pairs of flanges along the first part, m.
+    ``flanges`` are the positions of pairs of flanges along the first part, m.
     """
     member = structure.member("pipe")
     first = axes_about(direction)
@@ -113,7 +113,7 @@ def pipe(
 
 
 def rod(start: Float, end: Float, radius: float) -> Float:
-    """A wire or cable from end to end."""
+    """Return a wire or cable from end to end."""
     way = end - start
     return surface(TUBE, start, axes_about(way), radius, float(np.linalg.norm(way)))
 
@@ -162,7 +162,7 @@ def bundle(structure: Structure, start: Float, along: Float, length: float, rng:
 def cable(
     structure: Structure, start: Float, along: Float, length: float, radius: float, wave: float, rng: np.random.Generator
 ) -> None:
-    """Add a cable that sways by ``wave`` about its line, m."""
+    """Add a cable that varies by ``wave`` about its line, m."""
     many = max(2, math.ceil(length / 0.4))
     first, second, _ = axes_about(along)
     at = start + np.linspace(0.0, length, many + 1)[:, None] * along
@@ -171,7 +171,7 @@ def cable(
 
 
 def plate(structure: Structure, kind: str, material: str, middle: Float, axes: Float, a: float, b: float) -> Member:
-    """Add a plate of whole sizes a and b, seen from the side of its third axis."""
+    """Add a plate of full sizes a and b, visible from the side of its third axis."""
     member = structure.member(kind)
     structure.face(member, "plane", material, [surface(RECTANGLE, middle, axes, 0.5 * a, 0.5 * b)])
     return member

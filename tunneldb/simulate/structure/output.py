@@ -1,4 +1,4 @@
-"""Files of a synthetic structure: LAZ with truth, stations, reference curve, and truth of faces and anomalies."""
+"""Files of a synthetic structure: LAZ with reference data, stations, reference curve, and reference faces and anomalies."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from shapely.geometry import Polygon
 import tunneldb
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.files import made_folder, room_told
+from tunneldb.files import disk_full_as_oserror, made_folder
 from tunneldb.simulate.output import CREATED, SCALE
 from tunneldb.simulate.radiometry import reference_curve
 from tunneldb.simulate.structure.anomalies import Anomaly
-from tunneldb.simulate.structure.generate import FURTHEST, StructureCloud, StructureScan
+from tunneldb.simulate.structure.generate import MAX_RANGE, StructureCloud, StructureScan
 from tunneldb.simulate.structure.shapes import RING, Face
 
 DIMENSIONS = [
@@ -35,7 +35,7 @@ DIMENSIONS = [
 
 @dataclass
 class StructureFiles:
-    """What :func:`write_structure` made."""
+    """Files written by :func:`write_structure`."""
 
     cloud: Path
     stations: Path
@@ -45,7 +45,7 @@ class StructureFiles:
 
     @classmethod
     def named(cls, folder: Path, name: str) -> StructureFiles:
-        """Files of a name in a folder."""
+        """Return the files of a name in a folder."""
         base = str(folder / name)
         ends = (".laz", ".stations.csv", ".reference.csv", ".truth.json")
         return cls(Path(base + ends[0]), Path(base + ends[1]), Path(base + ends[2]), Path(base + ends[3]))
@@ -68,24 +68,24 @@ class _Tally:
 
 
 def write_structure(scan: StructureScan, folder: Path, progress: Callable[[int], None] | None = None) -> StructureFiles:
-    """Scan a structure into ``folder``; files appear there when all are complete.
+    """Scan a structure into ``folder``; files appear there only when all are complete.
 
     Parameters
     ----------
     progress : callable, optional
-        Called with the points written after each block.
+        Function of the number of points written, called after each block.
 
     Raises
     ------
     UserError
-        The folder cannot be written, or the disk is full.
+        If the folder cannot be written to, or the disk is full.
     """
     name = scan.parameters.name
     try:
         with (
             made_folder(folder),
             TemporaryDirectory(dir=folder, prefix=".simulate-") as scratch,
-            room_told(Path(scratch)),
+            disk_full_as_oserror(Path(scratch)),
         ):
             made = _write(scan, Path(scratch), name, progress)
             return made.moved(folder)
@@ -115,7 +115,7 @@ def _write(scan: StructureScan, folder: Path, name: str, progress: Callable[[int
                 progress(files.points)
     rows = np.column_stack([np.arange(1, len(scan.stations) + 1), scan.stations + origin])
     np.savetxt(files.stations, rows, ["%d"] + ["%.4f"] * 3, delimiter=",", header="scan_id,x,y,z", comments="")
-    curve = reference_curve(FURTHEST, np.random.default_rng(parameters.seed))
+    curve = reference_curve(MAX_RANGE, np.random.default_rng(parameters.seed))
     np.savetxt(files.reference, curve, ["%.2f", "%.3f"], delimiter=",", header="range_m,intensity_db", comments="")
     record = {
         "software": f"tunneldb {tunneldb.__version__}",
@@ -149,7 +149,7 @@ def _record(header: laspy.LasHeader, cloud: StructureCloud) -> laspy.ScaleAwareP
 
 
 def _count(tallies: list[_Tally], ids: Any, incidence: Any) -> None:
-    """Add points to those that they lie on."""
+    """Add points to the tallies of their ids."""
     for number in np.unique(ids[ids > 0]).tolist():
         mine = ids == number
         tallies[number - 1].points += int(mine.sum())
@@ -157,7 +157,7 @@ def _count(tallies: list[_Tally], ids: Any, incidence: Any) -> None:
 
 
 def _incidence(tally: _Tally) -> list[float] | None:
-    """5, 50 and 95 % of the incidence, degrees."""
+    """Return the 5, 50 and 95 % quantiles of the incidence, degrees."""
     if not tally.points:
         return None
     return [round(float(v), 2) for v in np.percentile(np.concatenate(tally.incidence), [5, 50, 95])]

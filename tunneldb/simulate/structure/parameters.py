@@ -1,4 +1,4 @@
-"""What a synthetic structure is made of, and how it is scanned."""
+"""Parameters of a synthetic structure and of its scan."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ LIMITS: dict[str, tuple[float, float, str]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class StructureParameters:
-    """A synthetic structure and its scan; lengths in m, angles in degrees, levels in dB.
+    """Synthetic structure and its scan; lengths in m, angles in degrees, levels in dB.
 
     Attributes
     ----------
     seed : int
-        Decides the structure, its anomalies and the noise.
+        Random seed for the structure, its anomalies and the noise.
     stations : int
-        Scanner positions, 1 to 4, spread in front of the structure.
+        Number of scanner positions, 1 to 4, spread in front of the structure.
     distance : float
-        From the stations to the structure's front.
+        Distance from the stations to the structure's front.
     width : float
-        Of the structure, across the view.
+        Width of the structure, across the view.
     angular_step : float
-        Between rays, in azimuth and in zenith.
+        Step between rays, in azimuth and in zenith.
     range_noise : float
         Standard deviation along the ray.
     beam : float
@@ -52,13 +52,13 @@ class StructureParameters:
     misregistration, gain : float
         Standard deviations of each station's shift along each axis, and of its level.
     anomalies : int
-        How many are put in; 0 makes a clean scene.
+        Number of anomalies; 0 for a scene without.
     contrast : (float, float)
-        Least and greatest contrast of an anomaly.
+        Limits of the contrast of an anomaly.
     fronts : int
-        Objects in front that split what is behind them.
+        Number of objects in front that divide the members behind.
     night : bool
-        No colours, and other noise; structure and anomalies stay.
+        True for a scan by night: no colours, and other noise; structure and anomalies are the same.
     """
 
     name: str = "structure"
@@ -86,10 +86,10 @@ class StructureParameters:
                 raise UserError(f"{name.replace('_', '-')} is {value:g}: give {low:g} to {high:g} {unit}")
         low, high = self.contrast
         if not 0.0 < low <= high <= 20.0:
-            raise UserError(f"contrast is {low:g} to {high:g} dB: give two growing values above 0 and up to 20")
+            raise UserError(f"contrast is {low:g} to {high:g} dB: give two ascending values above 0 and up to 20")
 
     def crs(self) -> pyproj.CRS:
-        """Coordinate system; projected, in metres."""
+        """Return the coordinate system; projected, in metres."""
         try:
             crs = pyproj.CRS.from_epsg(self.srid)
         except CRSError:
@@ -99,5 +99,5 @@ class StructureParameters:
         return crs
 
     def as_dict(self) -> dict[str, Any]:
-        """All parameters, for the record."""
+        """Return all parameters, for the record."""
         return asdict(self)

@@ -1,4 +1,4 @@
-"""Surfaces that rays meet by closed formulas, and the faces and members made of them.
+"""Surfaces with closed formulas for rays, and the faces and members made of them.
 
 Coordinates are local: x across the view, y away from the stations, z up, m.
 """
@@ -24,7 +24,7 @@ COLUMNS = 17
 
 
 def surface(kind: float, origin: Float, axes: Float, *sizes: float) -> Float:
-    """Row of a surface; ``axes`` (3, 3) has a unit axis in each row."""
+    """Return the row of a surface; ``axes`` (3, 3) has a unit axis in each row."""
     row = np.zeros(COLUMNS)
     row[0], row[1:4], row[4:13] = kind, origin, np.ravel(axes)
     row[13 : 13 + len(sizes)] = sizes
@@ -32,9 +32,9 @@ def surface(kind: float, origin: Float, axes: Float, *sizes: float) -> Float:
 
 
 def axes_about(direction: Float) -> Float:
-    """Right-handed unit axes (3, 3), the third along a direction, the first towards the stations (-y) as far as it can be.
+    """Return right-handed unit axes (3, 3), the third along a direction, the first towards the stations (-y) if possible.
 
-    So the seam of a pipe that is unrolled lies behind.
+    So the seam of an unrolled pipe is at the back.
     """
     third = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
     towards = np.array([0.0, -1.0, 0.0]) if abs(third[1]) < 0.9 else np.array([1.0, 0.0, 0.0])
@@ -45,21 +45,21 @@ def axes_about(direction: Float) -> Float:
 
 @dataclass
 class Face:
-    """A surface of one material: a plane, a cylinder or a bend.
+    """Surface of one material: a plane, a cylinder or a bend.
 
     Attributes
     ----------
     id, member : int
-        From 1.
+        Numbers, from 1.
     kind : str
         plane, cylinder or bend.
     material : str
         Name in :data:`tunneldb.simulate.structure.materials.MATERIALS`.
     row : (17,) array
-        The surface whose frame is the face's: u, v are along its first two axes (plane), or along the axis and around
-        it (cylinder).
+        Surface whose frame is that of the face: u, v are along its first two axes (plane), or along the axis and around it
+        (cylinder).
     surfaces : int
-        Of how many surfaces it is made; the end of a profile has several in one plane.
+        Number of surfaces in the face; the end of a profile has several in one plane.
     """
 
     id: int
@@ -70,14 +70,14 @@ class Face:
     surfaces: int = 1
 
     def unroll(self, xyz: Float) -> Float:
-        """Coordinates (n, 2) on the face of points (n, 3), m."""
+        """Return coordinates (n, 2) on the face of points (n, 3), m."""
         local = (xyz - self.row[1:4]) @ self.row[4:13].reshape(3, 3).T
         if self.kind == "plane":
             return np.asarray(local[:, :2])
         return np.column_stack([local[:, 2], self.row[13] * np.arctan2(local[:, 1], local[:, 0])])
 
     def to_space(self, uv: Float) -> Float:
-        """Points (n, 3) of coordinates (n, 2) on the face, m."""
+        """Return points (n, 3) of coordinates (n, 2) on the face, m."""
         axes = self.row[4:13].reshape(3, 3)
         if self.kind == "plane":
             return np.asarray(self.row[1:4] + uv @ axes[:2])
@@ -86,7 +86,7 @@ class Face:
         return np.asarray(self.row[1:4] + uv[:, :1] * axes[2] + round_)
 
     def size(self) -> tuple[float, float]:
-        """Lengths along u and v, m."""
+        """Return lengths along u and v, m."""
         if self.row[0] == RING:
             return 2.0 * float(self.row[14]), 2.0 * float(self.row[14])
         if self.kind == "plane":
@@ -96,7 +96,7 @@ class Face:
 
 @dataclass
 class Member:
-    """A structural member: number, what it is, the ids of its faces."""
+    """Structural member: number, kind, ids of its faces."""
 
     id: int
     kind: str
@@ -105,7 +105,7 @@ class Member:
 
 @dataclass
 class Structure:
-    """Members, faces, and all surfaces; ``owner`` has the face of each surface, 0 for wires and cables, which are no faces.
+    """Members, faces, and all surfaces; ``owner`` has the face of each surface, 0 for wires and cables, which have no faces.
 
     ``wire`` has the material of each surface that belongs to no face.
     """
@@ -122,7 +122,7 @@ class Structure:
         return self.members[-1]
 
     def face(self, member: Member, kind: str, material: str, rows: Sequence[Float]) -> Face:
-        """Add a face, made of one or more surfaces of one plane, or of one cylinder or bend."""
+        """Add a face, made of one or more surfaces in one plane, or of one cylinder or bend."""
         face = Face(len(self.faces) + 1, member.id, kind, material, rows[0], len(rows))
         self.faces.append(face)
         member.faces.append(face.id)
@@ -130,7 +130,7 @@ class Structure:
         return face
 
     def wires(self, material: str, rows: Sequence[Float]) -> None:
-        """Add what is no face: wires, cables, bars."""
+        """Add surfaces without faces: wires, cables, bars."""
         self._add(rows, 0, material)
 
     def _add(self, rows: Sequence[Float], owner: int, material: str) -> None:
@@ -139,12 +139,12 @@ class Structure:
         self.material += [material] * len(rows)
 
     def table(self) -> tuple[Float, Int64]:
-        """Surfaces (n, 17) and the face of each (n,)."""
+        """Return surfaces (n, 17) and the face of each (n,)."""
         return np.array(self.rows), np.array(self.owner, dtype=np.int64)
 
 
 def normals(rows: Float, xyz: Float) -> Float:
-    """Unit normals (n, 3), outward, where points (n, 3) lie on surfaces, a row of ``rows`` (n, 17) each."""
+    """Return unit normals (n, 3), outward, at points (n, 3) on surfaces, one row of ``rows`` (n, 17) each."""
     local = xyz - rows[:, 1:4]
     axis = rows[:, 10:13]
     kind = rows[:, 0]
@@ -159,7 +159,7 @@ def normals(rows: Float, xyz: Float) -> Float:
 
 
 def hulls(row: Float) -> Float:
-    """Balls (n, 4: middle, radius) that cover a surface, small where it is long and thin."""
+    """Return balls (n, 4: centre, radius) that cover a surface, small if it is long and thin."""
     kind, origin = row[0], row[1:4]
     first, second, third = row[4:13].reshape(3, 3)
     a, b, c = row[13:16]

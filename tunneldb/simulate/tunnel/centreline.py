@@ -29,7 +29,7 @@ PROFILE_COLUMNS = 4  # chainage, z, grade, change of grade per m
 
 @inner
 def axis_at(plan: Float, profile: Float, s: float) -> tuple[float, float, float, float, float, float, float, float]:
-    """Axis at chainage ``s``: x, y, z, cos and sin of direction, curvature, grade, change of grade.
+    """Return the axis at chainage ``s``: x, y, z, cos and sin of direction, curvature, grade, change of grade.
 
     The first and last elements continue beyond the ends.
     """
@@ -66,7 +66,7 @@ def axis_at(plan: Float, profile: Float, s: float) -> tuple[float, float, float,
 
 @kernel
 def _axis(plan: Float, profile: Float, s: Float, out: Float) -> None:
-    """Columns of :func:`axis_at` at chainages (n,), into ``out`` (8, n)."""
+    """Write the columns of :func:`axis_at` at chainages (n,) into ``out`` (8, n)."""
     for i in range(s.shape[0]):
         x, y, z, c, n, k, g, dg = axis_at(plan, profile, s[i])
         out[0, i] = x
@@ -96,7 +96,7 @@ class Frame(NamedTuple):
 
 @dataclass(frozen=True)
 class Element:
-    """A plan element: length in m, curvature at its start and end in 1/m (positive to the left)."""
+    """Plan element: length in m, curvature at its start and end in 1/m (positive to the left)."""
 
     length: float
     curvature_from: float
@@ -114,7 +114,7 @@ class CentreLine:
     profile : (k, 4) array
         Rows: chainage, z, grade, change of grade, with z from ``origin``.
     origin : (3,) array
-        Coordinates of the start, m. Kept apart so that the arithmetic runs on small numbers.
+        Coordinates of the start, m; separate, so that the arithmetic uses small numbers.
     start, end : float
         Chainage of both ends, m.
     """
@@ -180,7 +180,7 @@ class CentreLine:
         azimuth: float = 60.0,
         origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> CentreLine:
-        """A straight of ``straight`` m (default a fifth of the length), then an arc to the end.
+        """Return a straight of ``straight`` m (default a fifth of the length), then an arc to the end.
 
         Parameters
         ----------
@@ -189,7 +189,7 @@ class CentreLine:
         transition : float
             Length of the clothoid between straight and arc (and, in an S-curve, between the two arcs), m.
         s_curve : bool
-            Bend one way for half of the curved length, then the other way.
+            True to bend one way for half of the curved length, then the other way.
         """
         lead = 0.2 * length if straight is None else straight
         curved = length - lead - transition * (2 if s_curve else 1)
@@ -222,15 +222,15 @@ class CentreLine:
         )
 
     def table(self, chainage: Float) -> Float:
-        """Columns of :func:`axis_at` at chainages (n,) -> (8, n), positions from ``origin``."""
+        """Return the columns of :func:`axis_at` at chainages (n,) -> (8, n), positions relative to ``origin``."""
         return _axis_table(self.plan, self.profile, np.ascontiguousarray(np.atleast_1d(chainage), dtype=np.float64))
 
     def position(self, chainage: Float) -> Float:
-        """Coordinates of the axis at chainages (n,) -> (n, 3), m."""
+        """Return coordinates of the axis at chainages (n,) -> (n, 3), m."""
         return np.column_stack([*self.table(chainage)[:3]]) + self.origin
 
     def frame(self, chainage: Float) -> Frame:
-        """Position and unit vectors t, u, w of the axis at chainages (n,)."""
+        """Return position and unit vectors t, u, w of the axis at chainages (n,)."""
         x, y, z, c, n, _, g, _ = self.table(chainage)
         q = np.sqrt(1.0 + g * g)
         return Frame(
@@ -241,7 +241,7 @@ class CentreLine:
         )
 
     def vertices(self, spacing: float) -> Float:
-        """Axis vertices every ``spacing`` m of chainage, the last at the end of the tunnel; (n, 3)."""
+        """Return axis vertices every ``spacing`` m of chainage, the last at the end of the tunnel; (n, 3)."""
         count = math.ceil((self.end - self.start) / spacing - 1e-9)
         s = np.append(self.start + spacing * np.arange(count), self.end)
         return self.position(s)

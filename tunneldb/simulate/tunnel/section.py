@@ -26,10 +26,10 @@ LINE, ARC = 0.0, 1.0
 
 @inner
 def nearest(parts: Float, u: float, w: float) -> tuple[float, float, float, float]:
-    """Nearest point of a section: arc, offset (positive inside) and the gradient (u, w) of the offset.
+    """Return the nearest point of a section: arc, offset (positive inside) and the gradient (u, w) of the offset.
 
-    In the interior of a convex section the nearest point never is a corner, so the side on which a point lies
-    follows from the normal at the nearest point of whichever part is nearest.
+    In the interior of a convex section the nearest point is never a corner, so the side of a point follows from the normal at
+    the nearest point of the nearest part.
     """
     side = 1.0 if u >= 0.0 else -1.0
     a = abs(u)
@@ -77,7 +77,7 @@ def nearest(parts: Float, u: float, w: float) -> tuple[float, float, float, floa
 
 @kernel
 def _points(parts: Float, arc: Float, out: Float) -> None:
-    """Positions (u, w) and inward unit normals (u, w) of a section at arcs (n,), into ``out`` (4, n)."""
+    """Write positions (u, w) and inward unit normals (u, w) of a section at arcs (n,) into ``out`` (4, n)."""
     for k in range(arc.shape[0]):
         side = 1.0 if arc[k] >= 0.0 else -1.0
         a = abs(arc[k])
@@ -102,7 +102,7 @@ def _points(parts: Float, arc: Float, out: Float) -> None:
 
 @dataclass(frozen=True)
 class Section:
-    """A tunnel's cross-section.
+    """Cross-section of a tunnel.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Section:
     half_perimeter : float
         Arc at the middle of the floor, m.
     floor_arc : float
-        Arc of the corner between wall and floor, m; beyond it is floor.
+        Arc of the corner between wall and floor, m; greater arcs are on the floor.
     floor : float
         Height w of the floor, m (negative: below the axis).
     half_width : float
@@ -128,22 +128,22 @@ class Section:
     half_width: float
 
     def point(self, arc: Float) -> tuple[Float, Float]:
-        """Positions (n, 2) and inward unit normals (n, 2) in (u, w) at arcs (n,)."""
+        """Return positions (n, 2) and inward unit normals (n, 2) in (u, w) at arcs (n,)."""
         a = np.ascontiguousarray(np.atleast_1d(arc), dtype=np.float64)
         out = np.empty((4, a.size))
         _points(self.parts, a, out)
         return out[:2].T, out[2:].T
 
     def project(self, u: Float, w: Float) -> tuple[Float, Float, Float]:
-        """Arc (n,), offset (n,) (positive inside) and gradient of the offset (n, 2) of a few points (u, w)."""
-        # Interpreted: what is asked of many points is asked by compiled loops.
+        """Return arc (n,), offset (n,) (positive inside) and gradient of the offset (n, 2) of a few points (u, w)."""
+        # Interpreted: many points use compiled loops instead.
         rows = [nearest.py_func(self.parts, a, b) for a, b in zip(np.atleast_1d(u), np.atleast_1d(w), strict=True)]
         out = np.array(rows).reshape(-1, 4)
         return out[:, 0], out[:, 1], out[:, 2:]
 
 
 def _assemble(name: str, pieces: list[tuple[float, ...]], floor: float, half_width: float) -> Section:
-    """Number the arcs of the pieces (kind, length, ...) and close with the floor, to the middle."""
+    """Assign arcs to the pieces (kind, length, ...) and close with the floor, to the middle."""
     pieces = [p for p in pieces if p[1] > 0.0]
     pieces.append((LINE, half_width, half_width, floor, -1.0, 0.0))
     arc, rows = 0.0, []
@@ -154,24 +154,24 @@ def _assemble(name: str, pieces: list[tuple[float, ...]], floor: float, half_wid
 
 
 def circular(radius: float = 4.0, invert: float = 2.8) -> Section:
-    """Circle with a flat invert ``invert`` m below its centre; the axis is the circle's centre."""
+    """Return a circle with a flat invert ``invert`` m below its centre; the axis is the circle's centre."""
     if not 0.0 < radius <= 20.0:
-        raise UserError(f"radius of the section is {radius:g} m: give one above 0 and up to 20 m")
+        raise UserError(f"radius of the section is {radius:g} m: give more than 0 and up to 20 m")
     if not 0.0 < invert < radius:
-        raise UserError(f"invert lies {invert:g} m below the centre: give a depth between 0 and {radius:g} m")
+        raise UserError(f"invert is {invert:g} m below the centre: give a depth between 0 and {radius:g} m")
     corner = math.pi - math.acos(invert / radius)
     half_width = math.sqrt(radius**2 - invert**2)
     return _assemble("circular", [(ARC, radius * corner, 0.0, 0.0, radius, 0.0)], -invert, half_width)
 
 
 def horseshoe(radius: float = 4.0, wall: float = 3.0, inclination: float = 0.0) -> Section:
-    """Arch of one radius over straight walls of height ``wall`` and a flat floor; the axis is at mid height.
+    """Return an arch of one radius over straight walls of height ``wall`` and a flat floor; the axis is at mid height.
 
-    ``inclination`` (degrees) leans the walls inward towards the floor; the arch then runs on below its centre by
-    that angle, so that arch and wall meet with a common tangent.
+    ``inclination`` (degrees) leans the walls inwards towards the floor; the arch then continues below its centre by that
+    angle, so that arch and wall meet with a common tangent.
     """
     if not 0.0 < radius <= 20.0:
-        raise UserError(f"radius of the arch is {radius:g} m: give one above 0 and up to 20 m")
+        raise UserError(f"radius of the arch is {radius:g} m: give more than 0 and up to 20 m")
     if not 0.0 <= inclination <= 30.0:
         raise UserError(f"walls lean by {inclination:g} degrees: give 0 to 30")
     lean = math.radians(inclination)
@@ -195,7 +195,7 @@ def horseshoe(radius: float = 4.0, wall: float = 3.0, inclination: float = 0.0) 
 
 
 def box(width: float = 8.0, height: float = 6.0) -> Section:
-    """Rectangle with sharp corners; the axis is its centre."""
+    """Return a rectangle with sharp corners; the axis is its centre."""
     for what, value in (("width", width), ("height", height)):
         if not 1.0 <= value <= 40.0:
             raise UserError(f"{what} of the box is {value:g} m: give 1 to 40 m")

@@ -1,4 +1,4 @@
-"""A synthetic tunnel: a section swept along a centre line, perpendicular to its 3D axis.
+"""Synthetic tunnel: a section swept along a centre line, perpendicular to its 3D axis.
 
 Both directions between space and the unrolled plane are exact: coordinates of a point at (chainage, arc, offset),
 and chainage, arc, offset and surface normal of a point.
@@ -23,12 +23,12 @@ from tunneldb.simulate.tunnel.section import Section, nearest
 def foot(
     plan: Float, profile: Float, x: float, y: float, z: float, s: float, tolerance: float, most: int
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
-    """Foot of the perpendicular from a point to the axis: Newton's method from chainage ``s``, ``most`` steps.
+    """Find the foot of the perpendicular from a point to the axis: Newton's method from chainage ``s``, ``most`` steps.
 
-    It ends with a step of less than ``tolerance`` m. ``most`` is a ``np.int64``: of each literal number Numba would compile
-    a version of its own. Returns the chainage and the last step, then, as they are before
-    that step: u, w, cos and sin of the direction, curvature, grade, the length q of the unnormalised tangent, and D, by
-    which (cos, sin, grade) is divided to give the gradient of chainage.
+    It ends with a step of less than ``tolerance`` m. ``most`` is a ``np.int64``, since Numba would compile a version for each
+    literal number. Return the chainage and the last step, then, before that step: u, w, cos and sin of the direction,
+    curvature, grade, the length q of the unnormalised tangent, and D, by which (cos, sin, grade) is divided to give the
+    gradient of chainage.
     """
     step, u, w, c, n, k, g, q, d = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for _ in range(most):
@@ -50,7 +50,7 @@ def foot(
 def gradient(
     gu: float, gw: float, u: float, w: float, c: float, n: float, k: float, g: float, q: float, d: float
 ) -> tuple[float, float, float]:
-    """Gradient in space of a function of (u, w) with gradient (gu, gw) there.
+    """Return the gradient in space of a function of (u, w) with gradient (gu, gw) there.
 
     u and w also change with chainage, because the frame of a sloping curve turns about its tangent.
     """
@@ -61,9 +61,9 @@ def gradient(
 
 @kernel
 def _unroll(plan: Float, profile: Float, parts: Float, xyz: Float, s: Float, tolerance: float, out: Float) -> None:
-    """Chainage, arc, offset and unit normal of points (n, 3) from the line's origin, into ``out`` (6, n).
+    """Write chainage, arc, offset and unit normal of points (n, 3) from the line's origin into ``out`` (6, n).
 
-    ``s`` (n,) are chainages near them; the chainage found is good to the square of ``tolerance`` over the bend's radius.
+    ``s`` (n,) are chainages near them; the error of the chainage is the square of ``tolerance`` over the bend's radius.
     """
     for i in range(xyz.shape[0]):
         chainage, _, u, w, c, n, k, g, q, d = foot(
@@ -91,13 +91,13 @@ class Unrolled(NamedTuple):
 
 @dataclass(frozen=True)
 class Tunnel:
-    """A section swept along a centre line."""
+    """Section swept along a centre line."""
 
     line: CentreLine
     section: Section
 
     def to_space(self, chainage: Float, arc: Float, offset: Float | float = 0.0) -> Float:
-        """Coordinates (n, 3) of points of the unrolled plane, ``offset`` m off the surface into the tunnel."""
+        """Return coordinates (n, 3) of points of the unrolled plane, ``offset`` m off the surface into the tunnel."""
         given = np.atleast_1d(chainage), np.asarray(arc), np.asarray(offset)
         s, a, o = np.broadcast_arrays(*given)
         x, y, z, c, n, _, g, _ = self.line.table(s)
@@ -107,15 +107,15 @@ class Tunnel:
         return np.column_stack([x + u * n - w * g * c / q, y - u * c - w * g * n / q, z + w / q]) + self.line.origin
 
     def unroll(self, xyz: Float) -> Unrolled:
-        """Chainage, arc, offset and normal of points (n, 3) within the bend's radius of the axis."""
+        """Return chainage, arc, offset and normal of points (n, 3) within the bend's radius of the axis."""
         points = np.atleast_2d(np.asarray(xyz, float))
         guess = np.linspace(self.line.start, self.line.end, max(2, int((self.line.end - self.line.start) / 5)))
-        # The nearest of a few axis points is a start from which Newton's method converges.
+        # Newton's method converges from the nearest of a few axis points.
         _, index = cKDTree(self.line.position(guess)).query(points)
         return self.unroll_near(np.ascontiguousarray(points - self.line.origin), guess[index], 1e-10)
 
     def unroll_near(self, points: Float, chainage: Float, tolerance: float) -> Unrolled:
-        """Chainage, arc, offset and normal of points (n, 3) from the line's origin, by chainages (n,) near them.
+        """Return chainage, arc, offset and normal of points (n, 3) from the line's origin, by chainages (n,) near them.
 
         The last step of Newton's method is shorter than ``tolerance``, m; its square over the bend's radius is the error.
         """
@@ -124,7 +124,7 @@ class Tunnel:
         return Unrolled(out[0], out[1], out[2], out[3:].T)
 
     def area_factor(self, chainage: Float, arc: Float) -> Float:
-        """Area on the surface for a unit of area in the unrolled plane, at points (n,)."""
+        """Return the area on the surface per unit of area in the unrolled plane, at points (n,)."""
         h = 1e-3
         s, a = np.atleast_1d(np.asarray(chainage, float)), np.atleast_1d(np.asarray(arc, float))
         ds = (self.to_space(s + h, a) - self.to_space(s - h, a)) / (2 * h)
