@@ -25,7 +25,7 @@ class Finding:
     arc_from: float
     arc_to: float
     kind: str
-    found: Optional[str]
+    kind_detected: Optional[str]
     confidence: Optional[float]
     area: float
     review: str

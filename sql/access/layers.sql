@@ -56,7 +56,6 @@ LANGUAGE sql IMMUTABLE PARALLEL SAFE ROWS 60 SET search_path = pg_catalog, pg_te
         ('face', 'MultiPolygonZ', false),
         ('face_3d', 'MultiPolygonZ', false),
         ('face_sheet', 'MultiPolygon', true),
-        ('finding', 'PolygonZ', false),
         ('spot_face', 'Polygon', true),
         ('spot_map', 'Polygon', false),
         ('spot_3d', 'PolygonZ', false),

@@ -89,7 +89,7 @@ BEGIN
     END IF;
     IF kinds = ARRAY['any'] THEN
         IF NEW.kind IS DISTINCT FROM OLD.kind THEN
-            PERFORM tunnel_internal.check_kind(NEW.kind, CASE WHEN OLD.manual THEN OLD.unrolled END);
+            PERFORM tunnel_internal.check_kind(NEW.kind, (SELECT coalesce(a.shape, a.unrolled) FROM tunnel.finding a WHERE a.id = OLD.id AND a.manual));
         END IF;
     ELSIF judging AND NEW.kind IS DISTINCT FROM OLD.kind AND (NEW.kind IS NULL OR NEW.kind <> ALL (kinds)) THEN
         RAISE EXCEPTION 'the kind of % % can be %, not %', OLD.kind, OLD.id,

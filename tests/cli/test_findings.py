@@ -307,7 +307,7 @@ def test_what_was_drawn_is_in_the_list_of_leaks_and_in_the_report_without_figure
         assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
         assert "leaks are written as .csv, .geojson, .gpkg, .xlsx or .txt" in refused.stderr
     (drawn,) = [f for f in json.loads((tmp_path / "leaks.geojson").read_text())["features"] if f["id"] == key]
-    assert (drawn["properties"]["darkening_mean"], drawn["properties"]["counted"]) == (None, True)
+    assert (drawn["properties"]["drop_mean"], drawn["properties"]["counted"]) == (None, True)
     done = run("report", NAME, "-o", tmp_path / "report.html")
     assert done.exit_code in (0, 1), done.output
     written = run("export", NAME, "-o", tmp_path / "all.gpkg")

@@ -21,7 +21,7 @@ from tunneldb.cli.main import main
 COLUMNS = [
     *("id", "km", "chainage_from", "chainage_to", "label", "arc_from", "arc_to", "clock"),
     *("kind", "confidence", "reasons", "contrast", "area"),
-    *("darkening_mean", "darkening_max", "image_share", "review", "reviewed_by", "reviewed_at"),
+    *("drop_mean", "drop_max", "image_share", "review", "reviewed_by", "reviewed_at"),
 ]
 
 

@@ -66,7 +66,7 @@ ON_SHEETS = {
     "finding_point_sheet": "Point", "finding_line_sheet": "LineString", "finding_area_sheet": "Polygon",
 }  # fmt: skip
 LISTS = {"finding_photo", "finding_kind", "severity", "sheet_finding"}
-STYLED = {*ON_MAP, *UNROLLED} - {"leak_sheet"}
+STYLED = {*ON_MAP, *UNROLLED} - {"leak_sheet", "dark_map", "dark_unrolled"}
 
 
 @pytest.fixture(scope="session")

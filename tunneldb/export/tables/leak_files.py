@@ -27,8 +27,8 @@ COLUMNS = {
     **{name: name for name in ("id", "km", "chainage_from", "chainage_to", "label", "arc_from", "arc_to", "clock", "kind")},
     "confidence": "confidence_in_kind",
     **{name: name for name in ("reasons", "contrast", "area")},
-    "darkening_mean": "darkening_mean",
-    "darkening_max": "darkening_max",
+    "drop_mean": "darkening_mean",
+    "drop_max": "darkening_max",
     **{name: name for name in ("image_share", "review", "reviewed_by", "reviewed_at", "detected", "counted")},
 }
 """Columns of the files, and the attribute of a finding that each has: programs rely on these names."""
@@ -140,8 +140,8 @@ _GPKG_TYPE: dict[str, Any] = {
             "confidence",
             "contrast",
             "area",
-            "darkening_mean",
-            "darkening_max",
+            "drop_mean",
+            "drop_max",
             "image_share",
         ),
         np.float64,
