@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# A simulated tunnel from its scan to leaks in QGIS, in ./demo, with a server and a database of its own.
+# A simulated tunnel from its scan to leaks in QGIS, in ./demo, with a server and a database of its own; then 40 m of a tunnel
+# seen from two tripods, at ranges of 3 to 16 m, to show what the correction of intensity does.
 # Usage: scripts/demo.sh [path of tunneldb]
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -15,8 +16,11 @@ step() {
 }
 
 remove_former() { # of an earlier demo
-    if "$tunneldb" survey list | grep -q '^demo-2024 '; then "$tunneldb" survey remove demo-2024 --yes; fi
-    if "$tunneldb" tunnel list | grep -q '^demo '; then "$tunneldb" tunnel remove demo; fi
+    local name
+    for name in demo tripod; do
+        if "$tunneldb" survey list | grep -q "^$name-2024 "; then "$tunneldb" survey remove "$name-2024" --yes; fi
+        if "$tunneldb" tunnel list | grep -q "^$name "; then "$tunneldb" tunnel remove "$name"; fi
+    done
 }
 
 start=$SECONDS
@@ -32,19 +36,26 @@ step status
 step leaks demo-2024
 step leaks demo-2024 --by-km
 step evaluate demo-2024 demo/scan/demo.truth.gpkg
-step intensity demo-2024 -o demo/intensity.png
 step leaks demo-2024 --geometry map --format gpkg -o demo/leaks.gpkg
 step image demo-2024 -o demo/images
 step qgis demo-2024 -o demo/demo.qgz
 step report demo-2024 -o demo/report.html
 
+step simulate demo/tripod --name tripod --length 40 --radius 0 --station-spacing 25 --angular-step 0.3 --leaks 2
+step tunnel add tripod --srid 25830 --axis demo/tripod/tripod.axis.csv
+step survey add tripod-2024 --tunnel tripod --date 2024-05-04 --stations demo/tripod/tripod.stations.csv \
+    --reference demo/tripod/tripod.reference.csv --intensity Amplitude --intensity-kind amplitude
+step load tripod-2024 demo/tripod/tripod.laz
+step run tripod-2024 --to ground
+step intensity tripod-2024 -o demo/intensity.png
+
 cat <<TEXT
 
 Done in $((SECONDS - start)) s. Look at
-  demo/images/         the unrolled lining
-  demo/intensity.png   whether intensity depends on range or incidence, before and after correction
-  demo/leaks.gpkg      the leaks on the map
-  demo/demo.qgz        the project for QGIS
-  demo/report.html     the inspection report
-The demo's server runs on, for QGIS; to stop it: TUNNELDB_HOME=$TUNNELDB_HOME $tunneldb server stop
+  demo/images/         unrolled lining
+  demo/leaks.gpkg      leaks on the map
+  demo/demo.qgz        project for QGIS
+  demo/report.html     inspection report
+  demo/intensity.png   intensity against range and incidence, before and after correction
+The server of the demo keeps running for QGIS. To stop it: TUNNELDB_HOME=$TUNNELDB_HOME $tunneldb server stop
 TEXT

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-HEAD = """# Any real scan
+HEAD = """# Typical real scans
 
 <!-- Written by python -m benchmarks.any_scan --table; edit benchmarks/any_scan/page.py, not this page. -->
 
-What becomes of scans as people have them: {count} small ones, made by a generator of the benchmark's own, with its own
-reflection law, noise and shapes. Each was taken through `tunnel add`, `survey add`, `load`, `run`, `leaks` and `report` as its
-user would type them, and held against what had been written down beforehand as right. Of {count}, {right} came out right.
+How tunneldb handles typical defects of real scans: {count} small scans of a generator with its own reflection law, noise and shapes.
+Each passed through `tunnel add`, `survey add`, `load`, `run`, `leaks` and `report`, and was compared with an outcome specified
+beforehand. {right} of {count} are right.
 
 ```sh
 python -m benchmarks.any_scan                               # all, about {minutes} minutes
@@ -18,17 +18,16 @@ python -m benchmarks.any_scan --only d5 profiles-0.5        # some
 python -m benchmarks.any_scan --table docs/real-scans.md    # this page
 ```
 
-| word | right when |
+| outcome | right if |
 |---|---|
-| result | the leaks are found, each as one, and no false one |
-| warning | the same, as far as the scan lets, and a line that names the matter |
-| refusal | exit code 2, one line that names the matter, nothing half-written |
+| result | every leak is found as one, without a false one |
+| warning | likewise, as far as the scan permits, and a line names the problem |
+| refusal | exit code 2, one line names the problem, nothing is half-written |
 
-Never right, whatever was expected: an all-clear without a word of what was not looked at, a traceback, `leaks` and report
-with different counts. Found and true are leaks; a leak is found when at least 30 % of it is covered. Where several are right,
-any is.
+Always wrong: no statement of lining that was not inspected, a traceback, different counts in `leaks` and report. A leak is found if at
+least 30 % of it is covered. If several outcomes are listed, any of them is right.
 
-| scene | what is special | expected | seen | found of true | false | right |
+| scene | defect or property | expected | actual | found of all leaks | false | right |
 |---|---|---|---|---|---|---|
 """
 
@@ -49,8 +48,8 @@ def page(verdicts: dict[str, Any], names: list[str]) -> str:
     wrong = [v for v in verdicts.values() if not v["right"]]
     text += "\n".join(rows) + "\n"
     if missing:
-        text += f"\nOf the matrix, but not in this table as not run yet: {', '.join(missing)}.\n"
+        text += f"\nNot run yet: {', '.join(missing)}.\n"
     if wrong:
-        text += "\n## Not right\n\n"
+        text += "\n## Wrong outcomes\n\n"
         text += "\n".join(f"- **{v['name']}**: {'; '.join(v['faults'])}".replace("<", "&lt;") for v in wrong) + "\n"
     return text

@@ -1,12 +1,17 @@
 """The verb intensity on scan files by themselves, and surveys whose range curve is found on the lining."""
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from matplotlib.figure import Figure
 
 from tunneldb.cli.main import main
+from tunneldb.export.figures import intensity_dependence
+from tunneldb.radiometry.dependence import Dependence
+from tunneldb.radiometry.diagnosis import Diagnosis
 from tunneldb.radiometry.range_curve import MAX_SIGMA
 from tunneldb.simulate import Parameters, Simulation, write
 from tunneldb.simulate.radiometry import range_term
@@ -41,6 +46,22 @@ def test_a_file_by_itself(scan, tmp_path):
     assert "dB/10°" in says
     assert "seen by several scans" in says
     assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_title_lies_in_the_figure(tmp_path, monkeypatch):
+    empty = np.zeros(0)
+    kilometres = "pajares-2026, kilometre " + ", ".join(map(str, range(500, 560))) + ": amplitude"
+    monkeypatch.setattr(Dependence, "verdict", lambda _: "Corrected intensity still depends on range and incidence. " * 5)
+    drawn = []
+    monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: drawn.append(self))
+    monkeypatch.setattr(intensity_dependence, "replacing", lambda path: nullcontext(path))
+    intensity_dependence.write_figure(Diagnosis(kilometres, empty, empty, empty, empty), tmp_path / "a.png")
+    (figure,) = drawn
+    figure.canvas.draw()
+    (title,) = [text for text in figure.texts if text.get_text().startswith("pajares")]
+    extent = title.get_window_extent()
+    assert extent.x0 >= 0.0
+    assert extent.x1 <= figure.bbox.x1
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What each pixel of a face shows against the face's own level, scan by scan and all scans together."""
+"""Contrast of each pixel of a face with the face's own level, scan by scan and for all scans together."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from tunneldb.structures.level import FEWEST, MOST_PAIRS, OWN, SHORTH, LevelCurv
 from tunneldb.structures.models import RADIUS, normals_at, to_space
 
 LAGS = (2, 5)
-"""How many pixels lie between places whose levels are held against each other: the edge of a spot is between few of these."""
+"""Distance, in pixels, of places whose levels are compared: few of these pairs span the edge of a spot."""
 
 LEAST_OWN = 0.2
-"""Share of a face that lies at its member's level at least, or its own counts."""
+"""Minimum share of a face at its member's level; otherwise its own level counts."""
 
 UNIFORM = 0.6
-"""If so much of it lies at that: it is of another material then."""
+"""Minimum share of a face at its own level for it to be of another material."""
 
 CLOSING = 2
-"""Holes of so many pixels are no holes of the face, but places between points."""
+"""Maximum size of holes, in pixels, that are gaps between points and not holes of the face."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def observe_face(layout: Layout, sums: Sums, face: int, stations: Float, referen
 
 
 def member_levels(parts: list[list[Observed]], model: Float, *, by_range: bool) -> dict[int, LevelCurve]:
-    """Level of the surface of a member as each scan saw it: of all its faces, and of the same places for all scans.
+    """Return the level of a member's surface as each scan saw it: of all its faces, from the same places for all scans.
 
     Where one scan saw more rust than paint, the others tell it which is which.
 
@@ -148,7 +148,7 @@ def member_levels(parts: list[list[Observed]], model: Float, *, by_range: bool) 
 
 
 def face_level(curve: LevelCurve, one: Observed) -> LevelCurve:
-    """Level of a face by its member's, moved by what the face itself lies off it; its own place where it is all off."""
+    """Return the level of a face: its member's, shifted by the face's offset; unshifted if the whole face is off."""
     use = np.flatnonzero(curve.known(one.angle))
     if one.points[use].sum() < FEWEST:
         return curve
@@ -166,7 +166,7 @@ def face_level(curve: LevelCurve, one: Observed) -> LevelCurve:
 def curve_of(
     observed: list[Observed], model: Float, own: Bool | None = None, *, by_range: bool, one_surface: bool = True
 ) -> LevelCurve:
-    """Level of what one scan saw, of one face or of the faces of a member; see `level_curve`."""
+    """Return the level of what one scan saw of one face or of the faces of a member; see `level_curve`."""
     angle, range_m, value, points = (
         np.concatenate([getattr(one, name) for one in observed]) for name in ("angle", "range_m", "value", "points")
     )
@@ -178,7 +178,7 @@ def curve_of(
 
 
 def _pairs(one: Observed, step: int) -> Int64:
-    """Pairs (m, 2) of pixels that lie close to each other in their row or column, every so manieth of each kind."""
+    """Return pairs (m, 2) of nearby pixels in their row or column, every n-th of each kind."""
     found = [np.empty((0, 2), np.int64)]
     aparts = [lag * width for lag in LAGS for width in (1, one.columns)]
     for number, apart in enumerate(aparts):
@@ -192,7 +192,7 @@ def _pairs(one: Observed, step: int) -> Int64:
 
 
 def some_pixels(observed: list[Observed], inside: Bool) -> list[Observed]:
-    """Those of the pixels that lie in a part of the face (rows, columns), for each scan that saw any."""
+    """Select the pixels in a part of the face (rows, columns), for each scan that saw any."""
     found = []
     for one in observed:
         use = inside.ravel()[one.pixel]
@@ -203,7 +203,7 @@ def some_pixels(observed: list[Observed], inside: Bool) -> list[Observed]:
 
 
 def contrast_of(layout: Layout, face: int, observed: list[Observed], curves: list[LevelCurve], noise: float) -> FaceContrast:
-    """Hold the pixels of a face against its level.
+    """Compare the pixels of a face with its level.
 
     Parameters
     ----------

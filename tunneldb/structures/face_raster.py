@@ -1,4 +1,4 @@
-"""Each face unrolled into pixels, scan by scan: which face a point is on, where on it, and the sums of its intensity."""
+"""Unrolled pixels of each face, scan by scan: face and pixel of each point, and sums of its intensity."""
 
 from __future__ import annotations
 
@@ -16,39 +16,39 @@ from tunneldb.structures.voxel_moments import find_slot, key_table, voxel_key
 from tunneldb.threads import in_blocks
 
 CANDIDATES = 4
-"""Faces that a point in a voxel may be on."""
+"""Maximum number of faces that a point in a voxel may be on."""
 
 TOLERANCE = 3.5
-"""A point is on a face within so many standard deviations of the noise along the beam's slant, or of the face's own."""
+"""Standard deviations, of the noise along the oblique beam or of the face's own, within which a point is on a face."""
 
 LEAST_TOLERANCE = 0.0015
-"""And within this, m."""
+"""Maximum distance of a point on a face, m."""
 
 BEAM, DIVERGENCE = 0.003, 0.0003
-"""Diameter of a beam where it leaves the scanner, m, and what it grows by with each metre: of a common terrestrial scanner."""
+"""Diameter of a beam at the scanner, m, and its increase per metre: of a typical terrestrial scanner."""
 
 POINTS_A_PIXEL = 2.0
-"""Points that a pixel holds on average."""
+"""Mean number of points of a pixel."""
 
 FINEST, COARSEST = 0.003, 0.05
 """Limits of a pixel's side, m."""
 
 MOST_PIXELS = 40_000_000
-"""Pixels of all faces and scans; beyond that they are made larger."""
+"""Maximum number of pixels of all faces and scans; beyond it pixels are made larger."""
 
 BLOCK = 1 << 15
-"""Points that a thread takes at a time."""
+"""Number of points that a thread processes at a time."""
 
 STEP = 0.01
 """Step in which levels are summed, dB."""
 
 NONE = np.int32(-(2**31))
-"""Level of a point that has none."""
+"""Level of a point without intensity."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the pixels of each face lie in one long array.
+    """Places of each face's pixels in one long array.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Layout:
     size: int
 
     def centres(self, face: int) -> tuple[Float, Float]:
-        """Unrolled coordinates u (columns,) and v (rows,) of a face's pixels, m."""
+        """Return the unrolled coordinates u (columns,) and v (rows,) of a face's pixels, m."""
         column, row, columns, rows = self.shape[face]
         return (column + np.arange(columns) + 0.5) * self.pixel[face], (row + np.arange(rows) + 0.5) * self.pixel[face]
 
@@ -84,7 +84,7 @@ class Sums:
 
     @classmethod
     def empty(cls, size: int) -> Sums:
-        """Nothing yet."""
+        """Make empty sums."""
         return cls(np.zeros(size, np.uint16), np.zeros(size, np.int32))
 
 
@@ -111,7 +111,7 @@ class PointFinder:
         self.rms = faces.rms
 
     def find(self, xyz: Float, scan: Int32) -> tuple[Int32, Int32]:
-        """Face of points (n, 3) of scans (n,), -1 for none, and their pixel in it: row × columns + column.
+        """Return the face of points (n, 3) of scans (n,), -1 for none, and their pixel in it: row × columns + column.
 
         -2 - pixel within a beam's footprint of another face.
         """
@@ -140,7 +140,7 @@ class PointFinder:
 
 
 def lay_out(grid: VoxelGrid, faces: Faces, scans: int) -> Layout:
-    """Lay the pixels of all faces out, of a size that goes by how dense the points of each are."""
+    """Lay out the pixels of all faces, with a size that depends on the point density of each."""
     held = np.flatnonzero(faces.owner >= 0)
     order = held[np.argsort(faces.owner[held], kind="stable")]
     owner = faces.owner[order]
@@ -175,7 +175,7 @@ def lay_out(grid: VoxelGrid, faces: Faces, scans: int) -> Layout:
 
 
 def candidates_of(owner: Int32, starts: Int64, neighbours: Int32) -> Int32:
-    """Faces in each voxel and beside it, (n, CANDIDATES): its own first, then those of most voxels; -1 fills up."""
+    """Return the faces in each voxel and beside it, (n, CANDIDATES): its own first, then by number of voxels; -1 if none."""
     out = np.full((len(owner), CANDIDATES), -1, np.int32)
     _candidates(owner, starts, neighbours, out)
     return out
@@ -211,7 +211,7 @@ def _candidates(owner: Int32, starts: Int64, neighbours: Int32, out: Int32) -> N
 
 @inner
 def pixel_of(model: Float, side: float, shape: Int64, x: float, y: float, z: float) -> int:  # pragma: no cover - compiled
-    """Pixel of a place, row × columns + column; -1 beyond the face's box."""
+    """Return the pixel of a place, row × columns + column; -1 outside the face's box."""
     qx, qy, qz = x - model[0], y - model[1], z - model[2]
     ax, ay, az = model[3], model[4], model[5]
     bx, by, bz = model[8], model[9], model[10]

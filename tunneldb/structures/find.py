@@ -1,4 +1,4 @@
-"""From the sums of all faces to members, faces and spots: the list of the steps."""
+"""Steps from the sums of all faces to members, faces and spots."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from tunneldb.structures.solidity import closed, ray_densities, solid_faces
 from tunneldb.structures.spots import BIMODAL, FaceSpots, find_spots
 
 LEAST_AREA = 0.002
-"""Faces that are smaller are none, m²."""
+"""Minimum area of a face, m²."""
 
 LEAST_FILLED = 0.35
-"""Share of its pixels that hold points, holes of two pixels closed: gratings and leaves have less."""
+"""Minimum share of a face's pixels with points, with holes of two pixels closed: gratings and leaves have less."""
 
 LEAST_WIDTH = 2.0
-"""Mean width of a face, in pixels: less is a cable or an edge."""
+"""Minimum mean width of a face, in pixels: cables and edges are narrower."""
 
 
 TURNS = 2
-"""Times that the level is found."""
+"""Number of iterations for the level."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """What is found, and how to tell a point's.
+    """Members, faces and spots, and the means to find those of a point.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Found:
     anomaly: list[Int32 | None]
 
     def of_points(self, face: Int32, pixel: Int32) -> tuple[Int32, Int32, Int32]:
-        """Number of face, member and spot of points, by what `PointFinder.find` says of them."""
+        """Return the numbers of face, member and spot of points, from the result of `PointFinder.find`."""
         number, member = self.face_number[face], self.member_number[face]
         spot = np.zeros(len(face), np.int32)
         at = np.where(pixel < -1, -2 - pixel, pixel)
@@ -79,7 +79,7 @@ class Found:
 def find_structures(
     found: Segmentation, sums: Sums, images: RangeImages, reference: ReferenceCurve | None, *, by_range: bool
 ) -> Found:
-    """Join faces into members, and find on each face what differs from it.
+    """Join faces into members, and find spots on each face.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ class _Part:
 
 
 def _parts(found: Segmentation, sums: Sums, images: RangeImages, reference: ReferenceCurve | None) -> list[_Part]:
-    """Faces that are large and filled enough to be some, joined over what stands before them, parted by material."""
+    """Return faces that are large and filled enough, joined behind objects in front of them, and split by material."""
     layout = found.layout
     held, extents, densities = {}, {}, []
     for face in range(len(layout.models)):
@@ -188,7 +188,7 @@ def _parts(found: Segmentation, sums: Sums, images: RangeImages, reference: Refe
 
 
 def _surfaces(parts: list[_Part]) -> list[list[_Part]]:
-    """Parts by the surface that they are of, the largest surface first."""
+    """Group parts by their surface, the largest surface first."""
     of: dict[tuple[int, int], list[_Part]] = {}
     for part in parts:
         of.setdefault(part.surface, []).append(part)
@@ -196,7 +196,7 @@ def _surfaces(parts: list[_Part]) -> list[list[_Part]]:
 
 
 def _numbers(member: Int64, surfaces: list[list[Extent]]) -> Int64:
-    """Members (n,) of surfaces, numbered anew: from 1, the largest first."""
+    """Renumber the members (n,) of surfaces from 1, the largest first."""
     sizes = np.bincount(member, [sum(extent.outline.area for extent in surface) for surface in surfaces])
     number = np.empty(len(sizes), np.int64)
     number[np.argsort(-sizes, kind="stable")] = np.arange(1, len(sizes) + 1)
@@ -204,7 +204,7 @@ def _numbers(member: Int64, surfaces: list[list[Extent]]) -> Int64:
 
 
 def _planes(extents: dict[int, Extent], noise: float) -> list[list[int]]:
-    """Flat faces that lie in one plane, the largest first; a face by itself is a plane, too."""
+    """Group flat faces in one plane, the largest first; a single face is also a plane."""
     flat = sorted((face for face in extents if extents[face].model[RADIUS] == 0.0), key=lambda face: -extents[face].points)
     pairs = np.array(coplanar([extents[face] for face in flat], noise), np.int64).reshape(-1, 2)
     graph = sparse.coo_array((np.ones(len(pairs), np.int8), tuple(pairs.T)), shape=(len(flat), len(flat)))
@@ -213,7 +213,7 @@ def _planes(extents: dict[int, Extent], noise: float) -> list[list[int]]:
 
 
 def _extent(layout: Layout, face: int, held: Int64, scans: tuple[int, ...]) -> Extent | None:
-    """Extent of a face by the points in its pixels; None where these make none."""
+    """Return the extent of a face from the points in its pixels; None if there is none."""
     occupied = held > 0
     if not occupied.any():
         return None
@@ -231,7 +231,7 @@ def _extent(layout: Layout, face: int, held: Int64, scans: tuple[int, ...]) -> E
 
 
 def _points(layout: Layout, sums: Sums, face: int) -> tuple[Int64, tuple[int, ...]]:
-    """Points in each pixel of a face, and which scans they are of."""
+    """Count the points in each pixel of a face, and return the scans they are from."""
     size = int(layout.shape[face, 2] * layout.shape[face, 3])
     held, scans = np.zeros(size, np.int64), []
     for scan in np.flatnonzero(layout.start[face] >= 0).tolist():
@@ -252,7 +252,7 @@ def _judge(
     *,
     by_range: bool,
 ) -> list[tuple[FaceContrast, FaceSpots]]:
-    """Contrast and spots of the faces of a member.
+    """Compute contrast and spots of the faces of a member.
 
     Where there are spots the level is found once more without them: it is bent by what they cover.
     """
@@ -279,7 +279,7 @@ def _judge(
 
 
 def _about(spots: Bool) -> Bool:
-    """Spots with what lies beside them."""
+    """Add the surroundings to spots."""
     return np.asarray(ndimage.binary_dilation(spots, iterations=2)) if spots.any() else spots
 
 
@@ -309,7 +309,7 @@ def _face(
 
 
 def _members(faces: list[Face], member_of: Int64, surfaces: list[list[Extent]], origin: Float) -> list[Member]:
-    """Members of faces, and of surfaces, whose members (n,) are said."""
+    """Make members of faces from surfaces with known members (n,)."""
     on: dict[int, list[Face]] = {}
     sides: dict[int, list[list[Extent]]] = {}
     for face in faces:
@@ -320,7 +320,7 @@ def _members(faces: list[Face], member_of: Int64, surfaces: list[list[Extent]], 
 
 
 def _member(number: int, faces: list[Face], sides: list[list[Extent]], origin: Float) -> Member:
-    """A member, its line along the axis of a pipe, else along the middle of its longest side."""
+    """Make a member, with its line along the axis of a pipe, else along the middle of its longest side."""
     kind: MemberKind = "profile" if len(sides) > 1 else faces[0].kind
     if kind == "pipe":
         model = sides[0][0].model

@@ -20,43 +20,43 @@ from tunneldb.structures.voxel_grid import VoxelGrid, VoxelPlanes
 from tunneldb.threads import in_blocks
 
 TOLERANCE = 2.5
-"""A centroid lies no farther from the face, in standard deviations of the noise."""
+"""Maximum distance of a centroid from the face, in standard deviations of the noise."""
 
 WIDEST = 2.5
-"""Nor do the points of a voxel spread about it by more, in the same."""
+"""Maximum spread of a voxel's points about the face, in standard deviations of the noise."""
 
 LEAST_TOLERANCE = 0.001
-"""Nor is it asked to lie nearer than this, m: coordinates are rounded, sheets are not that flat."""
+"""Lower limit of both, m: coordinates are rounded, and sheets are not perfectly flat."""
 
 LEAST_NOISE, MOST_NOISE, UNKNOWN_NOISE = 0.0003, 0.006, 0.002
-"""Noise is not taken for less or more, m: what is rougher is rock or soil; nor is it known where nothing is flat."""
+"""Limits of the noise, m: rougher surfaces are rock or soil, and without flat surfaces it is unknown."""
 
 TURN = 18.0
-"""Normals of a face's voxels differ from its own by no more, degrees: of few points they scatter by some."""
+"""Maximum angle between the normals of a face's voxels and its own, degrees: with few points they scatter."""
 
 LARGEST = 3.0
-"""Greatest radius of a cylinder, m: vessels and ducts. What is larger is flat over the reach of a beam or pipe."""
+"""Maximum radius of a cylinder, m: vessels and ducts. Larger ones are flat over the width of a beam or pipe."""
 
 LEAST_RADIUS = 4.0
-"""Least radius of a cylinder, in standard deviations of the noise."""
+"""Minimum radius of a cylinder, in standard deviations of the noise."""
 
 LEAST_ANGLE = 50.0
-"""Angle over which a cylinder must be seen, degrees: less tells no radius."""
+"""Minimum angle over which a cylinder is seen, degrees: with less its radius is unknown."""
 
 LEAST_POINTS, LEAST_VOXELS = 60, 8
-"""Fewer points or voxels are no face."""
+"""Minimum number of points and of voxels of a face."""
 
 PATCH = 150
-"""Voxels in which it is looked whether normals turn about an axis."""
+"""Number of voxels used to test whether normals turn about an axis."""
 
 VAIN = 3
-"""No cylinder is tried from a voxel that lay so many times in such a patch from which none was found."""
+"""Number of unsuccessful cylinder patches with a voxel from which no cylinder is tried at it."""
 
 TIMES = 6
-"""How many times a plane is grown again from its seed, by the better plane that the time before gave, at most."""
+"""Maximum number of times that a plane is grown again from its seed with the improved plane."""
 
 ROUGH = 0.06
-"""Surface variation above which no face is begun: vegetation, bundles of cables."""
+"""Surface variation above which no face is started: vegetation, bundles of cables."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Grown:
 
 
 def noise_of(planes: VoxelPlanes, towards: Float) -> float:
-    """Standard deviation of ranges, m: of points about what is flat and seen squarely, over the cosine of incidence.
+    """Estimate the standard deviation of ranges, m: of points about flat surfaces, over the cosine of incidence.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def grow(grid: VoxelGrid, starts: Int64, neighbours: Int32, planes: VoxelPlanes,
 
 @inner
 def _spread(row: Float, c: Float, gx: float, gy: float, gz: float) -> float:  # pragma: no cover - compiled
-    """Variance of a voxel's points along a direction, m²."""
+    """Return the variance of a voxel's points along a direction, m²."""
     n = row[0]
     return (
         gx * gx * (row[4] / n - c[0] * c[0])
@@ -203,7 +203,7 @@ def _turning(
     seed: int, moments: Float, centroid: Float, normals: Float, starts: Int64, neighbours: Int32,
     owner: Int32, mark: Int32, stamp: int, queue: Int32, model: Float,
 ) -> int:  # pragma: no cover - compiled  # fmt: skip
-    """Number of voxels about a seed, into ``queue``, whose normals turn about an axis; 0 if they don't.
+    """Count the voxels around a seed, written to ``queue``, whose normals turn about an axis; 0 if they do not.
 
     A first cylinder into ``model`` then.
     """

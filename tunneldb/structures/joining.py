@@ -20,35 +20,35 @@ from tunneldb.structures.merging import ANGLE, APART
 from tunneldb.structures.models import AXIS, POINT, RADIUS, SIDE, normals_at, to_space, unroll
 
 COMMON_ANGLE = 5.0
-"""Rims that are one line are turned against each other by no more, degrees."""
+"""Maximum angle between rims on one line, degrees."""
 
 COMMON_APART = 2.5
-"""And lie no farther apart, in pixels."""
+"""Maximum distance between rims on one line, in pixels."""
 
 LEAST_RIM = 6
-"""A rim is at least so many pixels long."""
+"""Minimum length of a rim, in pixels."""
 
 GAP = 0.05
-"""Where one rim is common, the gap along it is no longer than this many metres (Table 1, whose unit is missing) …"""
+"""Maximum gap along a common rim, in metres (Table 1, whose unit is missing) …"""
 
 GAP_SPACINGS = 10.0
-"""… or this many pixels, or twice what the smaller face is long."""
+"""… or in pixels, or twice the length of the smaller face."""
 
 OCCLUDED = 0.8
-"""Share of the places of the gap that nothing was seen through."""
+"""Minimum share of the places of the gap without a line of sight through it."""
 
 CLEARANCE = 0.02
-"""What ends farther than this behind the surface went through, m."""
+"""Distance behind the surface from which a beam has passed through, m."""
 
 LEAST_FACING, LEAST_FACING_PIPE = 0.1, 0.5
-"""Cosine of the incidence from which a scan tells whether it sees through: beside a thin pipe it does so anyway."""
+"""Minimum cosine of the incidence for a line of sight to count: it always passes beside a thin pipe."""
 
 CELL = 0.1
 """Angle of a cell of the range image, degrees."""
 
 
 class RangeImages:
-    """How far each scan sees in each direction: the nearest point of each cell.
+    """Range image of each scan: the nearest point of each cell.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class RangeImages:
         _add_ranges(np.ascontiguousarray(xyz), np.ascontiguousarray(scan, np.int32), self.stations, self.cell, self.nearest)
 
     def closed(self, places: Float, scan: int) -> Bool:
-        """To which places (n, 3), or not even so far, a scan sees: what is behind them it does not."""
+        """Return True for places (n, 3) at or beyond the range seen by a scan: it does not see behind them."""
         row, column, far = self._cell(places, scan)
         nearest = self.nearest[scan]
         seen = nearest[row, column]
@@ -81,7 +81,7 @@ class RangeImages:
         return np.asarray(seen < far + CLEARANCE)
 
     def _cell(self, places: Float, scan: int) -> tuple[Int64, Int64, Float]:
-        """Row, column and distance of places (n, 3)."""
+        """Return row, column and distance of places (n, 3)."""
         towards = places - self.stations[scan]
         far = np.linalg.norm(towards, axis=1)
         row = np.clip(((np.arcsin(towards[:, 2] / far) + math.pi / 2) / self.cell).astype(np.int64), 0, self.rows - 1)
@@ -113,7 +113,7 @@ class Extent:
 
 
 def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
-    """Surface of each face (n,), numbered from 0 in the order of their first faces.
+    """Return the surface of each face (n,), numbered from 0 in the order of their first faces.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def numbered(found: DisjointSet) -> Int64:
 
 
 def coplanar(faces: list[Extent], noise: float) -> list[tuple[int, int]]:
-    """Pairs of faces on one plane or cylinder (3.2.1): the smaller lies on the surface of the larger."""
+    """Pair faces on one plane or cylinder (3.2.1): the smaller is on the surface of the larger."""
     if not faces:
         return []
     apart = max(APART, 3.0 * noise)
@@ -169,13 +169,13 @@ def coplanar(faces: list[Extent], noise: float) -> list[tuple[int, int]]:
 
 
 def _corners(face: Extent) -> Float:
-    """Places about a face's outline (n, 3)."""
+    """Return places along a face's outline (n, 3)."""
     at = shapely.get_coordinates(face.outline)
     return to_space(face.model, at[:, 0], at[:, 1])
 
 
 def _joined(one: Extent, other: Extent, rims: Float, others: Float, images: RangeImages) -> bool:
-    """Whether two faces of one surface, with their rims, are parted by what stands before it alone."""
+    """Return True if only objects in front separate two faces of one surface, given their rims."""
     common: list[Float] = []
     pixel = max(one.pixel, other.pixel)
     if one.model[RADIUS] == 0.0:
@@ -196,7 +196,7 @@ def _longest_gap(one: Extent, other: Extent, pixel: float) -> float:
 
 
 def _unrolled_on(one: Extent, other: Extent) -> shapely.MultiPolygon:
-    """Outline of a face in the unrolled coordinates of another; empty where nothing of an area is left of it there."""
+    """Return the outline of a face in the unrolled coordinates of another; empty if it has no area there."""
 
     def move(at: Float) -> Float:
         u, v, _ = unroll(one.model, to_space(other.model, at[:, 0], at[:, 1]))
@@ -206,7 +206,7 @@ def _unrolled_on(one: Extent, other: Extent) -> shapely.MultiPolygon:
 
 
 def _rims(outline: shapely.Geometry, pixel: float) -> Float:
-    """Straight pieces of an outline (n, 5), the longest first: middle (2), direction (2), length."""
+    """Return the straight pieces of an outline (n, 5), the longest first: middle (2), direction (2), length."""
     found = [np.empty((0, 5))]
     for part in shapely.get_parts(outline):
         ring = shapely.get_coordinates(shapely.simplify(part.exterior, 2.0 * pixel))
@@ -220,7 +220,7 @@ def _rims(outline: shapely.Geometry, pixel: float) -> Float:
 
 
 def _rims_on(plane: Float, other: Float, rims: Float) -> Float:
-    """Rims of a plane in the unrolled coordinates of another."""
+    """Return the rims of a plane in the unrolled coordinates of another."""
     half = 0.5 * rims[:, 4:] * rims[:, 2:4]
     ends = (to_space(other, at[:, 0], at[:, 1]) for at in (rims[:, :2] - half, rims[:, :2] + half))
     first, last = (np.column_stack(unroll(plane, at)[:2]) for at in ends)
@@ -230,7 +230,7 @@ def _rims_on(plane: Float, other: Float, rims: Float) -> Float:
 
 
 def _common_rims(mine: Float, yours: Float, pixel: float) -> list[Float]:
-    """Lines (middle, direction, length) that are rims of both (3.2.2), each once."""
+    """Return the lines (middle, direction, length) that are rims of both (3.2.2), without duplicates."""
     found: list[Float] = []
     least = math.cos(math.radians(COMMON_ANGLE))
     i, j = np.nonzero(np.abs(mine[:, 2:4] @ yours[:, 2:4].T) >= least)
@@ -251,7 +251,7 @@ def _apart(one: Float, other: Float) -> float:
 
 
 def _gap_along(line: Float, one: shapely.Geometry, other: shapely.Geometry) -> float:
-    """Gap between two faces along a line (3.2.3)."""
+    """Return the gap between two faces along a line (3.2.3)."""
     spans = []
     for shape in (one, other):
         at = (shapely.get_coordinates(shape) - line[:2]) @ line[2:4]
@@ -260,7 +260,7 @@ def _gap_along(line: Float, one: shapely.Geometry, other: shapely.Geometry) -> f
 
 
 def _occluded(one: Extent, moved: shapely.Geometry, scans: set[int], images: RangeImages) -> bool:
-    """Whether no scan that saw one of two faces looks through between them (3.2.4).
+    """Return True if no scan that saw one of two faces sees through between them (3.2.4).
 
     What was sent there came back from nearer, or from the surface itself, which goes on where points are too few for a face.
     """
@@ -280,7 +280,7 @@ def _occluded(one: Extent, moved: shapely.Geometry, scans: set[int], images: Ran
 
 
 def _gap_places(one: shapely.Geometry, other: shapely.Geometry, pixel: float) -> Float:
-    """Places (n, 2) between the facing rims of two faces: on the shortest ways from one to the other."""
+    """Return places (n, 2) between the facing rims of two faces, on the shortest paths between them."""
     ends = []
     for shape in (one, other):
         dense = shapely.get_coordinates(shapely.segmentize(shape.boundary, 2.0 * pixel))

@@ -1,4 +1,4 @@
-"""The level of a surface by incidence: what it shows where it is as it should be (Ono et al., 3.3 and 3.4).
+"""Level of an intact surface by incidence (Ono et al., 3.3 and 3.4).
 
 The paper parts a cluster into classes of cos θ and fits a normal distribution to the histogram of each. A class may be covered
 by rust altogether, though, and then its own histogram cannot tell; and 0.05 of cos θ is 18° at right angles to a surface, over
@@ -19,63 +19,63 @@ from tunneldb.radiometry.robust_statistics import robust_statistics
 from tunneldb.robust import MAD_TO_SIGMA
 
 CLASS = 0.05
-"""Width of a class of θ, radians: at 45° about what the paper's 0.05 of cos θ is (Table 1)."""
+"""Width of a class of θ, radians: at 45° about equal to the paper's 0.05 of cos θ (Table 1)."""
 
 CLASSES = int(np.pi / CLASS) + 1
 
 FEWEST = 30
-"""Fewer points tell no level."""
+"""Minimum number of points of a level."""
 
 STEEPEST = 80.0
-"""Beyond this incidence nothing is judged, degrees: there the beam is smeared over six times its width."""
+"""Maximum incidence, degrees: beyond it the beam covers over six times its width."""
 
 SHORTH = 0.25
-"""Share of the values in the shortest interval that marks the level: up to half of a surface may be something else."""
+"""Share of the values in the shortest interval, which locates the level: up to half of a surface may differ."""
 
 LEAST_SPAN = 0.01
-"""Span of lg R below which range makes no difference on a surface."""
+"""Span of lg R below which range has no effect on a surface."""
 
 BEND = 0.3
-"""Standard deviation of how the slope of the level changes from class to class, dB per class: gloss and slanting paint do no
+"""Standard deviation of the change of the level's slope from class to class, dB per class: gloss and oblique paint do no
 more."""
 
 SLOPE = 1.0
-"""The same of the slope itself, dB per class, 20 dB per radian: of few pixels noise would make more."""
+"""Standard deviation of the slope itself, dB per class, 20 dB per radian: noise of few pixels would make more."""
 
 RANGE_SLOPE = 20.0
-"""The same of the slope over lg R, dB."""
+"""Standard deviation of the slope over lg R, dB."""
 
 TUKEY = 4.0
-"""Differences count less the greater they are, and from so many standard deviations on not at all."""
+"""Limits of weights, in standard deviations: differences count less beyond the first, and not at all beyond the second."""
 
 MOST_PAIRS, MOST_PIXELS = 20_000, 40_000
-"""Pairs of places by which the shape is found, and pixels by which the level is, about."""
+"""Approximate number of pairs of places for the shape, and of pixels for the level."""
 
 MOST_POINTS = 8.0
-"""Pixels of more points count no more than these: what is uneven about a surface does not go by how often it is measured."""
+"""Maximum number of points that count in a pixel: a surface's unevenness does not depend on how often it is measured."""
 
 FITS = 8
-"""Times that their weights are found again, at most …"""
+"""Maximum number of reweighting rounds …"""
 
 SETTLED = 0.005
-"""… until the level changes by less, dB."""
+"""… which end when the level changes by less, dB."""
 
 MOST_WIDE = 1.5
-"""Where the surface scatters more than so many times as much as elsewhere, something else covers it."""
+"""Ratio of the scatter to that elsewhere from which another material covers the surface."""
 
 OWN = 2.5
-"""Pixels within so many standard deviations of the level are of the surface itself."""
+"""Standard deviations from the level within which pixels belong to the surface itself."""
 
 OWN_MAD = 0.98
-"""Median deviation of a normal distribution cut off there, over that of a whole one."""
+"""Ratio of the median deviation of a normal distribution truncated there to that of the whole one."""
 
 LEAST_SIGMA = 0.05
-"""The level scatters by no less, dB: of values that were rounded most may be alike."""
+"""Minimum scatter of the level, dB: most rounded values may be equal."""
 
 
 @dataclass(frozen=True)
 class LevelCurve:
-    """Level of a surface over θ, and where range was not corrected otherwise, over lg R.
+    """Level of a surface over θ, and over lg R if range was not corrected otherwise.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class LevelCurve:
     slope: float
 
     def known(self, angle: Float) -> Bool:
-        """Where the level is known (n,): within a class that holds enough points, or half a class beside it."""
+        """Return True where the level is known (n,): in a class with enough points, or half a class beside it."""
         enough = np.zeros(CLASSES + 2, np.bool_)
         enough[self.seen + 1] = True
         place = angle / CLASS
@@ -103,21 +103,21 @@ class LevelCurve:
         return np.asarray((enough[at] | enough[at + 1]) & (place <= np.radians(STEEPEST) / CLASS))
 
     def __call__(self, angle: Float, range_m: Float) -> Float:
-        """Level at angles of incidence, radians, and ranges (n,), dB."""
+        """Return the level at angles of incidence, radians, and ranges (n,), dB."""
         by_angle = np.interp(angle, self.angle, self.level)
         return np.asarray(by_angle + self.slope * (np.log10(range_m) - self.middle)) if self.slope else by_angle
 
     def sigmas(self, angle: Float) -> Float:
-        """Standard deviation there, dB."""
+        """Return the standard deviation there, dB."""
         return np.interp(angle, self.angle, self.sigma)
 
     def own(self, angle: Float, range_m: Float, value: Float) -> Bool:
-        """Which pixels (n,) lie at the level."""
+        """Return True for pixels (n,) at the level."""
         return np.asarray(np.abs(value - self(angle, range_m)) < OWN * self.sigmas(angle))
 
 
 UNKNOWN = LevelCurve(np.zeros(1), np.zeros(1), np.ones(1), np.empty(0, np.int64), 0.0, 0.0)
-"""Of a surface of which too little was seen."""
+"""Level of a surface of which too little was seen."""
 
 
 def level_curve(
@@ -176,7 +176,7 @@ def level_curve(
 
 
 def _seen(angle: Float, points: Float) -> Int64:
-    """Classes of θ that hold enough points."""
+    """Return the classes of θ with enough points."""
     number = np.floor(angle / CLASS).astype(np.int64)
     return np.flatnonzero(np.bincount(number, points) >= FEWEST)
 
@@ -201,7 +201,7 @@ class _Basis:
         self.prior = self._prior(knots)
 
     def _prior(self, knots: int) -> Float:
-        """Inverse covariance of the unknowns: rises from knot to knot are about 0 and change little, and so is the slope."""
+        """Return the prior inverse covariance: rises from knot to knot, their changes and the slope are about 0."""
         rise, bend = np.diff(np.eye(knots), axis=0), np.diff(np.eye(knots), n=2, axis=0)
         prior = np.zeros((knots + 1, knots + 1))
         prior[:knots, :knots] = bend.T @ bend / BEND**2 + rise.T @ rise / SLOPE**2 + 1e-9 * np.eye(knots)
@@ -209,12 +209,12 @@ class _Basis:
         return prior
 
     def __call__(self, found: Float) -> Float:
-        """Level of the pixels (n,)."""
+        """Return the level of the pixels (n,)."""
         level = found[self.first] + self.share * np.diff(found)[self.first]
         return np.asarray(level + found[-1] * self.along if self.by_range else level)
 
     def solve(self, one: Int64, other: Int64, seen: Float, weight: Float) -> Float:
-        """Unknowns by weighted least squares of levels ``one``, less those of ``other`` where that is not empty."""
+        """Solve weighted least squares of levels ``one``, minus those of ``other`` if that is not empty."""
         size = len(self.prior)
         matrix, right = self.prior.copy(), np.zeros(size)
         _accumulate(self.first, self.share, self.along, one, other, seen, weight, matrix, right)
@@ -222,7 +222,7 @@ class _Basis:
 
 
 def _shape(basis: _Basis, value: Float, weight: Float, pairs: Int64) -> Float:
-    """Level up to a constant: least squares of differences, with Huber's weights and then Tukey's."""
+    """Fit the level up to a constant: least squares of differences, with Huber's and then Tukey's weights."""
     found = np.zeros(len(basis.prior))
     if not len(pairs):
         return found
@@ -244,7 +244,7 @@ def _shape(basis: _Basis, value: Float, weight: Float, pairs: Int64) -> Float:
 
 
 def _fit(basis: _Basis, value: Float, weight: Float, found: Float, spread: float) -> tuple[Float, float]:
-    """Level, and standard deviation of what lies about it: least squares with Tukey's weights."""
+    """Fit the level, and the standard deviation about it: least squares with Tukey's weights."""
     every, nothing = np.arange(len(value)), np.empty(0, np.int64)
     weight = weight / weight.mean()
     for _ in range(FITS):
@@ -287,7 +287,7 @@ def _accumulate(
 
 
 def _sigmas(angle: Float, rest: Float, knots: Float, spread: float) -> Float:
-    """Standard deviation of the surface itself about its level at each knot, dB."""
+    """Return the standard deviation of the surface itself about its level at each knot, dB."""
     near = np.abs(rest) < 2.0 * OWN * spread
     angle, rest = angle[near], rest[near]
     out = np.full(len(knots), spread)

@@ -1,4 +1,4 @@
-"""Faces of two materials that lie in one plane: parted where the level steps along a straight line from rim to rim.
+"""Faces of two materials in one plane, split where the level steps along a straight line from rim to rim.
 
 Geometry alone cannot tell a brick wall from the concrete beside it, and the paper's histogram of both has two heads. A stain or
 rust does not end on a straight line over the whole of a wide face; a wall of another material does, and so does most of what is
@@ -24,45 +24,45 @@ from tunneldb.structures.level import SHORTH
 from tunneldb.structures.models import to_space, unroll
 
 LEAST_WIDTH = 0.4
-"""Both sides of the line are at least so wide, and the line as long, m: on a beam rust may well go from rim to rim."""
+"""Minimum width of both sides of the line, and minimum length of the line, m: on a beam rust may span from rim to rim."""
 
 LEAST_STEP = 1.0
-"""The level steps by so many standard deviations of a pixel at least."""
+"""Minimum step of the level, in standard deviations of a pixel."""
 
 LEAST_STEP_DB = 1.0
-"""And by so many decibels: materials that differ by less are not told from unevenness."""
+"""Minimum step of the level, dB: smaller differences may be unevenness."""
 
 USUAL_STEPS = 4.0
-"""And it is so many times as large as the steps over other lines are: where a surface is uneven these are large, too."""
+"""Minimum ratio of the step to those across other lines, which are large on an uneven surface."""
 
 EVEN = 0.85
-"""Share of the blocks along the line where it steps so, by half of the whole step to one and a half of it …"""
+"""Minimum share of the blocks along the line with half to one and a half of the whole step …"""
 
 PARTLY = 1.0 / 3.0
-"""… or this much, if most of one whole side lies that much off most of the other: rust beside the line hides the step."""
+"""… or this share, if most of one whole side differs from most of the other by that much: rust may hide the step."""
 
 ALONG, ACROSS = 8, 3
 """Pixels of a block along the line and across it."""
 
 BLOCKS = 4
-"""Blocks to either side whose median counts: near enough for incidence to be the same."""
+"""Number of blocks to either side whose median counts: near enough for the same incidence."""
 
 FEWEST = 6
-"""Blocks along the line that tell anything."""
+"""Minimum number of blocks along the line."""
 
 MOST_PIXELS = 2_000_000
-"""Pixels of a plane; beyond that they are made larger."""
+"""Maximum number of pixels of a plane; beyond it they are made larger."""
 
 MANY = 12
-"""Lines that tell what is usual: about the right one some four show its step."""
+"""Number of lines that give the usual step: around the right one about four show its step."""
 
 DEPTH = 3
-"""How many times a face is parted, at most."""
+"""Maximum number of splits of a face."""
 
 
 @dataclass(frozen=True)
 class Plane:
-    """Faces that lie in one plane, drawn together.
+    """Faces in one plane, rasterised together.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Plane:
 
 
 def parts_of_plane(layout: Layout, faces: list[int], seen: list[list[Observed]]) -> list[Int32] | None:
-    """Material of each pixel of the faces of a plane, the largest first, numbered from 0; None where it is all one.
+    """Return the material of each pixel of the faces of a plane, the largest first, from 0; None if there is only one.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def part_by_material(images: list[Float], pixel: float) -> Int32:
 
 
 def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
-    """Axis and place of the line over which the level steps most surely, as all scans see it; None where it steps over none."""
+    """Return axis and place of the most significant level step, as all scans see it; None if there is no step."""
     best: tuple[float, int, int, Bool] | None = None
     for axis in (0, 1):
         turned = [np.moveaxis(image, axis, 0) for image in images]
@@ -203,7 +203,7 @@ def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
 
 
 def _apart(blocks: Sequence[Float], k: int) -> float:
-    """By how much most of what lies beyond a line is off most of what lies before it, dB, the mean of all scans."""
+    """Return the difference between most of both sides of a line, dB, the mean of all scans."""
     steps, weights = [0.0], [0.0]
     for scan in blocks:
         sides = [side[np.isfinite(side)] for side in (scan[:k], scan[k:])]
@@ -215,7 +215,7 @@ def _apart(blocks: Sequence[Float], k: int) -> float:
 
 
 def _blocks(lines: Float) -> tuple[Float, float]:
-    """Medians of blocks (across, along) and the standard deviation of a pixel about them, dB."""
+    """Return medians of blocks (across, along) and the standard deviation of a pixel about them, dB."""
     rows, columns = -(-lines.shape[0] // ACROSS), -(-lines.shape[1] // ALONG)
     padded = np.full((rows * ACROSS, columns * ALONG), np.nan)
     padded[: lines.shape[0], : lines.shape[1]] = lines
@@ -231,12 +231,12 @@ def _blocks(lines: Float) -> tuple[Float, float]:
 
 
 def _medians(blocks: Float) -> Float:
-    """Median over the first axis; NaN where less than half of the blocks are known."""
+    """Return the median over the first axis; NaN if less than half of the blocks are known."""
     return np.where(np.isfinite(blocks).sum(axis=0) * 2 >= len(blocks), _nan_median(blocks), np.nan)
 
 
 def _nan_median(values: Float) -> Float:
-    """Median over the first axis of what is known; NaN where nothing is. NumPy's own takes many times as long."""
+    """Return the median of known values over the first axis; NaN if none is. NumPy's own takes many times as long."""
     ordered = np.sort(values, axis=0)
     count = np.isfinite(ordered).sum(axis=0)
     low, high = np.maximum(count - 1, 0) // 2, np.minimum(count // 2, len(ordered) - 1)
@@ -245,7 +245,7 @@ def _nan_median(values: Float) -> Float:
 
 
 def _sharpest(images: list[Float], about: int) -> int:
-    """First line behind a step near a place: of the pixels before it most lie below its middle, and behind it above.
+    """Return the first line behind a step near a place: most pixels before it are below its middle, most behind above.
 
     All scans vote: where something hides the step from one, another sees it. NaN is where none is seen.
     """

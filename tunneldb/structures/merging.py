@@ -1,4 +1,4 @@
-"""Faces that are one: pieces that touch, and what several scans see of one surface."""
+"""Merge faces that are one: pieces that touch, and views of several scans of one surface."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from tunneldb.structures.models import AXIS, POINT, RADIUS, SIDE, distance, fit_
 from tunneldb.structures.voxel_grid import AXIS_BITS, VoxelGrid
 
 ANGLE = 10.0
-"""Two faces are no farther turned against each other, degrees (Ono et al., Table 1)."""
+"""Maximum angle between two such faces, degrees (Ono et al., Table 1)."""
 
 APART = 0.005
-"""Nor does one lie farther off the other, m, on average (Table 1): registered scans fit so well."""
+"""Maximum mean distance between two such faces, m (Table 1): registered scans fit that well."""
 
 STEP = 0.002
-"""Within one scan, which is no farther off than noise, m: plates lie on each other."""
+"""The same within one scan, m, whose only error is noise: plates lie on each other."""
 
 ROUNDS = 6
 
 BLOCK = 100_000
-"""Voxels whose neighbours are looked at together."""
+"""Number of voxels whose neighbours are examined together."""
 
 LARGE = 250
-"""Where what is flattest is rougher than a scanner's noise, rock or soil, faces of fewer voxels are flat by chance."""
+"""Minimum number of voxels of a face if the flattest surfaces are rougher than scanner noise, as rock or soil."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def merge(grid: VoxelGrid, starts: Int64, neighbours: Int32, towards: Float, gro
 
 
 def _ordered(grid: VoxelGrid, centroid: Float, towards: Float, owner: Int32, models: Float, noise: float) -> Faces:
-    """Faces in order of size, seen from the right side; what scatters as no face does is left out."""
+    """Return faces in order of size, oriented to the scanner; those with too much scatter are left out."""
     count = len(models)
     sums, held = _sums(grid, owner, count), _Members(owner, count)
     rms, good = np.zeros(count), np.zeros(count, np.bool_)
@@ -129,7 +129,7 @@ def _ordered(grid: VoxelGrid, centroid: Float, towards: Float, owner: Int32, mod
 
 
 def distances(model: Float, xyz: Float) -> Float:
-    """Distance of places (n, 3) from a surface, towards the scanner's side, m."""
+    """Return the distance of places (n, 3) from a surface, towards the scanner's side, m."""
     out = np.empty(len(xyz))
     _distances(model, np.ascontiguousarray(xyz), out)
     return out
@@ -167,7 +167,7 @@ def refine(fine: VoxelGrid, face: Int32, faces: Faces, noise: float) -> None:
 
 
 def _fits(one: Float, other: Float, grid: VoxelGrid, centroid: Float, sums: Float, voxels: Int64, limit: float) -> bool:
-    """Whether the smaller face is of the larger one's surface."""
+    """Return True if the smaller face belongs to the larger one's surface."""
     if (one[RADIUS] == 0.0) != (other[RADIUS] == 0.0):
         # A strip of a cylinder that was taken for flat.
         if one[RADIUS] == 0.0 or len(voxels) > 200:
@@ -194,7 +194,7 @@ def _fits(one: Float, other: Float, grid: VoxelGrid, centroid: Float, sums: Floa
 
 
 def _touching(owner: Int32, starts: Int64, neighbours: Int32) -> Int64:
-    """Pairs of faces (m, 2) whose voxels touch, or touch one voxel between them."""
+    """Return pairs of faces (m, 2) whose voxels touch, or touch one voxel between them."""
     most, number = max(int(owner.max(initial=-1)) + 1, 1), 0
     pairs = np.empty(0, np.int64)
     for begin in range(0, len(owner), BLOCK):
@@ -206,7 +206,7 @@ def _touching(owner: Int32, starts: Int64, neighbours: Int32) -> Int64:
 
 
 def _at_one_place(keys: Int64, owner: Int32) -> Int64:
-    """Pairs of faces (m, 2) of different scans with voxels at one place."""
+    """Return pairs of faces (m, 2) of different scans with voxels at one place."""
     held = owner >= 0
     place = keys[held] & ((1 << (3 * AXIS_BITS)) - 1)
     mine = owner[held].astype(np.int64)
@@ -221,7 +221,7 @@ def _at_one_place(keys: Int64, owner: Int32) -> Int64:
 
 
 def _sums(grid: VoxelGrid, owner: Int32, count: int) -> Float:
-    """Moments (count, 10) of faces."""
+    """Return the moments (count, 10) of faces."""
     out = np.zeros((count, grid.moments.shape[1]))
     _add_moments(owner, grid.moments, out)
     return out
@@ -242,7 +242,7 @@ class _Members:
 def _contacts(
     owner: Int32, starts: Int64, neighbours: Int32, begin: int, end: int, most: int, found: Int64
 ) -> int:  # pragma: no cover - compiled
-    """Pairs of faces of voxels that touch, as first × most + second, into ``found``; how many. Runs of one pair count once."""
+    """Write pairs of faces with touching voxels, as first × most + second, to ``found``; runs of one pair count once."""
     beside, number, before = np.empty(27, np.int32), 0, np.int64(-1)
     for i in range(begin, end):
         many = 0

@@ -16,16 +16,16 @@ from tunneldb.compiled import inner, point_inner
 from tunneldb.geometry.normals import eigenvalues, normal
 
 WIDTH = 11
-"""Numbers of a row."""
+"""Number of values of a row."""
 
 POINT, AXIS, RADIUS, SIDE, ACROSS = slice(0, 3), slice(3, 6), 6, 7, slice(8, 11)
 
 ANGLES = 36
-"""Classes of the angle about an axis in which it is counted over how much of a turn a cylinder is seen."""
+"""Number of angular classes about an axis for the angle over which a cylinder is seen."""
 
 
 def with_directions(models: Float, middles: Float) -> Float:
-    """Give each model (k, WIDTH) the direction from which its unrolled coordinates count.
+    """Set the direction from which each model's (k, WIDTH) unrolled coordinates count.
 
     Of a plane u runs as level as can be and v upwards, to the left of u seen from the scanner's side. Of a cylinder u runs
     along its axis and v = r·φ around it, 0 in the direction of the middle (k, 3) of what is seen, so that the cut lies behind.
@@ -48,13 +48,13 @@ def with_directions(models: Float, middles: Float) -> Float:
 
 
 def _cross(one: Float, other: Float) -> Float:
-    """Vector product of two vectors (3,): of so little NumPy's own takes twenty times as long."""
+    """Return the vector product of two vectors (3,): for so few values NumPy's own takes twenty times as long."""
     (a, b, c), (x, y, z) = one.tolist(), other.tolist()
     return np.array([b * z - c * y, c * x - a * z, a * y - b * x])
 
 
 def unroll(model: Float, xyz: Float) -> tuple[Float, Float, Float]:
-    """Unrolled coordinates (u, v) and distance from the surface towards the scanner's side of points (n, 3); m."""
+    """Return unrolled coordinates (u, v) and distance from the surface towards the scanner's side of points (n, 3); m."""
     out = np.empty((len(xyz), 3))
     q = xyz - model[POINT]
     axis, across = model[AXIS], model[ACROSS]
@@ -81,7 +81,7 @@ def to_space(model: Float, u: Float, v: Float) -> Float:
 
 
 def normals_at(model: Float, u: Float, v: Float) -> Float:
-    """Unit normal (n, 3) towards the scanner's side at unrolled coordinates (n,)."""
+    """Return the unit normal (n, 3) towards the scanner's side at unrolled coordinates (n,)."""
     axis, across = model[AXIS], model[ACROSS]
     if model[RADIUS] == 0.0:
         return np.broadcast_to(axis, (len(u), 3))
@@ -92,7 +92,7 @@ def normals_at(model: Float, u: Float, v: Float) -> Float:
 
 @point_inner
 def distance(model: Float, x: float, y: float, z: float) -> float:  # pragma: no cover - compiled
-    """Distance of a place from a surface, towards the scanner's side, m."""
+    """Return the distance of a place from a surface, towards the scanner's side, m."""
     qx, qy, qz = x - model[0], y - model[1], z - model[2]
     along = qx * model[3] + qy * model[4] + qz * model[5]
     if model[6] == 0.0:
@@ -103,7 +103,7 @@ def distance(model: Float, x: float, y: float, z: float) -> float:  # pragma: no
 
 @point_inner
 def gradient(model: Float, x: float, y: float, z: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Normal of a surface beneath a place, towards the scanner's side."""
+    """Return the normal of a surface beneath a place, towards the scanner's side."""
     if model[6] == 0.0:
         return model[3], model[4], model[5]
     qx, qy, qz = x - model[0], y - model[1], z - model[2]
@@ -118,7 +118,7 @@ def gradient(model: Float, x: float, y: float, z: float) -> tuple[float, float, 
 
 @inner
 def fit_plane(total: Float, model: Float) -> float:  # pragma: no cover - compiled
-    """Plane of summed moments (10,) into a model that has the side already; the rms distance, m."""
+    """Write the plane of summed moments (10,) into a model with a known side, and return the rms distance, m."""
     n = total[0]
     x, y, z = total[1] / n, total[2] / n, total[3] / n
     xx, yy, zz = total[4] / n - x * x, total[5] / n - y * y, total[6] / n - z * z
@@ -138,7 +138,7 @@ def fit_plane(total: Float, model: Float) -> float:  # pragma: no cover - compil
 def fit_cylinder(
     moments: Float, centroid: Float, held: Int32, count: int, noise: float, model: Float, turns: int
 ) -> float:  # pragma: no cover - compiled
-    """Least-squares cylinder of voxels ``held`` (count,), Gauss-Newton with Tukey's weights; the rms distance, m.
+    """Fit a cylinder to voxels ``held`` (count,), Gauss-Newton with Tukey's weights, and return the rms distance, m.
 
     The centroid of a voxel's points lies inside the surface by the variance of these along the tangent over twice the radius,
     which is added.
@@ -234,7 +234,7 @@ def fit_cylinder(
 
 @inner
 def seen_angle(model: Float, centroid: Float, held: Int32, count: int) -> float:  # pragma: no cover - compiled
-    """Angle about its axis over which voxels show a cylinder, radians."""
+    """Return the angle about its axis over which voxels show a cylinder, radians."""
     ax, ay, az = model[3], model[4], model[5]
     if abs(ax) < 0.7:
         ux, uy, uz = 0.0, az, -ay

@@ -1,4 +1,4 @@
-"""Profiles: the sides of one beam or column, told by long edges that touch or lie a flange apart.
+"""Profiles: the sides of one beam or column, found by long edges that touch or are a flange apart.
 
 A beam is slender, its sides run along it, and each has an edge on another side or, around a flange or a leg, opposite to one.
 """
@@ -19,16 +19,16 @@ from tunneldb.structures.merging import ANGLE, APART
 from tunneldb.structures.models import AXIS, RADIUS, to_space, unroll
 
 SLENDER = 3.0
-"""A beam is at least so many times as long as its section is deep (EN 1992-1-1, 5.3.1)."""
+"""Minimum ratio of a beam's length to the depth of its section (EN 1992-1-1, 5.3.1)."""
 
 DEEPEST = 1.2
-"""Sections are no deeper, m: the deepest rolled one has 1118 mm (EN 10365, HL 1100)."""
+"""Maximum depth of sections, m: the deepest rolled one has 1118 mm (EN 10365, HL 1100)."""
 
 THICKEST = 0.04
-"""Edges of two sides lie no farther apart, m: the thickest rolled flange (EN 10365, HE 1000 M)."""
+"""Maximum distance of edges of two sides, m: the thickest rolled flange (EN 10365, HE 1000 M)."""
 
 OVERLAP = 0.5
-"""Along the beam they lie beside each other over this share of the shorter one."""
+"""Minimum overlap of the sides along the beam, as a share of the shorter one."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def box_of(surface: list[Extent]) -> Box:
 
 
 def places_of(surface: list[Extent]) -> Float:
-    """Places (n, 3) about the outlines of faces, m from the origin."""
+    """Return places (n, 3) along the outlines of faces, m from the origin."""
     found = []
     for extent in surface:
         at = shapely.get_coordinates(extent.outline)
@@ -87,7 +87,7 @@ def places_of(surface: list[Extent]) -> Float:
 
 
 def group(surfaces: list[list[Extent]], noise: float) -> Int64:
-    """Member of each surface (n,): sides of one profile are one, all others one each; numbered from 0 by the first of each.
+    """Return the member of each surface (n,): sides of one profile share one; numbered from 0 by the first of each.
 
     Parameters
     ----------
@@ -107,21 +107,21 @@ def group(surfaces: list[list[Extent]], noise: float) -> Int64:
 
 
 def middle_line(boxes: list[Box]) -> Float:
-    """Line (2, 3) along the middle of a profile's section, from end to end of its sides."""
+    """Return the line (2, 3) along the middle of a profile's section, from end to end of its sides."""
     frame, extent, section = _section(boxes)
     (x, y), (first, last) = section.mean(axis=0), extent
     return np.array([[first, x, y], [last, x, y]]) @ frame
 
 
 def _slender(boxes: list[Box]) -> bool:
-    """Whether sides together are as long and as deep as a beam."""
+    """Return True if sides together are as long and as deep as a beam."""
     _, (first, last), section = _section(boxes)
     depth = float(np.linalg.norm(np.diff(section[:3], axis=0), axis=1).max())
     return depth <= DEEPEST and last - first >= SLENDER * depth
 
 
 def _section(boxes: list[Box]) -> tuple[Float, Float, Float]:
-    """Section of sides at right angles to the longest.
+    """Return the section of sides at right angles to the longest.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def _section(boxes: list[Box]) -> tuple[Float, Float, Float]:
 
 
 def _touching(boxes: dict[int, Box], apart: float) -> Iterable[tuple[int, int]]:
-    """Pairs of sides that may be of one profile, the nearest first, of these those first that lie longest beside each other."""
+    """Return pairs of sides that may be of one profile, the nearest first, then those with the longest overlap."""
     numbers = list(boxes)
     near = shapely.box(*_bounds(boxes).T)
     i, j = shapely.STRtree(near).query(near)
@@ -160,13 +160,13 @@ def _touching(boxes: dict[int, Box], apart: float) -> Iterable[tuple[int, int]]:
 
 
 def _bounds(boxes: dict[int, Box]) -> Float:
-    """Least and greatest x and y of boxes (n, 4), half of `THICKEST` about them."""
+    """Return least and greatest x and y of boxes (n, 4), enlarged by half of `THICKEST`."""
     at = np.array([box.corners[:, :2] for box in boxes.values()]).reshape(-1, 4, 2)
     return np.column_stack([at.min(axis=1) - 0.5 * THICKEST, at.max(axis=1) + 0.5 * THICKEST])
 
 
 def _distance(one: Box, other: Box) -> tuple[float, float]:
-    """How far apart two sides lie in the section halfway along what they share, and how long that is, m; inf, 0: too little."""
+    """Return distance of two sides in the section halfway along their overlap, and its length, m; inf, 0: too short."""
     long, short = (one, other) if one.length >= other.length else (other, one)
     at = np.sort((short.ends - long.middle) @ long.along)
     begin, end = max(at[0], -0.5 * long.length), min(at[1], 0.5 * long.length)

@@ -17,11 +17,11 @@ from tunneldb.structures.records import EarlierSpot, SpotReconciliation
 from tunneldb.structures.results import Face, Spot, Structures
 
 NEAR = 0.05
-"""An earlier spot lies on a face if none of its vertices is farther from it, m: registration of scans is better than that."""
+"""Maximum distance of the vertices of an earlier spot from its face, m: registration of scans is better than that."""
 
 
 def reconcile_spots(found: Structures, own: Sequence[EarlierSpot], others: Sequence[EarlierSpot]) -> SpotReconciliation:
-    """Decide which earlier spot each spot is, which number it has, and what becomes of the others.
+    """Match each spot with an earlier one, number it, and decide what happens to the others.
 
     A spot is an earlier one of its kind if the two overlap best with each other on the same face, by at least 0.3 of their
     union. One that was found in another survey of the tunnel or site has that one's number.

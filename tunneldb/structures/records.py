@@ -1,4 +1,4 @@
-"""Plain records of structures: where they lie, what earlier runs had found, and what becomes of it."""
+"""Plain records of structures: places, earlier results, and changes to them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tunneldb.structures.results import Structures
 
 @dataclass(frozen=True)
 class PlacedFace:
-    """Where a face lies.
+    """Place of a face.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class PlacedFace:
 
 @dataclass(frozen=True)
 class PlacedSpot:
-    """Where a spot lies: as a face, and its outline on the map."""
+    """Place of a spot: on its face, and its outline on the map."""
 
     surface: shapely.Geometry
     map: Polygon
@@ -39,7 +39,7 @@ class PlacedSpot:
 
 @dataclass(frozen=True)
 class PlacedStructures:
-    """Structures and where they lie, in the order of ``structures``.
+    """Structures and their places, in the order of ``structures``.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class EarlierSpot:
 
 @dataclass(frozen=True)
 class SpotReconciliation:
-    """What becomes of the spots of a survey.
+    """Changes to the spots of a survey.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What is found of a structure: members, their faces, and the spots on these."""
+"""Results for a structure: members, their faces, and the spots on these."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from tunneldb.arrays import Bool, Float
 from tunneldb.structures.models import RADIUS, to_space
 
 SIMPLIFY = 0.75
-"""Tolerance by which outlines of faces are simplified, pixels."""
+"""Tolerance for simplifying outlines of faces, pixels."""
 
 UPRIGHT = 0.02
-"""Width on the map of what stands upright there, m."""
+"""Width on the map of vertical faces, m."""
 
 _CHORD = 0.005  # m by which an edge of a polygon may cut the corner of a curved face
 
@@ -28,7 +28,7 @@ MemberKind = Literal["flat", "pipe", "profile"]
 
 @dataclass(frozen=True)
 class Member:
-    """Faces of one surface, joined over what stands before it, or of the sides of one beam or column.
+    """Faces of one surface, joined behind objects in front of it, or of the sides of one beam or column.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class Face:
     outline: MultiPolygon
 
     def in_space(self, shape: shapely.Geometry) -> shapely.Geometry:
-        """A geometry of unrolled coordinates on the face, with Z, in the coordinates of the points."""
+        """Convert unrolled coordinates on the face to a geometry with Z, in the coordinates of the points."""
         if self.radius > 0.0:
             parts = isinstance(shape, MultiPolygon)
             shape = shapely.segmentize(shape, 2.0 * float(np.sqrt(2.0 * self.radius * _CHORD)))
@@ -125,7 +125,7 @@ class Face:
         return shapely.set_coordinates(lifted, raised)
 
     def on_map(self, shape: Polygon) -> Polygon:
-        """Where a polygon of unrolled coordinates lies in plan, m; what stands upright is a strip there, `UPRIGHT` wide."""
+        """Return a polygon of unrolled coordinates in plan, m; a vertical one is a strip `UPRIGHT` wide."""
         placed = shapely.force_2d(self.in_space(shape))
         plan = placed if placed.is_valid and placed.area > 0.05 * shape.area else placed.convex_hull
         return plan if isinstance(plan, Polygon) else plan.buffer(UPRIGHT / 2.0, cap_style="flat")
@@ -194,5 +194,5 @@ def outline_of(mask: Bool, left: int, bottom: int, pixel: float) -> MultiPolygon
 
 
 def kind_of(model: Float) -> Kind:
-    """Kind of a face, by its model."""
+    """Return the kind of a face, from its model."""
     return "pipe" if model[RADIUS] > 0.0 else "flat"

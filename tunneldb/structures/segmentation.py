@@ -1,4 +1,4 @@
-"""Faces of a structure from the moments of its voxels, and where their points belong."""
+"""Segment a structure into faces from the moments of its voxels, and assign points to them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tunneldb.structures.voxel_grid import VoxelGrid, voxel_planes
 from tunneldb.structures.voxel_moments import COARSEST, VoxelMoments
 
 POINTS_A_VOXEL = 3
-"""The edge of the voxels is the smallest of which half of the points share theirs with so many."""
+"""Minimum number of points of a voxel for half of all points; the voxel edge is the smallest that reaches it."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def find_faces(moments: VoxelMoments, stations: Float) -> Segmentation:
 
 
 def level_of(moments: VoxelMoments) -> int:
-    """Level of the voxels in which faces are grown."""
+    """Return the level of the voxels in which faces are grown."""
     for level in range(moments.level, COARSEST, -1):
         counts = np.sort(moments.counts(level))
         until = np.cumsum(counts)

@@ -1,4 +1,4 @@
-"""Which pixels of a face differ by more than chance lets any: means over windows of several sizes.
+"""Significant differences of a face's pixels: means over windows of several sizes.
 
 The paper asks 3σ of a single point (Ono et al., 3.4). Of hundred thousand pixels some hundred lie beyond that by chance, while
 a patch of a thousand that differ by 2σ each is none. So means over windows are held against the scatter of such means on the
@@ -21,16 +21,16 @@ WINDOWS = (3, 5, 9)
 """Sides of the windows, pixels."""
 
 ALARMS = 0.05
-"""Windows that pass by chance in a whole structure, on average, of each size."""
+"""Mean number of windows of each size that pass by chance in a whole structure."""
 
 LEAST_FILLED = 0.5
-"""Share of the pixels of a window that were judged, or its mean tells nothing."""
+"""Minimum share of a window's pixels with a value."""
 
 USUAL = 30.0
-"""Windows beside each other for which the usual scatter of all faces stands in: of few the own is not known."""
+"""Minimum number of adjacent windows for a face's own scatter; with fewer the usual scatter of all faces is used."""
 
 LEVEL_SIGMA = 0.15
-"""A level is known no better than this, dB."""
+"""Minimum standard error of a level, dB."""
 
 MOST_SAMPLES = 50_000
 
@@ -43,15 +43,15 @@ class Scatter:
     weight: dict[int, list[float]] = field(default_factory=dict)
 
     def copy(self) -> Scatter:
-        """As it is now."""
+        """Return the current state."""
         return Scatter(*({window: list(values) for window, values in part.items()} for part in (self.sigma, self.weight)))
 
     def restore(self, other: Scatter) -> None:
-        """Go back to what it was."""
+        """Restore an earlier state."""
         self.sigma, self.weight = other.sigma, other.weight
 
     def blended(self, window: int, sigma: float, number: float) -> float:
-        """Scatter of a face of so many windows by its own and the usual one, and remember it."""
+        """Return the scatter of a face of so many windows, from its own and the usual one, and store it."""
         known, weights = self.sigma.setdefault(window, []), self.weight.setdefault(window, [])
         usual = 1.0 / window
         if known:
@@ -65,12 +65,12 @@ class Scatter:
 
 
 def limit(pixels: int, window: int) -> float:
-    """How many standard deviations of a window's mean are none by chance, of a structure of so many pixels."""
+    """Return the standard deviations of a window's mean that chance does not exceed, for a structure of so many pixels."""
     return -float(ndtri(min(ALARMS * window**2 / max(pixels, 1), 0.01)))
 
 
 def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter: Scatter) -> Single:
-    """Mean of the window about each pixel that differs most, over what is none by chance: from 1 on it differs.
+    """Return the mean of the most different window around each pixel over the chance limit: significant from 1 on.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which faces are solid: what sends back every beam. A grating, a fence or leaves let most of them through.
+"""Solid faces, which return every beam; a grating, a fence or leaves let most of them through.
 
 A scanner turns by even steps, so that what is solid holds the same number of points in the same angle, wherever it is and
 however it is turned. Of a scan in which that does not hold, one that was thinned out, nothing is told.
@@ -15,27 +15,27 @@ from tunneldb.structures.face_raster import Layout
 from tunneldb.structures.models import to_space
 
 LEAST_RETURNED = 0.7
-"""Share of the beams that come back from a face at least."""
+"""Minimum share of the beams that a solid face returns."""
 
 EVEN = 0.3
-"""Of the points between the quantiles `QUANTILES` the density differs by no more, or the scan was thinned out."""
+"""Maximum ratio of the densities between the quantiles `QUANTILES`; otherwise the scan was thinned out."""
 
 QUANTILES = (0.25, 0.5, 0.95)
-"""Low, usual and high density: up to a quarter of what a scan sees may be gratings and fences."""
+"""Quantiles for low, usual and high density: up to a quarter of what a scan sees may be gratings and fences."""
 
 FEWEST = 60
-"""Fewer points of a face tell no density."""
+"""Minimum number of points of a face for a density."""
 
 
 def closed(occupied: Bool, pixels: int) -> Bool:
-    """Pixels (rows, columns) with those between them, holes of so many pixels being none."""
+    """Close holes of up to so many pixels in a mask (rows, columns)."""
     padded = np.pad(occupied, pixels)
     out = ndimage.binary_closing(padded, iterations=pixels)
     return np.asarray(out[pixels : out.shape[0] - pixels, pixels : out.shape[1] - pixels])
 
 
 def ray_densities(layout: Layout, face: int, seen: list[Observed], stations: Float) -> Float:
-    """Points of a face per step of azimuth and zenith (radians) for each scan (k, 2): density and points; NaN of too few."""
+    """Return density and points of a face per step of azimuth and zenith (radians) for each scan (k, 2); NaN if too few."""
     u, v = layout.centres(face)
     out = np.full((len(stations), 2), np.nan)
     for one in seen:
@@ -55,7 +55,7 @@ def ray_densities(layout: Layout, face: int, seen: list[Observed], stations: Flo
 
 
 def solid_faces(densities: Float) -> Bool:
-    """Which faces are solid (n,).
+    """Return True for solid faces (n,).
 
     Parameters
     ----------

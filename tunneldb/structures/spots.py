@@ -1,4 +1,4 @@
-"""From the contrast of a face to its spots: both tails, median filter, boundary, regions, verdict (Ono et al., 3.4)."""
+"""Spots from the contrast of a face: both tails, median filter, boundary, regions, verdict (Ono et al., 3.4)."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from tunneldb.structures.face_raster import STEP
 from tunneldb.structures.significance import Scatter, significance
 
 LEAST_AREA = 0.0016
-"""Smaller spots are left out, m²: 4 cm × 4 cm."""
+"""Minimum area of a spot, m²: 4 cm × 4 cm."""
 
 LEAST_POINTS = 30
-"""Spots of fewer points are left out."""
+"""Minimum number of points of a spot."""
 
 LEAST_JUDGED = 150
-"""Of a face of fewer points it is not told what is its own: a spot of the least points would be a fifth of it."""
+"""Minimum number of points of a face: the smallest spot would be a fifth of it."""
 
 RIM = 0.75
-"""A region of which more lies along the face's own edge is what the beam loses there."""
+"""Share of a region along the face's own edge from which it is an effect of the beam there."""
 
 BIMODAL = 0.5
-"""Share of what was judged that differs, from which it is not known which of both is the surface itself."""
+"""Share of the surface that differs from which it is uncertain which part is the surface itself."""
 
 _TOLD = ("thin", "gradual", "rectangular")
 
@@ -78,7 +78,7 @@ class FaceSpots:
 
 
 def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
-    """Find what differs from a face's own level, darker or brighter.
+    """Find spots that differ from a face's own level, darker or brighter.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
 
 
 def _judge(region: Region, kind: Literal["dark", "bright"], face: FaceContrast, differs: Single, rim: Bool) -> FoundSpot | None:
-    """What a region is; None if it is nothing."""
+    """Classify a region; return None if it is nothing."""
     if not region.filled:
         return None
     grid = face.image.grid
@@ -160,7 +160,7 @@ def _box(spot: FoundSpot) -> tuple[slice, slice]:
 
 
 def _over_rim(face: FaceContrast, numbers: Int32, found: list[FoundSpot]) -> None:
-    """Let spots reach over the face's rim, which was not judged: it is what lies nearest to it."""
+    """Extend spots over the face's rim, which has no contrast, to the nearest of it."""
     off = face.image.state[::-1] == PixelState.OFF
     if not found or not face.rim or off.all():
         return

@@ -1,4 +1,4 @@
-"""Pipes thinner than the voxels tell, from finer ones.
+"""Pipes too thin for the voxels, found in finer ones.
 
 Faces are grown in voxels of one width, by the density of most points. A pipe whose radius is a few of them at most shows as
 narrow strips, or as nothing. What is no face, and what may be such a strip, is looked at again in voxels half as wide, and in
@@ -17,14 +17,14 @@ from tunneldb.structures.voxel_grid import VoxelGrid, voxel_planes
 from tunneldb.structures.voxel_moments import VoxelMoments
 
 THIN = 4.0
-"""Radius, in edges of voxels, up to which a pipe is thin: such voxels have no normal to speak of (see `growing`)."""
+"""Maximum radius of a thin pipe, in voxel edges: such voxels have no usable normal (see `growing`)."""
 
 TAKEN = 0.5
-"""Share of its points by which a voxel, or a strip, is a thin pipe's."""
+"""Minimum share of a voxel's, or a strip's, points on a thin pipe."""
 
 
 def with_thin_pipes(moments: VoxelMoments, level: int, grid: VoxelGrid, faces: Faces, stations: Float, noise: float) -> Faces:
-    """Faces and the thin pipes that these leave, or lie on as strips.
+    """Return the remaining faces, and thin pipes beside them or on them as strips.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def with_thin_pipes(moments: VoxelMoments, level: int, grid: VoxelGrid, faces: F
 
 
 def _pipes(fine: VoxelGrid, stations: Float, noise: float, widest: float) -> Faces:
-    """Pipes of radii up to ``widest``, m, in voxels."""
+    """Find pipes of radii up to ``widest``, m, in voxels."""
     starts, neighbours = fine.neighbours()
     towards = stations[fine.scan] - fine.centroids
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
@@ -61,7 +61,7 @@ def _pipes(fine: VoxelGrid, stations: Float, noise: float, widest: float) -> Fac
 
 
 def _open(grid: VoxelGrid, faces: Faces, widest: float) -> Bool:
-    """Voxels (n,) on no face, on a plane as narrow as ``widest``, m, or on a pipe of no greater radius."""
+    """Return voxels (n,) on no face, on a plane as narrow as ``widest``, m, or on a pipe of no greater radius."""
     count = len(faces.models)
     held = faces.owner >= 0
     owner, at = faces.owner[held], grid.centroids[held]
@@ -84,7 +84,7 @@ def _chosen(grown: Grown, wanted: Bool) -> Grown:
 
 
 def _together(grid: VoxelGrid, faces: Faces, fine: VoxelGrid, place: Int64, pipes: Faces) -> Faces:
-    """Faces with thin pipes, which take the voxels, and the strips, that are theirs by most points."""
+    """Add thin pipes to faces; they take the voxels, and the strips, with most points on them."""
     held = np.flatnonzero(pipes.owner >= 0)
     if not len(held):
         return faces

@@ -12,10 +12,10 @@ from tunneldb.geometry.normals import eigenvalues, normal
 from tunneldb.threads import in_blocks
 
 AXIS_BITS = 17
-"""Bits of a voxel's place along an axis in its key; the number of its scan stands above them."""
+"""Bits of a voxel's place along an axis in its key; the scan number is in the bits above."""
 
 TURNS = 2
-"""How many times voxels off the plane of a neighbourhood are left out of it."""
+"""Number of rounds in which voxels off the plane of a neighbourhood are excluded from it."""
 
 _BLOCK = 1 << 14
 
@@ -55,7 +55,7 @@ class VoxelGrid:
         return np.ascontiguousarray(self.moments[:, 1:4] / self.moments[:, :1])
 
     def neighbours(self) -> tuple[Int64, Int32]:
-        """Voxels of the same scan that touch each one: where those of each begin (n + 1,), and their numbers."""
+        """Return the touching voxels of the same scan: begin of each voxel's list (n + 1,), and their numbers."""
         starts = np.zeros(len(self) + 1, np.int64)
         _count_neighbours(self.keys, starts)
         np.cumsum(starts, out=starts)
@@ -87,7 +87,7 @@ class VoxelPlanes:
 
 
 def voxel_planes(grid: VoxelGrid, starts: Int64, neighbours: Int32, stations: Float, noise: float) -> VoxelPlanes:
-    """Planes of the neighbourhoods of voxels, robust against what lies off them.
+    """Fit planes to the neighbourhoods of voxels, robustly.
 
     The plane of a voxel is that of its own neighbourhood or of the one beside it that fits better and holds it, so that
     normals stay sharp at creases (Kuwahara et al., 1976, choose a pixel's window so).

@@ -1,4 +1,4 @@
-"""Moments of the points in each voxel of each scan, gathered in one pass whose order does not show.
+"""Moments of the points in each voxel of each scan, summed in one pass, independent of the order.
 
 A voxel keeps the number of its points, their sum and the sum of their products (planes and their
 residuals follow from these alone, and those of a neighbourhood are sums). All are whole numbers of `QUANTUM`, so neither the
@@ -18,7 +18,7 @@ from tunneldb.errors import UserError
 from tunneldb.structures.voxel_grid import AXIS_BITS, VoxelGrid
 
 QUANTUM = 2.0**-14
-"""Step in which coordinates are counted, m: 0.06 mm."""
+"""Step of coordinates, m: 0.06 mm."""
 
 FINEST = 7
 """Edge of the finest voxels is 2^-FINEST m, 7.8 mm: two to three points of a dense scan."""
@@ -27,15 +27,15 @@ COARSEST = 2
 """Edge of the coarsest is 2^-COARSEST m."""
 
 MOST = 3_000_000
-"""Voxels that are kept at most; beyond that the next coarser ones take their place."""
+"""Maximum number of voxels in memory; beyond it the next coarser ones are used."""
 
 SCANS = 1 << 10
-"""Scans that can be told apart."""
+"""Maximum number of scans."""
 
 _HALF = 1 << (AXIS_BITS - 1)
 _MASK = (1 << AXIS_BITS) - 1
 REACH = _HALF * 2.0**-FINEST
-"""Points farther than this from the middle of the scanner's positions along an axis are left out, m."""
+"""Maximum distance of points from the middle of the scanner positions along an axis, m; others are ignored."""
 
 _ROOM = 1 << 16
 
@@ -87,19 +87,19 @@ class VoxelMoments:
             self._make_room()
 
     def complete(self) -> None:
-        """Give back the memory that further points would take; none can be added afterwards."""
+        """Free the memory for further points; none can be added afterwards."""
         self._table = np.empty(0, np.int32)
         self._keys.resize(self._size, refcheck=False)
         self._sums.resize((self._size, self._sums.shape[1]), refcheck=False)
 
     def grid(self, level: int) -> VoxelGrid:
-        """Voxels with an edge of 2^-level m, no finer than those kept, in the order of scans and places."""
+        """Return voxels with an edge of 2^-level m, no finer than those stored, in the order of scans and places."""
         keys, sums = self._keys[: self._size], self._sums[: self._size]
         keys, sums = _coarser_by(keys, sums, self.level, level)
         return VoxelGrid(2.0**-level, self.origin, keys, _metres(keys, sums, level))
 
     def within(self, grid: VoxelGrid, level: int, wanted: Bool, finer: int) -> tuple[VoxelGrid, Int64]:
-        """Finer voxels that lie in some of the voxels of a grid, and in which of these.
+        """Return the finer voxels inside some voxels of a grid, and the voxel of each.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class VoxelMoments:
         return found, np.searchsorted(grid.keys, _above(keys, finer - level))
 
     def counts(self, level: int) -> Int64:
-        """Points in each voxel with an edge of 2^-level m."""
+        """Return the points in each voxel with an edge of 2^-level m."""
         keys, count = self._keys[: self._size], self._sums[: self._size, 0]
         for _ in range(level, self.level):
             keys, place = np.unique(parents(keys), return_inverse=True)
@@ -142,7 +142,7 @@ class VoxelMoments:
             self._sums[len(keys) :] = 0
         else:
             raise UserError(
-                f"more than {MOST:,} voxels of {2.0**-COARSEST:g} m hold points: this is no structure; cut the file"
+                f"more than {MOST:,} voxels of {2.0**-COARSEST:g} m have points, too many for a structure; cut the file"
             )
         size = len(self._table)
         while size < 2 * len(self._keys):
@@ -152,14 +152,14 @@ class VoxelMoments:
 
 
 def parents(keys: Int64) -> Int64:
-    """Keys of the voxels twice as large in which voxels lie."""
+    """Return the keys of the voxels twice as large around voxels."""
     scan, axes = keys >> (3 * AXIS_BITS), [(keys >> (AXIS_BITS * k)) & _MASK for k in (2, 1, 0)]
     x, y, z = (((axis - _HALF) >> 1) + _HALF for axis in axes)
     return np.asarray((((scan << AXIS_BITS | x) << AXIS_BITS | y) << AXIS_BITS) | z)
 
 
 def _above(keys: Int64, times: int) -> Int64:
-    """Keys of the voxels in which voxels lie, twice as large so many times."""
+    """Return the keys of larger voxels around voxels, doubled so many times."""
     for _ in range(times):
         keys = parents(keys)
     return keys
@@ -172,7 +172,7 @@ def split_keys(keys: Int64) -> tuple[Int64, Int64]:
 
 
 def _coarser_by(keys: Int64, sums: Int64, level: int, wanted: int) -> tuple[Int64, Int64]:
-    """Moments of voxels with an edge of 2^-wanted m, in the order of their keys, of those of 2^-level m in any order."""
+    """Combine moments into voxels with an edge of 2^-wanted m, in the order of their keys, from those of 2^-level m."""
     if level == wanted:
         order = np.argsort(keys)
         return keys[order], sums[order]
@@ -182,7 +182,7 @@ def _coarser_by(keys: Int64, sums: Int64, level: int, wanted: int) -> tuple[Int6
 
 
 def _coarser(keys: Int64, sums: Int64, level: int) -> tuple[Int64, Int64]:
-    """Moments of voxels twice as large, in the order of their keys, of those with an edge of 2^-level m in any order."""
+    """Combine moments into voxels twice as large, in the order of their keys, from those with an edge of 2^-level m."""
     above = parents(keys)
     order = np.argsort(above, kind="stable")
     count = int(np.count_nonzero(np.diff(above[order]))) + 1 if len(above) else 0
@@ -192,7 +192,7 @@ def _coarser(keys: Int64, sums: Int64, level: int) -> tuple[Int64, Int64]:
 
 
 def _metres(keys: Int64, sums: Int64, level: int) -> Float:
-    """Moments (n, 10) about the origin, m and m²: number, x, y, z, xx, yy, zz, xy, xz, yz."""
+    """Return moments (n, 10) about the origin, m and m²: number, x, y, z, xx, yy, zz, xy, xz, yz."""
     corner = split_keys(keys)[1] * 2.0**-level + 0.5 * QUANTUM
     out = sums.astype(np.float64)
     n, s = out[:, 0], out[:, 1:4] * QUANTUM
@@ -206,7 +206,7 @@ def _metres(keys: Int64, sums: Int64, level: int) -> Float:
 
 @inner
 def voxel_key(x: float, y: float, z: float, scan: int, per_metre: float) -> int:  # pragma: no cover - compiled
-    """Key of the voxel of a place relative to the origin; -1 beyond what can be numbered."""
+    """Return the key of the voxel of a place relative to the origin; -1 out of range."""
     half = 1 << 16
     if not (abs(x) < 1e6 and abs(y) < 1e6 and abs(z) < 1e6):
         return -1
@@ -218,7 +218,7 @@ def voxel_key(x: float, y: float, z: float, scan: int, per_metre: float) -> int:
 
 @inner
 def find_slot(key: int, keys: Int64, table: Int32) -> int:  # pragma: no cover - compiled
-    """Slot of a table that holds the place of a key among keys, or the empty one (-1) where it belongs."""
+    """Return the slot of a table with the place of a key among keys, or the empty one (-1) where it belongs."""
     mask = np.uint64(table.shape[0] - 1)
     h = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
     at = (h ^ (h >> np.uint64(32))) & mask
@@ -301,7 +301,7 @@ def _add(
 def find_voxels(
     xyz: Float, scan: Int32, origin: Float, per_metre: float, keys: Int64, table: Int32, out: Int64, begin: int, end: int
 ) -> None:  # pragma: no cover - compiled
-    """Number of the voxel of each point from begin to end; -1 where there is none."""
+    """Write the number of the voxel of each point from begin to end; -1 without one."""
     for i in range(begin, end):
         key = voxel_key(xyz[i, 0] - origin[0], xyz[i, 1] - origin[1], xyz[i, 2] - origin[2], scan[i], per_metre)
         out[i] = -1
@@ -310,7 +310,7 @@ def find_voxels(
 
 
 def key_table(keys: Int64) -> Int32:
-    """Table in which `find_voxels` finds keys."""
+    """Return the table in which `find_voxels` looks up keys."""
     table = np.full(1 << max(10, (2 * len(keys)).bit_length()), -1, np.int32)
     _enter(keys, len(keys), table)
     return table

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 FORMATS = (".png", ".pdf", ".svg")
 _LINE, _BAND, _MEASURED = "#b2182b", "#2166ac", "#1b7837"
+_TITLE = 140  # characters a line of the title
 _SHOWN = (0.002, 0.998)  # shares of the points between whose values an axis runs
 
 
@@ -46,7 +48,7 @@ def write_figure(look: Diagnosis, path: Path) -> None:
     _panel(angle, look.angle, look.corrected, seen.incidence, "incidence, °", "corrected intensity, dB")
     _curves(curve, look)
     _losses(loss, look)
-    figure.suptitle(f"{look.title}\n{seen.verdict()}", fontsize=11)
+    figure.suptitle("\n".join(fill(line, _TITLE) for line in (look.title, seen.verdict())), fontsize=11)
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=110)
 
