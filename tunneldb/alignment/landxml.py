@@ -74,7 +74,7 @@ class LandXml:
         pvis = list(self._pvis(self._profiles(alignment)[profile], start))
         notes = []
         if self._unit != 1.0 or self._unit_note:
-            notes.append(f"lengths are converted to metres: 1 unit is {self._unit:.9g} m{self._told}")
+            notes.append(f"lengths are converted to metres: 1 unit is {self._unit:.9g} m{self._unit_note}")
         if self._epsg:
             notes.append(f"the file states its coordinate system as EPSG:{self._epsg}")
         return Design(
