@@ -34,7 +34,7 @@ def inside(p: Float, low: tuple[float, ...], high: tuple[float, ...]) -> Bool:
 
 
 def bent(p: Float, radius: float, slope: float) -> Float:
-    """From (along, right, up) to the map: along an arc that bends right (inf: straight), from north-east on, with a slope."""
+    """Transform (along, right, up) to the map: along an arc that bends right (inf: straight), from north-east, with a slope."""
     s, u, w = p.T
     turn = 0.9 + (s / radius)
     centre = np.array([np.sin(0.9), -np.cos(0.9)])  # to the right
