@@ -111,7 +111,7 @@ class Canal:
         return [ladder.measured() for ladder in self.ladders]
 
     def near(self, ladder: TrueLadder, points: Float, aside: float, before: float) -> Bool:
-        """Return True for points (n, 3), tunnel frame, within ``aside`` m of a ladder's middle and ``before`` m of its plane."""
+        """Return True for points (n, 3), tunnel frame, within ``aside`` m of a ladder's middle, ``before`` m of its plane."""
         own = ((points - ORIGIN) @ self.turn - ladder.origin) @ ladder.axes.T
         return np.asarray((np.abs(own[:, 0]) < aside) & (np.abs(own[:, 2]) < before))
 
