@@ -157,7 +157,7 @@ def recess_is_off(picture: LiningImage) -> LiningImage:
 
 
 def law(name: str) -> str:
-    """What is gathered for one of LAWS: that of Oren and Nayar is detection's own."""
+    """Collect the observations for one of LAWS; detection uses the law of Oren and Nayar."""
     given = name.split(",")[0]
     return Part.points if given == "Oren-Nayar" else given
 

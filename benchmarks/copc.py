@@ -35,7 +35,7 @@ def measured(survey: str, folder: Path) -> tuple[dict[str, float], dict[str, flo
 
 
 def differences(folder: Path, node_modules: Path | None) -> list[str]:
-    """What is wrong with the files that were written."""
+    """Return the faults of the written files."""
     files = sorted((folder / "copc").glob("*.copc.laz"))
     virtual = json.loads(next((folder / "copc").glob("*.vpc")).read_text())["features"]
     found = []
@@ -85,7 +85,7 @@ def cells_of(places: np.ndarray, cell: float) -> np.ndarray:
 
 
 def by_copc_js(path: Path, array: np.ndarray, node_modules: Path) -> list[str]:
-    """What copc.js reads otherwise."""
+    """Return the differences found by copc.js."""
     done = subprocess.run(
         ["node", str(SCRIPT), str(path)],
         env=dict(os.environ) | {"NODE_PATH": str(node_modules)},

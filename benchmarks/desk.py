@@ -95,7 +95,7 @@ def in_qgis(step: str, folder: Path, pictures: Path) -> list[dict[str, Any]]:
 
 
 def wrong_after_the_day(conn: psycopg.Connection, before: int, steps: list[dict[str, Any]]) -> list[str]:
-    """What is not as the steps say, in findings and audit."""
+    """Return deviations of findings and audit from the steps."""
     wrong = [f"{step['step']}: {step['said']}" for step in steps if step.get("failed")]
     drawn = Counter(step["kind"] for step in steps if step["step"] == "drawn")
     if drawn != KINDS:
@@ -119,7 +119,7 @@ def wrong_after_the_day(conn: psycopg.Connection, before: int, steps: list[dict[
 
 
 def wrong_after_the_rerun(conn: psycopg.Connection, former: list[Any], counted: int) -> list[str]:
-    """What was lost or doubled when all stages ran again."""
+    """Return losses and duplicates after all stages were run again."""
     now = conn.execute(STATE, [SURVEY]).fetchall()
     wrong = [f"was {a}\nis  {b}" for a, b in zip(former, now, strict=False) if a[:-2] != b[:-2] or a[-1] != b[-1]]
     if len(now) != len(former):

@@ -64,7 +64,7 @@ DRAWN: tuple[tuple[str, str, str, str, tuple[tuple[float, float], ...]], ...] = 
 
 
 def day() -> Iterator[None]:
-    """What an inspector does in a day."""
+    """Run the steps of an inspector's day."""
     yield from tidy()
     layers = {shape: layer(f"finding_{shape}_unrolled") for shape in ("area", "line", "point")}
     for shape in layers:
@@ -163,7 +163,7 @@ def day() -> Iterator[None]:
 
 
 def look() -> Iterator[None]:
-    """What it looks like when the project is opened again."""
+    """Check the project after opening it again."""
     yield from tidy()
     grab("desk-findings.png")
 
@@ -381,7 +381,7 @@ def grab(name: str) -> None:
 
 
 def drawing() -> bool:
-    """Whether a map is being drawn."""
+    """Return True if a map is being drawn."""
     return any(canvas.isDrawing() for canvas in iface.mainWindow().findChildren(QgsMapCanvas))
 
 

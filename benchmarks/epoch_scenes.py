@@ -84,7 +84,7 @@ def _shapes(rows: Sequence[Sequence[Any]]) -> list[BaseGeometry]:
 
 
 def movements(true: Rows, found: Rows) -> dict[str, Any]:
-    """What was found of movements, and regions where nothing moved."""
+    """Return the detected movements, and detected regions without movement."""
     rows = []
     for shape, said in zip(true.shapes, true.values, strict=True):
         alike = [

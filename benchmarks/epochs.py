@@ -89,7 +89,7 @@ def judge(significant: Bool, truth: Float, compared: Bool, holds: float, seconds
 
 
 def ours(surface: Surface, grid: CellGrid, old: Float, new: Float, truth: Float) -> tuple[tuple[object, ...], Change]:
-    """What compare does."""
+    """Return the result of compare."""
     begun = time.perf_counter()
     found = measure_change(surface, grid, cells(surface, grid, old), cells(surface, grid, new), 1.5, PIXEL)
     regions = change_regions(found.difference, found.variance, found.removed_error, found.scatter, found.place_error)
@@ -104,7 +104,7 @@ def ours(surface: Surface, grid: CellGrid, old: Float, new: Float, truth: Float)
 
 
 def m3c2(surface: Surface, grid: CellGrid, old: Float, new: Float, truth: Float) -> tuple[object, ...]:
-    """What M3C2 does: a cell is significant where its distance is beyond its own level of detection."""
+    """Return the result of M3C2: a cell is significant if its distance exceeds its own level of detection."""
     import py4dgeo
 
     chainage, arc = (values.ravel() for values in np.meshgrid(grid.chainage, grid.arc))

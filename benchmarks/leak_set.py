@@ -174,7 +174,7 @@ class Truth:
         return shapely.STRtree(self.dry)
 
     def near(self, place: BaseGeometry, within: float = 0.3) -> str:
-        """What that is dark but dry a polygon lies on, or next to; nothing where there is none."""
+        """Return the dry dark area that a polygon overlaps or touches; empty if there is none."""
         if not self.dry:
             return ""
         numbers = self.tree.query(place, predicate="dwithin", distance=within)

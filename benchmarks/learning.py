@@ -85,7 +85,7 @@ def salted(art: Painting, s: float, a: float) -> None:
 
 
 def old_stain(art: Painting, s: float, a: float) -> None:
-    """Where water was once: a patch as water makes it, a little fainter, with nothing about it."""
+    """Paint a former leak: a patch shaped like a leak, a little fainter, with nothing around it."""
     shape = blob(art, s, a, art.log(0.06, 2.0), art.uniform(0.5, 2.5))
     art.paint(art.cover(shape, art.log(0.006, 0.08)) * uneven(art), art.log(1.5, 6.0), DARK)
 

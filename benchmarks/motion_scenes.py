@@ -259,7 +259,7 @@ def made(scene: Scene, seed: int) -> tuple[Surface, CellGrid, Cells, Cells, list
 
 
 def judged(name: str, scene: Scene, seed: int) -> dict[str, object]:
-    """What compare says of a scene."""
+    """Return the result of compare for a scene."""
     surface, grid, old, new, parts = made(scene, seed)
     begun = time.process_time()
     found = measure_change(surface, grid, old, new, 1.5, PIXEL)

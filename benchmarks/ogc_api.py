@@ -66,7 +66,7 @@ def status(url: str, method: str = "GET") -> int:
 
 
 def by_http(url: str, expected: dict[str, int]) -> list[str]:
-    """What is wrong with the server's answers."""
+    """Return the faults of the server's answers."""
     served = {collection["id"] for collection in answer(f"{url}/collections?f=json&limit=1000")["collections"]}
     wrong = [f"{name} is served" for name in sorted(served - set(expected))]
     wrong += [f"{name} is not served" for name in sorted(set(expected) - served)]

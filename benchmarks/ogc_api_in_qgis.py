@@ -54,7 +54,7 @@ def pixels(url, name, layer):
 
 
 def found(url):
-    """What there is of each collection."""
+    """Return the contents of each collection."""
     with urlopen(f"{url}/collections?f=json&limit=100") as answer:
         names = [collection["id"] for collection in json.load(answer)["collections"]]
     collections = {}

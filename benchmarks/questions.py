@@ -54,7 +54,7 @@ def explain(dsn: str, query: str) -> str:
 
 
 def counted(dsn: str) -> dict[str, int]:
-    """What the database holds, as the planner knows it."""
+    """Return the row counts of the database, by the planner's statistics."""
     with connect(dsn) as connection:
         rows = connection.execute(
             "SELECT CASE WHEN relname ~ '^point_' THEN 'point' ELSE relname END, sum(reltuples)::bigint FROM pg_class"

@@ -74,7 +74,7 @@ class Measured:
 
 
 def meant(finding: int) -> Verdict:
-    """What is to be said of a finding: rejected every third, a kind every tenth, a remark every 25th."""
+    """Return the intended review of a finding: every third rejected, every tenth with a kind, every 25th with a remark."""
     kind = list(KINDS.values())[finding // 10 % len(KINDS)] if finding % 10 == 0 else None
     return Verdict(
         "rejected" if finding % 3 == 0 else "confirmed", kind, f"no. {finding}: look again" if finding % 25 == 0 else None

@@ -50,7 +50,7 @@ def theme(name: str) -> None:
 
 
 def state() -> dict[str, Any]:
-    """What the window and the dock show."""
+    """Return the contents of the window and the dock."""
     modal, focus, active = QApplication.activeModalWidget(), QApplication.focusWidget(), QApplication.activeWindow()
     seen: dict[str, Any] = {
         "project": QgsProject.instance().fileName(),
@@ -120,7 +120,7 @@ def layer(layer_id: str) -> list[int] | None:
 
 
 def edits(layer_id: str) -> dict[str, Any]:
-    """Whether a layer is open for editing, and has edits that are not saved."""
+    """Return True if a layer is open for editing, and True if it has unsaved edits."""
     found = QgsProject.instance().mapLayer(f"tunneldb_layer_{layer_id}")
     assert isinstance(found, QgsVectorLayer)
     return {"editable": found.isEditable(), "modified": found.isModified(), "features": found.featureCount()}

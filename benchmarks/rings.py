@@ -76,7 +76,7 @@ def against_published() -> tuple[list[tuple[object, ...]], list[tuple[object, ..
 
 
 def as_published() -> list[tuple[object, ...]]:
-    """How far the published centres lie from circles of least squares through all eight points, in vertical planes, mm."""
+    """Return the deviations of the published centres from least-squares circles through all eight points, vertical, mm."""
     theirs = published()
     off = []
     for name, points in surveyed().items():
@@ -94,7 +94,7 @@ def as_published() -> list[tuple[object, ...]]:
 
 
 def alone(names: Sequence[str]) -> list[tuple[object, ...]]:
-    """Of rings, the point that stands farthest off the plane of the seven others: by how much, and how far these do, mm."""
+    """Return for each ring the greatest distance of a point from the plane of the other seven, and theirs, mm."""
     rows: list[tuple[object, ...]] = []
     for name, points in surveyed().items():
         if name not in names:

@@ -59,7 +59,7 @@ def truth_of(path: Path) -> tuple[Simulation, list[dict[str, float]]]:
 
 
 def row(name: str, off: Float, se: Float, factor: float) -> tuple[object, ...]:
-    """Of differences (n,) and standard errors: what half and 95 % are below, the greatest, and the share within 1.96 errors."""
+    """Return median, 95 % quantile and maximum of differences (n,), and the share within 1.96 standard errors."""
     size = factor * np.abs(off)
     held = 100.0 * float(np.mean(np.abs(off) <= 1.96 * se))
     ratio = float(np.sqrt(np.mean((off / se) ** 2)))

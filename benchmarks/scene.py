@@ -71,7 +71,7 @@ class Scene:
 
     @cached_property
     def truth(self) -> dict[str, NDArray[Any]]:
-        """Of each point, in file order: chainage, arc, offset, class, leak."""
+        """Return chainage, arc, offset, class and leak of each point, in file order."""
         with np.load(self.file("truth.npz")) as arrays:
             return {name: arrays[name] for name in arrays.files}
 
@@ -83,6 +83,6 @@ class Scene:
 
     @cached_property
     def parameters(self) -> dict[str, Any]:
-        """What the tunnel was made with."""
+        """Return the parameters of the tunnel."""
         parameters: dict[str, Any] = json.loads(self.file("json").read_text())["parameters"]
         return parameters

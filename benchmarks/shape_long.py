@@ -53,7 +53,7 @@ def fill(dsn: str, folder: Path, kilometres: int, density: int) -> None:
 
 
 def verbs(gauge: Path, density: int) -> dict[str, tuple[object, ...]]:
-    """What is measured, in this order, and how it is called."""
+    """Return the measured commands with their arguments, in order."""
     found = {"rings found": ("rings", NEW, "--find", "--diameter", 8)} if density >= 1000 else {}
     return {
         "rings by length": ("rings", OLD, "--length", 1.5, "--diameter", 8),

@@ -119,7 +119,7 @@ def scene(number: int) -> Parameters:
 
 
 def eyes_of(simulation: Simulation, time_: Float, scan: NDArray[Any]) -> Float:
-    """Where the scanner stood for each point (n, 3), m."""
+    """Return the scanner position of each point (n, 3), m."""
     scanner = simulation.scanner
     if simulation.parameters.scanner == "static":
         return np.asarray(scanner.stations()[scan.astype(int) - 1])

@@ -105,7 +105,7 @@ class Samples:
                 self.rows.append((time.time(), own, self._server.seconds()))
 
     def between(self, begin: float, end: float) -> Spent:
-        """What was spent between two times."""
+        """Return the resources used between two times."""
         at, client, server = np.array(self.rows).T
         at_ends = [np.interp([begin, end], at, np.maximum.accumulate(values)) for values in (client, server)]
         of_client, of_server = (float(values[1] - values[0]) for values in at_ends)
@@ -143,7 +143,7 @@ def _of_children() -> float:
 
 
 def timed(server: Server, work: Callable[[], object]) -> Spent:
-    """What something takes that is done in this process."""
+    """Measure the time of work in this process."""
     servers, own, clock = server.seconds(), time.process_time(), time.perf_counter()
     work()
     return Spent(time.process_time() - own, server.seconds() - servers, time.perf_counter() - clock)
@@ -198,7 +198,7 @@ def once(server: Server, dsn: str, scene: Scene, survey: str, density: str) -> d
 
 
 def medians(runs: Sequence[dict[str, Spent]]) -> dict[str, Spent]:
-    """Of each part the median of client, server and clock."""
+    """Return the medians of client, server and clock times of each part."""
     return {part: Spent(*(median(run[part][i] for run in runs) for i in range(3))) for part in runs[0]}
 
 

@@ -96,11 +96,11 @@ class Installation:
         return found
 
     def compiled(self) -> int:
-        """How many compilations lie in the folder for compiled code: one for each function and types of arguments."""
+        """Return the number of compilations in the folder of compiled code: one per function and types of arguments."""
         return sum(1 for _ in self.cache.rglob("*.nbc"))
 
     def loops(self) -> dict[str, int]:
-        """How many compiled functions the package has, and how many of them are parallel."""
+        """Return the numbers of compiled functions in the package, and of parallel ones."""
         python, folder = self._command[0], None
         if self._other:
             python, folder = str(Path(python).parent / "python"), self.folder

@@ -34,11 +34,11 @@ inner_sums = njit(
 
 
 @inner
-def lower_bound(values: Int64, wanted: int, begin: int, end: int) -> int:  # pragma: no cover - compiled
-    """Return the index of the first of ascending values not less than ``wanted``, from ``begin`` on; ``end`` if none."""
+def lower_bound(values: Int64, value: int, begin: int, end: int) -> int:  # pragma: no cover - compiled
+    """Return the index of the first of ascending values not less than ``value``, from ``begin`` on; ``end`` if none."""
     while begin < end:
         middle = (begin + end) >> 1
-        if values[middle] < wanted:
+        if values[middle] < value:
             begin = middle + 1
         else:
             end = middle

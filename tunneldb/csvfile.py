@@ -225,9 +225,9 @@ def _indices(
 ) -> dict[str, int]:
     missing = [name for name in names if name not in header and name not in default]
     if missing:
-        said = ["separate columns by commas, semicolons, tabs or spaces"] if len(header) == 1 else []
-        said += [hint[name] for name in missing if name in hint]
-        raise InputError("; ".join([f"{path} has no column {', '.join(missing)}: the header is {','.join(header)!r}", *said]))
+        advice = ["separate columns by commas, semicolons, tabs or spaces"] if len(header) == 1 else []
+        advice += [hint[name] for name in missing if name in hint]
+        raise InputError("; ".join([f"{path} has no column {', '.join(missing)}: the header is {','.join(header)!r}", *advice]))
     repeated = [name for name in names if header.count(name) > 1]
     if repeated:
         raise InputError(f"{path} has the column {repeated[0]} twice")

@@ -31,7 +31,7 @@ def require_regular(path: Path) -> None:
         raise UserError(f"{path.name[:40]}{'…' if len(path.name) > 40 else ''}: {error.strerror}") from None
     if there and not path.is_file() and not path.is_dir():
         kinds = {"a pipe": path.is_fifo(), "a socket": path.is_socket()}
-        kind = next((name for name, held in kinds.items() if held), "a device")
+        kind = next((name for name, matches in kinds.items() if matches), "a device")
         raise UserError(f"{path} is {kind}, not a file")
 
 

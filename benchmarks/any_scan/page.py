@@ -8,7 +8,8 @@ HEAD = """# Typical real scans
 
 <!-- Written by python -m benchmarks.any_scan --table; edit benchmarks/any_scan/page.py, not this page. -->
 
-How tunneldb handles typical defects of real scans: {count} small scans of a generator with its own reflection law, noise and shapes.
+How tunneldb handles typical defects of real scans: {count} small scans of a generator with its own reflection law,
+noise and shapes.
 Each passed through `tunnel add`, `survey add`, `load`, `run`, `leaks` and `report`, and was compared with an outcome specified
 beforehand. {right} of {count} are right.
 
@@ -24,7 +25,8 @@ python -m benchmarks.any_scan --table docs/real-scans.md    # this page
 | warning | likewise, as far as the scan permits, and a line names the problem |
 | refusal | exit code 2, one line names the problem, nothing is half-written |
 
-Always wrong: no statement of lining that was not inspected, a traceback, different counts in `leaks` and report. A leak is found if at
+Always wrong: no statement of lining that was not inspected, a traceback,
+different counts in `leaks` and report. A leak is found if at
 least 30 % of it is covered. If several outcomes are listed, any of them is right.
 
 | scene | defect or property | expected | actual | found of all leaks | false | right |

@@ -429,7 +429,7 @@ def across_kilometres(how: str) -> Callable[[Path], Plan]:
 
 
 def bad_batch(folder: Path) -> Plan:
-    """Of three files one is cut off."""
+    """Make a batch of three files, one of them truncated."""
     cloud = static(TUBE)
     s = TUBE.unplace(cloud.xyz)[0]
     for number in range(3):

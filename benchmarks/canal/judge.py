@@ -124,7 +124,7 @@ def _classes(case: Case, pose: SonarPose, true: SonarScan) -> tuple[dict[str, An
 
 
 def _surfaces(case: Case, points: Float) -> dict[str, Any]:
-    """How far bed and wall lie from the truth, by cells over the points of all scans."""
+    """Return the distance of bed and wall from the reference, by cells over the points of all scans."""
     scene = case.scene
     klass, kind, space = points[:, 5], points[:, 6], points[:, 2:5]
     wall = (klass == WaterClass.LINING) & (kind == WALL)

@@ -60,7 +60,7 @@ def block(seed: int) -> CanalParameters:
 
 
 def dense(seed: int) -> CanalParameters:
-    """As many points as the instrument gives in its finest step."""
+    """Return a scan with the instrument's finest step."""
     return replace(usual(seed), sonar_step=0.09)
 
 
@@ -132,5 +132,5 @@ def check_points(scan: SonarScan) -> Float:
 
 
 def true_places(scan: SonarScan, points: Float) -> Float:
-    """Where points (n, 3) of a scan's file lie, by the truth."""
+    """Return the true places of points (n, 3) of a scan's file."""
     return np.asarray(scan.scale * points @ scan.rotation.T + scan.translation)

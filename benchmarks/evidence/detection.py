@@ -59,6 +59,6 @@ def detect(picture: LiningImage, truth: Outcome) -> tuple[Outcome, dict[int, Cov
 
 
 def _whole(found: Detection) -> list[Anomaly]:
-    """What was found, with what reaches an end of the kilometre: there is no other beyond."""
+    """Return all detected regions, including those at an end of the only kilometre."""
     cut = [judge_region(region, LEAST) for region in found.cut]
     return [*found.anomalies, *(anomaly for anomaly in cut if anomaly is not None)]

@@ -95,7 +95,7 @@ def loss(probabilities: Array, leak: NDArray[np.bool_], weights: Array) -> float
 
 
 def temperature(probabilities: Array, leak: NDArray[np.bool_], weights: Array) -> float:
-    """What the logarithm of odds must be divided by so that probabilities on tunnels left out are true (Guo et al., 2017)."""
+    """Return the divisor of log odds for calibrated probabilities on left-out tunnels (Guo et al., 2017)."""
     p = np.clip(probabilities, 1e-9, 1.0 - 1e-9)
     odds = np.log(p / (1.0 - p))
     found = minimize_scalar(lambda t: loss(1.0 / (1.0 + np.exp(-odds / t)), leak, weights), bounds=(0.5, 5.0), method="bounded")

@@ -54,7 +54,7 @@ class Painting:
         return float(np.exp(self.rng.uniform(np.log(low), np.log(high))))
 
     def cover(self, shape: Polygon, soft: float = 0.008) -> Array:
-        """How much of each pixel a shape covers, its rim blurred by a standard deviation, m."""
+        """Return the share of each pixel covered by a shape, its edge blurred by a standard deviation, m."""
         held = shapely.contains_xy(shape, *np.broadcast_arrays(self.x, self.y)).astype(float)
         return ndimage.gaussian_filter(held, max(soft, 0.004) / PIXEL)
 
@@ -198,7 +198,7 @@ def shadow(art: Painting, s: float, a: float) -> None:
 
 
 def between(art: Painting, s: float, a: float) -> None:
-    """What shows between appendages and ends nowhere on dry lining."""
+    """Paint lining that is visible between appendages and has no boundary on dry lining."""
     half, long, frame = art.log(0.05, 0.4), art.log(0.15, 1.2), art.uniform(0.06, 0.2)
     shown = box(s - long, a - half, s + long, a + half)
     art.state[(art.cover(shown.buffer(frame, join_style="mitre")) > 0.5) & (art.cover(shown) < 0.5)] = PixelState.OFF

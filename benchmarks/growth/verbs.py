@@ -38,7 +38,7 @@ class Run:
 
     @property
     def total(self) -> float:
-        """Of both, s."""
+        """Total of both, s."""
         return self.program + self.backends
 
 

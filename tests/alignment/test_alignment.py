@@ -42,7 +42,7 @@ def test_a_clothoid_is_fresnels(length: float, radius: float) -> None:
 
 
 def test_a_clothoid_between_arcs_is_a_piece_of_one() -> None:
-    """From R 140 to R 160, as in the Japanese sample: the piece of a clothoid of A 200 between these radii, run backwards."""
+    """R 140 to R 160, as in the Japanese sample: the piece of a clothoid of A 200 between these radii, reversed."""
     whole = PlanElement("clothoid", 200**2 / 140, 0.0, 0.0, 0.0, 0.0, -1 / 140)
     far, near = 200**2 / 140, 200**2 / 160
     piece, excess = clothoid_from_chord((0.0, 0.0), (1.0, 0.0), far - near, 1 / 140, 1 / 160)

@@ -34,7 +34,7 @@ def inside(p: Float, low: tuple[float, ...], high: tuple[float, ...]) -> Bool:
 
 
 def bent(p: Float, radius: float, slope: float) -> Float:
-    """From (along, right, up) to the map: along an arc that bends right (inf: straight), from north-east on, with a slope."""
+    """Transform (along, right, up) to the map: along an arc that bends right (inf: straight), from north-east, with a slope."""
     s, u, w = p.T
     turn = 0.9 + (s / radius)
     centre = np.array([np.sin(0.9), -np.cos(0.9)])  # to the right
@@ -185,14 +185,14 @@ def test_what_is_not_along_the_line_is_said() -> None:
     """A passage of 18 m by 3.5 m beside a tunnel of 120 m by 8 m, and a second piece of the tunnel beyond a gap of 40 m."""
     rng = np.random.default_rng(5)
     passed = find_axis(bent(with_passage(tunnel(5.0, rng), 5.0, rng), np.inf, 0.0))
-    assert 0.01 < passed.aside < 63.0 / (120.0 * 8.0)
-    assert passed.aside_at is not None
+    assert 0.01 < passed.off_line_share < 63.0 / (120.0 * 8.0)
+    assert passed.off_line_centre is not None
     middle = bent(np.array([[51.75, 15.0, 0.0]]), np.inf, 0.0)[0, :2]
-    assert np.hypot(*(passed.aside_at - middle)) < 4.0
+    assert np.hypot(*(passed.off_line_centre - middle)) < 4.0
     piece = box((160.0, -4.0, -3.0), (180.0, 4.0, 3.0), 5.0, rng)
     parted = find_axis(bent(np.vstack([tunnel(5.0, rng), piece]), np.inf, 0.0))
-    assert parted.aside == pytest.approx(20.0 / 140.0, abs=0.03)
-    assert find_axis(bent(tunnel(5.0, rng), np.inf, 0.0)).aside == 0.0
+    assert parted.off_line_share == pytest.approx(20.0 / 140.0, abs=0.03)
+    assert find_axis(bent(tunnel(5.0, rng), np.inf, 0.0)).off_line_share == 0.0
 
 
 def test_a_drawn_line_keeps_its_course_beyond_the_tunnel() -> None:

@@ -263,7 +263,7 @@ def test_operator_leaves_the_functions_alone(person: psycopg.Connection) -> None
 
 @pytest.mark.parametrize("person", ["otto"], indirect=True)
 def test_operator_forges_no_entry_of_the_audit(person: psycopg.Connection, conn: psycopg.Connection) -> None:
-    """By a view of his own that says what was before and after, with the trigger that notes it; nor by the function itself."""
+    """Neither a view of his own with old and new values and the audit trigger, nor the function itself, forges an entry."""
     install(conn, STAGES)  # once more, over what was granted before
     conn.commit()
     person.execute("CREATE TEMP VIEW mine AS SELECT * FROM tunnel_api.leak")

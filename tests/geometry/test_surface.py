@@ -226,7 +226,7 @@ def test_tangents_are_exact_on_a_circle() -> None:
 @given(low=st.floats(-3.9, 3.9))
 @settings(max_examples=20, deadline=None)
 def test_the_waterline_is_where_a_circle_meets_the_water(low: float) -> None:
-    """In a level straight tunnel the water a metres over the axis meets a circle at the angle whose cosine is a / radius."""
+    """Water a metres above the axis of a level straight tunnel meets a circle at the angle with cosine a / radius."""
     surface = circular_surface(Helix(1e7, 0.0), 60.0)
     left, right = surface.waterline(np.array([12.0, 31.7, 200.0]), ORIGIN[2] + low)
     arc = TUNNEL_RADIUS * np.arccos(low / TUNNEL_RADIUS)

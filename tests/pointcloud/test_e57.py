@@ -159,7 +159,7 @@ def test_times_count_from_the_scan_s_start(tmp_path: Path) -> None:
 
 
 def test_fields_of_extensions_are_dimensions(tmp_path: Path) -> None:
-    """As RIEGL writes reflectance, in dB, beside an intensity without a unit; where one scan lacks it, it is none."""
+    """RIEGL writes reflectance in dB beside an intensity without a unit; if one scan lacks it, it is not a dimension."""
     fields = cloud() | {"rlms:reflectance": np.random.default_rng(5).uniform(-25.0, 5.0, 1000)}
     path = e57.write(tmp_path / "a.e57", [e57.Scan(fields, STATION)])
     assert read_header(path).dimensions == ("intensity", "rlms:reflectance")

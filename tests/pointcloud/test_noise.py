@@ -71,7 +71,7 @@ def test_only_judged_points_are_noise_but_all_are_neighbours() -> None:
 
 @pytest.mark.parametrize("judged", [1, 40, 4000])
 def test_few_are_judged_as_all_are(judged: int) -> None:
-    """What is left out of a cloud because it is far from the few that are judged is no neighbour of theirs."""
+    """Points left out because they are far from the few points to classify are not neighbours of these."""
     rng = np.random.default_rng(2)
     cloud = ORIGIN + rng.uniform(-2, 2, (20_000, 3)) * [1, 1, 0.1]
     radius = rng.uniform(0.02, 0.15, len(cloud))

@@ -291,7 +291,7 @@ NUMBERS = ["u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4", "f8"]
 @pytest.mark.parametrize("suffix", ["las", "laz"])
 @pytest.mark.parametrize("kind", NUMBERS)
 def test_extra_bytes_of_any_number_type_with_scale_and_offset(tmp_path: Path, kind: str, suffix: str) -> None:
-    """As RIEGL writes them: Amplitude plain or scaled by 0.01, Reflectance signed, beside other dimensions."""
+    """RIEGL's formats: Amplitude plain or scaled by 0.01, Reflectance signed, beside other dimensions."""
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.add_extra_dims([
         laspy.ExtraBytesParams("Deviation", "u2"),

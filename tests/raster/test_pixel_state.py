@@ -246,16 +246,16 @@ def test_what_does_not_go_all_round_is_no_step():
 def test_rock_that_differs_from_section_to_section_is_lining():
     rng = np.random.default_rng(1)
     radius = 4.0 + np.repeat(rng.normal(0, 0.1, (12, 73)), 5, axis=1)[:, :361]
-    assert (SectionOutliers.of(straight(radius), MAX_GIRTH_SHARE).apart != 0).mean() < 0.03
+    assert (SectionOutliers.of(straight(radius), MAX_GIRTH_SHARE).deviation != 0).mean() < 0.03
 
 
 def test_a_wider_stretch_is_no_niche():
     radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
     radius[6:] += 0.5
-    assert not SectionOutliers.of(straight(radius), MAX_GIRTH_SHARE).apart.any()
+    assert not SectionOutliers.of(straight(radius), MAX_GIRTH_SHARE).deviation.any()
     radius = np.tile(box(3.0, 2.5, 2.5), (12, 1))
     radius[6] += 0.5
-    assert not SectionOutliers.of(straight(radius), MAX_GIRTH_SHARE).apart.any()
+    assert not SectionOutliers.of(straight(radius), MAX_GIRTH_SHARE).deviation.any()
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ def bed(seed: int) -> np.ndarray:
 
 
 def seen_from(field: np.ndarray, x: float, up: float, *, turned: bool, seed: int) -> LevelScan:
-    """What a level scanner at x, ``up`` over the bed and 0.5 m right of the middle, sees of it."""
+    """Return the scan of a level scanner at x, ``up`` over the bed and 0.5 m right of the middle."""
     rng = np.random.default_rng(seed)
     place = np.column_stack([rng.uniform(x - 10.0, x + 10.0, 60_000), rng.uniform(-WIDTH / 2.0, WIDTH / 2.0, 60_000)])
     cell = np.floor((place + np.array([0.0, WIDTH / 2.0])) / 0.05).astype(int)

@@ -152,7 +152,7 @@ def test_no_wall_at_the_water_is_said_so(scene: Scene) -> None:
 
 
 def test_a_ladder_with_other_gaps_is_fitted_to_its_own(scene: Scene) -> None:
-    """Of two ladders that differ in their gaps alone, each is found where its own rungs are."""
+    """Two ladders that differ only in their gaps are each found at their own rungs."""
     local = scene.laser - ORIGIN
     walls = find_walls(local[::3])
     ladders = scene.canal.measured()

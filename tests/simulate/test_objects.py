@@ -42,7 +42,7 @@ GRAZING = 0.087
 
 
 def sight(simulation: Simulation, cloud: Cloud) -> np.ndarray:
-    """Where the scanner was at each point."""
+    """Return the scanner position at each point."""
     if simulation.parameters.scanner == "static":
         return simulation.scanner.stations()[cloud.scan_id - 1]
     s = simulation.tunnel.line.start + (cloud.time - 300_000.0) * simulation.parameters.speed

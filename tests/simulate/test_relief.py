@@ -28,7 +28,7 @@ def scan(**values: Any) -> tuple[Simulation, Cloud]:
 
 
 def observers(simulation: Simulation, cloud: Cloud) -> np.ndarray:
-    """Where the trolley's scanner was at each point."""
+    """Return the position of the trolley's scanner at each point."""
     trajectory = simulation.scanner.trajectory()
     return np.column_stack([np.interp(cloud.time, trajectory[:, 0], c) for c in trajectory[:, 1:].T])
 
@@ -96,7 +96,7 @@ def test_the_section_is_wider_over_the_second_half_and_the_floor_goes_on() -> No
 
 
 def test_truth_lies_on_the_section_as_built() -> None:
-    """Where a round section is wider, arcs are longer as the radii are."""
+    """Arcs of a wider round section are longer in proportion to the radii."""
     simulation = Simulation(Parameters(**{**BARE, "radius_step": 0.08, "section": "circular"}))
     lay = as_built(simulation)
     radius, middle = 4.0, 0.5 * (simulation.tunnel.line.start + simulation.tunnel.line.end)

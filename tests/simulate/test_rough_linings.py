@@ -13,7 +13,7 @@ pytestmark = pytest.mark.slow
 
 
 def bond(simulation: Simulation, s: np.ndarray, arc: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of a running bond: number in the course, course, distance to the middle of the nearest joint."""
+    """Return position in a running bond: number in the course, course, distance to the middle of the nearest joint."""
     m = simulation.masonry
     course = np.floor(arc / m.height)
     along = s / m.length + 0.5 * np.mod(course, 2.0)

@@ -55,7 +55,7 @@ class TrueLadder:
             yield self.origin + np.array([*one, 0.0]) @ self.axes, self.origin + np.array([*other, 0.0]) @ self.axes
 
     def towards(self, station: Float, rays: Float) -> Int64:
-        """Which rays, unit vectors (n, 3), pass through a ball about all bars: the others meet none."""
+        """Return rays, unit vectors (n, 3), that pass through a ball around all bars; the others miss them."""
         ends = np.array(list(self.bars())).reshape(-1, 3)
         away = ends.mean(axis=0) - station
         radius = np.linalg.norm(ends - ends.mean(axis=0), axis=1).max() + DIAMETER
@@ -111,7 +111,7 @@ class Canal:
         return [ladder.measured() for ladder in self.ladders]
 
     def near(self, ladder: TrueLadder, points: Float, aside: float, before: float) -> Bool:
-        """Which points (n, 3), tunnel frame, lie about a ladder: ``aside`` m of its middle and ``before`` m of its plane."""
+        """Return True for points (n, 3), tunnel frame, within ``aside`` m of a ladder's middle, ``before`` m of its plane."""
         own = ((points - ORIGIN) @ self.turn - ladder.origin) @ ladder.axes.T
         return np.asarray((np.abs(own[:, 0]) < aside) & (np.abs(own[:, 2]) < before))
 

@@ -33,7 +33,7 @@ def beside(surface: Surface, chainage: float, across: np.ndarray, height: float)
 
 
 def relief(chainage: np.ndarray, arc: np.ndarray) -> np.ndarray:
-    """How far the lining stands off the surface of the sections, m."""
+    """Return the offset of the lining from the surface of the sections, m."""
     return np.asarray(0.03 * np.sin(arc) * np.cos(chainage / 15))
 
 

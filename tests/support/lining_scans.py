@@ -35,7 +35,7 @@ def scan(**values: Any) -> tuple[Simulation, np.ndarray, np.ndarray]:
 
 
 def inside(outline: shapely.Geometry, points: np.ndarray) -> np.ndarray:
-    """Which points (n, 2) lie in an outline."""
+    """Return True for points (n, 2) in an outline."""
     left, low, right, high = outline.bounds
     within = (points[:, 0] >= left) & (points[:, 0] <= right) & (points[:, 1] >= low) & (points[:, 1] <= high)
     shapely.prepare(outline)

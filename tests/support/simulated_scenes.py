@@ -61,6 +61,6 @@ def exact(simulation: Simulation) -> tuple[Surface, PlanLine]:
 
 
 def share(truth: NDArray[np.uint8], found: NDArray[np.uint8], klass: int) -> tuple[float, float]:
-    """Of the points of a class, how many are found; of those found, how many are its own."""
+    """Return the share of a class's points that are found, and the share of found points that belong to it."""
     both = ((truth == klass) & (found == klass)).sum()
     return float(both / max((truth == klass).sum(), 1)), float(both / max((found == klass).sum(), 1))

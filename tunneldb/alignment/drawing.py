@@ -102,8 +102,8 @@ def open_drawing(path: Path) -> Any:
     try:
         return filemanagement.readfile(str(path))
     except Exception as error:  # for damaged files ezdxf raises StopIteration, OverflowError and others
-        said = str(error).strip().splitlines() or [f"it is damaged ({type(error).__name__})"]
-        raise InputError(f"{path} cannot be read as DXF: {said[0]}") from None
+        message = str(error).strip().splitlines() or [f"it is damaged ({type(error).__name__})"]
+        raise InputError(f"{path} cannot be read as DXF: {message[0]}") from None
 
 
 def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
@@ -153,14 +153,14 @@ def choose_layer(path: Path, names: list[str], wanted: str | None, others: list[
     listed = ", ".join(repr(name) for name in names)
     if wanted is not None:
         if wanted not in names:
-            there = (
+            available = (
                 f"it has {listed}" if names else f"there are none; its layers: {', '.join(map(repr, others or [])) or 'none'}"
             )
-            raise InputError(f"{path} has no layer {wanted!r} of lines; {there}")
+            raise InputError(f"{path} has no layer {wanted!r} of lines; {available}")
         return wanted
     if not names:
-        held = f"; its layers: {', '.join(map(repr, others))}" if others else ""
-        raise InputError(f"{path} holds no lines{held}; draw the axis as a line")
+        other_layers = f"; its layers: {', '.join(map(repr, others))}" if others else ""
+        raise InputError(f"{path} holds no lines{other_layers}; draw the axis as a line")
     if len(names) > 1:
         raise InputError(f"{path} holds {len(names)} layers of lines: {listed}; choose one by --axis-layer NAME")
     return names[0]
@@ -182,15 +182,15 @@ def _check_crs(path: Path, stated: str | None, srid: int | None) -> tuple[str, .
         return () if srid == LOCAL else (f"states no coordinate system; using the tunnel's, EPSG:{srid}",)
     try:
         own = CRS.from_user_input(stated)
-        fits, wanted = fits_srid(own, srid), describe_srid(srid)
+        fits, tunnel_crs = fits_srid(own, srid), describe_srid(srid)
     except CRSError as error:
         raise InputError(f"{path}: SRID {srid} or the file's coordinate system is unknown: {error}") from None
     if not fits:
-        there = "in the scan's own coordinates" if srid == LOCAL else f"in EPSG:{srid}"
-        mend = "--srid local" if is_local(own) else "the line's SRID"
+        target = "in the scan's own coordinates" if srid == LOCAL else f"in EPSG:{srid}"
+        srid_option = "--srid local" if is_local(own) else "the line's SRID"
         raise InputError(
-            f"{path}: its coordinate system is {describe_crs(own)}, the tunnel's is {wanted}; save the line {there} (in QGIS: "
-            f"Export, Save Features As), or add the tunnel with {mend}"
+            f"{path}: its coordinate system is {describe_crs(own)}, the tunnel's is {tunnel_crs}; save the line {target} (in "
+            f"QGIS: Export, Save Features As), or add the tunnel with {srid_option}"
         )
     return ()
 
@@ -200,8 +200,8 @@ def _dxf_unit(path: Path, code: int, unit: float | None) -> tuple[float, str]:
     from ezdxf import units
 
     if unit is not None:
-        says = f"; the file states {units.decode(code)}" if code else ""
-        return unit, f"unit: {unit:.9g} m, as given{says}"
+        stated = f"; the file states {units.decode(code)}" if code else ""
+        return unit, f"unit: {unit:.9g} m, as given{stated}"
     if code == units.M:
         return 1.0, ""
     if code == 0:

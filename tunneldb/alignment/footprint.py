@@ -135,15 +135,15 @@ def _roofed(points: Float, edge: float) -> Int64:
     key = _key(np.floor(points[:, :2] / edge).astype(np.int64))
     order = np.lexsort((points[:, 2], key))
     key, z = key[order], points[order, 2]
-    held, first, count = np.unique(key, return_index=True, return_counts=True)
+    occupied, first, count = np.unique(key, return_index=True, return_counts=True)
     empty = np.append(np.diff(z), 0.0)
     empty[first + count - 1] = 0.0
     roof = np.maximum.reduceat(empty, first) >= CLEARANCE
     upright = z[first + count - 1] - z[first] >= CLEARANCE
-    beside = np.zeros(len(held), dtype=bool)
+    is_wall = np.zeros(len(occupied), dtype=bool)
     for step in _steps(1):
-        beside |= np.isin(held, _key(_cell(held[roof]) + step))
-    return _cell(held[roof | (upright & beside)])
+        is_wall |= np.isin(occupied, _key(_cell(occupied[roof]) + step))
+    return _cell(occupied[roof | (upright & is_wall)])
 
 
 def _filled(cell: Int64) -> Int64:

@@ -67,9 +67,9 @@ class FoundAxis:
         Median size of the tunnel, m.
     points : (n, 3) float array
         Points from which it was found, m.
-    aside : float
+    off_line_share : float
         Share of the roofed area that is farther from the line or its ends than the tunnel's width.
-    aside_at : (2,) float array or None
+    off_line_centre : (2,) float array or None
         Centre of the largest piece of that area, m.
     """
 
@@ -80,8 +80,8 @@ class FoundAxis:
     width: float
     height: float
     points: Float
-    aside: float = 0.0
-    aside_at: Float | None = None
+    off_line_share: float = 0.0
+    off_line_centre: Float | None = None
 
     @property
     def length(self) -> float:
@@ -117,8 +117,8 @@ def without_haze(points: Float, counts: Int64) -> Float:
     """
     block = np.unique(np.floor(points / _BLOCK).astype(np.int64), axis=0, return_inverse=True)[1].ravel()
     order = np.lexsort((counts, block))
-    first, held = np.unique(block[order], return_index=True, return_counts=True)[1:]
-    dense = counts[order][first + np.floor(0.9 * (held - 1)).astype(np.int64)]
+    first, sizes = np.unique(block[order], return_index=True, return_counts=True)[1:]
+    dense = counts[order][first + np.floor(0.9 * (sizes - 1)).astype(np.int64)]
     return points[counts >= _MIN_POINT_SHARE * dense[block]]
 
 
@@ -196,7 +196,11 @@ def _with_the_rest(found: FoundAxis, cells: Float, edge: float) -> FoundAxis:
     """Return the axis with the share of the roofed area, in cells (n, 2) of the plan, that is away from the line."""
     along = _at_even_distances(found.xyz[:, :2], edge)
     rest = cells[cKDTree(along).query(cells)[0] > max(found.width, STEP)]
-    return replace(found, aside=len(rest) / len(cells), aside_at=largest_group(rest, edge).mean(axis=0) if len(rest) else None)
+    return replace(
+        found,
+        off_line_share=len(rest) / len(cells),
+        off_line_centre=largest_group(rest, edge).mean(axis=0) if len(rest) else None,
+    )
 
 
 def _crossed(parts: list[Footprint], way: Float) -> list[Footprint]:
@@ -335,8 +339,8 @@ def _without_stray(points: Float) -> Float:
 
 
 def _moved(found: FoundAxis, by: Float) -> FoundAxis:
-    aside = None if found.aside_at is None else found.aside_at + by[:2]
-    return replace(found, xyz=found.xyz + by, points=found.points + by, aside_at=aside)
+    centre = None if found.off_line_centre is None else found.off_line_centre + by[:2]
+    return replace(found, xyz=found.xyz + by, points=found.points + by, off_line_centre=centre)
 
 
 def _place(plan: Float) -> str:

@@ -138,8 +138,8 @@ class Ifc:
             raise InputError(f"{self._path}: the placement of alignment {alignment.Name!r} is tilted, so it has no plan")
         unit = self._map_unit()
         corners = [matrix @ (x, 0.0, 0.0, 1.0) for x in (0.0, ARM / self._unit)]
-        origin, aside = (np.array(auto_xyz2enh(self._file, *corner[:3]), dtype=np.float64) * unit for corner in corners)
-        step = (aside - origin) / ARM
+        origin, beside_origin = (np.array(auto_xyz2enh(self._file, *corner[:3]), dtype=np.float64) * unit for corner in corners)
+        step = (beside_origin - origin) / ARM
         scale = float(np.hypot(step[0], step[1]))
         if abs(scale - 1.0) > MAX_SCALE_ERROR:
             raise InputError(

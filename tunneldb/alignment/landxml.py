@@ -51,7 +51,7 @@ class LandXml:
         if name is None:
             raise InputError(f"{path} states no unit of lengths (linearUnit of Units); give it by --axis-unit meter, foot, ...")
         self._unit = UNITS[name]
-        self._told = "" if unit is None or unit == stated else f", as given; the file states {stated or 'none'}"
+        self._unit_note = "" if unit is None or unit == stated else f", as given; the file states {stated or 'none'}"
         self._points = {
             point.get("name"): point.text for point in root.iter() if _tag(point) == "CgPoint" and point.get("name")
         }
@@ -73,8 +73,8 @@ class LandXml:
             raise InputError(f"{self._path}: the plan of alignment {self.names[number]!r} (CoordGeom) has no length")
         pvis = list(self._pvis(self._profiles(alignment)[profile], start))
         notes = []
-        if self._unit != 1.0 or self._told:
-            notes.append(f"lengths are converted to metres: 1 unit is {self._unit:.9g} m{self._told}")
+        if self._unit != 1.0 or self._unit_note:
+            notes.append(f"lengths are converted to metres: 1 unit is {self._unit:.9g} m{self._unit_note}")
         if self._epsg:
             notes.append(f"the file states its coordinate system as EPSG:{self._epsg}")
         return Design(

@@ -110,14 +110,14 @@ def section_centres(placed: Placed, count: int, half_width: float) -> Centres:
     cosine = np.cos(np.radians(angle))
     side = (angle > 45) & (angle < 135)
     a, b = radius[:, side], radius[:, ::-1][:, side]
-    shift, apart = (a - b) / 2.0, (a + b) * np.sin(np.radians(angle[side]))
-    usual = _usual(apart)
+    shift, widths = (a - b) / 2.0, (a + b) * np.sin(np.radians(angle[side]))
+    usual = _usual(widths)
     upright = usual >= _MIN_WIDTH_SHARE * np.nanmax(usual, initial=0.0)  # not vault and floor of a low, wide tunnel
-    free = (np.abs(apart / usual - 1.0) <= _MAX_WIDTH_DEVIATION) & upright
-    right, width = (_median(np.where(free, values, np.nan), fewest=1) for values in (shift, apart))
-    right, width = np.where(np.isfinite(right), (right, width), (_median(shift[:, upright]), _median(apart[:, upright])))
+    free = (np.abs(widths / usual - 1.0) <= _MAX_WIDTH_DEVIATION) & upright
+    right, width = (_median(np.where(free, values, np.nan), fewest=1) for values in (shift, widths))
+    right, width = np.where(np.isfinite(right), (right, width), (_median(shift[:, upright]), _median(widths[:, upright])))
     # a roof on posts has no walls at mid-height
-    walls = np.isfinite(apart[:, np.abs(angle[side] - 90.0) < _WALL]).sum(axis=1) >= _MIN_CLASSES
+    walls = np.isfinite(widths[:, np.abs(angle[side] - 90.0) < _WALL]).sum(axis=1) >= _MIN_CLASSES
     right, width = np.where(walls, (right, width), np.nan)
     floor, vault = np.abs(angle) > 135, np.abs(angle) < 45
     depth = _median(-radius[:, floor] * cosine[floor])
@@ -139,8 +139,8 @@ def vault_gap(placed: Placed, distance: Float) -> float:
     """
     overhead = placed.at((placed.station >= 0) & _overhead(placed))
     gaps = np.diff(np.sort(distance[overhead.station] + overhead.along))
-    apart = gaps[gaps > _MIN_PROFILE_GAP]
-    return 1.5 * max(float(np.quantile(apart, 0.9)) if len(apart) else 0.0, _MIN_GAP)
+    profile_gaps = gaps[gaps > _MIN_PROFILE_GAP]
+    return 1.5 * max(float(np.quantile(profile_gaps, 0.9)) if len(profile_gaps) else 0.0, _MIN_GAP)
 
 
 def roof_ends(placed: Placed, station: int, way: float, gap: float) -> float:
@@ -166,22 +166,22 @@ def _radii(placed: Placed, count: int) -> Float:
     away = np.hypot(placed.right, placed.up)
     order = np.lexsort((away, key))
     key, away = key[order], away[order]
-    held, first, points = np.unique(key, return_index=True, return_counts=True)
+    occupied, first, points = np.unique(key, return_index=True, return_counts=True)
     out = np.full(count * _CLASSES, np.nan)
-    out[held] = away[first + np.floor(_LINING_QUANTILE * (points - 1)).astype(np.int64)]
+    out[occupied] = away[first + np.floor(_LINING_QUANTILE * (points - 1)).astype(np.int64)]
     return out.reshape(count, _CLASSES)
 
 
-def _usual(apart: Float) -> Float:
+def _usual(widths: Float) -> Float:
     """Return the distance between the walls at each height, (classes,), m, where nothing stands in front of them.
 
     A train may stand along most of a tunnel, but hides no wall up to the vault; with niches the distance is greater.
     """
-    known = np.isfinite(apart).any(axis=0)
-    out = np.full(apart.shape[1], np.nan)
+    known = np.isfinite(widths).any(axis=0)
+    out = np.full(widths.shape[1], np.nan)
     if known.any():
-        half, most = np.nanquantile(apart[:, known], (0.5, _FREE_QUANTILE), axis=0)
-        out[known] = np.minimum(most, (1.0 + _MAX_WIDTH_DEVIATION) * half.max())
+        half, upper = np.nanquantile(widths[:, known], (0.5, _FREE_QUANTILE), axis=0)
+        out[known] = np.minimum(upper, (1.0 + _MAX_WIDTH_DEVIATION) * half.max())
     return out
 
 

@@ -30,7 +30,9 @@ def _files(seen: Preview) -> list[RenderableType]:
             Text(number(file.points) if file.points else ""),
             Text(size(file.bytes)),
             Text(spans(_kilometres_of(file, seen))),
-            Text("can't be read, see below", "bold red") if file.error else Text("read already" if file.there else "", "green"),
+            Text("can't be read, see below", "bold red")
+            if file.error
+            else Text("read already" if file.already_read else "", "green"),
         ]
         for file in seen.plan.files
     ]
@@ -81,7 +83,7 @@ def _time(seen: Preview) -> list[RenderableType]:
     if seen.seconds is None:
         lines = [Text("time: unknown until a kilometre was done in this database")]
     else:
-        most = "about" if all(not file.there for file in seen.plan.files) and seen.plan.files else "at most"
+        most = "about" if all(not file.already_read for file in seen.plan.files) and seen.plan.files else "at most"
         lines = [Text(f"time: {most} {duration(seen.seconds)} with {workers}, by what was measured in this database")]
     said = [
         f"read {number(1.0 / speed.seconds)} points/s"

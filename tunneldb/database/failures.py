@@ -19,21 +19,21 @@ def describe_failure(error: Exception) -> str | None:
         Error of the database, the disk, or any other. If it is described, only its own transaction was rolled back, and
         no earlier one.
     """
-    said = first_line(error)
+    message = first_line(error)
     match error:
         case psycopg.errors.DiskFull():
-            return f"the database's disk is full, the current work was rolled back: {said}"
+            return f"the database's disk is full, the current work was rolled back: {message}"
         case psycopg.errors.OutOfMemory():
-            mend = "; raise the server's max_locks_per_transaction" if "shared memory" in str(error) else ""
-            return f"the database's memory is full, the current work was rolled back: {said}{mend}"
+            advice = "; raise the server's max_locks_per_transaction" if "shared memory" in str(error) else ""
+            return f"the database's memory is full, the current work was rolled back: {message}{advice}"
         case psycopg.errors.InsufficientPrivilege():
-            return f"the database refused: {said}; ask its owner for the role tunnel_operator"
+            return f"the database refused: {message}; ask its owner for the role tunnel_operator"
         case psycopg.errors.QueryCanceled() | psycopg.errors.LockNotAvailable():
-            return f"the database cancelled the current work, which was rolled back: {said}"
+            return f"the database cancelled the current work, which was rolled back: {message}"
         case psycopg.errors.DeadlockDetected() | psycopg.errors.SerializationFailure():
-            return f"another program was changing the same rows, the current work was rolled back: {said}; run it again"
+            return f"another program was changing the same rows, the current work was rolled back: {message}; run it again"
         case psycopg.OperationalError():
-            return f"the connection to the database broke, the current work was rolled back: {said}"
+            return f"the connection to the database broke, the current work was rolled back: {message}"
         case OSError() if error.errno in NO_ROOM:
             where = f"{error.filename}: " if error.filename else ""
             return f"{where}{error.strerror}; the current work was rolled back: free some space, and run it again"

@@ -105,8 +105,8 @@ def _postgis(connection: psycopg.Connection[Any]) -> CheckResult:
             "wrong", "PostGIS", "not in this database", "tunneldb init   -- or a superuser: CREATE EXTENSION postgis;"
         )
     if tuple(map(int, version.split(".")[:2])) < MINIMUM_POSTGIS:
-        least = ".".join(map(str, MINIMUM_POSTGIS))
-        return CheckResult("wrong", "PostGIS", f"{version}, older than {least}", "SELECT postgis_extensions_upgrade();")
+        minimum = ".".join(map(str, MINIMUM_POSTGIS))
+        return CheckResult("wrong", "PostGIS", f"{version}, older than {minimum}", "SELECT postgis_extensions_upgrade();")
     schema = postgis_schema(connection)
     if schema != "public":
         return CheckResult("wrong", "PostGIS", f"{version}, in schema {schema} instead of public", "use a database of its own")
@@ -138,8 +138,8 @@ def _api(connection: psycopg.Connection[Any]) -> CheckResult:
 
 
 def _roles(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
-    there = {row[0] for row in connection.execute("SELECT rolname FROM pg_roles WHERE rolname = ANY(%s)", [list(ROLES)])}
-    missing = [role for role in ROLES if role not in there]
+    existing = {row[0] for row in connection.execute("SELECT rolname FROM pg_roles WHERE rolname = ANY(%s)", [list(ROLES)])}
+    missing = [role for role in ROLES if role not in existing]
     if missing:
         mend = "; ".join(f"CREATE ROLE {role}" for role in missing)
         mend = f"tunneldb init   -- if you may not create roles, first a superuser: {mend};"
@@ -221,9 +221,9 @@ def _settings(connection: psycopg.Connection[Any], *, embedded: bool) -> Iterato
                        ('max_wal_size', '2GB')) wanted (name, least)
         """
     ).fetchall()
-    small = [(name, least) for name, size, wanted, least in rows if size < wanted]
-    for name, least in small:
-        mend = f"as a superuser: ALTER SYSTEM SET {name} = '{least}'; then restart the server"
+    small = [(name, minimum) for name, size, required, minimum in rows if size < required]
+    for name, minimum in small:
+        mend = f"as a superuser: ALTER SYSTEM SET {name} = '{minimum}'; then restart the server"
         yield CheckResult("note", "settings", f"{name} is small for scans", mend)
     if not small:
         yield CheckResult("ok", "settings", "memory and WAL are big enough")
@@ -245,16 +245,16 @@ def _locks(connection: psycopg.Connection[Any]) -> CheckResult:
         [LOCKS_PER_TABLE],
     ).fetchone()
     assert row is not None
-    there, places, dump, removal = row
-    wanted = max(dump, removal or 0)
-    text = f"{there} for {dump} tables, one a kilometre"
-    if wanted + places * LOCKS_OF_A_SESSION <= there:
+    available, places, dump, removal = row
+    needed = max(dump, removal or 0)
+    text = f"{available} for {dump} tables, one a kilometre"
+    if needed + places * LOCKS_OF_A_SESSION <= available:
         return CheckResult("ok", "locks", text)
-    least = 64 * -(-(2 * wanted + places * LOCKS_OF_A_SESSION) // (64 * places))
+    advised = 64 * -(-(2 * needed + places * LOCKS_OF_A_SESSION) // (64 * places))
     what = "to dump them all" if dump >= (removal or 0) else "to remove the longest survey"
     return CheckResult(
         "note", "locks", f"{text}: too few {what}",
-        f"as a superuser: ALTER SYSTEM SET max_locks_per_transaction = {least}; then restart the server",
+        f"as a superuser: ALTER SYSTEM SET max_locks_per_transaction = {advised}; then restart the server",
     )  # fmt: skip
 
 
@@ -296,11 +296,11 @@ def _queue(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
 
 def _remarks(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
     """Report notes and limitations of the results."""
-    for survey, said in connection.execute(
+    for survey, remark in connection.execute(
         "SELECT s.name, r.said FROM tunnel.survey s CROSS JOIN LATERAL tunnel_api.remarks(s.id) WITH ORDINALITY AS"
         " r (file, stage, kilometres, remark, said, n) ORDER BY s.name, r.n"
     ).fetchall():
-        yield CheckResult("note", "results", f"{survey}, {said}")
+        yield CheckResult("note", "results", f"{survey}, {remark}")
 
 
 def _stale(state: Sequence[tuple[Any, ...]]) -> Iterator[CheckResult]:

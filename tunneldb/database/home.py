@@ -148,10 +148,10 @@ def _digest(folder: Path) -> str:
 
 def _socket_dir(state: Path, user: pwd.struct_passwd | None) -> Path:
     """Return the socket's folder: beside the data, or below /tmp if that path is too long or unusable for QGIS."""
-    beside = state / "run"
-    fits = len(os.fsencode(beside / SOCKET_NAME)) <= SOCKET_PATH_LIMIT - 5  # room for ".lock"
-    if fits and not set(" '\\") & set(str(beside)):  # QGIS hands the path to libpq unquoted
-        return beside
+    run = state / "run"
+    fits = len(os.fsencode(run / SOCKET_NAME)) <= SOCKET_PATH_LIMIT - 5  # room for ".lock"
+    if fits and not set(" '\\") & set(str(run)):  # QGIS hands the path to libpq unquoted
+        return run
     owner = os.geteuid() if user is None else user.pw_uid
     return Path(f"/tmp/tunneldb-{owner}-{_digest(state)}")
 

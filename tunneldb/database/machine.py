@@ -71,8 +71,8 @@ def settings(socket_dir: Path) -> dict[str, str]:
     return chosen
 
 
-def _mib(size: int, least: int, most: int) -> str:
-    return f"{min(max(size // MIB, least), most)}MB"
+def _mib(size: int, minimum: int, maximum: int) -> str:
+    return f"{min(max(size // MIB, minimum), maximum)}MB"
 
 
 def _shared_memory_type() -> str:

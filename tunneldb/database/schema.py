@@ -113,9 +113,9 @@ def _refuse_planted(connection: psycopg.Connection[Any]) -> None:
     """
     planted = overloads(connection)
     if planted:
-        text, mend = planted[0]
+        text, statement = planted[0]
         more = f", and {len(planted) - 1} more: tunneldb check" if len(planted) > 1 else ""
-        raise UserError(f"{text}: {mend}{more}")
+        raise UserError(f"{text}: {statement}{more}")
 
 
 def _fill_stages(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> None:
@@ -218,8 +218,8 @@ def revisions() -> set[str]:
 
 def schema_revision(connection: psycopg.Connection[Any]) -> str | None:
     """Return the revision of the database's schema `tunnel`, None if it has none."""
-    there = connection.execute("SELECT to_regclass('tunnel.alembic_version')").fetchone()
-    if there is None or there[0] is None:
+    table = connection.execute("SELECT to_regclass('tunnel.alembic_version')").fetchone()
+    if table is None or table[0] is None:
         return None
     row = connection.execute("SELECT version_num FROM tunnel.alembic_version").fetchone()
     return row[0] if row else None

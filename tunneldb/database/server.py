@@ -195,10 +195,10 @@ def _launch(home: Home, binaries: Binaries) -> None:
             return
         with home.log.open(errors="replace") as log:
             log.seek(begin)
-            said = log.read()
+            output = log.read()
         # After a crash of the server's first process, a query may still be running; it ends by itself.
-        if "pre-existing shared memory block" not in said or time.monotonic() > deadline:
-            raise UserError(f"the embedded server does not start: {_reason(said)}; see {home.log}")
+        if "pre-existing shared memory block" not in output or time.monotonic() > deadline:
+            raise UserError(f"the embedded server does not start: {_reason(output)}; see {home.log}")
         time.sleep(0.5)
 
 

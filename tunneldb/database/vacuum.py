@@ -101,15 +101,15 @@ def vacuum(
             " for the role tunnel_operator"
         )
     conn.autocommit = True
-    said: list[str | None] = []
+    notices: list[str | None] = []
     skipped = []
-    conn.add_notice_handler(lambda notice: said.append(notice.sqlstate))
+    conn.add_notice_handler(lambda notice: notices.append(notice.sqlstate))
     advance = begin("vacuum", float(sum(table.bytes for table in own)))
     for table in own:
-        said.clear()
+        notices.clear()
         with suppress(psycopg.errors.UndefinedTable):  # dropped since
             conn.execute(sql.SQL("VACUUM (ANALYZE, SKIP_LOCKED) {}").format(sql.Identifier(table.schema, table.table)))
-        if _LOCKED in said:
+        if _LOCKED in notices:
             skipped.append(table)
         advance(float(table.bytes))
     return skipped

@@ -266,10 +266,12 @@ def _edges(true: BaseGeometry, found: BaseGeometry, small: NDArray[np.object_], 
     Where the found leak extends over one that is too small to be required, that one's outline is used, too.
     """
     near = shapely.union_all([true, *small[shapely.intersects(small, found)]])
-    here, there = _points(found.boundary), _points(true.boundary)
+    found_points, true_points = _points(found.boundary), _points(true.boundary)
     if stretch is not None:
-        here, there = (points[shapely.distance(points, stretch.boundary) > 1e-6] for points in (here, there))
-    return np.concatenate([shapely.distance(here, near.boundary), shapely.distance(there, found.boundary)])
+        found_points, true_points = (
+            points[shapely.distance(points, stretch.boundary) > 1e-6] for points in (found_points, true_points)
+        )
+    return np.concatenate([shapely.distance(found_points, near.boundary), shapely.distance(true_points, found.boundary)])
 
 
 def _points(outline: BaseGeometry) -> NDArray[np.object_]:

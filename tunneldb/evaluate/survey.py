@@ -128,8 +128,8 @@ def distance_from_scanner(points: Float, poses: PoseModel) -> Float:
     distance[known], nearest = cKDTree(track).query(points[known])
     if poses.mobile:
         for other in (nearest - 1, nearest + 1):
-            beside = np.clip(other, 0, len(track) - 1)
-            distance[known] = np.fmin(distance[known], _from_segment(points[known], track[nearest], track[beside]))
+            neighbour = np.clip(other, 0, len(track) - 1)
+            distance[known] = np.fmin(distance[known], _from_segment(points[known], track[nearest], track[neighbour]))
     return distance
 
 

@@ -123,19 +123,19 @@ def _layer(path: Path, wanted: str | None, noun: str) -> str:
         raise InputError(f"{path}: no such file")
     source = vector_source(path)
     try:
-        there = [str(name) for name, kind in pyogrio.list_layers(source) if kind is not None]  # not tables
+        layers = [str(name) for name, kind in pyogrio.list_layers(source) if kind is not None]  # not tables
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: a layer name is not UTF-8: {_line(error)}") from None
     except DataSourceError:
         raise InputError(f"{path} is neither GeoPackage nor GeoJSON; convert it to one of these") from None
-    listed = ", ".join(there) or "none"
+    listed = ", ".join(layers) or "none"
     if wanted is not None:
-        if wanted not in there:
+        if wanted not in layers:
             raise InputError(f"{path} has no layer {wanted}; it has {listed}")
         return wanted
-    if len(there) != 1 and noun not in there:
+    if len(layers) != 1 and noun not in layers:
         raise InputError(f"{path} has the layers {listed}: choose the one with the true {noun}s by --layer")
-    return noun if noun in there else there[0]
+    return noun if noun in layers else layers[0]
 
 
 def _ids(meta: dict[str, Any], columns: list[NDArray[Any]], count: int) -> list[str]:

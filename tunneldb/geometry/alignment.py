@@ -84,10 +84,10 @@ class Alignment:
         end = start_chainage + float(chainage[-1])
         first, last = int(np.floor(start_chainage / spacing)), int(np.ceil((end - MILLIMETRE) / spacing))
         number = np.arange(first, max(last, first + 1) + 1)
-        wanted = number * spacing - start_chainage
-        inside = np.clip(wanted, 0.0, chainage[-1])
+        distances = number * spacing - start_chainage
+        inside = np.clip(distances, 0.0, chainage[-1])
         stations = position(np.interp(inside, chainage, parameter))
-        beyond = (wanted - inside)[:, None]
+        beyond = (distances - inside)[:, None]
         slope = position(np.where(beyond[:, 0] < 0.0, 0.0, parameter[-1]), 1)
         stations = stations + beyond * slope / np.hypot(slope[:, :1], slope[:, 1:2])
         return cls(spacing, number, stations, start_chainage, end)
@@ -111,13 +111,13 @@ class Alignment:
         NaN beyond the ends. Right is horizontal, up is at right angles to it and to the axis.
         """
         chainage, _, segment = self._located(points)
-        held = np.flatnonzero(np.isfinite(chainage))
-        k = segment[held].astype(np.int64)
-        frame = frames_at(self._segments, k, chainage[held] / self.spacing - self.number[k])
-        away = points[held] - frame[:, 0]
+        located = np.flatnonzero(np.isfinite(chainage))
+        k = segment[located].astype(np.int64)
+        frame = frames_at(self._segments, k, chainage[located] / self.spacing - self.number[k])
+        away = points[located] - frame[:, 0]
         found = np.full((len(points), 3), np.nan)
-        found[held, 0] = chainage[held]
-        found[held, 1:] = np.einsum("ij,ikj->ik", away, frame[:, 2:])
+        found[located, 0] = chainage[located]
+        found[located, 1:] = np.einsum("ij,ikj->ik", away, frame[:, 2:])
         return found
 
     @cached_property

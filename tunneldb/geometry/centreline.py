@@ -185,8 +185,8 @@ def _walls(along: Float, across: Float, count: int) -> Float:
     number, across = number[order], across[order]
     first, stop = (np.searchsorted(number, np.arange(count), side=side) for side in ("left", "right"))
     walls = np.full((count, 2), np.nan)
-    held = stop - first >= _MIN_CELLS
+    occupied = stop - first >= _MIN_CELLS
     spare = np.floor(_MAX_OUTLIER_SHARE * (stop - first - 1)).astype(np.int64)
-    walls[held, 0] = across[(first + spare)[held]]
-    walls[held, 1] = across[(stop - 1 - spare)[held]]
+    walls[occupied, 0] = across[(first + spare)[occupied]]
+    walls[occupied, 1] = across[(stop - 1 - spare)[occupied]]
     return walls

@@ -52,16 +52,16 @@ def eigenvalues(
     half = (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / 2.0
     angle = math.acos(min(max(half, -1.0), 1.0)) / 3.0
     greatest = mean + 2.0 * spread * math.cos(angle)
-    least = mean + 2.0 * spread * math.cos(angle + 2.0 * math.pi / 3.0)
-    return least, 3.0 * mean - greatest - least, greatest
+    smallest = mean + 2.0 * spread * math.cos(angle + 2.0 * math.pi / 3.0)
+    return smallest, 3.0 * mean - greatest - smallest, greatest
 
 
 @inner
 def normal(
-    xx: float, yy: float, zz: float, xy: float, xz: float, yz: float, least: float
+    xx: float, yy: float, zz: float, xy: float, xz: float, yz: float, eigenvalue: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Return the unit eigenvector of the least eigenvalue, by the longest cross product of two rows; zero if ambiguous."""
-    a, b, c = xx - least, yy - least, zz - least
+    a, b, c = xx - eigenvalue, yy - eigenvalue, zz - eigenvalue
     nx, ny, nz = xy * yz - xz * b, xz * xy - a * yz, a * b - xy * xy  # first and second row
     longest = nx * nx + ny * ny + nz * nz
     x, y, z = xy * c - xz * yz, xz * xz - a * c, a * yz - xy * xz  # first and third

@@ -36,7 +36,16 @@ def central_mode(counts: Float, classes: int, reach: int) -> int:  # pragma: no 
 
 @inner
 def plane_of_moments(
-    s: float, sx: float, sy: float, sxx: float, sxy: float, syy: float, sz: float, sxz: float, syz: float, least: float
+    s: float,
+    sx: float,
+    sy: float,
+    sxx: float,
+    sxy: float,
+    syy: float,
+    sz: float,
+    sxz: float,
+    syz: float,
+    min_determinant: float,
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Fit the plane z = a + b x + c y by weighted least squares, from the sums of the weights and of their products.
 
@@ -44,7 +53,7 @@ def plane_of_moments(
     ----------
     s, sx, sy, sxx, sxy, syy, sz, sxz, syz : float
         Σw, Σwx, Σwy, Σwx², Σwxy, Σwy², Σwz, Σwxz and Σwyz; s > 0.
-    least : float
+    min_determinant : float
         Determinant of the covariance of x and y up to which the points are treated as collinear: the plane is then level.
 
     Returns
@@ -55,7 +64,7 @@ def plane_of_moments(
     xz, yz = sxz - sx * sz / s, syz - sy * sz / s
     determinant = xx * yy - xy * xy
     b, c = 0.0, 0.0
-    if determinant > least * s * s:
+    if determinant > min_determinant * s * s:
         b = (xz * yy - yz * xy) / determinant
         c = (yz * xx - xz * xy) / determinant
     return (sz - b * sx - c * sy) / s, b, c

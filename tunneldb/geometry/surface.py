@@ -129,16 +129,16 @@ class Surface:
     def segment_index(self, chainage: Float) -> Int64:
         """Return the index of the segment at each chainage, -1 if there is none."""
         index = np.searchsorted(self.ends[:, 0], chainage, side="right") - 1
-        held = (index >= 0) & (chainage <= self.ends[index, 1])
-        return np.where(held, index, -1).astype(np.int64)
+        inside = (index >= 0) & (chainage <= self.ends[index, 1])
+        return np.where(inside, index, -1).astype(np.int64)
 
     def frames(self, chainage: Float) -> Float:
         """Return origin, tangent, right and up, (n, 4, 3), of the plane at each chainage (n,); NaN if there is no segment."""
         index = self.segment_index(np.asarray(chainage, dtype=np.float64))
-        held = index >= 0
-        k, at = index[held], np.asarray(chainage, dtype=np.float64)[held]
+        inside = index >= 0
+        k, at = index[inside], np.asarray(chainage, dtype=np.float64)[inside]
         frames = np.full((len(index), 4, 3), np.nan)
-        frames[held] = frames_at(self.segments, k, (at - self.ends[k, 0]) / (self.ends[k, 1] - self.ends[k, 0]))
+        frames[inside] = frames_at(self.segments, k, (at - self.ends[k, 0]) / (self.ends[k, 1] - self.ends[k, 0]))
         return frames
 
     def arc_range(self, chainage: Float) -> tuple[Float, Float]:
@@ -187,10 +187,10 @@ class Surface:
         if count < MIN_SECTIONS:
             return np.zeros_like(self.radius)
         first = np.clip(np.arange(count) - 3, 0, max(count - 7, 0))
-        beside = np.array([[n for n in range(f, f + min(7, count)) if n != k] for k, f in enumerate(first.tolist())])
-        apart = self.radius - np.median(self.radius[beside], axis=1)
-        usual = 3.0 * MAD_TO_SIGMA * np.median(np.abs(apart), axis=1)
-        return np.where(np.abs(apart) > np.maximum(usual, MIN_SECTION_DEVIATION)[:, None], apart, 0.0)
+        neighbours = np.array([[n for n in range(f, f + min(7, count)) if n != k] for k, f in enumerate(first.tolist())])
+        deviation = self.radius - np.median(self.radius[neighbours], axis=1)
+        usual = 3.0 * MAD_TO_SIGMA * np.median(np.abs(deviation), axis=1)
+        return np.where(np.abs(deviation) > np.maximum(usual, MIN_SECTION_DEVIATION)[:, None], deviation, 0.0)
 
 
 def _crossing(above: Float, arcs: Float) -> Float:

@@ -342,13 +342,13 @@ def to_space(
     """Return points (n, 3) of (chainage, arc, offset) rows (n, 3), each in the segment ``which``; NaN off the tunnel (-1)."""
     points = np.full((len(unrolled), 3), np.nan)
     a, b, g = sections_about(chainages, unrolled[:, 0], reach)
-    held = np.flatnonzero((which >= 0) & (a >= 0))
-    chainage, arc, offset = unrolled[held].T
-    k, a, b, g = which[held], a[held], b[held], g[held]
+    inside = np.flatnonzero((which >= 0) & (a >= 0))
+    chainage, arc, offset = unrolled[inside].T
+    k, a, b, g = which[inside], a[inside], b[inside], g[inside]
     h = 1.0 - g
     on_section = ~(arc < h * arcs[a, 0] + g * arcs[b, 0] - 1e-6) & ~(arc > h * arcs[a, -1] + g * arcs[b, -1] + 1e-6)
     if not on_section.all():
-        held, chainage, arc, offset = held[on_section], chainage[on_section], arc[on_section], offset[on_section]
+        inside, chainage, arc, offset = inside[on_section], chainage[on_section], arc[on_section], offset[on_section]
         k, a, b, g, h = k[on_section], a[on_section], b[on_section], g[on_section], h[on_section]
     low, high = np.zeros(len(arc), np.intp), np.full(len(arc), NODES - 1)
     for _ in range(int(NODES - 1).bit_length()):
@@ -365,7 +365,7 @@ def to_space(
     u = u0 + s * (u1 - u0) + offset * dw
     w = w0 + s * (w1 - w0) - offset * du
     frame = frames_at(segments, k, (chainage - ends[k, 0]) / (ends[k, 1] - ends[k, 0]))
-    points[held] = frame[:, 0] + u[:, None] * frame[:, 2] + w[:, None] * frame[:, 3]
+    points[inside] = frame[:, 0] + u[:, None] * frame[:, 2] + w[:, None] * frame[:, 3]
     return points
 
 

@@ -107,10 +107,10 @@ def describe_found(found: FoundAxis, start: float = 0.0) -> list[str]:
     stretches = [f"{chainage_label(start + a, 0)} to {chainage_label(start + b, 0)}" for a, b in found.doubtful]
     if stretches:
         lines.append(f"look at {', '.join(stretches)}: walls, vault or floor are missing there, or lie elsewhere")
-    if found.aside > TRUSTED_ASIDE and found.aside_at is not None:
+    if found.off_line_share > TRUSTED_ASIDE and found.off_line_centre is not None:
         lines.append(
-            f"{100 * found.aside:.0f} % of what has a roof is not along the line, most of it about "
-            f"{found.aside_at[0]:.0f},{found.aside_at[1]:.0f}: a side room, or the tunnel beyond a gap"
+            f"{100 * found.off_line_share:.0f} % of what has a roof is not along the line, most of it about "
+            f"{found.off_line_centre[0]:.0f},{found.off_line_centre[1]:.0f}: a side room, or the tunnel beyond a gap"
         )
     if whole < TRUSTED_SHARE * count or far > TRUSTED_DISTANCE:
         lines.append("doubtful as a whole: look at the picture before you go on, or draw the line")

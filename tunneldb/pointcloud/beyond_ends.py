@@ -38,11 +38,11 @@ class BeyondEnds:
     def add(self, xyz: Float) -> None:
         """Count points (n, 3), m, that are known to lie outside."""
         for metres, (end, outwards) in zip(self.metres, self.ends, strict=True):
-            apart = xyz - end
-            beyond = apart @ outwards
-            aside = np.sqrt(np.maximum((apart**2).sum(axis=1) - beyond**2, 0.0))
-            held = (beyond > 0.0) & (beyond < MAX_DISTANCE) & (aside <= self.limit)
-            metres += np.bincount(beyond[held].astype(np.int64), minlength=MAX_DISTANCE)
+            vector = xyz - end
+            beyond = vector @ outwards
+            lateral = np.sqrt(np.maximum((vector**2).sum(axis=1) - beyond**2, 0.0))
+            counted = (beyond > 0.0) & (beyond < MAX_DISTANCE) & (lateral <= self.limit)
+            metres += np.bincount(beyond[counted].astype(np.int64), minlength=MAX_DISTANCE)
 
     @property
     def points(self) -> tuple[int, int]:

@@ -80,7 +80,7 @@ class ChainageLookup:
         """Return the blocks of ``block`` point numbers that points with ascending numbers (n,) lie in, with chainages, m."""
         found = np.arange(number[0] // block, number[-1] // block + 1)
         starts = np.searchsorted(number, found * block)
-        found, starts = found[(held := np.diff(starts, append=len(number)) > 0)], starts[held]
+        found, starts = found[(occupied := np.diff(starts, append=len(number)) > 0)], starts[occupied]
         chainage = self.chainage[cell]
         low, high = np.minimum.reduceat(chainage, starts), np.maximum.reduceat(chainage, starts)
         return found, low - self.slack, high + self.slack

@@ -28,8 +28,8 @@ class UniformSample:
         Share of all points that is in the sample.
     """
 
-    def __init__(self, most: int = SAMPLE) -> None:
-        self.most, self.share = most, 1.0
+    def __init__(self, max_points: int = SAMPLE) -> None:
+        self.max_points, self.share = max_points, 1.0
         self._random = np.random.default_rng(1)
         self._kept: list[tuple[Float, Float, Int64]] = []
         self._count = 0
@@ -42,7 +42,7 @@ class UniformSample:
         good = on_earth(xyz).all(axis=1)
         self._kept.append((chance[chosen][good], xyz[good], chosen[good] + first))
         self._count += int(good.sum())
-        while self._count > 2 * self.most:
+        while self._count > 2 * self.max_points:
             self.share /= 2.0
             self._kept = [tuple(part[kept[0] < self.share] for part in kept) for kept in self._kept]  # type: ignore[misc]
             self._count = sum(len(kept[0]) for kept in self._kept)
@@ -123,8 +123,8 @@ def read_contents(path: Path, progress: Callable[[int], None] = lambda count: No
         ]
         right = np.logical_and.reduce([on_earth(values) for values in placed])
         misplaced += len(raw) - int(right.sum())
-        low = np.fmin(low, [_least(values[right]) for values in placed])
-        high = np.fmax(high, [-_least(-values[right]) for values in placed])
+        low = np.fmin(low, [_finite_minimum(values[right]) for values in placed])
+        high = np.fmax(high, [-_finite_minimum(-values[right]) for values in placed])
         numbers, counts = np.unique(np.asarray(raw.scan_id), return_counts=True)
         for number, count in zip(numbers.tolist(), counts.tolist(), strict=True):
             scans[number] = scans.get(number, 0) + count
@@ -140,7 +140,7 @@ def read_contents(path: Path, progress: Callable[[int], None] = lambda count: No
     return Contents(points, misplaced, low, high, times, untimed, scans, sample.xyz, sample.numbers, sample.share)
 
 
-def _least(values: NDArray[Any]) -> float:
+def _finite_minimum(values: NDArray[Any]) -> float:
     """Return the least finite value; infinity if none is finite."""
     finite = values[np.isfinite(values)]
     return float(finite.min()) if len(finite) else np.inf

@@ -134,8 +134,8 @@ class Tiling:
     _tile_of: Intp = field(repr=False)
 
     @classmethod
-    def of(cls, counts: CellCounts, most: int = TILE) -> Tiling:
-        """Divide space into tiles of at most ``most`` points, or of one cell."""
+    def of(cls, counts: CellCounts, max_points: int = TILE) -> Tiling:
+        """Divide space into tiles of at most ``max_points`` points, or of one cell."""
         cells = counts.cells()
         corner = cells.min(axis=0)
         relative = cells - corner
@@ -147,7 +147,7 @@ class Tiling:
             places, inverse = np.unique(relative[rest] >> (depth - level), axis=0, return_inverse=True)
             inverse = inverse.reshape(-1)
             points = np.bincount(inverse, counts.counts[rest]).astype(np.int64)
-            small = points <= most if level < depth else np.ones(len(places), np.bool_)
+            small = points <= max_points if level < depth else np.ones(len(places), np.bool_)
             edge = CELL * 2.0 ** (depth - level)
             number = np.cumsum(small) - 1 + len(found)
             for place, count in zip(places[small].tolist(), points[small].tolist(), strict=True):

@@ -122,16 +122,16 @@ class Points:
 
     def finite(self, *, time: bool, intensity: bool) -> Bool | None:
         """Return True for points with plausible coordinates, and finite time and intensity if requested; None if all are."""
-        wanted: list[Float | Single] = [self.xyz]
-        wanted += [self.time] if time else []
-        wanted += [self.intensity] if intensity else []
+        checked: list[Float | Single] = [self.xyz]
+        checked += [self.time] if time else []
+        checked += [self.intensity] if intensity else []
         with np.errstate(over="ignore", invalid="ignore"):
             if -MAX_COORDINATE <= self.xyz.min(initial=0.0) <= self.xyz.max(initial=0.0) <= MAX_COORDINATE and all(
-                np.isfinite(values.sum()) for values in wanted
+                np.isfinite(values.sum()) for values in checked
             ):
                 return None
         finite: Bool = np.asarray(on_earth(self.xyz).all(axis=1))
-        for values in wanted:
+        for values in checked:
             finite &= np.isfinite(values).reshape(len(self), -1).all(axis=1)
         return None if finite.all() else finite
 

@@ -35,9 +35,9 @@ def far_from_axis(xyz: Float, alignment: Alignment) -> Float:
     (n,) float array
         Distance, m; 0 for plausible positions.
     """
-    aside = alignment.distance(xyz)
-    beyond = np.isnan(aside)
-    distance = np.where(beyond, 0.0, aside)
+    lateral = alignment.distance(xyz)
+    beyond = np.isnan(lateral)
+    distance = np.where(beyond, 0.0, lateral)
     limit = np.where(beyond, MAX_END_DISTANCE, MAX_AXIS_DISTANCE)
     ends = alignment.vertices[[0, -1]]
     distance[beyond] = np.linalg.norm(xyz[beyond, None] - ends, axis=2).min(axis=1)

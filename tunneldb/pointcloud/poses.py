@@ -105,18 +105,18 @@ def longest_interval(time: Float) -> float:
 
 
 @point_inner
-def interval(time: Float, wanted: float, hint: int) -> int:  # pragma: no cover - compiled
-    """Return the index of the last of ascending times that is not after ``wanted``, or 0; the search begins at ``hint``."""
+def interval(time: Float, moment: float, hint: int) -> int:  # pragma: no cover - compiled
+    """Return the index of the last of ascending times that is not after ``moment``, or 0; the search begins at ``hint``."""
     last = time.shape[0] - 1
     # Points are nearly in order of time, so the previous interval or the next one is mostly right.
-    if time[hint] <= wanted and (hint == last or wanted < time[hint + 1]):
+    if time[hint] <= moment and (hint == last or moment < time[hint + 1]):
         return hint
-    if hint + 2 <= last and time[hint + 1] <= wanted < time[hint + 2]:
+    if hint + 2 <= last and time[hint + 1] <= moment < time[hint + 2]:
         return hint + 1
     low, high = 0, last + 1
     while low < high:
         middle = (low + high) >> 1
-        if wanted < time[middle]:
+        if moment < time[middle]:
             high = middle
         else:
             low = middle + 1
@@ -124,11 +124,11 @@ def interval(time: Float, wanted: float, hint: int) -> int:  # pragma: no cover 
 
 
 @point_inner
-def position_at(time: Float, track: Float, wanted: float, k: int) -> tuple[float, float, float]:  # pragma: no cover - compiled
+def position_at(time: Float, track: Float, moment: float, k: int) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Return the position of the trajectory at a time in its interval ``k``."""
     j = min(k + 1, time.shape[0] - 1)
     length = time[j] - time[k]
-    share = min(max((wanted - time[k]) / length, 0.0), 1.0) if length > 0.0 else 0.0
+    share = min(max((moment - time[k]) / length, 0.0), 1.0) if length > 0.0 else 0.0
     return (
         track[k, 0] + share * (track[j, 0] - track[k, 0]),
         track[k, 1] + share * (track[j, 1] - track[k, 1]),
@@ -138,9 +138,9 @@ def position_at(time: Float, track: Float, wanted: float, k: int) -> tuple[float
 
 @point_kernel
 def _interpolate(
-    time: Float, track: Float, wanted: Float, out: Float, begin: int, end: int
+    time: Float, track: Float, moments: Float, out: Float, begin: int, end: int
 ) -> None:  # pragma: no cover - compiled
     k = np.int64(0)
     for i in range(begin, end):
-        k = interval(time, wanted[i], k)
-        out[i, 0], out[i, 1], out[i, 2] = position_at(time, track, wanted[i], k)
+        k = interval(time, moments[i], k)
+        out[i, 0], out[i, 1], out[i, 2] = position_at(time, track, moments[i], k)

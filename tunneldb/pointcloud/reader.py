@@ -40,8 +40,8 @@ def _without_wrong_crs(header: ScanHeader) -> ScanHeader:
     if not np.isfinite(corners).all() or np.abs(corners).max() <= _DEGREES:
         return header
     x, y = header.low[:2]
-    said = f"{describe_crs(header.crs)} is in degrees, but x = {x:.0f}, y = {y:.0f} are not"
-    return replace(header, crs=None, unread_crs=said)
+    reason = f"{describe_crs(header.crs)} is in degrees, but x = {x:.0f}, y = {y:.0f} are not"
+    return replace(header, crs=None, unread_crs=reason)
 
 
 def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_time: bool) -> None:
@@ -66,10 +66,10 @@ def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_tim
     require_dimension(header.path, dimension, header.dimensions, "the survey's intensity")
     require_dimension(header.path, "gps_time" if needs_time else None, header.dimensions, "the trajectory")
     if header.crs is not None and not fits_srid(header.crs, srid):
-        mend = "with --srid local" if is_local(header.crs) else "with the file's SRID"
+        option = "with --srid local" if is_local(header.crs) else "with the file's SRID"
         raise InputError(
             f"{header.path}: its coordinate system is {describe_crs(header.crs)}, the tunnel's is {describe_srid(srid)}; "
-            f"transform the file or add the tunnel {mend}"
+            f"transform the file or add the tunnel {option}"
         )
 
 
@@ -80,8 +80,8 @@ def crs_note(header: ScanHeader, srid: int) -> str | None:
     """
     if header.crs is not None or (srid == LOCAL and not header.unread_crs):
         return None
-    said = f"a coordinate system that cannot be read ({header.unread_crs})" if header.unread_crs else "no coordinate system"
-    return f"states {said}; using the tunnel's, {srid_name(srid)}"
+    stated = f"a coordinate system that cannot be read ({header.unread_crs})" if header.unread_crs else "no coordinate system"
+    return f"states {stated}; using the tunnel's, {srid_name(srid)}"
 
 
 def read_chunks(

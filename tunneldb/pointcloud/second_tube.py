@@ -81,9 +81,9 @@ class SecondTubes:
         """Return a note about the number of points that were left out."""
         places = []
         for side, limits in zip(("left", "right"), self.limits, strict=True):
-            held = np.flatnonzero(np.isfinite(limits))
-            if len(held):
-                low, high = (self.km * KILOMETRE + STRETCH * end for end in (held[0], held[-1] + 1))
+            stretches = np.flatnonzero(np.isfinite(limits))
+            if len(stretches):
+                low, high = (self.km * KILOMETRE + STRETCH * end for end in (stretches[0], stretches[-1] + 1))
                 places.append(f"to the {side} between {chainage_label(low, 0)} and {chainage_label(high, 0)}")
         return f"{points} points of a second tube left out, {' and '.join(places)}; results are for the tube around the axis"
 
@@ -108,19 +108,19 @@ def find_second_tubes(parts: Iterable[Rows], alignment: Alignment, km: int) -> S
         _sort_in(rows["z"], away, which, count, low, high)
     limits = np.full((2, shape[0]), np.nan)
     for stretch in np.flatnonzero(count.any(axis=1)):
-        held = count[stretch] > max(1.0, MIN_DENSITY_RATIO * float(np.median(count[stretch][count[stretch] > 0])))
-        roofed = held & (high[stretch] - low[stretch] >= MIN_TUBE_SIZE)
-        limits[1, stretch] = _pillar(held, roofed)
-        limits[0, stretch] = -_pillar(held[::-1], roofed[::-1])
+        occupied = count[stretch] > max(1.0, MIN_DENSITY_RATIO * float(np.median(count[stretch][count[stretch] > 0])))
+        roofed = occupied & (high[stretch] - low[stretch] >= MIN_TUBE_SIZE)
+        limits[1, stretch] = _pillar(occupied, roofed)
+        limits[0, stretch] = -_pillar(occupied[::-1], roofed[::-1])
     for side in limits:
         _bridge(side)
     return SecondTubes(km, np.where(np.isfinite(limits), limits, [[-np.inf], [np.inf]]))
 
 
-def _pillar(held: Bool, roofed: Bool) -> float:
+def _pillar(occupied: Bool, roofed: Bool) -> float:
     """Return the distance right of the axis of a pillar with a tube behind it, m; NaN without one."""
-    middle, gap = len(held) // 2, round(MIN_PILLAR_WIDTH / CELL)
-    places = np.flatnonzero(held) - middle
+    middle, gap = len(occupied) // 2, round(MIN_PILLAR_WIDTH / CELL)
+    places = np.flatnonzero(occupied) - middle
     if not len(places) or np.abs(places).min() > gap:
         return np.nan
     right = places[places >= -gap]

@@ -82,7 +82,7 @@ class Spool:
         self.memory = memory
         self.dtype = dtype
         self._runs: list[_Run] = []
-        self._held = 0
+        self._bytes = 0
         self._file: IO[bytes] | None = None
         self._spilt = 0
 
@@ -111,10 +111,10 @@ class Spool:
         bins = bin_of(rows["chainage"]) if bins is None else bins
         ordered, first, start = _sort_by_bin(rows, bins)
         run = _Run(first, start, ordered, 0)
-        if self._held + rows.nbytes > self.memory:
+        if self._bytes + rows.nbytes > self.memory:
             self._spill(run)
         else:
-            self._held += rows.nbytes
+            self._bytes += rows.nbytes
         self._runs.append(run)
 
     def counts(self) -> tuple[int, Int64]:
@@ -142,8 +142,8 @@ class Spool:
         first, counts = self.counts()
         place = np.flatnonzero(counts)
         kms, inverse = np.unique((first + place) // BINS_PER_KM, return_inverse=True)
-        held = np.bincount(inverse, counts[place], len(kms)).astype(int)
-        return dict(zip(kms.tolist(), held.tolist(), strict=True))
+        totals = np.bincount(inverse, counts[place], len(kms)).astype(int)
+        return dict(zip(kms.tolist(), totals.tolist(), strict=True))
 
     def read(self, low: int, high: int) -> Rows:
         """Read the rows of bins low ≤ bin < high, in order of `add` and then of bins; they may be the spool's own arrays."""

@@ -95,9 +95,9 @@ class CellCounts:
         self._counts = counts
 
 
-def _table(least: int) -> Int32:
+def _table(min_slots: int) -> Int32:
     """Make an empty table of a power of two of slots."""
-    return np.full(1 << (least - 1).bit_length(), -1, np.int32)
+    return np.full(1 << (min_slots - 1).bit_length(), -1, np.int32)
 
 
 class Voxels:
@@ -204,9 +204,9 @@ class Voxels:
 def value_table(keys: Int64, values: UInt8) -> tuple[Int64, UInt8]:
     """Return slots for keys (n,), all different and not negative, and their values (n,), for look-up by `key_slot`."""
     slots = np.full(1 << max(10, (2 * len(keys)).bit_length()), -1, np.int64)
-    held = np.zeros(len(slots), np.uint8)
-    _enter_values(keys, values, slots, held)
-    return slots, held
+    stored = np.zeros(len(slots), np.uint8)
+    _enter_values(keys, values, slots, stored)
+    return slots, stored
 
 
 @inner
@@ -287,10 +287,10 @@ def key_slot(key: int, slots: Int64) -> np.int64:  # pragma: no cover - compiled
 
 
 @kernel
-def _enter_values(keys: Int64, values: UInt8, slots: Int64, held: UInt8) -> None:  # pragma: no cover - compiled
+def _enter_values(keys: Int64, values: UInt8, slots: Int64, stored: UInt8) -> None:  # pragma: no cover - compiled
     for i in range(keys.shape[0]):
         slot = key_slot(keys[i], slots)
-        slots[slot], held[slot] = keys[i], values[i]
+        slots[slot], stored[slot] = keys[i], values[i]
 
 
 @kernel

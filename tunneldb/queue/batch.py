@@ -43,7 +43,7 @@ class Incoming:
         First and last kilometre that it may touch; None if its box is unreadable, or it touches none.
     error : str or None
         Reason why it can't be read.
-    there : bool
+    already_read : bool
         True if it was already read and is unchanged, by path, size and times.
     """
 
@@ -54,7 +54,7 @@ class Incoming:
     km_from: int | None = None
     km_to: int | None = None
     error: str | None = None
-    there: bool = False
+    already_read: bool = False
 
 
 @dataclass(frozen=True)
@@ -125,13 +125,13 @@ def plan(
     files = _headers(conn, survey, [*named, *again], float(how["load.max_distance"]))
     if kilometres is not None:
         files = [file for file in files if file.error or _touches(file, kilometres)]
-    wanted = {km for file in files for km in _kilometres(file)}
-    wanted |= _near_damaged(conn, survey, files, float(how["load.max_distance"]))
+    requested = {km for file in files for km in _kilometres(file)}
+    requested |= _near_damaged(conn, survey, files, float(how["load.max_distance"]))
     if not named:
         goals = _goals(conn, survey)
         options = kilometres is not None or stage is not None or parameters
-        wanted |= goals if goals and not options else goals | set(loaded_kilometres(conn, survey))
-    chosen = {km for km in wanted if kilometres is None or km in kilometres}
+        requested |= goals if goals and not options else goals | set(loaded_kilometres(conn, survey))
+    chosen = {km for km in requested if kilometres is None or km in kilometres}
     if not chosen and not any(file.error for file in files) and not _awaits(conn, survey):
         where = "" if kilometres is None else f" in kilometres {kilometres[0]}-{kilometres[-1]}"
         raise UserError(f"survey {survey.name} has nothing to do{where}; type tunneldb batch {survey.name} FILES")
@@ -194,8 +194,8 @@ def _headers(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path
             off = f"{path}: its points lie off the given axis of tunnel {survey.tunnel}; does the file belong to this tunnel?"
             files.append(Incoming(path.name, path, size, points, error=off))
             continue
-        there = path.name in read and _untouched(path, size, *read[path.name])
-        files.append(Incoming(path.name, path, size, points, touched[0], touched[-1], None, there))
+        already_read = path.name in read and _untouched(path, size, *read[path.name])
+        files.append(Incoming(path.name, path, size, points, touched[0], touched[-1], None, already_read))
     return files
 
 
@@ -266,11 +266,11 @@ def give_up_file(conn: psycopg.Connection[Any], survey: Survey, name: str) -> No
         if row is None or not Path(row[0]).is_file():
             return
         reach = settings_of(row[1]).max_distance
-        held = _damaged_kilometres(Path(row[0]), load_alignment(conn, survey), reach)
-        if held:
+        damaged = _damaged_kilometres(Path(row[0]), load_alignment(conn, survey), reach)
+        if damaged:
             conn.execute(
                 "UPDATE tunnel.incoming SET km_from = %s, km_to = %s WHERE survey_id = %s AND name = %s",
-                [held[0], held[-1], survey.id, name],
+                [damaged[0], damaged[-1], survey.id, name],
             )
             conn.execute("SELECT tunnel_internal.queue_plan(%s)", [survey.id])
 
@@ -312,7 +312,7 @@ def register(conn: psycopg.Connection[Any], survey: Survey, asked: Plan, *, retr
     with conn.transaction():
         conn.execute("SELECT tunnel_internal.queue_lock(%s)", [survey.id])
         with conn.cursor() as cursor:
-            cursor.executemany(_INCOMING, [_row(survey, file, asked) for file in asked.files if not file.there])
+            cursor.executemany(_INCOMING, [_row(survey, file, asked) for file in asked.files if not file.already_read])
             cursor.executemany(_GOAL, [_goal(survey, km, asked) for km in asked.kilometres])
         if retry:
             conn.execute("UPDATE tunnel.goal SET retry_after = clock_timestamp() WHERE survey_id = %s", [survey.id])

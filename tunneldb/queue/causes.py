@@ -117,11 +117,11 @@ def cause_of(message: str | None, paths: Iterable[str] = ()) -> Cause:
     Files can have any name, even ``damaged.laz``. So the phrases are not searched in the path at the beginning of the
     message, nor in ``paths`` or their names elsewhere.
     """
-    said = message or ""
+    text = message or ""
     for path in paths:
         line = " ".join(path.split())  # as in messages
         for name in (line, line.rsplit("/", 1)[-1]):
-            said = re.sub(rf"(?<!\w){re.escape(name)}(?!\w)", "", said) if name else said
-    said = _LEADING.sub("", said, count=1) if said.startswith("/") else said
-    unknown = PROGRAM if _TYPED.match(said) else DATA
-    return next((cause for cause in CAUSES if any(mark in said for mark in cause.marks)), unknown)
+            text = re.sub(rf"(?<!\w){re.escape(name)}(?!\w)", "", text) if name else text
+    text = _LEADING.sub("", text, count=1) if text.startswith("/") else text
+    unknown = PROGRAM if _TYPED.match(text) else DATA
+    return next((cause for cause in CAUSES if any(mark in text for mark in cause.marks)), unknown)

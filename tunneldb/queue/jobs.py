@@ -127,8 +127,8 @@ def end_job(dsn: str | None, job: Job, error: Exception) -> None:
         If there is no connection; the job is taken over after the worker has exited.
     """
     with worker_session(dsn) as conn:
-        held = conn.execute("SELECT tunnel_internal.queue_hold(%s, %s)", [job.id, job.worker]).fetchone()
-        if held is None or not held[0]:
+        owned = conn.execute("SELECT tunnel_internal.queue_hold(%s, %s)", [job.id, job.worker]).fetchone()
+        if owned is None or not owned[0]:
             return
         if isinstance(error, psycopg.OperationalError):
             conn.execute("SELECT tunnel_internal.queue_return(%s)", [job.id])
@@ -170,19 +170,19 @@ def _stage(conn: psycopg.Connection[Any], job: Job, survey_id: int, km: int, nam
     survey = _survey(conn, survey_id)
     row = conn.execute("SELECT parameters FROM tunnel.goal WHERE survey_id = %s AND km = %s", [survey_id, km]).fetchone()
     conn.rollback()
-    wanted: Mapping[str, Any] = row[0] if row else {}
+    parameters: Mapping[str, Any] = row[0] if row else {}
     if name == "load":
-        _load(conn, job, survey, km, wanted)
+        _load(conn, job, survey, km, parameters)
         return
     stage = next(stage for stage in STAGES if stage.name == name)
-    values = settings(f"{key}={value}" for key, value in wanted.items() if not key.startswith("load."))
+    values = settings(f"{key}={value}" for key, value in parameters.items() if not key.startswith("load."))
     with stage_run(conn, survey_id, km, name, of_stage(values, stage.parameters), job) as run:
         run.counts.update(stage.work(conn, survey, km, values, lambda share: None))
 
 
-def _load(conn: psycopg.Connection[Any], job: Job, survey: Survey, km: int, wanted: Mapping[str, Any]) -> None:
+def _load(conn: psycopg.Connection[Any], job: Job, survey: Survey, km: int, parameters: Mapping[str, Any]) -> None:
     from tunneldb.pipeline.load import load_kilometre, parameters_of, settings_of
 
-    how = settings_of(wanted)
+    how = settings_of(parameters)
     with stage_run(conn, survey.id, km, "load", parameters_of(how), job) as run:
         run.counts.update(load_kilometre(conn, survey, km, how))

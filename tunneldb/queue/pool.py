@@ -80,12 +80,12 @@ class WorkerPool:
         self.leaving = True
 
     def _launch(self) -> subprocess.Popen[bytes]:
-        told = json.dumps({"threads": self.orders.threads, "survey": self.orders.survey})
+        orders = json.dumps({"threads": self.orders.threads, "survey": self.orders.survey})
         environment = dict(os.environ)
         environment["TUNNELDB_DSN"] = self.orders.dsn or ""
         # The pipe stays open while this process runs; a session of its own protects it from the terminal's Ctrl-C.
         process = subprocess.Popen(
-            [sys.executable, "-m", "tunneldb.queue.worker", told],
+            [sys.executable, "-m", "tunneldb.queue.worker", orders],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

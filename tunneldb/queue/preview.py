@@ -151,9 +151,9 @@ def preview(
     of_files = _stretches(conn, survey, plan)
     stretches = sorted(of_files.values())
     covered = sorted({km for stretch in stretches for km in kilometres_of(stretch)})
-    wanted: Sequence[int] = kilometres or (range(covered[0], covered[-1] + 1) if covered else ())
-    missing = tuple(km for km in wanted if km not in covered) if stretches else ()
-    new = [file for file in plan.files if not file.there and file.error is None]
+    requested: Sequence[int] = kilometres or (range(covered[0], covered[-1] + 1) if covered else ())
+    missing = tuple(km for km in requested if km not in covered) if stretches else ()
+    new = [file for file in plan.files if not file.already_read and file.error is None]
     points = sum(file.points for file in new)
     length = sum(high - low for low, high in _union(sorted(of_files[file.name] for file in new if file.name in of_files)))
     kept = _kept(conn, survey, plan)

@@ -180,7 +180,7 @@ def overview(conn: psycopg.Connection[Any], survey: str) -> Overview:
     to_read = sum(file.state != "failed" for file in files)
     asked = max((goals[km].requested_at for km in goals if _unfinished(kilometres[km])), default=None)
     share = throughput.share(steps, to_read, asked) if asked is not None else None
-    wanted = [kilometres[km][stage].state for km, goal in goals.items() for stage in STAGE_NAMES[: goal.step + 1]]
+    requested = [kilometres[km][stage].state for km, goal in goals.items() for stage in STAGE_NAMES[: goal.step + 1]]
     return Overview(
         survey,
         now[0],
@@ -188,8 +188,8 @@ def overview(conn: psycopg.Connection[Any], survey: str) -> Overview:
         {km: STAGE_NAMES[goal.step] for km, goal in goals.items()},
         files,
         workers,
-        done=sum(state in ("done", "empty") for state in wanted),
-        total=len(wanted),
+        done=sum(state in ("done", "empty") for state in requested),
+        total=len(requested),
         share=share,
         rate=points_per_second(conn, survey, share, asked, now[0]) if asked is not None and share is not None else None,
         left=throughput.left(steps, to_read, sum(not worker.lost for worker in workers), now[0]),

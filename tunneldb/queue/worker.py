@@ -236,7 +236,7 @@ def _end_with_parent() -> None:
 
 def main() -> int:
     """Run as a separate process; orders are JSON in the first argument, the DSN is in TUNNELDB_DSN."""
-    told = json.loads(sys.argv[1])
+    orders = json.loads(sys.argv[1])
     _end_with_parent()
     logging.basicConfig(format="%(asctime)s worker %(process)d: %(message)s", datefmt="%H:%M:%S")
     logging.getLogger().handlers[0].setLevel(logging.WARNING)  # the log file, if there is one, has what is done, too
@@ -245,7 +245,7 @@ def main() -> int:
     file = os.environ.get(VARIABLE)
     try:
         with logging_to(Path(file) if file else None):
-            work(Orders(os.environ.get("TUNNELDB_DSN") or None, told["threads"], told["survey"]))
+            work(Orders(os.environ.get("TUNNELDB_DSN") or None, orders["threads"], orders["survey"]))
     except UserError as error:
         log.error("%s", error)
         return 2

@@ -74,13 +74,13 @@ class Epoch:
         change = np.zeros(len(chainage))
         for one in self.deformations:
             west, south, east, north = one.outline.bounds
-            held = (chainage >= west) & (chainage < east) & (arc >= south) & (arc < north)
+            inside = (chainage >= west) & (chainage < east) & (arc >= south) & (arc < north)
             if one.kind == "ring":
                 # Both walls move inwards, and the crown rises, by half of the loss of width.
-                angle = arc[held] / self.parameters.section_radius
-                change[held] -= one.change * np.cos(_DEGREES * angle)
+                angle = arc[inside] / self.parameters.section_radius
+                change[inside] -= one.change * np.cos(_DEGREES * angle)
             else:
-                change[held] += one.change
+                change[inside] += one.change
         return change
 
 

@@ -206,7 +206,7 @@ def _fault(code: int | None, said: str) -> str:
 
 
 def _rows(dsn: str) -> Rows:
-    """What any change of a table's rows changes: their number, and the transactions that made them."""
+    """Return values that any change of a table's rows changes: their number, and the transactions that made them."""
     tables = "SELECT schemaname, tablename FROM pg_tables WHERE schemaname IN ('tunnel', 'tunnel_audit', 'tunnel_queue')"
     one = sql.SQL("SELECT {}, count(*), sum(xmin::text::bigint), max(ctid::text) FROM {}")
     with psycopg.connect(dsn, autocommit=True) as conn:

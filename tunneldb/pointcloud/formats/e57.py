@@ -159,12 +159,12 @@ def read_e57(
         if dimension == "gps_time":
             raise InputError(f"{path}: gps_time cannot be the intensity; the file has {', '.join(names)}")
         records = sum(scan.records for scan in scans)
-        wanted = check_ranges(path, ranges, records)
+        requested = check_ranges(path, ranges, records)
         cursor = _Cursor(path, image, scans, dimension, size, colours)
         if ranges is None:
             yield from cursor.all()
             return
-        for begin, end in wanted:
+        for begin, end in requested:
             yield from cursor.read(begin, end)
 
 

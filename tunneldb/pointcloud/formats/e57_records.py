@@ -161,8 +161,8 @@ def _limits(node: Any, name: str, values: Float) -> tuple[float, float]:
     low, high = (value_of(node, f"{name}{end}") for end in ("Minimum", "Maximum"))
     if low is not None and high is not None and high > low:
         return low, high
-    most = float(np.nanmax(values, initial=0.0))
-    return 0.0, next((float(end) for end in (1, 2**8 - 1, 2**16 - 1) if most <= end), most)
+    maximum = float(np.nanmax(values, initial=0.0))
+    return 0.0, next((float(end) for end in (1, 2**8 - 1, 2**16 - 1) if maximum <= end), maximum)
 
 
 def spread(values: Float, low: float, high: float) -> UInt16:

@@ -49,8 +49,8 @@ def require_dimension(
     near = alike or next(iter(difflib.get_close_matches(dimension, dimensions, 1)), None)
     meant = f" (did you mean {near!r}?{' capitals matter' if alike else ''})" if near else ""
     typed = f": {mend} {near or 'DIMENSION'}" if mend else ""
-    there = ", ".join(dimensions) or "none"
-    raise InputError(f"{path}: no dimension {dimension!r}{needed}{meant}; the file has {there}{typed}")
+    available = ", ".join(dimensions) or "none"
+    raise InputError(f"{path}: no dimension {dimension!r}{needed}{meant}; the file has {available}{typed}")
 
 
 def check_ranges(path: Path, ranges: Ranges | None, count: int) -> Ranges:

@@ -145,14 +145,14 @@ class _Taker:
     def selection(self) -> DecompressionSelection:
         """Return the parts of a point to decompress; extra bytes are decompressed all or not at all."""
         every = DecompressionSelection
-        wanted = every.base() | every.Z | every.CLASSIFICATION | every.POINT_SOURCE_ID | every.GPS_TIME
+        selected = every.base() | every.Z | every.CLASSIFICATION | every.POINT_SOURCE_ID | every.GPS_TIME
         if self.coloured:
-            wanted |= every.RGB
+            selected |= every.RGB
         if self.dimension is None:
-            return wanted
+            return selected
         if self.extra is not None:
-            return wanted | every.ALL_EXTRA_BYTES
-        return wanted | every.INTENSITY if self.dimension == "intensity" else every.all()
+            return selected | every.ALL_EXTRA_BYTES
+        return selected | every.INTENSITY if self.dimension == "intensity" else every.all()
 
     def __call__(self, record: Any) -> Raw:
         array = record.array

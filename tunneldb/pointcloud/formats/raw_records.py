@@ -126,7 +126,7 @@ def _extra_name(name: str) -> str:
 
 def _limits(values: Float) -> tuple[float, float]:
     """Return the range of 0–1, 8 bits or 16 bits that holds the values; 12 bits may be shifted below zero, as by Leica."""
-    most = float(np.nanmax(values, initial=0.0))
+    maximum = float(np.nanmax(values, initial=0.0))
     if float(np.nanmin(values, initial=0.0)) < 0.0:
         return -2048.0, 2047.0
-    return 0.0, next((float(end) for end in (1, 2**8 - 1, 2**16 - 1) if most <= end), most)
+    return 0.0, next((float(end) for end in (1, 2**8 - 1, 2**16 - 1) if maximum <= end), maximum)

@@ -97,8 +97,8 @@ def has_colours(path: Path) -> bool:
     InputError
         If the file cannot be read or contains no points.
     """
-    told = format_of(path).has_colours
-    return told is not None and told(path)
+    check = format_of(path).has_colours
+    return check is not None and check(path)
 
 
 def _scans_of_e57(path: Path) -> list[PosedScan]:

@@ -31,7 +31,7 @@ class TextLines:
         self.path = path
         self.line, self.offset = 1, 0
         self._file = path.open("rb")
-        self._held = b""
+        self._buffer = b""
         self._ends = np.empty(0, np.int64)  # offsets after the ends of the lines in memory
         self._at = 0  # number of these lines already taken
 
@@ -51,7 +51,7 @@ class TextLines:
         self._at += taken
         self.line += taken
         self.offset += end - begin
-        return self._held[begin:end], taken
+        return self._buffer[begin:end], taken
 
     def text(self) -> str | None:
         """Return the next line, without its end; None at the end of the file.
@@ -82,14 +82,14 @@ class TextLines:
         self.line -= 1
 
     def _fill(self) -> bool:
-        rest = self._held[int(self._ends[-1]) if len(self._ends) else 0 :]
+        rest = self._buffer[int(self._ends[-1]) if len(self._ends) else 0 :]
         data = self._file.read(BLOCK_BYTES)
         if not data and rest:
             data = b"\n"
-        self._held = rest + data
-        self._ends = np.flatnonzero(np.frombuffer(self._held, np.uint8) == ord("\n")) + 1
+        self._buffer = rest + data
+        self._ends = np.flatnonzero(np.frombuffer(self._buffer, np.uint8) == ord("\n")) + 1
         self._at = 0
-        if self._held and (not len(self._ends) or self._ends[0] > MAX_LINE_BYTES):
+        if self._buffer and (not len(self._ends) or self._ends[0] > MAX_LINE_BYTES):
             raise InputError(f"{self.path}, line {self.line}: no line end within {MAX_LINE_BYTES} bytes: not a text file")
         return bool(len(self._ends))
 

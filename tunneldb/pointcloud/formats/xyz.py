@@ -39,8 +39,8 @@ def read_table(path: Path) -> TextCloud:
     """
     with decoding(path, KIND):
         status = path.stat()
-        beside = names_file(path)
-        named = None if beside is None else (beside, beside.stat().st_mtime_ns)
+        names = names_file(path)
+        named = None if names is None else (names, names.stat().st_mtime_ns)
     return _read_table(path, (status.st_size, status.st_mtime_ns), named)
 
 

@@ -163,13 +163,13 @@ def fit(
     ladders: Sequence[LaserLadder],
     pairs: Sequence[tuple[int, int]],
     reaches: Sequence[float],
-    held: int = 0,
+    fixed: int = 0,
     *,
     hold_height: bool = False,
 ) -> Fitted:
     """Fit scans to walls, ladders and each other, within decreasing distances, round by round.
 
-    The first ``held`` scans are fixed; the next keeps its height if ``hold_height`` is set.
+    The first ``fixed`` scans are fixed; the next keeps its height if ``hold_height`` is set.
     """
     poses = [scan.pose for scan in scans]
     placed = [ladder.placed for ladder in ladders]
@@ -178,11 +178,11 @@ def fit(
     usual = np.array([0.0, 0.0, DEPTH_SHARE * radius, 0.0, 0.0, SLANT_USUAL, SLANT_USUAL, 0.0, 0.0])
     common = usual.copy()
     precision = _prior(len(scans), ladders, radius)
-    stay = np.append(np.arange(POSE * held), [POSE * held + 5] if hold_height else []).astype(np.int64)
+    stay = np.append(np.arange(POSE * fixed), [POSE * fixed + 5] if hold_height else []).astype(np.int64)
     normal, rows = np.eye(count), []
     for reach in reaches:
         leaning = replace(walls, batter=walls.batter + common[walls.side])
-        rows = _all_rows(scans, poses, leaning, placed, common, pairs, reach, held)
+        rows = _all_rows(scans, poses, leaning, placed, common, pairs, reach, fixed)
         normal, right = _normal_equations(rows, count)
         normal[stay, stay] += FIXED_PRECISION
         offset = _prior_offset(poses, placed, ladders, common - usual)
@@ -208,11 +208,11 @@ def _all_rows(
     common: Float,
     pairs: Sequence[tuple[int, int]],
     reach: float,
-    held: int,
+    fixed: int,
 ) -> list[Rows]:
     rows: list[Rows] = []
     first = POSE * len(scans)
-    for i, scan in enumerate(scans[held:], held):
+    for i, scan in enumerate(scans[fixed:], fixed):
         rows += wall_rows(scan.patches, poses[i], walls, common[4:6], i, first + np.array([0, 1, 4, 5]), reach)
         for k, points in scan.ladders.items():
             found = ladder_rows(points, poses[i], placed[k], float(common[2]), i, (first + 2, first + COMMON + 6 * k), reach)

@@ -133,10 +133,10 @@ def _settled(
     pose = _pose(i, place, reliefs, started, walls)
     if pose is None:
         return None
-    beside = sorted(started, key=lambda k: float(np.linalg.norm(started[k].pose.translation - pose.translation)))[
+    neighbours = sorted(started, key=lambda k: float(np.linalg.norm(started[k].pose.translation - pose.translation)))[
         :MAX_NEIGHBOURS
     ]
-    own, others = _levelled(scans[i], pose), [_levelled(scans[k], started[k].pose) for k in beside]
+    own, others = _levelled(scans[i], pose), [_levelled(scans[k], started[k].pose) for k in neighbours]
     found, likelihood = _fitted_beside(own, others, walls, place.direction)
     moved = abs(float((found.translation - pose.translation)[:2] @ place.direction))
     return (found, likelihood) if moved < MAX_SHIFT else None
@@ -199,9 +199,9 @@ def bed_likelihood(patches: tuple[Patches, Patches], poses: tuple[Pose, Pose], r
     square, same = rows.residual[bed] ** 2, rows.sigma[bed] ** 2
     other = same + 2.0 * roughness**2
     ratio = 0.5 * (np.log(other / same) - square / same + square / other)
-    told = np.log((1.0 - OUTLIER_SHARE) * np.exp(ratio) + OUTLIER_SHARE)
+    log_ratio = np.log((1.0 - OUTLIER_SHARE) * np.exp(ratio) + OUTLIER_SHARE)
     _, stretch, count = np.unique(rows.group[bed], return_inverse=True, return_counts=True)
-    return float((np.bincount(stretch, told) / count).sum())
+    return float((np.bincount(stretch, log_ratio) / count).sum())
 
 
 def _direction(scan: PreparedScan, pose: Pose) -> Float:
@@ -265,10 +265,10 @@ def agreement(one: int, other: int, poses: tuple[Pose, Pose], reliefs: Reliefs, 
     look = _direction(reliefs.scans[one], first)
     same = float(look @ _direction(reliefs.scans[other], second)) > 0.0
     along = float((second.translation - first.translation)[:2] @ look)
-    said = float(reliefs.near(one, other, along, turned=not same).max())
-    if abs(said) > MIN_AGREEMENT:
-        return int(np.sign(said))
+    evidence = float(reliefs.near(one, other, along, turned=not same).max())
+    if abs(evidence) > MIN_AGREEMENT:
+        return int(np.sign(evidence))
     scans = reliefs.scans
-    own, beside = _levelled(scans[other], second), _levelled(scans[one], first)
-    _, closely = _fitted_beside(own, [beside], walls, look)
+    own, neighbour = _levelled(scans[other], second), _levelled(scans[one], first)
+    _, closely = _fitted_beside(own, [neighbour], walls, look)
     return int(np.sign(closely)) if abs(closely) > MIN_LOG_RATIO else 0

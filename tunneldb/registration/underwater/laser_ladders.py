@@ -99,8 +99,8 @@ def _clusters(points: Float, walls: Walls) -> list[tuple[Float, Float]]:
     known = np.isfinite(away)
     near, piece = _thin(near[known], piece[known], MAX_LINK / 3.0)
     off = walls.distance(near, piece)
-    beside = (off > -NEIGHBOUR_RADIUS) & (off < WALL_DISTANCE[1] + NEIGHBOUR_RADIUS)
-    near, piece, off = near[beside], piece[beside], off[beside]
+    near_wall = (off > -NEIGHBOUR_RADIUS) & (off < WALL_DISTANCE[1] + NEIGHBOUR_RADIUS)
+    near, piece, off = near[near_wall], piece[near_wall], off[near_wall]
     bars = (off > WALL_DISTANCE[0]) & (off < WALL_DISTANCE[1])
     bars[bars] = _elongated(near, bars)
     near, piece = near[bars], piece[bars]
@@ -248,7 +248,7 @@ def _shifts(own: Float, ladder: Ladder, gap: float) -> list[float]:
     return chosen
 
 
-def _refine(cluster: Float, start: PlacedLadder, most: int) -> tuple[float, PlacedLadder, Float]:
+def _refine(cluster: Float, start: PlacedLadder, max_points: int) -> tuple[float, PlacedLadder, Float]:
     """Fit turn, shift and gap by robust least squares; return cost, ladder and covariance."""
     radius = start.ladder.diameter / 2.0
 
@@ -270,7 +270,7 @@ def _refine(cluster: Float, start: PlacedLadder, most: int) -> tuple[float, Plac
         return np.asarray(-np.column_stack([turn, shift, wider]) / NOISE)
 
     found = least_squares(
-        residual, np.zeros(7), derivatives, loss="cauchy", x_scale=np.array([0.01] * 6 + [0.005]), max_nfev=most
+        residual, np.zeros(7), derivatives, loss="cauchy", x_scale=np.array([0.01] * 6 + [0.005]), max_nfev=max_points
     )
     information = found.jac.T @ found.jac
     covariance = np.linalg.pinv(information, rcond=1e-12)

@@ -163,10 +163,10 @@ def find_smooth_patches(points: Float) -> Patches:
     if len(centre) < MAX_NORMAL_PATCHES:
         return Patches(centre[:0], centre[:0], count[:0], spread[:0])
     reach, about = cKDTree(centre).query(centre, MAX_NORMAL_PATCHES, distance_upper_bound=NORMAL_RADIUS)
-    there = np.isfinite(reach)[..., None]
-    number = there.sum(axis=1)
-    away = np.where(there, centre[np.where(there[..., 0], about, 0)] - centre[:, None], 0.0)
-    away = np.where(there, away - (away.sum(axis=1) / number)[:, None], 0.0)
+    valid = np.isfinite(reach)[..., None]
+    number = valid.sum(axis=1)
+    away = np.where(valid, centre[np.where(valid[..., 0], about, 0)] - centre[:, None], 0.0)
+    away = np.where(valid, away - (away.sum(axis=1) / number)[:, None], 0.0)
     value, vector = np.linalg.eigh(np.swapaxes(away, 1, 2) @ away / number[..., None])
     normal = _towards_scanner(vector[:, :, 0], centre)
     keep = (
@@ -308,14 +308,14 @@ def ladder_rows(
         poses.append(pose_derivatives(space[near], pose, direction))
         common.append(np.hstack([np.full((len(arm), 1), behind), -np.cross(arm, direction), -direction]))
     bar = which[near]
-    told = np.bincount(bar, _information_share(own[near], bar, away[near], sigma_across[near], placed))[bar]
+    shares = np.bincount(bar, _information_share(own[near], bar, away[near], sigma_across[near], placed))[bar]
     return Rows(
         np.concatenate([along[near], across[near]]),
         np.concatenate([sigma_along[near], sigma_across[near]]),
         np.vstack(poses), scan, None, None, np.vstack(common),
         np.concatenate([[depth_column], first_column + np.arange(6)]),
         np.concatenate([bar, bar + 1000]),
-        np.concatenate([np.full(len(bar), SHARED), sigma_across[near] / np.sqrt(np.minimum(told, BARS_BEAMS))]),
+        np.concatenate([np.full(len(bar), SHARED), sigma_across[near] / np.sqrt(np.minimum(shares, BARS_BEAMS))]),
         "ladder", ladder.name,
     )  # fmt: skip
 
@@ -368,29 +368,29 @@ def overlap_rows(
     i, k, normal, beside_normal = i[same], k[same], normal[same], beside_normal[same]
     if len(i) < 20:
         return None
-    place, beside = place[i], second.apply(other.centre[k])
+    place, neighbour = place[i], second.apply(other.centre[k])
     mean = normal + beside_normal
     mean /= np.linalg.norm(mean, axis=1)[:, None]
-    nearer = nearer_by_slant(place, first.translation, mean) - nearer_by_slant(beside, second.translation, mean)
+    nearer = nearer_by_slant(place, first.translation, mean) - nearer_by_slant(neighbour, second.translation, mean)
     bed = mean[:, 2] > MIN_BED_COSINE
-    apart = (second.translation - first.translation) * [1.0, 1.0, 0.0]
+    baseline = (second.translation - first.translation) * [1.0, 1.0, 0.0]
     design = np.column_stack(
         [
             np.where(bed, 0.0, -nearer),
             np.where(bed, -nearer, 0.0),
-            np.where(bed, 0.0, mean @ apart),
-            np.where(bed, mean @ apart, 0.0),
+            np.where(bed, 0.0, mean @ baseline),
+            np.where(bed, mean @ baseline, 0.0),
         ]
     )
-    residual = ((place - beside) * mean).sum(axis=1) + design @ common
+    residual = ((place - neighbour) * mean).sum(axis=1) + design @ common
     close = np.abs(residual) < within
-    i, k, place, beside = i[close], k[close], place[close], beside[close]
+    i, k, place, neighbour = i[close], k[close], place[close], neighbour[close]
     mean, residual, design = mean[close], residual[close], design[close]
     if len(i) < 20:
         return None
     sigma = np.sqrt(one.spread[i] ** 2 / one.count[i] + other.spread[k] ** 2 / other.count[k] + RELIEF**2)
     return Rows(
         residual, sigma, pose_derivatives(place, first, mean), scans[0], scans[1],
-        -pose_derivatives(beside, second, mean), design, columns, _stretches(place),
+        -pose_derivatives(neighbour, second, mean), design, columns, _stretches(place),
         np.full(len(i), SHARED), "scan", "",
     )  # fmt: skip

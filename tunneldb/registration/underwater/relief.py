@@ -118,8 +118,8 @@ def likelihood(one: Relief, other: Relief) -> Float:
     correlation = np.clip(product / np.sqrt(np.maximum(squares, 1e-12)), -MAX_CORRELATION, MAX_CORRELATION)
     patch = max(float((_middle_of(one.likeness, other.likeness)).sum()), 1.0)  # pixels per independent place
     weight = np.sqrt(np.maximum(shared / patch - MIN_INDEPENDENT_PLACES, 0.0))
-    told = (shared > MIN_CELLS) & (weight > 0.0)
-    return np.where(told, _log_ratio(np.arctanh(correlation) * weight, np.where(told, weight, 1.0)), NO_EVIDENCE)
+    valid = (shared > MIN_CELLS) & (weight > 0.0)
+    return np.where(valid, _log_ratio(np.arctanh(correlation) * weight, np.where(valid, weight, 1.0)), NO_EVIDENCE)
 
 
 def _log_ratio(score: Float, weight: Float) -> Float:
@@ -128,9 +128,9 @@ def _log_ratio(score: Float, weight: Float) -> Float:
     The similarity of two scans of one bed is not known in advance: all correlations up to MAX_SAME_BED_CORRELATION are
     equally likely, in Fisher's z.
     """
-    most = np.arctanh(MAX_SAME_BED_CORRELATION) * weight
-    high, low = log_ndtr(score), log_ndtr(score - most)
-    mean = high + np.log1p(-np.exp(np.minimum(low - high, -1e-12))) - np.log(most)
+    upper = np.arctanh(MAX_SAME_BED_CORRELATION) * weight
+    high, low = log_ndtr(score), log_ndtr(score - upper)
+    mean = high + np.log1p(-np.exp(np.minimum(low - high, -1e-12))) - np.log(upper)
     return np.asarray(mean + 0.5 * score**2 + 0.5 * np.log(2.0 * np.pi))
 
 

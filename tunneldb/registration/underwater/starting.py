@@ -55,17 +55,17 @@ def start_all(
     reliefs = Reliefs(scans)
     started = _agreeing(reliefs, started, reasons, walls, several=several)
     left = [i for i in scans if i not in started]
-    beside: dict[int, tuple[StartedScan, float]] = {}
+    placed: dict[int, tuple[StartedScan, float]] = {}
     new = list(started)
     while new and left:
         for i in left:
             if any(reliefs.may_overlap(k, i) for k in new):
                 at = place_beside(i, reliefs, started, walls, found)
-                beside = {k: one for k, one in beside.items() if k != i} | ({} if at is None else {i: at})
+                placed = {k: one for k, one in placed.items() if k != i} | ({} if at is None else {i: at})
         # less certain, more distant scans may become certain next to the first ones
-        most = max((likelihood for _, likelihood in beside.values()), default=0.0)
-        new = [i for i, (_, likelihood) in beside.items() if likelihood >= MIN_ROUND_SHARE * most]
-        started |= {i: beside.pop(i)[0] for i in new}
+        highest_likelihood = max((likelihood for _, likelihood in placed.values()), default=0.0)
+        new = [i for i, (_, likelihood) in placed.items() if likelihood >= MIN_ROUND_SHARE * highest_likelihood]
+        started |= {i: placed.pop(i)[0] for i in new}
         left = [i for i in left if i not in started]
     reasons = {i: reason for i, reason in reasons.items() if i not in started}
     return _agreeing(reliefs, started, reasons, walls, several=several), reasons
@@ -85,7 +85,7 @@ def _agreeing(
     another: its pose needs confirmation by another scan, or by the place given by the operator.
     """
     kept = dict(started)
-    said = {
+    agreements = {
         (a, b): agreement(a, b, (started[a].pose, started[b].pose), reliefs, walls)
         for a in started
         for b in started
@@ -93,7 +93,7 @@ def _agreeing(
     }
 
     def votes(i: int) -> tuple[int, int]:
-        of = [value for (a, b), value in said.items() if i in (a, b) and a in kept and b in kept]
+        of = [value for (a, b), value in agreements.items() if i in (a, b) and a in kept and b in kept]
         return of.count(1), of.count(-1)
 
     while kept:

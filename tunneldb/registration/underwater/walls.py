@@ -169,8 +169,8 @@ def _opposite(foot: Float, normal: Float) -> tuple[Float, Bool]:
     """Return the median distance, m, of each piece to the opposite wall along its normal, and whether there is one."""
     away = foot[None, :, :2] - foot[:, None, :2]
     ahead = (away * normal[:, None]).sum(axis=2)
-    beside = np.abs(away[..., 0] * -normal[:, None, 1] + away[..., 1] * normal[:, None, 0])
-    facing = (ahead > MIN_WIDTH) & (ahead < MAX_WIDTH) & (beside < 2.0 * SPACING)
+    lateral = np.abs(away[..., 0] * -normal[:, None, 1] + away[..., 1] * normal[:, None, 0])
+    facing = (ahead > MIN_WIDTH) & (ahead < MAX_WIDTH) & (lateral < 2.0 * SPACING)
     distance = np.where(facing, ahead, np.inf).min(axis=1)
     return distance, np.isfinite(distance)
 

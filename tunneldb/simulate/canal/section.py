@@ -145,7 +145,7 @@ def clearance(c: Section, solids: Float, x: float, y: float, z: float) -> tuple[
     s, o = stationed(c.radius, x, y)
     slope = c.slope if z > 0.0 else c.slope_below
     cosine = 1.0 / math.sqrt(1.0 + slope * slope)
-    most = 1.33 * _MAX_NOISE_SIGMA * c.roughness
+    max_relief = 1.33 * _MAX_NOISE_SIGMA * c.roughness
     best, kind = 1e9, WALL
     for face in range(2):
         side = 1.0 if face == 0 else -1.0
@@ -153,10 +153,10 @@ def clearance(c: Section, solids: Float, x: float, y: float, z: float) -> tuple[
         d, surface = wall, WALL
         if side == c.side and z - c.towpath_height > wall:
             d, surface = z - c.towpath_height, TOWPATH
-        if d < 2.0 * most + 0.05:
+        if d < 2.0 * max_relief + 0.05:
             d -= _stones(c, s, z if surface == WALL else o, face if surface == WALL else 3)
         else:
-            d -= most
+            d -= max_relief
         for k in range(solids.shape[0]):
             if solids[k, 0] == RECESS and solids[k, 3] * side > 0.0:
                 inside = -_solid(solids, k, s, o, z)
@@ -166,13 +166,13 @@ def clearance(c: Section, solids: Float, x: float, y: float, z: float) -> tuple[
             best, kind = d, surface
         if side == c.side:
             d = (c.half + c.towpath_width + slope * z - side * o) * cosine
-            d -= _stones(c, s, z, 4) if d < 2.0 * most + 0.05 else most
+            d -= _stones(c, s, z, 4) if d < 2.0 * max_relief + 0.05 else max_relief
             if d < best:
                 best, kind = d, WALL
     if z > c.vault_height:
         across, up = o - c.vault_offset, z - c.vault_height
         d = c.vault_radius - math.hypot(across, up)
-        d -= _stones(c, s, c.vault_radius * math.atan2(across, up), 5) if d < 2.0 * most + 0.05 else most
+        d -= _stones(c, s, c.vault_radius * math.atan2(across, up), 5) if d < 2.0 * max_relief + 0.05 else max_relief
         if d < best:
             best, kind = d, VAULT
     top = 1.38 * _MAX_NOISE_SIGMA * c.bed_relief + 2.0 * c.bed_rise

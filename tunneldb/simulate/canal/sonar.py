@@ -180,12 +180,12 @@ def _false_echoes(
     # off a wall and back from the other one: the walls are treated as vertical mirrors along the axis
     start = place[beam] + 0.98 * echoes.range[beam, None] * ways[beam]
     out.append(_bounced(scene, start, ways[beam] * [1.0, -1.0, 1.0], echoes.range[beam], beam))
-    held = np.flatnonzero(seen)
-    beam = rng.choice(held, min(by_lobes, len(held)), replace=False)
+    visible = np.flatnonzero(seen)
+    beam = rng.choice(visible, min(by_lobes, len(visible)), replace=False)
     lobe = np.clip(beam + rng.integers(-12, 13, len(beam)), 0, len(ways) - 1)  # some degrees above or below
     known = np.isfinite(echoes.range[lobe])
     out.append((beam[known].astype(np.int32), echoes.range[lobe][known]))
-    beam = rng.choice(held, min(max(count - sum(len(b) for b, _ in out), 0), len(held)), replace=False)
+    beam = rng.choice(visible, min(max(count - sum(len(b) for b, _ in out), 0), len(visible)), replace=False)
     out.append((beam.astype(np.int32), rng.uniform(_MIN_RANGE, min(15.0, parameters.sonar_maximum_range), len(beam))))
     return out
 

@@ -136,8 +136,8 @@ def _halos(p: Parameters, lining: Polygon, taken: BaseGeometry, rng: np.random.G
         for _ in range(TRIES):
             area = math.exp(rng.uniform(math.log(HALO_AREA[0]), math.log(HALO_AREA[1])))
             spot = _spot(area, rng.uniform(left, right), rng.uniform(bottom, top), rng).buffer(HALO)
-            apart = spot.buffer(MIN_CLEARANCE)
-            if lining.contains(spot) and not apart.intersects(taken) and not any(apart.intersects(h.outline) for h in halos):
+            margin = spot.buffer(MIN_CLEARANCE)
+            if lining.contains(spot) and not margin.intersects(taken) and not any(margin.intersects(h.outline) for h in halos):
                 break
         else:
             raise UserError(f"no room on the lining for halo {number + 1} of {p.halos}; use fewer halos or leaks")

@@ -99,11 +99,11 @@ def place_marks(parameters: Parameters, tunnel: Tunnel, taken: list[BaseGeometry
     """
     p, line = parameters, tunnel.line
     patches, paints = (np.random.default_rng(s) for s in seed.spawn(2))
-    wanted = [(_patch, patches)] * p.patches + [((_number, _stripe)[i % 2], paints) for i in range(p.paint)]
+    requested = [(_patch, patches)] * p.patches + [((_number, _stripe)[i % 2], paints) for i in range(p.paint)]
     lowest = tunnel.section.floor_arc - 0.1
     shapes = [t.buffer(MIN_CLEARANCE) for t in taken]
     marks: list[Mark] = []
-    for number, (make, rng) in enumerate(wanted):
+    for number, (make, rng) in enumerate(requested):
         tree = STRtree(shapes)
         for _ in range(TRIES):
             s = float(rng.uniform(line.start + 1.0, line.end - 1.0))
@@ -117,7 +117,7 @@ def place_marks(parameters: Parameters, tunnel: Tunnel, taken: list[BaseGeometry
             if inside and not len(tree.query(outline, predicate="intersects")):
                 break
         else:
-            raise UserError(f"no room on the lining for mark {number + 1} of {len(wanted)}; use fewer patches or less paint")
+            raise UserError(f"no room on the lining for mark {number + 1} of {len(requested)}; use fewer patches or less paint")
         shapes.append(outline.buffer(MIN_CLEARANCE))
         marks += made
     return marks

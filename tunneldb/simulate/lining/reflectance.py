@@ -129,15 +129,15 @@ def soot_amount(reflectance: Reflectance, s: Float) -> Float:
 
 def _grime(reflectance: Reflectance, s: Float, arc: Float) -> Float:
     """Return the grime at positions (n,), dB: the greatest value of all bands."""
-    most = np.zeros(s.size)
+    greatest = np.zeros(s.size)
     for i, (side, edge, fade, drop) in enumerate(reflectance.grime.tolist()):
         below = arc * side - edge
         near = np.flatnonzero((below >= -GRIME_RISE) & (below <= 6.0 * fade))
         below = below[near]
         shape = np.where(below > 0.0, np.exp(-np.maximum(below, 0.0) / fade), 1.0 + below / GRIME_RISE)
         change = smooth_field(s[near] / GRIME_LENGTH, np.full(near.size, i + 0.5), reflectance.salt + 3)
-        most[near] = np.maximum(most[near], drop * shape * np.maximum(0.0, 1.0 + GRIME_CHANGE * change))
-    return most
+        greatest[near] = np.maximum(greatest[near], drop * shape * np.maximum(0.0, 1.0 + GRIME_CHANGE * change))
+    return greatest
 
 
 @kernel

@@ -105,7 +105,7 @@ def lining_relief(
     scale = np.array([1.0, float(rng.uniform(*ROUGHNESS_FACTOR[p.lining])) if p.lining in ROUGHNESS_FACTOR else 1.0])
     rough = np.array(ROUGH.get(p.lining, ())).reshape(-1, 2) * scale
     facets = np.array(FACETS.get(p.lining, ())).reshape(-1, 2) * scale
-    most = MAX_ROUGH_SIGMA * float(rough[:, 1].sum()) + float(facets[:, 1].sum()) + masonry.face
+    max_height = MAX_ROUGH_SIGMA * float(rough[:, 1].sum()) + float(facets[:, 1].sum()) + masonry.face
     reach = np.hypot(*shape.ellipse[:, :2].T) + np.hypot(*shape.ellipse[:, 2:].T)
     away = float((reach + np.abs(shape.stand).max(axis=1, initial=0.0)).max(initial=0.0))
     grooves = masonry.depth + (CHAMFER_DEPTH if p.chamfers else 0.0)
@@ -118,8 +118,8 @@ def lining_relief(
         facets,
         masonry,
         int(seed.generate_state(1)[0]),
-        min(0.0, float(step.min(initial=0.0))) - rings.pocket_depth - p.radius_step - most - grooves - away,
-        max(0.0, float(step.max(initial=0.0))) + most + away,
+        min(0.0, float(step.min(initial=0.0))) - rings.pocket_depth - p.radius_step - max_height - grooves - away,
+        max(0.0, float(step.max(initial=0.0))) + max_height + away,
         tunnel.section.floor_arc,
         tunnel.section.floor,
     )
@@ -228,12 +228,12 @@ def intersect_relief(
             # A smooth surface is found by the secant method, a step by bisection.
             share = above / (above - gap) if j < 3 and gap < 0.0 else 0.5
             middle = before + share * (t - before) + (0.5 * TOLERANCE if j < 3 else 0.0)
-            there = _gap(relief, plan, profile, parts, x + middle * dx, y + middle * dy, z + middle * dz, at[0])
-            if there[1] > 0.0 and there[4][3] > relief.floor:
-                before, above = middle, there[1]
+            at_middle = _gap(relief, plan, profile, parts, x + middle * dx, y + middle * dy, z + middle * dz, at[0])
+            if at_middle[1] > 0.0 and at_middle[4][3] > relief.floor:
+                before, above = middle, at_middle[1]
             else:
                 t = middle
-                arc, gap, gu, gw, at = there
+                arc, gap, gu, gw, at = at_middle
         s, _, u, w, c, n, k, g, q, det = at
         found[0, i] = t
         found[1, i] = s
@@ -251,8 +251,8 @@ def intersect_relief(
         # In the direction of increasing arc.
         ax, ay, az = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
         if gap < -SIDE_DEPTH:
-            beside = _gap(relief, plan, profile, parts, x + before * dx, y + before * dy, z + before * dz, s)
-            is_end = abs(height(relief, s, beside[0]) - height(relief, beside[4][0], beside[0])) > SIDE_DEPTH
+            at_before = _gap(relief, plan, profile, parts, x + before * dx, y + before * dy, z + before * dz, s)
+            is_end = abs(height(relief, s, at_before[0]) - height(relief, at_before[4][0], at_before[0])) > SIDE_DEPTH
             if is_end:
                 ax, ay, az = tx, ty, tz
             found[3, i] = abs(ax * dx + ay * dy + az * dz)

@@ -141,8 +141,8 @@ def with_drips(leaks: list[Leak], gaps: tuple[float, float], room: Room, seed: n
             dripping.append(leak)
             continue
         drips = [_drip(leak.polygon, down, gaps, rng) for _ in range(int(rng.integers(1, 4)))]
-        apart = unary_union([d for d in drips if d is not None and room.bears(d, leak.polygon)])
-        outline = leak.polygon.union(apart)
+        separate = unary_union([d for d in drips if d is not None and room.bears(d, leak.polygon)])
+        outline = leak.polygon.union(separate)
         scale = leak.area_surface / leak.area
         dripping.append(replace(leak, polygon=outline, area_surface=outline.area * scale))
     return dripping

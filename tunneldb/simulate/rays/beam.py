@@ -28,7 +28,7 @@ MIN_SHARE = 0.02  # least share of the footprint that changes an echo
 HALVINGS = 5
 
 
-def aside(direction: Float, rng: np.random.Generator) -> tuple[Float, Float]:
+def footprint_offsets(direction: Float, rng: np.random.Generator) -> tuple[Float, Float]:
     """Return uniform random places in footprints: vectors across the rays (n, 3), 1 at the rim, and their lengths (n,)."""
     other = np.where(np.abs(direction[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
     one = np.cross(direction, other)
@@ -85,7 +85,7 @@ def blur(
         Function that casts rays in other directions.
     """
     direction = rays.direction[echoes.ray]
-    across, beside = aside(direction, rng)
+    across, offset = footprint_offsets(direction, rng)
     radius = 0.5 * (EXIT_DIAMETER + 1e-3 * divergence * echoes.range)
 
     def at(rows: Int64, share: Float | float) -> _Spot:
@@ -110,7 +110,7 @@ def blur(
         there = at(rows, middle).range
         is_first = np.abs(there - echoes.range[rows]) < np.abs(there - second.range)
         low, high = np.where(is_first, middle, low), np.where(is_first, high, middle)
-    share = segment_share(0.5 * (low + high) * beside[rows])
+    share = segment_share(0.5 * (low + high) * offset[rows])
     mixed = share >= MIN_SHARE
     rows, second, share = rows[mixed], second.take(mixed), share[mixed]
     before = echoes.take(rows)

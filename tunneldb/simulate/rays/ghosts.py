@@ -34,11 +34,11 @@ def mirror(
     up = tunnel.line.frame(echoes.chainage[chosen]).w
     mirrored = direction - 2.0 * np.sum(direction * up, axis=1)[:, None] * up
     spot = rays.origin[echoes.ray[chosen]] + echoes.range[chosen, None] * direction + FLOOR_OFFSET * up
-    there = shoot(spot, mirrored, echoes.chainage[chosen])
-    rows, whole = chosen[there.ray], echoes.range[chosen[there.ray]] + there.range
+    reflected = shoot(spot, mirrored, echoes.chainage[chosen])
+    rows, whole = chosen[reflected.ray], echoes.range[chosen[reflected.ray]] + reflected.range
     within = whole <= furthest
-    there = there.take(np.flatnonzero(within))
-    rows, whole, direction = rows[within], whole[within], direction[there.ray]
+    reflected = reflected.take(np.flatnonzero(within))
+    rows, whole, direction = rows[within], whole[within], direction[reflected.ray]
     if not len(rows):
         return echoes
     measured = whole + echoes.measured[rows] - echoes.range[rows]
@@ -53,8 +53,8 @@ def mirror(
         offset=place.offset,
         klass=np.full(len(rows), OUTLIER),
         leak=np.full(len(rows), -1),
-        drop=there.drop + loss[there.ray],
-        cosine=there.cosine,
+        drop=reflected.drop + loss[reflected.ray],
+        cosine=reflected.cosine,
         range=whole,
         thing=np.zeros(len(rows), dtype=np.int64),
     )

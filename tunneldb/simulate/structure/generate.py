@@ -141,10 +141,10 @@ class StructureScan:
             if len(out) == self.parameters.anomalies:
                 break
             face = faces[int(rng.choice(len(faces), p=weight / weight.sum()))]
-            there = [a for a in out if a.face is face]
+            existing = [a for a in out if a.face is face]
             wide = min(face.size()) > 1.0
             found = place(len(out) + 1, face, places[face.id], self.parameters.contrast, rng)
-            if found is None or (there and not wide) or any(a.outline.distance(found.outline) < 0.15 for a in there):
+            if found is None or (existing and not wide) or any(a.outline.distance(found.outline) < 0.15 for a in existing):
                 continue
             out.append(found)
         return out
@@ -242,10 +242,10 @@ class StructureScan:
         two = np.cross(direction, one)
         power, moment, hits = np.zeros(len(rows)), np.zeros(len(rows)), np.zeros(len(rows))
         for p, q in _SAMPLES:
-            there = direction + radius[:, None] * (p * one + q * two)
-            there /= np.linalg.norm(there, axis=1)[:, None]
-            far, which = cast(self._rows, self._views[k], self.stations[k], there)
-            level, _ = self._levels(k, there, far, which)
+            samples = direction + radius[:, None] * (p * one + q * two)
+            samples /= np.linalg.norm(samples, axis=1)[:, None]
+            far, which = cast(self._rows, self._views[k], self.stations[k], samples)
+            level, _ = self._levels(k, samples, far, which)
             far = np.where(which >= 0, far, 1.0)
             part = np.where(which >= 0, 10.0 ** (0.1 * (level + range_term(far))), 0.0)
             power, moment, hits = power + part, moment + part * far, hits + (which >= 0)

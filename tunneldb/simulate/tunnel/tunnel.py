@@ -21,17 +21,17 @@ from tunneldb.simulate.tunnel.section import Section, nearest
 
 @inner
 def foot(
-    plan: Float, profile: Float, x: float, y: float, z: float, s: float, tolerance: float, most: int
+    plan: Float, profile: Float, x: float, y: float, z: float, s: float, tolerance: float, max_steps: int
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
-    """Find the foot of the perpendicular from a point to the axis: Newton's method from chainage ``s``, ``most`` steps.
+    """Find the foot of the perpendicular from a point to the axis: Newton's method from chainage ``s``.
 
-    It ends with a step of less than ``tolerance`` m. ``most`` is a ``np.int64``, since Numba would compile a version for each
-    literal number. Return the chainage and the last step, then, before that step: u, w, cos and sin of the direction,
-    curvature, grade, the length q of the unnormalised tangent, and D, by which (cos, sin, grade) is divided to give the
-    gradient of chainage.
+    It ends with a step of less than ``tolerance`` m, or after ``max_steps`` steps. That is a ``np.int64``, since Numba would
+    compile a version for each literal number. Return the chainage and the last step, then, before that step: u, w, cos and
+    sin of the direction, curvature, grade, the length q of the unnormalised tangent, and D, by which (cos, sin, grade) is
+    divided to give the gradient of chainage.
     """
     step, u, w, c, n, k, g, q, d = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for _ in range(most):
+    for _ in range(max_steps):
         ax, ay, az, c, n, k, g, dg = axis_at(plan, profile, s)
         dx, dy, dz = x - ax, y - ay, z - az
         q = math.sqrt(1.0 + g * g)
