@@ -85,7 +85,7 @@ _PLACE = {"unrolled": "unrolled", "map": "map", "3d": "surface"}
 
 @dataclass(frozen=True)
 class Chosen:
-    """Which findings are wanted.
+    """Selection of findings.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ _SHARE = sql.SQL(
 
 
 BLOCK = 20_000
-"""Findings that are read at a time."""
+"""Number of findings read at a time."""
 
 
 def read_findings(
@@ -137,7 +137,7 @@ def read_findings(
 def stream_findings(
     conn: psycopg.Connection[Any], survey: Survey, geometry: Geometry = "unrolled", chosen: Chosen | None = None
 ) -> Iterator[Finding]:
-    """Yield findings of a survey in order of chainage, of which only BLOCK are in memory; until the transaction ends."""
+    """Yield findings of a survey in order of chainage, with only BLOCK in memory; until the transaction ends."""
     wanted = Chosen() if chosen is None else chosen
     query = sql.SQL(
         "SELECT {}, coalesce({}, 1), public.ST_AsBinary({}) FROM tunnel_api.lining_finding WHERE survey_id = %(survey)s"

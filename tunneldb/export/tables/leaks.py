@@ -1,4 +1,4 @@
-"""Leaks, joints and other dark spots of a survey, read and laid out as a table; as files: leak_files."""
+"""Leaks, joints and dry dark areas of a survey, read into a table; as files: leak_files."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
 Geometry = Literal["unrolled", "map", "3d"]
-"""Unrolled plane (chainage, arc); map strip beside the axis; on the surface in space."""
+"""Geometries: unrolled plane (chainage, arc); map strip beside the axis; on the surface in space."""
 
 Kind = Literal["leak", "joint", "dark", "all"]
-"""What is listed: leaks, joints, what else is dark but dry, or all of it."""
+"""Kinds to list: leaks, joints, dry dark areas, or all."""
 
 _PLURAL = {"leak": "leaks", "joint": "joints", "dark": "dark spots", "all": "anomalies"}
 _COLUMN = {"unrolled": "unrolled", "map": "map", "3d": "surface"}
@@ -101,7 +101,7 @@ COLUMNS = tuple(f.name for f in fields(Anomaly) if f.name != "geometry")
 
 @dataclass(frozen=True)
 class Selection:
-    """Which anomalies to read.
+    """Selection of anomalies.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class LeakList:
-    """Leaks of a survey, or what else is dark on its lining.
+    """Leaks, or other anomalies, of a survey.
 
     Attributes
     ----------
@@ -154,7 +154,7 @@ class LeakList:
 
     @property
     def total(self) -> str:
-        """How many there are, how large together, and what else is listed; also where nothing was searched."""
+        """Return number and total area, and other listed items; also if nothing was searched."""
         if not self.rows and not self.coverage.seen_area:
             return f"{_PLURAL[self.kind]} were not searched for"
         others = {
@@ -162,7 +162,7 @@ class LeakList:
             "not found again": sum(row.review != "rejected" and not row.detected for row in self.rows),
         }
         besides = " and ".join(f"{count} {name}" for name, count in others.items() if count)
-        return f"{self.count} {_PLURAL[self.kind]}, {self.area:.2f} m²" + (f"; listed besides: {besides}" if besides else "")
+        return f"{self.count} {_PLURAL[self.kind]}, {self.area:.2f} m²" + (f"; also listed: {besides}" if besides else "")
 
 
 _CHOSEN = sql.SQL(
@@ -175,14 +175,14 @@ _CHOSEN = sql.SQL(
 
 
 def listed_column(name: str) -> sql.Composable:
-    """A column of the views of leaks as lists have it: beside a kind that an inspector gave stands no confidence in another."""
+    """Return a column of the views of leaks for lists: no confidence if an inspector changed the kind."""
     return sql.SQL("CASE WHEN kind = found THEN confidence END AS confidence") if name == "confidence" else sql.Identifier(name)
 
 
 def read_leaks(
     conn: psycopg.Connection[Any], survey: Survey, geometry: Geometry = "unrolled", selection: Selection | None = None
 ) -> LeakList:
-    """Read the leaks of a survey, or what else is dark on its lining.
+    """Read the leaks, or other anomalies, of a survey.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def read_leaks(
 
 
 def as_table(leaks: LeakList, title: str, width: int | None = None) -> Table:
-    """Lay leaks or what else was read out for a terminal.
+    """Format leaks or other anomalies for a terminal.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def as_table(leaks: LeakList, title: str, width: int | None = None) -> Table:
 
 
 def _width(cells: dict[str, list[str]]) -> int:
-    """Width of a table with lines between its columns."""
+    """Return the width of a table with lines between its columns."""
     return 1 + sum(3 + max(map(cell_len, (heading, *column))) for heading, column in cells.items())
 
 
@@ -274,6 +274,6 @@ _LEAST_FIRST = ("image", "max dB", "contrast", "length m", "by", "drop dB", "con
 
 
 def clock_label(hours: float) -> str:
-    """Clock position as hours and minutes: 12 is the crown, 0.5 is 12:30."""
+    """Return a clock position as hours and minutes: 12 is the crown, 0.5 is 12:30."""
     minutes = round(hours * 60) % 720
     return f"{minutes // 60 or 12}:{minutes % 60:02d}"
