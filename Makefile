@@ -91,8 +91,8 @@ docs: $(VENV)/wheel $(VENV)/development
 	$(BIN)/python docs/generate_reference.py
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
-plugin:
-	$(PYTHON) scripts/package_plugin.py dist
+plugin: $(VENV)/wheel
+	$(BIN)/python scripts/package_plugin.py dist
 
 bench: install $(VENV)/development
 	$(BIN)/python -m benchmarks.run
