@@ -81,7 +81,7 @@ def _command(name: str, group: str) -> str:
 
 
 def _belongs(item: dict[str, Any], words: list[str]) -> bool:
-    """True if a parameter is one of the command with these fixed words: --classified divides export in two."""
+    """Return whether a parameter belongs to the command with these fixed words; --classified divides export in two."""
     if words[0] != "export":
         return True
     if item["option"] == "--classified":
