@@ -88,10 +88,11 @@ fuzz: install $(VENV)/development $(VENV)/tests $(VENV)/compiled
 	CASES=$(or $(CASES),10000) RIGHT=$(or $(RIGHT),1000) SECONDS=$(or $(SECONDS),inf) $(BIN)/pytest $(ENDLESS) -n 0 -s tests/cli/test_fuzz.py
 
 docs: $(VENV)/wheel $(VENV)/development
+	$(BIN)/python docs/generate_reference.py
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
-plugin:
-	$(PYTHON) scripts/package_plugin.py dist
+plugin: $(VENV)/wheel
+	$(BIN)/python scripts/package_plugin.py dist
 
 bench: install $(VENV)/development
 	$(BIN)/python -m benchmarks.run

@@ -1,52 +1,46 @@
-"""Write the reference pages from the program itself: its commands, its parameters, and the comments in its database.
+"""Write the parts of the reference pages that the program itself states: commands, parameters, views and functions.
 
     python docs/generate_reference.py
 
-makes a scratch database on the server of TUNNELDB_DSN, or on the embedded one, and drops it again.
+writes one file a part into `build/reference`, from a database on a temporary server. `make docs` runs it, and `site_hooks.py`
+puts each part where a page names it.
 """
 
 from __future__ import annotations
 
 import inspect
-import os
 import re
+import shutil
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 import psycopg
-from psycopg import sql
-from psycopg.conninfo import make_conninfo
-from view_diagram import view_diagram
+from site_hooks import REFERENCE
+from view_topics import base_views, views_by_topic
 
 from tunneldb.cli.main import COMMANDS, main
 from tunneldb.cli.output import JSON, Verb
-from tunneldb.database import install, open_connection, resolve_dsn
+from tunneldb.database import install, open_connection
 from tunneldb.database.schema import sql_files
+from tunneldb.database.server import Server
 from tunneldb.stages.parameters import PARAMETERS
 from tunneldb.stages.registry import STAGES
 
-FOLDER = Path(__file__).parent
-NOTE = "<!-- Written by generate_reference.py; edit what it reads, not this page. -->"
+Columns = dict[str, tuple[str, str]]
+"""Columns of a view: type and meaning by name."""
 
 
-def commands() -> str:
-    """Return the page of the command line."""
-    parts = [
-        "# The command line",
-        NOTE,
-        "`tunneldb [--dsn DSN] VERB …`. Without `--dsn` or `TUNNELDB_DSN` the embedded server is used. Results go to standard "
-        "output, messages and progress to standard error. Every verb but `psql` takes `--json`: "
-        "[one JSON object](howto-operate.md#for-programs-json) on standard output. Exit codes: 0 done; 1, where a verb states "
-        "it; 2 the input, the server or the command line is at fault, said in one line `tunneldb: …`.",
-        _options(main),
-    ]
+def commands(_: psycopg.Connection[Any]) -> str:
+    """Return the options of all commands, and each command with its help, options and examples."""
+    parts = [_options(main)]
     for verb in COMMANDS:
         command = main.get_command(click.Context(main), verb)
         assert command is not None
         parts += _command(command, verb)
-    return _page(parts)
+    return "\n\n".join(parts)
 
 
 def _command(command: click.Command, name: str) -> Iterator[str]:
@@ -110,8 +104,8 @@ def _metavar(option: click.Option) -> str:
     return names.get(option.type.name, option.type.name.upper().replace(" RANGE", "").replace("INTEGER", "N"))
 
 
-def parameters() -> str:
-    """Return the page of the parameters."""
+def parameters(_: psycopg.Connection[Any]) -> str:
+    """Return the table of the parameters."""
     stage_of = {prefix: stage.name for stage in STAGES for prefix in stage.parameters}
     rows = [
         (
@@ -123,73 +117,53 @@ def parameters() -> str:
         )
         for name, p in PARAMETERS.items()
     ]
-    load = main.get_command(click.Context(main), "load")
-    assert load is not None
-    return _page(
-        [
-            "# Parameters",
-            NOTE,
-            "Set by `tunneldb run SURVEY --set NAME=VALUE`, as often as needed, for that run. Every run records the values "
-            "that its stage depends on (`tunnel_api.run`, column `parameters`). A value out of its bounds is refused.",
-            _table(("parameter", "stage", "default", "bounds", "meaning"), rows),
-            "Loading has options of its own:",
-            _options(load),
-            "A survey has one density: files loaded later must be loaded with the same one.",
-        ]
-    )
+    return _table(("parameter", "stage", "default", "bounds", "meaning"), rows)
 
 
-def database(conn: psycopg.Connection[Any]) -> str:
-    """Return the page of schema tunnel_api, from the comments in an installed database."""
-    parts = [
-        "# Views and functions",
-        NOTE,
-        "Schema `tunnel_api`. What only its views and functions, triggers and the program call is in schema `tunnel_internal`. "
-        "Lengths are metres, chainage is in plan along the axis, arc is from the crown and positive to "
-        "the right looking up-chainage, offset is positive into the tunnel. Angles of sections are degrees from the upward "
-        "direction, positive to the right. Geometry is in the tunnel's SRID, or in the unrolled plane (chainage, arc), SRID 0.",
-        "## Views",
-        "Members of `tunnel_viewer` may read all of them. `axis_vertex` (its geometry), the views of leaks "
-        "(`review`, `remark` and `kind`), those of spots (`review` and `remark`), `region`, `finding_unrolled`, `finding_map`, "
-        "`finding_3d` and `finding_photo` may be changed by members of `tunnel_inspector`; findings are drawn also through the "
-        "unrolled and map views of leaks. They may call `finding_split`, `finding_merge` and `finding_undo`, "
-        "too.",
-    ]
-    parts += [
-        "By topic; what is after an arrow is the view that a key of the first leads to. Endings after a comma are views of the "
-        "same rows with one geometry: in the unrolled plane, on the map, in space, in the plane of a face, on a sheet. Nearly "
-        "all have `survey_id` and `survey`, the name, and lead to `survey`, and that to `tunnel`.",
-        f"```mermaid\n{view_diagram(conn)}```",
-    ]
-    parts += _views(conn)
-    parts += [
-        "## Functions",
-        "Those that only read may be called by members of `tunnel_viewer`; those that change data (marked) by members of "
-        "`tunnel_operator`. A function that reads tables of schema `tunnel` and doesn't run with its owner's rights needs "
-        "`tunnel_operator` too.",
-    ]
-    parts += _functions(conn)
-    return _page(parts)
+def views(conn: psycopg.Connection[Any]) -> str:
+    """Return the views by topic, and the columns of each. A sister view shows what differs from its base view only."""
+    topics = [(title, "<br>".join(f"`{line}`" for line in lines)) for title, lines in views_by_topic(conn)]
+    return "\n\n".join([_table(("topic", "views"), topics), *_views(conn)])
 
 
 def _views(conn: psycopg.Connection[Any]) -> Iterator[str]:
-    rows = conn.execute(
+    columns: dict[str, dict[str, tuple[str, str]]] = {}
+    comments: dict[str, str] = {}
+    for view, comment, column, kind, text in conn.execute(
         """
         SELECT c.relname, obj_description(c.oid, 'pg_class'), a.attname, format_type(a.atttypid, a.atttypmod),
                col_description(c.oid, a.attnum)
           FROM pg_class c JOIN pg_attribute a ON a.attrelid = c.oid AND a.attnum > 0
          WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' ORDER BY c.oid, a.attnum
         """
-    ).fetchall()
-    for view in dict.fromkeys(row[0] for row in rows):
-        columns = [row for row in rows if row[0] == view]
+    ):
+        comments[view] = comment
+        columns.setdefault(view, {})[column] = (kind, text)
+    for view, base in ((view, base_views(conn)[view]) for view in columns):
         yield f"### {view}"
-        yield _sentence(columns[0][1])
-        yield _table(("column", "type", "meaning"), [(f"`{column}`", kind, text) for _, _, column, kind, text in columns])
+        yield _sentence(comments[view])
+        yield from _columns(columns[view], columns[base] if base != view else {}, base)
+
+
+def _columns(own: Columns, base: Columns, name: str) -> Iterator[str]:
+    """The table of a view's columns; of a sister view, whose other columns are those of its base view, only what differs."""
+    if len(base.items() & own.items()) * 2 > len(own):
+        geometry = [f"`{column}` ({kind}): {text}" for column, (kind, text) in own.items() if kind.startswith("geometry")]
+        dropped = [f"`{column}`" for column, (kind, _) in base.items() if column not in own and not kind.startswith("geometry")]
+        without = f" without {', '.join(dropped)}" if dropped else ""
+        yield f"Columns of [{name}](#{name}){without}; geometry: {', '.join(geometry) or 'none'}."
+        own = {column: what for column, what in own.items() if base.get(column) != what and not what[0].startswith("geometry")}
+    if own:
+        yield _table(("column", "type", "meaning"), [(f"`{column}`", kind, text) for column, (kind, text) in own.items()])
+
+
+def functions(conn: psycopg.Connection[Any]) -> str:
+    """Return the functions by the file that they come from."""
+    return "\n\n".join(_functions(conn))
 
 
 def _functions(conn: psycopg.Connection[Any]) -> Iterator[str]:
-    """Functions by the file that they come from: both were made in the same order."""
+    """The paragraphs of the functions; files and database have them in the same order."""
     made = [
         (path, name)
         for path in sql_files()
@@ -234,31 +208,28 @@ def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|").strip() for cell in line) + " |" for line in lines)
 
 
-def _page(parts: list[str]) -> str:
-    return "\n\n".join(parts) + "\n"
-
-
-PAGES: dict[str, Callable[..., str]] = {
-    "reference-cli.md": lambda conn: commands(),
-    "reference-parameters.md": lambda conn: parameters(),
-    "reference-sql.md": database,
+PARTS: dict[str, Callable[[psycopg.Connection[Any]], str]] = {
+    "commands": commands,
+    "parameters": parameters,
+    "views": views,
+    "functions": functions,
 }
 
 
-def generate() -> None:
-    """Write all pages."""
-    server = resolve_dsn(os.environ.get("TUNNELDB_DSN"))
-    name = sql.Identifier(f"tunneldb_reference_{os.getpid()}")
-    with psycopg.connect(server, autocommit=True) as admin:
-        admin.execute(sql.SQL("CREATE DATABASE {}").format(name))
-        try:
-            with open_connection(make_conninfo(server, dbname=f"tunneldb_reference_{os.getpid()}")) as conn:
-                install(conn, STAGES)
-                for page, write in PAGES.items():
-                    (FOLDER / page).write_text(write(conn), encoding="utf-8")
-        finally:
-            admin.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(name))
+def generate(folder: Path) -> None:
+    """Write all parts into a folder, from a fresh database on a temporary server."""
+    home = Path(tempfile.mkdtemp(prefix="tunneldb-reference-"))
+    server = Server(home, {"fsync": "off", "shared_buffers": "32MB"})
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        with open_connection(server.start()) as conn:
+            install(conn, STAGES)
+            for part, write in PARTS.items():
+                (folder / f"{part}.md").write_text(write(conn) + "\n", encoding="utf-8")
+    finally:
+        server.stop()
+        shutil.rmtree(home)
 
 
 if __name__ == "__main__":
-    generate()
+    generate(REFERENCE)

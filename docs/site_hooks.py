@@ -2,7 +2,8 @@
 
 The pages are written to be read in the repository. There they lead to the README and back, and a block ``mermaid`` is
 drawn by whoever shows it; here the README is a page of the site, and such a block is the picture of it that
-``docs/generate_diagrams.py`` has drawn.
+``docs/generate_diagrams.py`` has drawn. Lists that are generated from the program, such as its commands,
+are not in the repository: a comment in the page says where each belongs, and ``docs/generate_reference.py`` writes them.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ OUTSIDE = {
     "CHANGELOG.md": "changes.md",
     "LICENSE": "license.txt",
 }
+REFERENCE = ROOT / "build" / "reference"
+PART = re.compile(r"<!-- make docs: (\w+) -->")
 LINK = re.compile(r"\]\(([^)\s#]+)")
 DIAGRAM = re.compile(r"^```mermaid\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -45,9 +48,18 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Lead links to the README to its page; put pictures in place of diagrams."""
+    """Lead links to the README to its page; put pictures in place of diagrams, and parts of the reference in their places."""
+    markdown = PART.sub(lambda part: _reference(part[1]), markdown)
     markdown = LINK.sub(lambda link: f"]({OUTSIDE.get(link[1].removeprefix('../'), link[1])}", markdown)
     return DIAGRAM.sub(lambda block: _picture(block[1], files), markdown)
+
+
+def _reference(part: str) -> str:
+    path = REFERENCE / f"{part}.md"
+    if not path.exists():
+        log.warning(f"no {path.relative_to(ROOT)}: python docs/generate_reference.py writes it")
+        return ""
+    return path.read_text("utf-8").strip()
 
 
 def _inside(target: str) -> str:

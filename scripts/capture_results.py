@@ -111,7 +111,7 @@ class Scene:
             "axis.json": ["axis", "s", "-o", "out/axis.csv", "--json"],
             "unroll.json": ["unroll", "s", "scan/points.csv", "-o", "out/unrolled.csv", "--json"],
         }.items():  # fmt: skip
-            self.run(*words, said=name, codes=(0, 1))  # 1: leaks were not sought
+            self.run(*words, said=name, codes=(0, 1))  # 1: leaks were not searched for
         rows = list(csv.DictReader((self.folder / "out" / "unrolled.csv").open()))
         inside = [f"{row['chainage']},{row['arc']},{row['offset']}\n" for row in rows if row["chainage"]]
         (self.folder / "out" / "inside.csv").write_text("chainage,arc,offset\n" + "".join(inside))

@@ -3,8 +3,9 @@
     scripts/package_plugin.py                  # dist/tunneldb_review-VERSION.zip
     scripts/package_plugin.py FOLDER --email … --homepage … --repository … --tracker …
 
-The version is that of tunneldb. The same files make the same zip. plugins.qgis.org takes a zip only if its metadata name an
-e-mail address and three pages that can be reached: who publishes there gives all four; QGIS installs a zip without them.
+The version is that of tunneldb, and the algorithms are generated from its commands (`plugin_catalogue.py`). The same files
+make the same zip. plugins.qgis.org takes a zip only if its metadata name an e-mail address and three pages that can be reached:
+who publishes there gives all four; QGIS installs a zip without them.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import re
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
+
+from plugin_catalogue import catalogue
 
 ROOT = Path(__file__).resolve().parents[1]
 NAME = "tunneldb_review"
@@ -49,6 +52,7 @@ def package(folder: Path, publisher: Mapping[str, str] | None = None) -> Path:
     files = {path.relative_to(SOURCE.parent).as_posix(): path.read_text("utf-8") for path in _files()}
     metadata = re.sub(r"(?m)^version=.*$", f"version={version()}", files[f"{NAME}/metadata.txt"])
     files[f"{NAME}/metadata.txt"] = metadata + "".join(f"{name}={value}\n" for name, value in (publisher or {}).items())
+    files[f"{NAME}/catalogue.py"] = catalogue()
     files[f"{NAME}/LICENSE"] = (ROOT / "LICENSE").read_text("utf-8")
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in sorted(files.items()):

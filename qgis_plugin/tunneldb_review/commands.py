@@ -1,6 +1,7 @@
-"""The verbs of ``tunneldb`` that are algorithms: their parameters in :mod:`.verbs`, the words of a call, what lines tell.
+"""The commands of ``tunneldb`` that are algorithms: the words of a call, and what its lines state.
 
-Knows neither QGIS nor ``tunneldb``: a test holds each option against the command line's own.
+Knows neither QGIS nor ``tunneldb``. Parameters are in ``catalogue.py``, which ``scripts/package_plugin.py`` generates from the
+command line.
 """
 
 from __future__ import annotations
@@ -8,8 +9,8 @@ from __future__ import annotations
 import re
 from typing import Any, List, Mapping, Optional
 
+from .catalogue import COMMANDS
 from .description import Command, Parameter
-from .verbs import COMMANDS
 
 __all__ = ["COMMANDS", "Command", "Parameter", "arguments_of", "error_of", "help_of", "progress_of"]
 

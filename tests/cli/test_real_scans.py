@@ -43,7 +43,7 @@ def test_a_room_with_a_pump_is_doubted_and_surveyed(dsn: str, tmp_path: Path) ->
         run(*shlex.split(f"{before} --no-poses --intensity-kind none" if stations else words)[1:])
     run("report", "pump-scan", "-o", str(tmp_path / "report.html"))
     text = (tmp_path / "report.html").read_text("utf-8")
-    assert "Leaks were not sought: the survey has no intensity" in text
+    assert "Leaks were not searched for: the survey has no intensity" in text
 
 
 @pytest.mark.parametrize("separator", [",", "\t"])

@@ -158,7 +158,7 @@ def test_leaks_of_several_parts_and_of_other_kilometres(conn, survey, tmp_path):
     path = gpkg(tmp_path / "truth.gpkg", truth)
     everything = figures(survey, path, tmp_path)["groups"][0]
     assert (everything["true"], everything["found"], everything["right"]) == (1, 1, 2)
-    assert "1 true leaks lie where leaks were not sought" in run("evaluate", survey, path).stdout
+    assert "1 true leaks lie where leaks were not searched for" in run("evaluate", survey, path).stdout
 
 
 def test_kinds_are_those_after_judging(conn, survey, tmp_path):

@@ -312,7 +312,7 @@ def test_damaged_and_hostile_files_are_refused_in_one_line(example: str, conn: p
     refused(rewritten(path, said("schema", "0001")), "is of schema 0001")
     refused(rewritten(path, said("format", 9)), "version 9 of the format")
     refused(rewritten(path, said("survey_id", -1)), "whole number")
-    refused(rewritten(path, said("survey_id", 4711)), "does not hold one survey")
+    refused(rewritten(path, said("survey_id", 4711)), "does not have exactly one survey")
     refused(rewritten(path, said("members", [1])), "manifest cannot be read")
     huge = json.loads(zipfile.ZipFile(path).read("manifest.json"))["members"]
     huge["rows/run.zst"]["bytes"] = 1 << 50

@@ -122,7 +122,7 @@ def test_files_get_the_classes(conn: psycopg.Connection, scans: tuple[Path, dict
     assert [path.name for path in (tmp_path / "first").iterdir()] == ["a.laz"]
 
     bytes_before = (folder / "a.laz").read_bytes()
-    assert "never to be written over" in export(folder, code=2)
+    assert "is a loaded scan file" in export(folder, code=2)
     assert (folder / "a.laz").read_bytes() == bytes_before
     assert not (folder / "b.laz").exists()
 
@@ -214,7 +214,7 @@ def test_kilometres_as_copc_hold_the_same_points(conn: psycopg.Connection, tmp_p
     assert (tmp_path / "copc" / names[0]).read_bytes() == again
     assert json.loads((tmp_path / "copc" / names[2]).read_text())["features"] == virtual["features"]
     (tmp_path / "copc" / names[2]).write_text("[]")
-    assert "is no virtual point cloud" in export(tmp_path / "copc", "--copc", "--km", 1, code=2)
+    assert "is not a virtual point cloud" in export(tmp_path / "copc", "--copc", "--km", 1, code=2)
     assert "--copc goes with --classified" in command("export", NAME, "-o", tmp_path / "x", "--copc", code=2)
 
     # Where the other kilometre isn't loaded, its points wait for it.

@@ -367,7 +367,7 @@ def test_other_programs_read_the_drawing(files: Path) -> None:
         (["-o", "x.gpkg", "--from", "12+300", "--to", "12300"], "between them lies no tunnel"),
         (
             ["-o", "x.dxf", "--from", "14000"],
-            "demo-2024 has nothing there: it lies between chainages 12300.000 and 12500.000 m",
+            "demo-2024 has no data there: it extends from chainage 12300.000 to 12500.000 m",
         ),
         (["-o", "nowhere/x.gpkg"], "nowhere/x.gpkg: cannot be written"),
     ],

@@ -86,7 +86,7 @@ def test_wet_area_is_cut_at_the_ends_and_leaves_out_the_rejected(conn, example):
 def test_table_lists_every_leak(example):
     text = run("leaks", example).stdout
     assert "6 leaks, " in text
-    assert "; listed besides: 1 rejected" in text
+    assert "; also listed: 1 rejected" in text
     rows = listed(run("leaks", example, "--format", "csv").stdout)
     assert len(rows) == 7
     assert all(row["label"] in text for row in rows)
@@ -283,4 +283,6 @@ def test_no_leaks_where_none_were_sought_are_said_to_be_so(conn, example):
     assert "sought" not in run("leaks", example).stderr
     without_intensity(conn)
     for option in ([], ["--by-km"], ["--format", "csv"]):
-        assert run("leaks", example, *option, code=1).stderr == f"survey {example} has no intensity: leaks were not sought\n"
+        assert (
+            run("leaks", example, *option, code=1).stderr == f"survey {example} has no intensity: leaks were not searched for\n"
+        )

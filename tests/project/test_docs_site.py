@@ -15,8 +15,9 @@ from pathlib import Path
 import pytest
 from markdown_it import MarkdownIt
 from playwright.sync_api import Browser, sync_playwright
+from support.reference import docs_script
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.server, pytest.mark.slow]
 
 ROOT = Path(__file__).parents[2]
 SOURCES = {page.stem: page for page in sorted((ROOT / "docs").glob("*.md"))} | {
@@ -26,6 +27,15 @@ SOURCES = {page.stem: page for page in sorted((ROOT / "docs").glob("*.md"))} | {
 }
 COMPARED = {"h1", "h2", "h3", "h4", "p", "ul", "ol", "li", "table", "tr", "td", "pre", "code", "img", "a", "strong", "em"}
 DIAGRAM = re.compile(r"^```mermaid\n.*?^```$", re.MULTILINE | re.DOTALL)
+
+
+def copy_project(folder: Path) -> Path:
+    """Copy what the site is made from, and write the generated parts of the reference."""
+    for name in ("mkdocs.yml", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE"):
+        shutil.copy(ROOT / name, folder)
+    shutil.copytree(ROOT / "docs", folder / "docs", ignore=shutil.ignore_patterns("__pycache__"))
+    docs_script("generate_reference").generate(folder / "build" / "reference")
+    return folder
 
 
 def build(project: Path, site: Path) -> subprocess.CompletedProcess[str]:
@@ -40,11 +50,15 @@ def build(project: Path, site: Path) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("site")
-    built = build(ROOT, folder)
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return copy_project(tmp_path_factory.mktemp("project"))
+
+
+@pytest.fixture(scope="module")
+def site(project: Path) -> Path:
+    built = build(project, project / "site")
     assert built.returncode == 0, built.stderr
-    return folder
+    return project / "site"
 
 
 class Elements(HTMLParser):
@@ -72,9 +86,11 @@ class Elements(HTMLParser):
 
 
 @pytest.mark.parametrize("name", SOURCES)
-def test_pages_show_what_the_repository_shows(site: Path, name: str) -> None:
+def test_pages_show_what_the_repository_shows(site: Path, project: Path, name: str) -> None:
     """MkDocs reads Markdown by older rules: lists after a line of text, or indented by two, would be running text."""
     text = DIAGRAM.sub("![picture](of.svg)", SOURCES[name].read_text("utf-8"))
+    reference = project / "build" / "reference"
+    text = docs_script("site_hooks").PART.sub(lambda part: (reference / f"{part[1]}.md").read_text("utf-8"), text)
     expected = Elements(f"<article>{MarkdownIt('commonmark').enable('table').render(text)}</article>").found
     assert Elements((site / f"{name}.html").read_text("utf-8")).found == expected
 
@@ -94,17 +110,21 @@ def test_nothing_is_fetched_from_elsewhere(site: Path) -> None:
     assert imports == []
 
 
-def test_dead_links_and_anchors_and_new_diagrams_fail(tmp_path: Path) -> None:
-    for name in ("mkdocs.yml", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE"):
-        shutil.copy(ROOT / name, tmp_path)
-    shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("__pycache__"))
+def test_dead_links_and_anchors_and_what_was_not_generated_fail(tmp_path: Path, project: Path) -> None:
+    shutil.copytree(project, tmp_path, ignore=shutil.ignore_patterns("site", "views.md"), dirs_exist_ok=True)
     with (tmp_path / "docs" / "index.md").open("a") as page:
         page.write(
             "\n[a](nowhere.md) [b](classes.md#nowhere) [c](../README.md#nowhere)\n\n```mermaid\nflowchart\n  a --> b\n```\n"
         )
     built = build(tmp_path, tmp_path / "site")
     assert built.returncode != 0
-    for complaint in ("'nowhere.md'", "'classes.md#nowhere'", "'overview.md#nowhere'", "generate_diagrams.py"):
+    for complaint in (
+        "'nowhere.md'",
+        "'classes.md#nowhere'",
+        "'overview.md#nowhere'",
+        "generate_diagrams.py",
+        "generate_reference.py",
+    ):
         assert complaint in built.stderr
 
 

@@ -1,17 +1,19 @@
-"""The SQL of the documentation runs, and its reference pages are what the program says of itself."""
+"""The SQL of the documentation runs, and the generated reference is complete."""
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import re
 from pathlib import Path
-from types import ModuleType
 
 import psycopg
 import pytest
 from support.cookbook_survey import draw_findings, prepare
 from support.queue_rows import add_file, add_job, add_worker
+from support.reference import docs_script
+
+from tunneldb.cli.main import COMMANDS
+from tunneldb.database.schema import sql_files
+from tunneldb.stages.parameters import PARAMETERS
 
 pytestmark = pytest.mark.slow
 
@@ -43,30 +45,52 @@ def test_every_query_runs(conn: psycopg.Connection, example: str) -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_reference_pages_are_up_to_date(conn: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(ROOT / "docs"))
-    script = generator()
-    old = [page for page, write in script.PAGES.items() if (ROOT / "docs" / page).read_text("utf-8") != write(conn)]
-    assert not old, "python docs/generate_reference.py writes them anew"
+def test_the_reference_has_every_command_parameter_view_and_function(conn: psycopg.Connection) -> None:
+    text = {part: write(conn) for part, write in docs_script("generate_reference").PARTS.items()}
+    assert re.findall(r"^## (\S+)$", text["commands"], re.MULTILINE) == list(COMMANDS)
+    assert re.findall(r"^\| `([\w.]+)`", text["parameters"], re.MULTILINE) == list(PARAMETERS)
+    views = [name for (name,) in conn.execute("SELECT viewname FROM pg_views WHERE schemaname = 'tunnel_api'")]
+    assert sorted(re.findall(r"^### (\w+)$", text["views"], re.MULTILINE)) == sorted(views)
+    functions = conn.execute(
+        "SELECT proname FROM pg_proc WHERE pronamespace = 'tunnel_api'::regnamespace AND prorettype <> 'trigger'::regtype"
+    ).fetchall()
+    assert sorted(re.findall(r"^```text\n(?:CALL )?(\w+)\(", text["functions"], re.MULTILINE)) == sorted(
+        name for (name,) in functions
+    )
 
 
-def test_the_diagram_shows_every_view_once(conn: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(ROOT / "docs"))
-    code = importlib.import_module("view_diagram").view_diagram(conn)
+def test_a_sister_view_has_the_columns_of_its_base_view_and_a_geometry(conn: psycopg.Connection) -> None:
+    text = docs_script("generate_reference").views(conn)
+    sisters = re.findall(
+        r"^### (\w+)\n\n.*\n\nColumns of \[(\w+)\]\(#\w+\)(?: without (.*?))?; geometry: `(\w+)`", text, re.MULTILINE
+    )
+    assert ("leak_map", "leak", "", "geom") in sisters
+    for view, base, dropped, geometry in sisters:
+        without = set(re.findall(r"`(\w+)`", dropped))
+        columns = {name for one in (view, base) for name in _columns(conn, one)} - {geometry}
+        assert columns - set(_columns(conn, view)) <= without | _geometries(conn, base)
+
+
+def _columns(conn: psycopg.Connection, view: str, kind: str = "%") -> list[str]:
+    query = (
+        "SELECT attname FROM pg_attribute WHERE attrelid = to_regclass(%s) AND attnum > 0"
+        " AND format_type(atttypid, atttypmod) LIKE %s"
+    )
+    return [name for (name,) in conn.execute(query, [f"tunnel_api.{view}", kind])]
+
+
+def _geometries(conn: psycopg.Connection, view: str) -> set[str]:
+    return set(_columns(conn, view, "geometry%"))
+
+
+def test_topics_show_every_view_once_and_name_files_that_are_there(conn: psycopg.Connection) -> None:
+    script = docs_script("view_topics")
     shown = []
-    for line in code.splitlines():
-        names = re.findall(r"\w+", line.strip('`"]').partition(" → ")[0])
-        if re.match(r"^\w+(, \w+)*( → .*)?[`\]\"]*$", line) and not line.startswith("flowchart"):
+    for _, lines in script.views_by_topic(conn):
+        for line in lines:
+            names = re.findall(r"\w+", line.partition(" → ")[0])
             shown += [name if not name.startswith("_") else names[0] + name for name in names]
     views = conn.execute("SELECT viewname FROM pg_views WHERE schemaname = 'tunnel_api'").fetchall()
     assert sorted([*shown, "tunnel", "survey"]) == sorted(name for (name,) in views)
-
-
-def generator() -> ModuleType:
-    """The script, which imports others beside it."""
-    spec = importlib.util.spec_from_file_location("generate_reference", ROOT / "docs" / "generate_reference.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    files = {name for path in sql_files() for name in (path.stem, f"{path.parent.name}/{path.stem}")}
+    assert {stem for stems in script.TOPICS.values() for stem in stems} <= files

@@ -44,7 +44,7 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_zip_holds_the_plugin_and_its_licence_in_one_folder(unpacked: Path) -> None:
     (folder,) = unpacked.iterdir()
     held = {path.name for path in folder.iterdir()}
-    assert held == {path.name for path in SOURCE.glob("*.py")} | {"metadata.txt", "icon.svg", "LICENSE"}
+    assert held == {path.name for path in SOURCE.glob("*.py")} | {"catalogue.py", "metadata.txt", "icon.svg", "LICENSE"}
     assert f"\nversion={tunneldb.__version__}\n" in (folder / "metadata.txt").read_text("utf-8")
 
 
@@ -77,8 +77,8 @@ def test_what_is_published_keeps_the_rules_of_plugins_qgis_org(tmp_path: Path) -
     assert tuple(map(int, metadata["qgisMinimumVersion"].split("."))) <= (3, 22)
 
 
-def test_it_is_python_of_3_9_and_imports_nothing_that_qgis_lacks() -> None:
-    for path in SOURCE.glob("*.py"):
+def test_it_is_python_of_3_9_and_imports_nothing_that_qgis_lacks(unpacked: Path) -> None:
+    for path in (unpacked / "tunneldb_review").glob("*.py"):
         tree = ast.parse(path.read_text("utf-8"), feature_version=(3, 9))
         imported = {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and not node.level}
         imported |= {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
@@ -88,7 +88,7 @@ def test_it_is_python_of_3_9_and_imports_nothing_that_qgis_lacks() -> None:
 
 def test_options_of_algorithms_are_those_of_the_command_line(unpacked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(unpacked))
-    from tunneldb_review.verbs import COMMANDS
+    from tunneldb_review.catalogue import COMMANDS
 
     assert len({command.name for command in COMMANDS}) == len(COMMANDS)
     for command in COMMANDS:
@@ -96,6 +96,7 @@ def test_options_of_algorithms_are_those_of_the_command_line(unpacked: Path, mon
         for word in (word for word in command.verb if not word.startswith("-")):
             assert isinstance(found, click.Group)
             found = found.get_command(context, word)  # type: ignore[assignment]
+        assert found.name == [word for word in command.verb if not word.startswith("-")][-1]
         known = {option: p for p in found.params if isinstance(p, click.Option) for option in (*p.opts, *p.secondary_opts)}
         given = {parameter.option.split()[0]: parameter for parameter in command.parameters if parameter.option}
         assert set(given) <= set(known), command.name
@@ -115,8 +116,8 @@ def test_calls_are_put_together_and_lines_are_read(unpacked: Path, monkeypatch: 
     from tunneldb_review.connection import dsn, of_source
 
     run = next(command for command in COMMANDS if command.name == "run")
-    words = arguments_of(run, {"SURVEY": "-a", "FIRST": "detect", "SET": "leak.min_area=0.1; x=2", "STALE": True})
-    assert words == ["run", "--from", "detect", "--stale", "--set", "leak.min_area=0.1", "--set", "x=2", "--", "-a"]
+    words = arguments_of(run, {"SURVEY": "-a", "FROM": "detect", "SET": "leak.min_area=0.1; x=2", "STALE": True})
+    assert words == ["run", "--from", "detect", "--set", "leak.min_area=0.1", "--set", "x=2", "--stale", "--", "-a"]
     with pytest.raises(ValueError, match="Survey"):
         arguments_of(run, {})
     assert progress_of("[2/5] axis km 12: 3 vertices") == 0.4

@@ -777,7 +777,7 @@ def test_sheets_without_intensity_speak_of_no_leaks(conn: psycopg.Connection, ex
     pages = words(path)
     assert len(pages) == 4
     for page in pages:
-        assert "leaks were not sought" in page
+        assert "leaks were not searched for" in page
         assert "gaps up to 0.6 m filled" in page
         for word in ("Drop", "leaks 0", "seen yet", "Orange"):
             assert word not in page

@@ -60,11 +60,11 @@ def test_the_chapter(example: str, conn: psycopg.Connection, tmp_path: Path) -> 
     assert done.exit_code == 0, done.output
     chapter = page.read_text("utf-8").split('<section id="clearance">')[1].split("</section>")[0]
     assert "Not measured: 20.0 m of 200.0 m" in chapter
-    assert "Metres in which nothing was seen that counts: 1." in chapter
+    assert "Metres without any measured point that counts: 1." in chapter
     assert re.findall(r"<dd>([−\d.]+)", chapter) == ["−50", "1", "1", "1", "180.0", "10.5"]
-    counted, others = chapter.split("What stands inside")[1].split("Inside, but not counted")
-    assert ("Appendage" in counted, "Object" in counted) == (True, False)
-    assert ("Appendage" in others, "Object" in others) == (False, True)
+    counted, others = chapter.split("<h4>Infringements</h4>")[1].split("Infringements that do not count: objects")
+    assert ("Fixture" in counted, "Object" in counted) == (True, False)
+    assert ("Fixture" in others, "Object" in others) == (False, True)
 
 
 def test_an_owner_may_leave_it_out(example: str, conn: psycopg.Connection, tmp_path: Path) -> None:

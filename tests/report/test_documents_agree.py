@@ -248,13 +248,13 @@ def test_report(documents: str, case: Case, tmp_path: Path) -> None:
     text = path.read_text("utf-8")
     for said in case.said:
         assert 0 < text.index(said) < text.index('class="verdict'), "before the verdict"
-    assert re.findall(r"<li>(.*)</li>", text.partition("To be known of these results")[2].partition("</ul>")[0]) == [
+    assert re.findall(r"<li>(.*)</li>", text.partition("Notes and limitations")[2].partition("</ul>")[0]) == [
         html.escape(said, quote=True).replace("&#x27;", "&#39;").replace("&quot;", "&#34;") for said in case.known
     ]
     figures = dict(re.findall(r"<dt>([^<]+)</dt><dd>([^<]+?) ?<", text))
     assert figures["Leaks"] == (str(len(case.counted)) if case.searched else "–")
     assert figures["Wet area"] == (f"{case.area:.2f}" if case.searched else "–")
-    assert figures["Lining seen"] == (f"{100 * case.seen:.1f} %" if case.searched else "–")
+    assert figures["Lining inspected"] == (f"{100 * case.seen:.1f} %" if case.searched else "–")
     strips = re.findall(r'<figure class="strip" id="strip-(\d+)">(.*?)</figure>', text, re.DOTALL)
     numbered: set[str] = set()
     for start, strip in strips:

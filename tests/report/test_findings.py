@@ -222,7 +222,7 @@ def test_report_workbook_and_json_say_which_dry_region_waits_and_who_approved(
     dsn = conn.info.dsn
     run(dsn, "report", example, "-o", tmp_path / "r.html")
     rows = {row[0]: row for row in table(section((tmp_path / "r.html").read_text("utf-8"), "dry"))}
-    assert rows[str(waiting)][7] == "nothing yet: it waits for an operator"
+    assert rows[str(waiting)][7] == "none yet: pending approval by an operator"
     assert "approved by" not in rows[str(waiting)][5]
     assert f"; approved by {operator}, " in rows[str(approved)][5]
     told = json.loads(run(dsn, "findings", example, "-o", tmp_path / "f.xlsx", "--json").stdout)
@@ -230,7 +230,7 @@ def test_report_workbook_and_json_say_which_dry_region_waits_and_who_approved(
     assert (stated[waiting], stated[approved]) == ((True, None), (False, operator))
     head, *cells = openpyxl.load_workbook(tmp_path / "f.xlsx")["Dry regions"].iter_rows(values_only=True)
     sheet = {row["No."]: row for row in (dict(zip(head, row, strict=True)) for row in cells)}
-    assert (sheet[waiting]["Waits for an operator"], sheet[approved]["Approved by"]) == (True, operator)
+    assert (sheet[waiting]["Pending approval"], sheet[approved]["Approved by"]) == (True, operator)
     assert sheet[approved]["Approved, UTC"] is not None
 
 
@@ -243,7 +243,7 @@ def test_photos_are_small_and_upright_and_what_is_missing_is_a_line(report: Path
     assert sizes == [(360, 480), (480, 360)]
     assert re.findall(r'<p class="lost">(.*?)</p>', chapter) == [
         "Photo gone.jpg (of it): no such file",
-        "Photo broken.jpg (of it): no image that can be read",
+        "Photo broken.jpg (of it): not a readable image",
         f"Photo {web}/2.jpg (of it): could not be fetched: 404 Not Found",
     ]
 

@@ -120,7 +120,7 @@ def test_leaks_are_those_of_the_database(reading: Reading, leaks: list[dict[str,
 
 def test_unseen_lining_is_stated(reading: Reading) -> None:
     """The first ten of the 200 m were not seen: stated as a share, as a stretch, and drawn."""
-    assert "<dt>Lining seen</dt><dd>95.0 %</dd>" in reading.text
+    assert "<dt>Lining inspected</dt><dd>95.0 %</dd>" in reading.text
     stretch = ("<td>12+300.000</td>", "<td>12+310.000</td>", '<td class="n">10.0</td>', '<td class="n">0.0 %</td>')
     assert "".join(stretch) in reading.text
     picture, (_, _, width, height) = reading.strip(12300)
@@ -193,7 +193,7 @@ def test_stretch(shared: str, leaks: list[dict[str, Any]], tmp_path: Path) -> No
     assert [row["id"] for row in part.rows] == [leak["id"] for leak in leaks if 12400 < leak["chainage"] < 12432]
     assert "12+400.000 to 12+432.500" in part.text
     assert "> 99.9 %" not in part.text
-    assert "<dt>Lining seen</dt><dd>100.0 %</dd>" in part.text
+    assert "<dt>Lining inspected</dt><dd>100.0 %</dd>" in part.text
     assert list(part.strips) == ["12400"]
 
 
@@ -286,7 +286,7 @@ def test_without_intensity_the_offset_is_shown(
 ) -> None:
     without_intensity(conn, every=6)
     path = tmp_path / "r.html"
-    assert "leaks were not sought" in run("report", example, "-o", path).stderr
+    assert "leaks were not searched for" in run("report", example, "-o", path).stderr
     reading = Reading(path)
     for strip in (12350, 12400):
         picture, _ = reading.strip(strip)
@@ -304,7 +304,7 @@ def test_without_intensity_the_offset_is_shown(
     for media in ("screen", "print"):
         page.emulate_media(media=media)
         shown = page.locator("body").inner_text()
-        assert shown.count("Leaks were not sought") == 1
+        assert shown.count("Leaks were not searched for: the survey has no intensity") == 1
         assert "gaps up to 0.6 m filled with the nearest value" in shown
         for word in ("0 leaks", "class", "0.0 %", "seen", "wet or dark"):
             assert word not in shown, (media, word)

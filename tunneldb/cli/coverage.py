@@ -36,7 +36,7 @@ def say_coverage(coverage: Coverage, survey: Survey, *, on_stdout: bool = False)
         searched_share=coverage.searched_share,
     )
     if survey.intensity_kind == "none":
-        notify(f"survey {survey.name} has no intensity: leaks were not sought")
+        notify(f"survey {survey.name} has no intensity: leaks were not searched for")
     elif coverage.statement is not None and on_stdout:
         console = Console()
         if console.is_terminal:  # else there is no width: nothing is to be broken there

@@ -137,7 +137,7 @@ def _of_leaks(
     )
     report = make_report(comparison, true.ids, [str(k) for k in findings.ids], distances, min_area, findings.seen)
     tell(outside=outside)
-    said = [f"{outside} true leaks lie where leaks were not sought, and are left out"] if outside else []
+    said = [f"{outside} true leaks lie where leaks were not searched for, and are left out"] if outside else []
     return report, {"kilometres": findings.kilometres}, said
 
 

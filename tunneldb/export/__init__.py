@@ -1,4 +1,4 @@
-"""What leaves the database as a file: images, point clouds, tables, figures, exchange formats and QGIS projects."""
+"""Export from the database to files: images, point clouds, tables, figures, exchange formats and QGIS projects."""
 
 import lazy_loader
 

@@ -24,7 +24,7 @@ LISTED = 40
 
 CHANGE_WORDS = {
     "new": "new", "grown": "grown", "shrunk": "shrunk", "same": "the same", "dry": "dry again", "kind": "of another kind",
-    "unseen": "unseen",
+    "unseen": "not inspected",
 }  # fmt: skip
 """States of leaks in words."""
 

@@ -33,7 +33,7 @@ STATE_WORDS = {
     "rejected": "rejected",
     "gone": "not found again",
     "dry": "in a dry region",
-    "same": "the same as another",
+    "same": "same as another",
     "merged": "merged into another",
 }
 """States in the words of the report."""

@@ -18,7 +18,7 @@ from tunneldb.report.words import ENGLISH, Words, known_texts, languages, read_l
 
 CHAPTERS = {
     "summary": "Summary",
-    "seen": "Seen and unseen",
+    "seen": "Inspected lining",
     "classes": "Waterproofing",
     "lining": "Lining",
     "leaks": "Leaks",

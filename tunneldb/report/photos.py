@@ -119,10 +119,10 @@ def _read(path: str, folder: Path, end: float) -> bytes:
         if not file.exists():
             raise _NotHadError("no such file")
         if not file.is_file() or file.stat().st_size > LARGEST:
-            raise _NotHadError("no image that can be read")
+            raise _NotHadError("not a readable image")
         return file.read_bytes()
     except OSError as error:
-        raise _NotHadError("may not be read") from error
+        raise _NotHadError("cannot be read") from error
 
 
 def _fetch(url: str, end: float) -> bytes:
@@ -165,5 +165,5 @@ def _picture(data: bytes) -> str:
         out = io.BytesIO()
         paper.save(out, "JPEG", quality=80, optimize=True)
     except Exception as error:  # decoders raise much that is no OSError; whatever it is, the report is written
-        raise _NotHadError("no image that can be read") from error
+        raise _NotHadError("not a readable image") from error
     return f"data:image/jpeg;base64,{base64.b64encode(out.getvalue()).decode()}"

@@ -253,4 +253,4 @@ def _summary(stated: Row, numbered: int, words: Words) -> str:
     leaks = words("1 leak") if count == 1 else words("{count} leaks", count=count)
     unnumbered = max(count - numbered, 0)
     without = words(", the {count} smallest without a number here", count=unnumbered) if unnumbered else ""
-    return leaks + without + words(", {share} of the lining seen", share=text.percent(stated["seen_share"]))
+    return leaks + without + words(", {share} of the lining inspected", share=text.percent(stated["seen_share"]))

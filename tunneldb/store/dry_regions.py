@@ -1,4 +1,4 @@
-"""Regions that people drew as dry, and what each took away."""
+"""Dry regions drawn by inspectors, and the leaks that each removed."""
 
 from __future__ import annotations
 

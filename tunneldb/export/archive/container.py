@@ -1,4 +1,4 @@
-"""The file of an archive: a ZIP (ZIP64) whose members are Zstandard frames, and a manifest that says what each of them holds.
+"""File of an archive: a ZIP (ZIP64) with Zstandard frames as members, and a manifest that describes each of them.
 
 Nothing is unpacked to disk: members are asked for by the names that the database's own tables give them. What a file from
 elsewhere says of itself is held against what is read of it, and no more is read than it announces.
@@ -22,7 +22,7 @@ import zstandard
 from tunneldb.errors import InputError
 
 FORMAT = 1
-"""Version of the format: another one is refused."""
+"""Version of the format; archives with another version are refused."""
 
 MANIFEST = "manifest.json"
 _MANIFEST_BYTES = 64 << 20
@@ -34,7 +34,7 @@ _CHUNK = 1 << 20
 
 @dataclass(frozen=True)
 class Member:
-    """What the manifest says of a member: rows, bytes of them unpacked, their SHA-256, and names and types of their columns."""
+    """Manifest entry of a member: rows, unpacked bytes, their SHA-256, and names and types of the columns."""
 
     rows: int
     bytes: int
@@ -44,7 +44,7 @@ class Member:
 
 @dataclass(frozen=True)
 class Manifest:
-    """What the manifest says of the archive.
+    """Manifest of the archive.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class ArchiveWriter:
         self._zip.close()
 
     def add(self, name: str, columns: Iterable[tuple[str, str]], chunks: Iterable[bytes | bytearray | memoryview]) -> None:
-        """Write a member; how many rows it has is told to `counted`."""
+        """Write a member; `counted` sets its number of rows."""
         digest, size = hashlib.sha256(), 0
         with self._zip.open(name, "w", force_zip64=True) as file:
             packer = zstandard.ZstdCompressor(level=_LEVEL, write_checksum=False).chunker(chunk_size=_CHUNK)
@@ -109,13 +109,13 @@ class ArchiveWriter:
         self._members[name] = replace(self._members[name], rows=rows)
 
     def finish(self, manifest: Manifest) -> None:
-        """Write the manifest, with what the members hold."""
+        """Write the manifest, with the entries of all members."""
         text = json.dumps({**asdict(manifest), "members": {k: asdict(m) for k, m in self._members.items()}}, indent=1)
         self._zip.writestr(MANIFEST, text, zipfile.ZIP_DEFLATED)
 
 
 class ArchiveReader:
-    """Reads an archive; nothing that it says of itself is taken on trust.
+    """Reader of an archive; nothing in the archive is trusted.
 
     Raises
     ------
@@ -147,7 +147,7 @@ class ArchiveReader:
         self._zip.close()
 
     def chunks(self, name: str) -> Iterator[bytes]:
-        """Unpacked bytes of a member, chunk by chunk.
+        """Yield the unpacked bytes of a member, chunk by chunk.
 
         Raises
         ------
@@ -164,7 +164,7 @@ class ArchiveReader:
                 while chunk := packed.read(_CHUNK):
                     size += len(chunk)
                     if size > member.bytes:
-                        raise self.wrong(f"{name} holds more than the manifest says")
+                        raise self.wrong(f"{name} is larger than its manifest entry")
                     digest.update(chunk)
                     yield chunk
         except (
@@ -178,11 +178,11 @@ class ArchiveReader:
         ) as error:
             raise self.wrong(f"{name} cannot be read: {error}") from None
         if size != member.bytes or digest.hexdigest() != member.sha256:
-            raise self.wrong(f"the checksum of {name} is not that of the manifest")
+            raise self.wrong(f"the checksum of {name} does not match the manifest")
 
     def wrong(self, what: str) -> InputError:
-        """Error for what is wrong with the file."""
-        return InputError(f"{self.path}: {what}; the file is damaged, or was changed. Nothing was imported")
+        """Return an error about the file."""
+        return InputError(f"{self.path}: {what}; the file is damaged or was changed. Nothing was imported")
 
     def _manifest(self) -> Manifest:
         try:

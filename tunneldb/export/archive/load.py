@@ -44,14 +44,14 @@ _MISFITS = (
     psycopg.errors.ProtocolViolation,  # a row that ends too early
     psycopg.errors.InternalError_,  # of PostGIS, for bytes that are no geometry
 )
-"""What the server says to rows that it cannot have been the source of."""
+"""Errors of the server for rows that it cannot have written."""
 
 Begin = Callable[[str, float | None], Callable[[float], None]]
 
 
 @dataclass
 class Loaded:
-    """What was imported.
+    """Result of an import.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Loaded:
 
 
 def load_survey(conn: psycopg.Connection[Any], path: Path, name: str | None, begin: Begin) -> Loaded:
-    """Bring a survey into the database, whole or not at all.
+    """Import a survey into the database, completely or not at all.
 
     Points and images go into tables that nobody else sees; what others use is locked at the end alone.
 
@@ -112,7 +112,7 @@ def load_survey(conn: psycopg.Connection[Any], path: Path, name: str | None, beg
         except _MISFITS as error:
             if error.diag.constraint_name == "survey_name_key":  # another brought it in meanwhile
                 raise survey_exists(name or archive.manifest.survey) from None
-            raise archive.wrong(f"its rows do not fit together: {first_line(error)}") from None
+            raise archive.wrong(f"its rows are inconsistent: {first_line(error)}") from None
     conn.commit()
     _note(conn, loaded, archive)
     return loaded
@@ -132,7 +132,7 @@ def _note(conn: psycopg.Connection[Any], loaded: Loaded, archive: ArchiveReader)
 
 
 def _require_schema(archive: ArchiveReader) -> None:
-    """Refuse rows of another schema: what a migration moves and works out, no reading of columns by their names does."""
+    """Refuse rows of another schema: reading columns by name does not replace a migration."""
     manifest = archive.manifest
     if manifest.schema != HEAD:
         raise InputError(
@@ -142,7 +142,7 @@ def _require_schema(archive: ArchiveReader) -> None:
 
 
 class _Loading:
-    """The steps of an import, which share the tables, the archive and what is counted."""
+    """Steps of an import, which share the tables, the archive and the counts."""
 
     def __init__(self, conn: psycopg.Connection[Any], archive: ArchiveReader, name: str, begin: Begin) -> None:
         self.conn, self.archive, self.begin = conn, archive, begin
@@ -168,7 +168,7 @@ class _Loading:
         return self.loaded
 
     def _members(self) -> list[tuple[str, int]]:
-        """Kilometres of points and images that are there; no member may be missing, unknown, or of other columns."""
+        """Return the kilometres with points and images; refuse members that are missing, unknown, or have other columns."""
         wanted: dict[str, Sequence[Column]] = {member_name(t.name, None): t.columns for t in self.tables if t.name not in BULK}
         wanted |= {member_name("audit", None): AUDIT}
         wanted |= {member_name(name, None): columns for name, columns in OTHERS.items()}
@@ -179,7 +179,7 @@ class _Loading:
                 wanted[member] = without_survey(self.by_name[found[1]])
         strange = sorted(set(wanted) ^ set(self.manifest.members))
         if strange:
-            raise self.archive.wrong(f"{strange[0][:80]!r} is missing, or is nothing that an archive holds")
+            raise self.archive.wrong(f"{strange[0][:80]!r} is missing, or unknown in an archive")
         for member, columns in wanted.items():
             if self.manifest.members[member].columns != tuple((c.name, c.type) for c in columns):
                 raise self.archive.wrong(f"{member} has other columns than schema {HEAD}")
@@ -193,7 +193,7 @@ class _Loading:
 
     def _counted(self, member: str, rows: int) -> int:
         if rows != self.manifest.members[member].rows:
-            raise self.archive.wrong(f"{member} has {rows} rows, the manifest says {self.manifest.members[member].rows}")
+            raise self.archive.wrong(f"{member} has {rows} rows, but the manifest says {self.manifest.members[member].rows}")
         return rows
 
     def _stage(self) -> None:
@@ -206,7 +206,7 @@ class _Loading:
                 sql.SQL("SELECT id FROM {}").format(sql.Identifier("pg_temp", f"archive_{table}"))
             ).fetchall()
             if rows != [(key,)]:
-                raise self.archive.wrong(f"it does not hold one {table}")
+                raise self.archive.wrong(f"it does not have exactly one {table}")
 
     def _number(self) -> None:
         """Find or make the tunnel, and give all rows their numbers."""
@@ -256,7 +256,7 @@ class _Loading:
             self.loaded.rows["audit"] = load_audit(self.conn, self.loaded.survey_id)
 
     def _settle(self) -> None:
-        """Work out what the triggers have only noted."""
+        """Update what the triggers have only marked."""
         self.conn.execute(
             "SELECT tunnel_internal.keep_waterproof(%s, w.km)"
             " FROM (SELECT DISTINCT km FROM tunnel.waterproof WHERE survey_id = %s) w",

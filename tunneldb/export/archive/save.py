@@ -22,7 +22,7 @@ Begin = Callable[[str, float | None], Callable[[float], None]]
 
 @dataclass(frozen=True)
 class Saved:
-    """What an archive holds: its bytes, rows of each table, and the kilometres of which it has points."""
+    """Content of an archive: its bytes, rows of each table, and the kilometres with points."""
 
     bytes: int
     rows: dict[str, int]

@@ -21,7 +21,7 @@ def write_survey(
     path: Path,
     begin: Callable[[str, float | None], Callable[[float], None]] = lambda text, total: lambda count: None,
 ) -> dict[str, int]:
-    """Write a stretch of a survey as a file of the kind that its ending says, and return how much of each layer.
+    """Write a stretch of a survey in the format of the file's extension, and return the counts of each layer.
 
     Parameters
     ----------
@@ -41,14 +41,14 @@ def write_survey(
     """
     ends = survey_ends(conn, survey)
     if ends is not None and (ends[0] >= high or ends[1] <= low):
-        raise UserError(f"survey {survey.name} has nothing there: it lies between chainages {ends[0]:.3f} and {ends[1]:.3f} m")
+        raise UserError(f"survey {survey.name} has no data there: it extends from chainage {ends[0]:.3f} to {ends[1]:.3f} m")
     held = conn.execute(
         "SELECT bool_or(chainage_to > %s AND chainage_from < %s) FROM tunnel.segment WHERE survey_id = %s",
         [low, high, survey.id],
     ).fetchone()
     if held is not None and held[0] is False:
         raise UserError(
-            f"survey {survey.name} has no axis between chainages {low:.3f} and {high:.3f} m: they lie in a gap of it"
+            f"survey {survey.name} has no axis between chainages {low:.3f} and {high:.3f} m: its axis has a gap there"
         )
     surface = load_surface(conn, survey, low, high)
     if path.suffix.lower() == ".gpkg":

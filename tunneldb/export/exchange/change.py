@@ -27,7 +27,7 @@ _LAYERS = (
     ("leak_change_3d", "leak_change", "surface", "MultiPolygon Z", "What became of leaks, in space"),
     ("change_section", "change_section", None, None, "Rigid motion of sections, and what remains of their change"),
 )  # fmt: skip
-"""Layers: name, view, geometry, its kind, what they hold."""
+"""Layers: name, view, geometry, its type, description."""
 
 
 def write_change_gpkg(conn: psycopg.Connection[Any], old: Survey, new: Survey, low: float, high: float, path: Path) -> None:
@@ -66,7 +66,7 @@ def _cell(value: Any) -> Any:
 
 
 def _column(values: list[Any]) -> Any:
-    """A column as GeoPackages hold it: numbers, NaN where there is none, or text."""
+    """Convert a column for a GeoPackage: numbers, with NaN for missing ones, or text."""
     cells = [_cell(value) for value in values]
     if any(isinstance(cell, str) for cell in cells):
         return np.array(cells, dtype=object)

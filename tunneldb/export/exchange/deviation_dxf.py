@@ -24,7 +24,7 @@ LAYERS = {
 """Colour (ACI) and description of each layer."""
 
 ROW = 10
-"""Sections in a row."""
+"""Number of sections in a row."""
 
 _TEXT, _CROSS, _GAP = 0.25, 0.5, 3.0  # m
 

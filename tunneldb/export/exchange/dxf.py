@@ -39,19 +39,19 @@ from tunneldb.store.remarks import Remark, read_remarks
 from tunneldb.store.survey import Survey
 
 MARGIN = 50.0
-"""Between the map, the unrolled lining and the profiles, m."""
+"""Distance between the map, the unrolled lining and the profiles, m."""
 
 TEXT = 1.0
 """Height of text on the map, m: 2 mm at 1:500."""
 
 LETTERS, LINE = 120, 1.6
-"""Most letters on a line of the text above the map; distance of lines there, of the height of text."""
+"""Maximum number of letters in a line of the text above the map; line spacing, relative to the text height."""
 
 PARTS = 7
-"""It is made in: map, leaks on it and in space, unrolled lining, profiles, sections in space, the file."""
+"""Steps of writing: map, leaks on it and in space, unrolled lining, profiles, sections in space, the file."""
 
 FEW = 20
-"""Fewer ticks than this all bear their station, not only those of whole hundreds."""
+"""Number of ticks below which all have a station label, not only those of whole hundreds."""
 
 _BLACK, _RED, _GREEN, _CYAN, _BLUE, _MAGENTA, _GREY = 7, 1, 94, 4, 150, 6, 8
 
@@ -60,7 +60,7 @@ _PLACES = {
     "3D": "on the lining, in space",
     "UNROLLED": "in the unrolled lining",
 }
-"""Where each finding is drawn: end of the layer's name, and what its description says."""
+"""Place where each finding is drawn: end of the layer's name, and its description."""
 
 LAYERS = {
     "AXIS": (_RED, "Axis through the middle of the tunnel, 3D"),
@@ -71,24 +71,24 @@ LAYERS = {
     **{
         f"{kind}_{place}": (colour, f"{text} {where}")
         for kind, colour, text in (
-            ("LEAK", _BLUE, "Leaks"), ("JOINT", _GREEN, "Joints"), ("DARK", _MAGENTA, "Dark but dry"),
+            ("LEAK", _BLUE, "Leaks"), ("JOINT", _GREEN, "Joints"), ("DARK", _MAGENTA, "Dry dark areas"),
         )
         for place, where in _PLACES.items()
     },
     "LEAK_TEXT": (_BLUE, "Number and area of leaks"),
     "LEAK_PROFILE": (_BLUE, "Leaks on the profiles"),
     "COVERAGE_GAP": (_MAGENTA, "Unrolled lining: where leaks could be missed, and why"),
-    "REMARK": (_MAGENTA, "Above the map: what is to be known of the results"),
+    "REMARK": (_MAGENTA, "Above the map: notes and limitations of the results"),
     "UNROLLED": (_GREY, "Unrolled lining: edges and crown"),
     "UNROLLED_CHAINAGE": (_GREY, "Unrolled lining: lines every 10 m, with stations"),
     "PROFILE": (_BLACK, "Profiles, looking up-chainage"),
     "PROFILE_AXIS": (_RED, "Profiles: the axis, level and plumb"),
     "PROFILE_TEXT": (_BLACK, "Profiles: station, width and height, m"),
 }  # fmt: skip
-"""Colour (ACI) and description of each layer that is always there; kinds of findings beside these get theirs as they occur."""
+"""Colour (ACI) and description of each layer that always exists; layers of further kinds of findings are added as needed."""
 
 _OTHER_KIND = _CYAN
-"""Colour of kinds of findings that have none of their own."""
+"""Colour of kinds of findings without a colour of their own."""
 
 
 def write_survey_dxf(
@@ -167,7 +167,7 @@ def write_survey_dxf(
 
 
 def _write_remarks(space: Any, corner: tuple[float, float], said: Sequence[str | None]) -> Box:
-    """Write what is to be known upwards from a corner, m, and return the box of it."""
+    """Write the notes upwards from a corner, m, and return their box."""
     lines = [
         line
         for text in filter(None, said)
@@ -175,7 +175,7 @@ def _write_remarks(space: Any, corner: tuple[float, float], said: Sequence[str |
     ]
     if not lines:
         return *corner, corner[0], corner[1] - MARGIN / 2
-    lines.insert(0, "To be known of these results:")
+    lines.insert(0, "Notes and limitations:")
     for n, line in enumerate(reversed(lines)):
         write(space, line, (corner[0], corner[1] + n * LINE * TEXT), TEXT, "REMARK")
     return *corner, corner[0] + TEXT * max(map(len, lines)), corner[1] + len(lines) * LINE * TEXT

@@ -1,4 +1,4 @@
-"""What a drawing is put together from: text, and outlines that bear what is known of them."""
+"""Building blocks of a drawing: text, and outlines with their attributes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shapely.geometry import Polygon
 from tunneldb.export.exchange.lines import plain_ring
 
 APPLICATION = "TUNNELDB"
-"""Under this name each leak, joint or dark spot bears what is known of it (extended data); also the name of the text style."""
+"""Name of the extended data with the attributes of each leak, joint or dry dark area; also the name of the text style."""
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
 VERSION = {"VERSION": "1.2"}
-"""Of the GeoPackage: one that QGIS and others of some years ago read without a warning."""
+"""Version of the GeoPackage, which QGIS and other programs of some years ago read without a warning."""
 
 _TICK = "Chainage: a tick across the axis every 10 m, longer every 100 m"
 _GRID = "Chainage in the unrolled plane: a line across the lining every 10 m"
@@ -42,11 +42,11 @@ _DRAWN = (
     ("lining_map", "Polygon", "lining", True, _LINING),
     ("lining_unrolled", "Polygon", "lining", False, _FLAT),
 )
-"""Layers that are drawn from the surface: name, geometry, style, whether on the map, what they hold."""
+"""Layers drawn from the surface: name, geometry, style, whether on the map, description."""
 
 
 def layers() -> list[VectorLayer]:
-    """Layers of the QGIS project that have rows of their own; of those on the same view the first."""
+    """Return the layers of the QGIS project that have rows of their own; only the first of those on the same view."""
     seen: dict[str, VectorLayer] = {}
     for layer in LAYERS:
         # Findings are of three kinds of geometry, "findings -o" writes them; leaks are there, and on sheets once more.
@@ -143,7 +143,7 @@ def _write(path: Path, name: str, table: Table, wkb: str, crs: str | None) -> No
 
 
 def _write_styles(path: Path, styled: list[tuple[str, str, str]]) -> None:
-    """Fill the table in which QGIS looks for the style of a layer, laid out as QGIS makes it."""
+    """Fill the table in which QGIS looks for the style of a layer, in the form that QGIS uses."""
     count = len(styled)
     table: dict[str, list[Any]] = {
         "f_table_catalog": [""] * count,
@@ -164,7 +164,7 @@ def _write_styles(path: Path, styled: list[tuple[str, str, str]]) -> None:
 
 
 def _cut_axis(conn: psycopg.Connection[Any], survey: Survey, table: Table, low: float, high: float) -> Table:
-    """The axis as one row, between two chainages (m)."""
+    """Return the axis between two chainages (m) as one row."""
     rows = conn.execute(
         "SELECT chainage, public.ST_X(geom), public.ST_Y(geom), public.ST_Z(geom) FROM tunnel_api.axis_vertex"
         " WHERE survey_id = %s ORDER BY chainage",
@@ -186,7 +186,7 @@ def _cut_axis(conn: psycopg.Connection[Any], survey: Survey, table: Table, low: 
 
 
 def _drawn(conn: psycopg.Connection[Any], survey: Survey, surface: Surface, low: float, high: float) -> Iterator[Table]:
-    """Ticks and grid lines of chainage, then the lining on the map and in the unrolled plane."""
+    """Return ticks and grid lines of chainage, then the lining on the map and in the unrolled plane."""
     chainages = tick_chainages(surface, low, high)
     named = _columns(
         chainage=chainages, label=np.array(labels(conn, survey, chainages), dtype=object), hundred=is_hundred(chainages)

@@ -14,16 +14,16 @@ from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.surface import Surface
 
 STEP = 10.0
-"""Between ticks, m of chainage."""
+"""Distance of ticks, m of chainage."""
 
 HUNDRED = 100.0
-"""Between ticks that are longer and bear their chainage, m."""
+"""Distance of longer ticks with a chainage label, m."""
 
 PIECES = 4
-"""Straight pieces of the axis in a segment; on a radius of 300 m a piece of 2.5 m leaves the arc by 3 mm."""
+"""Length of straight pieces of the axis in a segment; on a radius of 300 m a piece of 2.5 m leaves the arc by 3 mm."""
 
 TOLERANCE = 0.002
-"""How far a drawn section, or an outline in space, may leave the one that was found, m."""
+"""Maximum deviation of a drawn section, or an outline in space, from the original, m."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Profile:
 
 
 def stretches(surface: Surface, low: float, high: float) -> list[Float]:
-    """Chainages of the vertices of the axis between two chainages (m), an array for each part without a gap."""
+    """Return the chainages of the axis vertices between two chainages (m), an array for each part without a gap."""
     parts: list[list[Float]] = []
     last = None
     for number, (first, second) in zip(surface.number.tolist(), surface.ends, strict=True):
@@ -60,19 +60,19 @@ def stretches(surface: Surface, low: float, high: float) -> list[Float]:
 
 
 def axis_line(surface: Surface, chainages: Float) -> Float:
-    """Points (n, 3) of the axis at chainages (n,), in the tunnel's SRID, m."""
+    """Return points (n, 3) of the axis at chainages (n,), in the tunnel's SRID, m."""
     return np.asarray(surface.frames(chainages)[:, 0])
 
 
 def tick_chainages(surface: Surface, low: float, high: float, step: float = STEP) -> Float:
-    """Whole multiples of ``step`` (m) between two chainages at which the tunnel has an axis."""
+    """Return whole multiples of ``step`` (m) between two chainages at which the tunnel has an axis."""
     low, high = max(low, surface.ends[0, 0]), min(high, surface.ends[-1, 1])
     chainages = np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1) * step
     return np.asarray(chainages[surface.segment_index(chainages) >= 0], dtype=np.float64)
 
 
 def ticks(surface: Surface, chainages: Float) -> Float:
-    """Level lines across the axis, (n, 2, 3), from left to right; longer at each hundred metres."""
+    """Return horizontal lines across the axis, (n, 2, 3), from left to right; longer at each hundred metres."""
     frames = surface.frames(chainages)
     half = np.where(is_hundred(chainages), 3.0, 1.0)
     across = frames[:, 2] * half[:, None]
@@ -80,12 +80,12 @@ def ticks(surface: Surface, chainages: Float) -> Float:
 
 
 def is_hundred(chainages: Float) -> Bool:
-    """Whether each chainage (m) is a whole hundred."""
+    """Return True for chainages (m) at whole hundreds."""
     return np.asarray(np.abs(chainages / HUNDRED - np.round(chainages / HUNDRED)) < 1e-6)
 
 
 def edges(surface: Surface, chainages: Float) -> tuple[Float, Float]:
-    """Left and right edge of the unrolled lining, (n, 2) rows of chainage and arc, m, where there are sections."""
+    """Return the left and right edge of the unrolled lining, (n, 2) rows of chainage and arc, m, where sections exist."""
     arcs = np.column_stack(surface.arc_range(chainages))
     there = np.isfinite(arcs[:, 0])
     left, right = (np.column_stack([chainages, arcs[:, k]])[there] for k in (0, 1))
@@ -93,18 +93,18 @@ def edges(surface: Surface, chainages: Float) -> tuple[Float, Float]:
 
 
 def outline(surface: Surface, chainages: Float) -> Polygon | None:
-    """The unrolled lining along ``chainages`` as a polygon of chainage and arc, m; None where there are no sections."""
+    """Return the unrolled lining along ``chainages`` as a polygon of chainage and arc, m; None without sections."""
     left, right = edges(surface, chainages)
     return Polygon(np.concatenate([left, right[::-1]])) if len(left) > 1 else None
 
 
 def on_map(surface: Surface, unrolled: Float) -> Float:
-    """Places (n, 2) of the unrolled plane, laid on the map beside the axis, in the tunnel's SRID."""
+    """Return places (n, 2) of the unrolled plane on the map beside the axis, in the tunnel's SRID."""
     return to_map(surface, np.asarray(unrolled, dtype=np.float64))
 
 
 def profiles(surface: Surface, low: float, high: float) -> list[Profile]:
-    """The sections between two chainages, with no more vertices than their form needs."""
+    """Return the sections between two chainages, simplified to the vertices that their form needs."""
     angle = np.radians(np.arange(-180.0, 181.0))
     inside = (surface.chainages >= low) & (surface.chainages <= high)
     found = []
@@ -116,7 +116,7 @@ def profiles(surface: Surface, low: float, high: float) -> list[Profile]:
 
 
 def plain_ring(ring: Float) -> Float:
-    """A ring in space (n, 3), not closed, without the vertices that the tolerance makes needless (Douglas and Peucker)."""
+    """Simplify an open ring in space (n, 3) within the tolerance (Douglas and Peucker)."""
     closed = np.concatenate([ring, ring[:1]])
     far = int(np.argmax(np.linalg.norm(closed - closed[0], axis=1)))
     kept = np.zeros(len(closed), dtype=bool)
@@ -138,13 +138,13 @@ def plain_ring(ring: Float) -> Float:
 
 
 def in_space(surface: Surface, profile: Profile) -> Float:
-    """Vertices (n, 3) of a profile in the tunnel's SRID, m."""
+    """Return the vertices (n, 3) of a profile in the tunnel's SRID, m."""
     origin, _, right, up = surface.frames(np.array([profile.chainage]))[0]
     return np.asarray(origin + profile.right[:, None] * right + profile.up[:, None] * up)
 
 
 def wet_parts(surface: Surface, chainage: float, outlines: Sequence[Polygon]) -> list[Float]:
-    """Where outlines (chainage, arc) lie on the section at a chainage: lines (n, 2) of right and up of the axis, m."""
+    """Return outlines (chainage, arc) on the section at a chainage: lines (n, 2) right of and above the axis, m."""
     k = int(np.argmin(np.abs(surface.chainages - chainage)))
     arcs, radius = surface.arcs[k], surface.radius[k]
     cut = LineString([(chainage, arcs[0] - 1.0), (chainage, arcs[-1] + 1.0)])

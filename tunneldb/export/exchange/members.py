@@ -18,7 +18,7 @@ from tunneldb.structures.models import AXIS, POINT, SIDE
 from tunneldb.structures.results import Face, Member, Spot, Structures
 
 Geometry = Literal["face", "map", "3d"]
-"""Each face's own plane, of a pipe unrolled; the map; in space."""
+"""Geometries: each face's own plane, unrolled for a pipe; the map; in space."""
 
 _WHERE = {"face": "in each face's own plane", "map": "on the map", "3d": "in space"}
 _MEMBER = "Faces of one surface, joined over what stands before it; {}"
@@ -52,14 +52,14 @@ def write_members(path: Path, found: Structures, crs: CRS | None, geometry: Geom
 
 
 def _placed(face: Face, shape: shapely.Geometry, geometry: Geometry) -> shapely.Geometry:
-    """An outline on a face, in the coordinates asked for."""
+    """Return an outline on a face, in the requested coordinates."""
     if geometry == "map":
         return _solid(shapely.union_all([face.on_map(part) for part in shapely.get_parts(shape)]))
     return _solid(face.in_space(shape) if geometry == "3d" else shape)
 
 
 def member_row(member: Member) -> dict[str, Any]:
-    """A member as a row; m, m²."""
+    """Return a member as a row; m, m²."""
     return {
         "member": member.number,
         "kind": member.kind,
@@ -71,7 +71,7 @@ def member_row(member: Member) -> dict[str, Any]:
 
 
 def face_row(face: Face) -> dict[str, Any]:
-    """A face as a row; m, m², degrees, dB. Of a pipe a point of its axis and this, of a plane a point of it and its normal."""
+    """Return a face as a row; m, m², degrees, dB. A pipe has a point and the direction of its axis, a plane of its normal."""
     return {
         "face": face.number,
         "member": face.member,
@@ -94,7 +94,7 @@ def face_row(face: Face) -> dict[str, Any]:
 
 
 def spot_row(spot: Spot) -> dict[str, Any]:
-    """A spot as a row; m², dB."""
+    """Return a spot as a row; m², dB."""
     return {
         "spot": spot.number,
         "face": spot.face,
@@ -120,7 +120,7 @@ def _together(shapes: Sequence[shapely.Geometry]) -> shapely.Geometry:
 
 
 def _flat(row: dict[str, Any]) -> dict[str, Any]:
-    """A row with a column for each coordinate, and colours as QGIS reads them."""
+    """Return a row with a column for each coordinate, and colours for QGIS."""
     out: dict[str, Any] = {}
     for name, value in row.items():
         if name == "rgb":

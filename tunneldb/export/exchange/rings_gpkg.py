@@ -22,7 +22,7 @@ _LAYERS = (
     ("ring_map", True, "Rings of the lining, on the map strip beside the axis; m, degrees, ovality as a share"),
     ("ring_unrolled", False, "Rings of the lining (chainage, arc); m, degrees, ovality as a share"),
 )
-"""Layers of polygons: name, which is that of the view, whether on the map, what they hold."""
+"""Layers of polygons: name, which is that of the view, whether on the map, description."""
 
 _STEPS = ("ring_step", "Steps from each ring to the next, in cells of arc, at the joint (chainage, arc), m")
 _STEP_FIELDS = {"number": np.int64, "chainage": np.float64, "arc": np.float64, "step": np.float64, "step_se": np.float64}
@@ -90,7 +90,7 @@ def _write(
 
 
 def _column(name: str, values: list[Any]) -> Any:
-    """A column as GeoPackages hold it: text, whole numbers, or numbers with NaN where there is none."""
+    """Convert a column for a GeoPackage: text, whole numbers, or numbers with NaN for missing ones."""
     if name in _TEXT:
         return np.array(values, dtype=object)
     if name == "number":

@@ -15,16 +15,16 @@ from tunneldb.export.exchange.lines import Profile, wet_parts
 from tunneldb.geometry.surface import Surface
 
 Box = tuple[float, float, float, float]
-"""West, south, east, north, m."""
+"""Bounds: west, south, east, north, m."""
 
 SMALL = 0.25
 """Height of the text at leaks and profiles, m."""
 
 GAP = 2.0
-"""Between profiles, m."""
+"""Distance between profiles, m."""
 
 WIDE = 2.0
-"""Width of the sheet of profiles against its height, about."""
+"""Approximate ratio of width to height of the sheet of profiles."""
 
 
 def draw_unrolled(

@@ -18,7 +18,7 @@ from tunneldb.arrays import Bool
 from tunneldb.store.survey import Survey
 
 _ALONG = ("chainage_from", "chainage_to"), ("chainage", "chainage")
-"""Columns that say where a row lies along the tunnel: those of something long, and those of a place."""
+"""Columns with the position along the tunnel: of a stretch, and of a place."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Table:
 def read_table(
     conn: psycopg.Connection[Any], survey: Survey, view: str, low: float, high: float, where: str = "", geometry: str = "geom"
 ) -> Table:
-    """Read what a view of ``tunnel_api`` holds of a stretch of a survey.
+    """Read the rows of a view of ``tunnel_api`` for a stretch of a survey.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def read_table(
 
 
 def table_of(names: Sequence[str], rows: Sequence[tuple[Any, ...]], description: str, types: Sequence[int]) -> Table:
-    """Turn rows, whose last value is WKB, into columns.
+    """Convert rows, whose last value is WKB, to columns.
 
     Parameters
     ----------
@@ -121,12 +121,12 @@ def _text(value: Any) -> str:
 
 
 def _moment(value: dt.datetime) -> np.datetime64:
-    """Turn to UTC and drop the zone, which NumPy doesn't know."""
+    """Convert to UTC without a time zone, which NumPy does not support."""
     return np.datetime64(value.astimezone(dt.UTC).replace(tzinfo=None), "ms")
 
 
 _EMPTY = {"i": 0, "f": np.nan, "b": False, "M": np.datetime64("NaT"), "O": None}
-"""What stands in the place of a missing value, by kind of column."""
+"""Placeholder for a missing value, by kind of column."""
 
 
 def _forms() -> dict[int, tuple[np.dtype[Any], Callable[[Any], Any]]]:
@@ -141,4 +141,4 @@ def _forms() -> dict[int, tuple[np.dtype[Any], Callable[[Any], Any]]]:
 
 
 _FORM = _forms()
-"""Form of a column by its type in PostgreSQL; whatever is not here is written as text."""
+"""Format of a column by its type in PostgreSQL; other types are written as text."""

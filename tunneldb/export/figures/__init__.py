@@ -1,1 +1,1 @@
-"""Figures: how far the axis lies from its design, how intensity depends on range and incidence."""
+"""Figures: deviation of the axis from its design, dependence of intensity on range and incidence."""

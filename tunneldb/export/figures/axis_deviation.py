@@ -1,4 +1,4 @@
-"""Figure and table of how far the measured axis lies from the given one."""
+"""Figure and table of the deviation of the measured axis from the given one."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _MILLI = 1000.0
 
 
 def check_format(path: Path) -> None:
-    """Raise UserError for an ending that stands for no format of figures or tables."""
+    """Raise UserError for an extension that is no format of figures or tables."""
     if path.suffix.lower() not in (*FIGURES, ".csv"):
-        raise UserError(f"{path}: the deviation is written as {', '.join(FIGURES)} (a figure) or .csv (a table)")
+        raise UserError(f"{path}: write the deviation as {', '.join(FIGURES)} (a figure) or .csv (a table)")
 
 
 def write_deviation(deviation: Deviation, path: Path) -> None:
-    """Write the deviation as its ending says: a figure, or a table of all vertices.
+    """Write the deviation in the format of the file's extension: a figure, or a table of all vertices.
 
     The file appears whole. Raises UserError if its ending stands for no format or it can't be written.
     """
@@ -91,7 +91,7 @@ def _write_figure(deviation: Deviation, path: Path) -> None:
 
 
 def _stations(panels: Sequence[Axes], deviation: Deviation) -> None:
-    """Ticks at round stations, and a line where the stationing jumps or turns round."""
+    """Draw ticks at round stations, and a line where the stationing jumps or reverses."""
     from matplotlib.ticker import FixedLocator, MaxNLocator
 
     low, high = float(deviation.chainage[0]), float(deviation.chainage[-1])
@@ -117,7 +117,7 @@ def _stations(panels: Sequence[Axes], deviation: Deviation) -> None:
 
 
 def _course(axes: Axes, deviation: Deviation, values: np.ndarray, what: str) -> None:
-    """A course over the chainage, with what was measured, carried along and placed by hand told apart."""
+    """Draw a deviation over the chainage, with measured, interpolated and manual vertices distinguished."""
     source = np.array(deviation.source)
     axes.axhline(0.0, color="black", lw=0.8)
     axes.plot(deviation.chainage, _MILLI * values, color=_LINE, lw=1.0)
@@ -131,7 +131,7 @@ def _course(axes: Axes, deviation: Deviation, values: np.ndarray, what: str) -> 
 
 
 def _curvature(axes: Axes, deviation: Deviation) -> None:
-    """The curvature of the design: left above, right below."""
+    """Draw the curvature of the design: left above, right below."""
     for part in deviation.parts("horizontal"):
         sign = -1.0 if part.turn == "right" else 1.0
         ends = [sign * _MILLI / radius if radius else 0.0 for radius in (part.radius_from, part.radius_to)]
@@ -146,7 +146,7 @@ def _curvature(axes: Axes, deviation: Deviation) -> None:
 
 
 def _grade(axes: Axes, deviation: Deviation) -> None:
-    """The grade of the design."""
+    """Draw the grade of the design."""
     for part in deviation.parts("vertical"):
         if part.grade_from is not None and part.grade_to is not None:
             axes.plot([part.chainage_from, part.chainage_to], [part.grade_from, part.grade_to], color="black", lw=1.0)

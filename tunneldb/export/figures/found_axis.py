@@ -63,7 +63,7 @@ def _draw_plan(axes: Axes, found: FoundAxis, points: np.ndarray, start: float) -
 
 
 def _draw_profile(axes: Axes, found: FoundAxis, points: np.ndarray, start: float) -> None:
-    """Heights over the chainage, of the points near the line in plan only: floor and vault."""
+    """Draw heights over the chainage, only of points near the line in plan: floor and vault."""
     chainage = _chainages(found)
     placed = place_points(points, Frames.along(found.xyz), 3.0 * max(found.width, found.height))
     near = (placed.station >= 0) & (np.abs(placed.right) < found.width / 8.0)

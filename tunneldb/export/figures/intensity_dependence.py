@@ -26,9 +26,9 @@ _SHOWN = (0.002, 0.998)  # shares of the points between whose values an axis run
 
 
 def check_format(path: Path) -> None:
-    """Raise UserError for an ending that stands for no format of figures."""
+    """Raise UserError for an extension that is no format of figures."""
     if path.suffix.lower() not in FORMATS:
-        raise UserError(f"{path}: a figure is written as {', '.join(FORMATS)}")
+        raise UserError(f"{path}: write the figure as {', '.join(FORMATS)}")
 
 
 def write_figure(look: Diagnosis, path: Path) -> None:
@@ -72,7 +72,7 @@ def _panel(axes: Axes, at: Float, level: Float, course: ClassMeans, over: str, w
 
 
 def _curves(axes: Axes, look: Diagnosis) -> None:
-    """Range curves, each about its mean over the ranges that all of them have: they are known but for a constant."""
+    """Draw range curves, each relative to its mean over their common ranges: they are known except for a constant."""
     axes.set_xlabel("range, m")
     axes.set_ylabel("range curve about its mean, dB")
     if not len(look.range_m):

@@ -29,7 +29,7 @@ def export_change(conn: psycopg.Connection[Any], survey: Survey, km: int, folder
 
 
 def write_change(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int, path: Path) -> Path | None:
-    """Write the change of each cell of a kilometre, m, positive inwards; NaN where one of the surveys did not see it.
+    """Write the change of each cell of a kilometre, m, positive inwards; NaN where one of the surveys has no measurement.
 
     x is the chainage, y the arc, of the older survey, m. None where nothing was compared.
     """

@@ -1,4 +1,4 @@
-"""Classes of the pixels of a kilometre, from its offset image and what stage ``ground`` has stored of it."""
+"""Classes of the pixels of a kilometre, from its offset image and the stored results of stage ``ground``."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ NO_CLASS = PALETTES["class"].nodata
 """Value of a pixel without a class."""
 
 SEAM = 1e-3
-"""Points are kept so far from the ends of a section, m."""
+"""Minimum distance of points from the ends of a section, m."""
 
 CHUNK = 1_000_000
-"""Pixels that are classed at a time: some 150 bytes each."""
+"""Number of pixels classified at a time: some 150 bytes each."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class ClassPainter:
 
     @classmethod
     def load(cls, conn: psycopg.Connection, survey: Survey, km: int) -> ClassPainter | None:
-        """Load what is stored of a kilometre; None when stage ``ground`` has found nothing there, or stages have not run."""
+        """Load the stored results of a kilometre; None if stage ``ground`` found nothing there, or stages have not run."""
         held = conn.execute(
             "SELECT EXISTS (SELECT FROM tunnel.section WHERE survey_id = %(survey)s AND km = %(km)s)"
             " AND (EXISTS (SELECT FROM tunnel.lining WHERE survey_id = %(survey)s AND km = %(km)s)"
@@ -57,7 +57,7 @@ class ClassPainter:
         return cls(scene.surface, scene.classes)
 
     def paint(self, offset: Raster) -> UInt8:
-        """Class of each pixel of an offset image (rows, columns), NO_CLASS where no point fell."""
+        """Return the class of each pixel of an offset image (rows, columns), NO_CLASS without a point."""
         classes = np.full(offset.values.shape, NO_CLASS, np.uint8)
         rows, columns = np.nonzero(np.isfinite(offset.values))
         for first in range(0, len(rows), CHUNK):
@@ -66,7 +66,7 @@ class ClassPainter:
         return classes
 
     def _classes(self, offset: Raster, row: Intp, column: Intp) -> UInt8:
-        """Class of pixels (n,) that hold points."""
+        """Return the class of pixels (n,) with points."""
         place = offset.transform
         chainage = np.asarray(place.c + (column + 0.5) * place.a, dtype=np.float64)
         arc = np.asarray(place.f + (row + 0.5) * place.e, dtype=np.float64)

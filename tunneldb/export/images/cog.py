@@ -36,7 +36,7 @@ class Extent:
 
 
 def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int, NDArray[Any]]], name: str = "") -> None:
-    """Write an image; where no block lies it holds nothing (GDAL fills what is never written with the nodata value).
+    """Write an image; places without a block are empty (GDAL fills them with the nodata value).
 
     Parameters
     ----------

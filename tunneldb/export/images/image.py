@@ -31,7 +31,7 @@ from tunneldb.store.survey import Survey
 
 
 def image_kilometres(conn: psycopg.Connection, survey: Survey) -> list[int]:
-    """Kilometres of a survey that have images."""
+    """Return the kilometres of a survey that have images."""
     rows = conn.execute("SELECT DISTINCT km FROM tunnel.image WHERE survey_id = %s ORDER BY km", (survey.id,))
     return [km for (km,) in rows]
 
@@ -62,7 +62,7 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
 
 
 def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> list[Path]:
-    """Write what is looked at of a kilometre with its gaps filled, ``SURVEY-kmNNN-KIND-filled.tif``; their paths.
+    """Write the images of a kilometre with filled gaps, ``SURVEY-kmNNN-KIND-filled.tif``, and return their paths.
 
     The kinds are corrected intensity, or the offset where there is none, and deviation. Their pixels are those of a preview:
     they are there to be looked at, under the image that was measured. Their band's name and metadata say what they are. A
@@ -75,7 +75,7 @@ def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Pat
 
 
 def _export_filled(conn: psycopg.Connection, survey: Survey, km: int, kind: str, folder: Path) -> Path | None:
-    """Write an image with its gaps filled; None where there is none."""
+    """Write an image with filled gaps; return None if there is none."""
     blocks = image_blocks(conn, survey, km, kind)
     if not blocks:
         return None
@@ -104,7 +104,7 @@ def _export_filled(conn: psycopg.Connection, survey: Survey, km: int, kind: str,
 
 
 def _beside(conn: psycopg.Connection, survey: Survey, kind: str, block: int) -> list[tuple[int, int]]:
-    """Kilometre and number of a block of a kind, if there is one."""
+    """Return kilometre and number of a block of a kind, if there is one."""
     query = "SELECT km, block FROM tunnel.image WHERE survey_id = %s AND kind = %s AND block = %s"
     return conn.execute(query, (survey.id, kind, block)).fetchall()
 
@@ -143,7 +143,7 @@ _TITLES = {
 
 
 class _Sheet:
-    """Shrinks the blocks that pass through it to what the preview shows.
+    """Preview made from the blocks that pass through it.
 
     Parameters
     ----------
@@ -157,12 +157,12 @@ class _Sheet:
         self._blocks: list[tuple[float, Single]] = []
 
     def note(self, west: float, pixels: NDArray[Any]) -> None:
-        """Take a block that begins at a chainage, m."""
+        """Add a block that begins at a chainage, m."""
         shrink: Callable[[NDArray[Any], int], Single] = preview.shrink_codes if pixels.dtype == np.uint8 else preview.shrink
         self._blocks.append((west, shrink(pixels, self._factor)))
 
     def strips(self) -> Iterator[preview.Strip]:
-        """Lay the blocks into strips of a hectometre."""
+        """Place the blocks in strips of 100 m."""
         width = round(preview.STRIP / self.pixel)
         by_start: dict[float, Single] = {}
         for west, values in self._blocks:
@@ -183,7 +183,7 @@ def _pixels(
     painter: ClassPainter | None,
     sheet: _Sheet,
 ) -> Iterator[tuple[int, NDArray[Any]]]:
-    """First column and pixels of each stored block, codes in 8 bits, or their classes; the sheet takes note of them."""
+    """Yield first column and pixels of each stored block, as 8-bit codes or classes, and add them to the preview."""
     for block in blocks:
         raster = load_block(conn, survey, km, kind, block)
         pixels: NDArray[Any] = raster.values if painter is None else painter.paint(raster)
@@ -194,7 +194,7 @@ def _pixels(
 
 
 def preview_factor(pixel: float) -> int:
-    """How many pixels of the image make one of the preview."""
+    """Return the number of image pixels per preview pixel."""
     factor = max(1, round(preview.PIXEL / pixel))
     # A block must be a whole number of pixels.
     while abs(BLOCK / (pixel * factor) - round(BLOCK / (pixel * factor))) > 1e-6:

@@ -24,7 +24,7 @@ COLOURS: dict[PointClass, Colour] = {
 
 @dataclass(frozen=True)
 class Palette:
-    """What the codes in an image of 8 bits mean.
+    """Meaning of the codes in an 8-bit image.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ PALETTES = {
         nodata=255,
     ),
 }
-"""Of the kinds of image that hold codes: classes of points, states of pixels."""
+"""Palettes of the kinds of image with codes: classes of points, states of pixels."""
 
 
 def hexadecimal(colour: Colour) -> str:

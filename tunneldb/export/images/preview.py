@@ -1,4 +1,4 @@
-"""PNG previews of a kilometre's image: one strip a hectometre, or what is held of it, with a grid, ticks and a scale.
+"""PNG previews of a kilometre's image: a strip for each 100 m or its used part, with a grid, ticks and a scale.
 
 Gaps between profiles are filled in it, see :mod:`tunneldb.raster.gap_fill`.
 """
@@ -24,13 +24,13 @@ STRIP = 100.0
 """Length of a strip, m."""
 
 PIXEL = 0.05
-"""Side of a preview's pixel, m; that of the image where it is larger."""
+"""Minimum side of a preview's pixel, m; the image's pixel if that is larger."""
 
 OFFSET_SPANS = (0.02, 0.05, 0.1, 0.2, 0.5)
-"""Offsets beyond one of these are shown in the full colour, m: the first that nine tenths of the image stay within."""
+"""Offsets of the full colour, m: the first within which nine tenths of the image are."""
 
 _SIGNED = ("offset", *DEVIATION_KINDS.values())
-"""Kinds of image with a sign."""
+"""Kinds of image with signed values."""
 
 _MARGIN, _HEAD, _GAP = 84, 40, 26
 _TICK = 10  # of chainage, m
@@ -67,7 +67,7 @@ def shrink(values: Single, factor: int) -> Single:
 
 
 def shrink_codes(values: UInt8, factor: int) -> Single:
-    """Take the commonest code of ``factor`` × ``factor`` pixels, the greater of two; without 0, which becomes NaN."""
+    """Return the most frequent code of ``factor`` × ``factor`` pixels, the greater of two; ignores 0, which becomes NaN."""
     rows, columns = (-(-n // factor) * factor for n in values.shape)
     padded = np.zeros((rows, columns), np.uint8)
     padded[: values.shape[0], : values.shape[1]] = values
@@ -82,7 +82,7 @@ def shrink_codes(values: UInt8, factor: int) -> Single:
 
 
 def _filled(kind: str, values: Single, reach: float) -> Single:
-    """Fill the gaps of an image; what floats in them is no colour for its surroundings. Gaps between states are shown."""
+    """Fill the gaps of an image; fixtures in them do not colour their surroundings. Gaps between states are shown."""
     if kind == "state":
         return values
     if kind != "class":
@@ -146,7 +146,7 @@ def draw(
 
 
 def _held(strips: Sequence[Strip], pixel: float) -> list[Strip]:
-    """The strips from the first tick before what any of them holds to the last behind it."""
+    """Return the strips from the first tick before any content to the last behind it."""
     there = np.zeros(max(s.values.shape[1] for s in strips), dtype=bool)
     for strip in strips:
         there[: strip.values.shape[1]] |= np.isfinite(strip.values).any(axis=0)
@@ -168,7 +168,7 @@ def _head(
     span: tuple[float, float],
     font: ImageFont.ImageFont | ImageFont.FreeTypeFont,
 ) -> int:
-    """Write the title, and what colours mean; returns where it ends, pixels."""
+    """Write the title and the meaning of the colours, and return where it ends, pixels."""
     if kind in PALETTES:
         pen.text((_MARGIN, 8), f"{title}:", _INK, font)
         return _legend(pen, _MARGIN + int(pen.textlength(f"{title}:  ", font)), kind, strips, font)
@@ -193,7 +193,7 @@ def _legend(
     strips: Sequence[Strip],
     font: ImageFont.ImageFont | ImageFont.FreeTypeFont,
 ) -> int:
-    """Colour and name of each code that is there; returns where they end, pixels."""
+    """Draw colour and name of each code present, and return where they end, pixels."""
     there = np.unique(np.concatenate([np.nan_to_num(s.values) for s in strips]))
     for code, (name, colour) in PALETTES[kind].entries.items():
         if code in there:
@@ -216,7 +216,7 @@ def _span(kind: str, strips: Sequence[Strip]) -> tuple[float, float]:
 
 
 def _colours(kind: str, values: Single, low: float, high: float) -> UInt8:
-    """Colours (rows, columns, 3) of values; places without one in a pale grey."""
+    """Return the colours (rows, columns, 3) of values; places without one are pale grey."""
     if kind in PALETTES:
         table = np.full((256, 3), _EMPTY, np.uint8)
         for code, (_, colour_of_code) in PALETTES[kind].entries.items():
@@ -242,7 +242,7 @@ def _ticks(
     pixel: float,
     font: ImageFont.ImageFont | ImageFont.FreeTypeFont,
 ) -> None:
-    """Grid every 10 m along the tunnel and every 5 m across, with labels; right and left are those looking up-chainage."""
+    """Draw a grid every 10 m along the tunnel and every 5 m across, with labels; right and left are as seen up-chainage."""
     (x0, y0), (width, height) = corner, size
     length = round(width * pixel)
     for metre in range(0, length + 1, _TICK):

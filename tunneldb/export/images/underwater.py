@@ -1,4 +1,4 @@
-"""Rasters of what sonar scans saw below the water: the bed on the map, and the submerged part of the unrolled lining."""
+"""Rasters of sonar scans below the water: the bed on the map, and the submerged part of the unrolled lining."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ PIXEL = 0.1
 """Side of a pixel, m: of the bed's cells across; a beam is as wide 6 m away."""
 
 BANDS = ("height", "depth", "sigma")
-"""Of the raster of the bed, all in m."""
+"""Bounds of the raster of the bed, all in m."""
 
 _TILE = 256  # pixels
 _BESIDE = 50.0  # m of the surface beyond a kilometre's ends
 
 
 def export_bed(conn: psycopg.Connection[Any], survey: Survey, km: int, folder: Path) -> Path | None:
-    """Write the bed of a kilometre as it lies on the map, ``SURVEY-kmNNN-bed.tif``; its path, or None if no sonar saw any.
+    """Write the bed of a kilometre on the map, ``SURVEY-kmNNN-bed.tif``; return its path, or None if no sonar saw any.
 
     A Cloud Optimized GeoTIFF in the tunnel's SRID of three bands, BANDS, m; NaN where no sonar saw the bed.
     """
@@ -78,7 +78,7 @@ def _write_bed(path: Path, cells: BedCells, alignment: Alignment, crs: str) -> N
 def _tiles(
     cells: BedCells, alignment: Alignment, middles: Float, transform: Affine, shape: tuple[int, int]
 ) -> Iterator[tuple[Window, Single]]:
-    """Tiles of the raster in which there are cells: a canal fills little of the rectangle about it."""
+    """Return the tiles of the raster with cells: a canal fills little of its bounding box."""
     tree = cKDTree(middles)
     height = float(np.median(cells.values[:, 0]))
     for top in range(0, shape[0], _TILE):
@@ -95,7 +95,7 @@ def _tiles(
 
 
 def export_submerged(conn: psycopg.Connection[Any], survey: Survey, km: int, folder: Path) -> Path | None:
-    """Write what sonar scans saw of a kilometre, unrolled, ``SURVEY-kmNNN-submerged.tif``; its path, or None if there is none.
+    """Write the sonar scans of a kilometre, unrolled, ``SURVEY-kmNNN-submerged.tif``; return its path, or None if none.
 
     A Cloud Optimized GeoTIFF of the distance of the submerged lining and of the bed from the section surface, m, positive
     into the tunnel: x is the chainage, y the arc, m, as in all images; NaN where no sonar saw anything.

@@ -45,7 +45,7 @@ Begin = Callable[[str, int], Callable[[int], None]]
 def export_copc(
     conn: psycopg.Connection[Any], survey: Survey, folder: Path, kilometres: Collection[int], begin: Begin
 ) -> Iterator[Written]:
-    """Write each kilometre as ``SURVEY-kmNNN.copc.laz`` into a folder, and beside them ``SURVEY.vpc``, which names all.
+    """Write each kilometre as ``SURVEY-kmNNN.copc.laz`` into a folder, with ``SURVEY.vpc``, which lists all.
 
     Each point of a file is in one of the kilometres that the file touches, that in which its chainage is or the nearest; it
     has the class that `export_classified` gives it. Those of a kilometre that is not in the database yet are left to it. A file
@@ -91,13 +91,13 @@ def export_copc(
 
 
 class _Divide:
-    """Which kilometre points belong to."""
+    """Assignment of points to kilometres."""
 
     def __init__(self, alignment: Alignment) -> None:
         self.alignment = alignment
 
     def kilometre(self, xyz: Float, there: Sequence[int]) -> Int64:
-        """Of those that a file touches, that in which each point (n, 3) lies or the nearest, (n,)."""
+        """Return the kilometre of each point (n, 3), or the nearest, among those that a file touches, (n,)."""
         if len(there) == 1:
             return np.full(len(xyz), there[0], np.int64)
         chainage = self.alignment.chainage(xyz)
@@ -111,7 +111,7 @@ class _Divide:
 
 
 class _Source:
-    """A scan file that is read once for all its kilometres, and then for each of them where its points are.
+    """Scan file that is read once for all its kilometres, and again for each of them where its points are.
 
     Attributes
     ----------
@@ -124,11 +124,11 @@ class _Source:
         self.head = records_of(self.path).head
         self.chunks: dict[int, list[int]] = {km: [] for km in file.touched}
         if self.head.point_format not in FORMATS:
-            raise UserError(f"{file.path}: its points have waveforms, which a COPC can't hold: export without --copc")
+            raise UserError(f"{file.path}: its points have waveforms, which COPC does not support: export without --copc")
 
     @property
     def path(self) -> Path:
-        """Where it is; it is what was loaded."""
+        """Return its path, after checking that the file is the one that was loaded."""
         return unchanged_file(self.file.path, self.file.bytes, self.file.checksum)
 
     def count(self, groups: Sequence[_Group], divide: _Divide, begin: Begin) -> None:
@@ -149,7 +149,7 @@ class _Source:
                 try:
                     group.add(placement.coordinates(own))
                 except ValueError as error:
-                    raise UserError(f"{self.file.path}: {error}; mend the file") from None
+                    raise UserError(f"{self.file.path}: {error}; repair the file") from None
                 self.chunks[group.km].append(number)
             progress(len(xyz))
 
@@ -169,7 +169,7 @@ class _Group:
         self.cells: CellCounts | None = None
 
     def placement(self, source: _Source) -> Placement:
-        """How a file's points become those of the kilometre."""
+        """Return the conversion of a file's points to those of the kilometre."""
         return self.placements[list(self.sources).index(source)]
 
     def add(self, xyz: Float) -> None:
@@ -180,7 +180,7 @@ class _Group:
 
     @property
     def points(self) -> int:
-        """How many were counted."""
+        """Return the number of counted points."""
         return 0 if self.cells is None else int(self.cells.counts.sum())
 
 
@@ -220,7 +220,7 @@ def _sort(
     spool: BinaryIO,
     progress: Callable[[int], None],
 ) -> Int64:
-    """Put the points of a kilometre, classed, into a file, those of each tile side by side; points by class (256,)."""
+    """Write the classified points of a kilometre to a file, grouped by tile; points by class (256,)."""
     head, counts = group.head, np.zeros(256, np.int64)
     place = np.concatenate([[0], np.cumsum([tile.points for tile in tiling.tiles])])[:-1]
     for source in group.sources:

@@ -1,4 +1,4 @@
-"""Dimensions of a point cloud: what they are, and the statistics of their values."""
+"""Dimensions of a point cloud: definitions, and statistics of their values."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _NAMES = {
     "blue": "Blue",
     "nir": "Infrared",
 }
-"""Names that PDAL has for the dimensions of LAS, by which other programs know them."""
+"""PDAL's names of the LAS dimensions, as other programs use them."""
 
 _DEGREES = 0.006  # a step of the scan angle
 _TYPES = {"FloatingPoint": "floating", "SignedInteger": "signed"}
@@ -44,7 +44,7 @@ _TYPES = {"FloatingPoint": "floating", "SignedInteger": "signed"}
 
 @dataclass
 class Dimension:
-    """A dimension and what is known of its values.
+    """Dimension with statistics of its values.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Dimension:
     greatest: float = -np.inf
 
     def add(self, values: Float) -> None:
-        """Take these values (n,) in; those that are no number are left out."""
+        """Add values (n,); those that are not numbers are ignored."""
         values = values[np.isfinite(values)]
         if not len(values):
             return
@@ -82,7 +82,7 @@ class Dimension:
 
     @property
     def is_finite(self) -> bool:
-        """Whether the statistics are numbers: their sums can be greater than any number."""
+        """Return True if the statistics are finite: sums may overflow."""
         return bool(np.isfinite([self.average, self.variance]).all())
 
     @property
@@ -117,7 +117,7 @@ class Dimensions:
             self.every[dimension.name] = [Dimension(name, kind, size) for name in names]
 
     def add(self, records: UInt8) -> None:
-        """Take the values of records (n, size) in."""
+        """Add the values of records (n, size)."""
         points = laspy.ScaleAwarePointRecord(records.view(self.dtype)[:, 0], self.form, self.scales, self.offsets)
         for name, dimensions in self.every.items():
             values = np.asarray(points[name.lower() if name in "XYZ" else name], np.float64).reshape(len(records), -1)
@@ -125,5 +125,5 @@ class Dimensions:
                 dimension.add(column * _DEGREES if name == "scan_angle" else column)
 
     def listed(self) -> list[Dimension]:
-        """All of them."""
+        """Return all dimensions."""
         return [dimension for dimensions in self.every.values() for dimension in dimensions]

@@ -1,4 +1,4 @@
-"""Scan files written again with the face, the member and the spot that each point is on; or what is on them as polygons."""
+"""Scan files with the face, the member and the spot of each point added; or these as polygons."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DIMENSIONS = {
     "member": "member, 0: none",
     "anomaly": "spot, 0: none",
 }
-"""What is added to each point."""
+"""Attributes added to each point."""
 
 
 def check_target(source: Path, target: Path) -> None:
@@ -32,9 +32,9 @@ def check_target(source: Path, target: Path) -> None:
     UserError
     """
     if target.suffix.lower() not in (".laz", ".gpkg"):
-        raise UserError(f"{target}: points are written as .laz, polygons as .gpkg: let its name end so")
+        raise UserError(f"{target}: write points as .laz, or polygons as .gpkg; change the extension")
     if same_file(source, target):
-        raise UserError(f"{target} is the file that is read, never to be written over: choose another name with -o")
+        raise UserError(f"{target} is the input file; choose another name with -o")
     if not target.parent.is_dir():
         raise UserError(f"{target.parent}: no such folder")
 

@@ -1,4 +1,4 @@
-"""Classes for a scan file by itself, without a survey: its ground, its lining and what stands before it."""
+"""Classes of a single scan file without a survey: its ground, its lining, and objects in front of the lining."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Begin = Callable[[str, int], Callable[[int], None]]
 
 @dataclass(frozen=True)
 class Classified:
-    """What a file's points were found to be.
+    """Classification of a file's points.
 
     Attributes
     ----------
@@ -66,16 +66,16 @@ def classify_file(source: Path, target: Path, values: Mapping[str, float], begin
         cannot be written.
     """
     if target.suffix.lower() != ".laz":
-        raise UserError(f"{target}: what is written is LAZ: let its name end in .laz")
+        raise UserError(f"{target}: the output is LAZ; use the extension .laz")
     if same_file(source, target):
-        raise UserError(f"{target} is the file that is read, never to be written over: choose another name with -o")
+        raise UserError(f"{target} is the input file; choose another name with -o")
     if not target.parent.is_dir():
         raise UserError(f"{target.parent}: no such folder")
     count = read_header(source).points
     scene, origin = find_scene_of(source, values, begin("points", count))
     lining = any(cluster.klass == PointClass.LINING for cluster in scene.clusters) or scene.relief is not None
     if scene.ground is None and not lining:
-        raise UserError(f"{source}: neither ground nor lining is found in its {count} points: is it the scan of a tunnel?")
+        raise UserError(f"{source}: neither ground nor lining was found in its {count} points; check that it is a tunnel scan")
     with replacing(target) as temporary:
         counts = rewrite(source, temporary, lambda xyz: scene.classes(xyz - origin), CLASS_NAMES, begin("classes", count))
     return Classified(counts, scene.ground is not None, lining)
@@ -112,6 +112,6 @@ def find_scene_of(source: Path, values: Mapping[str, float], progress: Callable[
     try:
         line = centreline_through(thinned)
     except ValueError as error:
-        raise UserError(f"{source}: {error}; is its header's scale right?") from error
+        raise UserError(f"{source}: {error}; check the scale in its header") from error
     ground = find_ground(thinned, line, settings, spread=spread)
     return find_bare_scene(thinned, line, ground, ClusterSettings.of(values)), origin

@@ -23,7 +23,7 @@ from tunneldb.store.sources import unchanged_file
 from tunneldb.store.survey import Survey
 
 CLASS_NAMES = {int(klass): klass.name.lower() for klass in PointClass}
-"""Names of the classes, as they are written into the files."""
+"""Names of the classes, as written to the files."""
 
 _STAGE = "ground"
 
@@ -106,7 +106,7 @@ def export_classified(
 
 
 def survey_files(conn: psycopg.Connection[Any], survey: Survey) -> list[ScanFile]:
-    """Files of a survey in the order of chainage."""
+    """Return the files of a survey in the order of chainage."""
     there = set(loaded_kilometres(conn, survey))
     rows = conn.execute(
         "SELECT f.name, f.path, f.checksum, f.bytes, f.points,"
@@ -122,7 +122,7 @@ def survey_files(conn: psycopg.Connection[Any], survey: Survey) -> list[ScanFile
 
 
 def _targets(conn: psycopg.Connection[Any], files: Sequence[ScanFile], every: Sequence[ScanFile], folder: Path) -> list[Path]:
-    """Where the files go; those that differ in their endings alone keep them."""
+    """Return the output paths; files that differ only in their extension keep it."""
     stems = Counter(Path(file.name).stem for file in every)
     targets = []
     for file in files:
@@ -138,11 +138,11 @@ def require_no_scans(conn: psycopg.Connection[Any], targets: Sequence[Path]) -> 
     scans = {_identity(Path(path)) for (path,) in rows} - {None}
     for target in targets:
         if _identity(target) in scans:
-            raise UserError(f"{target} is a scan file that was loaded, never to be written over: choose another folder with -o")
+            raise UserError(f"{target} is a loaded scan file; choose another folder with -o")
 
 
 def _identity(path: Path) -> tuple[int, int] | None:
-    """What tells a file from all others, whichever way leads there; None if there is none."""
+    """Return the identity of a file, independent of the path; None if there is none."""
     try:
         status = path.stat()
     except OSError:
@@ -151,12 +151,12 @@ def _identity(path: Path) -> tuple[int, int] | None:
 
 
 def same_file(one: Path, other: Path) -> bool:
-    """Whether two paths lead to one file that exists."""
+    """Return True if two paths lead to one existing file."""
     return _identity(one) is not None and _identity(one) == _identity(other)
 
 
 def require_ground(conn: psycopg.Connection[Any], survey: Survey, kilometres: Collection[int]) -> None:
-    """Refuse kilometres whose ground never was found, or is out of date: its models don't fit what is there now."""
+    """Refuse kilometres without ground, or with outdated ground: its models do not match the current data."""
     rows = conn.execute(
         "SELECT s.km, s.stage, s.done_at IS NULL, s.reason FROM tunnel_api.stage_status s"
         " WHERE s.survey_id = %(survey)s AND s.km = ANY (%(km)s) AND (s.done_at IS NULL OR s.stale)"

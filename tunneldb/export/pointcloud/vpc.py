@@ -78,7 +78,7 @@ def write_vpc(path: Path, cloud: Cloud, date: dt.date, folder: Path) -> None:
 
 
 def listed_clouds(path: Path) -> dict[str, dict[str, Any]]:
-    """Items of a virtual point cloud by the names of their files; none if there is none.
+    """Return the items of a virtual point cloud by the names of their files; none without a file.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def listed_clouds(path: Path) -> dict[str, dict[str, Any]]:
         items = json.loads(path.read_text("utf-8"))["features"]
         return {Path(item["assets"]["data"]["href"]).name: item for item in items}
     except (ValueError, KeyError, TypeError):
-        raise UserError(f"{path} is no virtual point cloud: move it away, or choose another folder with -o") from None
+        raise UserError(f"{path} is not a virtual point cloud: move it away, or choose another folder with -o") from None
 
 
 def _item(cloud: Cloud, date: dt.date) -> dict[str, Any]:
@@ -142,7 +142,7 @@ def _item(cloud: Cloud, date: dt.date) -> dict[str, Any]:
 
 
 def _in_degrees(cloud: Cloud, crs: CRS) -> list[float] | None:
-    """Box in WGS 84: west, south, lowest, east, north, highest; heights as they are."""
+    """Return the box in WGS 84: west, south, lowest, east, north, highest; heights unchanged."""
     ways = [np.linspace(low, high, _SIDE) for low, high in zip(cloud.low[:2], cloud.high[:2], strict=True)]
     x, y = (values.ravel() for values in np.meshgrid(*ways))
     try:
@@ -156,7 +156,7 @@ def _in_degrees(cloud: Cloud, crs: CRS) -> list[float] | None:
 
 
 def _rectangle(box: Sequence[float]) -> dict[str, Any]:
-    """Polygon about a box, counterclockwise."""
+    """Return the polygon around a box, counterclockwise."""
     west, south, _, east, north, _ = box
     ring = [[west, south], [east, south], [east, north], [west, north], [west, south]]
     return {"type": "Polygon", "coordinates": [ring]}

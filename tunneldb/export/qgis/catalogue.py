@@ -1,4 +1,4 @@
-"""Kinds and severities of findings as an owner has them, with the colours and symbols by which QGIS draws them."""
+"""An owner's kinds and severities of findings, with the colours and symbols used in QGIS."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import psycopg
 from tunneldb.store.survey import Survey
 
 SHAPES = {"Polygon": "polygon", "Line": "line", "Point": "point"}
-"""What a kind may be drawn as, by the kind of geometry of a layer."""
+"""Possible symbols of a kind, by the geometry type of a layer."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """How a kind is drawn.
+    """Symbol of a kind.
 
     Attributes
     ----------
@@ -51,10 +51,10 @@ LOOKS = {
     "dark": Look("107,107,107", "dense6"),
 }
 OWN = (Look("27,158,119"), Look("79,109,0", "f_diagonal", "dash"), Look("140,45,140", "b_diagonal", "dot", "square"))
-"""Looks of an owner's kinds, in turn."""
+"""Symbols of an owner's own kinds, in turn."""
 
 HALOS = {4: "227,26,28", 3: "255,159,28"}
-"""Colour about what is severe, by severity."""
+"""Halo colour of severe findings, by severity."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Catalogue:
-    """What a form offers.
+    """Choices in a form.
 
     Attributes
     ----------

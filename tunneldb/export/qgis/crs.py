@@ -34,7 +34,7 @@ def crs_element(conn: psycopg.Connection, srid: int) -> ET.Element:
         try:
             crs = pyproj.CRS.from_wkt(text)
         except CRSError as error:
-            raise UserError(f"the definition of SRID {srid} in spatial_ref_sys can't be read: {error}") from error
+            raise UserError(f"the definition of SRID {srid} in spatial_ref_sys cannot be read: {error}") from error
     element = ET.Element("spatialrefsys")
     ET.SubElement(element, "wkt").text = crs.to_wkt("WKT2_2019")
     if known:
@@ -48,5 +48,5 @@ def crs_element(conn: psycopg.Connection, srid: int) -> ET.Element:
 
 
 def no_crs() -> ET.Element:
-    """Return the element ``spatialrefsys`` of what has no coordinate reference system, such as the unrolled plane."""
+    """Return the element ``spatialrefsys`` for data without a coordinate reference system, such as the unrolled plane."""
     return ET.Element("spatialrefsys")

@@ -63,7 +63,7 @@ def deviation_layout(
 
 
 def _texts(survey: Survey, scale: int, layer: str | None, bars: str) -> list[ET.Element]:
-    """Head and foot of the sheet; volumes are those of the sections whose bars begin on it."""
+    """Make head and foot of the sheet; volumes are those of the sections whose bars begin on it."""
     stretch = "[% {} %] – [% {} %]".format(ON_PAGE.format("label_from"), ON_PAGE.format("label_to"))
     here = " AND ".join(
         f"\"chainage_from\" {sign} attribute(@atlas_feature, 'chainage_{end}')" for sign, end in ((">=", "from"), ("<", "to"))
@@ -95,7 +95,7 @@ def _texts(survey: Survey, scale: int, layer: str | None, bars: str) -> list[ET.
 
 
 def _colours(limit: float, y: float) -> list[ET.Element]:
-    """A line with the colours of the image, and what they mean, mm."""
+    """Make a line with the colours of the image and their values, mm."""
     texts, x = [], MARGIN
     for share, colour in OFFSET_COLOURS:
         said = f"{1e3 * share * limit:+.0f} mm{' outside' if share == -1.0 else ' inside' if share == 1.0 else ''}"

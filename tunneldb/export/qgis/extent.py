@@ -1,4 +1,4 @@
-"""What each map theme shows at first."""
+"""Initial extent of each map theme."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from tunneldb.stages.run import nothing_yet
 from tunneldb.store.survey import Survey
 
 MARGIN = 0.08
-"""Margin around what is shown, as a share of its size."""
+"""Margin around the extent, as a share of its size."""
 
 WINDOW = 60.0
-"""Least length of tunnel that the unrolled theme shows at first, m."""
+"""Minimum length of tunnel in the initial unrolled theme, m."""
 
 PANEL = 3.5
-"""Width of the panel that shows it, of its height: a narrower extent would be widened over the end of the tunnel."""
+"""Width of the panel relative to its height: a narrower extent would be widened beyond the end of the tunnel."""
 
 
 MEMBERS_SHOWN = 6
-"""So many members theme Faces shows at first."""
+"""Number of members in the initial theme Faces."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def sheet_extent(conn: psycopg.Connection, survey: str) -> Extent | None:
 
 
 def first_members(conn: psycopg.Connection, survey: str) -> Extent | None:
-    """Return where the largest members of a survey are drawn, MEMBERS_SHOWN at most; None if it has none."""
+    """Return the drawing places of the largest members of a survey, MEMBERS_SHOWN at most; None if it has none."""
     row = conn.execute(
         "SELECT ST_XMin(e), ST_YMin(e), ST_XMax(e), ST_YMax(e) FROM (SELECT ST_Extent(g.geom) AS e FROM ("
         "SELECT geom FROM tunnel_api.member_sheet WHERE survey = %s ORDER BY number LIMIT %s) g) b WHERE e IS NOT NULL",

@@ -1,4 +1,4 @@
-"""What QGIS has no tool for: findings are split, merged and taken back by the database, from actions of their layers."""
+"""Actions of layers that QGIS has no tool for: the database splits, merges and undoes findings."""
 
 from __future__ import annotations
 

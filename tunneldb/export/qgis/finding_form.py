@@ -1,4 +1,4 @@
-"""The forms of findings and their photos in QGIS: what is offered, what is read-only, what a new one begins with."""
+"""Forms of findings and their photos in QGIS: choices, read-only fields, defaults."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from tunneldb.export.qgis.finding_style import options
 from tunneldb.export.qgis.sheet_tables import CLOCK
 
 KIND_LIST, SEVERITIES, PHOTOS = "finding_kind", "severity", "finding_photo"
-"""Views that forms take their lists and photos from, each a table of the project."""
+"""Views with the lists and photos of forms, each a table of the project."""
 
 CLOCK_TEXT = "clock_text"
-"""Field of a layer, not of its view: the clock position as it is said. The styles of leaks and changes have it too."""
+"""Field of a layer, not of its view: the clock position as text. The styles of leaks and changes have it too."""
 
 _ALIASES = {
     "id": "Number", "survey_id": "Survey key", "survey": "Survey", "km": "Kilometre", "segment": "Segment",
@@ -41,7 +41,7 @@ _DECIMALS = {
 }  # fmt: skip
 _MOMENTS = ("reviewed_at", "drawn_at", "created_at", "detected_at", "added_at")
 _SAVED = '"label" IS NOT NULL'
-"""What is just being drawn has no photos and no facts yet."""
+"""Condition for saved findings: new ones have no photos and no facts yet."""
 
 _REVIEWS = {"Open": "open", "Confirmed": "confirmed", "Rejected": "rejected"}
 _FACTS = (
@@ -60,7 +60,7 @@ def relation_id(layer: str) -> str:
 
 
 def relation(layer: str, photos: str) -> ET.Element:
-    """Return the element ``relation`` by which the form of a layer of findings shows photos, given the ids of both layers."""
+    """Return the element ``relation`` through which a form of findings shows photos, given the ids of both layers."""
     element = ET.Element(
         "relation", id=relation_id(layer), name="Photos", referencingLayer=photos, referencedLayer=layer, strength="Association"
     )
@@ -69,7 +69,7 @@ def relation(layer: str, photos: str) -> ET.Element:
 
 
 def finding_form(catalogue: Catalogue, geometry: str, layer: str, tables: Mapping[str, str], survey: str) -> list[ET.Element]:
-    """Return what makes the form of a layer of findings.
+    """Return the form of a layer of findings.
 
     Parameters
     ----------
@@ -127,12 +127,12 @@ def finding_form(catalogue: Catalogue, geometry: str, layer: str, tables: Mappin
 
 
 def as_html(column: str) -> str:
-    """Expression of a column's text as a map tip shows it, which is HTML: what somebody wrote is none."""
+    """Return the expression for a column's text in a map tip, which is HTML, with special characters escaped."""
     return f"replace(\"{column}\", map('&', '&amp;', '<', '&lt;'))"
 
 
 def photo_form() -> list[ET.Element]:
-    """Return what makes the form of photos: each is shown as large as a thumbnail."""
+    """Return the form of photos: each is shown in thumbnail size."""
     viewer = {
         "DocumentViewer": 1, "DocumentViewerHeight": 150, "DocumentViewerWidth": 220, "FileWidget": True,
         "FileWidgetButton": True, "FileWidgetFilter": "Photos (*.jpg *.jpeg *.png *.webp *.tif *.tiff)", "FullUrl": False,
@@ -156,7 +156,7 @@ def photo_form() -> list[ET.Element]:
 
 
 def defaults(values: Mapping[str, str]) -> ET.Element:
-    """Return the element ``defaults``: what a new feature begins with."""
+    """Return the element ``defaults`` with the defaults of a new feature."""
     element = ET.Element("defaults")
     for column, value in values.items():
         quoted = value.replace("'", "''")
@@ -165,7 +165,7 @@ def defaults(values: Mapping[str, str]) -> ET.Element:
 
 
 def demanded(column: str, expression: str, why: str) -> list[ET.Element]:
-    """Return the elements by which a form is not accepted unless an expression holds, and says why."""
+    """Return the elements that accept a form only if an expression is true, with the message otherwise."""
     constraints, said = ET.Element("constraints"), ET.Element("constraintExpressions")
     ET.SubElement(
         constraints, "constraint", field=column, constraints="4", notnull_strength="0", unique_strength="0", exp_strength="1"
@@ -175,7 +175,7 @@ def demanded(column: str, expression: str, why: str) -> list[ET.Element]:
 
 
 def _clock_text() -> ET.Element:
-    """Return the element ``expressionfields``, by which a layer has its clock position as text."""
+    """Return the element ``expressionfields`` with the clock position as text."""
     fields = ET.Element("expressionfields")
     ET.SubElement(
         fields, "field", name=CLOCK_TEXT, expression=CLOCK, type="10", typeName="string", subType="0", length="0",
@@ -185,7 +185,7 @@ def _clock_text() -> ET.Element:
 
 
 def _constraints(required: str) -> ET.Element:
-    """A column must be filled in; the key, which the database gives, need not be."""
+    """Return the constraint that a column must be filled; the key, which the database sets, may be empty."""
     constraints = ET.Element("constraints")
     for column, kinds, hard, unique in ((required, "1", "1", "0"), ("id", "3", "2", "2")):
         ET.SubElement(
@@ -196,7 +196,7 @@ def _constraints(required: str) -> ET.Element:
 
 
 def _listed(layer: str, key: str, condition: str, *, nothing: bool) -> tuple[str, dict[str, object]]:
-    """A drop-down of a table's rows by their labels."""
+    """Return a drop-down of a table's rows by their labels."""
     return "ValueRelation", {
         "Layer": layer, "LayerProviderName": "postgres", "Key": key, "Value": "label", "FilterExpression": condition,
         "AllowNull": nothing, "AllowMulti": False, "OrderByValue": False, "NofColumns": 1, "UseCompleter": False,
@@ -206,7 +206,7 @@ def _listed(layer: str, key: str, condition: str, *, nothing: bool) -> tuple[str
 def _fields(
     aliases: Mapping[str, str], widgets: Mapping[str, tuple[str, dict[str, object]]], edited: tuple[str, ...]
 ) -> list[ET.Element]:
-    """Widgets, names and rights of all columns."""
+    """Return widgets, names and rights of all columns."""
     fields, names, rights = (ET.Element(tag) for tag in ("fieldConfiguration", "aliases", "editable"))
     for index, (column, alias) in enumerate(aliases.items()):
         kind, config = widgets.get(column) or _plain(column)
@@ -228,7 +228,7 @@ def _plain(column: str) -> tuple[str, dict[str, object]]:
 
 
 def _container(form: ET.Element, name: str, columns: int, condition: str = "", *, box: bool = False) -> ET.Element:
-    """A tab, or a box in one; shown where a condition holds."""
+    """Return a tab, or a box in one; shown if a condition is true."""
     return ET.SubElement(
         form, "attributeEditorContainer", name=name, columnCount=str(columns), groupBox=str(int(box)), showLabel="1",
         visibilityExpressionEnabled=str(int(bool(condition))), visibilityExpression=condition,

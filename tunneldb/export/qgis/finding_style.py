@@ -1,4 +1,4 @@
-"""How findings are drawn: by kind, with a halo about what is severe; what does not count is switched off."""
+"""Style of findings: by kind, with a halo around severe ones; findings that do not count are switched off."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from tunneldb.export.qgis.catalogue import HALOS, SHAPES, Catalogue, Look
 from tunneldb.finding_kind import DRY as DRY_KINDS
 
 COUNTS = 'coalesce("counted", true)'
-"""What is shown: also what was just drawn and is not saved yet."""
+"""Condition for findings to show: also new ones that are not saved yet."""
 
 DRY = 'NOT "wet"'
-"""What has no outline and no number as a leak."""
+"""Condition for findings without an outline or a number as a leak."""
 
 _WHITE, _GREY = "255,255,255,200", "110,110,110,255"
 _UNKNOWN = Look("230,106,177")
 Layer = tuple[str, dict[str, str]]
-"""A layer of a symbol: its class and its properties."""
+"""Layer of a symbol: its class and its properties."""
 
 
 def finding_style(catalogue: Catalogue, geometry: str, *, in_space: bool, on_sheet: bool = False) -> list[ET.Element]:
-    """Return what says how a layer of findings is drawn, if wanted in a 3D view, too.
+    """Return the style of a layer of findings, optionally with a 3D view.
 
     On sheets leaks have outlines and numbers of their own: of these only what is severe is drawn, and drips as points.
     """
@@ -78,7 +78,7 @@ def _renderer(catalogue: Catalogue, geometry: str, *, on_sheet: bool = False) ->
 
 
 def _labeling(geometry: str, condition: str = COUNTS) -> ET.Element:
-    """Return the element ``labeling``: the number, from 1:4000 on, of what counts, or of what fulfils a condition."""
+    """Return the element ``labeling``: the number, from 1:4000 on, of findings that count, or that meet a condition."""
     root = ET.Element("labeling", type="simple")
     settings = ET.SubElement(root, "settings", calloutType="simple")
     style = ET.SubElement(
@@ -107,7 +107,7 @@ def _labeling(geometry: str, condition: str = COUNTS) -> ET.Element:
 
 
 def _renderer_3d(catalogue: Catalogue, geometry: str) -> ET.Element:
-    """Return the element ``renderer-3d``: what counts, by kind."""
+    """Return the element ``renderer-3d``: findings that count, by kind."""
     root = ET.Element("renderer-3d", type="rulebased")
     ET.SubElement(root, "vector-layer-3d-tiling", {"show-bounding-boxes": "0", "zoom-levels-count": "3"})
     rules = ET.SubElement(root, "rules", key=_key("3d", geometry))
@@ -168,7 +168,7 @@ def _marker(name: str, colour: str, size: float, edge: str, edge_width: float) -
 
 
 def _layers(geometry: str, look: Look) -> list[Layer]:
-    """The symbol of a kind: on a white rim, that it is seen on dark lining too."""
+    """Return the symbol of a kind, with a white rim for dark lining."""
     colour = f"{look.colour},255"
     if geometry == "Point":
         return [_marker(look.marker, colour, 3.6, "255,255,255,255", 0.4)]
@@ -193,7 +193,7 @@ def _pale(geometry: str) -> Layer:
 
 
 def _solid(geometry: str, colour: str) -> ET.Element:
-    """The symbol of a kind in space; points are balls of 0.15 m."""
+    """Return the symbol of a kind in space; points are spheres of 0.15 m."""
     if geometry == "Line":
         symbol = ET.Element("symbol", type="line", material_type="simpleline")
         ET.SubElement(

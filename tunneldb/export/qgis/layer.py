@@ -10,31 +10,31 @@ MAP, UNROLLED, SPACE = "Map", "Unrolled", "3D"
 """Groups of the layer tree, and the map themes of the same names."""
 
 FINDINGS, FINDINGS_MAP = "Findings", "Findings on the map"
-"""Map themes for drawing findings, on the unrolled lining and beside the axis; the first also names the group of the layers."""
+"""Map themes for drawing findings, on the unrolled lining and beside the axis; the first also names the layer group."""
 
 LISTS = "Lists"
-"""Group of the tables that forms take from."""
+"""Group of the tables with the choices of forms."""
 
 SHEETS = "Inspection sheets"
-"""The print layout, and the map theme that it shows."""
+"""Print layout, and its map theme."""
 
 
 STRUCTURES, FACES = "Structures", "Faces"
-"""Group of the layers of structures, and within it that of faces unrolled, with a map theme of its name."""
+"""Group of the layers of structures, and its subgroup of unrolled faces, with a map theme of its name."""
 
 UNDERWATER = "Under water"
 """Group of the layers of sonar scans, with the raster of the bed."""
 
 CLEARANCE = "Clearance"
-"""Group of the layers of clearance, but for those on the unrolled plane."""
+"""Group of the layers of clearance, except those on the unrolled plane."""
 DEVIATION = "Deviation"
-"""The map theme of deviation from the design, and the print layout of its sheets."""
+"""Map theme of deviation from the design, and print layout of its sheets."""
 
 CHANGE, CHANGE_MAP = "Change", "Change on the map"
-"""Map themes of what changed since an older survey, on the unrolled lining and beside the axis."""
+"""Map themes of changes since an older survey, on the unrolled lining and beside the axis."""
 
 MEMBERS = "Members"
-"""The print layout with a page for each member."""
+"""Print layout with a page for each member."""
 
 
 @dataclass(frozen=True)
@@ -81,12 +81,12 @@ class VectorLayer:
 
     @property
     def on_map(self) -> bool:
-        """Whether its coordinates are the tunnel's SRID; otherwise they are those of a plane on which things are unrolled."""
+        """True if its coordinates are in the tunnel's SRID; otherwise they are in an unrolled plane."""
         return self.group not in (UNROLLED, FACES)
 
     @property
     def path(self) -> tuple[str, ...]:
-        """Groups of the layer tree that it stands in, from the outermost."""
+        """Groups of the layer tree around it, from the outermost."""
         if self.part:
             return (self.group, self.part)
         return (STRUCTURES, FACES) if self.group == FACES else (self.group,)
@@ -98,12 +98,12 @@ class VectorLayer:
 
     @property
     def shows_findings(self) -> bool:
-        """Whether it shows findings of all kinds: its style and its form are made of the owner's catalogue."""
+        """True if it shows findings of all kinds: style and form depend on the owner's catalogue."""
         return self.style == "finding"
 
     @property
     def on_sheet(self) -> bool:
-        """Whether it is drawn on the inspection sheets alone."""
+        """True if it is drawn only on the inspection sheets."""
         return self.themes == (SHEETS,)
 
 
@@ -119,12 +119,12 @@ DRY_DARK = (
 
 
 def _only(wkb: str) -> str:
-    """Return the condition that rows are of a geometry: QGIS sets it only where it sees others when it opens the layer."""
+    """Return the condition for rows of a geometry type: QGIS adds it only if it finds others on opening the layer."""
     return f"public.geometrytype(\"geom\") = '{wkb.upper()}'"
 
 
 def _findings(suffix: str, group: str, theme: str, z: str = "", where: str = "") -> tuple[VectorLayer, ...]:
-    """Layers of findings of a view: points over lines over areas; they are drawn in on the lining and on the map."""
+    """Return the layers of findings of a view: points above lines above areas, editable on the lining and on the map."""
     on_sheet = suffix == "sheet"
     return tuple(
         VectorLayer(
@@ -143,7 +143,7 @@ LAYERS = (
     VectorLayer("axis_vertex", "Axis vertices (editable)", "axis_vertex", "PointZ", "axis_vertex", MAP, (MAP,), True),
     VectorLayer("leak_map", "Leaks beside the axis, unrolled (review)", "leak_map", "Polygon", "leak", MAP, (MAP,), True),
     VectorLayer(
-        "dark_map", "Dark but dry, map (review)", "finding_map", "Polygon", "dark", MAP, (), True,
+        "dark_map", "Dry dark areas, map (review)", "finding_map", "Polygon", "dark", MAP, (), True,
         where=DRY_DARK,
     ),
     VectorLayer("target_sphere", "Target spheres", "target_sphere", "PointZ", "target_sphere", MAP, (MAP, SPACE)),
@@ -158,7 +158,7 @@ LAYERS = (
     ),
     VectorLayer("leak_unrolled", "Leaks (review)", "leak_unrolled", "Polygon", "leak", UNROLLED, (UNROLLED,), True),
     VectorLayer(
-        "dark_unrolled", "Dark but dry (review)", "finding_unrolled", "Polygon", "dark", UNROLLED, (), True,
+        "dark_unrolled", "Dry dark areas (review)", "finding_unrolled", "Polygon", "dark", UNROLLED, (), True,
         where=DRY_DARK,
     ),
     VectorLayer("region", "Regions drawn by hand", "region", "Polygon", "region", UNROLLED, (UNROLLED, FINDINGS), True),

@@ -7,21 +7,21 @@ import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
 PAGE = (297.0, 210.0)
-"""A4, across, mm."""
+"""Page size A4, landscape, mm."""
 
 GAP = 10.0
-"""Between the pages of a layout, mm."""
+"""Distance between the pages of a layout, mm."""
 
 FONT = "Sans Serif"
 
 LABEL, MAP_ITEM, SCALE_BAR, FRAME, TABLE, PAGE_ITEM = 65641, 65639, 65646, 65647, 65649, 65638
-"""Numbers by which QGIS knows kinds of layout items."""
+"""QGIS' numbers of layout item types."""
 
 CELL_MARGIN = 0.7
 """Margin of a cell of a table, mm."""
 
 ROW = 4.1
-"""Height of a row of one line at the most, mm; with DejaVu it is 3.9."""
+"""Maximum height of a row with one line, mm; with DejaVu it is 3.9."""
 
 Column = tuple[str, str, float, int]
 """Heading, expression, width in mm, alignment (1 left, 2 right)."""
@@ -31,7 +31,7 @@ Box = tuple[float, float, float, float]
 
 
 def cut(text: str, letters: int | str, more: str = "") -> str:
-    """Return the expression of a text, cut where there is no room for all of it, which says so, and where more is."""
+    """Return the expression of a text, shortened if there is not enough space, with a mark and a reference."""
     return (
         f"with_variable('said', coalesce(regexp_replace({text}, '\\\\s+', ' '), ''), "
         f"if(length(@said) > {letters}, left(@said, {letters} - 1) || '…{more}', @said))"

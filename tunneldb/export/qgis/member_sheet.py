@@ -25,10 +25,10 @@ from tunneldb.export.qgis.layout_items import (
 from tunneldb.store.survey import Survey
 
 STRIP = (277.0, 110.0)
-"""What a member's faces are drawn in, mm; its cell in view ``member_sheet`` has these proportions."""
+"""Size of the drawing of a member's faces, mm; its cell in view ``member_sheet`` has the same proportions."""
 
 PAGES = 3
-"""The page of a member, and those that its table goes on to if it is long."""
+"""Page of a member, and continuation pages of a long table."""
 
 _MARGIN = 10.0
 _TOP = 28.0  # where the strip begins, mm
@@ -84,7 +84,7 @@ def member_layout(survey: Survey, coverage: tuple[str, str], spots: tuple[str, s
 
 
 def _strip() -> ET.Element:
-    """The faces of the member, at the scale at which its cell fills the strip."""
+    """Make the map of the member's faces, at the scale at which its cell fills the strip."""
     element = item(
         MEMBERS, MAP_ITEM, "strip", (_MARGIN, _TOP, *STRIP), frame="true", background="true", followPreset="true",
         followPresetName=FACES, mapRotation="0", drawCanvasItems="false", labelMargin="0,mm", keepLayerSet="false",
@@ -95,7 +95,7 @@ def _strip() -> ET.Element:
 
 
 def _texts(survey: Survey) -> list[ET.Element]:
-    """Head and foot of the page, and heads of those on which its table goes on."""
+    """Make head and foot of the page, and heads of continuation pages."""
     number, kind, place = (_MEMBER.format(name) for name in ("number", "kind", "label"))
     faces, area, seen, bimodal = (_MEMBER.format(name) for name in ("faces", "area", "seen_share", "bimodal"))
     spots, dark, bright = (_MEMBER.format(name) for name in ("spots", "dark_area", "bright_area"))
@@ -152,7 +152,7 @@ def _scale_bar(strip: str) -> ET.Element:
 
 
 def _spots(spots: tuple[str, str]) -> list[ET.Element]:
-    """The table of spots and its frames, two abreast on each page; a page whose first frame is empty is not printed."""
+    """Make the table of spots and its frames, two abreast on each page; a page with an empty first frame is not printed."""
     own = key(MEMBERS, "table")
     frames = []
     rows = 0

@@ -86,10 +86,10 @@ from tunneldb.store.spots import read_spots
 from tunneldb.store.survey import Survey
 
 QGIS_VERSION = "3.22.0-Białowieża"
-"""Version whose form of project is written; later ones read it."""
+"""QGIS version of the written project format; later versions read it."""
 
 NEW_KINDS = {"leak_map": "leak", "leak_unrolled": "leak", "dark_map": "dark", "dark_unrolled": "dark"}
-"""Layers of leaks and dark spots in which findings may be drawn, and the kind that such a one begins with."""
+"""Layers of leaks and dry dark areas in which findings may be drawn, and the initial kind of a new finding."""
 
 _DOCTYPE = "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
 
@@ -155,7 +155,7 @@ def store_project(
     images: Sequence[Path] = (),
     service: str | None = None,
 ) -> None:
-    """Put a project into ``public.qgis_projects``, where QGIS opens it from; one of the same name is replaced.
+    """Store a project in ``public.qgis_projects``, from which QGIS opens it; one with the same name is replaced.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def store_project(
 def _project(
     conn: psycopg.Connection, survey: Survey, images: Sequence[Path], folder: Path | None, service: str | None
 ) -> ET.Element:
-    """The project's root; with paths relative to its folder, or absolute if it is in none."""
+    """Return the project's root, with paths relative to its folder, or absolute without one."""
     crs = crs_element(conn, survey.srid)
     source = Source.of_connection(conn) if service is None else Source.of_service(service)
     cells = first_members(conn, survey.name)
@@ -203,7 +203,7 @@ def _project(
     if old is not None:
         layers = _with_change(conn, survey, old, layers)
     filled = filled_layers(conn, survey.name, layers)
-    entries = [_table(source, survey, "remark", "What is to be known (table)", counted=True)]
+    entries = [_table(source, survey, "remark", "Notes and limitations (table)", counted=True)]
     if structures:
         entries.append(_table(source, survey, "member_statistics", "Members (table)"))
     catalogue = None if survey.site else read_catalogue(conn, survey)
@@ -265,7 +265,7 @@ def _project(
 def _with_change(
     conn: psycopg.Connection, survey: Survey, old: Survey, layers: Sequence[VectorLayer]
 ) -> tuple[VectorLayer, ...]:
-    """These layers, and above them those of what changed since an older survey that have rows."""
+    """Return these layers, and above them the change layers since an older survey that have rows."""
     since = (
         replace(layer, title=f"{layer.title}, since {old.name}", where=f'"old_survey_id" = {old.id}') for layer in CHANGE_LAYERS
     )
@@ -281,7 +281,7 @@ def layer_id(name: str) -> str:
 def _vector(
     layer: VectorLayer, source: Source, survey: Survey, crs: ET.Element, catalogue: Catalogue | None, *, in_space: bool
 ) -> _Entry:
-    """A layer on a view; a 3D view draws it only if it is in space."""
+    """Return a layer on a view; a 3D view draws it only if it is in space."""
     element = ET.Element(
         "maplayer", type="vector", geometry=layer.geometry, wkbType=layer.wkb, readOnly=str(int(not layer.edited)),
         autoRefreshEnabled="0", refreshOnNotifyEnabled="0", hasScaleBasedVisibilityFlag="0",
@@ -316,7 +316,7 @@ def _vector(
 
 
 def _findings(layer: VectorLayer, catalogue: Catalogue, survey: Survey, *, in_space: bool) -> list[ET.Element]:
-    """How a layer of findings is drawn, and its form."""
+    """Return style and form of a layer of findings."""
     tables = {view: layer_id(view) for view in (KIND_LIST, SEVERITIES, PHOTOS)}
     return [
         *finding_style(catalogue, layer.geometry, in_space=in_space),
@@ -326,7 +326,7 @@ def _findings(layer: VectorLayer, catalogue: Catalogue, survey: Survey, *, in_sp
 
 
 def _lists(source: Source, survey: Survey) -> list[_Entry]:
-    """The tables that the forms of findings take from, and their photos, which are added and changed there."""
+    """Return the tables for the forms of findings, and their photos, which are edited there."""
     photos = _table(source, survey, PHOTOS, "Photos (table)", group=(LISTS,))
     photos.element.set("readOnly", "0")
     photos.element.extend(photo_form())
@@ -341,7 +341,7 @@ def _lists(source: Source, survey: Survey) -> list[_Entry]:
 def _table(
     source: Source, survey: Survey | None, view: str, title: str, *, counted: bool = False, group: tuple[str, ...] = ()
 ) -> _Entry:
-    """A table; if counted, how many lines it has stands beside its name."""
+    """Return a table; if counted, its number of rows is shown beside its name."""
     element = ET.Element(
         "maplayer", type="vector", geometry="No geometry", wkbType="NoGeometry", readOnly="1", autoRefreshEnabled="0",
         refreshOnNotifyEnabled="0", hasScaleBasedVisibilityFlag="0", minScale="0", maxScale="0",
@@ -356,7 +356,7 @@ def _table(
 
 
 def _rasters(images: Sequence[Path], folder: Path | None, crs: ET.Element) -> list[_Entry]:
-    """Layers of the images, a group for each kind; the first kind that there is is shown, and what lies below the water.
+    """Return the layers of the images, a group for each kind, with the first one visible, and of sonar scans.
 
     Theme Deviation shows deviation from the innermost layer of the design that there is, theme Change the change.
 
@@ -396,7 +396,7 @@ def _path(path: Path, folder: Path | None) -> str:
 
 
 def _tree(entries: Iterable[_Entry]) -> ET.Element:
-    """The layer tree: what theme Map shows is switched on."""
+    """Return the layer tree, with the layers of theme Map switched on."""
     top = _Group()
     for entry in entries:
         place = top
@@ -453,7 +453,7 @@ def _themes(entries: Sequence[_Entry], *, site: bool) -> ET.Element:
 
 
 def _views(conn: psycopg.Connection, survey: Survey, cells: Extent | None) -> list[View]:
-    """Where to start: the whole map first, then a window on the unrolled lining, each of its kilometres, faces unrolled."""
+    """Return bookmarks: the whole map first, then a window on the unrolled lining, each of its kilometres, unrolled faces."""
     views = [View("Map", MAP, map_extent(conn, survey))]
     kilometres = unrolled_extents(conn, survey.name)
     if kilometres:
@@ -465,7 +465,7 @@ def _views(conn: psycopg.Connection, survey: Survey, cells: Extent | None) -> li
 
 
 def _canvases(root: ET.Element, views: Sequence[View], crs: ET.Element) -> None:
-    """The main canvas with the map, and below it a second one that follows theme Unrolled, or Faces of a site."""
+    """Return the main canvas with the map, and below it a second one that follows theme Unrolled, or Faces for a site."""
     _canvas(root, "theMapCanvas", views[0], crs)
     docks = ET.SubElement(root, "mapViewDocks")
     if len(views) > 1:
@@ -512,7 +512,7 @@ def _bookmarks(views: Sequence[View], crs: ET.Element) -> ET.Element:
 
 
 def _properties(*, absolute: bool) -> ET.Element:
-    """Settings of the project: how it holds paths, lengths in plane metres."""
+    """Return settings of the project: paths, lengths in plane metres."""
     properties = ET.Element("properties")
     paths = ET.SubElement(properties, "Paths")
     ET.SubElement(paths, "Absolute", type="bool").text = str(absolute).lower()
@@ -531,7 +531,7 @@ def _text(root: ET.Element) -> str:
 
 
 def _archive(text: str, name: str) -> bytes:
-    """A project as a .qgz holds it."""
+    """Return a project in the form of a .qgz file."""
     held = io.BytesIO()
     with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(f"{name}.qgs", text)

@@ -16,10 +16,10 @@ from tunneldb.raster.geotiff import CHANGE, DEVIATION_KINDS
 from tunneldb.raster.grey import grey_range
 
 FILLED = "-filled"
-"""End of the kinds of image with gaps filled: each lies under the image of its kind as it was measured."""
+"""Suffix of the kinds of image with filled gaps: each is below the image of its kind as measured."""
 
 BED, SUBMERGED = "bed", "submerged"
-"""Kinds of image of what sonar scans saw: the bed, on the map, and submerged lining and bed, unrolled."""
+"""Kinds of image from sonar scans: the bed, on the map, and submerged lining and bed, unrolled."""
 
 KINDS = {
     "corrected": "Intensity, corrected",
@@ -38,13 +38,13 @@ KINDS = {
     SUBMERGED: "Offset below the water",
     BED: "Depth of the water",
 }
-"""Kinds of image, the one shown at first in front, with the names of their groups."""
+"""Kinds of image, the initially visible one first, with the names of their groups."""
 
 OFFSET_RANGES = (0.1, 0.2, 0.5)
-"""Offset at which the colours are full, m: the least that nine tenths of the images stay within."""
+"""Offset of the full colours, m: the smallest that nine tenths of the images are within."""
 
 CHANGE_RANGES = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
-"""The same of change, m."""
+"""Change of the full colours, m, likewise."""
 
 # Inwards red, outwards blue (ColorBrewer RdBu), the surface itself grey, to be told from paper.
 OFFSET_COLOURS = ((-1.0, "#2166ac"), (-0.4, "#92c5de"), (0.0, "#e6e6e6"), (0.4, "#f4a582"), (1.0, "#b2182b"))
@@ -67,7 +67,7 @@ def offset_range(paths: Sequence[Path], ranges: Sequence[float] = OFFSET_RANGES)
 
 
 def shown_limits(images: Sequence[Path]) -> tuple[str, float] | None:
-    """Kind of deviation that theme Deviation shows, of the images that there are, and where its colours are full, m."""
+    """Return the kind of deviation of theme Deviation, among the existing images, and the value of its full colours, m."""
     for kind in DEVIATION_KINDS.values():
         paths = [path for path in images if image_kind(path) == kind]
         if paths:
@@ -76,7 +76,7 @@ def shown_limits(images: Sequence[Path]) -> tuple[str, float] | None:
 
 
 def _sample(paths: Sequence[Path], band_number: int = 1) -> Float:
-    """Values of a band of images, some from all over each."""
+    """Return values of a band of images, sampled from all parts of each."""
     samples = [np.empty(0)]
     for path in paths:
         with rasterio.open(path) as image:
@@ -88,7 +88,7 @@ def _sample(paths: Sequence[Path], band_number: int = 1) -> Float:
 
 
 def pipe(kind: str, paths: Sequence[Path]) -> ET.Element:
-    """Return the element that says how an image is drawn, and all of its kind alike.
+    """Return the element with the style of an image, the same for all of its kind.
 
     Intensity is drawn in grey, offset, deviation and change in diverging colours, each state or class in its own; depth the
     darker the deeper.
@@ -142,7 +142,7 @@ def _ramp(element: ET.Element, band: int, items: Sequence[tuple[float, str, str]
 
 
 def _origin(renderer: ET.Element) -> None:
-    """State that the limits are given, not to be found out from the image."""
+    """Declare that the limits are given, not computed from the image."""
     origin = ET.SubElement(renderer, "minMaxOrigin")
     ET.SubElement(origin, "limits").text = "None"
     ET.SubElement(origin, "extent").text = "WholeRaster"

@@ -103,7 +103,7 @@ def sheet_layout(
 
 
 def strip_map(scale: int, extent: Extent, theme: str) -> ET.Element:
-    """The unrolled lining of a sheet as a theme shows it, from edge to edge as its table, under a grid of 10 m by 2 m."""
+    """Make the map of a sheet's unrolled lining in a theme, the full width of its table, with a grid of 10 m by 2 m."""
     width, height = LENGTH * 1000.0 / scale, (extent.ymax - extent.ymin) * 1000.0 / scale
     element = item(
         theme, MAP_ITEM, "strip", ((PAGE[0] - width) / 2 + 4, TOP, width, height), frame="true", background="true",
@@ -120,7 +120,7 @@ def strip_map(scale: int, extent: Extent, theme: str) -> ET.Element:
 
 
 def _grid(layout: str, name: str, x: str, y: str, label: str, *, bottom: bool) -> ET.Element:
-    """Lines at multiples of x and y metres, labelled on one side; the sides are shown in QGIS' numbers."""
+    """Make grid lines at multiples of x and y metres, labelled on one side; sides are QGIS' numbers."""
     shown, hidden = "0", "3"
     labelled = "bottom" if bottom else "left"
     sides: dict[str, str] = {}
@@ -142,7 +142,7 @@ def _grid(layout: str, name: str, x: str, y: str, label: str, *, bottom: bool) -
 
 
 def _texts(survey: Survey, scale: int, goes_on: Sequence[str]) -> list[ET.Element]:
-    """Head and foot of the sheet, and heads of the pages on which each of its tables goes on."""
+    """Make head and foot of the sheet, and heads of the continuation pages of its tables."""
     stretch = "[% {} %] – [% {} %]".format(ON_PAGE.format("label_from"), ON_PAGE.format("label_to"))
     number = "[% @atlas_featurenumber %] of [% @atlas_totalfeatures %]"
     left, right, wide = MARGIN, PAGE[0] - MARGIN, PAGE[0] - 2 * MARGIN
@@ -156,7 +156,7 @@ def _texts(survey: Survey, scale: int, goes_on: Sequence[str]) -> list[ET.Elemen
     )
     how = f"Unrolled lining from inside, 1:{scale} on A4; up it arc from the crown, m, right wall above; {FILL_NOTE}. "
     if survey.intensity_kind == "none":
-        sums = "No intensity: leaks were not sought"
+        sums = "No intensity: leaks were not searched for"
         how += "Red: inwards, blue: outwards."
     else:
         how += "Orange: leaks open, blue: confirmed; purple: leaks could be missed."
@@ -199,7 +199,7 @@ def _texts(survey: Survey, scale: int, goes_on: Sequence[str]) -> list[ET.Elemen
 
 
 def _colours(catalogue: Catalogue, y: float) -> list[ET.Element]:
-    """A line with the colours of the kinds and of the halos, as many as there is room for; leaks have their own."""
+    """Make a line with the colours of the kinds and of the halos, as many as fit; leaks have their own."""
     named = [(f"■ {kind.label}", kind.look.colour) for kind in catalogue.kinds if kind.code not in DETECTED]
     named = [(f"○ {catalogue.severities[degree]}", colour) for degree, colour in HALOS.items()] + named
     texts, x = [], MARGIN
@@ -213,14 +213,14 @@ def _colours(catalogue: Catalogue, y: float) -> list[ET.Element]:
 
 
 def _left_out(y: float) -> ET.Element:
-    """The line of findings that do not count."""
+    """Make the line about findings that do not count."""
     width, said = table_width(FINDINGS), ON_PAGE.format("left_out")
     box = (PAGE[0] - MARGIN - width, y, width, _LINE)
     return label(SHEETS, "left out", f"[% coalesce('Not counted and not drawn: ' || {said}, '') %]", box, 7)
 
 
 def scale_bar(strip: str, layout: str) -> ET.Element:
-    """A bar of 10 m beneath a strip, by its key."""
+    """Make a scale bar of 10 m beneath a strip, by its key."""
     element = item(
         layout, SCALE_BAR, "scale bar", (MARGIN, FOOT, 50, 10), style="Line Ticks Up", mapUuid=strip, unitType="meters",
         unitLabel="m", numUnitsPerSegment="5", numSegments="2", numSegmentsLeft="0", numMapUnitsPerScaleBarUnit="1",

@@ -10,23 +10,23 @@ from tunneldb.export.qgis.layer import SHEETS
 from tunneldb.export.qgis.layout_items import CELL_MARGIN, FRAME, PAGE, ROW, Column, cut, item, key, label, table
 
 LEAK_PAGES, FINDING_PAGES = 5, 3
-"""Pages on which each of the tables goes on, if it is long."""
+"""Number of continuation pages of each table."""
 
 MARGIN = 10.0
 TOP = 24.0
-"""Where the strip begins, and tables on further pages, mm."""
+"""Left edge of the strip, and top of tables on continuation pages, mm."""
 
 FOOT = 196.0
-"""Where the foot begins, mm."""
+"""Top of the foot, mm."""
 
 CLOCK = (
     "with_variable('minutes', round(\"clock\" * 60) % 720, to_string(if(@minutes < 60, 12, floor(@minutes / 60))) || ':' "
     "|| lpad(to_string(@minutes % 60), 2, '0'))"
 )
-"""A clock position as `tunneldb.export.tables.leaks.clock_label` writes it, which QGIS can't call; the styles have it too."""
+"""Clock position as in `tunneldb.export.tables.leaks.clock_label`, which QGIS cannot call; the styles have it too."""
 
 ON_PAGE = "attribute(@atlas_feature, '{}')"
-"""A column of the sheet that is printed."""
+"""Column of the printed sheet."""
 
 # As the sheet's sums count them: one that only touches its edge is not on it.
 _ON_SHEET = f'"chainage_to" > {ON_PAGE.format("chainage_from")} and "chainage_from" < {ON_PAGE.format("chainage_to")}'
@@ -36,7 +36,7 @@ _SIZE = f'if("length" IS NOT NULL, {_LONG}, if("area" > 0, format_number("area",
 
 @dataclass(frozen=True)
 class _Words:
-    """A column of words, which have the less room the more rows there are; what is left out is marked.
+    """Column of text, with less space the more rows there are; omissions are marked.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class _Words:
     more: int
 
     def column(self, lines: str) -> Column:
-        """Return the column where the expression `lines` says how many lines a row has room for."""
+        """Return the column, with the expression `lines` for the number of lines of a row."""
         letters = f"if({lines} > 1, {self.more} * {lines}, {self.one})"
         return self.heading, cut(self.text, letters), self.width, 1
 
@@ -119,7 +119,7 @@ FINDINGS = SheetTable(
 
 @dataclass(frozen=True)
 class Frames:
-    """Where a table stands: halves (0 left, 1 right) of pages, from the first on; on the first page it begins at `top`, mm."""
+    """Position of a table: halves (0 left, 1 right) of pages, from the first on; on the first page it begins at `top`, mm."""
 
     halves: tuple[tuple[int, int], ...]
     top: float
@@ -130,7 +130,7 @@ class Frames:
         return cls((*((0, half) for half in first), *((page, half) for page in pages for half in range(2))), top)
 
     def begins(self, page: int) -> float:
-        """Return where the table begins on a page, mm."""
+        """Return the top of the table on a page, mm."""
         return self.top if page == 0 else TOP
 
     @property
@@ -140,13 +140,13 @@ class Frames:
 
 
 def table_width(listed: SheetTable) -> float:
-    """Return how wide a table is, mm; two stand abreast."""
+    """Return the width of a table, mm; two are side by side."""
     widths = (column.width if isinstance(column, _Words) else column[2] for column in listed.columns)
     return sum(width + 2 * CELL_MARGIN for width in widths)
 
 
 def sheet_table(listed: SheetTable, source: tuple[str, str], place: Frames) -> list[ET.Element]:
-    """Return a table and its frames, and what its last page says where there are more rows than fit.
+    """Return a table and its frames, with a note on its last page if there are more rows than fit.
 
     What is empty is not printed, but for the first page.
 

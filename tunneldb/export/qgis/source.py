@@ -1,4 +1,4 @@
-"""Where the layers of a project get their rows, and the action by which QGIS has them recomputed after an edit of the axis."""
+"""Data source of a project's layers, and the QGIS action that recomputes results after an edit of the axis."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def quote(value: str) -> str:
 
 @dataclass(frozen=True)
 class Source:
-    """How QGIS reaches the database.
+    """Connection of QGIS to the database.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Source:
 
     @classmethod
     def of_connection(cls, conn: psycopg.Connection) -> Source:
-        """Connect to where ``conn`` is connected; as whoever opens the project, unless ``conn`` names another user.
+        """Make the connection of ``conn``; as the user who opens the project, unless ``conn`` names another user.
 
         Raises
         ------
@@ -50,8 +50,8 @@ class Source:
         info = conn.info
         if set(" '\\") & set(info.host):
             raise UserError(
-                f"QGIS cannot connect to a socket in {info.host!r}, for it does not quote the path: name an entry of"
-                " pg_service.conf by --service"
+                f"QGIS cannot connect to a socket in {info.host!r}, because it does not quote the path; give an entry of"
+                " pg_service.conf with --service"
             )
         parts = [f"dbname={quote(info.dbname)}", f"host={quote(info.host)}", f"port={info.port}"]
         if info.user != getpass.getuser():
@@ -83,11 +83,11 @@ class Source:
 
 
 RECOMPUTED_FROM = ("axis_vertex", "segment")
-"""Layers that offer it."""
+"""Layers with this action."""
 
 
 def recompute(survey: Survey, source: Source) -> ET.Element:
-    """Return the element ``attributeactions`` of a layer: it runs ``tunneldb run --stale`` and shows what that says.
+    """Return the element ``attributeactions`` of a layer: it runs ``tunneldb run --stale`` and shows its output.
 
     It runs the program that writes the project, on the database that the project reads, as whoever uses QGIS.
     """

@@ -1,4 +1,4 @@
-"""The 3D view of a project: where it looks, and what it shows."""
+"""3D view of a project: camera and content."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from tunneldb.export.qgis.extent import Extent
 from tunneldb.export.qgis.layer import SPACE, VectorLayer
 
 DISTANCE = 60.0
-"""From the camera to the point that it looks at, m: some 50 m of tunnel are in a square picture."""
+"""Distance from the camera to its target, m: about 50 m of tunnel in a square picture."""
 
 PITCH = 65.0
-"""Between the camera's direction and straight down, degrees."""
+"""Angle between the camera's direction and the vertical, degrees."""
 
 ASIDE = 50.0
-"""Between the camera's direction and the axis', in plan, degrees."""
+"""Angle between the camera's direction and the axis', in plan, degrees."""
 
 VIEW_SIZES = 1.2
-"""From the camera to the middle of a site, diagonals of it."""
+"""Distance from the camera to the middle of a site, in diagonals of it."""
 
 
 @dataclass(frozen=True)
 class Viewpoint:
-    """What the camera looks at.
+    """Camera of the 3D view.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Viewpoint:
 
     @property
     def yaw(self) -> float:
-        """How far the camera is turned from grid north, as QGIS counts it, anticlockwise; degrees."""
+        """Rotation of the camera from grid north, anticlockwise as in QGIS; degrees."""
         return (ASIDE - self.bearing) % 360.0
 
 
@@ -80,7 +80,7 @@ def viewpoint(conn: psycopg.Connection, survey: str, chainage: float | None) -> 
 
 
 def site_viewpoint(conn: psycopg.Connection, survey: str) -> Viewpoint:
-    """Return the middle of a survey's faces, from such a distance that all are seen, from where most of them face.
+    """Return the middle of a survey's faces, a distance from which all are visible, and the direction that most of them face.
 
     The camera looks against the normals of its planes, by area; ASIDE is taken off again.
     """
@@ -105,7 +105,7 @@ def filled_layers(conn: psycopg.Connection, survey: str, layers: Sequence[Vector
 
 
 def has_rows(conn: psycopg.Connection, survey: str, layer: VectorLayer) -> bool:
-    """Whether a layer has rows of its geometry."""
+    """Return True if a layer has rows of its geometry."""
     query = sql.SQL("SELECT EXISTS (SELECT FROM tunnel_api.{} WHERE survey = %s AND public.GeometryType({}) = upper(%s){})")
     condition = sql.SQL(f" AND {layer.where}" if layer.where else "")
     rows = query.format(sql.Identifier(layer.view), sql.Identifier(layer.column), condition)

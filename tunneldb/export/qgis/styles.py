@@ -29,19 +29,19 @@ def style_text(name: str) -> str:
 
 
 def style_elements(name: str) -> list[ET.Element]:
-    """Return the elements of a style file, as they stand within a layer of a project."""
+    """Return the elements of a style file, as within a layer of a project."""
     return list(ET.fromstring(style_text(name)))
 
 
 def require_table(conn: psycopg.Connection, name: str) -> None:
-    """Raise UserError where a table that QGIS reads is missing."""
+    """Raise UserError if a table that QGIS reads is missing."""
     exists = conn.execute("SELECT to_regclass(%s) IS NOT NULL", [name]).fetchone()
     if exists is None or not exists[0]:
         raise UserError(f'the table {name} is missing: run "tunneldb init" as the database\'s owner')
 
 
 def store_styles(conn: psycopg.Connection) -> int:
-    """Put each layer's style into ``public.layer_styles`` as its default; a rerun replaces ours and no other's.
+    """Store each layer's style in ``public.layer_styles`` as its default; a rerun replaces only styles of tunneldb.
 
     The schemas of typed layers (``tunnel_api.layer_schemas``) get those of their layers as well.
 
@@ -94,7 +94,7 @@ def _store_style(conn: psycopg.Connection, style: dict[str, str]) -> None:
 
 
 def styled_columns() -> list[tuple[str, str, str, str]]:
-    """Return view, geometry column, style and title of whatever has a style; some views have several geometries.
+    """Return view, geometry column, style and title of everything with a style; some views have several geometries.
 
     Of a view that is in a project twice, the layer of its own name has the style.
     """

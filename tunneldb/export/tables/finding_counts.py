@@ -1,4 +1,4 @@
-"""How many findings there are of each kind, and how large they are: the sums of report, workbook and ``--json``."""
+"""Numbers and sizes of findings by kind: the totals of report, workbook and ``--json``."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from tunneldb.store.findings import COUNTED, Finding, State
 
 ORIGINS = ("detected", "drawn", "redrawn", "split", "merged")
 STATES: tuple[State, ...] = get_args(State)
-"""In the order in which they are told."""
+"""Order of output."""
 
 UNCOUNTED: tuple[State, ...] = tuple(state for state in STATES if state not in COUNTED)
-"""States of what no sum counts."""
+"""States that are not included in totals."""
 
 SEVERITIES = (1, 2, 3, 4, 0)
-"""From the least; 0 for those that have none."""
+"""Severities from the least; 0 for findings without one."""
 
 
 @dataclass(frozen=True)
 class KindCount:
-    """What there is of a kind.
+    """Findings of a kind.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class KindCount:
 
 @dataclass
 class KindTally:
-    """What there is of a kind, while it is counted: a finding after the other."""
+    """Running count of the findings of a kind."""
 
     label: str = ""
     states: Counter[str] = field(default_factory=Counter)
@@ -74,7 +74,7 @@ class KindTally:
             self.length += finding.share * (finding.length or 0.0)
 
     def count(self, kind: str) -> KindCount:
-        """Return what was counted."""
+        """Return the counts."""
         return KindCount(
             kind,
             self.label,
@@ -88,7 +88,7 @@ class KindTally:
 
 
 def count_findings(findings: Iterable[Finding], order: Sequence[str] = ()) -> list[KindCount]:
-    """Count findings by kind, those that count and the others apart.
+    """Count findings by kind, separately for those that count and the others.
 
     Parameters
     ----------
@@ -104,6 +104,6 @@ def count_findings(findings: Iterable[Finding], order: Sequence[str] = ()) -> li
 
 
 def in_order(kinds: Iterable[str], order: Sequence[str]) -> list[str]:
-    """Put codes of kinds in an order; others follow by their code."""
+    """Sort codes of kinds in a given order; others follow by their code."""
     place = {kind: n for n, kind in enumerate(order)}
     return sorted(kinds, key=lambda kind: (place.get(kind, len(place)), kind))

@@ -1,4 +1,4 @@
-"""What stands beside the leaks in a GeoPackage: where they can't be vouched for, and what else is to be known."""
+"""Additional layers of a GeoPackage of leaks: gaps in the inspection, and notes on the results."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def write_gaps(path: Path, coverage: Coverage) -> None:
 
 
 def write_remarks(path: Path, remarks: Sequence[Remark], **options: str) -> None:
-    """Add the table ``remark``: the file, or the stage and kilometres, that it is about, what is to be known, and both at once.
+    """Add the table ``remark``: file, or stage and kilometres, the note, and both in one text.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def write_remarks(path: Path, remarks: Sequence[Remark], **options: str) -> None
         "remark": (object, [remark.remark for remark in remarks]),
         "said": (object, [remark.said for remark in remarks]),
     }
-    _write_table(path, "remark", columns, "What is to be known of these results", **options)
+    _write_table(path, "remark", columns, "Notes and limitations", **options)
 
 
 def _write_table(path: Path, name: str, columns: dict[str, tuple[Any, list[Any]]], description: str, **options: str) -> None:

@@ -12,7 +12,7 @@ _DEGREES = 180.0 / np.pi
 
 
 def scan_rows(found: Registration) -> list[tuple[str, ...]]:
-    """Cells of the table of scans, under `HEADER`: sigma is of the place in x, y and z, turn its largest about an axis."""
+    """Return the cells of the table of scans, for `HEADER`: sigma of x, y and z, turn its largest about an axis."""
     return [_row(scan) for scan in found.scans]
 
 

@@ -23,13 +23,13 @@ SUMMARY = ("rings", "median", "95 % below", "greatest", "ring")
 
 
 def rings_csv(surveyed: SurveyedRings, orders: int, chords: Sequence[Chord] = ()) -> str:
-    """Return the table of rings as CSV; what is not known is empty."""
+    """Return the table of rings as CSV; unknown values are empty."""
     records = ring_records(surveyed, orders, chords)
     return write_csv(list(records[0]), (record.values() for record in records))
 
 
 def ring_records(surveyed: SurveyedRings, orders: int, chords: Sequence[Chord] = ()) -> list[dict[str, Value]]:
-    """Return rings as mappings, with the columns in their order; what is not known is None."""
+    """Return rings as mappings, with the columns in their order; unknown values are None."""
     rows = []
     for row in surveyed.rows:
         first = dict.fromkeys(_FIRST) | dict(_first(row, surveyed.diameter))
@@ -41,7 +41,7 @@ def ring_records(surveyed: SurveyedRings, orders: int, chords: Sequence[Chord] =
 
 
 def summary(surveyed: SurveyedRings) -> Iterator[tuple[str, ...]]:
-    """Cells under `SUMMARY`, with what is summed up in front: how the sizes of each value are distributed over the rings."""
+    """Return the cells for `SUMMARY`, with the variable first: the distribution of each value over the rings."""
     values: dict[str, Callable[[RingRow], float]] = {
         "deviation to the right, mm": lambda row: 1e3 * abs(row.place.right.value) if row.place else math.nan,
         "deviation up, mm": lambda row: 1e3 * abs(row.place.up.value) if row.place else math.nan,
@@ -80,7 +80,7 @@ def _radius(row: RingRow) -> float:
 
 
 def _ovality(row: RingRow, diameter: float) -> tuple[float, float]:
-    """Largest less smallest diameter over the design diameter, and its standard error, ‰; NaN of a circle."""
+    """Return largest minus smallest diameter over the design diameter, and its standard error, ‰; NaN for a circle."""
     if row.ring is None or not row.ring.is_ellipse:
         return math.nan, math.nan
     ellipse = row.ring.adjustment.ellipse
@@ -89,7 +89,7 @@ def _ovality(row: RingRow, diameter: float) -> tuple[float, float]:
 
 
 def _empty_rest(orders: int, chords: Sequence[Chord]) -> Iterator[tuple[str, Value]]:
-    """Columns after the first ones, in their order."""
+    """Return the columns after the first ones, in their order."""
     names = ["diameter_largest", "diameter_smallest", "largest_clock"]
     plain = ["model", "sigma", "gap"]
     for name in names:

@@ -21,13 +21,13 @@ COLUMNS = (
     "inward", "inward_se", "inward_clock", "outward", "outward_se", "outward_clock", "sigma", "step_greatest",
     "step_greatest_se", "step_greatest_arc", "lip", "lip_se", "lip_arc", "remark",
 )  # fmt: skip
-"""Of a ring; m, °, and ovality as a share."""
+"""Columns of a ring; m, °, and ovality as a share."""
 
 _DECIMALS = 6
 
 
 def ring_rows(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
-    """Rings whose middle lies in a stretch, in order of chainage, each with its chords."""
+    """Read rings whose middle is in a stretch, in order of chainage, each with its chords."""
     with conn.cursor(row_factory=dict_row) as cursor:
         query = sql.SQL(
             "SELECT {}, (SELECT jsonb_object_agg(concat_ws('_', 'chord', c.clock_from, c.clock_to),"
@@ -48,7 +48,7 @@ def _flat(row: Row) -> Row:
 
 
 def write_rings(rows: list[Row], path: Path, ending: str, title: str) -> None:
-    """Write rings as .csv or .xlsx; what could not be told is empty."""
+    """Write rings as .csv or .xlsx; unknown values are empty."""
     header = list(dict.fromkeys(name for row in rows for name in row))
     if ending == ".xlsx":
         from tunneldb.export.tables.workbook import Column, Sheet, write_workbook

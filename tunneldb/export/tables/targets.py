@@ -1,4 +1,4 @@
-"""Report of target spheres and of how they lie to control points, as Markdown."""
+"""Report of target spheres and their differences from control points, as Markdown."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ HEADER = ("sphere", "scan", "chainage", "x", "y", "z", "radius mm", "rms mm", "s
 
 
 def sphere_rows(rows: Iterable[TargetObservation], stationing: Stationing) -> list[tuple[str, ...]]:
-    """Cells of the table of spheres, under `HEADER`."""
+    """Return the cells of the table of spheres, for `HEADER`."""
     return [
         (
             str(row.number),
@@ -70,7 +70,7 @@ def report(
     if comparison is not None:
         parts += _control(comparison)
     if found.refusals:
-        parts.append("## Not taken for target spheres")
+        parts.append("## Rejected candidates")
         cells = [
             (str(scan), *(f"{value:.2f}" for value in refusal.centre), str(refusal.points), refusal.reason)
             for scan, refusal in found.refusals
@@ -80,7 +80,7 @@ def report(
 
 
 def control_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    """Cells of the table of pairs: sphere, control point, sphere less control point in mm, and what a best motion leaves."""
+    """Return the cells of the table of pairs: sphere, control point, difference in mm, and residual after a best motion."""
     assert comparison.motion is not None
     ours, theirs = comparison.match.pairs.T
     off = comparison.centres[ours] - comparison.control.xyz[theirs]
@@ -101,7 +101,7 @@ CONTROL_HEADER = ("sphere", "control", "dx mm", "dy mm", "dz mm", "length mm", "
 
 
 def motion_lines(motion: Motion) -> list[str]:
-    """What a best motion is, in lines."""
+    """Return lines on the best motion."""
     x, y, z = motion.pivot
     lines = [
         f"Best rigid motion of the spheres onto the control points (not applied), without scale, {motion.freedom} redundant"
@@ -116,7 +116,7 @@ def motion_lines(motion: Motion) -> list[str]:
 
 
 def unmatched_lines(comparison: Comparison) -> list[str]:
-    """Which spheres and control points have no partner, in lines."""
+    """Return lines on the spheres and control points without a partner."""
     ours, theirs = comparison.match.pairs.T
     spheres = [str(number) for k, number in enumerate(comparison.numbers) if k not in ours]
     points = [name for k, name in enumerate(comparison.control.names) if k not in theirs]
@@ -127,7 +127,7 @@ def unmatched_lines(comparison: Comparison) -> list[str]:
 
 
 def how_line(comparison: Comparison) -> str:
-    """How spheres and control points were matched."""
+    """Return a line on the matching of spheres and control points."""
     count = len(comparison.match.pairs)
     return f"{count} of {len(comparison.control.names)} control points matched {_HOW[comparison.match.how]}."
 
@@ -154,7 +154,7 @@ def _control(comparison: Comparison) -> list[str]:
 
 
 def _between_scans(rows: list[TargetObservation]) -> list[str]:
-    """How far apart the scans saw each sphere: what their registration is worth."""
+    """Return the differences between scans of each sphere: the accuracy of their registration."""
     numbers, centres = mean_centres(rows)
     several = [row for row in rows if sum(other.number == row.number for other in rows) > 1]
     if not several:

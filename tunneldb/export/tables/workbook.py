@@ -1,4 +1,4 @@
-"""Tables as an Excel workbook (.xlsx): typed cells, a header that stays, filters; text is never taken for a formula."""
+"""Tables as an Excel workbook (.xlsx): typed cells, a fixed header, filters; text is never a formula."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from tunneldb import __version__
 from tunneldb.errors import UserError
 
 MOST_ROWS = 1_048_576
-"""Rows of a sheet, by ECMA-376."""
+"""Maximum number of rows of a sheet, by ECMA-376."""
 
 LONGEST = 32_767
-"""Characters of a cell."""
+"""Maximum number of characters of a cell."""
 
 _NARROWEST, _WIDEST = 8, 50  # columns, in characters
 
@@ -54,7 +54,7 @@ def write_workbook(path: Path, sheets: Sequence[Sheet], title: str) -> None:
     for sheet in sheets:
         if len(sheet.rows) >= MOST_ROWS:
             raise UserError(
-                f"{path.name}: {len(sheet.rows)} rows, and a sheet of Excel has {MOST_ROWS}: write .csv, or less of the tunnel"
+                f"{path.name}: {len(sheet.rows)} rows, but an Excel sheet has {MOST_ROWS}: write .csv, or a shorter stretch"
             )
     options = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
     # whole in memory first: on a full disk the library would leave a file half open, and complain when it is collected
@@ -106,7 +106,7 @@ def _write_cell(page: Worksheet, y: int, x: int, value: Any, form: Format, momen
 
 
 def _shown(value: Any) -> str:
-    """Return about what a cell shows."""
+    """Return the approximate displayed text of a cell."""
     if value is None:
         return ""
     if isinstance(value, dt.datetime):

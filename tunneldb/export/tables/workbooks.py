@@ -1,4 +1,4 @@
-"""Findings and leaks as Excel workbooks: what is listed, counts, what is not counted or could be missed, dry regions."""
+"""Findings and leaks as Excel workbooks: list, counts, uncounted findings, gaps in the inspection, dry regions."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def write_findings(
 
 
 def write_leaks(path: Path, title: str, leaks: LeakList, regions: Sequence[DryRegion]) -> None:
-    """Write leaks, or what else is dark, as a workbook, with a sheet of where they could be missed and what else is known."""
+    """Write leaks, or other anomalies, as a workbook, with a sheet of gaps in the inspection and notes."""
     kinds = sorted({row.kind for row in leaks.rows})
     reviews = ("open", "confirmed", "rejected")
     of_kind = {kind: [row for row in leaks.rows if row.kind == kind] for kind in kinds}
@@ -127,7 +127,7 @@ def _cell(name: str, value: Any) -> Any:
 
 
 def _counts(counts: Sequence[KindCount], severities: dict[int, str]) -> Sheet:
-    """By kind: how many count, by origin and by severity; then those that do not count; then the sum of each column."""
+    """Make rows by kind: number counted, by origin and by severity; then uncounted ones; then the total of each column."""
     degrees = [f"Severity {n} {severities.get(n, '')}".rstrip() if n else "No severity" for n in SEVERITIES]
     heads = [
         "Counted",
@@ -162,8 +162,8 @@ def _regions(regions: Sequence[DryRegion]) -> Sheet:
         [
             Column("No.", _WHOLE), Column("From"), Column("To"), Column("Arc from, m", _METRES), Column("Arc to, m", _METRES),
             Column("Area, m²", "0.00"), Column("Drawn by"), Column("Drawn, UTC"), Column("Why"),
-            Column("Waits for an operator"), Column("Approved by"), Column("Approved, UTC"),
-            Column("Leaks taken away", _WHOLE), Column("Their area, m²", "0.0000"), Column("Their numbers"),
+            Column("Pending approval"), Column("Approved by"), Column("Approved, UTC"),
+            Column("Leaks removed", _WHOLE), Column("Their area, m²", "0.0000"), Column("Their numbers"),
         ],
         [
             [

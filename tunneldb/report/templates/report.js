@@ -39,7 +39,7 @@
     ["Arc m", "arcFrom", arc, "n minor"],
     ["Length m", "length", (l) => fixed(l.length, 2), "n minor"],
     ["Area m²", "area", (l) => fixed(l.area, 2), "n"],
-    ["Drop dB", "drop", (l) => fixed(l.drop, 1), "n minor"],
+    ["Darkening dB", "drop", (l) => fixed(l.drop, 1), "n minor"],
     ["Contrast σ", "contrast", (l) => fixed(l.contrast, 1), "n minor"],
     ["Confidence", "confidence", (l) => fixed(l.confidence, 2), "n minor"],
     ...(leaks.some((leak) => leak.severity) ? [["Severity", "severity", (l) => _(l.severityLabel), "minor"]] : []),
@@ -97,7 +97,7 @@
     $("#found").textContent = !data.searched && !leaks.length
       ? _("Leaks were not searched for")
       : state.all
-        ? _("{count} leaks, with those rejected, in order of chainage", { count: listed.length })
+        ? _("{count} leaks, including rejected ones, by chainage", { count: listed.length })
         : _("{count} of {all} leaks, {area} m²", { count: listed.length, all: leaks.length, area: area.toFixed(2) });
     $("#table thead").replaceChildren(
       make("tr", {}, ...columns.map(([heading, key, , kind]) => {
@@ -148,7 +148,7 @@
     const [width, height] = shown.size;
     const bar = [0.5, 1, 2, 5, 10, 20, 50].findLast((length) => length < width / 2) ?? 0.5;
     const [x, y] = [width * 0.04, height * 0.95];
-    const drawing = make("svg:svg", { viewBox: `0 0 ${width} ${height}`, class: `view ${leak.review}`, role: "img", "aria-label": _("Lining about leak {id}", { id: leak.id }) });
+    const drawing = make("svg:svg", { viewBox: `0 0 ${width} ${height}`, class: `view ${leak.review}`, role: "img", "aria-label": _("Lining around leak {id}", { id: leak.id }) });
     if (shown.picture) {
       drawing.append(make("svg:image", { width, height, preserveAspectRatio: "none", href: shown.picture }));
     }
@@ -177,7 +177,7 @@
     const shown = detail(leak);
     const facts = [
       [_("Area"), `${fixed(leak.area, 2)} m²`], [_("Clock"), leak.clockLabel], [_("Arc, m"), arc(leak)], [_("Length"), `${fixed(leak.length, 2)} m`],
-      [_("Drop, most"), `${fixed(leak.drop, 1)}, ${fixed(leak.dropMax, 1)} dB`], [_("Contrast"), `${fixed(leak.contrast, 1)} σ`],
+      [_("Darkening, mean and greatest"), `${fixed(leak.drop, 1)}, ${fixed(leak.dropMax, 1)} dB`], [_("Contrast"), `${fixed(leak.contrast, 1)} σ`],
       [_("Confidence"), fixed(leak.confidence, 2)], [_("Measured"), leak.imageShare === null ? _("not yet") : _("{share} % of it", { share: Math.round(100 * leak.imageShare) })],
     ];
     const list = make("dl", {}, ...facts.map(([term, value]) => make("div", {}, make("dt", {}, term), make("dd", {}, value))));
@@ -243,8 +243,8 @@
     const largest = [...leaks].sort((a, b) => (a.review === "rejected") - (b.review === "rejected") || b.area - a.area).slice(0, data.cards);
     const order = largest.sort((a, b) => a.chainage - b.chainage || a.id - b.id);
     $("#sheets-note").textContent = order.length < leaks.length
-      ? _("The {count} largest of {all} leaks, in order of chainage; the HTML file of this report shows each.", { count: order.length, all: leaks.length })
-      : order.length ? _("All {count} leaks, in order of chainage.", { count: order.length }) : "";
+      ? _("The {count} largest of {all} leaks, by chainage; the HTML version of this report shows all.", { count: order.length, all: leaks.length })
+      : order.length ? _("All {count} leaks, by chainage.", { count: order.length }) : "";
     $("#sheets .cards").replaceChildren(...order.map(card));
   }
   function toScreen() {

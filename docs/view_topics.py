@@ -1,9 +1,8 @@
-"""The diagram of the views of tunnel_api, as Mermaid, made from the catalogue of an installed database."""
+"""The views of tunnel_api by topic, and which views show the same rows, from the catalogue of an installed database."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,19 +17,19 @@ TOPICS = {
     "How wet, and what was seen": ("coverage", "statistics", "waterproof", "coverage_gap"),
     "Ground and objects": ("ground",),
     "Inspection sheets": ("sheet",),
-    "Change between surveys": ("epochs",),
+    "Change between surveys": ("measures/change",),
     "Design profile": ("deviation", "deviation_layer", "thickness", "evenness"),
     "Clearance": ("clearance", "clearance_layer"),
     "Rings": ("ring",),
     "Structures": ("structures",),
     "Under water": ("sonar", "closed_section"),
     "Stages and queue": ("status", "queue", "remark", "size"),
-    "Who did what": ("audit", "change"),
+    "Who did what": ("audit", "views/change"),
 }
-"""Boxes of the diagram, and the files whose views stand in each; views of other files stand in a box of their file's name."""
+"""Topics, and the SQL files whose views belong to each; another file is a topic of its own."""
 
 OWNERS = {"tunnel", "survey"}
-"""Views that nearly all others lead to, by tunnel_id and survey_id: boxes of their own."""
+"""Views that nearly all others lead to, by tunnel_id and survey_id."""
 
 LEADS_TO = {
     "finding_id": "finding",
@@ -44,18 +43,12 @@ LEADS_TO = {
 HELPERS = {"face_placement"}
 """Views that only say where others draw."""
 
-COLUMNS = 3
-"""Boxes beside each other."""
-
-WIDE = '%%{init: {"flowchart": {"wrappingWidth": 700, "rankSpacing": 25, "nodeSpacing": 25}}}%%'
-"""Lets Mermaid wrap no line."""
-
 PLACES = ("_unrolled", "_map", "_3d", "_face", "_sheet")
 """Endings of views that show the rows of another with one geometry."""
 
 
-def view_diagram(conn: psycopg.Connection[Any]) -> str:
-    """Return the code of the diagram."""
+def views_by_topic(conn: psycopg.Connection[Any]) -> list[tuple[str, list[str]]]:
+    """Return each topic and its views: sister views after a comma, the views that the keys lead to after an arrow."""
     keys: dict[str, list[str]] = {}
     for view, column in conn.execute(
         "SELECT c.relname, a.attname FROM pg_class c JOIN pg_attribute a ON a.attrelid = c.oid AND a.attnum > 0"
@@ -64,19 +57,8 @@ def view_diagram(conn: psycopg.Connection[Any]) -> str:
         keys.setdefault(view, [])
         if column.endswith("_id"):
             keys[view].append(column)
-    boxes = list(_boxes(keys, _bases(conn, set(keys))))
-    lines = [WIDE, "flowchart LR", '  tunnel["`**tunnel**`"] -- tunnel_id --> survey["`**survey**`"]']
-    for n, (title, views) in enumerate(boxes):
-        text = "\n".join([f"**{title}**", *views])
-        lines.append(f'  b{n}["`{text}`"]')
-    lines += [f"  survey -- survey_id --> b{n}" for n in range(0, len(boxes), COLUMNS)]
-    lines += [f"  b{n} ~~~ b{n + 1}" for n in range(len(boxes) - 1) if (n + 1) % COLUMNS]
-    return "\n".join(lines) + "\n"
-
-
-def _boxes(keys: dict[str, list[str]], base: dict[str, str]) -> Iterator[tuple[str, list[str]]]:
-    """Titles of boxes and the lines in each."""
-    homes = {view: _home(path) for path in sql_files() for view in _made(path)}
+    base = base_views(conn)
+    topics = {view: _topic(path) for path in sql_files() for view in _made(path)}
     shown: dict[str, list[str]] = {title: [] for title in TOPICS}
     for view, columns in keys.items():
         if view in OWNERS or base[view] != view:
@@ -85,24 +67,29 @@ def _boxes(keys: dict[str, list[str]], base: dict[str, str]) -> Iterator[tuple[s
         named = {LEADS_TO.get(f"{view}.{column}", LEADS_TO.get(column, column.removesuffix("_id"))) for column in columns}
         leads = sorted(named & set(keys) - OWNERS - {view})
         line = f"{view}{', ' + ', '.join(others) if others else ''}{' → ' + ', '.join(leads) if leads else ''}"
-        shown.setdefault(homes.get(view, homes.get(view.rpartition("_")[0], "Other")), []).append(line)
-    yield from ((title, lines) for title, lines in shown.items() if lines)
+        shown.setdefault(topics.get(view, topics.get(view.rpartition("_")[0], "Other")), []).append(line)
+    return [(title, lines) for title, lines in shown.items() if lines]
 
 
-def _home(path: Path) -> str:
-    return next((title for title, stems in TOPICS.items() if path.stem in stems), path.stem.replace("_", " ").capitalize())
+def _topic(path: Path) -> str:
+    names = {path.stem, f"{path.parent.name}/{path.stem}"}
+    return next((title for title, stems in TOPICS.items() if names & set(stems)), path.stem.replace("_", " ").capitalize())
 
 
 def _made(path: Path) -> list[str]:
-    """Views that a file makes, those that it has made of a view with three geometries as well."""
+    """Return the views that a file makes, with those that it has made of a view with three geometries."""
     text = path.read_text("utf-8")
     made = re.findall(r"^CREATE OR REPLACE VIEW tunnel_api\.(\w+)", text, re.MULTILINE)
     return made + [f"{stem}{place}" for stem in re.findall(r"make_geometry_views\(\s*'\w+', '(\w+)'", text) for place in PLACES]
 
 
-def _bases(conn: psycopg.Connection[Any], views: set[str]) -> dict[str, str]:
-    """Of each view the one whose rows it shows with one geometry: the only one it rests on, or that of its name."""
-    rests: dict[str, set[str]] = {view: set() for view in views}
+def base_views(conn: psycopg.Connection[Any]) -> dict[str, str]:
+    """Return for each view the one whose rows it shows with one geometry, else itself.
+
+    That is the only view that it reads, or the one whose name it extends.
+    """
+    rows = conn.execute("SELECT viewname FROM pg_views WHERE schemaname = 'tunnel_api'")
+    rests: dict[str, set[str]] = {view: set() for (view,) in rows}
     for view, other in conn.execute(
         "SELECT DISTINCT v.relname, o.relname FROM pg_class v JOIN pg_rewrite r ON r.ev_class = v.oid"
         " JOIN pg_depend d ON d.classid = 'pg_rewrite'::regclass AND d.objid = r.oid AND d.refclassid = 'pg_class'::regclass"
@@ -112,13 +99,13 @@ def _bases(conn: psycopg.Connection[Any], views: set[str]) -> dict[str, str]:
         if other not in HELPERS:
             rests[view].add(other)
     bases = {}
-    for view in views:
+    for view in rests:
         found = view
         while place := next((place for place in PLACES if found.endswith(place)), None):
             stem = found.removesuffix(place)
             if len(rests[found]) == 1:
                 (found,) = rests[found]
-            elif stem in views:
+            elif stem in rests:
                 found = stem
             else:
                 break
