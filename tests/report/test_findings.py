@@ -398,18 +398,18 @@ def test_a_report_without_tables_of_leaks_lists_them_by_kind(drawn: str, tmp_pat
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("a = ", "is not TOML"), ("klient = 1", "klient: there is no such key"), ("client = 5", "client: takes a text, not 5"),
-        ('language = "xx"', "language: 'xx' is none of de, en, sl"), ('logo = "none.png"', "logo: there is no file"),
-        ('logo = "owner.toml"', "is no image"), ('chapters = "leaks"', "chapters: takes a list"),
-        ('chapters = ["leeks"]', "chapters: there is no chapter 'leeks'"), ("chapters = []", "chapters: takes a list"),
-        ("chapters = [[1]]", "there is no chapter [1]"),
-        ('chapters = ["leaks", "leaks"]', "'leaks' stands there 2 times"), ("headings = 1", "headings: takes a table"),
-        ('[headings]\n"Leeks" = "x"', "headings.'Leeks': there is no such heading"),
-        ('[headings]\n"Leaks" = 1', "headings.Leaks: takes a text, not 1"),
+        ("a = ", "is not TOML"), ("klient = 1", "klient: unknown key"), ("client = 5", "client: must be a text, not 5"),
+        ('language = "xx"', "language: 'xx' is none of de, en, sl"), ('logo = "none.png"', "logo: no file"),
+        ('logo = "owner.toml"', "is not a readable image"), ('chapters = "leaks"', "chapters: must be a list"),
+        ('chapters = ["leeks"]', "chapters: unknown chapter 'leeks'"), ("chapters = []", "chapters: must be a list"),
+        ("chapters = [[1]]", "unknown chapter [1]"),
+        ('chapters = ["leaks", "leaks"]', "'leaks' occurs 2 times"), ("headings = 1", "headings: must be a table"),
+        ('[headings]\n"Leeks" = "x"', "headings.'Leeks': unknown heading"),
+        ('[headings]\n"Leaks" = 1', "headings.Leaks: must be a text, not 1"),
         ('[headings]\n"{count} leaks" = "{number}"', "has other names in braces"),
         ('[headings]\n"Leaks" = "{"', "has other names in braces"),
         ('[severity_colours]\n5 = "#123456"', "severity_colours.5: severities are 1 to 4"),
-        ('[severity_colours]\n1 = "red"', "severity_colours.1: takes a colour such as #b8371d, not 'red'"),
+        ('[severity_colours]\n1 = "red"', "severity_colours.1: must be a colour such as #b8371d, not 'red'"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_a_template_is_one_line(tmp_path: Path, text: str, said: str) -> None:

@@ -1,4 +1,4 @@
-"""The chapter on what changed since an older survey: leaks, regions of lining, sections that moved, and series over surveys."""
+"""Chapter on changes since an older survey: leaks, regions of lining, moved sections, and series over surveys."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from tunneldb.report.rings import Curve
 from tunneldb.store.survey import Survey
 
 WIDTH, HEIGHT = 1000.0, 120.0
-"""Of the drawing of sections, in its own unit."""
+"""Size of the drawing of sections, in its own unit."""
 
 LISTED = 40
-"""So many regions are listed at most, the largest."""
+"""Maximum number of listed regions, the largest ones."""
 
 
 CHANGE_WORDS = {
@@ -31,7 +31,7 @@ CHANGE_WORDS = {
 
 @dataclass(frozen=True)
 class ChangeChapter:
-    """What the chapter states.
+    """Content of the chapter.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class ChangeChapter:
 
 
 def read_change(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> ChangeChapter | None:
-    """Read what changed in a stretch; None where the survey was compared with no older one there."""
+    """Read the changes in a stretch; None if the survey was not compared with an older one there."""
     old = older_compared(conn, survey, low, high)
     if old is None:
         return None
@@ -101,7 +101,7 @@ def read_change(conn: psycopg.Connection[Any], survey: Survey, low: float, high:
 
 
 def _path(sections: list[Row], name: str, low: float, scale: float, most: float) -> str:
-    """Steps of the sections; a gap where nothing is known."""
+    """Return the steps of the sections, with gaps where unknown."""
     parts, before = [], None
     for one in sections:
         if one[name] is None:

@@ -16,7 +16,7 @@ from tunneldb.store.survey import Survey
 
 
 def wet_curve(series: Sequence[Row]) -> Curve | None:
-    """Wet area, m², over the dates of surveys; None where there are not two of them."""
+    """Return the wet area, m², over the dates of surveys; None with fewer than two of them."""
     days = np.array([row["date"].toordinal() for row in series], dtype=np.float64)
     areas = np.array([np.nan if row["area"] is None else row["area"] for row in series], dtype=np.float64)
     if len(np.unique(days[np.isfinite(areas)])) < 2:
@@ -31,7 +31,7 @@ def wet_curve(series: Sequence[Row]) -> Curve | None:
 
 
 def ovality_curve(conn: psycopg.Connection[Any], old: Survey, new: Survey, low: float, high: float) -> Curve | None:
-    """Ovality of rings along a stretch, m, in both surveys, ‰; None where one of them has none there."""
+    """Return the ovality of rings along a stretch in both surveys, ‰; None if one of them has none there."""
     lines = [(name, *_ovality(conn, survey, low, high)) for name, survey in (("before", old), ("after", new))]
     if any(np.isfinite(values).sum() < 2 for _, _, values in lines):
         return None
@@ -40,7 +40,7 @@ def ovality_curve(conn: psycopg.Connection[Any], old: Survey, new: Survey, low: 
 
 
 def _ovality(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> tuple[Float, Float]:
-    """Middles of the rings of a stretch, m, and their ovality, ‰, NaN where it is not known."""
+    """Return the middles of the rings of a stretch, m, and their ovality, ‰, NaN if unknown."""
     rows = conn.execute(
         "SELECT (chainage_from + chainage_to) / 2, 1000 * ovality FROM tunnel.ring"
         " WHERE survey_id = %s AND (chainage_from + chainage_to) / 2 BETWEEN %s AND %s ORDER BY chainage_from",

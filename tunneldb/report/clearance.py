@@ -1,4 +1,4 @@
-"""The chapter on clearance: margins along each track, the tightest places, what stands inside, the tightest metre drawn."""
+"""Chapter on clearance: margins along each track, the tightest places, infringements, the tightest metre drawn."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
 PLACES = 10
-"""Tightest places that are listed, no two nearer to each other than APART."""
+"""Number of tightest places listed, at least APART from each other."""
 
 APART = 5.0
-"""Between the beginnings of places that are listed, m."""
+"""Minimum distance between the beginnings of listed places, m."""
 
 ROWS = 40
-"""Infringements in a table at most, the deepest."""
+"""Maximum number of infringements in a table, the deepest ones."""
 
 WIDTH, HEIGHT = 1000.0, 120.0
-"""Of the plot of margins, in its own unit."""
+"""Size of the plot of margins, in its own unit."""
 
 AROUND = 2.0
-"""About the outline points are drawn so far, m."""
+"""Maximum distance of drawn points from the outline, m."""
 
 POINT = 0.02
-"""Points nearer to each other than about this are one in the drawing, m."""
+"""Approximate distance below which points are one in the drawing, m."""
 
 
 @dataclass(frozen=True)
 class MarginPlot:
-    """Margins along a track, drawn: the least of each metre, or of each unit where metres are narrower.
+    """Plot of margins along a track: the least of each metre, or of each unit if metres are narrower.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class TightestMetre:
 
 @dataclass(frozen=True)
 class TrackChapter:
-    """What is stated of an outline about a track.
+    """Results for an outline around a track.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class TrackChapter:
 
 
 def read_clearance(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[TrackChapter]:
-    """Read what is stated of a stretch, m, for each outline and track that was measured; nothing where none was."""
+    """Read the results of a stretch, m, for each outline and track that was measured; empty if none was."""
     measured = conn.execute(
         "SELECT c.gauge, c.track, (SELECT g.source FROM tunnel.gauge g WHERE g.tunnel_id = %(tunnel)s AND g.name = c.gauge)"
         "  FROM (SELECT DISTINCT gauge, track FROM tunnel.clearance_section WHERE survey_id = %(survey)s"
@@ -214,7 +214,7 @@ def _plot(conn: psycopg.Connection[Any], survey: Survey, rows: Sequence[Row], lo
 
 
 def _runs(mask: Bool) -> list[tuple[float, float]]:
-    """Begin and width of where a mask along the plot is true, in the plot's unit."""
+    """Return begin and width of the runs where a mask along the plot is true, in the plot's unit."""
     ends = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))).reshape(-1, 2)
     unit = WIDTH / len(mask)
     return [(begin * unit, (end - begin) * unit) for begin, end in ends.tolist()]
@@ -247,7 +247,7 @@ def _metre(conn: psycopg.Connection[Any], survey: Survey, axis: Alignment, gauge
 
 
 def _point_paths(places: Float, classes: Any, outline: Float) -> dict[str, str]:
-    """Paths of dots for the points (n, 2) about an outline, by what they are; noise is left out."""
+    """Return paths of dots for the points (n, 2) around an outline, by class; noise is left out."""
     (west, low), (east, high) = outline.min(axis=0) - AROUND, outline.max(axis=0) + AROUND
     near = ((places > [west, low]) & (places < [east, high])).all(axis=1) & (classes != PointClass.NOISE)
     ground, passing = np.isin(classes, TRACK_CLASSES), np.isin(classes, TEMPORARY_CLASSES)

@@ -1,4 +1,4 @@
-"""What a report states, read from the database within one snapshot; chainages and lengths in m, areas in m²."""
+"""Content of a report, read from the database in one snapshot; chainages and lengths in m, areas in m²."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Leak:
 
     @property
     def counts(self) -> bool:
-        """Whether statistics count it: found last, and not rejected."""
+        """True if it is included in the totals: detected last, and not rejected."""
         return self.detected and self.review != "rejected"
 
     @property
@@ -107,11 +107,11 @@ class CoverageBins:
 
     @property
     def share(self) -> Float:
-        """Share of the lining seen, 0 to 1; NaN where detection did not run."""
+        """Share of the lining inspected, 0 to 1; NaN if detection did not run."""
         return np.divide(self.seen, self.lining, out=np.full(len(self.seen), np.nan), where=self.lining > 1e-6)
 
     def merged(self, count: int) -> CoverageBins:
-        """Take so many bins together."""
+        """Combine so many bins."""
         starts = np.arange(0, len(self.lining), count)
         return CoverageBins(
             np.append(self.edges[starts], self.edges[-1]),
@@ -121,7 +121,7 @@ class CoverageBins:
 
 
 def find_stretch(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> tuple[float, float]:
-    """Return the stretch to report, m: what is asked for, as far as the survey reaches.
+    """Return the stretch to report, m: the requested one, limited to the survey.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def find_stretch(conn: psycopg.Connection[Any], survey: Survey, low: float, high
     start, end = max(ends[0], low), min(ends[1], high)
     if start >= end:
         asked = f"from chainage {max(low, -1e9):.3f} to {min(high, 1e9):.3f} m"
-        raise UserError(f"survey {survey.name} reaches from chainage {ends[0]:.3f} to {ends[1]:.3f} m: nothing lies {asked}")
+        raise UserError(f"survey {survey.name} extends from chainage {ends[0]:.3f} to {ends[1]:.3f} m: it has nothing {asked}")
     return start, end
 
 
@@ -151,7 +151,7 @@ REPORTED = sql.SQL(
     "FROM tunnel_api.leak WHERE survey_id = %(survey)s AND (detected OR review = 'confirmed') AND chainage_to > %(low)s"
     " AND chainage_from < %(high)s"
 )
-"""Leaks of a stretch that a report states: found last, or confirmed although found no more; also the rejected."""
+"""Condition for leaks in a report: found last, or confirmed although not found again; also rejected ones."""
 
 _LEAK = sql.SQL(
     "SELECT {columns}, tunnel_internal.area_between(unrolled, area, %(low)s, %(high)s) AS inside,"
@@ -197,7 +197,7 @@ def read_statistics(conn: psycopg.Connection[Any], survey: Survey, starts: Seque
 
 
 def read_classes(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
-    """Read which classes of GB 50108-2008 a stretch keeps, and what breaks them, with their limits."""
+    """Read which classes of GB 50108-2008 a stretch meets, and which limits it exceeds."""
     return _rows(
         conn,
         "SELECT w.class, w.holds, w.breaks, w.leaks, l.wet_ratio, l.patch_area, l.patches_per_100, l.description"
@@ -229,7 +229,7 @@ def read_files_of_site(conn: psycopg.Connection[Any], survey: Survey) -> list[Ro
 
 
 def read_member_runs(conn: psycopg.Connection[Any], survey: Survey) -> list[Row]:
-    """Read how members were last found: when, with which versions, and what was counted."""
+    """Read how members were last found: time, versions, and counts."""
     return _rows(
         conn,
         "SELECT r.finished_at, r.versions, r.counts FROM tunnel.run r"
@@ -239,7 +239,7 @@ def read_member_runs(conn: psycopg.Connection[Any], survey: Survey) -> list[Row]
 
 
 def read_runs(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
-    """Read how each stage last succeeded, the same parameters and versions together, with the kilometres they hold for."""
+    """Read how each stage last succeeded, grouped by parameters and versions, with the kilometres of each group."""
     return _rows(
         conn,
         """
@@ -257,7 +257,7 @@ def read_runs(conn: psycopg.Connection[Any], survey: Survey, low: float, high: f
 
 
 def read_stale(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
-    """Read which stages of which kilometres are out of date or have not succeeded, and why."""
+    """Read which stages of which kilometres are out of date or have not succeeded, with the reason."""
     return _rows(
         conn,
         "SELECT stage, coalesce(reason, CASE WHEN done_at IS NULL THEN 'not done: ' || outcome END) AS reason,"
@@ -279,7 +279,7 @@ def read_radiometry(conn: psycopg.Connection[Any], survey: Survey, low: float, h
 
 
 def read_others(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> dict[str, int]:
-    """Count what is dark but no leak: joints and other dark spots."""
+    """Count dark areas that are no leak: joints and dry dark areas."""
     rows = conn.execute(
         "SELECT kind, count(*) FROM tunnel_api.finding WHERE survey_id = %s AND detected AND NOT wet AND NOT superseded"
         " AND coalesce(kind_detected, kind) = ANY (%s) AND chainage_to > %s AND chainage_from < %s GROUP BY kind",
@@ -290,7 +290,7 @@ def read_others(conn: psycopg.Connection[Any], survey: Survey, low: float, high:
 
 @dataclass(frozen=True)
 class Edit:
-    """A change that somebody made by hand: who and when, of what, from what to what."""
+    """Manual edit: person and time, object, old and new value."""
 
     at: dt.datetime
     who: str
@@ -302,7 +302,7 @@ class Edit:
 
 
 EDITS = 500
-"""So many edits are listed at most, the latest."""
+"""Maximum number of listed edits, the latest ones."""
 
 # the audit knows a survey by its name, and outlives it: it may hold edits of one of that name that was removed
 _AUDIT = sql.SQL(
@@ -312,7 +312,7 @@ _AUDIT = sql.SQL(
 
 
 def read_edits(conn: psycopg.Connection[Any], survey: Survey) -> tuple[int, list[Edit]]:
-    """Count what people changed by hand in a survey since it was added, and read the latest EDITS of it, latest first."""
+    """Count the manual edits in a survey since it was added, and read the latest EDITS of them, latest first."""
     which = {"name": survey.name, "id": survey.id, "most": EDITS}
     row = conn.execute(_AUDIT.format(sql.SQL("count(*)")), which).fetchone()
     assert row is not None
@@ -323,7 +323,7 @@ def read_edits(conn: psycopg.Connection[Any], survey: Survey) -> tuple[int, list
 
 
 def label_chainages(conn: psycopg.Connection[Any], survey: Survey, chainages: Sequence[float]) -> list[str]:
-    """Chainages, m, as they are written in the tunnel."""
+    """Return chainages, m, as they are written in the tunnel."""
     rows = conn.execute(
         "SELECT tunnel_api.station_label(%s, c) FROM unnest(%s::float8[]) WITH ORDINALITY AS q (c, n) ORDER BY n",
         [survey.tunnel_id, list(chainages)],
@@ -332,17 +332,17 @@ def label_chainages(conn: psycopg.Connection[Any], survey: Survey, chainages: Se
 
 
 def place_name(conn: psycopg.Connection[Any], survey: Survey) -> str:
-    """Return what the label of a place is: its chainage, or its station where the tunnel has a stationing of its own."""
+    """Return the label of a place: its chainage, or its station if the tunnel has a stationing of its own."""
     own = conn.execute("SELECT FROM tunnel.station_equation WHERE tunnel_id = %s LIMIT 1", [survey.tunnel_id]).fetchone()
     return "Chainage" if own is None else "Station"
 
 
 def _rows(conn: psycopg.Connection[Any], query: sql.Composed | LiteralString, values: list[Any] | dict[str, Any]) -> list[Row]:
-    """Rows of a query as mappings."""
+    """Return the rows of a query as mappings."""
     with conn.cursor(row_factory=dict_row) as cursor:
         return cursor.execute(query, values).fetchall()
 
 
 def kilometres_between(low: float, high: float) -> tuple[int, int]:
-    """First and last kilometre of a stretch."""
+    """Return the first and last kilometre of a stretch."""
     return int(np.floor(low / 1000)), int(np.ceil(high / 1000)) - 1

@@ -29,19 +29,19 @@ from tunneldb.store.images import load_block
 from tunneldb.store.survey import Survey
 
 WORST = 4
-"""So many sections are drawn of the greatest overbreak, and as many of the greatest underbreak."""
+"""Number of drawn sections with the greatest overbreak, and of those with the greatest underbreak."""
 
 ROWS = 60
-"""The table has so many stretches at most, of 100 m or a longer round length."""
+"""Maximum number of stretches in the table, of 100 m or a longer round length."""
 
 APART = 5.0
-"""None of them is nearer to a worse one, m."""
+"""Minimum distance from a worse section, m."""
 
 WIDTH, HEIGHT = 1000.0, 90.0
-"""Of each half of the plot along the tunnel, in its own unit."""
+"""Size of each half of the plot along the tunnel, in its own unit."""
 
 LIMITS = (0.02, 0.05, 0.1, 0.2, 0.5)
-"""Deviation at which colours are full, m: the first that nine tenths of the cells stay within."""
+"""Deviation of the full colours, m: the first within which nine tenths of the cells are."""
 
 _COLUMNS = 1000  # of a picture
 _STRIP = 100.0  # length of a picture of a short stretch, m; of a long one a tenth of it, in whole blocks
@@ -53,7 +53,7 @@ _TIMES = (50, 20, 10, 5, 2, 1)
 
 @dataclass(frozen=True)
 class Plot:
-    """Over- and underbreak along the tunnel: paths, and where lines of equal area and ticks stand, with labels."""
+    """Over- and underbreak along the tunnel: paths, and lines of equal area and ticks, with labels."""
 
     over: str
     under: str
@@ -63,7 +63,7 @@ class Plot:
 
 @dataclass(frozen=True)
 class Strip:
-    """A stretch of the image of deviation: what it is called, its length and height, m, and its picture."""
+    """Stretch of the image of deviation: label, length and height, m, and picture."""
 
     title: str
     length: float
@@ -83,7 +83,7 @@ class WorstSection:
 
 
 class DeviationChapter:
-    """What the chapter states of a layer.
+    """Results for a layer.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ class DeviationChapter:
             return cursor.execute(query, values).fetchall()
 
     def _plot(self) -> Plot:
-        """Over- and underbreak by bins of a round length, 500 at most."""
+        """Return over- and underbreak by bins of a round length, at most 500."""
         low, high = self._low, self._high
         step = max(step_for(high - low, 500), 1.0)
         rows = self._rows(
@@ -183,7 +183,7 @@ class DeviationChapter:
         )  # fmt: skip
 
     def strips(self) -> Iterator[Strip]:
-        """Pictures of the image of deviation, one after another, with no more than one in memory."""
+        """Yield pictures of the image of deviation, one after another, with no more than one in memory."""
         kind = DEVIATION_KINDS[self.layer]
         blocks = self._rows(
             "SELECT km, block FROM tunnel.image WHERE survey_id = %s AND kind = %s AND block BETWEEN %s AND %s"
@@ -220,7 +220,7 @@ class DeviationChapter:
         return Strip(" – ".join(label.split(".")[0] for label in labels), count * BLOCK, len(canvas) * side, url)
 
     def _worst(self, kind: str) -> list[WorstSection]:
-        """Sections with the greatest over- or underbreak, in order of chainage, none within 5 m of a worse one."""
+        """Return the sections with the greatest over- or underbreak, by chainage, none within 5 m of a worse one."""
         query = sql.SQL(
             "SELECT chainage_from, chainage_to, label, profile, overbreak, underbreak, seen_share, deviation_least,"
             " deviation_greatest, deviation FROM tunnel_api.deviation_section"
@@ -239,7 +239,7 @@ class DeviationChapter:
 def read_deviation(
     conn: psycopg.Connection[Any], survey: Survey, low: float, high: float, form: Form
 ) -> list[DeviationChapter]:
-    """Read what is stated of each layer that a stretch was held against, from inside."""
+    """Read the results of each layer that a stretch was compared with, from inside."""
     chapters = (DeviationChapter(conn, survey, layer, low, high, form) for layer in layers_held(conn, survey))
     return [chapter for chapter in chapters if chapter.whole["length"] is not None]
 
@@ -267,7 +267,7 @@ def _draw(row: dict[str, Any], design: Stretch) -> WorstSection:
 
 
 def _colours(values: Single, limit: float) -> UInt8:
-    """Colours (rows, columns, 3): blue outside, grey on the design, red inside."""
+    """Return colours (rows, columns, 3): blue outside, grey on the design, red inside."""
     share = np.nan_to_num(np.clip(values / limit, -1.0, 1.0))
     colours = np.stack([np.interp(share, (-1.0, 0.0, 1.0), band) for band in zip(_BLUE, _GREY, _RED, strict=True)], axis=-1)
     colours[np.isnan(values)] = _NONE

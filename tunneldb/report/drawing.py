@@ -13,7 +13,7 @@ from tunneldb.arrays import Float
 from tunneldb.report.data import CoverageBins, Leak
 
 STEPS = (1.0, 2.0, 5.0, 10.0, 20.0, 25.0, 50.0, 100.0, 200.0, 250.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0)
-"""Distances between ticks, and lengths of bins, m."""
+"""Possible distances between ticks, and lengths of bins, m."""
 
 
 def step_for(length: float, most: int) -> float:
@@ -22,25 +22,25 @@ def step_for(length: float, most: int) -> float:
 
 
 def ticks(low: float, high: float, step: float) -> list[float]:
-    """Multiples of a step from low to high, both to the millimetre."""
+    """Return multiples of a step from low to high, both to the millimetre."""
     low, high = round(low, 3), round(high, 3)
     return [float(n * step) for n in range(int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9)) + 1)]
 
 
 def line_path(xy: Float, decimals: int = 2) -> str:
-    """Path through points (n, 2)."""
+    """Return the path through points (n, 2)."""
     return "M" + "L".join(f"{_number(x, decimals)} {_number(y, decimals)}" for x, y in xy)
 
 
 def outline_path(outline: Polygon, west: float, north: float, tolerance: float) -> str:
-    """Path of an outline in the unrolled plane, simplified by a tolerance, m: x from ``west``, y downwards from ``north``."""
+    """Return the path of an outline in the unrolled plane, simplified, m: x from ``west``, y down from ``north``."""
     simple = outline.simplify(tolerance)
     rings = [simple.exterior, *simple.interiors]
     return "".join(line_path(np.array(ring.coords)[:-1, :2] * [1, -1] + [-west, north]) + "Z" for ring in rings)
 
 
 def _number(value: float, decimals: int) -> str:
-    """Shortest text of a number so rounded."""
+    """Return the shortest text of a rounded number."""
     text = f"{value:.{decimals}f}".rstrip("0").rstrip(".") if decimals else f"{value:.0f}"
     return "0" if text in ("-0", "") else text
 
@@ -63,31 +63,31 @@ class Section:
 
     @classmethod
     def of(cls, radius: Sequence[float], arc: Sequence[float]) -> Section:
-        """Take the radius and the arc at each whole degree from -180 to 180, m."""
+        """Set the radius and the arc at each whole degree from -180 to 180, m."""
         angle = np.radians(np.arange(-180.0, 181.0))
         far = np.asarray(radius, dtype=np.float64)
         return cls(np.asarray(arc, dtype=np.float64), far * np.sin(angle), far * np.cos(angle))
 
     def path(self) -> str:
-        """Closed path to 1 cm, y downwards."""
+        """Return the closed path to 1 cm, y downwards."""
         line = LineString(np.column_stack([self.x, -self.y])).simplify(0.01)
         return line_path(np.array(line.coords)) + "Z"
 
     def band(self, arc_from: float, arc_to: float) -> str:
-        """Path of the part between two arcs, m."""
+        """Return the path of the part between two arcs, m."""
         inner = self.arc[(self.arc > arc_from) & (self.arc < arc_to)]
         arcs = np.concatenate([[arc_from], inner, [arc_to]])
         x, y = (np.interp(arcs, self.arc, v) for v in (self.x, self.y))
         return line_path(np.array(LineString(np.column_stack([x, -y])).simplify(0.01).coords))
 
     def box(self) -> str:
-        """``viewBox`` that holds it with a margin of 0.7 m, for the clock's hours."""
+        """Return a ``viewBox`` with a margin of 0.7 m for the clock's hours."""
         west, east, low, high = self.x.min() - 0.7, self.x.max() + 0.7, self.y.min() - 0.7, self.y.max() + 0.7
         return f"{west:.2f} {-high:.2f} {east - west:.2f} {high - low:.2f}"
 
 
 def share_path(coverage: CoverageBins, low: float, high: float, base: float, height: float, scale: float = 1.0) -> str:
-    """Path of the area under the share of lining seen, in steps; ``base`` is where 0 lies, ``height`` how far up 1 is.
+    """Return the path of the area under the inspected share of lining, in steps; ``base`` is at 0, ``height`` the height of 1.
 
     x is the chainage from ``low``, times ``scale``; only what lies between ``low`` and ``high``.
     """
@@ -102,7 +102,7 @@ def share_path(coverage: CoverageBins, low: float, high: float, base: float, hei
 
 
 def without_detection(coverage: CoverageBins, low: float, high: float) -> list[tuple[float, float]]:
-    """Stretches between two chainages, m, in which detection did not run."""
+    """Return the stretches between two chainages, m, in which detection did not run."""
     none = np.isnan(coverage.share)
     turns = np.flatnonzero(np.diff(np.concatenate([[False], none, [False]]).astype(np.int8))).reshape(-1, 2)
     ends = [(max(float(coverage.edges[a]), low), min(float(coverage.edges[b]), high)) for a, b in turns.tolist()]
@@ -110,7 +110,7 @@ def without_detection(coverage: CoverageBins, low: float, high: float) -> list[t
 
 
 def wet_bins(low: Float, high: Float, area: Float, edges: Float) -> Float:
-    """Wet area in bins of chainage (n,), m²: that of each leak in the stretch spread evenly over its length there.
+    """Return the wet area in bins of chainage (n,), m²: each leak in the stretch is spread evenly over its length there.
 
     Parameters
     ----------
@@ -133,12 +133,12 @@ def wet_bins(low: Float, high: Float, area: Float, edges: Float) -> Float:
 
 
 ROWS = 12
-"""Rows of numbers beside a strip at most."""
+"""Maximum number of rows of numbers beside a strip."""
 
 
 @dataclass(frozen=True)
 class Sign:
-    """A number beside a picture that points at a leak.
+    """Number beside a picture that points at a leak.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ def place_signs(leaks: Sequence[Leak], low: float, high: float, width: float) ->
 
 
 def near(leak: Leak, least: float, shape: float) -> tuple[float, float, float, float]:
-    """Window about a leak: west, east, south, north, m; at least so wide, and ``shape`` times as wide as high."""
+    """Return a window around a leak: west, east, south, north, m; with a minimum width, and ``shape`` times as wide as high."""
     west, south, east, north = shapely.bounds(leak.outline)
     width = max(least, 1.5 * (east - west), 1.5 * (north - south) * shape)
     x, y = (west + east) / 2, (south + north) / 2

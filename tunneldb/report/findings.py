@@ -25,7 +25,7 @@ from tunneldb.store.findings import Chosen, Finding, stream_findings
 from tunneldb.store.survey import Survey
 
 MOST = 2000
-"""Rows of a kind at most; of more those that count first, then by severity and size, and a line says how many have none."""
+"""Maximum number of rows of a kind; counted ones first, then by severity and size. A line gives the number without a row."""
 
 STATE_WORDS = {
     "confirmed": "confirmed",
@@ -69,7 +69,7 @@ class KindChapter:
 
 @dataclass(frozen=True)
 class FindingsChapter:
-    """What a report states of findings.
+    """Findings in a report.
 
     Attributes
     ----------
@@ -105,33 +105,33 @@ class FindingsChapter:
 
     @property
     def states(self) -> dict[str, int]:
-        """How many there are in each state."""
+        """Number in each state."""
         return _states(self.kinds)
 
     @property
     def wet_states(self) -> dict[str, int]:
-        """How many leaks, those of wet kinds, there are in each state."""
+        """Number of leaks (wet kinds) in each state."""
         return _states([kind for kind in self.kinds if kind.count.kind in self.wet])
 
     @property
     def counted(self) -> int:
-        """How many sums count."""
+        """Number included in totals."""
         return sum(kind.count.counted for kind in self.kinds)
 
     @property
     def uncounted(self) -> int:
-        """How many no sum counts."""
+        """Number not included in totals."""
         return self.total - self.counted
 
     @property
     def listed(self) -> list[Finding]:
-        """Those that have a row, by their ids."""
+        """Those with a row, by their ids."""
         rows = [finding for kind in self.kinds for _, group in kind.groups for finding in group]
         return sorted(rows, key=lambda finding: finding.id)
 
     @property
     def besides(self) -> bool:
-        """Whether there is more than leaks, joints and dark spots as detection left them."""
+        """True if there is more than leaks, joints and dry dark areas as detected."""
         return bool(self.listed)
 
     @property
@@ -141,7 +141,7 @@ class FindingsChapter:
 
     @property
     def marks(self) -> list[Finding]:
-        """Those that the pictures of the lining show: they count, have a row, and are none of the leaks."""
+        """Those shown in the pictures of the lining: counted, with a row, and not leaks."""
         return [finding for finding in self.listed if finding.counted and finding.id not in self.leaks]
 
     @property
@@ -165,7 +165,7 @@ def read_findings_chapter(
     *,
     table: bool,
 ) -> FindingsChapter | None:
-    """Read what is stated of findings; None where there is none.
+    """Read the findings of a stretch; None if there are none.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def read_findings_chapter(
 
 @dataclass
 class _Reviews:
-    """What somebody has reviewed."""
+    """Reviewed findings."""
 
     first: dt.datetime | None = None
     last: dt.datetime | None = None
@@ -242,7 +242,7 @@ class _Gathered:
     plain: int = 0
 
     def add(self, finding: Finding, *, tabled: bool, digested: bool) -> None:
-        """Add a finding that is in the table of leaks or not, and of which the digest of leaks has all or not."""
+        """Add a finding, which may be in the table of leaks, and completely in the digest of leaks."""
         self.tally.add(finding)
         if not _is_plain(finding, tabled=tabled):
             self.noted.append(finding)
@@ -256,7 +256,7 @@ class _Gathered:
             self.plain += 1
 
     def _leave_beyond(self) -> None:
-        """Of too many keep those that weigh most, in order of chainage, and of the others a digest."""
+        """If there are too many, keep the most important, in order of chainage, and a digest of the others."""
         ranked = sorted(self.noted, key=_weight)
         shown = {finding.id for finding in ranked[:MOST]}
         for one in ranked[MOST:]:
@@ -283,19 +283,19 @@ class _Gathered:
 
 
 def _weight(finding: Finding) -> tuple[Any, ...]:
-    """Return what findings are put in order by, those that weigh most first."""
+    """Return the sort key of findings, the most important first."""
     return not finding.counted, -(finding.severity or 0), -finding.area, -(finding.length or 0.0), finding.id
 
 
 def _is_plain(finding: Finding, *, tabled: bool) -> bool:
-    """Whether a finding needs no row: as detected, and what was said of it is in the table of leaks, or nothing was said."""
+    """Return True if a finding needs no row: as detected, without edits or with all edits in the table of leaks."""
     if finding.origin != "detected" or finding.severity or finding.photos or finding.also_detected:
         return False
     return tabled or (finding.state == "open" and not finding.remark and not finding.reviewed_by)
 
 
 def digest_findings(digest: hashlib._Hash, found: FindingsChapter | None, regions: Sequence[DryRegion]) -> None:
-    """Add what is reported of findings that somebody noted, their photos, and of all dry regions."""
+    """Add the noted findings, their photos, and all dry regions."""
     known = {key for kind in found.kinds for key in kind.digested} if found else set()
     for finding in found.listed if found else []:
         if finding.id in known:
@@ -313,7 +313,7 @@ def digest_findings(digest: hashlib._Hash, found: FindingsChapter | None, region
 
 
 def _stated(finding: Finding, photos: Sequence[Thumbnail]) -> tuple[Any, ...]:
-    """Return what is reported of a finding that somebody noted."""
+    """Return the report entry of a noted finding."""
     return (
         finding.id, finding.kind, finding.origin, finding.state, finding.severity, finding.drawn_by, finding.reviewed_by,
         finding.remark, f"{finding.area:.4f}", f"{finding.length or 0:.4f}", finding.width, finding.geometry.wkb_hex,

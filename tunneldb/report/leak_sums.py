@@ -1,4 +1,4 @@
-"""Sums over all leaks of a stretch, read a block at a time: what lies in memory does not grow with their number."""
+"""Sums over all leaks of a stretch, read in blocks, so that memory does not grow with their number."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from tunneldb.report.text import DASH
 from tunneldb.store.survey import Survey
 
 BLOCK = 20_000
-"""Leaks that are read at a time."""
+"""Number of leaks read at a time."""
 
 SIZES = (0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0)
 """Limits of the classes of size, m²; 0.2 and 0.3 are limits of GB 50108-2008."""
 
 HOURS = (7, 8, 9, 10, 11, 12, 1, 2, 3, 4, 5, 6)
-"""Up the left wall, down the right one, and below."""
+"""Clock sectors: up the left wall, down the right one, and below."""
 
 _ROW = sql.SQL(
     "SELECT id, review, detected, reviewed_by, remark, area, public.ST_AsBinary(unrolled), chainage_from, chainage_to, clock,"
@@ -35,7 +35,7 @@ _ROW = sql.SQL(
 
 @dataclass
 class LeakSums:
-    """What a report states of all leaks of a stretch, listed or not.
+    """Totals of all leaks of a stretch, listed or not.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class LeakSums:
 
 
 def _bars(names: Sequence[str], sums: Float) -> list[dict[str, Any]]:
-    """Bars with their number in per cent of the greatest."""
+    """Return bars with their number in per cent of the greatest."""
     most = float(sums[:, 0].max()) or 1.0
     return [
         {"name": name, "count": int(count), "area": area, "width": round(100 * count / most, 1)}

@@ -1,4 +1,4 @@
-"""The unrolled images of a survey as one picture, of which any window may be had at any pixel; only a few blocks in memory."""
+"""Unrolled images of a survey as one picture, with any window at any pixel size; only a few blocks are in memory."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ from tunneldb.raster.pixel_state import PixelState
 from tunneldb.store.survey import Survey
 
 Form = Literal["WEBP", "JPEG"]
-"""Format of pictures: WebP is smaller; JPEG goes into a PDF as it is, where browsers unpack others to many times the size."""
+"""Format of pictures: WebP is smaller; JPEG goes into a PDF unchanged, while browsers unpack others to many times the size."""
 
 KEPT = 7
-"""Blocks in memory: those of a strip of 250 m, the one before and the one after."""
+"""Number of blocks in memory: those of a strip of 250 m, the one before and the one after."""
 
 NO_STATE = 255
-"""Where a block has no state."""
+"""Value without a state."""
 
 FILLED = 0.14
-"""Pixels without points take the mean of those about them, in a square so wide, m: about what the median filter looks at."""
+"""Width of the square around a pixel without points whose mean it takes, m: about that of the median filter."""
 
 LEAST = 0.005
-"""From black to white are at least so many m of offset."""
+"""Minimum range of offsets from black to white, m."""
 
 QUALITY = {"WEBP": 55, "JPEG": 70}
-"""Of the pictures, 0 to 100."""
+"""Quality of the pictures, 0 to 100."""
 
 UNSEEN, COVERED, FLOOR, NOTHING = (216, 200, 230), (186, 208, 188), (236, 239, 242), (255, 255, 255)
-"""Colours: lining not seen; something hangs before it; floor, which is not judged; no image."""
+"""Colours: lining not inspected; fixtures in front of it; floor, not inspected; no image."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Window:
         return self.north - self.south
 
     def widened(self, side: float) -> Window:
-        """Return the least window of whole pixels of that side, m, which holds it."""
+        """Return the smallest window of whole pixels of that side, m, around it."""
         west, south = (float(np.floor(edge / side + 1e-6) * side) for edge in (self.west, self.south))
         east, north = (float(np.ceil(edge / side - 1e-6) * side) for edge in (self.east, self.north))
         return Window(west, east, south, north)
@@ -73,7 +73,7 @@ class Window:
 
 @dataclass(frozen=True)
 class Picture:
-    """What a window shows: a file of an image."""
+    """Picture of a window: a file of an image."""
 
     window: Window
     form: Form
@@ -81,7 +81,7 @@ class Picture:
 
     @property
     def url(self) -> str:
-        """Address that holds the image itself."""
+        """Data URL of the image."""
         return f"data:image/{self.form.lower()};base64,{base64.b64encode(self.content).decode()}"
 
 
@@ -101,7 +101,7 @@ class _Block:
     state: UInt8
 
     def unseen(self, size: int) -> Bool:
-        """Lining that detection did not see, by the rule of `seen_lining` and its filter's side, pixels."""
+        """Return the lining that detection did not inspect, by `seen_lining` and its filter's side, pixels."""
         about = size // 2
         # What lies beyond the block is not known here; as it lies within, so that no line runs along its edges.
         seen = [seen for _, seen in seen_lining(np.pad(self.state, about, "reflect"), size)]
@@ -109,7 +109,7 @@ class _Block:
         return (self.state == PixelState.EMPTY) & ~np.concatenate(seen)[inner, inner]
 
     def lining(self) -> Single:
-        """What is shown of its lining, thinned, dB or m."""
+        """Return a sample of its lining, dB or m."""
         thin = (slice(None, None, 4), slice(None, None, 4))
         values = self.shown.values[thin]
         return values[np.isfinite(values) & np.isin(self.state[thin], (PixelState.LINING, PixelState.RECESS, PixelState.DARK))]
@@ -117,7 +117,7 @@ class _Block:
 
 @dataclass(frozen=True)
 class _Kilometre:
-    """How a kilometre is drawn.
+    """Rendering of a kilometre.
 
     Side of its pixels, m, and of the median filter, pixels; values shown black and white, dB or m.
     """
@@ -129,7 +129,7 @@ class _Kilometre:
 
 
 class Lining:
-    """Reads windows of the images of a survey: of corrected intensity, or of the offset where there is no intensity.
+    """Reader of windows of a survey's images: corrected intensity, or offset without intensity.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class Lining:
         self._unseen: OrderedDict[int, Bool] = OrderedDict()
 
     def picture(self, window: Window, pixel: float) -> Picture | None:
-        """Draw a window, None where there is no image.
+        """Draw a window; return None without an image.
 
         A pixel of the picture is about so large, m: a whole number of the image's own, which bounds the window anew.
         """
@@ -173,7 +173,7 @@ class Lining:
         return Picture(window, self._form, out.getvalue())
 
     def _offset(self, window: Window, side: float) -> Single:
-        """Offset of a window, m, NaN for none, with gaps filled from what lies in it and about it."""
+        """Return the offset of a window, m, NaN for none, with gaps filled from its surroundings."""
         edge = int(np.ceil(MAX_FILL_DISTANCE / side))
         about = Window(*(end + way * edge * side for end, way in zip(astuple(window), (-1, 1, -1, 1), strict=True)))
         sums = np.zeros((2, round(about.height / side), round(about.width / side)), np.float32)
@@ -208,7 +208,7 @@ class Lining:
         return block
 
     def _hidden(self, number: int, size: int) -> Bool:
-        """Lining of a block that was not seen; none where there is no intensity."""
+        """Return the lining of a block that was not inspected; none without intensity."""
         if self._kind == "offset":
             return np.zeros(self._block(number).state.shape, np.bool_)
         if number not in self._unseen:
@@ -219,7 +219,7 @@ class Lining:
         return self._unseen[number]
 
     def _kilometre(self, km: int) -> _Kilometre:
-        """What is drawn black and white is found from up to three of the kilometre's blocks."""
+        """Find the values for black and white, from up to three of the kilometre's blocks."""
         if km not in self._known:
             numbers = sorted(number for number, where in self._km.items() if where == km)
             blocks = [self._block(numbers[n]) for n in sorted({0, len(numbers) // 2, len(numbers) - 1})]
@@ -235,7 +235,7 @@ class Lining:
 
 @dataclass(frozen=True)
 class _Place:
-    """What a block has in a window, and where.
+    """Part of a block in a window, and its place.
 
     Attributes
     ----------
@@ -256,7 +256,7 @@ class _Place:
 
     @classmethod
     def of(cls, block: _Block, hidden: Bool, window: Window, side: float) -> _Place | None:
-        """Find the place of a block in a window whose picture has pixels of that side, m; None if it has none."""
+        """Find the place of a block in a window with pixels of that side, m; None if it has none."""
         transform, (height, width) = block.shown.transform, block.shown.values.shape
         column = np.floor((transform.c + transform.a * (np.arange(width) + 0.5) - window.west) / side).astype(np.intp)
         row = np.floor((window.north - transform.f - transform.e * (np.arange(height) + 0.5)) / side).astype(np.intp)
@@ -273,18 +273,18 @@ class _Place:
 
 
 def _inside(place: Intp, count: int) -> slice:
-    """Those of growing places that lie from 0 to ``count`` - 1."""
+    """Return those of increasing places from 0 to ``count`` - 1."""
     return slice(int(np.searchsorted(place, 0)), int(np.searchsorted(place, count)))
 
 
 def _offset_range(values: Single) -> tuple[float, float]:
-    """Offsets, m, drawn black and white: the 1st and the 98th percentile."""
+    """Return the offsets, m, for black and white: the 1st and the 98th percentile."""
     low, high = (float(v) for v in np.percentile(values, [1, 98])) if len(values) else (0.0, 1.0)
     return low, max(high, low + LEAST)
 
 
 def _grey(values: Single, kilometre: _Kilometre) -> UInt8:
-    """Values from black to white, and nothing where there is none."""
+    """Return values scaled from black to white, and empty ones without a value."""
     shade = np.clip((values - kilometre.low) / (kilometre.high - kilometre.low), 0.0, 1.0)
     grey = np.repeat(255.0 * np.nan_to_num(shade), 3).reshape(*shade.shape, 3).astype(np.uint8)
     grey[np.isnan(values)] = NOTHING
@@ -292,7 +292,7 @@ def _grey(values: Single, kilometre: _Kilometre) -> UInt8:
 
 
 def _seen(place: _Place, side: float, kilometre: _Kilometre) -> UInt8:
-    """Colours of corrected intensity and of lining that was not seen, is hidden or no lining."""
+    """Return colours of corrected intensity and of lining not inspected, hidden or outside."""
     held, level, lining, unseen, off, floor = place.sums()
     about = 2 * round(max(FILLED, kilometre.size * kilometre.pixel) / side / 2) + 1
 
@@ -332,5 +332,5 @@ def _accumulate(values: Single, state: UInt8, hidden: Bool, row: Intp, column: I
 
 
 def _ratio(part: Single, whole: Single) -> Single:
-    """Quotient, NaN where the divisor is none."""
+    """Return the quotient, NaN if the divisor is 0."""
     return np.divide(part, whole, out=np.full(part.shape, np.nan, np.float32), where=whole > 1e-3)

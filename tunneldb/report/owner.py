@@ -35,13 +35,13 @@ CHAPTERS = {
     "reviews": "Reviews",
     "signatures": "Signatures",
 }
-"""Chapters in their usual order, by name, with what the navigation calls them."""
+"""Chapters in their default order: names, and titles in the navigation."""
 
 COLOURS = {1: "#3a8f5c", 2: "#c9a100", 3: "#e0660b", 4: "#b8171d"}
-"""Usual colours of severities."""
+"""Default colours of severities."""
 
 LOGO = 640
-"""Width and height of a logo at most, pixels."""
+"""Maximum width and height of a logo, pixels."""
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _NAME = re.compile(r"\{\w+\}")
@@ -51,7 +51,7 @@ _IMAGES = ("PNG", "JPEG", "WEBP", "GIF", "TIFF", "BMP")
 
 @dataclass(frozen=True)
 class Owner:
-    """What an owner wants of the report.
+    """Owner's settings of the report.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ def _load(path: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Given:
-    """What a file holds; what is wrong with it is told with the file's name, the key and the value."""
+    """Settings file; errors are reported with the file's name, the key and the value."""
 
     path: Path
     values: dict[str, Any]
@@ -125,16 +125,16 @@ class _Given:
     def refuse_others(self, known: tuple[str, ...]) -> None:
         for key in self.values:
             if key not in known:
-                self.refuse(key, f"there is no such key; there are {', '.join(known)}")
+                self.refuse(key, f"unknown key; known are {', '.join(known)}")
 
     def text(self, key: str) -> str | None:
         value = self.values.get(key)
         if value is not None and (not isinstance(value, str) or not value.strip()):
-            self.refuse(key, f"takes a text, not {value!r}")
+            self.refuse(key, f"must be a text, not {value!r}")
         return value
 
     def day_format(self, key: str) -> str | None:
-        """Return how days are written; ``strftime`` prints a code that it does not know as it stands, and that is refused."""
+        """Return the date format; unknown codes, which ``strftime`` would print unchanged, are refused."""
         value = self.text(key)
         stray = value and re.search(r"%.?", _DAY_CODE.sub("", value), re.DOTALL)
         if stray:
@@ -144,18 +144,18 @@ class _Given:
     def table(self, key: str) -> dict[str, str]:
         value = self.values.get(key, {})
         if not isinstance(value, dict):
-            self.refuse(key, f"takes a table of texts, not {value!r}")
+            self.refuse(key, f"must be a table of texts, not {value!r}")
         for name, said in value.items():
             if not isinstance(said, str):
-                self.refuse(f"{key}.{name}", f"takes a text, not {said!r}")
+                self.refuse(f"{key}.{name}", f"must be a text, not {said!r}")
         return value
 
     def texts(self, key: str) -> dict[str, str]:
-        """Return a table of what is said for English texts; each has the names in braces that the English has."""
+        """Return a table of translations of English texts; each must have the same names in braces."""
         table, known = self.table(key), known_texts()
         for english, said in table.items():
             if english not in known:
-                self.refuse(f"{key}.{english!r}", "there is no such heading; all are in languages/en.toml of the package")
+                self.refuse(f"{key}.{english!r}", "unknown heading; all are in languages/en.toml of the package")
             stray = re.search(r"[{}]", _NAME.sub("", said))
             if stray or set(_NAME.findall(said)) != set(_NAME.findall(english)):
                 self.refuse(f"{key}.{english!r}", f"{said!r} has other names in braces")
@@ -180,12 +180,12 @@ def _words(given: _Given) -> Words:
 def _chapters(given: _Given) -> tuple[str, ...]:
     chapters = given.values.get("chapters", list(CHAPTERS))
     if not isinstance(chapters, list) or not chapters:
-        given.refuse("chapters", f"takes a list of names, not {chapters!r}")
+        given.refuse("chapters", f"must be a list of names, not {chapters!r}")
     for name in chapters:
         if not isinstance(name, str) or name not in CHAPTERS:
-            given.refuse("chapters", f"there is no chapter {name!r}; there are {', '.join(CHAPTERS)}")
+            given.refuse("chapters", f"unknown chapter {name!r}; known are {', '.join(CHAPTERS)}")
         if chapters.count(name) > 1:
-            given.refuse("chapters", f"{name!r} stands there {chapters.count(name)} times")
+            given.refuse("chapters", f"{name!r} occurs {chapters.count(name)} times")
     return tuple(chapters)
 
 
@@ -195,19 +195,19 @@ def _colours(given: _Given) -> dict[int, str]:
         if name not in ("1", "2", "3", "4"):
             given.refuse(f"severity_colours.{name}", "severities are 1 to 4")
         if not _COLOUR.fullmatch(colour):
-            given.refuse(f"severity_colours.{name}", f"takes a colour such as #b8371d, not {colour!r}")
+            given.refuse(f"severity_colours.{name}", f"must be a colour such as #b8371d, not {colour!r}")
     return COLOURS | {int(name): colour for name, colour in colours.items()}
 
 
 def _logo(given: _Given, path: Path) -> str:
-    """Return a logo, made smaller where it is larger than a cover needs, as a data URL."""
+    """Return a logo as a data URL, reduced if larger than a cover needs."""
     if not path.is_file():
-        given.refuse("logo", f"there is no file {path}")
+        given.refuse("logo", f"no file {path}")
     try:
         with Image.open(path, formats=_IMAGES) as image:
             small = image.convert("RGBA")
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # as decoders of broken images raise
-        given.refuse("logo", f"{path} is no image that can be read (PNG, JPEG, WebP, GIF, TIFF, BMP)")
+        given.refuse("logo", f"{path} is not a readable image (PNG, JPEG, WebP, GIF, TIFF, BMP)")
     small.thumbnail((LOGO, LOGO))
     data = io.BytesIO()
     small.save(data, "PNG", optimize=True)

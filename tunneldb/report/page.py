@@ -1,4 +1,4 @@
-"""The report as one HTML file, written piece by piece: what lies in memory does not grow with the pictures."""
+"""Report as one HTML file, written piece by piece, so that memory does not grow with the pictures."""
 
 from __future__ import annotations
 
@@ -40,18 +40,18 @@ from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey
 
 LISTED = 10_000
-"""Leaks that a report lists and draws, if nothing else is asked for: the largest; the others it counts."""
+"""Default number of leaks that a report lists and draws, the largest; the others are only counted."""
 
 CARDS = 400
-"""Leaks of which a printed report shows picture and section at most, the largest first; the HTML file shows those of all."""
+"""Maximum number of leaks with picture and section in a printed report, the largest first; the HTML file has all."""
 
 _OF_LEAKS = frozenset({"seen", "classes", "leaks", "statistics"})
-"""Chapters that say nothing where no leak was sought."""
+"""Chapters that are empty if leaks were not searched for."""
 
 
 @dataclass(frozen=True)
 class Written:
-    """What a report counts.
+    """Numbers of a report.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ def write_html(
 
 
 def write_site_html(conn: psycopg.Connection[Any], survey: Survey, path: Path, owner: Owner | None = None) -> int:
-    """Write the report of a survey of a site, which is the chapter on structures; the connection must be idle.
+    """Write the report of a survey of a site, with the chapter on structures; the connection must be idle.
 
     Returns
     -------
@@ -148,7 +148,7 @@ def write_site_html(conn: psycopg.Connection[Any], survey: Survey, path: Path, o
 
 
 def _digest_spots(digest: hashlib._Hash, found: StructuresChapter) -> hashlib._Hash:
-    """Add what is reported of the spots."""
+    """Add the reported spots."""
     for spot in sorted(found.spots.rows, key=lambda spot: spot.number):
         wkb = spot.geometry.wkb_hex
         stated = (spot.number, spot.review, spot.detected, spot.reviewed_by, spot.remark, f"{spot.area:.4f}", wkb)
@@ -296,7 +296,7 @@ class _Report:
         }
 
     def _says(self, chapter: str) -> bool:
-        """Whether a chapter has anything to say."""
+        """Return True if a chapter has content."""
         if chapter in _OF_LEAKS:
             return self.survey.intensity_kind != "none"
         there: dict[str, object] = {
@@ -309,7 +309,7 @@ class _Report:
         return data.label_chainages(self.conn, self.survey, chainages)
 
     def _kilometres(self) -> list[dict[str, Any]]:
-        """Statistics of each kilometre, as far as it lies in the stretch."""
+        """Return the statistics of each kilometre, limited to the stretch."""
         inner = [end for end in ticks(self.low, self.high, 1000.0) if self.low + 0.5 < end < self.high - 0.5]
         starts, ends = [self.low, *inner], [*inner, self.high]
         rows = data.read_statistics(self.conn, self.survey, starts, ends)
@@ -319,7 +319,7 @@ class _Report:
         return rows
 
     def _digest(self) -> str:
-        """SHA-256 of what is reported of the leaks: two reports of the same leaks and reviews have the same."""
+        """Return the SHA-256 of the reported leaks: two reports of the same leaks and reviews have the same."""
         digest = self.sums.digest.copy()
         digest_findings(digest, self.findings, self.regions)
         if self.structures:
@@ -327,7 +327,7 @@ class _Report:
         return digest.hexdigest()[:16]
 
     def _glance(self) -> dict[str, Any]:
-        """The whole stretch in one drawing, 1000 wide: share seen, wet area in bins, ticks."""
+        """Return the whole stretch in one drawing, 1000 wide: inspected share, wet area in bins, ticks."""
         length = self.high - self.low
         scale = 1000.0 / length
         bin_length, edges, wet = self.bin_length, self.sums.edges, self.sums.wet
@@ -351,7 +351,7 @@ class _Report:
         }
 
     def _table(self) -> Markup:
-        """Table of the leaks as JSON: names of the columns, and rows."""
+        """Return the table of the leaks as JSON: names of the columns, and rows."""
         rows = [
             [
                 leak.id, round(leak.middle, 3), leak.label, round(leak.chainage_to - leak.chainage_from, 2),
@@ -397,4 +397,4 @@ TABLE = [
     ),
     *("imageShare", "review", "by", "at", "remark", "detected", "strip", "kind", "origin", "severity", "severityLabel"),
 ]
-"""Columns of the table, as the script of the page calls them."""
+"""Columns of the table, as in the page's script."""

@@ -21,15 +21,15 @@ BROWSERS = (
     *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "microsoft-edge"),
     "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
 )
-"""Names under which a browser that prints may be installed."""
+"""Names of browsers that can print."""
 
 PATIENCE = 1800
-"""Seconds that a browser may print at most."""
+"""Maximum time for printing, s."""
 
 _TICK = 0.5  # seconds from one word on the wait to the next
 
 LONGEST = 60
-"""Bytes of a folder's path in which a browser can still open its socket: with its name there they must not be over 107."""
+"""Maximum bytes of a folder's path in which a browser can open its socket: with its name at most 107."""
 
 
 def find_browser() -> str:
@@ -43,20 +43,20 @@ def find_browser() -> str:
     stated = os.environ.get("TUNNELDB_BROWSER")
     found = [path for name in ((stated,) if stated else BROWSERS) if (path := shutil.which(name))]
     if not found:
-        lacking = "a PDF needs Chromium or Chrome, and none is installed"
-        said = f"TUNNELDB_BROWSER is {stated}, which is no program" if stated else lacking
+        lacking = "a PDF needs Chromium or Chrome, but none is installed"
+        said = f"TUNNELDB_BROWSER is {stated}, which is not a program" if stated else lacking
         raise UserError(f"{said}: install one, or write the report as .html and print it from a browser")
     chosen = next((path for path in found if not _is_snap(Path(path))), None)
     if chosen is None:
         raise UserError(
-            f"{found[0]} is a snap, which sees neither /tmp nor hidden folders and can't print the report: install Chrome, name"
-            " another browser by TUNNELDB_BROWSER, or write the report as .html and print it from the browser"
+            f"{found[0]} is a snap, which cannot access /tmp or hidden folders, so the report cannot be printed: install Chrome,"
+            " set TUNNELDB_BROWSER to another browser, or write the report as .html and print it from the browser"
         )
     return chosen
 
 
 def _is_snap(program: Path) -> bool:
-    """Whether a program is a snap, a link to one, or a script that starts one, as Ubuntu has it."""
+    """Return True if a program is a snap, a link to one, or a script that starts one, as on Ubuntu."""
     target = program.resolve()  # of a snap the program snap itself
     if target.name == "snap" or "/snap/" in f"{program} {target}":
         return True
@@ -108,7 +108,7 @@ def print_pdf(browser: str, page: Path, pdf: Path, waiting: Callable[[float], No
 
 
 def _is_whole(pdf: Path) -> bool:
-    """Whether a PDF has its end, by ISO 32000-1, 7.5.5."""
+    """Return True if a PDF has its end, by ISO 32000-1, 7.5.5."""
     with pdf.open("rb") as file:
         file.seek(max(0, pdf.stat().st_size - 1024))
         return b"%%EOF" in file.read()

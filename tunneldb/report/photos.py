@@ -1,4 +1,4 @@
-"""Photos of findings as small pictures for the report, from files and from the web; of one that can't be had it is told why."""
+"""Photos of findings as small pictures for the report, from files and from the web; with the reason if one is not available."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from tunneldb import __version__
 from tunneldb.store.survey import Survey
 
 SIZE = 480
-"""Width and height at most, pixels: 6 cm on paper at 200 dpi."""
+"""Maximum width and height, pixels: 6 cm on paper at 200 dpi."""
 
 LARGEST = 100_000_000
-"""Bytes of a photo at most."""
+"""Maximum bytes of a photo."""
 
 PATIENCE, TOGETHER = 10.0, 60.0
-"""Seconds that a server may take to say something, and that all photos from the web may take."""
+"""Timeout of a server, and total time for all photos from the web, s."""
 
 _FORMATS = ("JPEG", "PNG", "WEBP", "TIFF", "BMP", "GIF")  # none that runs another program, as PostScript
 _THREADS = 8
@@ -126,7 +126,7 @@ def _read(path: str, folder: Path, end: float) -> bytes:
 
 
 def _fetch(url: str, end: float) -> bytes:
-    """Return what lies at an address of the web."""
+    """Return the content of a web address."""
     opener = request.OpenerDirector()  # one that knows no files: a server could send us to them
     for handler in (
         request.ProxyHandler, request.HTTPHandler, request.HTTPSHandler, request.HTTPDefaultErrorHandler,
@@ -137,12 +137,12 @@ def _fetch(url: str, end: float) -> bytes:
     try:
         asked = request.Request(url, headers={"User-Agent": f"tunneldb/{__version__}"})
         if time.monotonic() > end:
-            raise _NotHadError("could not be fetched: no time was left")
+            raise _NotHadError("could not be fetched: out of time")
         with opener.open(asked, timeout=PATIENCE) as answer:
             while chunk := answer.read1(1 << 16):
                 data.write(chunk)
                 if time.monotonic() > end or data.tell() > LARGEST:
-                    raise _NotHadError("could not be fetched: it is too large or comes too slowly")
+                    raise _NotHadError("could not be fetched: too large or too slow")
     except HTTPError as error:
         raise _NotHadError(f"could not be fetched: {error.code} {error.reason}") from error
     except Exception as error:  # of sockets, TLS, HTTP and odd addresses; whatever it is, the report is written
@@ -153,7 +153,7 @@ def _fetch(url: str, end: float) -> bytes:
 
 
 def _picture(data: bytes) -> str:
-    """Return an image made small, upright as its camera says, as a data URL."""
+    """Return a small version of an image, rotated as the camera states, as a data URL."""
     try:
         with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
             image.draft("RGB", (2 * SIZE, 2 * SIZE))

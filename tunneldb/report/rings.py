@@ -15,10 +15,10 @@ from tunneldb.report.drawing import line_path, step_for, ticks
 from tunneldb.store.survey import Survey
 
 WIDTH, HEIGHT = 1000.0, 110.0
-"""Of a plot, in its own unit."""
+"""Size of a plot, in its own unit."""
 
 WORST = 10
-"""So many rings are listed: those of the most ovality, and those of the greatest steps."""
+"""Number of listed rings: those with the greatest ovality, and those with the greatest steps."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class RingsChapter:
-    """What the chapter states.
+    """Content of the chapter.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class RingsChapter:
 
 
 def read_rings(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> RingsChapter | None:
-    """Read what is stated of the rings of a stretch, m; None where none was measured."""
+    """Read the rings of a stretch, m; None if none was measured."""
     with conn.cursor(row_factory=dict_row) as cursor:
         rows = cursor.execute(
             "SELECT number, label, chainage_from, chainage_to, joint, seen_share, shape, centre_right, centre_up, radius,"
@@ -106,7 +106,7 @@ def read_rings(conn: psycopg.Connection[Any], survey: Survey, low: float, high: 
 
 
 def _worst(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The rings of most ovality and of the greatest steps, in order of chainage."""
+    """Return the rings with the greatest ovality and with the greatest steps, in order of chainage."""
     chosen: set[int] = set()
     for name in ("ovality", "step_greatest"):
         there = sorted((row for row in rows if row[name] is not None), key=lambda row: -abs(row[name]))

@@ -1,4 +1,4 @@
-"""The lining strip by strip: pictures with the leaks on them, and what each leak shows."""
+"""Lining strip by strip: pictures with the leaks on them, and details of each leak."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from tunneldb.store.findings import Finding
 from tunneldb.store.survey import Survey
 
 PICTURE, SHAPE = 256, 4 / 3
-"""Width of a leak's picture at most, pixels, and its width for its height."""
+"""Maximum width of a leak's picture, pixels, and ratio of its width to its height."""
 
 LEAST = 3.0
-"""Width of the lining that a leak's picture shows at least, m."""
+"""Minimum width of the lining in a leak's picture, m."""
 
 STRIP_PIXELS = 1600
 """Width of the picture of a strip, pixels."""
 
 LETTERS = 80
-"""Height of letters beside a strip: so many make its length."""
+"""Letter heights in the length of a strip."""
 
 SLIVER = 0.1
-"""A last strip shorter than this is left out, m, unless it leaks there."""
+"""Length below which a last strip without leaks is left out, m."""
 
 Progress = Callable[[int, int], None]
-"""Takes how many strips are drawn, and of how many."""
+"""Progress callback: number of strips drawn, and in total."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Strip:
 
 
 def strip_length(length: float) -> float:
-    """Length of a strip, m, for a stretch so long: no more than about a hundred."""
+    """Return the length of a strip, m, for a stretch: at most about a hundred strips."""
     return 50.0 if length <= 500 else 100.0 if length <= 5000 else 250.0 if length <= 50_000 else 500.0
 
 
@@ -240,13 +240,13 @@ class Strips:
 
 
 def _reaches_in(finding: Finding, low: float, high: float) -> bool:
-    """Whether a finding is to be seen between two chainages, m; one that begins at the second is not, but for a point."""
+    """Return True if a finding is visible between two chainages, m; one that begins at the second is not, except a point."""
     left, _, right, _ = finding.geometry.bounds
     return (left < high and right > low) or low <= left == right <= high
 
 
 def _summary(stated: Row, numbered: int, words: Words) -> str:
-    """How many leaks there are on a strip and how much of the lining was seen; so many leaks have a number beside it."""
+    """Return the number of leaks on a strip and the inspected share of the lining; only some leaks have a number beside it."""
     if stated["patches"] is None:
         return words("leaks were not searched for")
     count = stated["patches"]

@@ -17,17 +17,17 @@ WIDTH = 1000.0
 """Width of a picture, in its own unit."""
 
 HIDDEN = 0.5
-"""A face or member of which less than this share could be judged is marked."""
+"""Inspected share below which a face or member is marked."""
 
 LARGEST = 25
-"""So many of the largest members are listed, whether they have spots or not."""
+"""Number of the largest members listed, with spots or not."""
 
 _BARS = 4  # the bar of a picture is at least a fourth of its width
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """What is drawn: its path, the class that says how, and where its number stands.
+    """Drawn shape: its path, its CSS class, and the place of its number.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class StructuresChapter:
-    """What the chapter states.
+    """Content of the chapter.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class StructuresChapter:
 
     @property
     def coloured(self) -> bool:
-        """Whether any of the spots has a colour."""
+        """True if any of the spots has a colour."""
         return any(spot.rgb for spot in self.spots.rows)
 
     @property
@@ -106,7 +106,7 @@ class StructuresChapter:
 def read_structures(
     conn: psycopg.Connection[Any], survey: Survey, stretch: tuple[float, float] | None = None
 ) -> StructuresChapter | None:
-    """Read what is stated of a survey's structures; None where members were never found, nor looked for.
+    """Read the structures of a survey; None if members were never searched for.
 
     Parameters
     ----------

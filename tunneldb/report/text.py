@@ -22,7 +22,7 @@ SPACE = "\u202f"
 
 
 def percent(share: float | None, decimals: int = 1) -> str:
-    """Share as per cent; never 100 % of what is less, nor 0 % of what is more than nothing."""
+    """Return a share in per cent; 100 % only for all, 0 % only for nothing."""
     if share is None:
         return DASH
     least = 10**-decimals
@@ -35,7 +35,7 @@ def percent(share: float | None, decimals: int = 1) -> str:
 
 
 def number(value: float | None, decimals: int = 2) -> str:
-    """Return a number with so many decimals, thousands apart; a dash for none."""
+    """Return a number with so many decimals and thousands separators; a dash for None."""
     return DASH if value is None else f"{value:,.{decimals}f}".replace(",", SPACE).replace("-", "−")
 
 
@@ -45,27 +45,27 @@ def signed(value: float) -> str:
 
 
 def whole(value: float | None) -> str:
-    """Return a whole number, thousands apart; a dash for none."""
+    """Return a whole number with thousands separators; a dash for None."""
     return number(value, 0)
 
 
 def rounded(value: float | None, decimals: int) -> float | None:
-    """Round what may be none."""
+    """Round a value that may be None."""
     return None if value is None else round(value, decimals)
 
 
 def when(moment: dt.datetime) -> str:
-    """Moment to the minute, UTC."""
+    """Return a time to the minute, UTC."""
     return moment.astimezone(dt.UTC).strftime("%Y-%m-%d %H:%M UTC")
 
 
 def day(date: dt.date) -> str:
-    """Day with the month's name: 4 May 2024."""
+    """Return a date with the month's name: 4 May 2024."""
     return f"{date.day} {date:%B %Y}"
 
 
 def size(count: int) -> str:
-    """Bytes in the unit that suits."""
+    """Return bytes in a suitable unit."""
     value = float(count)
     for unit in ("B", "kB", "MB", "GB"):
         if value < 1000:
@@ -80,7 +80,7 @@ def short(label: str) -> str:
 
 
 def kilometres(numbers: Iterable[int]) -> str:
-    """Kilometres with those in a row taken together: 12, 14–17."""
+    """Return kilometres with ranges combined: 12, 14–17."""
     parts = []
     for _, group in groupby(enumerate(sorted(numbers)), key=lambda pair: pair[1] - pair[0]):
         row = [km for _, km in group]
@@ -89,18 +89,18 @@ def kilometres(numbers: Iterable[int]) -> str:
 
 
 def css(value: str) -> str:
-    """Text for a string in a style sheet: only what cannot end it."""
+    """Escape text for a string in a style sheet, so that it cannot end the string."""
     return "".join(c if c.isalnum() or c in " .,:;·–-_+()/" else f"\\{ord(c):x} " for c in value)
 
 
 def counters(said: str) -> str:
-    """Text with {page} and {pages} in it as content of a style sheet: strings between the counters of pages."""
+    """Return text with {page} and {pages} as content of a style sheet: strings between page counters."""
     parts = re.split(r"\{(pages?)\}", said)
     return " ".join(f"counter({part})" if n % 2 else f'"{css(part)}"' for n, part in enumerate(parts) if part)
 
 
 def stale(rows: Sequence[Row]) -> dict[str, list[tuple[str, str]]]:
-    """Return which stages are out of date, with their kilometres, and why: what is stale by another stage is no reason."""
+    """Return the stages that are out of date, with kilometres and reasons; staleness caused by another stage is no reason."""
     stages: defaultdict[str, set[int]] = defaultdict(set)
     reasons: defaultdict[str, set[int]] = defaultdict(set)
     for row in rows:
@@ -114,7 +114,7 @@ def stale(rows: Sequence[Row]) -> dict[str, list[tuple[str, str]]]:
 
 
 def versions(runs: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return the different sets of versions, with the stages and kilometres that each holds for."""
+    """Return the sets of versions, with the stages and kilometres of each."""
     by: defaultdict[str, list[Row]] = defaultdict(list)
     for run in runs:
         by[", ".join(f"{name} {value}" for name, value in sorted(run["versions"].items()))].append(run)
@@ -129,12 +129,12 @@ def versions(runs: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def crs(said: str) -> str:
-    """Return AUTHORITY:CODE as it is; of a definition the name, which is the first that it quotes."""
+    """Return AUTHORITY:CODE unchanged; for a definition its name, the first quoted text."""
     return said.split('"')[1] if '"' in said else said
 
 
 def script_json(value: Any) -> Markup:
-    """JSON that may stand in a script element."""
+    """Return JSON that is safe in a script element."""
     plain = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     return Markup(plain.replace("<", "\\u003c"))
 
@@ -143,12 +143,12 @@ _WHAT = {"finding": "finding", "axis_vertex": "axis vertex", "region": "region",
 
 
 def edit(entry: Edit, spots: Mapping[int, int]) -> dict[str, str]:
-    """Return a change made by hand in words: who and when, of what, and each column from what to what.
+    """Describe a manual edit: person and time, object, and old and new value of each column.
 
     People know spots by their numbers, which ``spots`` has by key; of one that is gone the key is all that is left.
     """
     before, after = entry.before or {}, entry.after or {}
-    which = str(entry.row_id if entry.view != "spot" else spots.get(entry.row_id, f"that is gone, key {entry.row_id}"))
+    which = str(entry.row_id if entry.view != "spot" else spots.get(entry.row_id, f"no longer existing, key {entry.row_id}"))
     if entry.action == "update":
         changes = "; ".join(_change(name, before.get(name), after.get(name)) for name in sorted({*before, *after}))
     else:
@@ -159,7 +159,7 @@ def edit(entry: Edit, spots: Mapping[int, int]) -> dict[str, str]:
 
 
 def _come_or_gone(view: str, before: Row, after: Row) -> str:
-    """Return in words that something was drawn, added, deleted or removed, and what it was."""
+    """Describe what was drawn, added, deleted or removed."""
     verb = ("added" if after else "removed") if view == "photo" else "drawn" if after else "deleted"
     stated = {
         name: value for name, value in (after or before).items() if name not in ("geom", "finding_id") and value is not None
@@ -180,5 +180,5 @@ def _change(name: str, before: Any, after: Any) -> str:
 
 
 def _shape(ewkt: Any) -> shapely.Geometry:
-    """Geometry of an EWKT."""
+    """Return the geometry of an EWKT."""
     return shapely.from_wkt(str(ewkt).rpartition(";")[2])

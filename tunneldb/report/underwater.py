@@ -1,4 +1,4 @@
-"""The chapter on what lies below the water of a canal tunnel: sonar scans, the bed, closed sections."""
+"""Chapter on a canal tunnel below the water: sonar scans, the bed, closed sections."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from tunneldb.report.drawing import line_path, step_for, ticks
 from tunneldb.store.survey import Survey
 
 WIDTH, HEIGHT = 1000.0, 180.0
-"""Of the profile of the bed, in its own unit."""
+"""Size of the profile of the bed, in its own unit."""
 
 SECTIONS = 12
-"""So many closed sections are drawn at most, evenly over those that there are."""
+"""Maximum number of drawn closed sections, evenly spread."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class ClosedSection:
 
 @dataclass(frozen=True)
 class UnderwaterChapter:
-    """What the chapter states.
+    """Content of the chapter.
 
     Attributes
     ----------
@@ -81,12 +81,12 @@ class UnderwaterChapter:
 
     @property
     def left_out(self) -> list[dict[str, Any]]:
-        """Scans of which nothing is in the tunnel: without a pose, or not loaded with the one that they have."""
+        """Number of scans outside the tunnel: without a pose, or not loaded with their current pose."""
         return [scan for scan in self.scans if not scan["kept"]]
 
 
 def read_underwater(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> UnderwaterChapter | None:
-    """Read what is stated of a stretch below the water, m; None where no sonar scan was registered."""
+    """Read the results of a stretch below the water, m; None if no sonar scan was registered."""
     scans = _rows(
         conn,
         "SELECT v.name, v.state, v.undetermined, v.sigma_x, v.sigma_y, v.sigma_z, v.scale,"

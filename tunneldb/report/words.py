@@ -17,7 +17,7 @@ _FOLDER = files("tunneldb.report") / "languages"
 
 @dataclass(frozen=True)
 class Words:
-    """What a report says for each of its English texts.
+    """Texts of a report for each English text.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Words:
 
 
 def languages() -> list[str]:
-    """Codes of the languages that there are."""
+    """Return the codes of the available languages."""
     return sorted(entry.name.removesuffix(".toml") for entry in _FOLDER.iterdir() if entry.name.endswith(".toml"))
 
 
@@ -54,5 +54,5 @@ def read_language(code: str) -> dict[str, Any]:
 
 
 def known_texts() -> frozenset[str]:
-    """All texts that can be said otherwise: those of the English catalogue, which says them as they are."""
+    """Return all translatable texts: those of the English catalogue."""
     return frozenset(read_language(ENGLISH)["texts"])
