@@ -49,7 +49,7 @@ def find_browser() -> str:
     chosen = next((path for path in found if not _is_snap(Path(path))), None)
     if chosen is None:
         raise UserError(
-            f"{found[0]} is a snap, which cannot access /tmp or hidden folders, so the report cannot be printed: install Chrome,"
+            f"{found[0]} is a snap, which cannot access /tmp or hidden folders, so cannot print the report: install Chrome,"
             " set TUNNELDB_BROWSER to another browser, or write the report as .html and print it from the browser"
         )
     return chosen
