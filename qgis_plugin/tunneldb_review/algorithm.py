@@ -77,7 +77,7 @@ class CommandAlgorithm(QgsProcessingAlgorithm):
                 made.setFlags(made.flags() | QgsProcessingParameterDefinition.FlagAdvanced)
             self.addParameter(made)
         if self.command.loads:
-            self.addParameter(QgsProcessingParameterBoolean(LOAD, "Add what was written to the project", defaultValue=True))
+            self.addParameter(QgsProcessingParameterBoolean(LOAD, "Add the output to the project", defaultValue=True))
         self.addOutput(QgsProcessingOutputNumber(EXIT_CODE, "Exit code"))
 
     def processAlgorithm(self, parameters: Dict[str, Any], context: QgsProcessingContext, feedback: Any) -> Dict[str, Any]:
@@ -105,10 +105,10 @@ class CommandAlgorithm(QgsProcessingAlgorithm):
         except CommandError as error:
             raise QgsProcessingException(str(error)) from None
         if ended.cancelled:
-            feedback.pushInfo("Cancelled: stages that were done are in the database, and the next run goes on from there.")
+            feedback.pushInfo("Cancelled: completed stages are in the database, and the next run continues from there.")
             return {EXIT_CODE: ended.code}
         if ended.code not in (0, 1):
-            raise QgsProcessingException(error_of(ended.error) or f"{settings.program} ended with {ended.code}")
+            raise QgsProcessingException(error_of(ended.error) or f"{settings.program} ended with exit code {ended.code}")
         if ended.code == 1:
             feedback.reportError(
                 f"Exit code 1: {self.command.wrong or error_of(ended.error) or 'something is wrong, see above'}"
@@ -138,7 +138,7 @@ class CommandAlgorithm(QgsProcessingAlgorithm):
         return self.parameterAsString(parameters, item.name, context)
 
     def _load(self, parameters: Dict[str, Any], context: QgsProcessingContext, paths: list[str]) -> None:
-        """Have what was written added to the project, where it is layers and the user wants it."""
+        """Add the output to the project, if it consists of layers and the user wants it."""
         if not self.command.loads or not self.parameterAsBool(parameters, LOAD, context):
             return
         for path in paths:

@@ -12,16 +12,16 @@ from qgis.PyQt.QtGui import QColor
 from .images import image_of, window
 
 ZOOM = 0.12
-"""As that of a cut-out: a canvas shows more about a finding."""
+"""Ratio of the extent to that of a cut-out: a canvas shows more around a finding."""
 
 _BESIDE = 15.0
-"""Metres about a finding on the map."""
+"""Distance shown around a finding on the map, m."""
 
 _LINE = QColor(220, 30, 30)
 
 
 def shows_unrolled(layers: Iterable[QgsMapLayer]) -> bool:
-    """Whether layers of a canvas are in the unrolled plane, which has no reference system."""
+    """Return True if the layers of a canvas are in the unrolled plane, which has no reference system."""
     for layer in layers:
         if isinstance(layer, QgsRasterLayer) and image_of(layer.source()) is not None:
             return True
@@ -37,7 +37,7 @@ class Followers:
         self._bands: Dict[QgsMapCanvas, QgsRubberBand] = {}
 
     def go(self, canvases: Iterable[QgsMapCanvas], facts: Dict[str, Any]) -> None:
-        """Go to a finding."""
+        """Show a finding."""
         self.clear()
         for canvas in canvases:
             unrolled = shows_unrolled(canvas.layers())
@@ -64,7 +64,7 @@ class Followers:
                     layer.triggerRepaint()
 
     def clear(self) -> None:
-        """Take the marks away."""
+        """Remove the marks."""
         for canvas, band in self._bands.items():
             if not sip.isdeleted(canvas) and not sip.isdeleted(band):
                 canvas.scene().removeItem(band)
@@ -84,7 +84,7 @@ def _map_extent(facts: Dict[str, Any]) -> QgsRectangle | None:
 
 
 def _lines(outline: QgsGeometry) -> List[List[Any]]:
-    """Lines and rings of a geometry, as lines."""
+    """Return lines and rings of a geometry, as lines."""
     lines: List[List[Any]] = []
     for part in outline.asGeometryCollection():
         if part.type() == QgsWkbTypes.PolygonGeometry:

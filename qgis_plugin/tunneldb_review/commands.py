@@ -1,4 +1,4 @@
-"""The commands of ``tunneldb`` that are algorithms: the words of a call, and what its lines state.
+"""Commands of ``tunneldb`` as algorithms: command line of a call, and meaning of its output lines.
 
 Knows neither QGIS nor ``tunneldb``. Parameters are in ``catalogue.py``, which ``scripts/package_plugin.py`` generates from the
 command line.
@@ -19,7 +19,7 @@ _FAULT = "tunneldb: "
 
 
 def arguments_of(command: Command, values: Mapping[str, Any]) -> List[str]:
-    """Return the words after ``tunneldb`` and where the database is.
+    """Return the command line after ``tunneldb`` and the database option.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def arguments_of(command: Command, values: Mapping[str, Any]) -> List[str]:
         words = _words(parameter, value)
         if not words:
             if parameter.required:
-                raise ValueError(f"{parameter.title}: say which")
+                raise ValueError(f"{parameter.title}: a value is required")
             continue
         if not parameter.option:
             positional += words
@@ -63,7 +63,7 @@ def progress_of(line: str) -> Optional[float]:
 
 
 def error_of(text: str) -> str:
-    """Return the line in which ``tunneldb`` says what is wrong, without its name; else the last line, or nothing.
+    """Return the error line of ``tunneldb``, without its name; else the last line, or nothing.
 
     What click says of a command line ends in a line ``Error: …``.
     """
@@ -76,7 +76,7 @@ def error_of(text: str) -> str:
 
 
 def help_of(command: Command) -> str:
-    """Return the help of an algorithm: what it does, and the verb that it calls."""
+    """Return the help of an algorithm: its purpose, and the command that it calls."""
     said = f"<p>{command.help}</p><p>Calls <code>tunneldb {' '.join(command.verb)}</code>.</p>"
     if command.wrong:
         said += f"<p>Exit code 1: {command.wrong}.</p>"

@@ -1,4 +1,4 @@
-"""Where the database, the command and the images are."""
+"""Dialog for the connection to the database, the command and the folder of images."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ class ConnectDialog(QDialog):
         self.attempt = attempt
         self.survey = settings.survey
         self.ways = {
-            PROJECT: QRadioButton("as the open project's layers do"),
+            PROJECT: QRadioButton("as in the layers of the open project"),
             SERVICE: QRadioButton("by a service of pg_service.conf"),
-            HOME: QRadioButton("to the embedded server of a home"),
+            HOME: QRadioButton("to the embedded server of a home folder"),
         }
         self.service = QLineEdit(settings.service)
         self.service.setObjectName("service")
@@ -51,10 +51,10 @@ class ConnectDialog(QDialog):
         self.authcfg.setConfigId(settings.authcfg)
         self.home, self.command, self.images = QgsFileWidget(), QgsFileWidget(), QgsFileWidget()
         self.home.setStorageMode(QgsFileWidget.GetDirectory)
-        self.home.lineEdit().setPlaceholderText("TUNNELDB_HOME; empty: the one in your data folder")
+        self.home.lineEdit().setPlaceholderText("TUNNELDB_HOME; empty: default in your data folder")
         self.command.lineEdit().setPlaceholderText("empty: tunneldb on the path")
         self.images.setStorageMode(QgsFileWidget.GetDirectory)
-        self.images.lineEdit().setPlaceholderText("where tunneldb image wrote to; not needed with a project")
+        self.images.lineEdit().setPlaceholderText("output folder of tunneldb image; not needed with a project")
         for box, value in ((self.home, settings.home), (self.command, settings.command), (self.images, settings.images)):
             box.setFilePath(value)
         self.ways.get(settings.way, self.ways[PROJECT]).setChecked(True)
@@ -63,7 +63,7 @@ class ConnectDialog(QDialog):
         self._arrange()
 
     def settings(self) -> Settings:
-        """Return what the user says."""
+        """Return the user's settings."""
         return Settings(
             way=next(way for way, button in self.ways.items() if button.isChecked()),
             service=self.service.text().strip(),
@@ -90,8 +90,8 @@ class ConnectDialog(QDialog):
         form.addRow("Command tunneldb", self.command)
         form.addRow("Images", self.images)
         hint = QLabel(
-            "No password is kept here: it comes from the service's entry, from .pgpass, or from QGIS's authentication manager,"
-            " which the command does not ask."
+            "No password is stored here: it comes from the service's entry, from .pgpass, or from QGIS's authentication manager"
+            " (which the command tunneldb does not use)."
         )
         hint.setWordWrap(True)
         test = QPushButton("Try it")

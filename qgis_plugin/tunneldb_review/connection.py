@@ -1,4 +1,4 @@
-"""How a database of tunneldb is reached: by QGIS, and by the command ``tunneldb``. Nothing here holds a password."""
+"""Connection to a database of tunneldb, for QGIS and for the command ``tunneldb``. Passwords are not stored here."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Dict, List
 
 PROJECT, SERVICE, HOME = "project", "service", "home"
-"""Where a connection is taken from: the open project's layers, an entry of pg_service.conf, the home of an embedded server."""
+"""Sources of a connection: the open project's layers, an entry of pg_service.conf, the home of an embedded server."""
 
 _WORD = re.compile(r"\s*([a-z_]+)\s*=\s*('(?:[^'\\]|\\.)*'|\S*)")
 _KEPT = ("service", "host", "port", "dbname", "user", "sslmode")
@@ -32,7 +32,7 @@ class Connection:
     home: str = ""
 
     def arguments(self) -> List[str]:
-        """Return what ``tunneldb`` is given before the verb."""
+        """Return the options of ``tunneldb`` before the command."""
         return [] if self.home else ["--dsn", dsn(self.words)]
 
     def environment(self) -> Dict[str, str]:
@@ -46,7 +46,7 @@ def of_service(name: str, authcfg: str = "") -> Connection:
 
 
 def of_home(folder: str, told: str) -> Connection:
-    """Connect to the embedded server of a folder, whose DSN ``tunneldb server start`` has told."""
+    """Connect to the embedded server of a folder, with the DSN printed by ``tunneldb server start``."""
     return Connection(words_of(told), home=folder)
 
 
@@ -66,7 +66,7 @@ def words_of(text: str) -> Dict[str, str]:
     """
     words = {name: _unquoted(value) for name, value in _WORD.findall(text) if name in _KEPT}
     if not words.get("service") and not words.get("dbname"):
-        raise ValueError(f"no database is named in {text.strip()[:80]!r}")
+        raise ValueError(f"no database in {text.strip()[:80]!r}")
     return {name: value for name, value in words.items() if value}
 
 

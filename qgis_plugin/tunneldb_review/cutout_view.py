@@ -44,7 +44,7 @@ class CutoutView(QWidget):
         return QSize(300, 220)
 
     def show_finding(self, picture: Picture | None, outline: str, review: str, missing: str = "") -> None:
-        """Say what is to be shown; `set_image` brings the image when it is drawn.
+        """Set what to show; `set_image` provides the image when it is drawn.
 
         Parameters
         ----------
@@ -90,7 +90,7 @@ class CutoutView(QWidget):
         self._label(painter, QPointF(6, 16), self.title)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Let pictures be drawn in the new size."""
+        """Have pictures drawn in the new size."""
         super().resizeEvent(event)
         self.resized.emit()
 

@@ -1,4 +1,4 @@
-"""Cut-outs of the images about a finding, drawn by QGIS beside the main thread, and the next ones before they are asked for."""
+"""Cut-outs of the images around a finding, drawn by QGIS in the background, with the next ones in advance."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from qgis.PyQt.QtGui import QColor, QImage
 from .images import Image, image_of, in_folder, kilometres, stacked
 
 KEPT = 60
-"""Pictures that are kept."""
+"""Number of pictures in memory."""
 
 BACKGROUND = QColor("#f7f7f7")
 _SAMPLE = 250_000
@@ -33,7 +33,7 @@ _OFFSET_COLOURS = ((-1.0, "#2166ac"), (-0.4, "#92c5de"), (0.0, "#e6e6e6"), (0.4,
 
 
 class Picture(NamedTuple):
-    """What a picture shows: which finding, which kind of image, of which size, from where to where."""
+    """Key of a picture: finding, kind of image, size, and extent."""
 
     finding: int
     kind: str
@@ -43,7 +43,7 @@ class Picture(NamedTuple):
 
 
 class ImageSource:
-    """The images of the open project, as it draws them, or, where it has none of a kind, those of a folder."""
+    """Images of the open project in its style; missing kinds come from a folder."""
 
     def __init__(self) -> None:
         self.folder = ""
@@ -90,7 +90,7 @@ class CutoutMaker(QObject):
         return image
 
     def want(self, picture: Picture, layers: Iterable[QgsRasterLayer]) -> None:
-        """Begin to draw a picture, unless it is there or under way; `made` says when it is there."""
+        """Start to draw a picture, unless it exists or is in progress; `made` reports it when ready."""
         if picture in self._images or picture in self._jobs:
             return
         settings = QgsMapSettings()
@@ -105,7 +105,7 @@ class CutoutMaker(QObject):
         job.start()
 
     def drop_others(self, wanted: Iterable[Picture]) -> None:
-        """Stop drawing what is wanted no more."""
+        """Stop drawing pictures that are no longer needed."""
         kept = set(wanted)
         for picture in [picture for picture in self._jobs if picture not in kept]:
             job = self._jobs.pop(picture)

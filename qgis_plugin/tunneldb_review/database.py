@@ -1,4 +1,4 @@
-"""The database through QGIS's own PostgreSQL provider, so that services, .pgpass and its authentication manager hold."""
+"""Database access through QGIS's PostgreSQL provider, so that services, .pgpass and its authentication manager apply."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from qgis.core import NULL, QgsDataSourceUri, QgsException, QgsProviderConnectio
 from . import sql
 from .connection import Connection
 
-LOST = "No connection to the database. Nothing is lost: the same key tries again."
-NOT_WRITTEN = "No connection to the database. This is not written yet: say it again when the server is back."
+LOST = "No connection to the database. Nothing is lost: press the same key to try again."
+NOT_WRITTEN = "No connection to the database. This was not written; repeat it when the server is back."
 
 
 class DatabaseError(Exception):
-    """What the database or QGIS refused, in one line."""
+    """Refusal by the database or QGIS, in one line."""
 
 
 class ConnectionLostError(DatabaseError):
-    """The server cannot be reached; what was asked of it is not done.
+    """Server not reachable; the request was not done.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ class ChangedMeanwhileError(DatabaseError):
     def __init__(self, finding_id: int, now: Mapping[str, Any]) -> None:
         remark = f", remark “{now['remark']}”" if now["remark"] else ""
         super().__init__(
-            f"{now['reviewed_by'] or 'Somebody'} has changed finding {finding_id} meanwhile: it is {now['review']},"
-            f" {now['kind_label'] or now['kind']}{remark}. Nothing was written; say again what it is."
+            f"{now['reviewed_by'] or 'Somebody'} has changed finding {finding_id} in the meantime: it is {now['review']},"
+            f" {now['kind_label'] or now['kind']}{remark}. Nothing was written; enter your review again."
         )
 
 
@@ -71,7 +71,7 @@ class Database:
         try:
             ((self.person, self.may_review, self.may_undo),) = self.rows(sql.PERSON)
         except ConnectionLostError as error:
-            raise DatabaseError(f"{error.reason}: is the server there, and does it let you in?") from None
+            raise DatabaseError(f"{error.reason}: check that the server runs and that you may log in") from None
 
     def rows(self, query: str) -> List[List[Any]]:
         """Return the rows of a query of :mod:`.sql`, with None for NULL.
@@ -87,7 +87,7 @@ class Database:
         return [[_plain(value) for value in row] for row in rows]
 
     def review(self, finding_id: int, seen: Mapping[str, Any], values: Mapping[str, Any]) -> bool:
-        """Write the review, the kind or the remark of a finding; False, and nothing is written, where it is so already.
+        """Write the review, the kind or the remark of a finding; return False, without writing, if it is already so.
 
         Parameters
         ----------
@@ -105,7 +105,7 @@ class Database:
             It is gone, the person may not, or the database refuses.
         """
         if not self.may_review:
-            raise DatabaseError(f"{self.person} may look, but not review: an operator grants tunnel_inspector")
+            raise DatabaseError(f"{self.person} may look, but not review: an operator must grant the role tunnel_inspector")
         try:
             if self.rows(sql.review(finding_id, seen, values)):
                 return True
@@ -113,14 +113,14 @@ class Database:
         except ConnectionLostError as error:
             raise ConnectionLostError(NOT_WRITTEN, error.reason) from None
         if not rows:
-            raise DatabaseError(f"finding {finding_id} is gone")
+            raise DatabaseError(f"finding {finding_id} does not exist any more")
         now = sql.told(rows[0])
         if any(now[name] != value for name, value in values.items()):
             raise ChangedMeanwhileError(finding_id, now)
         return False
 
     def undo(self, finding_id: int) -> str:
-        """Take back the last change of a finding, and return what that was, as "reviewed"."""
+        """Undo the last change of a finding, and return its columns, as "reviewed"."""
         return str(self.rows(sql.undo(finding_id))[0][0])
 
 
@@ -142,7 +142,7 @@ def _plain(value: Any) -> Any:
 
 
 def _explained(line: str) -> str:
-    """Name what is missing, where the server speaks of tables alone."""
+    """Name what is missing, if the server names only tables."""
     if "tunnel_api" in line and ("does not exist" in line or "permission denied" in line):
-        return f"that is no database of tunneldb for you ({line}): tunneldb init, and a role of tunnel_inspector"
+        return f"no tunneldb database for you ({line}): run tunneldb init, and have the role tunnel_inspector granted"
     return line

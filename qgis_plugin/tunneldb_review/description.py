@@ -1,4 +1,4 @@
-"""How an algorithm is described."""
+"""Description of an algorithm."""
 
 from __future__ import annotations
 

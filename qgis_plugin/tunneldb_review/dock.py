@@ -1,4 +1,4 @@
-"""The review dock: its widgets, keys and what they do; what is shown and written is in :mod:`.session`."""
+"""Review dock: its widgets, keys and actions; the logic of a review is in :mod:`.session`."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from .session import Session
 from .worklist import CONFIRMED, OPEN, REJECTED, Finding
 
 AHEAD = 2
-"""Findings whose pictures are drawn before they are asked for."""
+"""Number of findings whose pictures are drawn in advance."""
 
 NO_IMAGE = "No image: open the project of the survey, or name a folder of images in Connect."
 
 LINGER = 300
-"""Milliseconds that one stays at a finding before the map follows: it takes longer to draw than a verdict to say."""
+"""Delay before the map follows to a finding, ms: drawing takes longer than a verdict."""
 
 _ZOOM, _ZOOMS = 1.5, (0.1, 8.0)
 
@@ -42,7 +42,7 @@ class ReviewDock(QDockWidget):
     """
 
     said = pyqtSignal(str, bool)
-    """A line for the user, and whether it is of something that went wrong."""
+    """Message for the user, and whether it is an error."""
 
     survey_changed = pyqtSignal(str)
     reload_wanted = pyqtSignal()
@@ -68,7 +68,7 @@ class ReviewDock(QDockWidget):
         self.told.setWordWrap(True)
         self.message.setObjectName("message")
         self.message.setWordWrap(True)
-        self.go_on = QCheckBox("go on after a verdict")
+        self.go_on = QCheckBox("next finding after a verdict")
         self.go_on.setChecked(True)
         self.follow = QCheckBox("map follows")
         self.follow.setChecked(True)
@@ -82,7 +82,7 @@ class ReviewDock(QDockWidget):
         self.filters.offer(session.surveys, session.kinds, survey)
         self.panel.offer(session.kinds)
         if not session.surveys:
-            self._say("The database holds no survey of a tunnel.", wrong=True)
+            self._say("The database has no survey of a tunnel.", wrong=True)
             return
         self.read()
 
@@ -113,20 +113,20 @@ class ReviewDock(QDockWidget):
         self._judge(REJECTED)
 
     def reopen(self) -> None:
-        """Take the verdict away, and stay."""
+        """Remove the verdict, and stay."""
         self._do(lambda session: session.write(review=OPEN), repaint=True)
 
     def set_kind(self, code: str) -> None:
-        """Say what the finding is."""
+        """Set the kind of the finding."""
         self._do(lambda session: session.write(kind=code), repaint=True)
 
     def set_remark(self, text: str) -> None:
-        """Write the remark, and give the keys back to the dock; one that cannot be written stays there to be entered again."""
+        """Write the remark, and return the keys to the dock; a remark that cannot be written stays in the field."""
         if self._do(lambda session: session.write(remark=text.strip() or None)):
             self.take_keys()
 
     def undo(self) -> None:
-        """Take the last step back, and go to where it was.
+        """Undo the last step, and go to its finding.
 
         A remark that was typed, and not entered, is written if that is elsewhere, else it stays in its line.
         """
@@ -139,14 +139,14 @@ class ReviewDock(QDockWidget):
 
     def next(self) -> None:
         """Go to the next finding."""
-        self._step(lambda session: session.next(), "That was the last that is asked for.")
+        self._step(lambda session: session.next(), "That was the last finding of this selection.")
 
     def previous(self) -> None:
-        """Go to the finding before."""
-        self._step(lambda session: session.previous(), "There is none before.")
+        """Go to the previous finding."""
+        self._step(lambda session: session.previous(), "There is no previous finding.")
 
     def take_keys(self) -> None:
-        """Let keys go to the dock."""
+        """Give the keyboard focus to the dock."""
         self.widget().setFocus()
 
     def read_again(self) -> bool:
@@ -158,7 +158,7 @@ class ReviewDock(QDockWidget):
         return self._do(lambda session: session.again(self.filters.filter, str(self.filters.order.currentData())))
 
     def settled(self) -> bool:
-        """Whether the pictures of the finding are all there."""
+        """Return True if all pictures of the finding exist."""
         return all(view.picture is None or view.missing or view.image is not None for view in self.views.values())
 
     def _judge(self, review: str) -> None:
@@ -168,7 +168,7 @@ class ReviewDock(QDockWidget):
             if self.go_on.isChecked() and session.next():
                 return
             if self.go_on.isChecked():
-                self._say("That was the last that is asked for.")
+                self._say("That was the last finding of this selection.")
             session.look()
 
         self.message.clear()
@@ -180,7 +180,7 @@ class ReviewDock(QDockWidget):
             self._say(end)
 
     def _do(self, act: Callable[[Session], Any], *, repaint: bool = False, keep: bool = False, remark: bool = True) -> bool:
-        """Act on the session and show what came of it; an error is told in a line.
+        """Act on the session and show the result; report an error in one line.
 
         Parameters
         ----------
@@ -214,7 +214,7 @@ class ReviewDock(QDockWidget):
         return True
 
     def _remark_begun(self) -> Dict[str, Any]:
-        """The remark that was typed and not entered, if there is one."""
+        """Return the remark that was typed but not entered, if there is one."""
         box = self.panel.remark
         return (
             {"remark": box.text().strip() or None}
@@ -248,7 +248,7 @@ class ReviewDock(QDockWidget):
             self.lingering.start()
 
     def _move_map(self) -> None:
-        """Let the map follow, when the pictures are there."""
+        """Move the map to the finding when its pictures are ready."""
         if not self.settled():
             self.lingering.start()
             return

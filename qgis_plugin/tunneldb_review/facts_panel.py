@@ -1,4 +1,4 @@
-"""What is told of a finding, and what a person says of it."""
+"""Facts of a finding, and the inspector's input."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from qgis.PyQt.QtCore import Qt, pyqtSignal
 from qgis.PyQt.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLabel, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 _LETTERS = {"joint": "J", "dark": "D"}
-"""Kinds that detection finds beside leaks: always at hand, whatever their place in the list."""
+"""Kinds that detection finds besides leaks: always available, whatever their place in the list."""
 
 _BADGE = {"open": "#e67e22", "confirmed": "#1f6fd6", "rejected": "#757575"}
 
@@ -47,11 +47,11 @@ class FactsPanel(QWidget):
             self.kind.addItem(f"{label} ({keys[code]})" if code in keys else label, code)
 
     def show_finding(self, facts: Dict[str, Any] | None, probability: float | None) -> None:
-        """Tell of a finding, or that there is none."""
+        """Show a finding, or that there is none."""
         self.setEnabled(facts is not None)
         if facts is None:
             self.head.setText("<b>No finding</b>")
-            self.facts.setText("Nothing is left that is asked for.")
+            self.facts.setText("No finding is left in this selection.")
             self.remark.clear()
             return
         badge = f"<span style='color:{_BADGE.get(facts['review'], '#000')}'>{facts['review']}</span>"
@@ -87,7 +87,7 @@ def keys_of(kinds: List[Tuple[str, str]]) -> Dict[str, str]:
 
 
 def _lines(facts: Dict[str, Any], probability: float | None) -> List[str]:
-    """Facts in words, a line each."""
+    """Return the facts in words, a line each."""
     lines = []
     if probability is not None and facts["confidence"] is not None:
         lines.append(f"leak with probability <b>{probability:.2f}</b> (found as {facts['kind_detected']})")

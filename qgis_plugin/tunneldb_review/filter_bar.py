@@ -1,4 +1,4 @@
-"""Which findings are asked for, and in which order."""
+"""Selection and order of findings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class FilterBar(QWidget):
         self.kinds = QgsCheckableComboBox()
         self.kinds.setObjectName("kinds")
         self.kinds.setDefaultText("all kinds")
-        self.open_only = QCheckBox("only what is not reviewed")
+        self.open_only = QCheckBox("not reviewed only")
         self.open_only.setObjectName("open_only")
         self.open_only.setChecked(True)
         self.km_from, self.km_to = _kilometre("km_from"), _kilometre("km_to")
@@ -51,7 +51,7 @@ class FilterBar(QWidget):
             box.valueChanged.connect(lambda _: self.asked.emit())
 
     def offer(self, surveys: List[Tuple[int, str, str]], kinds: List[Tuple[str, str]], chosen: str) -> None:
-        """Offer surveys and kinds; says nothing of it."""
+        """Fill in surveys and kinds without a signal."""
         for box in (self.survey, self.kinds):
             box.blockSignals(True)
         self.survey.clear()
@@ -66,7 +66,7 @@ class FilterBar(QWidget):
 
     @property
     def filter(self) -> Filter:
-        """What is asked for."""
+        """Return the selection."""
         return Filter(
             frozenset(str(code) for code in self.kinds.checkedItemsData()),
             None if self.km_from.value() == _ANY_KM else self.km_from.value(),

@@ -1,4 +1,4 @@
-"""Which file shows what: images of the unrolled lining by the names that ``tunneldb image`` and ``tunneldb qgis`` give."""
+"""Files of images of the unrolled lining, by the names that ``tunneldb image`` and ``tunneldb qgis`` give."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Dict, Iterable, List, Optional, Tuple
 
 KINDS = {"raw": "Intensity, raw", "corrected": "Intensity, corrected", "offset": "Offset"}
-"""Kinds of image that are put side by side, with what they are called."""
+"""Kinds of image shown side by side, with their titles."""
 
 _NAME = re.compile(r"^(?P<survey>.+)-km(?P<km>-?\d+)-(?P<kind>[a-z]+)(?P<filled>-filled)?\.tif$", re.IGNORECASE)
 _MARGIN, _LEAST = 0.6, 1.6
@@ -16,7 +16,7 @@ _MARGIN, _LEAST = 0.6, 1.6
 
 @dataclass(frozen=True)
 class Image:
-    """An image of a kilometre; ``filled`` where gaps between points are."""
+    """Image of a kilometre; ``filled`` if gaps between points are filled."""
 
     path: str
     survey: str
@@ -26,7 +26,7 @@ class Image:
 
 
 def image_of(path: str) -> Optional[Image]:
-    """Return what a file shows, None if it is no image of the lining."""
+    """Return what a file shows; None if it is no image of the lining."""
     found = _NAME.match(os.path.basename(path))  # noqa: PTH119 - a source of QGIS is a string
     if found is None:
         return None
@@ -55,7 +55,7 @@ def kilometres(chainage_from: float, chainage_to: float) -> range:
 
 
 def window(box: Tuple[float, float, float, float], aspect: float, zoom: float = 1.0) -> Tuple[float, float, float, float]:
-    """Return what is shown of the plane about a finding.
+    """Return the extent shown around a finding.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def window(box: Tuple[float, float, float, float], aspect: float, zoom: float = 
 
 
 class Stamps:
-    """When files were last seen to be written, so that those which changed since are known."""
+    """Times of the last writing of files, for finding changed ones."""
 
     def __init__(self) -> None:
         self._seen: Dict[str, Tuple[int, int]] = {}
@@ -93,7 +93,7 @@ class Stamps:
             self._seen[path] = stamp
 
     def changed(self, path: str) -> bool:
-        """Whether a file is another than the one noted; one that is gone is not."""
+        """Return True if a file differs from the noted one; False if it is gone."""
         stamp = _stamp(path)
         return stamp is not None and stamp != self._seen.get(path)
 

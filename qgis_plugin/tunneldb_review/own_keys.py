@@ -27,12 +27,12 @@ class OwnKeys(QObject):
         self.done = done
 
     def keep(self, box: QComboBox) -> None:
-        """Let a box and the list that it unfolds keep their keys."""
+        """Leave keys to a box and the list that it unfolds."""
         box.installEventFilter(self)
         box.view().installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Take plain keys before shortcuts are looked for."""
+        """Take plain keys before shortcuts are evaluated."""
         unfolds = not isinstance(watched, QComboBox)
         if event.type() == QEvent.Type.ShortcutOverride and not event.modifiers() & _OTHERS:
             if (event.text() and event.text().isprintable()) or event.key() in _ARROWS:

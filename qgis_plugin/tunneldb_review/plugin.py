@@ -1,4 +1,4 @@
-"""What QGIS loads: menu, tool bar, dock and provider."""
+"""Entry point of QGIS: menu, tool bar, dock and provider."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class ReviewPlugin:
         self._add("Read images and findings again", self.reload)
 
     def unload(self) -> None:
-        """Take everything away again."""
+        """Remove everything again."""
         for action in self.actions:
             self.iface.removePluginDatabaseMenu(TITLE, action)
             self.iface.removeToolBarIcon(action)
@@ -82,7 +82,7 @@ class ReviewPlugin:
         self.dock.take_keys()
 
     def connect(self) -> None:
-        """Ask where the database is, and begin there."""
+        """Ask for the connection, and start there."""
         from .connect_dialog import ConnectDialog
 
         dialog = ConnectDialog(Settings.read(), self.attempt, self.iface.mainWindow())
@@ -94,7 +94,7 @@ class ReviewPlugin:
             self.begin(settings)
 
     def attempt(self, settings: Settings) -> Tuple[str, bool]:
-        """Try to connect, and say what is there."""
+        """Try to connect, and report the result."""
         try:
             session = Session(Database(settings.connection()))
         except (DatabaseError, CommandError, ValueError) as error:
@@ -114,11 +114,11 @@ class ReviewPlugin:
         self.dock.begin(session, settings.survey)
 
     def reload(self) -> None:
-        """Read image layers again whose files have changed, what layers show of the database, and what the dock lists."""
+        """Reload image layers with changed files, layers of the database, and the list of the dock."""
         names = self.reloader.reload()
         read = self.dock.read_again()
-        changed = f"{len(names)} images had changed and were read again" if names else "No image has changed"
-        findings = "findings are those of the database" if read else "findings of the dock were not read again"
+        changed = f"{len(names)} changed images were reloaded" if names else "No image has changed"
+        findings = "findings were reloaded" if read else "findings of the dock were not reloaded"
         self._say(f"{changed}; {findings}.", Qgis.Info if read else Qgis.Warning)
 
     def _keep_survey(self, survey: str) -> None:

@@ -25,7 +25,7 @@ class CommandProvider(QgsProcessingProvider):
         return "tunneldb"
 
     def longName(self) -> str:
-        """Return what it is."""
+        """Return the provider's name."""
         return "tunneldb: laser-scanned tunnels"
 
     def icon(self) -> QIcon:

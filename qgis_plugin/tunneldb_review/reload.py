@@ -1,4 +1,4 @@
-"""Image layers whose files were written anew, say by another run of detect: read again from the disk."""
+"""Reload image layers whose files were written again, for example by another run of detect."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class ImageReloader:
                 self._stamps.note(layer.source())
 
     def reload(self) -> List[str]:
-        """Read again the images whose files have changed, and what layers show of the database; returns names of the images."""
+        """Reload images whose files have changed, and layers of the database; return the names of the images."""
         changed = []
         for layer in QgsProject.instance().mapLayers().values():
             if isinstance(layer, QgsRasterLayer):

@@ -12,7 +12,7 @@ from .commands import error_of
 
 POLL = 200  # ms
 PATIENCE = (30.0, 10.0)
-"""Seconds that a command has to end what it is at, and after a second request, before it is killed."""
+"""Time for a command to end its current step, and after a second request, before it is killed, s."""
 
 _START, _ANSWER = 15_000, 120_000  # ms
 # of QGIS's own Python, which would mislead another; the DSN, which the plugin names itself
@@ -20,12 +20,12 @@ _NOT_PASSED = ("PYTHONHOME", "PYTHONPATH", "TUNNELDB_DSN")
 
 
 class CommandError(Exception):
-    """Why a command can't be run, or what it says is wrong, in one line."""
+    """Reason why a command cannot run, or its error, in one line."""
 
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended."""
+    """Result of a command."""
 
     code: int
     output: str
@@ -62,7 +62,7 @@ def run(
     process.setProcessEnvironment(_environment(environment))
     process.start(program, list(arguments))
     if not process.waitForStarted(_START):
-        raise CommandError(f"{program} cannot be started ({process.errorString()}): name the command in Connect")
+        raise CommandError(f"{program} cannot be started ({process.errorString()}): set the command in Connect")
     process.closeWriteChannel()
     output, error = _Lines(lambda line: told(line, False)), _Lines(lambda line: told(line, True))
     asked: List[float] = []
@@ -79,7 +79,7 @@ def run(
 
 
 def answer(program: str, arguments: Sequence[str], environment: Dict[str, str]) -> str:
-    """Return what a short command prints.
+    """Return the output of a short command.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def answer(program: str, arguments: Sequence[str], environment: Dict[str, str]) 
     until = time.monotonic() + _ANSWER / 1000
     ended = run(program, arguments, environment, lambda line, wrong: None, lambda: time.monotonic() > until)
     if ended.code:
-        raise CommandError(error_of(ended.error) or f"{program} ended with {ended.code}")
+        raise CommandError(error_of(ended.error) or f"{program} ended with exit code {ended.code}")
     return ended.output.strip()
 
 
@@ -115,7 +115,7 @@ def _environment(more: Dict[str, str]) -> QProcessEnvironment:
 
 
 class _Lines:
-    """Puts bytes together to lines, and tells each as soon as it is whole."""
+    """Assembles bytes to lines, and reports each complete line."""
 
     def __init__(self, told: Callable[[str], None]) -> None:
         self.told = told

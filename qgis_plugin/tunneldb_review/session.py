@@ -1,4 +1,4 @@
-"""A review under way: what the dock shows and does, without its widgets."""
+"""Review in progress: the logic of the dock, without its widgets."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from .database import ChangedMeanwhileError, Database, DatabaseError
 from .worklist import OPEN, Filter, Finding, Pace, WorkList, progress_text
 
 REFUSED = "taken back"
-"""What the database says of a step that will never be taken back; all else may pass, as a server that is away."""
+"""Database errors for a step that can never be undone; other errors may pass, such as a missing server."""
 
 
 class Session:
-    """Steps through the findings of a survey, and writes what a person says of them.
+    """Steps through the findings of a survey, and writes the inspector's verdicts.
 
     Parameters
     ----------
@@ -37,10 +37,10 @@ class Session:
         self.facts: Optional[Dict[str, Any]] = None
 
     def load(self, survey: str, asked: Filter, order: str) -> None:
-        """Read what there is to review in a survey, and go to the first."""
+        """Read the findings of a survey, and go to the first."""
         key = next((key for key, name, _ in self.surveys if name == survey), None)
         if key is None:
-            raise DatabaseError(f"there is no survey {survey!r} of a tunnel in this database")
+            raise DatabaseError(f"no survey {survey!r} of a tunnel in this database")
         rows = self.database.rows(sql.findings(key))
         if survey != self.survey:
             self.steps, self.pace = [], Pace()
@@ -57,7 +57,7 @@ class Session:
             self.look()
 
     def ask(self, asked: Filter, order: str) -> None:
-        """Put those in order that are asked for, and go to the first that is wanted."""
+        """Sort the selected findings, and go to the first."""
         was = self.work, self.facts
         self.work, self.facts = WorkList.of(self.findings.values(), asked, order), None
         try:
@@ -67,15 +67,15 @@ class Session:
             raise
 
     def next(self) -> bool:
-        """Go to the next; False where there is none."""
+        """Go to the next; return False if there is none."""
         return self._go(self.work.next)
 
     def previous(self) -> bool:
-        """Go to the one before; False where there is none."""
+        """Go to the previous one; return False if there is none."""
         return self._go(self.work.previous)
 
     def write(self, **values: Any) -> bool:
-        """Write review, kind or remark of the finding that is shown; False where it is so already.
+        """Write review, kind or remark of the current finding; return False if it is already so.
 
         What somebody else wrote alike since it was read is no step of this session; what this person wrote is one, as its
         answer may have been lost with the connection.
@@ -107,13 +107,13 @@ class Session:
         return True
 
     def look(self) -> None:
-        """Read again all that is told of the finding that is shown."""
+        """Read all facts of the current finding again."""
         current = self.work.current
         if current is not None and not self._read(current.id):
-            raise DatabaseError(f"finding {current.id} is gone: read the survey again")
+            raise DatabaseError(f"finding {current.id} does not exist any more: load the survey again")
 
     def undo(self, **begun: Any) -> str:
-        """Take back the last step of this session, and go to its finding; returns a sentence.
+        """Undo the last step of this session, and go to its finding; return a sentence.
 
         What the database refuses to take back is not tried again.
 
@@ -124,7 +124,7 @@ class Session:
             goes to another.
         """
         if not self.steps:
-            raise DatabaseError("nothing was reviewed here that could be taken back")
+            raise DatabaseError("there is no review to undo")
         key = self.steps[-1]
         if begun and not self.undoes_shown and self.write(**begun):
             self.steps[-2:] = [self.steps[-1], key]
@@ -141,12 +141,12 @@ class Session:
             self._note(key, {name: told[name] for name in ("review", "kind")})
             if self.work.go(key):
                 self.facts = told
-                return f"Finding {key}: what was {what} is taken back."
-        return f"Finding {key}: what was {what} is taken back; it is not in the list that is asked for."
+                return f"Finding {key}: undone: {what}."
+        return f"Finding {key}: undone: {what}; it is not in the current selection."
 
     @property
     def undoes_shown(self) -> bool:
-        """Whether the last step was one of the finding that is shown."""
+        """Return True if the last step was one of the current finding."""
         return self.facts is not None and self.steps[-1:] == [self.facts["id"]]
 
     def progress(self) -> str:
@@ -160,7 +160,7 @@ class Session:
             self.findings[key] = place
 
     def _go(self, step: Callable[[], bool]) -> bool:
-        """Step until there is a finding that is asked for; what cannot be read leaves all as it is.
+        """Step until there is a selected finding; if reading fails, nothing changes.
 
         What is gone leaves the list; what others have reviewed meanwhile is passed over where only open ones are wanted.
         """
@@ -184,12 +184,12 @@ class Session:
         return False
 
     def _stay(self, finding: Optional[Finding]) -> None:
-        """Go back to where one was."""
+        """Go back to the previous position."""
         if finding is None or not self.work.go(finding.id):
             self.work.at = -1
 
     def _read(self, key: int) -> bool:
-        """Read what is told of a finding into facts and list; whether it is there."""
+        """Read the facts of a finding into facts and list; return True if it exists."""
         rows = self.database.rows(sql.facts(key))
         if not rows:
             return False

@@ -1,4 +1,4 @@
-"""What the plugin keeps between sessions of QGIS: names, paths and ids of entries elsewhere, never a password."""
+"""Settings stored between sessions of QGIS: names, paths and ids of entries elsewhere, never a password."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ class Settings:
 
     @classmethod
     def read(cls) -> Settings:
-        """Return what is kept."""
+        """Return the stored settings."""
         kept = QgsSettings()
         return cls(**{name: str(kept.value(f"{_PREFIX}/{name}", default)) for name, default in vars(cls()).items()})
 
     def write(self) -> None:
-        """Keep it."""
+        """Store the settings."""
         kept = QgsSettings()
         for name, value in vars(self).items():
             kept.setValue(f"{_PREFIX}/{name}", value)
@@ -68,7 +68,7 @@ class Settings:
         """
         if self.way == SERVICE:
             if not self.service:
-                raise ValueError("name an entry of pg_service.conf in Connect")
+                raise ValueError("enter a service of pg_service.conf in Connect")
             return of_service(self.service, self.authcfg)
         if self.way == HOME:
             environment = {"TUNNELDB_HOME": self.home} if self.home else {}
@@ -76,7 +76,7 @@ class Settings:
         for layer in QgsProject.instance().mapLayers().values():
             if isinstance(layer, QgsVectorLayer) and layer.providerType() == "postgres" and '"tunnel_api"' in layer.source():
                 return of_source(layer.source())
-        raise ValueError("the open project has no layer of tunneldb: open one, or name a service or a home in Connect")
+        raise ValueError("the open project has no layer of tunneldb: open one, or enter a service or a home in Connect")
 
 
 __all__ = ["CommandError", "Settings"]

@@ -1,4 +1,4 @@
-"""What the plugin asks of schema ``tunnel_api``.
+"""Queries of the plugin to schema ``tunnel_api``.
 
 QGIS's connections take no parameters: what is put into a text is a whole number, a name of a column written here, or a value as
 hexadecimal digits, never the words of a person.
@@ -39,7 +39,7 @@ _FACTS = {
 
 
 def findings(survey_id: int) -> str:
-    """Return the query of what there is to review in a survey; columns as :func:`listed` names them."""
+    """Return the query of the findings to review in a survey; columns as :func:`listed` names them."""
     columns = ", ".join(f"f.{name}" for name in _LISTED)
     return (
         f"SELECT {columns} FROM tunnel_api.finding f WHERE f.survey_id = {int(survey_id)}"
@@ -48,7 +48,7 @@ def findings(survey_id: int) -> str:
 
 
 def facts(finding_id: int) -> str:
-    """Return the query of all that the dock tells of a finding; columns as :func:`told` names them."""
+    """Return the query of all facts of a finding; columns as :func:`told` names them."""
     return f"SELECT {', '.join(_FACTS.values())} FROM tunnel_api.finding f WHERE f.id = {int(finding_id)}"
 
 
@@ -95,15 +95,15 @@ _LOST = (
 
 
 def is_lost(message: str) -> bool:
-    """Whether the server or QGIS says that there is no connection."""
+    """Return True if the server or QGIS reports that there is no connection."""
     return any(mark in message for mark in _LOST)
 
 
 def error_line(message: str) -> str:
-    """Return the one line of what the server or QGIS said that tells what is wrong."""
+    """Return the line of the server's or QGIS's message with the error."""
     lines = [line.strip() for line in str(message).splitlines() if line.strip()]
     for mark in ("ERROR:", "FATAL:"):
         for line in lines:
             if mark in line:
                 return line.split(mark)[-1].strip()
-    return lines[0] if lines else "the database said nothing"
+    return lines[0] if lines else "the database returned no message"

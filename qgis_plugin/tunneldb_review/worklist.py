@@ -1,4 +1,4 @@
-"""What is to be reviewed, in which order, where one is, and how fast it goes; knows neither QGIS nor a database."""
+"""List of findings to review: order, position and speed; without QGIS and without a database."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Callable, Dict, FrozenSet, Iterable, List, Optional, Tuple
 OPEN, CONFIRMED, REJECTED = "open", "confirmed", "rejected"
 
 PAUSE = 300.0
-"""Seconds between two reviews that are a pause, and not counted."""
+"""Time between two reviews that is a pause, and not counted, s."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What the list knows of a finding: lengths in m, in the unrolled plane (chainage, arc); area in m².
+    """Finding in the list: lengths in m, in the unrolled plane (chainage, arc); area in m².
 
     ``confidence`` is how sure detection is of the kind that it found; None of what people drew.
     """
@@ -33,7 +33,7 @@ class Finding:
 
     @property
     def probability(self) -> float:
-        """How probable it is that it is a leak, as detection has it; what people drew as wet is one."""
+        """Probability that it is a leak, by detection; 1 if a person drew it as wet."""
         if self.confidence is None:
             return 1.0 if self.kind in ("leak", "drip") else 0.0
         return self.confidence if self.kind_detected == "leak" else 1.0 - self.confidence
@@ -46,12 +46,12 @@ ORDERS: Dict[str, Tuple[str, Callable[[Finding], Tuple[float, ...]]]] = {
     "large": ("Largest first", lambda f: (-f.area, f.chainage_from)),
     "chainage": ("By chainage", lambda f: (f.chainage_from, f.arc_from)),
 }
-"""Orders by name: what they are called, and the key of sorting."""
+"""Orders by name: title, and sort key."""
 
 
 @dataclass(frozen=True)
 class Filter:
-    """Which findings are asked for.
+    """Selection of findings.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Filter:
     open_only: bool = True
 
     def takes(self, finding: Finding) -> bool:
-        """Whether a finding is asked for, reviewed or not."""
+        """Return True if a finding is selected, reviewed or not."""
         return (
             (not self.kinds or finding.kind in self.kinds)
             and (self.km_from is None or finding.km >= self.km_from)
@@ -83,7 +83,7 @@ class Filter:
 
 @dataclass
 class WorkList:
-    """Findings in order, and the one that is looked at.
+    """Findings in order, and the current one.
 
     What was asked for stays in the list when its kind changes, so that one can step back to it.
     """
@@ -107,35 +107,35 @@ class WorkList:
         return [self.findings[place] for place in self._places(1)][:count]
 
     def next(self) -> bool:
-        """Go to the next; False, and stay, where there is none."""
+        """Go to the next; return False, and stay, if there is none."""
         return self._go(1)
 
     def previous(self) -> bool:
-        """Go to the one before; False, and stay, where there is none."""
+        """Go to the previous one; return False, and stay, if there is none."""
         return self._go(-1)
 
     def go(self, finding_id: int) -> bool:
-        """Go to a finding by its number, whatever is asked for; False, and stay, if it is not in the list."""
+        """Go to a finding by its number, selected or not; return False, and stay, if it is not in the list."""
         place = next((n for n, finding in enumerate(self.findings) if finding.id == finding_id), None)
         if place is not None:
             self.at = place
         return place is not None
 
     def drop(self, finding_id: int) -> None:
-        """Take one out of the list that is there no more, and stay where one is; at its beginning, if that is where one was."""
+        """Remove a finding that no longer exists, and keep the position; go to the beginning if it was the current one."""
         here = self.current
         self.findings = [finding for finding in self.findings if finding.id != finding_id]
         self.at = next((n for n, finding in enumerate(self.findings) if here is not None and finding.id == here.id), -1)
 
     def change(self, finding_id: int, **values: str) -> None:
-        """Note what was written of a finding."""
+        """Record what was written of a finding."""
         for place, finding in enumerate(self.findings):
             if finding.id == finding_id:
                 self.findings[place] = replace(finding, **values)
 
     @property
     def reviewed(self) -> int:
-        """How many of the list are reviewed."""
+        """Return the number of reviewed findings in the list."""
         return sum(finding.review != OPEN for finding in self.findings)
 
     def _go(self, step: int) -> bool:
@@ -151,7 +151,7 @@ class WorkList:
 
 @dataclass
 class Pace:
-    """How many reviews an hour, of the time in which there were some: pauses are left out."""
+    """Speed of review without pauses, per hour."""
 
     last: Optional[float] = None
     seconds: float = 0.0
@@ -168,7 +168,7 @@ class Pace:
 
     @property
     def per_hour(self) -> Optional[float]:
-        """Reviews an hour; None where two within PAUSE are lacking."""
+        """Return reviews per hour; None without two reviews within PAUSE."""
         return 3600.0 * self.intervals / self.seconds if self.intervals and self.seconds > 0 else None
 
 
@@ -180,5 +180,5 @@ def progress_text(work: WorkList, pace: Pace) -> str:
     if speed is not None:
         minutes = 60.0 * (total - done) / speed
         left = f"{minutes:.0f} min" if minutes < 90 else f"{minutes / 60:.1f} h"
-        said += f"; {speed:.0f} an hour, {left} left" if total > done else f"; {speed:.0f} an hour"
+        said += f"; {speed:.0f} per hour, {left} left" if total > done else f"; {speed:.0f} per hour"
     return said

@@ -167,7 +167,7 @@ def test_an_inspector_reviews_by_keys(
     assert did["first"] == did["previous"] != did["next"] == did["after_confirm"] == did["rejected"]
     assert did["focus_back"]
     assert did["after_undo"] == did["undone"]
-    assert "is taken back" in did["said"]
+    assert "undone" in did["said"]
     rows = {key: rest for key, *rest in conn.execute("SELECT id, review, kind, remark, reviewed_by FROM tunnel_api.finding")}
     assert rows[did["first"]][0] == "confirmed"
     assert rows[did["rejected"]][0] == "rejected"
@@ -214,7 +214,7 @@ def test_what_comes_between_loses_nothing_and_overwrites_nothing(
     for said, listed, shown, review in lost["away"]:
         assert said.startswith("No connection to the database")
         assert (listed, shown, review) == (lost["lost"], lost["lost"], "open")
-    assert "not written yet" in lost["remark_kept"][0]
+    assert "was not written" in lost["remark_kept"][0]
     assert lost["remark_kept"][1:] == ["wet again", True]
     with psycopg.connect(dsn) as connection:
         rows = {
@@ -231,7 +231,9 @@ def test_what_comes_between_loses_nothing_and_overwrites_nothing(
             ("open", None, "rejected", "soot"), (None, "soot", None, "no soot"), ("rejected", None, "confirmed", None),
         ]  # fmt: skip
 
-    changed = rf"\w+ has changed finding {two['first']} meanwhile: it is rejected, .+, remark “soot”\. Nothing was written"
+    changed = (
+        rf"\w+ has changed finding {two['first']} in the meantime: it is rejected, .+, remark “soot”\. Nothing was written"
+    )
     assert re.match(changed, two["said"])
     assert (two["stays"], two["shown"], two["kept"]) == (two["first"], ["rejected", "soot", True], "rejected|soot")
     assert (two["came"], two["listed"]) == (two["wanted"], False)
@@ -239,7 +241,7 @@ def test_what_comes_between_loses_nothing_and_overwrites_nothing(
     assert seen["rerun"].pop("said").endswith("; findings are those of the database.")
     assert seen["rerun"] == {"stays": True, "new": True}
     for said in (lost["read_again"], seen["ended"]):
-        assert said.endswith("; findings of the dock were not read again."), (lost["read_again"], seen["ended"])
+        assert said.endswith("; findings of the dock were not reloaded."), (lost["read_again"], seen["ended"])
 
     assert seen["not_entered"] == {
         "before": ["", "confirmed|"], "same": [True, "drips", "open|"], "with": "confirmed|drips",
@@ -266,5 +268,5 @@ def test_what_another_wrote_alike_is_no_step_of_the_dock(
         assert rows[confirmed["finding"]] == ["confirmed", "ines"], how
     confirmed, undone = seen["otto"]["confirmed"], seen["otto"]["undone"]  # as if the answer had been lost
     assert (confirmed["steps"], confirmed["counted"], undone["steps"]) == (1, 1, -1)
-    assert "is taken back" in undone["said"]
+    assert "undone" in undone["said"]
     assert rows[confirmed["finding"]] == ["open", None]
