@@ -1,4 +1,4 @@
-"""The log of a command: one JSON object a line in a file, and text on standard error.
+"""Log of a command: one JSON object per line in a file, and text on standard error.
 
 Log with ``logging.getLogger(__name__)``. Values that programs are to read go into ``extra=fields(km=3)``.
 """
@@ -21,7 +21,7 @@ VARIABLE = "TUNNELDB_LOG"
 """Environment variable that names the log file; workers inherit it."""
 
 MESSAGES = "tunneldb.messages"
-"""Logger of what a command prints on standard error by itself."""
+"""Logger of the messages that a command prints on standard error."""
 
 
 class JsonFormatter(logging.Formatter):
@@ -56,7 +56,7 @@ def logging_to(path: Path | None, verbosity: int = 0) -> Iterator[None]:
     path : Path or None
         File to append to; None for no file. Processes that are started inside find it in TUNNELDB_LOG.
     verbosity : int
-        0 for nothing on standard error, 1 for what is done, 2 for tracebacks of all errors too.
+        0 for nothing on standard error, 1 for progress messages, 2 also for tracebacks of all errors.
 
     Raises
     ------
@@ -105,6 +105,6 @@ class _TextFormatter(logging.Formatter):
 def _on_stderr(verbosity: int) -> logging.Handler:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(_TextFormatter(verbosity > 1))
-    # What is printed anyway is not repeated, but for its traceback.
+    # Messages that are printed anyway are not repeated, except for their tracebacks.
     handler.addFilter(lambda record: record.name != MESSAGES or (verbosity > 1 and record.exc_info is not None))
     return handler

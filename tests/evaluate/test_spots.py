@@ -16,7 +16,7 @@ from shapely.geometry import MultiPolygon, Polygon, box
 from support.example_structures import ALONG, NORMAL, ORIGIN, RADIUS, add_example_site, model, save_example_structures
 
 from tunneldb.cli.main import main
-from tunneldb.evaluate.surfaces import FoundFace, lay_on_face, lay_on_faces, on_one_plane
+from tunneldb.evaluate.surfaces import FoundFace, on_one_plane, project_on_face, project_on_faces
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -61,11 +61,11 @@ def test_a_polygon_goes_to_the_nearest_face_and_over_a_gap() -> None:
         FoundFace(2, 1, model(np.array([2.0, 0, 0]), UP, np.array([2.0, 0, 0])), box(0, 0, 1, 1)),
         FoundFace(3, 2, model(np.array([0, 0, -0.012]), -UP, np.zeros(3)), box(-9, -9, 9, 9)),  # the back of the sheet
     ]
-    over = lay_on_faces(Polygon([(0.5, 0.2, 0.001), (2.75, 0.2, 0.001), (2.75, 0.6, 0.001), (0.5, 0.6, 0.001)]), faces)
+    over = project_on_faces(Polygon([(0.5, 0.2, 0.001), (2.75, 0.2, 0.001), (2.75, 0.6, 0.001), (0.5, 0.6, 0.001)]), faces)
     assert {k: round(part.area, 9) for k, part in over.parts} == {0: 0.2, 1: pytest.approx(0.3 + 0.4, abs=1e-9)}
     assert over.on_faces == pytest.approx(0.5)
     assert on_one_plane([over.parts])[0].area == pytest.approx(0.9)
-    nowhere = lay_on_faces(Polygon([(0, 0, 5), (0, 1, 5), (0, 1, 6), (0, 0, 6)]), faces)
+    nowhere = project_on_faces(Polygon([(0, 0, 5), (0, 1, 5), (0, 1, 6), (0, 0, 6)]), faces)
     assert [(k, part.area) for k, part in nowhere.parts] == [(None, pytest.approx(1.0))]
     assert nowhere.on_faces == 0.0
 
@@ -74,7 +74,7 @@ def test_a_ring_over_the_cut_of_a_pipe_is_parted_there() -> None:
     pipe = FoundFace(1, 1, model(np.zeros(3), UP, np.array([1.0, 0, 0]), 0.5), box(0, -math.pi / 2, 2, math.pi / 2))
     turn = np.linspace(math.pi - 0.4, math.pi + 0.2, 200)
     bent = np.column_stack([0.5 * np.cos(turn), 0.5 * np.sin(turn), np.full(200, 0.5)])
-    flat = lay_on_face(Polygon(np.vstack([bent, bent[::-1] + UP])), pipe)
+    flat = project_on_face(Polygon(np.vstack([bent, bent[::-1] + UP])), pipe)
     assert flat.area == pytest.approx(0.6 * 0.5)
     assert sorted(round(part.area, 6) for part in shapely.get_parts(flat)) == [0.1, 0.2]
     assert shapely.covered_by(flat, shapely.box(-1, -math.pi / 2 - 1e-9, 3, math.pi / 2 + 1e-9))

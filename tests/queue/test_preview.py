@@ -15,7 +15,7 @@ from support.loaded_survey import ORIGIN, RADIUS, SURVEY, add_survey, write
 from support.queue_rows import add_file, add_run
 
 from tunneldb.cli.main import main
-from tunneldb.queue.batch import give_up_file, plan
+from tunneldb.queue.batch import plan, restrict_failed_file
 from tunneldb.queue.preview import FRAGMENT_BYTES, KILOMETRE_BYTES, PIXEL_BYTES, ROW_BYTES, preview
 from tunneldb.store.survey import get_survey
 
@@ -150,5 +150,5 @@ def test_a_file_that_fails_later_fails_only_the_kilometres_that_hold_its_points(
     assert (whole.km_from, whole.km_to) == (1, 3)  # its margin touches them, so they wait for it
     add_file(conn, tunnel, path.name, 2, "damaged in the middle")
     conn.execute("UPDATE tunnel.incoming SET km_from = 1, km_to = 3, path = %s", [str(path)])
-    give_up_file(conn, survey, path.name)
+    restrict_failed_file(conn, survey, path.name)
     assert conn.execute("SELECT km_from, km_to FROM tunnel.incoming").fetchone() == (2, 2)

@@ -27,8 +27,8 @@ _TRUSTED = """
 # PostGIS may belong to another role, as on managed servers.
 _OF_EXTENSION = "EXISTS (SELECT FROM pg_depend e WHERE e.deptype = 'e' AND e.classid = {} AND e.objid = {})"
 
-# Tables of the schema, and all that inherit from them or that they inherit from, wherever they are: a table that is made a
-# partition of another takes its triggers, checks and indexes.
+# Tables of the schema, and tables of any schema that inherit from them or that they inherit from: a table that becomes a
+# partition of another one gets its triggers, checks and indexes.
 _OWN_TABLES = """
     SELECT c.oid FROM pg_class c
      WHERE c.relnamespace = 'tunnel'::regnamespace AND c.relkind IN ('r', 'p', 'v')
@@ -75,7 +75,7 @@ SELECT format('%s on tunnel.%s %s', o.trigger, o.held, CASE WHEN t.oid IS NULL T
  ORDER BY 1
 """
 
-# Foreign keys of tables elsewhere: what is deleted or renumbered here deletes or changes rows there, and runs their triggers.
+# Foreign keys of other tables: deleting or renumbering rows here deletes or changes rows there, and runs their triggers.
 _REFERENCES = f"""
 WITH RECURSIVE held AS ({_OWN_TABLES})
 SELECT format('foreign key %I of %s is not tunneldb''s: it runs triggers there', k.conname, k.conrelid::regclass),
@@ -100,8 +100,9 @@ SELECT format('policy %I on %s is not tunneldb''s: it runs', y.polname, y.polrel
  ORDER BY 1
 """
 
-# Expressions by what they call: by the numbers of functions, operators and types in their trees, for dependences on what comes
-# with PostgreSQL, such as query_to_xml, are not kept. Those of tunneldb call what is immutable, the clock, and who is there.
+# Expressions by the functions, operators and types that they call, from the numbers in their trees, since dependences on
+# objects of PostgreSQL, such as query_to_xml, are not recorded. Those of tunneldb call only immutable functions, the clock,
+# and the id of the session.
 _EXPRESSIONS = f"""
 WITH RECURSIVE trusted AS ({_TRUSTED}), held AS ({_OWN_TABLES}),
 expression (relation, what, tree, mend) AS (

@@ -149,7 +149,7 @@ def _roles(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
         "SELECT bool_and(has_schema_privilege(role, 'tunnel_api', 'USAGE')) FROM unnest(%s::text[]) role", [list(ROLES)]
     ).fetchone()
     if granted is None or not granted[0]:
-        yield CheckResult("wrong", "roles", "without their rights, as after a restore", "tunneldb init")
+        yield CheckResult("wrong", "roles", "without their privileges, for example after a restore", "tunneldb init")
     else:
         yield CheckResult("ok", "roles", ", ".join(ROLES))
 
@@ -167,7 +167,7 @@ def _public(connection: psycopg.Connection[Any]) -> CheckResult:
         """
     ).fetchall()
     if not rows:
-        return CheckResult("ok", "schema public", "only its owner and the database's may create in it")
+        return CheckResult("ok", "schema public", "only its owner and the database's owner may create objects in it")
     names = ", ".join(name for (name,) in rows)
     text = f"{names} may create functions in it, which run in the place of PostgreSQL's with the rights of whoever calls them"
     return CheckResult("wrong", "schema public", text, f"as a superuser: REVOKE CREATE ON SCHEMA public FROM {names};")
@@ -186,16 +186,14 @@ def _audit(connection: psycopg.Connection[Any]) -> CheckResult:
         """
     ).fetchone()
     if row is None:
-        return CheckResult(
-            "wrong", "audit", "its table tunnel_audit.entry is missing", "restore schema tunnel_audit from a backup"
-        )
+        return CheckResult("wrong", "audit", "table tunnel_audit.entry is missing", "restore schema tunnel_audit from a backup")
     if not row[0]:
         mend = "ALTER TABLE tunnel_audit.entry ENABLE TRIGGER append_only;"
-        return CheckResult("wrong", "audit", "entries can be changed and deleted: its trigger is switched off", mend)
+        return CheckResult("wrong", "audit", "entries can be changed and deleted: its trigger is disabled", mend)
     if row[1]:
         mend = f"ALTER SCHEMA tunnel_audit OWNER TO {row[2]}; ALTER TABLE tunnel_audit.entry OWNER TO {row[2]};"
-        return CheckResult("wrong", "audit", "it belongs to the operators, who could drop it", mend)
-    return CheckResult("ok", "audit", "takes new entries only")
+        return CheckResult("wrong", "audit", "its owner is the role of operators, who could drop it", mend)
+    return CheckResult("ok", "audit", "accepts only new entries")
 
 
 def _foreign(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
@@ -281,7 +279,7 @@ def _queue(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
         "SELECT survey, name, path, message FROM tunnel_api.incoming WHERE state = 'failed' ORDER BY survey, name"
     ).fetchall():
         why = (message or "it could not be read").splitlines()[0]
-        mend = f"tunneldb batch {survey} {path}   -- once it is mended; or tunneldb survey remove-file {survey} {name}"
+        mend = f"tunneldb batch {survey} {path}   -- after fixing the file; or tunneldb survey remove-file {survey} {name}"
         yield CheckResult("note", "files", f"{survey}, {name}: {why}", mend)
     row = connection.execute(
         """
@@ -291,7 +289,7 @@ def _queue(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
     assert row is not None
     queued, workers = row
     if queued and not workers:
-        yield CheckResult("note", "queue", f"{queued} jobs wait, and no worker serves them", "tunneldb worker")
+        yield CheckResult("note", "queue", f"{queued} jobs are queued, but no worker is running", "tunneldb worker")
 
 
 def _remarks(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:

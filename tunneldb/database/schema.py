@@ -50,14 +50,14 @@ class StageRow(Protocol):
 
 
 def install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> None:
-    """Create or upgrade everything, in one transaction; what is up to date stays, tunnel_api and tunnel.stage are made anew.
+    """Create or upgrade everything, in one transaction; current parts stay, tunnel_api and tunnel.stage are created again.
 
     Parameters
     ----------
     connection
         Idle connection as the database's owner.
     stages
-        The stages of a kilometre, in their order, which tunnel_api goes by: `tunneldb.stages.registry.STAGES`.
+        Stages of a kilometre in order, for tunnel_api: `tunneldb.stages.registry.STAGES`.
 
     Raises
     ------

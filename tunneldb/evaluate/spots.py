@@ -17,7 +17,7 @@ from tunneldb.errors import NotReadyError
 from tunneldb.evaluate.measure import compare
 from tunneldb.evaluate.report import SPOTS, Report, make_report
 from tunneldb.evaluate.spot_truth import read_spot_truth
-from tunneldb.evaluate.surfaces import FoundFace, Laid, lay_on_face, lay_on_faces, on_one_plane, place_of
+from tunneldb.evaluate.surfaces import FoundFace, ProjectedPolygon, on_one_plane, place_of, project_on_face, project_on_faces
 from tunneldb.evaluate.survey import distance_from_scanner
 from tunneldb.store.poses import load_poses
 from tunneldb.store.spots import ListedSpot, read_spots
@@ -75,8 +75,8 @@ def evaluate_spots(
     origin = np.floor(shapely.get_coordinates(truth.shapes, include_z=True).mean(axis=0))
     faces = _read_faces(conn, survey, origin)
     shapes = [_shifted(shape, origin) for shape in truth.shapes]
-    true = [lay_on_faces(shape, faces) for shape in shapes]
-    found = _lay_found(rows, faces, origin)
+    true = [project_on_faces(shape, faces) for shape in shapes]
+    found = _project_found(rows, faces, origin)
     flat = on_one_plane([one.parts for one in [*true, *found]])
     comparison = compare(flat[: len(true)], flat[len(true) :], min_area, asked=truth.asked)
     poses = load_poses(conn, survey)
@@ -113,21 +113,21 @@ def _read_faces(conn: psycopg.Connection[Any], survey: Survey, origin: Float) ->
     return faces
 
 
-def _lay_found(rows: list[ListedSpot], faces: list[FoundFace], origin: Float) -> list[Laid]:
+def _project_found(rows: list[ListedSpot], faces: list[FoundFace], origin: Float) -> list[ProjectedPolygon]:
     """Project found spots onto their faces; a confirmed one that the last run did not find again keeps its place."""
     at = {face.number: k for k, face in enumerate(faces)}
     out = []
     for row in rows:
         shape = _shifted(row.geometry, origin)
         if row.face is None:
-            out.append(lay_on_faces(shape, faces))
+            out.append(project_on_faces(shape, faces))
         else:
-            flat = lay_on_face(shape, faces[at[row.face]])
-            out.append(Laid([(at[row.face], flat)], flat.area))
+            flat = project_on_face(shape, faces[at[row.face]])
+            out.append(ProjectedPolygon([(at[row.face], flat)], flat.area))
     return out
 
 
-def _place(laid: Laid, faces: list[FoundFace], xyz: Float) -> dict[str, Any]:
+def _place(laid: ProjectedPolygon, faces: list[FoundFace], xyz: Float) -> dict[str, Any]:
     """Return member, face and coordinates of a spot."""
     k = max(laid.parts, key=lambda one: one[1].area)[0]
     face = None if k is None else faces[k]

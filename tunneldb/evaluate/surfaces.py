@@ -44,7 +44,7 @@ class FoundFace:
 
 
 @dataclass(frozen=True)
-class Laid:
+class ProjectedPolygon:
     """Polygon projected onto faces.
 
     Attributes
@@ -59,12 +59,12 @@ class Laid:
     on_faces: float
 
 
-def lay_on_face(shape: BaseGeometry, face: FoundFace) -> BaseGeometry:
+def project_on_face(shape: BaseGeometry, face: FoundFace) -> BaseGeometry:
     """Unroll a polygon in space on a face, at any distance from it; m."""
     return shapely.union_all([_unrolled(part, face.model) for part in shapely.get_parts(shape)])
 
 
-def lay_on_faces(shape: BaseGeometry, faces: Sequence[FoundFace]) -> Laid:
+def project_on_faces(shape: BaseGeometry, faces: Sequence[FoundFace]) -> ProjectedPolygon:
     """Project a polygon in space onto the faces whose outlines it overlaps.
 
     A part outside all faces stays with the face that shares most of the polygon; a polygon on no face gets its own plane.
@@ -81,12 +81,12 @@ def lay_on_faces(shape: BaseGeometry, faces: Sequence[FoundFace]) -> Laid:
         off = np.abs(unroll(face.model, at)[2])
         if off.max() > NEAR:
             continue
-        flat = lay_on_face(shape, face)
+        flat = project_on_face(shape, face)
         shared = shapely.intersection(flat, face.outline)
         if shared.area > _MIN_AREA:
             near.append((float(np.median(off)), k, flat, shared))
     if not near:
-        return Laid([(None, _own_plane(shape))], 0.0)
+        return ProjectedPolygon([(None, _own_plane(shape))], 0.0)
     near.sort(key=lambda one: one[:2])
     near = [one for one in near if one[0] <= near[0][0] + MAX_FACE_DISTANCE]
     home = max(near, key=lambda one: one[3].area)
@@ -101,7 +101,7 @@ def lay_on_faces(shape: BaseGeometry, faces: Sequence[FoundFace]) -> Laid:
     rest = shapely.difference(home[2], covered)
     if rest.area > _MIN_AREA:
         parts[home[1]] = shapely.union(parts.get(home[1], Polygon()), rest)
-    return Laid(list(parts.items()), on_faces)
+    return ProjectedPolygon(list(parts.items()), on_faces)
 
 
 def on_one_plane(laid: Sequence[Sequence[tuple[int | None, BaseGeometry]]]) -> list[BaseGeometry]:
@@ -140,7 +140,7 @@ def _moved(shape: BaseGeometry, face: FoundFace, to: FoundFace) -> BaseGeometry:
         return to_space(face.model, flat[:, 0], flat[:, 1])[:, :3]
 
     lifted = shapely.force_3d(shape)
-    return lay_on_face(shapely.set_coordinates(lifted, raised(shapely.get_coordinates(shape))), to)
+    return project_on_face(shapely.set_coordinates(lifted, raised(shapely.get_coordinates(shape))), to)
 
 
 def _unrolled(part: Polygon, model: Float) -> BaseGeometry:

@@ -252,7 +252,7 @@ def extent(header: ScanHeader, alignment: Alignment, reach: float) -> tuple[floa
     return float(chainage.min()) + margin, float(chainage.max()) - margin
 
 
-def give_up_file(conn: psycopg.Connection[Any], survey: Survey, name: str) -> None:
+def restrict_failed_file(conn: psycopg.Connection[Any], survey: Survey, name: str) -> None:
     """Restrict the effect of a failed file to the kilometres that contain its points, without those that it just touches.
 
     Does nothing for a file that has not finally failed, or whose box is unreadable.

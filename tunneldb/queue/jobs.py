@@ -148,7 +148,7 @@ def _survey(conn: psycopg.Connection[Any], survey_id: int) -> Survey:
 def _read(conn: psycopg.Connection[Any], job: Job, survey_id: int, name: str) -> None:
     from tunneldb.pipeline.load import settings_of
     from tunneldb.pipeline.read import read_file
-    from tunneldb.queue.batch import give_up_file
+    from tunneldb.queue.batch import restrict_failed_file
 
     survey = _survey(conn, survey_id)
     row = conn.execute(
@@ -162,7 +162,7 @@ def _read(conn: psycopg.Connection[Any], job: Job, survey_id: int, name: str) ->
         with stage_run(conn, survey_id, None, "read", {**parameters, "file": name}, job) as run:
             run.counts.update(read_file(conn, survey, Path(path), settings_of(parameters)))
     except UserError:
-        give_up_file(conn, survey, name)
+        restrict_failed_file(conn, survey, name)
         raise
 
 

@@ -62,7 +62,7 @@ class Orders:
     survey: int | None = None
 
 
-class _Leave:
+class _ExitRequest:
     """Request to exit, and the worker of the queue to stop."""
 
     def __init__(self) -> None:
@@ -100,7 +100,7 @@ def work(orders: Orders) -> None:
 
 
 async def _work(orders: Orders) -> None:
-    leave = _Leave()
+    leave = _ExitRequest()
     loop = asyncio.get_running_loop()
     for name in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(name, leave.now)
@@ -147,7 +147,7 @@ async def _connected(orders: Orders) -> AsyncIterator[tuple[str, psycopg.AsyncCo
         yield dsn, presence
 
 
-async def _serve(orders: Orders, leave: _Leave, dsn: str, presence: psycopg.AsyncConnection[Any]) -> None:
+async def _serve(orders: Orders, leave: _ExitRequest, dsn: str, presence: psycopg.AsyncConnection[Any]) -> None:
     """Run jobs until asked to exit, or until the connection to the queue is lost."""
     from procrastinate.worker import Worker
 
@@ -157,7 +157,7 @@ async def _serve(orders: Orders, leave: _Leave, dsn: str, presence: psycopg.Asyn
 
     async def registered(worker: int) -> None:
         await presence.execute("SELECT tunnel_internal.queue_register(%s, %s, %s)", [worker, platform.node(), os.getpid()])
-        tending.append(asyncio.create_task(_tend(orders, leave, worker, presence)))
+        tending.append(asyncio.create_task(_heartbeat(orders, leave, worker, presence)))
 
     app = make_app(dsn, orders.dsn, registered, leave.pause)
     async with app.open_async():
@@ -182,7 +182,7 @@ async def _serve(orders: Orders, leave: _Leave, dsn: str, presence: psycopg.Asyn
                 await presence.execute("SELECT tunnel_internal.queue_rescue()")
 
 
-async def _tend(orders: Orders, leave: _Leave, worker: int, presence: psycopg.AsyncConnection[Any]) -> None:
+async def _heartbeat(orders: Orders, leave: _ExitRequest, worker: int, presence: psycopg.AsyncConnection[Any]) -> None:
     """Send heartbeats, also during the last job; take over jobs of lost workers; check for requests to exit."""
     beat = 0.0
     try:
@@ -239,7 +239,7 @@ def main() -> int:
     orders = json.loads(sys.argv[1])
     _end_with_parent()
     logging.basicConfig(format="%(asctime)s worker %(process)d: %(message)s", datefmt="%H:%M:%S")
-    logging.getLogger().handlers[0].setLevel(logging.WARNING)  # the log file, if there is one, has what is done, too
+    logging.getLogger().handlers[0].setLevel(logging.WARNING)  # a log file also gets messages of lower levels
     logging.getLogger("procrastinate").setLevel(logging.CRITICAL + 1)
     logging.getLogger("psycopg.pool").setLevel(logging.CRITICAL + 1)
     file = os.environ.get(VARIABLE)

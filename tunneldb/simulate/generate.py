@@ -19,20 +19,20 @@ from tunneldb.simulate.lining.blotches import Blotch, place_blotches
 from tunneldb.simulate.lining.leak_sites import site_leaks
 from tunneldb.simulate.lining.leaks import Leak, Room, place
 from tunneldb.simulate.lining.marks import Mark, chamfers, place_marks
-from tunneldb.simulate.lining.masonry import Masonry, lay_courses
+from tunneldb.simulate.lining.masonry import Masonry, make_masonry
 from tunneldb.simulate.lining.reflectance import Reflectance, lining_reflectance
 from tunneldb.simulate.lining.relief import lining_relief
 from tunneldb.simulate.lining.ring_shape import RingShape, shape
 from tunneldb.simulate.lining.rings import build
 from tunneldb.simulate.lining.seepage import joint_leaks, niche_leaks, with_drips
 from tunneldb.simulate.objects.fixtures import APPENDAGE, FLOOR, RAIL, Appendage, Niche, furnish, refuges
-from tunneldb.simulate.objects.mesh import hang_mesh
+from tunneldb.simulate.objects.mesh import make_mesh
 from tunneldb.simulate.objects.overhead import overhead, sleepers
 from tunneldb.simulate.objects.primitives import Primitive, TargetSphere, parts_table
 from tunneldb.simulate.objects.wall_clutter import clutter
 from tunneldb.simulate.objects.wall_covers import covers
 from tunneldb.simulate.parameters import Parameters
-from tunneldb.simulate.placement import stand
+from tunneldb.simulate.placement import place_objects
 from tunneldb.simulate.radiometry import counts, reference_curve
 from tunneldb.simulate.rays.beam import blur
 from tunneldb.simulate.rays.ghosts import mirror
@@ -141,7 +141,7 @@ class Simulation:
         fixed = [a.footprint() for a in self.appendages if a not in along]
         self.rings = build(parameters, self.tunnel, built, chamfered)
         self.ring_shape: RingShape = shape(parameters, self.rings, shaped)
-        self.masonry: Masonry = lay_courses(parameters, coursed)
+        self.masonry: Masonry = make_masonry(parameters, coursed)
         room = Room(self.tunnel, fixed + openings, [a.footprint() for a in along])
         self.leaks: list[Leak] = self._leaks(room, wet, joints, refuge, drips, sited)
         self.marks: list[Mark] = place_marks(parameters, self.tunnel, [k.polygon for k in self.leaks] + openings, marked)
@@ -153,12 +153,12 @@ class Simulation:
         )
         self._relief = lining_relief(parameters, self.tunnel, self.rings, self.ring_shape, self.masonry, moved)
         self.ring_steps = np.zeros(self.rings.level.size) if self._relief is None else self._relief.step
-        self._mesh = hang_mesh(parameters, self._relief.high if self._relief is not None else 0.0, meshed)
+        self._mesh = make_mesh(parameters, self._relief.high if self._relief is not None else 0.0, meshed)
         self._radiometry = parameters.radiometry()
         self.reference = reference_curve(parameters.max_range, np.random.default_rng(reference), self._radiometry.near_loss)
         self.scanner = Scanner(parameters, self.tunnel)
         self.instrument = Instrument.of(parameters, *self.scanner.times(), electric)
-        standing, spheres = stand(parameters, self.tunnel, self.scanner, self.appendages, self.niches, free)
+        standing, spheres = place_objects(parameters, self.tunnel, self.scanner, self.appendages, self.niches, free)
         self.spheres: list[TargetSphere] = spheres
         self.things: list[Primitive] = standing + overhead(parameters, self.tunnel, loose, len(standing) + 1)
         self.epoch = epoch(parameters, self.tunnel)
@@ -174,7 +174,7 @@ class Simulation:
         )
         solid = self.things + sleepers(parameters, self.tunnel)
         self._parts = parts_table(self.tunnel, solid) if solid else None
-        self._ground = ground.lay(parameters, self.tunnel.section, int(free.generate_state(1)[0]))
+        self._ground = ground.make_ground(parameters, self.tunnel.section, int(free.generate_state(1)[0]))
 
     def _leaks(
         self,

@@ -113,7 +113,7 @@ def _wall_spot(
     raise UserError("no room on the walls for another target sphere or lamp; use fewer or a longer tunnel")
 
 
-def _hiding_cable(floor: _Floor, s: float, centre: Float, wall: Float, radius: float) -> Primitive:
+def _occluding_cable(floor: _Floor, s: float, centre: Float, wall: Float, radius: float) -> Primitive:
     """Return a cable along the tunnel that hides the upper half of a sphere from the scanner."""
     p, scanner, line = floor.parameters, floor.scanner, floor.tunnel.line
     if p.scanner == "static":
@@ -158,7 +158,7 @@ def _spheres(
             if kind != "touching":
                 carriers.append(equipment.sphere_bracket(wall, centre, radius))
             if kind == "hidden":
-                carriers.append(_hiding_cable(floor, s, centre, wall, radius))
+                carriers.append(_occluding_cable(floor, s, centre, wall, radius))
         spheres.append(TargetSphere(i + 1, centre, radius, kind))
     return spheres, carriers
 
@@ -170,7 +170,7 @@ def _globe_radius(p: Parameters, rng: np.random.Generator) -> float:
             return radius
 
 
-def stand(
+def place_objects(
     parameters: Parameters,
     tunnel: Tunnel,
     scanner: Scanner,

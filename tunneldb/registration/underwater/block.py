@@ -15,12 +15,12 @@ from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.registration.underwater.adjustment import LADDER_SHIFT, Adjusted, adjust, scan_of
 from tunneldb.registration.underwater.chain import MAX_OVERLAP_DISTANCE
-from tunneldb.registration.underwater.determined import judge
+from tunneldb.registration.underwater.determined import classify_pose
 from tunneldb.registration.underwater.laser_ladders import LaserLadder, find_laser_ladders
 from tunneldb.registration.underwater.observations import Pose, Rows, cell_keys
 from tunneldb.registration.underwater.results import Ladder, LadderFit, Registration, Residual, SonarCloud, SonarPose
 from tunneldb.registration.underwater.single import PreparedScan, StartedScan, prepare
-from tunneldb.registration.underwater.starting import start_all
+from tunneldb.registration.underwater.starting import find_first_poses
 from tunneldb.registration.underwater.walls import Walls, find_walls, lower_edge
 
 WALL_VOXEL = 0.03  # m
@@ -56,7 +56,7 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
     found = find_laser_ladders(local, walls, ladders)
     scans, faults = _prepare([_local(cloud, origin) for cloud in clouds], walls)
     seen = {one.placed.ladder.name for one in found}
-    started, reasons = start_all(scans, walls, found, several=len(ladders) > 1)
+    started, reasons = find_first_poses(scans, walls, found, several=len(ladders) > 1)
     notes = []
     if edge > MAX_DRY_WALL:
         notes.append(f"the laser sees walls only from {edge:.2f} m above the water; check --water-level")
@@ -71,7 +71,7 @@ def register(laser: Float, clouds: Sequence[SonarCloud], ladders: Sequence[Ladde
             continue
         k = known.index(i)
         pose = adjusted.poses[k]
-        state, open_directions = judge(adjusted.covariance[k], _along(walls, pose))
+        state, open_directions = classify_pose(adjusted.covariance[k], _along(walls, pose))
         if state == "determined" and set(started[i].ladders) & set(moved):
             state, open_directions = "weak", (*open_directions, "ladders disagree")
         residuals = _residuals(adjusted.rows, k, [clouds[j].path.name for j in known])

@@ -14,7 +14,7 @@ from tunneldb.registration.underwater.first_pose import LevelScan
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
 from tunneldb.registration.underwater.observations import MIN_BED_COSINE, Patches, Pose, overlap_rows
 from tunneldb.registration.underwater.relief import NO_EVIDENCE, PIXEL, Relief, height_difference, likelihood, relief_of
-from tunneldb.registration.underwater.single import MIN_EDGES, PreparedScan, StartedScan, misses, sees
+from tunneldb.registration.underwater.single import MIN_EDGES, PreparedScan, StartedScan, missing_ladder_count, visible_ladders
 from tunneldb.registration.underwater.walls import Walls
 
 MAX_OVERLAP_DISTANCE = 15.0  # m between scanners whose scans are compared
@@ -94,7 +94,7 @@ class _Place:
         return abs(float((self.point - other.point) @ self.direction))
 
 
-def place_beside(
+def pose_from_neighbours(
     i: int,
     reliefs: Reliefs,
     started: Mapping[int, StartedScan],
@@ -102,7 +102,7 @@ def place_beside(
     found: Sequence[LaserLadder],
 ) -> tuple[StartedScan, float] | None:
     """Return the pose of scan ``i`` relative to started scans of the same bed, and its likelihood; None if uncertain."""
-    tried = (_settled(i, place, reliefs, started, walls) for place in _likeliest(_places(i, reliefs, started)))
+    tried = (_fitted_pose(i, place, reliefs, started, walls) for place in _likeliest(_places(i, reliefs, started)))
     settled = sorted((one for one in tried if one is not None), key=lambda one: -one[1])
     if not settled or settled[0][1] < MIN_LOG_RATIO:
         return None
@@ -110,8 +110,8 @@ def place_beside(
     for other, less in settled[1:]:
         if less > likelihood - MIN_LEAD and np.linalg.norm(other.translation - pose.translation) > PLACE_TOLERANCE:
             return None
-    seen = sees(reliefs.scans[i], pose, found)
-    return None if misses(pose, seen, found) else (StartedScan(pose, seen), likelihood)
+    seen = visible_ladders(reliefs.scans[i], pose, found)
+    return None if missing_ladder_count(pose, seen, found) else (StartedScan(pose, seen), likelihood)
 
 
 def _likeliest(places: Sequence[_Place]) -> list[_Place]:
@@ -125,7 +125,7 @@ def _likeliest(places: Sequence[_Place]) -> list[_Place]:
     return out[:MAX_PLACES]
 
 
-def _settled(
+def _fitted_pose(
     i: int, place: _Place, reliefs: Reliefs, started: Mapping[int, StartedScan], walls: Walls
 ) -> tuple[Pose, float] | None:
     """Return the pose fitted from a place to neighbouring scans, and its likelihood by the bed; None if it slides away."""
@@ -137,18 +137,18 @@ def _settled(
         :MAX_NEIGHBOURS
     ]
     own, others = _levelled(scans[i], pose), [_levelled(scans[k], started[k].pose) for k in neighbours]
-    found, likelihood = _fitted_beside(own, others, walls, place.direction)
+    found, likelihood = _fitted_to_neighbours(own, others, walls, place.direction)
     moved = abs(float((found.translation - pose.translation)[:2] @ place.direction))
     return (found, likelihood) if moved < MAX_SHIFT else None
 
 
-def _fitted_beside(own: Scan, others: Sequence[Scan], walls: Walls, direction: Float) -> tuple[Pose, float]:
+def _fitted_to_neighbours(own: Scan, others: Sequence[Scan], walls: Walls, direction: Float) -> tuple[Pose, float]:
     """Return the pose of a scan fitted to fixed scans, tried at several shifts along the canal, and its likelihood."""
     pairs = [(k, len(others)) for k in range(len(others))]
 
     def fitted(start: Pose, reaches: Sequence[float]) -> Pose:
         free = replace(own, pose=start)
-        return fit([*others, free], walls, (), pairs, reaches, len(others), hold_height=_tells_water(own)).poses[-1]
+        return fit([*others, free], walls, (), pairs, reaches, len(others), hold_height=_shows_waterline(own)).poses[-1]
 
     def likelihood(one: Pose) -> float:
         rough = _roughness(own.smooth, one, direction)
@@ -163,14 +163,14 @@ def _fitted_beside(own: Scan, others: Sequence[Scan], walls: Walls, direction: F
     return found, likelihood(found)
 
 
-def _tells_water(scan: PreparedScan | Scan) -> bool:
+def _shows_waterline(scan: PreparedScan | Scan) -> bool:
     """Return True if it shows the upper edges of its walls, at the water: it is level, while errors of slope accumulate."""
     return len(scan.edges) >= MIN_EDGES
 
 
 def _levelled(scan: PreparedScan, pose: Pose) -> Scan:
     """Return the scan without ladders, at the height given by the water."""
-    if _tells_water(scan):
+    if _shows_waterline(scan):
         pose = replace(pose, translation=np.array([*pose.translation[:2], -scan.flat.top]))
     return Scan(scan.patches, scan.smooth, scan.edges, pose, {})
 
@@ -270,5 +270,5 @@ def agreement(one: int, other: int, poses: tuple[Pose, Pose], reliefs: Reliefs, 
         return int(np.sign(evidence))
     scans = reliefs.scans
     own, neighbour = _levelled(scans[other], second), _levelled(scans[one], first)
-    _, closely = _fitted_beside(own, [neighbour], walls, look)
+    _, closely = _fitted_to_neighbours(own, [neighbour], walls, look)
     return int(np.sign(closely)) if abs(closely) > MIN_LOG_RATIO else 0

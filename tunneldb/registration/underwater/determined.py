@@ -11,7 +11,7 @@ MIN_WEAK_TURN, MIN_OPEN_TURN = np.radians(0.2), np.radians(3.0)
 MIN_WEAK_SCALE = 0.005
 
 
-def judge(covariance: Float, along: Float) -> tuple[str, tuple[str, ...]]:
+def classify_pose(covariance: Float, along: Float) -> tuple[str, tuple[str, ...]]:
     """Return the state of a pose, and the names of its badly determined directions.
 
     Parameters

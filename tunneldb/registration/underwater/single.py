@@ -159,7 +159,7 @@ def _try(points: Float, patches: Patches, candidate: Candidate, walls: Walls, fo
     likenesses = [(likeness(space, pose.translation, found[k].placed), k) for k in near]
     seen = tuple(k for value, k in likenesses if value > MIN_LIKENESS)
     alike = sum(value for value, k in likenesses if value > MIN_LIKENESS or k in first)
-    missed = misses(pose, seen, found)
+    missed = missing_ladder_count(pose, seen, found)
     return _Fitted(pose, seen, missed, alike)
 
 
@@ -167,7 +167,7 @@ def _explained(points: Float, pose: Pose, walls: Walls, found: Sequence[LaserLad
     return explained(points, pose, walls, [found[k].placed for k in _near(pose, found)])
 
 
-def misses(pose: Pose, seen: Sequence[int], found: Sequence[LaserLadder]) -> int:
+def missing_ladder_count(pose: Pose, seen: Sequence[int], found: Sequence[LaserLadder]) -> int:
     """Return the number of ladders in sight of a pose that are not among those seen."""
     return sum(k not in seen and _away(pose, found[k]) < SIGHT_RANGE for k in _near(pose, found))
 
@@ -182,7 +182,7 @@ def _same_place(one: Pose, other: Pose) -> bool:
     return _same(one, Pose(other.rotation, np.array([*other.translation[:2], one.translation[2]]), other.scale))
 
 
-def sees(scan: PreparedScan, pose: Pose, found: Sequence[LaserLadder]) -> tuple[int, ...]:
+def visible_ladders(scan: PreparedScan, pose: Pose, found: Sequence[LaserLadder]) -> tuple[int, ...]:
     """Return the ladders that a scan with this pose sees."""
     near = _near(pose, found)
     placed = pose.apply(scan.thin)

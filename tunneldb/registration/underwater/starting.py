@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tunneldb.errors import UserError
-from tunneldb.registration.underwater.chain import MAX_OVERLAP_DISTANCE, Reliefs, agreement, place_beside
+from tunneldb.registration.underwater.chain import MAX_OVERLAP_DISTANCE, Reliefs, agreement, pose_from_neighbours
 from tunneldb.registration.underwater.laser_ladders import LaserLadder
 from tunneldb.registration.underwater.single import PreparedScan, StartedScan, start
 from tunneldb.registration.underwater.walls import Walls
@@ -15,7 +15,7 @@ from tunneldb.registration.underwater.walls import Walls
 MIN_ROUND_SHARE = 0.5  # share of the best log likelihood of a round; less certain scans wait for the next round
 
 
-def start_all(
+def find_first_poses(
     scans: Mapping[int, PreparedScan], walls: Walls, found: Sequence[LaserLadder], *, several: bool
 ) -> tuple[dict[int, StartedScan], dict[int, str]]:
     """Find first poses from the ladders that a scan sees, then relative to scans that have one, as far as possible.
@@ -60,7 +60,7 @@ def start_all(
     while new and left:
         for i in left:
             if any(reliefs.may_overlap(k, i) for k in new):
-                at = place_beside(i, reliefs, started, walls, found)
+                at = pose_from_neighbours(i, reliefs, started, walls, found)
                 placed = {k: one for k, one in placed.items() if k != i} | ({} if at is None else {i: at})
         # less certain, more distant scans may become certain next to the first ones
         highest_likelihood = max((likelihood for _, likelihood in placed.values()), default=0.0)

@@ -76,7 +76,7 @@ def _moments() -> tuple[float, float]:
     return float(out.mean()), float(out.std())
 
 
-def lay(parameters: Parameters, section: Section, salt: int) -> Ground | None:
+def make_ground(parameters: Parameters, section: Section, salt: int) -> Ground | None:
     """Return the requested camber and ballast; ballast has mean height 0 and standard deviation ``parameters.ballast``."""
     if parameters.ballast == 0.0 and parameters.camber == 0.0:
         return None

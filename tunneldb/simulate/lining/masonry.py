@@ -58,7 +58,7 @@ class Masonry(NamedTuple):
     salt: int
 
 
-def lay_courses(parameters: Parameters, seed: np.random.SeedSequence) -> Masonry:
+def make_masonry(parameters: Parameters, seed: np.random.SeedSequence) -> Masonry:
     """Return the masonry of the lining, if it is of bricks or stones."""
     sizes = KINDS.get(parameters.lining)
     if sizes is None:

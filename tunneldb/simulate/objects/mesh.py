@@ -31,7 +31,7 @@ class Mesh(NamedTuple):
     drop: float
 
 
-def hang_mesh(parameters: Parameters, highest: float, seed: np.random.SeedSequence) -> Mesh | None:
+def make_mesh(parameters: Parameters, highest: float, seed: np.random.SeedSequence) -> Mesh | None:
     """Return the requested mesh, if any, in front of a lining whose relief reaches ``highest`` m."""
     if parameters.mesh == 0.0:
         return None
