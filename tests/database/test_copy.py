@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as hnp
 from psycopg import sql
 
 from tunneldb.database import PointZ, copy_binary, pack
-from tunneldb.database.copy import decode_array, encode_array, encode_value, pack_row
+from tunneldb.database.copy import pack_array, pack_row, pack_value, unpack_array
 
 TYPES = {"i2": "int2", "i4": "int4", "i8": "int8", "f4": "float4", "f8": "float8", "?": "bool"}
 
@@ -66,14 +66,14 @@ def test_unequal_lengths_are_refused() -> None:
 def test_arrays_of_any_length_and_nulls_are_sent_and_come_back(conn: psycopg.Connection) -> None:
     conn.execute("CREATE TEMP TABLE kept (n int, few int[], many float8[])")
     rows = [(1, np.array([1, -7], np.int32), np.array([0.5, np.nan, -np.inf])), (None, np.empty(0, np.int32), np.empty(0))]
-    packed = [pack_row([encode_value(n, "i"), encode_array(few), encode_array(many)]) for n, few, many in rows]
+    packed = [pack_row([pack_value(n, "i"), pack_array(few), pack_array(many)]) for n, few, many in rows]
     assert copy_binary(conn, sql.Identifier("kept"), ("n", "few", "many"), packed) == 2
     assert conn.execute("SELECT n, few, many[1], many[3] FROM kept").fetchall() == [
         (1, [1, -7], 0.5, -np.inf), (None, [], None, None),
     ]  # fmt: skip
     sent = conn.execute("SELECT array_send(few), array_send(many) FROM kept", binary=True).fetchall()
     for (few, many), (_, expected, others) in zip(sent, rows, strict=True):
-        np.testing.assert_array_equal(decode_array(few, np.int32), expected)
-        np.testing.assert_array_equal(decode_array(many, np.float64), others)
+        np.testing.assert_array_equal(unpack_array(few, np.int32), expected)
+        np.testing.assert_array_equal(unpack_array(many, np.float64), others)
     with pytest.raises(TypeError, match="float32"):
-        encode_array(np.zeros(3, np.float32))
+        pack_array(np.zeros(3, np.float32))

@@ -144,12 +144,12 @@ def pack_row(fields: Sequence[bytes | None]) -> bytes:
     return b"".join(parts)
 
 
-def encode_value(value: float | int | None, kind: str) -> bytes | None:
+def pack_value(value: float | int | None, kind: str) -> bytes | None:
     """Encode one number: ``kind`` is that of `struct`, ``h``, ``i``, ``q`` (int2, int4, int8) or ``d`` (float8)."""
     return None if value is None else struct.pack(f">{kind}", value)
 
 
-def encode_array(values: Float | Int32) -> bytes:
+def pack_array(values: Float | Int32) -> bytes:
     """Encode one array of float8 or int4.
 
     Format: ``array_send`` of PostgreSQL: dimensions, flag for NULLs, type, length, lower bound, elements.
@@ -173,7 +173,7 @@ def encode_array(values: Float | Int32) -> bytes:
     return struct.pack(">iiiii", 1, 0, oid, len(values), 1) + elements.tobytes()
 
 
-def decode_array(sent: bytes, dtype: type[np.float64] | type[np.int32]) -> NDArray[Any]:
+def unpack_array(sent: bytes, dtype: type[np.float64] | type[np.int32]) -> NDArray[Any]:
     """Decode an array (n,) of ``array_send`` of ``float8[]`` or ``int4[]`` without NULLs."""
     kind, _ = _ARRAYS[np.dtype(dtype)]
     elements = np.frombuffer(sent, [("length", ">i4"), ("value", kind)], offset=20) if len(sent) > 12 else None

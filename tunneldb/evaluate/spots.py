@@ -85,9 +85,9 @@ def evaluate_spots(
     places: list[list[dict[str, Any]]] = [[], []]
     distances: list[Float] = []
     for side, of in enumerate(kept):
-        at = np.array([place_of(laid.parts, faces, shape) for _, laid, shape in of]).reshape(-1, 3) + origin
+        at = np.array([place_of(projected.parts, faces, shape) for _, projected, shape in of]).reshape(-1, 3) + origin
         distances.append(distance_from_scanner(at, poses))
-        places[side] = [_place(laid, faces, xyz) for (_, laid, _), xyz in zip(of, at, strict=True)]
+        places[side] = [_place(projected, faces, xyz) for (_, projected, _), xyz in zip(of, at, strict=True)]
     report = make_report(
         comparison, truth.ids, [str(row.number) for row in rows], (distances[0], distances[1]), min_area, listed.seen_area,
         SPOTS, (places[0], places[1]),
@@ -127,9 +127,9 @@ def _project_found(rows: list[ListedSpot], faces: list[FoundFace], origin: Float
     return out
 
 
-def _place(laid: ProjectedPolygon, faces: list[FoundFace], xyz: Float) -> dict[str, Any]:
+def _place(projected: ProjectedPolygon, faces: list[FoundFace], xyz: Float) -> dict[str, Any]:
     """Return member, face and coordinates of a spot."""
-    k = max(laid.parts, key=lambda one: one[1].area)[0]
+    k = max(projected.parts, key=lambda one: one[1].area)[0]
     face = None if k is None else faces[k]
     x, y, z = (round(float(value), 3) for value in xyz)
     return {"member": face and face.member, "face": face and face.number, "x": x, "y": y, "z": z}

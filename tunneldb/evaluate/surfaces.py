@@ -104,10 +104,10 @@ def project_on_faces(shape: BaseGeometry, faces: Sequence[FoundFace]) -> Project
     return ProjectedPolygon(list(parts.items()), on_faces)
 
 
-def on_one_plane(laid: Sequence[Sequence[tuple[int | None, BaseGeometry]]]) -> list[BaseGeometry]:
+def on_one_plane(projected: Sequence[Sequence[tuple[int | None, BaseGeometry]]]) -> list[BaseGeometry]:
     """Return polygons from their parts on faces, with the faces side by side on one plane; areas are preserved."""
     bounds: dict[int | tuple[int, int], list[tuple[float, ...]]] = {}
-    for n, parts in enumerate(laid):
+    for n, parts in enumerate(projected):
         for k, part in parts:
             bounds.setdefault((n, -1) if k is None else k, []).append(part.bounds)
     shift: dict[int | tuple[int, int], float] = {}
@@ -118,7 +118,7 @@ def on_one_plane(laid: Sequence[Sequence[tuple[int | None, BaseGeometry]]]) -> l
         end += high - low + _FACE_SPACING
     return [
         _polygons(shapely.union_all([translate(part, shift[(n, -1) if k is None else k]) for k, part in parts]))
-        for n, parts in enumerate(laid)
+        for n, parts in enumerate(projected)
     ]
 
 

@@ -11,7 +11,7 @@ from shapely import affinity
 from shapely.geometry import MultiPolygon, Polygon, box
 
 from tunneldb.arrays import Float
-from tunneldb.simulate.lining.leaks import Leak, Room, place
+from tunneldb.simulate.lining.leaks import FreeArea, Leak, place
 from tunneldb.simulate.tunnel.tunnel import Tunnel
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def epoch(parameters: Parameters, tunnel: Tunnel) -> Epoch | None:
     return Epoch(p, tunnel, found)
 
 
-def leaks_since(parameters: Parameters, tunnel: Tunnel, room: Room, leaks: list[Leak]) -> list[Leak]:
+def leaks_since(parameters: Parameters, tunnel: Tunnel, free_area: FreeArea, leaks: list[Leak]) -> list[Leak]:
     """Return the leaks of a later scan: the largest grow, the smallest dry up, and new ones get new numbers."""
     p = parameters
     by_size = [leak.id for leak in sorted(leaks, key=lambda leak: -leak.area)]
@@ -114,7 +114,7 @@ def leaks_since(parameters: Parameters, tunnel: Tunnel, room: Room, leaks: list[
     limit = tunnel.section.floor_arc - 0.05
     kept = [_grown(leak, limit) if leak.id in grown else leak for leak in leaks if leak.id not in dried]
     rng = np.random.default_rng(np.random.SeedSequence(p.seed, spawn_key=(1_000_000 + p.epoch,)))
-    new = place(tunnel, room, p.new_leaks, p.leak_area, p.leak_drop, rng)
+    new = place(tunnel, free_area, p.new_leaks, p.leak_area, p.leak_drop, rng)
     return kept + [replace(leak, id=len(leaks) + leak.id) for leak in new]
 
 

@@ -17,7 +17,7 @@ from tunneldb.simulate.instrument import Instrument, noise_scale
 from tunneldb.simulate.lining import ballast as ground
 from tunneldb.simulate.lining.blotches import Blotch, place_blotches
 from tunneldb.simulate.lining.leak_sites import site_leaks
-from tunneldb.simulate.lining.leaks import Leak, Room, place
+from tunneldb.simulate.lining.leaks import FreeArea, Leak, place
 from tunneldb.simulate.lining.marks import Mark, chamfers, place_marks
 from tunneldb.simulate.lining.masonry import Masonry, make_masonry
 from tunneldb.simulate.lining.reflectance import Reflectance, lining_reflectance
@@ -142,8 +142,8 @@ class Simulation:
         self.rings = build(parameters, self.tunnel, built, chamfered)
         self.ring_shape: RingShape = shape(parameters, self.rings, shaped)
         self.masonry: Masonry = make_masonry(parameters, coursed)
-        room = Room(self.tunnel, fixed + openings, [a.footprint() for a in along])
-        self.leaks: list[Leak] = self._leaks(room, wet, joints, refuge, drips, sited)
+        free_area = FreeArea(self.tunnel, fixed + openings, [a.footprint() for a in along])
+        self.leaks: list[Leak] = self._leaks(free_area, wet, joints, refuge, drips, sited)
         self.marks: list[Mark] = place_marks(parameters, self.tunnel, [k.polygon for k in self.leaks] + openings, marked)
         self.marks += chamfers(parameters, self.tunnel, self.rings)
         taken = openings + [m.polygon() for m in self.marks if m.kind != "chamfer"]
@@ -163,7 +163,7 @@ class Simulation:
         self.things: list[Primitive] = standing + overhead(parameters, self.tunnel, loose, len(standing) + 1)
         self.epoch = epoch(parameters, self.tunnel)
         if self.epoch is not None:
-            self.leaks = leaks_since(parameters, self.tunnel, room, self.leaks)
+            self.leaks = leaks_since(parameters, self.tunnel, free_area, self.leaks)
             self._seed = np.random.SeedSequence(self._seed.entropy, spawn_key=(*self._seed.spawn_key, parameters.epoch, 1))
         self._scene = scene(
             self.tunnel,
@@ -178,7 +178,7 @@ class Simulation:
 
     def _leaks(
         self,
-        room: Room,
+        free_area: FreeArea,
         wall: np.random.SeedSequence,
         joints: np.random.SeedSequence,
         refuge: np.random.SeedSequence,
@@ -190,12 +190,12 @@ class Simulation:
         The last are placed first, since some need a whole ring.
         """
         p, tunnel = self.parameters, self.tunnel
-        at_sites = site_leaks(p, tunnel, self.rings, self.appendages, room, sited)
-        leaks = place(tunnel, room, p.leak_count(), p.leak_area, p.leak_drop, np.random.default_rng(wall))
-        leaks += joint_leaks(p, tunnel, self.rings, room, joints)
+        at_sites = site_leaks(p, tunnel, self.rings, self.appendages, free_area, sited)
+        leaks = place(tunnel, free_area, p.leak_count(), p.leak_area, p.leak_drop, np.random.default_rng(wall))
+        leaks += joint_leaks(p, tunnel, self.rings, free_area, joints)
         leaks += niche_leaks(p, tunnel, self.niches, refuge) + at_sites
         leaks = [replace(leak, id=i + 1) for i, leak in enumerate(leaks)]
-        return with_drips(leaks, p.drip_gap, room, drips) if p.drips else leaks
+        return with_drips(leaks, p.drip_gap, free_area, drips) if p.drips else leaks
 
     def make(self, plan: BlockPlan) -> Cloud:
         """Return the points of one block, reproducible by seed and index."""

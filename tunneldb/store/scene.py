@@ -16,7 +16,7 @@ from tunneldb.classification.lining_relief import Relief
 from tunneldb.classification.objects.clusters import CELL, Cluster
 from tunneldb.classification.scene import Scene
 from tunneldb.classification.targets.detection import Sphere
-from tunneldb.database.copy import copy_binary, decode_array, encode_array, encode_value, pack_row
+from tunneldb.database.copy import copy_binary, pack_array, pack_row, pack_value, unpack_array
 from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
@@ -65,10 +65,10 @@ def save_ground(
         left, right = (None if np.isnan(arc) else float(arc) for arc in arcs[row])
         packed.append(
             pack_row([
-                encode_value(survey.id, "i"), encode_value(ground.start + row, "i"), encode_value(km, "i"),
-                encode_value(float(across[held.start]), "d"), encode_array(ground.height[row, held]),
-                encode_value(float(ground.gamma[row]), "d"), encode_array(ground.foot[row]), encode_array(ground.lean[row]),
-                encode_value(left, "d"), encode_value(right, "d"), _ewkb(drawn, survey),
+                pack_value(survey.id, "i"), pack_value(ground.start + row, "i"), pack_value(km, "i"),
+                pack_value(float(across[held.start]), "d"), pack_array(ground.height[row, held]),
+                pack_value(float(ground.gamma[row]), "d"), pack_array(ground.foot[row]), pack_array(ground.lean[row]),
+                pack_value(left, "d"), pack_value(right, "d"), _ewkb(drawn, survey),
             ])
         )  # fmt: skip
     return copy_binary(conn, sql.Identifier("tunnel", "ground"), columns, packed)
@@ -88,7 +88,7 @@ def load_ground(conn: psycopg.Connection[Any], survey: Survey, first: float, sto
     ).fetchall()
     if not rows:
         return None
-    heights = [decode_array(row[2], np.float64) for row in rows]
+    heights = [unpack_array(row[2], np.float64) for row in rows]
     begins = [round(row[1] / COLUMN) for row in rows]
     start, left = rows[0][0], min(begins)
     last = rows[-1][0] + 1 if _is_end(rows[-1][0] + 1) and rows[-1][0] < stop else rows[-1][0]
@@ -100,7 +100,7 @@ def load_ground(conn: psycopg.Connection[Any], survey: Survey, first: float, sto
         k = row[0] - start
         height[k, begin - left : begin - left + len(values)] = values
         gamma[k] = row[3]
-        foot[k], lean[k] = decode_array(row[4], np.float64), decode_array(row[5], np.float64)
+        foot[k], lean[k] = unpack_array(row[4], np.float64), unpack_array(row[5], np.float64)
     ground = Ground(start, left, height, gamma, foot, lean)
     _carry_to_ends(ground)
     return ground
@@ -186,9 +186,9 @@ def save_clusters(conn: psycopg.Connection[Any], survey: Survey, km: int, cluste
     )  # fmt: skip
     packed = [
         pack_row([
-            encode_value(survey.id, "i"), encode_value(km, "i"), encode_value(int(c.klass), "h"), encode_value(c.along_from, "d"),
-            encode_value(c.along_to, "d"), encode_value(c.height_from, "d"), encode_value(c.height_to, "d"),
-            encode_value(c.points, "q"), encode_value(CELL, "d"), encode_array(np.ascontiguousarray(c.cells, np.int32).ravel()),
+            pack_value(survey.id, "i"), pack_value(km, "i"), pack_value(int(c.klass), "h"), pack_value(c.along_from, "d"),
+            pack_value(c.along_to, "d"), pack_value(c.height_from, "d"), pack_value(c.height_to, "d"),
+            pack_value(c.points, "q"), pack_value(CELL, "d"), pack_array(np.ascontiguousarray(c.cells, np.int32).ravel()),
             _ewkb(shapely.Polygon(c.hull), survey),
         ])
         for c in clusters
@@ -208,7 +208,7 @@ def load_clusters(conn: psycopg.Connection[Any], survey: Survey, first: float, s
     ).fetchall()
     return [
         Cluster(
-            klass, decode_array(cells, np.int32).reshape(-1, 3), points, along_from, along_to, height_from, height_to,
+            klass, unpack_array(cells, np.int32).reshape(-1, 3), points, along_from, along_to, height_from, height_to,
             shapely.get_coordinates(shapely.from_wkb(hull))[:-1],
         )
         for klass, cells, points, along_from, along_to, height_from, height_to, hull in rows

@@ -15,7 +15,7 @@ from psycopg import sql
 from tunneldb.arrays import Float, Int64, UInt8
 from tunneldb.classification.classes import PointClass
 from tunneldb.classification.objects.clusters import CELL
-from tunneldb.database.copy import decode_array
+from tunneldb.database.copy import unpack_array
 from tunneldb.database.fetch import fetch_array
 from tunneldb.shape.outline import Outline
 from tunneldb.store.partition import partition, partition_exists
@@ -88,7 +88,7 @@ def clusters_at(conn: psycopg.Connection[Any], survey: Survey, km: int, points: 
         return [None] * len(points)
     from scipy.spatial import cKDTree
 
-    cells = [decode_array(cells, np.int32).reshape(-1, 3) for _, cells in rows]
+    cells = [unpack_array(cells, np.int32).reshape(-1, 3) for _, cells in rows]
     owner: Int64 = np.repeat([key for key, _ in rows], [len(part) for part in cells])
     away, nearest = cKDTree(np.vstack(cells)).query(np.floor(points / CELL), p=np.inf, distance_upper_bound=2.5)
     return [int(owner[k]) if np.isfinite(d) else None for d, k in zip(away, nearest, strict=True)]

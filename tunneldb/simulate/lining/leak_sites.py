@@ -11,7 +11,7 @@ from shapely.geometry import LineString, Polygon, box
 
 from tunneldb.errors import UserError
 from tunneldb.simulate.floor_profile import rise
-from tunneldb.simulate.lining.leaks import Leak, Room, star, wet_patch
+from tunneldb.simulate.lining.leaks import FreeArea, Leak, star, wet_patch
 from tunneldb.simulate.lining.rings import POCKET, POCKET_FROM_JOINT, POCKETS, Rings
 from tunneldb.simulate.lining.seepage import band_of
 from tunneldb.simulate.objects.fixtures import Appendage
@@ -125,7 +125,7 @@ def site_leaks(
     tunnel: Tunnel,
     rings: Rings,
     appendages: Sequence[Appendage],
-    room: Room,
+    free_area: FreeArea,
     seed: np.random.SeedSequence,
 ) -> list[Leak]:
     """Return leaks at particular places, the largest kinds first, numbered from 1; all may be behind fixtures along the wall.
@@ -152,11 +152,11 @@ def site_leaks(
         for number in range(count):
             for _ in range(TRIES):
                 outline = make(rng)
-                if outline is not None and room.holds(outline, across=True):
+                if outline is not None and free_area.fits(outline, across=True):
                     break
             else:
                 raise UserError(f"no room for {kind} leak {number + 1} of {count}; use fewer leaks or a longer tunnel")
-            room.take(outline)
+            free_area.reserve(outline)
             inside = outline.representative_point()
             factor = float(tunnel.area_factor(np.array([inside.x]), np.array([inside.y]))[0])
             leaks.append(Leak(len(leaks) + 1, outline, outline.area * factor, float(rng.uniform(*p.leak_drop)), kind))

@@ -75,7 +75,7 @@ def wet_patch(rng: np.random.Generator, area: float, down: int, holed: bool) -> 
     return affinity.scale(patch.simplify(0.004), scale, scale, origin=(0.0, 0.0))
 
 
-class Room:
+class FreeArea:
     """Free area for leaks on the lining, away from obstacles, floor, tunnel ends and other leaks.
 
     ``runs`` are the fixtures along the tunnel, walls and floor, which a leak may be allowed to cross.
@@ -90,19 +90,19 @@ class Room:
         self._foot = tunnel.section.floor_arc
         self._leaks: list[BaseGeometry] = []
 
-    def holds(self, outline: BaseGeometry, across: bool = False) -> bool:
+    def fits(self, outline: BaseGeometry, across: bool = False) -> bool:
         """Return True if a leak fits there; with ``across`` it may extend to the floor and cross fixtures along the tunnel."""
         left, low, right, high = outline.bounds
         lowest, taken = (self._foot, self._taken) if across else (self.lowest, self._taken + self._runs)
         inside = low >= -lowest and high <= lowest and left > self.start and right < self.end
         return inside and outline.is_valid and not any(t.intersects(outline) for t in taken)
 
-    def take(self, outline: BaseGeometry) -> None:
+    def reserve(self, outline: BaseGeometry) -> None:
         """Reserve an area."""
         self._leaks.append(outline)
         self._taken.append(prep(outline.buffer(LEAK_MARGIN)))
 
-    def bears(self, drip: BaseGeometry, leak: BaseGeometry) -> bool:
+    def fits_drip(self, drip: BaseGeometry, leak: BaseGeometry) -> bool:
         """Return True if a drip fits there: on the lining, separate from its own leak and from all others."""
         others = [k for k in self._leaks if k is not leak]
         low, high = drip.bounds[1::2]
@@ -112,7 +112,7 @@ class Room:
 
 def place(
     tunnel: Tunnel,
-    room: Room,
+    free_area: FreeArea,
     count: int,
     area: tuple[float, float],
     drop: tuple[float, float],
@@ -130,17 +130,17 @@ def place(
     for number, size in enumerate(sizes):
         for _ in range(600):
             s = float(rng.uniform(line.start + end_margin, line.end - end_margin))
-            arc = float(rng.uniform(-room.lowest, room.lowest))
+            arc = float(rng.uniform(-free_area.lowest, free_area.lowest))
             polygon = wet_patch(rng, float(size), 1 if arc >= 0 else -1, number % 3 == 0 and size >= 0.5)
             for _ in range(2):  # simplification changed the area slightly
                 factor = math.sqrt(size / polygon.area)
                 polygon = affinity.scale(polygon, factor, factor, origin=(0.0, 0.0))
             polygon = affinity.translate(polygon, s, arc)
-            if room.holds(polygon):
+            if free_area.fits(polygon):
                 break
         else:
             raise UserError(f"no room on the lining for leak {number + 1} of {count} ({size:.2f} m²); use fewer or smaller")
-        room.take(polygon)
+        free_area.reserve(polygon)
         centre = polygon.representative_point()
         factor = float(tunnel.area_factor(np.array([centre.x]), np.array([centre.y]))[0])
         leaks.append((polygon, polygon.area * factor, float(rng.uniform(*drop))))

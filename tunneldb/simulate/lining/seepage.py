@@ -11,7 +11,7 @@ from shapely.geometry import LineString, MultiPolygon, Polygon
 from shapely.ops import unary_union
 
 from tunneldb.errors import UserError
-from tunneldb.simulate.lining.leaks import Leak, Room, star
+from tunneldb.simulate.lining.leaks import FreeArea, Leak, star
 from tunneldb.simulate.lining.rings import Rings
 from tunneldb.simulate.objects.fixtures import Niche, niche_table
 from tunneldb.simulate.parameters import Parameters
@@ -40,7 +40,9 @@ def band_of(length: float, width: float, rng: np.random.Generator) -> Polygon:
     return Polygon(np.vstack([sides[0], sides[1][::-1]]))
 
 
-def joint_leaks(parameters: Parameters, tunnel: Tunnel, rings: Rings, room: Room, seed: np.random.SeedSequence) -> list[Leak]:
+def joint_leaks(
+    parameters: Parameters, tunnel: Tunnel, rings: Rings, free_area: FreeArea, seed: np.random.SeedSequence
+) -> list[Leak]:
     """Return wet bands along joints of the lining, numbered from 1.
 
     Raises
@@ -65,11 +67,11 @@ def joint_leaks(parameters: Parameters, tunnel: Tunnel, rings: Rings, room: Room
                 s = rings.first + (i + 0.5) * rings.length
                 arc = (rings.shift[i] + int(rng.integers(0, m)) * rings.period + half) % (2.0 * half) - half
             band = affinity.translate(band, s, arc)
-            if room.holds(band):
+            if free_area.fits(band):
                 break
         else:
             raise UserError(f"no room for joint leak {len(leaks) + 1} of {p.joint_leaks}; use fewer leaks")
-        room.take(band)
+        free_area.reserve(band)
         factor = float(tunnel.area_factor(np.array([s]), np.array([arc]))[0])
         leaks.append(Leak(len(leaks) + 1, band, band.area * factor, float(rng.uniform(*p.leak_drop)), "joint"))
     return leaks
@@ -128,7 +130,7 @@ def _drip(leak: Polygon | MultiPolygon, down: float, gaps: tuple[float, float], 
     return LineString([(x, begin), (x + float(rng.normal(0.0, 0.01)), begin + down * length)]).buffer(0.5 * width)
 
 
-def with_drips(leaks: list[Leak], gaps: tuple[float, float], room: Room, seed: np.random.SeedSequence) -> list[Leak]:
+def with_drips(leaks: list[Leak], gaps: tuple[float, float], free_area: FreeArea, seed: np.random.SeedSequence) -> list[Leak]:
     """Return the leaks, larger ones with one to three drips below them, which belong to their reference outline.
 
     ``gaps`` are the limits of the distance between a drip and its leak, m.
@@ -141,7 +143,7 @@ def with_drips(leaks: list[Leak], gaps: tuple[float, float], room: Room, seed: n
             dripping.append(leak)
             continue
         drips = [_drip(leak.polygon, down, gaps, rng) for _ in range(int(rng.integers(1, 4)))]
-        separate = unary_union([d for d in drips if d is not None and room.bears(d, leak.polygon)])
+        separate = unary_union([d for d in drips if d is not None and free_area.fits_drip(d, leak.polygon)])
         outline = leak.polygon.union(separate)
         scale = leak.area_surface / leak.area
         dripping.append(replace(leak, polygon=outline, area_surface=outline.area * scale))
