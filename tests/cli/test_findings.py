@@ -248,7 +248,7 @@ def test_what_was_exported_is_imported_as_it_was(conn: psycopg.Connection, tmp_p
     ("text", "options", "said"),
     [
         ("art,chainage,arc\n", (), "has no column kind"),
-        ("kind,a,b\nleak,1,2\n", (), "does not say where the findings lie"),
+        ("kind,a,b\nleak,1,2\n", (), "has no place of the findings"),
         ("kind,chainage,arc\n", ("--column", "arc=Offset"), "has no column Offset"),
         ("kind,chainage,arc\ncrack,12350,0\n\ncrack,12351\n", (), "line 4: 2 values, but the header has 3 columns"),
         ("kind,chainage,arc\n", ("--map", "Riss"), "two names with = between"),

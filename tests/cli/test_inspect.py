@@ -109,12 +109,12 @@ def test_what_is_missing_is_said(tls: Path, tmp_path: Path) -> None:
     bare = changed(tls, tmp_path / "cloud.las", bare=True)
     said = inspected(bare)
     text = "\n".join(said["missing"])
-    for word in ("axis", "EPSG code in place of SRID", "where the scanner stood", "YYYY-MM-DD"):
+    for word in ("axis", "EPSG code in place of SRID", "scanner positions", "YYYY-MM-DD"):
         assert word in text
     assert any("merged" in doubt and "--no-poses" in doubt for doubt in said["doubts"])
     assert f"--srid SRID --axis auto {bare}" in said["commands"][1]
     assert "--stations STATIONS.csv --intensity intensity --intensity-kind linear --reference auto" in said["commands"][2]
-    assert any("intensity is taken for 16-bit counts" in doubt for doubt in said["doubts"])
+    assert any("intensity is guessed to be 16-bit counts" in doubt for doubt in said["doubts"])
 
 
 def test_feet_are_noticed(tls: Path, tmp_path: Path) -> None:

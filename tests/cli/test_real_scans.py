@@ -62,7 +62,7 @@ def test_rocks_of_unknown_stations_are_no_structure(tmp_path: Path) -> None:
     words = ["members", scan, "--intensity", "intensity", "--intensity-kind", "linear", "-o", str(found)]
     refused = CliRunner().invoke(main, words)
     assert refused.exit_code == 2
-    assert "where the scanner stood isn't in the file" in refused.stderr
+    assert "the scanner position is not in the file" in refused.stderr
     assert not found.exists()
     stations = tmp_path / "stations.csv"
     stations.write_text("scan_id,x,y,z\n0,515385,4918325,2330\n")

@@ -138,7 +138,7 @@ def test_a_shape_nested_without_end_is_refused(conn: psycopg.Connection, example
     path.write_text(f'kind,wkt\ncrack,"{deep}"\ncrack,"LINESTRING(12330 1, 12331 1)"\n')
     result = CliRunner().invoke(main, ["findings", "import", example, str(path)])
     assert result.exit_code == 2
-    assert "row 2: wkt is nested more than 20 deep" in result.stderr
+    assert "row 2: wkt has more than 20 nested parentheses" in result.stderr
     template = tmp_path / "deep.toml"
     template.write_text("client = " + "[" * 100_000)
     result = CliRunner().invoke(main, ["report", example, "--template", str(template), "-o", str(tmp_path / "a.html")])

@@ -163,7 +163,7 @@ def test_what_is_applied_is_in_force_until_it_is_undone(reviewed: psycopg.Connec
     assert stale(conn) == []  # detection never went by it
     assert model_in_force(conn, tunnel_id(conn)).model is standard_model()
     conn.rollback()
-    assert "nothing that was learned is in force for tunnel demo" in command("learn", SURVEY, "--undo", code=2).stderr
+    assert "tunnel demo has no adjustment from reviews" in command("learn", SURVEY, "--undo", code=2).stderr
     audit = conn.execute(
         "SELECT survey, row_id, action, after ->> 'note', after ->> 'undone' FROM tunnel_api.audit"
         " WHERE view = 'learned_model' ORDER BY id"

@@ -153,7 +153,7 @@ def test_what_cannot_be_registered_is_refused_and_nothing_stored(
     folder, _ = canal
     assert "check --up" in register(folder, code=2, up="-z").stderr
     assert "0.28 m below the water level" in register(folder, code=2, level=LEVEL + 0.28).stderr
-    assert "no laser point lies within" in register(folder, code=2, level=LEVEL + 20.0).stderr
+    assert "no laser point is within" in register(folder, code=2, level=LEVEL + 20.0).stderr
     ladders = tmp_path / "ladders.csv"
     cases = {
         "ladder,rung,height,stile_gap,diameter\nA,1,0.0,0.32,0.035\nA,2,0.28,0.32,0.035\n": "2 rungs; 3 are the least",
@@ -199,7 +199,7 @@ def test_speed_of_sound_and_place_may_be_told(
     for text, said in (
         ("file,x,y,within\nother.xyz,1,2,3\n", "other.xyz is none of the files"),
         ("file,x,y,within\nslow.xyz,1,2,0\n", "line 2: within is 0"),
-        ("file,x,y,within\nslow.xyz,1,2,1\nslow.xyz,1,2,1\n", "line 3: file slow.xyz stands twice"),
+        ("file,x,y,within\nslow.xyz,1,2,1\nslow.xyz,1,2,1\n", "line 3: file slow.xyz occurs twice"),
     ):
         start.write_text(text)
         assert said in command("register", NAME, slow, *how, "--start", start, code=2).stderr
@@ -231,7 +231,7 @@ def test_soundings_in_the_tunnels_system_need_no_pose(
     np.savetxt(soundings, points[:, :2], "%.4f")
     assert "2 values, expected x, y and z" in command("load", NAME, soundings, *how, code=2).stderr
     np.savetxt(soundings, points + np.array([5000.0, 0.0, 0.0]), "%.4f")
-    assert "lies along the axis" in command("load", NAME, soundings, *how, code=2).stderr
+    assert "is along the axis" in command("load", NAME, soundings, *how, code=2).stderr
     register(folder)
     named = command("load", NAME, folder / "s0.xyz", *how, code=2).stderr
     assert "has been registered" in named

@@ -56,8 +56,8 @@ def test_a_survey_too_thin_to_be_searched_is_unseen_and_not_clean(conn: psycopg.
     """At 5 points/m² nothing can be told: no leaks, none of the lining seen, and every document says so first."""
     write(Simulation(parameters("profiler", 1, density=5.0)), tmp_path)
     said = prepare(tmp_path, "profiler", "reflectance")
-    assert "lining with fewer than 12 is not searched for leaks, and counts as unseen" in said
-    assert "too few to tell wet from dry" in command("run", NAME).output
+    assert "lining with fewer than 12 is not searched for leaks, and counts as not inspected" in said
+    assert "too few to distinguish wet from dry" in command("run", NAME).output
     assert outlines(conn) == {}
     assert counts(conn)["seen"] < 0.01
     assert counts(conn)["sparse"] > 0.99
@@ -69,4 +69,4 @@ def test_a_survey_too_thin_to_be_searched_is_unseen_and_not_clean(conn: psycopg.
     assert "Searched, but unseen" in shown
     assert "0 leaks" not in shown
     remarks = [row[0] for row in conn.execute("SELECT remark FROM tunnel_api.remark WHERE stage = 'detect'").fetchall()]
-    assert any("counts as unseen" in remark for remark in remarks)
+    assert any("counts as not inspected" in remark for remark in remarks)

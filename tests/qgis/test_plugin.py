@@ -187,7 +187,7 @@ def test_an_inspector_reviews_by_keys(
     assert seen["images"]["drawn_as_before"]
     assert seen["leaks"]["EXIT_CODE"] in (0, 1)
     assert "leak_unrolled" in seen["leaks"]["loaded"]
-    assert re.match(r"there is no survey 'nowhere-2024'", seen["wrong"]["error"])
+    assert re.match(r"no survey 'nowhere-2024'", seen["wrong"]["error"])
     assert seen["left"] == []
     assert not [key for key in seen["settings"] if "password" in key]
 
@@ -238,7 +238,7 @@ def test_what_comes_between_loses_nothing_and_overwrites_nothing(
     assert (two["stays"], two["shown"], two["kept"]) == (two["first"], ["rejected", "soot", True], "rejected|soot")
     assert (two["came"], two["listed"]) == (two["wanted"], False)
 
-    assert seen["rerun"].pop("said").endswith("; findings are those of the database.")
+    assert seen["rerun"].pop("said").endswith("; findings were reloaded.")
     assert seen["rerun"] == {"stays": True, "new": True}
     for said in (lost["read_again"], seen["ended"]):
         assert said.endswith("; findings of the dock were not reloaded."), (lost["read_again"], seen["ended"])

@@ -287,5 +287,5 @@ def test_points_that_the_curve_does_not_span_are_refused(monkeypatch: pytest.Mon
 def test_no_point_on_the_lining_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     points = cloud(5_000)
     points.xyz[:, 2] += 30.0
-    with pytest.raises(UserError, match=r"no point of 0\.laz lies on the lining of kilometre 3"):
+    with pytest.raises(UserError, match=r"no point of 0\.laz is on the lining of kilometre 3"):
         read(monkeypatch, observer("amplitude", True), [[points]])

@@ -236,8 +236,8 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
         if (work.reviewed or work.edited) and not yes:
             kms = ", ".join(map(str, emptied))
             question = (
-                f"Kilometre {kms} is left without points: {work.anomalies} leaks and other dark spots go, {work.reviewed} of"
-                f" them reviewed, and {work.edited} axis vertices moved by hand; {work.drawn} findings that people drew are"
+                f"Kilometre {kms} is left without points: {work.anomalies} leaks and dry dark areas are removed, {work.reviewed} of"
+                f" them reviewed, and {work.edited} axis vertices moved by hand; {work.drawn} findings drawn by hand are"
                 f" kept. Remove {', '.join(names)}?"
             )
             if not click.confirm(question, err=True):
@@ -266,8 +266,8 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
         lost = removed.lost
         notify(
             f"{name}: no points are left in kilometre {', '.join(map(str, removed.emptied))}, and all that was made of them is"
-            f" gone: {lost.anomalies} leaks and other dark spots, {lost.reviewed} of them reviewed; {lost.drawn} findings that"
-            " people drew are kept"
+            f" gone: {lost.anomalies} leaks and dry dark areas, {lost.reviewed} of them reviewed; {lost.drawn} findings"
+            " drawn by hand are kept"
         )
     if stale[0]:
         notify(f"{name}: {stale[0]} stages are stale: tunneldb run {name} --stale")
@@ -314,7 +314,7 @@ def remove(settings: Settings, name: str, yes: bool) -> None:
         ).fetchone()
         assert row is not None
         connection.rollback()
-        question = f"Remove {name} with {row[0]} points and {row[1]} leaks and other dark spots, {row[2]} of them reviewed?"
+        question = f"Remove {name} with {row[0]} points and {row[1]} leaks and dry dark areas, {row[2]} of them reviewed?"
         if not yes and not click.confirm(question, err=True):
             raise click.Abort
         remove_survey(connection, name)

@@ -1,4 +1,4 @@
-"""What is done with the files of a survey, and the stages of a kilometre."""
+"""Processing of a survey's files, and the stages of a kilometre."""
 
 import lazy_loader
 

@@ -19,19 +19,19 @@ from tunneldb.pointcloud.reader import ScanHeader, check_header, read_chunks, re
 from tunneldb.pointcloud.voxels import Voxels
 
 EDGE = 0.5
-"""Edge of the voxels whose centroids the axis is found from, m."""
+"""Edge of the voxels whose centroids are used for the axis, m."""
 
 FARTHEST = 200_000.0
-"""Distance from most points beyond which a point is none of the scan, m."""
+"""Distance from most points beyond which a point does not belong to the scan, m."""
 
 TRUSTED_SHARE = 0.8
-"""Share of sections that must be whole for the axis not to be called doubtful."""
+"""Minimum share of whole sections for an axis that is not doubtful."""
 
 TRUSTED_DISTANCE = 0.5
-"""Distance from the line (m) within which 95 % of the sections' centres must lie for the same."""
+"""Distance from the line (m) that 95 % of the sections' centres must be within for an axis that is not doubtful."""
 
 TRUSTED_ASIDE = 0.03
-"""Share of what has a roof that may lie elsewhere before it is told."""
+"""Share of roofed area off the line from which it is reported."""
 
 Begin = Callable[[str, float | None], Callable[[float], None]]
 
@@ -70,7 +70,7 @@ def search_axis(files: Sequence[Path], srid: int | None, begin: Begin, along: Fl
 def found_given(
     files: Sequence[Path], srid: int | None, begin: Begin, start: float | None, reverse: bool
 ) -> tuple[GivenAxis, FoundAxis]:
-    """Return the axis found in scan files, as one that a tunnel can be given.
+    """Return the axis found in scan files, in the form of a given axis.
 
     Parameters
     ----------
@@ -82,38 +82,38 @@ def found_given(
         Whether chainage grows from its end farther east.
     """
     if not files:
-        raise UserError("--axis auto finds the axis in scan files; name them behind the tunnel: --axis auto SCAN...")
+        raise UserError("--axis auto finds the axis in scan files; name them after the tunnel: --axis auto SCAN...")
     found = search_axis(files, srid, begin)
     found = found.reversed() if reverse else found
     return GivenAxis(found.xyz, start or 0.0, source=f"the axis found in {_names(files)}"), found
 
 
 def complete(given: GivenAxis, files: Sequence[Path], srid: int, begin: Begin) -> tuple[GivenAxis, FoundAxis]:
-    """Give a line that was drawn in plan the tunnel's middle and heights from scan files; ends and direction stay."""
+    """Set the middle and heights of a line drawn in plan from scan files; ends and direction stay."""
     found = search_axis(files, srid, begin, given.xyz[:, :2])
     note = f"its middle and heights are from {_names(files)}"
     return GivenAxis(found.xyz, given.start, None, given.source, (*given.notes, note)), found
 
 
 def describe_found(found: FoundAxis, start: float = 0.0) -> list[str]:
-    """Lines that say what was found and how far to trust it; chainages from ``start`` (m) on."""
+    """Return lines on the axis found and its reliability; chainages from ``start`` (m) on."""
     whole, count = int(found.whole.sum()), len(found.whole)
     middle, far = np.nanquantile(found.away, (0.5, 0.95))
     lines = [
         f"axis found: {found.length:.1f} m; the tunnel is {found.width:.1f} m wide and {found.height:.1f} m high",
-        f"{whole} of {count} sections have both walls, vault and floor; the middles of half of them lie within {middle:.2f} m "
+        f"{whole} of {count} sections have both walls, vault and floor; the middles of half of them are within {middle:.2f} m "
         f"of the line, of 95 % within {far:.2f} m",
     ]
     stretches = [f"{chainage_label(start + a, 0)} to {chainage_label(start + b, 0)}" for a, b in found.doubtful]
     if stretches:
-        lines.append(f"look at {', '.join(stretches)}: walls, vault or floor are missing there, or lie elsewhere")
+        lines.append(f"check {', '.join(stretches)}: walls, vault or floor are missing there, or are elsewhere")
     if found.off_line_share > TRUSTED_ASIDE and found.off_line_centre is not None:
         lines.append(
-            f"{100 * found.off_line_share:.0f} % of what has a roof is not along the line, most of it about "
+            f"{100 * found.off_line_share:.0f} % of the roofed area is not along the line, most of it around "
             f"{found.off_line_centre[0]:.0f},{found.off_line_centre[1]:.0f}: a side room, or the tunnel beyond a gap"
         )
     if whole < TRUSTED_SHARE * count or far > TRUSTED_DISTANCE:
-        lines.append("doubtful as a whole: look at the picture before you go on, or draw the line")
+        lines.append("doubtful as a whole: check the picture before you continue, or draw the line")
     return lines
 
 
@@ -126,7 +126,7 @@ def write_axis(path: Path, xyz: Float) -> None:
 
 
 def _voxels(headers: Sequence[ScanHeader], begin: Begin) -> Float:
-    """Centroids of the voxels on surfaces."""
+    """Return centroids of the voxels on surfaces."""
     done = begin("reading", float(sum(header.points for header in headers)))
     voxels = Voxels(EDGE)
     middle: Float | None = None

@@ -1,4 +1,4 @@
-"""What the intensity of a kilometre is corrected with: range curve and roughness, found on a sample of its points."""
+"""Intensity correction of a kilometre: range curve and roughness, estimated from a sample of its points."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ from tunneldb.radiometry.roughness import (
 from tunneldb.raster.observation import ObservedPoints, Observer, RangeSpan
 
 CORNER = 0.1
-"""Points that serve for the roughness lie farther above the foot of the wall, m: there sections are rounded, and the incidence
+"""Minimum height above the foot of the wall of points for the roughness, m: below it sections are rounded, and the incidence
 angles wrong."""
 
 NEAR_SURFACE = 0.05
-"""Points that serve for the roughness lie no farther from the surface, m."""
+"""Maximum distance from the surface of points for the roughness, m."""
 
 UNKNOWN = ReferenceCurve(np.array([1e-3, 1e4]), np.zeros(2))
-"""Stands for a range curve that is yet to be found: changes nothing."""
+"""Placeholder for a range curve not found yet: no correction."""
 
 BORROW = (
-    "or, where the curve of a neighbouring kilometre was found, export its range_m and intensity_db"
+    "or, if the curve of a neighbouring kilometre was found, export its range_m and intensity_db"
     " (tunnel_api.range_curve) and run this one in a survey with that file as its --reference"
 )
-"""What else helps where no range curve could be found."""
+"""Further advice if no range curve could be found."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Sample:
 
     @property
     def observations(self) -> Observations:
-        """How the scanner saw the points."""
+        """Return how the scanner saw the points."""
         assert self.seen.observations is not None
         return self.seen.observations
 
@@ -75,7 +75,7 @@ class Sample:
         return self.clear & (np.abs(self.seen.offset) <= NEAR_SURFACE)
 
     def along(self, curve: ReferenceCurve) -> Sample:
-        """Correct for distance by a curve what was seen with an UNKNOWN one."""
+        """Correct samples seen with an UNKNOWN curve for distance."""
         observations = self.observations
         level = (observations.raw_db - curve(observations.range_m.astype(np.float64))).astype(np.float32)
         return replace(self, seen=replace(self.seen, observations=replace(observations, distance_db=level)))
@@ -83,7 +83,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a kilometre's intensity is corrected with.
+    """Intensity correction of a kilometre.
 
     Attributes
     ----------
@@ -104,10 +104,10 @@ class Calibration:
 
     @property
     def note(self) -> str | None:
-        """What the ledger is to say about it."""
+        """Return the note for the ledger."""
         if self.found is None:
             return None
-        alone = "hardly any lining was seen by two scans: the range curve rests on its being alike along the tunnel, within 5 m"
+        alone = "hardly any lining was seen by two scans: the range curve assumes uniform lining along the tunnel, within 5 m"
         return "; ".join(filter(None, [alone if self.found.hardly_overlaps else None, self.found.remark])) or None
 
 
@@ -116,7 +116,7 @@ def observe_sample(points: Points, observer: Observer) -> Sample:
     seen = observer.observe(points)
     if not seen.lining.any():
         raise UserError(
-            f"no point of kilometre {observer.km} lies on the lining: within {observer.tolerance:g} m of the sections and seen"
+            f"no point of kilometre {observer.km} is on the lining: within {observer.tolerance:g} m of the sections and seen"
             f" at less than intensity.max_incidence from nearer than intensity.max_range"
         )
     assert observer.radiometer is not None
@@ -168,7 +168,7 @@ def calibrate(points: Points, observer: Observer, drawn: list[Polygon], survey: 
 
 
 def find_range_curve(view: Sample, observer: Observer) -> RangeCurve:
-    """Range curve and roughness from the lining itself; see :func:`estimate_range_curve`.
+    """Estimate range curve and roughness from the lining itself; see :func:`estimate_range_curve`.
 
     It spans the ranges of all that full density may hold as lining: what stands out from it or back behind it too.
     """
@@ -190,7 +190,7 @@ def find_range_curve(view: Sample, observer: Observer) -> RangeCurve:
 
 
 def _roughness_found(view: Sample, found: RangeCurve) -> Roughness:
-    """The roughness that was found with the range curve, as founded as its deviation says."""
+    """Return the roughness found with the range curve, with its reliability from its deviation."""
     angle = np.degrees(np.arccos(view.observations.cosine[view.telling]))
     return Roughness(
         found.roughness,
@@ -204,12 +204,12 @@ def _roughness_found(view: Sample, found: RangeCurve) -> Roughness:
 
 
 def roughness_of(view: Sample, drawn: list[Polygon]) -> Roughness:
-    """Roughness from the regions that the user drew, or from automatic ones."""
+    """Estimate roughness from the regions that the user drew, or from automatic ones."""
     seen, observations = view.seen, view.observations
     if drawn:
         regions = drawn_regions(_polygon_of(seen, drawn), view.scan_id, observations.cosine, observations.distance_db)
         if len(regions) < 2:
-            raise UserError(f"the {len(drawn)} homogeneous regions drawn hold too few points: draw larger ones, or none")
+            raise UserError(f"the {len(drawn)} homogeneous regions drawn have too few points: draw larger ones, or none")
         return find_roughness(regions)
     near = view.telling
     regions = automatic_regions(
@@ -219,7 +219,7 @@ def roughness_of(view: Sample, drawn: list[Polygon]) -> Roughness:
 
 
 def _polygon_of(seen: ObservedPoints, polygons: list[Polygon]) -> Int64:
-    """Number of the polygon that holds each point, -1 for none."""
+    """Return the number of the polygon around each point, -1 for none."""
     number = np.full(len(seen.chainage), -1, np.int64)
     usable = np.flatnonzero(seen.use)
     for k, polygon in enumerate(polygons):
@@ -234,7 +234,7 @@ def dry_sigma(
     roughness: Roughness,
     dry_regions: list[Polygon],
 ) -> tuple[DryLevel, DryLevel, DryLevel]:
-    """Standard deviation of dry lining points, raw and corrected by Lambert's law and Oren–Nayar (Table 1)."""
+    """Return the standard deviation of dry lining points, raw and corrected by Lambert's law and Oren–Nayar (Table 1)."""
     seen, observations = view.seen, view.observations
     if dry_regions:
         dry = seen.lining & (_polygon_of(seen, dry_regions) >= 0)

@@ -57,15 +57,15 @@ from tunneldb.store.surface import load_surface, survey_ends
 from tunneldb.store.survey import Survey
 
 ASIDE = 50.0
-"""Length of the surface beyond the ends that is loaded too: sections are judged by the three before and after them, m."""
+"""Length of the surface loaded beyond the ends, m: sections are checked with the three before and after them."""
 
 TOLD = 0.01
-"""A smaller share of the lining that is too sparse to be searched is not worth a note: it is in what was not seen."""
+"""Share of the lining too sparse to be searched from which there is a note; less is only in the share not inspected."""
 
 
 @dataclass(frozen=True)
 class DetectionInputs:
-    """What detection in a kilometre goes by.
+    """Input of detection in a kilometre.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class DetectionInputs:
 
 @dataclass(frozen=True)
 class DetectionResult:
-    """What detection found in a kilometre.
+    """Result of detection in a kilometre.
 
     Attributes
     ----------
@@ -162,7 +162,7 @@ def detect(
             "learned": inputs.judge.id,
             "pixels": images.pixels,
             "leaks": 0,
-            "note": "no intensity: offset image only, no leaks sought",
+            "note": "no intensity: offset image only, leaks not searched for",
         }
     images = ImageStore(conn, survey, inputs.grid, KINDS)
     result = compute_detection(inputs, inputs.sample, values, images.save, progress)
@@ -170,7 +170,7 @@ def detect(
 
 
 def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float]) -> DetectionInputs:
-    """Read what detection in a kilometre goes by.
+    """Read the input of detection in a kilometre.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def compute_detection(
     save_block: Callable[[Window], None],
     progress: Callable[[float], None],
 ) -> DetectionResult:
-    """Calibrate the intensity, make the images from the files, and find what is dark in them.
+    """Calibrate the intensity, make the images from the files, and find dark areas in them.
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ def _save(
 
 
 def load_radiometer(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float]) -> Radiometer | None:
-    """Read what the intensity of a kilometre is corrected with, by the stages' parameters; None when it has none.
+    """Read the intensity correction of a kilometre, with the stages' parameters; None without intensity.
 
     A range curve that is to be found on the lining is UNKNOWN at first: see :func:`tunneldb.pipeline.calibration.calibrate`.
     """
@@ -311,16 +311,16 @@ def load_radiometer(conn: psycopg.Connection[Any], survey: Survey, km: int, valu
         reference = UNKNOWN if survey.reference == "auto" else load_reference(conn, survey)
     if needs_reference(kind) and reference is None:
         raise UserError(
-            f"survey {survey.name} has no reference curve, without which intensity of kind {kind} can't be corrected for"
-            " distance: add the survey with --reference CSV (range_m,intensity_db), or with --reference auto to have it"
-            " found on the lining, or take a reflectance dimension"
+            f"survey {survey.name} has no reference curve, which is required to correct intensity of kind {kind} for"
+            " distance: add the survey with --reference CSV (range_m,intensity_db), or with --reference auto to estimate it"
+            " from the lining, or use a reflectance dimension"
         )
     limits = (values[f"intensity.{name}"] for name in ("max_incidence", "max_range", "max_outside"))
     return Radiometer(kind, load_poses(conn, survey, km), reference, *limits)
 
 
 def load_floor(conn: psycopg.Connection[Any], survey: Survey, surface: Surface, km: int, halo: float) -> Floor:
-    """Where the floor of a kilometre begins, and of so many metres beyond its ends: where stage ``ground`` has found it.
+    """Return the edges of the floor of a kilometre, and of some metres beyond its ends, from stage ``ground``.
 
     In a canal it begins where the surface meets the water, if sonar scans were loaded.
     """
@@ -345,13 +345,13 @@ def _gather(
     counts = rasterize(observer, files, image, roughness, progress)
     if not image.inner_blocks():
         raise UserError(
-            f"no point of {', '.join(file.path.name for file in files)} lies on the lining of kilometre {observer.km}"
+            f"no point of {', '.join(file.path.name for file in files)} is on the lining of kilometre {observer.km}"
         )
     return counts
 
 
 def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:
-    """Grid of a kilometre and its halo: blocks that have a surface, from the lowest to the highest arc of their sections."""
+    """Return the grid of a kilometre and its halo: blocks with a surface, from the lowest to the highest arc."""
     first, last = km * KILOMETRE - surface.reach, (km + 1) * KILOMETRE + surface.reach
     if not ((surface.chainages >= first) & (surface.chainages <= last)).any():
         raise NotReadyError(f"kilometre {km} has no sections yet: run its stages segments and sections first")
@@ -364,7 +364,7 @@ def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:
 
 
 def _report(result: DetectionResult, known_before: list[str | None], other_pixels: list[int]) -> Counts:
-    """What the ledger says about the roughness, and what else there is to note."""
+    """Return the ledger's text on the roughness, and further notes."""
     roughness = result.calibration.roughness
 
     def known(value: float, digits: int) -> float | None:
@@ -383,18 +383,18 @@ def _report(result: DetectionResult, known_before: list[str | None], other_pixel
         notes.append(text)
     if other_pixels:
         notes.append(
-            f"leaks over the end towards kilometre {' and '.join(map(str, other_pixels))} are in two pieces: its pixels are of"
-            " another size; detect both with the same image.pixel"
+            f"leaks across the boundary to kilometre {' and '.join(map(str, other_pixels))} are in two pieces: its pixels have"
+            " another size; run detect on both with the same image.pixel"
         )
     if (sparse := result.counts.get("sparse")) is not None:
         notes.append(
-            f"{100.0 * sparse:.3g} % of the lining has fewer than {result.counts['least_density']:g} points/m², too few to tell"
-            " wet from dry: it was not searched for leaks and counts as unseen (image.min_density)"
+            f"{100.0 * sparse:.3g} % of the lining has fewer than {result.counts['least_density']:g} points/m², too few to"
+            " distinguish wet from dry: it was not searched for leaks and counts as not inspected (image.min_density)"
         )
     if (spacing := result.counts.get("profile_spacing")) is not None:
         notes.append(
-            f"profiles {spacing:g} m apart: between them the images show the nearest one; where leaks begin and end along the"
-            f" tunnel is known to {0.5 * spacing:.2g} m, and those shorter than {spacing:g} m may be missed"
+            f"profiles {spacing:g} m apart: between them the images show the nearest one; the ends of leaks along the"
+            f" tunnel are uncertain by {0.5 * spacing:.2g} m, and those shorter than {spacing:g} m may be missed"
         )
     if notes:
         report["note"] = "; ".join(notes)

@@ -29,12 +29,12 @@ from tunneldb.store.alignment import station_chainages
 from tunneldb.store.survey import Survey
 
 COLUMNS = ("kind", "severity", "width", "review", "remark", "photo")
-"""What is read of each row beside its place; all but the kind may be missing."""
+"""Columns read from each row besides its place; all except the kind are optional."""
 
 
 _TEXT = (".csv", ".txt")
 _LAYERED = (".gpkg", ".geojson", ".json")
-"""Endings of files that are imported: tables, and layers."""
+"""Extensions of imported files: tables, and layers."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Imported:
-    """What was imported: how many of each kind, and their ids in order of the file; or what is wrong with which row."""
+    """Result of an import: number of each kind and ids in order of the file; or the errors by row."""
 
     kinds: Counter[str]
     ids: list[int]
@@ -179,7 +179,7 @@ def _read_csv(conn: psycopg.Connection[Any], survey: Survey, path: Path, columns
     ways = [way for way in _WAYS if all(name in texts for name in way)]
     if not ways:
         raise UserError(
-            f"{path} does not say where the findings lie: it needs columns wkt or geometry; chainage_from, chainage_to,"
+            f"{path} has no place of the findings: it needs columns wkt or geometry; chainage_from, chainage_to,"
             f" arc_from and arc_to; chainage and arc; or x, y and z (--column OURS=THEIRS); its header is {','.join(header)!r}"
         )
     lines = _line_numbers(path)
@@ -189,14 +189,14 @@ def _read_csv(conn: psycopg.Connection[Any], survey: Survey, path: Path, columns
 
 
 _WAYS = (("wkt",), ("geometry",), ("chainage_from", "chainage_to", "arc_from", "arc_to"), ("chainage", "arc"), ("x", "y", "z"))
-"""Columns that say where a finding lies; of several the first that a row has. ``geometry`` is WKT, too: lists are written so,
-with the box about each beside it, which says less."""
+"""Columns with the place of a finding; the first available ones are used. ``geometry`` is WKT too: lists are written with it,
+together with the bounding box, which is less precise."""
 
 _PLACES = tuple(name for way in _WAYS for name in way)
 
 
 def _line_numbers(path: Path) -> list[int]:
-    """Line of each row that is not empty, as read_texts has them."""
+    """Return the line of each row that is not empty, as for read_texts."""
     with path.open(encoding="utf-8-sig", newline="") as file:
         reader = csv.reader(file)
         next(reader, None)
@@ -206,7 +206,7 @@ def _line_numbers(path: Path) -> list[int]:
 def _row(
     conn: psycopg.Connection[Any], survey: Survey, number: int, values: Mapping[str, str], way: tuple[str, ...] | None
 ) -> Row:
-    """A row of a CSV; one whose place cannot be read bears why."""
+    """Row of a CSV; if its place cannot be read, with the reason."""
     try:
         shape = _shape(conn, survey, values, way)
     except ValueError as error:
@@ -223,12 +223,12 @@ def _shape(
         raise ValueError(f"it has no place: {lacking} is empty" if lacking else "it has no place: all columns of it are empty")
     if len(way) == 1:
         if _depth(values[way[0]]) > _DEEPEST:  # by which GEOS, that reads it, would go down
-            raise ValueError(f"{way[0]} is nested more than {_DEEPEST} deep")
+            raise ValueError(f"{way[0]} has more than {_DEEPEST} nested parentheses")
         try:
             return shapely.from_wkt(values[way[0]])
         except shapely.errors.GEOSException as error:
             why = str(error).splitlines()[0]
-            raise ValueError(f"{way[0]} is {textwrap.shorten(values[way[0]], 60)!r}, which is no WKT: {why}") from None
+            raise ValueError(f"{way[0]} is {textwrap.shorten(values[way[0]], 60)!r}, which is not WKT: {why}") from None
     place = [
         _chainage(conn, survey, name, values[name]) if name.startswith("chainage") else _float(name, values[name])
         for name in way
@@ -237,11 +237,11 @@ def _shape(
 
 
 _DEEPEST = 20
-"""Levels of parentheses of WKT: a collection of polygons has four."""
+"""Maximum nesting of parentheses in WKT: a collection of polygons has four."""
 
 
 def _depth(text: str) -> int:
-    """How deep parentheses are nested."""
+    """Return the nesting depth of parentheses."""
     letters = np.frombuffer(text.encode("utf-32-le"), np.uint32)
     return int(np.cumsum((letters == ord("(")).astype(np.int64) - (letters == ord(")"))).max(initial=0))
 
@@ -257,7 +257,7 @@ def _float(name: str, text: str, said: str = "a number") -> float:
 
 
 def _chainage(conn: psycopg.Connection[Any], survey: Survey, name: str, text: str) -> float:
-    """A chainage in metres, or that of a station of the tunnel, which may be there twice or not at all."""
+    """Return a chainage in metres, given so or as a station of the tunnel, which must exist exactly once."""
     text = text.replace(",", ".")
     if "+" not in text[1:]:
         return _float(name, text, "a chainage in metres or a station, as 12+345.678")
@@ -277,7 +277,7 @@ def _read_layer(path: Path, survey: Survey, columns: Mapping[str, str], layer: s
     if path.suffix.lower() not in _LAYERED:
         raise UserError(f"{path}: findings are imported from {', '.join((*_TEXT, *_LAYERED))}; save a workbook as CSV")
     if not path.is_file():
-        raise UserError(f"{path}: there is no such file")
+        raise UserError(f"{path}: no such file")
     source = vector_source(path)
     try:
         there = [name for name, geometry in pyogrio.list_layers(source).tolist() if geometry is not None]
@@ -306,7 +306,7 @@ def _empty(value: Any) -> bool:
 
 
 def _view(path: Path, given: str | None, survey: Survey) -> str:
-    """Which coordinates a layer is in: the unrolled plane, which has no system, or the tunnel's."""
+    """Return the coordinates of a layer: the unrolled plane, which has no system, or the tunnel's."""
     crs = None if given is None else CRS(given)
     if crs is None or is_local(crs) or (path.suffix.lower() in (".geojson", ".json") and b'"crs"' not in path.read_bytes()):
         return "unrolled"

@@ -1,4 +1,4 @@
-"""What is missing of a scan to be worked on, and what to type next, by what its files hold."""
+"""Missing input of a scan, and the commands to type next, from the contents of its files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tunneldb.radiometry.intensity_kind import KindGuess
 from tunneldb.store.scanner import FARTHEST_SCANNER
 
 FAR_APART = 0.1
-"""Profiles farther apart than this leave room for leaks that are worth a report, m."""
+"""Profile spacing from which missed leaks are worth a remark, m."""
 
 _NO_INTENSITY = "--intensity-kind none"
 _MOST_FILES = 5  # named one by one
@@ -30,7 +30,7 @@ _SAME_PLACE = 0.001  # m
 
 @dataclass(frozen=True)
 class FirstSteps:
-    """What to do with scan files.
+    """Commands for scan files.
 
     Attributes
     ----------
@@ -48,12 +48,12 @@ class FirstSteps:
 
 
 def needs_axis(looks: Sequence[FileLook]) -> bool:
-    """Whether no axis lies beside the files, so that it has to be found in them."""
+    """Return True if no axis file is beside the scans, so that it must be found in them."""
     return _beside(looks, "axis.csv") is None and not any(look.foreign_unit for look in looks)
 
 
 def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> FirstSteps:
-    """Conclude what to do with the files of a survey.
+    """Choose the commands for the files of a survey.
 
     Parameters
     ----------
@@ -70,14 +70,14 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         if look.misplaced or look.untimed
     ]
     doubts += [
-        f"{look.path.name}: its profiles lie {look.profile_spacing:.2f} m apart, and what is between them was not seen"
+        f"{look.path.name}: its profiles are {look.profile_spacing:.2f} m apart; the lining between them was not measured"
         for look in looks
         if look.profile_spacing is not None and look.profile_spacing > FAR_APART
     ]
     if all(look.only_noise for look in looks):
         doubts.append(
-            "nothing to load: all points would be left out as noise, for none has others near enough to be of one surface with"
-            " it; single points that were measured in profiles are no scan"
+            "nothing to load: all points would be left out as noise, because none has others near enough on one surface;"
+            " single points measured in profiles are not a scan"
         )
         return FirstSteps(missing, doubts, [])
     if axis_fault is not None:
@@ -95,10 +95,10 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         given = _quoted(axis)
     elif axis_fault is None:
         given = f"auto {files}"
-        missing.append("the given axis, which no scan holds: give --axis your own, or have it found from the points (auto)")
+        missing.append("the given axis, which no scan contains: give your own with --axis, or have it found (auto)")
     else:
         given = "AXIS.csv"
-        missing.append("the given axis, x,y,z in place of AXIS.csv: it can't be found from these points")
+        missing.append("the given axis, x,y,z in place of AXIS.csv: it cannot be found from these points")
     survey, date = _survey(looks, name, missing)
     unknown: list[str] = []
     lacking: list[str] = []
@@ -110,7 +110,7 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         stations = poses if poses.startswith("--stations") else "--stations STATIONS.csv"
         levels = intensity.removesuffix(" --reference auto")  # that takes a lining
         doubts.append(
-            "what stands without an axis (a hall, a bridge, a plant) is looked at by: tunneldb members"
+            "structures without an axis (a hall, a bridge, a plant): tunneldb members"
             f" {_quoted(looks[0].path)} {stations} {levels} -o {shlex.quote(f'{name}-members.gpkg')}"
         )
     tunnel = f"tunneldb tunnel add {name} --srid {srid} --axis {given}"
@@ -154,7 +154,9 @@ def _srid(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> s
     if len(set(named.values())) > 1:
         doubts.append(f"the files are in different coordinate systems: {', '.join(map(str, named))}; transform them to one")
     codes = [code for code in named.values() if code is not None]
-    doubts += [f"{look.path.name}: its coordinate system can't be read: {look.unread_crs}" for look in looks if look.unread_crs]
+    doubts += [
+        f"{look.path.name}: its coordinate system cannot be read: {look.unread_crs}" for look in looks if look.unread_crs
+    ]
     if codes:
         doubts += [
             f"{look.path.name}: {place}"
@@ -171,7 +173,7 @@ def _srid(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> s
 
 
 def _beside(looks: Sequence[FileLook], ending: str) -> Path | None:
-    """File beside the scans that is called as one of them, but for its ending; None if there is none, or more than one."""
+    """Return the file beside the scans with the same name but another extension; None if there is none, or several."""
     found = set()
     for look in looks:
         stem = look.path.name.split(".", 1)[0]
@@ -193,31 +195,29 @@ def _poses(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> 
         return f"--stations {_quoted(stations)}"
     other = _stations_in_folder(looks)
     if other is not None:
-        doubts.append(
-            f"{other.name} has stations of the files' scan_id, near their points, and another name: are they of this scan?"
-        )
+        doubts.append(f"{other.name} has stations of the files' scan_id, near their points, but another name: check this guess")
         return f"--stations {_quoted(other)}"
     scans = sorted({scan for look in looks for scan in look.scans})
     times = [time for look in looks if look.times for time in look.times]
     if times and len(scans) < 3:
         missing.append(
-            "where the scanner was: its trajectory as TRAJECTORY.csv with time,x,y,z, time being the gps_time of the files, "
-            f"{min(times):.3f} to {max(times):.3f}; of a scanner that stood still its stations, see --stations; "
-            "if nobody knows, --no-poses in place of it, with intensity of kind reflectance or none"
+            "scanner positions: the trajectory as TRAJECTORY.csv with time,x,y,z, time being the gps_time of the files, "
+            f"{min(times):.3f} to {max(times):.3f}; for a static scanner its stations, see --stations; "
+            "if unknown, --no-poses in place of it, with intensity of kind reflectance or none"
         )
         return "--trajectory TRAJECTORY.csv"
     listed = ", ".join(map(str, scans[:10])) + (f" and {len(scans) - 10} more" if len(scans) > 10 else "")
-    missing.append(f"where the scanner stood: STATIONS.csv with scan_id,x,y,z, of scan_id {listed}")
+    missing.append(f"scanner positions: STATIONS.csv with scan_id,x,y,z, of scan_id {listed}")
     if len(scans) == 1:
         doubts.append(
-            "if this is several scans, merged, their positions are lost: export them one by one; or say --no-poses in place of "
+            "if this is several scans, merged, their positions are lost: export them one by one; or use --no-poses in place of "
             "--stations, with intensity of kind reflectance or none"
         )
     return "--stations STATIONS.csv"
 
 
 def _stations_in_folder(looks: Sequence[FileLook]) -> Path | None:
-    """The one table in the files' folders that is called stations and has one, near the points, for each scan; else None."""
+    """Return the only table named stations in the files' folders with one, near the points, for each scan; else None."""
     scans = {scan for look in looks for scan in look.scans}
     low = np.min([look.low for look in looks], axis=0) - FARTHEST_SCANNER
     high = np.max([look.high for look in looks], axis=0) + FARTHEST_SCANNER
@@ -237,9 +237,7 @@ def _stations_in_folder(looks: Sequence[FileLook]) -> Path | None:
 def _doubt_positions(posed: Sequence[FileLook], doubts: list[str]) -> None:
     places = np.array([scan.position for look in posed for scan in look.poses])
     if np.any(np.abs(places).max(axis=1) < _SAME_PLACE):
-        doubts.append(
-            "the pose of a scan is 0, 0, 0: did the scanner stand there, or was the pose lost when the scan was exported?"
-        )
+        doubts.append("the pose of a scan is 0, 0, 0: check whether the scanner stood there, or the pose was lost on export")
     elif len(places) > 1 and float(np.ptp(places, axis=0).max()) < _SAME_PLACE:
         doubts.append(f"all {len(places)} scans have the same position: export them with their own poses")
 
@@ -247,11 +245,11 @@ def _doubt_positions(posed: Sequence[FileLook], doubts: list[str]) -> None:
 def _intensity(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> str:
     found = _common_intensity(looks)
     if found is None:
-        missing.append("an intensity that leaks can be found in; without one the lining is shown, and no leaks are sought")
+        missing.append("an intensity for finding leaks; without one the lining is shown, and leaks are not searched for")
         return _NO_INTENSITY
     name, guess, sure = found
     if not sure:
-        doubts.append(f"{name} is taken for {guess.what} by its values ({guess.reason}): ask who scanned it, and say so")
+        doubts.append(f"{name} is guessed to be {guess.what} from its values ({guess.reason}): ask who scanned it")
     words = f"--intensity {shlex.quote(name)} --intensity-kind {guess.kind}"
     if guess.kind == "reflectance":
         return words
@@ -260,7 +258,7 @@ def _intensity(looks: Sequence[FileLook], missing: list[str], doubts: list[str])
 
 
 def _common_intensity(looks: Sequence[FileLook]) -> tuple[str, KindGuess, bool] | None:
-    """Dimension that all files have and whose values may be an intensity, what it may be, and whether its name says so too."""
+    """Return a dimension of all files that may be an intensity, its kind, and whether its name says so too."""
     found = []
     for first in looks[0].intensities:
         same = [_named(look, first.name) for look in looks]

@@ -14,23 +14,23 @@ from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
 MOST_NAMED = 5
-"""Rejected vertices that are named, at the most."""
+"""Maximum number of rejected vertices that are named."""
 
 WIDEST = 20.0
-"""Tunnels are narrower, m: four lanes or three tracks under one vault."""
+"""Maximum width of a tunnel, m: four lanes or three tracks under one vault."""
 
 TOUCHING = 0.1
-"""Stretches with less between them are one, m."""
+"""Distance below which stretches are one, m."""
 
 FOOT = 0.3048
 """m."""
 
 FEW_POINTS = 10_000
-"""A kilometre with fewer points than this, at the end of a tunnel, may be without a section of its own."""
+"""Minimum number of points of a kilometre at the end of a tunnel for it to need a section of its own."""
 
 
 def axis(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
-    """Stage 1 of Gonçalves et al. (2012): the axis; vertices edited by hand (stage 2) stay."""
+    """Find the axis (stage 1 of Gonçalves et al., 2012); vertices edited by hand (stage 2) stay."""
     _place_vertices(conn, survey)
     passes = conn.execute(
         """
@@ -90,7 +90,7 @@ def _place_vertices(conn: psycopg.Connection[Any], survey: Survey) -> None:
 
 
 def segments(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
-    """Stage 3: segments, and the segment and chainage of every point."""
+    """Make segments, and the segment and chainage of every point (stage 3)."""
     built = _one(conn, "SELECT tunnel_internal.segment_build(%s, %s)", survey.id, km)
     if not built:
         raise NotReadyError(f"kilometre {km} has no axis yet: tunneldb run {survey.name} --km {km} --from axis")
@@ -99,7 +99,7 @@ def segments(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Map
 
 
 def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float], progress: Progress) -> Counts:
-    """Stage 4: two cross-sections a segment."""
+    """Make two cross-sections per segment (stage 4)."""
     if not _one(conn, "SELECT count(*) FROM tunnel.segment WHERE survey_id = %s AND km = %s", survey.id, km):
         raise NotReadyError(f"kilometre {km} has no segments yet: tunneldb run {survey.name} --km {km} --from segments")
     built = _one(
@@ -140,7 +140,7 @@ def sections(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Map
 
 
 def _without_roof(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float]) -> tuple[float, str]:
-    """Length (m) of what has a floor and no roof, as portals and open cuts, and what is to be known of it."""
+    """Return the length (m) with a floor and no roof, such as portals and open cuts, and a note on it."""
     planes = conn.execute(
         "SELECT chainage_from, chainage_to FROM tunnel_internal.section_open(%s, %s, %s, %s, %s)",
         [survey.id, km, values["section.angle_step"], values["section.max_half_width"], int(values["section.min_points"])],
@@ -165,7 +165,7 @@ def _without_roof(conn: psycopg.Connection[Any], survey: Survey, km: int, values
 
 
 def _too_wide(width: float) -> str:
-    """Question sections of a width (m) that no tunnel has, as where coordinates in feet are taken for metres."""
+    """Question sections of an implausible width (m), for example from coordinates in feet."""
     if width <= WIDEST:
         return ""
     return (

@@ -33,7 +33,7 @@ def ground(
     values: Mapping[str, float],
     progress: Callable[[float], None],
 ) -> Counts:
-    """Find the ground, the lining and what else there is in a kilometre (Li et al., 2023), and class its points.
+    """Find ground, lining and other objects in a kilometre (Li et al., 2023), and classify its points.
 
     Points and sections so far beyond its ends as the ground depends on (``MARGIN``) are looked at too, so that its neighbours
     find the same there. A tunnel without ground has none in the database, and all else.

@@ -1,4 +1,4 @@
-"""A look at a scan file by itself: what it holds, and what that may be."""
+"""Inspection of a single scan file: contents, and their probable meaning."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from tunneldb.pointcloud.reader import ScanHeader, read_header
 from tunneldb.radiometry.intensity_kind import KindGuess, ValueRange, contradiction, guess_kind, value_range
 
 WIDEST = 20.0
-"""Width of a tunnel in metres above which it is rather one in feet: three lanes with their shoulders have 16 to 18 m."""
+"""Width in metres from which a tunnel is probably in feet: three lanes with their shoulders have 16 to 18 m."""
 
 NARROWEST = 1.5
-"""Width in metres below which nobody carries a scanner through it."""
+"""Minimum width in metres for carrying a scanner through."""
 
 LOWEST = 0.3
-"""Height over width below which a cloud is a piece of open country and no tunnel."""
+"""Height over width below which a cloud is open country and not a tunnel."""
 
 SHORTEST = 1.5
-"""Length over width below which a cloud is a room rather than a stretch of a tunnel."""
+"""Length over width below which a cloud is a room and not a stretch of a tunnel."""
 
 SEARCHED = 50_000_000
-"""Files with more points are not read once more to try whether their axis can be found."""
+"""Maximum number of points for reading a file again to test whether its axis can be found."""
 
 _FOOT = 0.3048  # m
 _PARTS = (0.25, 0.5, 0.75)  # of the tunnel's length, where profiles are looked for
@@ -55,7 +55,7 @@ _NO_INTENSITY = {
 
 @dataclass(frozen=True)
 class IntensityLook:
-    """A dimension that may hold the intensity.
+    """Dimension that may be the intensity.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class IntensityLook:
 
 @dataclass(frozen=True)
 class FileLook:
-    """What a scan file holds.
+    """Contents of a scan file.
 
     Attributes
     ----------
@@ -159,9 +159,9 @@ class FileLook:
 
     @property
     def other_than_a_tunnel(self) -> str | None:
-        """What it rather is by its size; None where nothing speaks against a tunnel."""
+        """Return its probable nature by size; None if it can be a tunnel."""
         if self.length is None or self.width is None or self.height is None:
-            return "no line runs through it as through a tunnel"
+            return "no axis through it as through a tunnel"
         size = f"{self.length:.1f} long, {self.width:.1f} wide and {self.height:.1f} high"
         if self.height < LOWEST * self.width:
             return f"{size}: open country or a street rather than a tunnel"
@@ -171,7 +171,7 @@ class FileLook:
 
 
 def inspect_file(path: Path, begin: Callable[[str, float | None], Callable[[float], None]]) -> FileLook:
-    """Look at a scan file, read in chunks of constant memory.
+    """Inspect a scan file, read in chunks with constant memory.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def inspect_file(path: Path, begin: Callable[[str, float | None], Callable[[floa
 
 
 def find_axis_fault(looks: Sequence[FileLook], begin: Callable[[str, float | None], Callable[[float], None]]) -> str | None:
-    """Why ``--axis auto`` would be refused for files; None if it would not, or they have more than SEARCHED points."""
+    """Return why ``--axis auto`` would be refused for files; None if not, or if they have more than SEARCHED points."""
     from tunneldb.pipeline.axis_search import search_axis
 
     if sum(look.points for look in looks) > SEARCHED:
@@ -233,7 +233,7 @@ def find_axis_fault(looks: Sequence[FileLook], begin: Callable[[str, float | Non
 
 
 def _described(path: Path, contents: Contents) -> tuple[str, str | None]:
-    """Format, and what the times are."""
+    """Return the format, and the kind of the times."""
     found = format_of(path)
     if found.is_las:
         name, kind = read_las_facts(path)
@@ -242,7 +242,7 @@ def _described(path: Path, contents: Contents) -> tuple[str, str | None]:
 
 
 def _date(times: tuple[float, float] | None, kind: str | None) -> dt.date | None:
-    """Day of the first time; to a few seconds, as GPS time knows no leap seconds."""
+    """Return the day of the first time; to a few seconds, because GPS time has no leap seconds."""
     if times is None or kind is None or kind.startswith("seconds of the GPS week"):
         return None
     seconds = times[0] + (_ADJUSTED if "adjusted" in kind else 0.0)
@@ -262,7 +262,7 @@ def _look_at(path: Path, name: str, points: int) -> IntensityLook:
 
 
 def _spacing(path: Path, contents: Contents, form: TunnelForm) -> float | None:
-    """Median of what is found in three short windows of the tunnel."""
+    """Return the median of three short windows of the tunnel."""
     along, _ = form.line.place(contents.xyz)
     first = float(np.percentile(along, 0.1))
     found = []
@@ -299,6 +299,6 @@ def _unit(header: ScanHeader, contents: Contents, form: TunnelForm | None) -> st
 
 
 def _unit_of(crs: CRS) -> str | None:
-    """Unit of a coordinate system in plan; None if it is the metre."""
+    """Return the unit of a coordinate system in plan; None if it is the metre."""
     units = {axis.unit_name for axis in horizontal(crs).axis_info}
     return None if units <= {"metre", "meter", "m"} else ", ".join(sorted(units))

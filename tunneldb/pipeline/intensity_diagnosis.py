@@ -1,4 +1,4 @@
-"""Whether intensity depends on range or incidence: diagnoses of a survey, and of a scan file by itself."""
+"""Diagnoses of the dependence of intensity on range and incidence, for a survey and for a single scan file."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
 THINNEST = 0.05
-"""Edge of the voxels to which a scan is thinned before planes are fitted, m; more where it would hold too many points."""
+"""Edge of the voxels for thinning a scan before fitting planes, m; larger for too many points."""
 
 MOST_POINTS = 2_000_000
-"""Points of a thinned scan, at the most."""
+"""Maximum number of points of a thinned scan."""
 
 
 def diagnose_survey(
@@ -47,7 +47,7 @@ def diagnose_survey(
     values: Mapping[str, float],
     progress: Callable[[float], None] = lambda count: None,
 ) -> Diagnosis:
-    """Look at lining points of survey density of some kilometres; nothing is changed.
+    """Diagnose lining points of survey density of some kilometres; nothing is changed.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def diagnose_survey(
 
 @dataclass(frozen=True)
 class DiagnosisInputs:
-    """What the diagnosis of a kilometre rests on.
+    """Input of a kilometre's diagnosis.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class DiagnosisInputs:
 
 
 def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float]) -> DiagnosisInputs:
-    """Load what the diagnosis of a kilometre rests on."""
+    """Load the input of a kilometre's diagnosis."""
     kind = cast(Kind, survey.intensity_kind)
     measured = load_reference(conn, survey) if needs_reference(kind) else None
     surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
@@ -117,7 +117,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
 
 
 def compute_diagnosis(inputs: DiagnosisInputs, most: int) -> Diagnosis:
-    """Look at a kilometre's sample; of its points near a scanner no more than ``most`` are kept to be shown."""
+    """Diagnose a kilometre's sample; at most ``most`` of its points near a scanner are kept for display."""
     view = inputs.view
     found, refused = _attempt(lambda: find_range_curve(view, inputs.observer), view.observations.raw_db[view.telling])
     if needs_reference(inputs.kind) and inputs.measured is None:
@@ -136,7 +136,7 @@ def compute_diagnosis(inputs: DiagnosisInputs, most: int) -> Diagnosis:
         roughness,
         found,
         inputs.measured,
-        [note, f"the measured curve can't be checked on this lining: {refused}" if refused and inputs.measured else refused],
+        [note, f"the measured curve cannot be checked on this lining: {refused}" if refused and inputs.measured else refused],
     )
 
 
@@ -147,7 +147,7 @@ def diagnose_file(
     scanner: tuple[float, float, float] | None,
     begin: Callable[[str, float | None], Callable[[float], None]] = lambda text, total: lambda count: None,
 ) -> Diagnosis:
-    """Look at a scan file by itself: normals are those of planes through neighbouring points.
+    """Diagnose a single scan file: normals are those of planes through neighbouring points.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def diagnose_file(
     scans = np.unique(scan_id)
     if scanner is not None and len(scans) > 1:
         raise InputError(
-            f"{path} holds {len(scans)} scans ({_some(scans)}), and --scanner is the place of one: split the file by"
+            f"{path} has {len(scans)} scans ({_some(scans)}), but --scanner is the position of one: split the file by"
             " point_source_id, or load it into a survey with --stations"
         )
     begin("fitting", None)
@@ -186,7 +186,7 @@ def diagnose_file(
     level = to_decibel(raw, kind)
     flat = np.isfinite(cosine) & np.isfinite(level)
     if not flat.any():
-        raise InputError(f"{path}: no surface is flat enough for its normal, and so for incidence angles, to be known")
+        raise InputError(f"{path}: no surface is flat enough for normals, so incidence angles are unknown")
     samples = IntensitySamples(xyz, scan_id, range_m, cosine, level).some(flat)
     range_m, cosine, level = samples.range_m, samples.cosine, samples.level
     found, refused = _attempt(lambda: estimate_range_curve(samples, unrolled=False), level)
@@ -216,7 +216,7 @@ def _diagnosis(
     measured: ReferenceCurve | None,
     remarks: list[str | None],
 ) -> Diagnosis:
-    """Correct points by what is known, and say by what."""
+    """Correct points with the known data, and note which were used."""
     nothing = roughness is None or (needs_reference(kind) and found is None and measured is None)
     with np.errstate(invalid="ignore", divide="ignore"):
         corrected = (
@@ -236,7 +236,7 @@ def _diagnosis(
             f" roughness {found.roughness:.1f}° ± {found.roughness_sigma:.1f}°"
         )
         if found.hardly_overlaps:
-            notes.append(f"{title}: hardly any of it was seen by two scans, so it is taken to be alike within a few metres")
+            notes.append(f"{title}: hardly any of it was seen by two scans, so it is assumed to be uniform within a few metres")
     notes += [f"{title}: {remark}" for remark in remarks if remark]
     return Diagnosis(
         f"{title}: {kind}",
@@ -252,7 +252,7 @@ def _diagnosis(
 
 
 def _attempt(find: Callable[[], RangeCurve], raw: NDArray[np.floating]) -> tuple[RangeCurve | None, str | None]:
-    """A range curve if one could be found, and why detection would refuse it or what it would remark, if it would.
+    """Return a range curve if one could be found, and the reason why detection would refuse it, or its remark.
 
     One less certain than that intensity, dB, is within so much of its mean anywhere, says nothing and is not shown.
     """
@@ -268,27 +268,27 @@ def _attempt(find: Callable[[], RangeCurve], raw: NDArray[np.floating]) -> tuple
 
 
 def _stations(path: Path, scanner: tuple[float, float, float] | None) -> dict[int, Float]:
-    """Positions of a file's scans by their numbers; none where ``scanner`` says it."""
+    """Return the positions of a file's scans by their numbers; none if ``scanner`` gives it."""
     if not has_scans(path):
         if scanner is None:
-            raise InputError(f"{path}: where the scanner stood isn't in the file: give --scanner X Y Z in its coordinates")
+            raise InputError(f"{path}: the scanner position is not in the file: give --scanner X Y Z in its coordinates")
         return {}
     scans = posed_scans(path)
     posed = {scan.number: scan.position for scan in scans if scan.position is not None}
     if scanner is not None:
         if posed:
-            raise InputError(f"{path}: its scans bring their poses, so --scanner isn't needed: leave it out")
+            raise InputError(f"{path}: its scans have poses; leave out --scanner")
         return {}
     for scan in scans:
         if scan.number not in posed:
             raise InputError(
-                f"{path}: scan {scan.name!r} has no pose, so where the scanner stood isn't known: give --scanner X Y Z"
+                f"{path}: scan {scan.name!r} has no pose, so the scanner position is unknown: give --scanner X Y Z"
             )
     return posed
 
 
 def _thinned(path: Path, dimension: str, progress: Callable[[float], None]) -> tuple[Float, Int32, Single]:
-    """Coordinates, scan and raw intensity of a scan's points, each scan thinned to a point a voxel."""
+    """Return coordinates, scan and raw intensity of a scan's points, each scan thinned to a point per voxel."""
     kept: list[Points] = []
     edge, count = THINNEST, 0
     for chunk in read_chunks(path, dimension):

@@ -1,4 +1,4 @@
-"""Ladders as they were measured before they were put into the water, and where sonars stood, from CSV files."""
+"""Ladders as measured before they were put into the water, and sonar positions, from CSV files."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def read_ladders(path: Path) -> list[Ladder]:
     """
     table = read_csv(path, COLUMNS)
     if len(table) == 0:
-        raise InputError(f"{path} holds no ladder; it needs rows ladder,{','.join(COLUMNS)}")
+        raise InputError(f"{path} has no ladder; it needs rows ladder,{','.join(COLUMNS)}")
     names = read_texts(path, "ladder")
     return [_ladder(table, name, [k for k, other in enumerate(names) if other == name]) for name in dict.fromkeys(names)]
 
@@ -62,7 +62,7 @@ def _ladder(table: CsvTable, name: str, rows: list[int]) -> Ladder:
 
 
 def read_start(path: Path) -> dict[str, Near]:
-    """Read where sonars stood, roughly: a row ``file,x,y,within`` for each scan of which that is known, by the file's name.
+    """Read approximate sonar positions: a row ``file,x,y,within`` for each scan with a known one, by the file's name.
 
     Raises
     ------
@@ -76,6 +76,6 @@ def read_start(path: Path) -> dict[str, Near]:
         if not within > 0.0:
             raise table.error(row, f"within is {within:g}; it is how far the sonar may have stood from x, y, in metres")
         if name in out:
-            raise table.error(row, f"file {name} stands twice")
+            raise table.error(row, f"file {name} occurs twice")
         out[name] = Near(np.array([table["x"][row], table["y"][row]]), within)
     return out

@@ -1,4 +1,4 @@
-"""Learning from reviews: what the model of evidence would be like, and what it would change; applied and taken back."""
+"""Learn from reviews: the adjusted model of evidence and its effects; apply and undo."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tunneldb.store.learned import (
 from tunneldb.store.survey import Survey, get_survey
 
 LARGEST = 10
-"""So many changes are listed."""
+"""Maximum number of listed changes."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Changes:
 
 @dataclass(frozen=True)
 class Plan:
-    """What reviews teach, and what would change.
+    """Result of learning, and its effects.
 
     Attributes
     ----------
@@ -104,18 +104,18 @@ class Plan:
 
     @property
     def loss(self) -> float:
-        """Mean loss on reviews held out of the way that was chosen."""
+        """Return the mean loss on held-out reviews of the chosen adjustment."""
         way = self.lesson.adjustment.way
         return next(one.loss for one in self.lesson.held_out if one.way == way)
 
 
 def get_surveys(conn: psycopg.Connection[Any], names: Sequence[str]) -> list[Survey]:
-    """Surveys of these names, each once."""
+    """Return the surveys of these names, without duplicates."""
     return [get_survey(conn, name) for name in dict.fromkeys(names)]
 
 
 def plan_learning(conn: psycopg.Connection[Any], surveys: Sequence[Survey]) -> Plan:
-    """Learn from the reviews of surveys, and tell what it would change in their tunnels; nothing is written.
+    """Learn from the reviews of surveys, and find what it would change in their tunnels; nothing is written.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def plan_learning(conn: psycopg.Connection[Any], surveys: Sequence[Survey]) -> P
 
 
 def no_features(without: Mapping[str, int]) -> list[str]:
-    """Say of which surveys reviewed findings have no features, a line for each."""
+    """Return which surveys have reviewed findings without features, a line for each."""
     return [
         f"{survey}: {count} reviewed {'finding has' if count == 1 else 'findings have'} no features: run detect again:"
         f" tunneldb run {survey} --from detect"
@@ -152,7 +152,7 @@ def no_features(without: Mapping[str, int]) -> list[str]:
 
 
 def apply_plan(conn: psycopg.Connection[Any], plan: Plan, note: str | None) -> dict[str, int]:
-    """Put what was learned in force for each tunnel of a plan; return its numbers by tunnel, none if nothing was learned."""
+    """Activate the adjustment for each tunnel of a plan; return its numbers by tunnel, none if nothing was learned."""
     adjustment = plan.lesson.adjustment
     if adjustment.way == "base":
         return {}
@@ -164,7 +164,7 @@ def apply_plan(conn: psycopg.Connection[Any], plan: Plan, note: str | None) -> d
 
 
 def undo_learning(conn: psycopg.Connection[Any], surveys: Sequence[Survey]) -> dict[str, int]:
-    """Take back what was last learned for the tunnels of surveys; return its numbers by tunnel.
+    """Undo the last adjustment for the tunnels of surveys; return its numbers by tunnel.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def undo_learning(conn: psycopg.Connection[Any], surveys: Sequence[Survey]) -> d
     for key, tunnel in {survey.tunnel_id: survey.tunnel for survey in surveys}.items():
         number = undo_learned(conn, key)
         if number is None:
-            raise UserError(f"nothing that was learned is in force for tunnel {tunnel}: there is nothing to undo")
+            raise UserError(f"tunnel {tunnel} has no adjustment from reviews: there is nothing to undo")
         undone[tunnel] = number
     return undone
 
@@ -189,7 +189,7 @@ def _reviewed(measured: Measured, rows: Bool) -> Reviewed:
 def _changes(
     conn: psycopg.Connection[Any], measured: Measured, lesson: Lesson, tunnels: Mapping[int, str]
 ) -> tuple[list[Changes], list[Change]]:
-    """What would be judged otherwise than by what is in force."""
+    """Return findings that would be classified differently than now."""
     new = lesson.adjustment.apply(standard_model(), "learned")
     before = np.full(len(measured.id), np.nan)
     for tunnel in tunnels:
@@ -224,6 +224,6 @@ def _changes(
 
 
 def _probabilities(model: EvidenceModel, measured: Measured, rows: Bool) -> Float:
-    """Probabilities of leaks; NaN where features are not known."""
+    """Return probabilities of leaks; NaN without features."""
     odds = model.constant + weigh(model, measured.features[rows], measured.outline[rows]).sum(axis=1)
     return np.asarray(np.where(measured.known[rows], 1.0 / (1.0 + np.exp(-odds)), np.nan))

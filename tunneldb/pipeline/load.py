@@ -1,4 +1,4 @@
-"""Loading what was read of scan files into a survey's kilometres: thinned as a whole, in chainage order."""
+"""Load spooled points into a survey's kilometres: thinned as a whole, in chainage order."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ BATCH = 20_000_000  # points of files of the same kilometre that are loaded in o
 
 
 def load_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, settings: FilterSettings) -> Counts:
-    """Load what waits for a kilometre, in the caller's transaction.
+    """Load the points that wait for a kilometre, in the caller's transaction.
 
     The rows that were read of files and wait there, and those that it has of other files, are thinned as a whole,
     written aside and swapped in. Which rows a kilometre has in the end does not depend on the order in which its files
@@ -78,7 +78,7 @@ def load_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, setti
 
 @dataclass(frozen=True)
 class Merged:
-    """A kilometre built aside.
+    """Kilometre built beside the current one.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ def merge(
     memory: int = MEMORY,
     held: Mapping[int, Spool] | None = None,
 ) -> Merged:
-    """Build a kilometre aside with what waits for it; `finish` puts it in place.
+    """Build a kilometre with the points that wait for it; `finish` puts it in place.
 
     What was read of the files in `held`, by id, is there and not in fragments.
     """
@@ -166,7 +166,7 @@ def merge(
 
 
 def _told(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Counts:
-    """What the ledger has of a second tube that was left out of a kilometre when it was loaded last, and of its place."""
+    """Return the ledger's entry of a second tube that was left out of a kilometre at its last load, and its place."""
     row = conn.execute(
         "SELECT counts FROM tunnel.run WHERE survey_id = %s AND km = %s AND stage = 'load' AND outcome = 'done'"
         " ORDER BY started_at DESC, id DESC LIMIT 1",
@@ -176,7 +176,7 @@ def _told(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Counts:
 
 
 def finish(conn: psycopg.Connection[Any], survey: Survey, merged: Sequence[Merged]) -> None:
-    """Put kilometres in place, and enter what their files have come to: last in a transaction, for others wait then."""
+    """Put kilometres in place, and record the counts of their files: last in a transaction, because others wait then."""
     changes: dict[int, tuple[int, int, int]] = {}
     for one in merged:
         if one.files:
@@ -251,7 +251,7 @@ def load_files(
 
 
 def _batches(headers: Sequence[ScanHeader], alignment: Alignment, reach: float) -> Iterator[list[ScanHeader]]:
-    """Consecutive files that share a kilometre, judged by the boxes in their headers."""
+    """Group consecutive files that share a kilometre, by the boxes in their headers."""
     batch: list[ScanHeader] = []
     kilometres: set[int] = set()
     for header in headers:
@@ -267,7 +267,7 @@ def _batches(headers: Sequence[ScanHeader], alignment: Alignment, reach: float) 
 
 
 def header_kilometres(header: ScanHeader, alignment: Alignment, reach: float) -> range:
-    """Kilometres that a file may touch by the box in its header, from the first to the last; empty if none.
+    """Return the kilometres that a file may touch by the box in its header, from the first to the last; may be empty.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def header_kilometres(header: ScanHeader, alignment: Alignment, reach: float) ->
 
 
 def chainages_near(header: ScanHeader, alignment: Alignment, reach: float) -> Float:
-    """Chainages of the given axis' stations within the reach of the box in a file's header, in plan, m."""
+    """Return the chainages of the given axis' stations within reach of the box in a file's header, in plan, m."""
     low, high = header.low[:2] - reach, header.high[:2] + reach
     inside = np.all((alignment.vertices[:, :2] >= low) & (alignment.vertices[:, :2] <= high), axis=1)
     return np.asarray(alignment.number[inside] * alignment.spacing, dtype=np.float64)
@@ -312,7 +312,7 @@ def _load_batch(reading: Reading, headers: Sequence[ScanHeader], given: Sequence
 
 
 def _withdraw(conn: psycopg.Connection[Any], survey: Survey, names: list[str]) -> None:
-    """Take files off the list of those that a batch is to read or could not read: they are loaded."""
+    """Remove files from the list of those that a batch must read or could not read: they are loaded."""
     conn.execute("DELETE FROM tunnel.incoming WHERE survey_id = %s AND name = ANY (%s)", [survey.id, names])
 
 
@@ -329,7 +329,7 @@ def _waiting(conn: psycopg.Connection[Any], file_ids: list[int]) -> list[int]:
 
 
 def _enter(conn: psycopg.Connection[Any], run: Run, one: Merged) -> None:
-    """Enter the kilometre into the ledger, for what rests on its points."""
+    """Record the kilometre in the ledger, for stages that depend on its points."""
     conn.execute(
         """
         INSERT INTO tunnel.run (survey_id, km, stage, parameters, versions, counts, backend_pid, backend_start,

@@ -1,4 +1,4 @@
-"""How a survey's files are read and loaded, as the ledger records it."""
+"""Settings for reading and loading a survey's files, as recorded in the ledger."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tunneldb.store.survey import Survey
 
 
 def settings_of(parameters: Mapping[str, Any]) -> FilterSettings:
-    """Settings that parameters state; those that they leave out have their defaults."""
+    """Make settings from parameters; missing ones have their defaults."""
     default = parameters_of(FilterSettings())
     value = {name: parameters.get(name, default[name]) for name in default}
     return FilterSettings(
@@ -26,7 +26,7 @@ def settings_of(parameters: Mapping[str, Any]) -> FilterSettings:
 
 
 def parameters_of(settings: FilterSettings) -> dict[str, Any]:
-    """Parameters that state settings: ``load.density`` (points per m², or ``all``), ``load.noise_points``, …."""
+    """Return settings as parameters: ``load.density`` (points per m², or ``all``), ``load.noise_points``, …."""
     return {
         "load.density": "all" if settings.density is None else settings.density,
         "load.noise_points": settings.noise_points,
@@ -37,7 +37,7 @@ def parameters_of(settings: FilterSettings) -> dict[str, Any]:
 
 
 def require_same_density(conn: psycopg.Connection[Any], survey: Survey, settings: FilterSettings) -> None:
-    """Keep to a survey's one density: another one would thin what is there, or leave it thinner than what comes.
+    """Require a survey's single density: another one would thin existing points, or leave them thinner than new ones.
 
     Raises
     ------

@@ -28,7 +28,7 @@ VOXEL = 0.05  # of which one point is kept, m: a beam is as wide a few metres of
 
 
 def record_soundings(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path], water_level: float) -> None:
-    """Record files of soundings that lie in the tunnel's system, for `load_sonar`; those that are recorded so stay.
+    """Record files of soundings in the tunnel's system, for `load_sonar`; already recorded ones stay.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def record_soundings(conn: psycopg.Connection[Any], survey: Survey, paths: Seque
         known = stored_scans(conn, survey)
         for path in paths:
             if not path.is_file():
-                raise UserError(f"{path}: there is no such file")
+                raise UserError(f"{path}: no such file")
             before = known.get(path.name)
             if before is not None and before.state != GIVEN:
                 raise UserError(f"{path}: a sonar scan {path.name} has been registered: load it without --medium, or rename it")
@@ -110,13 +110,13 @@ def _require_pose(path: Path, scan: StoredScan) -> None:
 
 
 def _rows(path: Path, scan: StoredScan, alignment: Alignment) -> tuple[SonarRows, int]:
-    """Points of a scan that are no false echoes, in the tunnel, and how many are false."""
+    """Return points of a scan in the tunnel without false echoes, and the number of these."""
     points, read, in_reach, reach = _placed(path, scan)
     chainage, across = alignment.places(points)
     inside = np.isfinite(chainage) & in_reach
     chainage, across, points = chainage[inside], across[inside], points[inside]
     if len(points) == 0:
-        raise UserError(f"{path}: none of its {read} points lies along the axis of the tunnel")
+        raise UserError(f"{path}: none of its {read} points is along the axis of the tunnel")
     spacing = spacing_of_soundings(points) if reach is None else spacing_of_rays(reach[inside])
     classes = classify(np.column_stack([chainage, across, points[:, 2] - scan.water_level]), spacing)
     true = classes != WaterClass.FALSE
@@ -133,7 +133,7 @@ def _rows(path: Path, scan: StoredScan, alignment: Alignment) -> tuple[SonarRows
 
 
 def _placed(path: Path, scan: StoredScan) -> tuple[Float, int, Bool, Float | None]:
-    """Points (n, 3) of a file in the tunnel, of how many, which are near enough to the sonar, and how far from it, if known."""
+    """Return points (n, 3) of a file in the tunnel, their total, those near enough to the sonar, and their ranges, if known."""
     if scan.state == GIVEN:
         points, invalid = read_soundings(path)
         return points, len(points) + invalid, np.ones(len(points), bool), None

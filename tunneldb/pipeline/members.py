@@ -38,15 +38,15 @@ Begin = Callable[[str, float | None], Callable[[float], None]]
 AUTO = "auto"
 
 SATURATED = 0.5
-"""Share of the points that have the greatest value of all from which there is nothing to be told by it."""
+"""Share of points with the greatest value from which an intensity is unusable."""
 
 UNKNOWN = 0.01
-"""Share of points without a scanner position that may be left out."""
+"""Maximum share of points without a scanner position that may be left out."""
 
 _WITHOUT = "on each flat face the level goes by incidence, which tells the range there, on each pipe by both"
 
 AT_ONCE = 250_000
-"""Points that are read and written at a time: voxels and faces need the memory."""
+"""Number of points read and written at a time: voxels and faces need the memory."""
 
 _SAMPLES = 400_000
 _SAMPLE_OF_VALUES = 100_000
@@ -54,7 +54,7 @@ _SAMPLE_OF_VALUES = 100_000
 
 @dataclass(frozen=True)
 class Inputs:
-    """What is to be looked at.
+    """Input of the search for members.
 
     Attributes
     ----------
@@ -77,13 +77,13 @@ class Inputs:
 
     @property
     def name(self) -> str:
-        """What errors about all of them name."""
+        """Return the name of all files for errors."""
         return str(self.paths[0]) if len(self.paths) == 1 else f"{self.paths[0]} and {len(self.paths) - 1} more files"
 
 
 @dataclass(frozen=True)
 class FileMembers:
-    """What is found in files.
+    """Result of the search in files.
 
     Attributes
     ----------
@@ -154,11 +154,11 @@ def find_members(inputs: Inputs, begin: Begin) -> FileMembers:
 
 
 def _usable(path: Path, dimension: str) -> ScanHeader:
-    """Header of a file, if it says that the file can be used."""
+    """Read the header of a file, and check that the file is usable."""
     header = read_header(path)
     if header.crs is not None and header.crs.is_geographic:
         raise UserError(
-            f"{path}: its coordinates are degrees, {describe_crs(header.crs)}, and a structure is measured in metres;"
+            f"{path}: its coordinates are degrees, {describe_crs(header.crs)}, but structures are measured in metres;"
             " transform the file into a projected system"
         )
     require_dimension(path, dimension, header.dimensions, "--intensity")
@@ -166,7 +166,7 @@ def _usable(path: Path, dimension: str) -> ScanHeader:
 
 
 def numbers_of_points(inputs: Inputs, members: FileMembers) -> Iterator[tuple[UInt32, UInt32, UInt32]]:
-    """Face, member and spot of all points, in the order of the files, chunk by chunk; 0 is none."""
+    """Yield face, member and spot of all points, in the order of the files, chunk by chunk; 0 is none."""
     finder, found = members.segmentation.finder, members.found
     for points, scan, use in read_all(inputs, lambda count: None):
         out = np.zeros((3, len(points)), np.uint32)
@@ -176,7 +176,7 @@ def numbers_of_points(inputs: Inputs, members: FileMembers) -> Iterator[tuple[UI
 
 
 def stations_for(path: Path, stations: list[Path]) -> PoseModel:
-    """Scanner positions, by the files given, and by an E57 or PTX file's own poses where none is.
+    """Return scanner positions, from the given files, or from the poses of an E57 or PTX file.
 
     Raises
     ------
@@ -185,17 +185,17 @@ def stations_for(path: Path, stations: list[Path]) -> PoseModel:
     """
     if not stations and not has_scans(path):
         raise UserError(
-            f"{path}: where the scanner stood isn't in the file, and incidence cannot be known without:"
+            f"{path}: the scanner position is not in the file, but needed for incidence;"
             " give --stations FILE with scan_id,x,y,z"
         )
     read = read_stations(stations or [path])
     if len(read.scan_id) > SCANS:
-        raise UserError(f"{path}: {len(read.scan_id)} stations, and {SCANS} are looked at together at most; part the file")
+        raise UserError(f"{path}: {len(read.scan_id)} stations, the maximum is {SCANS}; split the file")
     return PoseModel.from_stations(read.scan_id.astype(np.int64), read.xyz)
 
 
 class _Values:
-    """What the values of an intensity are, gathered chunk by chunk."""
+    """Statistics of the values of an intensity, summed chunk by chunk."""
 
     def __init__(self, inputs: Inputs) -> None:
         self.inputs = inputs
@@ -226,16 +226,16 @@ class _Values:
 
     @property
     def note(self) -> str | None:
-        """What gives to doubt about them."""
+        """Return doubts about the values."""
         return doubt(self.inputs.kind, np.concatenate(self.sample)) if self.sample else None
 
     def require(self) -> None:
-        """Raise a UserError where there is nothing to be told by the values."""
+        """Raise a UserError if the values are unusable."""
         what = f"{self.inputs.name}: {self.inputs.dimension}"
         if not np.isfinite(self.most):
-            raise UserError(f"{what}: no value is a number, so nothing can be told by it; choose another --intensity")
+            raise UserError(f"{what}: no value is a number; choose another --intensity")
         if self.least == self.most:
-            raise UserError(f"{what}: all values are {self.most:g}, so nothing can be told by it; choose another --intensity")
+            raise UserError(f"{what}: all values are {self.most:g}; choose another --intensity")
         if self.saturated > SATURATED:
             raise UserError(
                 f"{what} is saturated: {100 * self.saturated:.0f} % of the points have its greatest value, {self.most:g};"
@@ -243,11 +243,11 @@ class _Values:
             )
         wrong = contradiction(self.inputs.kind, np.concatenate(self.sample)) if self.sample else None
         if wrong:
-            raise UserError(f"{what} is no {self.inputs.kind}: {wrong}")
+            raise UserError(f"{what} is not {self.inputs.kind}: {wrong}")
 
 
 def _read(inputs: Inputs, values: _Values | None, progress: Callable[[float], None]) -> Iterator[tuple[Points, Int32]]:
-    """Points whose scanner position is known, with the place of their scan among the stations."""
+    """Return points with a known scanner position, with the index of their scan among the stations."""
     for points, scan, use in read_all(inputs, progress):
         if values is not None:
             values.add(points, int(use.size))
@@ -263,7 +263,7 @@ def _refuse_unknown(inputs: Inputs, points: Points, values: _Values) -> None:
 def read_all(
     inputs: Inputs, progress: Callable[[float], None], *, colours: bool = False
 ) -> Iterator[tuple[Points, Int32, Int64]]:
-    """All points, the place of their scan among the stations, and which of them have one."""
+    """Return all points, the index of their scan among the stations, and which of them have one."""
     ids = inputs.poses.scan_id
     files = chain.from_iterable(read_chunks(path, inputs.dimension, AT_ONCE, colours=colours) for path in inputs.paths)
     with closing(prefetch(files)) as chunks:
@@ -274,13 +274,13 @@ def read_all(
 
 
 def _reference(inputs: Inputs, segmentation: Segmentation, sums: Sums) -> tuple[ReferenceCurve | None, str | None]:
-    """The curve by which levels are corrected, and a note."""
+    """Return the curve for correcting levels, and a note."""
     if not needs_reference(inputs.kind):
         return None, None
     if isinstance(inputs.reference, ReferenceCurve):
         return inputs.reference, None
     if inputs.reference is None:
-        return None, f"no reference curve: {_WITHOUT}; --reference auto has it found from the faces"
+        return None, f"no reference curve: {_WITHOUT}; use --reference auto to estimate it from the faces"
     try:
         found = estimate_range_curve(_samples(segmentation, sums), unrolled=False)
         found.require()
@@ -291,7 +291,7 @@ def _reference(inputs: Inputs, segmentation: Segmentation, sums: Sums) -> tuple[
 
 
 def _samples(segmentation: Segmentation, sums: Sums) -> IntensitySamples:
-    """Pixels of all faces as samples of intensity over range and incidence."""
+    """Return pixels of all faces as samples of intensity over range and incidence."""
     layout = segmentation.layout
     step = max(1, int(np.count_nonzero(sums.count)) // _SAMPLES)
     place: list[Float] = []
@@ -311,7 +311,7 @@ def _samples(segmentation: Segmentation, sums: Sums) -> IntensitySamples:
 
 
 def _middle(stations: Float, headers: Sequence[ScanHeader]) -> Float:
-    """Middle of the scanner positions near the box of the points: a list may hold those of other files, too."""
+    """Return the middle of the scanner positions near the points' box: a list may include those of other files."""
     low = np.min([header.low for header in headers], axis=0)
     high = np.max([header.high for header in headers], axis=0)
     aside = np.maximum(low - stations, stations - high).max(axis=1)

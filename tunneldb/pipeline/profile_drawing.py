@@ -13,10 +13,10 @@ from tunneldb.arrays import Float
 from tunneldb.errors import InputError
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
-"""Metres in a unit."""
+"""Length of a unit, m."""
 
 NEAR = 0.001
-"""Ends that lie nearer than this are joined, m."""
+"""Maximum gap between ends that are joined, m."""
 
 _PLAIN = ("LINE", "ARC", "CIRCLE")
 _POLYLINES = ("LWPOLYLINE", "POLYLINE")
@@ -63,7 +63,7 @@ def read_drawing(path: Path, unit: str | None, layer: str | None) -> DrawnOutlin
             continue
         name = f"{entity.dxftype()} {entity.dxf.handle}"
         if entity.dxftype() in _CURVES:
-            raise InputError(f"{path}, {name}: a profile is lines and arcs, which a {entity.dxftype()} is not")
+            raise InputError(f"{path}, {name}: a profile consists of lines and arcs; {entity.dxftype()} is not supported")
         parts = entity.virtual_entities() if entity.dxftype() in _POLYLINES else [entity]
         for part in parts:
             for element in _elements(part):
@@ -71,14 +71,14 @@ def read_drawing(path: Path, unit: str | None, layer: str | None) -> DrawnOutlin
                     elements.append(element)
                     names.append(name)
     if not elements:
-        raise InputError(f"{path}: layer {chosen!r} holds no line with a length")
+        raise InputError(f"{path}: layer {chosen!r} has no line with a length")
     scaled = np.array(elements)
     scaled[:, :4] *= metres
     return DrawnOutline(*_joined(path, scaled, names), metres, notes)
 
 
 def _unit(path: Path, code: int, unit: str | None) -> tuple[float, tuple[str, ...]]:
-    """Metres in a unit of the drawing, and what is to be said of it: never guessed."""
+    """Return the unit of the drawing in metres, and a note; it is never guessed."""
     from ezdxf import units
 
     stated = {units.M: "m", units.CM: "cm", units.MM: "mm", units.FT: "ft", units.IN: "in"}.get(code)
@@ -98,7 +98,7 @@ def _layer(path: Path, names: list[str], wanted: str | None) -> str:
         raise InputError(f"{path} has no layer {wanted!r} of lines; it has {listed}")
     if wanted is None and len(names) != 1:
         mend = "; choose one by --drawing-layer NAME" if names else ""
-        raise InputError(f"{path} holds {len(names)} layers of lines: {listed}{mend}")
+        raise InputError(f"{path} has {len(names)} layers of lines: {listed}{mend}")
     return wanted or names[0]
 
 
@@ -117,11 +117,11 @@ def _elements(entity: Any) -> list[list[float]]:
 
 
 def _joined(path: Path, elements: Float, names: list[str]) -> tuple[Float, list[str]]:
-    """Put elements one after the other, turned round where they are drawn the other way."""
+    """Connect elements one after the other, reversed if drawn in the other direction."""
     chain, order, left = [elements[0]], [0], list(range(1, len(elements)))
 
     def nearest(x: float, y: float) -> tuple[float, int, bool]:
-        """Distance of the nearest free end, whose it is, and whether it is an end and no beginning."""
+        """Return the distance of the nearest free end, its element, and whether it is an end and not a beginning."""
         away = [
             (float(np.hypot(elements[k, i] - x, elements[k, i + 1] - y)), k, i == 2) for k in left for i in (0, 2)
         ]  # fmt: skip

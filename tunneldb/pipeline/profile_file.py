@@ -16,13 +16,13 @@ from tunneldb.pipeline.profile_drawing import METRES, read_drawing
 from tunneldb.shape.outline import TOLERANCE, Outline
 
 LEAST_SIZE, MOST_SIZE = 1.0, 60.0
-"""Outlines are that wide and high, m; others are in another unit."""
+"""Limits of an outline's width and height, m; outside them it is in another unit."""
 
 MOST_GAP = 0.5
-"""Points of an outline farther apart leave it open there, m."""
+"""Distance of consecutive points from which an outline is open there, m."""
 
 SIMPLIFIED = 0.02
-"""Points of an outline stray from the lines that are made of them by no more, m."""
+"""Maximum deviation of points from the fitted lines of an outline, m."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def read_profile(
 
 
 def _read_vertices(path: Path, origin: tuple[float, float]) -> ReadProfile:
-    """Vertices, each with the radius of the arc that leads to the next: positive outwards, negative inwards, 0 straight."""
+    """Read vertices, each with the radius of the arc to the next: positive outwards, negative inwards, 0 straight."""
     hint = dict.fromkeys(("right", "up"), "a profile has the columns right,up and perhaps radius, m")
     table = read_csv(path, ("right", "up", "radius"), {"radius": 0.0}, hint)
     if len(table) < 2:
@@ -110,7 +110,7 @@ def _read_vertices(path: Path, origin: tuple[float, float]) -> ReadProfile:
 
 
 def _clockwise(vertices: Float) -> bool:
-    """Whether vertices run clockwise, or, of two, upwards or to the right: as the left half of an outline, or its crown."""
+    """Return True if vertices run clockwise, or, for two, upwards or to the right, as the left half or the crown."""
     x, y = vertices.T
     area = float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
     if abs(area) > TOLERANCE:
@@ -119,7 +119,7 @@ def _clockwise(vertices: Float) -> bool:
 
 
 def _read_points(path: Path, origin: tuple[float, float], unit: str | None) -> ReadProfile:
-    """Points of an outline in any order: put in order of their direction from the middle, and joined by lines."""
+    """Order points of an outline by their direction from the middle, and connect them by lines."""
     if unit is None:
         raise UserError(f"{path}: points state no unit; say it by --unit {'|'.join(METRES)}")
     try:
@@ -171,7 +171,7 @@ def _outline(elements: Float) -> Outline:
 
 
 def _require_sound(path: Path, elements: Float, where: Callable[[int], str]) -> None:
-    """Raise a UserError for an outline that is no tunnel's in metres, lies elsewhere than the axis, or crosses itself."""
+    """Raise a UserError for an outline of implausible size, away from the axis, or crossing itself."""
     raw = Outline(elements)
     line = raw.flattened()
     size = np.ptp(line, axis=0)

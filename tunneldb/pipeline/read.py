@@ -1,4 +1,4 @@
-"""Reading a scan file: filtered, thinned, set aside by kilometre, whole or not at all."""
+"""Read a scan file: filtered, thinned, spooled by kilometre, completely or not at all."""
 
 from __future__ import annotations
 
@@ -41,20 +41,20 @@ from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
 FEWEST_INTENSITIES = 20
-"""Of fewer values nothing is said of their kind."""
+"""Minimum number of values for a remark on their kind."""
 
 Counts = dict[str, Any]
 Begin = Callable[[str, int], Callable[[int], None]]
-"""Takes what begins and how much it is; returns what takes how much of it is done."""
+"""Called with a step and its size; returns a function that takes the progress."""
 
 
 def silent(text: str, total: int) -> Callable[[int], None]:
-    """Begin something of which nobody is told."""
+    """Begin a step without a progress display."""
     return lambda done: None
 
 
 def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, settings: FilterSettings) -> Counts:
-    """Read a scan file and set its points aside for the kilometres that it touches, in the caller's transaction.
+    """Read a scan file and spool its points by kilometre, in the caller's transaction.
 
     A file is known by its name without the folder. One that was read before and is unchanged is left as it is, whether
     its kilometres are loaded yet or wait. One that replaces another of its name also has those read again that overlap
@@ -106,7 +106,7 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
 
 
 def read_headers(paths: Sequence[Path]) -> list[ScanHeader]:
-    """Read the headers of scan files, none of which may have the name of another.
+    """Read the headers of scan files, which must have different names.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def read_headers(paths: Sequence[Path]) -> list[ScanHeader]:
 
 
 def require_kind(survey: Survey, path: Path, sample: Single) -> None:
-    """Refuse a file a sample of whose intensity cannot be of the kind that the survey was declared to have."""
+    """Refuse a file whose intensity values contradict the declared kind."""
     kind = survey.intensity_kind
     if kind == "none" or len(sample) < FEWEST_INTENSITIES:
         return
@@ -158,7 +158,7 @@ class Read:
 
 @dataclass(frozen=True)
 class Reading:
-    """What reading files needs of their survey.
+    """Survey data for reading files.
 
     Attributes
     ----------
@@ -179,7 +179,7 @@ class Reading:
 
     @classmethod
     def of(cls, conn: psycopg.Connection[Any], survey: Survey, settings: FilterSettings, memory: int = MEMORY) -> Reading:
-        """Read the axis of the survey, and what scanner positions it has."""
+        """Read the axis of the survey, and its scanner positions."""
         return cls(conn, survey, settings, load_alignment(conn, survey), load_pose_coverage(conn, survey), memory)
 
     def check(self, header: ScanHeader) -> None:
@@ -189,7 +189,7 @@ class Reading:
         check_header(header, dimension, self.survey.srid, needs_time=self.poses.mobile)
 
     def read(self, headers: Sequence[ScanHeader], given: Sequence[Path], begin: Begin = silent) -> list[Read]:
-        """Read files, none of which is there unchanged, then those that have to be read again because of them.
+        """Read new or changed files, then those that must be read again because of them.
 
         Parameters
         ----------
@@ -219,21 +219,21 @@ class Reading:
         return found
 
     def claim(self, name: str) -> None:
-        """Keep others from reading a file of the same name; numbers far below those of kilometres stand for names."""
+        """Lock the name of a file against other readers; numbers far below those of kilometres represent names."""
         key = -(1 << 30) - (zlib.crc32(name.encode()) >> 2)
         row = self.conn.execute("SELECT pg_try_advisory_xact_lock(%s, %s)", [self.survey.id, key]).fetchone()
         if row is None or not row[0]:
             raise BusyError(f"another process is reading {name}: wait until it has finished (tunneldb status)")
 
     def overlapped(self, former: Sequence[Recorded], rest: Iterable[Recorded]) -> list[Recorded]:
-        """Files that overlap one that is replaced: points of theirs may come back where it was nearer to the centre."""
+        """Return files that overlap a replaced one: their points may return where it was nearer to the centre."""
         if self.settings.edge is None:
             return []
         reach = voxel_reach(self.settings.edge)
         return [file for file in rest if any(file.low <= old.high + reach and file.high >= old.low - reach for old in former)]
 
     def find(self, file: Recorded, given: Sequence[Path], why: str, mend: str) -> ScanHeader:
-        """Header of a file that has to be read again, from where it lies now if that is given.
+        """Return the header of a file that must be read again, from its given current place.
 
         Raises
         ------
@@ -272,13 +272,13 @@ class Reading:
         return Read(file_id, state, time.monotonic() - started, self._density_note(counts))
 
     def _density_note(self, counts: FilterCounts) -> str | None:
-        """Say that most of a file's points lie where there are too few for leaks to be sought."""
+        """Warn that most of a file's points are where their density is too low for finding leaks."""
         least = PARAMETERS["image.min_density"].default
         if self.survey.intensity_kind == "none" or counts.density >= least:
             return None
         return (
-            f"half of its points lie where there are {counts.density:.0f} points/m² or fewer; lining with fewer than {least:g}"
-            " is not searched for leaks, and counts as unseen (image.min_density)"
+            f"half of its points are where there are {counts.density:.0f} points/m² or fewer; lining with fewer than {least:g}"
+            " is not searched for leaks, and counts as not inspected (image.min_density)"
         )
 
     def _filter(self, header: ScanHeader, survivors: Spool, progress: Callable[[int], None]) -> tuple[FilterCounts, str]:
@@ -293,7 +293,7 @@ class Reading:
             return counts, digest.result()
 
     def leave(self, former: Recorded) -> list[int]:
-        """Drop what waits of a file's former content; returns the kilometres that may hold rows of it."""
+        """Drop the waiting points of a file's former content; return the kilometres that may have rows of it."""
         drop_fragments(self.conn, self.survey, [former.id], kilometres_of(self.conn, [former.id]))
         waiting = self.conn.execute("SELECT km FROM tunnel.file_km WHERE file_id = %s AND loaded_at IS NULL", [former.id])
         held = range(math.floor(former.low / KILOMETRE), math.floor(former.high / KILOMETRE) + 1)

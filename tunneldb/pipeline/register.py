@@ -28,7 +28,7 @@ VOXEL = 0.01  # of which one point each is kept, m
 
 @dataclass(frozen=True)
 class SonarInput:
-    """What is said of sonar scans.
+    """Options on sonar scans.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class SonarInput:
 
     @property
     def factor(self) -> float:
-        """By which ranges are to be multiplied, as far as is known beforehand."""
+        """Return the factor on ranges, as far as known beforehand."""
         return 1.0 if self.sound_speed is None else self.sound_speed[1] / self.sound_speed[0]
 
 
@@ -105,20 +105,20 @@ def register_survey(conn: psycopg.Connection[Any], survey: Survey, given: SonarI
 
 
 def _of_file(scan: SonarPose, factor: float) -> SonarPose:
-    """The pose of a file's points, by that of these times ``factor``."""
+    """Return the pose of a file's points, from that of these times ``factor``."""
     unit = np.ones(7)
     unit[6] = factor
     return replace(scan, scale=scan.scale * factor, covariance=scan.covariance * unit * unit[:, None])
 
 
 def _laser_points(conn: psycopg.Connection[Any], survey: Survey, water_level: float, begin: Begin) -> Float:
-    """Points (n, 3) of the survey's scan files about the water's level, one in each small voxel."""
+    """Return points (n, 3) of the survey's scan files near the water level, one per small voxel."""
     rows = conn.execute(
         "SELECT path, bytes, checksum FROM tunnel.scan_file WHERE survey_id = %s AND bytes > 0 ORDER BY name", [survey.id]
     ).fetchall()
     conn.rollback()
     if not rows:
-        raise UserError(f"survey {survey.name} has no scan of the laser: tunneldb load {survey.name} FILE")
+        raise UserError(f"survey {survey.name} has no laser scan: tunneldb load {survey.name} FILE")
     voxels = Voxels(VOXEL)
     lowest, highest = np.inf, -np.inf
     for name, size, checksum in rows:
@@ -131,7 +131,7 @@ def _laser_points(conn: psycopg.Connection[Any], survey: Survey, water_level: fl
             step(len(chunk))
     if len(voxels) == 0:
         raise UserError(
-            f"--water-level {water_level:g}: no laser point lies within {ABOVE:g} m above it;"
+            f"--water-level {water_level:g}: no laser point is within {ABOVE:g} m above it;"
             f" the survey's points are {lowest:.1f} to {highest:.1f} m high"
         )
     return voxels.centroids()

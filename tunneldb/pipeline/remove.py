@@ -1,4 +1,4 @@
-"""Withdrawing files from a survey: what is left is as if they had never been loaded."""
+"""Remove files from a survey: the rest is as if they had never been loaded."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MOST_NAMED = 10
 
 @dataclass
 class Removed:
-    """What became of a survey from which files were withdrawn.
+    """Result of removing files from a survey.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Removed:
 
 
 def known_names(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[str]) -> None:
-    """Require that a survey holds files of these names, or that a batch was to read them.
+    """Require that a survey has files of these names, or that a batch must read them.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def known_names(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[s
 
 
 def work_at_stake(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[str]) -> tuple[list[int], Work]:
-    """Kilometres that would hold no points without these files, and what would go with their results."""
+    """Return the kilometres that would have no points without these files, and the results lost with them."""
     recorded = recorded_files(conn, survey)
     kms = _spans([recorded[name] for name in names if name in recorded])
     rows = conn.execute(
@@ -81,7 +81,7 @@ def work_at_stake(conn: psycopg.Connection[Any], survey: Survey, names: Sequence
 
 
 def remove_files(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[str], begin: Begin = silent) -> Removed:
-    """Withdraw files from a survey, and take them off the list of those that a batch is to read.
+    """Remove files from a survey, and from the list of those that a batch must read.
 
     Thinning looks at all files of a kilometre together, so files that overlap one withdrawn are read again. That is one
     transaction, each kilometre that is loaded anew without the files another. One that is left without points loses its
@@ -160,7 +160,7 @@ def _reload(conn: psycopg.Connection[Any], survey: Survey, former: Sequence[Reco
 def _withdraw(
     conn: psycopg.Connection[Any], survey: Survey, former: Sequence[Recorded], settings: FilterSettings, begin: Begin
 ) -> list[str]:
-    """Read again what overlaps files that are there, and note that these have left their kilometres; all or nothing."""
+    """Read overlapping files again, and mark that the removed ones left their kilometres; all or nothing."""
     reading = Reading.of(conn, survey, settings)
     present = [file for file in former if file.bytes]
     others = [
@@ -168,7 +168,7 @@ def _withdraw(
     ]
     again = reading.overlapped(present, others)
     why = f"{', '.join(file.name for file in present)} overlaps"
-    mend = f"tell where it lies now (tunneldb load {survey.name} FILE), then remove again; nothing was removed"
+    mend = f"give its current path (tunneldb load {survey.name} FILE), then remove again; nothing was removed"
     headers = [(reading.find(file, (), why, mend), file) for file in again]
     for file in former:
         reading.claim(file.name)
@@ -183,7 +183,7 @@ def _withdraw(
 
 
 def _settings(conn: psycopg.Connection[Any], survey: Survey, name: str | None) -> FilterSettings:
-    """How a file was read, as the ledger has it; of what it does not name, and with None, how the last ones were."""
+    """Return how a file was read, from the ledger; missing settings, and with None all, are those of the last file."""
     row = conn.execute(
         """
         SELECT r.parameters FROM tunnel.run r
@@ -198,17 +198,17 @@ def _settings(conn: psycopg.Connection[Any], survey: Survey, name: str | None) -
 
 
 def _spans(files: Sequence[Recorded]) -> set[int]:
-    """Kilometres from the first to the last point of each file."""
+    """Return the kilometres from the first to the last point of each file."""
     return {km for file in files for km in range(math.floor(file.low / KILOMETRE), math.floor(file.high / KILOMETRE) + 1)}
 
 
 def _farewell(names: Sequence[str], lost: Work) -> str:
-    """What is to be known of a kilometre that went with its files."""
+    """Return a note on a kilometre that was removed with its files."""
     said = f"no points since {', '.join(names)} was removed"
     if lost.drawn:
-        said += f"; {lost.drawn} findings that people drew are kept"
+        said += f"; {lost.drawn} findings drawn by hand are kept"
     if not (lost.anomalies or lost.edited):
         return said
     gone = f", {lost.reviewed} of them reviewed" if lost.reviewed else ""
     edited = f", and {lost.edited} axis vertices moved by hand" if lost.edited else ""
-    return f"{said}; {lost.anomalies} leaks and other dark spots{gone}{edited} went with them"
+    return f"{said}; {lost.anomalies} leaks and dry dark areas{gone}{edited} were removed with them"

@@ -35,7 +35,7 @@ def replace_findings(
     min_area: float,
     model: EvidenceModel | None = None,
 ) -> tuple[Summary, list[int]]:
-    """Replace the findings of a kilometre and those across its ends; one that is found again keeps its number and its review.
+    """Replace the findings of a kilometre and those across its ends; one found again keeps its number and review.
 
     :func:`tunneldb.anomalies.reconcile.reconcile` decides which is which. What people drew, redrew, split or merged is left
     alone; what is found of it is counted once, with that (``link_findings``).

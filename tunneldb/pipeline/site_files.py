@@ -1,4 +1,4 @@
-"""Files of a survey of a site: looked through and recorded, their points left where they are."""
+"""Files of a survey of a site: checked and recorded; their points stay in the files."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def register_files(
 
 
 def remove_site_files(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[str]) -> None:
-    """Withdraw files of a site, by their names; what was found in them stays until members are found anew."""
+    """Remove files of a site, by their names; results from them stay until members are found again."""
     with stage_run(conn, survey.id, None, "load", {"removed": list(names)}):
         conn.execute("DELETE FROM tunnel.scan_file WHERE survey_id = %s AND name = ANY (%s)", [survey.id, list(names)])
 
@@ -123,7 +123,7 @@ def _register(
 
 
 def _look_through(survey: Survey, header: ScanHeader, poses: PoseCoverage, max_left_out: float, begin: Begin) -> FilterCounts:
-    """Count what of a file can't be used, and its extent; refuse it where that is too much."""
+    """Count unusable points of a file, and its extent; refuse it if there are too many."""
     counts, faults = FilterCounts(), PoseFaults()
     low, high = counts.extent[:3], counts.extent[3:]
     progress = begin(header.path.name, header.points)
@@ -140,7 +140,7 @@ def _look_through(survey: Survey, header: ScanHeader, poses: PoseCoverage, max_l
             np.maximum(high, points.xyz.max(axis=0), out=high)
             counts.intensities.append(points.intensity[::SAMPLE_STEP].copy())
     counts.unposed = faults.points
-    invalid = "coordinates, times or intensities that are no numbers; mend the file"
+    invalid = "coordinates, times or intensities that are not numbers; fix the file"
     for count, reason in ((counts.invalid, invalid), (counts.unposed, faults.text())):
         if count > max_left_out * counts.points or count == counts.points:
             raise UserError(

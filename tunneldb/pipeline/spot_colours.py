@@ -1,4 +1,4 @@
-"""Mean colours of spots, by one more pass over the files whose points have colours."""
+"""Mean colours of spots, by another pass over the files with coloured points."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tunneldb.pointcloud.formats.table import has_colours
 from tunneldb.pointcloud.reader import read_header
 
 EIGHT_BITS = 255
-"""Colours of a file that go no higher have 8 bits, though LAS has them in 16."""
+"""Maximum value of 8-bit colours, which some files have although LAS has 16 bits."""
 
 
 def find_coloured_members(inputs: Inputs, begin: Begin) -> FileMembers:
@@ -32,7 +32,7 @@ def find_coloured_members(inputs: Inputs, begin: Begin) -> FileMembers:
         total, count, most = _sums(replace(inputs, paths=(path,)), members, progress)
         if 0 < most <= EIGHT_BITS:
             total *= 65535 // EIGHT_BITS
-            notes.append(f"{path.name}: no colour is above {EIGHT_BITS}, so they were taken for such of 8 bits")
+            notes.append(f"{path.name}: no colour is above {EIGHT_BITS}, so colours are read as 8 bits")
         sums += total
         counts += count
     spots = [
@@ -43,7 +43,7 @@ def find_coloured_members(inputs: Inputs, begin: Begin) -> FileMembers:
 
 
 def _sums(inputs: Inputs, members: FileMembers, progress: Callable[[float], None]) -> tuple[Float, Int64, int]:
-    """Sums of the colours of each spot's points (k, 3), their number (k,), and the greatest value of all."""
+    """Return sums of the colours of each spot's points (k, 3), their number (k,), and the greatest value of all."""
     finder, found = members.segmentation.finder, members.found
     size = len(found.structures.spots) + 1
     sums, counts, most = np.zeros((size, 3)), np.zeros(size, np.int64), 0

@@ -24,7 +24,7 @@ from tunneldb.store.survey import Survey
 
 @dataclass(frozen=True)
 class SurveyMembers:
-    """What was found, and what became of the spots of an earlier run."""
+    """Result of a search, and the changes to earlier spots."""
 
     members: FileMembers
     spots: SavedSpots
@@ -80,16 +80,16 @@ def find_survey_members(conn: psycopg.Connection[Any], survey: Survey, begin: Be
 def _inputs(conn: psycopg.Connection[Any], survey: Survey) -> Inputs:
     if survey.intensity_dimension is None:
         raise UserError(
-            f"survey {survey.name} has no intensity, by which spots differ:"
+            f"survey {survey.name} has no intensity, which is required to find spots:"
             f" tunneldb survey set {survey.name} --intensity DIMENSION --intensity-kind KIND"
         )
     if survey.platform != "static":
-        raise UserError(f"survey {survey.name} is {survey.platform}; members are found in the scans of a static scanner")
+        raise UserError(f"survey {survey.name} is {survey.platform}; members are found only in scans of a static scanner")
     rows = conn.execute(
         "SELECT path, bytes, checksum FROM tunnel.scan_file WHERE survey_id = %s ORDER BY name", [survey.id]
     ).fetchall()
     if not rows:
-        raise NotReadyError(f"survey {survey.name} holds no files yet: tunneldb load {survey.name} FILE...")
+        raise NotReadyError(f"survey {survey.name} has no files yet: tunneldb load {survey.name} FILE...")
     return Inputs(
         tuple(unchanged_file(*row) for row in rows),
         survey.intensity_dimension,

@@ -1,4 +1,4 @@
-"""Control points from a file, and how the target spheres of a survey lie to them."""
+"""Control points from a file, and their differences from the target spheres of a survey."""
 
 from __future__ import annotations
 
@@ -70,13 +70,13 @@ def read_control(path: Path) -> Control:
     """
     table = read_csv(path, ("x", "y", "z"))
     if len(table) == 0:
-        raise UserError(f"{path} holds no control point; it needs rows id,x,y,z")
+        raise UserError(f"{path} has no control point; it needs rows id,x,y,z")
     names = read_texts(path, "id")
     for row, name in enumerate(names):
         if not name:
             raise table.error(row, "id is empty")
         if name in names[:row]:
-            raise table.error(row, f"id {name} stands above already (line {table.lines[names.index(name)]}); each point once")
+            raise table.error(row, f"id {name} is a duplicate (line {table.lines[names.index(name)]}); write each point once")
         near = np.flatnonzero(np.linalg.norm(table.values[:row] - table.values[row], axis=1) < SAME_PLACE)
         if len(near):
             raise table.error(row, f"point {name} is at the place of point {names[near[0]]} (line {table.lines[near[0]]})")
@@ -84,7 +84,7 @@ def read_control(path: Path) -> Control:
 
 
 def mean_centres(rows: list[TargetObservation]) -> tuple[Int64, Float]:
-    """Numbers (n,) of the spheres, and their centres (n, 3), of several scans the mean weighted by the fits' variance, m."""
+    """Return numbers (n,) of the spheres, and their centres (n, 3), averaged over scans with the fits' variance, m."""
     numbers = np.unique(np.array([row.number for row in rows], np.int64))
     centres = np.zeros((len(numbers), 3))
     for k, number in enumerate(numbers):

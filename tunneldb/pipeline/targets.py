@@ -64,7 +64,7 @@ class TargetObservation:
 
 @dataclass(frozen=True)
 class Search:
-    """What came of a search.
+    """Result of a search.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ def search(
 
 @dataclass(frozen=True)
 class _Place:
-    """Where points are along the tunnel, and where the scanner was."""
+    """Return the places of points along the tunnel, and the scanner positions."""
 
     alignment: Alignment
     surface: Surface | None
@@ -153,7 +153,7 @@ class _Place:
         return cls(load_alignment(conn, survey), _if_there(load_surface, conn, survey), _if_there(load_poses, conn, survey))
 
     def chainage(self, centre: Float) -> tuple[float, float | None]:
-        """Chainage of a centre by the given axis, NaN beyond its ends; and by the segments, if there are any there."""
+        """Return the chainage of a centre by the given axis, NaN beyond its ends; and by the segments, if available."""
         given = float(self.alignment.chainage(centre[None])[0])
         if self.surface is None:
             return given, None
@@ -161,12 +161,12 @@ class _Place:
         return given, None if np.isnan(found) else found
 
     def observers(self, points: Points) -> Float:
-        """Where the scanner was for each point (n, 3), m; NaN where it isn't known."""
+        """Return the scanner position for each point (n, 3), m; NaN if unknown."""
         return np.full((len(points), 3), np.nan) if self.poses is None or self.poses.empty else self.poses.positions(points)
 
 
 def _if_there(load: Callable[..., Any], conn: psycopg.Connection[Any], survey: Survey) -> Any:
-    """What a loader loads, None where it says that there is nothing: a search needs no more than points."""
+    """Return what a loader loads, None if it reports that there is nothing: a search needs only points."""
     try:
         return load(conn, survey)
     except UserError:
@@ -174,7 +174,7 @@ def _if_there(load: Callable[..., Any], conn: psycopg.Connection[Any], survey: S
 
 
 def _ground_of(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Callable[[Float], Bool] | None:
-    """What tells the points of a kilometre that lie on the ground; None before stage ``ground``."""
+    """Return the classifier of ground points of a kilometre; None before stage ``ground``."""
     first, stop = km * KILOMETRE - 10.0, (km + 1) * KILOMETRE + 10.0
     ground = load_ground(conn, survey, first, stop)
     if ground is None:
@@ -202,7 +202,7 @@ class _Kilometre:
     def search(self, begin: Callable[[str, int], Progress]) -> tuple[list[TargetObservation], list[tuple[int, Refusal]]]:
         total = sum(file.points for file in self.files)
         curved = CurvedCells(self.radius, MIN_POINTS)
-        step = begin(f"km {self.km}: what isn't flat", total)
+        step = begin(f"km {self.km}: parts that are not flat", total)
         for points in self._chunks():
             curved.add(points.xyz)
             step(len(points))
@@ -250,7 +250,7 @@ class _Kilometre:
         return rows
 
     def _is_ours(self, chainage: float, low: int, high: int) -> bool:
-        """Whether a chainage is in a window of bins, and in this kilometre: its neighbours see the same sphere."""
+        """Return True if a chainage is in a window of bins, and in this kilometre: its neighbours see the same sphere."""
         if np.isnan(chainage) or chainage // KILOMETRE != self.km:
             return False
         return low <= int(bin_of(np.array([chainage]))[0]) < high
@@ -259,7 +259,7 @@ class _Kilometre:
 def _numbered(
     rows: list[TargetObservation], radius: float, place: _Place
 ) -> tuple[list[TargetObservation], list[tuple[int, Refusal]]]:
-    """Rows with the numbers of their spheres, along the tunnel, by number and scan; and what no scan saw well."""
+    """Return rows with the numbers of their spheres, along the tunnel, by number and scan; and poorly seen candidates."""
     if not rows:
         return rows, []
     centres = np.array([row.sphere.centre for row in rows])

@@ -90,7 +90,6 @@ CAUSES = (
             "is NaN or infinite",
             "invalid pose",
             "export the file again",
-            "mend the file",
             "fix the file",
         ),
         "copy the file again, or export it again",

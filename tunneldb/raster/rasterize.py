@@ -73,7 +73,7 @@ def rasterize(
     if not used:
         unposed = f": the scanner position of {lost:,} of its points is not known" if lost else ""
         raise UserError(
-            f"no point of {', '.join(file.path.name for file in files)} lies on the lining of kilometre {observer.km}{unposed}"
+            f"no point of {', '.join(file.path.name for file in files)} is on the lining of kilometre {observer.km}{unposed}"
         )
     return {
         "files": len(files),

@@ -149,7 +149,7 @@ class _Source:
                 try:
                     group.add(placement.coordinates(own))
                 except ValueError as error:
-                    raise UserError(f"{self.file.path}: {error}; repair the file") from None
+                    raise UserError(f"{self.file.path}: {error}; fix the file") from None
                 self.chunks[group.km].append(number)
             progress(len(xyz))
 
