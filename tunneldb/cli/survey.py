@@ -236,8 +236,8 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
         if (work.reviewed or work.edited) and not yes:
             kms = ", ".join(map(str, emptied))
             question = (
-                f"Kilometre {kms} is left without points: {work.anomalies} leaks and dry dark areas are removed, {work.reviewed} of"
-                f" them reviewed, and {work.edited} axis vertices moved by hand; {work.drawn} findings drawn by hand are"
+                f"Kilometre {kms} will have no points: {work.anomalies} leaks and dry dark areas are removed, {work.reviewed}"
+                f" of them reviewed, and {work.edited} axis vertices moved by hand; {work.drawn} findings drawn by hand are"
                 f" kept. Remove {', '.join(names)}?"
             )
             if not click.confirm(question, err=True):
