@@ -18,10 +18,10 @@ from affine import Affine
 
 from benchmarks.common import print_table, save
 from tunneldb.geometry.surface import Surface
-from tunneldb.measures.deviation.measure import Design, block_steps
+from tunneldb.measures.deviation.compute import Design, block_steps
 from tunneldb.measures.evenness.compute.evenness import evenness, step_evenness
+from tunneldb.measures.evenness.compute.sections import CellGrid, polygons_of
 from tunneldb.measures.evenness.compute.straightedge import Cells, cell_means, gaps_beneath
-from tunneldb.measures.evenness.measure import CellGrid, polygons_of
 from tunneldb.measures.thickness.compute import section_thickness
 from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import BLOCK

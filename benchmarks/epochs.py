@@ -25,7 +25,7 @@ from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.surface import Surface
 from tunneldb.measures.change.compute.cells import CellGrid, Cells, CellSums, without_edges
 from tunneldb.measures.change.compute.change import WINDOW, change_regions
-from tunneldb.measures.change.measure import Change, measure_change
+from tunneldb.measures.change.compute.sections import Change, measure_change
 
 sys.path.append(str(Path(__file__).parent.parent / "tests"))
 from support.curved_lining import made

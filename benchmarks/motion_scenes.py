@@ -29,7 +29,7 @@ from tunneldb.geometry.frame import segment_rows, tangents
 from tunneldb.geometry.surface import Surface
 from tunneldb.measures.change.compute.cells import CellGrid, Cells, CellSums, without_edges
 from tunneldb.measures.change.compute.change import change_regions
-from tunneldb.measures.change.measure import measure_change
+from tunneldb.measures.change.compute.sections import measure_change
 
 sys.path.append(str(Path(__file__).parent.parent / "tests"))
 from support.curved_lining import helix

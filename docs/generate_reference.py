@@ -27,7 +27,7 @@ from tunneldb.database import install, open_connection
 from tunneldb.database.schema import sql_files
 from tunneldb.database.server import Server
 from tunneldb.stages.parameters import PARAMETERS
-from tunneldb.stages.registry import STAGES
+from tunneldb.stages.registry import REGISTRY, STAGES
 
 Columns = dict[str, tuple[str, str]]
 """Columns of a view: type and meaning by name."""
@@ -223,7 +223,7 @@ def generate(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     try:
         with open_connection(server.start()) as conn:
-            install(conn, STAGES)
+            install(conn, REGISTRY)
             for part, write in PARTS.items():
                 (folder / f"{part}.md").write_text(write(conn) + "\n", encoding="utf-8")
     finally:

@@ -20,10 +20,10 @@ TOPICS = {
     "Change between surveys": ("measures/change",),
     "Design profile": ("deviation", "deviation_layer", "thickness", "evenness"),
     "Clearance": ("clearance", "clearance_layer"),
-    "Rings": ("ring",),
+    "Rings": ("rings",),
     "Structures": ("structures",),
     "Under water": ("sonar", "closed_section"),
-    "Stages and queue": ("status", "queue", "remark", "size"),
+    "Stages and queue": ("status", "state", "queue", "remark", "size"),
     "Who did what": ("audit", "views/change"),
 }
 """Topics, and the SQL files whose views belong to each; another file is a topic of its own."""

@@ -22,7 +22,7 @@ from support.system import missing
 
 from tunneldb.database import connect, install, open_connection
 from tunneldb.database.server import Server
-from tunneldb.stages.registry import STAGES
+from tunneldb.stages.registry import REGISTRY
 
 pytest_plugins = ["support.example_survey"]
 
@@ -87,7 +87,7 @@ def installed(server_dsn: str) -> str:
     """Name of the database that is migrated and installed, and holds nothing else."""
     create_database(server_dsn, TEMPLATE)
     with open_connection(make_conninfo(server_dsn, dbname=TEMPLATE)) as connection:
-        install(connection, STAGES)
+        install(connection, REGISTRY)
     return TEMPLATE
 
 

@@ -108,21 +108,20 @@ SELECT s.id, km, q.stage, clock_timestamp(), clock_timestamp(), 'done', q.parame
 FROM generate_series(0, %(kilometres)s - 1) AS km
 CROSS JOIN tunnel.survey s
 JOIN tunnel.survey o ON o.tunnel_id = s.tunnel_id AND o.date < s.date
-CROSS JOIN LATERAL ({runs}) AS q (stage, parameters) WHERE %(sample)s = {of}
+CROSS JOIN LATERAL (
+    SELECT '{stage}', {given} || tunnel_internal.result_inputs(s.id, '{stage}', km, {subject})) AS q (stage, parameters)
+WHERE %(sample)s = {of}
 """
 
 RUNS = (
-    (
-        "s.id",
-        "SELECT 'deviation', jsonb_build_object('layer', 'lining') || tunnel_internal.deviation_inputs(s.id, km, 'lining')",
-    ),
-    ("s.id", "SELECT 'evenness', jsonb_build_object('length', 2) || tunnel_internal.evenness_inputs(s.id, km, 'lining')"),
-    ("s.id", "SELECT 'thickness', tunnel_internal.thickness_inputs(o.id, s.id, km, 'lining')"),
-    ("s.id", "SELECT 'clearance', jsonb_build_object('track', 'single') || tunnel_internal.clearance_inputs(s.id, km, 'A')"),
-    ("s.id", "SELECT 'rings', tunnel_internal.ring_inputs(s.id, km)"),
-    ("o.id", "SELECT 'compare', jsonb_build_object('old', o.id, 'cell', 0.1) || tunnel_internal.change_inputs(s.id, o.id, km)"),
+    ("s.id", "deviation", "jsonb_build_object('layer', 'lining')", "'lining'"),
+    ("s.id", "evenness", "jsonb_build_object('layer', 'lining', 'length', 2)", "'lining'"),
+    ("s.id", "thickness", "jsonb_build_object('before', o.id, 'layer', 'lining')", "o.id || ' lining'"),
+    ("s.id", "clearance", "jsonb_build_object('track', 'single', 'gauge', 'A')", "'single A'"),
+    ("s.id", "rings", "'{}'::jsonb", "''"),
+    ("o.id", "compare", "jsonb_build_object('old', o.id, 'cell', 0.1)", "o.id::text"),
 )
-"""Runs of the stages that have verbs of their own, with what they were made from: of the sample, or of the later survey."""
+"""Runs of the measures, of the sample or of the later survey: parameters, and the subject."""
 
 
 IMAGES = """
@@ -134,8 +133,10 @@ SELECT %(sample)s, km, 'offset', 20 * km, '' FROM generate_series(0, %(kilometre
 def note_shape(connection: Connection, sample: int, kilometres: int) -> None:
     """Note in the ledger that deviation, evenness, thickness, clearance, rings and change of the sample were measured."""
     connection.execute(IMAGES, {"sample": sample, "kilometres": kilometres})
-    for of, runs in RUNS:
-        connection.execute(MEASURED.format(of=of, runs=runs), {"sample": sample, "kilometres": kilometres})
+    for of, stage, given, subject in RUNS:
+        connection.execute(
+            MEASURED.format(of=of, stage=stage, given=given, subject=subject), {"sample": sample, "kilometres": kilometres}
+        )
     connection.commit()
 
 

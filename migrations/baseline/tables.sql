@@ -96,15 +96,21 @@ CREATE TABLE tunnel.stage (
     reads TEXT[] NOT NULL,
     reads_beside TEXT[] NOT NULL,
     parameters TEXT[] NOT NULL,
+    on_demand BOOLEAN NOT NULL,
+    subject TEXT[] NOT NULL,
+    tables TEXT[] NOT NULL,
     CONSTRAINT stage_pkey PRIMARY KEY (step),
     CONSTRAINT stage_name_key UNIQUE (name)
 );
-COMMENT ON TABLE tunnel.stage IS 'Stages of a kilometre, in their order; tunneldb init fills it anew';
+COMMENT ON TABLE tunnel.stage IS 'Stages of a kilometre and measures, in their order; tunneldb init fills it anew';
 COMMENT ON COLUMN tunnel.stage.step IS 'Its number in their order, from 1';
 COMMENT ON COLUMN tunnel.stage.name IS 'Name';
 COMMENT ON COLUMN tunnel.stage.reads IS 'Stages whose results in the kilometre itself it rests on';
 COMMENT ON COLUMN tunnel.stage.reads_beside IS 'Stages whose results in the kilometres before and after it rests on';
 COMMENT ON COLUMN tunnel.stage.parameters IS 'Prefixes of the parameters that it depends on';
+COMMENT ON COLUMN tunnel.stage.on_demand IS 'True for a measure, which a command of its own runs';
+COMMENT ON COLUMN tunnel.stage.subject IS 'Parameters of a run that distinguish results of the stage in one kilometre';
+COMMENT ON COLUMN tunnel.stage.tables IS 'Tables of schema tunnel that hold its results';
 
 CREATE TABLE tunnel.tunnel (
     id INTEGER GENERATED ALWAYS AS IDENTITY,
@@ -306,6 +312,23 @@ COMMENT ON COLUMN tunnel.learned_model.active_from IS 'Since when it is in force
 COMMENT ON COLUMN tunnel.learned_model.undone_by IS 'Who took it back';
 COMMENT ON COLUMN tunnel.learned_model.undone_at IS 'When it was taken back';
 CREATE INDEX learned_model_tunnel_id_idx ON tunnel.learned_model (tunnel_id);
+
+CREATE TABLE tunnel.stage_input (
+    stage TEXT NOT NULL,
+    number INTEGER NOT NULL,
+    key TEXT NOT NULL,
+    holds TEXT NOT NULL,
+    reason TEXT,
+    CONSTRAINT stage_input_pkey PRIMARY KEY (stage, number),
+    CONSTRAINT stage_input_holds_check CHECK (holds IN ('run', 'checksum', 'survey')),
+    CONSTRAINT stage_input_stage_fkey FOREIGN KEY(stage) REFERENCES tunnel.stage (name) ON DELETE CASCADE
+);
+COMMENT ON TABLE tunnel.stage_input IS 'Parameters of runs that say what a result was made from; tunneldb init fills it anew';
+COMMENT ON COLUMN tunnel.stage_input.stage IS 'Name of the measure';
+COMMENT ON COLUMN tunnel.stage_input.number IS 'Order of comparison, from 1';
+COMMENT ON COLUMN tunnel.stage_input.key IS 'Name of the parameter';
+COMMENT ON COLUMN tunnel.stage_input.holds IS 'run: keys of runs; checksum; survey: key of the older survey';
+COMMENT ON COLUMN tunnel.stage_input.reason IS 'Why a result is out of date whose parameter would be another now';
 
 CREATE TABLE tunnel.station_equation (
     tunnel_id INTEGER NOT NULL,
@@ -1297,13 +1320,7 @@ CREATE TABLE tunnel.run (
     message TEXT,
     worker TEXT,
     job_id BIGINT,
-    subject TEXT GENERATED ALWAYS AS (coalesce(CASE stage
-    WHEN 'deviation' THEN parameters ->> 'layer'
-    WHEN 'evenness' THEN parameters ->> 'layer'
-    WHEN 'thickness' THEN (parameters ->> 'before') || ' ' || (parameters ->> 'layer')
-    WHEN 'clearance' THEN (parameters ->> 'track') || ' ' || (parameters ->> 'gauge')
-    WHEN 'compare' THEN parameters ->> 'old'
-END, '')) STORED NOT NULL,
+    subject TEXT DEFAULT '' NOT NULL,
     CONSTRAINT run_pkey PRIMARY KEY (id),
     CONSTRAINT run_outcome_check CHECK (outcome IN ('running', 'done', 'failed')),
     CONSTRAINT run_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
@@ -1312,7 +1329,7 @@ COMMENT ON TABLE tunnel.run IS 'Ledger of every stage that was run';
 COMMENT ON COLUMN tunnel.run.id IS 'Key';
 COMMENT ON COLUMN tunnel.run.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.run.km IS 'Kilometre; none for the whole survey';
-COMMENT ON COLUMN tunnel.run.stage IS 'read, load, axis, segments, sections, ground, detect; spheres, members, deviation, clearance, rings, compare, thickness, evenness';
+COMMENT ON COLUMN tunnel.run.stage IS 'Name of the stage (tunnel.stage), or read, spheres, members, import';
 COMMENT ON COLUMN tunnel.run.parameters IS 'Parameters that it ran with';
 COMMENT ON COLUMN tunnel.run.versions IS 'Versions of the program and of its libraries';
 COMMENT ON COLUMN tunnel.run.counts IS 'What it counted and measured';
@@ -1324,7 +1341,7 @@ COMMENT ON COLUMN tunnel.run.outcome IS 'running, done or failed';
 COMMENT ON COLUMN tunnel.run.message IS 'Why it failed';
 COMMENT ON COLUMN tunnel.run.worker IS 'Machine and process that it ran on';
 COMMENT ON COLUMN tunnel.run.job_id IS 'Job of the queue that it was, if it was one';
-COMMENT ON COLUMN tunnel.run.subject IS 'What tells apart results of a stage that are there side by side, by its parameters: layer of profiles, older survey, track and outline; empty where there is one of a kilometre';
+COMMENT ON COLUMN tunnel.run.subject IS 'Values of the parameters that distinguish results of the stage in one kilometre, as tunnel.stage has them: layer, older survey, track and gauge; a trigger writes it';
 CREATE INDEX run_job_id_idx ON tunnel.run (job_id);
 CREATE INDEX run_survey_id_stage_km_subject_started_at_id_idx ON tunnel.run (survey_id, stage, km, subject, started_at, id);
 

@@ -81,73 +81,41 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.leaks_checksum(int, float8, float8) IS
     'Checksum of the leaks, joints and dark spots that count between two chainages (m): another as soon as one is judged, drawn or found anew; NULL without any';
 
--- What the change of a kilometre is made from. It is up to date as long as this is the same as in its row of the ledger.
-CREATE OR REPLACE FUNCTION tunnel_internal.change_inputs(survey_id int, old_survey_id int, km int) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.compare_inputs(survey_id int, km int, subject text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
-               'detect_old', tunnel_internal.last_run($2, 'detect', $3),
-               'detect_new', tunnel_internal.last_run($1, 'detect', $3),
-               'leaks_old', tunnel_internal.leaks_checksum($2, $3 * 1000 - 100, ($3 + 1) * 1000 + 100),
-               'leaks_new', tunnel_internal.leaks_checksum($1, $3 * 1000 - 100, ($3 + 1) * 1000 + 100))
+               'detect_old', tunnel_internal.last_run($3::int, 'detect', $2),
+               'detect_new', tunnel_internal.last_run($1, 'detect', $2),
+               'leaks_old', tunnel_internal.leaks_checksum($3::int, $2 * 1000 - 100, ($2 + 1) * 1000 + 100),
+               'leaks_new', tunnel_internal.leaks_checksum($1, $2 * 1000 - 100, ($2 + 1) * 1000 + 100))
 $$;
-COMMENT ON FUNCTION tunnel_internal.change_inputs(int, int, int) IS
-    'What the change of a kilometre from an older survey to this one is made from: the runs of stage detect, and checksums of the leaks of both. The run of stage compare holds the same in its parameters';
+COMMENT ON FUNCTION tunnel_internal.compare_inputs(int, int, text) IS
+    'What the change of a kilometre from an older survey to this one is made from: the runs of stage detect, and checksums of the leaks of both';
 
-CREATE OR REPLACE FUNCTION tunnel_internal.change_state(survey_id int, old_survey_id int)
-RETURNS TABLE (km int, done_at timestamptz, reason text, cell float8, length float8)
-LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
-    WITH last AS (
-        SELECT r.km, r.finished_at, r.parameters FROM tunnel_internal.last_runs($1, 'compare') r WHERE r.subject = $2::text
+CREATE OR REPLACE FUNCTION tunnel_internal.compare_places(survey_id int, of_subject text DEFAULT NULL)
+RETURNS TABLE (km int, subject text, present boolean, reason text)
+LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL RESTRICTED SECURITY DEFINER ROWS 50
+SET search_path = pg_catalog, pg_temp SET jit = off AS $$
+    WITH pair AS MATERIALIZED (
+        SELECT o.id
+          FROM (SELECT DISTINCT r.subject FROM tunnel_internal.last_runs($1, 'compare') r WHERE $2 IS NULL
+                 UNION ALL SELECT $2 WHERE $2 IS NOT NULL) p
+          JOIN tunnel.survey o ON o.id = p.subject::int
     ), seen AS (
-        SELECT i.km FROM tunnel_internal.image_kilometres($1, 'offset') i (km)
-        INTERSECT
-        SELECT i.km FROM tunnel_internal.image_kilometres($2, 'offset') i (km)
-    ), place AS (  -- where both saw something, or what was made of it is still there
-        SELECT k.km, true AS there FROM seen k
-         UNION ALL
-        SELECT DISTINCT c.km, false FROM tunnel.change_section c
-         WHERE c.survey_id = $1 AND c.old_survey_id = $2 AND NOT EXISTS (SELECT FROM seen k WHERE k.km = c.km)
-    ), detect_new AS MATERIALIZED (
-        SELECT t.km, t.reason FROM tunnel_internal.stage_state($1) t WHERE t.stage = 'detect'
-    ), detect_old AS MATERIALIZED (
-        SELECT t.km, t.reason FROM tunnel_internal.stage_state($2) t WHERE t.stage = 'detect'
+        SELECT p.id, n.km
+          FROM pair p
+         CROSS JOIN LATERAL tunnel_internal.image_kilometres($1, 'offset') n (km)
+          JOIN LATERAL tunnel_internal.image_kilometres(p.id, 'offset') o (km) ON o.km = n.km
     )
-    SELECT k.km, l.finished_at,
-           CASE WHEN NOT k.there THEN 'one of the surveys has nothing there any more'
-                WHEN o.reason IS NOT NULL THEN 'detect of the older survey is stale: ' || o.reason
-                WHEN n.reason IS NOT NULL THEN 'detect of the newer survey is stale: ' || n.reason
-                WHEN l.km IS NULL THEN 'never ran'
-                WHEN l.parameters -> 'detect_old' IS DISTINCT FROM i.inputs -> 'detect_old' THEN 'detect of the older survey ran since'
-                WHEN l.parameters -> 'detect_new' IS DISTINCT FROM i.inputs -> 'detect_new' THEN 'detect of the newer survey ran since'
-                WHEN l.parameters -> 'leaks_old' IS DISTINCT FROM i.inputs -> 'leaks_old' THEN 'leaks of the older survey changed since'
-                WHEN l.parameters -> 'leaks_new' IS DISTINCT FROM i.inputs -> 'leaks_new' THEN 'leaks of the newer survey changed since'
-           END,
-           (l.parameters ->> 'cell')::float8, (l.parameters ->> 'length')::float8
-      FROM place k
-     CROSS JOIN LATERAL (SELECT tunnel_internal.change_inputs($1, $2, k.km) AS inputs) i
-      LEFT JOIN last l ON l.km = k.km
-      LEFT JOIN detect_old o ON o.km = k.km
-      LEFT JOIN detect_new n ON n.km = k.km
+    SELECT k.km, k.id::text, true, NULL::text FROM seen k
+     UNION ALL  -- what was made of it is still there
+    SELECT DISTINCT c.km, c.old_survey_id::text, false, 'one of the surveys has nothing there any more'
+      FROM pair p
+      JOIN tunnel.change_section c ON c.survey_id = $1 AND c.old_survey_id = p.id
+     WHERE NOT EXISTS (SELECT FROM seen k WHERE k.id = p.id AND k.km = c.km)
 $$;
-COMMENT ON FUNCTION tunnel_internal.change_state(int, int) IS
-    'How far the comparison of a survey with an older one has come: of each kilometre that both saw, when it was last made, with what cells and sections (m), and why it is out of date, if it is';
-
-CREATE OR REPLACE VIEW tunnel_api.change_status AS
-SELECT ((s.id::bigint * 100000 + p.old_survey_id) * 1000000) + 500000 + t.km AS id, s.id AS survey_id, s.name AS survey,
-       p.old_survey_id, o.name AS old_survey, t.km, t.done_at, t.reason IS NOT NULL AS stale, t.reason, t.cell, t.length
-  FROM tunnel.survey s
- CROSS JOIN LATERAL (
-        SELECT DISTINCT r.subject::int AS old_survey_id FROM tunnel_internal.last_runs(s.id, 'compare') r) p
-  JOIN tunnel.survey o ON o.id = p.old_survey_id
- CROSS JOIN LATERAL tunnel_internal.change_state(s.id, p.old_survey_id) t;
-COMMENT ON VIEW tunnel_api.change_status IS 'Whether what is stored of the change between two surveys is up to date, by kilometre, of those that were compared';
-COMMENT ON COLUMN tunnel_api.change_status.old_survey_id IS 'Key of the survey that it is compared with';
-COMMENT ON COLUMN tunnel_api.change_status.old_survey IS 'Its name';
-COMMENT ON COLUMN tunnel_api.change_status.done_at IS 'When it was last made; NULL: never';
-COMMENT ON COLUMN tunnel_api.change_status.stale IS 'True when it was never made, or what it rests on has changed since';
-COMMENT ON COLUMN tunnel_api.change_status.reason IS 'Why it is stale';
-COMMENT ON COLUMN tunnel_api.change_status.cell IS 'Side of its cells, m';
-COMMENT ON COLUMN tunnel_api.change_status.length IS 'Length of its sections, m';
+COMMENT ON FUNCTION tunnel_internal.compare_places(int, text) IS
+    'Kilometres that this survey and an older one saw, or of which a comparison is still there: of all that were compared, or of the one given';
 
 CREATE OR REPLACE FUNCTION tunnel_api.change_stretches(old_survey text, new_survey text, step float8 DEFAULT 100)
 RETURNS TABLE (chainage_from float8, chainage_to float8, label text, compared float8, unseen float8, changed float8,

@@ -67,47 +67,24 @@ COMMENT ON COLUMN tunnel_api.clearance_infringement.points IS 'How many points i
 COMMENT ON COLUMN tunnel_api.clearance_infringement.unrolled IS 'What it covers of the unrolled plane: chainage and arc, m; NULL where it does not unroll';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.geom IS 'Its points, at most 200, deepest first, in the tunnel''s SRID';
 
--- What the clearance of a kilometre is made from, beside the options.
-CREATE OR REPLACE FUNCTION tunnel_internal.clearance_inputs(survey_id int, km int, gauge text) RETURNS jsonb
+-- The subject is a track and a gauge, whose name may hold spaces.
+CREATE OR REPLACE FUNCTION tunnel_internal.clearance_inputs(survey_id int, km int, subject text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
                'ground', (SELECT max(tunnel_internal.last_run($1, 'ground', k)) FROM generate_series($2 - 1, $2 + 1) k),
-               'gauge', $3,
-               'outline', (SELECT g.checksum FROM tunnel.gauge g WHERE g.tunnel_id = s.tunnel_id AND g.name = $3))
+               'outline', (SELECT g.checksum FROM tunnel.gauge g
+                            WHERE g.tunnel_id = s.tunnel_id AND g.name = substr($3, strpos($3, ' ') + 1)))
       FROM tunnel.survey s WHERE s.id = $1
 $$;
 COMMENT ON FUNCTION tunnel_internal.clearance_inputs(int, int, text) IS
-    'What the clearance of a survey''s kilometre is made from: the last run of stage ground there and beside, and a checksum of the outline. The run of stage clearance holds the same in its parameters';
+    'What the clearance of a kilometre is made from: the last run of stage ground there and beside, and a checksum of the outline';
 
-CREATE OR REPLACE FUNCTION tunnel_internal.clearance_state(survey_id int)
-RETURNS TABLE (run_id bigint, km int, gauge text, track text, done_at timestamptz, reason text)
-LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
-    WITH last AS (
-        SELECT r.id, r.km, r.parameters ->> 'gauge' AS gauge, r.parameters ->> 'track' AS track, r.finished_at, r.parameters
-          FROM tunnel_internal.last_runs($1, 'clearance') r
-    ), ground AS MATERIALIZED (
-        SELECT t.km, t.reason FROM tunnel_internal.stage_state($1) t WHERE t.stage = 'ground'
-    )
-    SELECT l.id::bigint, l.km, l.gauge, l.track, l.finished_at,
-           CASE WHEN t.reason IS NOT NULL THEN 'ground is stale: ' || t.reason
-                WHEN l.parameters -> 'ground' IS DISTINCT FROM n.inputs -> 'ground' THEN 'ground ran since'
-                WHEN l.parameters -> 'outline' IS DISTINCT FROM n.inputs -> 'outline' THEN 'outline changed since'
-           END
-      FROM last l
-     CROSS JOIN LATERAL (SELECT tunnel_internal.clearance_inputs($1, l.km, l.gauge) AS inputs) n
-      LEFT JOIN ground t ON t.km = l.km
+CREATE OR REPLACE FUNCTION tunnel_internal.clearance_places(survey_id int, of_subject text DEFAULT NULL)
+RETURNS TABLE (km int, subject text, present boolean, reason text)
+LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL RESTRICTED SECURITY DEFINER ROWS 50
+SET search_path = pg_catalog, pg_temp SET jit = off AS $$
+    SELECT r.km, coalesce($2, r.subject), true, NULL::text
+      FROM tunnel_internal.last_runs($1, CASE WHEN $2 IS NULL THEN 'clearance' ELSE 'ground' END) r
 $$;
-COMMENT ON FUNCTION tunnel_internal.clearance_state(int) IS
-    'How far the clearance of a survey has come: of each kilometre, outline and track that was measured, when, and why it is out of date, if it is';
-
-CREATE OR REPLACE VIEW tunnel_api.clearance_status AS
-SELECT t.run_id AS id, s.id AS survey_id, s.name AS survey, t.km, t.gauge, t.track,
-       t.done_at, t.reason IS NOT NULL AS stale, t.reason
-  FROM tunnel.survey s
- CROSS JOIN LATERAL tunnel_internal.clearance_state(s.id) t;
-COMMENT ON VIEW tunnel_api.clearance_status IS 'Whether the clearance of each kilometre that was measured is up to date';
-COMMENT ON COLUMN tunnel_api.clearance_status.gauge IS 'Name of the outline';
-COMMENT ON COLUMN tunnel_api.clearance_status.track IS 'The track';
-COMMENT ON COLUMN tunnel_api.clearance_status.done_at IS 'When it was last measured';
-COMMENT ON COLUMN tunnel_api.clearance_status.stale IS 'True when what it rests on has changed since';
-COMMENT ON COLUMN tunnel_api.clearance_status.reason IS 'Why it is stale';
+COMMENT ON FUNCTION tunnel_internal.clearance_places(int, text) IS
+    'Kilometres, tracks and gauges that were measured; of a track and gauge given, kilometres whose points have classes';

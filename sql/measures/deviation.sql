@@ -76,8 +76,7 @@ COMMENT ON COLUMN tunnel_api.deviation_section.shift_right IS 'How far the linin
 COMMENT ON COLUMN tunnel_api.deviation_section.shift_up IS 'How far it lies above it, m';
 COMMENT ON COLUMN tunnel_api.deviation_section.deviation IS 'Mean deviation of cells of equal length along the profile, m, positive inside; NaN where unseen';
 
--- What the deviation of a kilometre is made from. It is up to date as long as this is the same as in its row of the ledger.
-CREATE OR REPLACE FUNCTION tunnel_internal.deviation_inputs(survey_id int, km int, layer text) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.deviation_inputs(survey_id int, km int, subject text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
                'detect', tunnel_internal.last_run($1, 'detect', $2),
@@ -92,11 +91,12 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
       FROM tunnel.survey s WHERE s.id = $1
 $$;
 COMMENT ON FUNCTION tunnel_internal.deviation_inputs(int, int, text) IS
-    'What the deviation of a survey''s kilometre from a layer is made from: the run of stage detect, and a checksum of the profiles there and next to it. The run of stage deviation holds the same in its parameters';
+    'What the deviation from a layer in a kilometre is made from: the run of stage detect, and a checksum of the profiles there and next to it';
 
-CREATE OR REPLACE FUNCTION tunnel_internal.deviation_state(survey_id int)
-RETURNS TABLE (km int, layer text, done_at timestamptz, reason text)
-LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
+CREATE OR REPLACE FUNCTION tunnel_internal.deviation_places(survey_id int, of_subject text DEFAULT NULL)
+RETURNS TABLE (km int, subject text, present boolean, reason text)
+LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL RESTRICTED SECURITY DEFINER ROWS 50
+SET search_path = pg_catalog, pg_temp SET jit = off AS $$
     WITH design AS (
         SELECT p.layer, min(p.chainage_from) AS low, max(p.chainage_to) AS high
           FROM tunnel.survey s JOIN tunnel.design_profile p ON p.tunnel_id = s.tunnel_id
@@ -107,23 +107,15 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
         SELECT l.layer, i.km
           FROM (VALUES ('lining'), ('shotcrete'), ('excavation')) l (layer)
          CROSS JOIN LATERAL tunnel_internal.image_kilometres($1, 'deviation_' || l.layer) i (km)
-    ), detect AS MATERIALIZED (
-        SELECT t.km, t.reason FROM tunnel_internal.stage_state($1) t WHERE t.stage = 'detect'
-    ), last AS (
-        SELECT r.km, r.subject AS layer, r.finished_at, r.parameters FROM tunnel_internal.last_runs($1, 'deviation') r
     ), place AS (  -- where there is a design, or there was one and what was made by it is still there
         SELECT k.km, d.layer FROM seen k JOIN design d ON d.low < (k.km + 1) * 1000 AND d.high > k.km * 1000
          UNION
-        SELECT l.km, l.layer FROM last l
-         WHERE EXISTS (SELECT FROM tunnel.deviation_section o WHERE o.survey_id = $1 AND o.layer = l.layer AND o.km = l.km
+        SELECT l.km, l.subject FROM tunnel_internal.last_runs($1, 'deviation') l
+         WHERE EXISTS (SELECT FROM tunnel.deviation_section o WHERE o.survey_id = $1 AND o.layer = l.subject AND o.km = l.km
                           AND o.chainage_from >= l.km * 1000 - 1 AND o.chainage_from < (l.km + 1) * 1000)
     )
-    SELECT k.km, d.layer, l.finished_at,
-           CASE WHEN t.reason IS NOT NULL THEN 'detect is stale: ' || t.reason
-                WHEN l.km IS NULL THEN 'never ran'
-                WHEN l.parameters -> 'detect' IS DISTINCT FROM n.inputs -> 'detect' THEN 'detect ran since'
-                WHEN l.parameters -> 'profiles' IS DISTINCT FROM n.inputs -> 'profiles' THEN 'design profiles changed since'
-                WHEN NOT EXISTS (SELECT FROM pictured i WHERE i.km = k.km AND i.layer = d.layer) AND EXISTS (
+    SELECT k.km, d.layer, true,
+           CASE WHEN NOT EXISTS (SELECT FROM pictured i WHERE i.km = k.km AND i.layer = d.layer) AND EXISTS (
                      SELECT FROM tunnel.deviation_section o
                       WHERE o.survey_id = $1 AND o.km = k.km AND o.layer = d.layer AND o.seen_length > 0
                         AND o.chainage_from >= k.km * 1000 - 1 AND o.chainage_from < (k.km + 1) * 1000)
@@ -131,23 +123,10 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET sear
            END
       FROM seen k
       JOIN place d ON d.km = k.km
-     CROSS JOIN LATERAL (SELECT tunnel_internal.deviation_inputs($1, k.km, d.layer) AS inputs) n
-      LEFT JOIN detect t ON t.km = k.km
-      LEFT JOIN last l ON l.km = k.km AND l.layer = d.layer
+     WHERE $2 IS NULL OR d.layer = $2
 $$;
-COMMENT ON FUNCTION tunnel_internal.deviation_state(int) IS
-    'How far the deviation of a survey has come: of each kilometre with an offset image and each layer with a profile or sections there, when it was last made, and why it is out of date, if it is';
-
-CREATE OR REPLACE VIEW tunnel_api.deviation_status AS
-SELECT ((s.id::bigint * 1000000 + 500000 + t.km) * 10) + CASE t.layer WHEN 'lining' THEN 1 WHEN 'shotcrete' THEN 2 ELSE 3 END AS id,
-       s.id AS survey_id, s.name AS survey, t.km, t.layer, t.done_at, t.reason IS NOT NULL AS stale, t.reason
-  FROM tunnel.survey s
- CROSS JOIN LATERAL tunnel_internal.deviation_state(s.id) t;
-COMMENT ON VIEW tunnel_api.deviation_status IS 'Whether the deviation of each kilometre is up to date: one row per layer';
-COMMENT ON COLUMN tunnel_api.deviation_status.layer IS 'Layer of the profiles';
-COMMENT ON COLUMN tunnel_api.deviation_status.done_at IS 'When it was last made; NULL: never';
-COMMENT ON COLUMN tunnel_api.deviation_status.stale IS 'True when it was never made, or what it rests on has changed since';
-COMMENT ON COLUMN tunnel_api.deviation_status.reason IS 'Why it is stale';
+COMMENT ON FUNCTION tunnel_internal.deviation_places(int, text) IS
+    'Kilometres with an offset image, and each layer with a profile or sections there';
 
 -- Steps that an end of the stretch cuts count by their share.
 CREATE OR REPLACE FUNCTION tunnel_api.deviation_volume(

@@ -47,43 +47,21 @@ COMMENT ON COLUMN tunnel_api.evenness_area.gap IS 'Greatest gap in it, m';
 COMMENT ON COLUMN tunnel_api.evenness_area.direction IS 'along or around: how the straightedge lay';
 COMMENT ON COLUMN tunnel_api.evenness_area.geom IS 'In the unrolled plane (chainage, arc), m';
 
-CREATE OR REPLACE FUNCTION tunnel_internal.evenness_inputs(survey_id int, km int, layer text) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.evenness_inputs(survey_id int, km int, subject text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
-    SELECT jsonb_build_object('layer', $3, 'deviation', jsonb_agg(tunnel_internal.last_run($1, 'deviation', $2 + k, $3)
-               ORDER BY k))
+    SELECT jsonb_build_object('deviation', jsonb_agg(tunnel_internal.last_run($1, 'deviation', $2 + k, $3) ORDER BY k))
       FROM generate_series(-1, 1) k
 $$;
 COMMENT ON FUNCTION tunnel_internal.evenness_inputs(int, int, text) IS
-    'What the evenness of a survey''s kilometre is made from: the runs of stage deviation in it and the kilometres beside. The run of stage evenness holds the same in its parameters, beside the length of the straightedge and the limit';
+    'What the evenness of a kilometre is made from: the runs of stage deviation in it and the kilometres beside';
 
-CREATE OR REPLACE FUNCTION tunnel_internal.evenness_state(survey_id int)
-RETURNS TABLE (km int, layer text, done_at timestamptz, reason text, straightedge float8, gap_limit float8)
-LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
-    SELECT d.km, d.layer, l.finished_at,
-           CASE WHEN d.reason IS NOT NULL THEN 'deviation is stale: ' || d.reason
-                WHEN l.finished_at IS NULL THEN 'never ran'
-                WHEN l.parameters -> 'deviation' IS DISTINCT FROM tunnel_internal.evenness_inputs($1, d.km, d.layer) -> 'deviation'
-                THEN 'deviation ran since'
-           END,
-           (l.parameters ->> 'length')::float8, (l.parameters ->> 'limit')::float8
-      FROM tunnel_internal.deviation_state($1) d
-      LEFT JOIN tunnel_internal.last_runs($1, 'evenness') l ON l.km = d.km AND l.subject = d.layer
+CREATE OR REPLACE FUNCTION tunnel_internal.evenness_places(survey_id int, of_subject text DEFAULT NULL)
+RETURNS TABLE (km int, subject text, present boolean, reason text)
+LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL RESTRICTED SECURITY DEFINER ROWS 50
+SET search_path = pg_catalog, pg_temp SET jit = off AS $$
+    SELECT d.km, d.subject, true, NULL::text FROM tunnel_internal.deviation_places($1, $2) d
 $$;
-COMMENT ON FUNCTION tunnel_internal.evenness_state(int) IS
-    'How far the evenness of a survey has come: of each kilometre and layer that it can be held against, when it was last made, with which straightedge and limit (m), and why it is out of date, if it is';
-
-CREATE OR REPLACE VIEW tunnel_api.evenness_status AS
-SELECT ((s.id::bigint * 1000000 + 500000 + t.km) * 10) + CASE t.layer WHEN 'lining' THEN 1 WHEN 'shotcrete' THEN 2 ELSE 3 END AS id,
-       s.id AS survey_id, s.name AS survey, t.km, t.layer, t.done_at, t.straightedge, t.gap_limit, t.reason IS NOT NULL AS stale, t.reason
-  FROM tunnel.survey s
- CROSS JOIN LATERAL tunnel_internal.evenness_state(s.id) t;
-COMMENT ON VIEW tunnel_api.evenness_status IS 'Whether the evenness of each kilometre is up to date: one row per layer';
-COMMENT ON COLUMN tunnel_api.evenness_status.layer IS 'Layer whose profiles are the template';
-COMMENT ON COLUMN tunnel_api.evenness_status.done_at IS 'When it was last made; NULL: never';
-COMMENT ON COLUMN tunnel_api.evenness_status.straightedge IS 'Length of the straightedge, m';
-COMMENT ON COLUMN tunnel_api.evenness_status.gap_limit IS 'Limit of the gap, m';
-COMMENT ON COLUMN tunnel_api.evenness_status.stale IS 'True when it was never made, or what it rests on has changed since';
-COMMENT ON COLUMN tunnel_api.evenness_status.reason IS 'Why it is stale';
+COMMENT ON FUNCTION tunnel_internal.evenness_places(int, text) IS 'Kilometres and layers of the deviation from the design';
 
 CREATE OR REPLACE FUNCTION tunnel_api.evenness_stretches(survey text, layer text, step float8 DEFAULT 100)
 RETURNS TABLE (chainage_from float8, chainage_to float8, label text, straightedge float8, gap_limit float8, lining_area float8,

@@ -86,7 +86,7 @@ COMMENT ON COLUMN tunnel_api.ring_chord.length IS 'Length, m; NULL where an end 
 COMMENT ON COLUMN tunnel_api.ring_chord.length_se IS 'Standard error, m';
 
 -- Rings of other kilometres whose end is next to this one belong to it, too: the step at its beginning goes by both.
-CREATE OR REPLACE FUNCTION tunnel_internal.ring_inputs(survey_id int, km int) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.rings_inputs(survey_id int, km int, subject text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
                'detect', (SELECT jsonb_agg(l.id ORDER BY k) FROM generate_series($2 - 1, $2 + 1) k
@@ -94,43 +94,17 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
                'rings', (SELECT md5(string_agg(concat_ws(' ', g.number, g.chainage_from, g.chainage_to), ';' ORDER BY g.number))
                            FROM tunnel.ring g WHERE g.survey_id = $1 AND g.km = $2))
 $$;
-COMMENT ON FUNCTION tunnel_internal.ring_inputs(int, int) IS
-    'What the measures of a kilometre''s rings are made from: the runs of stage detect there and beside, and a checksum of the rings'' joints. The run of stage rings holds the same in its parameters';
+COMMENT ON FUNCTION tunnel_internal.rings_inputs(int, int, text) IS
+    'What the measures of a kilometre''s rings are made from: the runs of stage detect there and beside, and a checksum of the rings'' joints';
 
-CREATE OR REPLACE FUNCTION tunnel_internal.ring_state(survey_id int)
-RETURNS TABLE (km int, rings int, done_at timestamptz, reason text)
-LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 50 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
-    WITH detect AS MATERIALIZED (
-        SELECT t.km, t.reason FROM tunnel_internal.stage_state($1) t WHERE t.stage = 'detect'
-    ), last AS (
-        SELECT r.km, r.finished_at, r.parameters FROM tunnel_internal.last_runs($1, 'rings') r
-    )
-    SELECT g.km, g.rings, l.finished_at,
-           CASE WHEN t.reason IS NOT NULL THEN 'detect is stale: ' || t.reason
-                WHEN l.km IS NULL THEN 'never ran'
-                WHEN l.parameters -> 'detect' IS DISTINCT FROM n.inputs -> 'detect' THEN 'detect ran since'
-                WHEN l.parameters -> 'rings' IS DISTINCT FROM n.inputs -> 'rings' THEN 'rings changed since'
-                WHEN g.unmeasured THEN 'rings changed since'
-           END
-      FROM (SELECT o.km, count(*)::int AS rings, bool_or(o.shape IS NULL) AS unmeasured
-              FROM tunnel.ring o WHERE o.survey_id = $1 GROUP BY o.km) g
-     CROSS JOIN LATERAL (SELECT tunnel_internal.ring_inputs($1, g.km) AS inputs) n
-      LEFT JOIN detect t ON t.km = g.km
-      LEFT JOIN last l ON l.km = g.km
+CREATE OR REPLACE FUNCTION tunnel_internal.rings_places(survey_id int, of_subject text DEFAULT NULL)
+RETURNS TABLE (km int, subject text, present boolean, reason text)
+LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL RESTRICTED SECURITY DEFINER ROWS 50
+SET search_path = pg_catalog, pg_temp SET jit = off AS $$
+    SELECT o.km, '', true, CASE WHEN bool_or(o.shape IS NULL) THEN 'rings changed since' END
+      FROM tunnel.ring o WHERE o.survey_id = $1 GROUP BY o.km
 $$;
-COMMENT ON FUNCTION tunnel_internal.ring_state(int) IS
-    'How far the rings of a survey have come: of each kilometre with rings, how many, when they were last measured, and why that is out of date, if it is';
-
-CREATE OR REPLACE VIEW tunnel_api.ring_status AS
-SELECT (s.id::bigint * 1000000 + 500000 + t.km) AS id, s.id AS survey_id, s.name AS survey, t.km, t.rings, t.done_at,
-       t.reason IS NOT NULL AS stale, t.reason
-  FROM tunnel.survey s
- CROSS JOIN LATERAL tunnel_internal.ring_state(s.id) t;
-COMMENT ON VIEW tunnel_api.ring_status IS 'Whether the measures of the rings of each kilometre are up to date';
-COMMENT ON COLUMN tunnel_api.ring_status.rings IS 'How many rings have their middle there';
-COMMENT ON COLUMN tunnel_api.ring_status.done_at IS 'When they were last measured; NULL: never';
-COMMENT ON COLUMN tunnel_api.ring_status.stale IS 'True when they were never measured, or what that rests on has changed since';
-COMMENT ON COLUMN tunnel_api.ring_status.reason IS 'Why it is stale';
+COMMENT ON FUNCTION tunnel_internal.rings_places(int, text) IS 'Kilometres in which rings have their middle';
 
 -- Between the ends of the section that is nearest behind the ring's beginning, or before it.
 CREATE OR REPLACE VIEW tunnel_api.ring_unrolled AS

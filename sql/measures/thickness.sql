@@ -29,50 +29,28 @@ COMMENT ON COLUMN tunnel_api.thickness_section.thickness_least IS 'Least of a ce
 COMMENT ON COLUMN tunnel_api.thickness_section.least_at IS 'How far along the profile that is, from its left foot or lowest place clockwise, m';
 COMMENT ON COLUMN tunnel_api.thickness_section.thickness IS 'Thickness of cells of equal length along the profile, m; NaN where either saw nothing';
 
-CREATE OR REPLACE FUNCTION tunnel_internal.thickness_inputs(before_id int, survey_id int, km int, layer text) RETURNS jsonb
+CREATE OR REPLACE FUNCTION tunnel_internal.thickness_inputs(survey_id int, km int, subject text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
-    SELECT jsonb_build_object('layer', $4, 'before', $1) || jsonb_object_agg(v.part,
-               tunnel_internal.last_run(v.id, 'deviation', $3, $4))
-      FROM (VALUES ('old', $1), ('new', $2)) v (part, id)
+    SELECT jsonb_build_object('old', tunnel_internal.last_run(p.older_id, 'deviation', $2, p.layer),
+                              'new', tunnel_internal.last_run($1, 'deviation', $2, p.layer))
+      FROM (SELECT split_part($3, ' ', 1)::int AS older_id, split_part($3, ' ', 2) AS layer) p
 $$;
-COMMENT ON FUNCTION tunnel_internal.thickness_inputs(int, int, int, text) IS
-    'What the thickness between two surveys in a kilometre is made from: the runs of stage deviation of both. The run of stage thickness holds the same in its parameters';
+COMMENT ON FUNCTION tunnel_internal.thickness_inputs(int, int, text) IS
+    'What the thickness between an older survey and this one in a kilometre is made from: the runs of stage deviation of both';
 
-CREATE OR REPLACE FUNCTION tunnel_internal.thickness_state(before_id int, survey_id int, layer text)
-RETURNS TABLE (km int, done_at timestamptz, reason text)
-LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 25 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
-    SELECT n.km, l.finished_at,
-           CASE WHEN o.reason IS NOT NULL THEN 'deviation of the earlier survey is stale: ' || o.reason
-                WHEN n.reason IS NOT NULL THEN 'deviation of the later survey is stale: ' || n.reason
-                WHEN l.finished_at IS NULL THEN 'never ran'
-                WHEN l.parameters IS DISTINCT FROM tunnel_internal.thickness_inputs($1, $2, n.km, $3) THEN 'deviation ran since'
-           END
-      FROM tunnel_internal.deviation_state($2) n
-      JOIN tunnel_internal.deviation_state($1) o ON o.km = n.km AND o.layer = n.layer
-      LEFT JOIN tunnel_internal.last_runs($2, 'thickness') l ON l.km = n.km AND l.subject = $1 || ' ' || $3
-     WHERE n.layer = $3
+CREATE OR REPLACE FUNCTION tunnel_internal.thickness_places(survey_id int, of_subject text DEFAULT NULL)
+RETURNS TABLE (km int, subject text, present boolean, reason text)
+LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL RESTRICTED SECURITY DEFINER ROWS 25
+SET search_path = pg_catalog, pg_temp SET jit = off AS $$
+    SELECT n.km, p.older_id || ' ' || p.layer, true, NULL::text
+      FROM (SELECT DISTINCT d.before_id AS older_id, d.layer FROM tunnel.thickness_section d WHERE d.survey_id = $1 AND $2 IS NULL
+             UNION ALL
+            SELECT split_part($2, ' ', 1)::int, split_part($2, ' ', 2) WHERE $2 IS NOT NULL) p
+     CROSS JOIN LATERAL tunnel_internal.deviation_places($1, p.layer) n
+      JOIN LATERAL tunnel_internal.deviation_places(p.older_id, p.layer) o ON o.km = n.km
 $$;
-COMMENT ON FUNCTION tunnel_internal.thickness_state(int, int, text) IS
-    'How far the thickness between two surveys has come, along a layer''s profiles: of each kilometre that both have, when it was last made, and why it is out of date, if it is';
-
-CREATE OR REPLACE VIEW tunnel_api.thickness_status AS
-SELECT ((a.id::bigint * 100000 + p.before_id) * 1000000 + 500000 + t.km) * 10
-           + CASE p.layer WHEN 'lining' THEN 1 WHEN 'shotcrete' THEN 2 ELSE 3 END AS id,
-       a.id AS survey_id, a.name AS survey, p.before_id, b.name AS before, t.km, p.layer, t.done_at, t.reason IS NOT NULL AS stale, t.reason
-  FROM tunnel.survey a
- CROSS JOIN LATERAL (SELECT DISTINCT d.before_id, d.layer FROM tunnel.thickness_section d WHERE d.survey_id = a.id) p
-  JOIN tunnel.survey b ON b.id = p.before_id
- CROSS JOIN LATERAL tunnel_internal.thickness_state(p.before_id, a.id, p.layer) t;
-COMMENT ON VIEW tunnel_api.thickness_status IS
-    'Whether the thickness between surveys is up to date: one row per kilometre of each pair of surveys and layer of which some was made';
-COMMENT ON COLUMN tunnel_api.thickness_status.survey_id IS 'Key of the later survey';
-COMMENT ON COLUMN tunnel_api.thickness_status.survey IS 'Its name';
-COMMENT ON COLUMN tunnel_api.thickness_status.before_id IS 'Key of the earlier survey';
-COMMENT ON COLUMN tunnel_api.thickness_status.before IS 'Its name';
-COMMENT ON COLUMN tunnel_api.thickness_status.layer IS 'Layer of the profiles';
-COMMENT ON COLUMN tunnel_api.thickness_status.done_at IS 'When it was last made; NULL: never';
-COMMENT ON COLUMN tunnel_api.thickness_status.stale IS 'True when it was never made, or what it rests on has changed since';
-COMMENT ON COLUMN tunnel_api.thickness_status.reason IS 'Why it is stale';
+COMMENT ON FUNCTION tunnel_internal.thickness_places(int, text) IS
+    'Kilometres in which this survey and an older one can be compared with a layer: of pairs and layers with sections, or of the one given';
 
 -- A section lies in one stretch or two. Cells are only looked at of sections in which one is thinner than the minimum.
 CREATE OR REPLACE FUNCTION tunnel_api.thickness_stretches(

@@ -32,7 +32,7 @@ AS $$
         SELECT s.step, s.name, s.parameters,
                ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads)) AS here,
                ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads_beside)) AS beside
-          FROM tunnel.stage s
+          FROM tunnel.stage s WHERE NOT s.on_demand
     ), need AS MATERIALIZED (
         SELECT s.step, w.way, n.source
           FROM stage s CROSS JOIN (VALUES (-1), (0), (1)) AS w (way)
@@ -126,7 +126,7 @@ COMMENT ON FUNCTION tunnel_internal.queue_state(integer, integer, integer) IS
 -- How far a result reaches: to so many kilometres on both sides the readiness of a stage may depend on it.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_reach() RETURNS integer
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER SET search_path = pg_catalog, pg_temp
-AS $$ SELECT count(*)::integer - 1 FROM tunnel.stage $$;
+AS $$ SELECT count(*)::integer - 1 FROM tunnel.stage WHERE NOT on_demand $$;
 COMMENT ON FUNCTION tunnel_internal.queue_reach() IS
     'To how many kilometres on both sides a stage may become ready by what has been done in one: one for each stage after the first';
 
@@ -153,7 +153,7 @@ BEGIN
           FROM tunnel.incoming i
          WHERE i.survey_id = queue_plan.survey_id AND i.failed_at IS NULL
          UNION ALL
-        SELECT 'stage', -10 * (s.km + CASE s.step WHEN (SELECT max(t.step) FROM tunnel.stage t) THEN 8 ELSE 0 END) + s.step,
+        SELECT 'stage', -10 * (s.km + CASE s.step WHEN (SELECT max(t.step) FROM tunnel.stage t WHERE NOT t.on_demand) THEN 8 ELSE 0 END) + s.step,
                format('s%s.km%s', queue_plan.survey_id, s.km),
                jsonb_build_object('survey_id', queue_plan.survey_id, 'km', s.km, 'stage', s.stage)
           FROM tunnel_internal.queue_state(queue_plan.survey_id, queue_plan.km_from, queue_plan.km_to) s

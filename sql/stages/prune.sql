@@ -2,21 +2,15 @@
 -- by itself: the last attempt, the last success, and that which ended last; what runs; what a run that is kept was made from; and
 -- every import. What is loaded or read has no one result: there each list of files and each setting counts by itself.
 
--- The parameters by which a run says which runs it was made from. See the functions tunnel_internal.…_inputs.
+-- The parameters by which a run says which runs it was made from are those of tunnel.stage_input.
 CREATE OR REPLACE FUNCTION tunnel_internal.run_inputs(stage text, parameters jsonb) RETURNS bigint[]
-LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
 AS $$
     SELECT array_agg(i.id::bigint ORDER BY i.id::bigint)
-      FROM unnest(CASE $1 WHEN 'compare' THEN ARRAY['detect_old', 'detect_new']
-                          WHEN 'rings' THEN ARRAY['detect']
-                          WHEN 'deviation' THEN ARRAY['detect']
-                          WHEN 'thickness' THEN ARRAY['old', 'new']
-                          WHEN 'evenness' THEN ARRAY['deviation']
-                          WHEN 'clearance' THEN ARRAY['ground']
-                          ELSE '{}' END) AS n (name)
+      FROM tunnel.stage_input n
      CROSS JOIN LATERAL jsonb_array_elements_text(
-               CASE jsonb_typeof($2 -> n.name) WHEN 'array' THEN $2 -> n.name ELSE jsonb_build_array($2 -> n.name) END) AS i (id)
-     WHERE i.id ~ '^[0-9]{1,18}$'
+               CASE jsonb_typeof($2 -> n.key) WHEN 'array' THEN $2 -> n.key ELSE jsonb_build_array($2 -> n.key) END) AS i (id)
+     WHERE n.stage = $1 AND n.holds = 'run' AND i.id ~ '^[0-9]{1,18}$'
 $$;
 COMMENT ON FUNCTION tunnel_internal.run_inputs(text, jsonb) IS 'Runs that a run was made from, by its stage and parameters; NULL without any';
 

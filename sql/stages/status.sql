@@ -56,7 +56,7 @@ BEGIN
                'learned' = ANY (s.reads) AS of_learned,
                ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads) ORDER BY 1) AS here,
                ARRAY(SELECT o.step FROM tunnel.stage o WHERE o.name = ANY (s.reads_beside) ORDER BY 1) AS beside
-          FROM tunnel.stage s
+          FROM tunnel.stage s WHERE NOT s.on_demand
     ), need AS MATERIALIZED (
         SELECT s.step, w.way, n.source
           FROM stage s CROSS JOIN (VALUES (-1), (0), (1)) AS w (way)

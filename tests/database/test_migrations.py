@@ -23,7 +23,7 @@ from tunneldb.database.health import examine
 from tunneldb.database.schema import HEAD, alembic_config, install_api, sql_files
 from tunneldb.database.server import Server
 from tunneldb.errors import UserError
-from tunneldb.stages.registry import STAGES
+from tunneldb.stages.registry import REGISTRY
 
 ROOT = Path(__file__).parents[2]
 
@@ -54,18 +54,18 @@ def test_there_is_one_line_of_migrations() -> None:
 def test_a_second_install_changes_nothing(dsn: str) -> None:
     before = dump(dsn, "--schema-only")
     with open_connection(dsn) as connection:
-        install(connection, STAGES)
+        install(connection, REGISTRY)
     assert dump(dsn, "--schema-only") == before
 
 
 def test_the_stages_in_the_database_are_those_of_the_program(dsn: str, conn: psycopg.Connection) -> None:
     query = "SELECT name, reads, reads_beside, parameters FROM tunnel.stage ORDER BY step"
-    stages = [(stage.name, list(stage.reads), list(stage.reads_beside), list(stage.parameters)) for stage in STAGES]
+    stages = [(stage.name, list(stage.reads), list(stage.reads_beside), list(stage.parameters)) for stage in REGISTRY]
     assert conn.execute(query).fetchall() == stages
-    conn.execute("UPDATE tunnel.stage SET step = step + 10, parameters = '{old}'")
-    conn.execute("INSERT INTO tunnel.stage VALUES (1, 'of another version', '{}', '{}', '{}')")
+    conn.execute("UPDATE tunnel.stage SET step = step + 100, parameters = '{old}'")
+    conn.execute("INSERT INTO tunnel.stage VALUES (1, 'of another version', '{}', '{}', '{}', false, '{}', '{}')")
     conn.commit()
-    install(conn, STAGES)
+    install(conn, REGISTRY)
     assert conn.execute(query).fetchall() == stages
 
 
@@ -74,7 +74,7 @@ def test_install_is_whole_or_not_at_all(empty_dsn: str, monkeypatch: pytest.Monk
     broken.write_text("CREATE TABLE tunnel_api.half ();\nSELECT nonsense;")
     monkeypatch.setattr("tunneldb.database.schema.sql_files", lambda: [broken])
     with open_connection(empty_dsn) as connection, pytest.raises(psycopg.errors.UndefinedColumn) as caught:
-        install(connection, STAGES)
+        install(connection, REGISTRY)
     assert caught.value.__notes__ == [f"in {broken}, line 2"]
     with open_connection(empty_dsn) as connection:
         assert connection.execute("SELECT to_regnamespace('tunnel'), to_regnamespace('tunnel_api')").fetchone() == (None, None)
@@ -86,7 +86,7 @@ def test_the_functions_are_made_anew_and_data_stay(example: str, dsn: str, conn:
     conn.commit()
     leaks = conn.execute("SELECT count(*) FROM tunnel.finding").fetchone()
     conn.commit()
-    install(conn, STAGES)
+    install(conn, REGISTRY)
     assert conn.execute("SELECT tunnel_api.chainage_label(12345.678)").fetchone() == ("12+345.678",)
     assert conn.execute("SELECT to_regproc('tunnel_api.left_over')").fetchone() == (None,)
     assert conn.execute("SELECT count(*) FROM tunnel.finding").fetchone() == leaks
@@ -245,7 +245,7 @@ def test_a_dump_restored_on_another_server_needs_one_init(example: str, dsn: str
         subprocess.run([*restore, str(archive)], check=True)
         assert [finding.subject for finding in examine(other) if finding.level == "wrong"] == ["roles"]
         with open_connection(other) as connection:
-            install(connection, STAGES)
+            install(connection, REGISTRY)
         assert not [finding for finding in examine(other) if finding.level == "wrong"]
         with connect(other) as connection:
             connection.execute("SET ROLE tunnel_viewer")
@@ -259,7 +259,7 @@ def test_init_does_not_wait_for_ever_for_others(conn: psycopg.Connection, dsn: s
     monkeypatch.setattr("tunneldb.database.schema._LOCK_TIMEOUT", "100ms")
     conn.execute("SELECT * FROM tunnel_api.leak")  # and stays in its transaction
     with open_connection(dsn) as connection, pytest.raises(UserError, match="close QGIS"):
-        install(connection, STAGES)
+        install(connection, REGISTRY)
 
 
 def test_postgis_in_another_schema_is_refused(empty_dsn: str) -> None:
@@ -267,7 +267,7 @@ def test_postgis_in_another_schema_is_refused(empty_dsn: str) -> None:
         connection.execute("CREATE SCHEMA gis")
         connection.execute("CREATE EXTENSION postgis SCHEMA gis")
     with open_connection(empty_dsn) as connection, pytest.raises(UserError, match="in schema gis"):
-        install(connection, STAGES)
+        install(connection, REGISTRY)
 
 
 def test_a_deleted_survey_takes_its_rows_along(example: str, conn: psycopg.Connection) -> None:
@@ -289,7 +289,7 @@ def test_a_newer_or_unreleased_database_is_refused(conn: psycopg.Connection, dsn
     with pytest.raises(UserError, match=message):
         connect(dsn)
     with pytest.raises(UserError, match=message):
-        install(conn, STAGES)
+        install(conn, REGISTRY)
 
 
 def test_a_database_without_postgis_or_schema_is_refused(empty_dsn: str) -> None:

@@ -11,7 +11,7 @@ from tests.database.test_roles import DRAW, MOVE, REVIEW
 from tunneldb.cli.main import main
 from tunneldb.database import install
 from tunneldb.errors import UserError
-from tunneldb.stages.registry import STAGES
+from tunneldb.stages.registry import REGISTRY
 
 # Each fits a call that tunnel_api makes better than PostgreSQL's own, which take "any", anyelement or another type.
 OVERLOADS = (
@@ -86,11 +86,11 @@ def test_functions_run_nothing_that_was_planted(conn: psycopg.Connection, person
     assert "PUBLIC may create functions in it" in said
     assert "function public.format(text,text) is not tunneldb's" in said
     with pytest.raises(UserError, match=r"function public\..* DROP ROUTINE public\..* more: tunneldb check"):
-        install(conn, STAGES)
+        install(conn, REGISTRY)
     conn.rollback()
     conn.execute(sql.SQL("DROP OWNED BY {}").format(sql.Identifier(person.info.user)))
     conn.commit()
-    install(conn, STAGES)
+    install(conn, REGISTRY)
     conn.commit()
     with pytest.raises(psycopg.errors.InsufficientPrivilege):
         person.execute("CREATE FUNCTION public.format(a int, b int) RETURNS text LANGUAGE sql AS 'SELECT NULL'")

@@ -8,7 +8,7 @@ from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
 from tunneldb.database import install, open_connection
-from tunneldb.stages.registry import STAGES
+from tunneldb.stages.registry import REGISTRY
 
 REVIEW = "UPDATE tunnel_api.leak_unrolled SET review = 'confirmed'"
 JUDGE = "UPDATE tunnel_api.finding_map SET kind = 'leak' WHERE kind = 'joint'"
@@ -264,7 +264,7 @@ def test_operator_leaves_the_functions_alone(person: psycopg.Connection) -> None
 @pytest.mark.parametrize("person", ["otto"], indirect=True)
 def test_operator_forges_no_entry_of_the_audit(person: psycopg.Connection, conn: psycopg.Connection) -> None:
     """Neither a view of his own with old and new values and the audit trigger, nor the function itself, forges an entry."""
-    install(conn, STAGES)  # once more, over what was granted before
+    install(conn, REGISTRY)  # once more, over what was granted before
     conn.commit()
     person.execute("CREATE TEMP VIEW mine AS SELECT * FROM tunnel_api.leak")
     for function in ("review_finding", "edit_axis_vertex", "edit_region"):
@@ -321,7 +321,7 @@ def test_roles_need_a_superuser_where_the_owner_may_not_make_them(server_dsn: st
     said: list[str] = []
     with open_connection(make_conninfo(server_dsn, dbname="landlords", user="landlord")) as owner:
         owner.add_notice_handler(lambda notice: said.append(notice.message_primary or ""))
-        install(owner, STAGES)
+        install(owner, REGISTRY)
         assert owner.execute("SELECT count(*) FROM tunnel_api.leak").fetchone() == (0,)
     # here the roles exist already, made for the other databases, so only the membership is lacking
     assert any("GRANT tunnel_operator TO landlord" in message for message in said)

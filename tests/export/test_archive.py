@@ -20,7 +20,7 @@ from tunneldb.export.archive import load
 from tunneldb.export.archive.load import load_survey
 from tunneldb.export.archive.save import save_survey
 from tunneldb.stages.ledger import lock
-from tunneldb.stages.registry import STAGES
+from tunneldb.stages.registry import REGISTRY
 from tunneldb.store.archive.tables import EXCLUDED, archive_tables, stored_tables
 from tunneldb.store.catalog import remove_survey
 from tunneldb.store.survey import get_survey
@@ -199,7 +199,7 @@ def test_in_a_database_of_others_its_tunnel_is_added(
     before = views(conn, NAME, exact=False)
     path = save(conn, tmp_path / "demo.tdb")
     with open_connection(empty_dsn) as fresh:
-        install(fresh, STAGES)
+        install(fresh, REGISTRY)
     with connect(empty_dsn) as other:
         loaded = load_survey(other, path, None, silent)
         assert loaded.new_tunnel

@@ -10,7 +10,8 @@ from support.curved_lining import made
 from tunneldb.measures.change.compute.cells import CellGrid, Cells, CellSums, rounding_variance, with_hollows, without_edges
 from tunneldb.measures.change.compute.change import change_regions, significant
 from tunneldb.measures.change.compute.leaks import Leak, groups, state_of, wet_area
-from tunneldb.measures.change.measure import Change, measure_change, rings_apart, section_figures
+from tunneldb.measures.change.compute.sections import Change, measure_change, section_figures
+from tunneldb.measures.change.measure import rings_apart
 
 pytestmark = pytest.mark.slow
 

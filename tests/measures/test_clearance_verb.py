@@ -101,7 +101,9 @@ def test_walls_a_box_and_a_person_about_a_track_found_by_its_rails(
     assert run("clearance", survey, "--gauge", gauge)["made"] == []
     conn.execute("UPDATE tunnel.run SET id = DEFAULT WHERE stage = 'ground' AND km = 1")
     conn.commit()
-    stale = conn.execute("SELECT km, reason FROM tunnel_api.clearance_status WHERE stale ORDER BY km").fetchall()
+    stale = conn.execute(
+        "SELECT km, reason FROM tunnel_api.result_status WHERE stage = 'clearance' AND stale ORDER BY km"
+    ).fetchall()
     assert (1, "ground ran since") in stale
     assert 1 in run("clearance", survey, "--gauge", gauge)["made"]
     # Other options are measured anew; a given axis 0.1 m to the right takes that off the margin on the right.

@@ -118,7 +118,12 @@ def test_change_leaks_files_and_when_they_are_stale(surveys: tuple[str, str], co
 
     def reasons() -> list[str | None]:
         conn.rollback()
-        return [row[0] for row in conn.execute("SELECT reason FROM tunnel_api.change_status ORDER BY km").fetchall()]
+        return [
+            row[0]
+            for row in conn.execute(
+                "SELECT reason FROM tunnel_api.result_status WHERE stage = 'compare' ORDER BY km"
+            ).fetchall()
+        ]
 
     assert reasons() == [None, None]
     conn.execute("UPDATE tunnel.finding SET review = 'rejected' WHERE chainage_from = 970")

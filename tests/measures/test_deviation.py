@@ -17,7 +17,7 @@ from support.curved_lining import circle, made
 from support.straight_survey import FIRST, LAST, RADIUS, Scene, make_survey
 
 from tunneldb.cli.main import main
-from tunneldb.measures.deviation.measure import Design
+from tunneldb.measures.deviation.compute import Design
 from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.pixel_state import PixelState
@@ -118,7 +118,7 @@ def test_it_is_stale_after_what_it_rests_on_and_written_as_files(survey: str, co
 
     def reasons() -> list[tuple[int, str | None]]:
         conn.rollback()
-        return conn.execute("SELECT km, reason FROM tunnel_api.deviation_status ORDER BY km").fetchall()
+        return conn.execute("SELECT km, reason FROM tunnel_api.result_status WHERE stage = 'deviation' ORDER BY km").fetchall()
 
     assert reasons() == [(0, "never ran"), (1, "never ran")]
     assert run("deviation", survey, "--from", 1010, "-o", tmp_path / "d.tif")["made"] == [1]
@@ -183,6 +183,6 @@ def test_a_profile_that_is_removed_and_added_again_leaves_no_image_missing(
     run("profile", "remove", survey, "round")
     run("profile", "add", survey, "round", path)  # the same again: what was measured holds, but its image went
     conn.rollback()
-    rows = conn.execute("SELECT km, reason FROM tunnel_api.deviation_status ORDER BY km").fetchall()
+    rows = conn.execute("SELECT km, reason FROM tunnel_api.result_status WHERE stage = 'deviation' ORDER BY km").fetchall()
     assert rows == [(0, "its image is not stored"), (1, "its image is not stored")]
     assert run("deviation", survey)["made"] == [0, 1]

@@ -109,15 +109,15 @@ def test_thickness_is_what_was_put_on(surveys: tuple[str, str], conn: psycopg.Co
     ring = np.pi * (RADIUS**2 - (RADIUS - THICK) ** 2)
     missing = 2.0 * THIN[2] / RADIUS / 2.0 * ((RADIUS - THIN[3]) ** 2 - (RADIUS - THICK) ** 2)
     assert volume == pytest.approx((LAST - FIRST) * ring - 5.0 * missing, rel=1e-3)
-    (reasons,) = zip(*conn.execute("SELECT reason FROM tunnel_api.thickness_status"), strict=True)
+    (reasons,) = zip(*conn.execute("SELECT reason FROM tunnel_api.result_status WHERE stage = 'thickness'"), strict=True)
     assert reasons == (None, None)
     conn.rollback()
     path = tmp_path / "t.csv"
     assert run("thickness", *surveys, "-o", path)["made"] == []
     assert len(path.read_text().splitlines()) == 1 + LAST - FIRST
     run("profile", "remove", "before", "round")
-    found = {row[0] for row in conn.execute("SELECT reason FROM tunnel_api.thickness_status")}
-    assert found == {"deviation of the earlier survey is stale: design profiles changed since"}
+    found = {row[0] for row in conn.execute("SELECT reason FROM tunnel_api.result_status WHERE stage = 'thickness'")}
+    assert found == {"deviation of the older survey is stale: design profiles changed since"}
     done = CliRunner().invoke(main, ["thickness", "after", "after"])
     assert (done.exit_code, "given twice" in done.output) == (2, True)
 
@@ -143,5 +143,7 @@ def test_gaps_beneath_a_straightedge_over_the_end_of_a_kilometre(surveys: tuple[
     assert run("evenness", surveys[0], "--length", 2, "--limit", 0.02)["made"] == []
     assert run("evenness", surveys[0], "--length", 2, "--limit", 0.04, "--from", 1005)["made"] == [1]
     conn.execute("UPDATE tunnel.run SET outcome = 'failed' WHERE stage = 'deviation' AND km = 0")
-    found = conn.execute("SELECT reason FROM tunnel_api.evenness_status WHERE survey = 'before' ORDER BY km").fetchall()
+    found = conn.execute(
+        "SELECT reason FROM tunnel_api.result_status WHERE stage = 'evenness' AND survey = 'before' ORDER BY km"
+    ).fetchall()
     assert found == [("deviation is stale: never ran",), ("deviation ran since",)]

@@ -118,7 +118,7 @@ def test_rings_are_measured_over_the_end_of_a_kilometre(survey: str, conn: psyco
 def test_rings_are_stale_after_what_they_rest_on(survey: str, conn: psycopg.Connection, tmp_path: Path) -> None:
     def reasons() -> list[tuple]:
         conn.rollback()
-        return conn.execute("SELECT km, reason FROM tunnel_api.ring_status ORDER BY km").fetchall()
+        return conn.execute("SELECT km, reason FROM tunnel_api.result_status WHERE stage = 'rings' ORDER BY km").fetchall()
 
     path = tmp_path / "rings.csv"
     path.write_text("number,chainage_from,chainage_to\n7,950,951.5\n8,951.5,953\n9,1010,1012\n")

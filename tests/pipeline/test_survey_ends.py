@@ -119,7 +119,7 @@ def darken(conn: psycopg.Connection, survey: int) -> None:
     conn.execute(
         "INSERT INTO tunnel.run (survey_id, km, stage, outcome, finished_at, counts)"
         " SELECT %s, 0, name, 'done', clock_timestamp(), jsonb_build_object('note', name || ' says') FROM tunnel.stage"
-        " WHERE name <> 'axis' ORDER BY step",
+        " WHERE name <> 'axis' AND NOT on_demand ORDER BY step",
         [survey],
     )
 

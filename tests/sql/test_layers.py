@@ -23,7 +23,7 @@ from tunneldb.cli.main import main
 from tunneldb.database import connect, install
 from tunneldb.errors import UserError
 from tunneldb.export.qgis.styles import store_styles, styled_columns
-from tunneldb.stages.registry import STAGES
+from tunneldb.stages.registry import REGISTRY
 from tunneldb.store.catalog import add_site, make_layers, remove_tunnel
 
 SCHEMA = "tunnel_25830"
@@ -167,17 +167,17 @@ def test_schemas_come_and_go_with_tunnels(conn: psycopg.Connection, dsn: str, mo
     assert "tunnel_local" in schemas(conn)  # what somebody's view rests on stays
     conn.commit()
     with pytest.raises(UserError, match="mine depend on schema tunnel_api"):
-        install(conn, STAGES)
+        install(conn, REGISTRY)
     conn.rollback()
     conn.execute("DROP VIEW public.mine")
     conn.execute(sql.SQL("CREATE TABLE {} AS SELECT 1 AS a").format(sql.Identifier(SCHEMA, "kept")))
     conn.commit()
     with pytest.raises(UserError, match=rf"{SCHEMA}.kept are in a schema of typed layers"):
-        install(conn, STAGES)
+        install(conn, REGISTRY)
     conn.rollback()
     conn.execute(sql.SQL("DROP TABLE {}").format(sql.Identifier(SCHEMA, "kept")))
     conn.commit()
-    install(conn, STAGES)
+    install(conn, REGISTRY)
     assert schemas(conn) == [SCHEMA]
 
 

@@ -36,7 +36,7 @@ INSERT INTO tunnel.run (survey_id, km, stage, started_at, finished_at, outcome)
 SELECT s, km, g.name, t, t + interval '30 s', 'done'
 FROM unnest(%s::int[]) s, generate_series(0, 2) km, tunnel.stage g,
     LATERAL (SELECT '2024-05-05'::timestamptz + g.step * interval '10 min') q (t)
-WHERE s %% 3 = 0
+WHERE s %% 3 = 0 AND NOT g.on_demand
 """
 
 FILES = """

@@ -11,7 +11,7 @@ from shapely.geometry import box
 
 from tests.sql.test_statistics import add_coverage, add_leak, add_survey, ask
 from tunneldb.database import connect, install
-from tunneldb.stages.registry import STAGES
+from tunneldb.stages.registry import REGISTRY
 from tunneldb.store.waterproof import keep_missing
 
 NAMES = (
@@ -235,7 +235,7 @@ def test_where_nothing_can_be_kept_one_row_stands_for_all_changes(conn: psycopg.
         conn.commit()
     assert ask(conn, "SELECT count(*)::int AS n FROM tunnel.waterproof WHERE km = 3") == [{"n": 1}]
     assert differences(conn) == []
-    install(conn, STAGES)
+    install(conn, REGISTRY)
     assert ask(conn, "SELECT count(*)::int AS n FROM tunnel.waterproof WHERE km = 3") == [{"n": 1}]
     conn.execute("UPDATE tunnel.segment SET chainage_to = 4000 WHERE km = 3 AND chainage_to = 4002")
     conn.execute("UPDATE tunnel_api.leak SET review = 'open' WHERE km = 3")
@@ -285,7 +285,7 @@ def test_an_upgrade_keeps_what_was_not(conn: psycopg.Connection, survey: int) ->
     conn.execute("DELETE FROM tunnel.waterproof")
     assert differences(conn) == []
     conn.commit()
-    install(conn, STAGES)
+    install(conn, REGISTRY)
     conn.rollback()
     assert (kept(conn), differences(conn)) == ([], []), "right without, and slower"
     conn.rollback()

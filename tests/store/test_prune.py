@@ -13,17 +13,17 @@ from support.example_change import EARLIER, add_earlier
 from support.queue_rows import add_goal, add_job
 
 from tunneldb.cli.main import main
-from tunneldb.stages.registry import STAGE_NAMES
-from tunneldb.store.archive.numbers import PARAMETERS
+from tunneldb.stages.registry import MEASURES, STAGE_NAMES
+from tunneldb.stages.stage import Holds
 
 HISTORIES = {"run", "change", "job", "survey_size"}
 """Views that list runs and jobs, or what they take: the only ones that may be different."""
 
 INPUTS = """
-    SELECT k, tunnel_internal.change_inputs(n.id, o.id, k), tunnel_internal.ring_inputs(n.id, k),
-           tunnel_internal.deviation_inputs(n.id, k, 'lining'), tunnel_internal.evenness_inputs(n.id, k, 'lining'),
-           tunnel_internal.thickness_inputs(o.id, n.id, k, 'lining'), tunnel_internal.clearance_inputs(n.id, k, 'example')
-      FROM tunnel.survey n, tunnel.survey o, generate_series(11, 13) k
+    SELECT k, r.stage, tunnel_internal.result_inputs(n.id, r.stage, k, r.subject)
+      FROM tunnel.survey n, tunnel.survey o, generate_series(11, 13) k,
+           (VALUES ('compare', o.id::text), ('rings', ''), ('deviation', 'lining'), ('evenness', 'lining'),
+                   ('thickness', o.id || ' lining'), ('clearance', 'single example')) r (stage, subject)
 """
 """What results made now would be made from."""
 
@@ -62,12 +62,12 @@ def add_history(conn: psycopg.Connection, count: int) -> None:
     surveys = {name: key for key, name in conn.execute("SELECT id, name FROM tunnel.survey")}
     new, old = surveys["demo-2024"], surveys[EARLIER]
     made_from = {
-        "compare": ("tunnel_internal.change_inputs(%s, %s, %s)", [new, old], {"old": old, "cell": 0.1, "length": 5}),
-        "rings": ("tunnel_internal.ring_inputs(%s, %s)", [new], {"options": {}}),
-        "deviation": ("tunnel_internal.deviation_inputs(%s, %s, 'lining')", [new], {"layer": "lining"}),
-        "evenness": ("tunnel_internal.evenness_inputs(%s, %s, 'lining')", [new], {"length": 4, "limit": 0.01}),
-        "thickness": ("tunnel_internal.thickness_inputs(%s, %s, %s, 'lining')", [old, new], {}),
-        "clearance": ("tunnel_internal.clearance_inputs(%s, %s, 'example')", [new], {"track": "single"}),
+        "compare": (f"{old}", {"old": old, "cell": 0.1, "length": 5}),
+        "rings": ("", {"options": {}}),
+        "deviation": ("lining", {"layer": "lining"}),
+        "evenness": ("lining", {"layer": "lining", "length": 4, "limit": 0.01}),
+        "thickness": (f"{old} lining", {"before": old, "layer": "lining"}),
+        "clearance": ("single example", {"track": "single", "gauge": "example"}),
     }
     add = "INSERT INTO tunnel.run (survey_id, km, stage, parameters, counts, outcome, message, started_at, finished_at, job_id)"
     add += " SELECT %s, %s, %s, %s, %s, %s, %s, t, t + make_interval(secs => %s), %s"
@@ -76,8 +76,8 @@ def add_history(conn: psycopg.Connection, count: int) -> None:
         stage = str(rng.choice([*STAGE_NAMES, *made_from, "read"]))
         survey, km = int(rng.choice([new, old])), int(rng.choice([11, 12, 12, 13]))
         if stage in made_from:
-            function, arguments, options = made_from[stage]
-            row = conn.execute(f"SELECT {function}".encode(), [*arguments, km]).fetchone()
+            subject, options = made_from[stage]
+            row = conn.execute("SELECT tunnel_internal.result_inputs(%s, %s, %s, %s)", [new, stage, km, subject]).fetchone()
             assert row is not None
             survey, parameters = new, row[0] | options
         else:
@@ -143,28 +143,23 @@ def test_pruning_a_long_history_changes_no_view_and_nothing_that_status_or_check
     assert said("prune")["superseded"] == []
 
 
-def test_the_inputs_of_runs_are_all_known(example: str, conn: psycopg.Connection) -> None:
-    """What the functions …_inputs give are runs that `run_inputs` knows, checksums, or what was asked for."""
-    others = {"layer", "before", "gauge", "profiles", "rings", "outline", "leaks_old", "leaks_new", "files", "settings_at"}
-    stages = {"change": "compare", "ring": "rings"}
-    functions = conn.execute(
-        "SELECT p.oid::regprocedure::text, substring(p.proname FROM '(.*)_inputs$'), p.proargtypes::regtype[]::text[]"
-        " FROM pg_proc p WHERE p.pronamespace = 'tunnel_internal'::regnamespace AND p.proname ~ '_inputs$'"
-        " AND p.proname <> 'run_inputs'"
-    ).fetchall()
-    assert len(functions) >= 7
+def test_the_inputs_of_results_are_those_of_the_registry(example: str, conn: psycopg.Connection) -> None:
+    """The functions …_inputs give what the registry says: runs, which `run_inputs` knows, and checksums."""
     survey = conn.execute("SELECT id FROM tunnel.survey").fetchone()
     assert survey is not None
-    for signature, subject, types in functions:
-        arguments = ["'lining'" if kind == "text" else str(survey[0]) for kind in types]
-        call = f"SELECT tunnel_internal.{subject}_inputs({', '.join(arguments)})"
-        given = conn.execute(call.encode()).fetchone()
-        assert given is not None, signature
-        stage = stages.get(subject, subject)
-        runs = {name for name in given[0] if PARAMETERS.get((stage, name)) == "run"}
-        assert set(given[0]) - runs <= others, signature
-        known = conn.execute("SELECT tunnel_internal.run_inputs(%s, %s)", [stage, Jsonb(dict.fromkeys(runs, 7))]).fetchone()
-        assert known == ([7] * len(runs) or None,), signature
+    assert len(MEASURES) >= 6
+    for stage in MEASURES:
+        subject = " ".join(str(survey[0]) if key in ("before", "old") else "lining" for key in stage.subject)
+        given = conn.execute(
+            "SELECT tunnel_internal.result_inputs(%s, %s, 12, %s)", [survey[0], stage.name, subject]
+        ).fetchone()
+        assert given is not None
+        assert set(given[0]) == {one.key for one in stage.inputs if one.holds != Holds.SURVEY}, stage.name
+        runs = [one.key for one in stage.inputs if one.holds == Holds.RUN]
+        known = conn.execute(
+            "SELECT tunnel_internal.run_inputs(%s, %s)", [stage.name, Jsonb(dict.fromkeys(runs, 7))]
+        ).fetchone()
+        assert known == ([7] * len(runs) or None,), stage.name
 
 
 def test_what_runs_or_waits_is_left_alone(example: str, conn: psycopg.Connection) -> None:

@@ -9,7 +9,7 @@ from tunneldb.arrays import Float
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.frame import segment_rows, tangents
 from tunneldb.geometry.surface import Surface
-from tunneldb.measures.deviation.measure import STATIONS
+from tunneldb.measures.deviation.compute import STATIONS
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.grid import BLOCK
 from tunneldb.shape.outline import Outline

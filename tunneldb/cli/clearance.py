@@ -8,21 +8,27 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.measure import (
+    every_option,
+    number,
+    output_option,
+    require_ending,
+    say_written,
+    surveys_in,
+    with_progress,
+    write_text,
+)
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
-from tunneldb.cli.progress import bar, step
-from tunneldb.cli.stretch import parse_stretch, stretch_options
+from tunneldb.cli.stretch import stretch_options
 from tunneldb.cli.tables import print_table
-from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import exit_on_sigterm, replacing
-from tunneldb.store.survey import get_survey
+from tunneldb.files import replacing
 
 if TYPE_CHECKING:
     from tunneldb.measures.clearance.compute.gauge import Widening
     from tunneldb.measures.clearance.tables import Row
 
-_FILES = (".csv", ".dxf", ".gpkg")
 _LENGTH = FiniteRange(0.0)
 
 
@@ -66,11 +72,8 @@ _LENGTH = FiniteRange(0.0)
 )
 @click.option("--group-radius", type=_LENGTH, default=0.3, show_default=True, metavar="M", help="… within this radius.")
 @stretch_options
-@click.option("--every", type=FiniteRange(1.0), default=10.0, show_default=True, metavar="M", help="Of sections of a .dxf.")
-@click.option(
-    "-o", "--output", type=FilePath(dir_okay=False),
-    help="File to write: .csv of all metres and directions, .dxf of sections with outline and points, .gpkg.",
-)  # fmt: skip
+@every_option(10.0, "Of sections of a .dxf.")
+@output_option("File to write: .csv of all metres and directions, .dxf of sections with outline and points, .gpkg.")
 @click.pass_obj
 def clearance(settings: Settings, /, survey: str, outline: Path, name: str | None, output: Path | None, **asked: Any) -> None:
     """Hold what stands in SURVEY against an outline about a track, and state margins and infringements.
@@ -86,27 +89,23 @@ def clearance(settings: Settings, /, survey: str, outline: Path, name: str | Non
     from tunneldb.pipeline.profile_file import read_profile
     from tunneldb.store.surface import load_alignment
 
-    if output is not None and output.suffix.lower() not in _FILES:
-        raise UserError(f"{output}: clearance is written as {', '.join(_FILES[:-1])} or {_FILES[-1]}")
+    require_ending(output, "clearance", (".csv", ".dxf", ".gpkg"))
     options = Options(
         asked["track_gauge"], _widening(asked), asked["radius"] or None, asked["cant"], asked["group_points"],
         asked["group_radius"],
     )  # fmt: skip
     read = closed(read_profile(outline).outline)
     gauge = name or outline.stem
-    with connect(settings.dsn) as conn:
-        found = get_survey(conn, survey)
-        part = parse_stretch(conn, found, asked["start"], asked["end"])
+    with surveys_in(settings, [survey], asked["start"], asked["end"]) as (conn, [found], part):
         if asked["track_axis"] is not None:
             tracks = read_track(asked["track_axis"], load_alignment(conn, found, 1.0))
         else:
             tracks = find_tracks(conn, found, options.track_gauge)
         track = _chosen(survey, tracks.names, asked["track"])
         save_gauge(conn, found, gauge, read, str(outline))
-        with exit_on_sigterm(), bar("km") as progress:
-            made = measure_clearance(
-                conn, found, tracks, track, gauge, read, options, part.low, part.high, step(progress)
-            )  # fmt: skip
+        made = with_progress(
+            lambda begin: measure_clearance(conn, found, tracks, track, gauge, read, options, part.low, part.high, begin)
+        )
         kilometres = summary(conn, found, gauge, track, part.low, part.high)
         if not kilometres:
             raise UserError(f"survey {survey}: track {track} was not seen there; nothing was measured, and nothing is clear")
@@ -116,8 +115,7 @@ def clearance(settings: Settings, /, survey: str, outline: Path, name: str | Non
         if output is None:
             tell(sections=[row | {"margins": [None if m != m else m for m in row["margins"]]} for row in rows])
         elif output.suffix.lower() == ".csv":
-            with replacing(output) as temporary:
-                temporary.write_text(sections_csv(rows), encoding="utf-8")
+            write_text(output, sections_csv(rows))
         elif output.suffix.lower() == ".gpkg":
             from tunneldb.export.exchange import clearance_gpkg
 
@@ -128,10 +126,8 @@ def clearance(settings: Settings, /, survey: str, outline: Path, name: str | Non
 
             with replacing(output) as temporary:
                 write_clearance(conn, found, gauge, track, part.low, part.high, asked["every"], temporary)
-    tell(files=[output] if output else [])
     _print(kilometres, rows, inside, track, gauge)
-    if output:
-        click.echo(f"written to {output}", err=True)
+    say_written([output] if output else [])
 
 
 def _widening(asked: dict[str, Any]) -> Widening:
@@ -159,9 +155,6 @@ def _chosen(survey: str, names: list[str], wanted: str | None) -> str:
 
 
 def _print(kilometres: list[Row], rows: list[Row], inside: list[Row], track: str, gauge: str) -> None:
-    def metres(value: float | None) -> str:
-        return "" if value is None else f"{value:.3f}"
-
     print_table(
         [
             "km", "metres", "track seen %", "axis ± mm", "cant ± mm", "least margin m", "metres inside", "seen %", "stray",
@@ -170,7 +163,7 @@ def _print(kilometres: list[Row], rows: list[Row], inside: list[Row], track: str
         [
             (row["km"], f"{row['metres']} of {row['run']['metres']}", f"{100 * row['run']['track_seen']:.1f}",
              f"{1e3 * row['run'].get('axis_se', 0.0):.1f}", f"{1e3 * row['run'].get('cant_se', 0.0):.1f}",
-             metres(row["margin"]), row["metres_inside"], f"{100 * row['seen_share']:.1f}",
+             number(row["margin"], 3), row["metres_inside"], f"{100 * row['seen_share']:.1f}",
              row["stray"], row["passing"], row["ground"])
             for row in kilometres
         ],
@@ -180,8 +173,8 @@ def _print(kilometres: list[Row], rows: list[Row], inside: list[Row], track: str
     print_table(
         ["tightest at", "margin m", "±", "clock °", "by", "cluster", "radius m", "wider left mm", "right mm", "roll mrad"],
         [
-            (row["label"], metres(row["margin"]), metres(row["margin_se"]), f"{row['clock']:.0f}", row["class"],
-             row["cluster_id"], "" if row["radius"] is None else f"{row['radius']:.0f}", f"{1e3 * row['widened_left']:.1f}",
+            (row["label"], number(row["margin"], 3), number(row["margin_se"], 3), f"{row['clock']:.0f}", row["class"],
+             row["cluster_id"], number(row["radius"], 0), f"{1e3 * row['widened_left']:.1f}",
              f"{1e3 * row['widened_right']:.1f}", f"{1e3 * row['roll']:.1f}")
             for row in tightest
         ],

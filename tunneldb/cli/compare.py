@@ -9,20 +9,17 @@ import click
 import psycopg
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.measure import output_option, require_ending, say_written, surveys_in, with_progress, write_text
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.param_types import FilePath, FiniteRange
-from tunneldb.cli.progress import bar, step
-from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
+from tunneldb.cli.param_types import FiniteRange
+from tunneldb.cli.stretch import Stretch, stretch_options
 from tunneldb.cli.tables import print_table
-from tunneldb.database import connect
-from tunneldb.errors import UserError
-from tunneldb.files import by_kilometre, exit_on_sigterm, replacing
-from tunneldb.store.survey import Survey, get_survey
+from tunneldb.files import by_kilometre, replacing
+from tunneldb.store.survey import Survey
 
 if TYPE_CHECKING:
     from tunneldb.measures.change.tables import Row
 
-_FILES = (".csv", ".gpkg", ".xlsx", ".tif")
 _WORDS = {
     "new": "new", "grown": "grown", "shrunk": "shrunk", "same": "the same", "dry": "dry again", "kind": "of another kind",
     "unseen": "unseen",
@@ -47,11 +44,10 @@ _WORDS = {
     "--length", type=FiniteRange(0.5, 50.0), default=1.5, show_default=True, metavar="M",
     help="Length of the sections of which the rigid motion is taken out, m.",
 )  # fmt: skip
-@click.option(
-    "-o", "--output", type=FilePath(dir_okay=False),
-    help="File to write: .csv of what became of leaks; .gpkg or .xlsx of leaks, regions and sections; .tif of the change of "
-    "each cell, one a kilometre.",
-)  # fmt: skip
+@output_option(
+    "File to write: .csv of what became of leaks; .gpkg or .xlsx of leaks, regions and sections; .tif of the change of "
+    "each cell, one a kilometre."
+)
 @click.pass_obj
 def compare(
     settings: Settings,
@@ -73,14 +69,9 @@ def compare(
     from tunneldb.measures.change.measure import compare as bring_up_to_date
     from tunneldb.measures.change.tables import change_rows, summary
 
-    if output is not None and output.suffix.lower() not in _FILES:
-        raise UserError(f"{output}: compare is written as {', '.join(_FILES[:-1])} or {_FILES[-1]}")
-    with connect(settings.dsn) as conn:
-        first, second = get_survey(conn, old), get_survey(conn, new)
-        part = parse_stretch(conn, first, start, end)
-        conn.rollback()
-        with exit_on_sigterm(), bar("km") as progress:
-            made = bring_up_to_date(conn, first, second, part.low, part.high, cell, length, step(progress))
+    require_ending(output, "compare", (".csv", ".gpkg", ".xlsx", ".tif"))
+    with surveys_in(settings, [old, new], start, end) as (conn, [first, second], part):
+        made = with_progress(lambda begin: bring_up_to_date(conn, first, second, part.low, part.high, cell, length, begin))
         rows = {
             view: change_rows(conn, view, first, second, part.low, part.high)
             for view in ("change_section", "change_region", "leak_change")
@@ -89,11 +80,10 @@ def compare(
         files = [] if output is None else _write(conn, first, second, part, rows, output)
     tell(
         old=old, new=new, made=made, summary=whole, sections=rows["change_section"], regions=rows["change_region"],
-        leaks=rows["leak_change"], files=files,
+        leaks=rows["leak_change"],
     )  # fmt: skip
     _print(rows, whole)
-    for file in files:
-        click.echo(f"written to {file}", err=True)
+    say_written(files)
 
 
 def _write(
@@ -102,14 +92,13 @@ def _write(
     if output.suffix.lower() == ".csv":
         from tunneldb.measures.change.tables import change_csv
 
-        with replacing(output) as temporary:
-            temporary.write_text(change_csv(rows["leak_change"], "leak_change"), encoding="utf-8")
-        return [output]
+        return write_text(output, change_csv(rows["leak_change"], "leak_change"))
     if output.suffix.lower() == ".tif":
         from tunneldb.export.images.change import write_change
-        from tunneldb.measures.change.rows import stale_kilometres
+        from tunneldb.measures.change.measure import change_between
+        from tunneldb.stages.stale import result_states
 
-        there = stale_kilometres(conn, old, new, part.low, part.high)
+        there = result_states(conn, change_between(old, new), part.low, part.high)
         paths = by_kilometre(output, list(there))
         written = (write_change(conn, old, new, km, path) for km, path in zip(there, paths, strict=True))
         return [path for path in written if path is not None]

@@ -9,21 +9,27 @@ import click
 import psycopg
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.measure import (
+    axis_quality,
+    axis_sigma_option,
+    every_option,
+    layer_option,
+    output_option,
+    require_ending,
+    say_written,
+    surveys_in,
+    with_progress,
+    write_text,
+)
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.param_types import FilePath, FiniteRange
-from tunneldb.cli.profile import layer_option
-from tunneldb.cli.progress import bar, step
-from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
+from tunneldb.cli.stretch import Stretch, stretch_options
 from tunneldb.cli.tables import print_table
-from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import by_kilometre, exit_on_sigterm, replacing
-from tunneldb.store.survey import Survey, get_survey
+from tunneldb.files import by_kilometre, replacing
+from tunneldb.store.survey import Survey
 
 if TYPE_CHECKING:
     from tunneldb.measures.deviation.tables import Row
-
-_FILES = (".csv", ".tif", ".dxf")
 
 
 @verb(
@@ -37,18 +43,9 @@ _FILES = (".csv", ".tif", ".dxf")
 @click.argument("survey")
 @layer_option
 @stretch_options
-@click.option(
-    "--every", type=FiniteRange(1.0), default=100.0, show_default="100; of a .dxf 10", metavar="M",
-    help="Length of the stretches that are listed; distance of the sections of a .dxf, m.",
-)  # fmt: skip
-@click.option(
-    "--axis-sigma", type=FiniteRange(0.0, 1.0), metavar="M",
-    help="What the axis and the scan's place are good for, standard deviation, m: goes into the errors of volumes.",
-)  # fmt: skip
-@click.option(
-    "-o", "--output", type=FilePath(dir_okay=False),
-    help="File to write: .csv of sections, .dxf of sections with the design, .tif of each pixel, one a kilometre.",
-)  # fmt: skip
+@every_option(text="Length of the stretches that are listed; distance of the sections of a .dxf, m.", shown="100; of a .dxf 10")
+@axis_sigma_option("What the axis and the scan's place are good for, standard deviation, m: goes into the errors of volumes.")
+@output_option("File to write: .csv of sections, .dxf of sections with the design, .tif of each pixel, one a kilometre.")
 @click.pass_obj
 @click.pass_context
 def deviation(
@@ -72,14 +69,9 @@ def deviation(
     from tunneldb.measures.deviation.measure import measure_deviation
     from tunneldb.measures.deviation.tables import COLUMNS, rows_csv, section_rows, stretch_rows, volume
 
-    if output is not None and output.suffix.lower() not in _FILES:
-        raise UserError(f"{output}: deviation is written as {', '.join(_FILES[:-1])} or {_FILES[-1]}")
-    with connect(settings.dsn) as conn:
-        found = get_survey(conn, survey)
-        part = parse_stretch(conn, found, start, end)
-        conn.rollback()
-        with exit_on_sigterm(), bar("km") as progress:
-            made = measure_deviation(conn, found, layer, part.low, part.high, step(progress))
+    require_ending(output, "deviation", (".csv", ".tif", ".dxf"))
+    with surveys_in(settings, [survey], start, end) as (conn, [found], part):
+        made = with_progress(lambda begin: measure_deviation(conn, found, layer, part.low, part.high, begin))
         whole = volume(conn, found, layer, part.low, part.high, axis_sigma or 0.0)
         if whole is None:
             raise UserError(f"survey {survey} has nothing to hold against layer {layer} there")
@@ -89,17 +81,12 @@ def deviation(
         if output is None:
             tell(sections=section_rows(conn, found, layer, part.low, part.high))
         elif output.suffix.lower() == ".csv":
-            text = rows_csv(COLUMNS, section_rows(conn, found, layer, part.low, part.high))
-            with replacing(output) as temporary:
-                temporary.write_text(text, encoding="utf-8")
-            files = [output]
+            files = write_text(output, rows_csv(COLUMNS, section_rows(conn, found, layer, part.low, part.high)))
         else:
             given = context.get_parameter_source("every") is not click.core.ParameterSource.DEFAULT
             files = _write(conn, found, layer, part, every if given else 10.0, output)
-    tell(files=files)
     _print(rows, whole, layer, axis_sigma)
-    for file in files:
-        click.echo(f"written to {file}", err=True)
+    say_written(files)
 
 
 def _write(conn: psycopg.Connection[Any], survey: Survey, layer: str, part: Stretch, every: float, output: Path) -> list[Path]:
@@ -110,9 +97,10 @@ def _write(conn: psycopg.Connection[Any], survey: Survey, layer: str, part: Stre
             write_sections(conn, survey, layer, part.low, part.high, every, temporary)
         return [output]
     from tunneldb.export.images.deviation import write_deviation
-    from tunneldb.measures.deviation.rows import stale_kilometres
+    from tunneldb.measures.deviation.measure import deviation_from
+    from tunneldb.stages.stale import result_states
 
-    there = stale_kilometres(conn, survey, layer, part.low, part.high)
+    there = result_states(conn, deviation_from(survey, layer), part.low, part.high)
     paths = by_kilometre(output, list(there))
     written = (write_deviation(conn, survey, km, layer, path) for km, path in zip(there, paths, strict=True))
     return [path for path in written if path is not None]
@@ -131,9 +119,4 @@ def _print(rows: list[Row], whole: Row, layer: str, axis_sigma: float | None) ->
         [*table, ("all", *cells(whole))],
         right=(1, 2, 3, 4, 5, 6),
     )
-    axis = (
-        "taken to be right: --axis-sigma says what it is good for"
-        if axis_sigma is None
-        else f"good for {1e3 * axis_sigma:g} mm"
-    )
-    click.echo(f"against {layer}; of the lining seen; ± is one standard deviation, the axis {axis}")
+    click.echo(f"against {layer}; of the lining seen; ± is one standard deviation, the axis {axis_quality(axis_sigma)}")

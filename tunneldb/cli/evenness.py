@@ -7,16 +7,22 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.measure import (
+    every_option,
+    layer_option,
+    number,
+    output_option,
+    require_ending,
+    say_written,
+    surveys_in,
+    with_progress,
+    write_text,
+)
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.param_types import FilePath, FiniteRange
-from tunneldb.cli.profile import layer_option
-from tunneldb.cli.progress import bar, step
-from tunneldb.cli.stretch import parse_stretch, stretch_options
+from tunneldb.cli.param_types import FiniteRange
+from tunneldb.cli.stretch import stretch_options
 from tunneldb.cli.tables import print_table
-from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.files import exit_on_sigterm, replacing
-from tunneldb.store.survey import get_survey
 
 
 @verb(
@@ -35,10 +41,8 @@ from tunneldb.store.survey import get_survey
     "--limit", type=FiniteRange(0.001, 10.0), default=0.02, show_default=True, metavar="M",
     help="Greater gaps beneath it are outlined and summed up, m.",
 )  # fmt: skip
-@click.option(
-    "--every", type=FiniteRange(1.0), default=100.0, show_default=True, metavar="M", help="Length of the stretches listed, m.",
-)  # fmt: skip
-@click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write: .csv of sections of 1 m.")
+@every_option()
+@output_option("File to write: .csv of sections of 1 m.")
 @click.pass_obj
 def evenness(
     settings: Settings,
@@ -62,14 +66,9 @@ def evenness(
     from tunneldb.measures.evenness.measure import measure_evenness
     from tunneldb.measures.evenness.tables import COLUMNS, section_rows, stretch_rows
 
-    if output is not None and output.suffix.lower() != ".csv":
-        raise UserError(f"{output}: evenness is written as .csv")
-    with connect(settings.dsn) as conn:
-        found = get_survey(conn, survey)
-        part = parse_stretch(conn, found, start, end)
-        conn.rollback()
-        with exit_on_sigterm(), bar("km") as progress:
-            made = measure_evenness(conn, found, layer, length, limit, part.low, part.high, step(progress))
+    require_ending(output, "evenness", (".csv",))
+    with surveys_in(settings, [survey], start, end) as (conn, [found], part):
+        made = with_progress(lambda begin: measure_evenness(conn, found, layer, length, limit, part.low, part.high, begin))
         rows = stretch_rows(conn, found, layer, part.low, part.high, every)
         if not rows:
             raise UserError(f"survey {survey} has no lining there that was held against layer {layer}")
@@ -77,26 +76,18 @@ def evenness(
     tell(survey=survey, layer=layer, made=made, length=length, limit=limit, stretches=rows)
     if output is None:
         tell(sections=sections)
-    else:
-        with replacing(output) as temporary:
-            temporary.write_text(rows_csv(COLUMNS, sections), encoding="utf-8")
-    tell(files=[] if output is None else [output])
-
-    def millimetres(value: float | None) -> str:
-        return "" if value is None else f"{1e3 * value:.1f}"
-
+    files = [] if output is None else write_text(output, rows_csv(COLUMNS, sections))
     print_table(
         ["from", "seen m²", "not measured m²", "over limit m²", "gap along mm", "gap around mm", "waviness %"],
         [
             (
                 row["label"], f"{row['lining_area']:.1f}", f"{row['lining_area'] - row['measured_area']:.1f}",
-                f"{row['over_area']:.2f}", millimetres(row["gap_along"]), millimetres(row["gap_around"]),
-                "" if row["waviness"] is None else f"{100.0 * row['waviness']:.1f}",
+                f"{row['over_area']:.2f}", number(row["gap_along"], 1, 1e3), number(row["gap_around"], 1, 1e3),
+                number(row["waviness"], 1, 100.0),
             )
             for row in rows
         ],
         right=(1, 2, 3, 4, 5, 6),
     )  # fmt: skip
     click.echo(f"beneath {length:g} m, on a template of layer {layer}; limit {1e3 * limit:g} mm")
-    if output is not None:
-        click.echo(f"written to {output}", err=True)
+    say_written(files)

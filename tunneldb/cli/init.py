@@ -10,7 +10,7 @@ from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.database import open_connection
 from tunneldb.database.foreign import catalogue_alone
 from tunneldb.database.schema import install, schema_revision
-from tunneldb.stages.registry import STAGES
+from tunneldb.stages.registry import REGISTRY
 from tunneldb.store.waterproof import keep_missing
 
 
@@ -30,7 +30,7 @@ def init(settings: Settings) -> None:
             before = schema_revision(connection)
         connection.rollback()
         tell_warnings(connection)
-        install(connection, STAGES)
+        install(connection, REGISTRY)
         after = schema_revision(connection)
         connection.rollback()
         change = "created" if before is None else "is up to date" if before == after else f"upgraded from {before}"

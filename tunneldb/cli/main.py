@@ -17,6 +17,7 @@ from tunneldb import __version__
 from tunneldb.cli.output import AS_JSON, AT_FAULT, DONE, JSON, QUIET, error_line, exit_code, notify, run_as_json, write_lines
 from tunneldb.errors import UserError, did_you_mean
 from tunneldb.log import MESSAGES, fields, logging_to
+from tunneldb.stages.registry import MEASURES
 
 _WORDS = "tunneldb.words"
 """Key in the context's meta: the command line, for the log."""
@@ -66,12 +67,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "Measure": {
         "axis": ("tunneldb.cli.axis:axis", "Compare the measured axis with the design axis."),
-        "rings": ("tunneldb.cli.rings:rings", "Measure lining rings: centre, radius, ovality, steps, chords."),
-        "deviation": ("tunneldb.cli.deviation:deviation", "Measure deviation from design profiles, overbreak and underbreak."),
-        "evenness": ("tunneldb.cli.evenness:evenness", "Measure evenness with a virtual straightedge."),
-        "thickness": ("tunneldb.cli.thickness:thickness", "Compute layer thickness and volume between two surveys."),
-        "clearance": ("tunneldb.cli.clearance:clearance", "Check the clearance around a track."),
-        "compare": ("tunneldb.cli.compare:compare", "Compare two surveys: changes of leaks and of the lining."),
+        **{stage.name: (stage.command, stage.summary) for stage in MEASURES},
         "spheres": ("tunneldb.cli.spheres:spheres", "Find target spheres, and compare them with control points."),
         "unroll": ("tunneldb.cli.unroll:unroll", "Convert x,y,z to chainage,arc,offset, or back."),
     },

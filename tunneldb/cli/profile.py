@@ -5,15 +5,13 @@ from __future__ import annotations
 import click
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.measure import LAYERS, layer_option
 from tunneldb.cli.output import VerbGroup, notify, records, tell
 from tunneldb.cli.param_types import file_path
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-
-LAYERS = click.Choice(["lining", "shotcrete", "excavation"])
-layer_option = click.option("--layer", type=LAYERS, default="lining", show_default=True, help="Layer that it is of.")
 
 
 @click.group(cls=VerbGroup)

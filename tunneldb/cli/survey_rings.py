@@ -10,19 +10,18 @@ import click
 import psycopg
 
 from tunneldb.cli.main import Settings
+from tunneldb.cli.measure import number, surveys_in, with_progress
 from tunneldb.cli.output import notify, tell
 from tunneldb.cli.progress import bar, step
-from tunneldb.cli.stretch import parse_stretch
 from tunneldb.cli.tables import print_table
-from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import exit_on_sigterm, replacing
-from tunneldb.store.survey import Survey, get_survey
+from tunneldb.store.survey import Survey
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-    from tunneldb.export.tables.survey_rings import Row
+    from tunneldb.measures.rings.tables import Row
 
 _FILES = (".csv", ".gpkg", ".xlsx")
 
@@ -55,21 +54,18 @@ def survey_rings(
     output: Path | None,
 ) -> None:
     """Define the rings of a survey if that was said, measure what is out of date, and list them."""
-    from tunneldb.export.tables.survey_rings import ring_rows, write_rings
+    from tunneldb.export.tables.survey_rings import write_rings
     from tunneldb.measures.rings.measure import RingOptions, measure_survey_rings
+    from tunneldb.measures.rings.tables import ring_rows
 
     definition.require_one()
     if output is not None and output.suffix.lower() not in _FILES:
         raise UserError(f"{output}: rings of a survey are written as {', '.join(_FILES[:-1])} or {_FILES[-1]}")
     options = RingOptions(diameter, chords) if diameter is not None or chords else None
-    with connect(settings.dsn) as conn:
-        survey = get_survey(conn, name)
-        part = parse_stretch(conn, survey, *ends)
-        conn.rollback()
+    with surveys_in(settings, [name], *ends) as (conn, [survey], part):
         with exit_on_sigterm(), bar("blocks") as progress:
             _define(conn, survey, definition, progress)
-        with exit_on_sigterm(), bar("km") as progress:
-            made = measure_survey_rings(conn, survey, part.low, part.high, options, step(progress))
+        made = with_progress(lambda begin: measure_survey_rings(conn, survey, part.low, part.high, options, begin))
         rows = ring_rows(conn, survey, part.low, part.high)
         if not rows:
             raise UserError(f"survey {name} has no rings there: say where they lie, by --length, --rings or --find")
@@ -114,16 +110,13 @@ _SHOWN = 20
 
 
 def _print(rows: list[Row], output: Path | None) -> None:
-    def number(value: float | None, factor: float, decimals: int) -> str:
-        return "" if value is None else f"{factor * value:.{decimals}f}"
-
     told = sorted((row for row in rows if row["ovality"] is not None), key=lambda row: -row["ovality"])
     shown = told[:_SHOWN] if len(rows) > _SHOWN else rows
     table = [
         (
-            row["number"], row["label"], number(row["seen_share"], 100.0, 0), number(row["centre_right"], 1e3, 1),
-            number(row["centre_up"], 1e3, 1), number(row["radius"], 1.0, 4), number(row["ovality"], 1e3, 2),
-            number(row["ovality_se"], 1e3, 2), number(row["step_greatest"], 1e3, 1), number(row["lip"], 1e3, 1),
+            row["number"], row["label"], number(row["seen_share"], 0, 100.0), number(row["centre_right"], 1, 1e3),
+            number(row["centre_up"], 1, 1e3), number(row["radius"], 4), number(row["ovality"], 2, 1e3),
+            number(row["ovality_se"], 2, 1e3), number(row["step_greatest"], 1, 1e3), number(row["lip"], 1, 1e3),
             row["remark"] or "",
         )
         for row in shown

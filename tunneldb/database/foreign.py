@@ -46,6 +46,7 @@ _OWN = (
     *(("finding", name, "tunnel", name) for name in ("set_wet", "count_insert", "count_update", "count_delete")),
     ("finding", "count_truncate", "tunnel", "forget_findings"),
     ("finding_kind", "wet_of_kind", "tunnel", "wet_of_kind"),
+    ("run", "set_subject", "tunnel", "set_subject"),
     ("waterproof", "keep", "tunnel_internal", "keep_at_commit"),
 )
 _OURS = ", ".join(str(each) for each in _OWN)

@@ -33,6 +33,19 @@ _LAYERS_LOCK = 7088630452  # the one of tunnel_api.make_layers
 _LOCK_TIMEOUT = "30s"  # time to wait for other users of the objects to change
 
 
+class InputRow(Protocol):
+    """Row of tunnel.stage_input, with the table's columns of the same names."""
+
+    @property
+    def key(self) -> str: ...  # noqa: D102
+
+    @property
+    def holds(self) -> str: ...  # noqa: D102
+
+    @property
+    def reason(self) -> str: ...  # noqa: D102
+
+
 class StageRow(Protocol):
     """Row of tunnel.stage, with the table's columns of the same names."""
 
@@ -48,6 +61,18 @@ class StageRow(Protocol):
     @property
     def parameters(self) -> Sequence[str]: ...  # noqa: D102
 
+    @property
+    def on_demand(self) -> bool: ...  # noqa: D102
+
+    @property
+    def subject(self) -> Sequence[str]: ...  # noqa: D102
+
+    @property
+    def tables(self) -> Sequence[str]: ...  # noqa: D102
+
+    @property
+    def inputs(self) -> Sequence[InputRow]: ...  # noqa: D102
+
 
 def install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> None:
     """Create or upgrade everything, in one transaction; current parts stay, tunnel_api and tunnel.stage are created again.
@@ -57,7 +82,7 @@ def install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> 
     connection
         Idle connection as the database's owner.
     stages
-        Stages of a kilometre in order, for tunnel_api: `tunneldb.stages.registry.STAGES`.
+        Stages of a kilometre and measures in order: `tunneldb.stages.registry.REGISTRY`.
 
     Raises
     ------
@@ -120,16 +145,27 @@ def _refuse_planted(connection: psycopg.Connection[Any]) -> None:
 
 def _fill_stages(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> None:
     connection.execute("DELETE FROM tunnel.stage")
+    columns = ("reads", "reads_beside", "parameters", "subject", "tables")
     with connection.cursor() as cursor:
         cursor.executemany(
-            "INSERT INTO tunnel.stage (step, name, reads, reads_beside, parameters) VALUES (%s, %s, %s, %s, %s)",
+            sql.SQL("INSERT INTO tunnel.stage (step, name, on_demand, {}) VALUES (%s, %s, %s, %s, %s, %s, %s, %s)").format(
+                sql.SQL(", ").join(map(sql.Identifier, columns))
+            ),
             [
-                (step, stage.name, list(stage.reads), list(stage.reads_beside), list(stage.parameters))
+                (step, stage.name, stage.on_demand, *(list(getattr(stage, name)) for name in columns))
                 for step, stage in enumerate(stages, 1)
             ],
         )
+        cursor.executemany(
+            "INSERT INTO tunnel.stage_input (stage, number, key, holds, reason) VALUES (%s, %s, %s, %s, %s)",
+            [
+                (stage.name, number, one.key, str(one.holds), one.reason or None)
+                for stage in stages
+                for number, one in enumerate(stage.inputs, 1)
+            ],
+        )
     # For a table that was never analysed the planner expects a thousand rows: status and queue then take seconds.
-    connection.execute("ANALYZE tunnel.stage")
+    connection.execute("ANALYZE tunnel.stage, tunnel.stage_input")
 
 
 def install_api(connection: psycopg.Connection[Any]) -> None:

@@ -86,8 +86,9 @@ def read_change(conn: psycopg.Connection[Any], survey: Survey, low: float, high:
     scale = WIDTH / (high - low)
     series = _series(conn, survey, low, high)
     stale = conn.execute(
-        "SELECT km FROM tunnel_internal.change_state(%s, %s) WHERE reason IS NOT NULL AND done_at IS NOT NULL ORDER BY km",
-        [survey.id, old.id],
+        "SELECT km FROM tunnel_internal.result_state(%s, 'compare', %s)"
+        " WHERE reason IS NOT NULL AND done_at IS NOT NULL ORDER BY km",
+        [survey.id, str(old.id)],
     ).fetchall()
     return ChangeChapter(
         old, summary(sections, regions, leaks), [leak for leak in leaks if leak["state"] != "same"],

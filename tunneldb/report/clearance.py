@@ -155,9 +155,9 @@ def _track(
     rows = section_rows(conn, survey, gauge, track, low, high)
     found = infringement_rows(conn, survey, gauge, track, low, high)
     stale = conn.execute(
-        "SELECT km, reason FROM tunnel_internal.clearance_state(%s) WHERE gauge = %s AND track = %s AND reason IS NOT NULL"
+        "SELECT km, reason FROM tunnel_internal.result_state(%s, 'clearance') WHERE subject = %s AND reason IS NOT NULL"
         " AND (km + 1) * 1000.0 > %s AND km * 1000.0 < %s ORDER BY km",
-        [survey.id, gauge, track, low, high],
+        [survey.id, f"{track} {gauge}", low, high],
     ).fetchall()
     tightest = _tightest(rows)
     return TrackChapter(

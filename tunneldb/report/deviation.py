@@ -120,7 +120,7 @@ class DeviationChapter:
             survey.name, layer, self.step, low, high,
         )  # fmt: skip
         self.stale = sorted({row["reason"] for row in self._rows(
-            "SELECT reason FROM tunnel_internal.deviation_state(%s) WHERE layer = %s AND reason IS NOT NULL"
+            "SELECT reason FROM tunnel_internal.result_state(%s, 'deviation', %s) WHERE reason IS NOT NULL"
             " AND (km + 1) * 1000 > %s AND km * 1000 < %s", survey.id, layer, low, high,
         )})  # fmt: skip
         usual = self._rows(

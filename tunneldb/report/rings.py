@@ -84,8 +84,8 @@ def read_rings(conn: psycopg.Connection[Any], survey: Survey, low: float, high: 
     if not rows:
         return None
     found = conn.execute(
-        "SELECT coalesce(bool_or(stale), false) FROM tunnel_api.ring_status WHERE survey_id = %s"
-        " AND (km + 1) * 1000 > %s AND km * 1000 < %s",
+        "SELECT coalesce(bool_or(reason IS NOT NULL), false) FROM tunnel_internal.result_state(%s, 'rings')"
+        " WHERE (km + 1) * 1000 > %s AND km * 1000 < %s",
         [survey.id, low, high],
     ).fetchone()
     oval = [row for row in rows if row["ovality"] is not None]

@@ -1,14 +1,15 @@
-"""Stages that are run on demand by a verb of their own: what they share is how kilometres follow each other."""
+"""Running measures: kilometre by kilometre, and what all of them refuse."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import psycopg
 
-from tunneldb.errors import NotReadyError, UserError
+from tunneldb.errors import UserError
 from tunneldb.stages.ledger import stage_run
+from tunneldb.stages.stale import Result, ResultState, result_inputs
 from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
@@ -18,53 +19,44 @@ Begin = Callable[[str, float], Callable[[float], None]]
 
 def measure_kilometres(
     conn: psycopg.Connection[Any],
-    survey: Survey,
-    stage: str,
-    kilometres: Iterable[int],
-    inputs: Callable[[int], dict[str, Any]],
+    result: Result,
+    states: Mapping[int, ResultState],
+    options: Callable[[int], Mapping[str, Any]],
     measure: Callable[[int], Mapping[str, Any]],
     title: str,
     begin: Begin,
 ) -> list[int]:
-    """Run a stage over kilometres, each in a transaction of its own that the ledger knows; return which.
+    """Make a result where it is out of date or was made with other options, and return in which kilometres.
+
+    Each kilometre is a run of the ledger and a transaction of its own.
 
     Parameters
     ----------
     conn : Connection
         With nothing written.
-    survey : Survey
-        Whose ledger it is.
-    kilometres : iterable of int
-        Those that are missing or out of date.
-    inputs : callable
-        Of a kilometre: what it rests on, by which it is known to be out of date later.
+    result : Result
+    states : mapping
+        State of the result by kilometre.
+    options : callable
+        Takes a kilometre; returns the options to make it with, as the ledger keeps them.
     measure : callable
-        Of a kilometre: replace what is stored of it; counts for the ledger.
+        Takes a kilometre; replaces what is stored of it and returns counts for the ledger.
     title : str
-        What the progress is called.
+        Title of the progress bar.
     """
-    wanted = list(kilometres)
+    wanted = [
+        km
+        for km, state in states.items()
+        if state.reason is not None or any(state.parameters.get(name) != value for name, value in options(km).items())
+    ]
     advance = begin(title, len(wanted))
     for km in wanted:
-        rests_on = inputs(km)
+        parameters = {**result.subject, **result_inputs(conn, result, km), **options(km)}
         conn.rollback()
-        with stage_run(conn, survey.id, km, stage, rests_on) as run:
+        with stage_run(conn, result.survey.id, km, result.stage, parameters) as run:
             run.counts.update(measure(km))
         advance(1)
     return wanted
-
-
-def refuse_stale(reasons: Mapping[int, str | None], survey: str, verb: str) -> None:
-    """Refuse to measure what rests on a stage that is itself out of date.
-
-    Raises
-    ------
-    UserError
-        If a kilometre's reason is that another stage is stale.
-    """
-    for km, why in reasons.items():
-        if why is not None and " is stale" in why:
-            raise NotReadyError(f"kilometre {km}: {why}; tunneldb run {survey} --stale, then {verb}")
 
 
 def refuse_beyond(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> None:

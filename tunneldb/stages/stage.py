@@ -1,9 +1,14 @@
-"""A stage: what it reads, what it depends on, and the function that does it."""
+"""A stage: what it reads, what it depends on, what its results are, and what does it.
+
+A stage of a kilometre has a function and runs in the order of the registry. A measure is a stage that is run on demand, by a
+command of its own.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -17,31 +22,80 @@ Progress = Callable[[float], None]
 """Takes the share of a stage that is done, 0 to 1."""
 
 
+class Holds(StrEnum):
+    """What a parameter of a run holds."""
+
+    RUN = "run"
+    """Keys of the runs that the result was made from: one, or an array."""
+
+    CHECKSUM = "checksum"
+    """Checksum of what else it was made from."""
+
+    SURVEY = "survey"
+    """Key of the older survey that it is compared with."""
+
+
+@dataclass(frozen=True)
+class Input:
+    """A parameter of a stage's runs that says what the result was made from: a row of `tunnel.stage_input`.
+
+    Attributes
+    ----------
+    key : str
+        Name of the parameter.
+    holds : Holds
+    reason : str
+        Why the result is out of date when the parameter would be another now; empty for a survey.
+    """
+
+    key: str
+    holds: Holds
+    reason: str = ""
+
+
 @dataclass(frozen=True)
 class Stage:
-    """A step of the pipeline: a row of `tunnel.stage`, and the function that does it.
+    """A step of the pipeline or a measure: a row of `tunnel.stage`, and what does it.
 
     Attributes
     ----------
     name : str
     function : str
         ``module:function`` that does one kilometre; connection, survey, km, values of the parameters and progress go in, counts
-        come out. Empty for ``load``, which goes by the files (`tunneldb.pipeline.load`).
+        come out. Empty for ``load``, which goes by the files (`tunneldb.pipeline.load`), and for measures.
     reads : tuple of str
         Stages whose results in the kilometre itself it rests on, directly or through another; ``survey`` where it rests on the
         scanner's positions, the reference curve or the kind of intensity, ``sonar`` on what sonar scans saw below the water,
-        ``learned`` on what the model of evidence learned from reviews.
+        ``learned`` on what the model of evidence learned from reviews. Of a measure only those that it reads directly.
     reads_beside : tuple of str
         Stages whose results in the kilometres before and after it rests on.
     parameters : tuple of str
         Prefixes of the parameters that it depends on. Those of ``load`` are kept with the files.
+    tables : tuple of str
+        Tables of schema tunnel that hold its results, with the columns ``survey_id`` and ``km``.
+    on_demand : bool
+        True for a measure.
+    subject : tuple of str
+        Parameters that distinguish results of the stage in one kilometre; the older survey first, the layer last.
+    inputs : tuple of Input
+        What the results are compared with to be known as out of date, in this order.
+    command : str
+        ``module:command`` of the command line; empty for a stage of a kilometre.
+    summary : str
+        What the command does, for ``tunneldb --help``.
     """
 
     name: str
-    function: str
-    reads: tuple[str, ...]
-    reads_beside: tuple[str, ...]
-    parameters: tuple[str, ...]
+    function: str = ""
+    reads: tuple[str, ...] = ()
+    reads_beside: tuple[str, ...] = ()
+    parameters: tuple[str, ...] = ()
+    tables: tuple[str, ...] = ()
+    on_demand: bool = False
+    subject: tuple[str, ...] = ()
+    inputs: tuple[Input, ...] = ()
+    command: str = ""
+    summary: str = ""
 
     def work(
         self,

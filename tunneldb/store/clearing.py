@@ -10,14 +10,6 @@ from psycopg import sql
 
 from tunneldb.store.survey import Survey
 
-_RESULTS = (
-    "change_section", "change_image", "change_region", "leak_change", "clearance_infringement", "clearance_section", "ring",
-    "evenness_area", "evenness_section", "thickness_section", "deviation_section", "boundary_region", "finding", "coverage",
-    "image", "radiometry", "range_curve", "target_sphere",
-    "cluster", "lining", "ground", "section", "segment", "axis_vertex",
-)  # fmt: skip
-"""Tables of schema tunnel whose rows are the results of stages in a kilometre."""
-
 
 @dataclass(frozen=True)
 class Work:
@@ -74,7 +66,11 @@ def clear_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int) -> W
     drew stay where they are, and what they have changed by hand stays in the audit.
     """
     lost = work_in(conn, survey, [km])
-    for table in _RESULTS:
+    tables = conn.execute(
+        "SELECT t.name FROM tunnel.stage s CROSS JOIN unnest(s.tables) WITH ORDINALITY AS t (name, n)"
+        " ORDER BY s.step DESC, t.n DESC"
+    ).fetchall()
+    for (table,) in tables:
         detected = sql.SQL(" AND origin = 'detected' AND merged_into IS NULL" if table == "finding" else "")
         query = sql.SQL("DELETE FROM {} WHERE survey_id = %s AND km = %s{}").format(sql.Identifier("tunnel", table), detected)
         conn.execute(query, [survey.id, km])

@@ -5,17 +5,17 @@ from __future__ import annotations
 import datetime as dt
 from typing import Any
 
-from sqlalchemy import ARRAY, BigInteger, Computed, Identity, Index, Text, text
+from sqlalchemy import ARRAY, BigInteger, ForeignKey, Identity, Index, Text, text
 from sqlalchemy.orm import Mapped, mapped_column
 
 from tunneldb.database.models.base import AUDIT_SCHEMA, CLOCK, KM, SURVEY, Base, one_of, parent
 
 
 class Stage(Base):
-    """Stage of a kilometre."""
+    """Stage of a kilometre, or measure."""
 
     __tablename__ = "stage"
-    __table_args__ = {"comment": "Stages of a kilometre, in their order; tunneldb init fills it anew"}  # noqa: RUF012
+    __table_args__ = {"comment": "Stages of a kilometre and measures, in their order; tunneldb init fills it anew"}  # noqa: RUF012
 
     step: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment="Its number in their order, from 1")
     name: Mapped[str] = mapped_column(unique=True, comment="Name")
@@ -24,6 +24,29 @@ class Stage(Base):
         ARRAY(Text), comment="Stages whose results in the kilometres before and after it rests on"
     )
     parameters: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Prefixes of the parameters that it depends on")
+    on_demand: Mapped[bool] = mapped_column(comment="True for a measure, which a command of its own runs")
+    subject: Mapped[list[str]] = mapped_column(
+        ARRAY(Text), comment="Parameters of a run that distinguish results of the stage in one kilometre"
+    )
+    tables: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Tables of schema tunnel that hold its results")
+
+
+class StageInput(Base):
+    """Parameter of a measure's runs that says what the result was made from."""
+
+    __tablename__ = "stage_input"
+    __table_args__ = (
+        one_of("holds", "run", "checksum", "survey"),
+        {"comment": "Parameters of runs that say what a result was made from; tunneldb init fills it anew"},
+    )
+
+    stage: Mapped[str] = mapped_column(
+        ForeignKey("tunnel.stage.name", ondelete="CASCADE"), primary_key=True, comment="Name of the measure"
+    )
+    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment="Order of comparison, from 1")
+    key: Mapped[str] = mapped_column(comment="Name of the parameter")
+    holds: Mapped[str] = mapped_column(comment="run: keys of runs; checksum; survey: key of the older survey")
+    reason: Mapped[str | None] = mapped_column(comment="Why a result is out of date whose parameter would be another now")
 
 
 class Goal(Base):
@@ -57,15 +80,6 @@ class Worker(Base):
     )
 
 
-SUBJECT = """coalesce(CASE stage
-    WHEN 'deviation' THEN parameters ->> 'layer'
-    WHEN 'evenness' THEN parameters ->> 'layer'
-    WHEN 'thickness' THEN (parameters ->> 'before') || ' ' || (parameters ->> 'layer')
-    WHEN 'clearance' THEN (parameters ->> 'track') || ' ' || (parameters ->> 'gauge')
-    WHEN 'compare' THEN parameters ->> 'old'
-END, '')"""
-
-
 class Run(Base):
     """Run of a stage."""
 
@@ -80,10 +94,7 @@ class Run(Base):
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     km: Mapped[int | None] = mapped_column(comment="Kilometre; none for the whole survey")
-    stage: Mapped[str] = mapped_column(
-        comment="read, load, axis, segments, sections, ground, detect; spheres, members, deviation, clearance, rings, compare, "
-        "thickness, evenness"
-    )
+    stage: Mapped[str] = mapped_column(comment="Name of the stage (tunnel.stage), or read, spheres, members, import")
     parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="Parameters that it ran with")
     versions: Mapped[dict[str, Any]] = mapped_column(
         server_default=text("'{}'"), comment="Versions of the program and of its libraries"
@@ -100,9 +111,9 @@ class Run(Base):
     worker: Mapped[str | None] = mapped_column(comment="Machine and process that it ran on")
     job_id: Mapped[int | None] = mapped_column(BigInteger, comment="Job of the queue that it was, if it was one")
     subject: Mapped[str] = mapped_column(
-        Computed(SUBJECT, persisted=True),
-        comment="What tells apart results of a stage that are there side by side, by its parameters: layer of profiles, "
-        "older survey, track and outline; empty where there is one of a kilometre",
+        server_default=text("''"),
+        comment="Values of the parameters that distinguish results of the stage in one kilometre, as tunnel.stage has them: "
+        "layer, older survey, track and gauge; a trigger writes it",
     )
 
 

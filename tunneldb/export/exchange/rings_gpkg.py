@@ -13,8 +13,8 @@ import shapely
 from psycopg import sql
 
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
-from tunneldb.export.tables.survey_rings import Row
 from tunneldb.geometry.crs import LOCAL
+from tunneldb.measures.rings.tables import Row
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.survey import Survey
 

@@ -13,34 +13,15 @@ import shapely
 from psycopg import sql
 
 from tunneldb.anomalies.geometries import Geometries
-from tunneldb.arrays import Float, Single, known
+from tunneldb.arrays import Single, known
 from tunneldb.finding_kind import DETECTED
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.measures.change.compute.leaks import Leak
-from tunneldb.measures.change.compute.rigid_motion import Motion
+from tunneldb.measures.change.compute.sections import Section
 from tunneldb.raster.geotiff import Raster, decode, encode
 from tunneldb.raster.grid import BLOCK
 from tunneldb.store.images import load_kinds
 from tunneldb.store.survey import Survey, get_survey
-
-
-@dataclass(frozen=True)
-class Section:
-    """A section with its motion and what remains of its change; areas m², lengths m."""
-
-    low: float
-    high: float
-    seen_old: float
-    seen_new: float
-    seen_both: float
-    motion: Motion
-    rms: float
-    least: float
-    greatest: float
-    lod: float
-    cell: float
-    arc_from: float
-    change: Float
 
 
 @dataclass(frozen=True)
@@ -84,25 +65,6 @@ def load_blocks(
         offset = images["offset"]
         if offset.transform.c < high and offset.transform.c + BLOCK > low:
             yield offset, images["state"].values if "state" in images else None
-
-
-def change_inputs(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int) -> dict[str, Any]:
-    """What the change of a kilometre is made from, as the ledger keeps it."""
-    row = conn.execute("SELECT tunnel_internal.change_inputs(%s, %s, %s)", [new.id, old.id, km]).fetchone()
-    assert row is not None
-    return {"old": old.id, **row[0]}
-
-
-def stale_kilometres(
-    conn: psycopg.Connection[Any], old: Survey, new: Survey, low: float, high: float
-) -> dict[int, tuple[str | None, float | None, float | None]]:
-    """Kilometres of a stretch that both saw: why what is stored is out of date, and the cell and length it was made with."""
-    rows = conn.execute(
-        "SELECT km, reason, cell, length FROM tunnel_internal.change_state(%s, %s)"
-        " WHERE (km + 1) * %s::float8 > %s AND km * %s::float8 < %s ORDER BY km",
-        [new.id, old.id, KILOMETRE, low, KILOMETRE, high],
-    ).fetchall()
-    return {km: (reason, cell, length) for km, reason, cell, length in rows}
 
 
 def load_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Leak]:

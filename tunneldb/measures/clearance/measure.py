@@ -26,17 +26,15 @@ from tunneldb.measures.clearance.rows import (
     SavedInfringement,
     SavedSection,
     classed_kilometres,
-    clearance_inputs,
     clusters_at,
     flat_outline,
-    ground_reason,
     load_classed,
-    made_of,
     save_clearance,
 )
 from tunneldb.shape.outline import Outline
-from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond, refuse_stale
+from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond
 from tunneldb.stages.run import nothing_yet
+from tunneldb.stages.stale import Result, refuse_blocked, result_states
 from tunneldb.store.surface import load_alignment, load_surface, survey_ends
 from tunneldb.store.survey import Survey
 
@@ -139,18 +137,14 @@ def measure_clearance(
     """
     refuse_beyond(conn, survey, low, high)
     ends = survey_ends(conn, survey) or (-np.inf, np.inf)
-    there = [km for km in classed_kilometres(conn, survey) if (km + 1) * KILOMETRE > low and km * KILOMETRE < high]
-    if not there:
+    result = Result(survey, "clearance", {"track": track, "gauge": gauge})
+    states = result_states(conn, result, low, high)
+    if not states:
         raise nothing_yet(conn, survey, "has no classes of points there")
-    reasons = {km: ground_reason(conn, survey, km) for km in there}
-    refuse_stale({km: why and f"ground is stale: {why}" for km, why in reasons.items()}, survey.name, "clearance")
-
-    def inputs(km: int) -> dict[str, Any]:
-        return clearance_inputs(conn, survey, km, gauge) | {"track": track, "axis": tracks.source} | asdict(options)
-
+    refuse_blocked(states, survey.name, "clearance")
     axis = load_alignment(conn, survey, _STATIONS)
     return measure_kilometres(
-        conn, survey, "clearance", [km for km in there if made_of(conn, survey, km, gauge, track) != inputs(km)], inputs,
+        conn, result, states, lambda km: {"axis": tracks.source, **asdict(options)},
         lambda km: measure_kilometre(conn, survey, km, axis, tracks, track, gauge, outline, options, ends),
         f"clearance of {survey.name}", begin,
     )  # fmt: skip

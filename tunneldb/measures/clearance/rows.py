@@ -107,31 +107,6 @@ def save_gauge(conn: psycopg.Connection[Any], survey: Survey, name: str, outline
     conn.commit()
 
 
-def clearance_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, gauge: str) -> dict[str, Any]:
-    """What the clearance of a kilometre is made from, but for options."""
-    row = conn.execute("SELECT tunnel_internal.clearance_inputs(%s, %s, %s)", [survey.id, km, gauge]).fetchone()
-    assert row is not None
-    return dict(row[0])
-
-
-def made_of(conn: psycopg.Connection[Any], survey: Survey, km: int, gauge: str, track: str) -> dict[str, Any] | None:
-    """Inputs and options of the last run of a kilometre; None if it never ran."""
-    row = conn.execute(
-        "SELECT parameters FROM tunnel.run WHERE survey_id = %s AND km = %s AND stage = 'clearance' AND outcome = 'done'"
-        " AND subject = %s ORDER BY started_at DESC, id DESC LIMIT 1",
-        [survey.id, km, f"{track} {gauge}"],
-    ).fetchone()
-    return None if row is None else dict(row[0])
-
-
-def ground_reason(conn: psycopg.Connection[Any], survey: Survey, km: int) -> str | None:
-    """Why stage ground is out of date in a kilometre; None if it is not."""
-    row = conn.execute(
-        "SELECT reason FROM tunnel_internal.stage_state(%s) WHERE stage = 'ground' AND km = %s", [survey.id, km]
-    ).fetchone()
-    return None if row is None else row[0]
-
-
 def save_clearance(
     conn: psycopg.Connection[Any], survey: Survey, km: int, gauge: str, track: str,
     sections: Sequence[SavedSection], infringements: Sequence[SavedInfringement],

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int64
+from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.surface import Surface
+from tunneldb.raster.geotiff import Raster
 from tunneldb.shape.outline import Outline
-from tunneldb.shape.profile import Deviation, strip_area
+from tunneldb.shape.profile import Deviation, Stretch, deviation, strip_area
 
 CELL = 0.1
 """Length of a cell along the profile, m, if pixels are a third of it or less."""
@@ -18,6 +23,14 @@ MIN_PIXELS = 3
 
 _MIN_SEEN_FOR_SHIFT = 0.4
 """Minimum seen share of a profile for the shift of the whole lining to be computed."""
+
+STEP = 1.0
+"""Length of a step of chainage, m; steps begin at whole metres."""
+
+STATIONS = 1.0
+"""Stations of the given axis are so close, m: between them its curve is followed to 0.01 mm."""
+
+_ARM = 5.0  # m from the axis, where the planes of the measured axis are held against those of the given one
 
 
 @dataclass(frozen=True)
@@ -171,3 +184,74 @@ def _shift(mean: Float, inward: Float) -> Float:
     design = np.column_stack([inward[seen], np.ones(int(seen.sum()))])
     solved, _, rank, _ = np.linalg.lstsq(design, mean[seen], rcond=1e-3)
     return np.asarray(solved[:2]) if rank == 3 else np.full(2, np.nan)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of chainage with its figures."""
+
+    profile: str
+    low: float
+    high: float
+    figures: SectionDeviation
+
+
+@dataclass(frozen=True)
+class Design:
+    """What a kilometre is held against: its surface, the given axis, and the profiles about that."""
+
+    surface: Surface
+    axis: Alignment
+    stretches: Sequence[Stretch]
+
+    def places(self, chainage: Float, arc: Float, offset: Raster) -> tuple[Float, Float, Float]:
+        """Chainage along the given axis (c,), and where pixels lie about it, right and up, both (c, r), m.
+
+        The planes of the measured axis and of the given one differ by fractions of a degree: of each column the place of three
+        points is worked out, and that of all others is linear between them.
+        """
+        right, up = self.surface.section_points(chainage, arc, offset.values)
+        origin, _, to_right, upwards = np.moveaxis(self.surface.frames(chainage), 1, 0)
+        held = np.isfinite(origin[:, 0])
+        moved = np.full((3, len(chainage), 3), np.nan)
+        for k, points in enumerate((origin, origin + _ARM * to_right, origin + _ARM * upwards)):
+            moved[k, held] = self.axis.across(points[held])
+        base, by_right, by_up = moved[0], (moved[1] - moved[0]) / _ARM, (moved[2] - moved[0]) / _ARM
+        placed = [base[:, k, None] + by_right[:, k, None] * right + by_up[:, k, None] * up for k in (1, 2)]
+        return base[:, 0], placed[0], placed[1]
+
+    def deviation(self, offset: Raster, lining: Bool) -> tuple[Float, Deviation]:
+        """Chainage along the given axis of the columns of a block, and deviation of its pixels of lining, (c, r)."""
+        chainage, arc = offset.places()
+        shown = replace(offset, values=np.where(lining, offset.values, np.float32(np.nan)))
+        along, right, up = self.places(chainage, arc, shown)
+        found = Deviation(*(np.full(right.shape, np.nan) for _ in range(3)))
+        for stretch in self.stretches:
+            held = np.flatnonzero((along >= stretch.low) & (along < stretch.high))
+            if len(held):
+                part = deviation(stretch, along[held], right[held], up[held])
+                found.distance[held], found.share[held], found.curvature[held] = part.distance, part.share, part.curvature
+        return along, found
+
+
+def block_steps(
+    stretches: Sequence[Stretch], offset: Raster, along: Float, found: Deviation, ends: tuple[float, float]
+) -> Iterator[Step]:
+    """Figures of the steps of a block, cut where the survey, or a profile, begins or ends."""
+    pixel, west = offset.transform.a, offset.transform.c
+    chainage, _ = offset.places()
+    number = np.floor((chainage - west) / STEP)
+    for first, stop in pairwise(np.flatnonzero(np.diff(number, prepend=-1.0, append=-1.0)).tolist()):
+        here = slice(first, stop)
+        begin = west + STEP * float(number[first])
+        for stretch in stretches:
+            held = (along[here] >= stretch.low) & (along[here] < stretch.high)
+            held &= (chainage[here] >= ends[0]) & (chainage[here] <= ends[1])
+            if not held.any():
+                continue
+            k = first + np.flatnonzero(held)
+            low, high = float(chainage[k[0]] - pixel / 2.0), float(chainage[k[-1]] + pixel / 2.0)
+            low, high = max(low, begin), min(high, begin + STEP)
+            part = Deviation(found.distance[k], found.share[k], found.curvature[k])
+            outline = stretch.at(float(along[k].mean()))
+            yield Step(stretch.name, round(low, 6), round(high, 6), section_deviation(part, outline, pixel))

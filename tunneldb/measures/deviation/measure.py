@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -12,70 +10,19 @@ import psycopg
 
 from tunneldb.arrays import Bool, Float
 from tunneldb.classification.classes import PointClass
-from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
-from tunneldb.measures.deviation.compute import section_deviation
-from tunneldb.measures.deviation.rows import (
-    STEP,
-    Step,
-    deviation_inputs,
-    load_offsets,
-    replace_image,
-    save_steps,
-    stale_kilometres,
-)
+from tunneldb.measures.deviation.compute import STATIONS, Design, Step, block_steps
+from tunneldb.measures.deviation.rows import load_offsets, replace_image, save_steps
 from tunneldb.raster.geotiff import Raster
-from tunneldb.shape.profile import Deviation, Stretch, deviation
-from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond, refuse_stale
+from tunneldb.shape.profile import Deviation
+from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond
 from tunneldb.stages.run import nothing_yet
+from tunneldb.stages.stale import Result, ResultState, refuse_blocked, result_states
 from tunneldb.store.design import load_design
 from tunneldb.store.scene import load_scene
 from tunneldb.store.surface import load_alignment, load_surface, survey_ends
 from tunneldb.store.survey import Survey
-
-STATIONS = 1.0
-"""Stations of the given axis are so close, m: between them its curve is followed to 0.01 mm."""
-
-_ARM = 5.0  # m from the axis, where the planes of the measured axis are held against those of the given one
-
-
-@dataclass(frozen=True)
-class Design:
-    """What a kilometre is held against: its surface, the given axis, and the profiles about that."""
-
-    surface: Surface
-    axis: Alignment
-    stretches: Sequence[Stretch]
-
-    def places(self, chainage: Float, arc: Float, offset: Raster) -> tuple[Float, Float, Float]:
-        """Chainage along the given axis (c,), and where pixels lie about it, right and up, both (c, r), m.
-
-        The planes of the measured axis and of the given one differ by fractions of a degree: of each column the place of three
-        points is worked out, and that of all others is linear between them.
-        """
-        right, up = self.surface.section_points(chainage, arc, offset.values)
-        origin, _, to_right, upwards = np.moveaxis(self.surface.frames(chainage), 1, 0)
-        held = np.isfinite(origin[:, 0])
-        moved = np.full((3, len(chainage), 3), np.nan)
-        for k, points in enumerate((origin, origin + _ARM * to_right, origin + _ARM * upwards)):
-            moved[k, held] = self.axis.across(points[held])
-        base, by_right, by_up = moved[0], (moved[1] - moved[0]) / _ARM, (moved[2] - moved[0]) / _ARM
-        placed = [base[:, k, None] + by_right[:, k, None] * right + by_up[:, k, None] * up for k in (1, 2)]
-        return base[:, 0], placed[0], placed[1]
-
-    def deviation(self, offset: Raster, lining: Bool) -> tuple[Float, Deviation]:
-        """Chainage along the given axis of the columns of a block, and deviation of its pixels of lining, (c, r)."""
-        chainage, arc = offset.places()
-        shown = replace(offset, values=np.where(lining, offset.values, np.float32(np.nan)))
-        along, right, up = self.places(chainage, arc, shown)
-        found = Deviation(*(np.full(right.shape, np.nan) for _ in range(3)))
-        for stretch in self.stretches:
-            held = np.flatnonzero((along >= stretch.low) & (along < stretch.high))
-            if len(held):
-                part = deviation(stretch, along[held], right[held], up[held])
-                found.distance[held], found.share[held], found.curvature[held] = part.distance, part.share, part.curvature
-        return along, found
 
 
 def measure_deviation(
@@ -105,7 +52,7 @@ def measure_deviation(
         If the layer has no profile, or the survey no offset image where it has one.
     """
     refuse_beyond(conn, survey, low, high)
-    there = measurable_kilometres(conn, survey, layer, low, high)
+    states = measurable_kilometres(conn, survey, layer, low, high)
 
     def measure(km: int) -> dict[str, Any]:
         steps, note = _kilometre(conn, survey, km, layer)
@@ -118,15 +65,19 @@ def measure_deviation(
         return {**sums, "note": note} if note else sums
 
     return measure_kilometres(
-        conn, survey, "deviation", [km for km, why in there.items() if why is not None],
-        lambda km: deviation_inputs(conn, survey, km, layer), measure, f"deviation of {survey.name}", begin,
-    )  # fmt: skip
+        conn, deviation_from(survey, layer), states, lambda km: {}, measure, f"deviation of {survey.name}", begin
+    )
+
+
+def deviation_from(survey: Survey, layer: str) -> Result:
+    """Return the result of this measure that is of a layer."""
+    return Result(survey, "deviation", {"layer": layer})
 
 
 def measurable_kilometres(
     conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float
-) -> dict[int, str | None]:
-    """Kilometres of a stretch that can be held against a layer, and why each has to be; None of those that are up to date.
+) -> dict[int, ResultState]:
+    """Return the state of the deviation from a layer in each kilometre of a stretch that can be compared with it.
 
     Raises
     ------
@@ -134,12 +85,12 @@ def measurable_kilometres(
         As `measure_deviation` does.
     """
     load_design(conn, survey.tunnel_id, survey.tunnel, layer)
-    there = stale_kilometres(conn, survey, layer, low, high)
+    states = result_states(conn, deviation_from(survey, layer), low, high)
     conn.rollback()
-    if not there:
+    if not states:
         raise nothing_yet(conn, survey, f"has no offset image where layer {layer} has a profile")
-    refuse_stale(there, survey.name, "deviation")
-    return there
+    refuse_blocked(states, survey.name, "deviation")
+    return states
 
 
 def load_design_of(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> Design:
@@ -180,29 +131,6 @@ def _kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: st
     assert states is not None
     note = None if states[0] else "no intensity: what is lining is told by the classes of stage ground, which keep thin cables"
     return steps, note
-
-
-def block_steps(
-    stretches: Sequence[Stretch], offset: Raster, along: Float, found: Deviation, ends: tuple[float, float]
-) -> Iterator[Step]:
-    """Figures of the steps of a block, cut where the survey, or a profile, begins or ends."""
-    pixel, west = offset.transform.a, offset.transform.c
-    chainage, _ = offset.places()
-    number = np.floor((chainage - west) / STEP)
-    for first, stop in pairwise(np.flatnonzero(np.diff(number, prepend=-1.0, append=-1.0)).tolist()):
-        here = slice(first, stop)
-        begin = west + STEP * float(number[first])
-        for stretch in stretches:
-            held = (along[here] >= stretch.low) & (along[here] < stretch.high)
-            held &= (chainage[here] >= ends[0]) & (chainage[here] <= ends[1])
-            if not held.any():
-                continue
-            k = first + np.flatnonzero(held)
-            low, high = float(chainage[k[0]] - pixel / 2.0), float(chainage[k[-1]] + pixel / 2.0)
-            low, high = max(low, begin), min(high, begin + STEP)
-            part = Deviation(found.distance[k], found.share[k], found.curvature[k])
-            outline = stretch.at(float(along[k].mean()))
-            yield Step(stretch.name, round(low, 6), round(high, 6), section_deviation(part, outline, pixel))
 
 
 def lining_by_class(conn: psycopg.Connection[Any], survey: Survey, km: int, surface: Surface) -> Callable[[Raster], Bool]:

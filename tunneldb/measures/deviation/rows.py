@@ -3,33 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import psycopg
 
 from tunneldb.arrays import Bool
-from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.measures.deviation.compute import SectionDeviation
+from tunneldb.measures.deviation.compute import Step
 from tunneldb.raster.geotiff import DEVIATION_KINDS, Raster, encode
 from tunneldb.raster.grid import BLOCK
 from tunneldb.raster.pixel_state import shows_lining
 from tunneldb.store.images import image_blocks, load_kinds
 from tunneldb.store.survey import Survey
-
-STEP = 1.0
-"""Length of a step of chainage, m; steps begin at whole metres."""
-
-
-@dataclass(frozen=True)
-class Step:
-    """A step of chainage with its figures."""
-
-    profile: str
-    low: float
-    high: float
-    figures: SectionDeviation
 
 
 def layers_held(conn: psycopg.Connection[Any], survey: Survey) -> list[str]:
@@ -58,25 +43,6 @@ def replace_image(conn: psycopg.Connection[Any], survey: Survey, km: int, layer:
                 "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %b)",
                 (survey.id, km, kind, round(raster.transform.c / BLOCK), encode(raster, kind)),
             )
-
-
-def stale_kilometres(
-    conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float
-) -> dict[int, str | None]:
-    """Kilometres of a stretch with an offset image in which the layer has a design, and why what is stored is out of date."""
-    rows = conn.execute(
-        "SELECT km, reason FROM tunnel_internal.deviation_state(%s)"
-        " WHERE layer = %s AND (km + 1) * %s::float8 > %s AND km * %s::float8 < %s ORDER BY km",
-        [survey.id, layer, KILOMETRE, low, KILOMETRE, high],
-    ).fetchall()
-    return dict(rows)
-
-
-def deviation_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> dict[str, Any]:
-    """What the deviation of a kilometre is made from, as the ledger keeps it."""
-    row = conn.execute("SELECT tunnel_internal.deviation_inputs(%s, %s, %s)", [survey.id, km, layer]).fetchone()
-    assert row is not None
-    return {"layer": layer, **row[0]}
 
 
 def save_steps(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str, steps: Sequence[Step]) -> None:

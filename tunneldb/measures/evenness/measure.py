@@ -2,58 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import psycopg
-import rasterio.features
-import shapely
-import shapely.geometry
-from affine import Affine
 
 from tunneldb.arrays import Single
 from tunneldb.errors import UserError
-from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.measures.deviation.compute import CELL, MIN_PIXELS
+from tunneldb.measures.deviation.compute import MIN_PIXELS
 from tunneldb.measures.deviation.measure import measure_deviation
-from tunneldb.measures.deviation.rows import STEP
-from tunneldb.measures.evenness.compute.evenness import ALONG, AROUND, Evenness, evenness, step_evenness, uneven_areas
+from tunneldb.measures.evenness.compute.evenness import evenness
+from tunneldb.measures.evenness.compute.sections import CellGrid, cells_in, polygons_of, steps_of
 from tunneldb.measures.evenness.compute.straightedge import Cells, cell_means
-from tunneldb.measures.evenness.rows import (
-    EvennessStep,
-    UnevenPolygon,
-    evenness_inputs,
-    evenness_kilometres,
-    save_evenness,
-)
+from tunneldb.measures.evenness.rows import save_evenness
 from tunneldb.raster.geotiff import DEVIATION_KINDS, laid
 from tunneldb.raster.grid import BLOCK
 from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond
+from tunneldb.stages.stale import Result, result_states
 from tunneldb.store.images import image_blocks, load_block
 from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
-
-
-@dataclass(frozen=True)
-class CellGrid:
-    """Cells of a stretch of an image.
-
-    Attributes
-    ----------
-    cell : float
-        Side of a cell, m.
-    west, south : float
-        Least chainage and arc, m.
-    cells : Cells
-        Rows from the lowest arc up.
-    """
-
-    cell: float
-    west: float
-    south: float
-    cells: Cells
 
 
 def measure_evenness(
@@ -89,7 +57,8 @@ def measure_evenness(
     refuse_beyond(conn, survey, low, high)
     # The kilometres beside are part of what a straightedge near an end lies on.
     measure_deviation(conn, survey, layer, low - length, high + length, begin)
-    there = evenness_kilometres(conn, survey, layer, length, limit, low, high)
+    result = Result(survey, "evenness", {"layer": layer})
+    states = result_states(conn, result, low, high)
     conn.rollback()
 
     def measure(km: int) -> dict[str, int]:
@@ -105,20 +74,8 @@ def measure_evenness(
         return {"steps": len(steps), "areas": len(areas)}
 
     return measure_kilometres(
-        conn, survey, "evenness", [km for km, why in there.items() if why is not None],
-        lambda km: {**evenness_inputs(conn, survey, km, layer), "length": length, "limit": limit},
-        measure, f"evenness of {survey.name}", begin,
-    )  # fmt: skip
-
-
-def cells_in(pixel: float) -> int:
-    """Pixels to a side of a cell, of CELL or three pixels, that fills blocks and steps of chainage without a rest."""
-    factor = max(3, round(CELL / pixel))
-    return next((n for n in range(factor, 8 * factor) if _whole(STEP / (n * pixel)) and _whole(BLOCK / (n * pixel))), factor)
-
-
-def _whole(number: float) -> bool:
-    return abs(number - round(number)) < 1e-6
+        conn, result, states, lambda km: {"length": length, "limit": limit}, measure, f"evenness of {survey.name}", begin
+    )
 
 
 def load_cells(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> CellGrid | None:
@@ -155,32 +112,3 @@ def load_cells(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: st
 def _padded(values: Single, rows: int) -> Single:
     """The same with so many rows, the last ones empty."""
     return np.pad(values, ((0, rows - len(values)), (0, 0)), constant_values=np.nan)
-
-
-def steps_of(grid: CellGrid, found: Evenness, km: int, limit: float, ends: tuple[float, float]) -> Iterator[EvennessStep]:
-    """Steps of a kilometre in which something was seen, as far as the survey reaches."""
-    columns = max(round(STEP / grid.cell), 1)
-    for first in range(0, found.cells.mean.shape[1], columns):
-        low = round(grid.west + first * grid.cell, 6)
-        high = round(low + columns * grid.cell, 6)
-        if np.floor((low + high) / 2.0 / KILOMETRE) != km or high <= ends[0] or low >= ends[1]:
-            continue
-        figures = step_evenness(found, slice(first, first + columns), limit)
-        if figures.seen:
-            yield EvennessStep(max(low, ends[0]), min(high, ends[1]), grid.south, grid.cell, figures)
-
-
-def polygons_of(grid: CellGrid, found: Evenness, km: int, limit: float) -> Iterator[UnevenPolygon]:
-    """Where the gap is too large in a kilometre, in the unrolled plane, along the sides of cells."""
-    first = max(round((km * KILOMETRE - grid.west) / grid.cell), 0)
-    last = min(round(((km + 1) * KILOMETRE - grid.west) / grid.cell), found.cells.mean.shape[1])
-    areas = uneven_areas(found, slice(first, last), limit)
-    place = Affine(grid.cell, 0.0, round(grid.west + first * grid.cell, 6), 0.0, grid.cell, grid.south)
-    for shape, number in rasterio.features.shapes(areas.label, areas.label > 0, connectivity=4, transform=place):
-        k = int(number) - 1
-        yield UnevenPolygon(
-            shapely.geometry.polygon.orient(shapely.geometry.shape(shape)),
-            float(areas.cells[k] * grid.cell**2),
-            float(areas.gap[k]),
-            ALONG if areas.along[k] else AROUND,
-        )

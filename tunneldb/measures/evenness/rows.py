@@ -3,61 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import psycopg
 import shapely
 from psycopg import sql
-from shapely.geometry import Polygon
 
 from tunneldb.arrays import Float
-from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.measures.evenness.compute.evenness import StepEvenness
+from tunneldb.measures.evenness.compute.sections import EvennessStep, UnevenPolygon
 from tunneldb.store.survey import Survey
-
-
-@dataclass(frozen=True)
-class EvennessStep:
-    """A step of chainage, whose rows of cells begin at an arc, m, and go up."""
-
-    low: float
-    high: float
-    arc_from: float
-    cell: float
-    figures: StepEvenness
-
-
-@dataclass(frozen=True)
-class UnevenPolygon:
-    """Where the gap is too large, in the unrolled plane, with its area, m², greatest gap, m, and how the straightedge lay."""
-
-    outline: Polygon
-    area: float
-    gap: float
-    direction: str
-
-
-def evenness_kilometres(
-    conn: psycopg.Connection[Any], survey: Survey, layer: str, length: float, limit: float, low: float, high: float
-) -> dict[int, str | None]:
-    """Kilometres of a stretch that were held against a layer, and why what is stored of their evenness is out of date."""
-    rows = conn.execute(
-        "SELECT km, reason, straightedge, gap_limit FROM tunnel_internal.evenness_state(%s)"
-        " WHERE layer = %s AND (km + 1) * %s::float8 > %s AND km * %s::float8 < %s ORDER BY km",
-        [survey.id, layer, KILOMETRE, low, KILOMETRE, high],
-    ).fetchall()
-    other = "another straightedge or limit is asked for"
-    return {km: why if why is not None or asked == [length, limit] else other for km, why, *asked in rows}
-
-
-def evenness_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> dict[str, Any]:
-    """What the evenness of a kilometre is made from, as the ledger keeps it."""
-    row = conn.execute("SELECT tunnel_internal.evenness_inputs(%s, %s, %s)", [survey.id, km, layer]).fetchone()
-    assert row is not None
-    inputs: dict[str, Any] = row[0]
-    return inputs
 
 
 def save_evenness(

@@ -12,7 +12,8 @@ import psycopg
 from tunneldb.arrays import Bool
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.measures.deviation.measure import Design, lining_by_class
+from tunneldb.measures.deviation.compute import Design
+from tunneldb.measures.deviation.measure import lining_by_class
 from tunneldb.measures.rings.compute.patches import PATCH, Patches, average, join
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.grid import BLOCK

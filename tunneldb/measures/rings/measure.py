@@ -14,7 +14,7 @@ from tunneldb.arrays import Float
 from tunneldb.csvfile import read_csv
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.measures.deviation.measure import STATIONS
+from tunneldb.measures.deviation.compute import STATIONS
 from tunneldb.measures.rings.compute.joint_steps import MARGIN, REACH, Steps, joint_steps
 from tunneldb.measures.rings.compute.joints import Joints, NoRingsError, column_signals, follow, peaks, ring_length, strength
 from tunneldb.measures.rings.compute.lining_ring import LiningRing, measure_ring
@@ -22,19 +22,17 @@ from tunneldb.measures.rings.lining_patches import LiningPatches, load_images
 from tunneldb.measures.rings.rows import (
     MeasuredRing,
     RingBounds,
-    last_options,
     length_before,
     load_bounds,
-    ring_inputs,
-    ring_state,
     save_definition,
     save_rings,
 )
 from tunneldb.raster.pixel_state import shows_lining
 from tunneldb.shape.circle import taubin
 from tunneldb.shape.profile import Profile
-from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond, refuse_stale
+from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond
 from tunneldb.stages.run import nothing_yet
+from tunneldb.stages.stale import Result, refuse_blocked, result_states
 from tunneldb.store.design import load_profiles
 from tunneldb.store.images import survey_blocks
 from tunneldb.store.surface import load_alignment, survey_ends
@@ -171,14 +169,16 @@ def measure_survey_rings(
         See `tunneldb.stages.on_demand.Begin`.
     """
     refuse_beyond(conn, survey, low, high)
-    state, last = ring_state(conn, survey), last_options(conn, survey)
+    result = Result(survey, "rings")
+    states = result_states(conn, result)
     profiles = load_profiles(conn, survey.tunnel_id, "lining")
     axis = load_alignment(conn, survey, STATIONS)
     conn.rollback()
-    there = {km: why for km, why in state.items() if (km + 1) * KILOMETRE > low and km * KILOMETRE < high}
-    refuse_stale(there, survey.name, "rings")
+    last = {km: state.parameters.get("options", {}) for km, state in states.items() if state.parameters}
     usual = last[max(last)] if last else RingOptions().plain
-    plain = {km: last.get(km, usual) if options is None else options.plain for km in there}
+    states = {km: state for km, state in states.items() if (km + 1) * KILOMETRE > low and km * KILOMETRE < high}
+    refuse_blocked(states, survey.name, "rings")
+    plain = {km: last.get(km, usual) if options is None else options.plain for km in states}
 
     def measure(km: int) -> dict[str, int]:
         rings = load_bounds(conn, survey, km)
@@ -189,9 +189,8 @@ def measure_survey_rings(
         return {"rings": len(rings), "fitted": sum(one.ring.ring is not None for one in measured)}
 
     return measure_kilometres(
-        conn, survey, "rings", [km for km, why in there.items() if why is not None or plain[km] != last.get(km)],
-        lambda km: {**ring_inputs(conn, survey, km), "options": plain[km]}, measure, f"rings of {survey.name}", begin,
-    )  # fmt: skip
+        conn, result, states, lambda km: {"options": plain[km]}, measure, f"rings of {survey.name}", begin
+    )
 
 
 def _measured(

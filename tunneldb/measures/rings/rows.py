@@ -99,29 +99,6 @@ def length_before(conn: psycopg.Connection[Any], survey: Survey, joint: float) -
     return row[0] if row else 0.0
 
 
-def ring_state(conn: psycopg.Connection[Any], survey: Survey) -> dict[int, str | None]:
-    """Kilometres that have rings, and why what was measured of them is out of date."""
-    return dict(conn.execute("SELECT km, reason FROM tunnel_internal.ring_state(%s) ORDER BY km", [survey.id]).fetchall())
-
-
-def ring_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int) -> dict[str, Any]:
-    """What the measures of a kilometre's rings are made from, as the ledger keeps it."""
-    row = conn.execute("SELECT tunnel_internal.ring_inputs(%s, %s)", [survey.id, km]).fetchone()
-    assert row is not None
-    return dict(row[0])
-
-
-def last_options(conn: psycopg.Connection[Any], survey: Survey) -> dict[int, dict[str, Any]]:
-    """Options by which the rings of each kilometre were last measured."""
-    return dict(
-        conn.execute(
-            "SELECT DISTINCT ON (km) km, coalesce(parameters -> 'options', '{}') FROM tunnel.run"
-            " WHERE survey_id = %s AND stage = 'rings' AND outcome = 'done' ORDER BY km, started_at DESC, id DESC",
-            [survey.id],
-        ).fetchall()
-    )
-
-
 def save_rings(conn: psycopg.Connection[Any], survey: Survey, rings: Sequence[MeasuredRing]) -> None:
     """Replace what was measured of rings, and their chords."""
     for measured in rings:

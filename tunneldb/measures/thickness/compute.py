@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tunneldb.arrays import Float
+from tunneldb.measures.deviation.compute import STEP
 from tunneldb.shape.outline import Outline
-from tunneldb.shape.profile import strip_area
+from tunneldb.shape.profile import Stretch, strip_area
 
 MIN_SEEN_SHARE = 0.5
 """Minimum seen share of a cell made of cells of another length."""
@@ -100,3 +102,41 @@ def resampled(values: Float, count: int) -> Float:
     selected, total = within(seen.astype(np.float64)), within(np.where(seen, values, 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.where(selected > MIN_SEEN_SHARE * len(values) / count, total / selected, np.nan))
+
+
+@dataclass(frozen=True)
+class DeviationCells:
+    """A step of chainage of a survey with the deviation of its cells."""
+
+    profile: str
+    low: float
+    high: float
+    noise_area: float
+    cells: Float
+
+
+@dataclass(frozen=True)
+class ThicknessStep:
+    """A step of chainage that two surveys have, with what lies between them."""
+
+    low: float
+    high: float
+    noise_area: float
+    figures: SectionThickness
+
+
+def compared_steps(
+    stretches: Sequence[Stretch], before: Sequence[DeviationCells], after: Sequence[DeviationCells]
+) -> Iterator[ThicknessStep]:
+    """What lies between two surveys, of the steps that both have, as far as both reach."""
+    by_place = {(np.floor(old.low / STEP), old.profile): old for old in before}
+    by_name = {stretch.name: stretch for stretch in stretches}
+    for new in after:
+        old = by_place.get((np.floor(new.low / STEP), new.profile))
+        if old is None:
+            continue
+        low, high = max(old.low, new.low), min(old.high, new.high)
+        if low < high:
+            outline = by_name[new.profile].at((low + high) / 2.0)
+            noise = float(np.hypot(old.noise_area, new.noise_area))
+            yield ThicknessStep(low, high, noise, section_thickness(old.cells, new.cells, outline))

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from typing import Any
 
-import numpy as np
 import psycopg
 
 from tunneldb.errors import UserError
 from tunneldb.measures.deviation.measure import measurable_kilometres, measure_deviation
-from tunneldb.measures.deviation.rows import STEP
-from tunneldb.measures.thickness.compute import section_thickness
+from tunneldb.measures.thickness.compute import compared_steps
 from tunneldb.measures.thickness.rows import (
-    DeviationCells,
-    ThicknessStep,
     load_cells,
     save_thickness,
-    stale_thickness,
-    thickness_inputs,
 )
-from tunneldb.shape.profile import Stretch
 from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond, refuse_different_tunnels
+from tunneldb.stages.stale import Result, result_states
 from tunneldb.store.design import load_design
 from tunneldb.store.survey import Survey
 
@@ -62,9 +55,10 @@ def measure_thickness(
     for survey in (before, after):
         measure_deviation(conn, survey, layer, low, high, begin)
     stretches = load_design(conn, after.tunnel_id, after.tunnel, layer)
-    there = stale_thickness(conn, before, after, layer, low, high)
+    result = Result(after, "thickness", {"before": before.id, "layer": layer})
+    states = result_states(conn, result, low, high)
     conn.rollback()
-    if not there:
+    if not states:
         raise UserError(f"surveys {before.name} and {after.name} have no kilometre in common there")
 
     def measure(km: int) -> dict[str, Any]:
@@ -74,24 +68,5 @@ def measure_thickness(
         return {"steps": len(steps), "volume": sum(step.figures.area * (step.high - step.low) for step in steps)}
 
     return measure_kilometres(
-        conn, after, "thickness", [km for km, why in there.items() if why is not None],
-        lambda km: thickness_inputs(conn, before, after, km, layer),
-        measure, f"thickness from {before.name} to {after.name}", begin,
-    )  # fmt: skip
-
-
-def compared_steps(
-    stretches: Sequence[Stretch], before: Sequence[DeviationCells], after: Sequence[DeviationCells]
-) -> Iterator[ThicknessStep]:
-    """What lies between two surveys, of the steps that both have, as far as both reach."""
-    by_place = {(np.floor(old.low / STEP), old.profile): old for old in before}
-    by_name = {stretch.name: stretch for stretch in stretches}
-    for new in after:
-        old = by_place.get((np.floor(new.low / STEP), new.profile))
-        if old is None:
-            continue
-        low, high = max(old.low, new.low), min(old.high, new.high)
-        if low < high:
-            outline = by_name[new.profile].at((low + high) / 2.0)
-            noise = float(np.hypot(old.noise_area, new.noise_area))
-            yield ThicknessStep(low, high, noise, section_thickness(old.cells, new.cells, outline))
+        conn, result, states, lambda km: {}, measure, f"thickness from {before.name} to {after.name}", begin
+    )

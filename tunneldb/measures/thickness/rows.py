@@ -3,37 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import psycopg
 
-from tunneldb.arrays import Float
-from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.measures.thickness.compute import SectionThickness
+from tunneldb.measures.thickness.compute import DeviationCells, ThicknessStep
 from tunneldb.store.survey import Survey
-
-
-@dataclass(frozen=True)
-class DeviationCells:
-    """A step of chainage of a survey with the deviation of its cells."""
-
-    profile: str
-    low: float
-    high: float
-    noise_area: float
-    cells: Float
-
-
-@dataclass(frozen=True)
-class ThicknessStep:
-    """A step of chainage that two surveys have, with what lies between them."""
-
-    low: float
-    high: float
-    noise_area: float
-    figures: SectionThickness
 
 
 def load_cells(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> list[DeviationCells]:
@@ -45,26 +21,6 @@ def load_cells(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: st
         binary=True,
     ).fetchall()
     return [DeviationCells(name, low, high, noise, np.array(cells, np.float64)) for name, low, high, noise, cells in rows]
-
-
-def stale_thickness(
-    conn: psycopg.Connection[Any], before: Survey, after: Survey, layer: str, low: float, high: float
-) -> dict[int, str | None]:
-    """Kilometres of a stretch in which both surveys were held against a layer, and why what is stored is out of date."""
-    rows = conn.execute(
-        "SELECT km, reason FROM tunnel_internal.thickness_state(%s, %s, %s)"
-        " WHERE (km + 1) * %s::float8 > %s AND km * %s::float8 < %s ORDER BY km",
-        [before.id, after.id, layer, KILOMETRE, low, KILOMETRE, high],
-    ).fetchall()
-    return dict(rows)
-
-
-def thickness_inputs(conn: psycopg.Connection[Any], before: Survey, after: Survey, km: int, layer: str) -> dict[str, Any]:
-    """What the thickness of a kilometre is made from, as the ledger keeps it."""
-    row = conn.execute("SELECT tunnel_internal.thickness_inputs(%s, %s, %s, %s)", [before.id, after.id, km, layer]).fetchone()
-    assert row is not None
-    inputs: dict[str, Any] = row[0]
-    return inputs
 
 
 def save_thickness(

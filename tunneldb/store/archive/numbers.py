@@ -14,20 +14,6 @@ from psycopg import sql
 from tunneldb.store.archive.out import OTHERS, outline_checksum
 from tunneldb.store.archive.tables import SHARED, Table
 
-PARAMETERS: Mapping[tuple[str, str], str] = {
-    ("compare", "old"): "survey",
-    ("compare", "detect_old"): "run",
-    ("compare", "detect_new"): "run",
-    ("thickness", "before"): "survey",
-    ("thickness", "old"): "run",
-    ("thickness", "new"): "run",
-    ("deviation", "detect"): "run",
-    ("clearance", "ground"): "run",
-    ("rings", "detect"): "run",
-    ("evenness", "deviation"): "run",
-}
-"""Keys of the ledger's parameters that hold numbers of rows, or arrays of them, by stage: what a result was made from."""
-
 _AUDITED = ("finding", "spot", "axis_vertex", "region", "photo", "learned_model")
 
 
@@ -159,6 +145,13 @@ def number_of(target: str, value: sql.Composable, *, others: bool) -> sql.Compos
     return sql.SQL("(SELECT m.new FROM {} AS m WHERE m.old = {})").format(source, value)
 
 
+def ledger_numbers(conn: psycopg.Connection[Any]) -> list[tuple[str, str, str]]:
+    """Return stage and name of the ledger's parameters that hold numbers of rows, or arrays of them, and whose: run, survey."""
+    return conn.execute(
+        "SELECT stage, key, holds FROM tunnel.stage_input WHERE holds IN ('run', 'survey') ORDER BY stage, number"
+    ).fetchall()
+
+
 def renumber_ledger(conn: psycopg.Connection[Any], *, keep: bool) -> None:
     """Put the numbers of here into the ledger's parameters and counts; no run that was cut off is taken to be under way."""
     # no server process has this number
@@ -166,7 +159,7 @@ def renumber_ledger(conn: psycopg.Connection[Any], *, keep: bool) -> None:
     if keep:
         return
     conn.execute("UPDATE pg_temp.archive_run SET job_id = NULL")
-    for (stage, key), target in PARAMETERS.items():
+    for stage, key, target in ledger_numbers(conn):
         number = sql.SQL("CASE jsonb_typeof(e.v) WHEN 'number' THEN e.v::text::numeric::bigint END")
         here = number_of(target, number, others=True)
         conn.execute(

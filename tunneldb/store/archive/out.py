@@ -208,8 +208,8 @@ def _others(tables: Sequence[Table], survey: Survey) -> Iterator[tuple[str, sql.
         if target == twin == "survey" and one != other
     ]
     runs = sql.SQL(
-        "SELECT (r.parameters ->> CASE r.stage WHEN 'compare' THEN 'old' ELSE 'before' END)::int AS id FROM tunnel.run r"
-        " WHERE r.survey_id = {} AND r.stage IN ('compare', 'thickness')"
+        "SELECT (r.parameters ->> i.key)::int AS id FROM tunnel.run r JOIN tunnel.stage_input i USING (stage)"
+        " WHERE r.survey_id = {} AND i.holds = 'survey'"
     ).format(key)
     others = sql.SQL(" UNION ").join([*beside, runs])
     yield (
@@ -230,8 +230,8 @@ def _others(tables: Sequence[Table], survey: Survey) -> Iterator[tuple[str, sql.
         "other_run",
         sql.SQL(
             "SELECT o.id, o.survey_id, o.km, o.stage, o.started_at FROM tunnel.run o WHERE o.survey_id <> {} AND o.id IN"
-            " (SELECT (r.parameters ->> CASE r.stage WHEN 'compare' THEN 'detect_old' ELSE 'old' END)::bigint FROM tunnel.run r"
-            " WHERE r.survey_id = {} AND r.stage IN ('compare', 'thickness')) ORDER BY o.id"
+            " (SELECT unnest(tunnel_internal.run_inputs(r.stage, r.parameters)) FROM tunnel.run r WHERE r.survey_id = {})"
+            " ORDER BY o.id"
         ).format(key, key),
     )
 

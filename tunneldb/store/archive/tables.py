@@ -17,6 +17,7 @@ BULK = ("point", "image")
 EXCLUDED = {
     "alembic_version": "the schema's own",
     "stage": "made anew by tunneldb init",
+    "stage_input": "made anew by tunneldb init",
     "worker": "who serves the queue at the moment",
     "incoming": "files that wait to be read, which a batch asks for again",
     "finding_sum": "sums that triggers keep",
