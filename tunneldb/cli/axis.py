@@ -21,12 +21,12 @@ from tunneldb.store.survey import get_survey
 @click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write: .png, .pdf, .svg, or .csv.")
 @click.pass_obj
 def axis(settings: Settings, survey: str, start: str | None, end: str | None, output: Path | None) -> None:
-    """Show how far the axis of SURVEY lies from the axis given.
+    """Show the deviation of the axis of SURVEY from the given axis.
 
-    Measured minus given, to the right looking up-chainage and upwards, mm: on average and at most, for each element of the
-    design alignment, or for each kilometre where the axis was given as a table. Vertices without enough points around them
-    (interpolated) are not counted. With -o, a figure of the deviation along the tunnel with the elements of the design
-    marked, or a table (.csv, metres) of all vertices.
+    Measured minus given, to the right looking up-chainage and upwards, mm: mean and maximum for each element of the
+    design alignment, or for each kilometre if the axis is a table. Interpolated vertices are not counted. With -o, a
+    figure of the deviation along the tunnel with the elements of the design, or a table (.csv, metres) of all
+    vertices.
     """
     from tunneldb.export.figures.axis_deviation import check_format, write_deviation
     from tunneldb.store.alignment import load_deviation

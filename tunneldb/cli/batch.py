@@ -38,18 +38,18 @@ if TYPE_CHECKING:
 )
 @click.argument("survey")
 @click.argument("files", nargs=-1, type=FilePath(), metavar="[FILES...]")
-@click.option("--workers", type=click.IntRange(1, 1000), metavar="N", help="Worker processes to start; one a core by default.")
-@click.option("--km", metavar="A[-B]", help="Only these kilometres, 511 or 511-512.")
 @click.option(
-    "--to", "last", metavar="STAGE", help="End with this stage: load, axis, segments, sections, ground or detect (default)."
+    "--workers", type=click.IntRange(1, 1000), metavar="N", help="Number of worker processes; default: one for each core."
 )
+@click.option("--km", metavar="A[-B]", help="Only these kilometres, 511 or 511-512.")
+@click.option("--to", "last", metavar="STAGE", help="Last stage: load, axis, segments, sections, ground or detect (default).")
 @click.option("--density", help="Points per m² of surface to keep, 1 or more, or 'all'; 100, or what the survey has.")
 @click.option("--set", "assignments", multiple=True, metavar="NAME=VALUE", help="Set a parameter, as for tunneldb run.")
-@click.option("--retry-failed", is_flag=True, help="Try again what has failed.")
+@click.option("--retry-failed", is_flag=True, help="Retry failed jobs.")
 @click.option(
     "--preview",
     is_flag=True,
-    help="Only show what would be done: files, kilometres covered and missing, points, disk, time.",
+    help="Only show the plan: files, kilometres covered and missing, points, disk space, time.",
 )
 @click.pass_obj
 def batch(
@@ -64,12 +64,12 @@ def batch(
     retry_failed: bool,
     preview: bool,
 ) -> None:
-    """Bring FILES of SURVEY from their points to leaks, kilometre by kilometre, on all cores.
+    """Load FILES into SURVEY and run all stages, kilometre by kilometre, on all cores.
 
-    What is wanted is kept in the database: a batch that was stopped or killed goes on where it was when it is called again,
-    without FILES. A file or kilometre that fails holds up no other. Workers of other machines on the same database help.
+    The goal is stored in the database: a stopped or killed batch continues when it is called again without FILES. A
+    failed file or kilometre does not block others. Workers of other machines on the same database help.
 
-    Ctrl-C ends the stages that are under way, and stops; a second one stops at once.
+    Ctrl-C finishes the current stages and stops; a second one stops at once.
     """
     from tunneldb.queue.batch import plan, register
     from tunneldb.stages.registry import STAGE_NAMES

@@ -15,9 +15,9 @@ from tunneldb.cli.output import tell, verb
 )
 @click.pass_obj
 def check(settings: Settings) -> None:
-    """Check the server and the database; say what mends them.
+    """Check the server and the database, and show how to fix faults.
 
-    ✓ is as it should be, • works but could be better, ✗ is wrong.
+    ✓ correct, • works but can be improved, ✗ wrong.
     """
     from tunneldb.database.health import CheckResult, examine
 

@@ -42,45 +42,61 @@ _LENGTH = FiniteRange(0.0)
 @click.argument("survey")
 @click.option(
     "--gauge", "outline", required=True, type=FilePath(dir_okay=False),
-    help="Outline that is to be clear, .csv or .dxf as of profile add: about the track's middle on its running surface, m.",
+    help="Clearance outline, .csv or .dxf as of profile add: about the track's middle on its running "
+        "surface, m.",
 )  # fmt: skip
-@click.option("--name", help="Name under which the outline is kept; by default that of its file.")
+@click.option("--name", help="Name of the outline; default: that of its file.")
 @click.option("--track", help="left or right, or the number from the left of more than two; needed if there are several.")
 @click.option(
     "--track-axis", type=FilePath(dir_okay=False),
-    help="Axis of the track or lane, instead of by rails: chainage,right,up[,cant] about the given axis, or x,y,z[,cant]; m.",
+    help="Axis of the track or lane, instead of rails: chainage,right,up[,cant] about the given axis, or "
+        "x,y,z[,cant]; m.",
 )  # fmt: skip
 @click.option(
-    "--track-gauge", type=_LENGTH, default=1.435, show_default=True, metavar="M", help="Between the rails' inner faces."
+    "--track-gauge",
+    type=_LENGTH,
+    default=1.435,
+    show_default=True,
+    metavar="M",
+    help="Distance between the rails' inner faces.",
 )
-@click.option("--bogie-distance", type=_LENGTH, default=0.0, metavar="M", help="Of the vehicle, between its bogies' middles.")
-@click.option("--overhang", type=_LENGTH, default=0.0, metavar="M", help="Of the vehicle, from a bogie's middle to its end.")
+@click.option("--bogie-distance", type=_LENGTH, default=0.0, metavar="M", help="Distance between the middles of the bogies.")
+@click.option(
+    "--overhang", type=_LENGTH, default=0.0, metavar="M", help="Distance from a bogie's middle to the end of the vehicle."
+)
 @click.option(
     "--curve-widening", nargs=2, type=_LENGTH, default=(0.0, 0.0), metavar="INSIDE OUTSIDE",
-    help="Wider by these over the radius, m², instead of a vehicle.",
+    help="Widening inside and outside over the radius, m², instead of a vehicle.",
 )  # fmt: skip
-@click.option("--radius", type=FINITE, metavar="M", help="Of the curve, positive to the right, instead of the track's own.")
 @click.option(
-    "--cant", type=FINITE, metavar="M", help="How much higher the left rail lies, for roll, instead of the track's own."
+    "--radius", type=FINITE, metavar="M", help="Radius of the curve, positive to the right, instead of the track's own."
 )
-@click.option("--speed", type=_LENGTH, default=0.0, metavar="KM/H", help="For roll by too little or too much cant.")
-@click.option("--flexibility", type=_LENGTH, default=0.0, help="Roll of the vehicle over the angle of missing cant.")
-@click.option("--roll-height", type=FINITE, default=0.5, show_default=True, metavar="M", help="About which it rolls.")
-@click.option("--allowance", type=_LENGTH, default=0.0, metavar="M", help="For all else, to each side.")
 @click.option(
-    "--group-points", type=click.IntRange(1, 10**9), default=3, show_default=True, help="Fewer points are no obstacle, …"
+    "--cant", type=FINITE, metavar="M", help="Height of the left rail above the right, for roll, instead of the track's own."
+)
+@click.option("--speed", type=_LENGTH, default=0.0, metavar="KM/H", help="Speed, for roll by cant deficiency or excess.")
+@click.option("--flexibility", type=_LENGTH, default=0.0, help="Roll of the vehicle over the angle of missing cant.")
+@click.option("--roll-height", type=FINITE, default=0.5, show_default=True, metavar="M", help="Height of the roll centre.")
+@click.option("--allowance", type=_LENGTH, default=0.0, metavar="M", help="Allowance for all else, to each side.")
+@click.option(
+    "--group-points",
+    type=click.IntRange(1, 10**9),
+    default=3,
+    show_default=True,
+    help="Least number of points of an obstacle, …",
 )
 @click.option("--group-radius", type=_LENGTH, default=0.3, show_default=True, metavar="M", help="… within this radius.")
 @stretch_options
-@every_option(10.0, "Of sections of a .dxf.")
+@every_option(10.0, "Distance of the sections of a .dxf.")
 @output_option("File to write: .csv of all metres and directions, .dxf of sections with outline and points, .gpkg.")
 @click.pass_obj
 def clearance(settings: Settings, /, survey: str, outline: Path, name: str | None, output: Path | None, **asked: Any) -> None:
-    """Hold what stands in SURVEY against an outline about a track, and state margins and infringements.
+    """Check the clearance around a track of SURVEY: margins and infringements.
 
-    The track is found by its rails, or given. Points of survey density of any class count but ground, rails and noise; objects
-    and spheres, which may be gone, are stated and do not count. What was not seen is stated, and is never clear. No norm's
-    outline or values come with tunneldb; docs/howto-clearance.md says how the outline is widened.
+    The track is found from its rails, or given. Points of survey density of any class count except ground, rails and
+    noise; objects and spheres, which can be temporary, are stated and do not count. Directions that were not
+    inspected are stated and never count as clear. No outline or value of a standard is included;
+    docs/howto-clearance.md describes the widening.
     """
     from tunneldb.measures.clearance.compute.gauge import closed
     from tunneldb.measures.clearance.measure import Options, find_tracks, measure_clearance, read_track

@@ -42,11 +42,11 @@ _WORDS = {
 )  # fmt: skip
 @click.option(
     "--length", type=FiniteRange(0.5, 50.0), default=1.5, show_default=True, metavar="M",
-    help="Length of the sections of which the rigid motion is taken out, m.",
+    help="Length of the sections whose rigid motion is removed, m.",
 )  # fmt: skip
 @output_option(
-    "File to write: .csv of what became of leaks; .gpkg or .xlsx of leaks, regions and sections; .tif of the change of "
-    "each cell, one a kilometre."
+    "File to write: .csv of changes of leaks; .gpkg or .xlsx of leaks, regions and sections; .tif of "
+    "the change of each cell, one a kilometre."
 )
 @click.pass_obj
 def compare(
@@ -59,12 +59,12 @@ def compare(
     length: float,
     output: Path | None,
 ) -> None:
-    """Compare two surveys of a tunnel: what became of the leaks of OLD, and where the lining of NEW is another.
+    """Compare two surveys of a tunnel: changes of the leaks of OLD, and of the lining.
 
-    What is missing or out of date is made first, kilometre by kilometre. Of each section of the lining the rigid motion is
-    taken out and stated: it is the error of the registration or a movement of the tunnel, and which, only control points tell.
-    What remains is stated with its level of detection, and where it is significant as regions. What one survey did not see is
-    unseen: it is neither changed nor unchanged, and its leaks are neither new nor dry. docs/howto-compare.md says more.
+    Missing or outdated kilometres are computed first. The rigid motion of each section of the lining is removed and
+    stated; only control points can separate registration error from movement. The rest is stated with its level of
+    detection, and as regions where it is significant. Lining not inspected by one survey is neither changed nor
+    unchanged, and its leaks are neither new nor dry. See docs/howto-compare.md.
     """
     from tunneldb.measures.change.measure import compare as bring_up_to_date
     from tunneldb.measures.change.tables import change_rows, summary

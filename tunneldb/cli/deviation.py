@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 @click.argument("survey")
 @layer_option
 @stretch_options
-@every_option(text="Length of the stretches that are listed; distance of the sections of a .dxf, m.", shown="100; of a .dxf 10")
-@axis_sigma_option("What the axis and the scan's place are good for, standard deviation, m: goes into the errors of volumes.")
+@every_option(text="Length of the listed stretches; distance of the sections of a .dxf, m.", shown="100; of a .dxf 10")
+@axis_sigma_option("Accuracy of axis and registration, standard deviation, m: part of the errors of volumes.")
 @output_option("File to write: .csv of sections, .dxf of sections with the design, .tif of each pixel, one a kilometre.")
 @click.pass_obj
 @click.pass_context
@@ -59,12 +59,12 @@ def deviation(
     axis_sigma: float | None,
     output: Path | None,
 ) -> None:
-    """Hold the lining of SURVEY against the design profiles of its tunnel, and state over- and underbreak.
+    """Measure the deviation of the lining of SURVEY from its design profiles, overbreak and underbreak.
 
-    What is missing or out of date is made first, kilometre by kilometre, from the offset image: the distance of each pixel of
-    lining from the lines and arcs of the profile, positive inside. Areas are of sections of 1 m, volumes of stretches, both of
-    what was seen; what was not is stated as unseen, and is in none of them. tunneldb profile add gives the profiles;
-    docs/howto-shape.md says what the columns mean.
+    Missing or outdated kilometres are computed first, from the offset image: the distance of each lining pixel from
+    the lines and arcs of the profile, positive inside. Areas are of sections of 1 m, volumes of stretches, both of
+    the inspected lining; the rest is stated as not inspected. Add profiles by tunneldb profile add;
+    docs/howto-shape.md describes the columns.
     """
     from tunneldb.measures.deviation.measure import measure_deviation
     from tunneldb.measures.deviation.tables import COLUMNS, rows_csv, section_rows, stretch_rows, volume

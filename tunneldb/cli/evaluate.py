@@ -38,16 +38,14 @@ MIN_LEAK, MIN_SPOT = 0.1, 0.01  # m²
 )
 @click.argument("survey")
 @click.argument("truth", type=FilePath(dir_okay=False))
-@click.option(
-    "--layer", metavar="NAME", help="Layer of the file that holds the true ones [the only one, or leak; of spots spot]."
-)
+@click.option("--layer", metavar="NAME", help="Layer of the file with the reference [the only one, or leak; for spots spot].")
 @click.option("--km", metavar="A-B", help="Only these kilometres: 12 or 12-14.")
-@click.option("--spots", is_flag=True, help="Spots of structures, not leaks; always so of a site.")
+@click.option("--spots", is_flag=True, help="Compare spots of structures instead of leaks; always for a site.")
 @click.option(
     "--min-area",
     type=FiniteRange(min=0),
     metavar="M2",
-    help=f"Smaller true ones are neither demanded nor do they harm, m² [{MIN_LEAK}; of spots {MIN_SPOT}].",
+    help="Least area of a required reference leak, m² [0.1; for spots 0.01].",
 )
 @click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write: .json (all) or .csv (figures).")
 @click.pass_obj
@@ -61,7 +59,7 @@ def evaluate(
     min_area: float | None,
     output: Path | None,
 ) -> None:
-    """Hold the leaks of SURVEY, or its spots, against true ones, from the file TRUTH.
+    """Compare the leaks of SURVEY, or its spots, with reference ones of the file TRUTH.
 
     TRUTH is a GeoPackage or GeoJSON file with a polygon for each leak: in the unrolled plane (x chainage, y arc; no coordinate
     system), or 3D in the tunnel's; for each spot, 3D in the tunnel's, or the .truth.json of tunneldb simulate-structure. Those

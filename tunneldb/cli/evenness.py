@@ -39,7 +39,7 @@ from tunneldb.errors import UserError
 )  # fmt: skip
 @click.option(
     "--limit", type=FiniteRange(0.001, 10.0), default=0.02, show_default=True, metavar="M",
-    help="Greater gaps beneath it are outlined and summed up, m.",
+    help="Gap above which areas are outlined and summed, m.",
 )  # fmt: skip
 @every_option()
 @output_option("File to write: .csv of sections of 1 m.")
@@ -55,12 +55,11 @@ def evenness(
     every: float,
     output: Path | None,
 ) -> None:
-    """Lay a straightedge on the lining of SURVEY, along the tunnel and around its section, and state the gaps beneath it.
+    """Measure evenness of the lining of SURVEY with a virtual straightedge, along the tunnel and around its section.
 
-    It lies on cells of 0.1 m of the image of deviation, from the design profiles of the layer, on the two points that it
-    touches; around the section it has the curvature of the design, as a template has. The gap is measured between these points.
-    Each place of the lining has the greatest gap of all straightedges over it. Deviation is made first, where it is missing or
-    out of date; docs/howto-shape.md says what the columns mean.
+    It rests on two cells of 0.1 m of the deviation image; around the section it has the curvature of the design. The
+    gap is measured between these points. Each cell has the greatest gap of all straightedges over it. Missing or
+    outdated deviation is computed first; docs/howto-shape.md describes the columns.
     """
     from tunneldb.measures.deviation.tables import rows_csv
     from tunneldb.measures.evenness.measure import measure_evenness

@@ -42,7 +42,7 @@ _PLAIN = (".gpkg", ".dxf")
     "--output",
     required=True,
     type=FilePath(),
-    help="File to write, .gpkg or .dxf; with --classified a folder, made if it isn't there.",
+    help="File to write, .gpkg or .dxf; with --classified a folder, created if missing.",
 )
 @stretch_options
 @click.option("--classified", is_flag=True, help="Scan files at full density, each point with its class.")
@@ -59,31 +59,28 @@ def export(
     copc: bool,
     km: str | None,
 ) -> None:
-    """Write SURVEY for programs that don't reach the database: as GeoPackage, as DXF drawing, or its classed scan files.
+    """Write SURVEY as GeoPackage or DXF drawing, or its classified scan files.
 
-    A GeoPackage holds what the QGIS project shows of axis, lining, leaks and ground, in layers of the same names with their
-    styles, and chainage ticks and the lining laid flat besides. Layers of the unrolled plane (x is the chainage, y the arc, m)
-    are in an undefined Cartesian system there, all others in the tunnel's.
+    A GeoPackage has the layers of the QGIS project for axis, lining, leaks and ground with their styles, and chainage
+    ticks and the lining unrolled on the map. Layers of the unrolled plane (x is the chainage, y the arc, m) have an
+    undefined Cartesian system, all others the tunnel's.
 
-    A DXF drawing (2010, metres) holds axis, sections and leaks in their true places, with chainage ticks; below the map
-    the unrolled lining and, side by side, the profiles of the sections, with what leaks on them. What an inspector
-    rejected isn't drawn.
+    A DXF drawing (2010, metres) has axis, sections and leaks in true coordinates, with chainage ticks; below the map
+    the unrolled lining and the profiles of the sections with their leaks. Rejected findings are not drawn.
 
-    In both the layer of coverage gaps tells where leaks could be missed: what was not searched for them, is out of date or was
-    hardly seen; and the table or layer of remarks what else is to be known of the results.
+    In both, the layer of coverage gaps shows where leaks could be missed: lining not searched, outdated or hardly
+    inspected. The table or layer of remarks has notes and limitations of the results.
 
-    Neither holds findings that are no water, such as cracks; how many there are is said. tunneldb findings -o writes them.
+    Neither has dry findings, such as cracks; their number is stated. tunneldb findings -o writes them.
 
-    With --classified the scan files are written again, as LAZ 1.4 with the class of each point. The classes are those of
-    stage ground, which must have run and be up to date in every kilometre that a file touches: 2 ground, 64 lining, 65
-    niche, 66 appendage, 67 rail, 68 object, 69 target sphere, 70 noise, 1 outside of the surveyed tunnel. All else stays as
-    it is in the files. A file is written whole and once, also where it touches several kilometres; it appears when it is
-    complete, and is never written over a file of the survey.
+    With --classified the scan files are written as LAZ 1.4 with the class of each point, from stage ground, which
+    must be up to date in every kilometre of a file: 2 ground, 64 lining, 65 niche, 66 fixture, 67 rail, 68 object, 69
+    target sphere, 70 noise, 1 outside the surveyed tunnel. All other data are kept. A file across several kilometres
+    is written once, whole; it appears when it is complete, and never overwrites a file of the survey.
 
-    With --classified --copc the same points are written by kilometres, each as SURVEY-kmNNN.copc.laz, a Cloud Optimized
-    Point Cloud (LAZ 1.4 in the order of an octree, which programs read by area and detail), and SURVEY.vpc names them all, a
-    virtual point cloud for QGIS 3.32 and later and PDAL. With --km only these kilometres are written; those that lie in the
-    folder stay in SURVEY.vpc.
+    With --classified --copc the points are written by kilometres, each as SURVEY-kmNNN.copc.laz, a Cloud Optimized
+    Point Cloud (LAZ 1.4 in octree order), with SURVEY.vpc, a virtual point cloud of all for QGIS 3.32 and later and
+    PDAL. With --km only these kilometres are written; others in the folder stay in SURVEY.vpc.
     """
     if copc and not classified:
         raise UserError("--copc goes with --classified: it writes the points of the scan files with their classes")

@@ -44,7 +44,7 @@ class _FindingsGroup(VerbGroup):
 
 @click.group(cls=_FindingsGroup)
 def findings() -> None:
-    """List what was found and drawn on the lining, of all kinds, or import what another system has."""
+    """List, export, import or undo findings of all kinds, detected or drawn."""
 
 
 @findings.command(
@@ -58,31 +58,33 @@ def findings() -> None:
     ],
 )
 @click.argument("survey")
-@click.option("--kind", "kinds", multiple=True, metavar="KIND", help="Only of this kind; as often as needed.")
+@click.option("--kind", "kinds", multiple=True, metavar="KIND", help="Only this kind; may be repeated.")
 @click.option(
     "--origin", "origins", multiple=True, type=click.Choice(["detected", "drawn", "redrawn", "split", "merged"]),
-    help="Only of this origin; as often as needed.",
+    help="Only this origin; may be repeated.",
 )  # fmt: skip
 @click.option(
     "--state", "states", multiple=True, type=click.Choice([*get_args(State), "all"]),
-    help="Only in this state, or all; as often as needed. Default: open and confirmed, which count.",
+    help="Only this state, or all; may be repeated. Default: open and confirmed, which count.",
 )  # fmt: skip
-@click.option("--min-severity", type=click.IntRange(1, 4), help="Only of at least this severity.")
-@click.option("--min-area", type=FiniteRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
+@click.option("--min-severity", type=click.IntRange(1, 4), help="Least severity.")
+@click.option("--min-area", type=FiniteRange(min=0), default=0.0, metavar="M2", help="Least area, m².")
 @stretch_options
-@click.option("--clock", metavar="A-B", help="Only those between these hours, clockwise; 12 is the crown: 10-2 or 10:30-1:30.")
+@click.option(
+    "--clock", metavar="A-B", help="Only between these clock positions, clockwise; 12 is the crown: 10-2 or 10:30-1:30."
+)
 @click.option(
     "--geometry", type=click.Choice(["unrolled", "map", "3d"]), default="unrolled", show_default=True,
-    help="Coordinates: chainage and arc; the strip on the map beside the axis; on the lining in space.",
+    help="Coordinates: chainage and arc; map strip beside the axis; on the lining in space.",
 )  # fmt: skip
 @click.option(
     "--format",
     "form",
     type=click.Choice(["table", "csv", "geojson", "gpkg", "xlsx"]),
-    help="Default: by the ending of -o, else a table.",
+    help="Default: by the ending of -o, otherwise a table.",
 )
 @click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write.")
-@click.option("--count", is_flag=True, help="How many there are of each kind and origin instead, and what became of them.")
+@click.option("--count", is_flag=True, help="Number of each kind and origin instead, by state.")
 @click.pass_obj
 def list_findings(
     settings: Settings,
@@ -102,13 +104,13 @@ def list_findings(
 ) -> None:
     """List the findings of SURVEY, detected and drawn, or write them to a file.
 
-    Listed is what counts: open and confirmed. With --state the rest: rejected; gone, which the last detection did not find
-    again; dry, which a dry region took away; same, for which another stands that shows the same; merged into another.
+    Listed are findings that count: open and confirmed. --state selects others: rejected; gone (not found again by the
+    last detection); dry (in a dry region); same (represented by another finding); merged into another.
 
-    An Excel workbook has sheets of what is listed, of counts, of what else fits but for its state, and of dry regions. The
-    counts are in kinds of --json, too, of whatever state.
+    An Excel workbook has sheets of the listed findings, of counts, of findings that fit except for their state, and
+    of dry regions. --json has the counts too, of any state.
 
-    The word list may be left out: tunneldb findings SURVEY.
+    The word list is optional: tunneldb findings SURVEY.
     """
     if count:
         _refuse_with_count(
@@ -239,22 +241,24 @@ def _print_counts(conn: psycopg.Connection, survey: Survey, kinds: Sequence[str]
 )
 @click.argument("survey")
 @click.argument("file", type=FilePath(dir_okay=False))
-@click.option("--map", "kinds", multiple=True, metavar="THEIRS=OURS", help="Their name of a kind and ours; as often as needed.")
 @click.option(
-    "--column", "columns", multiple=True, metavar="OURS=THEIRS", help="Our name of a column and theirs; as often as needed."
+    "--map", "kinds", multiple=True, metavar="THEIRS=OURS", help="Kind in FILE and kind of tunneldb; may be repeated."
+)
+@click.option(
+    "--column", "columns", multiple=True, metavar="OURS=THEIRS", help="Column of tunneldb and column in FILE; may be repeated."
 )
 @click.option("--layer", metavar="NAME", help="Layer of a GeoPackage; default: its only one.")
 @click.pass_obj
 def import_(
     settings: Settings, survey: str, file: Path, kinds: tuple[str, ...], columns: tuple[str, ...], layer: str | None
 ) -> None:
-    """Import the findings of another system from FILE into SURVEY: all, or, if anything is wrong with a row, none.
+    """Import findings of another system from FILE into SURVEY, all or none.
 
-    FILE is CSV, GeoPackage or GeoJSON. It says of each its kind, and may say severity (1 to 4), width (m), review, remark and
-    photo (path or URL). Polygons, lines and points of a layer without a coordinate system are in chainage and arc, m; in the
-    tunnel's they must be 3D, on the lining. A CSV says where each lies by wkt or geometry (WKT: chainage and arc, or 3D), by
-    chainage_from, chainage_to, arc_from and arc_to, by chainage and arc, or by x, y and z; a chainage may be a station, as
-    12+345.678. What is wrong is told row by row; then nothing is imported.
+    FILE is CSV, GeoPackage or GeoJSON with a kind for each finding, and optionally severity (1 to 4), width (m),
+    review, remark and photo (path or URL). Geometries of a layer without a coordinate system are in chainage and arc,
+    m; in the tunnel's they must be 3D, on the lining. A CSV has places by wkt or geometry (WKT: chainage and arc, or
+    3D), by chainage_from, chainage_to, arc_from and arc_to, by chainage and arc, or by x, y and z; a chainage may be
+    a station, as 12+345.678. Each wrong row is listed; then nothing is imported.
     """
     theirs, ours = _pairs(kinds, "--map"), _pairs(columns, "--column")
     with connect(settings.dsn) as conn:
@@ -272,10 +276,10 @@ def import_(
 @click.argument("number", metavar="ID", type=click.IntRange(min=1))
 @click.pass_obj
 def undo(settings: Settings, number: int) -> None:
-    """Take back the last change of the finding ID: drawn, redrawn, reviewed, split, merged or deleted.
+    """Undo the last change of the finding ID: drawn, redrawn, reviewed, split, merged or deleted.
 
-    Called again it takes back the one before. Only who made a change, or an operator, takes it back, and none that a later
-    change rests on. What was split or merged is taken back of the finding that kept its number.
+    A second call undoes the change before. Only the author of a change, or an operator, can undo it, and not if a
+    later change depends on it. Undo a split or merge on the finding that kept its number.
     """
     with connect(settings.dsn) as conn:
         try:

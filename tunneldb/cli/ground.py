@@ -27,11 +27,11 @@ _NAMES = [name for name in PARAMETERS if name.startswith(_PREFIXES)]
 @click.option("-o", "--output", required=True, type=FilePath(dir_okay=False), help="File to write, .laz; not FILE.")
 @click.option("--set", "assignments", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see below. May be repeated.")
 def ground(file: Path, output: Path, assignments: tuple[str, ...]) -> None:
-    """Class the points of FILE by itself: ground, lining and what stands or hangs before it; needs no database.
+    """Classify the points of FILE: ground, lining, fixtures and objects in front of the lining; needs no database.
 
-    FILE may be of any format that is read; what is written is LAZ 1.4 with the classes 2 ground, 64 lining, 65 niche, 66
-    appendage, 67 rail, 68 object, 70 noise. Of LAS and LAZ all else stays as it is. With a survey, tunneldb export
-    --classified knows the lining better.
+    FILE may have any supported format; output is LAZ 1.4 with the classes 2 ground, 64 lining, 65 niche, 66 fixture,
+    67 rail, 68 object, 70 noise. All other data of LAS and LAZ are kept. For a survey, tunneldb export --classified
+    is more accurate.
     """
     for assignment in assignments:
         if not assignment.startswith(_PREFIXES):

@@ -19,11 +19,10 @@ from tunneldb.store.waterproof import keep_missing
 def init(settings: Settings) -> None:
     """Create or upgrade the schema, the functions and the roles.
 
-    Data stay; schema tunnel_api is made anew. Run it once for a new database, and again after each upgrade of
-    tunneldb.
+    Data are kept; schema tunnel_api is recreated. Run it once for a new database, and after each upgrade of tunneldb.
 
-    After an upgrade, waterproofing is then worked out kilometre by kilometre, each committed, while others work. It may be
-    cut off: views are right without, and slower, and the next init goes on with the rest.
+    After an upgrade, statistics of waterproofing are recomputed kilometre by kilometre, each committed, while others
+    work. If it is interrupted, views are correct but slower, and the next init continues.
     """
     with open_connection(settings.dsn) as connection:
         with catalogue_alone(connection):

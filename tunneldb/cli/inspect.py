@@ -27,11 +27,11 @@ _MOST_SCANS = 8
 )
 @click.argument("files", nargs=-1, required=True, type=FilePath(), metavar="FILES...")
 def inspect(files: tuple[Path, ...]) -> None:
-    """Tell what scan FILES hold, what is missing, and what to type next; needs no database.
+    """Show the contents of scan FILES, missing inputs, and the next commands; needs no database.
 
-    Files are read in chunks, once, and of up to 50 million points once more, to try whether their axis can be found. Density,
-    size and values are found on a random share of the points, and said to be. What an intensity is, and whether lengths are
-    metres, is guessed from its values: ask who made the scan.
+    Files are read once in chunks, and up to 50 million points a second time, to test if an axis can be found.
+    Density, size and values are estimates from a random sample. The kind of intensity and the unit of length are
+    guessed from values: ask whoever made the scan.
     """
     from tunneldb.pipeline.first_steps import first_steps, needs_axis
     from tunneldb.pipeline.inspection import find_axis_fault, inspect_file

@@ -31,13 +31,15 @@ _FILES = (".las", ".laz", ".e57")
 @click.argument("survey", metavar="SURVEY|FILE")
 @click.option("--km", metavar="A-B", help="Only these kilometres of the survey: 12 or 12-14.")
 @click.option("-o", "--output", type=FilePath(dir_okay=False), help="Figure to write: .png, .pdf or .svg.")
-@click.option("--intensity", metavar="DIMENSION", help="Of a file: dimension that holds the intensity.")
-@click.option("--intensity-kind", type=click.Choice(get_args(Kind)), help="Of a file: what it is; as for tunneldb survey add.")
+@click.option("--intensity", metavar="DIMENSION", help="For a file: dimension with the intensity.")
+@click.option(
+    "--intensity-kind", type=click.Choice(get_args(Kind)), help="For a file: kind of intensity, as for tunneldb survey add."
+)
 @click.option(
     "--scanner",
     type=(FINITE, FINITE, FINITE),
     metavar="X Y Z",
-    help="Of a file: where the scanner stood, in the file's coordinates; an E57 or PTX file says it by its poses.",
+    help="For a file: scanner position in the file's coordinates; E57 and PTX files contain it.",
 )
 @click.pass_obj
 def intensity(
@@ -49,11 +51,11 @@ def intensity(
     intensity_kind: str | None,
     scanner: tuple[float, float, float] | None,
 ) -> None:
-    """Show whether intensity depends on range or incidence, before and after correction.
+    """Plot intensity against range and incidence, before and after correction.
 
-    Of a SURVEY the points of survey density on the lining are looked at, after the stages sections and ground; nothing is
-    changed. Of a scan FILE by itself all flat surfaces are, and no database is needed. The table gives the
-    slope of intensity, and how much the medians of classes of range and incidence differ (standard deviation).
+    For a SURVEY, points of survey density on the lining are used, after the stages sections and ground; nothing is
+    changed. For a scan FILE, all flat surfaces are used, without a database. The table has the slope of intensity,
+    and the standard deviation of the medians of classes of range and incidence.
     """
     if output is not None:
         check_format(output)

@@ -55,34 +55,36 @@ _CLOCK = re.compile(rf"{_HOUR}-{_HOUR}")
     type=click.Choice(["leak", "joint", "dark", "all"]),
     default="leak",
     show_default=True,
-    help="What to list: leaks, joints, what else is dark but dry, or all of it.",
+    help="Kind to list: leaks, joints, dry dark areas, or all.",
 )
 @click.option(
     "--geometry",
     type=click.Choice(["unrolled", "map", "3d"]),
     default="unrolled",
     show_default=True,
-    help="Coordinates: chainage and arc; the strip on the map beside the axis; on the lining in space.",
+    help="Coordinates: chainage and arc; map strip beside the axis; on the lining in space.",
 )
 @click.option(
     "--format",
     "form",
     type=click.Choice(["table", "csv", "geojson", "gpkg", "xlsx"]),
-    help="Default: by the ending of -o, else a table.",
+    help="Default: by the ending of -o, otherwise a table.",
 )
 @click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write.")
 @click.option("--km", metavar="A-B", help="Only these kilometres: 12 or 12-14.")
 @stretch_options
-@click.option("--clock", metavar="A-B", help="Only those between these hours, clockwise; 12 is the crown: 10-2 or 10:30-1:30.")
-@click.option("--min-area", type=FiniteRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
+@click.option(
+    "--clock", metavar="A-B", help="Only between these clock positions, clockwise; 12 is the crown: 10-2 or 10:30-1:30."
+)
+@click.option("--min-area", type=FiniteRange(min=0), default=0.0, metavar="M2", help="Least area, m².")
 @click.option(
     "--min-confidence",
     type=FiniteRange(0, 1),
     default=0.0,
     metavar="SHARE",
-    help="Only those that detection is at least so sure of, 0 to 1; none without a confidence.",
+    help="Least confidence, 0 to 1; excludes leaks without a confidence.",
 )
-@click.option("--by-km", is_flag=True, help="Leaks of each kilometre summed up instead, with its class of waterproofing.")
+@click.option("--by-km", is_flag=True, help="Sums of each kilometre instead, with its class of waterproofing.")
 @click.pass_context
 def leaks(
     context: click.Context,
@@ -99,24 +101,24 @@ def leaks(
     min_confidence: float,
     by_km: bool,
 ) -> None:
-    """List the leaks of SURVEY, or what else is dark on its lining, or export them.
+    """List the leaks of SURVEY, or other dark areas of its lining, or export them.
 
-    Of a stretch or of kilometres those are listed that reach into it, and their area is summed as far as it lies there; of
-    hours of the clock, looking up-chainage, those whose middle lies there. Listed, but not counted, are those that an
-    inspector rejected, or confirmed and the last detection did not find again.
+    With a range or kilometres, overlapping leaks are listed, and their area is summed inside it; with clock positions
+    (looking up-chainage), leaks with their middle there. Rejected leaks, and confirmed ones that the last detection
+    did not find, are listed and not counted.
 
-    First it says where the list can't be vouched for: stretches that are not loaded, not searched for leaks, failed, out of
-    date, or of whose lining less than half was seen; then what else is to be known: left out,
-    interpolated, in doubt. The same is in every file; see tunnel_api.coverage_gap and tunnel_api.remark.
+    First it states where leaks could be missed: stretches not loaded, not searched, failed, outdated, or less than
+    half inspected; then notes and limitations: data left out, interpolated, in doubt. The same is in every file; see
+    tunnel_api.coverage_gap and tunnel_api.remark.
 
-    In the table arc is counted from the crown, to the right looking up-chainage. clock is where the middle lies: 12:00 is the
-    crown, 3:00 right. conf. is how sure detection is of its kind, 0 to 1, where no inspector gave it another. drop is how much
-    darker than dry lining it is in the mean, max at the most, and contrast the mean drop in standard deviations of the dry
-    lining about it. image is the share of its area on which the image holds measurements.
+    In the table, arc is counted from the crown, to the right looking up-chainage. clock is the position of the
+    middle: 12:00 is the crown, 3:00 right. conf. is the probability of the detected kind, 0 to 1. drop is the mean
+    darkening below dry lining, max the greatest, and contrast the mean darkening in standard deviations of the local
+    dry lining. image is the share of its area with measurements.
 
-    With --by-km a line for each kilometre, and one for all: wet area and number of leaks, the most in any 100 m² of lining, and
-    the best class of GB 50108-2008 that the lining seen keeps, as far as a scan can tell. Any other stretch, and what breaks a
-    class: SELECT * FROM tunnel_api.waterproof_class(survey, from, to).
+    --by-km prints a line for each kilometre and one for all: wet area, number of leaks, the most in any 100 m² of
+    lining, and the best class of GB 50108-2008 that the inspected lining meets. For another range: SELECT * FROM
+    tunnel_api.waterproof_class(survey, from, to).
     """
     settings: Settings = context.obj
     chosen = cast(Geometry, geometry)

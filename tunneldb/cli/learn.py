@@ -30,24 +30,21 @@ STRONGEST = 8
     ],
 )
 @click.argument("surveys", metavar="SURVEY...", nargs=-1, required=True)
-@click.option("--apply", "apply_", is_flag=True, help="Put what was learned in force for the tunnels of these surveys.")
-@click.option("--undo", is_flag=True, help="Take back what was last put in force for the tunnels of these surveys.")
-@click.option("--list", "list_", is_flag=True, help="List what was learned for the tunnels of these surveys.")
-@click.option("--note", metavar="TEXT", help="With --apply: what to remember of it.")
+@click.option("--apply", "apply_", is_flag=True, help="Activate the adapted model for the tunnels of these surveys.")
+@click.option("--undo", is_flag=True, help="Deactivate the last adapted model of the tunnels of these surveys.")
+@click.option("--list", "list_", is_flag=True, help="List the adapted models of the tunnels of these surveys.")
+@click.option("--note", metavar="TEXT", help="With --apply: note to store.")
 @click.pass_obj
 def learn(settings: Settings, surveys: tuple[str, ...], apply_: bool, undo: bool, list_: bool, note: str | None) -> None:
-    """Learn from what inspectors confirmed, rejected and renamed in SURVEY... how far evidence of leaks holds there.
+    """Adapt leak detection to findings that inspectors confirmed, rejected and renamed in SURVEY...
 
-    Without --apply it changes nothing, and says what would change: how the reviews agree with the model of evidence as it
-    comes with the program, recalibrated (how sure it may be) and, from 25 reviews on, refit (how much each reason counts) and
-    extended (what was measured speaks for itself, too), each judged on reviews of other places than those that it was fitted
-    to; and which findings would change their kind. The best is chosen; where none is better than the model as it is by more
-    than
-    chance, nothing is learned. Few false leaks may be paid for with missed ones: both are stated.
+    Without --apply nothing changes. The output shows how the reviews agree with the present model, recalibrated and,
+    from 25 reviews on, refit (a factor for each reason) and extended (also a term for each feature), each judged on
+    reviews of other places; and the findings that would change their kind. The best is selected if it is
+    significantly better. Fewer false leaks can mean more missed ones: both are stated.
 
-    What is applied holds for the tunnels of the surveys, all surveys of them: their stage detect is stale then, until tunneldb
-    run SURVEY --stale. Reviews stay. Of findings that were detected before their features were stored reviews teach nothing
-    until stage detect has run again.
+    An applied model is used for all surveys of these tunnels: their stage detect becomes stale until tunneldb run
+    SURVEY --stale. Reviews are kept. Findings without stored features are ignored until stage detect has run again.
     """
     from tunneldb.pipeline.learn import apply_plan, get_surveys, plan_learning, undo_learning
     from tunneldb.store.learned import list_learned

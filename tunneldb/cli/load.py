@@ -47,7 +47,7 @@ MOST_NAMED = 5  # files of which the same is said
     type=click.IntRange(1, 1000),
     default=5,
     show_default=True,
-    help="A point with fewer points than this around it, itself included, is noise; 1 keeps all.",
+    help="Points with fewer points than this around them, including themselves, are noise; 1 keeps all.",
 )
 @click.option(
     "--noise-diameter",
@@ -55,7 +55,7 @@ MOST_NAMED = 5  # files of which the same is said
     default=0.05,
     show_default=True,
     metavar="M",
-    help="Diameter of what is around a point, at full density; wider where the scan is sparser.",
+    help="Diameter of the neighbourhood of a point at full density; wider where the scan is sparser.",
 )
 @click.option(
     "--max-distance",
@@ -63,7 +63,7 @@ MOST_NAMED = 5  # files of which the same is said
     default=25.0,
     show_default=True,
     metavar="M",
-    help="Points farther from the given axis are left out.",
+    help="Distance from the given axis beyond which points are left out.",
 )
 @click.option(
     "--max-left-out",
@@ -71,16 +71,17 @@ MOST_NAMED = 5  # files of which the same is said
     default=5.0,
     show_default=True,
     metavar="PERCENT",
-    help="Points of unknown scanner position, or whose time or intensity is NaN, are left out; a file with more is refused.",
+    help="Share of points of unknown scanner position, or with NaN time or intensity, that are left out; a "
+    "file with more is refused.",
 )
 @click.option(
     "--medium",
     type=click.Choice(["air", "water"]),
     default="air",
     show_default=True,
-    help="water: FILES are soundings that lie in the tunnel's system already. Registered sonar scans need no word.",
+    help="water: FILES are soundings in the tunnel's system. Not needed for registered sonar scans.",
 )
-@click.option("--water-level", type=FINITE, metavar="M", help="Height of the water, of soundings, m.")
+@click.option("--water-level", type=FINITE, metavar="M", help="Height of the water for soundings, m.")
 @click.pass_obj
 def load(
     settings: Settings,
@@ -96,14 +97,14 @@ def load(
 ) -> None:
     """Load FILES (LAS, LAZ, E57, PTX, PTS, PLY, tables of points) into SURVEY.
 
-    Noise is dropped, the rest thinned to the survey's density and stored in the order of chainage. A file that is
-    loaded already is left alone; a file of the same name with other content takes its place.
+    Noise is removed, and the rest thinned to the survey's density and stored by chainage. A loaded file with the same
+    content is skipped; one with other content replaces the former.
 
-    Files of a site are looked through and recorded; their points stay where they are.
+    Files of a site are checked and recorded; their points stay in the files.
 
-    Files that were registered as sonar scans come into the tunnel by their poses: their points are classed, false echoes
-    left out (as noise), and the bed is worked out. What was loaded of the laser's files stays as it is. So do soundings
-    (--medium water), as a boat's multibeam sonar makes them, without a pose.
+    Registered sonar scans are loaded by their poses: their points are classified, false echoes are removed as noise,
+    and the bed is computed. Laser points do not change. Soundings in the tunnel's system (--medium water), such as
+    those of a multibeam sonar, have no pose.
     """
     from tunneldb.pipeline.load import load_files
     from tunneldb.pipeline.site_files import register_files

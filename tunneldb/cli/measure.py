@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 LAYERS = click.Choice(["lining", "shotcrete", "excavation"])
-layer_option = click.option("--layer", type=LAYERS, default="lining", show_default=True, help="Layer that it is of.")
+layer_option = click.option("--layer", type=LAYERS, default="lining", show_default=True, help="Layer of the profile.")
 
 
-def every_option(default: float = 100.0, text: str = "Length of the stretches listed, m.", shown: str | bool = True) -> Any:
+def every_option(default: float = 100.0, text: str = "Length of the listed stretches, m.", shown: str | bool = True) -> Any:
     """Return the option --every: a length in m, of which rows are listed."""
     return click.option("--every", type=FiniteRange(1.0), default=default, show_default=shown, metavar="M", help=text)
 

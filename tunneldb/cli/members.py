@@ -39,20 +39,20 @@ _MOST = 20  # rows of a table that are printed
     multiple=True,
     type=FilePath(),
     metavar="FILE",
-    help="Where the scanner stood: CSV with scan_id,x,y,z. An E57 or PTX file says it by its poses. May be repeated.",
+    help="Scanner positions: CSV with scan_id,x,y,z. E57 and PTX files contain them. May be repeated.",
 )
-@click.option("--intensity", metavar="DIMENSION", help="Dimension that holds the intensity.")
-@click.option("--intensity-kind", type=click.Choice(get_args(Kind)), help="What it is; as for tunneldb survey add.")
+@click.option("--intensity", metavar="DIMENSION", help="Dimension with the intensity.")
+@click.option("--intensity-kind", type=click.Choice(get_args(Kind)), help="Kind of intensity, as for tunneldb survey add.")
 @click.option(
     "--reference",
     metavar="CSV|auto",
-    help="Curve of a reference target by which range is corrected; auto finds one from the faces.",
+    help="Curve of a reference target for the range correction; auto: estimated from the faces.",
 )
 @click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write: .laz or .gpkg; not FILE.")
 @click.option(
     "--geometry",
     type=click.Choice(["face", "map", "3d"]),
-    help="Coordinates of a .gpkg: each face's own plane, of a pipe unrolled; the map; in space [3d].",
+    help="Coordinates of a .gpkg: plane of each face (pipes unrolled); map; space [3d].",
 )
 @click.pass_obj
 def members(
@@ -65,14 +65,14 @@ def members(
     output: Path | None,
     geometry: str | None,
 ) -> None:
-    """Find the members of a structure in the files of SURVEY or in a scan FILE, and what differs from its own surface there.
+    """Find the members of a structure in the files of SURVEY or in a scan FILE, and spots on their surfaces.
 
-    Planes and cylinders are found as faces, faces that something before them parts are joined into members, and what is dark
-    or bright against its own surface is a spot: rust, stains, cracks, flakes; the name is the inspector's to give. A .laz has
-    the input's points with the dimensions face, member and anomaly (0: none), a .gpkg polygons in the layers member, face and
-    spot; a FILE by itself needs no database. Of a SURVEY, of a site or of a tunnel, all are kept in the database in place of
-    what was found before: tunneldb spots lists them, views tunnel_api.member, face and spot have them. A spot that is found
-    again keeps its number and its review.
+    Planes and cylinders are found as faces, and faces separated by shadows are joined into members. Areas dark or
+    bright against their own surface are spots: rust, stains, cracks, flakes; an inspector names them. A .laz has the
+    input's points with the dimensions face, member and anomaly (0: none), a .gpkg polygons in the layers member, face
+    and spot; a FILE needs no database. For a SURVEY, of a site or tunnel, results are stored and replace earlier
+    ones: see tunneldb spots and the views tunnel_api.member, face and spot. A spot that is found again keeps its
+    number and review.
     """
     from tunneldb.pointcloud.formats.table import scan_suffixes
 

@@ -110,7 +110,7 @@ class Verb(click.Command):
         super().__init__(*arguments, **options)
         self.examples = tuple(examples)
         self.wrong = wrong
-        help_ = "Print one JSON object: what was done, counts, seconds; also when it fails."
+        help_ = "Print one JSON object with results, counts and seconds; also after an error."
         self.params.append(click.Option([JSON], is_flag=True, expose_value=False, help=help_))
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:

@@ -16,7 +16,7 @@ from tunneldb.errors import UserError
 
 @click.group(cls=VerbGroup)
 def profile() -> None:
-    """Add, list or remove the design profiles of a tunnel: lines and arcs about its axis, by chainage and layer."""
+    """Add, list or remove the design profiles of a tunnel: lines and arcs around its axis, by chainage and layer."""
 
 
 @profile.command(
@@ -29,8 +29,8 @@ def profile() -> None:
 @click.argument("words", nargs=-1, required=True, metavar="TUNNEL [NAME] FILE")
 @stretch_options
 @layer_option
-@click.option("--unit", type=click.Choice(["m", "cm", "mm", "ft", "in"]), help="Unit of a .dxf that states none, or of a .txt.")
-@click.option("--origin", default="0,0", metavar="RIGHT,UP", help="Where FILE has the axis, in its own unit.  [default: 0,0]")
+@click.option("--unit", type=click.Choice(["m", "cm", "mm", "ft", "in"]), help="Unit of a .dxf without a unit, or of a .txt.")
+@click.option("--origin", default="0,0", metavar="RIGHT,UP", help="Position of the axis in FILE, in its unit.")
 @click.option("--drawing-layer", metavar="NAME", help="Layer of a .dxf, if several have lines.")
 @click.pass_obj
 def add(
@@ -43,12 +43,12 @@ def add(
     origin: str,
     drawing_layer: str | None,
 ) -> None:
-    """Add a design profile to TUNNEL, which holds from one place to another, by default along the whole axis.
+    """Add a design profile to TUNNEL for a range, by default the whole axis.
 
-    FILE is a .csv with right,up and perhaps radius, m: a row for each vertex, seen from the axis looking up-chainage; radius is
-    of the arc that leads to the next vertex, positive where it bulges outwards, 0 of a line; an outline whose last row repeats
-    the first is closed. Or a .dxf of lines, arcs and polylines; or a .txt with two columns, points of an outline. Where two
-    profiles of a layer leave tunnel between them, the one goes over into the other linearly.
+    FILE is a .csv with right,up and optionally radius, m: a row for each vertex, seen from the axis looking
+    up-chainage; radius is of the arc to the next vertex, positive if it bulges outwards, 0 for a line; if the last
+    row repeats the first, the outline is closed. Or a .dxf of lines, arcs and polylines; or a .txt with two columns,
+    points of an outline. Between two profiles of a layer the outline changes linearly.
     """
     from tunneldb.pipeline.profile_file import read_profile
     from tunneldb.shape.profile import Profile
@@ -84,7 +84,7 @@ def add(
 @click.argument("tunnel")
 @click.pass_obj
 def list_(settings: Settings, tunnel: str) -> None:
-    """List the design profiles of TUNNEL, with the transitions between them."""
+    """List the design profiles of TUNNEL and the transitions between them."""
     from tunneldb.shape.profile import stretches
     from tunneldb.store.catalog import get_tunnel
     from tunneldb.store.design import load_profiles

@@ -29,16 +29,16 @@ from tunneldb.store.survey import get_survey
     ]
 )
 @click.argument("name", required=False, metavar="[SURVEY]")
-@click.option("--before", type=DAY, metavar="YYYY-MM-DD", help="Only what began before that day.")
-@click.option("--yes", is_flag=True, help="Delete it; without, it is only shown.")
+@click.option("--before", type=DAY, metavar="YYYY-MM-DD", help="Only runs that began before that day.")
+@click.option("--yes", is_flag=True, help="Delete; without it, only show.")
 @click.pass_obj
 def prune(settings: Settings, name: str | None, before: dt.datetime | None, yes: bool) -> None:
-    """Show which old runs of the ledger and finished jobs of the queue nothing goes by any more; with --yes delete them.
+    """Show runs and jobs that are no longer needed; with --yes delete them.
 
-    Of all surveys, or of SURVEY. Of each stage of each kilometre, and each layer, outline or pair of surveys, stay the last
-    attempt, the last success and the success that ended last, what these were made from, and every import. So nothing is
-    stale afterwards that was not before. Results, findings and the audit are not touched. Surveys on which a
-    batch is at work are left out, and told. The room is free for new rows after tunneldb vacuum.
+    For all surveys, or SURVEY. For each stage of each kilometre, and each layer, outline or pair of surveys, the last
+    attempt, the last success and the success that ended last are kept, with the runs that these were made from, and
+    every import. Nothing becomes stale. Results, findings and the audit do not change. Surveys with a running batch
+    are skipped and listed. tunneldb vacuum frees the space for new rows.
     """
     with connect(settings.dsn) as connection:
         survey = None if name is None else get_survey(connection, name, site=True)

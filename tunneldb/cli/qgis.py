@@ -39,26 +39,27 @@ from tunneldb.store.survey import Survey, get_survey
 )  # fmt: skip
 @click.option(
     "--database", "name", is_flag=False, flag_value="", metavar="[NAME]",
-    help="Put the project into the database, under this name or the survey's; in QGIS: Project, Open From, PostgreSQL.",
+    help="Write the project to the database, under this name or the survey's; in QGIS: Project, Open From, "
+        "PostgreSQL.",
 )  # fmt: skip
 @click.option(
     "--images", "folder", type=FilePath(file_okay=False),
-    help="Folder of the images, one that all who open the project can reach; else FILE-images, or SURVEY-images here.",
+    help="Folder of the images that all users can reach; default: FILE-images, or SURVEY-images here.",
 )  # fmt: skip
-@click.option("--service", metavar="NAME", help="Let the project connect by this entry of pg_service.conf (never a password).")
+@click.option("--service", metavar="NAME", help="Entry of pg_service.conf by which the project connects (never a password).")
 @click.pass_obj
 def qgis(
     settings: Settings, survey: str, output: Path | None, name: str | None, folder: Path | None, service: str | None
 ) -> None:
     """Write a QGIS project of SURVEY: map, unrolled lining, 3D and inspection sheets, with styled layers.
 
-    Where members of structures were found, they are in it, with their faces and spots on the map, in space and unrolled, and an
-    atlas with a page for each; of a site they are all that there is.
+    If members of structures were found, it has them with faces and spots on the map, in space and unrolled, and an
+    atlas with a page for each; the project of a site has only these.
 
-    Leaks can be reviewed and axis vertices moved in it. It shows the intensity, or the offset where there is none, over the
-    same with gaps up to 0.6 m filled. Of a survey that was compared with an older one it shows what changed. The styles also go
-    into the database, where QGIS finds them for layers that are added by hand. A project in the database holds the images by
-    their absolute paths.
+    Leaks can be reviewed and axis vertices moved in it. It shows the intensity, or the offset if there is none, with
+    gaps up to 0.6 m filled below it. For a survey compared with an older one it shows the changes. Styles are also
+    stored in the database for layers that are added by hand. A project in the database refers to the images by
+    absolute paths.
     """
     if output is None and name is None:
         raise UserError("say where the project goes: -o FILE.qgz, or --database")

@@ -37,20 +37,21 @@ UP = {"+z": 1, "-z": -1}
     type=FilePath(dir_okay=False),
     required=True,
     metavar="CSV",
-    help="Ladders that stand in the water: ladder,rung,height,stile_gap,diameter, m; a row for each rung.",
+    help="Ladders in the water: ladder,rung,height,stile_gap,diameter, m; a row for each rung.",
 )
-@click.option("--up", type=click.Choice(list(UP)), required=True, help="Whether z of the sonar's files points up or down.")
+@click.option("--up", type=click.Choice(list(UP)), required=True, help="Direction of z in the sonar's files, up or down.")
 @click.option("--water-level", type=FINITE, required=True, metavar="M", help="Height of the water in the tunnel's system, m.")
 @click.option(
     "--start",
     type=FilePath(dir_okay=False),
     metavar="CSV",
-    help="Where sonars stood, roughly: file,x,y,within, m. A scan is then sought no farther from x, y; others anywhere.",
+    help="Approximate sonar positions: file,x,y,within, m. The search is limited to within of x, y; other "
+    "scans are searched everywhere.",
 )
 @click.option(
     "--sound-speed",
     metavar="ASSUMED=MEASURED",
-    help="Speed of sound that the sonar was set to, and that of the water, m/s; needed where they differ by more than 3 %.",
+    help="Speed of sound of the sonar's setting and of the water, m/s; needed if they differ by more than 3 %.",
 )
 @click.option("--report", type=FilePath(dir_okay=False), metavar="FILE", help="Report to write, as Markdown.")
 @click.pass_context
@@ -67,10 +68,10 @@ def register(
 ) -> None:
     """Register sonar scans from below the water (FILES) to the laser scans of SURVEY above it.
 
-    FILES are static scans of a mechanical sonar in axes of its own, m: .xyz, .txt, .csv, .off, LAS, LAZ, E57, PLY. Where
-    the sonar stood and which way it looked need not be known. All scans are adjusted together: to the laser's walls,
-    continued below the water, to ladders that stand in the water and are seen by both, and to each other. The poses are
-    stored (tunnel_api.sonar_scan), with their covariance, in the place of those that these files had.
+    FILES are static scans of a mechanical sonar in its own axes, m: .xyz, .txt, .csv, .off, LAS, LAZ, E57, PLY.
+    Position and heading of the sonar may be unknown. All scans are adjusted together: to the laser's walls, extended
+    below the water, to ladders seen by both, and to each other. Poses are stored with their covariance
+    (tunnel_api.sonar_scan) and replace earlier poses of these files.
 
     A point of a file lies in the tunnel at rotation · (scale · point) + translation.
     """

@@ -54,7 +54,7 @@ _PRINTING = 1.2  # time in which it prints a page as a multiple of that in which
     "--photos",
     type=FilePath(),
     metavar="FOLDER",
-    help="Where relative paths of photos begin. Default: the current folder.",
+    help="Folder of relative photo paths. Default: the current folder.",
 )
 @click.option(
     "--list",
@@ -63,7 +63,7 @@ _PRINTING = 1.2  # time in which it prints a page as a multiple of that in which
     default=LISTED,
     show_default=True,
     metavar="N",
-    help="Leaks that are listed and drawn at most, the largest, those rejected last. The others are in all sums.",
+    help="Most leaks to list and draw, the largest, rejected ones last. Sums include all.",
 )
 @click.pass_obj
 def report(
@@ -76,18 +76,17 @@ def report(
     photos: Path | None,
     listed: int,
 ) -> None:
-    """Write the inspection report of SURVEY, to be handed over and signed.
+    """Write the inspection report of SURVEY for signature.
 
-    It says first where leaks could be missed: what was not searched for them, is out of date or was hardly seen. It states
-    what was scanned and how much of the lining was seen, class of waterproofing, the unrolled lining with its
-    leaks, each leak with picture and cross-section, statistics, findings of all kinds with photos, dry regions, parameters and
-    versions, and who reviewed what. Where members
-    of structures were found, a chapter states what of them could be judged, their spots, and each member's faces unrolled; of a
-    site that is all.
+    It first states where leaks could be missed: lining not searched, outdated or hardly inspected. It contains the
+    scanned and inspected lining, class of waterproofing, the unrolled lining with its leaks, each leak with picture
+    and cross-section, statistics, findings of all kinds with photos, dry regions, parameters and versions, and
+    reviews by person. If members of structures were found, a chapter has the part that could be judged, their spots,
+    and each member's unrolled faces; for a site that is the report.
 
-    The HTML file is whole in itself: it asks nothing of the network. Its table of leaks can be sorted and searched, and it
-    prints on A4. The PDF is what it prints; of pictures of single leaks it holds those of the 400 largest. It is printed by
-    the program that TUNNELDB_BROWSER names, or by the Chromium or Chrome that is found.
+    The HTML file needs no network. Its table of leaks can be sorted and searched, and it prints on A4. The PDF is its
+    print, with pictures of the 400 largest leaks. It is printed by the program in TUNNELDB_BROWSER, or by Chromium or
+    Chrome.
     """
     suffix = output.suffix.lower()
     if suffix not in (".html", ".htm", ".pdf"):

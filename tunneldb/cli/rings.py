@@ -37,33 +37,33 @@ _CHORD = re.compile(f"{_END}-{_END}")
 @click.argument("survey", required=False)
 @click.option(
     "--length", type=FiniteRange(0.3, 20.0), metavar="M",
-    help="Of SURVEY: its rings are whole ones of that length, from its beginning or --start on, m.",
+    help="Of SURVEY: length of the rings, from its start or --start on, m.",
 )  # fmt: skip
-@click.option("--start", "joint_at", type=FINITE, metavar="CHAINAGE", help="With --length: a joint lies there, m.")
+@click.option("--start", "joint_at", type=FINITE, metavar="CHAINAGE", help="With --length: chainage of a joint, m.")
 @click.option(
     "--rings", "rings_file", type=FilePath(dir_okay=False), metavar="CSV",
-    help="Of SURVEY: its rings are those of a file: number,chainage_from,chainage_to, m.",
+    help="Of SURVEY: file of rings: number,chainage_from,chainage_to, m.",
 )  # fmt: skip
-@click.option("--find", is_flag=True, help="Of SURVEY: its rings lie between the joints that its images show.")
+@click.option("--find", is_flag=True, help="Of SURVEY: find the rings between joints in the images.")
 @stretch_options
 @click.option(
     "--points",
     type=FilePath(dir_okay=False),
     metavar="CSV",
-    help="Surveyed points: ring,point,x,y,z, m, and perhaps offset, how far the prism stands before the lining, m.",
+    help="Surveyed points: ring,point,x,y,z, m, and optionally offset: distance of the prism from the lining, m.",
 )
 @click.option(
     "--axis",
     type=FilePath(dir_okay=False),
     metavar="CSV",
-    help="Of --points: design axis: chainage,x,y,z, m, in growing chainage.",
+    help="Of --points: design axis: chainage,x,y,z, m, in increasing chainage.",
 )
 @click.option("--diameter", type=FiniteRange(0.5, 50.0), metavar="M", help="Inner diameter of the design, m.")
 @click.option(
     "--sigma",
     type=FiniteRange(0.0, 0.1, min_open=True),
     metavar="M",
-    help="What a point is good for, its standard deviation, m. By default all rings together say it.",
+    help="Standard deviation of a point, m. Default: estimated from all rings.",
 )
 @click.option(
     "--harmonics",
@@ -84,7 +84,7 @@ _CHORD = re.compile(f"{_END}-{_END}")
     "-o",
     "--output",
     type=FilePath(dir_okay=False),
-    help="File to write, .csv, of a survey also .xlsx, or .gpkg with maps; else standard output.",
+    help="File to write, .csv, for a survey also .xlsx, or .gpkg with maps; default: standard output.",
 )
 @click.pass_obj
 @click.pass_context
@@ -108,14 +108,14 @@ def rings(
 ) -> None:
     """Measure rings: centre, deviation from the design axis, radius, ovality, harmonics, chords, steps.
 
-    Those of SURVEY are measured from the offset image, kilometre by kilometre, and stored; --length, --rings or --find says
-    where they lie, and need be given once only. Ovality is a share of --diameter, else of a design profile that is a circle,
-    else of the ring's own mean diameter.
+    Rings of SURVEY are measured from the offset image, kilometre by kilometre, and stored; define them once by
+    --length, --rings or --find. Ovality is relative to --diameter, else to a circular design profile, else to the
+    ring's own mean diameter.
 
-    With --points rings are measured from points of a total station, which needs no database.
-    A ring needs 5 points, its ellipse 6. Each value has its standard error. A point that cannot belong to its ring is left out,
-    and named in the column remark; so is what could not be told. Clock positions are degrees from the crown to the right,
-    looking up-chainage. docs/howto-shape.md says what each column means.
+    With --points rings are measured from total-station points, without a database. A ring needs 5 points, its ellipse
+    6. Each value has its standard error. A point that cannot belong to its ring is rejected and named in the column
+    remark, as are unknown values. Clock positions are degrees from the crown to the right, looking up-chainage.
+    docs/howto-shape.md describes the columns.
     """
     _require_one_kind(context, survey, points)
     lines = _chords(chords)

@@ -42,13 +42,14 @@ def parameter_table(names: Iterable[str] = PARAMETERS) -> str:
     ],
 )
 @click.argument("survey")
-@click.option("--km", metavar="A[-B]", help="Only these kilometres, 511 or 511-512; all that are loaded by default.")
-@click.option("--from", "first", metavar="STAGE", help="Begin with this stage: axis, segments, sections, ground or detect.")
-@click.option("--to", "last", metavar="STAGE", help="End with this stage.")
+@click.option("--km", metavar="A[-B]", help="Only these kilometres, 511 or 511-512; default: all loaded.")
+@click.option("--from", "first", metavar="STAGE", help="First stage: axis, segments, sections, ground or detect.")
+@click.option("--to", "last", metavar="STAGE", help="Last stage.")
 @click.option("--set", "assignments", multiple=True, metavar="NAME=VALUE", help="Set a parameter; see below. May be repeated.")
 @click.option(
     "--stale", is_flag=True,
-    help="Only what is out of date (tunneldb status), say after an axis vertex was moved, with the parameters that it had.",
+    help="Only stale stages (tunneldb status), for example after an axis vertex was moved, with the "
+        "parameters of their last run.",
 )  # fmt: skip
 @click.pass_obj
 def run(
@@ -62,9 +63,8 @@ def run(
 ) -> None:
     """Run the stages of SURVEY: axis, segments, sections, ground, detect.
 
-    Each stage of each kilometre is one transaction that replaces what the stage made there before, so a run may be
-    stopped at any moment and repeated. Axis vertices moved by hand and reviews of leaks stay. All that each stage has
-    counted is in --json.
+    Each stage of each kilometre is one transaction that replaces the earlier result, so a run can be stopped and
+    repeated at any time. Axis vertices moved by hand and reviews are kept. --json has all counts.
     """
     from tunneldb.stages.run import choose_stages, loaded_kilometres, parse_km, run_tasks, stage_tasks, stale_tasks
 

@@ -13,9 +13,9 @@ from tunneldb.errors import UserError
 @click.group(cls=VerbGroup)
 @click.pass_obj
 def server(settings: Settings) -> None:
-    """Start, stop or look at the embedded server.
+    """Start, stop or inspect the embedded server.
 
-    Every command starts it by itself; it runs on until it is stopped or the machine goes down.
+    Every command starts it; it runs until it is stopped or the machine shuts down.
     """
     if settings.dsn is not None:
         raise UserError("a DSN is given (--dsn or TUNNELDB_DSN), so the embedded server is not used")
@@ -31,7 +31,7 @@ def start() -> None:
 
 @server.command(examples=["tunneldb server stop"])
 def stop() -> None:
-    """Stop it; what other commands are doing is undone."""
+    """Stop it; running transactions of other commands are rolled back."""
     embedded = Server()
     stopped = embedded.stop()
     tell(stopped=stopped, folder=embedded.folder)
@@ -40,7 +40,7 @@ def stop() -> None:
 
 @server.command(examples=["tunneldb server status"])
 def status() -> None:
-    """Print whether it runs, and where its data are."""
+    """Print its state and the place of its data."""
     embedded = Server()
     state = embedded.state()
     tell(state=state, folder=embedded.folder)

@@ -265,7 +265,7 @@ def _options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--no-truth", is_flag=True, help="Leave out the truth of each point (21 bytes a point).")
 @_options
 def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> None:
-    """Make a simulated scan of a tunnel, with its truth, in the folder OUT.
+    """Simulate a scan of a tunnel, with its reference data, in the folder OUT.
 
     A section is swept along a curved and sloping axis, perpendicular to it. A static scanner or a profiler on a
     trolley shoots rays at the lining, which carries leaks, cables, a tray, boxes, lamps, rails and refuge niches, and

@@ -57,7 +57,7 @@ def _option(name: str, metavar: str, text: str, kind: Any = FINITE) -> Any:
 @_option("name", "NAME", "First part of the file names.", str)
 @_option("seed", "N", "Seed; the same seed gives the same points.", SEED)
 def simulate_canal(out: Path, **given: Any) -> None:
-    """Make simulated scans of a canal tunnel, with their truth, in the folder OUT.
+    """Simulate scans of a canal tunnel, with their reference data, in the folder OUT.
 
     A laser scans the tunnel above the water, a mechanical sonar with beams of one degree scans walls and bed below it, from
     tripods whose place and direction are unknown. Both see ladders that stand in the water. Some echoes are false: by way of

@@ -48,7 +48,7 @@ def _option(name: str, metavar: str, text: str, kind: Any = FINITE, nargs: int =
 @_option("name", "NAME", "First part of the file names.", str)
 @_option("seed", "N", "Seed; the same seed gives the same points.", SEED)
 def simulate_structure(out: Path, **given: Any) -> None:
-    """Make a simulated scan of a structure, with its truth, in the folder OUT.
+    """Simulate a scan of a structure, with its reference data, in the folder OUT.
 
     Profiles, pipes with elbows and flanges, a cable tray, a grating of wires and a bundle of cables stand before a wall of
     two materials; posts and pipes in front hide strips of them. Painted, bare, galvanised and rusty steel, brick and

@@ -18,10 +18,10 @@ KINDS = ("points", "images", "sections", "results", "runs", "inputs")
 @click.argument("name", required=False, metavar="[SURVEY]")
 @click.pass_obj
 def sizes(settings: Settings, name: str | None) -> None:
-    """Tell what each survey, or SURVEY by itself, takes of the database.
+    """Show the disk space of each survey, or of SURVEY.
 
-    Points and images have tables of each survey. What stands behind a ≈ is the survey's share of tables that all have in
-    common, by the statistics of the last ANALYZE; nothing is counted for it. inputs: files, scanner positions, what is wanted.
+    Points and images have tables for each survey. Values with ≈ are the survey's share of common tables, estimated
+    from the last ANALYZE. inputs: files, scanner positions, goals.
     """
     with connect(settings.dsn) as connection:
         survey_id = None if name is None else get_survey(connection, name, site=True).id

@@ -28,7 +28,7 @@ from tunneldb.store.survey import get_survey
     type=FiniteRange(0.02, 0.5),
     required=True,
     metavar="M",
-    help="Radius of the spheres, m, 0.0725 for example.",
+    help="Radius of the spheres, m, such as 0.0725.",
 )
 @click.option(
     "--tolerance",
@@ -36,13 +36,13 @@ from tunneldb.store.survey import get_survey
     default=0.005,
     show_default=True,
     metavar="M",
-    help="The fitted radius may differ by so much, and the points lie off the sphere by so much (rms), m.",
+    help="Limit of the radius error and of the residuals (rms), m.",
 )
 @click.option(
     "--control",
     type=FilePath(dir_okay=False),
     metavar="CSV",
-    help="Control points, id,x,y,z, in the tunnel's system or another one.",
+    help="Control points, id,x,y,z, in the tunnel's system or another.",
 )
 @click.option(
     "--within",
@@ -50,7 +50,7 @@ from tunneldb.store.survey import get_survey
     default=0.1,
     show_default=True,
     metavar="M",
-    help="A control point belongs to the sphere within this distance, m.",
+    help="Greatest distance of a control point from its sphere, m.",
 )
 @click.option("--report", type=FilePath(dir_okay=False), metavar="FILE", help="Report to write, as Markdown.")
 @click.pass_obj
@@ -65,9 +65,9 @@ def spheres(
 ) -> None:
     """Find the target spheres in the scan files of SURVEY, and compare them with control points.
 
-    The files are read at full density. What is found replaces what was found before (tunnel_api.target_sphere). Residuals
-    and the best rigid motion onto the control points are reported, never applied. Stages need not have been run; after
-    sections the spheres have a chainage, and after ground the search leaves out the ground.
+    The files are read at full density. Results replace earlier ones (tunnel_api.target_sphere). Residuals and the
+    best rigid motion onto the control points are reported, never applied. No stage is required; after sections the
+    spheres have a chainage, and after ground the search excludes the ground.
     """
     from tunneldb.export.tables.targets import (
         CONTROL_HEADER,

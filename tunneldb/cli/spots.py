@@ -29,29 +29,33 @@ if TYPE_CHECKING:
 )
 @click.argument("survey")
 @click.option(
-    "--kind", type=click.Choice(["dark", "bright", "all"]), default="all", show_default=True, help="Against their own surface."
+    "--kind",
+    type=click.Choice(["dark", "bright", "all"]),
+    default="all",
+    show_default=True,
+    help="Dark or bright against their own surface.",
 )
 @click.option(
     "--geometry",
     type=click.Choice(["face", "map", "3d"]),
     default="face",
     show_default=True,
-    help="Coordinates: the face's own plane, of a pipe unrolled; the map; in space.",
+    help="Coordinates: plane of the face (pipes unrolled); map; space.",
 )
 @click.option(
     "--format",
     "form",
     type=click.Choice(["table", "csv", "geojson", "gpkg"]),
-    help="Default: by the ending of -o, else a table.",
+    help="Default: by the ending of -o, otherwise a table.",
 )
 @click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write.")
-@click.option("--min-area", type=FiniteRange(min=0), default=0.0, metavar="M2", help="Only those of at least so many m².")
+@click.option("--min-area", type=FiniteRange(min=0), default=0.0, metavar="M2", help="Least area, m².")
 @click.option(
     "--min-confidence",
     type=FiniteRange(0, 1),
     default=0.0,
     metavar="SHARE",
-    help="Only those that detection is at least so sure of, 0 to 1.",
+    help="Least confidence, 0 to 1.",
 )
 @click.pass_context
 def spots(
@@ -64,11 +68,10 @@ def spots(
     min_area: float,
     min_confidence: float,
 ) -> None:
-    """List what on the members of SURVEY is dark or bright against its own surface, or export it.
+    """List spots on the members of SURVEY that are dark or bright against their own surface, or export them.
 
-    First it says for what the list can't be vouched: what of the faces could not be judged, and whether files or settings have
-    changed since tunneldb members. Listed, but not counted, are those that an inspector rejected, or confirmed and the last run
-    did not find again.
+    First it states the part of the faces that could not be judged, and changes of files or settings since tunneldb
+    members. Rejected spots, and confirmed ones that the last run did not find, are listed and not counted.
     """
     from tunneldb.export.tables.spots import as_csv, as_geojson, write_gpkg
     from tunneldb.store.spots import Kind, SpotSelection, read_spots

@@ -26,26 +26,26 @@ AT_ONCE = 50
 
 @verb(examples=["tunneldb status", "tunneldb status pajares-2026 --watch", "tunneldb status pajares-2026 --json"])
 @click.argument("survey", required=False)
-@click.option("--watch", is_flag=True, help="Look again and again until nothing is left to do, or Ctrl-C.")
+@click.option("--watch", is_flag=True, help="Refresh until nothing is left to do, or Ctrl-C.")
 @click.option(
     "--interval",
     type=FiniteRange(0.1, 3600.0),
     default=2.0,
     show_default=True,
     metavar="S",
-    help="Time between two looks of --watch, seconds.",
+    help="Interval of --watch, seconds.",
 )
 @click.pass_obj
 def status(settings: Settings, survey: str | None, watch: bool, interval: float) -> None:
-    """Show how far each kilometre of SURVEY has come, files, workers, speed and time left; or all surveys in short.
+    """Show stages done in each kilometre of SURVEY, files, workers, speed and remaining time; or a summary of all.
 
     \b
     done         the result is in the database
-    running      a process is at it
+    running      in progress
     queued       ready: the next free worker takes it
     waits        for an earlier stage, of this kilometre or of a neighbour
     failed       the reason is beside it
-    stale        done, but what it rests on has changed since
+    stale        done, but its input has changed since
     interrupted  the program that ran it is gone
     never        not yet run
     empty        the kilometre holds no points, and awaits none

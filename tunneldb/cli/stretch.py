@@ -47,8 +47,8 @@ class Stretch:
 
 def stretch_options(command: Command) -> Command:
     """Add the options --from and --to, which the command gets as ``start`` and ``end``."""
-    help_from = "Begin at this place: a station of the tunnel, as 12+345.678, or a chainage in plain metres, as 345.678."
-    end = click.option("--to", "end", metavar="PLACE", help="End there.")
+    help_from = "Start: a station of the tunnel, as 12+345.678, or a chainage in metres, as 345.678."
+    end = click.option("--to", "end", metavar="PLACE", help="End, likewise.")
     return click.option("--from", "start", metavar="PLACE", help=help_from)(end(command))
 
 

@@ -24,7 +24,7 @@ FILE = FilePath()
 
 @click.group(cls=VerbGroup)
 def survey() -> None:
-    """Add, list, measure, set, archive or remove the scanning campaigns of a tunnel, and withdraw files."""
+    """Add, list, change, export, import or remove surveys of a tunnel, and remove files."""
 
 
 survey.add_command(export)
@@ -57,39 +57,40 @@ DAY = Day()
     ]
 )
 @click.argument("name")
-@click.option("--tunnel", required=True, help="Tunnel that was scanned.")
-@click.option("--date", type=DAY, required=True, metavar="YYYY-MM-DD", help="Day of the scan.")
-@click.option("--trajectory", type=FILE, help="CSV with time,x,y,z of a mobile scanner; time as gps_time in the files.")
+@click.option("--tunnel", required=True, help="Scanned tunnel.")
+@click.option("--date", type=DAY, required=True, metavar="YYYY-MM-DD", help="Date of the scan.")
+@click.option("--trajectory", type=FILE, help="CSV with time,x,y,z of a mobile scanner; time is the gps_time of the files.")
 @click.option(
     "--stations",
     type=FILE,
     multiple=True,
-    help="CSV with scan_id,x,y,z of a static scanner, scan_id as point_source_id; or an E57 or PTX file, for the poses of its "
-    "scans; or a folder of such files. May be given several times.",
+    help="CSV with scan_id,x,y,z of a static scanner (scan_id is point_source_id); or an E57 or PTX file "
+    "with the poses of its scans; or a folder of such files. May be repeated.",
 )
 @click.option(
     "--no-poses",
     is_flag=True,
-    help="Nobody knows where the scanner was, as of merged scans: intensity, of kind reflectance or none, is taken as it is, "
-    "and every result says so.",
+    help="Unknown scanner positions, as of merged scans: intensity, of kind reflectance or none, is used "
+    "uncorrected, and every result states it.",
 )
-@click.option("--backwards", is_flag=True, help="The trajectory was driven towards falling chainage.")
+@click.option("--backwards", is_flag=True, help="The trajectory was driven down-chainage.")
 @click.option(
     "--reference",
     metavar="FILE|auto",
-    help="The scanner's intensity over range: CSV with range_m,intensity_db, measured on a target; or auto, to have it found "
-    "on the lining (a file of that name is ./auto).",
+    help="Intensity of the scanner by range: CSV with range_m,intensity_db, measured on a target; or auto: "
+    "estimated on the lining (a file of that name is ./auto).",
 )
 @click.option(
     "--intensity",
     metavar="DIMENSION",
-    help="Dimension of the files that holds the intensity, such as Amplitude; not read when the kind is none.",
+    help="Dimension of the files with the intensity, such as Amplitude; not read for kind none.",
 )
 @click.option(
     "--intensity-kind",
     type=click.Choice(["amplitude", "reflectance", "linear", "none"]),
     required=True,
-    help="amplitude: dB, falls with range. reflectance: dB, range removed by the maker. linear: counts. none: there is none.",
+    help="amplitude: dB, decreases with range. reflectance: dB, range corrected by the manufacturer. "
+    "linear: counts. none: no intensity.",
 )
 @click.pass_obj
 def add(
@@ -145,12 +146,12 @@ def add(
     ],
 )
 @click.argument("name")
-@click.option("--date", type=DAY, metavar="YYYY-MM-DD", help="Day of the scan.")
-@click.option("--trajectory", type=FILE, help="Takes the place of the scanner's positions; as for survey add.")
-@click.option("--stations", type=FILE, multiple=True, help="The same for a static scanner; may be given several times.")
-@click.option("--backwards", is_flag=True, help="The trajectory was driven towards falling chainage.")
-@click.option("--reference", metavar="FILE|auto", help="The scanner's intensity over range, as for survey add.")
-@click.option("--intensity", metavar="DIMENSION", help="Dimension that holds the intensity; the files must be loaded again.")
+@click.option("--date", type=DAY, metavar="YYYY-MM-DD", help="Date of the scan.")
+@click.option("--trajectory", type=FILE, help="Replaces the scanner positions; as for survey add.")
+@click.option("--stations", type=FILE, multiple=True, help="Likewise for a static scanner; may be repeated.")
+@click.option("--backwards", is_flag=True, help="The trajectory was driven down-chainage.")
+@click.option("--reference", metavar="FILE|auto", help="Intensity of the scanner by range, as for survey add.")
+@click.option("--intensity", metavar="DIMENSION", help="Dimension with the intensity; the files must be loaded again.")
 @click.option("--intensity-kind", type=click.Choice(["amplitude", "reflectance", "linear", "none"]), help="What it is.")
 @click.pass_obj
 def set_(
@@ -164,7 +165,7 @@ def set_(
     intensity: str | None,
     intensity_kind: str | None,
 ) -> None:
-    """Set what was said of the survey NAME to something else; what rests on it is stale then.
+    """Change the settings of the survey NAME; results that depend on them become stale.
 
     Points, axis, sections and reviews stay.
     """
@@ -211,12 +212,12 @@ def set_(
 @click.option("--yes", is_flag=True, help="Do not ask.")
 @click.pass_obj
 def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: bool) -> None:
-    """Withdraw FILES, by their names, from SURVEY, as if they had never been loaded.
+    """Remove FILES, by their names, from SURVEY, as if they had never been loaded.
 
-    Files that overlap them are read again, and their kilometres loaded without them. One that is left without points
-    loses all that was made of it: where somebody has reviewed leaks there, or moved vertices, it asks first; findings that
-    people drew, redrew, split or merged are kept. A file that
-    a batch could not read is taken off its list. If it is cut off, call it again.
+    Overlapping files are read again, and their kilometres loaded without the removed ones. A kilometre without points
+    loses its results; if it has reviewed leaks or moved vertices, the command asks first. Findings that people drew,
+    redrew, split or merged are kept. A file that a batch could not read is removed from its list. After an
+    interruption, repeat the command.
     """
     from tunneldb.pipeline.remove import known_names, remove_files, work_at_stake
     from tunneldb.pipeline.site_files import remove_site_files

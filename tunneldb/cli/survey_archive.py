@@ -20,10 +20,11 @@ from tunneldb.store.survey import get_survey
 @click.option("--output", "-o", type=FilePath(), required=True, help="File to write, such as ringo-2024.tdb.")
 @click.pass_obj
 def export(settings: Settings, name: str, output: Path) -> None:
-    """Write SURVEY with all that belongs to it into one file, from which survey import restores it.
+    """Write SURVEY with all its data into one file for survey import.
 
-    The file holds the survey's rows of all tables, points and images among them, its tunnel, and its part of the audit; scan
-    files and photos stay where they lie. No stage may be at work on the survey meanwhile; reviews go on, and are not in it.
+    The file holds the survey's rows of all tables, including points and images, its tunnel, and its part of the
+    audit. Scan files and photos are not included. No stage may be running on the survey; later reviews are not
+    included.
     """
     from tunneldb.export.archive.save import save_survey
 
@@ -45,13 +46,13 @@ def export(settings: Settings, name: str, output: Path) -> None:
     ],
 )
 @click.argument("file", type=FilePath())
-@click.option("--name", help="What the survey is to be called here; its own name without.")
+@click.option("--name", help="Name of the survey in this database; default: its own name.")
 @click.pass_obj
 def import_(settings: Settings, file: Path, name: str | None) -> None:
-    """Bring the survey of FILE, which survey export wrote, into the database, whole or not at all.
+    """Import the survey of FILE, written by survey export, into the database in one transaction.
 
-    Its tunnel is added, or the one of that name used if the axis is the same. In the database that it came from all rows have
-    the numbers that they had; in another they get new ones. If it is cut off, nothing was imported; call it again.
+    Its tunnel is added, or the existing one is used if the axis is the same. In the original database all rows keep
+    their numbers; in another they get new ones. After an interruption nothing is imported: repeat the command.
     """
     from tunneldb.export.archive.load import load_survey
 

@@ -37,11 +37,9 @@ from tunneldb.errors import UserError
 @click.argument("after")
 @layer_option
 @stretch_options
-@click.option(
-    "--minimum", type=FiniteRange(0.0), metavar="M", help="Thickness that is demanded, m: states how many m² are thinner."
-)
+@click.option("--minimum", type=FiniteRange(0.0), metavar="M", help="Required thickness, m: states the area below it.")
 @every_option()
-@axis_sigma_option("How well the two scans lie to each other, standard deviation, m: goes into the errors of volumes.")
+@axis_sigma_option("Accuracy of the registration between the scans, standard deviation, m: part of the errors of volumes.")
 @output_option("File to write: .csv of sections.")
 @click.pass_obj
 def thickness(
@@ -56,11 +54,11 @@ def thickness(
     axis_sigma: float | None,
     output: Path | None,
 ) -> None:
-    """State what lies between surveys BEFORE and AFTER of one tunnel: what was put on, or went.
+    """Compute layer thickness and volume between the surveys BEFORE and AFTER of one tunnel.
 
-    Both are held against the design profiles of one layer, whichever they show themselves, and compared in cells of 0.1 m along
-    its lines and arcs: thickness is measured at right angles to these. What is missing or out of date is made first. Only what
-    both saw is in a volume or an area.
+    Both are compared with the design profiles of one layer, in cells of 0.1 m along its lines and arcs: thickness is
+    measured at right angles to these. Missing or outdated results are computed first. Volumes and areas include only
+    lining that both inspected.
     """
     from tunneldb.measures.deviation.tables import rows_csv
     from tunneldb.measures.thickness.measure import measure_thickness

@@ -46,7 +46,7 @@ class Srid(click.ParamType[int]):
 
 @click.group(cls=VerbGroup)
 def tunnel() -> None:
-    """Add, list or remove tunnels, and give them a stationing."""
+    """Add, list or remove tunnels; set their stationing."""
 
 
 @tunnel.command(
@@ -65,7 +65,8 @@ def tunnel() -> None:
     "--srid",
     type=Srid(),
     required=True,
-    help="Spatial reference of all coordinates, an EPSG number: projected, metres; or local: metres of no place on Earth.",
+    help="Spatial reference of all coordinates: EPSG number of a projected system in metres, or local: "
+    "metres in own coordinates.",
 )
 @click.option(
     "--axis",
@@ -73,42 +74,43 @@ def tunnel() -> None:
     help="Design alignment (LandXML, IFC 4.3); lines of a drawing or a map (DXF, GeoPackage, Shapefile, GeoJSON, FlatGeobuf); "
     "CSV with a header x,y,z, or a trajectory: points of the axis in growing chainage; or auto: found in the SCAN files.",
 )
-@click.option("--site", is_flag=True, help="It has no axis: a bridge, a hall, a plant, of which structures are to be found.")
-@click.option("--axis-layer", metavar="NAME", help="Which layer of a drawing or a map, if several hold lines.")
+@click.option("--site", is_flag=True, help="A structure without an axis: a bridge, a hall, a plant.")
+@click.option("--axis-layer", metavar="NAME", help="Layer of a drawing or map, if several hold lines.")
 @click.option(
     "--axis-unit",
     type=click.Choice(UNITS),
     metavar="UNIT",
-    help=f"Unit of a LandXML's or a DXF's lengths, where it states none or a wrong one: {', '.join(UNITS)}.",
+    help="Unit of the lengths of a LandXML or DXF without a unit, or with a wrong one: millimeter, "
+    "centimeter, meter, kilometer, inch, foot, USSurveyFoot, mile. ",
 )
 @click.option(
     "--alignment",
     metavar="NAME",
-    help="Which alignment of a LandXML or IFC file, if it holds several; of lines that don't meet, the number.",
+    help="Alignment of a LandXML or IFC file with several; number of one of several lines that do not meet.",
 )
-@click.option("--profile", metavar="NAME", help="Which profile of the alignment, if it has several.")
-@click.option("--reverse", is_flag=True, help="Let chainage grow the other way; not of a design alignment.")
+@click.option("--profile", metavar="NAME", help="Profile of the alignment, if it has several.")
+@click.option("--reverse", is_flag=True, help="Reverse the direction of chainage; not for a design alignment.")
 @click.option(
     "--start-chainage",
     type=FINITE,
     metavar="M",
-    help="Chainage of the axis's beginning. [default: that of the alignment; else 0]",
+    help="Chainage of the start of the axis. [default: that of the alignment; else 0]",
 )
 @click.option(
-    "--spacing", type=FINITE, default=10.0, show_default=True, metavar="M", help="Distance between the axis's vertices."
+    "--spacing", type=FINITE, default=10.0, show_default=True, metavar="M", help="Distance between the axis vertices."
 )
 @click.option(
     "--stationing",
     "equations",
     type=FilePath(),
     metavar="FILE",
-    help="The tunnel's own stationing, see tunneldb tunnel stationing. [default: that of the alignment]",
+    help="CSV of the tunnel's stationing, see tunneldb tunnel stationing. [default: that of the alignment]",
 )
 @click.option(
     "--axis-out",
     type=FilePath(dir_okay=False),
     metavar="FILE",
-    help="Where an axis found in SCAN files is kept, .csv, with its picture, .png, beside it. [default: NAME.found-axis.csv]",
+    help="File of an axis found in SCAN files, .csv, with a picture, .png, beside it. [default: NAME.found-axis.csv]",
 )
 @click.pass_obj
 def add(
@@ -128,13 +130,13 @@ def add(
     equations: Path | None,
     axis_out: Path | None,
 ) -> None:
-    """Add the tunnel NAME with its given axis, or with --site a structure that has none.
+    """Add the tunnel NAME with its given axis, or, with --site, a structure without an axis.
 
-    Of a design alignment the elements (lines, arcs, clothoids; grades, parabolas, circles) and the stationing are kept, and
-    the axis follows them to a millimetre. Lengths in feet are turned into metres when the file says that they are feet.
+    The elements of a design alignment (lines, arcs, clothoids; grades, parabolas, circles) and its stationing are
+    stored, and the axis follows them to a millimetre. Lengths in feet are converted if the file states them.
 
-    Lines that meet end to end are joined. A line without heights, as drawn in QGIS, takes its heights and the tunnel's middle
-    from SCAN files. With --axis auto these are all that is needed; look at the picture that is written.
+    Lines that meet end to end are joined. A line without heights, as drawn in QGIS, takes its heights and the
+    tunnel's middle from SCAN files. --axis auto needs SCAN files only; check the picture that is written.
     """
     from tunneldb.alignment.drawing import describe_line
     from tunneldb.alignment.given import read_given
@@ -226,21 +228,21 @@ def _add_site(settings: Settings, name: str, srid: int, given: set[Any]) -> None
     "-o",
     "--output",
     type=FilePath(dir_okay=False),
-    help="Axis to write, .csv with x,y,z. [default: NAME.found-axis.csv, NAME being what the SCAN files are called]",
+    help="Axis to write, .csv with x,y,z. [default: NAME.found-axis.csv, with the name of the SCAN files]",
 )
 @click.option(
     "--picture",
     type=FilePath(dir_okay=False),
     metavar="FILE",
-    help="Picture to write, .png. [default: beside the axis, of its name]",
+    help="Picture to write, .png. [default: beside the axis, with its name]",
 )
-@click.option("--reverse", is_flag=True, help="Let chainage grow the other way.")
+@click.option("--reverse", is_flag=True, help="Reverse the direction of chainage.")
 def find_axis(scans: tuple[Path, ...], output: Path | None, picture: Path | None, reverse: bool) -> None:
     """Find the axis of the tunnel in SCAN files; needs no database.
 
-    It needs a roof, two walls and a floor along most of one tunnel, and nothing else: straight or curved, rising or falling,
-    with niches, cross passages, a train, open cuts before the portals. Chainage grows from the end farther west. The picture
-    shows the line over the points in plan and profile: look at it, then tunneldb tunnel add --axis.
+    It needs a roof, two walls and a floor along most of one tunnel. The tunnel may be straight or curved, level or
+    steep, with niches, cross passages, a train, or open cuts at the portals. Chainage increases from the western end.
+    The picture shows the line over the points in plan and profile: check it, then use tunneldb tunnel add --axis.
     """
     from tunneldb.alignment.drawing import describe_line
     from tunneldb.files import common_name
@@ -278,15 +280,15 @@ def _keep(found: FoundAxis, path: Path, picture: Path | None, start: float, titl
 @click.argument("name")
 @click.argument("file", type=FilePath(), required=False)
 @click.option("--show", is_flag=True, help="Print the pieces of the stationing.")
-@click.option("--clear", is_flag=True, help="Take the tunnel's own stationing away: stations are chainages again.")
+@click.option("--clear", is_flag=True, help="Remove the stationing: stations are chainages again.")
 @click.pass_obj
 def stationing(settings: Settings, name: str, file: Path | None, show: bool, clear: bool) -> None:
-    """Give the tunnel NAME its own stationing from FILE, show it, or take it away.
+    """Set the stationing of the tunnel NAME from FILE, show it, or remove it.
 
-    FILE is a CSV with a row for each piece of the stationing: chainage,station and, if a piece runs backwards, direction.
-    From that chainage (distance along the axis, m) the station is station + direction × (chainage - that of the row), up to
-    the next row; before the first row it is reckoned back from that. Nothing else is changed: all is stored in chainage,
-    and the labels of views, lists and pictures (12+345.678) are stations from then on.
+    FILE is a CSV with a row for each piece of the stationing: chainage,station and, if a piece runs backwards,
+    direction. From that chainage (distance along the axis, m) the station is station + direction × (chainage - that
+    of the row), up to the next row. The first row also applies before its chainage. All data stay stored in chainage;
+    labels (12+345.678) in views, lists and pictures are stations.
     """
     from tunneldb.store.alignment import read_equations, save_equations
     from tunneldb.store.catalog import get_tunnel
@@ -334,7 +336,7 @@ def list_(settings: Settings) -> None:
 @click.argument("name")
 @click.pass_obj
 def remove(settings: Settings, name: str) -> None:
-    """Remove the tunnel NAME, which must have no surveys any more."""
+    """Remove the tunnel NAME, which must have no surveys."""
     from tunneldb.store.catalog import remove_tunnel
 
     with connect(settings.dsn) as connection:

@@ -16,14 +16,14 @@ SHOWN = 20
 
 
 @verb(examples=["tunneldb vacuum", "tunneldb vacuum --yes"])
-@click.option("--yes", is_flag=True, help="Do it; without, it is only shown.")
+@click.option("--yes", is_flag=True, help="Do it; without it, only show.")
 @click.pass_obj
 def vacuum(settings: Settings, yes: bool) -> None:
-    """Show what deleted and replaced rows take, of the schema's tables; with --yes VACUUM (ANALYZE) those.
+    """Show the disk space of deleted and replaced rows; with --yes VACUUM (ANALYZE) their tables.
 
-    What is freed is used for new rows; PostgreSQL gives back to the disk only what lies at a table's end. The numbers are
-    estimates of the server's statistics. Points of a kilometre that is replaced, and surveys that are removed, leave nothing.
-    Tables that somebody is changing at the moment are left out, and told. For operators.
+    Freed space is used for new rows; PostgreSQL returns only the end of a table to the disk. The numbers are
+    estimates of the server's statistics. Replaced kilometres and removed surveys leave no dead rows. Tables in use
+    are skipped and listed. For operators.
     """
     from tunneldb.database.vacuum import tables_to_vacuum
     from tunneldb.database.vacuum import vacuum as run

@@ -17,21 +17,23 @@ from tunneldb.errors import UserError
 
 
 @verb(examples=["tunneldb worker --concurrency 8"])
-@click.option("--concurrency", type=click.IntRange(1, 1000), default=1, show_default=True, metavar="N", help="Jobs at a time.")
+@click.option(
+    "--concurrency", type=click.IntRange(1, 1000), default=1, show_default=True, metavar="N", help="Number of parallel jobs."
+)
 @click.option(
     "--threads",
     type=click.IntRange(1, 1000),
     default=1,
     show_default=True,
     metavar="N",
-    help="Threads that each computes with.",
+    help="Threads for each job.",
 )
 @click.pass_obj
 def worker(settings: Settings, concurrency: int, threads: int) -> None:
-    """Do what batches ask for, of all surveys, until told to stop.
+    """Run queued jobs of all surveys until stopped.
 
-    A worker needs the database and the scan files, under the same paths as where the batch was called. A server that is away is
-    waited for. Ctrl-C, SIGTERM and tunneldb stop let it end the stage that it is at; a second Ctrl-C ends it at once.
+    A worker needs the database, and the scan files under the same paths as the batch. It waits for an unreachable
+    server. After Ctrl-C, SIGTERM or tunneldb stop it finishes the current stage; a second Ctrl-C ends it at once.
     """
     from tunneldb.queue.pool import WorkerPool, interrupts
     from tunneldb.queue.worker import Orders
@@ -81,10 +83,10 @@ class _Jobs:
 
 
 @verb(examples=["tunneldb stop --wait"])
-@click.option("--wait", is_flag=True, help="Wait until all have left.")
+@click.option("--wait", is_flag=True, help="Wait until all have exited.")
 @click.pass_obj
 def stop(settings: Settings, wait: bool) -> None:
-    """Ask all workers of the database to end the stages that they are at, and leave. What is wanted stays wanted."""
+    """Ask all workers of the database to finish their current stage and exit. Goals are kept."""
     with connect(settings.dsn) as conn:
         conn.autocommit = True
         conn.execute("SELECT tunnel_internal.queue_rescue()")
