@@ -132,6 +132,6 @@ def test_detection_by_a_curve_found_on_the_lining(conn, stations):
 
 def test_a_curve_that_the_maker_removed_is_not_sought(conn, stations):
     says = _add(stations, "Reflectance", "reflectance", code=2)
-    assert "--reference auto has nothing to find" in says
+    assert "--reference auto is not needed" in says
     assert len(says.strip().splitlines()) == 1
     assert conn.execute("SELECT count(*) FROM tunnel.survey").fetchone() == (0,)

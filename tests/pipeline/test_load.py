@@ -90,12 +90,12 @@ def test_the_same_content_under_another_name_is_left_out(survey: psycopg.Connect
     copy.write_bytes(path.read_bytes())
     said, first = load(survey, [path, copy])
     assert (said.name, said.state, said.kept) == ("copy.laz", "a copy", 0)
-    assert said.note == "has the same content as a.laz: left out, for all its points would count twice"
+    assert said.note == "has the same content as a.laz: left out, because all its points would count twice"
     assert first.kept > 0
     before = rows(survey)
     (said,) = load(survey, [copy])
     assert said.note is not None
-    assert said.note.startswith("has the same content as a.laz, which the survey holds: left out")
+    assert said.note.startswith("has the same content as a.laz, which is in the survey: left out")
     assert rows(survey) == before
     load(survey, [copy, other])
     assert survey.execute("SELECT name FROM tunnel.scan_file ORDER BY 1").fetchall() == [("a.laz",), ("other.laz",)]

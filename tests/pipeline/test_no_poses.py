@@ -17,7 +17,7 @@ from tunneldb.simulate import Parameters, Simulation, write
 
 pytestmark = pytest.mark.slow
 
-SAID = "where the scanner was is not known"
+SAID = "scanner positions are unknown"
 
 
 def command(*arguments: object, code: int = 0) -> Result:
@@ -83,6 +83,6 @@ def test_what_falls_with_range_is_not_set_either(cloud: Path, conn: psycopg.Conn
     command("tunnel", "add", "t", "--srid", 25830, "--axis", cloud / "t.axis.csv")
     command("survey", "add", "s", "--tunnel", "t", "--date", "2024-05-04", "--no-poses", "--intensity-kind", "none")
     refused = command("survey", "set", "s", "--intensity-kind", "linear", "--intensity", "intensity", code=2)
-    assert "can't be corrected without scanner positions" in refused.stderr
+    assert "cannot be corrected without scanner positions" in refused.stderr
     command("survey", "set", "s", "--trajectory", cloud / "t.trajectory.csv")
     assert conn.execute("SELECT platform FROM tunnel.survey").fetchone() == ("mobile",)

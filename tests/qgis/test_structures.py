@@ -38,7 +38,7 @@ def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
     assert "tunneldb members hall-1" in command("qgis", "hall-1", "-o", project, code=2)
     assert not project.exists()
     save_example_structures(conn, "hall-1")
-    assert "more than half differs of member 2" in command("qgis", "hall-1", "-o", project)
+    assert "more than half of member 2 differs" in command("qgis", "hall-1", "-o", project)
     seen = act(project, "describe")
     assert {name: (layer["wkb"], layer["features"]) for name, layer in seen["layers"].items()} == LAYERS | {
         "remark": ("NoGeometry", 0), "scan_station": ("PointZ", 1),

@@ -47,7 +47,7 @@ def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
     warning, figures = text.index('id="unjudged"'), text.index('class="figures"')
     assert warning < figures
     assert listed["statement"][1:] in text[warning:figures]
-    assert "more than half differs of member 2" in text[warning:figures]
+    assert "more than half of member 2 differs" in text[warning:figures]
     assert f"<dd>{listed['count']}</dd>" in text[figures:]
     assert f"<dd>{listed['area']:.4f} " in text[figures:]
     spots = rows(text, "Spots")

@@ -195,6 +195,6 @@ def _print(found: FileMembers) -> None:
         if count:
             click.echo(f"{count} of {found.points} points {why} and were left out")
     if bimodal := [str(member.number) for member in structures.members if member.bimodal]:
-        click.echo(f"more than half differs of member {', '.join(bimodal)} (bimodal): which half is its own surface is open")
+        click.echo(f"more than half of member {', '.join(bimodal)} differs (bimodal): its own surface cannot be identified")
     for note in found.notes:
         click.echo(note)

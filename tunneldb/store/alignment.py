@@ -1,4 +1,4 @@
-"""A tunnel's station equations and its design alignment, to and from the database, and how far the axis lies from that."""
+"""Station equations and design alignment of a tunnel in the database, and the deviation of the axis from the design."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def read_equations(path: Path) -> list[Equation]:
     """
     table = read_csv(path, ("chainage", "station", "direction"), default={"direction": 1.0})
     if len(table) == 0:
-        raise UserError(f"{path} has no row under its header; it needs one for each piece of the stationing")
+        raise UserError(f"{path} has no row below its header; it needs one for each piece of the stationing")
     table.require_growing("chainage")
     for row, direction in enumerate(table["direction"]):
         if direction not in (1, -1):
@@ -39,7 +39,7 @@ def read_equations(path: Path) -> list[Equation]:
 
 
 def station_chainages(connection: psycopg.Connection[Any], tunnel_id: int, station: str) -> list[float]:
-    """Chainages, m, at which a tunnel has a station as 12+345.678, in order: none, one or, where stations repeat, several.
+    """Return the chainages, m, of a station such as 12+345.678, in order: none, one or, if stations repeat, several.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def station_chainages(connection: psycopg.Connection[Any], tunnel_id: int, stati
 
 
 def save_equations(connection: psycopg.Connection[Any], tunnel_id: int, equations: Sequence[Equation]) -> None:
-    """Give a tunnel these station equations in place of those that it had; without any its stations are its chainages.
+    """Replace a tunnel's station equations by these; without any its stations are its chainages.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def save_equations(connection: psycopg.Connection[Any], tunnel_id: int, equation
 
 
 def _require_within(connection: psycopg.Connection[Any], tunnel_id: int, equations: Sequence[Equation]) -> None:
-    """An equation beyond the end is likely a station where a chainage should stand. Before the beginning one may lie."""
+    """Refuse an equation beyond the end, probably a station instead of a chainage. One before the beginning is allowed."""
     row = connection.execute(
         "SELECT name, start_chainage, start_chainage + ST_Length(alignment) FROM tunnel.tunnel WHERE id = %s", [tunnel_id]
     ).fetchone()
@@ -91,7 +91,7 @@ def _require_within(connection: psycopg.Connection[Any], tunnel_id: int, equatio
     name, start, end = row
     if equations and equations[-1].chainage >= end:
         raise UserError(
-            f"a station equation at chainage {equations[-1].chainage:.3f} m lies beyond the end of tunnel {name!r}, which "
+            f"a station equation at chainage {equations[-1].chainage:.3f} m is beyond the end of tunnel {name!r}, which "
             f"reaches from {start:.3f} to {end:.3f} m; chainage is distance along the axis, not a station"
         )
 
@@ -106,7 +106,7 @@ def load_stationing(connection: psycopg.Connection[Any], tunnel_id: int) -> Stat
 
 
 def labels(conn: psycopg.Connection[Any], survey: Survey, chainages: Float) -> list[str]:
-    """Stations at chainages (m) of a survey's tunnel, written 12+345.678."""
+    """Return the stations at chainages (m) of a survey's tunnel, in the form 12+345.678."""
     rows = conn.execute(
         "SELECT tunnel_api.station_label(%s, c.chainage) FROM unnest(%s::float8[]) WITH ORDINALITY AS c (chainage, n)"
         " ORDER BY n",
@@ -116,7 +116,7 @@ def labels(conn: psycopg.Connection[Any], survey: Survey, chainages: Float) -> l
 
 
 def save_design(connection: psycopg.Connection[Any], tunnel_id: int, design: Design) -> None:
-    """Store the elements of a design alignment, and its stationing where it has its own."""
+    """Store the elements of a design alignment, and its stationing if it has one."""
     plan = [
         (tunnel_id, n, e.kind, design.start + distance, e.length, e.x, e.y, e.bearing, e.curvature_from, e.curvature_to)
         for n, (e, distance) in enumerate(zip(design.plan, design.distances.tolist(), strict=False), start=1)
@@ -154,7 +154,7 @@ def save_design(connection: psycopg.Connection[Any], tunnel_id: int, design: Des
 def load_deviation(
     connection: psycopg.Connection[Any], survey: Survey, low: float = -math.inf, high: float = math.inf
 ) -> Deviation:
-    """Return how far a survey's axis lies from the axis given, between two chainages (m).
+    """Return the deviation of a survey's axis from the given axis, between two chainages (m).
 
     Raises
     ------

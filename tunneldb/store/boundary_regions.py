@@ -13,7 +13,7 @@ from tunneldb.anomalies.regions import Region, RegionProperties
 from tunneldb.store.survey import Survey
 
 LOCK = -3
-"""First key of the advisory lock, the survey being the second: findings across ends of kilometres are written one by one."""
+"""First key of the advisory lock; the survey is the second. Findings across kilometre boundaries are written one by one."""
 
 
 def replace_boundary_regions(conn: psycopg.Connection[Any], survey: Survey, km: int, regions: Sequence[Region]) -> set[int]:

@@ -33,7 +33,7 @@ from tunneldb.store.unknown import unknown_survey, unknown_tunnel
 
 @dataclass(frozen=True)
 class Intensity:
-    """Which dimension of the scan files holds the intensity, and what it is."""
+    """Intensity dimension of the scan files, and its kind."""
 
     kind: str
     dimension: str | None
@@ -109,9 +109,9 @@ def _taken(name: str) -> UserError:
 
 
 def _require_name(name: str) -> None:
-    """Names stand in file names and on the command line."""
+    """Refuse names that are unsuitable for file names and the command line."""
     if not re.fullmatch(r"[A-Za-z0-9][\w.-]*", name):
-        raise UserError(f"the name {name!r} will not do: letters, digits, and inside also - _ .")
+        raise UserError(f"invalid name {name!r}: use letters, digits, and - _ . inside")
 
 
 def _require_metres(connection: psycopg.Connection[Any], srid: int) -> None:
@@ -129,7 +129,7 @@ def _require_metres(connection: psycopg.Connection[Any], srid: int) -> None:
 
 
 def survey_exists(name: str) -> UserError:
-    """What is said of a survey's name that is taken."""
+    """Return the error for an existing survey's name."""
     return UserError(f"there is a survey {name!r} already: tunneldb survey list")
 
 
@@ -206,7 +206,7 @@ def add_survey(
 
 @dataclass(frozen=True)
 class SurveyChange:
-    """What a survey is to be set to; None leaves what it has.
+    """New settings of a survey; None keeps the old one.
 
     Attributes
     ----------
@@ -230,7 +230,7 @@ class SurveyChange:
 
 
 def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyChange) -> tuple[list[str], int]:
-    """Set a survey's date, positions, reference or intensity; what rests on them is stale then.
+    """Set a survey's date, positions, reference or intensity; results that depend on them become stale.
 
     Returns
     -------
@@ -347,12 +347,12 @@ def remove_tunnel(connection: psycopg.Connection[Any], name: str) -> None:
 
 
 def make_layers(connection: psycopg.Connection[Any]) -> None:
-    """Give each coordinate system that tunnels are in its schema of typed layers; drop those of others."""
+    """Create the schema of typed layers of each coordinate system in use; drop the others."""
     connection.execute("CALL tunnel_api.make_layers()")
 
 
 def crs_text(conn: psycopg.Connection[Any], srid: int) -> str:
-    """A coordinate system of the database as other programs know it: AUTHORITY:CODE, its definition, or that it is local.
+    """Return a coordinate system of the database in a form for other programs: AUTHORITY:CODE, its definition, or local.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Taking away what was made of a kilometre that holds no points any more."""
+"""Delete the results of a kilometre without points."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tunneldb.store.survey import Survey
 
 @dataclass(frozen=True)
 class Work:
-    """What people have done to the results of kilometres.
+    """Manual edits of the results of kilometres.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Work:
 
 
 def work_in(conn: psycopg.Connection[Any], survey: Survey, kms: list[int]) -> Work:
-    """Count what would go with the results of kilometres."""
+    """Count the manual edits that would be lost with the results of kilometres."""
     row = conn.execute(
         """
         SELECT count(*) FILTER (WHERE NOT q.drawn), count(*) FILTER (WHERE NOT q.drawn AND q.reviewed),
@@ -52,7 +52,7 @@ def work_in(conn: psycopg.Connection[Any], survey: Survey, kms: list[int]) -> Wo
 
 
 def has_results(conn: psycopg.Connection[Any], survey: Survey, km: int) -> bool:
-    """Whether a stage after ``load`` was tried in a kilometre, so that there is something to be cleared."""
+    """Return True if a stage after ``load`` was tried in a kilometre, so that there may be results."""
     row = conn.execute(
         "SELECT FROM tunnel.run WHERE survey_id = %s AND km = %s AND stage <> 'load' LIMIT 1", [survey.id, km]
     ).fetchone()
@@ -60,7 +60,7 @@ def has_results(conn: psycopg.Connection[Any], survey: Survey, km: int) -> bool:
 
 
 def clear_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Work:
-    """Delete the results of all stages after ``load`` in a kilometre, and that they ran; what a batch wants of it, too.
+    """Delete the results and runs of all stages after ``load`` in a kilometre, and its requests of a batch.
 
     That points were loaded, and are gone, stays in the ledger: what the neighbours have is stale by that. Findings that people
     drew stay where they are, and what they have changed by hand stays in the audit.

@@ -1,4 +1,4 @@
-"""Where a survey was searched for leaks and what was seen of it, as every document states it."""
+"""Search and inspection coverage of a survey, as stated in every document."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class CoverageGap:
 
 @dataclass(frozen=True)
 class Coverage:
-    """What a statement on the leaks of a stretch rests on.
+    """Data for a statement on the leaks of a stretch.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Coverage:
 
     @property
     def complete(self) -> bool:
-        """Whether all of it was searched, and anything was seen."""
+        """True if all of it was searched, and anything was inspected."""
         return self.seen_area > 0 and all(gap.searched for gap in self.gaps)
 
 
@@ -82,7 +82,7 @@ _GAPS = sql.SQL(
 
 
 def read_coverage(conn: psycopg.Connection[Any], survey: Survey, low: float = -math.inf, high: float = math.inf) -> Coverage:
-    """Read what a statement on the leaks between two chainages, m, rests on."""
+    """Read the data for a statement on the leaks between two chainages, m."""
     place = {"survey": survey.id, "tunnel": survey.tunnel_id, "name": survey.name, "low": low, "high": high}
     with conn.cursor(row_factory=class_row(CoverageGap)) as cursor:
         gaps = cursor.execute(_GAPS, place).fetchall()
@@ -97,7 +97,7 @@ def read_coverage(conn: psycopg.Connection[Any], survey: Survey, low: float = -m
 
 
 def seen_share(conn: psycopg.Connection[Any], survey: Survey, km: int) -> float:
-    """Share of the lining of a kilometre that the last detection saw, as far as the survey reaches, 0 to 1."""
+    """Return the share of a kilometre's lining that the last detection inspected, within the survey, 0 to 1."""
     row = conn.execute(
         "SELECT c.seen_share FROM tunnel_internal.km_ends k"
         " CROSS JOIN LATERAL tunnel_api.coverage(%s, k.chainage_from, k.chainage_to) c WHERE k.survey_id = %s AND k.km = %s",
@@ -107,7 +107,7 @@ def seen_share(conn: psycopg.Connection[Any], survey: Survey, km: int) -> float:
 
 
 def sum_leaks(conn: psycopg.Connection[Any], survey: Survey) -> tuple[int, float]:
-    """How many leaks a survey has, found last and not rejected, and their area, m²."""
+    """Return number and area, m², of a survey's leaks that were found last and not rejected."""
     row = conn.execute(
         "SELECT coalesce(patches, 0), coalesce(wet_area, 0) FROM tunnel_api.leak_statistics(%s, '-infinity', 'infinity')",
         [survey.name],

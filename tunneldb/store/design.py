@@ -20,7 +20,7 @@ from tunneldb.store.surface import alignment_of
 
 @dataclass(frozen=True)
 class DesignTunnel:
-    """A tunnel with what profiles are placed by.
+    """Tunnel with the data for placing profiles.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ def get_design_tunnel(conn: psycopg.Connection[Any], tunnel_id: int, name: str) 
     """
     line = alignment_of(conn, tunnel_id)
     if line is None:
-        raise UserError(f"{name} is a site: without an axis there are no profiles about it")
+        raise UserError(f"{name} is a site: profiles need an axis")
     return DesignTunnel(tunnel_id, name, line.start, line.end)
 
 
@@ -76,7 +76,7 @@ def save_profile(conn: psycopg.Connection[Any], tunnel: DesignTunnel, profile: P
 
 
 def remove_profile(conn: psycopg.Connection[Any], tunnel_id: int, tunnel: str, name: str, layer: str) -> None:
-    """Remove a profile, and the images of deviation where it or a transition to it held; what was made by it becomes stale."""
+    """Remove a profile, and the images of deviation where it or its transitions apply; results from it become stale."""
     there = load_profiles(conn, tunnel_id, layer)
     place = next((k for k, profile in enumerate(there) if profile.name == name), None)
     if place is None:
@@ -94,7 +94,7 @@ def remove_profile(conn: psycopg.Connection[Any], tunnel_id: int, tunnel: str, n
 
 
 def load_profiles(conn: psycopg.Connection[Any], tunnel_id: int, layer: str) -> list[Profile]:
-    """Profiles of a layer, in order of chainage."""
+    """Return the profiles of a layer, in order of chainage."""
     rows = conn.execute(
         "SELECT name, chainage_from, chainage_to, outline FROM tunnel.design_profile"
         " WHERE tunnel_id = %s AND layer = %s ORDER BY chainage_from",
@@ -104,7 +104,7 @@ def load_profiles(conn: psycopg.Connection[Any], tunnel_id: int, layer: str) -> 
 
 
 def load_design(conn: psycopg.Connection[Any], tunnel_id: int, tunnel: str, layer: str) -> list[Stretch]:
-    """Profiles of a layer and the transitions between them, in order of chainage.
+    """Return the profiles of a layer and the transitions between them, in order of chainage.
 
     Raises
     ------
@@ -127,12 +127,12 @@ def _stretches(tunnel: str, layer: str, profiles: Sequence[Profile]) -> list[Str
         return stretches(profiles)
     except ValueError as error:
         raise UserError(
-            f"profiles of layer {layer} of tunnel {tunnel}: {error}; say where each holds by --from and --to"
+            f"profiles of layer {layer} of tunnel {tunnel}: {error}; set their limits with --from and --to"
         ) from None
 
 
 def _vertices(outline: Outline) -> Float:
-    """Rows of right, up and bulge; the last one's bulge is 0."""
+    """Return rows of right, up and bulge; the last one's bulge is 0."""
     elements = outline.elements
     return np.vstack([elements[:, [0, 1, 4]], [[*elements[-1, 2:4], 0.0]]])
 

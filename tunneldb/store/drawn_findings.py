@@ -1,4 +1,4 @@
-"""Findings that people drew: their outlines for detection to measure, and what follows from a new surface."""
+"""Drawn findings: their outlines for measuring by detection, and updates after a new surface."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tunneldb.store.survey import Survey
 
 @dataclass(frozen=True)
 class Drawn:
-    """A finding whose outline is a person's.
+    """Finding with a drawn outline.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Drawn:
 
 
 def load_drawn(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Drawn]:
-    """Read the findings of a kilometre, by their middles, whose outlines people drew."""
+    """Read the findings with drawn outlines in a kilometre, by their middles."""
     rows = conn.execute(
         "SELECT id, drawn_at, public.ST_AsBinary(unrolled) FROM tunnel.finding"
         " WHERE survey_id = %s AND km = %s AND origin <> 'detected' AND merged_into IS NULL ORDER BY id",
@@ -46,7 +46,7 @@ def load_drawn(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[D
 
 
 def save_measured(conn: psycopg.Connection[Any], drawn: Sequence[Drawn], measured: Sequence[Measurement]) -> None:
-    """Write what was measured of outlines, but of those that were redrawn meanwhile."""
+    """Write the measurements of outlines, except those redrawn in the meantime."""
     with conn.cursor() as cursor:
         cursor.executemany(
             "UPDATE tunnel.finding SET darkening_mean = %s, darkening_max = %s, contrast = %s, image_share = %s"
@@ -59,7 +59,7 @@ def save_measured(conn: psycopg.Connection[Any], drawn: Sequence[Drawn], measure
 
 
 def settle_findings(conn: psycopg.Connection[Any], survey: Survey, km: int) -> None:
-    """Bring what people drew in a kilometre together with what detection found there.
+    """Reconcile drawn findings in a kilometre with those of detection.
 
     Outlines in the unrolled plane stay; where they lie on the map and in space follows the surface of now. What is the same
     counts once, and what lies in dry regions is marked.

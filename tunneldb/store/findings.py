@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from tunneldb.store.survey import Survey
 
 Geometry = Literal["unrolled", "map", "3d"]
-"""Unrolled plane (chainage, arc); map strip beside the axis; on the surface in space."""
+"""Geometries: unrolled plane (chainage, arc); map strip beside the axis; on the surface in space."""
 
 State = Literal["open", "confirmed", "rejected", "gone", "dry", "same", "merged"]
 COUNTED: tuple[State, ...] = ("open", "confirmed")
@@ -91,7 +91,7 @@ class Finding:
 
 
 COLUMNS = tuple(field.name for field in fields(Finding) if field.name not in ("share", "geometry"))
-"""Columns of the view that a finding is read from."""
+"""Columns of the view for a finding."""
 
 GEOMETRY_COLUMN = {"unrolled": "unrolled", "map": "map", "3d": "surface"}
 
@@ -104,7 +104,7 @@ def finding_of(row: Sequence[Any]) -> Finding:
 
 @dataclass(frozen=True)
 class Chosen:
-    """Which findings are wanted.
+    """Selection of findings.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ _SHARE = sql.SQL(
 
 
 BLOCK = 20_000
-"""Findings that are read at a time."""
+"""Number of findings read at a time."""
 
 
 def read_findings(
@@ -156,7 +156,7 @@ def read_findings(
 def stream_findings(
     conn: psycopg.Connection[Any], survey: Survey, geometry: Geometry = "unrolled", chosen: Chosen | None = None
 ) -> Iterator[Finding]:
-    """Yield findings of a survey in order of chainage, of which only BLOCK are in memory; until the transaction ends."""
+    """Yield findings of a survey in order of chainage, with only BLOCK in memory; until the transaction ends."""
     wanted = Chosen() if chosen is None else chosen
     query = sql.SQL(
         "SELECT {}, coalesce({}, 1), public.ST_AsBinary({}) FROM tunnel_api.finding WHERE survey_id = %(survey)s"

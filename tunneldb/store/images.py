@@ -37,7 +37,7 @@ def load_reference(conn: psycopg.Connection[Any], survey: Survey) -> ReferenceCu
 
 
 def image_blocks(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: str) -> list[int]:
-    """Numbers of the blocks of a kilometre's image of a kind, in order."""
+    """Return the numbers of the blocks of a kilometre's image of a kind, in order."""
     rows = conn.execute(
         "SELECT block FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = %s ORDER BY block", (survey.id, km, kind)
     )
@@ -45,7 +45,7 @@ def image_blocks(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: s
 
 
 def survey_blocks(conn: psycopg.Connection[Any], survey: Survey, kind: str) -> list[int]:
-    """Numbers of the blocks of a survey's image of a kind, in order."""
+    """Return the numbers of the blocks of a survey's image of a kind, in order."""
     rows = conn.execute("SELECT block FROM tunnel.image WHERE survey_id = %s AND kind = %s ORDER BY block", (survey.id, kind))
     return [block for (block,) in rows]
 
@@ -117,7 +117,7 @@ class ImageStore:
             self._insert(kind, block, Raster(_values(window, kind), grid.transform(columns.start)))
 
     def save_states(self, state: UInt8, dark: Bool) -> None:
-        """Save what the pixels (rows, columns) of the kilometre show, in the blocks saved before; ``DARK`` where dark."""
+        """Save the states of the pixels (rows, columns) of the kilometre, in blocks saved before; ``DARK`` for dark ones."""
         grid = self.grid
         for block in self._blocks:
             first = (block - grid.first_block) * grid.block_columns
@@ -190,12 +190,12 @@ def save_coverage(conn: psycopg.Connection[Any], survey: Survey, km: int, covera
 
 
 def drop_coverage(conn: psycopg.Connection[Any], survey: Survey, km: int) -> None:
-    """Take away the coverage of a kilometre."""
+    """Delete the coverage of a kilometre."""
     conn.execute("DELETE FROM tunnel.coverage WHERE survey_id = %s AND km = %s", (survey.id, km))
 
 
 def drop_radiometry(conn: psycopg.Connection[Any], survey: Survey, km: int) -> None:
-    """Take away the radiometry of a kilometre."""
+    """Delete the radiometry of a kilometre."""
     conn.execute("DELETE FROM tunnel.radiometry WHERE survey_id = %s AND km = %s", (survey.id, km))
 
 

@@ -1,4 +1,4 @@
-"""Leaks, joints and other dark spots of a survey, with what can be said of the stretch, as lists have them."""
+"""Leaks, joints and dry dark areas of a survey, with statements on the stretch, for lists."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
 Kind = Literal["leak", "joint", "dark", "all"]
-"""What is listed: leaks, joints, what else is dark but dry, or all of it."""
+"""Kinds to list: leaks, joints, dry dark areas, or all."""
 
 _PLURAL = {"leak": "leaks", "joint": "joints", "dark": "dark spots", "all": "anomalies"}
 
@@ -50,7 +50,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class LeakList:
-    """Leaks of a survey, or what else is dark on its lining.
+    """Leaks, or other dark areas, of a survey.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class LeakList:
 
     @property
     def total(self) -> str:
-        """How many there are, how large together, and what else is listed; also where nothing was searched."""
+        """Return number and total area, and other listed items; also if nothing was searched."""
         if not self.rows and not self.coverage.seen_area:
             return f"{_PLURAL[self.kind]} were not searched for"
         others = {
@@ -85,7 +85,7 @@ class LeakList:
             "not found again": sum(row.review != "rejected" and not row.detected for row in self.rows),
         }
         besides = " and ".join(f"{count} {name}" for name, count in others.items() if count)
-        return f"{self.count} {_PLURAL[self.kind]}, {self.area:.2f} m²" + (f"; listed besides: {besides}" if besides else "")
+        return f"{self.count} {_PLURAL[self.kind]}, {self.area:.2f} m²" + (f"; also listed: {besides}" if besides else "")
 
 
 _CHOSEN = sql.SQL(
@@ -102,7 +102,7 @@ _CHOSEN = sql.SQL(
 def read_leaks(
     conn: psycopg.Connection[Any], survey: Survey, geometry: Geometry = "unrolled", selection: Selection | None = None
 ) -> LeakList:
-    """Read the leaks of a survey, or what else is dark on its lining.
+    """Read the leaks, or other dark areas, of a survey.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Features and reviews of findings, and what was learned from them: tables to arrays and back."""
+"""Features and reviews of findings, and adjustments learned from them: tables to arrays and back."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from tunneldb.anomalies.learning import Adjustment, Way
 from tunneldb.arrays import Bool, Float, Int64
 
 OUTLINE = "outline"
-"""Name under which is stored, behind the features, how much the outline tells."""
+"""Name of the outline's reliability, stored behind the features."""
 
 STORED = (*NAMES, OUTLINE)
-"""What this version stores of each finding, in this order."""
+"""Values that this version stores of each finding, in this order."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Anomalies and what was measured of them.
+    """Anomalies and their features.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class InForce:
 
 
 def feature_list(conn: psycopg.Connection[Any]) -> int:
-    """Key of the order in which this version stores features."""
+    """Return the key of the order in which this version stores features."""
     conn.execute("INSERT INTO tunnel.feature_list (names) VALUES (%s) ON CONFLICT DO NOTHING", [list(STORED)])
     row = conn.execute("SELECT id FROM tunnel.feature_list WHERE names = %s", [list(STORED)]).fetchone()
     assert row is not None
@@ -150,12 +150,12 @@ def load_measured(conn: psycopg.Connection[Any], tunnels: Iterable[int]) -> Meas
 
 
 def _order(names: Sequence[str]) -> list[int] | None:
-    """Where what this version stores is in an order of features; None if some of it is missing."""
+    """Return the places of this version's values in an order of features; None if some are missing."""
     return [names.index(name) for name in STORED] if set(STORED) <= set(names) else None
 
 
 def model_in_force(conn: psycopg.Connection[Any], tunnel: int) -> InForce:
-    """The model of evidence for a tunnel: the program's, adjusted as was learned for it."""
+    """Return the evidence model of a tunnel: the program's, with the adjustments learned for it."""
     row = conn.execute(
         "SELECT id, base, way, parameters FROM tunnel.learned_model WHERE id = tunnel_internal.learned_in_force(%s)", [tunnel]
     ).fetchone()
@@ -178,7 +178,7 @@ def apply_learned(
     losses: tuple[float, float],
     note: str | None,
 ) -> int:
-    """Put an adjustment of the program's model in force for a tunnel; return its number.
+    """Activate an adjustment of the program's model for a tunnel; return its number.
 
     Parameters
     ----------
@@ -197,14 +197,14 @@ def apply_learned(
 
 
 def undo_learned(conn: psycopg.Connection[Any], tunnel: int) -> int | None:
-    """Take back what was last learned for a tunnel; return its number, None when nothing is in force."""
+    """Undo the last adjustment of a tunnel; return its number, None if there is none."""
     row = conn.execute("SELECT tunnel_internal.learned_undo(%s)", [tunnel]).fetchone()
     assert row is not None
     return None if row[0] is None else int(row[0])
 
 
 def list_learned(conn: psycopg.Connection[Any], tunnels: Iterable[int]) -> list[Learned]:
-    """What was learned for some tunnels, the last first."""
+    """Return the adjustments of some tunnels, the last first."""
     with conn.cursor(row_factory=class_row(Learned)) as cursor:
         return cursor.execute(
             """
@@ -223,6 +223,6 @@ def places_of(conn: psycopg.Connection[Any], findings: Sequence[int]) -> dict[in
 
 
 def surveys_of(conn: psycopg.Connection[Any], tunnels: Iterable[int]) -> dict[int, str]:
-    """Names of all surveys of some tunnels, by their keys, in order of date."""
+    """Return the names of all surveys of some tunnels, by their keys, in order of date."""
     rows = conn.execute("SELECT id, name FROM tunnel.survey WHERE tunnel_id = ANY (%s) ORDER BY date, id", [list(tunnels)])
     return dict(rows.fetchall())

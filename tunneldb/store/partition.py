@@ -1,4 +1,4 @@
-"""Points of a kilometre: its partition of tunnel.point, and fragments, what was read of a file and waits to be loaded there.
+"""Points of a kilometre: its partition of tunnel.point, and fragments, points of a file that wait to be loaded there.
 
 A partition is written anew as a whole, from rows that are there and rows that come. A fragment is a table of its own, in which
 rows lie packed in blocks as they lie in memory, in the order of chainage: writing and reading them is copying bytes.
@@ -38,13 +38,13 @@ def partition(survey: Survey, km: int, suffix: str = "") -> sql.Identifier:
 
 
 def partition_exists(conn: psycopg.Connection[Any], survey: Survey, km: int) -> bool:
-    """Tell whether a survey's kilometre holds points."""
+    """Return True if a survey's kilometre has points."""
     row = conn.execute("SELECT to_regclass(%s)", [partition(survey, km).as_string(conn)]).fetchone()
     return row is not None and row[0] is not None
 
 
 def rows_in(conn: psycopg.Connection[Any], survey: Survey, km: int) -> int:
-    """Rows of a survey's kilometre, 0 if there is no partition for it."""
+    """Return the number of rows of a survey's kilometre, 0 without a partition."""
     if not partition_exists(conn, survey, km):
         return 0
     row = conn.execute(sql.SQL("SELECT count(*) FROM {}").format(partition(survey, km))).fetchone()
@@ -53,7 +53,7 @@ def rows_in(conn: psycopg.Connection[Any], survey: Survey, km: int) -> int:
 
 
 def read_partition(conn: psycopg.Connection[Any], survey: Survey, km: int, alignment: Alignment) -> Iterator[Rows]:
-    """Rows of a kilometre, some at a time, with the file's id as tag.
+    """Yield rows of a kilometre, some at a time, with the file's id as tag.
 
     Their chainage is that of the given axis again, as at loading, for the stage ``segments`` sets it by the axis found.
     """
@@ -81,7 +81,7 @@ def read_partition(conn: psycopg.Connection[Any], survey: Survey, km: int, align
 
 
 def _ranges(counts: list[tuple[int, int]]) -> Iterator[tuple[float, float]]:
-    """Ranges of whole metres with about WINDOW rows each."""
+    """Return ranges of whole metres with about WINDOW rows each."""
     low, held = None, 0
     for metre, count in counts:
         low, held = metre if low is None else low, held + count
@@ -102,7 +102,7 @@ def write_partition(
     progress: Callable[[int], None],
     own: Callable[[Rows], Bool] | None = None,
 ) -> tuple[Int64, Int64]:
-    """Build a kilometre's partition aside from all its rows, thinned as a whole; `swap_partition` puts it in place.
+    """Build a kilometre's partition separately from all its rows, thinned as a whole; `swap_partition` puts it in place.
 
     The table is made and filled in the caller's transaction: the embedded server writes no WAL for its rows.
 
@@ -153,7 +153,7 @@ def write_partition(
 
 
 def parts_by_window(parts: Sequence[tuple[Spool, int | None]], km: int) -> Iterator[Rows]:
-    """Rows of several spools in a kilometre, a window of chainage after the other."""
+    """Yield rows of several spools in a kilometre, one window of chainage after the other."""
     begin, end = km * BINS_PER_KM, (km + 1) * BINS_PER_KM
     counts = sum((spool.counts_of(begin, end) for spool, _ in parts), np.zeros(BINS_PER_KM, np.int64))
     for low, high in windows(begin, counts, WINDOW):
@@ -171,7 +171,7 @@ def _read(parts: Sequence[tuple[Spool, int | None]], low: int, high: int) -> Row
 
 
 def swap_partition(conn: psycopg.Connection[Any], survey: Survey, km: int, rows: int) -> None:
-    """Put what `write_partition` has built, with so many rows, in the place of a kilometre; one without rows goes.
+    """Replace a kilometre by the partition that `write_partition` has built; one without rows is removed.
 
     To be called late in a transaction: others see the old kilometre until its end, but wait for it from here on.
 
@@ -213,7 +213,7 @@ def write_fragments(conn: psycopg.Connection[Any], survey: Survey, file_id: int,
 
 
 def read_fragment(conn: psycopg.Connection[Any], survey: Survey, file_id: int, km: int, tag: int) -> Iterator[Rows]:
-    """Rows of a fragment, block by block in the order of chainage, with this tag.
+    """Yield rows of a fragment, block by block in the order of chainage, with this tag.
 
     The connection is busy until the last one has come.
     """
@@ -226,7 +226,7 @@ def read_fragment(conn: psycopg.Connection[Any], survey: Survey, file_id: int, k
 
 
 def drop_fragments(conn: psycopg.Connection[Any], survey: Survey, file_ids: Iterable[int], kms: Iterable[int]) -> None:
-    """Drop the fragments of files in kilometres, where there are any."""
+    """Drop the fragments of files in kilometres, if there are any."""
     kms = list(kms)
     for file_id in file_ids:
         for km in kms:

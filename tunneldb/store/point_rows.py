@@ -35,7 +35,7 @@ PACKED = np.dtype(
 
 
 def _place(dtype: np.dtype[np.void], name: str) -> int:
-    """Byte at which a field of a record begins."""
+    """Return the byte at which a field of a record begins."""
     assert dtype.fields is not None
     return int(dtype.fields[name][1])
 
@@ -98,7 +98,7 @@ def by_chainage(chainage: Float) -> Int32:
 
 @kernel
 def _binned(chainage: Float, low: float, high: float, start: Int32, order: Int32) -> bool:  # pragma: no cover - compiled
-    """Write the order; False where so many values crowd together that comparing all of them is quicker."""
+    """Write the order; return False if so many values are close together that comparing all is faster."""
     n = chainage.shape[0]
     scale = (n - 1) / (high - low) if high > low else 0.0
     for i in range(n):

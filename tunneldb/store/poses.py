@@ -1,4 +1,4 @@
-"""Where the scanner was: the stations of a survey, or its trajectory, whole or as far as a kilometre needs it."""
+"""Scanner positions: the stations of a survey, or its trajectory, whole or as far as a kilometre needs it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _PLACE = (
 
 _ALWAYS = [(-np.inf, np.inf)]
 _ENDS = [(-np.inf, -np.inf), (np.inf, np.inf)]
-"""Spans of time, s: of the whole trajectory, and of its first pose and its last."""
+"""Time spans, s: of the whole trajectory, and from its first pose to its last."""
 
 # Of each span its poses, the last one before it and the first one after, by the primary key.
 _ABOUT = sql.SQL(
@@ -43,7 +43,7 @@ _ABOUT = sql.SQL(
 
 
 def is_mobile(conn: psycopg.Connection[Any], survey: Survey) -> bool:
-    """Whether a survey's scanner positions come from a trajectory; says so where it has none of its kind.
+    """Return True if a survey's scanner positions come from a trajectory; raise an error if it has none of its kind.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def is_mobile(conn: psycopg.Connection[Any], survey: Survey) -> bool:
 
 
 def load_pose_coverage(conn: psycopg.Connection[Any], survey: Survey) -> PoseCoverage:
-    """Read what scanner positions a survey has, of a trajectory no more than its ends and gaps.
+    """Read the scanner positions of a survey, of a trajectory only its ends and gaps.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def _trajectory(conn: psycopg.Connection[Any], survey: Survey, spans: list[tuple
 
 
 def _spans(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[tuple[float, float]]:
-    """When the points of a kilometre were measured; all times, where that isn't known of a file, or one waits to be loaded."""
+    """Return the measuring times of a kilometre's points; all times, if unknown for a file, or one waits to be loaded."""
     row = conn.execute(
         """
         SELECT bool_and(k.seconds IS NOT NULL AND k.loaded_at IS NOT NULL),

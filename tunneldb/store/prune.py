@@ -1,4 +1,4 @@
-"""Runs of the ledger and jobs of the queue that nothing goes by any more."""
+"""Superseded runs of the ledger and jobs of the queue."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tunneldb.store.survey import Survey
 
 @dataclass(frozen=True)
 class Superseded:
-    """What of a survey, or left of one that is gone, nothing goes by any more.
+    """Superseded runs and jobs of a survey, also of a deleted one.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Superseded:
 
 
 def superseded(conn: psycopg.Connection[Any], survey: Survey | None, before: dt.date | None) -> list[Superseded]:
-    """What would be pruned, of one survey or of all: by survey, runs by stage, then jobs.
+    """Return what would be pruned, for one survey or all: by survey, runs by stage, then jobs.
 
     Parameters
     ----------
@@ -80,13 +80,13 @@ def superseded(conn: psycopg.Connection[Any], survey: Survey | None, before: dt.
 
 
 def busy(conn: psycopg.Connection[Any], survey_id: int) -> bool:
-    """Whether jobs of a survey wait or run: how long the rest takes is told by all the runs that there are."""
+    """Return True if jobs of a survey wait or run: estimates of the remaining time need all runs."""
     row = conn.execute("SELECT tunnel_internal.queue_busy(%s)", [survey_id]).fetchone()
     return row is not None and bool(row[0])
 
 
 def prune(conn: psycopg.Connection[Any], survey_id: int | None, before: dt.date | None) -> tuple[int, int]:
-    """Delete what is superseded of a survey, or with None jobs of surveys that are gone; return how many runs and jobs went.
+    """Delete superseded runs of a survey, or with None jobs of deleted surveys; return the numbers of runs and jobs.
 
     One transaction. Nobody commits a result of the survey, or begins a run, until it ends.
 

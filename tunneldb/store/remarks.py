@@ -1,4 +1,4 @@
-"""What a reader of a survey's results is to know: function `tunnel_api.remarks`, which finds the words for every document."""
+"""Remarks on a survey's results, from function `tunnel_api.remarks`, the same for every document."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tunneldb.store.survey import Survey
 
 @dataclass(frozen=True)
 class Remark:
-    """What is to be known of a scan file, or of a stage of some kilometres.
+    """Remark on a scan file, or on a stage of some kilometres.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Remark:
 
 
 def read_remarks(conn: psycopg.Connection[Any], survey: Survey, low: float = -math.inf, high: float = math.inf) -> list[Remark]:
-    """Read what is to be known of the results between two chainages, m: of files first, then of kilometres."""
+    """Read the remarks on the results between two chainages, m: of files first, then of kilometres."""
     with conn.cursor(row_factory=class_row(Remark)) as cursor:
         return cursor.execute(
             "SELECT file, stage, kilometres, remark, said FROM tunnel_api.remarks(%s, %s, %s)", [survey.id, low, high]

@@ -23,7 +23,7 @@ COUNTED = ("points", "noise", "outside", "invalid", "unposed", "thinned", "kept"
 
 @dataclass(frozen=True)
 class Loaded:
-    """What became of a file that was to be loaded.
+    """Result of loading a file.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Content:
 
 
 def checksum(path: Path) -> str:
-    """SHA-256 of a file, hexadecimal; with the names of its columns, where they stand in a file beside it."""
+    """Return the SHA-256 of a file, hexadecimal; including its column names, if these are in a file beside it."""
     try:
         with path.open("rb") as file:
             digest = hashlib.file_digest(file, "sha256")
@@ -96,7 +96,7 @@ def checksum(path: Path) -> str:
 
 
 def recorded_files(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, Recorded]:
-    """Files that a survey holds, by name."""
+    """Return the files of a survey, by name."""
     rows = conn.execute(
         "SELECT id, name, path, checksum, bytes, chainage_from, chainage_to FROM tunnel.scan_file WHERE survey_id = %s",
         [survey.id],
@@ -105,13 +105,13 @@ def recorded_files(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, R
 
 
 def sonar_among(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path]) -> list[Path]:
-    """Those of some files that were registered as sonar scans of the survey, by their names."""
+    """Return those of some files that were registered as sonar scans of the survey, by their names."""
     known = conn.execute("SELECT name FROM tunnel.sonar_scan WHERE survey_id = %s", [survey.id]).fetchall()
     return [path for path in paths if (path.name,) in known]
 
 
 def unchanged(conn: psycopg.Connection[Any], path: Path, recorded: Recorded | None) -> Loaded | None:
-    """Leave a file of the same content as it is, but note where it lies now, for what reads it at full density."""
+    """Keep a file with unchanged content, but record its current path, for reading it at full density."""
     if recorded is None or path.stat().st_size != recorded.bytes or checksum(path) != recorded.checksum:
         return None
     place = str(path.resolve())
@@ -122,21 +122,21 @@ def unchanged(conn: psycopg.Connection[Any], path: Path, recorded: Recorded | No
 
 
 def copies_of(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path]) -> dict[Path, Loaded]:
-    """Files that have the content of one given before them, or of one that the survey holds under another name.
+    """Return files with the content of one given before them, or of one in the survey under another name.
 
     Their points would count twice. Only files of the same size are read for it.
     """
     given = {path.name: path for path in paths}
     held = {name: file for name, file in recorded_files(conn, survey).items() if name not in given}
     sizes = Counter(path.stat().st_size for path in given.values()) + Counter(file.bytes for file in held.values())
-    known = {file.checksum: f"{name}, which the survey holds" for name, file in held.items()}
+    known = {file.checksum: f"{name}, which is in the survey" for name, file in held.items()}
     copies = {}
     for name, path in given.items():
         if sizes[path.stat().st_size] == 1:
             continue
         digest = checksum(path)
         if digest in known:
-            note = f"has the same content as {known[digest]}: left out, for all its points would count twice"
+            note = f"has the same content as {known[digest]}: left out, because all its points would count twice"
             copies[path] = Loaded(name, "a copy", 0, 0, 0, 0, 0, 0, 0, note=note)
         else:
             known[digest] = name
@@ -144,7 +144,7 @@ def copies_of(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Pat
 
 
 def outcome(conn: psycopg.Connection[Any], file_id: int, state: str, seconds: float = 0.0) -> Loaded:
-    """What a file's points have come to so far."""
+    """Current counts of a file's points."""
     row = conn.execute(
         "SELECT name, points, noise, outside, invalid, unposed, thinned, kept FROM tunnel.scan_file WHERE id = %s", [file_id]
     ).fetchone()
@@ -198,7 +198,7 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
 
 
 def kilometres_of(conn: psycopg.Connection[Any], file_ids: Iterable[int]) -> list[int]:
-    """Kilometres that files touch, or touched before and have not been taken out of yet."""
+    """Return the kilometres that files touch, or touched before and have not been removed from yet."""
     rows = conn.execute("SELECT DISTINCT km FROM tunnel.file_km WHERE file_id = ANY (%s) ORDER BY km", [list(file_ids)])
     return [row[0] for row in rows.fetchall()]
 
@@ -246,7 +246,7 @@ def _multirange(ranges: Sequence[tuple[int, int]]) -> Multirange[int]:
 
 
 def withdraw_file(conn: psycopg.Connection[Any], file_id: int, left: Iterable[int]) -> None:
-    """Note that a file is to leave the kilometres that may hold rows of it; one of no bytes has been withdrawn."""
+    """Mark a file for removal from the kilometres that may have rows of it; a file of no bytes has been removed."""
     record_kilometres(conn, file_id, {}, FilterCounts(), left)
     conn.execute(
         "UPDATE tunnel.scan_file SET checksum = '', bytes = 0, points = 0, noise = 0, outside = 0, invalid = 0, unposed = 0,"

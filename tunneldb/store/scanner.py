@@ -1,4 +1,4 @@
-"""What a survey knows of its scanner: where it stood, and its intensity over range."""
+"""Scanner data of a survey: positions, and intensity over range."""
 
 from __future__ import annotations
 
@@ -84,10 +84,10 @@ def read_positions(
             worst, more = int(np.argmax(far)), np.count_nonzero(far) - 1
             others = f", and {more} more as far" if more else ""
             raise UserError(
-                f"{', '.join(map(str, paths))}: the station of scan_id {stations.scan_id[worst]} lies {far[worst]:.0f} m"
+                f"{', '.join(map(str, paths))}: the station of scan_id {stations.scan_id[worst]} is {far[worst]:.0f} m"
                 f" from the axis of {tunnel!r}{others}; no scanner stands more than"
-                f" {MAX_AXIS_DISTANCE:g} m aside of it or {MAX_END_DISTANCE:g} m beyond its ends: mend the position, or take"
-                " the row out, and the points of that scan are left out"
+                f" {MAX_AXIS_DISTANCE:g} m beside it or {MAX_END_DISTANCE:g} m beyond its ends: fix the position, or remove"
+                " the row, and the points of that scan are left out"
             )
         return Positions(False, stations.scan_id, stations.xyz)
     table = _read_trajectory(paths[0])
@@ -102,7 +102,7 @@ def read_positions(
             int(np.argmax(wild)),
             f"this pose and {np.count_nonzero(wild) - 1} others ({100 * wild.mean():.2g} %) lie more than"
             f" {MAX_AXIS_DISTANCE:g} m aside of the axis of {tunnel!r}, {MAX_END_DISTANCE:g} m beyond its ends, or jump;"
-            " mend the trajectory",
+            " fix the trajectory",
         )
     notes = []
     if wild.any():
@@ -124,7 +124,7 @@ def read_positions(
 
 
 def save_positions(connection: psycopg.Connection[Any], survey: int, positions: Positions, srid: int) -> None:
-    """Write the positions of a survey, by its key, that has none, and what is to be known of them."""
+    """Write the positions of a survey, by its key, that has none, and a note on them."""
     note = "; ".join(positions.notes) or None
     longest, gaps = None, None
     if positions.mobile:
@@ -159,19 +159,19 @@ def save_reference(connection: psycopg.Connection[Any], survey: int, curve: CsvT
 
 
 def require_range(kind: str) -> None:
-    """A range curve can be found only in intensity that falls with range."""
+    """Refuse --reference auto for intensity that does not fall with range."""
     if kind == "none":
-        raise UserError("--reference auto finds the range curve in the intensity, and intensity of kind none is not read")
+        raise UserError("--reference auto estimates the range curve from the intensity, but intensity of kind none is not read")
     if kind == "reflectance":
-        raise UserError("--reference auto has nothing to find: from intensity of kind reflectance the maker removed the range")
+        raise UserError("--reference auto is not needed: the maker already corrects intensity of kind reflectance for range")
 
 
 def require_no_range(kind: str) -> None:
-    """Without scanner positions nothing can take the range out of the intensity."""
+    """Refuse intensity that needs range correction without scanner positions."""
     if kind not in ("reflectance", "none"):
         raise UserError(
-            f"intensity of kind {kind} falls with range, which can't be corrected without scanner positions: --no-poses takes"
-            " --intensity-kind reflectance, from which the maker removed the range, or none"
+            f"intensity of kind {kind} falls with range, which cannot be corrected without scanner positions: --no-poses needs"
+            " --intensity-kind reflectance, which the maker has corrected for range, or none"
         )
 
 
@@ -188,7 +188,7 @@ def _read_trajectory(path: Path) -> CsvTable:
 
 
 def _require_near(paths: Sequence[Path], xyz: Float, alignment: Alignment, tunnel: str) -> None:
-    """The scanner must have been near the axis at least once."""
+    """Require that the scanner was near the axis at least once."""
     distance = alignment.distance(xyz)
     beyond = np.isnan(distance)
     distance[beyond] = np.linalg.norm(xyz[beyond, None] - alignment.vertices[[0, -1]], axis=2).min(axis=1)
@@ -198,21 +198,21 @@ def _require_near(paths: Sequence[Path], xyz: Float, alignment: Alignment, tunne
         raise UserError(
             f"{', '.join(map(str, paths))}: the scanner was never within {FARTHEST_SCANNER:g} m of the axis of {tunnel!r} "
             f"({distance[nearest]:.0f} m at the nearest{', beyond its ends' if beyond[nearest] else ''}); "
-            f"{guess or 'is it of another tunnel or in another SRID?'}"
+            f"{guess or 'check that it belongs to this tunnel and SRID'}"
         )
 
 
 def _require_direction(path: Path, xyz: Float, alignment: Alignment, *, backwards: bool) -> None:
-    """The trajectory must run up the axis, or down it when that was said."""
+    """Require that the trajectory runs up the axis, or down it if stated."""
     chainage = alignment.chainage(xyz)
     within = chainage[np.isfinite(chainage)]
     if not len(within):
-        raise UserError(f"{path}: no pose lies between the ends of the axis; is it that of the tunnel that was driven through?")
+        raise UserError(f"{path}: no pose is between the ends of the axis; check that it belongs to this tunnel")
     run = within[-1] - within[0]
     if run < 0 and not backwards:
         raise UserError(
-            f"{path}: the trajectory runs {-run:.0f} m down the axis; reverse the axis's points, or say --backwards "
-            "if the scanner did go towards falling chainage"
+            f"{path}: the trajectory runs {-run:.0f} m down the axis; reverse the axis's points, or use --backwards "
+            "if the scanner moved towards decreasing chainage"
         )
     if run > 0 and backwards:
         raise UserError(f"{path}: the trajectory runs {run:.0f} m up the axis, so --backwards is wrong")

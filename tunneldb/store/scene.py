@@ -1,4 +1,4 @@
-"""What stage ``ground`` has found of a kilometre, to and from the database: ground, lining and clusters."""
+"""Results of stage ``ground`` for a kilometre in the database: ground, lining and clusters."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
 BESIDE = 20.0
-"""What lies so far beyond the ends of a stretch is loaded too: heights are interpolated, things reach over the ends, m."""
+"""Distance beyond the ends of a stretch that is loaded too, m: heights are interpolated, objects cross the ends."""
 
 
 def line_of(surface: Surface) -> PlanLine:
-    """The axis as a line in plan: the vertices of the segments, at their chainages."""
+    """Return the axis as a line in plan: the vertices of the segments, at their chainages."""
     vertices = surface.segments[:, :6].reshape(-1, 3)
     along = surface.ends.ravel()
     new = np.diff(along, prepend=-np.inf) > 1e-6
@@ -75,7 +75,7 @@ def save_ground(
 
 
 def load_ground(conn: psycopg.Connection[Any], survey: Survey, first: float, stop: float) -> Ground | None:
-    """Ground of a survey between two chainages, m; None if there is none.
+    """Load the ground of a survey between two chainages, m; None if there is none.
 
     What lies between metres that have one is as wide as all of them together, NaN where nothing is known. Where a kilometre
     has ground to its last metre and the next one has none, or has not been worked on, it goes on straight to the end.
@@ -107,7 +107,7 @@ def load_ground(conn: psycopg.Connection[Any], survey: Survey, first: float, sto
 
 
 def _carry_to_ends(ground: Ground) -> None:
-    """Give the ends of kilometres whose next one has no ground what goes on straight from the metres before them."""
+    """Extrapolate the ends of kilometres without a following ground from the metres before them."""
     height, others = ground.height, (ground.gamma, ground.foot, ground.lean)
     for k in range(1, len(height)):
         if _is_end(ground.start + k) and np.isnan(height[k]).all():
@@ -117,12 +117,12 @@ def _carry_to_ends(ground: Ground) -> None:
 
 
 def _is_end(metre: int) -> bool:
-    """Whether a kilometre ends at a metre, of which the ground is kept with the next one."""
+    """Return True if a kilometre ends at a metre, whose ground is stored with the next one."""
     return metre % KILOMETRE == 0
 
 
 def load_arcs(conn: psycopg.Connection[Any], survey: Survey, first: int, stop: int) -> tuple[Float, Float]:
-    """Arcs at which the ground begins on the left and on the right, at each metre from ``first`` to ``stop``; NaN for none.
+    """Return the arcs of the ground's left and right limits, at each metre from ``first`` to ``stop``; NaN for none.
 
     The end of a kilometre has those of its last metre, if the next one has none.
     """
@@ -157,7 +157,7 @@ def save_relief(conn: psycopg.Connection[Any], survey: Survey, km: int, relief: 
 
 
 def load_relief(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km_to: int) -> Relief | None:
-    """Lining of kilometres ``km_from`` to ``km_to``, put together; None if there is none."""
+    """Load the lining of kilometres ``km_from`` to ``km_to``, joined; None if there is none."""
     rows = conn.execute(
         'SELECT cell, box, "offset", spread FROM tunnel.lining WHERE survey_id = %s AND km BETWEEN %s AND %s ORDER BY km',
         [survey.id, km_from, km_to],
@@ -178,7 +178,7 @@ def load_relief(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km_
 
 
 def save_clusters(conn: psycopg.Connection[Any], survey: Survey, km: int, clusters: Sequence[Cluster]) -> int:
-    """Replace the clusters of a kilometre by those of these whose middle lies in it; returns how many there are."""
+    """Replace the clusters of a kilometre by those with their middle in it; return their number."""
     _forget(conn, survey, km, "cluster")
     columns = (
         "survey_id", "km", "class", "chainage_from", "chainage_to", "height_from", "height_to", "points", "cell", "cells",
@@ -198,7 +198,7 @@ def save_clusters(conn: psycopg.Connection[Any], survey: Survey, km: int, cluste
 
 
 def load_clusters(conn: psycopg.Connection[Any], survey: Survey, first: float, stop: float) -> list[Cluster]:
-    """Clusters of a survey that lie between two chainages, m, at least in part."""
+    """Load the clusters of a survey that are at least partly between two chainages, m."""
     rows = conn.execute(
         "SELECT class, array_send(cells), points, chainage_from, chainage_to, height_from, height_to,"
         " public.ST_AsBinary(geom) FROM tunnel.cluster WHERE survey_id = %s AND km BETWEEN %s AND %s"
@@ -216,12 +216,12 @@ def load_clusters(conn: psycopg.Connection[Any], survey: Survey, first: float, s
 
 
 def save_classes(conn: psycopg.Connection[Any], survey: Survey, km: int, classes: UInt8) -> None:
-    """Give the points of a kilometre their classes (n,), in the order of its rows."""
+    """Write the classes (n,) of a kilometre's points, in the order of its rows."""
     conn.execute("SELECT tunnel_internal.class_write(%s, %s, %b)", [survey.id, km, classes.tobytes()])
 
 
 def load_scene(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km_to: int) -> Scene:
-    """What stage ``ground`` has found of kilometres ``km_from`` to ``km_to``: classes points of any density there.
+    """Load the results of stage ``ground`` for kilometres ``km_from`` to ``km_to``: they classify points of any density.
 
     Raises
     ------
@@ -241,7 +241,7 @@ def load_scene(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km_t
 
 
 def load_spheres(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km_to: int) -> Float:
-    """Target spheres of kilometres ``km_from`` to ``km_to`` and of those beside them, of all scans that saw each.
+    """Load target spheres of kilometres ``km_from`` to ``km_to`` and the neighbouring ones, averaged over scans.
 
     They have a kilometre also where they were found before there were segments, and so have no chainage.
 

@@ -1,4 +1,4 @@
-"""Poses of sonar scans, what they rest on, and the ladders, as the database keeps them."""
+"""Poses of sonar scans, their observations, and the ladders, in the database."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def save_registration(conn: psycopg.Connection[Any], survey: Survey, found: Regi
 
 
 def save_scans(conn: psycopg.Connection[Any], survey: Survey, scans: Sequence[SonarPose], water_level: float, up: int) -> None:
-    """Store scans and their poses in the place of those of their names, whose points go; see `save_registration`."""
+    """Replace scans and poses of the same names, and delete their points; see `save_registration`."""
     names = [scan.path.name for scan in scans]
     rows = conn.execute(
         "SELECT DISTINCT p.km FROM tunnel.sonar_point p JOIN tunnel.sonar_scan c ON c.id = p.scan_id"
@@ -101,7 +101,7 @@ def _list(values: Float) -> list[float]:
 
 @dataclass(frozen=True)
 class StoredScan:
-    """A registered scan: its pose, and what became of its points; counts as those of `tunneldb.store.scan_files.Loaded`."""
+    """Registered scan: its pose, and the counts of its points, as in `tunneldb.store.scan_files.Loaded`."""
 
     id: int
     checksum: str
@@ -141,13 +141,13 @@ class SonarRows:
 
 
 def has_sonar(conn: psycopg.Connection[Any], survey: Survey) -> bool:
-    """Whether sonar scans were registered for a survey."""
+    """Return True if sonar scans were registered for a survey."""
     row = conn.execute("SELECT EXISTS (SELECT FROM tunnel.sonar_scan WHERE survey_id = %s)", [survey.id]).fetchone()
     return row is not None and bool(row[0])
 
 
 def stored_scans(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, StoredScan]:
-    """Registered scans of a survey, by name; poses of those that have none are NaN."""
+    """Load the registered scans of a survey, by name; poses are NaN if there is none."""
     rows = conn.execute(
         "SELECT name, id, checksum, state, undetermined, rotation, translation, scale, water_level, loaded_at IS NOT NULL,"
         "       coalesce(points, 0), coalesce(false_echoes, 0), coalesce(outside, 0), coalesce(kept, 0)"
@@ -173,7 +173,7 @@ def stored_scans(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, Sto
 
 
 def water_level(conn: psycopg.Connection[Any], survey: Survey, km: int) -> float | None:
-    """Height of the water in a kilometre, m; None where no sonar scan was loaded."""
+    """Return the water level in a kilometre, m; None if no sonar scan was loaded."""
     row = conn.execute("SELECT height FROM tunnel.water_level WHERE survey_id = %s AND km = %s", [survey.id, km]).fetchone()
     return None if row is None else row[0]
 
@@ -202,7 +202,7 @@ def save_points(conn: psycopg.Connection[Any], survey: Survey, scan: StoredScan,
 
 
 def save_bed(conn: psycopg.Connection[Any], survey: Survey, kilometres: Sequence[int]) -> None:
-    """Make the bed and the water's level of kilometres anew from the points that they have; what rests on them is stale."""
+    """Recompute bed and water level of kilometres from their points; results that depend on them become stale."""
     conn.execute(
         """
         INSERT INTO tunnel.water_level (survey_id, km, height, changed_at)
@@ -251,7 +251,7 @@ class BedCells:
     values: Float
 
     def at(self, chainage: Float, across: Float) -> Float:
-        """Values (k, 3) of the cells that hold places (k,), m; NaN where there is none."""
+        """Return the values (k, 3) of the cells at places (k,), m; NaN if there is none."""
         key, wanted = self._keys(self.chainage, self.across), self._keys(chainage, across)
         order = np.argsort(key)
         place = order[np.minimum(np.searchsorted(key, wanted, sorter=order), len(order) - 1)]
@@ -259,7 +259,7 @@ class BedCells:
 
     @staticmethod
     def _keys(chainage: Float, across: Float) -> Int64:
-        """A whole number for each cell, -1 beyond the axis."""
+        """Return a whole number for each cell, -1 beyond the axis."""
         with np.errstate(invalid="ignore"):
             key = np.floor(chainage) * 10_000 + np.floor(across * 10.0) + 5_000  # a canal is not 500 m wide
         return np.where(np.isfinite(key), key, -1).astype(np.int64)
@@ -277,7 +277,7 @@ def load_bed(conn: psycopg.Connection[Any], survey: Survey, km: int) -> BedCells
 
 
 def load_sonar_points(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Float:
-    """Points (n, 3) of sonar scans on the submerged lining and the bed of a kilometre, tunnel's SRID, m."""
+    """Load points (n, 3) of sonar scans on the submerged lining and the bed of a kilometre, tunnel's SRID, m."""
     rows = conn.execute(
         "SELECT ST_X(geom), ST_Y(geom), ST_Z(geom) FROM tunnel.sonar_point"
         " WHERE survey_id = %s AND km = %s AND classification IN (40, 42) ORDER BY id",

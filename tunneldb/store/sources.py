@@ -1,4 +1,4 @@
-"""What a stage reads: the scan files of a kilometre, and its points of survey density."""
+"""Input of a stage: the scan files of a kilometre, and its points of survey density."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tunneldb.store.scan_files import checksum
 from tunneldb.store.survey import Survey
 
 SAMPLE = 500_000
-"""Points of survey density that are looked at, about."""
+"""Approximate number of points in a sample of survey density."""
 
 _FIELDS = (
     ("x", "f8", sql.SQL("public.ST_X(geom)")),
@@ -32,7 +32,7 @@ _FIELDS = (
 
 
 def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[ScanSource]:
-    """Scan files of a survey that touch a kilometre, in order of chainage; each must be what was loaded.
+    """Return the scan files of a survey that touch a kilometre, in order of chainage; they must be unchanged.
 
     A file's checksum is read once in the life of a process, and once more whenever its size or time of change is another.
 
@@ -57,7 +57,7 @@ def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Scan
 
 
 def unchanged_file(name: str, size: int, known: str) -> Path:
-    """Path of a scan file that has the size and the checksum with which it was loaded.
+    """Return the path of a scan file, after checking the size and the checksum with which it was loaded.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def unchanged_file(name: str, size: int, known: str) -> Path:
 
 @cache
 def _checksum(path: Path, changed: int, size: int) -> str:
-    """Checksum of a file that was last changed then and has that size."""
+    """Return the checksum of a file with this modification time and size."""
     return checksum(path)
 
 

@@ -1,4 +1,4 @@
-"""Spots of structures, and what of the faces could be judged, as lists have them."""
+"""Spots of structures, and the inspected share of the faces, for lists."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shapely.geometry import Polygon
 from tunneldb.store.survey import Survey
 
 Geometry = Literal["face", "map", "3d"]
-"""The face's own plane; the map; in space."""
+"""Geometries: the face's own plane; the map; in space."""
 
 Kind = Literal["dark", "bright", "all"]
 
@@ -55,7 +55,7 @@ COLUMNS = tuple(field.name for field in fields(ListedSpot) if field.name != "geo
 
 @dataclass(frozen=True)
 class SpotSelection:
-    """Which spots to read.
+    """Selection of spots.
 
     Attributes
     ----------
@@ -102,19 +102,18 @@ class SpotList:
 
     @property
     def total(self) -> str:
-        """How many there are, how large together, and of how much."""
+        """Return number, total area, and inspected area."""
         if not self.rows and not self.seen_area:
             return "spots were not searched for"
         return (
-            f"{self.count} spots, {self.area:.4f} m², on {self.seen_area:.1f} m² that were judged,"
-            f" of {self.face_area:.1f} m² of faces"
+            f"{self.count} spots, {self.area:.4f} m², on {self.seen_area:.1f} m² inspected of {self.face_area:.1f} m² of faces"
         )
 
 
 def read_spots(
     conn: psycopg.Connection[Any], survey: Survey, geometry: Geometry = "face", selection: SpotSelection | None = None
 ) -> SpotList:
-    """Read the spots of a survey, and what can be said of the rest."""
+    """Read the spots of a survey, and notes on the rest."""
     chosen = SpotSelection() if selection is None else selection
     query = sql.SQL(
         "SELECT {}, public.ST_AsBinary({}) FROM tunnel_api.spot WHERE survey_id = %(survey)s"
@@ -143,7 +142,7 @@ def read_spots(
 def _coverage(
     conn: psycopg.Connection[Any], survey: Survey, low: float | None, high: float | None
 ) -> tuple[float, float, str | None, bool]:
-    """Area of the faces and what of it was judged, m², for what nothing is said, and whether the search is up to date."""
+    """Return area and inspected area of the faces, m², notes on the rest, and whether the search is up to date."""
     row = conn.execute(
         """
         SELECT a.area, a.seen, a.unplaced,
@@ -168,15 +167,15 @@ def _coverage(
     assert row is not None
     face_area, seen_area, unplaced, current, bimodal = row
     if current is None:
-        return 0.0, 0.0, f"members were never looked for: tunneldb members {survey.name}", False
+        return 0.0, 0.0, f"members have not been searched for: tunneldb members {survey.name}", False
     said = []
     if not current:
         said.append(f"files or settings have changed since members were found: tunneldb members {survey.name}")
     if seen_area < face_area:
         share = 1.0 - seen_area / face_area
-        said.append(f"{100 * share:.0f} % of the faces ({face_area - seen_area:.1f} m²) could not be judged")
+        said.append(f"{100 * share:.0f} % of the faces ({face_area - seen_area:.1f} m²) could not be inspected")
     if unplaced:
         said.append(f"{unplaced:.1f} m² of faces have no chainage, and are not in the stretch")
     if bimodal:
-        said.append(f"more than half differs of member {bimodal}: which half is its own surface is open")
+        said.append(f"more than half of member {bimodal} differs: its own surface cannot be identified")
     return face_area, seen_area, "; ".join(said) or None, current

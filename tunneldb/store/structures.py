@@ -28,7 +28,7 @@ class SavedSpots:
 def save_structures(
     conn: psycopg.Connection[Any], survey: Survey, placed: PlacedStructures, changes: SpotReconciliation
 ) -> SavedSpots:
-    """Replace the members and faces of a survey, and write what becomes of its spots.
+    """Replace the members and faces of a survey, and write the changes to its spots.
 
     Parameters
     ----------
@@ -163,5 +163,5 @@ def _spot_row(spot: Spot, place: PlacedSpot, survey: Survey) -> dict[str, Any]:
 
 
 def _number(value: float) -> float | None:
-    """A number, NULL where there is none."""
+    """Return a number, NULL for None or NaN."""
     return float(value) if np.isfinite(value) else None

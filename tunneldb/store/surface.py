@@ -14,14 +14,14 @@ from tunneldb.store.survey import Survey
 
 
 def load_alignment(conn: psycopg.Connection[Any], survey: Survey, spacing: float | None = None) -> Alignment:
-    """Given axis of a survey's tunnel, which is no site, with stations so far apart, m; None: as its vertices are."""
+    """Load the given axis of a survey's tunnel, which is no site, with stations this far apart, m; None: its vertices."""
     alignment = alignment_of(conn, survey.tunnel_id, spacing)
     assert alignment is not None
     return alignment
 
 
 def alignment_of(conn: psycopg.Connection[Any], tunnel_id: int, spacing: float | None = None) -> Alignment | None:
-    """Given axis of a tunnel, with stations so far apart, m; None: as its vertices are. None where it is a site."""
+    """Load the given axis of a tunnel, with stations this far apart, m; None: its vertices. None for a site."""
     rows = conn.execute(
         "SELECT ST_X(d.geom), ST_Y(d.geom), ST_Z(d.geom), t.start_chainage, t.spacing"
         " FROM tunnel.tunnel t, ST_DumpPoints(t.alignment) d WHERE t.id = %s ORDER BY d.path",
@@ -33,7 +33,7 @@ def alignment_of(conn: psycopg.Connection[Any], tunnel_id: int, spacing: float |
 
 
 def load_surface(conn: psycopg.Connection[Any], survey: Survey, first: float = -np.inf, last: float = np.inf) -> Surface:
-    """Surface of a survey between two chainages (m), with one spacing more to both sides; the whole by default.
+    """Load the surface of a survey between two chainages (m), with one spacing more on both sides; the whole by default.
 
     Raises
     ------
@@ -65,6 +65,6 @@ def load_surface(conn: psycopg.Connection[Any], survey: Survey, first: float = -
 
 
 def survey_ends(conn: psycopg.Connection[Any], survey: Survey) -> tuple[float, float] | None:
-    """Chainage at which a survey begins and ends, m: its first and last point, within its segments; None without segments."""
+    """Return the chainages of a survey's first and last point, within its segments, m; None without segments."""
     row = conn.execute("SELECT chainage_from, chainage_to FROM tunnel_api.survey_ends(%s)", [survey.id]).fetchone()
     return None if row is None or row[0] is None else (float(row[0]), float(row[1]))

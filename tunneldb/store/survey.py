@@ -1,4 +1,4 @@
-"""One survey, with what its tunnel says about it."""
+"""Survey, with the data of its tunnel."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from tunneldb.errors import UserError
 from tunneldb.store.unknown import unknown_survey
 
 UNPOSED = (
-    "where the scanner was is not known: intensity is taken as the maker gives it, incidence is not corrected, and lining seen"
-    " too slantingly or from too far counts as seen; leaks may be missing, and false ones among them"
+    "scanner positions are unknown: intensity is used as the maker gives it, incidence is not corrected, and lining at too"
+    " oblique incidence or too far away counts as inspected; leaks may be missed, and there may be false ones"
 )
-"""What is to be said of leaks that were sought without scanner positions."""
+"""Remark on leaks that were searched for without scanner positions."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Survey:
 
     @property
     def note(self) -> str | None:
-        """What is to be said of all leaks of the survey, if anything."""
+        """Return a remark on all leaks of the survey, if there is any."""
         return UNPOSED if self.platform == "unknown" and self.intensity_kind != "none" else None
 
 

@@ -1,4 +1,4 @@
-"""What is said of a survey or a tunnel that the database does not have: which it has, and which one was perhaps meant."""
+"""Errors about an unknown survey or tunnel: with the existing names, and the one that was probably meant."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import psycopg
 from tunneldb.errors import UserError, did_you_mean
 
 LISTED = 20
-"""Names that a message lists at most."""
+"""Maximum number of names in a message."""
 
 _OF_TUNNEL = (
     "SELECT s.name FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE t.name = %s ORDER BY s.date, s.name"
@@ -26,7 +26,7 @@ def unknown_survey(conn: psycopg.Connection[Any], name: str) -> UserError:
 
 
 def unknown_tunnel(conn: psycopg.Connection[Any], name: str) -> UserError:
-    """Return the error for a tunnel that there is not; of a survey's name it says of which tunnel that is."""
+    """Return the error for an unknown tunnel; if it is a survey's name, with its tunnel."""
     row = conn.execute(
         "SELECT t.name FROM tunnel.tunnel t JOIN tunnel.survey s ON s.tunnel_id = t.id WHERE s.name = %s", [name]
     ).fetchone()

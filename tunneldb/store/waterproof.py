@@ -1,4 +1,4 @@
-"""Statistics of waterproofing that are kept of each kilometre (tunnel.waterproof): worked out where they are missing."""
+"""Waterproofing statistics of each kilometre (tunnel.waterproof), computed if missing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import psycopg
 
 Begin = Callable[[str, float | None], Callable[[float], None]]
-"""Takes a text and a total, and returns what takes the counts."""
+"""Called with a text and a total; returns a function that takes the progress."""
 
 
 def keep_missing(conn: psycopg.Connection[Any], begin: Begin) -> int:

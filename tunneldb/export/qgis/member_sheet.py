@@ -105,16 +105,16 @@ def _texts(survey: Survey) -> list[ET.Element]:
     what = f"{'Site' if survey.site else 'Tunnel'} {survey.tunnel}, survey {survey.name} of {survey.date:%Y-%m-%d}"
     sums = (
         f"[% {faces} %] face[% if({faces} = 1, '', 's') %], [% format_number({area}, 2) %] m², of which "
-        f"[% format_number(100 * {seen}, 1) %] % could be judged; [% {spots} %] spot[% if({spots} = 1, '', 's') %], "
+        f"[% format_number(100 * {seen}, 1) %] % was inspected; [% {spots} %] spot[% if({spots} = 1, '', 's') %], "
         f"dark [% format_number({dark}, 4) %] m², bright [% format_number({bright}, 4) %] m²"
     )
     doubt = (
-        f"[% if({bimodal}, 'More than half of it differs: which half is its own surface is open. ', '') %]"
-        f"[% if({seen} < 0.9995, 'Of what could not be judged nothing is said.', '') %]"
+        f"[% if({bimodal}, 'More than half of it differs: its own surface cannot be identified. ', '') %]"
+        f"[% if({seen} < 0.9995, 'There is no result for the part not inspected.', '') %]"
     )
     how = (
-        "Faces unrolled, with the share judged. Brown: darker than its own surface, yellow: brighter; "
-        "outlined orange: open, blue: confirmed, grey: rejected. Hatched: half unjudged."
+        "Faces unrolled, with the inspected share. Brown: darker than its own surface, yellow: brighter; "
+        "outlined orange: open, blue: confirmed, grey: rejected. Hatched: less than half inspected."
     )
     texts = [
         label(MEMBERS, "member", title, (left, 5, 150, 8), 15, bold=True),

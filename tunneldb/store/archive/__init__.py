@@ -1,1 +1,1 @@
-"""A survey's rows out of the database and into another: which tables they are in, and what in them refers to what."""
+"""Transfer of a survey's rows between databases: their tables, and their references."""

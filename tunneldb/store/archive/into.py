@@ -42,7 +42,7 @@ def _copy_in(
 
 
 def insert_rows(conn: psycopg.Connection[Any], table: Table, old: int, new: int) -> tuple[int, int]:
-    """Put a table's staged rows into place; return how many, and how many were left out.
+    """Insert a table's staged rows; return how many, and how many were left out.
 
     Of two surveys, the row of which one is not in this database is left out, and so is one that names a finding of it that is
     not there.
@@ -126,7 +126,7 @@ def load_points(
 
 
 def attach_points(conn: psycopg.Connection[Any], survey: int, kms: Iterable[int]) -> None:
-    """Put the points of kilometres into place."""
+    """Insert the points of kilometres."""
     for km in kms:
         conn.execute("SELECT tunnel_internal.partition_swap(%s, %s)", [survey, km])
 
@@ -148,7 +148,7 @@ def load_images(
 
 
 def attach_images(conn: psycopg.Connection[Any], survey: int, images: sql.Identifier) -> None:
-    """Put a survey's images into place. Its table belongs to the owner of the others, as if the survey had been added."""
+    """Insert a survey's images. Their table belongs to the owner of the others, as if the survey had been added."""
     row = conn.execute(
         "SELECT r.rolname FROM pg_class c JOIN pg_roles r ON r.oid = c.relowner WHERE c.oid = 'tunnel.image'::regclass"
     ).fetchone()
@@ -196,7 +196,7 @@ def load_audit(conn: psycopg.Connection[Any], survey: int) -> int:
 
 
 def _state(column: str) -> sql.Composable:
-    """What a finding or a photo was, with the numbers that it names: parent, merged into, merged with, finding."""
+    """Return an earlier version of a finding or a photo, with its references renumbered: parent, merged into, finding."""
     value = sql.Identifier("a", column)
     changed = _numbers(value, dict.fromkeys(("parent_id", "merged_into", "finding_id"), "finding"))
     here = number_of("finding", sql.SQL("(e.v)::text::bigint"), others=False)

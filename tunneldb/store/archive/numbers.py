@@ -1,4 +1,4 @@
-"""The numbers of an archive's rows in the database that they come into: their own where that is possible, or else new ones.
+"""Numbers of an archive's rows in the target database: the same if possible, else new ones.
 
 They are kept in temporary tables, ``map_<table>`` with ``old`` and ``new``; those of other surveys' rows in ``others_<table>``.
 """
@@ -18,12 +18,12 @@ _AUDITED = ("finding", "spot", "axis_vertex", "region", "photo", "learned_model"
 
 
 def staged(table: str) -> sql.Identifier:
-    """Name of the temporary table that holds an archive's rows of a table."""
+    """Return the name of the temporary table with an archive's rows of a table."""
     return sql.Identifier("pg_temp", f"archive_{table}")
 
 
 def keeps_numbers(conn: psycopg.Connection[Any], tables: Sequence[Table], name: str) -> bool:
-    """Whether all rows can have the numbers that they had, in the database that they came from.
+    """Return True if all rows can keep their numbers, in the database that they came from.
 
     That is so when each number was dealt out here and is free, and the audit has the archive's entries, and none of another
     survey on any of these rows.
@@ -111,7 +111,7 @@ def number_shared(conn: psycopg.Connection[Any], tables: Mapping[str, Table]) ->
 
 
 def number_others(conn: psycopg.Connection[Any]) -> None:
-    """Find the other surveys that rows name, with their findings and runs, by what each is known by."""
+    """Find the other surveys that rows refer to, with their findings and runs, by their natural keys."""
     conn.execute(
         "CREATE TEMPORARY TABLE others_survey ON COMMIT DROP AS SELECT a.id::bigint AS old, s.id::bigint AS new"
         " FROM pg_temp.archive_other_survey a JOIN tunnel.survey s ON s.name = a.name AND s.created_at = a.created_at"
@@ -136,7 +136,7 @@ def number_others(conn: psycopg.Connection[Any]) -> None:
 
 
 def number_of(target: str, value: sql.Composable, *, others: bool) -> sql.Composed:
-    """Expression for the number that a row of a table has here; NULL where there is none."""
+    """Return an expression for the number of a table's row in this database; NULL if there is none."""
     source = sql.SQL("pg_temp.{}").format(sql.Identifier(f"map_{target}"))
     if others:
         source = sql.SQL("(SELECT old, new FROM {} UNION ALL SELECT old, new FROM pg_temp.{})").format(
@@ -153,7 +153,7 @@ def ledger_numbers(conn: psycopg.Connection[Any]) -> list[tuple[str, str, str]]:
 
 
 def renumber_ledger(conn: psycopg.Connection[Any], *, keep: bool) -> None:
-    """Put the numbers of here into the ledger's parameters and counts; no run that was cut off is taken to be under way."""
+    """Renumber the ledger's parameters and counts; no interrupted run counts as running."""
     # no server process has this number
     conn.execute("UPDATE pg_temp.archive_run SET backend_pid = 0 WHERE outcome = 'running'")
     if keep:

@@ -1,4 +1,4 @@
-"""Rows of a survey out of the database, as streams of binary COPY: of one moment, and while no stage is at work on it."""
+"""Rows of a survey from the database, as streams of binary COPY: of one snapshot, while no stage works on the survey."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ AUDIT = (
     Column("part_of", "bigint"),
     Column("kept", "jsonb"),
 )
-"""What an archive holds of the audit: the survey's entries."""
+"""Audit entries of the survey in an archive."""
 
 OTHER_SURVEY = (Column("id", "integer"), Column("name", "text"), Column("created_at", "timestamp with time zone"))
-"""Surveys that this one was compared with, which the archive does not hold."""
+"""Surveys that this one was compared with, which are not in the archive."""
 
 OTHER_FINDING = (
     Column("id", "bigint"),
@@ -39,7 +39,7 @@ OTHER_FINDING = (
     Column("created_at", "timestamp with time zone"),
     Column("outline", "text"),
 )
-"""Their findings that comparisons name, and by what each is known again: when it came to be and a checksum of its outline."""
+"""Their findings in comparisons, with natural keys: time of creation and checksum of the outline."""
 
 OTHER_RUN = (
     Column("id", "bigint"),
@@ -48,7 +48,7 @@ OTHER_RUN = (
     Column("stage", "text"),
     Column("started_at", "timestamp with time zone"),
 )
-"""Their runs that comparisons rest on, and by what each is known again."""
+"""Their runs that comparisons depend on, with natural keys."""
 
 OTHERS = {"other_survey": OTHER_SURVEY, "other_finding": OTHER_FINDING, "other_run": OTHER_RUN}
 
@@ -69,18 +69,18 @@ class Stream:
 
 
 def member_name(table: str, km: int | None) -> str:
-    """Name of the member that holds a table's rows, of a `BULK` table those of a kilometre."""
+    """Return the member's name for a table's rows, for a `BULK` table those of a kilometre."""
     return f"rows/{table}.zst" if km is None else f"{table}/km{km}.zst"
 
 
 def without_survey(table: Table) -> tuple[Column, ...]:
-    """Columns of a `BULK` table but the survey's, which is the same in all rows."""
+    """Return the columns of a `BULK` table without the survey's, which is the same in all rows."""
     return tuple(column for column in table.columns if column.name != "survey_id")
 
 
 @contextmanager
 def still(conn: psycopg.Connection[Any], survey: Survey) -> Iterator[None]:
-    """Keep stages off the survey, and show it as it is at one moment; reviews go on, and are not seen.
+    """Lock the survey against stages, and use one snapshot of it; reviews go on, and are not seen.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def still(conn: psycopg.Connection[Any], survey: Survey) -> Iterator[None]:
 
 
 def kilometres(conn: psycopg.Connection[Any], survey: Survey) -> list[int]:
-    """Kilometres of which anything was read, done or wanted."""
+    """Return the kilometres with anything read, done or requested."""
     rows = conn.execute(
         """
         SELECT r.km FROM tunnel.run r WHERE r.survey_id = %(id)s AND r.km IS NOT NULL
@@ -124,7 +124,7 @@ def kilometres(conn: psycopg.Connection[Any], survey: Survey) -> list[int]:
 
 
 def streams(conn: psycopg.Connection[Any], survey: Survey) -> list[Stream]:
-    """All rows of a survey and its tunnel, and what of other surveys they name; in the order in which they are loaded."""
+    """Yield all rows of a survey and its tunnel, and references to other surveys, in the order of loading."""
     tables = archive_tables(conn)
     by_name = {table.name: table for table in tables}
     found = [
@@ -167,7 +167,7 @@ class Rows:
         self.count = 0
 
     def __iter__(self) -> Iterator[bytes | bytearray | memoryview]:
-        """Give the chunks."""
+        """Yield the chunks."""
         source = self._stream.query if self._stream.table == "point" else sql.SQL("({})").format(self._stream.query)
         with self._conn.cursor() as cursor:
             with cursor.copy(sql.SQL("COPY {} TO STDOUT (FORMAT binary)").format(source)) as copy:
@@ -237,5 +237,5 @@ def _others(tables: Sequence[Table], survey: Survey) -> Iterator[tuple[str, sql.
 
 
 def outline_checksum(alias: str) -> sql.Composed:
-    """Checksum of a finding's outline in the unrolled plane."""
+    """Return the checksum of a finding's outline in the unrolled plane."""
     return sql.SQL("md5(public.ST_AsEWKB({}))").format(sql.Identifier(alias, "unrolled"))

@@ -1,4 +1,4 @@
-"""Which tables hold a survey, by the catalogue: a table that a migration adds is found by its foreign keys."""
+"""Tables of a survey, from the catalogue: a new table is found by its foreign keys."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import psycopg
 from psycopg import sql
 
 BULK = ("point", "image")
-"""Tables that are partitioned by survey: their rows go by kilometre, into tables of their own."""
+"""Tables that are partitioned by survey: their rows are transferred by kilometre."""
 
 EXCLUDED = {
     "alembic_version": "the schema's own",
@@ -23,10 +23,10 @@ EXCLUDED = {
     "finding_sum": "sums that triggers keep",
     "waterproof": "statistics of kilometres, worked out anew",
 }
-"""Tables of schema tunnel that no archive holds, and why."""
+"""Tables of schema tunnel that are not archived, with the reason."""
 
 SHARED: Mapping[str, tuple[str, ...]] = {"feature_list": ("names",), "finding_kind": ("code",), "severity": ("id",)}
-"""Tables of all surveys that rows refer to, and the columns by which a row is known in another database."""
+"""Tables of all surveys that rows refer to, and the columns of their natural keys."""
 
 UNDECLARED: Mapping[tuple[str, str], str] = {
     ("clearance_section", "cluster_id"): "cluster",
@@ -34,7 +34,7 @@ UNDECLARED: Mapping[tuple[str, str], str] = {
     ("leak_change", "old_ids"): "finding",
     ("leak_change", "new_ids"): "finding",
 }
-"""Columns that hold ids of a table without a foreign key: ids that may be gone, arrays."""
+"""Columns with ids of a table without a foreign key: the ids may be gone, or are arrays."""
 
 _PIECE = re.compile(r"(point|image)_s\d+(_.*)?|fragment_s\d+_.*")
 
@@ -49,7 +49,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of schema tunnel of which an archive holds rows.
+    """Table of schema tunnel with archived rows.
 
     Attributes
     ----------
@@ -83,12 +83,12 @@ class Table:
         return sql.Identifier("tunnel", self.name)
 
     def arrays(self) -> frozenset[str]:
-        """Columns that hold several ids."""
+        """Return the columns with several ids."""
         return frozenset(c.name for c in self.columns if c.name in self.refers and c.type.endswith("[]"))
 
 
 def archive_tables(conn: psycopg.Connection[Any]) -> list[Table]:
-    """Tables of which an archive holds rows, each after those that it refers to.
+    """Return the tables with archived rows, each after those that it refers to.
 
     A table is the survey's when a foreign key leads from it to `survey`, directly or through another; its tunnel's in the same
     way. `BULK` tables, which are partitioned and so have none, come last.
@@ -125,7 +125,7 @@ def archive_tables(conn: psycopg.Connection[Any]) -> list[Table]:
 
 
 def belongs(table: Table, tables: Mapping[str, Table], survey: int, tunnel: int) -> sql.Composable:
-    """Condition on a table's rows, to be the survey's or its tunnel's; of two surveys a row is if either is this one."""
+    """Return the condition for a table's rows of the survey or its tunnel; with two surveys either may be this one."""
     if table.role == "shared":
         return sql.SQL("true")
     root, key = ("survey", survey) if table.role == "survey" else ("tunnel", tunnel)
@@ -142,12 +142,12 @@ def belongs(table: Table, tables: Mapping[str, Table], survey: int, tunnel: int)
 
 
 def stored_tables(conn: psycopg.Connection[Any]) -> set[str]:
-    """Names of all tables of schema tunnel, without the pieces that `BULK` tables are in and what waits to go into them."""
+    """Return all tables of schema tunnel, without the partitions of `BULK` tables and their waiting rows."""
     return set(_columns(conn))
 
 
 def _below(keys: Mapping[str, list[tuple[str, str]]], root: str) -> set[str]:
-    """The root and all tables from which foreign keys lead to it."""
+    """Return the root and all tables with foreign keys that lead to it."""
     found = {root}
     while more := {name for name, held in keys.items() if name not in found and any(t in found for _, t in held)}:
         found |= more
@@ -172,7 +172,7 @@ def _columns(conn: psycopg.Connection[Any]) -> dict[str, list[tuple[str, str, bo
 
 
 def _foreign_keys(conn: psycopg.Connection[Any]) -> dict[str, list[tuple[str, str]]]:
-    """Column and table referred to, of each table's foreign keys, which are of one column each."""
+    """Return column and target table of each table's foreign keys, which have one column each."""
     rows = conn.execute(
         """
         SELECT c.conrelid::regclass::text, a.attname, t.relname

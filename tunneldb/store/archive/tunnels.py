@@ -1,4 +1,4 @@
-"""The tunnel of an archived survey: the one that is there, if its axis is the same."""
+"""Tunnel of an archived survey: an existing one with the same name, if its axis is the same."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _DESIGNS = {
 
 
 def existing_tunnel(conn: psycopg.Connection[Any], name: str) -> int | None:
-    """Number of the tunnel of that name, None where there is none."""
+    """Return the number of the tunnel with that name, None if there is none."""
     row = conn.execute("SELECT id FROM tunnel.tunnel WHERE name = %s FOR KEY SHARE", [name]).fetchone()
     return None if row is None else int(row[0])
 
 
 def use_tunnel(conn: psycopg.Connection[Any], tunnel: int, name: str) -> list[str]:
-    """Take the tunnel that is there for the archive's; return what of the two differs, which stays as it is there.
+    """Use the existing tunnel for the archive's; return their differences, which stay as they are here.
 
     Raises
     ------
@@ -41,8 +41,8 @@ def use_tunnel(conn: psycopg.Connection[Any], tunnel: int, name: str) -> list[st
     ).fetchone()
     if row is None or not row[0]:
         raise UserError(
-            f"there is a tunnel {name!r} with another axis, SRID or spacing, along which no chainage of the archive would be"
-            " right: import into another database; nothing was imported"
+            f"there is a tunnel {name!r} with another axis, SRID or spacing, so that chainages of the archive would be"
+            " wrong: import into another database; nothing was imported"
         )
     conn.execute(
         "CREATE TEMPORARY TABLE map_tunnel ON COMMIT DROP AS"

@@ -10,7 +10,7 @@
       <rule key="{tunneldb-5}" symbol="5" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 5" label="Member 5, 13, …"/>
       <rule key="{tunneldb-6}" symbol="6" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 6" label="Member 6, 14, …"/>
       <rule key="{tunneldb-7}" symbol="7" filter="&quot;seen_share&quot; &gt;= 0.5 and &quot;member&quot; % 8 = 7" label="Member 7, 15, …"/>
-      <rule key="{tunneldb-8}" symbol="8" filter="&quot;seen_share&quot; &lt; 0.5" label="Less than half of it could be judged"/>
+      <rule key="{tunneldb-8}" symbol="8" filter="&quot;seen_share&quot; &lt; 0.5" label="Less than half of it inspected"/>
     </rules>
     <symbols>
       <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
@@ -463,6 +463,6 @@
     <field name="outline" editable="0"/>
   </editable>
   <previewExpression>"number"</previewExpression>
-  <mapTip>&lt;b&gt;Face [% "number" %]&lt;/b&gt; of member [% "member" %], [% "kind" %]&lt;br&gt;[% format_number("area", 2) %] m², of which [% format_number(100 * "seen_share", 0) %] % could be judged[% if("bimodal", '&lt;br&gt;more than half differs: which half is its own surface is open', '') %]</mapTip>
+  <mapTip>&lt;b&gt;Face [% "number" %]&lt;/b&gt; of member [% "member" %], [% "kind" %]&lt;br&gt;[% format_number("area", 2) %] m², of which [% format_number(100 * "seen_share", 0) %] % inspected[% if("bimodal", '&lt;br&gt;more than half differs: its own surface cannot be identified', '') %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

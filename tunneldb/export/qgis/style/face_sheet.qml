@@ -4,7 +4,7 @@
     <rules key="{tunneldb-rules}">
       <rule key="{tunneldb-0}" symbol="0" filter="&quot;seen_share&quot; &gt;= 0.5 and not &quot;bimodal&quot;" label="Face"/>
       <rule key="{tunneldb-1}" symbol="1" filter="&quot;bimodal&quot;" label="More than half differs: which half is its own is open"/>
-      <rule key="{tunneldb-2}" symbol="2" filter="&quot;seen_share&quot; &lt; 0.5" label="Less than half of it could be judged"/>
+      <rule key="{tunneldb-2}" symbol="2" filter="&quot;seen_share&quot; &lt; 0.5" label="Less than half of it inspected"/>
     </rules>
     <symbols>
       <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
@@ -191,6 +191,6 @@
     <field name="bimodal" editable="0"/>
   </editable>
   <previewExpression>"number"</previewExpression>
-  <mapTip>&lt;b&gt;Face [% "number" %]&lt;/b&gt; of member [% "member" %], [% "kind" %]&lt;br&gt;[% format_number("area", 2) %] m², of which [% format_number(100 * "seen_share", 0) %] % could be judged[% if("bimodal", '&lt;br&gt;more than half differs: which half is its own surface is open', '') %]</mapTip>
+  <mapTip>&lt;b&gt;Face [% "number" %]&lt;/b&gt; of member [% "member" %], [% "kind" %]&lt;br&gt;[% format_number("area", 2) %] m², of which [% format_number(100 * "seen_share", 0) %] % inspected[% if("bimodal", '&lt;br&gt;more than half differs: its own surface cannot be identified', '') %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>
