@@ -35,7 +35,7 @@ def template(example_template: str) -> str:
         (
             "detect",
             DETECTED,
-            "1 leak, 93.4 % of the lining seen; dark but dry: 2 joints and 1 dark spot; 3 of before not found again",
+            "1 leak, 93.4 % of the lining inspected; dry dark areas: 2 joints and 1 other area; 3 not found again",
         ),
         ("detect", {"pixels": 1234, "leaks": 0}, "offset image of 1 234 pixels"),
     ],

@@ -129,7 +129,7 @@ def test_arguments(tmp_path: Path) -> None:
     assert source.read_bytes() == before
     assert "extension .laz" in ground(source, tmp_path / "out.las", code=2)
     assert "no such file" in ground(tmp_path / "none.laz", tmp_path / "out.laz", code=2)
-    assert "no parameter of this verb" in ground(source, tmp_path / "out.laz", "--set", "section.angle_step=10", code=2)
+    assert "no parameter of this command" in ground(source, tmp_path / "out.laz", "--set", "section.angle_step=10", code=2)
     assert "out of bounds" in ground(source, tmp_path / "out.laz", "--set", "ground.voxel=-1", code=2)
     assert "no such folder" in _refused(source, tmp_path / "none" / "out.laz")
 

@@ -39,7 +39,7 @@ DEGREES = {
     "gradual": "as if it faded out",
     "rectangular": "like something with straight sides",
     "stripe": "like a painted stripe",
-    "shadow": "like the shadow of an appendage",
+    "shadow": "like the shadow of a fixture",
 }
 """Degrees of :mod:`tunneldb.anomalies.degrees`; each is its own reason."""
 
@@ -64,8 +64,8 @@ FEATURES = (
     Feature("turned_box", "rectangular", "share that it fills of the smallest rectangle of any direction"),
     Feature("aspect", "stripe", "length of the box along the tunnel over its width, as a logarithm"),
     Feature("box_waviness", "stripe", "standard deviation of the sides of the box about straight lines, m"),
-    Feature("beside", "shadow", "share of its sides that face an appendage or the floor"),
-    Feature("beneath", "shadow", "share of its sides that face an appendage above"),
+    Feature("beside", "shadow", "share of its sides that face a fixture or the floor"),
+    Feature("beneath", "shadow", "share of its sides that face a fixture above"),
     Feature("ragged", "shape", "perimeter over that of a circle of the same area, as a logarithm"),
     Feature("taper", "shape", "how far its middle lies above that of its extent, in parts of this"),
     Feature("upright", "shape", "extent around the tunnel over that along it, as a logarithm"),

@@ -10,9 +10,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import tell, verb
 
 
-@verb(
-    examples=["tunneldb check", "tunneldb check --json"], wrong="something is wrong, and stands in the list with what mends it"
-)
+@verb(examples=["tunneldb check", "tunneldb check --json"], wrong="a check failed; the list has the fix")
 @click.pass_obj
 def check(settings: Settings) -> None:
     """Check the server and the database, and show how to fix faults.

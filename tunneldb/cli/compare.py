@@ -147,8 +147,8 @@ def _print(rows: dict[str, list[Row]], whole: Row) -> None:
     )
     if whole["shift_greatest"] is not None:
         click.echo(
-            f"sections were shifted as a whole by up to {1e3 * whole['shift_greatest']:.1f} mm, which is taken out: the error"
-            " of the registration or a movement of the tunnel; which, cannot be told without control points"
+            f"sections were shifted as a whole by up to {1e3 * whole['shift_greatest']:.1f} mm, which is removed: only"
+            " control points can separate registration error from movement"
         )
     if whole["sections_without_motion"]:
         click.echo(f"in {whole['sections_without_motion']} sections too little was seen by both to tell how they moved")

@@ -74,7 +74,7 @@ def deviation(
         made = with_progress(lambda begin: measure_deviation(conn, found, layer, part.low, part.high, begin))
         whole = volume(conn, found, layer, part.low, part.high, axis_sigma or 0.0)
         if whole is None:
-            raise UserError(f"survey {survey} has nothing to hold against layer {layer} there")
+            raise UserError(f"survey {survey} has no lining or profile of layer {layer} there")
         rows = stretch_rows(conn, found, layer, part.low, part.high, every, axis_sigma or 0.0)
         tell(survey=survey, layer=layer, made=made, axis_sigma=axis_sigma, volume=whole, stretches=rows)
         files: list[Path] = []

@@ -70,7 +70,7 @@ def evenness(
         made = with_progress(lambda begin: measure_evenness(conn, found, layer, length, limit, part.low, part.high, begin))
         rows = stretch_rows(conn, found, layer, part.low, part.high, every)
         if not rows:
-            raise UserError(f"survey {survey} has no lining there that was held against layer {layer}")
+            raise UserError(f"survey {survey} has no lining there that was compared with layer {layer}")
         sections = section_rows(conn, found, layer, part.low, part.high)
     tell(survey=survey, layer=layer, made=made, length=length, limit=limit, stretches=rows)
     if output is None:

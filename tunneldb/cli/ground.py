@@ -35,7 +35,9 @@ def ground(file: Path, output: Path, assignments: tuple[str, ...]) -> None:
     """
     for assignment in assignments:
         if not assignment.startswith(_PREFIXES):
-            raise UserError(f"{assignment.partition('=')[0]!r} is no parameter of this verb; there are {', '.join(_NAMES)}")
+            raise UserError(
+                f"{assignment.partition('=')[0]!r} is no parameter of this command; parameters: {', '.join(_NAMES)}"
+            )
     values = settings(assignments)
     from tunneldb.export.pointcloud.single_file import classify_file
 

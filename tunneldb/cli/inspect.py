@@ -95,8 +95,8 @@ def _rows(look: FileLook) -> list[tuple[str, str]]:
     least, median, most = map(_rounded, look.density)
     rows += [
         ("density", f"{median} per m² of surface, {least} to {most} for 80 % of it; counted within 1 m of 400 places, {share}"),
-        ("profiles", "can't be told" if look.profile_spacing is None else f"every {_length(look.profile_spacing)}"),
-        ("unit of length", look.unit or "nothing speaks against metres"),
+        ("profile spacing", "unknown" if look.profile_spacing is None else f"every {_length(look.profile_spacing)}"),
+        ("unit of length", look.unit or "probably metres"),
         ("times", _times(look)),
         ("scans", _scans(look)),
     ]

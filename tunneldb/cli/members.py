@@ -171,7 +171,7 @@ def _print(found: FileMembers) -> None:
     area = sum(face.area for face in structures.faces)
     seen = sum(face.area * face.seen_share for face in structures.faces)
     click.echo(
-        f"{len(structures.members)} members of {len(structures.faces)} faces, {area:.1f} m², of which {seen:.1f} m² was judged;"
+        f"{len(structures.members)} members of {len(structures.faces)} faces, {area:.1f} m², {seen:.1f} m² judged;"
         f" {len(structures.spots)} spots"
     )
     rows = [

@@ -63,7 +63,7 @@ def _points(seen: Preview) -> list[RenderableType]:
         rows = f"about {number(seen.rows)} rows, as of the files before {seen.kept:.1%} were kept"
     else:
         rows = f"at most {number(seen.rows)} rows"
-    return [Text(f"points to be read: {number(seen.points)}, of which {rows}")]
+    return [Text(f"points to be read: {number(seen.points)}, {rows}")]
 
 
 def _disk(seen: Preview) -> list[RenderableType]:

@@ -117,7 +117,7 @@ class _Shown:
         note = counts.pop("note", None)
         say(f"[{done}/{self.total}] {stage.name} km {km}: {stage_sentence(stage.name, counts)}")
         if note:
-            say(f"  to be known: {note}")
+            say(f"  note: {note}")
 
 
 def _say_result(conn: psycopg.Connection[Any], survey: Survey) -> None:

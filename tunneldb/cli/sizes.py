@@ -42,7 +42,7 @@ def sizes(settings: Settings, name: str | None) -> None:
     print_table(
         ["survey", *KINDS, "total"],
         [
-            ["(not told apart)" if survey is None else survey, *(_cell(found.get(kind)) for kind in KINDS), _total(found)]
+            ["(unknown survey)" if survey is None else survey, *(_cell(found.get(kind)) for kind in KINDS), _total(found)]
             for survey, found in table.items()
         ],
         right=range(1, len(KINDS) + 2),
@@ -50,7 +50,7 @@ def sizes(settings: Settings, name: str | None) -> None:
     if name is None:
         click.echo(f"database: {decimal(database[0])}")
     if None in table:
-        notify("not told apart: tables that were never analyzed; tunneldb vacuum --yes analyzes them")
+        notify("unknown survey: tables that were never analyzed; tunneldb vacuum --yes analyzes them")
 
 
 def _cell(found: tuple[int, bool] | None) -> str:

@@ -67,12 +67,12 @@ _CLASSES = ("unassigned", "ground", "lining", "niche", "appendage", "rail", "obj
 def _detect(counts: Counts) -> str:
     if "seen" not in counts:
         return f"offset image of {number(counts['pixels'], 'pixel')}"
-    said = f"{number(counts['leaks'], 'leak')}, {100 * counts['seen']:.1f} % of the lining seen"
-    dry = [number(counts["joints"], "joint"), number(counts["dark"], "dark spot")]
-    said += f"; dark but dry: {' and '.join(dry)}"
+    said = f"{number(counts['leaks'], 'leak')}, {100 * counts['seen']:.1f} % of the lining inspected"
+    dry = [number(counts["joints"], "joint"), number(counts["dark"], "other area")]
+    said += f"; dry dark areas: {' and '.join(dry)}"
     changes = {
-        "leaks_over_ends": "over the end of the kilometre",
-        "leaks_gone": "of before not found again",
+        "leaks_over_ends": "across the kilometre boundary",
+        "leaks_gone": "not found again",
         "leaks_kept_for_review": "kept because they were reviewed",
     }
     return "; ".join([said, *(f"{_grouped(counts[name])} {words}" for name, words in changes.items() if counts.get(name))])

@@ -141,7 +141,7 @@ def add(
     "set",
     examples=[
         "tunneldb survey set ringo-2024 --date 2024-05-05",
-        "tunneldb survey set ringo-2024 --trajectory trajectory-mended.csv",
+        "tunneldb survey set ringo-2024 --trajectory trajectory-fixed.csv",
         "tunneldb survey set ringo-2024 --intensity-kind linear --reference auto",
     ],
 )

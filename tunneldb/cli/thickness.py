@@ -69,7 +69,7 @@ def thickness(
         made = with_progress(lambda begin: measure_thickness(conn, old, new, layer, part.low, part.high, begin))
         rows = stretch_rows(conn, old, new, layer, part.low, part.high, every, minimum or 0.0, axis_sigma or 0.0)
         if not rows:
-            raise UserError(f"surveys {before} and {after} have no section in common there that was held against layer {layer}")
+            raise UserError(f"surveys {before} and {after} have no common section there that was compared with layer {layer}")
         sections = section_rows(conn, old, new, layer, part.low, part.high)
     tell(before=before, after=after, layer=layer, made=made, minimum=minimum, axis_sigma=axis_sigma, stretches=rows)
     if output is None:

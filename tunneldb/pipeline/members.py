@@ -43,7 +43,7 @@ SATURATED = 0.5
 UNKNOWN = 0.01
 """Maximum share of points without a scanner position that may be left out."""
 
-_WITHOUT = "on each flat face the level goes by incidence, which tells the range there, on each pipe by both"
+_WITHOUT = "the level of a flat face depends on incidence, which determines the range there, that of a pipe on both"
 
 AT_ONCE = 250_000
 """Number of points read and written at a time: voxels and faces need the memory."""

@@ -35,9 +35,7 @@ PARAMETERS: dict[str, Parameter] = {
     "axis.angle_step": Parameter(5.0, 1.0, 20.0, "°", "width of the angular classes that place a vertex"),
     "axis.tolerance": Parameter(0.002, 1e-5, 1.0, "m", "the axis rests when no vertex moves by as much in a pass"),
     "axis.max_iterations": Parameter(20, 1, 100, "", "passes at the most", whole=True),
-    "axis.max_deviation": Parameter(
-        0.5, 0.05, 10.0, "m", "a vertex that lies farther off where its neighbours lead is interpolated"
-    ),
+    "axis.max_deviation": Parameter(0.5, 0.05, 10.0, "m", "deviation from its neighbours above which a vertex is interpolated"),
     "axis.max_rejected": Parameter(
         0.3, 0.0, 1.0, "", "share of the vertices that may be interpolated for that or as they do not rest; one always may"
     ),
@@ -69,7 +67,7 @@ PARAMETERS: dict[str, Parameter] = {
         0.0,
         1e6,
         "/m²",
-        "lining with fewer points about it counts as unseen: at 12 the noise filter's widest circle still holds a wall's "
+        "lining with fewer points around it is not inspected: at 12 the noise filter's widest circle still holds a wall's "
         "points (it takes 2 % of them for noise, at 5 45 %), and the widest median filter 12 pixels that show any",
     ),
     "intensity.max_incidence": Parameter(75.0, 30.0, 89.0, "°", "points seen more slantingly are left out of the images"),

@@ -101,7 +101,7 @@ def read_positions(
         raise table.error(
             int(np.argmax(wild)),
             f"this pose and {np.count_nonzero(wild) - 1} others ({100 * wild.mean():.2g} %) lie more than"
-            f" {MAX_AXIS_DISTANCE:g} m aside of the axis of {tunnel!r}, {MAX_END_DISTANCE:g} m beyond its ends, or jump;"
+            f" {MAX_AXIS_DISTANCE:g} m beside the axis of {tunnel!r}, {MAX_END_DISTANCE:g} m beyond its ends, or jump;"
             " fix the trajectory",
         )
     notes = []

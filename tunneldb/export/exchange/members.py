@@ -21,9 +21,9 @@ Geometry = Literal["face", "map", "3d"]
 """Geometries: each face's own plane, unrolled for a pipe; the map; in space."""
 
 _WHERE = {"face": "in each face's own plane", "map": "on the map", "3d": "in space"}
-_MEMBER = "Faces of one surface, joined over what stands before it; {}"
-_FACE = "Planes and parts of cylinders; {}. Of what was not seen (1 - seen_share) nothing is known"
-_SPOT = "What is darker or brighter than its own surface; {}"
+_MEMBER = "Faces of one surface, joined across objects in front of it; {}"
+_FACE = "Planes and parts of cylinders; {}. The share 1 - seen_share was not inspected"
+_SPOT = "Areas darker or brighter than their own surface; {}"
 
 
 def write_members(path: Path, found: Structures, crs: CRS | None, geometry: Geometry = "3d") -> dict[str, int]:

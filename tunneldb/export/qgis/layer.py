@@ -151,7 +151,7 @@ LAYERS = (
     VectorLayer("segment", "Segments", "segment", "LineStringZ", "segment", MAP, (MAP,)),
     VectorLayer("section", "Sections", "section", "LineStringZ", "section", MAP, (MAP, SPACE)),
     VectorLayer("outline", "Walls, at their widest", "outline", "LineString", "outline", MAP, (MAP, FINDINGS_MAP)),
-    VectorLayer("cluster", "Objects, rails, appendages", "cluster", "Polygon", "cluster", MAP, (MAP,)),
+    VectorLayer("cluster", "Objects, rails, fixtures", "cluster", "Polygon", "cluster", MAP, (MAP,)),
     *_findings("unrolled", UNROLLED, FINDINGS),
     VectorLayer(
         "coverage_gap", "Where leaks could be missed", "coverage_gap", "Polygon", "coverage_gap", UNROLLED, (UNROLLED, SHEETS)

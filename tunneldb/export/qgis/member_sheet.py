@@ -104,7 +104,7 @@ def _texts(survey: Survey) -> list[ET.Element]:
     page_of = "[% @atlas_featurenumber %] of [% @atlas_totalfeatures %]"
     what = f"{'Site' if survey.site else 'Tunnel'} {survey.tunnel}, survey {survey.name} of {survey.date:%Y-%m-%d}"
     sums = (
-        f"[% {faces} %] face[% if({faces} = 1, '', 's') %], [% format_number({area}, 2) %] m², of which "
+        f"[% {faces} %] face[% if({faces} = 1, '', 's') %], [% format_number({area}, 2) %] m², "
         f"[% format_number(100 * {seen}, 1) %] % was inspected; [% {spots} %] spot[% if({spots} = 1, '', 's') %], "
         f"dark [% format_number({dark}, 4) %] m², bright [% format_number({bright}, 4) %] m²"
     )

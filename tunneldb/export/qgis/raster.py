@@ -33,7 +33,7 @@ KINDS = {
         for end, said in (("", ""), (FILLED, f", {FILL_NOTE}"))
     },
     CHANGE: "Change since an older survey",
-    "state": "States: seen, unseen, dark",
+    "state": "States: inspected, not inspected, dark",
     "class": "Classes",
     SUBMERGED: "Offset below the water",
     BED: "Depth of the water",

@@ -40,7 +40,7 @@ _LEAK = (
     (Column("Reviewed by"), "reviewed_by"), (Column("Reviewed, UTC"), "reviewed_at"), (Column("Reasons"), "reasons"),
 )  # fmt: skip
 
-_NAMES = {"leak": "Leaks", "joint": "Joints", "dark": "Dark spots", "all": "Leaks, joints, dark spots"}
+_NAMES = {"leak": "Leaks", "joint": "Joints", "dark": "Dry dark areas", "all": "Leaks, joints, dry dark areas"}
 
 
 def write_findings(
