@@ -1,4 +1,4 @@
-"""The ledger: a row of tunnel.run for every stage of every kilometre that was tried."""
+"""Ledger: a row of tunnel.run for each attempt of a stage in a kilometre."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ _ATTEMPTS = 6
 
 
 class LostError(Exception):
-    """A job was taken from its worker, which was thought to be lost: what it did must not be committed."""
+    """Job that was taken from its worker, which was thought to be lost; its work must not be committed."""
 
 
 @dataclass
 class Run:
-    """A run under way; what is put into ``counts`` is written with its end."""
+    """Run in progress; ``counts`` is written at its end."""
 
     id: int
     started_at: dt.datetime
@@ -51,7 +51,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Job:
-    """A job of the queue that a worker is at; ``attempts`` counts how often it was begun before."""
+    """Job of the queue that a worker runs; ``attempts`` is the number of earlier attempts."""
 
     id: int
     worker: int
@@ -227,14 +227,14 @@ def _end_job(conn: psycopg.Connection[Any], job: Job, error: BaseException) -> N
 
 
 def retry_at(error: BaseException, attempts: int) -> dt.timedelta | None:
-    """How long to wait before another attempt: 1, 2, 4 s and so on, more or less; None if it would be in vain."""
+    """Return the time to wait before another attempt, about 1, 2, 4 s and so on; None if it would fail again."""
     if attempts + 1 >= _ATTEMPTS or not isinstance(error, (BusyError, *_PASSING)):
         return None
     return dt.timedelta(seconds=2.0**attempts * random.uniform(0.7, 1.3))
 
 
 def describe(error: BaseException) -> str:
-    """One line: the message of what the user can mend; of anything else also its type."""
+    """Return one line: the message of an error that the user can fix; of any other also its type."""
     if isinstance(error, Exception) and (known := describe_failure(error)) is not None:
         return known
     text = " ".join((first_line(error) if isinstance(error, psycopg.Error) else str(error)).split())
@@ -244,7 +244,7 @@ def describe(error: BaseException) -> str:
 
 
 def versions(conn: psycopg.Connection[Any]) -> dict[str, str]:
-    """Versions of the program, the server and the libraries that results depend on."""
+    """Return the versions of the program, the server and the libraries that results depend on."""
     row = conn.execute("SELECT current_setting('server_version'), PostGIS_Lib_Version()").fetchone()
     assert row is not None
     return {

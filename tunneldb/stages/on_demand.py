@@ -1,4 +1,4 @@
-"""Running measures: kilometre by kilometre, and what all of them refuse."""
+"""Measures by kilometre: their runs, and the requests that all of them refuse."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def measure_kilometres(
 
 
 def refuse_beyond(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> None:
-    """Refuse a stretch that lies beyond the ends of a survey, before its kilometres are measured for nothing.
+    """Refuse a stretch beyond the ends of a survey, before its kilometres are measured in vain.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from tunneldb.errors import InputError, did_you_mean
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that steers a stage.
+    """Numeric parameter of a stage.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ PARAMETERS: dict[str, Parameter] = {
 
 
 def settings(assignments: Iterable[str] = ()) -> dict[str, float]:
-    """Values of all parameters, some of them set as ``name=value``.
+    """Return the values of all parameters, some of them set as ``name=value``.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def check_together(values: Mapping[str, float]) -> None:
 
 
 def of_stage(values: Mapping[str, float], prefixes: Iterable[str]) -> dict[str, float]:
-    """Those of the values whose names begin with one of the prefixes: what a stage depends on."""
+    """Return the values whose names begin with one of the prefixes: those that a stage depends on."""
     chosen = tuple(f"{prefix}." for prefix in prefixes)
     return {name: value for name, value in values.items() if name.startswith(chosen)}
 

@@ -1,4 +1,4 @@
-"""The stages of a kilometre and the measures: their order, what each rests on and what does it. The one place that says so.
+"""The stages of a kilometre and the measures: order, sources, results and functions. The only place that defines them.
 
 `tunneldb init` writes REGISTRY to the tables `tunnel.stage` and `tunnel.stage_input`. From there the database's functions and
 views know the stages: state, queue, pruning, archives, and what is cleared with a kilometre. This module imports nothing that

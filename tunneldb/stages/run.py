@@ -1,4 +1,4 @@
-"""Running the stages of a survey, stage by stage and kilometre by kilometre."""
+"""Runs of the stages of a survey, by stage and kilometre."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tunneldb.store.survey import Survey
 
 
 def km_range(text: str) -> range:
-    """Kilometres of ``511`` or ``511-513``; before the zero of the chainage they are negative, ``-2`` or ``-2--1``.
+    """Return the kilometres of ``511`` or ``511-513``; before chainage zero they are negative, ``-2`` or ``-2--1``.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def km_range(text: str) -> range:
 
 
 def parse_km(text: str | None, there: list[int]) -> list[int]:
-    """Kilometres of ``text`` (``511`` or ``511-513``) that are there; all of them without a text.
+    """Return the existing kilometres of ``text`` (``511`` or ``511-513``); all of them without a text.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def parse_km(text: str | None, there: list[int]) -> list[int]:
 
 
 def loaded_kilometres(conn: psycopg.Connection[Any], survey: Survey) -> list[int]:
-    """Kilometres of a survey that hold points."""
+    """Return the kilometres of a survey that hold points."""
     rows = conn.execute(
         """
         SELECT substring(c.relname FROM '_km(-?[0-9]+)$')::int AS km
@@ -73,7 +73,7 @@ def nothing_yet(conn: psycopg.Connection[Any], survey: Survey, lack: str) -> Not
 
 
 def choose_stages(first: str | None, last: str | None) -> list[Stage]:
-    """Stages from ``first`` to ``last``, both by name and included.
+    """Return the stages from ``first`` to ``last``, both by name and included.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def choose_stages(first: str | None, last: str | None) -> list[Stage]:
 
 
 class Task(NamedTuple):
-    """A stage of a kilometre that is to run, with the values of all parameters."""
+    """Stage of a kilometre to run, with the values of all parameters."""
 
     stage: Stage
     km: int
@@ -101,7 +101,7 @@ class Task(NamedTuple):
 
 
 def stage_tasks(kilometres: Iterable[int], stages: Iterable[Stage], values: Mapping[str, float]) -> list[Task]:
-    """Stages over kilometres: each for all kilometres before the next, for the axis of one shapes its neighbours' segments."""
+    """Return stages of kilometres: each for all kilometres before the next, since an axis shapes neighbouring segments."""
     return [Task(stage, km, values) for stage in stages for km in kilometres]
 
 
@@ -112,7 +112,7 @@ def stale_tasks(
     stages: Iterable[Stage],
     assignments: Sequence[str] = (),
 ) -> list[Task]:
-    """What is stale of a survey, in the order in which it must run, as ``tunnel_api.stage_status`` has it.
+    """Return the stale stages of a survey in the order in which they must run, from ``tunnel_api.stage_status``.
 
     Parameters
     ----------

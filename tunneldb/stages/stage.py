@@ -1,4 +1,4 @@
-"""A stage: what it reads, what it depends on, what its results are, and what does it.
+"""Stages: their sources, parameters, results, and functions or commands.
 
 A stage of a kilometre has a function and runs in the order of the registry. A measure is a stage that is run on demand, by a
 command of its own.
@@ -23,7 +23,7 @@ Progress = Callable[[float], None]
 
 
 class Holds(StrEnum):
-    """What a parameter of a run holds."""
+    """Content of a parameter of a run."""
 
     RUN = "run"
     """Keys of the runs that the result was made from: one, or an array."""
@@ -37,7 +37,7 @@ class Holds(StrEnum):
 
 @dataclass(frozen=True)
 class Input:
-    """A parameter of a stage's runs that says what the result was made from: a row of `tunnel.stage_input`.
+    """Parameter of a stage's runs that names a source of the result: a row of `tunnel.stage_input`.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Input:
 
 @dataclass(frozen=True)
 class Stage:
-    """A step of the pipeline or a measure: a row of `tunnel.stage`, and what does it.
+    """Step of the pipeline or measure: a row of `tunnel.stage`, and its function or command.
 
     Attributes
     ----------

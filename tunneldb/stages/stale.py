@@ -1,4 +1,4 @@
-"""Which results of a measure are out of date, and why."""
+"""State of the results of a measure: which are out of date, and why."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tunneldb.store.survey import Survey
 
 @dataclass(frozen=True)
 class Result:
-    """A result that a measure makes of each kilometre of a survey.
+    """Result that a measure makes of each kilometre of a survey.
 
     Attributes
     ----------

@@ -69,7 +69,7 @@ def compare(
     length: float,
     begin: Begin,
 ) -> list[int]:
-    """Bring the change of the kilometres of a stretch up to date, each in a transaction of its own; return which were.
+    """Bring the change of a stretch up to date, each kilometre in one transaction; return those that were made.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int,
 
 
 def _old_sums(conn: psycopg.Connection[Any], old: Survey, km: int, surface: Surface, cell: float) -> CellSums | None:
-    """Sums of the older survey's kilometre; its grid covers the blocks that there are."""
+    """Sum the older survey's kilometre by cell; the grid covers the stored blocks."""
     ends = _extent(conn, old, km)
     if ends is None:
         return None
@@ -171,7 +171,7 @@ def _old_sums(conn: psycopg.Connection[Any], old: Survey, km: int, surface: Surf
 def _new_sums(
     conn: psycopg.Connection[Any], new: Survey, km: int, surface: Surface, old: Surface, grid: CellGrid, pixel: float
 ) -> CellSums:
-    """Sums of the newer survey in the cells of the older one's plane: each pixel is brought there through space."""
+    """Sum the newer survey in the cells of the older one's plane; each pixel is transformed through space."""
     sums = CellSums(grid, pixel)
     classes = _Lining(conn, new, km, surface)
     for raster, state in load_blocks(conn, new, km * KILOMETRE - BESIDE, (km + 1) * KILOMETRE + BESIDE):
@@ -185,14 +185,14 @@ def _new_sums(
 
 
 class _Lining:
-    """What pixels of a survey show: by their stored states, or by the classes of stage ``ground`` where none are stored."""
+    """Content of a survey's pixels: from their stored states, or without these from the classes of stage ``ground``."""
 
     def __init__(self, conn: psycopg.Connection[Any], survey: Survey, km: int, surface: Surface) -> None:
         self._of = conn, survey, km, surface
         self._classes: Callable[[Raster], Bool] | None = None
 
     def seen(self, raster: Raster, state: Single | None) -> tuple[Bool, Bool]:
-        """Pixels that show lining or its recesses, and of these, lining."""
+        """Return the pixels that show lining or its recesses, and those that show lining."""
         there = np.isfinite(raster.values)
         if state is None:
             self._classes = self._classes or lining_by_class(*self._of)
@@ -203,7 +203,7 @@ class _Lining:
 
 
 def _extent(conn: psycopg.Connection[Any], survey: Survey, km: int) -> tuple[float, float, float, float, float] | None:
-    """Chainage and arc from and to of a kilometre's offset image, and its pixel, m."""
+    """Return the range of chainage and of arc of a kilometre's offset image, and its pixel, m."""
     blocks = image_blocks(conn, survey, km, "offset")
     if not blocks:
         return None
@@ -219,7 +219,7 @@ def _parts(raster: Raster, seen: Bool) -> list[tuple[Any, Any]]:
 
 
 def _places(raster: Raster, part: tuple[Any, Any]) -> tuple[Float, Float, Float]:
-    """Chainage, arc and offset of pixels."""
+    """Return chainage, arc and offset of pixels."""
     place = raster.transform
     return (
         place.c + (part[1] + 0.5) * place.a,
@@ -229,7 +229,7 @@ def _places(raster: Raster, part: tuple[Any, Any]) -> tuple[Float, Float, Float]
 
 
 def _stored_region(region: shape_change.Region, grid: CellGrid, surface: Surface) -> list[StoredRegion]:
-    """A region with its outline along the edges of its cells."""
+    """Return a region with its outline along the edges of its cells."""
     row, column = int(region.rows.min()), int(region.columns.min())
     mask = np.zeros((int(np.ptp(region.rows)) + 1, int(np.ptp(region.columns)) + 1), np.uint8)
     mask[region.rows - row, region.columns - column] = 1
@@ -245,7 +245,7 @@ def _stored_region(region: shape_change.Region, grid: CellGrid, surface: Surface
 
 
 def rings_apart(outline: shapely.Polygon) -> shapely.Polygon:
-    """An outline of cells whose rings touch nowhere, drawn in by 1 mm: QGIS fills no other in space.
+    """Shrink an outline of cells by 1 mm, so that its rings touch nowhere: QGIS fills no other in 3D.
 
     Cells that are connected share an edge, so that it stays in one piece.
     """
@@ -256,7 +256,7 @@ def _leaks(
     conn: psycopg.Connection[Any], surveys: tuple[Survey, Survey], km: int, surfaces: tuple[Surface, Surface], found: Change,
     pixel: float,
 ) -> list[StoredGroup]:  # fmt: skip
-    """Groups of leaks whose middle lies in the kilometre."""
+    """Return the groups of leaks whose middle is in the kilometre."""
     low, high = km * KILOMETRE, (km + 1) * KILOMETRE
     wide = [load_surface(conn, survey, low - HALO, high + HALO) for survey in surveys]
     old = load_leaks(conn, surveys[0], low - HALO, high + HALO)
@@ -271,7 +271,7 @@ def _leaks(
 
 
 def _brought(leak: Leak, surface: Surface, old: Surface) -> Leak | None:
-    """A leak of the newer survey with its outline in the older one's plane; None where that has no surface."""
+    """Transform a leak of the newer survey to the older one's plane; None where that has no surface."""
 
     def through_space(unrolled: Float) -> Float:
         there = old.unroll(surface.to_space(unrolled[:, 0], unrolled[:, 1], np.zeros(len(unrolled))))
@@ -303,7 +303,7 @@ def _polygons(shape: shapely.Geometry) -> list[Polygon]:
 
 
 def _seen_share(outline: shapely.Geometry, cells: Cells, grid: CellGrid) -> float:
-    """Share of a place that an epoch saw."""
+    """Return the share of a place that an epoch saw."""
     west, south, east, north = outline.bounds
     column = np.arange(max(int((west - grid.west) / grid.cell), 0), min(int((east - grid.west) / grid.cell) + 1, grid.columns))
     row = np.arange(max(int((south - grid.south) / grid.cell), 0), min(int((north - grid.south) / grid.cell) + 1, grid.rows))

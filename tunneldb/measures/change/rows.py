@@ -26,7 +26,7 @@ from tunneldb.store.survey import Survey, get_survey
 
 @dataclass(frozen=True)
 class StoredRegion:
-    """A region of change with its geometries."""
+    """Region of change with its geometries."""
 
     outline: shapely.Polygon
     shaped: Geometries
@@ -38,7 +38,7 @@ class StoredRegion:
 
 @dataclass(frozen=True)
 class StoredGroup:
-    """Leaks of one place with what became of them; geometries are of many parts."""
+    """Leaks of one place with their change of state, and multi-part geometries."""
 
     state: str
     old: Sequence[Leak]
@@ -54,7 +54,7 @@ class StoredGroup:
 def load_blocks(
     conn: psycopg.Connection[Any], survey: Survey, low: float, high: float
 ) -> Iterator[tuple[Raster, Single | None]]:
-    """Blocks of the offset image that lie between two chainages (m), whole or in part, with the state of pixels, if stored."""
+    """Load the blocks of the offset image between two chainages (m), also partial ones, with the state of pixels, if stored."""
     blocks = conn.execute(
         "SELECT km, block FROM tunnel.image WHERE survey_id = %s AND kind = 'offset' AND km BETWEEN %s AND %s"
         " ORDER BY km, block",
@@ -68,7 +68,7 @@ def load_blocks(
 
 
 def load_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Leak]:
-    """Findings that count between two chainages (m), whole or in part: leaks, joints, other dark spots."""
+    """Load the findings that count between two chainages (m), also partly: leaks, joints, other dark spots."""
     rows = conn.execute(
         "SELECT id, coalesce(kind_override, kind), wet, area, contrast, public.ST_AsBinary(unrolled) FROM tunnel.finding"
         " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected'"
@@ -84,7 +84,7 @@ def load_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: 
 def older_compared(
     conn: psycopg.Connection[Any], survey: Survey, low: float = -math.inf, high: float = math.inf
 ) -> Survey | None:
-    """Of the surveys that one was compared with between two chainages (m), the last before it; None without any."""
+    """Return the last earlier survey that one was compared with between two chainages (m); None without any."""
     row = conn.execute(
         "SELECT o.name FROM tunnel.change_section c JOIN tunnel.survey o ON o.id = c.old_survey_id"
         " WHERE c.survey_id = %s AND c.chainage_to > %s AND c.chainage_from < %s AND o.date <= %s"
@@ -95,7 +95,7 @@ def older_compared(
 
 
 def clear_change(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int) -> None:
-    """Take away what was stored of a kilometre."""
+    """Delete the stored change of a kilometre."""
     for table in ("change_section", "change_image", "change_region", "leak_change"):
         query = sql.SQL("DELETE FROM {} WHERE survey_id = %s AND old_survey_id = %s AND km = %s").format(
             sql.Identifier("tunnel", table)
@@ -131,7 +131,7 @@ def save_images(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int
 
 
 def load_images(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int) -> dict[str, Raster]:
-    """Images of a kilometre by kind; none where it was not compared."""
+    """Load the images of a kilometre by kind; empty if it was not compared."""
     rows = conn.execute(
         "SELECT kind, tiff FROM tunnel.change_image WHERE survey_id = %s AND old_survey_id = %s AND km = %s",
         [new.id, old.id, km],

@@ -34,7 +34,7 @@ _DECIMALS = 6
 
 
 def change_rows(conn: psycopg.Connection[Any], view: str, old: Survey, new: Survey, low: float, high: float) -> list[Row]:
-    """Rows of a view of change that lie in a stretch, whole or in part, in order of chainage."""
+    """Read the rows of a view of change in a stretch, also partial ones, in order of chainage."""
     query = sql.SQL(
         "SELECT {} FROM {} WHERE survey_id = %s AND old_survey_id = %s AND chainage_to > %s AND chainage_from < %s"
         " ORDER BY chainage_from, id"
@@ -45,13 +45,13 @@ def change_rows(conn: psycopg.Connection[Any], view: str, old: Survey, new: Surv
 
 
 def change_csv(rows: list[Row], view: str) -> str:
-    """Rows as CSV, with a header; what could not be told is empty."""
+    """Return rows as CSV with a header; unknown values are empty."""
     cells = ([row[name] for name in COLUMNS[view]] for row in rows)
     return write_csv(COLUMNS[view], ([" ".join(map(str, v)) if isinstance(v, list) else v for v in row] for row in cells))
 
 
 def summary(sections: list[Row], regions: list[Row], leaks: list[Row]) -> Row:
-    """Sums over a stretch: areas m²; how many leaks are in each state."""
+    """Sum over a stretch: areas in m², and the number of leaks in each state."""
     states: dict[str, int] = {}
     for leak in leaks:
         states[leak["state"]] = states.get(leak["state"], 0) + 1

@@ -45,7 +45,7 @@ _EDGE = 2.0  # m beyond them from which points may belong to it: its ends are th
 
 @dataclass(frozen=True)
 class Options:
-    """What a clearance depends on beside points and outline; ``radius`` and ``cant`` replace what the track says, m."""
+    """Options of a clearance; ``radius`` and ``cant`` replace those of the track, m."""
 
     track_gauge: float = GAUGE
     widening: Widening = field(default_factory=Widening)
@@ -128,7 +128,7 @@ def measure_clearance(
     conn: psycopg.Connection[Any], survey: Survey, tracks: Tracks, track: str, gauge: str, outline: Outline, options: Options,
     low: float, high: float, begin: Begin,
 ) -> list[int]:  # fmt: skip
-    """Bring the clearance of the kilometres of a stretch up to date, each in a transaction of its own; return which were.
+    """Bring the clearance of a stretch up to date, each kilometre in one transaction; return those that were made.
 
     Raises
     ------
@@ -222,7 +222,7 @@ def _fitted(conn: psycopg.Connection[Any], survey: Survey, km: int, axis: Alignm
 
 
 def _share_seen(track: Track, begins: Float, held: Bool) -> float:
-    """Share of the metres whose nearest station saw both rails; 0 where there is no track."""
+    """Return the share of metres whose nearest station saw both rails; 0 without a track."""
     if not held.any():
         return 0.0
     k = np.abs(track.chainage[None, :] - begins[held][:, None] - STEP / 2.0).argmin(axis=1)
@@ -230,7 +230,7 @@ def _share_seen(track: Track, begins: Float, held: Bool) -> float:
 
 
 def _bend(axis: Alignment, track: Track, middle: Float) -> Float:
-    """Curvature of the track in plan at places along the axis (n,), 1/m, positive to the right, from a metre to the next."""
+    """Return the curvature of the track in plan at places along the axis (n,), 1/m, positive to the right, by metre."""
     low, high = max(middle[0] - _BESIDE, track.chainage[0]), min(middle[-1] + _BESIDE, track.chainage[-1])
     along = np.arange(low, high, STEP)
     if len(along) < 5:
@@ -262,7 +262,7 @@ def _infringements(
 
 
 def _covered(surface: Surface, xyz: Float, klass: int) -> shapely.Geometry | None:
-    """What points on the lining cover of the unrolled plane: 0.1 m about each; None of what stands off it."""
+    """Return the area of the unrolled plane within 0.1 m of points on the lining; None for other classes."""
     if klass not in (PointClass.LINING, PointClass.NICHE, PointClass.APPENDAGE):
         return None
     unrolled = surface.unroll(xyz)

@@ -48,7 +48,7 @@ class SavedInfringement:
 def load_classed(
     conn: psycopg.Connection[Any], survey: Survey, km: int, begin: float, end: float, rails: bool = False
 ) -> tuple[Float, UInt8]:
-    """Points between two chainages of the survey (n, 3), m, and their classes (n,), of a kilometre and those beside it.
+    """Load points between two chainages (n, 3), m, and their classes (n,), from a kilometre and its neighbours.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def load_classed(
 
 
 def classed_kilometres(conn: psycopg.Connection[Any], survey: Survey) -> list[int]:
-    """Kilometres whose points have classes, in order."""
+    """Return the kilometres whose points have classes, in order."""
     rows = conn.execute(
         "SELECT DISTINCT km FROM tunnel.run WHERE survey_id = %s AND stage = 'ground' AND outcome = 'done' ORDER BY km",
         [survey.id],
@@ -78,7 +78,7 @@ def classed_kilometres(conn: psycopg.Connection[Any], survey: Survey) -> list[in
 
 
 def clusters_at(conn: psycopg.Connection[Any], survey: Survey, km: int, points: Float) -> list[int | None]:
-    """Key of the cluster in whose cells, or beside whose cells, each point (n, 3) lies; None without."""
+    """Return the key of the cluster in or next to whose cells each point (n, 3) is; None without."""
     rows = conn.execute(
         "SELECT id, array_send(cells) FROM tunnel.cluster WHERE survey_id = %s AND km BETWEEN %s AND %s ORDER BY id",
         [survey.id, km - 1, km + 1],
@@ -137,7 +137,7 @@ def save_clearance(
 
 
 def flat_outline(outline: Outline) -> list[float]:
-    """Vertices and bulges of an outline, one after the other."""
+    """Return the vertices and bulges of an outline in one list."""
     return [float(value) for value in _flat(outline)]
 
 

@@ -21,7 +21,7 @@ SECTION = (
 
 
 def section_rows(conn: psycopg.Connection[Any], survey: Survey, gauge: str, track: str, low: float, high: float) -> list[Row]:
-    """Sections of a stretch in order, with the columns SECTION and ``margins``."""
+    """Read the sections of a stretch in order, with the columns SECTION and ``margins``."""
     with conn.cursor(row_factory=dict_row) as cursor:
         return cursor.execute(
             "SELECT label, chainage_from, chainage_to, track, margin, margin_se, clock, class, cluster_id, seen_share, points,"
@@ -35,7 +35,7 @@ def section_rows(conn: psycopg.Connection[Any], survey: Survey, gauge: str, trac
 def infringement_rows(
     conn: psycopg.Connection[Any], survey: Survey, gauge: str, track: str, low: float, high: float
 ) -> list[Row]:
-    """Infringements of a stretch, deepest first."""
+    """Read the infringements of a stretch, deepest first."""
     with conn.cursor(row_factory=dict_row) as cursor:
         return cursor.execute(
             "SELECT id, label, chainage_from, chainage_to, depth, clock, class, counts, cluster_id, points"
@@ -46,7 +46,7 @@ def infringement_rows(
 
 
 def summary(conn: psycopg.Connection[Any], survey: Survey, gauge: str, track: str, low: float, high: float) -> list[Row]:
-    """A row for each kilometre of a stretch, with what its run found of the track."""
+    """Read a row for each kilometre of a stretch, with the counts of its run."""
     with conn.cursor(row_factory=dict_row) as cursor:
         return cursor.execute(
             "SELECT c.km, count(*) AS metres, min(c.margin) AS margin, count(*) FILTER (WHERE c.inside > 0) AS metres_inside,"
@@ -61,7 +61,7 @@ def summary(conn: psycopg.Connection[Any], survey: Survey, gauge: str, track: st
 
 
 def sections_csv(rows: Sequence[Row]) -> str:
-    """Sections as CSV, with a column for each direction of 5°."""
+    """Return sections as CSV, with a column for each direction of 5°."""
     count = len(rows[0]["margins"]) if rows else 0
     names = [*SECTION, *(f"margin_{k * 360 // count:03d}" for k in range(count))]
     cells = ([*(row[name] for name in SECTION), *(None if v != v else v for v in row["margins"])] for row in rows)

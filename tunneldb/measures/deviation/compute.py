@@ -188,7 +188,7 @@ def _shift(mean: Float, inward: Float) -> Float:
 
 @dataclass(frozen=True)
 class Step:
-    """A step of chainage with its figures."""
+    """Step of chainage with its figures."""
 
     profile: str
     low: float
@@ -198,14 +198,14 @@ class Step:
 
 @dataclass(frozen=True)
 class Design:
-    """What a kilometre is held against: its surface, the given axis, and the profiles about that."""
+    """Design of a kilometre: its measured surface, the given axis, and the profiles about that axis."""
 
     surface: Surface
     axis: Alignment
     stretches: Sequence[Stretch]
 
     def places(self, chainage: Float, arc: Float, offset: Raster) -> tuple[Float, Float, Float]:
-        """Chainage along the given axis (c,), and where pixels lie about it, right and up, both (c, r), m.
+        """Return the chainage along the given axis (c,), and the places of pixels right of it and above it, (c, r), m.
 
         The planes of the measured axis and of the given one differ by fractions of a degree: of each column the place of three
         points is worked out, and that of all others is linear between them.
@@ -221,7 +221,7 @@ class Design:
         return base[:, 0], placed[0], placed[1]
 
     def deviation(self, offset: Raster, lining: Bool) -> tuple[Float, Deviation]:
-        """Chainage along the given axis of the columns of a block, and deviation of its pixels of lining, (c, r)."""
+        """Return the chainage of a block's columns along the given axis, and the deviation of its lining pixels, (c, r)."""
         chainage, arc = offset.places()
         shown = replace(offset, values=np.where(lining, offset.values, np.float32(np.nan)))
         along, right, up = self.places(chainage, arc, shown)
@@ -237,7 +237,7 @@ class Design:
 def block_steps(
     stretches: Sequence[Stretch], offset: Raster, along: Float, found: Deviation, ends: tuple[float, float]
 ) -> Iterator[Step]:
-    """Figures of the steps of a block, cut where the survey, or a profile, begins or ends."""
+    """Compute the steps of a block, cut at the ends of the survey and of profiles."""
     pixel, west = offset.transform.a, offset.transform.c
     chainage, _ = offset.places()
     number = np.floor((chainage - west) / STEP)

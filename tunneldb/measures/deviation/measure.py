@@ -33,7 +33,7 @@ def measure_deviation(
     high: float,
     begin: Begin,
 ) -> list[int]:
-    """Bring the deviation of the kilometres of a stretch up to date, each in a transaction of its own; return which were.
+    """Bring the deviation of a stretch up to date, each kilometre in one transaction; return those that were made.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def measurable_kilometres(
 
 
 def load_design_of(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> Design:
-    """Load what a kilometre is held against."""
+    """Load the design of a kilometre."""
     return Design(
         load_surface(conn, survey, km * KILOMETRE, (km + 1) * KILOMETRE),
         load_alignment(conn, survey, STATIONS),
@@ -105,7 +105,7 @@ def load_design_of(conn: psycopg.Connection[Any], survey: Survey, km: int, layer
 def deviation_blocks(
     conn: psycopg.Connection[Any], survey: Survey, km: int, design: Design
 ) -> Iterator[tuple[Raster, Float, Deviation]]:
-    """Blocks of a kilometre: the offset image, chainage of its columns along the given axis, deviation of its pixels."""
+    """Yield the blocks of a kilometre: offset image, chainage of its columns along the given axis, deviation of its pixels."""
     classes: Callable[[Raster], Bool] | None = None
     for offset, lining in load_offsets(conn, survey, km):
         if lining is None:
@@ -134,7 +134,7 @@ def _kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: st
 
 
 def lining_by_class(conn: psycopg.Connection[Any], survey: Survey, km: int, surface: Surface) -> Callable[[Raster], Bool]:
-    """What of an offset image is lining, by the classes of stage ``ground``: where no state of pixels is stored."""
+    """Return a function that finds lining in an offset image from the classes of stage ``ground``, without stored states."""
     scene = load_scene(conn, survey, km, km)
 
     def lining(offset: Raster) -> Bool:

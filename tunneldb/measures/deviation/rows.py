@@ -18,7 +18,7 @@ from tunneldb.store.survey import Survey
 
 
 def layers_held(conn: psycopg.Connection[Any], survey: Survey) -> list[str]:
-    """Layers that a survey was held against, from inside."""
+    """Return the layers that a survey was compared with, from inside."""
     query = (
         "SELECT l FROM unnest(%s::text[]) WITH ORDINALITY AS u (l, n)"
         " WHERE EXISTS (SELECT FROM tunnel.deviation_section d WHERE d.survey_id = %s AND d.layer = l) ORDER BY n"
@@ -27,7 +27,7 @@ def layers_held(conn: psycopg.Connection[Any], survey: Survey) -> list[str]:
 
 
 def load_offsets(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Iterator[tuple[Raster, Bool | None]]:
-    """Blocks of a kilometre's offset image, in order, with which pixels (rows, columns) show lining; None if not stored."""
+    """Load the blocks of a kilometre's offset image in order, with the pixels (rows, columns) of lining; None if not stored."""
     for block in image_blocks(conn, survey, km, "offset"):
         images = load_kinds(conn, survey, km, block, ("offset", "state"))
         yield images["offset"], shows_lining(images["state"].values) if "state" in images else None

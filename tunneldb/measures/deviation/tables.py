@@ -24,7 +24,7 @@ _DECIMALS = 5
 
 
 def section_rows(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float) -> list[Row]:
-    """Sections that lie in a stretch, whole or in part, in order of chainage."""
+    """Read the sections in a stretch, also partial ones, in order of chainage."""
     with conn.cursor(row_factory=dict_row) as cursor:
         query = sql.SQL(
             "SELECT {} FROM tunnel_api.deviation_section"
@@ -37,7 +37,7 @@ def section_rows(conn: psycopg.Connection[Any], survey: Survey, layer: str, low:
 def stretch_rows(
     conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float, step: float, axis_sigma: float
 ) -> list[Row]:
-    """Over- and underbreak by stretches of so many metres, of those that lie in a stretch, whole or in part."""
+    """Read over- and underbreak by stretches of ``step`` metres, also partial ones."""
     with conn.cursor(row_factory=dict_row) as cursor:
         return cursor.execute(
             "SELECT s.chainage_from, s.chainage_to, s.label, v.* FROM tunnel_api.deviation_stretches(%s, %s, %s) s,"
@@ -48,7 +48,7 @@ def stretch_rows(
 
 
 def volume(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float, axis_sigma: float) -> Row | None:
-    """Over- and underbreak of a stretch; None where nothing was held against the design."""
+    """Read over- and underbreak of a stretch; None if nothing was compared with the design."""
     with conn.cursor(row_factory=dict_row) as cursor:
         return cursor.execute(
             "SELECT * FROM tunnel_api.deviation_volume(%s, %s, %s, %s, %s) v WHERE v.length IS NOT NULL",
@@ -57,7 +57,7 @@ def volume(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float
 
 
 def rows_csv(columns: Sequence[str], rows: Sequence[Row]) -> str:
-    """Rows as CSV, with a header; what could not be told is empty."""
+    """Return rows as CSV with a header; unknown values are empty."""
     return write_csv(columns, ([row[name] for name in columns] for row in rows))
 
 

@@ -1,4 +1,4 @@
-"""How even a survey's lining is, kilometre by kilometre, from the image of its deviation from the design."""
+"""Evenness of a survey's lining, by kilometre, from the image of its deviation from the design."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def measure_evenness(
     high: float,
     begin: Begin,
 ) -> list[int]:
-    """Bring the evenness of a stretch up to date, each kilometre in a transaction of its own; return which were.
+    """Bring the evenness of a stretch up to date, each kilometre in one transaction; return those that were made.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def measure_evenness(
 
 
 def load_cells(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> CellGrid | None:
-    """Cells of a kilometre's image of deviation, with a block of either neighbour; None without an image."""
+    """Load the cells of a kilometre's image of deviation, with a block of each neighbour; None without an image."""
     kind = DEVIATION_KINDS[layer]
     blocks = [(km, block) for block in image_blocks(conn, survey, km, kind)]
     if not blocks:
@@ -110,5 +110,5 @@ def load_cells(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: st
 
 
 def _padded(values: Single, rows: int) -> Single:
-    """The same with so many rows, the last ones empty."""
+    """Return the values with additional empty rows at the end."""
     return np.pad(values, ((0, rows - len(values)), (0, 0)), constant_values=np.nan)

@@ -1,4 +1,4 @@
-"""How even the linings of surveys are, to and from the database."""
+"""Evenness of linings, to and from the database."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def save_evenness(
 
 
 def _greatest(gaps: Float, step: EvennessStep) -> tuple[float | None, float | None]:
-    """Greatest gap of a step, and the arc of its cell's middle, m."""
+    """Return the greatest gap of a step, and the arc of its cell's middle, m."""
     if not np.isfinite(gaps).any():
         return None, None
     k = int(np.nanargmax(gaps))

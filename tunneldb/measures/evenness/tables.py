@@ -1,4 +1,4 @@
-"""How even a lining is, as tables by section and by stretch."""
+"""Evenness of a lining, as rows by section and by stretch."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COLUMNS = (
 
 
 def section_rows(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float) -> list[Row]:
-    """Sections that lie in a stretch, whole or in part, in order of chainage."""
+    """Read the sections in a stretch, also partial ones, in order of chainage."""
     query = sql.SQL(
         "SELECT {} FROM tunnel_api.evenness_section"
         " WHERE survey_id = %s AND layer = %s AND chainage_to > %s AND chainage_from < %s ORDER BY chainage_from"
@@ -31,7 +31,7 @@ def section_rows(conn: psycopg.Connection[Any], survey: Survey, layer: str, low:
 
 
 def stretch_rows(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float, step: float) -> list[Row]:
-    """Evenness by stretches of so many metres that lie in another one, whole or in part."""
+    """Read evenness by stretches of ``step`` metres, also partial ones."""
     with conn.cursor(row_factory=dict_row) as cursor:
         return cursor.execute(
             "SELECT * FROM tunnel_api.evenness_stretches(%s, %s, %s) WHERE chainage_to > %s AND chainage_from < %s"

@@ -47,14 +47,14 @@ class LiningPatches:
         self._block = lru_cache(_KEPT)(self._load)
 
     def between(self, low: float, high: float) -> Patches | None:
-        """Patches between two chainages, m; None where there is no image."""
+        """Return the patches between two chainages, m; None without an image."""
         blocks = range(int(np.floor(low / BLOCK)), int(np.floor(high / BLOCK)) + 1)
         parts = [part.between(low, high) for part in map(self._block, blocks) if part is not None]
         parts = [part for part in parts if len(part.chainage)]
         return join(parts) if parts else None
 
     def girth(self, chainage: float) -> float:
-        """Length of the section at a place, m; 0 where there is none."""
+        """Return the length of the section at a chainage, m; 0 without one."""
         low, high = self.surface.arc_range(np.array([chainage]))
         return float(np.nan_to_num(high[0] - low[0]))
 
@@ -81,5 +81,5 @@ class LiningPatches:
 
 
 def load_images(conn: psycopg.Connection[Any], survey: Survey, block: int, kinds: tuple[str, ...]) -> dict[str, Raster]:
-    """Images of a block by kind; those that are not stored are missing."""
+    """Load the images of a block by kind, of those that are stored."""
     return load_kinds(conn, survey, int(block * BLOCK // KILOMETRE), block, kinds)

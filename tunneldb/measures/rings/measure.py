@@ -46,7 +46,7 @@ _ROUND = 0.002  # m: so near to one circle lies each point of a profile that is 
 
 @dataclass(frozen=True)
 class RingOptions:
-    """How rings are measured.
+    """Options of the measurement of rings.
 
     Attributes
     ----------
@@ -61,12 +61,12 @@ class RingOptions:
 
     @property
     def plain(self) -> dict[str, Any]:
-        """As the ledger keeps it."""
+        """Options as the ledger keeps them."""
         return {"diameter": self.diameter, "chords": [list(chord) for chord in self.chords]}
 
 
 def rings_by_length(conn: psycopg.Connection[Any], survey: Survey, length: float, start: float | None) -> list[RingBounds]:
-    """Whole rings of one length between the ends of a survey; a joint is at ``start``, else at its beginning."""
+    """Return whole rings of one length between the ends of a survey; a joint is at ``start``, else at its beginning."""
     low, high = _ends(conn, survey)
     first = low if start is None else start + length * np.ceil((low - start) / length - 1e-9)
     joints = np.asarray(first + length * np.arange(int((high - first) / length + 1e-9) + 1), dtype=np.float64)
@@ -74,7 +74,7 @@ def rings_by_length(conn: psycopg.Connection[Any], survey: Survey, length: float
 
 
 def rings_of_file(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> list[RingBounds]:
-    """Rings of a CSV file: number, chainage_from, chainage_to."""
+    """Read rings from a CSV file: number, chainage_from, chainage_to."""
     table = read_csv(path, ("number", "chainage_from", "chainage_to"))
     low, high = _ends(conn, survey)
     numbers = table["number"]
@@ -97,7 +97,7 @@ def rings_of_file(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> 
 
 
 def find_rings(conn: psycopg.Connection[Any], survey: Survey, begin: Begin) -> tuple[list[RingBounds], Joints]:
-    """Rings between the joints that the images show.
+    """Find rings between the joints that the images show.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def find_rings(conn: psycopg.Connection[Any], survey: Survey, begin: Begin) -> t
 def _signals(
     conn: psycopg.Connection[Any], survey: Survey, blocks: Sequence[int], advance: Callable[[float], None]
 ) -> tuple[Float, float, float]:
-    """Signals of the columns of blocks that follow each other, chainage of the first one's beginning, and pixel, m."""
+    """Return the signals of the columns of consecutive blocks, the chainage of their beginning, and the pixel, m."""
     parts: list[Float] = []
     start, pixel = 0.0, 0.0
     for block in blocks:
@@ -155,7 +155,7 @@ def define_rings(conn: psycopg.Connection[Any], survey: Survey, rings: Sequence[
 def measure_survey_rings(
     conn: psycopg.Connection[Any], survey: Survey, low: float, high: float, options: RingOptions | None, begin: Begin
 ) -> list[int]:
-    """Bring the measures of the rings of a stretch up to date, each kilometre in a transaction of its own; return which were.
+    """Bring the rings of a stretch up to date, each kilometre in one transaction; return those that were made.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def _measured(
 
 
 def _diameter(given: float | None, profiles: Sequence[Profile], chainage: float) -> tuple[float | None, str]:
-    """Design diameter at a place and where it is from; None: the ring's own."""
+    """Return the design diameter at a chainage and its source; None for the ring's own."""
     if given is not None:
         return given, "option"
     for profile in profiles:

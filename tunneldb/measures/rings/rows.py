@@ -19,7 +19,7 @@ from tunneldb.store.survey import Survey
 
 @dataclass(frozen=True)
 class RingBounds:
-    """A ring as it is defined.
+    """Definition of a ring.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class RingBounds:
 
 @dataclass(frozen=True)
 class MeasuredRing:
-    """A ring with its measures, the step at its beginning, and the diameter that ovality is a share of."""
+    """Ring with its measures, the step at its beginning, and the diameter that ovality refers to."""
 
     bounds: RingBounds
     ring: LiningRing
@@ -74,13 +74,13 @@ def save_definition(conn: psycopg.Connection[Any], survey: Survey, rings: Sequen
 
 
 def has_rings(conn: psycopg.Connection[Any], survey: Survey) -> bool:
-    """Whether rings of a survey are defined."""
+    """Return True if rings of a survey are defined."""
     row = conn.execute("SELECT EXISTS (SELECT FROM tunnel.ring WHERE survey_id = %s)", [survey.id]).fetchone()
     return row is not None and bool(row[0])
 
 
 def load_bounds(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[RingBounds]:
-    """Rings that have their middle in a kilometre, in order."""
+    """Load the rings with their middle in a kilometre, in order."""
     rows = conn.execute(
         "SELECT number, chainage_from, chainage_to, joint FROM tunnel.ring"
         " WHERE survey_id = %s AND km = %s ORDER BY chainage_from",
@@ -90,7 +90,7 @@ def load_bounds(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[
 
 
 def length_before(conn: psycopg.Connection[Any], survey: Survey, joint: float) -> float:
-    """Length of the ring that ends at a joint, m; 0 where none does."""
+    """Return the length of the ring that ends at a joint, m; 0 without one."""
     row = conn.execute(
         "SELECT chainage_to - chainage_from FROM tunnel.ring"
         " WHERE survey_id = %s AND chainage_from < %s AND abs(chainage_to - %s) < 0.001 ORDER BY chainage_from DESC LIMIT 1",
@@ -100,7 +100,7 @@ def length_before(conn: psycopg.Connection[Any], survey: Survey, joint: float) -
 
 
 def save_rings(conn: psycopg.Connection[Any], survey: Survey, rings: Sequence[MeasuredRing]) -> None:
-    """Replace what was measured of rings, and their chords."""
+    """Replace the measures of rings, and their chords."""
     for measured in rings:
         values = {name: _plain(value) for name, value in _columns(measured).items()}
         query = sql.SQL("UPDATE tunnel.ring SET {} WHERE survey_id = {} AND number = {} RETURNING id").format(
@@ -119,7 +119,7 @@ def save_rings(conn: psycopg.Connection[Any], survey: Survey, rings: Sequence[Me
 
 
 def _columns(measured: MeasuredRing) -> dict[str, Any]:
-    """All measures of a ring by column; NULL what it has not."""
+    """Return all measures of a ring by column; None for those that it lacks."""
     one, steps = measured.ring, measured.steps
     greatest, lip = steps.greatest, one.lip
     values: dict[str, Any] = {
@@ -169,7 +169,7 @@ def _shape_columns(measured: MeasuredRing) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """A value as psycopg takes it; None of a number that is none."""
+    """Return a value for psycopg; None for NaN."""
     if isinstance(value, (float, np.floating)):
         return known(float(value))
     return value

@@ -1,4 +1,4 @@
-"""Rings from surveyed points: read, fit, hold against the design axis."""
+"""Rings from surveyed points: read, fit, compare with the design axis."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _NOTED_SAGITTA = 0.001  # m
 
 @dataclass(frozen=True)
 class Placed:
-    """A value with its standard error, m or °."""
+    """Value with its standard error, m or °."""
 
     value: float
     se: float
@@ -34,7 +34,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class RingPlace:
-    """How a ring lies to the design axis.
+    """Position of a ring relative to the design axis.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class RingPlace:
 
 @dataclass(frozen=True)
 class RingRow:
-    """What is said of one ring.
+    """Result of one ring.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class RingRow:
 
 @dataclass(frozen=True)
 class SurveyedRings:
-    """All rings of a file.
+    """Results of the rings of a file.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ def measure_rings(points: Path, axis: Path, diameter: float, sigma: float | None
 
 
 def _refusal(ring: SurveyedRing, away: float, diameter: float) -> str | None:
-    """Why nothing is made of a ring, before any fit."""
+    """Return why a ring cannot be fitted; None if it can."""
     if ring.refused is not None:
         return ring.refused
     if len(ring.xyz) < LEAST_POINTS:
@@ -170,7 +170,7 @@ def _row(surveyed: SurveyedRing, ring: Ring | str | None, line: DesignAxis, diam
 
 
 def _place(ring: Ring, line: DesignAxis, tangent: Float) -> RingPlace:
-    """Chainage, deviations and turns with their standard errors."""
+    """Return chainage, deviations and turns with their standard errors."""
     along = np.array([tangent[0], tangent[1], 0.0]) / np.hypot(tangent[0], tangent[1])
     grade = tangent[2] / np.hypot(tangent[0], tangent[1])
     # Up is above the axis at the centre's own chainage, which is as uncertain as the grade is steep.
@@ -182,7 +182,7 @@ def _place(ring: Ring, line: DesignAxis, tangent: Float) -> RingPlace:
 
 
 def _turns(ring: Ring, tangent: Float) -> tuple[Placed, Placed]:
-    """Turn of the ring's plane against the axis, to the right and upwards."""
+    """Return the turn of the ring's plane against the axis, to the right and upwards."""
     normal = ring.plane.normal
     plan = np.arctan2(normal[0], normal[1]) - np.arctan2(tangent[0], tangent[1])
     right = np.degrees((plan + np.pi) % (2.0 * np.pi) - np.pi)

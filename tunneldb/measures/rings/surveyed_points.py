@@ -74,7 +74,7 @@ def read_points(path: Path) -> list[SurveyedRing]:
 
 
 def _ring(name: str, points: Sequence[str], table: CsvTable, rows: Sequence[int]) -> SurveyedRing:
-    """Ring without points that are there twice; refused where one name stands for two places."""
+    """Return a ring without duplicate points; refuse a name with two places."""
     xyz, offset = table.columns(("x", "y", "z"))[rows], table["offset"][rows]
     kept: list[int] = []
     remarks: list[str] = []
@@ -152,6 +152,6 @@ def require_near(path: Path, distance: Float, limit: float) -> None:
 
 
 def _unit(ratio: float) -> str:
-    """What unit a length is in that is so many times what it should be, as a hint; empty without one."""
+    """Return a hint at the unit of a length that is wrong by this factor; empty without one."""
     found = [name for factor, name in _UNITS.items() if abs(ratio / factor - 1.0) < 0.2]
     return f": are the points in {found[0]}?" if found else ""

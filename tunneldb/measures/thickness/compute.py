@@ -106,7 +106,7 @@ def resampled(values: Float, count: int) -> Float:
 
 @dataclass(frozen=True)
 class DeviationCells:
-    """A step of chainage of a survey with the deviation of its cells."""
+    """Step of chainage of a survey with the deviation of its cells."""
 
     profile: str
     low: float
@@ -117,7 +117,7 @@ class DeviationCells:
 
 @dataclass(frozen=True)
 class ThicknessStep:
-    """A step of chainage that two surveys have, with what lies between them."""
+    """Step of chainage that two surveys have, with the layer between them."""
 
     low: float
     high: float
@@ -128,7 +128,7 @@ class ThicknessStep:
 def compared_steps(
     stretches: Sequence[Stretch], before: Sequence[DeviationCells], after: Sequence[DeviationCells]
 ) -> Iterator[ThicknessStep]:
-    """What lies between two surveys, of the steps that both have, as far as both reach."""
+    """Yield the layer between two surveys in the steps that both have, within the ends of both."""
     by_place = {(np.floor(old.low / STEP), old.profile): old for old in before}
     by_name = {stretch.name: stretch for stretch in stretches}
     for new in after:

@@ -1,4 +1,4 @@
-"""What lies between the linings of two surveys, kilometre by kilometre, from their deviation from one layer's profiles."""
+"""Thickness between the linings of two surveys, by kilometre, from their deviation from one layer's profiles."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def measure_thickness(
     high: float,
     begin: Begin,
 ) -> list[int]:
-    """Bring what lies between two surveys up to date, each kilometre in a transaction of its own; return which were.
+    """Bring the thickness between two surveys up to date, each kilometre in one transaction; return those that were made.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What lies between the linings of two surveys, to and from the database."""
+"""Thickness between the linings of two surveys, to and from the database."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tunneldb.store.survey import Survey
 
 
 def load_cells(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str) -> list[DeviationCells]:
-    """Steps of a kilometre that were held against a layer, in order of chainage."""
+    """Load the steps of a kilometre that were compared with a layer, in order of chainage."""
     rows = conn.execute(
         "SELECT profile, chainage_from, chainage_to, noise_area, deviation FROM tunnel.deviation_section"
         " WHERE survey_id = %s AND km = %s AND layer = %s ORDER BY chainage_from",

@@ -1,4 +1,4 @@
-"""What lies between two surveys, as tables by section and by stretch."""
+"""Thickness between two surveys, as rows by section and by stretch."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ COLUMNS = (
 def section_rows(
     conn: psycopg.Connection[Any], before: Survey, after: Survey, layer: str, low: float, high: float
 ) -> list[Row]:
-    """Sections that lie in a stretch, whole or in part, in order of chainage."""
+    """Read the sections in a stretch, also partial ones, in order of chainage."""
     query = sql.SQL(
         "SELECT {} FROM tunnel_api.thickness_section WHERE survey_id = %s AND before_id = %s AND layer = %s"
         " AND chainage_to > %s AND chainage_from < %s ORDER BY chainage_from"
@@ -43,7 +43,7 @@ def stretch_rows(
     minimum: float,
     axis_sigma: float,
 ) -> list[Row]:
-    """Volume and thickness by stretches of so many metres that lie in another one, whole or in part."""
+    """Read volume and thickness by stretches of ``step`` metres, also partial ones."""
     with conn.cursor(row_factory=dict_row) as cursor:
         return cursor.execute(
             "SELECT * FROM tunnel_api.thickness_stretches(%s, %s, %s, %s, %s, %s)"

@@ -26,7 +26,7 @@ BENT_STEP = 10.0
 
 @dataclass(frozen=True)
 class Section:
-    """A section with its motion and what remains of its change; areas m², lengths m."""
+    """Section with its motion and the change that remains without it; areas m², lengths m."""
 
     low: float
     high: float
@@ -45,7 +45,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Change:
-    """What a kilometre shows; (rows, columns) arrays of cells.
+    """Change of a kilometre, in (rows, columns) arrays of cells.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, len
 
 
 def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells, relief: tuple[Single, Single]) -> Float:
-    """What the motions of a section do to its cells, (n, 6), about its middle: the middle of what is seen of it.
+    """Return the effect of a section's motions on its cells, (n, 6), about the middle of its seen part.
 
     A lining with relief changes its offset where it moves along itself, too, and so tells how far it did.
     """
@@ -138,7 +138,7 @@ def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells, 
 
 
 def _bent(surface: Surface, grid: CellGrid, chainage: float) -> Float:
-    """Curvature (rows,) of a section over two cells about each row, 1/m; 0 where it is not known."""
+    """Return the curvature (rows,) of a section over two cells about each row, 1/m; 0 where it is unknown."""
     normals = []
     for beside in (-grid.cell, grid.cell):
         points = surface.to_space(np.full(grid.rows, chainage), grid.arc + beside, np.zeros(grid.rows))
@@ -151,7 +151,7 @@ def _bent(surface: Surface, grid: CellGrid, chainage: float) -> Float:
 
 
 def section_figures(found: Change) -> list[Section]:
-    """Figures of the sections that one of the epochs saw."""
+    """Compute the figures of the sections that at least one epoch saw."""
     grid, cell = found.grid, found.grid.cell
     window, _, number = shape_change.window_means(found.difference, found.variance, found.removed_error, found.scatter)
     both = np.isfinite(found.difference)
@@ -178,7 +178,7 @@ def section_figures(found: Change) -> list[Section]:
 
 
 def _along(change: Single) -> Float:
-    """Mean of each row (rows,) of the cells that were compared; NaN where none was."""
+    """Return the mean of each row (rows,) over the compared cells; NaN without any."""
     count = np.isfinite(change).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.nansum(change, axis=1, dtype=np.float64) / count)

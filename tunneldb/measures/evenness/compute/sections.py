@@ -21,7 +21,7 @@ from tunneldb.raster.grid import BLOCK
 
 @dataclass(frozen=True)
 class EvennessStep:
-    """A step of chainage, whose rows of cells begin at an arc, m, and go up."""
+    """Step of chainage, with rows of cells from an arc, m, upwards."""
 
     low: float
     high: float
@@ -61,7 +61,7 @@ class CellGrid:
 
 
 def cells_in(pixel: float) -> int:
-    """Pixels to a side of a cell, of CELL or three pixels, that fills blocks and steps of chainage without a rest."""
+    """Return the pixels along a side of a cell of CELL or three pixels that divides blocks and steps of chainage."""
     factor = max(3, round(CELL / pixel))
     return next((n for n in range(factor, 8 * factor) if _whole(STEP / (n * pixel)) and _whole(BLOCK / (n * pixel))), factor)
 
@@ -71,7 +71,7 @@ def _whole(number: float) -> bool:
 
 
 def steps_of(grid: CellGrid, found: Evenness, km: int, limit: float, ends: tuple[float, float]) -> Iterator[EvennessStep]:
-    """Steps of a kilometre in which something was seen, as far as the survey reaches."""
+    """Yield the steps of a kilometre with seen cells, within the ends of the survey."""
     columns = max(round(STEP / grid.cell), 1)
     for first in range(0, found.cells.mean.shape[1], columns):
         low = round(grid.west + first * grid.cell, 6)
@@ -84,7 +84,7 @@ def steps_of(grid: CellGrid, found: Evenness, km: int, limit: float, ends: tuple
 
 
 def polygons_of(grid: CellGrid, found: Evenness, km: int, limit: float) -> Iterator[UnevenPolygon]:
-    """Where the gap is too large in a kilometre, in the unrolled plane, along the sides of cells."""
+    """Yield the areas of a kilometre with too large a gap, in the unrolled plane, along the sides of cells."""
     first = max(round((km * KILOMETRE - grid.west) / grid.cell), 0)
     last = min(round(((km + 1) * KILOMETRE - grid.west) / grid.cell), found.cells.mean.shape[1])
     areas = uneven_areas(found, slice(first, last), limit)
