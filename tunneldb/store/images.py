@@ -71,7 +71,7 @@ def load_regions(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: s
     One that waits for an operator is left out.
     """
     rows = conn.execute(
-        "SELECT public.ST_AsBinary(geom) FROM tunnel.region WHERE survey_id = %s AND kind = %s AND NOT waits"
+        "SELECT public.ST_AsBinary(geom) FROM tunnel.region WHERE survey_id = %s AND kind = %s AND NOT pending_approval"
         " AND public.ST_XMax(geom) > %s AND public.ST_XMin(geom) < %s ORDER BY id",
         (survey.id, kind, km * KILOMETRE, (km + 1) * KILOMETRE),
     ).fetchall()
