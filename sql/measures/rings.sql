@@ -13,7 +13,7 @@ SELECT r.id, r.survey_id, s.name AS survey, r.km,
   FROM tunnel.ring r
   JOIN tunnel.survey s ON s.id = r.survey_id;
 COMMENT ON VIEW tunnel_api.ring IS
-    'Rings of linings with their shape, each value with its standard error (_se); what was not measured, or cannot be told, is NULL';
+    'Rings of linings with their shape, each value with its standard error (_se); NULL if not measured or unknown';
 COMMENT ON COLUMN tunnel_api.ring.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.ring.number IS 'Number of the ring';
 COMMENT ON COLUMN tunnel_api.ring.origin IS 'How the rings were given: length, file, or found';
