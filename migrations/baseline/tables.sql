@@ -377,7 +377,7 @@ COMMENT ON COLUMN tunnel.survey.intensity_kind IS 'amplitude (dB, falls with ran
 COMMENT ON COLUMN tunnel.survey.platform IS 'static (rows in station), mobile (rows in pose), or unknown: range and incidence are not corrected';
 COMMENT ON COLUMN tunnel.survey.reference IS 'Range curve: none, measured on a target (rows in reference) or auto, from the lining of each kilometre';
 COMMENT ON COLUMN tunnel.survey.created_at IS 'When it was added';
-COMMENT ON COLUMN tunnel.survey.positions_note IS 'What is to be known of its scanner positions: poses left out, gaps';
+COMMENT ON COLUMN tunnel.survey.positions_note IS 'Notes on its scanner positions: poses left out, gaps';
 COMMENT ON COLUMN tunnel.survey.longest_interval IS 'Longest interval of its trajectory that is interpolated over, s; NULL without a trajectory';
 COMMENT ON COLUMN tunnel.survey.trajectory_gaps IS 'Longer intervals of its trajectory: times from and to, one after the other, s; NULL without a trajectory';
 COMMENT ON COLUMN tunnel.survey.settings_at IS 'When scanner positions, reference or intensity were last set to others';
@@ -566,7 +566,7 @@ COMMENT ON COLUMN tunnel.change_section.change_greatest IS 'Greatest mean of a w
 COMMENT ON COLUMN tunnel.change_section.lod IS 'Median level of detection of its cells, 95 %, m';
 COMMENT ON COLUMN tunnel.change_section.cell IS 'Side of a cell, m';
 COMMENT ON COLUMN tunnel.change_section.arc_from IS 'Arc at which the first of change begins, m';
-COMMENT ON COLUMN tunnel.change_section.change IS 'Mean of what remains, of each cell along the arc over the section''s length, m, positive inwards; NaN unseen';
+COMMENT ON COLUMN tunnel.change_section.change IS 'Mean remaining change of each cell along the arc over the section''s length, m, positive inwards; NaN: not inspected';
 CREATE INDEX change_section_old_survey_id_idx ON tunnel.change_section (old_survey_id);
 CREATE INDEX change_section_sums_idx ON tunnel.change_section (survey_id, old_survey_id, chainage_from) INCLUDE (chainage_to, seen_old, seen_both, shift);
 CREATE INDEX change_section_survey_id_old_survey_id_shift_idx ON tunnel.change_section (survey_id, old_survey_id, shift);
@@ -790,7 +790,7 @@ COMMENT ON COLUMN tunnel.deviation_section.deviation_least IS 'Least mean of a c
 COMMENT ON COLUMN tunnel.deviation_section.least_at IS 'How far along the profile that is, m';
 COMMENT ON COLUMN tunnel.deviation_section.deviation_greatest IS 'Greatest mean of a cell, m: the greatest underbreak';
 COMMENT ON COLUMN tunnel.deviation_section.greatest_at IS 'How far along the profile that is, m';
-COMMENT ON COLUMN tunnel.deviation_section.deviation IS 'Mean deviation in cells of equal length along the profile, from its beginning, m, positive inside; NaN unseen';
+COMMENT ON COLUMN tunnel.deviation_section.deviation IS 'Mean deviation in cells of equal length along the profile, from its beginning, m, positive inside; NaN: not inspected';
 CREATE INDEX deviation_section_survey_id_layer_overbreak_idx ON tunnel.deviation_section (survey_id, layer, overbreak);
 CREATE INDEX deviation_section_survey_id_layer_underbreak_idx ON tunnel.deviation_section (survey_id, layer, underbreak);
 
@@ -911,7 +911,7 @@ CREATE TABLE tunnel.goal (
     CONSTRAINT goal_pkey PRIMARY KEY (survey_id, km),
     CONSTRAINT goal_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
 );
-COMMENT ON TABLE tunnel.goal IS 'What batches want of each kilometre';
+COMMENT ON TABLE tunnel.goal IS 'Requested stages of each kilometre';
 COMMENT ON COLUMN tunnel.goal.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.goal.km IS 'Kilometre: floor(chainage / 1000)';
 COMMENT ON COLUMN tunnel.goal.stage IS 'Stage up to which the kilometre is to be brought';
@@ -1032,7 +1032,7 @@ COMMENT ON COLUMN tunnel.leak_change.id IS 'Key';
 COMMENT ON COLUMN tunnel.leak_change.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.leak_change.old_survey_id IS 'Survey that it is compared with';
 COMMENT ON COLUMN tunnel.leak_change.km IS 'Kilometre: floor(chainage / 1000) of its middle';
-COMMENT ON COLUMN tunnel.leak_change.state IS 'new, grown, shrunk, same, dry (again), kind (another in the newer survey), unseen (not told, for too little was seen by one of them)';
+COMMENT ON COLUMN tunnel.leak_change.state IS 'new, grown, shrunk, same, dry (again), kind (another in the newer survey), unseen (one survey inspected too little)';
 COMMENT ON COLUMN tunnel.leak_change.old_ids IS 'Findings of the older survey';
 COMMENT ON COLUMN tunnel.leak_change.new_ids IS 'Findings of the newer survey';
 COMMENT ON COLUMN tunnel.leak_change.old_kinds IS 'Their kinds';
@@ -1254,7 +1254,7 @@ CREATE TABLE tunnel.ring (
     CONSTRAINT ring_chainage_check CHECK (chainage_from < chainage_to),
     CONSTRAINT ring_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
 );
-COMMENT ON TABLE tunnel.ring IS 'Rings of the lining of a survey; what is measured of one is NULL until it is, or where it cannot be told';
+COMMENT ON TABLE tunnel.ring IS 'Rings of the lining of a survey; values are NULL until measured, or if unknown';
 COMMENT ON COLUMN tunnel.ring.id IS 'Key';
 COMMENT ON COLUMN tunnel.ring.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.ring.km IS 'Kilometre: floor(chainage / 1000)';
@@ -1300,7 +1300,7 @@ COMMENT ON COLUMN tunnel.ring.step_greatest_arc IS 'Arc of its place, m';
 COMMENT ON COLUMN tunnel.ring.lip IS 'Greatest step within the ring, between segments, m, positive where what follows clockwise stands in';
 COMMENT ON COLUMN tunnel.ring.lip_se IS 'Standard error, m';
 COMMENT ON COLUMN tunnel.ring.lip_arc IS 'Arc of its place, m';
-COMMENT ON COLUMN tunnel.ring.remark IS 'What is to be known of it';
+COMMENT ON COLUMN tunnel.ring.remark IS 'Notes and limitations';
 CREATE INDEX ring_survey_id_chainage_from_idx ON tunnel.ring (survey_id, chainage_from);
 CREATE INDEX ring_survey_id_ovality_idx ON tunnel.ring (survey_id, ovality);
 
@@ -1591,7 +1591,7 @@ COMMENT ON COLUMN tunnel.thickness_section.id IS 'Key';
 COMMENT ON COLUMN tunnel.thickness_section.survey_id IS 'Later survey';
 COMMENT ON COLUMN tunnel.thickness_section.before_id IS 'Earlier survey';
 COMMENT ON COLUMN tunnel.thickness_section.km IS 'Kilometre: floor(chainage / 1000)';
-COMMENT ON COLUMN tunnel.thickness_section.layer IS 'Layer whose profiles both were held against';
+COMMENT ON COLUMN tunnel.thickness_section.layer IS 'Layer whose profiles both were compared with';
 COMMENT ON COLUMN tunnel.thickness_section.chainage_from IS 'Chainage of its beginning, m';
 COMMENT ON COLUMN tunnel.thickness_section.chainage_to IS 'Chainage of its end, m';
 COMMENT ON COLUMN tunnel.thickness_section.design_length IS 'Length of the profile in its middle, m';
@@ -2052,7 +2052,7 @@ COMMENT ON COLUMN tunnel.spot.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.spot.number IS 'Its number in the tunnel or site: the same in the next survey';
 COMMENT ON COLUMN tunnel.spot.face_id IS 'Face that it is on; NULL where the last run found it no more';
 COMMENT ON COLUMN tunnel.spot.kind IS 'dark or bright, against its own surface';
-COMMENT ON COLUMN tunnel.spot.reasons IS 'What speaks for it or against it';
+COMMENT ON COLUMN tunnel.spot.reasons IS 'Evidence for and against it';
 COMMENT ON COLUMN tunnel.spot.confidence IS 'Confidence that it differs and is none of an edge or of noise, 0 to 1';
 COMMENT ON COLUMN tunnel.spot.contrast IS 'Mean difference from its surface in standard deviations of it';
 COMMENT ON COLUMN tunnel.spot.difference IS 'Mean difference from its surface, dB';

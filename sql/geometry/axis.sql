@@ -256,7 +256,7 @@ AS $$
     SELECT r.n, sqrt(least(sum(r.shift ^ 2), sum(r.place ^ 2))) FROM residual r GROUP BY r.n ORDER BY r.n
 $$;
 COMMENT ON FUNCTION tunnel_internal.axis_residual(int[], float8[], float8[], float8[], float8[], float8[], float8[]) IS
-'How far each vertex of an axis lies off where its neighbours lead, m: the lesser of what its shift from the given axis differs from theirs, and its distance from the curve through their places.';
+'Deviation of each vertex of an axis from its neighbours, m: the lesser of the difference of its shift from the given axis and theirs, and its distance from the curve through their places.';
 
 
 -- Moves the vertices of a kilometre onto the tunnel's centre, pass by pass, and writes them to tunnel.axis_vertex.
@@ -404,4 +404,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.axis_refine(int, int, float8, float8, float8, int, int, float8, float8) IS
-'Stage 1 for one kilometre: moves the axis vertices onto the tunnel''s centre until none moves by tolerance (m) in a pass; returns each pass with its greatest move, m. Vertices edited by hand stay; one that does not rest in max_iterations passes, or lies farther than max_deviation (m) off where its neighbours lead, is interpolated, with a remark, as long as they are no greater share than max_rejected. After Gonçalves et al. (2012), stages 1 and 2.';
+'Stage 1 for one kilometre: moves the axis vertices onto the tunnel''s centre until none moves by tolerance (m) in a pass; returns each pass with its greatest move, m. Vertices edited by hand stay; one that still moves after max_iterations passes, or deviates from its neighbours by more than max_deviation (m), is interpolated, with a remark, up to a share of max_rejected. After Gonçalves et al. (2012), stages 1 and 2.';

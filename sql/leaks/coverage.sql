@@ -31,7 +31,7 @@ AS $$
             * least($3 / $2 - least(floor($3 / $2)::int, cardinality($1) - 2), 1)
 $$;
 COMMENT ON FUNCTION tunnel_internal.sum_upto(float8[], float8, float8) IS
-'Sum over steps of one length (m) up to a place (m from where they begin), of their running sums, of which the first is 0.';
+'Sum over steps of one length (m) up to a place (m from their start), from their running sums; the first is 0.';
 
 
 CREATE OR REPLACE FUNCTION tunnel_internal.coverage_at(survey_id int, places float8[])
@@ -95,7 +95,7 @@ AS $$
     WHERE e.chainage_from IS NOT NULL AND r.ends[1] < r.ends[2] AND tunnel_internal.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.coverage(text, float8, float8) IS
-'Lining of a survey between two chainages (m) where it was searched for leaks, what the last detection saw of it, and the pixels that it found wet, after the median filter (m²); seen_share of the lining of the whole stretch, in which kilometres without detection count as unseen, as in leak_statistics; wet_pixel_share of what was seen, as Xu et al. (2018) state it. Steps of chainage that an end cuts count by their share.';
+'Lining of a survey between two chainages (m) that was searched for leaks, its part inspected by the last detection, and wet pixels after the median filter (m²). seen_share: inspected share of the lining of the whole stretch; kilometres without detection count as not inspected, as in leak_statistics. wet_pixel_share: share of the inspected lining, as in Xu et al. (2018). Steps of chainage across an end count in part.';
 
 
 -- Of an area on the lining (m²) whose outline lies in the unrolled plane, the part between two chainages (m). The planner puts

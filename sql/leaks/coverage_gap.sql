@@ -181,7 +181,7 @@ AS $$
     FROM tunnel_internal.coverage_gaps_of($1, ARRAY[$2], ARRAY[$3]) g
 $$;
 COMMENT ON FUNCTION tunnel_api.coverage_gaps(int, float8, float8) IS
-'Where a survey cannot vouch for its list of leaks between two chainages (m), or anywhere: one row a stretch, those that were not searched for leaks first, then from the least chainage on. state: not scanned (no points or no lining there), not loaded, not searched, failed, interrupted, stale (searched before something changed), unseen (5 m or more of which less than half of the lining was seen), no intensity. searched: whether the result of a search stands there. No rows: everything was searched, is up to date and was seen by more than half.';
+'Stretches of a survey between two chainages (m), or of all of it, where leaks could be missed: first those that were not searched, then by chainage. state: not scanned (no points or no lining), not loaded, not searched, failed, interrupted, stale (searched before a change), unseen (5 m or more with less than half of the lining inspected), no intensity. searched: true if a result of a search exists. No rows: everything was searched, is up to date, and more than half was inspected.';
 
 
 CREATE OR REPLACE FUNCTION tunnel_internal.coverage_statements(survey_id int, starts float8[], ends float8[])
@@ -216,7 +216,7 @@ AS $$
     ORDER BY k.stretch
 $$;
 COMMENT ON FUNCTION tunnel_internal.coverage_statements(int, float8[], float8[]) IS
-'What coverage_statement has to say of each of some stretches of a survey, given by where they begin and end (m); n: the first is 1. No row for one of which there is nothing to say.';
+'Statements of coverage_statement on several stretches of a survey, given by start and end (m); n: number of the stretch, from 1. No row for a stretch without a statement.';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.coverage_statement(

@@ -16,7 +16,7 @@ SELECT m.id, m.tunnel_id, t.name AS tunnel, m.id = tunnel_internal.learned_in_fo
   FROM tunnel.learned_model m
   JOIN tunnel.tunnel t ON t.id = m.tunnel_id;
 COMMENT ON VIEW tunnel_api.learned_model IS 'What was learned of each tunnel from reviews (tunneldb learn), and what of it is in force';
-COMMENT ON COLUMN tunnel_api.learned_model.in_force IS 'Whether stage detect goes by it: the last of its tunnel that was not undone';
+COMMENT ON COLUMN tunnel_api.learned_model.in_force IS 'True if stage detect uses it: the last of its tunnel that was not undone';
 
 -- Notes an edit of what was learned in the audit of each survey of a tunnel.
 CREATE OR REPLACE FUNCTION tunnel_internal.note_learned(tunnel_id integer, id integer, before jsonb, after jsonb) RETURNS void

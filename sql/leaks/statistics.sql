@@ -258,7 +258,7 @@ AS $$
     WHERE e.chainage_from IS NOT NULL AND r.low < r.high AND tunnel_internal.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.leak_statistics(text, float8, float8) IS
-'Leaks of a survey between two chainages (m), as far as it reaches; of kind leak, found last and not rejected. wet_ratio is wet_area of the lining seen; lining_area and seen_area are those of the part that was searched for leaks, which makes up searched_share of the length; seen_share is that of the lining of the whole stretch, in which what was not searched counts as unseen. patches and wet_area are NULL where nothing was searched and nothing is known. A leak that an end cuts counts by its part in wet_area and as one patch; largest_area and largest_leak take leaks whole. window_patches: most patches in any 100 m² of lining, here between window_from and window_to, and which; window_wet_area: greatest wet area in any 100 m² (m²). class: best class of GB 50108-2008 that the seen lining keeps, NULL if nothing was seen.';
+'Leaks of a survey between two chainages (m), as far as it reaches; of kind leak, found last and not rejected. wet_ratio is wet_area over the inspected lining; lining_area and seen_area are those of the part that was searched for leaks, which makes up searched_share of the length; seen_share is the inspected share of the whole stretch; lining that was not searched counts as not inspected. patches and wet_area are NULL where nothing was searched and nothing is known. A leak that an end cuts counts by its part in wet_area and as one patch; largest_area and largest_leak take leaks whole. window_patches: most patches in any 100 m² of lining, here between window_from and window_to, and which; window_wet_area: greatest wet area in any 100 m² (m²). class: best class of GB 50108-2008 that the inspected lining meets, NULL if none was inspected.';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.waterproof_class(survey text, chainage_from float8, chainage_to float8)
@@ -318,7 +318,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.waterproof_class(text, float8, float8) IS
-'Which classes of waterproofing (GB 50108-2008, table 3.2.1) a survey keeps between two chainages (m): one row a class, with what breaks it and the ids of the leaks that do. It speaks of the lining seen, the share seen_share: what was not seen cannot be certified. holds is NULL where nothing was seen and nothing breaks the class. Volumes of water, which the standard limits as well, cannot be told from a scan.';
+'Classes of waterproofing (GB 50108-2008, table 3.2.1) that a survey meets between two chainages (m): one row a class, with the exceeded limits and the ids of the leaks that exceed them. Applies to the inspected lining, the share seen_share. holds is NULL if nothing was inspected and no limit is exceeded. A scan cannot measure volumes of water, which the standard also limits.';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.ring_statistics(

@@ -12,7 +12,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_surve
   JOIN tunnel.survey s ON s.id = c.survey_id
   JOIN tunnel.survey o ON o.id = c.old_survey_id;
 COMMENT ON VIEW tunnel_api.change_section IS
-    'What sections of lining did between two surveys as a whole (the registration''s error or the tunnel''s movement: which, cannot be told without control points), and what remains';
+    'Motion of sections of lining between two surveys as a whole (only control points can separate registration error from movement), and the remaining change';
 COMMENT ON COLUMN tunnel_api.change_section.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.change_section.old_survey IS 'Name of the survey that it is compared with';
 COMMENT ON COLUMN tunnel_api.change_section.unseen IS 'Lining that the older survey saw and the newer one did not, m²: nothing is known of its change';
@@ -39,7 +39,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_surve
   JOIN tunnel.survey s ON s.id = c.survey_id
   JOIN tunnel.survey o ON o.id = c.old_survey_id;
 COMMENT ON VIEW tunnel_api.leak_change IS
-    'What became of leaks between two surveys, with area before and after and three geometries; what one of them did not see is unseen, never new or dry';
+    'Changes of leaks between two surveys, with area before and after and three geometries; a leak not inspected by one survey is unseen, never new or dry';
 COMMENT ON COLUMN tunnel_api.leak_change.area_change IS 'Wet area in the newer survey less that in the older, m²';
 COMMENT ON COLUMN tunnel_api.leak_change.area_change_se IS 'Its standard error by resolution and threshold, m²';
 
@@ -79,7 +79,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
        AND NOT a.superseded AND (a.wet OR a.kind IN ('leak', 'joint', 'dark')) AND tunnel_internal.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_internal.leaks_checksum(int, float8, float8) IS
-    'Checksum of the leaks, joints and dark spots that count between two chainages (m): another as soon as one is judged, drawn or found anew; NULL without any';
+    'Checksum of the leaks, joints and dry dark areas that count between two chainages (m); changes when one is reviewed, drawn or detected; NULL without any';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.compare_inputs(survey_id int, km int, subject text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
@@ -115,7 +115,7 @@ SET search_path = pg_catalog, pg_temp SET jit = off AS $$
      WHERE NOT EXISTS (SELECT FROM seen k WHERE k.id = p.id AND k.km = c.km)
 $$;
 COMMENT ON FUNCTION tunnel_internal.compare_places(int, text) IS
-    'Kilometres that this survey and an older one saw, or of which a comparison is still there: of all that were compared, or of the one given';
+    'Kilometres that this survey and an older one inspected, or that have a stored comparison: with all compared surveys, or with the given one';
 
 CREATE OR REPLACE FUNCTION tunnel_api.change_stretches(old_survey text, new_survey text, step float8 DEFAULT 100)
 RETURNS TABLE (chainage_from float8, chainage_to float8, label text, compared float8, unseen float8, changed float8,
@@ -147,7 +147,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 250 SECURITY DEFINER SET search_pa
      ORDER BY s.k
 $$;
 COMMENT ON FUNCTION tunnel_api.change_stretches(text, text, float8) IS
-'Change between two surveys by stretches of so many metres: lining compared, and seen by the older but not by the newer (unseen), m²; area of significant change (changed), of it inwards and outwards, in so many regions; greatest shift of a section as a whole (m); wet area in each (m²). What is unseen is in none of the others';
+'Change between two surveys by stretches of so many metres: lining compared, and inspected by the older survey only (unseen), m²; area of significant change (changed), of it inwards and outwards, in so many regions; greatest shift of a section as a whole (m); wet area in each (m²). Lining that was not inspected is in no other column';
 
 CREATE OR REPLACE FUNCTION tunnel_api.change_at(old_survey text, chainage float8, arc float8)
 RETURNS TABLE (survey text, date date, change float8, lod float8)
@@ -159,7 +159,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 10 SECURITY DEFINER SET search_pat
      ORDER BY s.date, s.name
 $$;
 COMMENT ON FUNCTION tunnel_api.change_at(text, float8, float8) IS
-'Change of the lining at a place (chainage and arc of the older survey, m) in each survey that was compared with it, by date: mean over the length of the section, m, positive inwards, without the section''s rigid motion; NULL where unseen. lod: level of detection of a single cell there, m';
+'Change of the lining at a place (chainage and arc of the older survey, m) in each survey that was compared with it, by date: mean over the length of the section, m, positive inwards, without the section''s rigid motion; NULL if not inspected. lod: level of detection of a single cell there, m';
 
 -- Nodes of a section lie at each whole degree from -180 to 180.
 CREATE OR REPLACE FUNCTION tunnel_internal.arc_at_clock(survey_id int, chainage float8, clock float8) RETURNS float8
@@ -202,7 +202,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 10 SECURITY DEFINER SET search_pat
      ORDER BY s.date, s.name
 $$;
 COMMENT ON FUNCTION tunnel_api.ring_series(text, float8) IS
-'Shape of the ring at a chainage (m) in each survey of a tunnel whose rings are defined, by date: share of it that is seen, mean radius (m), ovality as a share of the design diameter, clock position of the largest diameter (degrees), each with its standard error; NULL where it was not measured or cannot be told. Rings are those of each survey: their numbers differ where they were found or counted otherwise';
+'Shape of the ring at a chainage (m) in each survey of a tunnel whose rings are defined, by date: inspected share, mean radius (m), ovality as a share of the design diameter, clock position of the largest diameter (degrees), each with its standard error; NULL if not measured or unknown. Rings are those of each survey; their numbers can differ';
 
 CREATE OR REPLACE FUNCTION tunnel_api.leak_area_series(tunnel text, step float8 DEFAULT 100)
 RETURNS TABLE (chainage_from float8, chainage_to float8, label text, survey text, date date, leaks bigint, area float8)

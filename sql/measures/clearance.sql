@@ -30,7 +30,7 @@ COMMENT ON COLUMN tunnel_api.clearance_section.label IS 'Station of its middle, 
 COMMENT ON COLUMN tunnel_api.clearance_section.margin IS 'Least distance, m, negative inside the outline; NULL where nothing was seen that counts';
 COMMENT ON COLUMN tunnel_api.clearance_section.margin_se IS 'Its standard error by that of the track''s axis and cant alone, m; 0 of a given track';
 COMMENT ON COLUMN tunnel_api.clearance_section.clock IS 'Direction of the point, degrees from straight above the outline''s middle to the right';
-COMMENT ON COLUMN tunnel_api.clearance_section.class IS 'What it is: lining, niche, appendage, unassigned';
+COMMENT ON COLUMN tunnel_api.clearance_section.class IS 'Class: lining, niche, fixture (appendage), unassigned';
 COMMENT ON COLUMN tunnel_api.clearance_section.cluster_id IS 'Cluster that it lies in, if any';
 COMMENT ON COLUMN tunnel_api.clearance_section.seen_share IS 'Share of the directions, of 5° each, with a return of anything, 0 to 1';
 COMMENT ON COLUMN tunnel_api.clearance_section.points IS 'Points that count';
@@ -60,7 +60,7 @@ COMMENT ON COLUMN tunnel_api.clearance_infringement.track IS 'single; left or ri
 COMMENT ON COLUMN tunnel_api.clearance_infringement.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.depth IS 'How deep it reaches in, m';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.clock IS 'Direction of its deepest point, degrees from straight above the outline''s middle to the right';
-COMMENT ON COLUMN tunnel_api.clearance_infringement.class IS 'What causes it: lining, niche, appendage, object, sphere, unassigned';
+COMMENT ON COLUMN tunnel_api.clearance_infringement.class IS 'Class that causes it: lining, niche, fixture (appendage), object, sphere, unassigned';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.counts IS 'False of objects and spheres, which may be gone';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.cluster_id IS 'Cluster that its deepest point lies in, if any';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.points IS 'How many points it has';

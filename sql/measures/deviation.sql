@@ -72,9 +72,9 @@ COMMENT ON COLUMN tunnel_api.deviation_section.deviation_least IS 'Least mean of
 COMMENT ON COLUMN tunnel_api.deviation_section.least_at IS 'How far along the profile that is, from its left foot or lowest place clockwise, m';
 COMMENT ON COLUMN tunnel_api.deviation_section.deviation_greatest IS 'Greatest mean of a cell, m: what stands in most';
 COMMENT ON COLUMN tunnel_api.deviation_section.greatest_at IS 'How far along the profile that is, m';
-COMMENT ON COLUMN tunnel_api.deviation_section.shift_right IS 'How far the lining as a whole lies right of the profile, m: the axis''s error or the lining''s, which cannot be told apart';
+COMMENT ON COLUMN tunnel_api.deviation_section.shift_right IS 'Displacement of the whole lining to the right of the profile, m: an error of the axis or of the lining';
 COMMENT ON COLUMN tunnel_api.deviation_section.shift_up IS 'How far it lies above it, m';
-COMMENT ON COLUMN tunnel_api.deviation_section.deviation IS 'Mean deviation of cells of equal length along the profile, m, positive inside; NaN where unseen';
+COMMENT ON COLUMN tunnel_api.deviation_section.deviation IS 'Mean deviation of cells of equal length along the profile, m, positive inside; NaN: not inspected';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.deviation_inputs(survey_id int, km int, subject text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
@@ -154,7 +154,7 @@ AS $$
         HAVING count(*) > 0) d
 $$;
 COMMENT ON FUNCTION tunnel_api.deviation_volume(text, text, float8, float8, float8) IS
-'Overbreak and underbreak of a survey against a layer''s design between two chainages (m), m³, of the lining that was seen: area of each section times its length along the axis. length (m) and design_area (m²) of what was held against the design; seen_share of the whole stretch, in which what was not held against it counts as unseen. overbreak_sigma and underbreak_sigma: standard deviations by the scatter of pixels and by an axis that is uncertain by axis_sigma (m) to the right and as much up, all along the stretch alike.';
+'Overbreak and underbreak of a survey from a layer''s design between two chainages (m), m³, of the inspected lining: area of each section times its length along the axis. length (m) and design_area (m²) of the compared part; seen_share of the whole stretch; the rest counts as not inspected. overbreak_sigma and underbreak_sigma: standard deviations from the scatter of pixels and from an axis accuracy of axis_sigma (m) to the right and up, constant along the stretch.';
 
 CREATE OR REPLACE FUNCTION tunnel_api.deviation_stretches(survey text, layer text, step float8 DEFAULT 100, axis_sigma float8 DEFAULT 0)
 RETURNS TABLE (chainage_from float8, chainage_to float8, label text, length float8, design_area float8, seen_area float8,

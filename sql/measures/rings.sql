@@ -13,7 +13,7 @@ SELECT r.id, r.survey_id, s.name AS survey, r.km,
   FROM tunnel.ring r
   JOIN tunnel.survey s ON s.id = r.survey_id;
 COMMENT ON VIEW tunnel_api.ring IS
-    'Rings of linings with their shape, each value with its standard error (_se); what was not measured, or cannot be told, is NULL';
+    'Rings of linings with their shape, each value with its standard error (_se); NULL if not measured or unknown';
 COMMENT ON COLUMN tunnel_api.ring.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.ring.number IS 'Number of the ring';
 COMMENT ON COLUMN tunnel_api.ring.origin IS 'How the rings were given: length, file, or found';
@@ -52,7 +52,7 @@ COMMENT ON COLUMN tunnel_api.ring.step_greatest_arc IS 'Arc of its place, m';
 COMMENT ON COLUMN tunnel_api.ring.lip IS 'Greatest step within the ring, between segments, m, positive where what follows clockwise stands in';
 COMMENT ON COLUMN tunnel_api.ring.lip_se IS 'Standard error, m';
 COMMENT ON COLUMN tunnel_api.ring.lip_arc IS 'Arc of its place, m';
-COMMENT ON COLUMN tunnel_api.ring.remark IS 'What is to be known of it';
+COMMENT ON COLUMN tunnel_api.ring.remark IS 'Notes and limitations';
 
 -- In a cell of arc each; the joint is the one at the ring's beginning.
 CREATE OR REPLACE VIEW tunnel_api.ring_step AS
@@ -133,7 +133,7 @@ COMMENT ON COLUMN tunnel_api.ring_unrolled.centre_right IS 'How far its centre l
 COMMENT ON COLUMN tunnel_api.ring_unrolled.centre_up IS 'How far its centre lies above the given axis, mm';
 COMMENT ON COLUMN tunnel_api.ring_unrolled.step_greatest IS 'Greatest step at its beginning, mm, positive where it stands in';
 COMMENT ON COLUMN tunnel_api.ring_unrolled.lip IS 'Greatest step between its segments, mm';
-COMMENT ON COLUMN tunnel_api.ring_unrolled.remark IS 'What is to be known of it';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.remark IS 'Notes and limitations';
 COMMENT ON COLUMN tunnel_api.ring_unrolled.geom IS 'Chainage and arc, m';
 
 CREATE OR REPLACE VIEW tunnel_api.ring_map AS
@@ -160,5 +160,5 @@ COMMENT ON COLUMN tunnel_api.ring_map.centre_right IS 'How far its centre lies r
 COMMENT ON COLUMN tunnel_api.ring_map.centre_up IS 'How far its centre lies above the given axis, mm';
 COMMENT ON COLUMN tunnel_api.ring_map.step_greatest IS 'Greatest step at its beginning, mm, positive where it stands in';
 COMMENT ON COLUMN tunnel_api.ring_map.lip IS 'Greatest step between its segments, mm';
-COMMENT ON COLUMN tunnel_api.ring_map.remark IS 'What is to be known of it';
+COMMENT ON COLUMN tunnel_api.ring_map.remark IS 'Notes and limitations';
 COMMENT ON COLUMN tunnel_api.ring_map.geom IS 'On the map, tunnel''s SRID';

@@ -15,7 +15,7 @@ COMMENT ON COLUMN tunnel_api.thickness_section.survey_id IS 'Key of the later su
 COMMENT ON COLUMN tunnel_api.thickness_section.survey IS 'Its name';
 COMMENT ON COLUMN tunnel_api.thickness_section.before_id IS 'Key of the earlier survey';
 COMMENT ON COLUMN tunnel_api.thickness_section.before IS 'Its name';
-COMMENT ON COLUMN tunnel_api.thickness_section.layer IS 'Layer whose profiles both were held against';
+COMMENT ON COLUMN tunnel_api.thickness_section.layer IS 'Layer whose profiles both were compared with';
 COMMENT ON COLUMN tunnel_api.thickness_section.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.thickness_section.design_length IS 'Length of the profile, m';
 COMMENT ON COLUMN tunnel_api.thickness_section.compared_length IS 'What of that both saw, m';

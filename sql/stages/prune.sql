@@ -52,7 +52,7 @@ AS $$
      WHERE ($1 IS NULL OR l.survey_id = $1) AND NOT EXISTS (SELECT FROM keep k WHERE k.id = l.id)
 $$;
 COMMENT ON FUNCTION tunnel_internal.superseded_runs(int, timestamptz) IS
-    'Runs of the ledger, of one survey or of all, that began before a moment and that nothing goes by any more: neither state nor result, nor whether it is stale; bytes: of the row';
+    'Runs of the ledger, of one survey or all, that began before a time and are no longer needed for any state or result; bytes: of the row';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.superseded_jobs(survey_id int DEFAULT NULL, before timestamptz DEFAULT 'infinity')
 RETURNS TABLE (id bigint, survey_id integer, state text, ended_at timestamptz, rows bigint, bytes bigint)
@@ -75,4 +75,4 @@ AS $$
        AND NOT EXISTS (SELECT FROM needed n WHERE n.job_id = j.id)
 $$;
 COMMENT ON FUNCTION tunnel_internal.superseded_jobs(int, timestamptz) IS
-    'Jobs of the queue, of one survey or of all, that ended before a moment, and of which no run is kept: rows and bytes with those of what happened to it';
+    'Jobs of the queue, of one survey or all, that ended before a time and have no run that is kept; rows and bytes include their events';

@@ -22,7 +22,7 @@ COMMENT ON VIEW tunnel_api.section_piece IS
     'Pieces of sections in kilometres into which sonar scans were loaded, one per degree from straight below the axis to the left; closed_section and section_part are made of them';
 COMMENT ON COLUMN tunnel_api.section_piece.section_id IS 'Key of the section';
 COMMENT ON COLUMN tunnel_api.section_piece.n IS 'Number in its section, from 1';
-COMMENT ON COLUMN tunnel_api.section_piece.part IS 'lining (above the water), submerged (seen by a sonar) or unseen (bridged between what was seen)';
+COMMENT ON COLUMN tunnel_api.section_piece.part IS 'lining (above the water), submerged (inspected by a sonar) or unseen (interpolated, not inspected)';
 COMMENT ON COLUMN tunnel_api.section_piece.below IS 'Whether it lies below the water';
 COMMENT ON COLUMN tunnel_api.section_piece.length IS 'm';
 COMMENT ON COLUMN tunnel_api.section_piece.here IS 'Where it begins, tunnel''s SRID, m';
@@ -46,7 +46,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.km, c.chainage,
     HAVING bool_or(q.part = 'submerged')) p ON true
  WHERE w.height IS NOT NULL;
 COMMENT ON VIEW tunnel_api.closed_section IS
-    'Cross-sections of canal tunnels, closed through the bed: those of which a sonar saw anything below the water';
+    'Cross-sections of canal tunnels with sonar points, closed through the bed';
 COMMENT ON COLUMN tunnel_api.closed_section.water_level IS 'Height of the water, m';
 COMMENT ON COLUMN tunnel_api.closed_section.unseen IS 'Share of its line below the water that no sonar saw, 0 to 1; there it is bridged';
 COMMENT ON COLUMN tunnel_api.closed_section.wet_area IS 'Area of the water, m²; NULL where more than a fifth of the line below it was not seen';
@@ -63,10 +63,10 @@ SELECT min(r.id) AS id, r.survey_id, s.name AS survey, r.km, r.section_id, c.cha
   JOIN tunnel.survey s ON s.id = r.survey_id
  GROUP BY r.survey_id, s.name, r.km, r.section_id, c.chainage, r.part, r.run;
 COMMENT ON VIEW tunnel_api.section_part IS
-    'Parts of closed sections that rest on the same: lining above the water, submerged, or unseen';
+    'Parts of closed sections by source: lining above the water, submerged, or unseen (not inspected)';
 COMMENT ON COLUMN tunnel_api.section_part.id IS 'Key';
 COMMENT ON COLUMN tunnel_api.section_part.section_id IS 'Key of the section';
-COMMENT ON COLUMN tunnel_api.section_part.part IS 'lining (above the water), submerged (seen by a sonar) or unseen (bridged between what was seen)';
+COMMENT ON COLUMN tunnel_api.section_part.part IS 'lining (above the water), submerged (inspected by a sonar) or unseen (interpolated, not inspected)';
 COMMENT ON COLUMN tunnel_api.section_part.length IS 'm';
 COMMENT ON COLUMN tunnel_api.section_part.geom IS 'Line in space, tunnel''s SRID, m';
 

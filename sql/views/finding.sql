@@ -261,7 +261,7 @@ SELECT (a.survey_id::bigint * 100000 + min(k.id)) * 10
  CROSS JOIN LATERAL (SELECT a.state IN ('open', 'confirmed') AS counted) c
  GROUP BY a.survey_id, s.name, a.kind, a.wet, a.origin
 HAVING sum(a.findings) <> 0;
-COMMENT ON VIEW tunnel_api.finding_count IS 'How many findings of each kind and origin a survey has, and what became of them';
+COMMENT ON VIEW tunnel_api.finding_count IS 'Number of findings of a survey by kind, origin and state';
 COMMENT ON COLUMN tunnel_api.finding_count.id IS 'A key, of survey, kind and origin';
 COMMENT ON COLUMN tunnel_api.finding_count.kind IS 'Code of the kind';
 COMMENT ON COLUMN tunnel_api.finding_count.wet IS 'Whether the kind counts as wet';

@@ -13,7 +13,7 @@ SELECT c.id, c.name, c.description
     (68, 'object', 'What stands on the ground: people, trolleys, equipment, bollards'),
     (69, 'sphere', 'Target sphere'),
     (70, 'noise', 'Points by themselves in the air, or behind the lining')) AS c (id, name, description);
-COMMENT ON VIEW tunnel_api.class IS 'Classes of points: codes of LAS, of which 2 is ASPRS''s and those from 64 on are free for the user';
+COMMENT ON VIEW tunnel_api.class IS 'Classes of points: LAS codes; 2 is ASPRS''s, 64 and above are user-defined';
 COMMENT ON COLUMN tunnel_api.class.id IS 'Code in tunnel_api.point, tunnel_api.cluster and in exported files';
 COMMENT ON COLUMN tunnel_api.class.name IS 'Name';
 COMMENT ON COLUMN tunnel_api.class.description IS 'What the points lie on';

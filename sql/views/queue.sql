@@ -6,7 +6,7 @@ SELECT (g.survey_id::bigint * 1000000 + 500000 + g.km) AS id, g.survey_id, s.nam
        g.requested_at, g.retry_after
   FROM tunnel.goal g
   JOIN tunnel.survey s ON s.id = g.survey_id;
-COMMENT ON VIEW tunnel_api.goal IS 'What batches want of each kilometre';
+COMMENT ON VIEW tunnel_api.goal IS 'Requested stages of each kilometre';
 COMMENT ON COLUMN tunnel_api.goal.stage IS 'Stage up to which the kilometre is to be brought';
 COMMENT ON COLUMN tunnel_api.goal.retry_after IS 'Stages that failed before this moment are tried again';
 

@@ -51,11 +51,11 @@ SELECT 16 * s.id::bigint + 6, s.id, s.name, NULL, 'survey', NULL, s.positions_no
   FROM tunnel.survey s
  WHERE s.positions_note IS NOT NULL;
 COMMENT ON VIEW tunnel_api.remark IS
-    'What a reader of the results is to know: notes of the stages by kilometre, points that were left out by file and what its intensity gives to doubt, and what is to be known of the scanner positions';
+    'Notes and limitations of the results: notes of the stages by kilometre, points left out and doubtful intensity by file, and notes on the scanner positions';
 COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file, and for the survey as a whole';
 COMMENT ON COLUMN tunnel_api.remark.stage IS 'Stage that says so; survey for what was said when the survey was added or set';
 COMMENT ON COLUMN tunnel_api.remark.file IS 'Name of the scan file; NULL for a kilometre';
-COMMENT ON COLUMN tunnel_api.remark.remark IS 'What is to be known';
+COMMENT ON COLUMN tunnel_api.remark.remark IS 'Notes and limitations';
 
 
 -- Files first, then by kilometre; what is the same in several kilometres is said once.
@@ -121,7 +121,7 @@ AS $$
     SELECT r.file, r.stage, r.kilometres, r.remark, r.said FROM tunnel_internal.remarks_of($1, ARRAY[$2], ARRAY[$3]) r
 $$;
 COMMENT ON FUNCTION tunnel_api.remarks(int, float8, float8) IS
-'What is to be known of a survey''s results between two chainages (m), or anywhere, by the view remark: of its files there, then of its kilometres, the same in several of them once. said: the whole in words, as every document has it.';
+'Notes and limitations of a survey''s results between two chainages (m), or of all, from the view remark: of its files, then of its kilometres; equal ones once. said: full text, as in every document.';
 
 
 CREATE OR REPLACE FUNCTION tunnel_internal.remark_statements(survey_id int, starts float8[], ends float8[])
@@ -135,7 +135,7 @@ AS $$
      GROUP BY r.n
 $$;
 COMMENT ON FUNCTION tunnel_internal.remark_statements(int, float8[], float8[]) IS
-'What remarks has to say of each of some stretches of a survey, given by where they begin and end (m), on one line; n: the first is 1. No row for one of which there is nothing to say.';
+'Remarks on several stretches of a survey, given by start and end (m), one line each; n: number of the stretch, from 1. No row for a stretch without remarks.';
 
 
 CREATE OR REPLACE FUNCTION tunnel_internal.remark_statement(

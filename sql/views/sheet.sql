@@ -133,7 +133,7 @@ COMMENT ON COLUMN tunnel_api.sheet.seen_share IS 'Share of it that was seen, as 
 COMMENT ON COLUMN tunnel_api.sheet.wet_area IS 'Area of the leaks within the sheet, m²; a leak over its edge by its part';
 COMMENT ON COLUMN tunnel_api.sheet.leaks IS 'Leaks on it or over its edges, found last and not rejected; NULL where they were not searched for';
 COMMENT ON COLUMN tunnel_api.sheet.gaps IS 'Where on it leaks were not searched for, or not as they should be (coverage_statement); NULL if nowhere';
-COMMENT ON COLUMN tunnel_api.sheet.remarks IS 'What is to be known of the results there (remark_statement); NULL if nothing';
+COMMENT ON COLUMN tunnel_api.sheet.remarks IS 'Notes and limitations of the results there (remark_statement); NULL if none';
 COMMENT ON COLUMN tunnel_api.sheet.findings IS 'Findings in its table (sheet_finding, listed), beside leaks; NULL if none';
 COMMENT ON COLUMN tunnel_api.sheet.left_out IS
     'How many findings on it do not count, leaks among them, and are not drawn: rejected, merged, same, dry; NULL if none';

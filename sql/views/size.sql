@@ -89,7 +89,7 @@ SELECT coalesce(z.survey_id, 0)::bigint * 10
   LEFT JOIN tunnel.survey s ON s.id = z.survey_id;
 COMMENT ON VIEW tunnel_api.survey_size IS
     'What each survey takes of the database, by kind; cheap, for it reads the catalogue and no table. What belongs to a tunnel or to the database as a whole is not in it';
-COMMENT ON COLUMN tunnel_api.survey_size.survey_id IS 'Key of the survey; NULL for tables in common that were never analyzed, and so not told apart';
+COMMENT ON COLUMN tunnel_api.survey_size.survey_id IS 'Key of the survey; NULL for common tables that were never analyzed';
 COMMENT ON COLUMN tunnel_api.survey_size.survey IS 'Its name; NULL also where points or images are left of one that is gone';
 COMMENT ON COLUMN tunnel_api.survey_size.kind IS
     'points (also those that wait to be loaded), images, sections (with axis and segments), results, runs (the ledger) or inputs (files, scanner positions, what is wanted)';

@@ -27,7 +27,7 @@ COMMENT ON COLUMN tunnel_api.radiometry.reference IS 'Range curve of the survey:
 COMMENT ON COLUMN tunnel_api.radiometry.range_from IS 'Least of the ranges that the curve was found on (tunnel_api.range_curve), m; NULL unless the reference is auto';
 COMMENT ON COLUMN tunnel_api.radiometry.range_to IS 'Greatest of them, m';
 COMMENT ON COLUMN tunnel_api.radiometry.range_sigma IS 'Greatest standard deviation of its shape between them, dB: what is judged';
-COMMENT ON COLUMN tunnel_api.radiometry.roughness IS 'Roughness angle of Oren-Nayar, degrees (eq. 13-18); NULL where the lining''s own cannot be told and that of concrete is taken, as its remark says';
+COMMENT ON COLUMN tunnel_api.radiometry.roughness IS 'Roughness angle of Oren-Nayar, degrees (eq. 13-18); NULL if it could not be estimated and that of concrete is used, as its remark states';
 COMMENT ON COLUMN tunnel_api.radiometry.threshold IS 'Corrected intensity below which lining is wet, dB (eq. 19-20)';
 COMMENT ON COLUMN tunnel_api.radiometry.sigma_raw IS 'Standard deviation of dry lining before correction, dB';
 COMMENT ON COLUMN tunnel_api.radiometry.sigma_lambert IS 'The same after correction by Lambert''s law, dB';

@@ -292,7 +292,7 @@ BEGIN
         ('kind', 'dark or bright, against its own surface; what caused it, the inspector says'),
         ('chainage', 'Chainage of its middle, m; NULL of a site or beyond the sections'),
         ('label', 'Station of its middle, as 12+345.678'),
-        ('reasons', 'What speaks for it or against it'),
+        ('reasons', 'Evidence for and against it'),
         ('confidence', 'How sure detection is that it differs, 0-1'),
         ('contrast', 'Mean difference from its surface, in standard deviations of that'),
         ('difference', 'Mean difference from its surface, dB'),

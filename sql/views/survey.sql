@@ -97,7 +97,7 @@ COMMENT ON COLUMN tunnel_api.axis_vertex.n IS 'Number: the vertex stands at chai
 COMMENT ON COLUMN tunnel_api.axis_vertex.points IS 'Points averaged';
 COMMENT ON COLUMN tunnel_api.axis_vertex.source IS 'measured, interpolated or edited (by hand)';
 COMMENT ON COLUMN tunnel_api.axis_vertex.remark IS
-    'Why the place that was measured is not taken, if it is not: it did not come to rest, or lies off where its neighbours lead';
+    'Reason why the measured place was rejected: it was unstable, or deviates from its neighbours';
 COMMENT ON COLUMN tunnel_api.axis_vertex.edited_by IS 'Who moved it last, set by the database';
 COMMENT ON COLUMN tunnel_api.axis_vertex.edited_at IS 'When it was moved last, set by the database';
 

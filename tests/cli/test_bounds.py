@@ -38,7 +38,7 @@ def test_a_stretch_that_begins_where_the_survey_ends(example: str, conn: psycopg
         for stretch in (["--to", str(row[0])], ["--from", str(row[1])]):
             result = CliRunner().invoke(main, [verb, example, *stretch])
             assert result.exit_code == 2
-            assert f"has nothing there: it reaches from chainage {row[0]:.3f} to {row[1]:.3f} m" in result.stderr
+            assert f"has no data there: it extends from chainage {row[0]:.3f} to {row[1]:.3f} m" in result.stderr
     conn.rollback()
     assert conn.execute(runs).fetchone() == before
     assert CliRunner().invoke(main, ["deviation", example, "--to", str(row[0] + 20.0)]).exit_code == 0

@@ -142,12 +142,12 @@ def test_what_cannot_be_done_is_one_line(survey: str, tmp_path: Path) -> None:
     for words, said in (
         (["rings"], "rings of what"),
         (["rings", survey], "has no rings there"),
-        (["rings", survey, "--find"], "no rings can be told"),
+        (["rings", survey, "--find"], "rings not found"),
         (["rings", survey, "--find", "--length", "2"], "one of"),
         (["rings", survey, "--start", "2"], "--length"),
         (["rings", survey, "--sigma", "0.002"], "--points"),
         (["rings", survey, "--rings", path], "begins within"),
-        (["rings", survey, "--rings", tmp_path / "large.csv"], "nine digits at most"),
+        (["rings", survey, "--rings", tmp_path / "large.csv"], "at most nine digits"),
         (["rings", survey, "--length", "2", "-o", tmp_path / "r.pdf"], ".csv"),
     ):
         done = invoke(*words)

@@ -60,7 +60,7 @@ def test_real_rings_are_those_that_were_published(tmp_path: Path) -> None:
     moved = {ring for ring, values in off.items() if values[3] > 0.002}
     assert moved == {ring for ring, row in ours.items() if "along the tunnel" in row["remark"]}
     assert len(moved) == 14
-    assert "point 5 left out: 35.5 mm inside" in ours["0"]["remark"]
+    assert "point 5 rejected: 35.5 mm inside" in ours["0"]["remark"]
     assert float(ours["917"]["ovality"]) == pytest.approx(14.2, abs=0.2)
 
 
@@ -77,12 +77,12 @@ def test_a_ring_lies_where_it_was_put(files: tuple[Path, Path]) -> None:
     ("rows", "header", "said"),
     [
         (lines(), "ring,point,x,y,h", "has no column z"),
-        ([], "ring,point,x,y,z", "holds no point"),
+        ([], "ring,point,x,y,z", "has no point"),
         (lines(radius=3000.0), "ring,point,x,y,z", "in millimetres"),
         (lines(radius=6.0), "ring,point,x,y,z", "is 6 m the radius"),
         ([row.replace("20.0000", "20000") for row in lines()], "ring,point,x,y,z", "from the axis"),
         (lines(points=4), "ring,point,x,y,z", "only 4 points; a ring needs 5"),
-        ([f"{row},30" for row in lines()], "ring,point,x,y,z,offset", "offsets are metres"),
+        ([f"{row},30" for row in lines()], "ring,point,x,y,z,offset", "offsets are in metres"),
         ([*lines(), "1,9,a,0,0"], "ring,point,x,y,z", "line 10: x is 'a'"),
     ],
 )
@@ -121,8 +121,8 @@ def test_what_is_wrong_of_one_ring_is_its_remark(files: tuple[Path, Path]) -> No
     remarks = {row["ring"]: row["remark"] for row in said["rows"]}
     assert remarks["1"] == ""
     assert remarks["few"] == "only 4 points; a ring needs 5"
-    assert remarks["twice"] == "point 1 is there twice: counted once"
-    assert remarks["other"] == "point 1 is there twice, at different places"
+    assert remarks["twice"] == "point 1 occurs twice: counted once"
+    assert remarks["other"] == "point 1 occurs twice, at different places"
     assert "m from the axis" in remarks["far"]
     assert "ellipse not determined" in remarks["half"]
     by_name = {row["ring"]: row for row in said["rows"]}

@@ -76,7 +76,7 @@ def batch(
     from tunneldb.stages.run import km_range
 
     if last is not None and last not in STAGE_NAMES:
-        raise UserError(f"there is no stage {last!r}; the stages are {', '.join(STAGE_NAMES)}")
+        raise UserError(f"unknown stage {last!r}; the stages are {', '.join(STAGE_NAMES)}")
     values = settings(assignments)
     kilometres = None if km is None else km_range(km)
     chosen = {name: values[name] for name in (text.partition("=")[0] for text in assignments) if name in PARAMETERS}
@@ -124,7 +124,7 @@ def _work(survey: Survey, dsn: str | None, count: int) -> Watch:
 
 
 def _busy(conn: psycopg.Connection[Any], survey: Survey) -> tuple[bool, dt.datetime]:
-    """Whether there is something to be done, and the server's time."""
+    """Return whether there is work to do, and the server's time."""
     row = conn.execute("SELECT tunnel_internal.queue_busy(%s), clock_timestamp()", [survey.id]).fetchone()
     assert row is not None
     return bool(row[0]), row[1]

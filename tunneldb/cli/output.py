@@ -88,7 +88,7 @@ def records(names: Sequence[str], rows: Iterable[Sequence[Any]]) -> list[dict[st
 
 
 def wants_json() -> bool:
-    """Whether the verb under way is to print JSON."""
+    """Return True if the current command prints JSON."""
     context = click.get_current_context(silent=True)
     return context is not None and bool(context.meta.get(AS_JSON))
 

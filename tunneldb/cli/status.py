@@ -69,7 +69,7 @@ def status(settings: Settings, survey: str | None, watch: bool, interval: float)
 
 
 def _all(connection: psycopg.Connection[Any]) -> None:
-    """A line a survey: what is loaded, and at how many of its kilometres each stage is done."""
+    """Print a line for each survey: loaded data, and the number of kilometres that each stage has done."""
     rows = connection.execute(
         """
         SELECT s.name, s.tunnel, s.date, s.files, s.points, tunnel_api.station_label(s.tunnel_id, s.chainage_from),

@@ -70,7 +70,7 @@ def parse_stretch(conn: psycopg.Connection[Any], survey: OfTunnel, start: str | 
 
 
 def _chainage(conn: psycopg.Connection[Any], survey: OfTunnel, option: str, place: str) -> float:
-    """A station may be there twice or not at all; a chainage is one place, and may lie beyond the tunnel's ends."""
+    """Return the chainage of a station, which must exist exactly once, or a chainage, which may be beyond the tunnel."""
     if _METRES.fullmatch(place.strip()):
         if abs(float(place)) > MAX_MEASUREMENT:
             raise UserError(f"{option} {place[:20]}…: no tunnel is so long")

@@ -134,7 +134,7 @@ class Pixels(NamedTuple):
         return cls(whole[0], whole[1], whole[2], single[0], single[1], single[2])
 
     def first(self, count: int) -> Pixels:
-        """Those of the first so many points."""
+        """Return the pixels of the first so many points."""
         return Pixels(
             self.row[:count], self.column[:count], self.weight[:count],
             self.offset[:count], self.raw[:count], self.corrected[:count],
@@ -271,7 +271,7 @@ def _project(
     raws: Single,
     correcteds: Single,
 ) -> tuple[int, int, int, int, float, float]:  # pragma: no cover - compiled
-    """What `project` does with a block of unrolled points; of plain arrays, which compile faster than tuples of them."""
+    """Process a block of unrolled points for `project`; plain arrays compile faster than tuples of them."""
     mobile = trajectory.shape[0] > 0
     posed = mobile or known_scans.shape[0] > 0
     curve = knots.shape[0] > 0

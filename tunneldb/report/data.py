@@ -139,7 +139,7 @@ def find_stretch(conn: psycopg.Connection[Any], survey: Survey, low: float, high
 
 
 def _listed_column(name: str) -> sql.Composable:
-    """A column of the views of leaks as lists have it: beside a kind that an inspector gave stands no confidence in another."""
+    """Return a column of the views of leaks for lists: no confidence if an inspector changed the kind."""
     return (
         sql.SQL("CASE WHEN kind = kind_detected THEN confidence END AS confidence")
         if name == "confidence"

@@ -125,7 +125,7 @@ class FindingsChapter:
 
     @property
     def listed(self) -> list[Finding]:
-        """Those with a row, by their ids."""
+        """Findings with a row, by their ids."""
         rows = [finding for kind in self.kinds for _, group in kind.groups for finding in group]
         return sorted(rows, key=lambda finding: finding.id)
 
@@ -141,7 +141,7 @@ class FindingsChapter:
 
     @property
     def marks(self) -> list[Finding]:
-        """Those shown in the pictures of the lining: counted, with a row, and not leaks."""
+        """Findings in the pictures of the lining: counted, with a row, and not leaks."""
         return [finding for finding in self.listed if finding.counted and finding.id not in self.leaks]
 
     @property

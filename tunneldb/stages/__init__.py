@@ -1,4 +1,4 @@
-"""Stages and measures: one registry of them, what runs them, and the ledger of what ran."""
+"""Stages and measures: their registry, their execution, and the ledger of runs."""
 
 import lazy_loader
 

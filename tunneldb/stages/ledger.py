@@ -149,7 +149,7 @@ def _begin(
 
 
 def lock(conn: psycopg.Connection[Any], survey_id: int, km: int | None, *, shared: bool = False) -> None:
-    """Keep other runs off a survey's kilometre, or with None off its stages of the whole, until the transaction ends.
+    """Lock a survey's kilometre, or with None its stages of the whole survey, until the transaction ends.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def _hold(conn: psycopg.Connection[Any], job: Job) -> None:
 
 
 def _finish(conn: psycopg.Connection[Any], survey_id: int, run: Run, job: Job | None) -> None:
-    """Record the end, of what a load has entered for each of its kilometres, too, as the last thing before the commit."""
+    """Record the end, and the entries of a load for each of its kilometres, as the last step before the commit."""
     if job is not None:
         _hold(conn, job)
     conn.execute("SELECT tunnel_internal.queue_lock(%s)", [survey_id])
@@ -216,7 +216,7 @@ def _fail(conn: psycopg.Connection[Any], survey_id: int, run: Run, job: Job | No
 
 
 def _end_job(conn: psycopg.Connection[Any], job: Job, error: BaseException) -> None:
-    """Put a job back that may succeed another time; end it as failed if not."""
+    """Return a job to the queue if a retry may succeed; end it as failed otherwise."""
     again = retry_at(error, job.attempts)
     if again is None:
         conn.execute("SELECT tunnel_internal.queue_fail(%s, %s)", [job.id, describe(error)])

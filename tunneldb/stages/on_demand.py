@@ -14,7 +14,7 @@ from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
 
 Begin = Callable[[str, float], Callable[[float], None]]
-"""Called with a text and the number of kilometres; returns what takes those that are done."""
+"""Called with a text and the number of kilometres; returns a function that takes the progress."""
 
 
 def measure_kilometres(
@@ -69,7 +69,7 @@ def refuse_beyond(conn: psycopg.Connection[Any], survey: Survey, low: float, hig
     """
     ends = survey_ends(conn, survey)
     if ends is not None and (high <= ends[0] or low >= ends[1]):
-        raise UserError(f"survey {survey.name} has nothing there: it reaches from chainage {ends[0]:.3f} to {ends[1]:.3f} m")
+        raise UserError(f"survey {survey.name} has no data there: it extends from chainage {ends[0]:.3f} to {ends[1]:.3f} m")
 
 
 def refuse_different_tunnels(one: Survey, other: Survey, verb: str) -> None:
@@ -81,9 +81,9 @@ def refuse_different_tunnels(one: Survey, other: Survey, verb: str) -> None:
         If they are.
     """
     if one.id == other.id:
-        raise UserError(f"survey {one.name} is given twice: {verb} takes two surveys of one tunnel")
+        raise UserError(f"survey {one.name} is given twice: {verb} needs two surveys of one tunnel")
     if one.tunnel_id != other.tunnel_id:
         raise UserError(
-            f"survey {one.name} is of tunnel {one.tunnel}, {other.name} of {other.tunnel}: {verb} takes two surveys of one"
+            f"survey {one.name} is of tunnel {one.tunnel}, {other.name} of {other.tunnel}: {verb} needs two surveys of one"
             " tunnel"
         )

@@ -1,4 +1,4 @@
-"""Parameters of the stages: names, defaults, bounds and what each means."""
+"""Parameters of the stages: names, defaults, bounds and descriptions."""
 
 from __future__ import annotations
 
@@ -31,36 +31,34 @@ class Parameter:
 
 
 PARAMETERS: dict[str, Parameter] = {
-    "axis.half_width": Parameter(1.0, 0.05, 3.0, "m", "half the thickness of the slab whose points place a vertex"),
-    "axis.angle_step": Parameter(5.0, 1.0, 20.0, "°", "width of the angular classes that place a vertex"),
-    "axis.tolerance": Parameter(0.002, 1e-5, 1.0, "m", "the axis rests when no vertex moves by as much in a pass"),
-    "axis.max_iterations": Parameter(20, 1, 100, "", "passes at the most", whole=True),
+    "axis.half_width": Parameter(1.0, 0.05, 3.0, "m", "half the thickness of the slab of points for a vertex"),
+    "axis.angle_step": Parameter(5.0, 1.0, 20.0, "°", "width of the angular classes for a vertex"),
+    "axis.tolerance": Parameter(0.002, 1e-5, 1.0, "m", "maximum movement of vertices in the last pass"),
+    "axis.max_iterations": Parameter(20, 1, 100, "", "maximum number of passes", whole=True),
     "axis.max_deviation": Parameter(0.5, 0.05, 10.0, "m", "deviation from its neighbours above which a vertex is interpolated"),
-    "axis.max_rejected": Parameter(
-        0.3, 0.0, 1.0, "", "share of the vertices that may be interpolated for that or as they do not rest; one always may"
-    ),
+    "axis.max_rejected": Parameter(0.3, 0.0, 1.0, "", "maximum share of interpolated vertices; one is always allowed"),
     "section.angle_step": Parameter(5.0, 1.0, 20.0, "°", "width of an angular class; must divide 180"),
-    "section.half_width": Parameter(0.15, 0.01, 2.5, "m", "half the thickness of a section's slab, to begin with"),
-    "section.max_half_width": Parameter(2.5, 0.01, 2.5, "m", "widest half of a slab where the classes don't fill"),
-    "section.min_points": Parameter(5, 2, 1000, "", "points that fill a class", whole=True),
-    "section.protrusion": Parameter(0.03, 0.001, 1.0, "m", "classes that stand in by more are hung on the wall, not the wall"),
-    "ground.voxel": Parameter(0.1, 0.02, 0.5, "m", "edge of the voxels to which points are thinned before ground is sought"),
-    "ground.distance": Parameter(0.05, 0.005, 0.5, "m", "points nearer to a plane lie on it"),
-    "ground.angle": Parameter(15.0, 1.0, 60.0, "°", "normals of the ground depart less from the vertical"),
-    "ground.gamma": Parameter(0.1, 0.01, 0.5, "m", "ground is no thicker above its height; each metre finds its own thickness"),
-    "ground.radius": Parameter(0.3, 0.05, 2.0, "m", "points so near make a normal"),
-    "cluster.radius": Parameter(3.0, 1.0, 20.0, "", "points so near belong to a cluster, in spacings of the points"),
-    "cluster.min_points": Parameter(4, 1, 1000, "", "points so near that make the core of a cluster", whole=True),
-    "cluster.region": Parameter(0.4, 0.05, 1.0, "", "objects stand in this part of the tunnel's height, from the ground"),
-    "lining.tolerance": Parameter(0.5, 0.01, 5.0, "m", "points that stand in farther from the surface are not lining"),
-    "lining.recess": Parameter(1.2, 0.01, 3.0, "m", "points farther behind the surface are not lining, not even of a niche"),
+    "section.half_width": Parameter(0.15, 0.01, 2.5, "m", "initial half thickness of a section's slab"),
+    "section.max_half_width": Parameter(2.5, 0.01, 2.5, "m", "maximum half thickness of a slab if classes have too few points"),
+    "section.min_points": Parameter(5, 2, 1000, "", "minimum number of points of a class", whole=True),
+    "section.protrusion": Parameter(0.03, 0.001, 1.0, "m", "protrusion from which a class is a fixture and not the wall"),
+    "ground.voxel": Parameter(0.1, 0.02, 0.5, "m", "edge of the voxels for thinning points before the ground search"),
+    "ground.distance": Parameter(0.05, 0.005, 0.5, "m", "maximum distance of a point on a plane"),
+    "ground.angle": Parameter(15.0, 1.0, 60.0, "°", "maximum deviation of the ground's normals from the vertical"),
+    "ground.gamma": Parameter(0.1, 0.01, 0.5, "m", "maximum thickness of ground above its height; each metre has its own"),
+    "ground.radius": Parameter(0.3, 0.05, 2.0, "m", "radius of the neighbourhood of a normal"),
+    "cluster.radius": Parameter(3.0, 1.0, 20.0, "", "radius of the neighbourhood in a cluster, in point spacings"),
+    "cluster.min_points": Parameter(4, 1, 1000, "", "minimum points near a core point, itself included", whole=True),
+    "cluster.region": Parameter(0.4, 0.05, 1.0, "", "part of the tunnel's height, from the ground, with objects"),
+    "lining.tolerance": Parameter(0.5, 0.01, 5.0, "m", "maximum distance of lining inside the surface"),
+    "lining.recess": Parameter(1.2, 0.01, 3.0, "m", "maximum distance of lining behind the surface, niches included"),
     "image.pixel": Parameter(0.02, 0.005, 0.5, "m", "edge of a pixel of the unrolled images"),
     "image.spacing": Parameter(
         0.0,
         0.0,
         1.25,
         "m",
-        "distance of profiles along the tunnel, between which the nearest is shown; 0: told from the points",
+        "distance of profiles along the tunnel, with the nearest shown between them; 0: from the points",
     ),
     "image.min_density": Parameter(
         12.0,
@@ -68,15 +66,15 @@ PARAMETERS: dict[str, Parameter] = {
         1e6,
         "/m²",
         "lining with fewer points around it is not inspected: at 12 the noise filter's widest circle still holds a wall's "
-        "points (it takes 2 % of them for noise, at 5 45 %), and the widest median filter 12 pixels that show any",
+        "points (it classifies 2 % of them as noise, at 5 45 %), and the widest median filter 12 pixels with points",
     ),
-    "intensity.max_incidence": Parameter(75.0, 30.0, 89.0, "°", "points seen more slantingly are left out of the images"),
-    "intensity.max_range": Parameter(40.0, 2.0, 1000.0, "m", "points seen from farther are left out of the images"),
+    "intensity.max_incidence": Parameter(75.0, 30.0, 89.0, "°", "maximum incidence of points in the images"),
+    "intensity.max_range": Parameter(40.0, 2.0, 1000.0, "m", "maximum range of points in the images"),
     "intensity.max_outside": Parameter(
-        0.05, 0.0, 1.0, "", "share of the lining's points that may lie outside the reference curve, and are left out"
+        0.05, 0.0, 1.0, "", "maximum share of the lining's points outside the reference curve, which are left out"
     ),
-    "appendage.distance": Parameter(0.03, 0.005, 0.5, "m", "what stands off the local plane by more hangs on the lining"),
-    "leak.min_area": Parameter(0.05, 0.0, 100.0, "m²", "smaller leaks are left out"),
+    "appendage.distance": Parameter(0.03, 0.005, 0.5, "m", "distance from the local plane from which a pixel is a fixture"),
+    "leak.min_area": Parameter(0.05, 0.0, 100.0, "m²", "minimum area of a leak"),
 }
 
 
@@ -92,16 +90,14 @@ def settings(assignments: Iterable[str] = ()) -> dict[str, float]:
     for assignment in assignments:
         name, equals, text = assignment.partition("=")
         if name not in PARAMETERS:
-            raise InputError(
-                f"there is no parameter {name!r}; there are {', '.join(PARAMETERS)}.{did_you_mean(name, PARAMETERS)}"
-            )
+            raise InputError(f"unknown parameter {name!r}; known are {', '.join(PARAMETERS)}.{did_you_mean(name, PARAMETERS)}")
         values[name] = _value(name, text if equals else "")
     check_together(values)
     return values
 
 
 def check_together(values: Mapping[str, float]) -> None:
-    """Check what bounds alone do not: that the values of all parameters go together.
+    """Check the values of all parameters together, beyond their bounds.
 
     Raises
     ------

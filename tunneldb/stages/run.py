@@ -26,7 +26,7 @@ def km_range(text: str) -> range:
     """
     match = re.fullmatch(r"(-?\d+)(?:-(-?\d+))?", text.strip())
     if match is None:
-        raise UserError(f"--km takes a kilometre or a range of them, 511 or 511-513, not {text!r}")
+        raise UserError(f"--km needs a kilometre or a range, 511 or 511-513, not {text!r}")
     first, last = int(match[1]), int(match[2] or match[1])
     if last < first:
         raise UserError(f"--km {text}: the range runs backwards")
@@ -65,7 +65,7 @@ def loaded_kilometres(conn: psycopg.Connection[Any], survey: Survey) -> list[int
 
 
 def nothing_yet(conn: psycopg.Connection[Any], survey: Survey, lack: str) -> NotReadyError:
-    """Return what to raise where a survey lacks what its stages make: what to type is to load it, or to run it."""
+    """Return the error for missing results of a survey's stages, with the command to type: load or run."""
     run = f"tunneldb run {survey.name}"
     if not loaded_kilometres(conn, survey):
         run = f"it holds no points: tunneldb load {survey.name} FILE..., then {run}"
@@ -84,7 +84,7 @@ def choose_stages(first: str | None, last: str | None) -> list[Stage]:
     names = [stage.name for stage in there]
     for name in (first, last):
         if name is not None and name not in names:
-            raise UserError(f"there is no stage {name!r}; the stages are {', '.join(names)}")
+            raise UserError(f"unknown stage {name!r}; the stages are {', '.join(names)}")
     begin = names.index(first) if first else 0
     end = names.index(last) if last else len(names) - 1
     if end < begin:
@@ -143,14 +143,14 @@ def stale_tasks(
         if km not in chosen:
             continue
         if name == "load":
-            raise UserError(f"kilometre {km} is to be loaded first, for {reason}: tunneldb batch {survey.name}")
+            raise UserError(f"kilometre {km} must be loaded first, because of {reason}: tunneldb batch {survey.name}")
         if name in by_name:
             kept = {key: value for key, value in (former or {}).items() if key in values and key not in given}
             together = {**values, **kept}
             try:
                 check_together(together)
             except UserError as error:
-                raise UserError(f"stage {name} of kilometre {km}, with the parameters that it had: {error}") from None
+                raise UserError(f"stage {name} of kilometre {km}, with its earlier parameters: {error}") from None
             tasks.append(Task(by_name[name], km, together))
     return tasks
 

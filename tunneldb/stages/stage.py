@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Counts = dict[str, Any]
 Progress = Callable[[float], None]
-"""Takes the share of a stage that is done, 0 to 1."""
+"""Called with the completed share of a stage, 0 to 1."""
 
 
 class Holds(StrEnum):
@@ -105,7 +105,7 @@ class Stage:
         values: Mapping[str, float],
         progress: Progress,
     ) -> Counts:
-        """Do one kilometre, inside a transaction that the caller holds; what computes is imported only now."""
+        """Process one kilometre, in the caller's transaction; the computing package is imported only now."""
         module, _, name = self.function.partition(":")
         counts: Counts = getattr(import_module(module), name)(conn, survey, km, values, progress)
         return counts

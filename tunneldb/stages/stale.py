@@ -79,7 +79,7 @@ def result_inputs(conn: psycopg.Connection[Any], result: Result, km: int) -> dic
 
 
 def refuse_blocked(states: Mapping[int, ResultState], survey: str, command: str) -> None:
-    """Refuse to measure what rests on a stage that is itself out of date.
+    """Refuse to measure with the results of a stage that is out of date.
 
     Raises
     ------

@@ -144,7 +144,7 @@ def copies_of(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Pat
 
 
 def outcome(conn: psycopg.Connection[Any], file_id: int, state: str, seconds: float = 0.0) -> Loaded:
-    """Current counts of a file's points."""
+    """Return the current counts of a file's points."""
     row = conn.execute(
         "SELECT name, points, noise, outside, invalid, unposed, thinned, kept FROM tunnel.scan_file WHERE id = %s", [file_id]
     ).fetchone()

@@ -132,7 +132,7 @@ def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
 
 
 def numbered(found: DisjointSet) -> Int64:
-    """Number of the subset of each element (n,), from 0 in the order of their first elements."""
+    """Return the subset number of each element (n,), from 0 in the order of their first elements."""
     number = np.empty(len(found), np.int64)
     for place, subset in enumerate(sorted(found.subsets(), key=min)):
         number[list(subset)] = place

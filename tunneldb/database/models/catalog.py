@@ -127,9 +127,7 @@ class Survey(Base):
         comment="Range curve: none, measured on a target (rows in reference) or auto, from the lining of each kilometre",
     )
     created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was added")
-    positions_note: Mapped[str | None] = mapped_column(
-        comment="What is to be known of its scanner positions: poses left out, gaps"
-    )
+    positions_note: Mapped[str | None] = mapped_column(comment="Notes on its scanner positions: poses left out, gaps")
     longest_interval: Mapped[float | None] = mapped_column(
         comment="Longest interval of its trajectory that is interpolated over, s; NULL without a trajectory"
     )

@@ -66,7 +66,8 @@ class ChangeSection(Base):
     cell: Mapped[float] = mapped_column(comment="Side of a cell, m")
     arc_from: Mapped[float] = mapped_column(comment="Arc at which the first of change begins, m")
     change: Mapped[Reals] = mapped_column(
-        comment="Mean of what remains, of each cell along the arc over the section's length, m, positive inwards; NaN unseen"
+        comment="Mean remaining change of each cell along the arc over the section's length, m, positive inwards; "
+        "NaN: not inspected"
     )
 
 
@@ -141,8 +142,8 @@ class LeakChange(Base):
     old_survey_id: Mapped[int] = mapped_column(parent("survey"), comment=OLD)
     km: Mapped[int] = mapped_column(comment=KM + " of its middle")
     state: Mapped[str] = mapped_column(
-        comment="new, grown, shrunk, same, dry (again), kind (another in the newer survey), unseen (not told, for too little "
-        "was seen by one of them)"
+        comment="new, grown, shrunk, same, dry (again), kind (another in the newer survey), unseen (one survey "
+        "inspected too little)"
     )
     old_ids: Mapped[list[int]] = mapped_column(ARRAY(BigInteger), comment="Findings of the older survey")
     new_ids: Mapped[list[int]] = mapped_column(ARRAY(BigInteger), comment="Findings of the newer survey")

@@ -24,7 +24,7 @@ class Ring(Base):
         one_of("shape", "ellipse", "circle", "none"),
         one_of("diameter_from", "option", "profile", "ring"),
         CheckConstraint("chainage_from < chainage_to", name="chainage"),
-        {"comment": "Rings of the lining of a survey; what is measured of one is NULL until it is, or where it cannot be told"},
+        {"comment": "Rings of the lining of a survey; values are NULL until measured, or if unknown"},
     )
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
@@ -78,7 +78,7 @@ class Ring(Base):
     )
     lip_se: Mapped[float | None] = mapped_column(comment="Standard error, m")
     lip_arc: Mapped[float | None] = mapped_column(comment="Arc of its place, m")
-    remark: Mapped[str | None] = mapped_column(comment="What is to be known of it")
+    remark: Mapped[str | None] = mapped_column(comment="Notes and limitations")
 
 
 class RingChord(Base):

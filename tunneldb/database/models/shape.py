@@ -84,5 +84,6 @@ class DeviationSection(Base):
     deviation_greatest: Mapped[float | None] = mapped_column(comment="Greatest mean of a cell, m: the greatest underbreak")
     greatest_at: Mapped[float | None] = mapped_column(comment="How far along the profile that is, m")
     deviation: Mapped[Reals] = mapped_column(
-        comment="Mean deviation in cells of equal length along the profile, from its beginning, m, positive inside; NaN unseen"
+        comment="Mean deviation in cells of equal length along the profile, from its beginning, m, positive inside; "
+        "NaN: not inspected"
     )

@@ -98,9 +98,7 @@ class Spot(Review, Base):
         ForeignKey(Face.id, ondelete="SET NULL"), comment="Face that it is on; NULL where the last run found it no more"
     )
     kind: Mapped[str] = mapped_column(comment="dark or bright, against its own surface")
-    reasons: Mapped[list[str]] = mapped_column(
-        ARRAY(Text), server_default=text("'{}'"), comment="What speaks for it or against it"
-    )
+    reasons: Mapped[list[str]] = mapped_column(ARRAY(Text), server_default=text("'{}'"), comment="Evidence for and against it")
     confidence: Mapped[float] = mapped_column(comment="Confidence that it differs and is none of an edge or of noise, 0 to 1")
     contrast: Mapped[float] = mapped_column(comment="Mean difference from its surface in standard deviations of it")
     difference: Mapped[float] = mapped_column(comment="Mean difference from its surface, dB")

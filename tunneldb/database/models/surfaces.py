@@ -30,7 +30,7 @@ class ThicknessSection(Base):
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment="Later survey")
     before_id: Mapped[int] = mapped_column(parent("survey"), comment="Earlier survey")
     km: Mapped[int] = mapped_column(comment=KM)
-    layer: Mapped[str] = mapped_column(comment="Layer whose profiles both were held against")
+    layer: Mapped[str] = mapped_column(comment="Layer whose profiles both were compared with")
     chainage_from: Mapped[float] = mapped_column(comment="Chainage of its beginning, m")
     chainage_to: Mapped[float] = mapped_column(comment="Chainage of its end, m")
     design_length: Mapped[float] = mapped_column(comment="Length of the profile in its middle, m")

@@ -53,7 +53,7 @@ class Goal(Base):
     """Requested stage of a kilometre."""
 
     __tablename__ = "goal"
-    __table_args__ = {"comment": "What batches want of each kilometre"}  # noqa: RUF012
+    __table_args__ = {"comment": "Requested stages of each kilometre"}  # noqa: RUF012
 
     survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
     km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=KM)

@@ -57,7 +57,7 @@ def layers() -> list[VectorLayer]:
 
 
 def parts() -> int:
-    """Number of layers that a survey is written in."""
+    """Return the number of layers of a survey."""
     return len(layers()) + len(_DRAWN)
 
 

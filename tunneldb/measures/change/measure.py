@@ -50,11 +50,11 @@ from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
 BESIDE = 5.0
-"""What of the newer survey lies so far beyond the ends of a kilometre, m, may lie in it by the older one's axis."""
+"""Distance beyond the ends of a kilometre, m, from which parts of the newer survey may be in it by the older one's axis."""
 
 
 HALO = 100.0
-"""Leaks so far beyond the ends of a kilometre are matched with it, m, so that a group is the same seen from both sides."""
+"""Distance beyond the ends of a kilometre, m, within which leaks are matched with it, so that groups are the same from both."""
 
 _AT_A_TIME = 2_000_000  # pixels
 
@@ -97,7 +97,7 @@ def compare(
     conn.rollback()
     if not states:
         raise UserError(
-            f"{old.name} and {new.name} have no kilometre with offset images in common there: tunneldb run makes them"
+            f"{old.name} and {new.name} have no common kilometre with offset images there: make them with tunneldb run"
         )
     refuse_blocked(states, "SURVEY", "compare")
     return measure_kilometres(
@@ -154,7 +154,7 @@ def _old_sums(conn: psycopg.Connection[Any], old: Survey, km: int, surface: Surf
         return None
     west, east, south, north, pixel = ends
     if cell < MIN_SIDE * pixel * (1.0 - 1e-9):
-        raise UserError(f"cells of {cell:g} m hold too few pixels of {pixel:g} m: give --cell {MIN_SIDE * pixel:g} or more")
+        raise UserError(f"cells of {cell:g} m have too few pixels of {pixel:g} m: give --cell {MIN_SIDE * pixel:g} or more")
     row = np.floor(south / cell), np.ceil(north / cell)
     column = np.floor(west / cell + 1e-9), np.ceil(east / cell - 1e-9)
     grid = CellGrid(cell, float(column[0] * cell), float(row[0] * cell), int(column[1] - column[0]), int(row[1] - row[0]))

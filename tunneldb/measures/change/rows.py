@@ -161,7 +161,7 @@ def save_regions(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: in
 
 
 def save_leaks(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int, found: Sequence[StoredGroup]) -> None:
-    """Save what became of the leaks of a kilometre."""
+    """Save the states of the leaks of a kilometre."""
     with conn.cursor() as cursor:
         cursor.executemany(
             "INSERT INTO tunnel.leak_change (survey_id, old_survey_id, km, state, old_ids, new_ids, old_kinds, new_kinds,"

@@ -28,7 +28,7 @@ COLUMNS = {
         "area_change", "area_change_se", "seen_old", "seen_new", "old_kinds", "new_kinds", "old_ids", "new_ids",
     ),
 }  # fmt: skip
-"""Of the views; m, m² and rad."""
+"""Columns of the views; m, m² and rad."""
 
 _DECIMALS = 6
 

@@ -57,7 +57,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Tracks:
-    """Tracks by name: rough ones of the whole survey, to be fitted, or one that was given."""
+    """Tracks by name: approximate ones of the whole survey, to be fitted, or a given one."""
 
     rough: dict[str, Pairs]
     given: Track | None = None
@@ -70,7 +70,7 @@ class Tracks:
 
 
 def find_tracks(conn: psycopg.Connection[Any], survey: Survey, gauge: float = GAUGE) -> Tracks:
-    """Find the tracks of a survey by the rails that stage ground told.
+    """Find the tracks of a survey from the rails that stage ground classified.
 
     Raises
     ------
@@ -89,11 +89,11 @@ def find_tracks(conn: psycopg.Connection[Any], survey: Survey, gauge: float = GA
     try:
         found = follow(Pairs.joined(parts))
     except ValueError as error:
-        raise UserError(f"survey {survey.name}: {error}; give the track by --track-axis") from None
+        raise UserError(f"survey {survey.name}: {error}; give the track with --track-axis") from None
     if not found:
         raise UserError(
-            f"survey {survey.name}: no two rails {gauge:g} m apart were told along 25 m or more; give the track by"
-            " --track-axis, or its --track-gauge"
+            f"survey {survey.name}: no two rails {gauge:g} m apart were found along 25 m or more; give the track with"
+            " --track-axis, or its gauge with --track-gauge"
         )
     names = {1: ["single"], 2: ["left", "right"]}.get(len(found)) or [str(k + 1) for k in range(len(found))]
     return Tracks(dict(zip(names, found, strict=True)))
@@ -114,9 +114,9 @@ def read_track(path: Path, axis: Alignment) -> Tracks:
         places = axis.across(places)
         if not np.isfinite(places).all():
             row = int(np.flatnonzero(~np.isfinite(places[:, 0]))[0])
-            raise table.error(row, "the place lies beyond the given axis")
+            raise table.error(row, "the place is beyond the given axis")
     if len(table) < 2 or (np.diff(places[:, 0]) <= 0.0).any():
-        raise UserError(f"{path}: a track takes two rows or more, in growing chainage")
+        raise UserError(f"{path}: a track needs at least two rows, in increasing chainage")
     zero = np.zeros(len(table))
     reach = float(np.diff(places[:, 0]).max()) / 2.0
     chainage, right, up = places.T

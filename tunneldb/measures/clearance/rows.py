@@ -22,7 +22,7 @@ from tunneldb.store.partition import partition, partition_exists
 from tunneldb.store.survey import Survey
 
 MOST_POINTS = 200
-"""Points of an infringement that are kept."""
+"""Maximum number of stored points of an infringement."""
 
 _XYZ = tuple((axis, "f8", sql.SQL(f"public.ST_{axis.upper()}(geom)")) for axis in "xyz")
 _CLASS = ("class", "i2", sql.SQL("coalesce(class, 1::smallint)"))
@@ -95,7 +95,7 @@ def clusters_at(conn: psycopg.Connection[Any], survey: Survey, km: int, points: 
 
 
 def save_gauge(conn: psycopg.Connection[Any], survey: Survey, name: str, outline: Outline, source: str) -> None:
-    """Keep an outline under a name, in place of that which had it; committed."""
+    """Store an outline under a name, replacing an earlier one; committed."""
     flat = _flat(outline)
     checksum = hashlib.md5(np.round(flat, 9).tobytes(), usedforsecurity=False).hexdigest()
     conn.execute(

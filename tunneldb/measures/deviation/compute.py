@@ -28,7 +28,7 @@ STEP = 1.0
 """Length of a step of chainage, m; steps begin at whole metres."""
 
 STATIONS = 1.0
-"""Stations of the given axis are so close, m: between them its curve is followed to 0.01 mm."""
+"""Distance of stations of the given axis, m: between them its curve is followed to 0.01 mm."""
 
 _ARM = 5.0  # m from the axis, where the planes of the measured axis are held against those of the given one
 

@@ -129,7 +129,7 @@ def _kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: st
         "SELECT EXISTS (SELECT FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = 'state')", [survey.id, km]
     ).fetchone()
     assert states is not None
-    note = None if states[0] else "no intensity: what is lining is told by the classes of stage ground, which keep thin cables"
+    note = None if states[0] else "no intensity: lining is taken from the classes of stage ground, which include thin cables"
     return steps, note
 
 

@@ -18,7 +18,7 @@ COLUMNS = (
     "chainage_from", "chainage_to", "label", "profile", "design_length", "seen_length", "overbreak", "underbreak",
     "deviation_mean", "deviation_least", "least_at", "deviation_greatest", "greatest_at", "sigma", "shift_right", "shift_up",
 )  # fmt: skip
-"""Of a section; m and m²."""
+"""Columns of a section; m and m²."""
 
 _DECIMALS = 5
 

@@ -16,7 +16,7 @@ COLUMNS = (
     "chainage_from", "chainage_to", "label", "lining_area", "measured_area", "over_area", "gap_along", "gap_along_at",
     "gap_around", "gap_around_at", "waviness", "sigma",
 )  # fmt: skip
-"""Of a section; m and m²."""
+"""Columns of a section; m and m²."""
 
 
 def section_rows(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float) -> list[Row]:

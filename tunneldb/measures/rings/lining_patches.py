@@ -23,13 +23,13 @@ from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
 _BESIDE = 100.0
-"""Rings reach over a kilometre's ends by less, m."""
+"""Maximum length by which rings extend over a kilometre's ends, m."""
 
 _KEPT = 4  # blocks
 
 
 class LiningPatches:
-    """Patches of a kilometre, and of what is next to it; few blocks are held at a time.
+    """Patches of a kilometre and its surroundings; few blocks are in memory at a time.
 
     Parameters
     ----------

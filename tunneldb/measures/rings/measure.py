@@ -80,19 +80,19 @@ def rings_of_file(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> 
     numbers = table["number"]
     for row, (begin, end) in enumerate(table.columns(("chainage_from", "chainage_to")).tolist()):
         if not LEAST_LENGTH <= end - begin <= MOST_LENGTH:
-            raise table.error(row, f"a ring is {LEAST_LENGTH:g} to {MOST_LENGTH:g} m long, not {end - begin:g}")
+            raise table.error(row, f"a ring must be {LEAST_LENGTH:g} to {MOST_LENGTH:g} m long, not {end - begin:g}")
         if numbers[row] != round(numbers[row]) or abs(numbers[row]) > np.iinfo(np.int32).max:
-            raise table.error(row, f"a ring has a whole number, of nine digits at most, not {numbers[row]:g}")
+            raise table.error(row, f"a ring's number must be whole, of at most nine digits, not {numbers[row]:g}")
     order = np.argsort(table["chainage_from"], kind="stable")
     over = np.flatnonzero(table["chainage_from"][order[1:]] < table["chainage_to"][order[:-1]] - 1e-6)
     if len(over):
         raise table.error(int(order[over[0] + 1]), f"ring {numbers[order[over[0] + 1]]:.0f} begins within the one before it")
     values, counts = np.unique(numbers, return_counts=True)
     if (counts > 1).any():
-        raise UserError(f"{path}: ring {values[np.argmax(counts)]:.0f} is there more than once")
+        raise UserError(f"{path}: ring {values[np.argmax(counts)]:.0f} occurs more than once")
     rings = [RingBounds(int(numbers[k]), float(table["chainage_from"][k]), float(table["chainage_to"][k])) for k in order]
     if not any(ring.high > low and ring.low < high for ring in rings):
-        raise UserError(f"{path}: no ring lies within survey {survey.name}, {low:.1f} to {high:.1f} m")
+        raise UserError(f"{path}: no ring is within survey {survey.name}, {low:.1f} to {high:.1f} m")
     return rings
 
 
@@ -118,7 +118,7 @@ def find_rings(conn: psycopg.Connection[Any], survey: Survey, begin: Begin) -> t
     try:
         found = follow(where, weight, ring_length(where, weight))
     except NoRingsError as refused:
-        raise UserError(f"survey {survey.name}: no rings can be told: {refused}; give --length or --rings") from None
+        raise UserError(f"survey {survey.name}: rings not found: {refused}; give --length or --rings") from None
     states = np.where(found.seen, "seen", "missing").tolist()
     pairs = zip(found.chainage[:-1].tolist(), found.chainage[1:].tolist(), states[:-1], strict=True)
     return [RingBounds(k, low, high, state) for k, (low, high, state) in enumerate(pairs, 1)], found
@@ -203,9 +203,7 @@ def _measured(
     diameter, whence = _diameter(options["diameter"], profiles, middle)
     if patches is None or len(patches.chainage) < 2:
         nothing = np.empty(0)
-        return MeasuredRing(
-            bounds, LiningRing(0.0, None, None, (), "there is no image of it"), Steps(nothing, nothing, nothing), None, whence
-        )
+        return MeasuredRing(bounds, LiningRing(0.0, None, None, (), "no image"), Steps(nothing, nothing, nothing), None, whence)
     if isinstance(before, RingBounds):
         ahead = before.high - before.low if abs(before.high - bounds.low) < 1e-3 else 0.0
     else:

@@ -49,7 +49,7 @@ class MeasuredRing:
 
 
 def save_definition(conn: psycopg.Connection[Any], survey: Survey, rings: Sequence[RingBounds], origin: str) -> int:
-    """Replace the rings of a survey where they differ from those that are there; return how many are new.
+    """Replace the rings of a survey that differ from the stored ones; return the number of new ones.
 
     Rings that stay keep what was measured of them.
     """

@@ -16,10 +16,10 @@ from tunneldb.shape.plane import OFF_PLANE_LIMIT
 from tunneldb.shape.rings import LEAST_POINTS, Ring, RingPoints, fit_rings
 
 MOST_TURN = 10.0
-"""A plane that stands more askew to the axis is not one of a ring, °."""
+"""Maximum angle of a ring's plane to the axis, °."""
 
 OTHER_SIZE = 0.1
-"""A ring whose radius differs from the design's by more than this share is remarked upon."""
+"""Deviation of a ring's radius from the design's, as a share, from which there is a remark."""
 
 _NOTED_SAGITTA = 0.001  # m
 
@@ -139,7 +139,7 @@ def measure_rings(points: Path, axis: Path, diameter: float, sigma: float | None
         results[k] = ring
     rows = [_row(ring, result, line, diameter) for ring, result in zip(surveyed, results, strict=True)]
     if not any(row.ring for row in rows):
-        raise UserError(f"{points}: no ring could be made; of ring {rows[0].name}: {rows[0].remarks[-1]}")
+        raise UserError(f"{points}: no ring could be fitted; ring {rows[0].name}: {rows[0].remarks[-1]}")
     return SurveyedRings(rows, diameter, found, sigma is not None, tuple(_notes(line, found)))
 
 
@@ -149,7 +149,7 @@ def _refusal(ring: SurveyedRing, away: float, diameter: float) -> str | None:
         return ring.refused
     if len(ring.xyz) < LEAST_POINTS:
         return f"only {len(ring.xyz)} points; a ring needs {LEAST_POINTS}"
-    return f"the points lie {away:.1f} m from the axis" if away > diameter else None
+    return f"the points are {away:.1f} m from the axis" if away > diameter else None
 
 
 def _row(surveyed: SurveyedRing, ring: Ring | str | None, line: DesignAxis, diameter: float) -> RingRow:
@@ -160,12 +160,12 @@ def _row(surveyed: SurveyedRing, ring: Ring | str | None, line: DesignAxis, diam
     tangent = line.tangent(np.array([chainage]))[0]
     turn = np.degrees(np.arccos(min(1.0, abs(float(ring.plane.normal @ tangent)))))
     if turn > MOST_TURN:
-        askew = f"the points' plane stands {turn:.0f}° askew to the axis: are they of one ring?"
+        askew = f"the points' plane is {turn:.0f}° askew to the axis: check that they are of one ring"
         return RingRow(surveyed.name, surveyed.points, None, None, (*remarks, askew))
     remarks += _remarks(surveyed, ring, diameter)
     place = _place(ring, line, tangent) if line.covers(chainage) else None
     if place is None:
-        remarks.append("the axis does not reach it: no chainage, no deviation")
+        remarks.append("the ring is beyond the axis: no chainage, no deviation")
     return RingRow(surveyed.name, surveyed.points, ring, place, tuple(remarks))
 
 
@@ -197,10 +197,10 @@ def _remarks(surveyed: SurveyedRing, ring: Ring, diameter: float) -> Iterator[st
     for k in np.flatnonzero(~ring.used):
         off = adjustment.distance[k]
         side = "outside" if off > 0.0 else "inside"
-        yield f"point {surveyed.points[k]} left out: {1e3 * abs(off):.1f} mm {side} the {shape} through the others"
+        yield f"point {surveyed.points[k]} rejected: {1e3 * abs(off):.1f} mm {side} the {shape} through the others"
     for k in np.flatnonzero(np.abs(ring.along) > OFF_PLANE_LIMIT):
         off = 1e3 * abs(ring.along[k])
-        yield f"point {surveyed.points[k]} stands {off:.0f} mm along the tunnel from the plane of the others"
+        yield f"point {surveyed.points[k]} is {off:.0f} mm along the tunnel from the plane of the others"
     if not ring.is_ellipse:
         why = f"{int(ring.used.sum())} points" if len(ring.used) <= LEAST_POINTS else f"a gap of {ring.gap:.0f}° between points"
         yield f"ellipse not determined ({why}): centre and radius are from a circle and biased if the ring is oval"
@@ -212,8 +212,8 @@ def _remarks(surveyed: SurveyedRing, ring: Ring, diameter: float) -> Iterator[st
 def _notes(line: DesignAxis, sigma: float | None) -> Iterator[str]:
     if line.sagitta > _NOTED_SAGITTA:
         yield (
-            f"the axis is taken as straight between its vertices; on its curves that is up to {1e3 * line.sagitta:.0f} mm off: "
-            "give vertices more closely"
+            f"the axis is straight between its vertices; on its curves the error is up to {1e3 * line.sagitta:.0f} mm: "
+            "give vertices at smaller distances"
         )
     if sigma is None:
-        yield "too few rings to say what a point is good for: only gross errors are found; --sigma says it"
+        yield "too few rings to estimate the accuracy of points: only gross errors are found; give it with --sigma"

@@ -1,4 +1,4 @@
-"""Reading what rings are made of: surveyed points and the design axis, with what can be wrong of them as a whole."""
+"""Read surveyed points and the design axis of rings, and check them as a whole."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tunneldb.errors import UserError
 from tunneldb.shape.axis import DesignAxis
 
 MOST_OFFSET = 1.0
-"""Prisms don't stand farther off the lining than that, m."""
+"""Maximum distance of prisms from the lining, m."""
 
 _UNITS = {1000.0: "millimetres", 100.0: "centimetres", 3.2808: "feet"}
 _STRETCH = 0.01  # of the axis: chainage in plan against its vertices; a grade of 14 % along the slope
@@ -56,16 +56,16 @@ def read_points(path: Path) -> list[SurveyedRing]:
     UserError
         When the file can't be read, lacks a column or holds no point, or an offset is none in metres.
     """
-    hint = dict.fromkeys(("x", "y", "z"), "needed are ring,point,x,y,z and perhaps offset")
+    hint = dict.fromkeys(("x", "y", "z"), "required are ring,point,x,y,z and perhaps offset")
     table = read_csv(path, ("x", "y", "z", "offset"), {"offset": 0.0}, hint)
     rings, points = read_texts(path, "ring"), read_texts(path, "point")
     if not len(table):
-        raise UserError(f"{path} holds no point")
+        raise UserError(f"{path} has no point")
     far = np.flatnonzero(np.abs(table["offset"]) > MOST_OFFSET)
     if len(far):
         row = int(far[0])
         raise table.error(
-            row, f"offset is {table['offset'][row]:g}, and no prism stands so far off the lining; offsets are metres"
+            row, f"offset is {table['offset'][row]:g}, too far from the lining for a prism; offsets are in metres"
         )
     rows: dict[str, list[int]] = {}
     for row, name in enumerate(rings):
@@ -83,13 +83,13 @@ def _ring(name: str, points: Sequence[str], table: CsvTable, rows: Sequence[int]
         same_name = next((j for j in kept if points[j] == point), None)
         same_place = next((j for j in kept if (xyz[j] == xyz[k]).all()), None)
         if same_name is not None and same_place != same_name:
-            refused = f"point {point} is there twice, at different places"
+            refused = f"point {point} occurs twice, at different places"
             break
         if same_place is not None:
             twice = (
-                f"point {point} is there twice"
+                f"point {point} occurs twice"
                 if same_name is not None
-                else f"points {points[same_place]} and {point} are one place"
+                else f"points {points[same_place]} and {point} are at one place"
             )
             remarks.append(f"{twice}: counted once")
             continue
@@ -119,20 +119,20 @@ def read_axis(path: Path) -> DesignAxis:
     usual = float(np.median(ratio))
     if abs(usual - 1.0) > _STRETCH:
         raise UserError(
-            f"{path}: where chainage grows by 1 m, the axis is {usual:.4g} long in plan{_unit(usual)}; all must be metres, "
+            f"{path}: for 1 m of chainage, the axis is {usual:.4g} long in plan{_unit(usual)}; all must be metres, "
             "chainage in plan"
         )
     far = np.flatnonzero(length > (1.0 + _STRETCH) * np.diff(chainage) + 1.0)
     if len(far):
         raise table.error(
             int(far[0]) + 1,
-            f"{length[far[0]]:.3f} m from the point before in plan, where chainage grows by {np.diff(chainage)[far[0]]:.3f} m",
+            f"{length[far[0]]:.3f} m from the previous point in plan, but chainage grows by {np.diff(chainage)[far[0]]:.3f} m",
         )
     return DesignAxis(xyz, chainage)
 
 
 def require_size(path: Path, radii: Float, diameter: float) -> None:
-    """Raise a UserError where most rings are of another size: in another unit, or the diameter is a radius."""
+    """Raise a UserError if most rings have another size: another unit, or a radius given as diameter."""
     ratio = float(np.median(radii)) / (diameter / 2.0) if len(radii) else 1.0
     if 0.8 < ratio < 1.25:
         return
@@ -144,11 +144,11 @@ def require_size(path: Path, radii: Float, diameter: float) -> None:
 
 
 def require_near(path: Path, distance: Float, limit: float) -> None:
-    """Raise a UserError where most rings lie farther from the axis than a limit, m."""
+    """Raise a UserError if most rings are farther from the axis than a limit, m."""
     middle = float(np.median(distance))
     if middle > limit:
-        asked = "is it the axis of this tunnel, in the same system, and do x and y stand in the same order?"
-        raise UserError(f"{path}: half of the rings lie {middle:.4g} m and more from the axis: {asked}")
+        asked = "check that it is the axis of this tunnel, in the same system, with x and y in the same order"
+        raise UserError(f"{path}: half of the rings are {middle:.4g} m or more from the axis: {asked}")
 
 
 def _unit(ratio: float) -> str:

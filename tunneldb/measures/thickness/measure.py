@@ -59,7 +59,7 @@ def measure_thickness(
     states = result_states(conn, result, low, high)
     conn.rollback()
     if not states:
-        raise UserError(f"surveys {before.name} and {after.name} have no kilometre in common there")
+        raise UserError(f"surveys {before.name} and {after.name} have no common kilometre there")
 
     def measure(km: int) -> dict[str, Any]:
         old, new = load_cells(conn, before, km, layer), load_cells(conn, after, km, layer)

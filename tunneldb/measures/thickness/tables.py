@@ -16,7 +16,7 @@ COLUMNS = (
     "chainage_from", "chainage_to", "label", "design_length", "compared_length", "area", "thickness_mean", "thickness_least",
     "least_at",
 )  # fmt: skip
-"""Of a section; m and m²."""
+"""Columns of a section; m and m²."""
 
 
 def section_rows(

@@ -17,11 +17,11 @@ from tunneldb.measures.change.compute.rigid_motion import Motion, SectionCells, 
 from tunneldb.measures.change.compute.tied_motion import tied_motions
 
 GROUP = 1.0
-"""Length of the stretches of arc, m, of whose residuals the standard errors of motions are made."""
+"""Length of the stretches of arc, m, whose residuals give the standard errors of motions."""
 
 
 BENT_STEP = 10.0
-"""Corners of the section are looked for once in so many metres."""
+"""Distance, m, at which the section is examined for corners."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Change:
 
 
 def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, length: float, pixel: float) -> Change:
-    """Take the rigid motion of each section out of the difference of two epochs, and state its level of detection.
+    """Remove the rigid motion of each section from the difference of two epochs, and compute its level of detection.
 
     A pixel, of a side in m, stands for its points as if they lay in its middle. Where profiles are about a pixel apart, all of
     a place lie to one side of it, and in the other epoch to another: uniform within the pixel, in both.

@@ -187,7 +187,7 @@ def follow(pairs: Pairs) -> list[Pairs]:
         shared = np.intersect1d(one.chainage, two.chainage)
         if len(shared) and abs(float(np.median(two.middle)) - float(np.median(one.middle))) < GAUGE:
             apart = float(np.median(two.middle) - np.median(one.middle))
-            raise ValueError(f"near chainage {shared[0]:.0f} two tracks would lie {apart:.2f} m apart")
+            raise ValueError(f"near chainage {shared[0]:.0f} two tracks would be {apart:.2f} m apart")
     return found
 
 

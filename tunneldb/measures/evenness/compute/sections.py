@@ -32,7 +32,7 @@ class EvennessStep:
 
 @dataclass(frozen=True)
 class UnevenPolygon:
-    """Where the gap is too large, in the unrolled plane, with its area, m², greatest gap, m, and how the straightedge lay."""
+    """Area with too large gaps, in the unrolled plane, with its area, m², greatest gap, m, and straightedge direction."""
 
     outline: Polygon
     area: float
