@@ -18,22 +18,22 @@ CLOCK_TEXT = "clock_text"
 _ALIASES = {
     "id": "Number", "survey_id": "Survey key", "survey": "Survey", "km": "Kilometre", "segment": "Segment",
     "chainage_from": "Chainage from (m)", "chainage_to": "Chainage to (m)", "label": "Chainage", "arc_from": "Arc from (m)",
-    "arc_to": "Arc to (m)", "clock": "Clock position (h)", "kind": "Kind", "kind_label": "Name of its kind",
+    "arc_to": "Arc to (m)", "clock": "Clock position (h)", "kind": "Kind", "kind_label": "Kind (name)",
     "kind_detected": "Found as",
-    "wet": "Wet", "origin": "Origin of the outline", "manual": "Drawn, never detected", "severity": "Severity",
-    "severity_label": "Name of its severity", "width": "Width of the line (m)", "length": "Length (m)", "area": "Area (m²)",
+    "wet": "Wet", "origin": "Origin of the outline", "manual": "Drawn by hand", "severity": "Severity",
+    "severity_label": "Severity (name)", "width": "Width of the line (m)", "length": "Length (m)", "area": "Area (m²)",
     "measured": "Measured on the image", "darkening_mean": "Mean darkening (dB)", "darkening_max": "Greatest darkening (dB)",
     "image_share": "Share measured", "contrast": "Contrast (sigma)", "confidence": "Confidence (0-1)", "reasons": "Reasons",
     "review": "Review", "reviewed_by": "Reviewed by", "reviewed_at": "Reviewed at", "remark": "Remark", "drawn_by": "Drawn by",
     "drawn_at": "Drawn at", "detected": "Found by the last detection", "created_at": "First found or drawn",
     "detected_at": "Last detected", "also_detected": "Also detected", "detected_as": "Detected as", "parent_id": "Split off",
-    "merged_into": "Merged into", "merged": "Merged into this", "same_as": "The same as", "dry_region_id": "In dry region",
-    "counted": "Counted in sums", "state": "State", "photos": "Photos", "evidence": "Evidence for (+) and against (-)",
+    "merged_into": "Merged into", "merged": "Merged into this", "same_as": "Same as", "dry_region_id": "In dry region",
+    "counted": "Included in totals", "state": "State", "photos": "Photos", "evidence": "Evidence for (+) and against (-)",
     "model": "Classified by model", "superseded": "Superseded", CLOCK_TEXT: "Clock position",
 }  # fmt: skip
 _PHOTO_ALIASES = {
-    "id": "Photo", "finding_id": "Of finding", "survey_id": "Survey key", "survey": "Survey", "path": "File or URL",
-    "caption": "What it shows", "added_by": "Added by", "added_at": "Added at",
+    "id": "Photo", "finding_id": "Finding", "survey_id": "Survey key", "survey": "Survey", "path": "File or URL",
+    "caption": "Caption", "added_by": "Added by", "added_at": "Added at",
 }  # fmt: skip
 _DECIMALS = {
     "chainage_from": 3, "chainage_to": 3, "arc_from": 2, "arc_to": 2, "clock": 1, "length": 2, "area": 3, "darkening_mean": 1,

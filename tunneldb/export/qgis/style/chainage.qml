@@ -3,7 +3,7 @@
   <renderer-v2 type="RuleRenderer" forceraster="0" enableorderby="0" symbollevels="0">
     <rules key="{root}">
       <rule symbol="0" key="{r0}" filter='"hundred"' label="Each 100 m"/>
-      <rule symbol="1" key="{r1}" filter='NOT "hundred"' label="Each 10 m" scalemaxdenom="5000" scalemindenom="1"/>
+      <rule symbol="1" key="{r1}" filter='NOT "hundred"' label="Stations every 10 m" scalemaxdenom="5000" scalemindenom="1"/>
     </rules>
     <symbols>
       <symbol name="0" type="line" alpha="1" clip_to_extent="1" force_rhr="0">

@@ -278,7 +278,7 @@
     <alias index="11" field="clock" name="Clock position (h)"/>
     <alias index="12" field="area" name="Area (m²)"/>
     <alias index="13" field="change_mean" name="Mean change, positive inwards (m)"/>
-    <alias index="14" field="lod" name="Detected from (m)"/>
+    <alias index="14" field="lod" name="Level of detection (m)"/>
     <alias index="15" field="change_extreme" name="Greatest change (m)"/>
     <alias index="16" field="clock_text" name="Clock position"/>
   </aliases>

@@ -3,7 +3,7 @@
   <renderer-v2 type="categorizedSymbol" attr="counts" forceraster="0" enableorderby="0" symbollevels="0">
     <categories>
       <category symbol="0" value="true" type="bool" label="Inside the outline" render="true"/>
-      <category symbol="1" value="false" type="bool" label="Inside, but may be gone: does not count" render="true"/>
+      <category symbol="1" value="false" type="bool" label="Inside, but may be temporary: does not count" render="true"/>
     </categories>
     <symbols>
       <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
@@ -149,14 +149,14 @@
     <alias index="6" field="chainage_from" name="Chainage from (m)"/>
     <alias index="7" field="chainage_to" name="Chainage to (m)"/>
     <alias index="8" field="label" name="Station"/>
-    <alias index="9" field="depth" name="How deep (m)"/>
+    <alias index="9" field="depth" name="Depth (m)"/>
     <alias index="10" field="clock" name="Direction (°)"/>
-    <alias index="11" field="class" name="What causes it"/>
+    <alias index="11" field="class" name="Class of the nearest point"/>
     <alias index="12" field="counts" name="Counts"/>
     <alias index="13" field="cluster_id" name="Cluster"/>
     <alias index="14" field="points" name="Points"/>
   </aliases>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% "gauge" %] about track [% "track" %]: [% format_number("depth", 3) %] m inside, [% "class" %], [% "points" %] points[% if("counts", '', '; does not count, as it may be gone') %]</mapTip>
+  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% "gauge" %] about track [% "track" %]: [% format_number("depth", 3) %] m inside, [% "class" %], [% "points" %] points[% if("counts", '', '; does not count, may be temporary') %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

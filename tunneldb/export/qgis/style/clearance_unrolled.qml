@@ -7,7 +7,7 @@
       <rule symbol="2" key="{r2}" filter='"margin" &gt;= 0.1 AND "margin" &lt; 0.2' label="0.1 to 0.2 m"/>
       <rule symbol="3" key="{r3}" filter='"margin" &gt;= 0.2 AND "margin" &lt; 0.5' label="0.2 to 0.5 m"/>
       <rule symbol="4" key="{r4}" filter='"margin" &gt;= 0.5' label="0.5 m and more"/>
-      <rule symbol="5" key="{r5}" filter='"margin" IS NULL' label="nothing seen that counts"/>
+      <rule symbol="5" key="{r5}" filter='"margin" IS NULL' label="no point that counts"/>
       <rule symbol="6" key="{r6}" filter='"seen_share" &lt; 0.5' label="less than half of the directions seen"/>
     </rules>
     <symbols>
@@ -232,16 +232,16 @@
     <alias index="6" field="chainage_from" name="Chainage from (m)"/>
     <alias index="7" field="chainage_to" name="Chainage to (m)"/>
     <alias index="8" field="label" name="Station"/>
-    <alias index="9" field="margin" name="Least margin (m)"/>
+    <alias index="9" field="margin" name="Smallest margin (m)"/>
     <alias index="10" field="margin_se" name="± by the track (m)"/>
     <alias index="11" field="clock" name="Direction (°)"/>
-    <alias index="12" field="class" name="What it is"/>
+    <alias index="12" field="class" name="Class"/>
     <alias index="13" field="cluster_id" name="Cluster"/>
-    <alias index="14" field="seen_share" name="Share of directions seen"/>
+    <alias index="14" field="seen_share" name="Share of directions measured"/>
     <alias index="15" field="inside" name="Points inside that count"/>
     <alias index="16" field="passing" name="Points inside of objects"/>
   </aliases>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% "gauge" %] about track [% "track" %]: [% coalesce(format_number("margin", 3) || ' m, ' || "class", 'nothing seen that counts') %]; [% round(100 * "seen_share") %] % of the directions seen</mapTip>
+  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% "gauge" %] about track [% "track" %]: [% coalesce(format_number("margin", 3) || ' m, ' || "class", 'no point that counts') %]; [% round(100 * "seen_share") %] % of the directions seen</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

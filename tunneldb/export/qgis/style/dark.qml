@@ -3,7 +3,7 @@
   <renderer-v2 type="categorizedSymbol" attr="kind" forceraster="0" enableorderby="0" symbollevels="0">
     <categories>
       <category symbol="0" value="joint" label="Joint" render="true"/>
-      <category symbol="1" value="dark" label="Dark but dry" render="true"/>
+      <category symbol="1" value="dark" label="Dry dark area" render="true"/>
       <category symbol="2" value="leak" label="Leak" render="true"/>
     </categories>
     <symbols>
@@ -183,7 +183,7 @@
                 <Option type="QString" name="Joint" value="joint"/>
               </Option>
               <Option type="Map">
-                <Option type="QString" name="Dark but dry" value="dark"/>
+                <Option type="QString" name="Dry dark area" value="dark"/>
               </Option>
             </Option>
           </Option>
@@ -539,13 +539,13 @@
     <alias index="9" field="arc_to" name="Arc to (m)"/>
     <alias index="10" field="clock" name="Clock position (h)"/>
     <alias index="11" field="kind" name="Kind"/>
-    <alias index="12" field="kind_label" name="Name of its kind"/>
+    <alias index="12" field="kind_label" name="Kind (name)"/>
     <alias index="13" field="kind_detected" name="Found as"/>
     <alias index="14" field="wet" name="Wet"/>
     <alias index="15" field="origin" name="Origin of the outline"/>
-    <alias index="16" field="manual" name="Drawn, never detected"/>
+    <alias index="16" field="manual" name="Drawn by hand"/>
     <alias index="17" field="severity" name="Severity"/>
-    <alias index="18" field="severity_label" name="Name of its severity"/>
+    <alias index="18" field="severity_label" name="Severity (name)"/>
     <alias index="19" field="width" name="Width of the line (m)"/>
     <alias index="20" field="length" name="Length (m)"/>
     <alias index="21" field="area" name="Area (m²)"/>
@@ -570,9 +570,9 @@
     <alias index="40" field="parent_id" name="Split off"/>
     <alias index="41" field="merged_into" name="Merged into"/>
     <alias index="42" field="merged" name="Merged into this"/>
-    <alias index="43" field="same_as" name="The same as"/>
+    <alias index="43" field="same_as" name="Same as"/>
     <alias index="44" field="dry_region_id" name="In dry region"/>
-    <alias index="45" field="counted" name="Counted in sums"/>
+    <alias index="45" field="counted" name="Included in totals"/>
     <alias index="46" field="state" name="State"/>
     <alias index="47" field="photos" name="Photos"/>
     <alias index="48" field="evidence" name="Evidence for (+) and against (-)"/>
@@ -670,6 +670,6 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "found" %]&lt;br&gt;drop [% format_number("darkening_mean", 1) %] dB, [% "review" %]</mapTip>
+  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "found" %]&lt;br&gt;darkening [% format_number("darkening_mean", 1) %] dB, [% "review" %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -151,9 +151,9 @@
     <alias index="9" field="arc_to" name="Arc to (m)"/>
     <alias index="10" field="area" name="Area (m²)"/>
     <alias index="11" field="gap" name="Greatest gap (m)"/>
-    <alias index="12" field="direction" name="Straightedge laid"/>
+    <alias index="12" field="direction" name="Straightedge direction"/>
   </aliases>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;: gap [% format_number(1000 * "gap", 0) %] mm beneath a straightedge laid [% "direction" %]&lt;br&gt;[% format_number("area", 2) %] m²</mapTip>
+  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;: gap [% format_number(1000 * "gap", 0) %] mm beneath a straightedge [% "direction" %]&lt;br&gt;[% format_number("area", 2) %] m²</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

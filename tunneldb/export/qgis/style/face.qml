@@ -423,7 +423,7 @@
     <alias index="7" field="rms" name="RMS (m)"/>
     <alias index="8" field="points" name="Points"/>
     <alias index="9" field="area" name="Area (m²)"/>
-    <alias index="10" field="seen_share" name="Share judged"/>
+    <alias index="10" field="seen_share" name="Inspected share"/>
     <alias index="11" field="incidence_from" name="Incidence from (°)"/>
     <alias index="12" field="incidence_to" name="Incidence to (°)"/>
     <alias index="13" field="level" name="Level (dB)"/>

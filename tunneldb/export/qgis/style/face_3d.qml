@@ -306,7 +306,7 @@
     <alias index="5" field="kind" name="Kind"/>
     <alias index="6" field="radius" name="Radius (m)"/>
     <alias index="7" field="area" name="Area (m²)"/>
-    <alias index="8" field="seen_share" name="Share judged"/>
+    <alias index="8" field="seen_share" name="Inspected share"/>
     <alias index="9" field="bimodal" name="More than half differs"/>
   </aliases>
   <editable>

@@ -3,7 +3,7 @@
   <renderer-v2 type="RuleRenderer" forceraster="0" enableorderby="0" symbollevels="0">
     <rules key="{tunneldb-rules}">
       <rule key="{tunneldb-0}" symbol="0" filter="&quot;seen_share&quot; &gt;= 0.5 and not &quot;bimodal&quot;" label="Face"/>
-      <rule key="{tunneldb-1}" symbol="1" filter="&quot;bimodal&quot;" label="More than half differs: which half is its own is open"/>
+      <rule key="{tunneldb-1}" symbol="1" filter="&quot;bimodal&quot;" label="More than half differs: own surface not identified"/>
       <rule key="{tunneldb-2}" symbol="2" filter="&quot;seen_share&quot; &lt; 0.5" label="Less than half of it inspected"/>
     </rules>
     <symbols>
@@ -175,7 +175,7 @@
     <alias index="5" field="kind" name="Kind"/>
     <alias index="6" field="radius" name="Radius (m)"/>
     <alias index="7" field="area" name="Area (m²)"/>
-    <alias index="8" field="seen_share" name="Share judged"/>
+    <alias index="8" field="seen_share" name="Inspected share"/>
     <alias index="9" field="bimodal" name="More than half differs"/>
   </aliases>
   <editable>

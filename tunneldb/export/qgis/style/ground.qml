@@ -118,7 +118,7 @@
     <alias index="5" field="label" name="Chainage"/>
     <alias index="6" field="across" name="First height, right of the axis (m)"/>
     <alias index="7" field="height" name="Heights (m)"/>
-    <alias index="8" field="gamma" name="Ground up to so much above (m)"/>
+    <alias index="8" field="gamma" name="Ground thickness (m)"/>
     <alias index="9" field="foot_left" name="Left wall, right of the axis (m)"/>
     <alias index="10" field="foot_right" name="Right wall, right of the axis (m)"/>
     <alias index="11" field="arc_left" name="Begins on the left at arc (m)"/>

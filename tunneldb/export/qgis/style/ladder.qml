@@ -103,8 +103,8 @@
     <alias index="4" field="origin" name="Origin"/>
     <alias index="5" field="axes" name="Axes"/>
     <alias index="6" field="rms" name="Deviation of the laser's points (m)"/>
-    <alias index="7" field="rungs" name="Rungs that the laser saw"/>
-    <alias index="8" field="scans" name="Sonar scans that saw it"/>
+    <alias index="7" field="rungs" name="Rungs seen by the laser"/>
+    <alias index="8" field="scans" name="Number of sonar scans"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>

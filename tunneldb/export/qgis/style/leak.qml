@@ -213,7 +213,7 @@
                 <Option type="QString" name="Joint" value="joint"/>
               </Option>
               <Option type="Map">
-                <Option type="QString" name="Dark but dry" value="dark"/>
+                <Option type="QString" name="Dry dark area" value="dark"/>
               </Option>
             </Option>
           </Option>
@@ -446,7 +446,7 @@
     <alias index="24" field="detected" name="Found by the last detection"/>
     <alias index="25" field="created_at" name="First detected"/>
     <alias index="26" field="detected_at" name="Last detected"/>
-    <alias index="27" field="counted" name="Counted in sums"/>
+    <alias index="27" field="counted" name="Included in totals"/>
     <alias index="28" field="evidence" name="Evidence for (+) and against (-)"/>
     <alias index="29" field="model" name="Classified by model"/>
     <alias index="30" field="wet" name="Wet"/>
@@ -524,6 +524,6 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "found" %]&lt;br&gt;drop [% format_number("darkening_mean", 1) %] dB, [% "review" %]</mapTip>
+  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "found" %]&lt;br&gt;darkening [% format_number("darkening_mean", 1) %] dB, [% "review" %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -8,7 +8,7 @@
       <category symbol="3" value="shrunk" label="shrunk" render="true"/>
       <category symbol="4" value="dry" label="dry again" render="true"/>
       <category symbol="5" value="kind" label="of another kind" render="true"/>
-      <category symbol="6" value="unseen" label="unseen by one survey: nothing is known" render="true"/>
+      <category symbol="6" value="unseen" label="not inspected in one survey" render="true"/>
     </categories>
     <symbols>
       <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
@@ -397,7 +397,7 @@
     <alias index="3" field="old_survey_id" name="Key of the older survey"/>
     <alias index="4" field="old_survey" name="Older survey"/>
     <alias index="5" field="km" name="Kilometre"/>
-    <alias index="6" field="state" name="What became of it"/>
+    <alias index="6" field="state" name="State"/>
     <alias index="7" field="chainage_from" name="Chainage from (m)"/>
     <alias index="8" field="chainage_to" name="Chainage to (m)"/>
     <alias index="9" field="label" name="Station"/>
@@ -417,6 +417,6 @@
     <alias index="23" field="clock_text" name="Clock position"/>
   </aliases>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock: [% map_get(map('new', 'new', 'grown', 'grown', 'same', 'the same', 'shrunk', 'shrunk', 'dry', 'dry again', 'kind', 'of another kind', 'unseen', 'unseen'), "state") %]&lt;br&gt;[% format_number("area_old", 3) %] ± [% format_number("area_old_se", 3) %] m² in [% "old_survey" %], [% format_number("area_new", 3) %] ± [% format_number("area_new_se", 3) %] m² in [% "survey" %]&lt;br&gt;seen [% round(100 * "seen_old") %] % and [% round(100 * "seen_new") %] %</mapTip>
+  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock: [% map_get(map('new', 'new', 'grown', 'grown', 'same', 'the same', 'shrunk', 'shrunk', 'dry', 'dry again', 'kind', 'of another kind', 'unseen', 'not inspected'), "state") %]&lt;br&gt;[% format_number("area_old", 3) %] ± [% format_number("area_old_se", 3) %] m² in [% "old_survey" %], [% format_number("area_new", 3) %] ± [% format_number("area_new_se", 3) %] m² in [% "survey" %]&lt;br&gt;seen [% round(100 * "seen_old") %] % and [% round(100 * "seen_new") %] %</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -182,7 +182,7 @@
     <alias index="7" field="label" name="Chainage"/>
     <alias index="8" field="faces" name="Faces"/>
     <alias index="9" field="area" name="Area (m²)"/>
-    <alias index="10" field="seen_share" name="Share judged"/>
+    <alias index="10" field="seen_share" name="Inspected share"/>
     <alias index="11" field="bimodal" name="More than half differs"/>
     <alias index="12" field="spots" name="Spots"/>
     <alias index="13" field="dark_area" name="Dark (m²)"/>

@@ -4,7 +4,7 @@
     <categories>
       <category symbol="0" value="homogeneous" label="One material" render="true"/>
       <category symbol="1" value="dry" label="Dry lining" render="true"/>
-      <category symbol="2" value="waits" label="Dry lining, waits for an operator" render="true"/>
+      <category symbol="2" value="waits" label="Dry lining, pending approval" render="true"/>
     </categories>
     <symbols>
       <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
@@ -156,9 +156,9 @@
     <alias index="4" field="drawn_by" name="Drawn by"/>
     <alias index="5" field="drawn_at" name="Drawn at"/>
     <alias index="6" field="reason" name="Reason"/>
-    <alias index="7" field="pending_approval" name="Waits for an operator"/>
-    <alias index="8" field="approved_by" name="Put in force by"/>
-    <alias index="9" field="approved_at" name="Put in force at"/>
+    <alias index="7" field="pending_approval" name="Pending approval"/>
+    <alias index="8" field="approved_by" name="Approved by"/>
+    <alias index="9" field="approved_at" name="Approved at"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -185,6 +185,6 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"kind"</previewExpression>
-  <mapTip>&lt;b&gt;[% "kind" %]&lt;/b&gt;&lt;br&gt;drawn by [% "drawn_by" %][% if("pending_approval", ', waits for an operator', '') %][% coalesce('&lt;br&gt;' || replace("reason", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %]</mapTip>
+  <mapTip>&lt;b&gt;[% "kind" %]&lt;/b&gt;&lt;br&gt;drawn by [% "drawn_by" %][% if("pending_approval", ', pending approval', '') %][% coalesce('&lt;br&gt;' || replace("reason", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -133,7 +133,7 @@
     <alias index="6" field="chainage_to" name="Chainage to (m)"/>
     <alias index="7" field="label_from" name="From"/>
     <alias index="8" field="label_to" name="To"/>
-    <alias index="9" field="ticks" name="Each 10 m"/>
+    <alias index="9" field="ticks" name="Stations every 10 m"/>
     <alias index="10" field="lining_area" name="Lining (m²)"/>
     <alias index="11" field="seen_share" name="Share seen"/>
     <alias index="12" field="wet_area" name="Wet area (m²)"/>

@@ -80,9 +80,9 @@
     <alias index="2" field="survey" name="Survey"/>
     <alias index="3" field="name" name="File"/>
     <alias index="4" field="state" name="State"/>
-    <alias index="5" field="exaggeration" name="Drawn so many times as large"/>
-    <alias index="6" field="half_major" name="Greater half axis (m)"/>
-    <alias index="7" field="half_minor" name="Lesser half axis (m)"/>
+    <alias index="5" field="exaggeration" name="Scale factor of the drawing"/>
+    <alias index="6" field="half_major" name="Major semi-axis (m)"/>
+    <alias index="7" field="half_minor" name="Minor semi-axis (m)"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>

@@ -185,7 +185,7 @@
     <alias index="4" field="up" name="z axis"/>
     <alias index="5" field="water_level" name="Water level (m)"/>
     <alias index="6" field="state" name="State"/>
-    <alias index="7" field="undetermined" name="Known badly"/>
+    <alias index="7" field="undetermined" name="Poorly determined"/>
     <alias index="8" field="rotation" name="Rotation"/>
     <alias index="9" field="translation" name="Place"/>
     <alias index="10" field="scale" name="Scale"/>

@@ -421,7 +421,7 @@
     <alias index="21" field="detected" name="Found by the last run"/>
     <alias index="22" field="created_at" name="First found"/>
     <alias index="23" field="detected_at" name="Last found"/>
-    <alias index="24" field="counted" name="Counted in sums"/>
+    <alias index="24" field="counted" name="Included in totals"/>
     <alias index="25" field="rgb" name="Mean colour (RGB)"/>
   </aliases>
   <editable>

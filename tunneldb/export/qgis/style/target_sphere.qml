@@ -209,7 +209,7 @@
     <alias index="10" field="y" name="y (m)"/>
     <alias index="11" field="z" name="z (m)"/>
     <alias index="12" field="radius" name="Radius (m)"/>
-    <alias index="13" field="nominal" name="Radius asked for (m)"/>
+    <alias index="13" field="nominal" name="Nominal radius (m)"/>
     <alias index="14" field="rms" name="RMS of the fit (m)"/>
     <alias index="15" field="sigma" name="Standard deviation of the centre (m)"/>
     <alias index="16" field="coverage" name="Share of the sphere seen"/>
