@@ -254,7 +254,7 @@ LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
 DECLARE
     job tunnel_queue.procrastinate_jobs := (SELECT j FROM tunnel_queue.procrastinate_jobs j WHERE j.id = job_id);
-    reason constant text := 'its worker or the server went down 20 times while at it, perhaps for want of memory';
+    reason constant text := 'its worker or the server went down 20 times while at it, perhaps for lack of memory';
 BEGIN
     IF job.attempts < 19 THEN
         PERFORM tunnel_queue.procrastinate_retry_job_v2(job_id, clock_timestamp(), NULL, NULL, NULL);

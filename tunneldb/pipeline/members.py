@@ -90,7 +90,7 @@ class FileMembers:
     found : Found
     segmentation : Segmentation
     points, far, unknown, untold : int
-        Points; those left out for lying too far away, for want of a scanner position, and those whose intensity is no number.
+        Points; those left out for lying too far away, for lack of a scanner position, and those whose intensity is no number.
     saturated : float
         Share of the points with the greatest intensity of all.
     notes : tuple of str

@@ -50,7 +50,7 @@ CAUSES = (
     ),
     Cause(
         "memory",
-        ("the database's memory is full", "for want of memory", "MemoryError", "Cannot allocate memory"),
+        ("the database's memory is full", "for lack of memory", "MemoryError", "Cannot allocate memory"),
         "provide more memory, or use fewer --workers",
     ),
     Cause("rights", ("the database refused:",), "ask its owner to grant the role tunnel_operator"),

@@ -83,7 +83,7 @@ def print_pdf(browser: str, page: Path, pdf: Path, waiting: Callable[[float], No
     UserError
         If the browser makes no PDF.
     OSError
-        If it makes one that is cut off, for want of room.
+        If it makes one that is cut off, for lack of room.
     """
     with tempfile.TemporaryDirectory(prefix="tunneldb-browser-", ignore_cleanup_errors=True) as profile:
         command = [

@@ -238,7 +238,7 @@ def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyCha
         What the user is to know of the positions.
     reload : int
         How many of its files have to be loaded again: those of which another dimension is read now, or of which points were
-        left out for want of a position.
+        left out for lack of a position.
 
     Raises
     ------
