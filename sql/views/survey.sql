@@ -55,11 +55,13 @@ COMMENT ON COLUMN tunnel_api.file.thinned IS 'Points dropped by thinning to surv
 CREATE OR REPLACE VIEW tunnel_api.point AS
 SELECT ((p.km::bigint & 65535) << 44) | ((p.ctid::text::pg_catalog.point)[0]::bigint << 12)
          | (p.ctid::text::pg_catalog.point)[1]::bigint AS id,
-       p.survey_id, p.km, p.chainage, p.segment, p.gps_time, p.scan_id, p.file_id, p.intensity, p.classification,
-       p.class, p.geom::public.geometry AS geom
-  FROM tunnel.point p;
+       p.survey_id, s.name AS survey, p.km, p.chainage, p.segment, p.gps_time, p.scan_id, p.file_id, p.intensity,
+       p.classification, p.class, p.geom::public.geometry AS geom
+  FROM tunnel.point p
+  LEFT JOIN tunnel.survey s ON s.id = p.survey_id;  -- LEFT: the planner leaves the table out where the name is not asked for
 COMMENT ON VIEW tunnel_api.point IS
-    'Points at survey density, in chainage order; state survey_id and km (and chainage) to read only their part';
+    'Points at survey density, in chainage order. Filter by survey_id and km (and chainage), or use the function points, to read one partition only';
+COMMENT ON COLUMN tunnel_api.point.survey IS 'Name of the survey. A filter by it alone reads the points of all surveys: use survey_id = tunnel_api.survey_id(name)';
 COMMENT ON COLUMN tunnel_api.point.id IS 'Key within a survey, valid until the kilometre is loaded or tagged anew';
 COMMENT ON COLUMN tunnel_api.point.km IS 'floor(chainage / 1000) on the given axis, at loading';
 COMMENT ON COLUMN tunnel_api.point.chainage IS 'Chainage, m: on the given axis as loaded, on the axis found after stage segments';

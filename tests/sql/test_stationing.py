@@ -300,6 +300,10 @@ def test_the_commands_show_and_take_stations(conn: psycopg.Connection, example: 
     assert listed("--from", "0+530", "--to", "0+560") == every[1:2]
     assert listed("--from", "2+980", "--to", "2+940") == listed("--from", "2+940", "--to", "2+980") == every[-1:]
     assert listed("--to", "12350") == every[:2]
+    for ends in (("--from", "560", "--to", "530"), ("--from", "0+560", "--to", "0+530")):
+        result = run("leaks", example, *ends)
+        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+        assert f"{' '.join(ends)} runs backwards: give the smaller one first" in result.stderr
     assert listed("--from", "12000", "--to", "13000", code=1) == every  # nothing was scanned of its ends
     refused(run("leaks", example, "--from", "0+590"), "--from 0+590", "2 times", "12390.000 and 12410.000", "--from 12390.000")
     refused(run("leaks", example, "--to", "7+000"), "no such station", "tunneldb tunnel stationing demo --show")

@@ -53,20 +53,33 @@ def stretch_options(command: Command) -> Command:
 
 
 def parse_stretch(conn: psycopg.Connection[Any], survey: OfTunnel, start: str | None, end: str | None) -> Stretch:
-    """Stretch of a survey's tunnel between two places; where stations run backwards they may be given in either order.
+    """Return the stretch of a survey's tunnel between two places, the one with the smaller chainage first.
+
+    Where stations run backwards, two stations may be given in either order.
 
     Raises
     ------
     UserError
-        For a place that can't be read, that the tunnel hasn't, or that it has more than once; or for two that are one.
+        For a place that can't be read, that the tunnel hasn't, or that it has more than once; for two places in the wrong
+        order, or at the same chainage.
     """
     low = -math.inf if start is None else _chainage(conn, survey, "--from", start)
     high = math.inf if end is None else _chainage(conn, survey, "--to", end)
     if start is not None and end is not None:
-        low, high = sorted((low, high))
+        if low > high and _stations_rise(start, end):  # against the chainage: they run backwards there
+            low, high = high, low
+        if low > high:
+            raise UserError(f"--from {start} --to {end} runs backwards: give the smaller one first")
         if low == high:
             raise UserError(f"--from {start} --to {end}: between them lies no tunnel")
     return Stretch(low, high)
+
+
+def _stations_rise(start: str, end: str) -> bool:
+    """Return True if both places are stations, not chainages, and the first is the smaller one."""
+    stations = [place for place in (start, end) if not _METRES.fullmatch(place.strip())]
+    first, last = (float(place.replace("+", "")) for place in stations) if len(stations) == 2 else (0.0, 0.0)
+    return first < last
 
 
 def _chainage(conn: psycopg.Connection[Any], survey: OfTunnel, option: str, place: str) -> float:
