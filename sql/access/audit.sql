@@ -6,20 +6,22 @@ SELECT e.id, e.at, e.who, e.survey, e.view, e.row_id, e.action, e.before, e.afte
        e.imported_by, e.imported_at
   FROM tunnel_audit.entry e;
 COMMENT ON VIEW tunnel_api.audit IS
-    'What people changed through the views: who, when, before and after; it outlives what it speaks of. No role changes it, but for operators by a trigger or a function of their own on a table, which tunneldb check reports';
-COMMENT ON COLUMN tunnel_api.audit.at IS 'When';
-COMMENT ON COLUMN tunnel_api.audit.who IS 'Who was logged in';
-COMMENT ON COLUMN tunnel_api.audit.view IS 'What was changed: finding (leaks, too), spot, axis_vertex, region, photo or learned_model';
-COMMENT ON COLUMN tunnel_api.audit.row_id IS 'Its id in that view';
+    'Edits that people made through the views: when, who, values before and after. Entries outlive the rows they describe. No role can change them';
+COMMENT ON COLUMN tunnel_api.audit.at IS 'Time of the edit';
+COMMENT ON COLUMN tunnel_api.audit.who IS 'Role that was logged in';
+COMMENT ON COLUMN tunnel_api.audit.view IS
+    'View of the edited row: finding (leaks, too), spot, axis_vertex, region, photo or learned_model';
+COMMENT ON COLUMN tunnel_api.audit.row_id IS 'Key of the row in that view';
 COMMENT ON COLUMN tunnel_api.audit.action IS 'insert, update or delete';
-COMMENT ON COLUMN tunnel_api.audit.before IS 'Columns that changed, as they were, geometry as EWKT; NULL of an insert';
-COMMENT ON COLUMN tunnel_api.audit.after IS 'The same columns as they became, geometry as EWKT; NULL of a delete';
+COMMENT ON COLUMN tunnel_api.audit.before IS 'Changed columns before the edit, geometry as EWKT; NULL for an insert';
+COMMENT ON COLUMN tunnel_api.audit.after IS 'Changed columns after the edit, geometry as EWKT; NULL for a delete';
 
-COMMENT ON COLUMN tunnel_api.audit.undoes IS 'Entry that this one takes back (finding_undo)';
-COMMENT ON COLUMN tunnel_api.audit.part_of IS 'Entry of the step that this one is a part of: a split, a merge, a delete';
-COMMENT ON COLUMN tunnel_api.audit.kept IS 'What had been measured of a finding before its outline changed';
-COMMENT ON COLUMN tunnel_api.audit.imported_by IS 'Who brought it in with an archive (survey import): then at and who are what the archive says; NULL of what was done here';
-COMMENT ON COLUMN tunnel_api.audit.imported_at IS 'When it was brought in';
+COMMENT ON COLUMN tunnel_api.audit.undoes IS 'Entry that this one reverses (finding_undo)';
+COMMENT ON COLUMN tunnel_api.audit.part_of IS 'Entry of the split, merge or delete that this entry belongs to';
+COMMENT ON COLUMN tunnel_api.audit.kept IS 'Measured values of a finding before its outline changed';
+COMMENT ON COLUMN tunnel_api.audit.imported_by IS
+    'Role that imported the entry with an archive (survey import); at and who are then those of the archive. NULL for edits made here';
+COMMENT ON COLUMN tunnel_api.audit.imported_at IS 'Time of the import; NULL for edits made here';
 
 -- Notes an edit: of what was and is, the columns that differ; nothing when none does. Without before it is an insert, without
 -- after a delete. Only the triggers, which run with the owner's rights, get through to the table. Returns the entry's id.
@@ -35,4 +37,4 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_
     RETURNING id
 $$;
 COMMENT ON FUNCTION tunnel_internal.note_edit(text, text, bigint, jsonb, jsonb, bigint, bigint, jsonb) IS
-    'Writes into the audit which columns of a row an edit changed; for the triggers of the views alone, called by no role';
+    'Write an entry of the audit with the columns that an edit changed. Only the triggers of the views call it';

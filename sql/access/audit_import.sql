@@ -6,7 +6,8 @@ CREATE OR REPLACE FUNCTION tunnel_internal.audit_reserve(count int) RETURNS SETO
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER ROWS 1000 SET search_path = pg_catalog, pg_temp AS $$
     SELECT nextval('tunnel_audit.entry_id_seq'::regclass) FROM generate_series(1, $1)
 $$;
-COMMENT ON FUNCTION tunnel_internal.audit_reserve(int) IS 'So many numbers of entries of the audit, growing, that nobody else gets; for survey import';
+COMMENT ON FUNCTION tunnel_internal.audit_reserve(int) IS
+    'Return new, growing keys of audit entries, reserved for the caller (survey import)';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.audit_import(survey_id int, entries jsonb) RETURNS int
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
@@ -28,4 +29,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.audit_import(int, jsonb) IS
-    'Enters what an archive has of the audit of a survey, as imported by who calls, now; for survey import. Returns how many entries';
+    'Write the audit entries of an archived survey, marked as imported by the caller, and return their number (survey import)';

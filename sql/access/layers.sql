@@ -69,7 +69,7 @@ LANGUAGE sql IMMUTABLE PARALLEL SAFE ROWS 60 SET search_path = pg_catalog, pg_te
         ('sonar_ellipse', 'Polygon', false)
 $$;
 COMMENT ON FUNCTION tunnel_api.layer_types() IS
-    'The views of tunnel_api that are layers: the type of their geometry geom, and whether it lies in a plane of its own (SRID 0) or in the tunnel''s coordinate system';
+    'Views of tunnel_api that are layers, with the type of their geometry geom. plane: true if it lies in a plane of its own (SRID 0), false if in the tunnel''s coordinate system';
 
 CREATE OR REPLACE FUNCTION tunnel_api.layer_schemas() RETURNS TABLE (schema text, srid int)
 LANGUAGE sql STABLE PARALLEL SAFE ROWS 3 SET search_path = pg_catalog, pg_temp AS $$
@@ -80,7 +80,7 @@ LANGUAGE sql STABLE PARALLEL SAFE ROWS 3 SET search_path = pg_catalog, pg_temp A
      ORDER BY 1
 $$;
 COMMENT ON FUNCTION tunnel_api.layer_schemas() IS
-    'The schemas of typed layers, one for each coordinate system that tunnels are in, with its SRID; 0 of local coordinates';
+    'Schemas of typed layers, one for each coordinate system in use, with its SRID (0: local coordinates)';
 
 -- With the rights of the owner, as operators add tunnels and only the owner makes schemas; it takes nothing that a caller could say.
 CREATE OR REPLACE PROCEDURE tunnel_api.make_layers()
@@ -118,7 +118,7 @@ BEGIN
 END
 $$;
 COMMENT ON PROCEDURE tunnel_api.make_layers() IS
-    'Makes the schemas of typed layers of all coordinate systems that tunnels are in, and drops those of others; tunnel add and tunnel remove call it';
+    'Create the schemas of typed layers for all coordinate systems in use and drop unused ones. tunnel add and tunnel remove call it';
 
 CREATE OR REPLACE PROCEDURE tunnel_internal.make_layer_schema(name text, srid int)
 LANGUAGE plpgsql SET search_path = pg_catalog, pg_temp AS $$
@@ -187,4 +187,4 @@ BEGIN
 END
 $$;
 COMMENT ON PROCEDURE tunnel_internal.make_layer_schema(text, int) IS
-    'Makes one schema of typed layers, of the tunnels with that SRID: views, comments, what may be edited and by whom; make_layers calls it';
+    'Create one schema of typed layers for the tunnels with an SRID: views, comments, triggers and rights. make_layers calls it';

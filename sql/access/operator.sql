@@ -4,4 +4,5 @@ CREATE OR REPLACE FUNCTION tunnel_internal.for_operators(said text) RETURNS text
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
     SELECT CASE WHEN coalesce(pg_has_role(to_regrole('tunnel_operator'), 'USAGE'), true) THEN said END
 $$;
-COMMENT ON FUNCTION tunnel_internal.for_operators(text) IS 'The text, if who asks is an operator; NULL to others. Where there is no such role, to all';
+COMMENT ON FUNCTION tunnel_internal.for_operators(text) IS
+    'Return the text if the caller is an operator, else NULL. Without the role tunnel_operator, everybody gets the text';

@@ -25,7 +25,7 @@ AS $$
     ORDER BY d.n
 $$;
 COMMENT ON FUNCTION tunnel_api.axis_deviation(int) IS
-'How far the axis of a survey lies from the axis given, at each vertex: to_right looking up-chainage and up, m, in the plane of the given axis at its chainage. source: measured, interpolated or edited (by hand). To choose vertices on the map use the view of this name.';
+'Distance of each vertex of a survey''s measured axis from the given axis: to_right (looking up-chainage) and up, m, in the plane of the given axis. source: measured, interpolated or edited (by hand). The view of the same name has geometry';
 
 
 CREATE OR REPLACE VIEW tunnel_api.axis_deviation AS
@@ -36,12 +36,12 @@ SELECT v.id, v.survey_id, s.name AS survey, v.n, v.km, d.chainage,
  CROSS JOIN LATERAL tunnel_api.axis_deviation(s.id) d
   JOIN tunnel.axis_vertex v ON v.survey_id = s.id AND v.n = d.n;
 COMMENT ON VIEW tunnel_api.axis_deviation IS
-    'How far the axis of each survey lies from the axis given (the design alignment, if it came as one), vertex by vertex';
+    'Distance of each vertex of the measured axis from the given axis (the design alignment, if one was given)';
 COMMENT ON COLUMN tunnel_api.axis_deviation.source IS 'measured, interpolated or edited (by hand)';
 COMMENT ON COLUMN tunnel_api.axis_deviation.to_right IS 'Measured minus given, horizontally to the right looking up-chainage, m';
-COMMENT ON COLUMN tunnel_api.axis_deviation.up IS 'Measured minus given, upwards at right angles to the given axis, m';
+COMMENT ON COLUMN tunnel_api.axis_deviation.up IS 'Measured minus given, upwards, perpendicular to the given axis, m';
 COMMENT ON COLUMN tunnel_api.axis_deviation.distance IS 'Distance of the measured vertex from the given axis, m';
-COMMENT ON COLUMN tunnel_api.axis_deviation.geom IS 'The vertex as measured, in the tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.axis_deviation.geom IS 'Measured vertex, in the tunnel''s SRID';
 
 
 -- The given axis holds a vertex each metre, so that its substring by length lies where the element does.
@@ -71,18 +71,18 @@ SELECT e.tunnel_id::bigint * 1000000 + CASE e.plane WHEN 'vertical' THEN 500000 
  CROSS JOIN LATERAL (SELECT least(greatest((e.chainage - t.start_chainage) / w.length, 0), 1) AS low,
                             least(greatest((e.chainage + e.length - t.start_chainage) / w.length, 0), 1) AS high) f;
 COMMENT ON VIEW tunnel_api.alignment_element IS
-    'Elements of the design alignments that tunnels were given (LandXML, IFC), in plan (horizontal) and in profile (vertical)';
+    'Elements of design alignments (LandXML, IFC), in plan (horizontal) and in profile (vertical)';
 COMMENT ON COLUMN tunnel_api.alignment_element.plane IS 'horizontal (plan) or vertical (profile)';
-COMMENT ON COLUMN tunnel_api.alignment_element.n IS 'Number along the alignment, from 1, in its plane';
+COMMENT ON COLUMN tunnel_api.alignment_element.n IS 'Number along the alignment, from 1, separate for plan and profile';
 COMMENT ON COLUMN tunnel_api.alignment_element.kind IS 'line, arc or clothoid in plan; grade, parabola or circle in profile';
 COMMENT ON COLUMN tunnel_api.alignment_element.length IS 'Length in plan, m';
 COMMENT ON COLUMN tunnel_api.alignment_element.turn IS
-    'left or right in plan, looking up-chainage; crest or sag in profile; NULL where it is straight';
+    'left or right in plan, looking up-chainage; crest or sag in profile; NULL if straight';
 COMMENT ON COLUMN tunnel_api.alignment_element.radius_from IS
-    'Radius at its beginning, m; NULL where it is straight. Of a parabola that at its vertex';
-COMMENT ON COLUMN tunnel_api.alignment_element.radius_to IS 'Radius at its end, m; NULL where it is straight';
+    'Radius at the beginning, m; NULL if straight. For a parabola, the radius at its vertex';
+COMMENT ON COLUMN tunnel_api.alignment_element.radius_to IS 'Radius at the end, m; NULL if straight';
 COMMENT ON COLUMN tunnel_api.alignment_element.parameter IS 'Parameter A of a clothoid, m';
-COMMENT ON COLUMN tunnel_api.alignment_element.grade_from IS 'Rise of a vertical element at its beginning, %';
-COMMENT ON COLUMN tunnel_api.alignment_element.grade_to IS 'Rise of a vertical element at its end, %';
-COMMENT ON COLUMN tunnel_api.alignment_element.z_from IS 'Height at which a vertical element begins, m';
-COMMENT ON COLUMN tunnel_api.alignment_element.geom IS 'Its piece of the axis as given, in the tunnel''s SRID; NULL beyond the ends';
+COMMENT ON COLUMN tunnel_api.alignment_element.grade_from IS 'Grade of a vertical element at its beginning, %';
+COMMENT ON COLUMN tunnel_api.alignment_element.grade_to IS 'Grade of a vertical element at its end, %';
+COMMENT ON COLUMN tunnel_api.alignment_element.z_from IS 'Height of a vertical element at its beginning, m';
+COMMENT ON COLUMN tunnel_api.alignment_element.geom IS 'Part of the given axis, in the tunnel''s SRID; NULL beyond its ends';

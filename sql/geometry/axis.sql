@@ -46,7 +46,7 @@ AS $$
     ORDER BY t.n
 $$;
 COMMENT ON FUNCTION tunnel_internal.axis_frame(int[], float8[], float8[], float8[]) IS
-'Vertices of an axis with unit tangent (t), right (u) and up (w) vectors, in the tunnel''s SRID. Neighbours are vertices whose numbers differ by one. Source: Gonçalves et al. (2012), fig. 5.';
+'Vertices of an axis with unit vectors: tangent (t), right (u), up (w), in the tunnel''s SRID. Neighbours are vertices whose numbers differ by one. Source: Gonçalves et al. (2012), fig. 5';
 
 
 -- The points that may lie at most half_width (m) from the planes of vertices n, by their chainage, as text for FROM: number of
@@ -73,7 +73,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.axis_source(int, int[], float8) IS
-'What to read in FROM for the points near the planes of axis vertices n, by chainage: n, x, y, z (m).';
+'FROM expression that reads the points near the planes of axis vertices n, by chainage: n, x, y, z (m)';
 
 
 -- The table in which axis_near sets points of a kilometre aside.
@@ -84,7 +84,7 @@ AS $$
     SELECT tunnel_internal.partition_name($1, $2) || '_axis'
 $$;
 COMMENT ON FUNCTION tunnel_internal.axis_near_name(int, int) IS
-'Name of the table of schema tunnel that stage axis has while it works on a kilometre.';
+'Name of the temporary table of stage axis for a kilometre, in schema tunnel';
 
 
 -- Sets the points near the planes of vertices aside in a table, in the place of an older one, for the passes of axis_refine:
@@ -111,7 +111,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.axis_near(int, int, int[], float8[], float8[], float8[], float8) IS
-'Sets the points near the planes of axis vertices of a kilometre aside, in the table that axis_near_name names: n, x, y, z (m).';
+'Copy the points near the planes of a kilometre''s axis vertices to the table axis_near_name: n, x, y, z (m)';
 
 
 -- Whether the planes of vertices have moved since points were set aside, so far that one within half_width of its plane may be
@@ -127,7 +127,7 @@ AS $$
     JOIN tunnel_internal.axis_frame($1, $5, $6, $7) o ON o.n = f.n
 $$;
 COMMENT ON FUNCTION tunnel_internal.axis_astray(int[], float8[], float8[], float8[], float8[], float8[], float8[]) IS
-'Whether planes of axis vertices have moved by half a metre within 30 m of their vertex, since these were at ox, oy, oz.';
+'True if a plane of an axis vertex moved by 0.5 m or more within 30 m of its vertex since the vertices were at ox, oy, oz';
 
 
 -- Where the tunnel's centre lies, seen from given vertices: the shift of each, right and up in its plane, m.
@@ -222,7 +222,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.axis_shift(int, int[], float8[], float8[], float8[], float8, float8, int, regclass) IS
-'One pass of stage 1: how far each vertex lies from the tunnel''s centre, to the right and up in its plane, m, from the points within half_width of the plane, averaged by angular class. After Gonçalves et al. (2012), stage 1.';
+'One pass of stage axis: offset of the tunnel''s centre from each vertex, to the right and up in its plane, m, from the points within half_width of the plane, averaged by angular class. After Gonçalves et al. (2012), stage 1';
 
 
 -- How far each vertex lies off where its neighbours lead, m.
@@ -256,7 +256,7 @@ AS $$
     SELECT r.n, sqrt(least(sum(r.shift ^ 2), sum(r.place ^ 2))) FROM residual r GROUP BY r.n ORDER BY r.n
 $$;
 COMMENT ON FUNCTION tunnel_internal.axis_residual(int[], float8[], float8[], float8[], float8[], float8[], float8[]) IS
-'Deviation of each vertex of an axis from its neighbours, m: the lesser of the difference of its shift from the given axis and theirs, and its distance from the curve through their places.';
+'Deviation of each vertex of an axis from its neighbours, m: the smaller of the difference between its shift and theirs, and its distance from the curve through them';
 
 
 -- Moves the vertices of a kilometre onto the tunnel's centre, pass by pass, and writes them to tunnel.axis_vertex.
@@ -404,4 +404,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.axis_refine(int, int, float8, float8, float8, int, int, float8, float8) IS
-'Stage 1 for one kilometre: moves the axis vertices onto the tunnel''s centre until none moves by tolerance (m) in a pass; returns each pass with its greatest move, m. Vertices edited by hand stay; one that still moves after max_iterations passes, or deviates from its neighbours by more than max_deviation (m), is interpolated, with a remark, up to a share of max_rejected. After Gonçalves et al. (2012), stages 1 and 2.';
+'Stage axis for one kilometre: move the axis vertices to the tunnel''s centre until no vertex moves by more than tolerance (m) in a pass, and return the passes with their largest move, m. Vertices edited by hand stay. Vertices that do not converge in max_iterations passes, or deviate from their neighbours by more than max_deviation (m), are interpolated with a remark, up to a share max_rejected. After Gonçalves et al. (2012), stages 1 and 2';

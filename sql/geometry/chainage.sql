@@ -10,7 +10,7 @@ AS $$
     SELECT to_char(round($1 * 1000)::bigint, 'FM999999990"+"000"."000')
 $$;
 COMMENT ON FUNCTION tunnel_api.chainage_label(float8) IS
-'Chainage (m) as text, km + m with mm: 12345.678 -> 12+345.678.';
+'Chainage (m) as text, km + m with mm: 12345.678 → 12+345.678';
 
 
 -- The way back: '12+345.678', '12+345', '-0+005' or plain metres ('12345.678') -> m. Anything else is an error.
@@ -34,7 +34,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.chainage_parse(text) IS
-'Chainage in m of its text: 12+345.678 -> 12345.678; plain metres are taken as they are.';
+'Chainage (m) from text: 12+345.678 → 12345.678. Plain metres are accepted';
 
 
 -- What functions of a stretch or of kilometres begin with: one that runs backwards would be an empty one, with no leak in it.
@@ -53,4 +53,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.in_order(float8, float8, text) IS
-'True; an error where the end of a stretch (m) or of kilometres comes before its beginning.';
+'Return true; raise an error if the end of a stretch (m) or of a range of kilometres is smaller than its beginning';

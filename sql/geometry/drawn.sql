@@ -34,7 +34,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.unmap_point(int, geometry, float8) IS
-'A point of the map strip (tunnel''s SRID) in the unrolled plane (chainage, arc; m), sought from a chainage near it; NULL where there is no axis. The inverse of map_point.';
+'Unrolled coordinates (chainage, arc; m) of a point of the map strip (tunnel''s SRID), searched from a near chainage; NULL where there is no axis. Inverse of map_point';
 
 
 CREATE OR REPLACE FUNCTION tunnel_internal.unmap_strip(survey_id int, shape geometry)
@@ -75,7 +75,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.unmap_strip(int, geometry) IS
-'A point, line or polygon of the map strip (tunnel''s SRID) in the unrolled plane (chainage, arc; m; SRID 0), edges cut to pieces of a metre. NULL if any vertex lies beyond the ends of the axis. The inverse of map_strip.';
+'Unrolled plane (chainage, arc; m; SRID 0) of a point, line or polygon of the map strip (tunnel''s SRID). Edges are split into pieces of 1 m. NULL if a vertex lies beyond the ends of the axis. Inverse of map_strip';
 
 
 -- Clock position of a place on the lining, as detection has it: of the ray from the axis to it, above 0 up to 12.
@@ -104,7 +104,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.clock_at(int, float8, float8) IS
-'Clock position (hours above 0 up to 12: 12 is the crown, 3 right looking up-chainage) of a place of the unrolled plane (m); NULL off the tunnel.';
+'Clock position (hours, more than 0 to 12; 12 is the crown, 3 is right looking up-chainage) of a point of the unrolled plane (m); NULL off the tunnel';
 
 
 -- A polygon drawn is its own outline; a line has one as wide as it is, at least a centimetre, and a point one of 5 cm about it, so
@@ -185,4 +185,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.drawn_figures(int, geometry, float8) IS
-'All that follows from a polygon, line (with its width, m) or point drawn in the unrolled plane (chainage, arc; m): kilometre and clock position of its middle, extent, area and length on the surface, outline and three geometries. An error if it is not valid or reaches beyond the lining.';
+'Values derived from a polygon, a line (with its width, m) or a point drawn in the unrolled plane (chainage, arc; m): kilometre and clock position of the middle, extent, area and length on the surface, outline and three geometries. Raises an error if the shape is invalid or extends beyond the lining';

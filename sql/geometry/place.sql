@@ -10,7 +10,7 @@ AS $$
         || lpad(((round($1 * 60)::int % 720 + 720) % 60)::text, 2, '0')
 $$;
 COMMENT ON FUNCTION tunnel_api.clock_text(float8) IS
-'Clock position (hours, 12 is the crown, 3 the right wall looking up-chainage) as text: 0.5 -> 12:30.';
+'Clock position (hours; 12 is the crown, 3 the right wall looking up-chainage) as text: 0.5 → 12:30';
 
 
 -- Whether a clock position lies on the way round from one to another, ends included; all in hours.
@@ -21,7 +21,7 @@ AS $$
     SELECT $1 - $2 - 12 * floor(($1 - $2) / 12) <= $3 - $2 - 12 * floor(($3 - $2) / 12)
 $$;
 COMMENT ON FUNCTION tunnel_api.clock_between(float8, float8, float8) IS
-'Whether a clock position lies between two others, clockwise and ends included (hours): from 10 to 2 goes over the crown, from 2 to 10 under the floor.';
+'True if a clock position lies between two others (hours), clockwise, ends included: 10 to 2 passes the crown, 2 to 10 the floor';
 
 
 -- Number of the ring that holds a chainage, of a lining of rings of one length, the first of which begins at
@@ -33,4 +33,4 @@ AS $$
     SELECT floor(($1 - $3) / $2 + 1e-9)::int + 1
 $$;
 COMMENT ON FUNCTION tunnel_api.ring_number(float8, float8, float8) IS
-'Number of the ring of a segmental lining that holds a chainage (m), by the length of the rings and the chainage at which ring 1 begins (m), as in ring_statistics; 0 and less before that.';
+'Number of the ring at a chainage (m), from the ring length (m) and the chainage of the beginning of ring 1 (m), as in ring_statistics; 0 or negative before ring 1';

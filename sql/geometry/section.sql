@@ -16,7 +16,7 @@ AS $$
     ORDER BY 3
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_plane(int, int) IS
-'Planes of the cross-sections of one kilometre, at 25 % and 75 % of each segment, within what was scanned: chainage (m) and frame (origin, tangent, right, up; 12 numbers). Source: Gonçalves et al. (2012), stage 4.';
+'Planes of the cross-sections of a kilometre, at 25 % and 75 % of each segment, within the scanned part: chainage (m) and frame (origin, tangent, right, up; 12 numbers). Source: Gonçalves et al. (2012), stage 4';
 
 
 -- The points of a slab: those at most half_width (in chainage, m) from a plane, in the plane's own frame, right and up, and how
@@ -50,7 +50,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_slab(int, float8, float8[], float8) IS
-'Points at most half_width (m of chainage) from the plane of a section, those of sonar scans on the bed and the submerged lining included, in its frame: right and up of the axis, and how far from the plane in chainage, m. Source: Gonçalves et al. (2012), stage 4.';
+'Points within half_width (m of chainage) of a section plane, in its frame: right and up of the axis, and distance from the plane, m. Includes sonar points on the bed and the submerged lining. Source: Gonçalves et al. (2012), stage 4';
 
 
 -- Angular classes of the sections of a kilometre.
@@ -132,4 +132,4 @@ AS $$
     ORDER BY 1, 2, 3
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_classes(int, int, float8, float8, int[]) IS
-'Angular classes of the sections of one kilometre: a line through the points within two standard deviations, by class of angle_step degrees counted from -180°. radius, sigma in m, slope in m/m, spread in m². Source: Gonçalves et al. (2012), stage 4.';
+'Angular classes of the sections of a kilometre, of angle_step degrees from -180°: line fitted to the points within two standard deviations. radius and sigma in m, slope in m/m, spread in m². Source: Gonçalves et al. (2012), stage 4';

@@ -34,7 +34,7 @@ AS $$
     LEFT JOIN filled f ON f.section = p.segment * 100 + p.half
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_least_width(int, int, float8, float8, int) IS
-'Of each section (segment * 100 + half) of one kilometre the narrowest slab in which nine classes of ten hold four times min_points points, counted before any is left out: half_width, two or at least four times that, m.';
+'Narrowest slab of each section (segment * 100 + half) of a kilometre in which 90 % of the angular classes hold four times min_points points: half_width, or a width of at least four times that, m';
 
 
 -- The angular classes of each section of a kilometre, as arrays over the classes (NULL for an empty one).
@@ -96,7 +96,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_gather(int, int, float8, float8, float8, int) IS
-'Angular classes of each section of one kilometre as arrays; the slab (width: half of it, m) is widened until nine classes of ten hold four times min_points points, from four times half_width on min_points; a class of so many counts.';
+'Angular classes of each section of a kilometre as arrays. The slab (width: half its length, m) is widened until 90 % of the classes hold four times min_points points, or min_points points from four times half_width on. Classes with that many points are used';
 
 
 -- Whether a section has a roof: at least a third of the classes within 45° of the upward direction are filled (radius: over the
@@ -110,7 +110,7 @@ AS $$
     WHERE abs((k.class - 0.5) * $1 - 180) < 45
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_roofed(float8, float8[]) IS
-'Whether at least a third of the angular classes within 45° of the upward direction are filled: without a roof there is no lining. radius: over the classes, counted from -180°, NULL for an empty one.';
+'True if at least a third of the angular classes within 45° of upwards are filled; without a roof there is no lining. radius: of the classes from -180°, NULL for an empty class';
 
 
 -- Where a kilometre has a floor and no roof, so no section: the chainage that each such plane stands for, m.
@@ -144,7 +144,7 @@ AS $$
     ORDER BY 1
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_open(int, int, float8, float8, int) IS
-'Where a kilometre has a floor and no roof, as at portals and in open cuts, and therefore no section: chainage from and to of each plane, m.';
+'Parts of a kilometre with a floor but no roof (portals, open cuts), which have no sections: chainage from and to of each plane, m';
 
 
 -- The curves of the sections of a kilometre.
@@ -224,7 +224,7 @@ AS $$
     ORDER BY g.i
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_curves(int, int, float8, float8, float8, int, float8) IS
-'The curves of the sections of one kilometre, each compared with its neighbours: radius and arc (m) at each degree from -180° to 180°, and radius and state of each angular class.';
+'Curves of the sections of a kilometre, each checked against its neighbours: radius and arc (m) at each degree from -180° to 180°; radius and state of each angular class';
 
 
 -- Writes the sections of a kilometre to tunnel.section and tunnel.section_class, replacing those there; returns how many.
@@ -278,4 +278,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_build(int, int, float8, float8, float8, int, float8) IS
-'Stage 4 for one kilometre: rewrites tunnel.section and tunnel.section_class; returns the number of sections. angle_step in degrees, widths in m. Source: Gonçalves et al. (2012), stage 4.';
+'Stage sections for one kilometre: rewrite tunnel.section and tunnel.section_class, and return the number of sections. angle_step in degrees, widths in m. Source: Gonçalves et al. (2012), stage 4';

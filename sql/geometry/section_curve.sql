@@ -11,7 +11,7 @@ AS $$
         3 * (radius_b - radius_a) - 2 * slope_a - slope_b + s * (2 * (radius_a - radius_b) + slope_a + slope_b)))
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_between(float8, float8, float8, float8, float8) IS
-'Radius (m) at the share s (0-1) of the way from one angular class to another: the cubic Hermite curve with their radii (m) and slopes (m over the whole way).';
+'Radius (m) at the fraction s (0-1) between two angular classes: cubic Hermite curve through their radii (m) and slopes (m over the interval)';
 
 
 -- Where the lines of two classes meet: angle (degrees) and radius (m); NULL if they don't between the two classes.
@@ -48,7 +48,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_corner(float8, float8, float8, float8, float8, float8) IS
-'Angle (degrees) and radius (m) where the lines of two angular classes meet; NULL if not between them.';
+'Angle (degrees) and radius (m) of the intersection of the lines of two angular classes; NULL if it does not lie between them';
 
 
 -- The curve of a section: radius and arc at each whole degree from -180° to 180°, and what became of each class.
@@ -292,4 +292,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_curve(float8, float8[], float8[], float8[], float8[], float8) IS
-'The smooth closed curve of a section through its angular classes: radius and arc (m) at each degree from -180° to 180°, and the radius and state of each class (measured, rejected, interpolated). After Gonçalves et al. (2012), stage 4, with a curve for the polygon.';
+'Smooth closed curve of a section through its angular classes: radius and arc (m) at each degree from -180° to 180°; radius and state (measured, rejected, interpolated) of each class. After Gonçalves et al. (2012), stage 4, with a curve in place of the polygon';

@@ -43,7 +43,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.segment_frame(float8[], float8) IS
-'The plane at the fraction f (0-1) of a segment: origin, tangent, right and up (12 numbers), in the tunnel''s SRID, m. segment: vertex_from, vertex_to, tangent_from, tangent_to.';
+'Plane at the fraction f (0-1) of a segment: origin, tangent, right and up (12 numbers), tunnel''s SRID, m. segment: vertex_from, vertex_to, tangent_from, tangent_to';
 
 
 -- The segments of a kilometre as they follow from the axis vertices, without writing them.
@@ -90,7 +90,7 @@ AS $$
     ORDER BY m.n
 $$;
 COMMENT ON FUNCTION tunnel_internal.segment_plan(int, int) IS
-'The segments of one kilometre as they follow from the axis vertices: number, chainage of both planes (m, in plan), and vertex_from, vertex_to, tangent_from, tangent_to (12 numbers, tunnel''s SRID). Source: Gonçalves et al. (2012), stage 3.';
+'Segments of a kilometre computed from the axis vertices: number, chainage of both planes (m, in plan), vertex_from, vertex_to, tangent_from, tangent_to (12 numbers, tunnel''s SRID). Source: Gonçalves et al. (2012), stage 3';
 
 
 -- Whether the planes of a segment are not those of the axis any more: a vertex at one of its ends has moved by more than 0.1 mm
@@ -119,7 +119,7 @@ AS $$
     )
 $$;
 COMMENT ON FUNCTION tunnel_internal.segment_moved(int, int, float8[]) IS
-'Whether the axis has moved under a segment since it was made, so that its planes are others now. n: its number; segment: vertex_from, vertex_to, tangent_from, tangent_to, 3 numbers each.';
+'True if the planes of a segment differ from those of the present axis. n: number of the segment; segment: vertex_from, vertex_to, tangent_from, tangent_to, 3 numbers each';
 
 
 -- Writes the segments of a kilometre to tunnel.segment, replacing those there; returns how many.
@@ -146,7 +146,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.segment_build(int, int) IS
-'Stage 3 for one kilometre: rewrites tunnel.segment from the axis vertices; returns the number of segments. Source: Gonçalves et al. (2012), stage 3.';
+'Stage segments for one kilometre: rewrite tunnel.segment from the axis vertices, and return the number of segments. Source: Gonçalves et al. (2012), stage 3';
 
 
 -- Segment and chainage of every point of a kilometre: the partition is rewritten with both and swapped in. Rows keep their
@@ -230,4 +230,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.segment_tag(int, int) IS
-'Stage 3 for the points of one kilometre: rewrites their partition with segment number and chainage (m, in plan) and swaps it in; returns the number of points tagged. Source: Gonçalves et al. (2012), stage 3.';
+'Stage segments for the points of one kilometre: rewrite their partition with segment and chainage (m, in plan), and return the number of tagged points. Source: Gonçalves et al. (2012), stage 3';

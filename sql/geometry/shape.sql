@@ -16,7 +16,7 @@ BEGIN
     RETURN found;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.survey_id(text) IS 'The id of a survey, by its name; an error if there is none.';
+COMMENT ON FUNCTION tunnel_api.survey_id(text) IS 'Key of a survey, by its name. Raises an error if there is none';
 
 
 -- A point, line or polygon with each vertex carried over: 'roll' (unrolled plane to surface), 'map' (unrolled plane to map
@@ -59,7 +59,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.carry_over(int, geometry, text, float8) IS
-'A point, line or polygon carried over vertex by vertex, edges cut to pieces of step metres: way is roll (unrolled plane to surface), map (unrolled plane to map strip) or unroll (space to unrolled plane). NULL if any vertex lies off the tunnel.';
+'Transform a point, line or polygon vertex by vertex. way: roll (unrolled plane to surface), map (unrolled plane to map strip) or unroll (space to unrolled plane). Edges are split into pieces of step metres first. NULL if a vertex lies off the tunnel';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.roll(survey_id int, unrolled geometry)
@@ -67,7 +67,7 @@ RETURNS geometry
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 AS $$ SELECT tunnel_internal.carry_over(survey_id, unrolled, 'roll', 0.1) $$;
 COMMENT ON FUNCTION tunnel_api.roll(int, geometry) IS
-'A point, line or polygon of the unrolled plane (chainage, arc; m) laid on the tunnel''s surface: 3D, tunnel''s SRID. NULL if any of it lies off the tunnel.';
+'Point, line or polygon of the unrolled plane (chainage, arc; m) on the tunnel''s surface: 3D, tunnel''s SRID. NULL if any part lies off the tunnel';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.map_strip(survey_id int, unrolled geometry)
@@ -75,7 +75,7 @@ RETURNS geometry
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 AS $$ SELECT tunnel_internal.carry_over(survey_id, unrolled, 'map', 1.0) $$;
 COMMENT ON FUNCTION tunnel_api.map_strip(int, geometry) IS
-'A point, line or polygon of the unrolled plane (chainage, arc; m) laid on the map beside the axis, tunnel''s SRID. Source: Gonçalves et al. (2012), eq. 1.';
+'Point, line or polygon of the unrolled plane (chainage, arc; m) on the map beside the axis, tunnel''s SRID. Source: Gonçalves et al. (2012), eq. 1';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.unroll_shape(survey_id int, shape geometry)
@@ -83,4 +83,4 @@ RETURNS geometry
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 AS $$ SELECT tunnel_internal.carry_over(survey_id, shape, 'unroll', 0.1) $$;
 COMMENT ON FUNCTION tunnel_api.unroll_shape(int, geometry) IS
-'A point, line or polygon in space (3D, tunnel''s SRID) in the unrolled plane (chainage, arc; m; SRID 0). NULL if any of it lies off the tunnel.';
+'Point, line or polygon in space (3D, tunnel''s SRID) in the unrolled plane (chainage, arc; m; SRID 0). NULL if any part lies off the tunnel';

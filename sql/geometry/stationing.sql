@@ -20,7 +20,7 @@ BEGIN
     RETURN found;
 END
 $$;
-COMMENT ON FUNCTION tunnel_api.tunnel_id(text) IS 'The id of a tunnel, by its name; an error if there is none.';
+COMMENT ON FUNCTION tunnel_api.tunnel_id(text) IS 'Key of a tunnel, by its name. Raises an error if there is none';
 
 
 -- Also what `stationing` reads: a view, for it runs with the rights of who calls it. What is not asked for is not reckoned.
@@ -32,12 +32,14 @@ SELECT e.tunnel_id::bigint * 10000000000 + 5000000000 + round(e.chainage * 1000)
        e.station, e.direction::integer AS direction, tunnel_api.chainage_label(e.station) AS label
   FROM tunnel.station_equation e;
 COMMENT ON VIEW tunnel_api.station_equation IS
-    'Station equations: where the stations of a tunnel begin, jump or turn round. Tunnels without rows have their chainage for station';
-COMMENT ON COLUMN tunnel_api.station_equation.chainage IS 'Chainage (distance) from which the row holds, m; the first holds before it, too';
-COMMENT ON COLUMN tunnel_api.station_equation.station_back IS 'Station there by the row before, m; NULL in the first';
-COMMENT ON COLUMN tunnel_api.station_equation.station IS 'Station there, m';
-COMMENT ON COLUMN tunnel_api.station_equation.direction IS '1 where stations grow with chainage, -1 where they run backwards';
-COMMENT ON COLUMN tunnel_api.station_equation.label IS 'Station there, as 12+345.678';
+    'Station equations: chainages at which the stations of a tunnel begin, jump or reverse. In tunnels without rows, station equals chainage';
+COMMENT ON COLUMN tunnel_api.station_equation.chainage IS
+    'Chainage from which the row applies, m; the first row applies before it as well';
+COMMENT ON COLUMN tunnel_api.station_equation.station_back IS
+    'Station at this chainage by the previous row, m; NULL in the first row';
+COMMENT ON COLUMN tunnel_api.station_equation.station IS 'Station at this chainage, m';
+COMMENT ON COLUMN tunnel_api.station_equation.direction IS '1 if stations increase with chainage, -1 if they decrease';
+COMMENT ON COLUMN tunnel_api.station_equation.label IS 'Station at this chainage, as 12+345.678';
 
 
 -- Station (m) and its written form at a chainage (m) of a tunnel, one row. Neither STRICT nor with the owner's rights, so
@@ -59,7 +61,7 @@ AS $$
           ELSE $2 END AS station) s
 $$;
 COMMENT ON FUNCTION tunnel_api.stationing(int, float8) IS
-'Station (m) at a chainage (m) of a tunnel, and its label 12+345.678. For use over many rows, in FROM; else station and station_label.';
+'Station (m) at a chainage (m) of a tunnel, and its label 12+345.678. For many rows, in FROM; else use station or station_label';
 
 
 -- Station (m) at a chainage (m) of a tunnel.
@@ -70,7 +72,7 @@ AS $$
     SELECT s.station FROM tunnel_api.stationing($1, $2) s
 $$;
 COMMENT ON FUNCTION tunnel_api.station(int, float8) IS
-'Station (m) at a chainage (m) of a tunnel, in its own stationing; where that has an equation, the station ahead.';
+'Station (m) at a chainage (m) of a tunnel; at a station equation, the station ahead';
 
 
 -- The same as it is written.
@@ -81,7 +83,7 @@ AS $$
     SELECT s.label FROM tunnel_api.stationing($1, $2) s
 $$;
 COMMENT ON FUNCTION tunnel_api.station_label(int, float8) IS
-'Station at a chainage (m) of a tunnel, in its own stationing, as 12+345.678.';
+'Station at a chainage (m) of a tunnel, as 12+345.678';
 
 
 -- The pieces of a tunnel's stationing between its ends, in growing chainage (m); one if it has no equations.
@@ -113,7 +115,7 @@ AS $$
     ORDER BY p.low
 $$;
 COMMENT ON FUNCTION tunnel_api.station_pieces(int) IS
-'Pieces of a tunnel''s stationing between its ends, from chainage to chainage (m) and from station to station (m); direction is -1 where stations run backwards.';
+'Pieces of a tunnel''s stationing: chainages and stations (m) of their ends; direction is -1 where stations decrease';
 
 
 -- Chainages (m) of the places of a tunnel that have a station, given as 12+345.678 or in metres: none, one, or several
@@ -140,4 +142,4 @@ AS $$
     ORDER BY chainage
 $$;
 COMMENT ON FUNCTION tunnel_api.station_chainages(int, text) IS
-'Chainages (m) in a tunnel that have a station, written 12+345.678 or in metres: none, one, or several where stations overlap.';
+'Chainages (m) of a tunnel that have a station (12+345.678, or metres): none, one, or several where stations overlap';

@@ -25,7 +25,7 @@ SELECT k.survey_id::bigint * 1000000 + 500000 + k.km AS id, k.survey_id, k.km, k
        AND NOT EXISTS (SELECT FROM tunnel.segment g WHERE g.survey_id = q.survey_id AND g.km = i.km)
      GROUP BY q.survey_id, i.km) k;
 COMMENT ON VIEW tunnel_internal.km_ends IS
-    'Where each kilometre of a survey begins and ends: with its segments, as far as they were scanned; without segments with its points';
+    'Beginning and end of each kilometre of a survey: of the scanned part of its segments; of its points if it has no segments';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.survey_ends(survey_id int, OUT chainage_from float8, OUT chainage_to float8)
@@ -34,4 +34,4 @@ COST 5000  -- once a survey, not once a kilometre
 SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$ SELECT min(k.chainage_from), max(k.chainage_to) FROM tunnel_internal.km_ends k WHERE k.survey_id = $1 $$;
 COMMENT ON FUNCTION tunnel_api.survey_ends(int) IS
-'Least and greatest chainage (m) of what a survey scanned: its first and last point, within its segments. NULL before it has any.';
+'Smallest and greatest chainage (m) that a survey scanned: its first and last point, within its segments. NULL before it has segments';

@@ -33,7 +33,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.section_at(int, float8) IS
-'The section at a chainage, blended from those before and after: radius and arc (m) at each degree from -180° to 180°; NULL where none is near.';
+'Section at a chainage, interpolated between its neighbours: radius and arc (m) at each degree from -180° to 180°; NULL if no section is near';
 
 
 -- Node of a section (taken round the circle) and the unit direction of the section there, towards growing angle: u, w, du, dw.
@@ -53,7 +53,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_node(float8[], int) IS
-'Node k (0-359, -180° + k) of a section, right and up of the axis (m), and the unit direction of the section there.';
+'Node k (0-359, at -180° + k) of a section, right and up of the axis (m), and the unit direction of the section there';
 
 
 -- Chainage, arc and offset of a point of a survey's tunnel; NULL where it lies off the tunnel.
@@ -180,7 +180,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.unroll(int, geometry) IS
-'Chainage (m in plan along the axis), arc (m along the section from the crown, positive right) and offset (m from the surface, positive into the tunnel) of a point in the tunnel''s SRID; NULL off the tunnel. After Gonçalves et al. (2012), stage 5.';
+'Chainage (m in plan along the axis), arc (m along the section from the crown, positive right looking up-chainage) and offset (m from the surface, positive into the tunnel) of a 3D point in the tunnel''s SRID; NULL off the tunnel. After Gonçalves et al. (2012), stage 5';
 
 
 -- The point at chainage, arc and offset, in the tunnel's SRID; NULL where they lie off the tunnel. The inverse of unroll.
@@ -236,7 +236,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.roll(int, float8, float8, float8) IS
-'The point (tunnel''s SRID) at chainage, arc and offset, m; NULL off the tunnel. The inverse of unroll.';
+'Point at chainage, arc and offset, m: 3D, tunnel''s SRID; NULL off the tunnel. Inverse of unroll';
 
 
 -- A point of the unrolled plane laid on the map beside the axis, in the tunnel's SRID (Gonçalves et al., 2012, eq. 1):
@@ -261,4 +261,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.map_point(int, float8, float8) IS
-'The point of the map strip (tunnel''s SRID) at chainage and arc, m: arc metres to the right of the axis. Source: Gonçalves et al. (2012), eq. 1.';
+'Point of the map strip (tunnel''s SRID) at chainage and arc, m: arc metres to the right of the axis. Source: Gonçalves et al. (2012), eq. 1';

@@ -9,15 +9,17 @@ SELECT c.survey_id::bigint * 1000000 + 500000 + c.km AS id, c.survey_id, c.km, c
   FROM tunnel.coverage c
 WINDOW earlier AS (PARTITION BY c.survey_id ORDER BY c.km ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING);
 COMMENT ON VIEW tunnel_internal.coverage_sums IS
-    'Lining of each kilometre, what the last detection saw of it and the pixels that it found wet, as running sums over steps of chainage; coverage_at reads them';
+    'Lining of each kilometre, its inspected part and its wet pixels, as running sums over steps of chainage; read by coverage_at';
 COMMENT ON COLUMN tunnel_internal.coverage_sums.step IS 'Length of a step, m; the first begins with the kilometre';
-COMMENT ON COLUMN tunnel_internal.coverage_sums.lining_sums IS 'Lining from the beginning of the kilometre to that of each step and to the end of the last, m²';
-COMMENT ON COLUMN tunnel_internal.coverage_sums.seen_sums IS 'The same of the lining seen, m²';
-COMMENT ON COLUMN tunnel_internal.coverage_sums.wet_sums IS 'The same of wet pixels, m²';
-COMMENT ON COLUMN tunnel_internal.coverage_sums.length_before IS 'Length of the kilometres before it that were detected, m';
-COMMENT ON COLUMN tunnel_internal.coverage_sums.lining_before IS 'Their lining, m²';
-COMMENT ON COLUMN tunnel_internal.coverage_sums.seen_before IS 'Their lining seen, m²';
-COMMENT ON COLUMN tunnel_internal.coverage_sums.wet_before IS 'Their wet pixels, m²';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.lining_sums IS
+    'Lining from the beginning of the kilometre to the beginning of each step, and to the end of the last step, m²';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.seen_sums IS 'Inspected lining, summed in the same way, m²';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.wet_sums IS 'Wet pixels, summed in the same way, m²';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.length_before IS 'Length of the searched kilometres before this one, m';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.lining_before IS 'Lining of the searched kilometres before this one, m²';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.seen_before IS
+    'Inspected lining of the searched kilometres before this one, m²';
+COMMENT ON COLUMN tunnel_internal.coverage_sums.wet_before IS 'Wet pixels of the searched kilometres before this one, m²';
 
 
 -- Running sums of the steps of a kilometre (the first is 0) at a place so far along it (m); a step counts by its share. The
@@ -31,7 +33,7 @@ AS $$
             * least($3 / $2 - least(floor($3 / $2)::int, cardinality($1) - 2), 1)
 $$;
 COMMENT ON FUNCTION tunnel_internal.sum_upto(float8[], float8, float8) IS
-'Sum over steps of one length (m) up to a place (m from their start), from their running sums; the first is 0.';
+'Sum over steps of equal length (m) up to a distance (m) from their beginning, from running sums that begin with 0';
 
 
 CREATE OR REPLACE FUNCTION tunnel_internal.coverage_at(survey_id int, places float8[])
@@ -74,7 +76,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.coverage_at(int, float8[]) IS
-'At each of some chainages of a survey (m): length of tunnel that was looked at (m), its lining, the lining seen and wet pixels (m²), all from where the survey begins on. The differences between two places are those of the stretch between; a step that a place cuts counts by its share.';
+'Sums from the beginning of a survey up to each given chainage (m): searched length (m), lining, inspected lining and wet pixels (m²). The difference between two chainages is the sum of the stretch between them; a step that is cut counts in proportion';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.coverage(
@@ -95,7 +97,7 @@ AS $$
     WHERE e.chainage_from IS NOT NULL AND r.ends[1] < r.ends[2] AND tunnel_internal.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.coverage(text, float8, float8) IS
-'Lining of a survey between two chainages (m) that was searched for leaks, its part inspected by the last detection, and wet pixels after the median filter (m²). seen_share: inspected share of the lining of the whole stretch; kilometres without detection count as not inspected, as in leak_statistics. wet_pixel_share: share of the inspected lining, as in Xu et al. (2018). Steps of chainage across an end count in part.';
+'Lining of a survey between two chainages (m) that was searched for leaks, its inspected part, and its wet pixels after the median filter (m²). seen_share: inspected share of the lining of the whole stretch; kilometres without detection count as not inspected, as in leak_statistics. wet_pixel_share: share of wet pixels in the inspected lining (Xu et al., 2018). Steps of chainage that are cut count in proportion';
 
 
 -- Of an area on the lining (m²) whose outline lies in the unrolled plane, the part between two chainages (m). The planner puts
@@ -111,4 +113,4 @@ AS $$
             public.ST_MakePoint(greatest($3, -1e9), -1e4), public.ST_MakePoint(least($4, 1e9), 1e4)))) END
 $$;
 COMMENT ON FUNCTION tunnel_internal.area_between(geometry, float8, float8, float8) IS
-'Part of an area on the lining (m²), such as a leak''s, that lies between two chainages (m), by its outline in the unrolled plane. The area of a leak over the end of a stretch, wherever it is stated.';
+'Part of an area on the lining (m²), e.g. of a leak, that lies between two chainages (m), by its outline in the unrolled plane';

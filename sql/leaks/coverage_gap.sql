@@ -167,7 +167,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.coverage_gaps_of(int, float8[], float8[]) IS
-'What coverage_gaps has to say of each of some stretches of a survey, given by where they begin and end (m); n: the first is 1.';
+'Result of coverage_gaps for several stretches of a survey, given by their beginnings and ends (m). n: number of the stretch, from 1';
 
 
 -- The planner puts the body in the place of a call.
@@ -181,7 +181,7 @@ AS $$
     FROM tunnel_internal.coverage_gaps_of($1, ARRAY[$2], ARRAY[$3]) g
 $$;
 COMMENT ON FUNCTION tunnel_api.coverage_gaps(int, float8, float8) IS
-'Stretches of a survey between two chainages (m), or of all of it, where leaks could be missed: first those that were not searched, then by chainage. state: not scanned (no points or no lining), not loaded, not searched, failed, interrupted, stale (searched before a change), unseen (5 m or more with less than half of the lining inspected), no intensity. searched: true if a result of a search exists. No rows: everything was searched, is up to date, and more than half was inspected.';
+'Stretches between two chainages (m) of a survey where leaks could be missed, and why; stretches that were not searched come first. state: not scanned (no points or no lining), not loaded, not searched, failed, interrupted, stale (something changed since the search), unseen (5 m or more with less than half of the lining inspected), no intensity. searched: true if the stretch has results of a search. No rows: everything was searched, is up to date, and more than half of the lining was inspected';
 
 
 CREATE OR REPLACE FUNCTION tunnel_internal.coverage_statements(survey_id int, starts float8[], ends float8[])
@@ -216,7 +216,7 @@ AS $$
     ORDER BY k.stretch
 $$;
 COMMENT ON FUNCTION tunnel_internal.coverage_statements(int, float8[], float8[]) IS
-'Statements of coverage_statement on several stretches of a survey, given by start and end (m); n: number of the stretch, from 1. No row for a stretch without a statement.';
+'Result of coverage_statement for several stretches of a survey, given by their beginnings and ends (m). n: number of the stretch, from 1. No row for a stretch without gaps';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.coverage_statement(
@@ -225,7 +225,7 @@ RETURNS text
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
 AS $$ SELECT s.said FROM tunnel_internal.coverage_statements($1, ARRAY[$2], ARRAY[$3]) s $$;
 COMMENT ON FUNCTION tunnel_api.coverage_statement(int, float8, float8) IS
-'What coverage_gaps has to say of a survey between two chainages (m), in words, six stretches of each kind at most; NULL if there is nothing. What every document says before it counts leaks.';
+'Result of coverage_gaps for a stretch of a survey (m) in words, at most six stretches of each kind; NULL if there are no gaps. Every document states it before it counts leaks';
 
 
 -- Numbered by name, too, so that a condition on it leaves the other surveys out.
@@ -241,10 +241,12 @@ SELECT s.id::bigint * 1000000 + row_number() OVER (PARTITION BY s.id, s.name) AS
                percentile_cont(0.98) WITHIN GROUP (ORDER BY t.arc[361]) AS arc_to
           FROM tunnel.section t WHERE t.survey_id = s.id) a;
 COMMENT ON VIEW tunnel_api.coverage_gap IS
-    'Where surveys cannot vouch for their lists of leaks, and why: see coverage_gaps; rectangles of the unrolled plane (chainage, arc), SRID 0';
+    'Stretches of surveys where leaks could be missed, and why (see coverage_gaps), as rectangles of the unrolled plane (chainage, arc), SRID 0';
 COMMENT ON COLUMN tunnel_api.coverage_gap.id IS 'Key, valid until something is loaded, run or edited';
 COMMENT ON COLUMN tunnel_api.coverage_gap.state IS 'not scanned, not loaded, not searched, failed, interrupted, stale, unseen or no intensity';
-COMMENT ON COLUMN tunnel_api.coverage_gap.reason IS 'Why';
-COMMENT ON COLUMN tunnel_api.coverage_gap.searched IS 'Whether the result of a search for leaks stands there nevertheless';
-COMMENT ON COLUMN tunnel_api.coverage_gap.seen_share IS 'Share of the lining that was seen, where that is little; else NULL';
-COMMENT ON COLUMN tunnel_api.coverage_gap.geom IS 'As high as the survey''s sections; NULL before it has any';
+COMMENT ON COLUMN tunnel_api.coverage_gap.reason IS 'Cause of the gap';
+COMMENT ON COLUMN tunnel_api.coverage_gap.searched IS 'True if the stretch has results of a search for leaks';
+COMMENT ON COLUMN tunnel_api.coverage_gap.seen_share IS
+    'Inspected share of the lining, where it is less than half; else NULL';
+COMMENT ON COLUMN tunnel_api.coverage_gap.geom IS
+    'Rectangle of the unrolled plane over the full width of the sections; NULL before the survey has sections';

@@ -76,7 +76,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.image_values(int, text, float8[], float8[]) IS
-'What an unrolled image holds at places (chainage, arc; m), in their order: of raw and corrected the intensity in dB, of offset and deviation_… m, of state the code of what the pixel shows; NULL where no point fell or there is no image. Reads each block of 50 m once. Needs the extension postgis_raster.';
+'Values of an unrolled image at places (chainage, arc; m), in their order: dB (raw, corrected), m (offset, deviation_…), or the code of the pixel''s state (state); NULL without a measurement or an image. Reads each block of 50 m once. Needs the extension postgis_raster';
 
 CREATE OR REPLACE FUNCTION tunnel_api.image_value(survey_id int, kind text, chainage float8, arc float8)
 RETURNS float8
@@ -85,7 +85,7 @@ AS $$
     SELECT v.value FROM tunnel_api.image_values($1, $2, ARRAY[$3], ARRAY[$4]) v
 $$;
 COMMENT ON FUNCTION tunnel_api.image_value(int, text, float8, float8) IS
-'What an unrolled image (raw, corrected, offset, state, deviation_lining, …) holds at one place (chainage, arc; m), as image_values, which is to be asked for many: a block of 50 m is read for each call.';
+'Value of an unrolled image (raw, corrected, offset, state, deviation_lining, …) at one place (chainage, arc; m). Each call reads a block of 50 m: for many places use image_values';
 
 
 -- Images lie in a partition for each survey. A plan for all surveys would open them all, each time: this one is made for the survey
@@ -104,4 +104,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.image_kilometres(int, text) IS
-    'Kilometres of a survey that have images of a kind: raw, corrected, offset, state, deviation_lining and so on';
+    'Kilometres of a survey that have images of a kind: raw, corrected, offset, state, deviation_lining, …';

@@ -21,7 +21,7 @@ AS $$
     ORDER BY l.distance
 $$;
 COMMENT ON FUNCTION tunnel_api.nearest_leaks(int, geometry, int) IS
-'The leaks, found last and not rejected, nearest to a point in the tunnel''s SRID, nearest first: distance along the lining from where the point stands over it (m), 0 on a leak; not across the seam in the middle of the floor, so that a leak beyond it is as far as over the crown. None where the point lies off the tunnel.';
+'Leaks nearest to a 3D point in the tunnel''s SRID, nearest first. Rejected leaks and leaks that the last detection did not find are left out. distance: along the lining, m, 0 on a leak, never across the seam in the middle of the floor. No rows if the point lies off the tunnel';
 
 
 -- Wet area of a stretch of a survey, m² on the lining: the leaks (of kind leak, after judging) that were found last and are
@@ -45,4 +45,4 @@ AS $$
     WHERE g.low < g.high AND tunnel_internal.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.wet_area(text, float8, float8) IS
-'Wet area (m² on the lining) of a survey between two chainages (m), of leaks found last and not rejected.';
+'Wet area (m² on the lining) of a survey between two chainages (m). Rejected leaks and leaks that the last detection did not find are left out';

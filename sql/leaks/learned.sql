@@ -8,15 +8,16 @@ LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_c
     SELECT max(m.id) FROM tunnel.learned_model m WHERE m.tunnel_id = $1 AND m.undone_at IS NULL
 $$;
 COMMENT ON FUNCTION tunnel_internal.learned_in_force(integer) IS
-    'Number of what the model of evidence learned from a tunnel''s reviews and is in force; NULL for none';
+    'Number of the adapted model of evidence in force for a tunnel; NULL if there is none';
 
 CREATE OR REPLACE VIEW tunnel_api.learned_model AS
 SELECT m.id, m.tunnel_id, t.name AS tunnel, m.id = tunnel_internal.learned_in_force(m.tunnel_id) AS in_force, m.base, m.way,
        m.parameters, m.surveys, m.reviews, m.loss_base, m.loss, m.note, m.applied_by, m.active_from, m.undone_by, m.undone_at
   FROM tunnel.learned_model m
   JOIN tunnel.tunnel t ON t.id = m.tunnel_id;
-COMMENT ON VIEW tunnel_api.learned_model IS 'What was learned of each tunnel from reviews (tunneldb learn), and what of it is in force';
-COMMENT ON COLUMN tunnel_api.learned_model.in_force IS 'True if stage detect uses it: the last of its tunnel that was not undone';
+COMMENT ON VIEW tunnel_api.learned_model IS 'Models of evidence that were adapted to a tunnel''s reviews (tunneldb learn)';
+COMMENT ON COLUMN tunnel_api.learned_model.in_force IS
+    'True if stage detect uses the model: the last of its tunnel that was not undone';
 
 -- Notes an edit of what was learned in the audit of each survey of a tunnel.
 CREATE OR REPLACE FUNCTION tunnel_internal.note_learned(tunnel_id integer, id integer, before jsonb, after jsonb) RETURNS void
@@ -24,7 +25,7 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp AS $
     SELECT tunnel_internal.note_edit(s.name, 'learned_model', $2, $3, $4) FROM tunnel.survey s WHERE s.tunnel_id = $1 ORDER BY s.id
 $$;
 COMMENT ON FUNCTION tunnel_internal.note_learned(integer, integer, jsonb, jsonb) IS
-    'Writes into the audit what was learned or undone, once for each survey of the tunnel; called by no role';
+    'Write an entry of the audit for each survey of a tunnel whose model of evidence was adapted or reset. Only other functions call it';
 
 -- Puts in force what was learned; returns its number.
 CREATE OR REPLACE FUNCTION tunnel_internal.learned_apply(tunnel_id integer, base text, way text, parameters jsonb, surveys text[],
@@ -43,7 +44,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.learned_apply(integer, text, text, jsonb, text[], jsonb, double precision, double precision, text) IS
-    'Puts in force what was learned from reviews for a tunnel, and notes it in the audit; returns its number';
+    'Put an adapted model of evidence in force for a tunnel, write it to the audit, and return its number';
 
 -- Takes back what is in force; what was in force before it is again. Returns its number; NULL when nothing was in force.
 CREATE OR REPLACE FUNCTION tunnel_internal.learned_undo(tunnel_id integer) RETURNS integer
@@ -62,4 +63,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.learned_undo(integer) IS
-    'Takes back what was last learned for a tunnel, and notes it in the audit; returns its number, NULL when there is nothing';
+    'Undo the last adaptation of a tunnel''s model of evidence, write it to the audit, and return its number; NULL if there is none';

@@ -10,12 +10,12 @@ SELECT c.id, c.wet_ratio, c.patch_area, c.patches_per_100, c.description
     (3, NULL, 0.3, 7, 'Few leaks, no running water'),
     (4, NULL, NULL, NULL, 'Leaks, no running water')) AS c (id, wet_ratio, patch_area, patches_per_100, description);
 COMMENT ON VIEW tunnel_api.waterproof_limit IS
-    'Classes of waterproofing (GB 50108-2008, table 3.2.1) with those limits that a scan can check. The volumes of water that the standard limits as well, in L/(m² d), it cannot';
-COMMENT ON COLUMN tunnel_api.waterproof_limit.id IS 'Class, 1 the driest';
-COMMENT ON COLUMN tunnel_api.waterproof_limit.wet_ratio IS 'Greatest wet area, of the lining';
-COMMENT ON COLUMN tunnel_api.waterproof_limit.patch_area IS 'Greatest area of a patch, m²';
-COMMENT ON COLUMN tunnel_api.waterproof_limit.patches_per_100 IS 'Most patches in any 100 m² of lining';
-COMMENT ON COLUMN tunnel_api.waterproof_limit.description IS 'What the class allows';
+    'Classes of waterproofing (GB 50108-2008, table 3.2.1) with the limits that a scan can check. The limits of water volume, L/(m² d), are not among them';
+COMMENT ON COLUMN tunnel_api.waterproof_limit.id IS 'Class; 1 is the driest';
+COMMENT ON COLUMN tunnel_api.waterproof_limit.wet_ratio IS 'Largest permitted wet area, as a share of the lining';
+COMMENT ON COLUMN tunnel_api.waterproof_limit.patch_area IS 'Largest permitted area of a leak, m²';
+COMMENT ON COLUMN tunnel_api.waterproof_limit.patches_per_100 IS 'Largest permitted number of leaks in any 100 m² of lining';
+COMMENT ON COLUMN tunnel_api.waterproof_limit.description IS 'Requirement of the class';
 
 
 -- Any 100 m² of lining, seen or not: a window slid along a stretch that has more. The lining up to a place takes the part of
@@ -99,7 +99,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.slide_window(float8[], float8[]) IS
-'Most leaks in a window of 100 m² slid along a stretch, where it then begins (NULL without leaks), and the greatest wet area in one; places (m² of lining) and turns (of wet area per m² of lining) as stretch_statistics makes them.';
+'Largest number of leaks in a window of 100 m² moved along a stretch, the beginning of that window (NULL without leaks), and the largest wet area in a window. places (m² of lining) and turns (wet area per m² of lining) are those of stretch_statistics';
 
 
 -- Statistics of stretches of a survey, given by where they begin, in growing order, and end; they do not overlap.
@@ -236,7 +236,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.stretch_statistics(int, float8[], float8[]) IS
-'Statistics of leaks over stretches of a survey that follow one another, as leak_statistics gives them of one.';
+'Result of leak_statistics for consecutive stretches of a survey';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.leak_statistics(survey text, chainage_from float8, chainage_to float8)
@@ -258,7 +258,7 @@ AS $$
     WHERE e.chainage_from IS NOT NULL AND r.low < r.high AND tunnel_internal.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.leak_statistics(text, float8, float8) IS
-'Leaks of a survey between two chainages (m), as far as it reaches; of kind leak, found last and not rejected. wet_ratio is wet_area over the inspected lining; lining_area and seen_area are those of the part that was searched for leaks, which makes up searched_share of the length; seen_share is the inspected share of the whole stretch; lining that was not searched counts as not inspected. patches and wet_area are NULL where nothing was searched and nothing is known. A leak that an end cuts counts by its part in wet_area and as one patch; largest_area and largest_leak take leaks whole. window_patches: most patches in any 100 m² of lining, here between window_from and window_to, and which; window_wet_area: greatest wet area in any 100 m² (m²). class: best class of GB 50108-2008 that the inspected lining meets, NULL if none was inspected.';
+'Statistics of leaks of a survey between two chainages (m), within the surveyed part. Counts leaks that the last detection found and nobody rejected. lining_area and seen_area: of the part searched for leaks, which makes up searched_share of the length. seen_share: inspected share of the lining of the whole stretch; what was not searched counts as not inspected. wet_ratio: wet_area / seen_area. patches and wet_area are NULL if nothing was searched. A leak across an end counts in part in wet_area and as one patch; largest_area and largest_leak use whole leaks. window_patches: largest number of leaks in any 100 m² of lining, between window_from and window_to; window_wet_area: largest wet area in any 100 m² (m²). class: best class of GB 50108-2008 that the inspected lining meets; NULL if nothing was inspected';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.waterproof_class(survey text, chainage_from float8, chainage_to float8)
@@ -318,7 +318,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.waterproof_class(text, float8, float8) IS
-'Classes of waterproofing (GB 50108-2008, table 3.2.1) that a survey meets between two chainages (m): one row a class, with the exceeded limits and the ids of the leaks that exceed them. Applies to the inspected lining, the share seen_share. holds is NULL if nothing was inspected and no limit is exceeded. A scan cannot measure volumes of water, which the standard also limits.';
+'Classes of waterproofing (GB 50108-2008, table 3.2.1) of a survey between two chainages (m), one row for each class. holds: true if the inspected lining meets the class; NULL if nothing was inspected and no limit is exceeded. breaks: exceeded limits; leaks: ids of the leaks that exceed them. seen_share: inspected share of the lining; the rest cannot be certified. Limits of water volume cannot be checked with a scan';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.ring_statistics(
@@ -375,4 +375,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.ring_statistics(text, float8, float8, float8, float8) IS
-'Statistics of leaks, as leak_statistics gives them, for each ring of a segmental lining: rings of ring_length (m) from first_chainage on, where the first begins, to the end of the survey; of those only the ones that reach into a stretch, if one is given. label: station at which the ring begins, in growing chainage. A leak over several rings counts in each.';
+'Statistics of leaks (see leak_statistics) for each ring of a segmental lining: rings of ring_length (m) from first_chainage (m, beginning of ring 1) to the end of the survey, or only those in a stretch. label: station of the beginning of the ring. A leak across several rings counts in each';

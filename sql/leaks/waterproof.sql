@@ -29,19 +29,23 @@ SELECT s.id::bigint * 1000000 + 500000 + k.km AS id, s.id AS survey_id, s.name A
           FROM tunnel_internal.stretch_statistics(s.id, ARRAY[k.chainage_from], ARRAY[k.chainage_to]) f
          WHERE w.id IS NULL) t;
 COMMENT ON VIEW tunnel_api.km_waterproof IS
-    'Waterproofing of each kilometre by GB 50108-2008, as far as a scan can tell: see leak_statistics and waterproof_class';
-COMMENT ON COLUMN tunnel_api.km_waterproof.lining_area IS 'Lining, seen or not, m²';
-COMMENT ON COLUMN tunnel_api.km_waterproof.seen_share IS 'Share of it that was seen: the rest cannot be certified';
-COMMENT ON COLUMN tunnel_api.km_waterproof.wet_area IS 'Area of the leaks within the kilometre, m²; a leak over its end by its part';
-COMMENT ON COLUMN tunnel_api.km_waterproof.wet_ratio IS 'wet_area, of the lining seen';
-COMMENT ON COLUMN tunnel_api.km_waterproof.patches IS 'Leaks in the kilometre or over its ends; NULL where they were not searched for';
-COMMENT ON COLUMN tunnel_api.km_waterproof.largest_area IS 'Area of the largest of them, whole, m²';
-COMMENT ON COLUMN tunnel_api.km_waterproof.largest_leak IS 'Its id';
-COMMENT ON COLUMN tunnel_api.km_waterproof.window_patches IS 'Most leaks in any 100 m² of lining';
-COMMENT ON COLUMN tunnel_api.km_waterproof.window_from IS 'Where those 100 m² begin, m';
-COMMENT ON COLUMN tunnel_api.km_waterproof.window_to IS 'Where they end, m';
-COMMENT ON COLUMN tunnel_api.km_waterproof.window_wet_area IS 'Greatest wet area in any 100 m² of lining, m²';
-COMMENT ON COLUMN tunnel_api.km_waterproof.class IS 'Best class that the lining seen keeps; NULL if none was seen';
+    'Waterproofing of each kilometre by GB 50108-2008, as far as a scan can check it: see leak_statistics and waterproof_class';
+COMMENT ON COLUMN tunnel_api.km_waterproof.lining_area IS 'Lining, inspected or not, m²';
+COMMENT ON COLUMN tunnel_api.km_waterproof.seen_share IS 'Inspected share of the lining; the rest cannot be certified';
+COMMENT ON COLUMN tunnel_api.km_waterproof.wet_area IS
+    'Area of the leaks within the kilometre, m²; a leak across a kilometre boundary counts in part';
+COMMENT ON COLUMN tunnel_api.km_waterproof.wet_ratio IS 'wet_area / inspected lining';
+COMMENT ON COLUMN tunnel_api.km_waterproof.patches IS
+    'Number of leaks in the kilometre or across its boundaries; NULL if it was not searched';
+COMMENT ON COLUMN tunnel_api.km_waterproof.largest_area IS
+    'Area of the largest leak, including parts beyond the kilometre, m²';
+COMMENT ON COLUMN tunnel_api.km_waterproof.largest_leak IS 'Id of the largest leak';
+COMMENT ON COLUMN tunnel_api.km_waterproof.window_patches IS 'Largest number of leaks in any 100 m² of lining';
+COMMENT ON COLUMN tunnel_api.km_waterproof.window_from IS 'Chainage at which those 100 m² begin, m';
+COMMENT ON COLUMN tunnel_api.km_waterproof.window_to IS 'Chainage at which those 100 m² end, m';
+COMMENT ON COLUMN tunnel_api.km_waterproof.window_wet_area IS 'Largest wet area in any 100 m² of lining, m²';
+COMMENT ON COLUMN tunnel_api.km_waterproof.class IS
+    'Best class that the inspected lining meets; NULL if nothing was inspected';
 
 -- Works out a kilometre anew and keeps it, in place of what was noted and kept. What goes wrong is said, but is no reason to
 -- refuse the change that brought it about. One that has no segments, or whose segments reach beyond the kilometre's ends (leaks
@@ -81,7 +85,7 @@ EXCEPTION
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.keep_waterproof(int, int) IS
-'Keeps the statistics of a kilometre, for view km_waterproof to be quick; it is right without that, too. Called at the end of each transaction that changes leaks or coverage, and by tunneldb init.';
+'Store the statistics of a kilometre so that the view km_waterproof is fast; the view is correct without it. Called at the end of each transaction that changes leaks or coverage, and by tunneldb init';
 
 -- At the end of a transaction, once a kilometre: the first call takes the notes of the others away. Under a stricter isolation
 -- than read committed it would make transactions fail that only look at each other's kilometres, so there nothing is kept.
@@ -97,7 +101,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.keep_at_commit() IS
-    'Trigger of tunnel.waterproof: keeps the statistics of a kilometre in which something was changed';
+    'Trigger of tunnel.waterproof: store the statistics of a changed kilometre';
 
 DROP TRIGGER IF EXISTS keep ON tunnel.waterproof;
 CREATE CONSTRAINT TRIGGER keep AFTER INSERT ON tunnel.waterproof DEFERRABLE INITIALLY DEFERRED
@@ -119,4 +123,4 @@ AS $$
      ORDER BY k.km
 $$;
 COMMENT ON FUNCTION tunnel_internal.waterproof_unkept(int) IS
-'Kilometres of a survey whose statistics are not kept, or not as they are now: the view km_waterproof works them out each time it is asked. tunneldb init keeps them.';
+'Kilometres of a survey whose statistics are not stored or out of date; the view km_waterproof computes them at each query. tunneldb init stores them';

@@ -12,10 +12,11 @@ SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_surve
   JOIN tunnel.survey s ON s.id = c.survey_id
   JOIN tunnel.survey o ON o.id = c.old_survey_id;
 COMMENT ON VIEW tunnel_api.change_section IS
-    'Motion of sections of lining between two surveys as a whole (only control points can separate registration error from movement), and the remaining change';
+    'Rigid motion of lining sections between two surveys, and the change that remains. Only control points can separate registration error from movement';
 COMMENT ON COLUMN tunnel_api.change_section.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.change_section.old_survey IS 'Name of the survey that it is compared with';
-COMMENT ON COLUMN tunnel_api.change_section.unseen IS 'Lining that the older survey saw and the newer one did not, m²: nothing is known of its change';
+COMMENT ON COLUMN tunnel_api.change_section.unseen IS
+    'Lining that the older survey inspected and the newer one did not, m²; its change is unknown';
 
 CREATE OR REPLACE VIEW tunnel_api.change_region AS
 SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_survey, c.km, c.chainage_from, c.chainage_to,
@@ -26,7 +27,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_surve
   JOIN tunnel.survey s ON s.id = c.survey_id
   JOIN tunnel.survey o ON o.id = c.old_survey_id;
 COMMENT ON VIEW tunnel_api.change_region IS
-    'Lining that changed significantly between two surveys, without the rigid motion of its section, with three geometries';
+    'Areas of lining that changed significantly between two surveys, after removal of the rigid motion of the section, with three geometries';
 
 CREATE OR REPLACE VIEW tunnel_api.leak_change AS
 SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_survey, c.km, c.state, c.chainage_from, c.chainage_to,
@@ -39,9 +40,9 @@ SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_surve
   JOIN tunnel.survey s ON s.id = c.survey_id
   JOIN tunnel.survey o ON o.id = c.old_survey_id;
 COMMENT ON VIEW tunnel_api.leak_change IS
-    'Changes of leaks between two surveys, with area before and after and three geometries; a leak not inspected by one survey is unseen, never new or dry';
-COMMENT ON COLUMN tunnel_api.leak_change.area_change IS 'Wet area in the newer survey less that in the older, m²';
-COMMENT ON COLUMN tunnel_api.leak_change.area_change_se IS 'Its standard error by resolution and threshold, m²';
+    'Change of leaks between two surveys: state, area before and after, three geometries. What one survey did not inspect is unseen, never new or dry';
+COMMENT ON COLUMN tunnel_api.leak_change.area_change IS 'Wet area of the newer survey minus that of the older one, m²';
+COMMENT ON COLUMN tunnel_api.leak_change.area_change_se IS 'Standard error of area_change from resolution and threshold, m²';
 
 DO $$
 DECLARE
@@ -79,7 +80,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
        AND NOT a.superseded AND (a.wet OR a.kind IN ('leak', 'joint', 'dark')) AND tunnel_internal.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_internal.leaks_checksum(int, float8, float8) IS
-    'Checksum of the leaks, joints and dry dark areas that count between two chainages (m); changes when one is reviewed, drawn or detected; NULL without any';
+    'Checksum of the counted leaks, joints and dark areas between two chainages (m); changes with each review, drawing or detection. NULL if there are none';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.compare_inputs(survey_id int, km int, subject text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
@@ -90,7 +91,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
                'leaks_new', tunnel_internal.leaks_checksum($1, $2 * 1000 - 100, ($2 + 1) * 1000 + 100))
 $$;
 COMMENT ON FUNCTION tunnel_internal.compare_inputs(int, int, text) IS
-    'What the change of a kilometre from an older survey to this one is made from: the runs of stage detect, and checksums of the leaks of both';
+    'Inputs of the comparison of a kilometre with an older survey: runs of stage detect and checksums of the leaks of both';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.compare_places(survey_id int, of_subject text DEFAULT NULL)
 RETURNS TABLE (km int, subject text, present boolean, reason text)
@@ -115,7 +116,7 @@ SET search_path = pg_catalog, pg_temp SET jit = off AS $$
      WHERE NOT EXISTS (SELECT FROM seen k WHERE k.id = p.id AND k.km = c.km)
 $$;
 COMMENT ON FUNCTION tunnel_internal.compare_places(int, text) IS
-    'Kilometres that this survey and an older one inspected, or that have a stored comparison: with all compared surveys, or with the given one';
+    'Kilometres that a survey and an older one both inspected or that were compared: for all older surveys, or for a given one';
 
 CREATE OR REPLACE FUNCTION tunnel_api.change_stretches(old_survey text, new_survey text, step float8 DEFAULT 100)
 RETURNS TABLE (chainage_from float8, chainage_to float8, label text, compared float8, unseen float8, changed float8,
@@ -147,7 +148,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 250 SECURITY DEFINER SET search_pa
      ORDER BY s.k
 $$;
 COMMENT ON FUNCTION tunnel_api.change_stretches(text, text, float8) IS
-'Change between two surveys by stretches of so many metres: lining compared, and inspected by the older survey only (unseen), m²; area of significant change (changed), of it inwards and outwards, in so many regions; greatest shift of a section as a whole (m); wet area in each (m²). Lining that was not inspected is in no other column';
+'Change between two surveys in stretches of step metres: lining compared, and lining that only the older survey inspected (unseen), m²; area and number of significant changes, inwards and outwards; largest rigid shift of a section (m); wet area of each survey (m²). unseen is included in no other column';
 
 CREATE OR REPLACE FUNCTION tunnel_api.change_at(old_survey text, chainage float8, arc float8)
 RETURNS TABLE (survey text, date date, change float8, lod float8)
@@ -159,7 +160,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 10 SECURITY DEFINER SET search_pat
      ORDER BY s.date, s.name
 $$;
 COMMENT ON FUNCTION tunnel_api.change_at(text, float8, float8) IS
-'Change of the lining at a place (chainage and arc of the older survey, m) in each survey that was compared with it, by date: mean over the length of the section, m, positive inwards, without the section''s rigid motion; NULL if not inspected. lod: level of detection of a single cell there, m';
+'Change of the lining at a place (chainage and arc of the older survey, m) in each survey that was compared with it, by date: mean over the length of the section, m, positive inwards, without rigid motion; NULL if not inspected. lod: level of detection of a single cell, m';
 
 -- Nodes of a section lie at each whole degree from -180 to 180.
 CREATE OR REPLACE FUNCTION tunnel_internal.arc_at_clock(survey_id int, chainage float8, clock float8) RETURNS float8
@@ -172,7 +173,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
                           ORDER BY abs(c.chainage - $2) LIMIT 1) s
 $$;
 COMMENT ON FUNCTION tunnel_internal.arc_at_clock(int, float8, float8) IS
-'Arc (m from the crown) at a clock position (hours) of the section nearest to a chainage (m) of a survey; NULL where none lies within 10 m';
+'Arc (m from the crown) at a clock position (hours) of the section nearest to a chainage (m); NULL if no section lies within 10 m';
 
 CREATE OR REPLACE FUNCTION tunnel_api.convergence(old_survey text, chainage float8, clock_from float8 DEFAULT 9, clock_to float8 DEFAULT 3)
 RETURNS TABLE (survey text, date date, convergence float8)
@@ -186,7 +187,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 10 SECURITY DEFINER SET search_pat
 $$;
 
 COMMENT ON FUNCTION tunnel_api.convergence(text, float8, float8, float8) IS
-'By how much the chord between two clock positions, by default 9 and 3, became longer since the older survey, m, in each survey that was compared with it, by date; negative where the walls approach each other. The clock positions must lie opposite to each other: then the changes along both normals are those along the chord';
+'Change of the length of the chord between two clock positions (default 9 and 3) since the older survey, m, in each survey that was compared with it, by date; negative if the walls approach each other. The clock positions must be opposite each other';
 
 CREATE OR REPLACE FUNCTION tunnel_api.ring_series(tunnel text, chainage float8)
 RETURNS TABLE (survey text, date date, number int, label text, seen_share float8, radius float8, radius_se float8, ovality float8,
@@ -202,7 +203,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 10 SECURITY DEFINER SET search_pat
      ORDER BY s.date, s.name
 $$;
 COMMENT ON FUNCTION tunnel_api.ring_series(text, float8) IS
-'Shape of the ring at a chainage (m) in each survey of a tunnel whose rings are defined, by date: inspected share, mean radius (m), ovality as a share of the design diameter, clock position of the largest diameter (degrees), each with its standard error; NULL if not measured or unknown. Rings are those of each survey; their numbers can differ';
+'Shape of the ring at a chainage (m) in each survey of a tunnel with rings, by date: inspected share, mean radius (m), ovality as a share of the design diameter, clock position of the largest diameter (degrees), with standard errors; NULL if not measured. Ring numbers can differ between surveys';
 
 CREATE OR REPLACE FUNCTION tunnel_api.leak_area_series(tunnel text, step float8 DEFAULT 100)
 RETURNS TABLE (chainage_from float8, chainage_to float8, label text, survey text, date date, leaks bigint, area float8)
@@ -218,4 +219,4 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 1000 SECURITY DEFINER SET search_p
      ORDER BY q.k, q.date, q.name
 $$;
 COMMENT ON FUNCTION tunnel_api.leak_area_series(text, float8) IS
-'Wet area (m²) of each survey of a tunnel by stretches of so many metres, by date: leaks that count, where their middle lies. A stretch without a row of a survey has no leak in it, or was not seen: tunnel_api.coverage_gaps tells which';
+'Wet area (m²) of each survey of a tunnel in stretches of step metres, by date: counted leaks, at their middle. A stretch without a row has no leak or was not inspected (tunnel_api.coverage_gaps)';

@@ -10,9 +10,9 @@ COMMENT ON FUNCTION tunnel_internal.class_name(int) IS 'Name of a class of point
 CREATE OR REPLACE VIEW tunnel_api.gauge AS
 SELECT g.id, g.tunnel_id, t.name AS tunnel, g.name, g.outline, g.source, g.added_at
   FROM tunnel.gauge g JOIN tunnel.tunnel t ON t.id = g.tunnel_id;
-COMMENT ON VIEW tunnel_api.gauge IS 'Outlines that are to be clear about tracks or lanes';
+COMMENT ON VIEW tunnel_api.gauge IS 'Clearance outlines (gauges) around tracks or lanes';
 COMMENT ON COLUMN tunnel_api.gauge.outline IS
-    'Of each vertex: right of the track''s middle, above its running surface (m) and the bulge of what leads to the next';
+    'Vertices: distance to the right of the track''s centre and above its running surface (m), and bulge of the edge to the next vertex';
 COMMENT ON COLUMN tunnel_api.gauge.source IS 'File that it was read from';
 
 CREATE OR REPLACE VIEW tunnel_api.clearance_section AS
@@ -23,49 +23,61 @@ SELECT c.id, c.survey_id, s.name AS survey, c.km, c.gauge, c.track, c.chainage_f
        c.widened_right, c.roll, c.margins, c.outline, c.geom::public.geometry AS geom
   FROM tunnel.clearance_section c JOIN tunnel.survey s ON s.id = c.survey_id;
 COMMENT ON VIEW tunnel_api.clearance_section IS
-    'Least distance of what stands in the tunnel from an outline about a track, by metre; where seen_share is below 1, what was not seen may stand nearer';
-COMMENT ON COLUMN tunnel_api.clearance_section.gauge IS 'Name of the outline';
-COMMENT ON COLUMN tunnel_api.clearance_section.track IS 'single; left or right; of more than two their number from the left; given';
+    'Smallest distance of objects in the tunnel from a gauge, for each metre. Where seen_share is less than 1, an object that was not measured may be nearer';
+COMMENT ON COLUMN tunnel_api.clearance_section.gauge IS 'Name of the gauge';
+COMMENT ON COLUMN tunnel_api.clearance_section.track IS
+    'single; left or right; with more than two tracks, the number from the left; given';
 COMMENT ON COLUMN tunnel_api.clearance_section.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.clearance_section.margin IS 'Least distance, m, negative inside the outline; NULL where nothing was seen that counts';
-COMMENT ON COLUMN tunnel_api.clearance_section.margin_se IS 'Its standard error by that of the track''s axis and cant alone, m; 0 of a given track';
-COMMENT ON COLUMN tunnel_api.clearance_section.clock IS 'Direction of the point, degrees from straight above the outline''s middle to the right';
-COMMENT ON COLUMN tunnel_api.clearance_section.class IS 'Class: lining, niche, fixture (appendage), unassigned';
-COMMENT ON COLUMN tunnel_api.clearance_section.cluster_id IS 'Cluster that it lies in, if any';
-COMMENT ON COLUMN tunnel_api.clearance_section.seen_share IS 'Share of the directions, of 5° each, with a return of anything, 0 to 1';
-COMMENT ON COLUMN tunnel_api.clearance_section.points IS 'Points that count';
-COMMENT ON COLUMN tunnel_api.clearance_section.inside IS 'Of them inside the outline';
-COMMENT ON COLUMN tunnel_api.clearance_section.stray IS 'Points inside that are noise or without company: they do not count';
-COMMENT ON COLUMN tunnel_api.clearance_section.passing IS 'Points inside of objects and spheres, which may be gone: they do not count';
-COMMENT ON COLUMN tunnel_api.clearance_section.ground IS 'Points inside of ground and rails: they do not count';
-COMMENT ON COLUMN tunnel_api.clearance_section.track_right IS 'Middle of the track right of the given axis, m';
-COMMENT ON COLUMN tunnel_api.clearance_section.track_up IS 'Plane of the running surface above the given axis, m';
-COMMENT ON COLUMN tunnel_api.clearance_section.cant IS 'How much higher the left rail lies than the right one, m';
-COMMENT ON COLUMN tunnel_api.clearance_section.radius IS 'Of the track in plan, positive to the right, m; NULL where straight';
-COMMENT ON COLUMN tunnel_api.clearance_section.widened_left IS 'By how much the outline is wider on the left, without roll, m';
-COMMENT ON COLUMN tunnel_api.clearance_section.widened_right IS 'By how much it is wider on the right, m';
+COMMENT ON COLUMN tunnel_api.clearance_section.margin IS
+    'Smallest distance, m, negative inside the gauge; NULL if nothing relevant was measured';
+COMMENT ON COLUMN tunnel_api.clearance_section.margin_se IS
+    'Standard error of margin from the track''s axis and cant only, m; 0 for a given track';
+COMMENT ON COLUMN tunnel_api.clearance_section.clock IS
+    'Direction of the point, degrees clockwise from above the middle of the gauge';
+COMMENT ON COLUMN tunnel_api.clearance_section.class IS 'Class of the point: lining, niche, appendage, unassigned';
+COMMENT ON COLUMN tunnel_api.clearance_section.cluster_id IS 'Cluster of the point, if any';
+COMMENT ON COLUMN tunnel_api.clearance_section.seen_share IS
+    'Share of the directions, in classes of 5°, with any return, 0 to 1';
+COMMENT ON COLUMN tunnel_api.clearance_section.points IS 'Number of relevant points';
+COMMENT ON COLUMN tunnel_api.clearance_section.inside IS 'Number of relevant points inside the gauge';
+COMMENT ON COLUMN tunnel_api.clearance_section.stray IS 'Points inside that are noise or isolated; ignored';
+COMMENT ON COLUMN tunnel_api.clearance_section.passing IS
+    'Points inside on objects and spheres, which may be temporary; ignored';
+COMMENT ON COLUMN tunnel_api.clearance_section.ground IS 'Points inside on ground and rails; ignored';
+COMMENT ON COLUMN tunnel_api.clearance_section.track_right IS 'Centre of the track to the right of the given axis, m';
+COMMENT ON COLUMN tunnel_api.clearance_section.track_up IS 'Running surface above the given axis, m';
+COMMENT ON COLUMN tunnel_api.clearance_section.cant IS 'Height of the left rail above the right rail, m';
+COMMENT ON COLUMN tunnel_api.clearance_section.radius IS
+    'Radius of the track in plan, positive to the right, m; NULL if straight';
+COMMENT ON COLUMN tunnel_api.clearance_section.widened_left IS 'Widening of the gauge on the left, without roll, m';
+COMMENT ON COLUMN tunnel_api.clearance_section.widened_right IS 'Widening of the gauge on the right, without roll, m';
 COMMENT ON COLUMN tunnel_api.clearance_section.roll IS 'Roll of the vehicle, positive to the right, rad';
-COMMENT ON COLUMN tunnel_api.clearance_section.margins IS 'Least distance in each 5° by clock, from straight above to the right, m; NaN where nothing that counts was seen';
-COMMENT ON COLUMN tunnel_api.clearance_section.outline IS 'The outline widened, in the track''s frame, as in gauge';
-COMMENT ON COLUMN tunnel_api.clearance_section.geom IS 'The point with the least distance, in the tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.clearance_section.margins IS
+    'Smallest distance in each 5° clockwise from above, m; NaN if nothing relevant was measured';
+COMMENT ON COLUMN tunnel_api.clearance_section.outline IS 'Widened gauge in the track''s frame, as in the view gauge';
+COMMENT ON COLUMN tunnel_api.clearance_section.geom IS 'Point with the smallest distance, tunnel''s SRID';
 
 CREATE OR REPLACE VIEW tunnel_api.clearance_infringement AS
 SELECT i.id, i.survey_id, s.name AS survey, i.km, i.gauge, i.track, i.chainage_from, i.chainage_to,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (i.chainage_from + i.chainage_to) / 2) l) AS label, i.depth, i.clock, tunnel_internal.class_name(i.class) AS class,
        i.counts, i.cluster_id, i.points, i.unrolled, i.geom::public.geometry AS geom
   FROM tunnel.clearance_infringement i JOIN tunnel.survey s ON s.id = i.survey_id;
-COMMENT ON VIEW tunnel_api.clearance_infringement IS 'Groups of points inside an outline about a track, in pieces of 10 m at most';
-COMMENT ON COLUMN tunnel_api.clearance_infringement.gauge IS 'Name of the outline';
-COMMENT ON COLUMN tunnel_api.clearance_infringement.track IS 'single; left or right; of more than two their number from the left; given';
+COMMENT ON VIEW tunnel_api.clearance_infringement IS 'Groups of points inside a gauge, in pieces of at most 10 m';
+COMMENT ON COLUMN tunnel_api.clearance_infringement.gauge IS 'Name of the gauge';
+COMMENT ON COLUMN tunnel_api.clearance_infringement.track IS
+    'single; left or right; with more than two tracks, the number from the left; given';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.clearance_infringement.depth IS 'How deep it reaches in, m';
-COMMENT ON COLUMN tunnel_api.clearance_infringement.clock IS 'Direction of its deepest point, degrees from straight above the outline''s middle to the right';
-COMMENT ON COLUMN tunnel_api.clearance_infringement.class IS 'Class that causes it: lining, niche, fixture (appendage), object, sphere, unassigned';
-COMMENT ON COLUMN tunnel_api.clearance_infringement.counts IS 'False of objects and spheres, which may be gone';
-COMMENT ON COLUMN tunnel_api.clearance_infringement.cluster_id IS 'Cluster that its deepest point lies in, if any';
-COMMENT ON COLUMN tunnel_api.clearance_infringement.points IS 'How many points it has';
-COMMENT ON COLUMN tunnel_api.clearance_infringement.unrolled IS 'What it covers of the unrolled plane: chainage and arc, m; NULL where it does not unroll';
-COMMENT ON COLUMN tunnel_api.clearance_infringement.geom IS 'Its points, at most 200, deepest first, in the tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.clearance_infringement.depth IS 'Greatest depth inside the gauge, m';
+COMMENT ON COLUMN tunnel_api.clearance_infringement.clock IS
+    'Direction of the deepest point, degrees clockwise from above the middle of the gauge';
+COMMENT ON COLUMN tunnel_api.clearance_infringement.class IS
+    'Class of the points: lining, niche, appendage, object, sphere, unassigned';
+COMMENT ON COLUMN tunnel_api.clearance_infringement.counts IS 'False for objects and spheres, which may be temporary';
+COMMENT ON COLUMN tunnel_api.clearance_infringement.cluster_id IS 'Cluster of the deepest point, if any';
+COMMENT ON COLUMN tunnel_api.clearance_infringement.points IS 'Number of points';
+COMMENT ON COLUMN tunnel_api.clearance_infringement.unrolled IS
+    'Area covered in the unrolled plane (chainage, arc; m); NULL if it cannot be unrolled';
+COMMENT ON COLUMN tunnel_api.clearance_infringement.geom IS 'Points, at most 200, deepest first, tunnel''s SRID';
 
 -- The subject is a track and a gauge, whose name may hold spaces.
 CREATE OR REPLACE FUNCTION tunnel_internal.clearance_inputs(survey_id int, km int, subject text) RETURNS jsonb
@@ -77,7 +89,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
       FROM tunnel.survey s WHERE s.id = $1
 $$;
 COMMENT ON FUNCTION tunnel_internal.clearance_inputs(int, int, text) IS
-    'What the clearance of a kilometre is made from: the last run of stage ground there and beside, and a checksum of the outline';
+    'Inputs of the clearance of a kilometre: last runs of stage ground in it and its neighbours, and a checksum of the gauge';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.clearance_places(survey_id int, of_subject text DEFAULT NULL)
 RETURNS TABLE (km int, subject text, present boolean, reason text)
@@ -87,4 +99,4 @@ SET search_path = pg_catalog, pg_temp SET jit = off AS $$
       FROM tunnel_internal.last_runs($1, CASE WHEN $2 IS NULL THEN 'clearance' ELSE 'ground' END) r
 $$;
 COMMENT ON FUNCTION tunnel_internal.clearance_places(int, text) IS
-    'Kilometres, tracks and gauges that were measured; of a track and gauge given, kilometres whose points have classes';
+    'Kilometres, tracks and gauges that were measured; for a given track and gauge, kilometres whose points have classes';

@@ -25,8 +25,9 @@ SELECT c.id, c.survey_id, c.survey, c.km, c.gauge, c.track, c.chainage_from, c.c
                public.ST_MakePoint(a.x + (c.chainage_to - a.begin) * a.dx + r.aside * a.dy,
                                    a.y + (c.chainage_to - a.begin) * a.dy - r.aside * a.dx)), a.srid) AS geom) g
  WHERE g.geom IS NOT NULL;
-COMMENT ON VIEW tunnel_api.clearance_map IS 'Least distance from an outline by metre, along the middle of the track on the map';
-COMMENT ON COLUMN tunnel_api.clearance_map.geom IS 'A metre of the track in plan, tunnel''s SRID';
+COMMENT ON VIEW tunnel_api.clearance_map IS
+    'Smallest distance from a gauge for each metre, along the centre of the track on the map';
+COMMENT ON COLUMN tunnel_api.clearance_map.geom IS 'One metre of the track in plan, tunnel''s SRID';
 
 -- Beyond the lining's left end each outline and track has a row of its own, from the lining outwards.
 CREATE OR REPLACE VIEW tunnel_api.clearance_unrolled AS
@@ -44,20 +45,20 @@ SELECT c.id, c.survey_id, s.name AS survey, c.km, c.gauge, c.track, c.chainage_f
       FROM (SELECT DISTINCT q.gauge, q.track FROM tunnel.clearance_section q WHERE q.survey_id = s.id) d) r
   JOIN tunnel_api.clearance_section c ON c.survey_id = s.id AND c.gauge = r.gauge AND c.track = r.track;
 COMMENT ON VIEW tunnel_api.clearance_unrolled IS
-    'Least distance from an outline by metre, in a row for each outline and track beside the unrolled lining';
+    'Smallest distance from a gauge for each metre, in one strip for each gauge and track below the unrolled lining';
 COMMENT ON COLUMN tunnel_api.clearance_unrolled.geom IS 'In the unrolled plane (chainage, arc), m, below the lining''s left end';
 
 CREATE OR REPLACE VIEW tunnel_api.clearance_infringement_3d AS
 SELECT i.id, i.survey_id, i.survey, i.km, i.gauge, i.track, i.chainage_from, i.chainage_to, i.label, i.depth, i.clock, i.class,
        i.counts, i.cluster_id, i.points, i.geom
   FROM tunnel_api.clearance_infringement i;
-COMMENT ON VIEW tunnel_api.clearance_infringement_3d IS 'Groups of points inside an outline about a track, in space';
-COMMENT ON COLUMN tunnel_api.clearance_infringement_3d.geom IS 'Its points, at most 200, deepest first, in the tunnel''s SRID';
+COMMENT ON VIEW tunnel_api.clearance_infringement_3d IS 'Groups of points inside a gauge, in space';
+COMMENT ON COLUMN tunnel_api.clearance_infringement_3d.geom IS 'Points, at most 200, deepest first, tunnel''s SRID';
 
 CREATE OR REPLACE VIEW tunnel_api.clearance_infringement_unrolled AS
 SELECT i.id, i.survey_id, i.survey, i.km, i.gauge, i.track, i.chainage_from, i.chainage_to, i.label, i.depth, i.clock, i.class,
        i.counts, i.cluster_id, i.points, i.unrolled AS geom
   FROM tunnel_api.clearance_infringement i WHERE i.unrolled IS NOT NULL;
 COMMENT ON VIEW tunnel_api.clearance_infringement_unrolled IS
-    'What groups of points inside an outline about a track cover of the unrolled lining; those that stand off it are not here';
+    'Areas of the unrolled lining covered by points inside a gauge. Objects away from the lining are not included';
 COMMENT ON COLUMN tunnel_api.clearance_infringement_unrolled.geom IS 'In the unrolled plane (chainage, arc), m';

@@ -11,12 +11,12 @@ SELECT p.id, p.tunnel_id, t.name AS tunnel, p.layer, p.name, p.chainage_from, p.
   FROM tunnel.design_profile p
   JOIN tunnel.tunnel t ON t.id = p.tunnel_id;
 COMMENT ON VIEW tunnel_api.design_profile IS
-    'Design profiles of tunnels, by layer and chainage of the given axis; between two of a layer the one goes over into the other linearly';
+    'Design profiles of tunnels, by layer and chainage of the given axis; interpolated linearly between two of a layer';
 COMMENT ON COLUMN tunnel_api.design_profile.layer IS 'lining, shotcrete or excavation';
-COMMENT ON COLUMN tunnel_api.design_profile.elements IS 'Lines and arcs';
-COMMENT ON COLUMN tunnel_api.design_profile.closed IS 'Whether it ends where it begins; one that does not has no floor';
+COMMENT ON COLUMN tunnel_api.design_profile.elements IS 'Number of lines and arcs';
+COMMENT ON COLUMN tunnel_api.design_profile.closed IS 'True if it ends where it begins; an open profile has no floor';
 COMMENT ON COLUMN tunnel_api.design_profile.outline IS
-    'Of each vertex: right of the axis, above it (m) and the bulge of what leads to the next; clockwise looking up-chainage';
+    'Vertices: to the right of the axis and above it (m), and bulge of the edge to the next vertex; clockwise looking up-chainage';
 COMMENT ON COLUMN tunnel_api.design_profile.source IS 'File that it was read from';
 
 CREATE OR REPLACE VIEW tunnel_api.design_profile_element AS
@@ -34,13 +34,14 @@ COMMENT ON VIEW tunnel_api.design_profile_element IS 'Lines and arcs of design p
 COMMENT ON COLUMN tunnel_api.design_profile_element.profile_id IS 'Key of the profile';
 COMMENT ON COLUMN tunnel_api.design_profile_element.layer IS 'lining, shotcrete or excavation';
 COMMENT ON COLUMN tunnel_api.design_profile_element.name IS 'Name of the profile';
-COMMENT ON COLUMN tunnel_api.design_profile_element.right_from IS 'Where it begins, right of the axis, m';
-COMMENT ON COLUMN tunnel_api.design_profile_element.up_from IS 'Where it begins, above the axis, m';
-COMMENT ON COLUMN tunnel_api.design_profile_element.right_to IS 'Where it ends, right of the axis, m';
-COMMENT ON COLUMN tunnel_api.design_profile_element.up_to IS 'Where it ends, above the axis, m';
-COMMENT ON COLUMN tunnel_api.design_profile_element.number IS 'Along the profile, from 1';
+COMMENT ON COLUMN tunnel_api.design_profile_element.right_from IS 'Beginning, to the right of the axis, m';
+COMMENT ON COLUMN tunnel_api.design_profile_element.up_from IS 'Beginning, above the axis, m';
+COMMENT ON COLUMN tunnel_api.design_profile_element.right_to IS 'End, to the right of the axis, m';
+COMMENT ON COLUMN tunnel_api.design_profile_element.up_to IS 'End, above the axis, m';
+COMMENT ON COLUMN tunnel_api.design_profile_element.number IS 'Number along the profile, from 1';
 COMMENT ON COLUMN tunnel_api.design_profile_element.kind IS 'line or arc';
-COMMENT ON COLUMN tunnel_api.design_profile_element.radius IS 'Of an arc, positive where it bulges outwards, m; NULL of a line';
+COMMENT ON COLUMN tunnel_api.design_profile_element.radius IS
+    'Radius of an arc, positive if convex outwards, m; NULL for a line';
 COMMENT ON COLUMN tunnel_api.design_profile_element.length IS 'Length, m';
 
 CREATE OR REPLACE VIEW tunnel_api.deviation_section AS
@@ -52,29 +53,36 @@ SELECT d.id, d.survey_id, s.name AS survey, d.km, d.layer, d.profile, d.chainage
   FROM tunnel.deviation_section d
   JOIN tunnel.survey s ON s.id = d.survey_id;
 COMMENT ON VIEW tunnel_api.deviation_section IS
-    'Lining against its design profile, in steps of 1 m of chainage; what is not seen is in no area, and in seen_share';
+    'Deviation of the lining from its design profile, for each metre of chainage. Lining that was not inspected is in no area; see seen_share';
 COMMENT ON COLUMN tunnel_api.deviation_section.layer IS 'Layer of the profile';
-COMMENT ON COLUMN tunnel_api.deviation_section.profile IS 'Its name; of a transition both';
+COMMENT ON COLUMN tunnel_api.deviation_section.profile IS 'Name of the profile; in a transition, both names';
 COMMENT ON COLUMN tunnel_api.deviation_section.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.deviation_section.design_length IS 'Length of the profile, m';
-COMMENT ON COLUMN tunnel_api.deviation_section.seen_length IS 'What of that was seen, m';
-COMMENT ON COLUMN tunnel_api.deviation_section.seen_share IS 'The same as a share, 0 to 1';
-COMMENT ON COLUMN tunnel_api.deviation_section.overbreak IS 'Area outside the profile, of what was seen, m²';
-COMMENT ON COLUMN tunnel_api.deviation_section.underbreak IS 'Area inside the profile, of what was seen, m²';
-COMMENT ON COLUMN tunnel_api.deviation_section.noise_area IS 'Standard deviation of underbreak less overbreak by the scatter of pixels, m²';
-COMMENT ON COLUMN tunnel_api.deviation_section.over_right IS 'By how much overbreak grows when the axis moves to the right, m² for 1 m';
-COMMENT ON COLUMN tunnel_api.deviation_section.over_up IS 'By how much overbreak grows when the axis moves up, m² for 1 m';
-COMMENT ON COLUMN tunnel_api.deviation_section.under_right IS 'By how much underbreak grows when the axis moves to the right, m² for 1 m';
-COMMENT ON COLUMN tunnel_api.deviation_section.under_up IS 'By how much underbreak grows when the axis moves up, m² for 1 m';
-COMMENT ON COLUMN tunnel_api.deviation_section.sigma IS 'Scatter of pixels within cells: noise, and texture of the lining, m';
+COMMENT ON COLUMN tunnel_api.deviation_section.seen_length IS 'Inspected length of the profile, m';
+COMMENT ON COLUMN tunnel_api.deviation_section.seen_share IS 'Inspected share of the profile, 0 to 1';
+COMMENT ON COLUMN tunnel_api.deviation_section.overbreak IS 'Inspected area outside the profile, m²';
+COMMENT ON COLUMN tunnel_api.deviation_section.underbreak IS 'Inspected area inside the profile, m²';
+COMMENT ON COLUMN tunnel_api.deviation_section.noise_area IS
+    'Standard deviation of underbreak minus overbreak from the scatter of pixels, m²';
+COMMENT ON COLUMN tunnel_api.deviation_section.over_right IS
+    'Increase of overbreak if the axis moves to the right, m² for 1 m';
+COMMENT ON COLUMN tunnel_api.deviation_section.over_up IS 'Increase of overbreak if the axis moves up, m² for 1 m';
+COMMENT ON COLUMN tunnel_api.deviation_section.under_right IS
+    'Increase of underbreak if the axis moves to the right, m² for 1 m';
+COMMENT ON COLUMN tunnel_api.deviation_section.under_up IS 'Increase of underbreak if the axis moves up, m² for 1 m';
+COMMENT ON COLUMN tunnel_api.deviation_section.sigma IS
+    'Scatter of pixels within cells (noise and texture of the lining), m';
 COMMENT ON COLUMN tunnel_api.deviation_section.deviation_mean IS 'Mean deviation, positive inside the profile, m';
-COMMENT ON COLUMN tunnel_api.deviation_section.deviation_least IS 'Least mean of a cell, m: the deepest overbreak';
-COMMENT ON COLUMN tunnel_api.deviation_section.least_at IS 'How far along the profile that is, from its left foot or lowest place clockwise, m';
-COMMENT ON COLUMN tunnel_api.deviation_section.deviation_greatest IS 'Greatest mean of a cell, m: what stands in most';
-COMMENT ON COLUMN tunnel_api.deviation_section.greatest_at IS 'How far along the profile that is, m';
-COMMENT ON COLUMN tunnel_api.deviation_section.shift_right IS 'Displacement of the whole lining to the right of the profile, m: an error of the axis or of the lining';
-COMMENT ON COLUMN tunnel_api.deviation_section.shift_up IS 'How far it lies above it, m';
-COMMENT ON COLUMN tunnel_api.deviation_section.deviation IS 'Mean deviation of cells of equal length along the profile, m, positive inside; NaN: not inspected';
+COMMENT ON COLUMN tunnel_api.deviation_section.deviation_least IS 'Smallest mean of a cell, m: deepest overbreak';
+COMMENT ON COLUMN tunnel_api.deviation_section.least_at IS
+    'Distance of that cell along the profile, clockwise from its left foot or lowest point, m';
+COMMENT ON COLUMN tunnel_api.deviation_section.deviation_greatest IS 'Greatest mean of a cell, m: deepest underbreak';
+COMMENT ON COLUMN tunnel_api.deviation_section.greatest_at IS 'Distance of that cell along the profile, m';
+COMMENT ON COLUMN tunnel_api.deviation_section.shift_right IS
+    'Shift of the lining as a whole to the right of the profile, m: error of the axis or of the lining, which cannot be separated';
+COMMENT ON COLUMN tunnel_api.deviation_section.shift_up IS 'Shift of the lining as a whole above the profile, m';
+COMMENT ON COLUMN tunnel_api.deviation_section.deviation IS
+    'Mean deviation of cells of equal length along the profile, m, positive inside; NaN if not inspected';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.deviation_inputs(survey_id int, km int, subject text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
@@ -91,7 +99,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
       FROM tunnel.survey s WHERE s.id = $1
 $$;
 COMMENT ON FUNCTION tunnel_internal.deviation_inputs(int, int, text) IS
-    'What the deviation from a layer in a kilometre is made from: the run of stage detect, and a checksum of the profiles there and next to it';
+    'Inputs of the deviation of a kilometre from a layer: run of stage detect, and a checksum of the profiles in and next to it';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.deviation_places(survey_id int, of_subject text DEFAULT NULL)
 RETURNS TABLE (km int, subject text, present boolean, reason text)
@@ -126,7 +134,7 @@ SET search_path = pg_catalog, pg_temp SET jit = off AS $$
      WHERE $2 IS NULL OR d.layer = $2
 $$;
 COMMENT ON FUNCTION tunnel_internal.deviation_places(int, text) IS
-    'Kilometres with an offset image, and each layer with a profile or sections there';
+    'Kilometres with an offset image, and each layer with a profile or sections in them';
 
 -- Steps that an end of the stretch cuts count by their share.
 CREATE OR REPLACE FUNCTION tunnel_api.deviation_volume(
@@ -154,7 +162,7 @@ AS $$
         HAVING count(*) > 0) d
 $$;
 COMMENT ON FUNCTION tunnel_api.deviation_volume(text, text, float8, float8, float8) IS
-'Overbreak and underbreak of a survey from a layer''s design between two chainages (m), m³, of the inspected lining: area of each section times its length along the axis. length (m) and design_area (m²) of the compared part; seen_share of the whole stretch; the rest counts as not inspected. overbreak_sigma and underbreak_sigma: standard deviations from the scatter of pixels and from an axis accuracy of axis_sigma (m) to the right and up, constant along the stretch.';
+'Overbreak and underbreak of a survey from a layer''s design between two chainages (m), m³, of the inspected lining: area of each section times its length along the axis. length (m) and design_area (m²) of the compared part; seen_share of the whole stretch, in which what was not compared counts as not inspected. overbreak_sigma and underbreak_sigma: standard deviations from the scatter of pixels and from an axis uncertain by axis_sigma (m) to the right and up, alike along the whole stretch';
 
 CREATE OR REPLACE FUNCTION tunnel_api.deviation_stretches(survey text, layer text, step float8 DEFAULT 100, axis_sigma float8 DEFAULT 0)
 RETURNS TABLE (chainage_from float8, chainage_to float8, label text, length float8, design_area float8, seen_area float8,
@@ -183,4 +191,4 @@ AS $$
          GROUP BY n) w
 $$;
 COMMENT ON FUNCTION tunnel_api.deviation_stretches(text, text, float8, float8) IS
-'deviation_volume of each stretch of so many metres, 1 or more, that a survey has, from whole multiples of them on: m³ by 100 m, by default';
+'deviation_volume of each stretch of step metres (1 or more) of a survey, from whole multiples of step on. Default: m³ for each 100 m';

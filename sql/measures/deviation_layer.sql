@@ -18,14 +18,14 @@ SELECT d.id * 2 + b.side AS id, d.survey_id, s.name AS survey, d.km, d.layer, d.
     VALUES (0, 'overbreak', d.overbreak, a.low, a.low - d.overbreak),
            (1, 'underbreak', d.underbreak, a.high, a.high + d.underbreak)) AS b (side, kind, area, foot, top);
 COMMENT ON VIEW tunnel_api.deviation_bar IS
-    'Over- and underbreak of each metre as bars beside the unrolled lining: overbreak below its left edge, underbreak above its right one, 1 m for each m²';
+    'Overbreak and underbreak of each metre as bars beside the unrolled lining: overbreak below its left edge, underbreak above its right edge, 1 m for each m²';
 COMMENT ON COLUMN tunnel_api.deviation_bar.layer IS 'Layer of the profile';
-COMMENT ON COLUMN tunnel_api.deviation_bar.profile IS 'Its name; of a transition both';
+COMMENT ON COLUMN tunnel_api.deviation_bar.profile IS 'Name of the profile; in a transition, both names';
 COMMENT ON COLUMN tunnel_api.deviation_bar.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.deviation_bar.kind IS 'overbreak or underbreak';
-COMMENT ON COLUMN tunnel_api.deviation_bar.area IS 'Of the section, of what was seen, m²';
-COMMENT ON COLUMN tunnel_api.deviation_bar.volume IS 'Of its length of the tunnel, m³';
-COMMENT ON COLUMN tunnel_api.deviation_bar.seen_share IS 'What of the profile was seen, 0 to 1';
+COMMENT ON COLUMN tunnel_api.deviation_bar.area IS 'Area of the section, inspected part, m²';
+COMMENT ON COLUMN tunnel_api.deviation_bar.volume IS 'Volume over its length of tunnel, m³';
+COMMENT ON COLUMN tunnel_api.deviation_bar.seen_share IS 'Inspected share of the profile, 0 to 1';
 COMMENT ON COLUMN tunnel_api.deviation_bar.geom IS 'In the unrolled plane (chainage, arc), m';
 
 CREATE OR REPLACE VIEW tunnel_api.deviation_map AS
@@ -46,11 +46,11 @@ SELECT g.id * 10 + v.place AS id, g.survey_id, s.name AS survey, g.km,
        AND d.chainage_from >= g.chainage_from - 0.5 AND d.chainage_from < g.chainage_to - 0.5
     HAVING count(*) > 0) w;
 COMMENT ON VIEW tunnel_api.deviation_map IS
-    'Over- and underbreak by segment, on the axis: means of the sections that have their middle in it';
+    'Overbreak and underbreak of each segment on the axis: means of the sections with their middle in it';
 COMMENT ON COLUMN tunnel_api.deviation_map.layer IS 'Layer of the profile';
-COMMENT ON COLUMN tunnel_api.deviation_map.label_from IS 'Station at its begin, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.deviation_map.overbreak IS 'By metre of tunnel, of what was seen, m²';
-COMMENT ON COLUMN tunnel_api.deviation_map.underbreak IS 'By metre of tunnel, of what was seen, m²';
-COMMENT ON COLUMN tunnel_api.deviation_map.seen_share IS 'What of the profile was seen, 0 to 1';
-COMMENT ON COLUMN tunnel_api.deviation_map.greatest IS 'Greatest deviation of a cell, in- or outwards, m';
+COMMENT ON COLUMN tunnel_api.deviation_map.label_from IS 'Station at its beginning, as 12+345.678';
+COMMENT ON COLUMN tunnel_api.deviation_map.overbreak IS 'Overbreak for each metre of tunnel, inspected part, m²';
+COMMENT ON COLUMN tunnel_api.deviation_map.underbreak IS 'Underbreak for each metre of tunnel, inspected part, m²';
+COMMENT ON COLUMN tunnel_api.deviation_map.seen_share IS 'Inspected share of the profile, 0 to 1';
+COMMENT ON COLUMN tunnel_api.deviation_map.greatest IS 'Greatest deviation of a cell, inwards or outwards, m';
 COMMENT ON COLUMN tunnel_api.deviation_map.geom IS 'Axis of the segment in plan, tunnel''s SRID';

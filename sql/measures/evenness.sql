@@ -9,25 +9,30 @@ SELECT d.id, d.survey_id, s.name AS survey, d.km, d.layer, d.straightedge, d.gap
   FROM tunnel.evenness_section d
   JOIN tunnel.survey s ON s.id = d.survey_id;
 COMMENT ON VIEW tunnel_api.evenness_section IS
-    'Gaps beneath a straightedge laid on the lining along and around it, the curvature of the design taken out, in steps of 1 m of chainage';
-COMMENT ON COLUMN tunnel_api.evenness_section.layer IS 'Layer whose profiles are the template';
+    'Evenness of the lining: gaps beneath a virtual straightedge along and around it, after removal of the design curvature, for each metre of chainage';
+COMMENT ON COLUMN tunnel_api.evenness_section.layer IS 'Layer whose profiles are the reference';
 COMMENT ON COLUMN tunnel_api.evenness_section.straightedge IS 'Length of the straightedge, m';
-COMMENT ON COLUMN tunnel_api.evenness_section.gap_limit IS 'Limit of the gap beneath it, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.gap_limit IS 'Permitted gap, m';
 COMMENT ON COLUMN tunnel_api.evenness_section.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.evenness_section.arc_from IS 'Arc of the first cell''s edge, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.arc_from IS 'Arc of the edge of the first cell, m';
 COMMENT ON COLUMN tunnel_api.evenness_section.cell IS 'Side of a cell, m';
-COMMENT ON COLUMN tunnel_api.evenness_section.lining_area IS 'Lining that was seen, m²';
-COMMENT ON COLUMN tunnel_api.evenness_section.measured_area IS 'What of that lay beneath a straightedge, m²; the rest is not measured';
-COMMENT ON COLUMN tunnel_api.evenness_section.over_area IS 'What of that has a greater gap than the limit, m²';
-COMMENT ON COLUMN tunnel_api.evenness_section.gap IS 'Greatest gap of both ways, m; NULL where no straightedge could be laid';
-COMMENT ON COLUMN tunnel_api.evenness_section.gap_along IS 'Greatest gap beneath one laid along the tunnel, m';
-COMMENT ON COLUMN tunnel_api.evenness_section.gap_along_at IS 'Arc of that, m';
-COMMENT ON COLUMN tunnel_api.evenness_section.gap_around IS 'Greatest gap beneath one laid around the section, m';
-COMMENT ON COLUMN tunnel_api.evenness_section.gap_around_at IS 'Arc of that, m';
-COMMENT ON COLUMN tunnel_api.evenness_section.waviness IS 'Greatest depth of a hollow that lies whole beneath the straightedge over the distance to its nearer rim';
-COMMENT ON COLUMN tunnel_api.evenness_section.sigma IS 'Standard deviation of a cell''s mean by the scatter of pixels, m: a gap of a few times that is noise';
-COMMENT ON COLUMN tunnel_api.evenness_section.along IS 'Greatest gap along, by cells of arc from arc_from up, m; NaN where none could be laid';
-COMMENT ON COLUMN tunnel_api.evenness_section.around IS 'Greatest gap around, by cells of arc from arc_from up, m; NaN where none could be laid';
+COMMENT ON COLUMN tunnel_api.evenness_section.lining_area IS 'Inspected lining, m²';
+COMMENT ON COLUMN tunnel_api.evenness_section.measured_area IS
+    'Part of it beneath a straightedge, m²; the rest is not measured';
+COMMENT ON COLUMN tunnel_api.evenness_section.over_area IS 'Part of it with a gap greater than the limit, m²';
+COMMENT ON COLUMN tunnel_api.evenness_section.gap IS 'Greatest gap in both directions, m; NULL if not measured';
+COMMENT ON COLUMN tunnel_api.evenness_section.gap_along IS 'Greatest gap along the tunnel, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.gap_along_at IS 'Arc of the greatest gap along the tunnel, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.gap_around IS 'Greatest gap around the section, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.gap_around_at IS 'Arc of the greatest gap around the section, m';
+COMMENT ON COLUMN tunnel_api.evenness_section.waviness IS
+    'Greatest ratio of the depth of a hollow beneath the straightedge to the distance from its nearer edge';
+COMMENT ON COLUMN tunnel_api.evenness_section.sigma IS
+    'Standard deviation of the mean of a cell from the scatter of pixels, m; a gap of a few times that is noise';
+COMMENT ON COLUMN tunnel_api.evenness_section.along IS
+    'Greatest gap along the tunnel, by cells of arc from arc_from up, m; NaN if not measured';
+COMMENT ON COLUMN tunnel_api.evenness_section.around IS
+    'Greatest gap around the section, by cells of arc from arc_from up, m; NaN if not measured';
 
 CREATE OR REPLACE VIEW tunnel_api.evenness_area AS
 SELECT d.id, d.survey_id, s.name AS survey, d.km, d.layer, public.st_xmin(d.geom) AS chainage_from, public.st_xmax(d.geom) AS chainage_to,
@@ -37,14 +42,14 @@ SELECT d.id, d.survey_id, s.name AS survey, d.km, d.layer, public.st_xmin(d.geom
   FROM tunnel.evenness_area d
   JOIN tunnel.survey s ON s.id = d.survey_id;
 COMMENT ON VIEW tunnel_api.evenness_area IS
-    'Where the gap beneath a straightedge laid on the lining is greater than the limit; one at the end of a kilometre is in two parts';
-COMMENT ON COLUMN tunnel_api.evenness_area.layer IS 'Layer whose profiles are the template';
+    'Areas where the gap beneath a virtual straightedge is greater than the limit. An area across a kilometre boundary is in two parts';
+COMMENT ON COLUMN tunnel_api.evenness_area.layer IS 'Layer whose profiles are the reference';
 COMMENT ON COLUMN tunnel_api.evenness_area.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.evenness_area.arc_from IS 'Least arc, m';
+COMMENT ON COLUMN tunnel_api.evenness_area.arc_from IS 'Smallest arc, m';
 COMMENT ON COLUMN tunnel_api.evenness_area.arc_to IS 'Greatest arc, m';
-COMMENT ON COLUMN tunnel_api.evenness_area.area IS 'Its area, m²';
-COMMENT ON COLUMN tunnel_api.evenness_area.gap IS 'Greatest gap in it, m';
-COMMENT ON COLUMN tunnel_api.evenness_area.direction IS 'along or around: how the straightedge lay';
+COMMENT ON COLUMN tunnel_api.evenness_area.area IS 'Area, m²';
+COMMENT ON COLUMN tunnel_api.evenness_area.gap IS 'Greatest gap, m';
+COMMENT ON COLUMN tunnel_api.evenness_area.direction IS 'Direction of the straightedge: along or around';
 COMMENT ON COLUMN tunnel_api.evenness_area.geom IS 'In the unrolled plane (chainage, arc), m';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.evenness_inputs(survey_id int, km int, subject text) RETURNS jsonb
@@ -53,7 +58,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
       FROM generate_series(-1, 1) k
 $$;
 COMMENT ON FUNCTION tunnel_internal.evenness_inputs(int, int, text) IS
-    'What the evenness of a kilometre is made from: the runs of stage deviation in it and the kilometres beside';
+    'Inputs of the evenness of a kilometre: runs of stage deviation in it and its neighbours';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.evenness_places(survey_id int, of_subject text DEFAULT NULL)
 RETURNS TABLE (km int, subject text, present boolean, reason text)
@@ -61,7 +66,7 @@ LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL RESTRICTED SECURITY DEFINER RO
 SET search_path = pg_catalog, pg_temp SET jit = off AS $$
     SELECT d.km, d.subject, true, NULL::text FROM tunnel_internal.deviation_places($1, $2) d
 $$;
-COMMENT ON FUNCTION tunnel_internal.evenness_places(int, text) IS 'Kilometres and layers of the deviation from the design';
+COMMENT ON FUNCTION tunnel_internal.evenness_places(int, text) IS 'Kilometres and layers with deviations from the design';
 
 CREATE OR REPLACE FUNCTION tunnel_api.evenness_stretches(survey text, layer text, step float8 DEFAULT 100)
 RETURNS TABLE (chainage_from float8, chainage_to float8, label text, straightedge float8, gap_limit float8, lining_area float8,
@@ -81,4 +86,4 @@ AS $$
          GROUP BY 1) w
 $$;
 COMMENT ON FUNCTION tunnel_api.evenness_stretches(text, text, float8) IS
-'Evenness of a survey''s lining by stretches of so many metres, 1 or more, from whole multiples of them on: area seen, beneath a straightedge and with a greater gap than the limit (m²), greatest gaps (m), greatest waviness. A section counts where its middle is';
+'Evenness of a survey''s lining in stretches of step metres (1 or more), from whole multiples of step on: inspected area, area beneath a straightedge, area with a gap greater than the limit (m²), greatest gaps (m), greatest waviness. A section counts at its middle';

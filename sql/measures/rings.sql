@@ -13,46 +13,48 @@ SELECT r.id, r.survey_id, s.name AS survey, r.km,
   FROM tunnel.ring r
   JOIN tunnel.survey s ON s.id = r.survey_id;
 COMMENT ON VIEW tunnel_api.ring IS
-    'Rings of linings with their shape, each value with its standard error (_se); NULL if not measured or unknown';
+    'Rings of segmental linings with their shape; each value with its standard error (_se). NULL: not measured, or not determined';
 COMMENT ON COLUMN tunnel_api.ring.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.ring.number IS 'Number of the ring';
-COMMENT ON COLUMN tunnel_api.ring.origin IS 'How the rings were given: length, file, or found';
-COMMENT ON COLUMN tunnel_api.ring.joint IS 'Joint at its beginning: given, seen, or missing';
-COMMENT ON COLUMN tunnel_api.ring.seen_share IS 'Share of its circumference that is seen; NULL: not measured';
-COMMENT ON COLUMN tunnel_api.ring.shape IS 'What was fitted: ellipse, circle, or none';
-COMMENT ON COLUMN tunnel_api.ring.centre_right IS 'How far its centre lies right of the given axis, m';
-COMMENT ON COLUMN tunnel_api.ring.centre_right_se IS 'Standard error, m';
-COMMENT ON COLUMN tunnel_api.ring.centre_up IS 'How far its centre lies above the given axis, m';
-COMMENT ON COLUMN tunnel_api.ring.centre_up_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring.origin IS 'Source of the rings: length, file, or found';
+COMMENT ON COLUMN tunnel_api.ring.joint IS 'Joint at its beginning: given, seen (detected), or missing';
+COMMENT ON COLUMN tunnel_api.ring.seen_share IS 'Inspected share of the circumference; NULL: not measured';
+COMMENT ON COLUMN tunnel_api.ring.shape IS 'Fitted shape: ellipse, circle, or none';
+COMMENT ON COLUMN tunnel_api.ring.centre_right IS 'Distance of the centre to the right of the given axis, m';
+COMMENT ON COLUMN tunnel_api.ring.centre_right_se IS 'Standard error of centre_right, m';
+COMMENT ON COLUMN tunnel_api.ring.centre_up IS 'Height of the centre above the given axis, m';
+COMMENT ON COLUMN tunnel_api.ring.centre_up_se IS 'Standard error of centre_up, m';
 COMMENT ON COLUMN tunnel_api.ring.radius IS 'Mean radius, m';
-COMMENT ON COLUMN tunnel_api.ring.radius_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring.radius_se IS 'Standard error of radius, m';
 COMMENT ON COLUMN tunnel_api.ring.diameter_largest IS 'Largest diameter of the ellipse, m';
-COMMENT ON COLUMN tunnel_api.ring.diameter_largest_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring.diameter_largest_se IS 'Standard error of diameter_largest, m';
 COMMENT ON COLUMN tunnel_api.ring.diameter_smallest IS 'Smallest diameter of the ellipse, m';
-COMMENT ON COLUMN tunnel_api.ring.diameter_smallest_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring.diameter_smallest_se IS 'Standard error of diameter_smallest, m';
 COMMENT ON COLUMN tunnel_api.ring.largest_clock IS 'Clock position of the largest diameter, degrees';
-COMMENT ON COLUMN tunnel_api.ring.largest_clock_se IS 'Standard error, degrees';
-COMMENT ON COLUMN tunnel_api.ring.ovality IS 'Largest less smallest diameter over the design diameter';
-COMMENT ON COLUMN tunnel_api.ring.ovality_se IS 'Standard error';
-COMMENT ON COLUMN tunnel_api.ring.design_diameter IS 'Diameter that ovality is a share of, m';
-COMMENT ON COLUMN tunnel_api.ring.diameter_from IS 'Where that is from: option, profile, or ring: its own mean';
-COMMENT ON COLUMN tunnel_api.ring.harmonic IS 'Amplitudes of the radius by order, from 2, m; NaN untold';
-COMMENT ON COLUMN tunnel_api.ring.harmonic_se IS 'Their standard errors, m';
-COMMENT ON COLUMN tunnel_api.ring.harmonic_clock IS 'First clock position where each is outwards most, degrees';
-COMMENT ON COLUMN tunnel_api.ring.inward IS 'Least departure from the circle of the mean radius, m, negative inside';
-COMMENT ON COLUMN tunnel_api.ring.inward_se IS 'Standard error, m';
-COMMENT ON COLUMN tunnel_api.ring.inward_clock IS 'Its clock position, degrees';
-COMMENT ON COLUMN tunnel_api.ring.outward IS 'Greatest departure from that circle, m';
-COMMENT ON COLUMN tunnel_api.ring.outward_se IS 'Standard error, m';
-COMMENT ON COLUMN tunnel_api.ring.outward_clock IS 'Its clock position, degrees';
-COMMENT ON COLUMN tunnel_api.ring.sigma IS 'Scatter of cells about what was fitted, m';
-COMMENT ON COLUMN tunnel_api.ring.step_greatest IS 'Greatest step either way, m, with its sign';
-COMMENT ON COLUMN tunnel_api.ring.step_greatest_se IS 'Standard error, m';
-COMMENT ON COLUMN tunnel_api.ring.step_greatest_arc IS 'Arc of its place, m';
-COMMENT ON COLUMN tunnel_api.ring.lip IS 'Greatest step within the ring, between segments, m, positive where what follows clockwise stands in';
-COMMENT ON COLUMN tunnel_api.ring.lip_se IS 'Standard error, m';
-COMMENT ON COLUMN tunnel_api.ring.lip_arc IS 'Arc of its place, m';
-COMMENT ON COLUMN tunnel_api.ring.remark IS 'Notes and limitations';
+COMMENT ON COLUMN tunnel_api.ring.largest_clock_se IS 'Standard error of largest_clock, degrees';
+COMMENT ON COLUMN tunnel_api.ring.ovality IS '(Largest − smallest diameter) / design diameter';
+COMMENT ON COLUMN tunnel_api.ring.ovality_se IS 'Standard error of ovality';
+COMMENT ON COLUMN tunnel_api.ring.design_diameter IS 'Design diameter for ovality, m';
+COMMENT ON COLUMN tunnel_api.ring.diameter_from IS 'Source of the design diameter: option, profile, or ring (its own mean)';
+COMMENT ON COLUMN tunnel_api.ring.harmonic IS
+    'Amplitudes of the harmonics of the radius, from order 2, m; NaN if not determined';
+COMMENT ON COLUMN tunnel_api.ring.harmonic_se IS 'Standard errors of the amplitudes, m';
+COMMENT ON COLUMN tunnel_api.ring.harmonic_clock IS 'First clock position of the maximum of each harmonic, degrees';
+COMMENT ON COLUMN tunnel_api.ring.inward IS 'Smallest deviation from the circle with the mean radius, m, negative inside';
+COMMENT ON COLUMN tunnel_api.ring.inward_se IS 'Standard error of inward, m';
+COMMENT ON COLUMN tunnel_api.ring.inward_clock IS 'Clock position of inward, degrees';
+COMMENT ON COLUMN tunnel_api.ring.outward IS 'Greatest deviation from that circle, m';
+COMMENT ON COLUMN tunnel_api.ring.outward_se IS 'Standard error of outward, m';
+COMMENT ON COLUMN tunnel_api.ring.outward_clock IS 'Clock position of outward, degrees';
+COMMENT ON COLUMN tunnel_api.ring.sigma IS 'Scatter of cells around the fitted shape, m';
+COMMENT ON COLUMN tunnel_api.ring.step_greatest IS 'Greatest step at its beginning, m, with its sign';
+COMMENT ON COLUMN tunnel_api.ring.step_greatest_se IS 'Standard error of step_greatest, m';
+COMMENT ON COLUMN tunnel_api.ring.step_greatest_arc IS 'Arc of step_greatest, m';
+COMMENT ON COLUMN tunnel_api.ring.lip IS
+    'Greatest step between segments of the ring, m, positive if the next segment clockwise protrudes';
+COMMENT ON COLUMN tunnel_api.ring.lip_se IS 'Standard error of lip, m';
+COMMENT ON COLUMN tunnel_api.ring.lip_arc IS 'Arc of lip, m';
+COMMENT ON COLUMN tunnel_api.ring.remark IS 'Note on the ring';
 
 -- In a cell of arc each; the joint is the one at the ring's beginning.
 CREATE OR REPLACE VIEW tunnel_api.ring_step AS
@@ -63,13 +65,13 @@ SELECT r.id * 1000 + n AS id, r.id AS ring_id, r.survey_id, s.name AS survey, r.
  CROSS JOIN LATERAL generate_subscripts(r.step, 1) AS n
  WHERE r.step[n] <> 'NaN';
 COMMENT ON VIEW tunnel_api.ring_step IS
-    'Steps of the lining from each ring to the next, in cells of arc; cells in which none can be told are left out';
+    'Steps of the lining from each ring to the next, in cells of arc. Cells without a determined step are left out';
 COMMENT ON COLUMN tunnel_api.ring_step.ring_id IS 'Key of the ring behind the joint';
 COMMENT ON COLUMN tunnel_api.ring_step.number IS 'Number of the ring behind the joint';
-COMMENT ON COLUMN tunnel_api.ring_step.cell IS 'Number of the cell, from the lowest arc on, from 1';
-COMMENT ON COLUMN tunnel_api.ring_step.arc IS 'Arc of its middle from the crown, m, positive right';
-COMMENT ON COLUMN tunnel_api.ring_step.step IS 'How far the ring behind the joint stands in before the other, m';
-COMMENT ON COLUMN tunnel_api.ring_step.step_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring_step.cell IS 'Number of the cell, from the smallest arc up, from 1';
+COMMENT ON COLUMN tunnel_api.ring_step.arc IS 'Arc of the middle of the cell from the crown, m, positive right';
+COMMENT ON COLUMN tunnel_api.ring_step.step IS 'Step, m, positive if the ring behind the joint protrudes';
+COMMENT ON COLUMN tunnel_api.ring_step.step_se IS 'Standard error of step, m';
 
 CREATE OR REPLACE VIEW tunnel_api.ring_chord AS
 SELECT c.id, c.ring_id, r.survey_id, s.name AS survey, r.km, r.number, r.chainage_from, r.chainage_to, c.clock_from,
@@ -77,13 +79,14 @@ SELECT c.id, c.ring_id, r.survey_id, s.name AS survey, r.km, r.number, r.chainag
   FROM tunnel.ring_chord c
   JOIN tunnel.ring r ON r.id = c.ring_id
   JOIN tunnel.survey s ON s.id = r.survey_id;
-COMMENT ON VIEW tunnel_api.ring_chord IS 'Chords of rings between two clock positions: how they change between surveys is convergence';
+COMMENT ON VIEW tunnel_api.ring_chord IS
+    'Chords of rings between two clock positions. Their change between surveys is the convergence';
 COMMENT ON COLUMN tunnel_api.ring_chord.ring_id IS 'Key of the ring';
 COMMENT ON COLUMN tunnel_api.ring_chord.number IS 'Number of the ring';
-COMMENT ON COLUMN tunnel_api.ring_chord.clock_from IS 'Clock position of its one end, degrees from the crown to the right';
-COMMENT ON COLUMN tunnel_api.ring_chord.clock_to IS 'Clock position of its other end, degrees';
-COMMENT ON COLUMN tunnel_api.ring_chord.length IS 'Length, m; NULL where an end is not seen';
-COMMENT ON COLUMN tunnel_api.ring_chord.length_se IS 'Standard error, m';
+COMMENT ON COLUMN tunnel_api.ring_chord.clock_from IS 'Clock position of one end, degrees from the crown to the right';
+COMMENT ON COLUMN tunnel_api.ring_chord.clock_to IS 'Clock position of the other end, degrees';
+COMMENT ON COLUMN tunnel_api.ring_chord.length IS 'Length, m; NULL if an end is not inspected';
+COMMENT ON COLUMN tunnel_api.ring_chord.length_se IS 'Standard error of length, m';
 
 -- Rings of other kilometres whose end is next to this one belong to it, too: the step at its beginning goes by both.
 CREATE OR REPLACE FUNCTION tunnel_internal.rings_inputs(survey_id int, km int, subject text) RETURNS jsonb
@@ -95,7 +98,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
                            FROM tunnel.ring g WHERE g.survey_id = $1 AND g.km = $2))
 $$;
 COMMENT ON FUNCTION tunnel_internal.rings_inputs(int, int, text) IS
-    'What the measures of a kilometre''s rings are made from: the runs of stage detect there and beside, and a checksum of the rings'' joints';
+    'Inputs of the measures of a kilometre''s rings: runs of stage detect in it and its neighbours, and a checksum of the joints';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.rings_places(survey_id int, of_subject text DEFAULT NULL)
 RETURNS TABLE (km int, subject text, present boolean, reason text)
@@ -104,7 +107,7 @@ SET search_path = pg_catalog, pg_temp SET jit = off AS $$
     SELECT o.km, '', true, CASE WHEN bool_or(o.shape IS NULL) THEN 'rings changed since' END
       FROM tunnel.ring o WHERE o.survey_id = $1 GROUP BY o.km
 $$;
-COMMENT ON FUNCTION tunnel_internal.rings_places(int, text) IS 'Kilometres in which rings have their middle';
+COMMENT ON FUNCTION tunnel_internal.rings_places(int, text) IS 'Kilometres that contain the middle of a ring';
 
 -- Between the ends of the section that is nearest behind the ring's beginning, or before it.
 CREATE OR REPLACE VIEW tunnel_api.ring_unrolled AS
@@ -121,20 +124,20 @@ SELECT r.id, r.survey_id, r.survey, r.km, r.number, r.label, r.chainage_from, r.
                 (SELECT t.chainage, t.arc[1], t.arc[361] FROM tunnel.section t
                   WHERE t.survey_id = r.survey_id AND t.chainage < r.chainage_from ORDER BY t.chainage DESC LIMIT 1)) q
          ORDER BY abs(q.chainage - r.chainage_from) LIMIT 1) e;
-COMMENT ON VIEW tunnel_api.ring_unrolled IS 'Rings on the unrolled plane, with what QGIS shows of them';
+COMMENT ON VIEW tunnel_api.ring_unrolled IS 'Rings on the unrolled plane, with the columns that QGIS shows';
 COMMENT ON COLUMN tunnel_api.ring_unrolled.number IS 'Number of the ring';
 COMMENT ON COLUMN tunnel_api.ring_unrolled.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.ring_unrolled.joint IS 'Joint at its beginning: given, seen, or missing';
-COMMENT ON COLUMN tunnel_api.ring_unrolled.seen_share IS 'Share of its circumference that is seen; NULL: not measured';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.joint IS 'Joint at its beginning: given, seen (detected), or missing';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.seen_share IS 'Inspected share of the circumference; NULL: not measured';
 COMMENT ON COLUMN tunnel_api.ring_unrolled.radius IS 'Mean radius, m';
-COMMENT ON COLUMN tunnel_api.ring_unrolled.ovality IS 'Largest less smallest diameter over the design diameter, per mille';
-COMMENT ON COLUMN tunnel_api.ring_unrolled.ovality_se IS 'Standard error, per mille';
-COMMENT ON COLUMN tunnel_api.ring_unrolled.centre_right IS 'How far its centre lies right of the given axis, mm';
-COMMENT ON COLUMN tunnel_api.ring_unrolled.centre_up IS 'How far its centre lies above the given axis, mm';
-COMMENT ON COLUMN tunnel_api.ring_unrolled.step_greatest IS 'Greatest step at its beginning, mm, positive where it stands in';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.ovality IS '(Largest − smallest diameter) / design diameter, per mille';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.ovality_se IS 'Standard error of ovality, per mille';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.centre_right IS 'Distance of the centre to the right of the given axis, mm';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.centre_up IS 'Height of the centre above the given axis, mm';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.step_greatest IS 'Greatest step at its beginning, mm, positive if it protrudes';
 COMMENT ON COLUMN tunnel_api.ring_unrolled.lip IS 'Greatest step between its segments, mm';
-COMMENT ON COLUMN tunnel_api.ring_unrolled.remark IS 'Notes and limitations';
-COMMENT ON COLUMN tunnel_api.ring_unrolled.geom IS 'Chainage and arc, m';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.remark IS 'Note on the ring';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.geom IS 'Outline in the unrolled plane (chainage, arc), m';
 
 CREATE OR REPLACE VIEW tunnel_api.ring_map AS
 SELECT r.id, r.survey_id, r.survey, r.km, r.number, r.label, r.chainage_from, r.chainage_to, r.joint, r.seen_share, r.radius,
@@ -148,17 +151,17 @@ SELECT r.id, r.survey_id, r.survey, r.km, r.number, r.label, r.chainage_from, r.
                tunnel_internal.map_point(r.survey_id, r.chainage_to, e.high) AS c,
                tunnel_internal.map_point(r.survey_id, r.chainage_from, e.high) AS d) c
  WHERE c.a IS NOT NULL AND c.b IS NOT NULL;
-COMMENT ON VIEW tunnel_api.ring_map IS 'Rings laid on the map beside the axis, with what QGIS shows of them';
+COMMENT ON VIEW tunnel_api.ring_map IS 'Rings on the map strip beside the axis, with the columns that QGIS shows';
 COMMENT ON COLUMN tunnel_api.ring_map.number IS 'Number of the ring';
 COMMENT ON COLUMN tunnel_api.ring_map.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.ring_map.joint IS 'Joint at its beginning: given, seen, or missing';
-COMMENT ON COLUMN tunnel_api.ring_map.seen_share IS 'Share of its circumference that is seen; NULL: not measured';
+COMMENT ON COLUMN tunnel_api.ring_map.joint IS 'Joint at its beginning: given, seen (detected), or missing';
+COMMENT ON COLUMN tunnel_api.ring_map.seen_share IS 'Inspected share of the circumference; NULL: not measured';
 COMMENT ON COLUMN tunnel_api.ring_map.radius IS 'Mean radius, m';
-COMMENT ON COLUMN tunnel_api.ring_map.ovality IS 'Largest less smallest diameter over the design diameter, per mille';
-COMMENT ON COLUMN tunnel_api.ring_map.ovality_se IS 'Standard error, per mille';
-COMMENT ON COLUMN tunnel_api.ring_map.centre_right IS 'How far its centre lies right of the given axis, mm';
-COMMENT ON COLUMN tunnel_api.ring_map.centre_up IS 'How far its centre lies above the given axis, mm';
-COMMENT ON COLUMN tunnel_api.ring_map.step_greatest IS 'Greatest step at its beginning, mm, positive where it stands in';
+COMMENT ON COLUMN tunnel_api.ring_map.ovality IS '(Largest − smallest diameter) / design diameter, per mille';
+COMMENT ON COLUMN tunnel_api.ring_map.ovality_se IS 'Standard error of ovality, per mille';
+COMMENT ON COLUMN tunnel_api.ring_map.centre_right IS 'Distance of the centre to the right of the given axis, mm';
+COMMENT ON COLUMN tunnel_api.ring_map.centre_up IS 'Height of the centre above the given axis, mm';
+COMMENT ON COLUMN tunnel_api.ring_map.step_greatest IS 'Greatest step at its beginning, mm, positive if it protrudes';
 COMMENT ON COLUMN tunnel_api.ring_map.lip IS 'Greatest step between its segments, mm';
-COMMENT ON COLUMN tunnel_api.ring_map.remark IS 'Notes and limitations';
-COMMENT ON COLUMN tunnel_api.ring_map.geom IS 'On the map, tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.ring_map.remark IS 'Note on the ring';
+COMMENT ON COLUMN tunnel_api.ring_map.geom IS 'Outline on the map strip, tunnel''s SRID';

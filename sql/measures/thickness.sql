@@ -10,24 +10,29 @@ SELECT d.id, d.survey_id, s.name AS survey, d.before_id, b.name AS before, d.km,
   JOIN tunnel.survey s ON s.id = d.survey_id
   JOIN tunnel.survey b ON b.id = d.before_id;
 COMMENT ON VIEW tunnel_api.thickness_section IS
-    'What lies between the linings of two surveys, at right angles to a layer''s design profile, in steps of 1 m of chainage; what either did not see is in no area';
+    'Layer thickness between the linings of two surveys, perpendicular to a layer''s design profile, for each metre of chainage. Lining that either survey did not inspect is in no area';
 COMMENT ON COLUMN tunnel_api.thickness_section.survey_id IS 'Key of the later survey';
-COMMENT ON COLUMN tunnel_api.thickness_section.survey IS 'Its name';
+COMMENT ON COLUMN tunnel_api.thickness_section.survey IS 'Name of the later survey';
 COMMENT ON COLUMN tunnel_api.thickness_section.before_id IS 'Key of the earlier survey';
-COMMENT ON COLUMN tunnel_api.thickness_section.before IS 'Its name';
-COMMENT ON COLUMN tunnel_api.thickness_section.layer IS 'Layer whose profiles both were compared with';
+COMMENT ON COLUMN tunnel_api.thickness_section.before IS 'Name of the earlier survey';
+COMMENT ON COLUMN tunnel_api.thickness_section.layer IS 'Layer whose profiles are the reference of both';
 COMMENT ON COLUMN tunnel_api.thickness_section.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.thickness_section.design_length IS 'Length of the profile, m';
-COMMENT ON COLUMN tunnel_api.thickness_section.compared_length IS 'What of that both saw, m';
-COMMENT ON COLUMN tunnel_api.thickness_section.compared_share IS 'The same as a share, 0 to 1';
-COMMENT ON COLUMN tunnel_api.thickness_section.area IS 'Area between the two, of what both saw, m²; less where material went';
-COMMENT ON COLUMN tunnel_api.thickness_section.noise_area IS 'Standard deviation of the area by the scatter of pixels, m²';
-COMMENT ON COLUMN tunnel_api.thickness_section.by_right IS 'By how much the area grows when the later survey moves to the right, m² for 1 m';
-COMMENT ON COLUMN tunnel_api.thickness_section.by_up IS 'By how much the area grows when the later survey moves up, m² for 1 m';
-COMMENT ON COLUMN tunnel_api.thickness_section.thickness_mean IS 'Mean thickness of the cells that both saw, m; NULL without any';
-COMMENT ON COLUMN tunnel_api.thickness_section.thickness_least IS 'Least of a cell, m';
-COMMENT ON COLUMN tunnel_api.thickness_section.least_at IS 'How far along the profile that is, from its left foot or lowest place clockwise, m';
-COMMENT ON COLUMN tunnel_api.thickness_section.thickness IS 'Thickness of cells of equal length along the profile, m; NaN where either saw nothing';
+COMMENT ON COLUMN tunnel_api.thickness_section.compared_length IS 'Length that both inspected, m';
+COMMENT ON COLUMN tunnel_api.thickness_section.compared_share IS 'Share that both inspected, 0 to 1';
+COMMENT ON COLUMN tunnel_api.thickness_section.area IS
+    'Area between the two linings where both inspected it, m²; negative where material was removed';
+COMMENT ON COLUMN tunnel_api.thickness_section.noise_area IS 'Standard deviation of the area from the scatter of pixels, m²';
+COMMENT ON COLUMN tunnel_api.thickness_section.by_right IS
+    'Increase of the area if the later survey moves to the right, m² for 1 m';
+COMMENT ON COLUMN tunnel_api.thickness_section.by_up IS 'Increase of the area if the later survey moves up, m² for 1 m';
+COMMENT ON COLUMN tunnel_api.thickness_section.thickness_mean IS
+    'Mean thickness of the cells that both inspected, m; NULL if there are none';
+COMMENT ON COLUMN tunnel_api.thickness_section.thickness_least IS 'Smallest thickness of a cell, m';
+COMMENT ON COLUMN tunnel_api.thickness_section.least_at IS
+    'Distance of that cell along the profile, clockwise from its left foot or lowest point, m';
+COMMENT ON COLUMN tunnel_api.thickness_section.thickness IS
+    'Thickness of cells of equal length along the profile, m; NaN if either survey did not inspect it';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.thickness_inputs(survey_id int, km int, subject text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
@@ -36,7 +41,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
       FROM (SELECT split_part($3, ' ', 1)::int AS older_id, split_part($3, ' ', 2) AS layer) p
 $$;
 COMMENT ON FUNCTION tunnel_internal.thickness_inputs(int, int, text) IS
-    'What the thickness between an older survey and this one in a kilometre is made from: the runs of stage deviation of both';
+    'Inputs of the thickness between an older survey and this one in a kilometre: runs of stage deviation of both';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.thickness_places(survey_id int, of_subject text DEFAULT NULL)
 RETURNS TABLE (km int, subject text, present boolean, reason text)
@@ -50,7 +55,7 @@ SET search_path = pg_catalog, pg_temp SET jit = off AS $$
       JOIN LATERAL tunnel_internal.deviation_places(p.older_id, p.layer) o ON o.km = n.km
 $$;
 COMMENT ON FUNCTION tunnel_internal.thickness_places(int, text) IS
-    'Kilometres in which this survey and an older one can be compared with a layer: of pairs and layers with sections, or of the one given';
+    'Kilometres in which this survey and an older one can be compared with a layer: of all pairs and layers with sections, or of a given one';
 
 -- A section lies in one stretch or two. Cells are only looked at of sections in which one is thinner than the minimum.
 CREATE OR REPLACE FUNCTION tunnel_api.thickness_stretches(
@@ -80,4 +85,4 @@ AS $$
          GROUP BY n) w
 $$;
 COMMENT ON FUNCTION tunnel_api.thickness_stretches(text, text, text, float8, float8, float8) IS
-'What lies between two surveys of a tunnel along a layer''s profiles, by stretches of so many metres, 1 or more, from whole multiples of them on: volume (m³) of what both saw (compared_area, of design_area, m²), mean and least thickness (m), thin_area (m²) of cells thinner than the minimum (m). volume_sigma: standard deviation by the scatter of pixels and by surveys that lie to each other only within axis_sigma (m), to the right and as much up, along the stretch alike.';
+'Layer thickness and volume between two surveys of a tunnel along a layer''s profiles, in stretches of step metres (1 or more), from whole multiples of step on: volume (m³) of the part that both inspected (compared_area of design_area, m²), mean and smallest thickness (m), thin_area (m²) of cells thinner than minimum (m). volume_sigma: standard deviation from the scatter of pixels and from a relative position of the surveys known to axis_sigma (m) to the right and up, alike along the stretch';

@@ -31,4 +31,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.class_write(int, int, bytea) IS
-'Classes of the points of one kilometre: rewrites their partition with one byte of classes a row, in the rows'' order, and swaps it in; returns the number of points.';
+'Rewrite the partition of one kilometre with the classes of its points, one byte each in the order of rows, and return the number of points';

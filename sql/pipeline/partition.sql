@@ -6,7 +6,7 @@ RETURNS text
 LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
 AS $$ SELECT 'point_s' || survey_id || '_km' || km $$;
 COMMENT ON FUNCTION tunnel_internal.partition_name(int, int) IS
-'Name, in schema tunnel, of the partition of tunnel.point that holds a survey''s kilometre.';
+'Name of the partition of tunnel.point that holds a kilometre of a survey';
 
 
 -- The partitions of a survey's kilometres as text for FROM: each by its name, so that what reads them holds no lock on their
@@ -21,7 +21,7 @@ AS $$
     WHERE to_regclass('tunnel.' || quote_ident(n.name)) IS NOT NULL AND tunnel_internal.in_order(km_from, km_to, 'km')
 $$;
 COMMENT ON FUNCTION tunnel_internal.partition_source(int, int, int) IS
-'What to read in FROM for the points of a survey''s kilometres km_from to km_to: their partitions by name, without a lock on the table that holds them.';
+'FROM expression that reads the points of the kilometres km_from to km_to of a survey: their partitions by name, without a lock on the parent table';
 
 
 -- Locks a survey's kilometre, and the table that holds its partitions, against readers: as late as possible in a transaction,
@@ -67,7 +67,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.partition_lock(int, int) IS
-'Locks a survey''s kilometre and the table that holds it, to swap or drop it, without holding up readers while it waits; gives up after the session''s lock_timeout, or 10 minutes.';
+'Lock a kilometre of a survey and its parent table before a swap or a drop, without blocking readers while it waits. Gives up after the session''s lock_timeout, or 10 minutes';
 
 
 -- Makes the table that holds a survey's partitions, if there is none. Attached, for that lets others read on meanwhile.
@@ -90,7 +90,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.partition_parent(int) IS
-'Makes the table that holds the partitions of a survey''s kilometres, if there is none.';
+'Create the parent table of a survey''s partitions if there is none';
 
 
 -- Makes the empty table <partition>_new, in which a survey's kilometre is built aside. Its check spares ATTACH a scan while others
@@ -110,7 +110,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.partition_new(int, int) IS
-'Makes the empty table <partition>_new, in which a survey''s kilometre of tunnel.point is built aside for partition_swap.';
+'Create the empty table <partition>_new, in which partition_swap expects the new points of a kilometre';
 
 
 -- Puts the table <partition>_new, made by partition_new and filled in about the order of chainage, in the place of a survey's
@@ -141,7 +141,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.partition_swap(int, int) IS
-'Puts the table <partition>_new in the place of a survey''s kilometre of tunnel.point, with its index, in the caller''s transaction; to be called as late in it as possible. Long readers delay it and are not held up.';
+'Replace the partition of a survey''s kilometre by the table <partition>_new, with its index, in the caller''s transaction. Call it as late as possible. Long readers delay it and are not blocked';
 
 
 -- Makes the empty table tunnel.fragment_s<survey>_f<file>_km<km>, in the place of an older one. It belongs to the owner of
@@ -164,4 +164,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.fragment_create(int, int, int) IS
-'Makes the empty table that takes what was read of a file until it is loaded into a kilometre: blocks of packed rows.';
+'Create an empty table for points that were read from a file and not yet loaded into a kilometre: blocks of packed rows';

@@ -8,7 +8,7 @@ CREATE OR REPLACE FUNCTION tunnel_internal.queue_lock(survey_id integer) RETURNS
 LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
 AS $$ SELECT pg_advisory_xact_lock(-2, survey_id) $$;
 COMMENT ON FUNCTION tunnel_internal.queue_lock(integer) IS
-    'Waits until nobody commits a result of the survey, and lets nobody else until the transaction ends';
+    'Wait until nobody commits a result of the survey, and block others until the transaction ends';
 
 -- What becomes of each stage that is wanted of each kilometre:
 --   done     it is there, nothing that it rests on has changed since, and it was made with the parameters that are wanted
@@ -121,14 +121,14 @@ AS $$
      WHERE c.km BETWEEN $2 AND $3
 $$;
 COMMENT ON FUNCTION tunnel_internal.queue_state(integer, integer, integer) IS
-    'What becomes of each stage that is wanted of each kilometre of a survey: done, running, queued, ready, waits, failed, blocked or empty';
+    'State of each requested stage in each kilometre of a survey: done, running, queued, ready, waits, failed, blocked or empty';
 
 -- How far a result reaches: to so many kilometres on both sides the readiness of a stage may depend on it.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_reach() RETURNS integer
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$ SELECT count(*)::integer - 1 FROM tunnel.stage WHERE NOT on_demand $$;
 COMMENT ON FUNCTION tunnel_internal.queue_reach() IS
-    'To how many kilometres on both sides a stage may become ready by what has been done in one: one for each stage after the first';
+    'Number of kilometres on both sides in which a stage can become ready after a result in one kilometre: one for each later stage';
 
 -- Defers a job for each file to be read and for each stage of the kilometres that is ready; returns how many. Whoever commits
 -- a result calls it last, for the kilometre and queue_reach to both sides, so that the jobs come to be with what made them
@@ -169,7 +169,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.queue_plan(integer, integer, integer) IS
-    'Defers the jobs of a survey that are ready: files to be read, and stages of the kilometres; returns how many. Under queue_lock until the transaction ends';
+    'Queue the jobs of a survey that are ready (files to read, stages of kilometres), and return their number. Holds queue_lock until the transaction ends';
 
 -- Locks a job's row to the end of the transaction; true when the worker is still at it. False when it was taken to be lost, and
 -- another has the job: then the result must not be committed.
@@ -180,8 +180,7 @@ AS $$
                                  WHERE j.id = $1 FOR UPDATE) AS j
                     WHERE j.status = 'doing' AND j.worker_id = $2)
 $$;
-COMMENT ON FUNCTION tunnel_internal.queue_hold(bigint, bigint) IS
-    'Locks a job, and says whether the worker is still at it';
+COMMENT ON FUNCTION tunnel_internal.queue_hold(bigint, bigint) IS 'Lock a job, and return true if the worker still runs it';
 
 -- Ends a job that has done its work, and defers what is ready now. A file that was read is taken off the list, unless it was
 -- asked for anew after the job began; kilometres that points of it wait for are loaded, whether a batch has asked for them or
@@ -222,7 +221,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.queue_done(bigint, timestamptz) IS
-    'Ends a job that has done its work since a moment, and defers what is ready now';
+    'Finish a job that succeeded since a moment, and queue what is ready now';
 
 -- Ends a job that has failed for good, and defers what need not wait for it any more.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_fail(job_id bigint, message text) RETURNS void
@@ -245,7 +244,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.queue_fail(bigint, text) IS
-    'Ends a job that has failed for good, and defers what need not wait for it any more';
+    'Mark a job as failed for good, and queue what need not wait for it any more';
 
 -- Puts a job back into the queue whose worker, or the worker's session, was lost; the 20th time it fails for good, for then it
 -- is likely to be the job that kills them.
@@ -269,7 +268,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.queue_return(bigint) IS
-    'Puts a job back into the queue whose worker was lost; the 20th time it fails';
+    'Return the job of a lost worker to the queue; the 20th time it fails';
 
 -- Whether a worker is there: while it lives, a session of its own holds this lock (queue_register).
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_present(worker_id bigint) RETURNS boolean
@@ -280,8 +279,7 @@ AS $$
                       AND l.objsubid = 2 AND l.granted
                       AND l.database = (SELECT d.oid FROM pg_database d WHERE d.datname = current_database()))
 $$;
-COMMENT ON FUNCTION tunnel_internal.queue_present(bigint) IS
-    'Whether the session lives that a worker keeps open while it lives';
+COMMENT ON FUNCTION tunnel_internal.queue_present(bigint) IS 'True if the session that a worker keeps open is alive';
 
 -- Enters a worker; the session that calls it must live as long as the worker does.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_register(worker_id bigint, host text, pid integer) RETURNS void
@@ -291,7 +289,7 @@ AS $$
     INSERT INTO tunnel.worker (id, host, pid) VALUES (worker_id, host, pid) ON CONFLICT (id) DO NOTHING;
 $$;
 COMMENT ON FUNCTION tunnel_internal.queue_register(bigint, text, integer) IS
-    'Enters a worker; it is there as long as the session lives that calls this';
+    'Register a worker, which is present as long as the calling session lives';
 
 -- Takes jobs from workers that are lost: those without a heartbeat for the given time, whose sessions are ended, and those
 -- that were killed, so that both their own session and that of their job are gone. Returns how many jobs. Rows of lost workers
@@ -333,7 +331,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.queue_rescue(interval) IS
-    'Takes jobs from workers that are lost, and puts them back into the queue; returns how many';
+    'Take jobs from lost workers, return them to the queue, and return their number';
 
 -- Whether there are jobs of a survey that wait or run. When there are none, there is nothing left to be done: each result brings
 -- along the jobs that it makes possible.
@@ -343,5 +341,4 @@ AS $$
     SELECT EXISTS (SELECT FROM tunnel_queue.procrastinate_jobs j
                     WHERE j.status IN ('todo', 'doing') AND (j.args ->> 'survey_id')::integer = $1)
 $$;
-COMMENT ON FUNCTION tunnel_internal.queue_busy(integer) IS
-    'Whether there are jobs of the survey that wait or run';
+COMMENT ON FUNCTION tunnel_internal.queue_busy(integer) IS 'True if the survey has waiting or running jobs';

@@ -38,7 +38,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.last_runs_of(int[], text[], boolean, int, int) IS
-'The last run of each of some stages in each kilometre of some surveys, as last_runs has them of one';
+'Result of last_runs for several stages and surveys';
 
 
 -- The planner puts the body in the place of a call.
@@ -48,7 +48,7 @@ RETURNS SETOF tunnel.run
 LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL SAFE ROWS 25
 AS $$ SELECT r.* FROM tunnel_internal.last_runs_of(ARRAY[$1], ARRAY[$2], $3, $4, $5) r $$;
 COMMENT ON FUNCTION tunnel_internal.last_runs(int, text, boolean, int, int) IS
-'The last run of a stage in each kilometre of a survey, of those from km_from to km_to, and of each subject (layer, older survey, track and outline) that has results of its own: the last that succeeded, or with false the last that began';
+'Last successful run of a stage in each kilometre of a survey from km_from to km_to, for each subject (layer, older survey, track and gauge). With false, the last run that began';
 
 
 CREATE OR REPLACE FUNCTION tunnel_internal.last_run(survey_id int, stage text, km int, subject text DEFAULT '') RETURNS bigint
@@ -60,7 +60,7 @@ AS $$
      ORDER BY r.started_at DESC, r.id DESC LIMIT 1
 $$;
 COMMENT ON FUNCTION tunnel_internal.last_run(int, text, int, text) IS
-'The last run of a stage that succeeded in one kilometre of a survey, of one subject; NULL where there is none';
+'Last successful run of a stage in one kilometre of a survey, for one subject; NULL if there is none';
 
 
 -- Stages that ran in kilometres of a survey, from one to the next in the same index.
@@ -82,4 +82,4 @@ AS $$
     )
     SELECT p.stage FROM part p
 $$;
-COMMENT ON FUNCTION tunnel_internal.stages_run(int) IS 'Stages that the ledger has runs of in a survey, in order of their names';
+COMMENT ON FUNCTION tunnel_internal.stages_run(int) IS 'Stages that have runs in the ledger of a survey, by name';

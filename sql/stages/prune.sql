@@ -12,7 +12,8 @@ AS $$
                CASE jsonb_typeof($2 -> n.key) WHEN 'array' THEN $2 -> n.key ELSE jsonb_build_array($2 -> n.key) END) AS i (id)
      WHERE n.stage = $1 AND n.holds = 'run' AND i.id ~ '^[0-9]{1,18}$'
 $$;
-COMMENT ON FUNCTION tunnel_internal.run_inputs(text, jsonb) IS 'Runs that a run was made from, by its stage and parameters; NULL without any';
+COMMENT ON FUNCTION tunnel_internal.run_inputs(text, jsonb) IS
+    'Runs that a run used, by its stage and parameters; NULL if it used none';
 
 -- Of one survey the runs of all surveys of its tunnel are looked at: only those name each other.
 CREATE OR REPLACE FUNCTION tunnel_internal.superseded_runs(survey_id int DEFAULT NULL, before timestamptz DEFAULT 'infinity')
@@ -52,7 +53,7 @@ AS $$
      WHERE ($1 IS NULL OR l.survey_id = $1) AND NOT EXISTS (SELECT FROM keep k WHERE k.id = l.id)
 $$;
 COMMENT ON FUNCTION tunnel_internal.superseded_runs(int, timestamptz) IS
-    'Runs of the ledger, of one survey or all, that began before a time and are no longer needed for any state or result; bytes: of the row';
+    'Runs of one survey, or of all, that began before a moment and are no longer needed for states, results or staleness. bytes: of the row';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.superseded_jobs(survey_id int DEFAULT NULL, before timestamptz DEFAULT 'infinity')
 RETURNS TABLE (id bigint, survey_id integer, state text, ended_at timestamptz, rows bigint, bytes bigint)
@@ -75,4 +76,4 @@ AS $$
        AND NOT EXISTS (SELECT FROM needed n WHERE n.job_id = j.id)
 $$;
 COMMENT ON FUNCTION tunnel_internal.superseded_jobs(int, timestamptz) IS
-    'Jobs of the queue, of one survey or all, that ended before a time and have no run that is kept; rows and bytes include their events';
+    'Jobs of one survey, or of all, that ended before a moment and have no run any more: rows and bytes, including their events';

@@ -14,7 +14,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.result_inputs(int, text, int, text) IS
-    'Runs and checksums that the result of a measure in a kilometre would be made from now';
+    'Runs and checksums that a new result of a measure in a kilometre would use';
 
 -- A result is out of date when what it reads is out of date (then blocked_by names that stage), when it was never made, or when
 -- one of its inputs is another now than in the parameters of its last run. The subject of what is read is the end of the
@@ -75,7 +75,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.result_state(int, text, text) IS
-    'State of the results of a stage in a survey by kilometre and subject: the last run that succeeded with its parameters, and why the result is out of date, if it is; blocked_by: the stage that must run first. Without a subject: all results that there are or can be made; with one also those of a pair of surveys, or of a track and gauge, that were never made';
+    'State of the results of a measure in a survey, by kilometre and subject: last successful run, and why the result is out of date, if it is. blocked_by: stage that must run first. Without a subject, all existing and possible results; with a subject, also results that were never made';
 
 CREATE OR REPLACE VIEW tunnel_api.result_status AS
 SELECT hashtextextended(concat_ws(' ', s.id, g.name, t.km, t.subject), 0) & 9007199254740991 AS id,
@@ -88,12 +88,14 @@ SELECT hashtextextended(concat_ws(' ', s.id, g.name, t.km, t.subject), 0) & 9007
   LEFT JOIN tunnel.survey o ON o.id = t.older_id
  WHERE g.on_demand;
 COMMENT ON VIEW tunnel_api.result_status IS
-    'Whether the measures of each survey are up to date: one row per measure, kilometre and subject';
+    'State of the results of measures, one row for each measure, kilometre and subject';
 COMMENT ON COLUMN tunnel_api.result_status.stage IS 'Measure: deviation, evenness, thickness, clearance, rings, compare';
-COMMENT ON COLUMN tunnel_api.result_status.subject IS 'Layer of the profiles, or track and gauge; empty where there is one result of a kilometre';
-COMMENT ON COLUMN tunnel_api.result_status.older_survey IS 'Name of the survey that it is compared with; NULL of a measure of one survey';
-COMMENT ON COLUMN tunnel_api.result_status.done_at IS 'When it was last made; NULL: never';
-COMMENT ON COLUMN tunnel_api.result_status.stale IS 'True if it was never made, or what it rests on has changed since';
-COMMENT ON COLUMN tunnel_api.result_status.blocked_by IS 'Stage that is itself out of date and must run first; NULL: none';
-COMMENT ON COLUMN tunnel_api.result_status.reason IS 'Why it is stale';
-COMMENT ON COLUMN tunnel_api.result_status.parameters IS 'Parameters of the last run: what it was made from, and its options';
+COMMENT ON COLUMN tunnel_api.result_status.subject IS
+    'Layer of the profiles, or track and gauge; empty if a kilometre has one result only';
+COMMENT ON COLUMN tunnel_api.result_status.older_survey IS 'Name of the older survey; NULL for a measure of one survey';
+COMMENT ON COLUMN tunnel_api.result_status.done_at IS 'Time of the last result; NULL if there is none';
+COMMENT ON COLUMN tunnel_api.result_status.stale IS
+    'True if there is no result, or something that it depends on changed since';
+COMMENT ON COLUMN tunnel_api.result_status.blocked_by IS 'Stage that is out of date itself and must run first; NULL if none';
+COMMENT ON COLUMN tunnel_api.result_status.reason IS 'Reason why it is stale';
+COMMENT ON COLUMN tunnel_api.result_status.parameters IS 'Parameters of the last run: its inputs and options';

@@ -8,7 +8,7 @@ LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER SET search_path 
                     WHERE a.pid = $1 AND (a.backend_start IS NULL OR a.backend_start = $2))
 $$;
 COMMENT ON FUNCTION tunnel_internal.session_lives(integer, timestamptz) IS
-    'Whether the server process with this number and start still lives';
+    'True if the server process with this number and start time is alive';
 
 CREATE OR REPLACE VIEW tunnel_api.run AS
 SELECT r.id, r.survey_id, s.name AS survey, r.km, r.stage,
@@ -20,9 +20,9 @@ SELECT r.id, r.survey_id, s.name AS survey, r.km, r.stage,
   JOIN tunnel.survey s ON s.id = r.survey_id;
 COMMENT ON VIEW tunnel_api.run IS 'Ledger: each run of a stage, with parameters, versions, counts and outcome';
 COMMENT ON COLUMN tunnel_api.run.km IS 'Kilometre; NULL for the whole survey';
-COMMENT ON COLUMN tunnel_api.run.outcome IS 'running, done, failed, or interrupted when its session is gone';
-COMMENT ON COLUMN tunnel_api.run.worker IS 'Machine and process that it ran on';
-COMMENT ON COLUMN tunnel_api.run.job_id IS 'Job of the queue that it was (tunnel_api.job); NULL when run by hand';
+COMMENT ON COLUMN tunnel_api.run.outcome IS 'running, done, failed, or interrupted (its session is gone)';
+COMMENT ON COLUMN tunnel_api.run.worker IS 'Machine and process that ran it';
+COMMENT ON COLUMN tunnel_api.run.job_id IS 'Job of the queue (tunnel_api.job); NULL if run by hand';
 
 -- Last run of each stage on each kilometre of some surveys that was ever loaded or worked on, waits to be loaded or is wanted,
 -- and whether its result is out of date. Load rests on the files that touch the kilometre; what the others rest on, here and on
@@ -195,7 +195,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.stage_states(integer[], integer, integer) IS
-    'How far kilometres of some surveys have come, as stage_state says of one; run_id and done_id: the last run and the last success (tunnel_api.run)';
+    'Result of stage_state for several surveys. run_id: last run; done_id: last successful run (tunnel_api.run)';
 
 -- The same of one survey, with what the ledger has of the runs.
 CREATE OR REPLACE FUNCTION tunnel_internal.stage_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
@@ -216,7 +216,7 @@ AS $$
       LEFT JOIN tunnel.run b ON b.id = t.done_id
 $$;
 COMMENT ON FUNCTION tunnel_internal.stage_state(integer, integer, integer) IS
-    'How far kilometres of a survey have come: for each stage the last run, the last success, and what has changed since. What lies beyond the range is not looked at';
+    'State of the kilometres of a survey: last run and last success of each stage, and what changed since. Kilometres outside the range are ignored';
 
 CREATE OR REPLACE VIEW tunnel_api.stage_status AS
 SELECT (s.id::bigint * 1000000 + 500000 + t.km) * 10 + t.step AS id, s.id AS survey_id, s.name AS survey, t.km, t.step,
@@ -225,10 +225,11 @@ SELECT (s.id::bigint * 1000000 + 500000 + t.km) * 10 + t.step AS id, s.id AS sur
   FROM tunnel.survey s
  CROSS JOIN LATERAL tunnel_internal.stage_state(s.id) t
   LEFT JOIN tunnel.run r ON r.id = t.run_id;
-COMMENT ON VIEW tunnel_api.stage_status IS 'How far each kilometre of each survey has come: one row per stage';
-COMMENT ON COLUMN tunnel_api.stage_status.step IS 'Number of the stage in their order';
-COMMENT ON COLUMN tunnel_api.stage_status.outcome IS 'Of the last run: running, done, failed, interrupted (its session is gone) or never';
+COMMENT ON VIEW tunnel_api.stage_status IS 'State of each stage in each kilometre of each survey';
+COMMENT ON COLUMN tunnel_api.stage_status.step IS 'Number of the stage in the order of processing';
+COMMENT ON COLUMN tunnel_api.stage_status.outcome IS
+    'Outcome of the last run: running, done, failed, interrupted (its session is gone) or never';
 COMMENT ON COLUMN tunnel_api.stage_status.done_at IS 'End of the last successful run, whose result is in the database';
-COMMENT ON COLUMN tunnel_api.stage_status.counts IS 'What the last run counted';
-COMMENT ON COLUMN tunnel_api.stage_status.stale IS 'True when what the result rests on has changed since it was made';
-COMMENT ON COLUMN tunnel_api.stage_status.reason IS 'Why it is stale';
+COMMENT ON COLUMN tunnel_api.stage_status.counts IS 'Counts of the last run';
+COMMENT ON COLUMN tunnel_api.stage_status.stale IS 'True if something that the result depends on changed since it was made';
+COMMENT ON COLUMN tunnel_api.stage_status.reason IS 'Reason why it is stale';

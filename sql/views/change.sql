@@ -15,9 +15,12 @@ SELECT r.id * 2 + 1, s.name, r.finished_at, r.worker, r.stage, r.km, concat_ws('
   FROM tunnel.run r
   JOIN tunnel.survey s ON s.id = r.survey_id
  WHERE r.finished_at IS NOT NULL;
-COMMENT ON VIEW tunnel_api.change IS 'What happened to a survey: edits by hand (tunnel_api.audit) and stages that ran (tunnel_api.run)';
-COMMENT ON COLUMN tunnel_api.change.at IS 'When it was changed, or the run ended';
-COMMENT ON COLUMN tunnel_api.change.who IS 'Who was logged in; of a stage the machine and process, NULL of one by hand';
-COMMENT ON COLUMN tunnel_api.change.what IS 'finding, axis_vertex, region, photo or learned_model, or the stage';
-COMMENT ON COLUMN tunnel_api.change.km IS 'Kilometre; NULL of a region, of what is there no more, and of a run over the whole survey';
-COMMENT ON COLUMN tunnel_api.change.detail IS 'What was done to which row, or how the run ended';
+COMMENT ON VIEW tunnel_api.change IS
+    'History of a survey: edits by hand (tunnel_api.audit) and runs of stages (tunnel_api.run)';
+COMMENT ON COLUMN tunnel_api.change.at IS 'Time of the edit, or end of the run';
+COMMENT ON COLUMN tunnel_api.change.who IS
+    'Role that was logged in; for a stage, machine and process; NULL for a stage run by hand';
+COMMENT ON COLUMN tunnel_api.change.what IS 'Edited view (finding, axis_vertex, region, photo or learned_model), or stage';
+COMMENT ON COLUMN tunnel_api.change.km IS
+    'Kilometre; NULL for a region, for a deleted row, and for a run over the whole survey';
+COMMENT ON COLUMN tunnel_api.change.detail IS 'Edited row and kind of edit, or outcome of the run';

@@ -19,16 +19,17 @@ SELECT c.id * 1000 + n.n AS id, c.id AS section_id, c.survey_id, c.km, n.n,
       FROM generate_series(1, 360) AS i) n
   JOIN tunnel.section_class k ON k.section_id = c.id AND k.class = floor((n.n - 0.5::float8) / c.angle_step);
 COMMENT ON VIEW tunnel_api.section_piece IS
-    'Pieces of sections in kilometres into which sonar scans were loaded, one per degree from straight below the axis to the left; closed_section and section_part are made of them';
+    'Pieces of closed sections, one for each degree from straight below the axis to the left, in kilometres with sonar scans. closed_section and section_part consist of them';
 COMMENT ON COLUMN tunnel_api.section_piece.section_id IS 'Key of the section';
-COMMENT ON COLUMN tunnel_api.section_piece.n IS 'Number in its section, from 1';
-COMMENT ON COLUMN tunnel_api.section_piece.part IS 'lining (above the water), submerged (inspected by a sonar) or unseen (interpolated, not inspected)';
-COMMENT ON COLUMN tunnel_api.section_piece.below IS 'Whether it lies below the water';
-COMMENT ON COLUMN tunnel_api.section_piece.length IS 'm';
-COMMENT ON COLUMN tunnel_api.section_piece.here IS 'Where it begins, tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel_api.section_piece.next IS 'Where it ends, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel_api.section_piece.n IS 'Number in the section, from 1';
+COMMENT ON COLUMN tunnel_api.section_piece.part IS
+    'lining (above the water), submerged (inspected by sonar) or unseen (interpolated across a gap)';
+COMMENT ON COLUMN tunnel_api.section_piece.below IS 'True if it lies below the water';
+COMMENT ON COLUMN tunnel_api.section_piece.length IS 'Length, m';
+COMMENT ON COLUMN tunnel_api.section_piece.here IS 'Beginning of the piece, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel_api.section_piece.next IS 'End of the piece, tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel_api.section_piece.wet_area IS 'Area of the water above it, m²';
-COMMENT ON COLUMN tunnel_api.section_piece.depth IS 'Of its lower end below the water, m';
+COMMENT ON COLUMN tunnel_api.section_piece.depth IS 'Depth of its lower end below the water, m';
 
 CREATE OR REPLACE VIEW tunnel_api.closed_section AS
 SELECT c.id, c.survey_id, s.name AS survey, c.km, c.chainage,
@@ -46,11 +47,14 @@ SELECT c.id, c.survey_id, s.name AS survey, c.km, c.chainage,
     HAVING bool_or(q.part = 'submerged')) p ON true
  WHERE w.height IS NOT NULL;
 COMMENT ON VIEW tunnel_api.closed_section IS
-    'Cross-sections of canal tunnels with sonar points, closed through the bed';
-COMMENT ON COLUMN tunnel_api.closed_section.water_level IS 'Height of the water, m';
-COMMENT ON COLUMN tunnel_api.closed_section.unseen IS 'Share of its line below the water that no sonar saw, 0 to 1; there it is bridged';
-COMMENT ON COLUMN tunnel_api.closed_section.wet_area IS 'Area of the water, m²; NULL where more than a fifth of the line below it was not seen';
-COMMENT ON COLUMN tunnel_api.closed_section.depth IS 'Greatest depth that was seen, m; NULL where more than a fifth of the line below the water was not seen';
+    'Cross-sections of canal tunnels, closed through the bed, where sonar measured anything below the water';
+COMMENT ON COLUMN tunnel_api.closed_section.water_level IS 'Height of the water surface, m';
+COMMENT ON COLUMN tunnel_api.closed_section.unseen IS
+    'Share of the line below the water without sonar, 0 to 1; interpolated there';
+COMMENT ON COLUMN tunnel_api.closed_section.wet_area IS
+    'Cross-sectional area of the water, m²; NULL if sonar is missing on more than 20 % of the line below the water';
+COMMENT ON COLUMN tunnel_api.closed_section.depth IS
+    'Greatest measured depth, m; NULL if sonar is missing on more than 20 % of the line below the water';
 COMMENT ON COLUMN tunnel_api.closed_section.geom IS 'Closed line in space, tunnel''s SRID, m';
 
 CREATE OR REPLACE VIEW tunnel_api.section_part AS
@@ -63,11 +67,12 @@ SELECT min(r.id) AS id, r.survey_id, s.name AS survey, r.km, r.section_id, c.cha
   JOIN tunnel.survey s ON s.id = r.survey_id
  GROUP BY r.survey_id, s.name, r.km, r.section_id, c.chainage, r.part, r.run;
 COMMENT ON VIEW tunnel_api.section_part IS
-    'Parts of closed sections by source: lining above the water, submerged, or unseen (not inspected)';
+    'Parts of closed sections by origin: lining above the water, submerged, or unseen';
 COMMENT ON COLUMN tunnel_api.section_part.id IS 'Key';
 COMMENT ON COLUMN tunnel_api.section_part.section_id IS 'Key of the section';
-COMMENT ON COLUMN tunnel_api.section_part.part IS 'lining (above the water), submerged (inspected by a sonar) or unseen (interpolated, not inspected)';
-COMMENT ON COLUMN tunnel_api.section_part.length IS 'm';
+COMMENT ON COLUMN tunnel_api.section_part.part IS
+    'lining (above the water), submerged (inspected by sonar) or unseen (interpolated across a gap)';
+COMMENT ON COLUMN tunnel_api.section_part.length IS 'Length, m';
 COMMENT ON COLUMN tunnel_api.section_part.geom IS 'Line in space, tunnel''s SRID, m';
 
 -- Where sections meet the water, joined from section to section; a line ends where a segment has no section.
@@ -86,10 +91,10 @@ SELECT min(p.id) AS id, p.survey_id, s.name AS survey, p.side, min(p.chainage) A
   JOIN tunnel.survey s ON s.id = p.survey_id
  GROUP BY p.survey_id, s.name, p.side, p.piece, p.height
 HAVING count(*) > 1;
-COMMENT ON VIEW tunnel_api.waterline IS 'Where the walls meet the water, in kilometres into which sonar scans were loaded';
+COMMENT ON VIEW tunnel_api.waterline IS 'Lines where the walls meet the water, in kilometres with sonar scans';
 COMMENT ON COLUMN tunnel_api.waterline.id IS 'Key';
 COMMENT ON COLUMN tunnel_api.waterline.side IS 'left or right, looking up-chainage';
-COMMENT ON COLUMN tunnel_api.waterline.height IS 'Of the water, m';
+COMMENT ON COLUMN tunnel_api.waterline.height IS 'Height of the water surface, m';
 COMMENT ON COLUMN tunnel_api.waterline.geom IS 'Line in space, tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel_api.waterline.chainage_from IS 'Of its first section, m';
-COMMENT ON COLUMN tunnel_api.waterline.chainage_to IS 'Of its last section, m';
+COMMENT ON COLUMN tunnel_api.waterline.chainage_from IS 'Chainage of its first section, m';
+COMMENT ON COLUMN tunnel_api.waterline.chainage_to IS 'Chainage of its last section, m';

@@ -1,8 +1,8 @@
 -- Comments of the views' columns that have none of their own, for psql, QGIS and the reference: what the view behind it says, else
 -- what a name means in every view, else what the column of the same name in the table behind it is said to be. Needs all views.
 
-COMMENT ON COLUMN tunnel_api.axis.geom IS 'The axis, tunnel''s SRID';
-COMMENT ON COLUMN tunnel_api.section_unrolled.geom IS 'From its left to its right end, in the unrolled plane';
+COMMENT ON COLUMN tunnel_api.axis.geom IS 'Axis, tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.section_unrolled.geom IS 'Section from its left to its right end, in the unrolled plane';
 
 DO $$
 DECLARE
@@ -23,28 +23,28 @@ BEGIN
                 ('segment', 'Number of the segment'),
                 ('chainage', 'Chainage, m'),
                 ('label', 'Station, as 12+345.678'),
-                ('chainage_from', 'Least chainage, m'),
+                ('chainage_from', 'Smallest chainage, m'),
                 ('chainage_to', 'Greatest chainage, m'),
-                ('label_from', 'Station at the least chainage, as 12+345.678'),
+                ('label_from', 'Station at the smallest chainage, as 12+345.678'),
                 ('label_to', 'Station at the greatest chainage, as 12+345.678'),
                 ('points', 'Number of points'),
                 ('files', 'Number of files'),
                 ('vertices', 'Number of vertices'),
                 ('srid', 'Coordinate reference system of the tunnel'),
-                ('half', 'Place in the segment, %: 25 or 75'),
+                ('half', 'Position in the segment, %: 25 or 75'),
                 ('angle_step', 'Width of an angular class, degrees'),
-                ('interpolated', 'Angular classes without enough points of their own, or rejected'),
+                ('interpolated', 'Number of angular classes filled from their neighbours: empty or rejected'),
                 ('duration', 'finished_at - started_at'),
-                ('leaks_open', 'Of these, those not reviewed yet'),
-                ('leaks_confirmed', 'Of these, those confirmed'),
-                ('leaks_rejected', 'Leaks rejected'),
+                ('leaks_open', 'Number of these not reviewed yet'),
+                ('leaks_confirmed', 'Number of these confirmed'),
+                ('leaks_rejected', 'Number of rejected leaks'),
                 ('largest_area', 'Area of the largest leak, m²'),
                 ('greatest_drop', 'Greatest drop of intensity, dB'),
-                ('remark', 'The reviewer''s remark'),
-                ('created_at', 'When the row was made'),
-                ('detected_at', 'When it was last detected'),
-                ('drawn_by', 'Who drew it last, set by the database'),
-                ('drawn_at', 'When it was drawn last, set by the database')) AS m (name, text) ON m.name = a.attname
+                ('remark', 'Remark of the reviewer'),
+                ('created_at', 'Time when the row was created'),
+                ('detected_at', 'Time of the last detection that found it'),
+                ('drawn_by', 'Role that drew it last, set by the database'),
+                ('drawn_at', 'Time of the last drawing, set by the database')) AS m (name, text) ON m.name = a.attname
           LEFT JOIN pg_class t
                  ON t.oid = to_regclass(CASE WHEN v.relname = 'file' THEN 'tunnel.scan_file'
                                              WHEN v.relname = 'stage_status' THEN 'tunnel.run'

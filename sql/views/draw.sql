@@ -11,7 +11,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
       FROM tunnel.finding a WHERE a.id = $1
 $$;
 COMMENT ON FUNCTION tunnel_internal.finding_state(bigint) IS
-    'What the audit has of a finding: what people can change, geometry in the unrolled plane as EWKT';
+    'Editable columns of a finding for the audit, geometry in the unrolled plane as EWKT';
 
 -- What was measured of a finding, which goes with its outline.
 CREATE OR REPLACE FUNCTION tunnel_internal.finding_measured(id bigint) RETURNS jsonb
@@ -23,7 +23,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
       FROM tunnel.finding a WHERE a.id = $1 AND a.image_share IS NOT NULL
 $$;
 COMMENT ON FUNCTION tunnel_internal.finding_measured(bigint) IS
-    'What was measured of a finding''s outline, as the audit keeps it when that changes; NULL of one that was not measured';
+    'Measured values of a finding for the audit, before its outline changes; NULL if it was not measured';
 
 -- Which wet findings are the same, about a place of the unrolled plane. One that was detected is the same as what a person drew,
 -- redrew, split or merged when these together cover half of it: the person's outline counts, also where he rejects it. One that a
@@ -82,7 +82,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.link_findings(int, geometry) IS
-'Marks which wet findings of a survey about a place (unrolled plane) are the same, so that each counts once: see settle_findings.';
+'Mark wet findings of a survey near a place (unrolled plane) with the same area, so that each area counts once: see settle_findings';
 
 -- Leaks that detection found lie in a dry region when half of them does, redrawn, split and merged ones too. One that waits for
 -- an operator has none. What is no longer a leak lies in none.
@@ -99,7 +99,7 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_te
      WHERE a.id = w.id AND a.dry_region_id IS DISTINCT FROM w.region
 $$;
 COMMENT ON FUNCTION tunnel_internal.mark_dry(int, geometry) IS
-'Marks the leaks of a survey about a place (unrolled plane) that detection found and that lie in a dry region by half, and takes the mark from the others: called after each change of a region, and by settle_findings.';
+'Mark the detected leaks of a survey near a place (unrolled plane) that lie in a dry region with at least half of their area, and unmark the others. Called after each change of a region, and by settle_findings';
 
 -- What follows for other findings from a change of some.
 CREATE OR REPLACE FUNCTION tunnel_internal.settle_findings(survey_id int, place geometry) RETURNS void
@@ -110,7 +110,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.settle_findings(int, geometry) IS
-'Brings the findings of a survey about a place (unrolled plane) together, as link_findings and mark_dry do: called after each change of an outline, a kind or a review, and by detection.';
+'Update the relations between findings of a survey near a place (unrolled plane): link_findings and mark_dry. Called after each change of an outline, a kind or a review, and by detection';
 
 -- Each change of findings adds rows to their sums; there need be no more of them than sums. Who does the same meanwhile has the
 -- rows that he has.
@@ -128,7 +128,7 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_te
     HAVING sum(a.findings) <> 0 OR abs(sum(a.area)) + abs(sum(a.length)) + abs(sum(a.extent)) > 1e-9
 $$;
 COMMENT ON FUNCTION tunnel_internal.pack_sums(int) IS
-    'Puts the rows together that changes of findings have added to their sums (tunnel.finding_sum); called by detection and imports';
+    'Combine the rows that changes of findings added to tunnel.finding_sum; called by detection and imports';
 
 -- Refuses a kind that there is not, is not offered any more, or is not drawn so.
 CREATE OR REPLACE FUNCTION tunnel_internal.check_kind(kind text, drawn geometry) RETURNS void
@@ -150,7 +150,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.check_kind(text, geometry) IS
-    'An error unless there is a kind of findings of this code which is drawn so; without a geometry, of any';
+    'Raise an error unless a kind of findings with this code can be drawn with this geometry, or with any if none is given';
 
 -- What was drawn in a view, in the unrolled plane: of view finding_unrolled it lies there, of finding_map on the strip beside the
 -- axis, of finding_3d in space.
@@ -184,7 +184,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.drawn_in(int, text, geometry) IS
-    'What was drawn in a view (unrolled, map or 3d) in the unrolled plane; an error where it does not lie on the tunnel';
+    'Unrolled geometry of a shape drawn in a view (unrolled, map or 3d). Raises an error if it does not lie on the tunnel';
 
 -- Gives a finding an outline of a person's: all that follows is worked out, what was measured of the old one goes until the next
 -- detection measures the new one.
@@ -202,7 +202,7 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_
      WHERE w.id = $1 AND a.id = w.id
 $$;
 COMMENT ON FUNCTION tunnel_internal.redraw(bigint, geometry, float8, text) IS
-    'Gives a finding another outline (unrolled plane) and origin, works out its figures and drops what was measured of the old one; for draw_finding, finding_split and finding_merge alone';
+    'Change the outline (unrolled plane) and origin of a finding, compute its values, and clear the measured ones. Only draw_finding, finding_split and finding_merge call it';
 
 -- A new finding of a person's, like another or on its own; its id, which is given for one that comes back.
 CREATE OR REPLACE FUNCTION tunnel_internal.add_finding(
@@ -220,7 +220,7 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_
     RETURNING id
 $$;
 COMMENT ON FUNCTION tunnel_internal.add_finding(int, text, geometry, float8, int, text, text, text, boolean, bigint, bigint) IS
-    'A new finding (unrolled plane) with all that follows from its outline; its id. For draw_finding, finding_split and finding_undo alone';
+    'Insert a finding (unrolled plane) with all values computed from its outline, and return its id. Only draw_finding, finding_split and finding_undo call it';
 
 -- After the surface has changed: outlines in the unrolled plane stay. One that now reaches beyond the lining stays as it was.
 CREATE OR REPLACE FUNCTION tunnel_internal.renew_findings(survey_id int, km int) RETURNS void
@@ -246,7 +246,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.renew_findings(int, int) IS
-'Works out anew where what people drew in a kilometre lies on the map and in space, after the axis or the sections have changed; called by detection. The outlines in the unrolled plane stay.';
+'Compute the map and space geometries of drawn findings of a kilometre again after the axis or the sections changed; called by detection. Outlines in the unrolled plane stay';
 
 -- Detection writes its findings of a survey under this lock, and so sees all that was drawn before, and none is drawn meanwhile;
 -- who draws does not wait for who draws.
@@ -255,7 +255,7 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_te
     SELECT pg_advisory_xact_lock_shared(-3, $1)
 $$;
 COMMENT ON FUNCTION tunnel_internal.lock_findings(int) IS
-    'Keeps detection from writing the findings of a survey, or waits for it, until the transaction ends';
+    'Block detection from writing the findings of a survey, or wait for it, until the transaction ends';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.draw_finding() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
@@ -386,7 +386,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.draw_finding() IS
-    'Trigger of the views of findings: draws, redraws, reviews and deletes, works out what follows and notes who and when';
+    'Trigger of the views of findings: insert, redraw, review or delete a finding, compute its values, and write role and time';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.check_finding(severity int, width float8, review text) RETURNS void
 LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
@@ -402,7 +402,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.check_finding(int, float8, text) IS
-    'An error unless these can be a finding''s severity, width (m) and review';
+    'Raise an error unless severity, width (m) and review are valid';
 
 DO $$
 DECLARE
@@ -470,7 +470,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.finding_split(bigint, geometry) IS
-'Splits a finding (a polygon or a line) along a line of the unrolled plane (SRID 0) or of the map strip (tunnel''s SRID). The larger part keeps the number and the review; the others are new and have what it had. Returns the ids, that of the larger part first.';
+'Split a finding (a polygon or a line) along a line of the unrolled plane (SRID 0) or of the map strip (tunnel''s SRID). The larger part keeps the id and the review; the other parts are new findings with the same columns. Returns the ids, that of the larger part first';
 
 -- What lies apart by less than a metre is joined by a strip of a centimetre.
 CREATE OR REPLACE FUNCTION tunnel_api.finding_merge(ids bigint[]) RETURNS bigint
@@ -558,7 +558,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.finding_merge(bigint[]) IS
-'Merges findings of one kind (polygons, or lines end to end) that touch or lie within a metre. The oldest keeps its number and review and gets the outline of all, their greatest severity and all their remarks; the others stay as merged into it, and are not counted. Returns its id.';
+'Merge findings of one kind (polygons, or lines end to end) that touch or lie within 1 m. The oldest keeps its id and review, and gets the outline of all, the highest severity and all remarks. The others get the state merged and are not counted. Returns the id of the oldest';
 
 -- Adds, changes or deletes a photo of a finding: a path or URL, and what it shows.
 CREATE OR REPLACE FUNCTION tunnel_internal.edit_photo() RETURNS trigger
@@ -599,7 +599,7 @@ BEGIN
     RETURN NEW;
 END
 $$;
-COMMENT ON FUNCTION tunnel_internal.edit_photo() IS 'Trigger of view finding_photo: writes a photo and notes who and when';
+COMMENT ON FUNCTION tunnel_internal.edit_photo() IS 'Trigger of the view finding_photo: write a photo with role and time';
 
 CREATE OR REPLACE TRIGGER edit INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.finding_photo
     FOR EACH ROW EXECUTE FUNCTION tunnel_internal.edit_photo();

@@ -59,7 +59,8 @@ BEGIN
     RETURN NEW;
 END
 $$;
-COMMENT ON FUNCTION tunnel_internal.edit_axis_vertex() IS 'Trigger of view axis_vertex: moves a vertex and notes who and when';
+COMMENT ON FUNCTION tunnel_internal.edit_axis_vertex() IS
+    'Trigger of the view axis_vertex: move a vertex, and write role and time';
 
 CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.axis_vertex
     FOR EACH ROW EXECUTE FUNCTION tunnel_internal.edit_axis_vertex();
@@ -143,7 +144,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.review_finding() IS
-    'Trigger of the views of leaks and spots: sets review, remark and kind and notes who and when';
+    'Trigger of the views of leaks, findings and spots: set review, remark and kind, and write role and time';
 
 DO $$
 DECLARE
@@ -186,7 +187,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.draw_leak() IS
-    'Trigger of the views of leaks with one geometry: draws, redraws and deletes by the view of findings';
+    'Trigger of the views of leaks with one geometry: insert, redraw and delete through the views of findings';
 
 DO $$
 DECLARE
@@ -207,7 +208,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
       FROM tunnel.region r WHERE r.id = $1
 $$;
 COMMENT ON FUNCTION tunnel_internal.region_state(int) IS
-    'What the audit has of a region: kind, reason, outline as EWKT, whether it waits and who put it in force';
+    'Columns of a region for the audit: kind, reason, outline as EWKT, pending approval, operator who approved it';
 
 -- Adds, changes or deletes a region drawn by hand in the unrolled plane (m). A new one names its survey by survey_id or,
 -- without that, by name.
@@ -308,7 +309,7 @@ BEGIN
     RETURN NEW;
 END
 $$;
-COMMENT ON FUNCTION tunnel_internal.edit_region() IS 'Trigger of view region: writes a region and notes who and when';
+COMMENT ON FUNCTION tunnel_internal.edit_region() IS 'Trigger of the view region: write a region, with role and time';
 
 CREATE OR REPLACE TRIGGER edit INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.region
     FOR EACH ROW EXECUTE FUNCTION tunnel_internal.edit_region();
@@ -335,4 +336,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.dry_region_approve(int) IS
-'Puts a dry region in force that is larger than dry_region_limit of its tunnel; for operators. Returns how many open leaks it took away.';
+'Approve a dry region that is larger than dry_region_limit of its tunnel; for operators. Returns the number of open leaks that it excludes';

@@ -15,19 +15,19 @@ COMMENT ON FUNCTION tunnel_internal.evidence_text(jsonb) IS
 CREATE OR REPLACE VIEW tunnel_api.finding_kind AS
 SELECT k.id, k.code, k.label, k.geometries, k.wet, k.position, k.active FROM tunnel.finding_kind k;
 COMMENT ON VIEW tunnel_api.finding_kind IS
-    'Kinds of findings; operators add their own and change words, places and what is offered. One that was used is not deleted, but set inactive';
-COMMENT ON COLUMN tunnel_api.finding_kind.code IS 'Its code, in lower case';
-COMMENT ON COLUMN tunnel_api.finding_kind.label IS 'Its name, in the owner''s words';
-COMMENT ON COLUMN tunnel_api.finding_kind.geometries IS 'What it may be drawn as: polygon, line, point';
-COMMENT ON COLUMN tunnel_api.finding_kind.wet IS 'Whether it counts as wet in statistics and classes';
-COMMENT ON COLUMN tunnel_api.finding_kind.position IS 'Its place in lists';
-COMMENT ON COLUMN tunnel_api.finding_kind.active IS 'Whether it is offered for what is drawn';
+    'Kinds of findings. Operators add kinds and change labels, order and availability. A kind that was used cannot be deleted, only set inactive';
+COMMENT ON COLUMN tunnel_api.finding_kind.code IS 'Code, in lower case';
+COMMENT ON COLUMN tunnel_api.finding_kind.label IS 'Name, in the owner''s words';
+COMMENT ON COLUMN tunnel_api.finding_kind.geometries IS 'Permitted geometries: polygon, line, point';
+COMMENT ON COLUMN tunnel_api.finding_kind.wet IS 'True if findings of this kind count as wet in statistics and classes';
+COMMENT ON COLUMN tunnel_api.finding_kind.position IS 'Position in lists';
+COMMENT ON COLUMN tunnel_api.finding_kind.active IS 'True if new findings can be drawn with this kind';
 
 CREATE OR REPLACE VIEW tunnel_api.severity AS SELECT s.id::int AS id, s.label, s.text FROM tunnel.severity s;
-COMMENT ON VIEW tunnel_api.severity IS 'Words for the degrees of severity, 1 (the least) to 4; operators change them to their own';
-COMMENT ON COLUMN tunnel_api.severity.id IS '1, the least, to 4';
-COMMENT ON COLUMN tunnel_api.severity.label IS 'Its name, in the owner''s words';
-COMMENT ON COLUMN tunnel_api.severity.text IS 'What it means';
+COMMENT ON VIEW tunnel_api.severity IS 'Degrees of severity, 1 (lowest) to 4. Operators can change the words';
+COMMENT ON COLUMN tunnel_api.severity.id IS 'Severity, 1 (lowest) to 4';
+COMMENT ON COLUMN tunnel_api.severity.label IS 'Name, in the owner''s words';
+COMMENT ON COLUMN tunnel_api.severity.text IS 'Meaning';
 
 CREATE OR REPLACE VIEW tunnel_api.finding AS
 SELECT a.id, a.survey_id, s.name AS survey, a.km,
@@ -65,7 +65,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
  CROSS JOIN LATERAL (SELECT (a.chainage_from + a.chainage_to) / 2 AS chainage,
                             floor((a.chainage_from + a.chainage_to) / 2 / t.spacing)::integer AS near) m;
 COMMENT ON VIEW tunnel_api.finding IS
-    'Findings on the lining, detected and drawn, of all kinds and states, with their three geometries: polygons, lines and points as they are; review, remark and kind can be updated, and all that people draw through finding_unrolled, finding_map and finding_3d';
+    'Findings on the lining, detected and drawn, of all kinds and states, with three geometries: polygons, lines and points. review, remark and kind can be updated; draw and edit outlines in finding_unrolled, finding_map and finding_3d';
 
 -- The comments on its columns, and its views of one geometry.
 DO $$
@@ -141,11 +141,11 @@ SELECT a.id, a.survey_id, s.name AS survey, a.unrolled::public.geometry(Polygon,
   FROM tunnel.finding a
   JOIN tunnel.survey s ON s.id = a.survey_id;
 COMMENT ON VIEW tunnel_api.finding_polygon IS
-    'Findings as polygons: of a line the strip of its width, of a point a circle of 5 cm radius; all else is in finding, by id';
-COMMENT ON COLUMN tunnel_api.finding_polygon.id IS 'Its id in finding';
-COMMENT ON COLUMN tunnel_api.finding_polygon.unrolled IS 'In the unrolled plane';
-COMMENT ON COLUMN tunnel_api.finding_polygon.map IS 'On the map strip beside the axis, tunnel''s SRID';
-COMMENT ON COLUMN tunnel_api.finding_polygon.surface IS 'On the lining in space, tunnel''s SRID';
+    'Findings as polygons: a line as a strip of its width, a point as a circle of 5 cm radius. Other columns are in finding, with the same id';
+COMMENT ON COLUMN tunnel_api.finding_polygon.id IS 'Id in finding';
+COMMENT ON COLUMN tunnel_api.finding_polygon.unrolled IS 'Polygon in the unrolled plane (chainage, arc), m, SRID 0';
+COMMENT ON COLUMN tunnel_api.finding_polygon.map IS 'Polygon on the map strip beside the axis, tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.finding_polygon.surface IS 'Polygon on the lining in space (3D), tunnel''s SRID';
 
 CREATE OR REPLACE VIEW tunnel_api.finding_evidence AS
 SELECT a.id * 100 + e.n AS id, a.id AS finding_id, a.survey_id, s.name AS survey, e.reason, e.log_odds
@@ -154,9 +154,10 @@ SELECT a.id * 100 + e.n AS id, a.id AS finding_id, a.survey_id, s.name AS survey
  CROSS JOIN LATERAL (SELECT v.key AS reason, v.value::double precision AS log_odds, row_number() OVER (ORDER BY v.key) AS n
                        FROM jsonb_each_text(a.evidence) v) e;
 COMMENT ON VIEW tunnel_api.finding_evidence IS 'Evidence for and against each finding being a leak: a row for each reason';
-COMMENT ON COLUMN tunnel_api.finding_evidence.finding_id IS 'Its finding';
-COMMENT ON COLUMN tunnel_api.finding_evidence.reason IS 'What was measured: faint, thin, rectangular, …';
-COMMENT ON COLUMN tunnel_api.finding_evidence.log_odds IS 'Its contribution to the logarithm of the odds of a leak; negative: against one';
+COMMENT ON COLUMN tunnel_api.finding_evidence.finding_id IS 'Id of the finding';
+COMMENT ON COLUMN tunnel_api.finding_evidence.reason IS 'Measured property: faint, thin, rectangular, …';
+COMMENT ON COLUMN tunnel_api.finding_evidence.log_odds IS
+    'Contribution to the logarithm of the odds of a leak; negative: evidence against a leak';
 
 CREATE OR REPLACE VIEW tunnel_api.leak AS
 SELECT a.id, a.survey_id, s.name AS survey, a.km,
@@ -234,11 +235,11 @@ SELECT p.id, p.finding_id, a.survey_id, s.name AS survey, p.path, p.caption, p.a
   JOIN tunnel.finding a ON a.id = p.finding_id
   JOIN tunnel.survey s ON s.id = a.survey_id;
 COMMENT ON VIEW tunnel_api.finding_photo IS 'Photos of findings, by path or URL; rows may be added, changed and deleted';
-COMMENT ON COLUMN tunnel_api.finding_photo.finding_id IS 'Its finding';
+COMMENT ON COLUMN tunnel_api.finding_photo.finding_id IS 'Id of the finding';
 COMMENT ON COLUMN tunnel_api.finding_photo.path IS 'Path or URL';
-COMMENT ON COLUMN tunnel_api.finding_photo.caption IS 'What it shows';
-COMMENT ON COLUMN tunnel_api.finding_photo.added_by IS 'Who added it, set by the database';
-COMMENT ON COLUMN tunnel_api.finding_photo.added_at IS 'When it was added, set by the database';
+COMMENT ON COLUMN tunnel_api.finding_photo.caption IS 'Caption';
+COMMENT ON COLUMN tunnel_api.finding_photo.added_by IS 'Role that added it, set by the database';
+COMMENT ON COLUMN tunnel_api.finding_photo.added_at IS 'Time when it was added, set by the database';
 
 -- How many there are of each kind and origin, and what becomes of each, from the sums that triggers on tunnel.finding keep.
 CREATE OR REPLACE VIEW tunnel_api.finding_count AS
@@ -262,21 +263,21 @@ SELECT (a.survey_id::bigint * 100000 + min(k.id)) * 10
  GROUP BY a.survey_id, s.name, a.kind, a.wet, a.origin
 HAVING sum(a.findings) <> 0;
 COMMENT ON VIEW tunnel_api.finding_count IS 'Number of findings of a survey by kind, origin and state';
-COMMENT ON COLUMN tunnel_api.finding_count.id IS 'A key, of survey, kind and origin';
+COMMENT ON COLUMN tunnel_api.finding_count.id IS 'Key, of survey, kind and origin';
 COMMENT ON COLUMN tunnel_api.finding_count.kind IS 'Code of the kind';
-COMMENT ON COLUMN tunnel_api.finding_count.wet IS 'Whether the kind counts as wet';
+COMMENT ON COLUMN tunnel_api.finding_count.wet IS 'True if the kind counts as wet';
 COMMENT ON COLUMN tunnel_api.finding_count.origin IS 'detected, drawn, redrawn, split or merged';
-COMMENT ON COLUMN tunnel_api.finding_count.counted IS 'How many sums count: open and confirmed';
-COMMENT ON COLUMN tunnel_api.finding_count.open IS 'Of these, those not reviewed yet';
-COMMENT ON COLUMN tunnel_api.finding_count.confirmed IS 'Of these, those confirmed or drawn';
-COMMENT ON COLUMN tunnel_api.finding_count.rejected IS 'Rejected, not counted';
-COMMENT ON COLUMN tunnel_api.finding_count.merged IS 'Merged into another, which counts for them';
-COMMENT ON COLUMN tunnel_api.finding_count.same IS 'The same as another, which counts for them';
-COMMENT ON COLUMN tunnel_api.finding_count.dry IS 'Taken away by a dry region';
-COMMENT ON COLUMN tunnel_api.finding_count.gone IS 'Not found again by the last detection, though not rejected';
-COMMENT ON COLUMN tunnel_api.finding_count.to_measure IS 'Counted, but without measured figures until the next detect';
-COMMENT ON COLUMN tunnel_api.finding_count.area IS 'Area of those counted, m²';
-COMMENT ON COLUMN tunnel_api.finding_count.length IS 'Length of those counted, m';
+COMMENT ON COLUMN tunnel_api.finding_count.counted IS 'Number included in totals: open and confirmed';
+COMMENT ON COLUMN tunnel_api.finding_count.open IS 'Number of these not reviewed yet';
+COMMENT ON COLUMN tunnel_api.finding_count.confirmed IS 'Number of these confirmed or drawn';
+COMMENT ON COLUMN tunnel_api.finding_count.rejected IS 'Number rejected';
+COMMENT ON COLUMN tunnel_api.finding_count.merged IS 'Number merged into another finding';
+COMMENT ON COLUMN tunnel_api.finding_count.same IS 'Number with the same area as another finding';
+COMMENT ON COLUMN tunnel_api.finding_count.dry IS 'Number excluded by a dry region';
+COMMENT ON COLUMN tunnel_api.finding_count.gone IS 'Number that the last detection did not find again, not rejected';
+COMMENT ON COLUMN tunnel_api.finding_count.to_measure IS 'Number included in totals and not measured before the next detect';
+COMMENT ON COLUMN tunnel_api.finding_count.area IS 'Area of the findings included in totals, m²';
+COMMENT ON COLUMN tunnel_api.finding_count.length IS 'Length of the findings included in totals, m';
 
 CREATE OR REPLACE VIEW tunnel_api.dry_region AS
 SELECT r.id, r.survey_id, s.name AS survey, ST_XMin(r.geom) AS chainage_from, ST_XMax(r.geom) AS chainage_to,
@@ -293,18 +294,20 @@ SELECT r.id, r.survey_id, s.name AS survey, ST_XMin(r.geom) AS chainage_from, ST
          WHERE a.dry_region_id = r.id AND a.review = 'open' AND a.merged_into IS NULL AND a.same_as IS NULL) l
  WHERE r.kind = 'dry';
 COMMENT ON VIEW tunnel_api.dry_region IS
-    'Dry regions and what each took away: open leaks that lie in it by half are kept but not counted, and come back with its removal';
-COMMENT ON COLUMN tunnel_api.dry_region.arc_from IS 'Least arc, m';
+    'Dry regions and the leaks that each excludes: open leaks with at least half of their area in it are kept but not counted, and return when the region is deleted';
+COMMENT ON COLUMN tunnel_api.dry_region.arc_from IS 'Smallest arc, m';
 COMMENT ON COLUMN tunnel_api.dry_region.arc_to IS 'Greatest arc, m';
-COMMENT ON COLUMN tunnel_api.dry_region.area IS 'Its area in the unrolled plane, m²';
-COMMENT ON COLUMN tunnel_api.dry_region.area_limit IS 'Area above which it must say why, and waits for an operator (tunnel.tunnel.dry_region_limit), m²';
-COMMENT ON COLUMN tunnel_api.dry_region.reason IS 'Why it was drawn';
-COMMENT ON COLUMN tunnel_api.dry_region.pending_approval IS 'Whether it waits for an operator (dry_region_approve): until then it takes nothing away';
-COMMENT ON COLUMN tunnel_api.dry_region.approved_by IS 'Operator who put it in force, where it had to wait';
-COMMENT ON COLUMN tunnel_api.dry_region.approved_at IS 'When';
-COMMENT ON COLUMN tunnel_api.dry_region.leaks IS 'How many open leaks it took away';
-COMMENT ON COLUMN tunnel_api.dry_region.leaks_area IS 'Their area, m²';
-COMMENT ON COLUMN tunnel_api.dry_region.leak_ids IS 'Their ids (finding)';
+COMMENT ON COLUMN tunnel_api.dry_region.area IS 'Area in the unrolled plane, m²';
+COMMENT ON COLUMN tunnel_api.dry_region.area_limit IS
+    'Area above which a region needs a reason and the approval of an operator (tunnel.tunnel.dry_region_limit), m²';
+COMMENT ON COLUMN tunnel_api.dry_region.reason IS 'Reason why it was drawn';
+COMMENT ON COLUMN tunnel_api.dry_region.pending_approval IS
+    'True if it waits for the approval of an operator (dry_region_approve); until then it has no effect';
+COMMENT ON COLUMN tunnel_api.dry_region.approved_by IS 'Operator who approved it, where approval was required';
+COMMENT ON COLUMN tunnel_api.dry_region.approved_at IS 'Time of the approval';
+COMMENT ON COLUMN tunnel_api.dry_region.leaks IS 'Number of open leaks that it excludes';
+COMMENT ON COLUMN tunnel_api.dry_region.leaks_area IS 'Area of those leaks, m²';
+COMMENT ON COLUMN tunnel_api.dry_region.leak_ids IS 'Ids of those leaks (finding)';
 COMMENT ON COLUMN tunnel_api.dry_region.geom IS 'Polygon in the unrolled plane (chainage, arc), m';
 
 -- An example of an owner's view, by the Specifications for the National Tunnel Inventory (FHWA): severity 1 to 4 as condition
@@ -338,10 +341,10 @@ SELECT s.id::bigint * 10 + q.n AS id, s.id AS survey_id, s.name AS survey, q.ele
                 SELECT CASE e.unit WHEN 'm²' THEN g.area WHEN 'each' THEN g.findings ELSE g.length END AS amount) m
          GROUP BY e.n, e.element, e.unit) q;
 COMMENT ON VIEW tunnel_api.snti_condition IS
-    'Example: quantities of elements in the condition states of FHWA''s SNTI, from the severity of counted findings (none: CS2); of the liner the rest of what was scanned is in CS1. Owners make their own';
+    'Example: quantities of elements in the condition states of FHWA''s SNTI, from the severity of counted findings (without severity: CS2). The rest of the scanned liner is in CS1. Owners can write their own view';
 COMMENT ON COLUMN tunnel_api.snti_condition.element IS 'liner, cracks, joints, bolts or drips';
 COMMENT ON COLUMN tunnel_api.snti_condition.unit IS 'm², m or each';
 COMMENT ON COLUMN tunnel_api.snti_condition.cs1 IS 'Quantity in condition state 1, good';
-COMMENT ON COLUMN tunnel_api.snti_condition.cs2 IS 'Condition state 2, fair';
-COMMENT ON COLUMN tunnel_api.snti_condition.cs3 IS 'Condition state 3, poor';
-COMMENT ON COLUMN tunnel_api.snti_condition.cs4 IS 'Condition state 4, severe';
+COMMENT ON COLUMN tunnel_api.snti_condition.cs2 IS 'Quantity in condition state 2, fair';
+COMMENT ON COLUMN tunnel_api.snti_condition.cs3 IS 'Quantity in condition state 3, poor';
+COMMENT ON COLUMN tunnel_api.snti_condition.cs4 IS 'Quantity in condition state 4, severe';

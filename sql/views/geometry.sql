@@ -31,4 +31,4 @@ BEGIN
 END
 $$;
 COMMENT ON PROCEDURE tunnel_internal.make_geometry_views(text, text, text, text, text, text, text, text, text) IS
-    'Makes of a view with three geometries the three views of one, named by stem and suffix, with its comments; subject and remark are what their own comments begin and end with';
+    'Create, for a view with three geometries, three views with one geometry each, named by stem and suffix, with its comments. subject and remark are the beginning and the end of their own comments';

@@ -13,10 +13,11 @@ SELECT c.id, c.name, c.description
     (68, 'object', 'What stands on the ground: people, trolleys, equipment, bollards'),
     (69, 'sphere', 'Target sphere'),
     (70, 'noise', 'Points by themselves in the air, or behind the lining')) AS c (id, name, description);
-COMMENT ON VIEW tunnel_api.class IS 'Classes of points: LAS codes; 2 is ASPRS''s, 64 and above are user-defined';
-COMMENT ON COLUMN tunnel_api.class.id IS 'Code in tunnel_api.point, tunnel_api.cluster and in exported files';
-COMMENT ON COLUMN tunnel_api.class.name IS 'Name';
-COMMENT ON COLUMN tunnel_api.class.description IS 'What the points lie on';
+COMMENT ON VIEW tunnel_api.class IS
+    'Classes of points: codes of LAS. 2 is defined by ASPRS; those from 64 on are free for the user';
+COMMENT ON COLUMN tunnel_api.class.id IS 'Code, as in tunnel_api.point, tunnel_api.cluster and exported files';
+COMMENT ON COLUMN tunnel_api.class.name IS 'Name of the class';
+COMMENT ON COLUMN tunnel_api.class.description IS 'Surface or object that the points lie on';
 
 CREATE OR REPLACE VIEW tunnel_api.ground AS
 SELECT g.survey_id::bigint * 100000000 + 50000000 + g.n AS id, g.survey_id, s.name AS survey, g.km, g.n::float8 AS chainage,
@@ -24,9 +25,9 @@ SELECT g.survey_id::bigint * 100000000 + 50000000 + g.n AS id, g.survey_id, s.na
        g.foot[1] AS foot_left, g.foot[2] AS foot_right, g.arc_left, g.arc_right, g.geom::public.geometry AS geom
   FROM tunnel.ground g
   JOIN tunnel.survey s ON s.id = g.survey_id;
-COMMENT ON VIEW tunnel_api.ground IS 'Ground at each metre along the tunnel that has one (Li et al., 2023)';
-COMMENT ON COLUMN tunnel_api.ground.foot_left IS 'Where the left wall meets the ground, m right of the axis; NaN where there is no wall';
-COMMENT ON COLUMN tunnel_api.ground.foot_right IS 'Where the right wall meets the ground, m right of the axis; NaN where there is no wall';
+COMMENT ON VIEW tunnel_api.ground IS 'Ground at each metre of chainage where there is one (Li et al., 2023)';
+COMMENT ON COLUMN tunnel_api.ground.foot_left IS 'Foot of the left wall, m right of the axis; NaN where there is no wall';
+COMMENT ON COLUMN tunnel_api.ground.foot_right IS 'Foot of the right wall, m right of the axis; NaN where there is no wall';
 
 -- The cells that a cluster's points fill are for the export of classified files, and stay in the table.
 CREATE OR REPLACE VIEW tunnel_api.cluster AS
@@ -43,11 +44,12 @@ SELECT c.id, c.survey_id, s.name AS survey, c.km,
   LEFT JOIN tunnel_api.class k ON k.id = c.class
  CROSS JOIN LATERAL (SELECT (c.chainage_from + c.chainage_to) / 2 AS chainage,
                             floor((c.chainage_from + c.chainage_to) / 2 / t.spacing)::integer AS near) m;
-COMMENT ON VIEW tunnel_api.cluster IS 'What stands in the tunnel or hangs on its lining, found by stage ground (Li et al., 2023)';
-COMMENT ON COLUMN tunnel_api.cluster.segment IS 'Number of the segment that holds its middle';
-COMMENT ON COLUMN tunnel_api.cluster.class_name IS 'Name of its class';
+COMMENT ON VIEW tunnel_api.cluster IS
+    'Objects in the tunnel, fixtures in front of the lining and niches behind it, found by stage ground (Li et al., 2023)';
+COMMENT ON COLUMN tunnel_api.cluster.segment IS 'Number of the segment at its middle';
+COMMENT ON COLUMN tunnel_api.cluster.class_name IS 'Name of the class';
 COMMENT ON COLUMN tunnel_api.cluster.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.cluster.area IS 'Area of its hull in plan, m²';
+COMMENT ON COLUMN tunnel_api.cluster.area IS 'Area of the hull in plan, m²';
 
 CREATE OR REPLACE VIEW tunnel_api.target_sphere AS
 SELECT p.id, p.survey_id, s.name AS survey, p.km,
@@ -61,9 +63,9 @@ SELECT p.id, p.survey_id, s.name AS survey, p.km,
   JOIN tunnel.survey s ON s.id = p.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
  CROSS JOIN LATERAL (SELECT floor(p.chainage / t.spacing)::integer AS near) m;
-COMMENT ON VIEW tunnel_api.target_sphere IS 'Target spheres, one row for each scan that saw one (Li et al., 2023)';
-COMMENT ON COLUMN tunnel_api.target_sphere.segment IS 'Number of the segment that holds its centre';
+COMMENT ON VIEW tunnel_api.target_sphere IS 'Target spheres, one row for each scan that shows one (Li et al., 2023)';
+COMMENT ON COLUMN tunnel_api.target_sphere.segment IS 'Number of the segment at its centre';
 COMMENT ON COLUMN tunnel_api.target_sphere.label IS 'Station of its centre, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.target_sphere.x IS 'Centre in the tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel_api.target_sphere.y IS 'Centre in the tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel_api.target_sphere.x IS 'Easting of the centre, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel_api.target_sphere.y IS 'Northing of the centre, tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel_api.target_sphere.z IS 'Height of the centre, m';

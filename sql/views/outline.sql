@@ -32,8 +32,8 @@ SELECT s.id::bigint * 100000000 + 50000000 + 2 * w.first + (w.side = 'right')::i
              UNION SELECT least(g.chainage_to, e.chainage_to) WHERE h.is_last) r) p
      GROUP BY p.piece, p.side) w;
 COMMENT ON VIEW tunnel_api.outline IS
-    'Walls of the tunnel in plan, left and right: at each cross-section where the lining is widest, in pieces where segments have no sections';
+    'Walls of the tunnel in plan, left and right: the widest place of the lining at each cross-section. Lines end where segments have no sections';
 COMMENT ON COLUMN tunnel_api.outline.side IS 'left or right, looking up-chainage';
-COMMENT ON COLUMN tunnel_api.outline.nearest IS 'Least distance from the axis, m';
+COMMENT ON COLUMN tunnel_api.outline.nearest IS 'Smallest distance from the axis, m';
 COMMENT ON COLUMN tunnel_api.outline.farthest IS 'Greatest distance from the axis, m';
-COMMENT ON COLUMN tunnel_api.outline.geom IS 'In plan, tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.outline.geom IS 'Line in plan, tunnel''s SRID';

@@ -18,4 +18,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.points(text, float8, float8) IS
-'Points of a survey from one chainage (m) up to another, as the view point has them, with no look at other surveys: where a database holds many, the way to ask by a survey''s name';
+'Points of a survey from one chainage (m) up to another, with the columns of the view point. Reads the partitions of that survey only';

@@ -6,9 +6,9 @@ SELECT (g.survey_id::bigint * 1000000 + 500000 + g.km) AS id, g.survey_id, s.nam
        g.requested_at, g.retry_after
   FROM tunnel.goal g
   JOIN tunnel.survey s ON s.id = g.survey_id;
-COMMENT ON VIEW tunnel_api.goal IS 'Requested stages of each kilometre';
-COMMENT ON COLUMN tunnel_api.goal.stage IS 'Stage up to which the kilometre is to be brought';
-COMMENT ON COLUMN tunnel_api.goal.retry_after IS 'Stages that failed before this moment are tried again';
+COMMENT ON VIEW tunnel_api.goal IS 'Stages up to which batches process each kilometre';
+COMMENT ON COLUMN tunnel_api.goal.stage IS 'Last stage to run';
+COMMENT ON COLUMN tunnel_api.goal.retry_after IS 'Stages that failed before this time are tried again';
 
 CREATE OR REPLACE VIEW tunnel_api.incoming AS
 SELECT ('x' || left(md5(i.survey_id || '/' || i.name), 13))::bit(52)::bigint AS id, i.survey_id, s.name AS survey, i.name,
@@ -16,13 +16,14 @@ SELECT ('x' || left(md5(i.survey_id || '/' || i.name), 13))::bit(52)::bigint AS 
        CASE WHEN i.failed_at IS NULL THEN 'waiting' ELSE 'failed' END AS state, i.requested_at, i.failed_at, i.message
   FROM tunnel.incoming i
   JOIN tunnel.survey s ON s.id = i.survey_id;
-COMMENT ON VIEW tunnel_api.incoming IS 'Files that a batch is to read: waiting, or failed and why. A file that was read is in tunnel_api.file';
-COMMENT ON COLUMN tunnel_api.incoming.id IS 'Made from survey and name, for programs that need a key';
-COMMENT ON COLUMN tunnel_api.incoming.path IS 'Where it lies; shown to operators alone';
-COMMENT ON COLUMN tunnel_api.incoming.points IS 'Points that its header announces; 0 if it is unreadable';
-COMMENT ON COLUMN tunnel_api.incoming.km_from IS 'First kilometre that it may touch, by its header; NULL if that is unreadable';
-COMMENT ON COLUMN tunnel_api.incoming.state IS 'waiting to be read, or failed';
-COMMENT ON COLUMN tunnel_api.incoming.message IS 'Why it failed, and what to do';
+COMMENT ON VIEW tunnel_api.incoming IS
+    'Files of a batch that wait to be read or failed. Files that were read are in tunnel_api.file';
+COMMENT ON COLUMN tunnel_api.incoming.id IS 'Key, derived from survey and name';
+COMMENT ON COLUMN tunnel_api.incoming.path IS 'Path of the file; visible to operators only';
+COMMENT ON COLUMN tunnel_api.incoming.points IS 'Number of points by its header; 0 if unreadable';
+COMMENT ON COLUMN tunnel_api.incoming.km_from IS 'First kilometre that it can touch, by its header; NULL if unreadable';
+COMMENT ON COLUMN tunnel_api.incoming.state IS 'waiting, or failed';
+COMMENT ON COLUMN tunnel_api.incoming.message IS 'Reason of the failure, and what to do';
 
 -- Apart by their state, for which jobs that wait or run have indexes: who asks for these is not to look at those that are done.
 CREATE OR REPLACE VIEW tunnel_api.job AS
@@ -40,14 +41,15 @@ SELECT j.id, (j.args->>'survey_id')::integer AS survey_id, s.name AS survey, (j.
   LEFT JOIN LATERAL (SELECT max(v.at) AS at FROM tunnel_queue.procrastinate_events v WHERE v.job_id = j.id) e ON true
   LEFT JOIN LATERAL (SELECT u.message FROM tunnel.run u WHERE u.job_id = j.id ORDER BY u.id DESC LIMIT 1) r ON true;
 COMMENT ON VIEW tunnel_api.job IS 'Jobs of the queue: a stage of a kilometre, or the reading of a file';
-COMMENT ON COLUMN tunnel_api.job.file IS 'Name of the file to be read; NULL for a stage of a kilometre';
-COMMENT ON COLUMN tunnel_api.job.stage IS 'Stage of the kilometre; read where a file is to be read';
+COMMENT ON COLUMN tunnel_api.job.file IS 'Name of the file to read; NULL for a stage of a kilometre';
+COMMENT ON COLUMN tunnel_api.job.stage IS 'Stage of the kilometre; read if a file is to be read';
 COMMENT ON COLUMN tunnel_api.job.state IS 'queued, running, done, failed or cancelled';
-COMMENT ON COLUMN tunnel_api.job.attempts IS 'How often it was begun before';
-COMMENT ON COLUMN tunnel_api.job.worker_id IS 'Key of the worker that runs or ran it; NULL before and when that has left';
+COMMENT ON COLUMN tunnel_api.job.attempts IS 'Number of earlier attempts';
+COMMENT ON COLUMN tunnel_api.job.worker_id IS
+    'Key of the worker that runs or ran it; NULL before, and after that worker left';
 COMMENT ON COLUMN tunnel_api.job.worker IS 'Machine and process that runs or ran it';
-COMMENT ON COLUMN tunnel_api.job.since IS 'When it came into this state';
-COMMENT ON COLUMN tunnel_api.job.message IS 'Why it failed';
+COMMENT ON COLUMN tunnel_api.job.since IS 'Time since which it is in this state';
+COMMENT ON COLUMN tunnel_api.job.message IS 'Reason of the failure';
 
 CREATE OR REPLACE VIEW tunnel_api.worker AS
 SELECT w.id, w.host, w.pid, w.started_at, q.last_heartbeat AS heartbeat, w.stop AS stopping, d.doing, d.since
@@ -57,9 +59,9 @@ SELECT w.id, w.host, w.pid, w.started_at, q.last_heartbeat AS heartbeat, w.stop 
                             min(j.since) AS since
                        FROM tunnel_api.job j WHERE j.worker_id = w.id AND j.state = 'running') d ON true;
 COMMENT ON VIEW tunnel_api.worker IS 'Workers that serve the queue';
-COMMENT ON COLUMN tunnel_api.worker.host IS 'Machine that it runs on';
-COMMENT ON COLUMN tunnel_api.worker.pid IS 'Its process there';
-COMMENT ON COLUMN tunnel_api.worker.heartbeat IS 'When it last said that it lives';
-COMMENT ON COLUMN tunnel_api.worker.stopping IS 'Whether it was asked to finish what it is at and leave';
-COMMENT ON COLUMN tunnel_api.worker.doing IS 'What it is at: stage and kilometre or file; NULL when idle';
-COMMENT ON COLUMN tunnel_api.worker.since IS 'Since when it is at it';
+COMMENT ON COLUMN tunnel_api.worker.host IS 'Machine of the worker';
+COMMENT ON COLUMN tunnel_api.worker.pid IS 'Number of its process';
+COMMENT ON COLUMN tunnel_api.worker.heartbeat IS 'Time of the last sign of life';
+COMMENT ON COLUMN tunnel_api.worker.stopping IS 'True if it was asked to finish its current job and exit';
+COMMENT ON COLUMN tunnel_api.worker.doing IS 'Current job: stage and kilometre, or file; NULL if idle';
+COMMENT ON COLUMN tunnel_api.worker.since IS 'Beginning of the current job';

@@ -51,11 +51,12 @@ SELECT 16 * s.id::bigint + 6, s.id, s.name, NULL, 'survey', NULL, s.positions_no
   FROM tunnel.survey s
  WHERE s.positions_note IS NOT NULL;
 COMMENT ON VIEW tunnel_api.remark IS
-    'Notes and limitations of the results: notes of the stages by kilometre, points left out and doubtful intensity by file, and notes on the scanner positions';
-COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file, and for the survey as a whole';
-COMMENT ON COLUMN tunnel_api.remark.stage IS 'Stage that says so; survey for what was said when the survey was added or set';
+    'Notes on the results of surveys: notes of stages by kilometre, points of files that were left out, doubtful intensity of files, and notes on scanner positions';
+COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file or for the survey as a whole';
+COMMENT ON COLUMN tunnel_api.remark.stage IS
+    'Stage that wrote the note; survey for notes written when the survey was added or set';
 COMMENT ON COLUMN tunnel_api.remark.file IS 'Name of the scan file; NULL for a kilometre';
-COMMENT ON COLUMN tunnel_api.remark.remark IS 'Notes and limitations';
+COMMENT ON COLUMN tunnel_api.remark.remark IS 'Text of the note';
 
 
 -- Files first, then by kilometre; what is the same in several kilometres is said once.
@@ -108,7 +109,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.remarks_of(int, float8[], float8[]) IS
-'What remarks has to say of each of some stretches of a survey, given by where they begin and end (m); n: the first is 1.';
+'Result of remarks for several stretches of a survey, given by their beginnings and ends (m). n: number of the stretch, from 1';
 
 
 -- The planner puts the body in the place of a call.
@@ -121,7 +122,7 @@ AS $$
     SELECT r.file, r.stage, r.kilometres, r.remark, r.said FROM tunnel_internal.remarks_of($1, ARRAY[$2], ARRAY[$3]) r
 $$;
 COMMENT ON FUNCTION tunnel_api.remarks(int, float8, float8) IS
-'Notes and limitations of a survey''s results between two chainages (m), or of all, from the view remark: of its files, then of its kilometres; equal ones once. said: full text, as in every document.';
+'Notes on a survey''s results between two chainages (m), from the view remark: first those of files, then those of kilometres; the same note of several kilometres is one row. said: the note in words, as in every document';
 
 
 CREATE OR REPLACE FUNCTION tunnel_internal.remark_statements(survey_id int, starts float8[], ends float8[])
@@ -135,7 +136,7 @@ AS $$
      GROUP BY r.n
 $$;
 COMMENT ON FUNCTION tunnel_internal.remark_statements(int, float8[], float8[]) IS
-'Remarks on several stretches of a survey, given by start and end (m), one line each; n: number of the stretch, from 1. No row for a stretch without remarks.';
+'Notes on several stretches of a survey, given by their beginnings and ends (m), one line each. n: number of the stretch, from 1. No row for a stretch without notes';
 
 
 CREATE OR REPLACE FUNCTION tunnel_internal.remark_statement(
@@ -144,4 +145,4 @@ RETURNS text
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED
 AS $$ SELECT r.said FROM tunnel_internal.remark_statements($1, ARRAY[$2], ARRAY[$3]) r $$;
 COMMENT ON FUNCTION tunnel_internal.remark_statement(int, float8, float8) IS
-'What remarks has to say of a survey between two chainages (m), on one line; NULL if there is nothing.';
+'Notes on a stretch of a survey (m) in one line; NULL if there are none';

@@ -12,7 +12,7 @@ LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_c
                       WHERE s.id = $1 AND l.share > 0 AND l.share < 1))
 $$;
 COMMENT ON FUNCTION tunnel_internal.scanner_chainage(int, geometry) IS
-    'Chainage (m) of a place in the tunnel, also where there are no sections yet: as unroll has it, else along the axis as given; NULL beyond its ends and of a site';
+    'Chainage (m) of a scanner position: from unroll, else along the given axis; NULL beyond its ends and on a site';
 
 CREATE OR REPLACE VIEW tunnel_api.scan_station AS
 SELECT (c.survey_id::bigint << 32) | (c.scan_id::bigint & 4294967295) AS id, c.survey_id, s.name AS survey, s.date, c.scan_id, k.chainage,
@@ -21,13 +21,13 @@ SELECT (c.survey_id::bigint << 32) | (c.scan_id::bigint & 4294967295) AS id, c.s
   FROM tunnel.station c
   JOIN tunnel.survey s ON s.id = c.survey_id
  CROSS JOIN LATERAL (SELECT tunnel_internal.scanner_chainage(c.survey_id, c.geom) AS chainage OFFSET 0) k;
-COMMENT ON VIEW tunnel_api.scan_station IS 'Where a static scanner stood';
+COMMENT ON VIEW tunnel_api.scan_station IS 'Positions of static scanners';
 COMMENT ON COLUMN tunnel_api.scan_station.date IS 'Day of the survey';
-COMMENT ON COLUMN tunnel_api.scan_station.scan_id IS 'Number of the scan, as the points have it';
+COMMENT ON COLUMN tunnel_api.scan_station.scan_id IS 'Number of the scan, as in the points';
 COMMENT ON COLUMN tunnel_api.scan_station.chainage IS 'Chainage, m; NULL beyond the ends of the axis';
 COMMENT ON COLUMN tunnel_api.scan_station.label IS 'Station, as 12+345.678; NULL beyond the ends of the axis';
-COMMENT ON COLUMN tunnel_api.scan_station.height IS 'Of the scanner, m';
-COMMENT ON COLUMN tunnel_api.scan_station.geom IS 'The scanner''s place, tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.scan_station.height IS 'Height of the scanner, m';
+COMMENT ON COLUMN tunnel_api.scan_station.geom IS 'Position of the scanner, tunnel''s SRID';
 
 -- A vertex a second is enough for a map, and a line a minute for its times. Of a minute the line goes on to where the next one
 -- begins. It ends where a gap does: an interval longer than survey.longest_interval.
@@ -61,13 +61,17 @@ SELECT (s.id::bigint << 38) | ((m.minute & 4294967295) << 6) | m.part AS id, s.i
  CROSS JOIN LATERAL (SELECT tunnel_internal.scanner_chainage(s.id, public.st_endpoint(m.geom)) AS chainage OFFSET 0) b
  WHERE m.geom IS NOT NULL;
 COMMENT ON VIEW tunnel_api.trajectory IS
-    'The way of a mobile scanner, a line for each minute, with a vertex a second; where its gaps are, a line ends';
+    'Path of a mobile scanner: a line for each minute, with a vertex for each second. Lines end at gaps';
 COMMENT ON COLUMN tunnel_api.trajectory.date IS 'Day of the survey';
-COMMENT ON COLUMN tunnel_api.trajectory.time_from IS 'When it begins, s, as the points'' gps_time';
-COMMENT ON COLUMN tunnel_api.trajectory.time_to IS 'When it ends, s: where the next one begins, or at the last vertex before a gap';
-COMMENT ON COLUMN tunnel_api.trajectory.chainage_from IS 'Lesser chainage of its two ends, or that of the only one within the ends of the axis, m';
-COMMENT ON COLUMN tunnel_api.trajectory.chainage_to IS 'Greater chainage of its two ends, or that of the only one within the ends of the axis, m';
-COMMENT ON COLUMN tunnel_api.trajectory.upwards IS 'Whether the scanner moved up-chainage; NULL if an end is beyond the ends of the axis';
-COMMENT ON COLUMN tunnel_api.trajectory.poses IS 'Positions that the trajectory has there';
+COMMENT ON COLUMN tunnel_api.trajectory.time_from IS 'Time of its beginning, s, as gps_time of the points';
+COMMENT ON COLUMN tunnel_api.trajectory.time_to IS
+    'Time of its end, s: beginning of the next line, or last vertex before a gap';
+COMMENT ON COLUMN tunnel_api.trajectory.chainage_from IS
+    'Smaller chainage of its two ends (or of the one end within the axis), m';
+COMMENT ON COLUMN tunnel_api.trajectory.chainage_to IS
+    'Greater chainage of its two ends (or of the one end within the axis), m';
+COMMENT ON COLUMN tunnel_api.trajectory.upwards IS
+    'True if the scanner moved up-chainage; NULL if an end lies beyond the ends of the axis';
+COMMENT ON COLUMN tunnel_api.trajectory.poses IS 'Number of positions in the trajectory';
 COMMENT ON COLUMN tunnel_api.trajectory.speed IS 'Mean speed, m/s';
-COMMENT ON COLUMN tunnel_api.trajectory.geom IS 'The scanner''s way, tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.trajectory.geom IS 'Path of the scanner, tunnel''s SRID';

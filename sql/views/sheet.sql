@@ -13,11 +13,11 @@ SELECT f.id, f.survey_id, f.survey, f.km, f.chainage_from, f.chainage_to, f.labe
         SELECT f.counted AND (f.origin <> 'detected' OR f.severity IS NOT NULL
                               OR f.kind NOT IN ('leak', 'joint', 'dark')) AS shown) p;
 COMMENT ON VIEW tunnel_api.sheet_finding IS
-    'Findings as sheets draw and list them: what people drew, judged to be of a kind of their own or gave a severity';
-COMMENT ON COLUMN tunnel_api.sheet_finding.position IS 'Place of its kind in lists';
-COMMENT ON COLUMN tunnel_api.sheet_finding.shown IS 'Whether it is drawn as a finding: it counts, and people had a hand in it';
-COMMENT ON COLUMN tunnel_api.sheet_finding.listed IS 'Whether it is in the table of findings: of these what is not wet';
-COMMENT ON COLUMN tunnel_api.sheet_finding.geom IS 'In the unrolled plane (chainage, arc), m: a polygon, a line or a point';
+    'Findings as drawn and listed on sheets: drawn by people, or given a kind or a severity by people';
+COMMENT ON COLUMN tunnel_api.sheet_finding.position IS 'Position of its kind in lists';
+COMMENT ON COLUMN tunnel_api.sheet_finding.shown IS 'True if it is drawn as a finding: it counts, and people edited it';
+COMMENT ON COLUMN tunnel_api.sheet_finding.listed IS 'True if it is in the table of findings: those shown that are not wet';
+COMMENT ON COLUMN tunnel_api.sheet_finding.geom IS 'Polygon, line or point in the unrolled plane (chainage, arc), m';
 
 CREATE OR REPLACE VIEW tunnel_api.sheet_leak AS
 SELECT l.id, l.survey_id, l.survey, l.km, l.chainage_from, l.chainage_to, l.label, l.arc_from, l.arc_to, l.clock, l.kind,
@@ -29,10 +29,10 @@ SELECT l.id, l.survey_id, l.survey, l.km, l.chainage_from, l.chainage_to, l.labe
   JOIN tunnel.finding a ON a.id = l.id
   LEFT JOIN tunnel.finding_kind k ON k.code = l.kind
   LEFT JOIN tunnel.severity v ON v.id = a.severity;
-COMMENT ON VIEW tunnel_api.sheet_leak IS 'Leaks as sheets draw and list them';
+COMMENT ON VIEW tunnel_api.sheet_leak IS 'Leaks as drawn and listed on sheets';
 COMMENT ON COLUMN tunnel_api.sheet_leak.note IS
-    'Its kind, if that is not leak, and its severity in the owner''s words, then the remark; empty if there is none';
-COMMENT ON COLUMN tunnel_api.sheet_leak.geom IS 'In the unrolled plane (chainage, arc), m';
+    'Kind, unless it is leak, severity in the owner''s words, and remark; empty if there are none';
+COMMENT ON COLUMN tunnel_api.sheet_leak.geom IS 'Polygon in the unrolled plane (chainage, arc), m';
 
 -- All sheets of a survey are as high as its widest place, so that they have one scale. Each section is taken for the middle
 -- one of itself and its neighbours: a single one that went astray, say at a portal, must not blow up all sheets.
@@ -125,16 +125,21 @@ SELECT s.id::bigint * 1000000 + 500000 + r.number AS id, s.id AS survey_id, s.na
                  GROUP BY q.state, q.listed) t) f ON true
  WHERE a.arc_from IS NOT NULL;
 COMMENT ON VIEW tunnel_api.sheet IS
-    'Sheets of 50 m on which a survey is drawn and printed: rectangles of the unrolled plane (chainage, arc), SRID 0';
-COMMENT ON COLUMN tunnel_api.sheet.number IS 'floor(chainage / 50), as the blocks of the images';
-COMMENT ON COLUMN tunnel_api.sheet.ticks IS 'Station at each 10 m from its beginning to its end, as 12+350';
-COMMENT ON COLUMN tunnel_api.sheet.lining_area IS 'Lining, seen or not, m²; NULL before detection';
-COMMENT ON COLUMN tunnel_api.sheet.seen_share IS 'Share of it that was seen, as in leak_statistics; on what was not, no leak was searched for';
-COMMENT ON COLUMN tunnel_api.sheet.wet_area IS 'Area of the leaks within the sheet, m²; a leak over its edge by its part';
-COMMENT ON COLUMN tunnel_api.sheet.leaks IS 'Leaks on it or over its edges, found last and not rejected; NULL where they were not searched for';
-COMMENT ON COLUMN tunnel_api.sheet.gaps IS 'Where on it leaks were not searched for, or not as they should be (coverage_statement); NULL if nowhere';
-COMMENT ON COLUMN tunnel_api.sheet.remarks IS 'Notes and limitations of the results there (remark_statement); NULL if none';
-COMMENT ON COLUMN tunnel_api.sheet.findings IS 'Findings in its table (sheet_finding, listed), beside leaks; NULL if none';
+    'Sheets of 50 m for drawings of a survey: rectangles of the unrolled plane (chainage, arc), SRID 0';
+COMMENT ON COLUMN tunnel_api.sheet.number IS 'floor(chainage / 50), as in the blocks of the images';
+COMMENT ON COLUMN tunnel_api.sheet.ticks IS 'Stations each 10 m from its beginning to its end, as 12+350';
+COMMENT ON COLUMN tunnel_api.sheet.lining_area IS 'Lining, inspected or not, m²; NULL before detection';
+COMMENT ON COLUMN tunnel_api.sheet.seen_share IS
+    'Inspected share of the lining, as in leak_statistics; leaks are searched for on the inspected lining only';
+COMMENT ON COLUMN tunnel_api.sheet.wet_area IS
+    'Area of the leaks within the sheet, m²; a leak across its edge counts in part';
+COMMENT ON COLUMN tunnel_api.sheet.leaks IS
+    'Number of leaks on the sheet or across its edges. Rejected leaks and leaks that the last detection did not find are left out. NULL if it was not searched';
+COMMENT ON COLUMN tunnel_api.sheet.gaps IS
+    'Stretches where leaks could be missed (coverage_statement); NULL if there are none';
+COMMENT ON COLUMN tunnel_api.sheet.remarks IS 'Notes on the results (remark_statement); NULL if there are none';
+COMMENT ON COLUMN tunnel_api.sheet.findings IS
+    'Number of findings in its table (sheet_finding, listed), besides leaks; NULL if there are none';
 COMMENT ON COLUMN tunnel_api.sheet.left_out IS
-    'How many findings on it do not count, leaks among them, and are not drawn: rejected, merged, same, dry; NULL if none';
-COMMENT ON COLUMN tunnel_api.sheet.geom IS 'From edge to edge, as high as the survey''s widest place';
+    'Number of findings, including leaks, that do not count and are not drawn: rejected, merged, same, dry; NULL if there are none';
+COMMENT ON COLUMN tunnel_api.sheet.geom IS 'Rectangle over the full width of the survey';

@@ -14,7 +14,7 @@ AS $$
                 ELSE 'results' END
 $$;
 COMMENT ON FUNCTION tunnel_internal.table_kind(text) IS
-    'What a table of schema tunnel holds of a survey: points, images, sections, results, runs or inputs';
+    'Kind of data in a table of schema tunnel: points, images, sections, results, runs or inputs';
 
 -- Points and images have tables of each survey. Of another, surveys are given the share that they have of its rows by the
 -- statistics of the planner: of a survey among the most common values its frequency, of the others what is left, in equal parts.
@@ -78,8 +78,7 @@ AS $$
       FROM part p
      GROUP BY p.survey_id, p.kind
 $$;
-COMMENT ON FUNCTION tunnel_internal.survey_sizes() IS
-    'What each survey takes of the database, by kind: from the catalogue, without reading a table';
+COMMENT ON FUNCTION tunnel_internal.survey_sizes() IS 'Disk space of each survey, by kind of data, from the catalogue';
 
 CREATE OR REPLACE VIEW tunnel_api.survey_size AS
 SELECT coalesce(z.survey_id, 0)::bigint * 10
@@ -88,12 +87,13 @@ SELECT coalesce(z.survey_id, 0)::bigint * 10
   FROM tunnel_internal.survey_sizes() z
   LEFT JOIN tunnel.survey s ON s.id = z.survey_id;
 COMMENT ON VIEW tunnel_api.survey_size IS
-    'What each survey takes of the database, by kind; cheap, for it reads the catalogue and no table. What belongs to a tunnel or to the database as a whole is not in it';
-COMMENT ON COLUMN tunnel_api.survey_size.survey_id IS 'Key of the survey; NULL for common tables that were never analyzed';
-COMMENT ON COLUMN tunnel_api.survey_size.survey IS 'Its name; NULL also where points or images are left of one that is gone';
+    'Disk space of each survey, by kind of data. Fast: reads the catalogue only. Data of a tunnel or of the database as a whole are not included';
+COMMENT ON COLUMN tunnel_api.survey_size.survey_id IS
+    'Key of the survey; NULL for shared tables without statistics (ANALYZE)';
+COMMENT ON COLUMN tunnel_api.survey_size.survey IS 'Name of the survey; NULL if it was deleted and points or images remain';
 COMMENT ON COLUMN tunnel_api.survey_size.kind IS
-    'points (also those that wait to be loaded), images, sections (with axis and segments), results, runs (the ledger) or inputs (files, scanner positions, what is wanted)';
-COMMENT ON COLUMN tunnel_api.survey_size.rows IS 'Rows, as the last ANALYZE counted or estimated them; NULL before the first';
-COMMENT ON COLUMN tunnel_api.survey_size.bytes IS 'Bytes on disk, with indexes and long values';
+    'points (including those that wait to be loaded), images, sections (with axis and segments), results, runs (ledger) or inputs (files, scanner positions, goals)';
+COMMENT ON COLUMN tunnel_api.survey_size.rows IS 'Number of rows by the last ANALYZE; NULL before the first one';
+COMMENT ON COLUMN tunnel_api.survey_size.bytes IS 'Bytes on disk, with indexes and TOAST';
 COMMENT ON COLUMN tunnel_api.survey_size.estimated IS
-    'Whether it is the share of tables that surveys have in common, by an estimate of their rows; false: of tables of its own, exact';
+    'True if estimated as a share of tables that several surveys use; false if exact';

@@ -10,11 +10,12 @@ SELECT c.id, c.survey_id, s.name AS survey, c.name, c.up, c.water_level, c.state
   JOIN tunnel.survey s ON s.id = c.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id;
 COMMENT ON VIEW tunnel_api.sonar_scan IS
-    'Sonar scans below the water: a point of the file lies in the tunnel at rotation · (scale · point) + translation';
-COMMENT ON COLUMN tunnel_api.sonar_scan.sigma_x IS 'Standard deviation of its place along x, m';
-COMMENT ON COLUMN tunnel_api.sonar_scan.sigma_y IS 'Standard deviation of its place along y, m';
-COMMENT ON COLUMN tunnel_api.sonar_scan.sigma_z IS 'Standard deviation of its height, m';
-COMMENT ON COLUMN tunnel_api.sonar_scan.geom IS 'Place of the sonar, in the tunnel''s SRID; NULL where no pose was found, or none is needed';
+    'Sonar scans below the water. A point of the file lies in the tunnel at rotation · (scale · point) + translation';
+COMMENT ON COLUMN tunnel_api.sonar_scan.sigma_x IS 'Standard deviation of the position along x, m';
+COMMENT ON COLUMN tunnel_api.sonar_scan.sigma_y IS 'Standard deviation of the position along y, m';
+COMMENT ON COLUMN tunnel_api.sonar_scan.sigma_z IS 'Standard deviation of the height, m';
+COMMENT ON COLUMN tunnel_api.sonar_scan.geom IS
+    'Position of the sonar, tunnel''s SRID; NULL if no pose was found or none is needed';
 
 -- The ellipse in which a scan's place in plan lies with a probability of 95 % is that of covariance × 5.991 (chi², two degrees of
 -- freedom); its half axes are the roots of the eigenvalues.
@@ -32,13 +33,13 @@ SELECT c.id, c.survey_id, c.survey, c.name, c.state, 100 AS exaggeration, e.half
            atan2(2 * v.xy, c.covariance[25] - c.covariance[33]) / 2 AS turn) e
  WHERE c.geom IS NOT NULL;
 COMMENT ON VIEW tunnel_api.sonar_ellipse IS
-    'Ellipses in which the places of sonar scans in plan lie with a probability of 95 %, drawn 100 times as large';
+    '95 % confidence ellipses of the horizontal positions of sonar scans, drawn 100 times enlarged';
 COMMENT ON COLUMN tunnel_api.sonar_ellipse.name IS 'Name of the scan''s file';
-COMMENT ON COLUMN tunnel_api.sonar_ellipse.state IS 'determined, or weak (known worse than it should be)';
-COMMENT ON COLUMN tunnel_api.sonar_ellipse.exaggeration IS 'So many times as large as it is';
-COMMENT ON COLUMN tunnel_api.sonar_ellipse.half_major IS 'Greater half axis, m';
-COMMENT ON COLUMN tunnel_api.sonar_ellipse.half_minor IS 'Lesser half axis, m';
-COMMENT ON COLUMN tunnel_api.sonar_ellipse.geom IS 'Ellipse, drawn 100 times as large, in plan, tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.sonar_ellipse.state IS 'determined, or weak (less precise than required)';
+COMMENT ON COLUMN tunnel_api.sonar_ellipse.exaggeration IS 'Factor of enlargement';
+COMMENT ON COLUMN tunnel_api.sonar_ellipse.half_major IS 'Semi-major axis, m';
+COMMENT ON COLUMN tunnel_api.sonar_ellipse.half_minor IS 'Semi-minor axis, m';
+COMMENT ON COLUMN tunnel_api.sonar_ellipse.geom IS 'Ellipse, 100 times enlarged, in plan, tunnel''s SRID';
 
 CREATE OR REPLACE VIEW tunnel_api.registration_residual AS
 SELECT r.id, c.survey_id, s.name AS survey, r.scan_id, c.name AS scan, r.kind, r.name, r.count, r.median, r.p95
@@ -46,7 +47,7 @@ SELECT r.id, c.survey_id, s.name AS survey, r.scan_id, c.name AS scan, r.kind, r
   JOIN tunnel.sonar_scan c ON c.id = r.scan_id
   JOIN tunnel.survey s ON s.id = c.survey_id;
 COMMENT ON VIEW tunnel_api.registration_residual IS
-    'What is left between sonar scans and the walls, ladders and other scans that they were fitted to';
+    'Residuals between sonar scans and the walls, ladders and other scans that they were fitted to';
 COMMENT ON COLUMN tunnel_api.registration_residual.scan IS 'Name of the sonar scan';
 
 CREATE OR REPLACE VIEW tunnel_api.ladder AS
@@ -55,17 +56,17 @@ SELECT l.id, l.survey_id, s.name AS survey, l.name, l.origin, l.axes, l.rms, l.r
   FROM tunnel.ladder l
   JOIN tunnel.survey s ON s.id = l.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id;
-COMMENT ON VIEW tunnel_api.ladder IS 'Ladders that stand in the water, as the laser sees them above it';
-COMMENT ON COLUMN tunnel_api.ladder.geom IS 'Its origin, in the tunnel''s SRID';
+COMMENT ON VIEW tunnel_api.ladder IS 'Ladders in the water, as the laser shows them above it';
+COMMENT ON COLUMN tunnel_api.ladder.geom IS 'Origin of the ladder, tunnel''s SRID';
 
 CREATE OR REPLACE VIEW tunnel_api.sonar_point AS
 SELECT p.id, p.survey_id, p.km, p.scan_id, c.name AS scan, p.chainage, p.across, p.classification,
        public.ST_Z(p.geom) - c.water_level AS over_water, p.geom::public.geometry AS geom
   FROM tunnel.sonar_point p
   JOIN tunnel.sonar_scan c ON c.id = p.scan_id;
-COMMENT ON VIEW tunnel_api.sonar_point IS 'Points of sonar scans in the tunnel, thinned and without false echoes';
+COMMENT ON VIEW tunnel_api.sonar_point IS 'Points of sonar scans in the tunnel, thinned, without false echoes';
 COMMENT ON COLUMN tunnel_api.sonar_point.scan IS 'Name of the sonar scan';
-COMMENT ON COLUMN tunnel_api.sonar_point.over_water IS 'Height above the water, m; below it less than 0';
+COMMENT ON COLUMN tunnel_api.sonar_point.over_water IS 'Height above the water, m; negative below it';
 
 CREATE OR REPLACE VIEW tunnel_api.bed AS
 SELECT b.id, b.survey_id, s.name AS survey, b.km, b.n + 0.5::float8 AS chainage, (b.across_n + 0.5::float8) / 10 AS across, b.height, b.depth,
@@ -73,9 +74,9 @@ SELECT b.id, b.survey_id, s.name AS survey, b.km, b.n + 0.5::float8 AS chainage,
   FROM tunnel.bed b
   JOIN tunnel.survey s ON s.id = b.survey_id;
 COMMENT ON VIEW tunnel_api.bed IS
-    'The bed below the water in cells of 1 m along and 0.1 m across; cells that no sonar saw are not there. Of silt it is the top';
-COMMENT ON COLUMN tunnel_api.bed.chainage IS 'Chainage of the cell''s middle, m';
-COMMENT ON COLUMN tunnel_api.bed.across IS 'Place of the cell''s middle right of the given axis, m';
+    'Bed below the water in cells of 1 m along and 0.1 m across the axis. Cells without sonar are missing. Where there is silt, its top';
+COMMENT ON COLUMN tunnel_api.bed.chainage IS 'Chainage of the middle of the cell, m';
+COMMENT ON COLUMN tunnel_api.bed.across IS 'Distance of the middle of the cell to the right of the given axis, m';
 
 CREATE OR REPLACE FUNCTION tunnel_api.depth(survey text, chainage float8, across float8, OUT depth float8, OUT sigma float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
@@ -85,7 +86,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
      WHERE s.name = $1 AND b.n = floor($2) AND b.across_n = floor($3 * 10)
 $$;
 COMMENT ON FUNCTION tunnel_api.depth(text, float8, float8) IS
-    'Depth of the water, m, over the cell of the bed at a chainage and a place right of the given axis, m, and its standard deviation; NULL where no sonar saw the bed';
+    'Depth of water over the bed (m) at a chainage and a distance to the right of the given axis (m), with its standard deviation; NULL without sonar';
 
 CREATE OR REPLACE FUNCTION tunnel_api.bed_volume(
     survey text, chainage_from float8, chainage_to float8, height float8,
@@ -105,12 +106,12 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
       FROM cell, width
 $$;
 COMMENT ON FUNCTION tunnel_api.bed_volume(text, float8, float8, float8) IS
-    'Volume of the bed above a height (tunnel''s system, m) between two chainages, as silt above a design bed, and of the room below it, m³; its standard deviation if all cells err alike, as a pose does; the area seen, and that which no sonar saw, taken as wide as the bed mostly is, m²: nothing is said of the latter';
+    'Volumes between two chainages (m): bed above a height (m, e.g. silt above a design bed) and space below it, m³, with their standard deviation for an error common to all cells (the pose). seen_area: area with sonar; unseen_area: area without, assuming the usual width of the bed, m². Areas without sonar are in no volume';
 
 CREATE OR REPLACE VIEW tunnel_api.water_level AS
 SELECT w.id, w.survey_id, s.name AS survey, w.km, w.height, w.changed_at
   FROM tunnel.water_level w
   JOIN tunnel.survey s ON s.id = w.survey_id
  WHERE w.height IS NOT NULL;
-COMMENT ON VIEW tunnel_api.water_level IS 'The water in kilometres into which sonar scans were loaded';
-COMMENT ON COLUMN tunnel_api.water_level.height IS 'Of the water, m';
+COMMENT ON VIEW tunnel_api.water_level IS 'Height of the water in kilometres with sonar scans';
+COMMENT ON COLUMN tunnel_api.water_level.height IS 'Height of the water surface, m';

@@ -8,10 +8,12 @@ SELECT (r.survey_id::bigint * 1000000 + 500000 + r.km) * 10000 + c.n AS id, r.su
   JOIN tunnel.survey s ON s.id = r.survey_id
  CROSS JOIN LATERAL unnest(r.range_m, r.intensity_db, r.sigma_db) WITH ORDINALITY AS c (range_m, intensity_db, sigma_db, n);
 COMMENT ON VIEW tunnel_api.range_curve IS
-    'Range curve that was found on the lining of each kilometre, of surveys whose reference is auto: a row a range';
+    'Range curve of the intensity, estimated on the lining of each kilometre in surveys with reference auto: one row for each range';
 COMMENT ON COLUMN tunnel_api.range_curve.range_m IS 'Range, m';
-COMMENT ON COLUMN tunnel_api.range_curve.intensity_db IS 'Intensity of dry lining at right angles at this range, dB';
-COMMENT ON COLUMN tunnel_api.range_curve.sigma_db IS 'Standard deviation of the curve''s shape there, dB; NULL beyond the ranges of nearly all points, where it goes on by its slope';
+COMMENT ON COLUMN tunnel_api.range_curve.intensity_db IS
+    'Intensity of dry lining at perpendicular incidence at this range, dB';
+COMMENT ON COLUMN tunnel_api.range_curve.sigma_db IS
+    'Standard deviation of the shape of the curve, dB; NULL where the curve is extrapolated';
 
 CREATE OR REPLACE VIEW tunnel_api.radiometry AS
 SELECT r.survey_id::bigint * 1000000 + 500000 + r.km AS id, r.survey_id, s.name AS survey, r.km, s.reference,
@@ -24,14 +26,20 @@ SELECT r.survey_id::bigint * 1000000 + 500000 + r.km AS id, r.survey_id, s.name 
                       WHERE q.survey_id = r.survey_id AND q.km = r.km AND v.sigma_db IS NOT NULL) c ON true;
 COMMENT ON VIEW tunnel_api.radiometry IS 'Intensity correction of each kilometre (Xu et al., 2018)';
 COMMENT ON COLUMN tunnel_api.radiometry.reference IS 'Range curve of the survey: none, measured or auto';
-COMMENT ON COLUMN tunnel_api.radiometry.range_from IS 'Least of the ranges that the curve was found on (tunnel_api.range_curve), m; NULL unless the reference is auto';
-COMMENT ON COLUMN tunnel_api.radiometry.range_to IS 'Greatest of them, m';
-COMMENT ON COLUMN tunnel_api.radiometry.range_sigma IS 'Greatest standard deviation of its shape between them, dB: what is judged';
-COMMENT ON COLUMN tunnel_api.radiometry.roughness IS 'Roughness angle of Oren-Nayar, degrees (eq. 13-18); NULL if it could not be estimated and that of concrete is used, as its remark states';
-COMMENT ON COLUMN tunnel_api.radiometry.threshold IS 'Corrected intensity below which lining is wet, dB (eq. 19-20)';
+COMMENT ON COLUMN tunnel_api.radiometry.range_from IS
+    'Smallest range on which the curve was estimated (tunnel_api.range_curve), m; NULL unless the reference is auto';
+COMMENT ON COLUMN tunnel_api.radiometry.range_to IS 'Greatest range on which the curve was estimated, m';
+COMMENT ON COLUMN tunnel_api.radiometry.range_sigma IS
+    'Largest standard deviation of the shape of the curve between them, dB; the criterion of acceptance';
+COMMENT ON COLUMN tunnel_api.radiometry.roughness IS
+    'Roughness angle of Oren-Nayar, degrees (eq. 13-18); NULL if it could not be estimated and that of concrete is used, as stated in the remark';
+COMMENT ON COLUMN tunnel_api.radiometry.threshold IS
+    'Threshold of corrected intensity, dB; darker lining is wet (eq. 19-20)';
 COMMENT ON COLUMN tunnel_api.radiometry.sigma_raw IS 'Standard deviation of dry lining before correction, dB';
-COMMENT ON COLUMN tunnel_api.radiometry.sigma_lambert IS 'The same after correction by Lambert''s law, dB';
-COMMENT ON COLUMN tunnel_api.radiometry.sigma_oren_nayar IS 'The same after correction by Oren-Nayar, dB';
+COMMENT ON COLUMN tunnel_api.radiometry.sigma_lambert IS
+    'Standard deviation of dry lining after correction by Lambert''s law, dB';
+COMMENT ON COLUMN tunnel_api.radiometry.sigma_oren_nayar IS
+    'Standard deviation of dry lining after correction by Oren-Nayar, dB';
 
 -- Leaks, areas and shares are those of km_waterproof. Of a kilometre that was detected before there was a coverage the lining
 -- seen is what that detection counted: pixels of lining that hold measurements × the area of a pixel.
@@ -59,11 +67,15 @@ SELECT g.id, g.survey_id, g.survey, g.km, g.chainage_from, g.chainage_to, g.lini
            AND k.chainage_from >= g.chainage_from - (  -- no more of the index is read than the longest can reach
                    SELECT max(m.chainage_to - m.chainage_from) FROM tunnel.finding m WHERE m.survey_id = g.survey_id) - 1e-6
            AND k.wet AND NOT k.superseded) l;
-COMMENT ON VIEW tunnel_api.km_statistics IS 'Leaks of each kilometre, summed, as km_waterproof has them; without those rejected or no longer found';
-COMMENT ON COLUMN tunnel_api.km_statistics.lining_area IS 'Lining, seen or not, m²; NULL before detection, and after one by an earlier version';
-COMMENT ON COLUMN tunnel_api.km_statistics.seen_area IS 'Lining that the last detection saw, m²; NULL before it';
+COMMENT ON VIEW tunnel_api.km_statistics IS
+    'Statistics of leaks for each kilometre, consistent with km_waterproof. Rejected leaks and leaks that the last detection did not find are left out';
+COMMENT ON COLUMN tunnel_api.km_statistics.lining_area IS 'Lining, inspected or not, m²; NULL before detection';
+COMMENT ON COLUMN tunnel_api.km_statistics.seen_area IS 'Lining inspected by the last detection, m²; NULL before it';
 COMMENT ON COLUMN tunnel_api.km_statistics.seen_share IS 'seen_area / lining_area';
-COMMENT ON COLUMN tunnel_api.km_statistics.wet_area IS 'Area of the leaks on the lining within the kilometre, m²; a leak over its end by its part';
+COMMENT ON COLUMN tunnel_api.km_statistics.wet_area IS
+    'Area of the leaks within the kilometre, m²; a leak across a kilometre boundary counts in part';
 COMMENT ON COLUMN tunnel_api.km_statistics.wet_share IS 'wet_area / seen_area';
-COMMENT ON COLUMN tunnel_api.km_statistics.wet_pixel_share IS 'Share of wet pixels, after the median filter, in the lining seen (Xu et al., 2018)';
-COMMENT ON COLUMN tunnel_api.km_statistics.leaks IS 'Leaks in the kilometre or over its ends, open or confirmed; NULL where they were not searched for';
+COMMENT ON COLUMN tunnel_api.km_statistics.wet_pixel_share IS
+    'Share of wet pixels, after the median filter, in the inspected lining (Xu et al., 2018)';
+COMMENT ON COLUMN tunnel_api.km_statistics.leaks IS
+    'Number of leaks in the kilometre or across its boundaries, open or confirmed; NULL if it was not searched';

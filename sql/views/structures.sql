@@ -13,7 +13,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
       FROM tunnel.survey s WHERE s.id = $1
 $$;
 COMMENT ON FUNCTION tunnel_internal.members_inputs(int) IS
-    'What members of a survey are found from: checksums of its files by name, and when its settings were last changed, s since 1970. The run of stage members holds the same in its parameters';
+    'Inputs of the members of a survey: checksums of its files by name, and the last change of its settings, s since 1970';
 
 CREATE OR REPLACE VIEW tunnel_api.member AS
 SELECT m.id, m.survey_id, s.name AS survey, m.number, m.kind, m.length, m.area, m.bimodal, m.chainage,
@@ -21,15 +21,16 @@ SELECT m.id, m.survey_id, s.name AS survey, m.number, m.kind, m.length, m.area, 
        m.line::public.geometry AS geom
   FROM tunnel.member m
   JOIN tunnel.survey s ON s.id = m.survey_id;
-COMMENT ON VIEW tunnel_api.member IS 'Members of structures: faces that belong together, joined where others hide them';
-COMMENT ON COLUMN tunnel_api.member.number IS 'Its number in the survey; dimension member of files written';
+COMMENT ON VIEW tunnel_api.member IS 'Members of structures: faces that belong together, connected where objects hide them';
+COMMENT ON COLUMN tunnel_api.member.number IS 'Number in the survey';
 COMMENT ON COLUMN tunnel_api.member.kind IS 'flat (planes that lie in one), pipe (cylinders about one axis) or profile (sides of one beam)';
-COMMENT ON COLUMN tunnel_api.member.length IS 'Length along its line, gaps counted, m';
+COMMENT ON COLUMN tunnel_api.member.length IS 'Length along its line, including gaps, m';
 COMMENT ON COLUMN tunnel_api.member.area IS 'Area of its faces, m²';
-COMMENT ON COLUMN tunnel_api.member.bimodal IS 'Whether so much of it differs from the rest that neither is known to be its own surface';
-COMMENT ON COLUMN tunnel_api.member.chainage IS 'Chainage of its middle, m; NULL of a site or beyond the sections';
+COMMENT ON COLUMN tunnel_api.member.bimodal IS
+    'True if so much of its surface differs from the rest that the reference surface is unknown';
+COMMENT ON COLUMN tunnel_api.member.chainage IS 'Chainage of its middle, m; NULL on a site or beyond the sections';
 COMMENT ON COLUMN tunnel_api.member.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.member.geom IS 'Its middle line; of a flat one along its longest side; in the tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.member.geom IS 'Middle line, tunnel''s SRID; for a flat member, along its longest side';
 
 CREATE OR REPLACE VIEW tunnel_api.face AS
 SELECT f.id, f.survey_id, s.name AS survey, m.number AS member, f.number, f.kind, f.radius, f.rms, f.points, f.area,
@@ -40,29 +41,35 @@ SELECT f.id, f.survey_id, s.name AS survey, m.number AS member, f.number, f.kind
   FROM tunnel.face f
   JOIN tunnel.member m ON m.id = f.member_id
   JOIN tunnel.survey s ON s.id = f.survey_id;
-COMMENT ON VIEW tunnel_api.face IS 'Faces of members: planes and cylinders, with what of them could be judged';
-COMMENT ON COLUMN tunnel_api.face.member IS 'Number of the member that it belongs to';
-COMMENT ON COLUMN tunnel_api.face.number IS 'Its number in the survey; dimension face of files written';
+COMMENT ON VIEW tunnel_api.face IS 'Faces of members: planes and cylinders, with the inspected part';
+COMMENT ON COLUMN tunnel_api.face.member IS 'Number of its member';
+COMMENT ON COLUMN tunnel_api.face.number IS 'Number in the survey';
 COMMENT ON COLUMN tunnel_api.face.kind IS 'flat (a plane) or pipe (a part of a cylinder)';
-COMMENT ON COLUMN tunnel_api.face.radius IS 'Radius of a pipe, m; NULL of a plane';
-COMMENT ON COLUMN tunnel_api.face.rms IS 'Root mean square of its points'' distances from it, m';
-COMMENT ON COLUMN tunnel_api.face.points IS 'Points of the scans on it';
+COMMENT ON COLUMN tunnel_api.face.radius IS 'Radius of a pipe, m; NULL for a plane';
+COMMENT ON COLUMN tunnel_api.face.rms IS 'Root mean square distance of its points, m';
+COMMENT ON COLUMN tunnel_api.face.points IS 'Number of scan points on it';
 COMMENT ON COLUMN tunnel_api.face.area IS 'Area within its outline, m²';
-COMMENT ON COLUMN tunnel_api.face.seen_share IS 'Share of it that could be judged, 0 to 1: where there is less, nothing is said of the rest';
-COMMENT ON COLUMN tunnel_api.face.incidence_from IS 'Least angle of incidence at which it was judged, degrees; NULL where nothing was';
-COMMENT ON COLUMN tunnel_api.face.incidence_to IS 'Greatest angle of incidence at which it was judged, degrees';
-COMMENT ON COLUMN tunnel_api.face.level IS 'Its own level of intensity, dB; NULL where none could be found: it was not judged';
-COMMENT ON COLUMN tunnel_api.face.sigma IS 'Standard deviation about its level, dB';
-COMMENT ON COLUMN tunnel_api.face.bimodal IS 'Whether more than half of it differs, so that nobody knows which half is its own';
-COMMENT ON COLUMN tunnel_api.face.chainage IS 'Chainage of its middle, m; NULL of a site or beyond the sections';
+COMMENT ON COLUMN tunnel_api.face.seen_share IS 'Inspected share, 0 to 1; nothing is known of the rest';
+COMMENT ON COLUMN tunnel_api.face.incidence_from IS
+    'Smallest angle of incidence of the inspected part, degrees; NULL if nothing was inspected';
+COMMENT ON COLUMN tunnel_api.face.incidence_to IS 'Greatest angle of incidence of the inspected part, degrees';
+COMMENT ON COLUMN tunnel_api.face.level IS
+    'Intensity of its own surface, dB; NULL if it could not be determined and the face was not inspected';
+COMMENT ON COLUMN tunnel_api.face.sigma IS 'Standard deviation of the intensity of its own surface, dB';
+COMMENT ON COLUMN tunnel_api.face.bimodal IS
+    'True if more than half of it differs, so that the reference surface is unknown';
+COMMENT ON COLUMN tunnel_api.face.chainage IS 'Chainage of its middle, m; NULL on a site or beyond the sections';
 COMMENT ON COLUMN tunnel_api.face.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.face.origin IS 'Where its unrolled coordinates are (0, 0), of a pipe on its axis: x, y, z, in the tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel_api.face.axis IS 'Axis of a pipe; of a plane its normal, towards the scanners';
-COMMENT ON COLUMN tunnel_api.face.across IS 'Direction at right angles to it from which unrolled coordinates count: u of a plane, v = 0 of a pipe';
-COMMENT ON COLUMN tunnel_api.face.inside IS 'Whether a pipe is seen from inside';
-COMMENT ON COLUMN tunnel_api.face.side IS 'Side of its member, from 1: faces of one plane or pipe are of one side';
-COMMENT ON COLUMN tunnel_api.face.outline IS 'Its outline in its own plane, of a pipe unrolled (along the axis, around it), m; SRID 0';
-COMMENT ON COLUMN tunnel_api.face.geom IS 'Its outline in space, in the tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.face.origin IS
+    'Origin of its unrolled coordinates, on the axis of a pipe: x, y, z, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel_api.face.axis IS 'Axis of a pipe; normal of a plane, towards the scanners';
+COMMENT ON COLUMN tunnel_api.face.across IS
+    'Direction perpendicular to axis from which unrolled coordinates are measured: u of a plane, v = 0 of a pipe';
+COMMENT ON COLUMN tunnel_api.face.inside IS 'True if a pipe was scanned from inside';
+COMMENT ON COLUMN tunnel_api.face.side IS 'Side of its member, from 1; faces of one plane or pipe have the same side';
+COMMENT ON COLUMN tunnel_api.face.outline IS
+    'Outline in its own plane; for a pipe, unrolled (along the axis, around it), m; SRID 0';
+COMMENT ON COLUMN tunnel_api.face.geom IS 'Outline in space, tunnel''s SRID';
 
 CREATE OR REPLACE VIEW tunnel_api.spot AS
 SELECT p.id, p.survey_id, s.name AS survey, p.number, m.number AS member, m.kind AS member_kind, f.number AS face, p.kind,
@@ -76,7 +83,7 @@ SELECT p.id, p.survey_id, s.name AS survey, p.number, m.number AS member, m.kind
   LEFT JOIN tunnel.face f ON f.id = p.face_id
   LEFT JOIN tunnel.member m ON m.id = f.member_id;
 COMMENT ON VIEW tunnel_api.spot IS
-    'Spots on members that are darker or brighter than their own surface, with three geometries; review and remark can be updated';
+    'Spots on members, darker or brighter than their own surface, with three geometries; review and remark can be updated';
 
 CREATE OR REPLACE VIEW tunnel_api.member_statistics AS
 SELECT m.id, m.survey_id, s.name AS survey, m.number, m.kind, m.length, m.chainage,
@@ -91,30 +98,32 @@ SELECT m.id, m.survey_id, s.name AS survey, m.number, m.kind, m.length, m.chaina
                             coalesce(sum(q.area) FILTER (WHERE q.kind = 'bright'), 0) AS bright_area
                        FROM tunnel.spot q JOIN tunnel.face f ON f.id = q.face_id
                       WHERE f.member_id = m.id AND q.detected AND q.review <> 'rejected') p;
-COMMENT ON VIEW tunnel_api.member_statistics IS 'Members with what of them could be judged, and what of that differs from its own surface';
-COMMENT ON COLUMN tunnel_api.member_statistics.number IS 'Its number in the survey';
+COMMENT ON VIEW tunnel_api.member_statistics IS
+    'Members with their inspected part and the part of it that differs from their own surface';
+COMMENT ON COLUMN tunnel_api.member_statistics.number IS 'Number in the survey';
 COMMENT ON COLUMN tunnel_api.member_statistics.kind IS 'flat, pipe or profile';
-COMMENT ON COLUMN tunnel_api.member_statistics.length IS 'Length along its line, gaps counted, m';
-COMMENT ON COLUMN tunnel_api.member_statistics.faces IS 'Its faces';
+COMMENT ON COLUMN tunnel_api.member_statistics.length IS 'Length along its line, including gaps, m';
+COMMENT ON COLUMN tunnel_api.member_statistics.faces IS 'Number of faces';
 COMMENT ON COLUMN tunnel_api.member_statistics.area IS 'Area of its faces, m²';
-COMMENT ON COLUMN tunnel_api.member_statistics.seen_share IS 'Share of that which could be judged, 0 to 1';
-COMMENT ON COLUMN tunnel_api.member_statistics.bimodal IS 'Whether so much of it differs from the rest that neither is known to be its own surface';
-COMMENT ON COLUMN tunnel_api.member_statistics.spots IS 'Spots on it that count';
-COMMENT ON COLUMN tunnel_api.member_statistics.dark_area IS 'Area of those that are darker, m²';
-COMMENT ON COLUMN tunnel_api.member_statistics.bright_area IS 'Area of those that are brighter, m²';
-COMMENT ON COLUMN tunnel_api.member_statistics.spot_share IS 'Share of what could be judged that differs, 0 to 1';
-COMMENT ON COLUMN tunnel_api.member_statistics.geom IS 'Its middle line, in the tunnel''s SRID';
+COMMENT ON COLUMN tunnel_api.member_statistics.seen_share IS 'Inspected share of the area, 0 to 1';
+COMMENT ON COLUMN tunnel_api.member_statistics.bimodal IS
+    'True if so much of its surface differs from the rest that the reference surface is unknown';
+COMMENT ON COLUMN tunnel_api.member_statistics.spots IS 'Number of spots included in totals';
+COMMENT ON COLUMN tunnel_api.member_statistics.dark_area IS 'Area of darker spots, m²';
+COMMENT ON COLUMN tunnel_api.member_statistics.bright_area IS 'Area of brighter spots, m²';
+COMMENT ON COLUMN tunnel_api.member_statistics.spot_share IS 'Share of the inspected part that differs, 0 to 1';
+COMMENT ON COLUMN tunnel_api.member_statistics.geom IS 'Middle line, tunnel''s SRID';
 
 -- Products of vectors in space, as arrays of three numbers.
 CREATE OR REPLACE FUNCTION tunnel_internal.dot(a float8[], b float8[]) RETURNS float8
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
 RETURN a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
-COMMENT ON FUNCTION tunnel_internal.dot(float8[], float8[]) IS 'Inner product of two vectors in space';
+COMMENT ON FUNCTION tunnel_internal.dot(float8[], float8[]) IS 'Dot product of two vectors in space';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.cross_product(a float8[], b float8[]) RETURNS float8[]
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
 RETURN ARRAY[a[2] * b[3] - a[3] * b[2], a[3] * b[1] - a[1] * b[3], a[1] * b[2] - a[2] * b[1]];
-COMMENT ON FUNCTION tunnel_internal.cross_product(float8[], float8[]) IS 'Vector product of two vectors in space';
+COMMENT ON FUNCTION tunnel_internal.cross_product(float8[], float8[]) IS 'Cross product of two vectors in space';
 
 -- A spot lies on its face, and of two surfaces in one place a 3D view shows now the one, now the other.
 CREATE OR REPLACE VIEW tunnel_api.face_3d AS
@@ -133,15 +142,16 @@ SELECT f.id, f.survey_id, s.name AS survey, m.number AS member, f.number, f.kind
  CROSS JOIN LATERAL (SELECT 1 + CASE WHEN f.inside THEN 1 ELSE -1 END * least(0.01 / f.radius, 0.25) AS k,
                             tunnel_internal.dot(f.origin, f.axis) AS along) k;
 COMMENT ON VIEW tunnel_api.face_3d IS
-    'Faces in space, to be drawn: 1 cm behind where they are, of a thin pipe a quarter of its radius, so that spots are seen before them';
-COMMENT ON COLUMN tunnel_api.face_3d.member IS 'Number of the member that it belongs to';
-COMMENT ON COLUMN tunnel_api.face_3d.number IS 'Its number in the survey';
+    'Faces in space for 3D views, moved 1 cm back (a thin pipe: a quarter of its radius) so that spots are visible in front of them';
+COMMENT ON COLUMN tunnel_api.face_3d.member IS 'Number of its member';
+COMMENT ON COLUMN tunnel_api.face_3d.number IS 'Number in the survey';
 COMMENT ON COLUMN tunnel_api.face_3d.kind IS 'flat (a plane) or pipe (a part of a cylinder)';
-COMMENT ON COLUMN tunnel_api.face_3d.radius IS 'Radius of a pipe, m; NULL of a plane';
+COMMENT ON COLUMN tunnel_api.face_3d.radius IS 'Radius of a pipe, m; NULL for a plane';
 COMMENT ON COLUMN tunnel_api.face_3d.area IS 'Area within its outline, m²';
-COMMENT ON COLUMN tunnel_api.face_3d.seen_share IS 'Share of it that could be judged, 0 to 1';
-COMMENT ON COLUMN tunnel_api.face_3d.bimodal IS 'Whether more than half of it differs, so that nobody knows which half is its own';
-COMMENT ON COLUMN tunnel_api.face_3d.geom IS 'Its outline in space, in the tunnel''s SRID, behind where it is';
+COMMENT ON COLUMN tunnel_api.face_3d.seen_share IS 'Inspected share, 0 to 1';
+COMMENT ON COLUMN tunnel_api.face_3d.bimodal IS
+    'True if more than half of it differs, so that the reference surface is unknown';
+COMMENT ON COLUMN tunnel_api.face_3d.geom IS 'Outline in space, moved back, tunnel''s SRID';
 
 -- How the faces of a survey are laid out on one plane to be drawn (SRID 0, m), member below member, so that no two lie on each
 -- other. The faces of a side of a member lie there as they do in its plane or, of a pipe, about its axis: in the frame of its
@@ -212,16 +222,16 @@ SELECT p.id, p.survey_id, p.survey, p.member_id, p.xx, p.xy, p.yx, p.yy,
   JOIN stacked k ON k.member_id = p.member_id AND k.side = p.side AND k.survey_id = p.survey_id AND k.survey = p.survey
   JOIN cell c ON c.member_id = p.member_id AND c.survey_id = p.survey_id AND c.survey = p.survey;
 COMMENT ON VIEW tunnel_internal.face_placement IS
-    'How faces are laid out on one plane to be drawn, member below member: drawn x = xx u + xy v + x, y = yx u + yy v + y';
+    'Placement of faces on one drawing plane, member below member: drawn x = xx u + xy v + x, y = yx u + yy v + y';
 COMMENT ON COLUMN tunnel_internal.face_placement.id IS 'Key of the face';
 COMMENT ON COLUMN tunnel_internal.face_placement.member_id IS 'Key of its member';
-COMMENT ON COLUMN tunnel_internal.face_placement.xx IS 'Of its unrolled u in the drawn x';
-COMMENT ON COLUMN tunnel_internal.face_placement.xy IS 'Of its unrolled v in the drawn x';
-COMMENT ON COLUMN tunnel_internal.face_placement.yx IS 'Of its unrolled u in the drawn y';
-COMMENT ON COLUMN tunnel_internal.face_placement.yy IS 'Of its unrolled v in the drawn y';
+COMMENT ON COLUMN tunnel_internal.face_placement.xx IS 'Factor of its unrolled u in the drawn x';
+COMMENT ON COLUMN tunnel_internal.face_placement.xy IS 'Factor of its unrolled v in the drawn x';
+COMMENT ON COLUMN tunnel_internal.face_placement.yx IS 'Factor of its unrolled u in the drawn y';
+COMMENT ON COLUMN tunnel_internal.face_placement.yy IS 'Factor of its unrolled v in the drawn y';
 COMMENT ON COLUMN tunnel_internal.face_placement.x IS 'Drawn x of its unrolled origin, m';
 COMMENT ON COLUMN tunnel_internal.face_placement.y IS 'Drawn y of its unrolled origin, m';
-COMMENT ON COLUMN tunnel_internal.face_placement.cell IS 'Rectangle that its member is drawn in; SRID 0, m';
+COMMENT ON COLUMN tunnel_internal.face_placement.cell IS 'Rectangle in which its member is drawn; SRID 0, m';
 
 CREATE OR REPLACE VIEW tunnel_api.member_sheet AS
 SELECT m.id, m.survey_id, m.survey, m.number, m.kind, m.length, m.chainage,
@@ -232,21 +242,23 @@ SELECT m.id, m.survey_id, m.survey, m.number, m.kind, m.length, m.chainage,
   JOIN tunnel.survey s ON s.id = m.survey_id
   JOIN (SELECT DISTINCT p.survey_id, p.survey, p.member_id, p.cell FROM tunnel_internal.face_placement p) c
     ON c.member_id = m.id AND c.survey_id = m.survey_id AND c.survey = m.survey;
-COMMENT ON VIEW tunnel_api.member_sheet IS 'Pages of members: where each is drawn, its faces unrolled, with what could be judged of it';
-COMMENT ON COLUMN tunnel_api.member_sheet.number IS 'Its number in the survey';
+COMMENT ON VIEW tunnel_api.member_sheet IS
+    'Pages of members: where each is drawn with its faces unrolled, and its inspected part';
+COMMENT ON COLUMN tunnel_api.member_sheet.number IS 'Number in the survey';
 COMMENT ON COLUMN tunnel_api.member_sheet.kind IS 'flat, pipe or profile';
-COMMENT ON COLUMN tunnel_api.member_sheet.length IS 'Length along its line, gaps counted, m';
-COMMENT ON COLUMN tunnel_api.member_sheet.chainage IS 'Chainage of its middle, m; NULL of a site or beyond the sections';
+COMMENT ON COLUMN tunnel_api.member_sheet.length IS 'Length along its line, including gaps, m';
+COMMENT ON COLUMN tunnel_api.member_sheet.chainage IS 'Chainage of its middle, m; NULL on a site or beyond the sections';
 COMMENT ON COLUMN tunnel_api.member_sheet.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.member_sheet.faces IS 'Its faces';
+COMMENT ON COLUMN tunnel_api.member_sheet.faces IS 'Number of faces';
 COMMENT ON COLUMN tunnel_api.member_sheet.area IS 'Area of its faces, m²';
-COMMENT ON COLUMN tunnel_api.member_sheet.seen_share IS 'Share of that which could be judged, 0 to 1';
-COMMENT ON COLUMN tunnel_api.member_sheet.bimodal IS 'Whether so much of it differs from the rest that neither is known to be its own surface';
-COMMENT ON COLUMN tunnel_api.member_sheet.spots IS 'Spots on it that count';
-COMMENT ON COLUMN tunnel_api.member_sheet.dark_area IS 'Area of those that are darker, m²';
-COMMENT ON COLUMN tunnel_api.member_sheet.bright_area IS 'Area of those that are brighter, m²';
-COMMENT ON COLUMN tunnel_api.member_sheet.spot_share IS 'Share of what could be judged that differs, 0 to 1';
-COMMENT ON COLUMN tunnel_api.member_sheet.geom IS 'Rectangle that it is drawn in; SRID 0, m';
+COMMENT ON COLUMN tunnel_api.member_sheet.seen_share IS 'Inspected share of the area, 0 to 1';
+COMMENT ON COLUMN tunnel_api.member_sheet.bimodal IS
+    'True if so much of its surface differs from the rest that the reference surface is unknown';
+COMMENT ON COLUMN tunnel_api.member_sheet.spots IS 'Number of spots included in totals';
+COMMENT ON COLUMN tunnel_api.member_sheet.dark_area IS 'Area of darker spots, m²';
+COMMENT ON COLUMN tunnel_api.member_sheet.bright_area IS 'Area of brighter spots, m²';
+COMMENT ON COLUMN tunnel_api.member_sheet.spot_share IS 'Share of the inspected part that differs, 0 to 1';
+COMMENT ON COLUMN tunnel_api.member_sheet.geom IS 'Rectangle in which it is drawn; SRID 0, m';
 
 CREATE OR REPLACE VIEW tunnel_api.face_sheet AS
 SELECT f.id, f.survey_id, p.survey, m.number AS member, f.number, f.kind, f.radius, f.area, f.seen_share, f.bimodal,
@@ -254,15 +266,16 @@ SELECT f.id, f.survey_id, p.survey, m.number AS member, f.number, f.kind, f.radi
   FROM tunnel_internal.face_placement p
   JOIN tunnel.face f ON f.id = p.id
   JOIN tunnel.member m ON m.id = p.member_id;
-COMMENT ON VIEW tunnel_api.face_sheet IS 'Faces unrolled, member below member, as seen from the scanner''s side';
-COMMENT ON COLUMN tunnel_api.face_sheet.member IS 'Number of the member that it belongs to';
-COMMENT ON COLUMN tunnel_api.face_sheet.number IS 'Its number in the survey';
+COMMENT ON VIEW tunnel_api.face_sheet IS 'Unrolled faces, member below member, viewed from the scanners'' side';
+COMMENT ON COLUMN tunnel_api.face_sheet.member IS 'Number of its member';
+COMMENT ON COLUMN tunnel_api.face_sheet.number IS 'Number in the survey';
 COMMENT ON COLUMN tunnel_api.face_sheet.kind IS 'flat (a plane) or pipe (a part of a cylinder)';
-COMMENT ON COLUMN tunnel_api.face_sheet.radius IS 'Radius of a pipe, m; NULL of a plane';
+COMMENT ON COLUMN tunnel_api.face_sheet.radius IS 'Radius of a pipe, m; NULL for a plane';
 COMMENT ON COLUMN tunnel_api.face_sheet.area IS 'Area within its outline, m²';
-COMMENT ON COLUMN tunnel_api.face_sheet.seen_share IS 'Share of it that could be judged, 0 to 1';
-COMMENT ON COLUMN tunnel_api.face_sheet.bimodal IS 'Whether more than half of it differs, so that nobody knows which half is its own';
-COMMENT ON COLUMN tunnel_api.face_sheet.geom IS 'Its outline where it is drawn; SRID 0, m';
+COMMENT ON COLUMN tunnel_api.face_sheet.seen_share IS 'Inspected share, 0 to 1';
+COMMENT ON COLUMN tunnel_api.face_sheet.bimodal IS
+    'True if more than half of it differs, so that the reference surface is unknown';
+COMMENT ON COLUMN tunnel_api.face_sheet.geom IS 'Outline on the drawing plane; SRID 0, m';
 
 -- Where face_sheet draws its face.
 DO $$
@@ -276,8 +289,8 @@ BEGIN
 END
 $$;
 COMMENT ON VIEW tunnel_api.spot_sheet IS
-    'Spots on the faces unrolled, member below member, where face_sheet draws these; review and remark can be updated';
-COMMENT ON COLUMN tunnel_api.spot_sheet.geom IS 'Its outline where it is drawn; SRID 0, m';
+    'Spots on unrolled faces, in the drawing plane of face_sheet; review and remark can be updated';
+COMMENT ON COLUMN tunnel_api.spot_sheet.geom IS 'Outline on the drawing plane; SRID 0, m';
 
 -- The comments on its columns, and its views of one geometry.
 DO $$

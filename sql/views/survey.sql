@@ -10,14 +10,16 @@ CREATE OR REPLACE VIEW tunnel_api.tunnel AS
 SELECT t.id, t.name, t.srid, t.start_chainage, t.spacing, t.dry_region_limit, t.design, t.created_at,
        t.alignment IS NULL AS site, t.alignment::public.geometry AS geom
   FROM tunnel.tunnel t;
-COMMENT ON VIEW tunnel_api.tunnel IS 'Tunnels, with the axis as it was given';
-COMMENT ON COLUMN tunnel_api.tunnel.srid IS 'Coordinate reference system of all the tunnel''s geometry on the map; 0: local coordinates, metres of no place on Earth';
+COMMENT ON VIEW tunnel_api.tunnel IS 'Tunnels, with their given axis';
+COMMENT ON COLUMN tunnel_api.tunnel.srid IS 'Coordinate reference system of the tunnel''s geometry; 0: local coordinates, m';
 COMMENT ON COLUMN tunnel_api.tunnel.start_chainage IS 'Chainage of the first vertex of the given axis, m';
 COMMENT ON COLUMN tunnel_api.tunnel.spacing IS 'Distance between the vertices of a survey''s axis, m';
-COMMENT ON COLUMN tunnel_api.tunnel.dry_region_limit IS 'Area above which a dry region must say why it is drawn, and waits for an operator, m²';
-COMMENT ON COLUMN tunnel_api.tunnel.design IS 'What the axis was read from or found in: file and alignment, file and layer, or scan; NULL of a table';
-COMMENT ON COLUMN tunnel_api.tunnel.geom IS 'Axis as given, in the tunnel''s SRID; NULL of a site';
-COMMENT ON COLUMN tunnel_api.tunnel.site IS 'Whether it is a site, which has no axis, and so no chainage, sections or unrolled lining';
+COMMENT ON COLUMN tunnel_api.tunnel.dry_region_limit IS
+    'Area above which a dry region needs a reason and the approval of an operator, m²';
+COMMENT ON COLUMN tunnel_api.tunnel.design IS
+    'Source of the given axis: file and alignment, file and layer, or scan; NULL for a table';
+COMMENT ON COLUMN tunnel_api.tunnel.geom IS 'Given axis, tunnel''s SRID; NULL for a site';
+COMMENT ON COLUMN tunnel_api.tunnel.site IS 'True if it is a site: no axis, chainage, sections or unrolled lining';
 
 CREATE OR REPLACE VIEW tunnel_api.survey AS
 SELECT s.id, s.tunnel_id, t.name AS tunnel, s.name, s.date, s.platform, s.intensity_dimension, s.intensity_kind,
@@ -27,26 +29,27 @@ SELECT s.id, s.tunnel_id, t.name AS tunnel, s.name, s.date, s.platform, s.intens
   LEFT JOIN LATERAL (SELECT count(*) AS files, coalesce(sum(kept), 0)::bigint AS points,
                             min(chainage_from) AS chainage_from, max(chainage_to) AS chainage_to
                        FROM tunnel.scan_file WHERE survey_id = s.id) f ON true;
-COMMENT ON VIEW tunnel_api.survey IS 'Scanning campaigns of tunnels, with what is loaded of each';
-COMMENT ON COLUMN tunnel_api.survey.points IS 'Points kept in the database at survey density';
+COMMENT ON VIEW tunnel_api.survey IS 'Surveys (scanning campaigns) of tunnels, with their loaded data';
+COMMENT ON COLUMN tunnel_api.survey.points IS 'Number of points in the database, at survey density';
 COMMENT ON COLUMN tunnel_api.survey.intensity_kind IS 'amplitude (dB), reflectance (dB, range removed), linear (counts) or none';
 COMMENT ON COLUMN tunnel_api.survey.reference IS
-    'Range curve of the intensity: none, measured on a target, or auto, from the lining of each kilometre (tunnel_api.range_curve)';
+    'Range curve of the intensity: none, measured (on a target) or auto (from the lining of each kilometre, tunnel_api.range_curve)';
 
 CREATE OR REPLACE VIEW tunnel_api.file AS
 SELECT f.id, f.survey_id, s.name AS survey, f.name, tunnel_internal.for_operators(f.path) AS path, f.checksum, f.bytes, f.points, f.noise, f.outside, f.thinned,
        f.kept, f.chainage_from, f.chainage_to, f.extent, f.srid, f.loaded_at, f.invalid, f.unposed
   FROM tunnel.scan_file f
   JOIN tunnel.survey s ON s.id = f.survey_id;
-COMMENT ON VIEW tunnel_api.file IS 'Scan files loaded, with what was dropped of each';
-COMMENT ON COLUMN tunnel_api.file.path IS 'Where it lies; shown to operators alone';
+COMMENT ON VIEW tunnel_api.file IS 'Loaded scan files, with the number of points dropped for each reason';
+COMMENT ON COLUMN tunnel_api.file.path IS 'Path of the file; visible to operators only';
 COMMENT ON COLUMN tunnel_api.file.checksum IS 'SHA-256 of the file';
 COMMENT ON COLUMN tunnel_api.file.points IS 'Points in the file = invalid + outside + unposed + noise + thinned + kept';
-COMMENT ON COLUMN tunnel_api.file.noise IS 'Points dropped as isolated (Xu et al., 2018, section II-D)';
-COMMENT ON COLUMN tunnel_api.file.outside IS 'Points dropped as too far from the axis or beyond its ends';
-COMMENT ON COLUMN tunnel_api.file.invalid IS 'Points dropped as their coordinates, time or intensity are no numbers';
+COMMENT ON COLUMN tunnel_api.file.noise IS 'Points dropped as isolated noise (Xu et al., 2018, section II-D)';
+COMMENT ON COLUMN tunnel_api.file.outside IS 'Points dropped because they lie too far from the axis or beyond its ends';
+COMMENT ON COLUMN tunnel_api.file.invalid IS
+    'Points dropped because a coordinate, their time or their intensity is not a number';
 COMMENT ON COLUMN tunnel_api.file.unposed IS
-    'Points dropped as the scanner''s position is not known: outside the trajectory, in its gaps, or of a scan without a station';
+    'Points dropped because the scanner position is unknown: outside the trajectory, in its gaps, or in a scan without a station';
 COMMENT ON COLUMN tunnel_api.file.thinned IS 'Points dropped by thinning to survey density';
 
 -- The key is the row's place in its partition: loading or a stage that rewrites the kilometre deals it out anew.
@@ -62,10 +65,12 @@ SELECT ((p.km::bigint & 65535) << 44) | ((p.ctid::text::pg_catalog.point)[0]::bi
 COMMENT ON VIEW tunnel_api.point IS
     'Points at survey density, in chainage order. Filter by survey_id and km (and chainage), or use the function points, to read one partition only';
 COMMENT ON COLUMN tunnel_api.point.survey IS 'Name of the survey. A filter by it alone reads the points of all surveys: use survey_id = tunnel_api.survey_id(name)';
-COMMENT ON COLUMN tunnel_api.point.id IS 'Key within a survey, valid until the kilometre is loaded or tagged anew';
+COMMENT ON COLUMN tunnel_api.point.id IS 'Key within a survey, valid until the kilometre is loaded or tagged again';
 COMMENT ON COLUMN tunnel_api.point.km IS 'floor(chainage / 1000) on the given axis, at loading';
-COMMENT ON COLUMN tunnel_api.point.chainage IS 'Chainage, m: on the given axis as loaded, on the axis found after stage segments';
-COMMENT ON COLUMN tunnel_api.point.segment IS 'Number of the segment that holds the point; NULL before stage segments or off the tunnel';
+COMMENT ON COLUMN tunnel_api.point.chainage IS
+    'Chainage, m: on the given axis after loading, on the measured axis after stage segments';
+COMMENT ON COLUMN tunnel_api.point.segment IS
+    'Number of the segment of the point; NULL before stage segments or off the tunnel';
 COMMENT ON COLUMN tunnel_api.point.intensity IS 'As in the file, in the unit of the survey''s intensity_kind; 0 if none';
 
 CREATE OR REPLACE VIEW tunnel_api.axis AS
@@ -81,10 +86,10 @@ SELECT s.id, s.id AS survey_id, s.name AS survey, t.name AS tunnel, a.vertices, 
                        count(*) FILTER (WHERE source = 'edited') AS edited,
                        min(n) AS first, max(n) AS last, public.st_makeline(v.geom ORDER BY n) AS geom
                   FROM tunnel.axis_vertex v WHERE v.survey_id = s.id) a ON a.vertices > 1;
-COMMENT ON VIEW tunnel_api.axis IS 'Axis of each survey, one line';
-COMMENT ON COLUMN tunnel_api.axis.id IS 'The survey''s id';
-COMMENT ON COLUMN tunnel_api.axis.interpolated IS 'Vertices without enough points around them';
-COMMENT ON COLUMN tunnel_api.axis.edited IS 'Vertices placed by hand';
+COMMENT ON VIEW tunnel_api.axis IS 'Measured axis of each survey, one line';
+COMMENT ON COLUMN tunnel_api.axis.id IS 'Key of the survey';
+COMMENT ON COLUMN tunnel_api.axis.interpolated IS 'Number of vertices without enough points';
+COMMENT ON COLUMN tunnel_api.axis.edited IS 'Number of vertices placed by hand';
 
 CREATE OR REPLACE VIEW tunnel_api.axis_vertex AS
 SELECT v.id, v.survey_id, s.name AS survey, v.n, v.km, v.n * t.spacing AS chainage,
@@ -94,14 +99,14 @@ SELECT v.id, v.survey_id, s.name AS survey, v.n, v.km, v.n * t.spacing AS chaina
   JOIN tunnel.survey s ON s.id = v.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id;
 COMMENT ON VIEW tunnel_api.axis_vertex IS
-    'Vertices of the axes. A vertex that is moved (UPDATE of geom) becomes "edited" and stays so; segments and what follows are stale then';
-COMMENT ON COLUMN tunnel_api.axis_vertex.n IS 'Number: the vertex stands at chainage n × spacing of the given axis';
-COMMENT ON COLUMN tunnel_api.axis_vertex.points IS 'Points averaged';
+    'Vertices of the measured axes. A vertex that is moved (UPDATE of geom) becomes edited and stays so; segments and later stages become stale';
+COMMENT ON COLUMN tunnel_api.axis_vertex.n IS 'Number: the vertex has chainage n × spacing on the given axis';
+COMMENT ON COLUMN tunnel_api.axis_vertex.points IS 'Number of averaged points';
 COMMENT ON COLUMN tunnel_api.axis_vertex.source IS 'measured, interpolated or edited (by hand)';
 COMMENT ON COLUMN tunnel_api.axis_vertex.remark IS
-    'Reason why the measured place was rejected: it was unstable, or deviates from its neighbours';
-COMMENT ON COLUMN tunnel_api.axis_vertex.edited_by IS 'Who moved it last, set by the database';
-COMMENT ON COLUMN tunnel_api.axis_vertex.edited_at IS 'When it was moved last, set by the database';
+    'Reason why the measured position is not used, if it is not: it did not converge, or deviates from its neighbours';
+COMMENT ON COLUMN tunnel_api.axis_vertex.edited_by IS 'Role that moved it last, set by the database';
+COMMENT ON COLUMN tunnel_api.axis_vertex.edited_at IS 'Time of the last move, set by the database';
 
 -- A segment is stale when its planes are not those of the axis any more (segment_moved).
 CREATE OR REPLACE VIEW tunnel_api.segment AS
@@ -114,10 +119,11 @@ SELECT g.id, g.survey_id, s.name AS survey, g.n, g.km, g.chainage_from, g.chaina
        g.geom::public.geometry AS geom
   FROM tunnel.segment g
   JOIN tunnel.survey s ON s.id = g.survey_id;
-COMMENT ON VIEW tunnel_api.segment IS 'Segments: the tunnel between planes perpendicular to the axis at consecutive vertices';
-COMMENT ON COLUMN tunnel_api.segment.n IS 'Number: that of the vertex at its start';
-COMMENT ON COLUMN tunnel_api.segment.slope IS 'Rise of the axis up-chainage, %';
-COMMENT ON COLUMN tunnel_api.segment.stale IS 'True when the axis has moved since the segment was made: run stage segments again';
+COMMENT ON VIEW tunnel_api.segment IS
+    'Segments: parts of the tunnel between planes perpendicular to the axis at consecutive vertices';
+COMMENT ON COLUMN tunnel_api.segment.n IS 'Number: that of the vertex at its beginning';
+COMMENT ON COLUMN tunnel_api.segment.slope IS 'Grade of the axis up-chainage, %';
+COMMENT ON COLUMN tunnel_api.segment.stale IS 'True if the axis moved since the segment was made: run stage segments again';
 
 CREATE OR REPLACE VIEW tunnel_api.section AS
 SELECT c.id, c.survey_id, s.name AS survey, c.km, c.segment, c.half, c.chainage,
@@ -125,11 +131,12 @@ SELECT c.id, c.survey_id, s.name AS survey, c.km, c.segment, c.half, c.chainage,
        c.geom::public.geometry AS geom
   FROM tunnel.section c
   JOIN tunnel.survey s ON s.id = c.survey_id;
-COMMENT ON VIEW tunnel_api.section IS 'Cross-sections at 25 % and 75 % of each segment, drawn in space';
-COMMENT ON COLUMN tunnel_api.section.half IS 'Place in the segment, %: 25 or 75';
-COMMENT ON COLUMN tunnel_api.section.half_width IS 'Half the length of tunnel whose points the section was made from, m';
+COMMENT ON VIEW tunnel_api.section IS 'Cross-sections at 25 % and 75 % of each segment, in space';
+COMMENT ON COLUMN tunnel_api.section.half IS 'Position in the segment, %: 25 or 75';
+COMMENT ON COLUMN tunnel_api.section.half_width IS 'Half the length of tunnel whose points were used, m';
 COMMENT ON COLUMN tunnel_api.section.angle_step IS 'Width of an angular class, degrees';
-COMMENT ON COLUMN tunnel_api.section.interpolated IS 'Angular classes that are not measured: empty, or rejected as something hung on the wall; filled from their neighbours';
+COMMENT ON COLUMN tunnel_api.section.interpolated IS
+    'Number of angular classes filled from their neighbours: empty, or rejected as a fixture in front of the wall';
 
 CREATE OR REPLACE VIEW tunnel_api.section_unrolled AS
 SELECT c.id, c.survey_id, s.name AS survey, c.km, c.segment, c.half, c.chainage,
@@ -151,8 +158,10 @@ SELECT r.id, r.survey_id, s.name AS survey, r.kind, r.drawn_by, r.drawn_at, r.re
 COMMENT ON VIEW tunnel_api.region IS
     'Regions of the unrolled plane drawn by hand for the intensity correction; rows may be added, changed and deleted';
 COMMENT ON COLUMN tunnel_api.region.kind IS 'homogeneous (one material: gives the roughness) or dry (dry lining: gives the threshold)';
-COMMENT ON COLUMN tunnel_api.region.reason IS 'Why it is drawn: a dry region larger than the tunnel''s limit (dry_region) needs one';
-COMMENT ON COLUMN tunnel_api.region.pending_approval IS 'Whether it waits for an operator (dry_region_approve), being larger than that limit: until then it is as if it were not there';
-COMMENT ON COLUMN tunnel_api.region.approved_by IS 'Operator who put it in force, where it had to wait';
-COMMENT ON COLUMN tunnel_api.region.approved_at IS 'When';
+COMMENT ON COLUMN tunnel_api.region.reason IS
+    'Reason why it was drawn; required for a dry region larger than the tunnel''s limit (dry_region)';
+COMMENT ON COLUMN tunnel_api.region.pending_approval IS
+    'True if it waits for the approval of an operator (dry_region_approve); until then it has no effect';
+COMMENT ON COLUMN tunnel_api.region.approved_by IS 'Operator who approved it, where approval was required';
+COMMENT ON COLUMN tunnel_api.region.approved_at IS 'Time of the approval';
 COMMENT ON COLUMN tunnel_api.region.geom IS 'Polygon in the unrolled plane (chainage, arc), m';

@@ -10,7 +10,7 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_te
      ORDER BY e.id DESC LIMIT 1
 $$;
 COMMENT ON FUNCTION tunnel_internal.last_step(bigint) IS
-    'The last entry of the audit about a finding that was not taken back; for finding_undo alone';
+    'Last entry of the audit of a finding that was not undone; only finding_undo calls it';
 
 -- Refuses to take a step back that is not the caller's, or that something later rests on.
 CREATE OR REPLACE FUNCTION tunnel_internal.check_undo(finding_id bigint, step tunnel_audit.entry) RETURNS void
@@ -55,7 +55,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.check_undo(bigint, tunnel_audit.entry) IS
-    'An error unless a finding''s last step can be taken back by who calls; for finding_undo alone';
+    'Raise an error unless the caller can undo the last step of a finding; only finding_undo calls it';
 
 -- Who drew and who reviewed a finding, by the steps before one that is taken back.
 CREATE OR REPLACE FUNCTION tunnel_internal.stamp_finding(finding_id bigint, step tunnel_audit.entry) RETURNS void
@@ -78,7 +78,7 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_te
      WHERE a.id = $1
 $$;
 COMMENT ON FUNCTION tunnel_internal.stamp_finding(bigint, tunnel_audit.entry) IS
-    'Notes with a finding who drew and who reviewed it last before a step, as the audit has it; for finding_undo alone';
+    'Restore the roles and times of a finding''s last drawing and review before a step, from the audit; only finding_undo calls it';
 
 -- Gives a finding the columns that it had before a step.
 CREATE OR REPLACE FUNCTION tunnel_internal.restore_finding(finding_id bigint, step tunnel_audit.entry) RETURNS void
@@ -112,7 +112,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.restore_finding(bigint, tunnel_audit.entry) IS
-    'Gives a finding the columns, the outline and what was measured of it as they were before a step; for finding_undo alone';
+    'Restore the columns, the outline and the measured values of a finding before a step; only finding_undo calls it';
 
 -- Brings a finding back that was deleted, with its photos.
 CREATE OR REPLACE FUNCTION tunnel_internal.revive_finding(survey_id int, step tunnel_audit.entry) RETURNS void
@@ -134,7 +134,7 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.revive_finding(int, tunnel_audit.entry) IS
-    'Brings a deleted finding back under its number, with its photos; for finding_undo alone';
+    'Restore a deleted finding with its id and photos; only finding_undo calls it';
 
 CREATE OR REPLACE FUNCTION tunnel_api.finding_undo(id bigint) RETURNS text
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
@@ -195,4 +195,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.finding_undo(bigint) IS
-'Takes back the last change of a finding that was not taken back yet: drawn, redrawn, reviewed, split, merged or deleted, which it returns. Only who made it, or an operator; refused where a later change rests on it. What was split or merged is taken back of the finding that kept its number.';
+'Undo the last change of a finding (drawn, redrawn, reviewed, split, merged or deleted) and return its kind. Only the role that made the change, or an operator, can undo it. Refused if a later change depends on it. Undo a split or a merge on the finding that kept its id';
