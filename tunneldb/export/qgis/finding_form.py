@@ -29,7 +29,7 @@ _ALIASES = {
     "detected_at": "Last detected", "also_detected": "Also detected", "detected_as": "Detected as", "parent_id": "Split off",
     "merged_into": "Merged into", "merged": "Merged into this", "same_as": "Same as", "dry_region_id": "In dry region",
     "counted": "Included in totals", "state": "State", "photos": "Photos", "evidence": "Evidence for (+) and against (-)",
-    "model": "Classified by model", "superseded": "Superseded", CLOCK_TEXT: "Clock position",
+    "model": "Classified by model", "easting": "Easting (m)", "northing": "Northing (m)", "height": "Height (m)", "superseded": "Superseded", CLOCK_TEXT: "Clock position",
 }  # fmt: skip
 _PHOTO_ALIASES = {
     "id": "Photo", "finding_id": "Finding", "survey_id": "Survey key", "survey": "Survey", "path": "File or URL",
@@ -37,7 +37,7 @@ _PHOTO_ALIASES = {
 }  # fmt: skip
 _DECIMALS = {
     "chainage_from": 3, "chainage_to": 3, "arc_from": 2, "arc_to": 2, "clock": 1, "length": 2, "area": 3, "darkening_mean": 1,
-    "darkening_max": 1, "image_share": 2, "contrast": 1, "confidence": 2,
+    "darkening_max": 1, "image_share": 2, "contrast": 1, "confidence": 2, "easting": 2, "northing": 2, "height": 2,
 }  # fmt: skip
 _MOMENTS = ("reviewed_at", "drawn_at", "created_at", "detected_at", "added_at")
 _SAVED = '"label" IS NOT NULL'
