@@ -1,10 +1,10 @@
--- What may be written through the views, by INSTEAD OF triggers: the position of axis vertices, review, remark and kind of
--- leaks (views/finding.sql) and spots of structures (views/structures.sql), and regions drawn by hand. The functions run with the owner's rights, so that who edits
--- needs no right on schema tunnel, and stamp each row with session_user, which stays the person's own name in them. Each locks
--- its row and takes only what the person changed: what somebody else did meanwhile stays, and the audit says what truly was.
--- What both changed, each to something else, is refused to the later one, as a failure of serialization.
+-- Edits through the views, by INSTEAD OF triggers: positions of axis vertices; review, remark and kind of findings and leaks
+-- (views/finding.sql); review and remark of spots (views/structures.sql); regions drawn by hand. The functions run with the owner's
+-- rights, so that inspectors need no right on schema tunnel, and write session_user, the person's own role, into each row. They
+-- lock the row and write only the changed columns, so that concurrent edits of other columns stay. If two people changed the
+-- same column to different values, the later edit is refused with a serialization failure.
 
--- Moves an axis vertex. Frame and unit: the tunnel's SRID, m.
+-- Move an axis vertex. Frame and unit: the tunnel's SRID, m.
 CREATE OR REPLACE FUNCTION tunnel_internal.edit_axis_vertex() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
@@ -37,7 +37,7 @@ BEGIN
     END IF;
     SELECT v.* INTO was FROM tunnel.axis_vertex v WHERE v.id = OLD.id FOR UPDATE;
     IF NOT FOUND THEN
-        RETURN NULL;  -- gone meanwhile
+        RETURN NULL;  -- deleted meanwhile
     END IF;
     IF was.geom OPERATOR(public.=) NEW.geom THEN
         RETURN NEW;
@@ -65,10 +65,9 @@ COMMENT ON FUNCTION tunnel_internal.edit_axis_vertex() IS
 CREATE OR REPLACE TRIGGER edit INSTEAD OF UPDATE ON tunnel_api.axis_vertex
     FOR EACH ROW EXECUTE FUNCTION tunnel_internal.edit_axis_vertex();
 
--- Sets the review, the remark and, where there are kinds to choose from, the kind of a finding: TG_ARGV is its table in schema
--- tunnel, what it is called, and its kinds, or any: those of finding_kind. For the views of leaks and spots, and finding. A kind other than the one that
--- was found is noted as judged; the one that was found takes that back. Geometries, whose columns differ between the views, are
--- never written back.
+-- Set review, remark and, where kinds are given, the kind of a finding or a spot. TG_ARGV: table in schema tunnel, name in
+-- messages, permitted kinds (any: those of finding_kind). A kind other than the detected one is stored as kind_override; setting
+-- the detected kind clears it. Geometries, whose columns differ between the views, are never written.
 CREATE OR REPLACE FUNCTION tunnel_internal.review_finding() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
@@ -109,7 +108,7 @@ BEGIN
           FROM tunnel.finding a WHERE a.id = OLD.id FOR UPDATE;
     END IF;
     IF NOT FOUND THEN
-        RETURN NULL;  -- gone meanwhile
+        RETURN NULL;  -- deleted meanwhile
     END IF;
     NEW.review := CASE WHEN NEW.review = OLD.review THEN was.review ELSE NEW.review END;
     NEW.remark := CASE WHEN NEW.remark IS NOT DISTINCT FROM OLD.remark THEN was.remark ELSE NEW.remark END;
@@ -163,7 +162,7 @@ BEGIN
 END
 $$;
 
--- What is drawn, redrawn and deleted in a layer of leaks is a finding, a leak unless it says another kind: TG_ARGV is the place, see
+-- Insert, redraw and delete in a layer of leaks go through the views of findings; the kind is leak by default. TG_ARGV: place, see
 -- draw_finding. Runs before the review of the same update.
 CREATE OR REPLACE FUNCTION tunnel_internal.draw_leak() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
@@ -200,7 +199,7 @@ BEGIN
 END
 $$;
 
--- What the audit has of a region.
+-- Columns of a region for the audit.
 CREATE OR REPLACE FUNCTION tunnel_internal.region_state(id int) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_strip_nulls(jsonb_build_object('kind', r.kind, 'reason', r.reason, 'pending_approval', nullif(r.pending_approval, false),
@@ -210,8 +209,7 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.region_state(int) IS
     'Columns of a region for the audit: kind, reason, outline as EWKT, pending approval, operator who approved it';
 
--- Adds, changes or deletes a region drawn by hand in the unrolled plane (m). A new one names its survey by survey_id or,
--- without that, by name.
+-- Insert, change or delete a region drawn by hand in the unrolled plane (m). A new region needs survey_id or survey (name).
 CREATE OR REPLACE FUNCTION tunnel_internal.edit_region() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
@@ -225,7 +223,7 @@ BEGIN
         before := tunnel_internal.region_state(OLD.id);
         DELETE FROM tunnel.region r WHERE r.id = OLD.id RETURNING r.* INTO was;
         IF NOT FOUND THEN
-            RETURN NULL;  -- gone meanwhile
+            RETURN NULL;  -- deleted meanwhile
         END IF;
         PERFORM tunnel_internal.note_edit(OLD.survey, 'region', OLD.id, before, NULL);
         PERFORM tunnel_internal.mark_dry(was.survey_id, was.geom);
@@ -284,7 +282,7 @@ BEGIN
         NEW.drawn_by := was.drawn_by;
         NEW.drawn_at := was.drawn_at;
     END IF;
-    -- what an operator put in force is the region for the reason that it had
+    -- the approval applies to the region with its reason at that time
     IF was.id IS NULL OR NEW.kind <> was.kind OR NOT NEW.geom OPERATOR(public.=) was.geom OR NEW.reason IS DISTINCT FROM was.reason THEN
         NEW.pending_approval := NEW.kind = 'dry' AND public.ST_Area(NEW.geom) > most;
         NEW.approved_by := NULL;
@@ -314,7 +312,7 @@ COMMENT ON FUNCTION tunnel_internal.edit_region() IS 'Trigger of the view region
 CREATE OR REPLACE TRIGGER edit INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.region
     FOR EACH ROW EXECUTE FUNCTION tunnel_internal.edit_region();
 
--- A dry region larger than the tunnel's limit takes nothing away until an operator has looked at it.
+-- A dry region larger than the tunnel's limit has no effect until an operator approves it.
 CREATE OR REPLACE FUNCTION tunnel_api.dry_region_approve(region_id int) RETURNS int
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE

@@ -1,7 +1,7 @@
 -- Findings on the lining: what was detected and what people drew, of all kinds and states; leaks are the wet ones. A finding on a
 -- vertical wall has no area in plan, so there are three geometries, each with a view of its own for QGIS: unrolled (chainage,
 -- arc; SRID 0), on the map beside the axis, and in space. Findings are drawn and edited through finding_unrolled, finding_map and
--- finding_3d (views/draw.sql). Needs stationing (geometry/stationing.sql) and make_geometry_views (views/geometry.sql).
+-- finding_3d (findings/draw.sql). Needs stationing (geometry/stationing.sql) and make_geometry_views (views/geometry.sql).
 
 -- What each reason adds to the logarithm of the odds of a leak, the strongest first, as "faint +2.3, rectangular -1.2".
 CREATE OR REPLACE FUNCTION tunnel_internal.evidence_text(evidence jsonb) RETURNS text

@@ -1,7 +1,7 @@
--- Taking back what a person did to a finding, as the audit has it. The audit only grows: an undo is an entry of its own, which
--- names the one that it takes back.
+-- Undo of a person's change of a finding, from the audit. The audit only grows: an undo is a new entry that names the entry it
+-- reverses.
 
--- The last change of a finding that was not taken back.
+-- Last change of a finding that was not undone.
 CREATE OR REPLACE FUNCTION tunnel_internal.last_step(finding_id bigint) RETURNS tunnel_audit.entry
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
     SELECT e.* FROM tunnel_audit.entry e
@@ -12,7 +12,7 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.last_step(bigint) IS
     'Last entry of the audit of a finding that was not undone; only finding_undo calls it';
 
--- Refuses to take a step back that is not the caller's, or that something later rests on.
+-- Refuse to undo a step of somebody else, or one that a later change depends on.
 CREATE OR REPLACE FUNCTION tunnel_internal.check_undo(finding_id bigint, step tunnel_audit.entry) RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
@@ -57,7 +57,7 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.check_undo(bigint, tunnel_audit.entry) IS
     'Raise an error unless the caller can undo the last step of a finding; only finding_undo calls it';
 
--- Who drew and who reviewed a finding, by the steps before one that is taken back.
+-- Roles and times of drawing and review, from the steps before the one that is undone.
 CREATE OR REPLACE FUNCTION tunnel_internal.stamp_finding(finding_id bigint, step tunnel_audit.entry) RETURNS void
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
     WITH stood AS MATERIALIZED (
@@ -80,7 +80,7 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.stamp_finding(bigint, tunnel_audit.entry) IS
     'Restore the roles and times of a finding''s last drawing and review before a step, from the audit; only finding_undo calls it';
 
--- Gives a finding the columns that it had before a step.
+-- Restore the columns of a finding before a step.
 CREATE OR REPLACE FUNCTION tunnel_internal.restore_finding(finding_id bigint, step tunnel_audit.entry) RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
@@ -89,7 +89,7 @@ DECLARE
 BEGIN
     IF changed ?| ARRAY['geom', 'origin']
        OR (changed ? 'width' AND EXISTS (SELECT FROM tunnel.finding a WHERE a.id = finding_id AND a.shape IS NOT NULL)) THEN
-        -- what detection has found of it since would count beside it if it were detected again
+        -- a detection since would count twice if the finding were detected again
         IF becomes ->> 'origin' = 'detected' AND EXISTS (
             SELECT FROM tunnel.finding x WHERE x.same_as = finding_id AND x.origin = 'detected' AND x.created_at > step.at) THEN
             becomes := becomes || '{"origin": "redrawn"}';
@@ -114,7 +114,7 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.restore_finding(bigint, tunnel_audit.entry) IS
     'Restore the columns, the outline and the measured values of a finding before a step; only finding_undo calls it';
 
--- Brings a finding back that was deleted, with its photos.
+-- Restore a deleted finding with its photos.
 CREATE OR REPLACE FUNCTION tunnel_internal.revive_finding(survey_id int, step tunnel_audit.entry) RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
@@ -148,7 +148,7 @@ DECLARE
     place public.geometry;
     done bigint;
 BEGIN
-    -- not one that was added later under the same name
+    -- not a survey of the same name that was added later
     survey_key := (SELECT s.id FROM tunnel.survey s WHERE s.name = step.survey AND s.created_at <= step.at);
     IF survey_key IS NULL THEN
         RAISE EXCEPTION 'there is no change of a finding % to be taken back', finding USING ERRCODE = 'invalid_parameter_value';
@@ -157,7 +157,7 @@ BEGIN
     PERFORM FROM tunnel.finding a
       WHERE a.id = finding OR a.id IN (SELECT e.row_id FROM tunnel_audit.entry e WHERE e.part_of = step.id AND e.view = 'finding')
       ORDER BY a.id FOR UPDATE;
-    step := tunnel_internal.last_step(finding);  -- of now, that nobody else can change it
+    step := tunnel_internal.last_step(finding);  -- read again under the lock
     PERFORM tunnel_internal.check_undo(finding, step);
     before := tunnel_internal.finding_state(finding);
     place := (SELECT a.unrolled FROM tunnel.finding a WHERE a.id = finding);
@@ -169,7 +169,7 @@ BEGIN
         PERFORM tunnel_internal.restore_finding(finding, step);
     END IF;
     done := tunnel_internal.note_edit(step.survey, 'finding', finding, before, tunnel_internal.finding_state(finding), undoes => step.id);
-    IF done IS NULL THEN  -- a merge into one that held all
+    IF done IS NULL THEN  -- a merge that did not change the outline
         done := tunnel_internal.note_edit(step.survey, 'finding', finding, before || jsonb_build_object('merged', step.after -> 'merged'),
                                      tunnel_internal.finding_state(finding), undoes => step.id);
     END IF;
