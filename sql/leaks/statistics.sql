@@ -1,112 +1,9 @@
--- Statistics of leaks and classes of waterproofing by GB 50108-2008, over any stretches of a survey.
+-- Statistics of leaks over stretches of a survey, and over rings. Needs waterproof_limit, slide_window and stretch_leaks.
 
--- Limits of GB 50108-2008, table 3.2.1, as far as a scan can tell: it shows where the lining is wet, not how much water
--- flows. NULL is no limit.
-CREATE OR REPLACE VIEW tunnel_api.waterproof_limit AS
-SELECT c.id, c.wet_ratio, c.patch_area, c.patches_per_100, c.description
-  FROM (VALUES
-    (1, NULL::float8, NULL::float8, 0, 'No leak, no wet patch'),
-    (2, 0.002, 0.2, 3, 'No leak, few wet patches (tunnels: wet area at most 2 in 1000)'),
-    (3, NULL, 0.3, 7, 'Few leaks, no running water'),
-    (4, NULL, NULL, NULL, 'Leaks, no running water')) AS c (id, wet_ratio, patch_area, patches_per_100, description);
-COMMENT ON VIEW tunnel_api.waterproof_limit IS
-    'Classes of waterproofing (GB 50108-2008, table 3.2.1) with the limits that a scan can check. The limits of water volume, L/(m² d), are not among them';
-COMMENT ON COLUMN tunnel_api.waterproof_limit.id IS 'Class; 1 is the driest';
-COMMENT ON COLUMN tunnel_api.waterproof_limit.wet_ratio IS 'Largest permitted wet area, as a share of the lining';
-COMMENT ON COLUMN tunnel_api.waterproof_limit.patch_area IS 'Largest permitted area of a leak, m²';
-COMMENT ON COLUMN tunnel_api.waterproof_limit.patches_per_100 IS 'Largest permitted number of leaks in any 100 m² of lining';
-COMMENT ON COLUMN tunnel_api.waterproof_limit.description IS 'Requirement of the class';
-
-
--- Any 100 m² of lining, seen or not: a window slid along a stretch that has more. The lining up to a place takes the part of
--- chainage, so that a leak is an interval [a, b] and every window has a length of 100. One that begins at s holds a leak for s
--- from a - 100 to b: their number changes there only. The area of a leak is spread evenly over its interval; that within a
--- window then changes along straight lines, which bend where an end of a leak enters the window or leaves it, and is greatest
--- at a bend or at an end of the stretch.
+-- Statistics of stretches of a survey, given by their beginnings, in growing order, and ends; they do not overlap.
 --
--- Given are the places in growing order, of both ends of each leak and of both ends of the stretch, and how the wet area per
--- m² of lining changes there: grows where a leak begins, falls where it ends, stays at the ends of the stretch. A loop, and no
--- query: it does in one pass what takes several sorts.
-CREATE OR REPLACE FUNCTION tunnel_internal.slide_window(
-    places float8[], turns float8[], OUT patches int, OUT window_from float8, OUT wet_area float8)
-LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE STRICT
-AS $$
-DECLARE
-    size constant int := cardinality(places);
-    first_begin constant float8 := places[1];
-    last_begin constant float8 := places[size] - 100;
-    entering int := 1;  -- the next of the places to come into the window
-    leaving int := 1;  -- and to go out of it
-    enters float8 := places[1] - 100;  -- where the window begins when they do
-    leaves float8 := places[1];
-    s float8 := enters;  -- where it begins
-    before float8;
-    turn float8;
-    slope float8 := 0;  -- of the wet area in it
-    held float8 := 0;
-    inside int := 0;
-    growing boolean := false;  -- whether it has held most leaks since window_from
-BEGIN
-    patches := 0;
-    window_from := first_begin;
-    wet_area := 0;
-    LOOP
-        before := s;
-        IF enters <= leaves THEN
-            s := enters;
-            held := held + slope * (s - before);
-            turn := turns[entering];
-            slope := slope + turn;
-            IF turn > 0 THEN
-                inside := inside + 1;
-                IF inside > patches THEN
-                    patches := inside;
-                    window_from := greatest(s, first_begin);
-                    growing := true;
-                END IF;
-            END IF;
-            IF held > wet_area AND s >= first_begin THEN
-                wet_area := held;
-            END IF;
-            EXIT WHEN entering = size;
-            entering := entering + 1;
-            enters := places[entering] - 100;
-        ELSE
-            s := leaves;
-            held := held + slope * (s - before);
-            turn := turns[leaving];
-            slope := slope - turn;
-            IF turn < 0 THEN
-                inside := inside - 1;
-                IF growing THEN  -- the middle of where it holds them
-                    window_from := (window_from + s) / 2;
-                    growing := false;
-                END IF;
-            END IF;
-            IF held > wet_area THEN
-                wet_area := held;
-            END IF;
-            leaving := leaving + 1;
-            leaves := places[leaving];
-        END IF;
-    END LOOP;
-    IF growing THEN
-        window_from := (window_from + last_begin) / 2;
-    END IF;
-    IF patches = 0 THEN
-        window_from := NULL;
-    END IF;
-END
-$$;
-COMMENT ON FUNCTION tunnel_internal.slide_window(float8[], float8[]) IS
-'Largest number of leaks in a window of 100 m² moved along a stretch, the beginning of that window (NULL without leaks), and the largest wet area in a window. places (m² of lining) and turns (wet area per m² of lining) are those of stretch_statistics';
-
-
--- Statistics of stretches of a survey, given by where they begin, in growing order, and end; they do not overlap.
---
--- Leaks are those of kind leak that the last detection found and nobody rejected. One that an end cuts counts by its part
--- in wet_area, as one patch, and whole where the size of a patch matters: a spot is no smaller for being cut by a limit.
--- Windows: see slide_window. A leak where no lining is known is in none.
+-- Counts leaks that the last detection found and nobody rejected. A leak that an end cuts counts in part in wet_area, as one
+-- patch, and whole where the size of a patch matters. A leak where no lining is known is in no window (see slide_window).
 CREATE OR REPLACE FUNCTION tunnel_internal.stretch_statistics(survey_id int, starts float8[], ends float8[])
 RETURNS TABLE (
     n int, chainage_from float8, chainage_to float8, lining_area float8, seen_area float8, seen_share float8,
@@ -117,8 +14,8 @@ LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 100
 SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 SET jit = off
-SET enable_nestloop = off  -- how few or many rows there are is not known when it is planned
-SET enable_mergejoin = off  -- it would sort rows with sums of a kilometre in them
+SET enable_nestloop = off  -- the number of rows is unknown at planning
+SET enable_mergejoin = off  -- it would sort rows that contain the sums of a kilometre
 SET plan_cache_mode = force_generic_plan  -- planning takes longer than a short stretch
 AS $$
 #variable_conflict use_column
@@ -129,14 +26,9 @@ DECLARE
     first_km constant int := (
         SELECT coalesce(max(c.km) FILTER (WHERE c.km <= floor(first_start / 1000)), min(c.km))
         FROM tunnel.coverage c WHERE c.survey_id = survey_key);
-    -- no leak that begins before this reaches into a stretch
-    first_leak constant float8 := first_start - 1e-6 - (
-        SELECT coalesce(max(l.chainage_to - l.chainage_from), 0) FROM tunnel.finding l WHERE l.survey_id = survey_key);
 BEGIN
     RETURN QUERY
-    WITH given AS MATERIALIZED (
-        SELECT starts AS low, ends AS high
-    ), km AS MATERIALIZED (  -- [:] takes the sums out of their storage once, not for each leak
+    WITH km AS MATERIALIZED (  -- [:] takes the sums out of their storage once, not for each leak
         SELECT c.km, c.km * 1000::float8 AS start, c.step, c.lining_before AS before, c.lining_sums[:] AS lining
         FROM tunnel_internal.coverage_sums c
         WHERE c.survey_id = survey_key AND c.km BETWEEN first_km AND floor(last_end / 1000)
@@ -146,27 +38,8 @@ BEGIN
         SELECT f.n, f.chainage AS low, t.chainage AS high, f.lining AS a, t.lining AS b, t.length - f.length AS looked_at,
             CASE WHEN t.length > f.length THEN t.seen - f.seen END AS seen
         FROM tunnel_internal.coverage_at(survey_key, starts) f JOIN tunnel_internal.coverage_at(survey_key, ends) t ON t.n = f.n
-    ), leak AS (
-        SELECT l.id, l.area, l.chainage_from AS low, l.chainage_to AS high, generate_series(
-            greatest(width_bucket(l.chainage_from, g.low), 1), width_bucket(l.chainage_to, g.low)) AS n
-        FROM given g CROSS JOIN tunnel.finding l
-        WHERE l.survey_id = survey_key AND l.detected AND l.review <> 'rejected' AND l.wet AND NOT l.superseded
-            AND l.chainage_from > first_leak AND l.chainage_to > first_start AND l.chainage_from < last_end
-    ), cut AS (
-        SELECT l.n, l.id, greatest(l.low, g.low[l.n]) AS low, least(l.high, g.high[l.n]) AS high, l.area AS whole,
-            CASE WHEN l.low >= g.low[l.n] AND l.high <= g.high[l.n] THEN l.area
-                 -- few are cut: only they are looked up, the others come from the index alone
-                 ELSE (SELECT tunnel_internal.area_between(a.unrolled, a.area, g.low[l.n], g.high[l.n])
-                     FROM tunnel.finding a WHERE a.id = l.id) END AS area
-        FROM leak l CROSS JOIN given g
-        WHERE l.high > g.low[l.n] AND l.low < g.high[l.n]
     ), patch AS MATERIALIZED (
-        SELECT c.n, c.id, c.whole, c.area,
-            coalesce(f.before + tunnel_internal.sum_upto(f.lining, f.step, least(c.low - f.start, 1000)), 0) AS a,
-            coalesce(t.before + tunnel_internal.sum_upto(t.lining, t.step, least(c.high - t.start, 1000)), 0) AS b
-        FROM cut c CROSS JOIN known
-        LEFT JOIN km f ON f.km = known.km[width_bucket(floor(c.low / 1000)::int, known.km)]
-        LEFT JOIN km t ON t.km = known.km[width_bucket(floor(c.high / 1000)::int, known.km)]
+        SELECT l.* FROM tunnel_internal.stretch_leaks(survey_key, starts, ends) l
     ), total AS MATERIALIZED (
         SELECT p.n, count(*)::int AS patches, sum(p.area) AS area, max(p.whole) AS largest FROM patch p GROUP BY p.n
     ), largest AS (
@@ -188,7 +61,7 @@ BEGIN
     ), slid AS MATERIALIZED (
         SELECT l.n, w.patches, w.window_from AS a, w.window_from + 100 AS b, w.wet_area
         FROM listed l CROSS JOIN LATERAL tunnel_internal.slide_window(l.places, l.turns) w
-    ), placed AS (  -- windows in chainage again
+    ), placed AS (  -- windows, converted to chainage
         SELECT q.n, min(q.chainage) AS low, max(q.chainage) AS high
         FROM (
             SELECT e.n, k.start + k.step * (i.k - 1 + coalesce((e.at - k.before - k.lining[i.k])
@@ -208,11 +81,11 @@ BEGIN
             CASE WHEN coalesce(s.looked_at, 0) > 0 THEN s.seen / nullif(s.b - s.a, 0) * least(s.looked_at / (s.high - s.low), 1)
                  ELSE 0 END AS seen_share,
             least(coalesce(s.looked_at, 0) / nullif(s.high - s.low, 0), 1) AS searched_share,
-            -- that none was found is said only where they were searched for
+            -- 0 only where leaks were searched for
             CASE WHEN s.looked_at > 0 THEN coalesce(t.area, 0) ELSE t.area END AS wet,
             coalesce(t.area, 0) / nullif(s.seen, 0) AS ratio,
             CASE WHEN s.looked_at > 0 THEN coalesce(t.patches, 0) ELSE t.patches END AS patches, t.largest, l.id,
-            -- where there are no more than 100 m², they are the window; where no lining is known, there is none
+            -- up to 100 m² are one window; without known lining there is none
             CASE WHEN w.n IS NOT NULL THEN w.patches WHEN s.b > s.a THEN coalesce(t.patches, 0) END AS crowd,
             CASE WHEN p.n IS NOT NULL THEN greatest(p.low, s.low) WHEN w.n IS NULL AND s.b > s.a THEN s.low END AS crowd_low,
             CASE WHEN p.n IS NOT NULL THEN least(p.high, s.high) WHEN w.n IS NULL AND s.b > s.a THEN s.high END AS crowd_high,
