@@ -69,7 +69,7 @@ CALL tunnel_internal.make_geometry_views(
     'change_region', 'change_region', 'Lining that changed significantly,',
     plane_text => 'in the unrolled plane (chainage, arc) of the older survey, SRID 0');
 CALL tunnel_internal.make_geometry_views(
-    'leak_change', 'leak_change', 'What became of leaks,',
+    'leak_change', 'leak_change', 'Change of leaks,',
     plane_text => 'in the unrolled plane (chainage, arc) of the older survey, SRID 0');
 
 CREATE OR REPLACE FUNCTION tunnel_internal.leaks_checksum(survey_id int, chainage_from float8, chainage_to float8) RETURNS text

@@ -70,7 +70,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
 COMMENT ON VIEW tunnel_api.finding IS
     'Findings on the lining, detected and drawn, of all kinds and states, with three geometries: polygons, lines and points. review, remark and kind can be updated; draw and edit outlines in finding_unrolled, finding_map and finding_3d';
 
--- The comments on its columns, and its views of one geometry.
+-- Comments of its columns, and its views with one geometry.
 DO $$
 DECLARE
     comment record;
@@ -194,7 +194,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
 COMMENT ON VIEW tunnel_api.leak IS
     'Water leaks: findings whose kind is wet, detected and drawn, as polygons in three geometries; review, remark and kind can be updated';
 
--- The comments on its columns, and its views of one geometry.
+-- Comments of its columns, and its views with one geometry.
 DO $$
 DECLARE
     comment record;

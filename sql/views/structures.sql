@@ -292,33 +292,33 @@ COMMENT ON VIEW tunnel_api.spot_sheet IS
     'Spots on unrolled faces, in the drawing plane of face_sheet; review and remark can be updated';
 COMMENT ON COLUMN tunnel_api.spot_sheet.geom IS 'Outline on the drawing plane; SRID 0, m';
 
--- The comments on its columns, and its views of one geometry.
+-- Comments of its columns, and its views with one geometry.
 DO $$
 DECLARE
     comment record;
 BEGIN
     FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
-        ('number', 'Its number in the tunnel or site: the same in the next survey'),
-        ('member', 'Number of the member that it is on; NULL where the last run found it no more'),
+        ('number', 'Number in the tunnel or site, the same in the next survey'),
+        ('member', 'Number of its member; NULL if the last run did not find it again'),
         ('member_kind', 'flat, pipe or profile'),
         ('face', 'Number of its face'),
-        ('kind', 'dark or bright, against its own surface; what caused it, the inspector says'),
-        ('chainage', 'Chainage of its middle, m; NULL of a site or beyond the sections'),
+        ('kind', 'dark or bright, compared with its own surface; the cause is for the inspector to state in the remark'),
+        ('chainage', 'Chainage of its middle, m; NULL on a site or beyond the sections'),
         ('label', 'Station of its middle, as 12+345.678'),
         ('reasons', 'Evidence for and against it'),
         ('confidence', 'How sure detection is that it differs, 0-1'),
         ('contrast', 'Mean difference from its surface, in standard deviations of that'),
         ('difference', 'Mean difference from its surface, dB'),
         ('area', 'Area on its face, m²'),
-        ('points', 'Points of the scans on it'),
-        ('scans', 'Scans that saw it'),
+        ('points', 'Number of scan points on it'),
+        ('scans', 'Scans that cover it'),
         ('review', 'open, confirmed or rejected'),
-        ('reviewed_by', 'Who reviewed it last, set by the database'),
-        ('reviewed_at', 'When it was reviewed last, set by the database'),
-        ('remark', 'The reviewer''s remark'),
-        ('detected', 'False when the last run found it no more (kept for its review)'),
-        ('counted', 'Whether sums count it: found last, and not rejected'),
-        ('rgb', 'Mean colour of its points: red, green, blue, 0 to 255; NULL where the scan files have none')) AS t (name, text)
+        ('reviewed_by', 'Role that reviewed it last, set by the database'),
+        ('reviewed_at', 'Time of the last review, set by the database'),
+        ('remark', 'Remark of the reviewer'),
+        ('detected', 'False if the last run did not find it again (kept for its review)'),
+        ('counted', 'True if totals include it: found by the last run, and not rejected'),
+        ('rgb', 'Mean colour of its points: red, green, blue, 0 to 255; NULL if the scan files have no colours')) AS t (name, text)
       JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
       JOIN pg_class c ON c.oid = a.attrelid
      WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname IN ('spot', 'spot_sheet')
