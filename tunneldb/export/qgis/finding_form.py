@@ -29,7 +29,8 @@ _ALIASES = {
     "detected_at": "Last detected", "also_detected": "Also detected", "detected_as": "Detected as", "parent_id": "Split off",
     "merged_into": "Merged into", "merged": "Merged into this", "same_as": "Same as", "dry_region_id": "In dry region",
     "counted": "Included in totals", "state": "State", "photos": "Photos", "evidence": "Evidence for (+) and against (-)",
-    "model": "Classified by model", "easting": "Easting (m)", "northing": "Northing (m)", "height": "Height (m)", "superseded": "Superseded", CLOCK_TEXT: "Clock position",
+    "model": "Classified by model", "easting": "Easting (m)", "northing": "Northing (m)", "height": "Height (m)",
+    "superseded": "Superseded", CLOCK_TEXT: "Clock position",
 }  # fmt: skip
 _PHOTO_ALIASES = {
     "id": "Photo", "finding_id": "Finding", "survey_id": "Survey key", "survey": "Survey", "path": "File or URL",
