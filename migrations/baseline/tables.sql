@@ -26,12 +26,12 @@ CREATE TABLE tunnel.finding_kind (
 );
 COMMENT ON TABLE tunnel.finding_kind IS 'Kinds of findings, which an owner extends; those of detection are leak, joint and dark';
 COMMENT ON COLUMN tunnel.finding_kind.id IS 'Key';
-COMMENT ON COLUMN tunnel.finding_kind.code IS 'Its code, in lower case';
-COMMENT ON COLUMN tunnel.finding_kind.label IS 'Its name, in the owner''s words';
-COMMENT ON COLUMN tunnel.finding_kind.geometries IS 'What it may be drawn as: polygon, line, point';
-COMMENT ON COLUMN tunnel.finding_kind.wet IS 'Whether it counts as wet in statistics and classes';
-COMMENT ON COLUMN tunnel.finding_kind.position IS 'Its place in lists';
-COMMENT ON COLUMN tunnel.finding_kind.active IS 'Whether it is offered for what is drawn';
+COMMENT ON COLUMN tunnel.finding_kind.code IS 'Code, in lower case';
+COMMENT ON COLUMN tunnel.finding_kind.label IS 'Name, in the owner''s words';
+COMMENT ON COLUMN tunnel.finding_kind.geometries IS 'Permitted geometries: polygon, line, point';
+COMMENT ON COLUMN tunnel.finding_kind.wet IS 'True if findings of this kind count as wet in statistics and classes';
+COMMENT ON COLUMN tunnel.finding_kind.position IS 'Position in lists';
+COMMENT ON COLUMN tunnel.finding_kind.active IS 'True if new findings can be drawn with this kind';
 
 CREATE TABLE tunnel.image (
     survey_id INTEGER NOT NULL,
@@ -87,8 +87,8 @@ CREATE TABLE tunnel.severity (
 );
 COMMENT ON TABLE tunnel.severity IS 'Words for the degrees of severity, which an owner changes to his own';
 COMMENT ON COLUMN tunnel.severity.id IS '1, the least, to 4';
-COMMENT ON COLUMN tunnel.severity.label IS 'Its name, in the owner''s words';
-COMMENT ON COLUMN tunnel.severity.text IS 'What it means';
+COMMENT ON COLUMN tunnel.severity.label IS 'Name, in the owner''s words';
+COMMENT ON COLUMN tunnel.severity.text IS 'Meaning';
 
 CREATE TABLE tunnel.stage (
     step INTEGER NOT NULL,
@@ -103,7 +103,7 @@ CREATE TABLE tunnel.stage (
     CONSTRAINT stage_name_key UNIQUE (name)
 );
 COMMENT ON TABLE tunnel.stage IS 'Stages of a kilometre and measures, in their order; tunneldb init fills it anew';
-COMMENT ON COLUMN tunnel.stage.step IS 'Its number in their order, from 1';
+COMMENT ON COLUMN tunnel.stage.step IS 'Number in the order of stages, from 1';
 COMMENT ON COLUMN tunnel.stage.name IS 'Name';
 COMMENT ON COLUMN tunnel.stage.reads IS 'Stages whose results in the kilometre itself it rests on';
 COMMENT ON COLUMN tunnel.stage.reads_beside IS 'Stages whose results in the kilometres before and after it rests on';
@@ -135,8 +135,8 @@ COMMENT ON COLUMN tunnel.tunnel.start_chainage IS 'Chainage of the given axis''s
 COMMENT ON COLUMN tunnel.tunnel.dry_region_limit IS 'Area above which a dry region must say why it is drawn, and waits for an operator, m²';
 COMMENT ON COLUMN tunnel.tunnel.spacing IS 'Distance between vertices of the averaged axis, m of chainage';
 COMMENT ON COLUMN tunnel.tunnel.alignment IS 'Axis as given, in growing chainage, in the tunnel''s SRID; NULL of a site';
-COMMENT ON COLUMN tunnel.tunnel.design IS 'What the given axis was read from or found in: file and alignment, file and layer, or scan; NULL of a table';
-COMMENT ON COLUMN tunnel.tunnel.created_at IS 'When it was added';
+COMMENT ON COLUMN tunnel.tunnel.design IS 'Source of the given axis: file and alignment, file and layer, or scan; NULL for a table';
+COMMENT ON COLUMN tunnel.tunnel.created_at IS 'Time when it was added';
 
 CREATE TABLE tunnel.worker (
     id BIGINT NOT NULL,
@@ -149,9 +149,9 @@ CREATE TABLE tunnel.worker (
 COMMENT ON TABLE tunnel.worker IS 'Workers that serve the queue';
 COMMENT ON COLUMN tunnel.worker.id IS 'Key: that of the queue''s worker';
 COMMENT ON COLUMN tunnel.worker.host IS 'Machine that it runs on';
-COMMENT ON COLUMN tunnel.worker.pid IS 'Its process there';
-COMMENT ON COLUMN tunnel.worker.started_at IS 'When it started';
-COMMENT ON COLUMN tunnel.worker.stop IS 'Whether it was asked to finish what it is at and leave';
+COMMENT ON COLUMN tunnel.worker.pid IS 'Number of its process';
+COMMENT ON COLUMN tunnel.worker.started_at IS 'Time of the start';
+COMMENT ON COLUMN tunnel.worker.stop IS 'True if it was asked to finish its current job and exit';
 
 CREATE TABLE tunnel_audit.entry (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
@@ -174,17 +174,17 @@ CREATE TABLE tunnel_audit.entry (
 COMMENT ON TABLE tunnel_audit.entry IS 'What people changed through the views: who, when, before and after; outlives what it speaks of';
 COMMENT ON COLUMN tunnel_audit.entry.id IS 'Key';
 COMMENT ON COLUMN tunnel_audit.entry.at IS 'When';
-COMMENT ON COLUMN tunnel_audit.entry.who IS 'Who was logged in';
+COMMENT ON COLUMN tunnel_audit.entry.who IS 'Role that was logged in';
 COMMENT ON COLUMN tunnel_audit.entry.survey IS 'Name of the survey';
-COMMENT ON COLUMN tunnel_audit.entry.view IS 'What was changed: finding, spot, axis_vertex, region or photo';
-COMMENT ON COLUMN tunnel_audit.entry.row_id IS 'Its id there';
+COMMENT ON COLUMN tunnel_audit.entry.view IS 'Edited view: finding, spot, axis_vertex, region or photo';
+COMMENT ON COLUMN tunnel_audit.entry.row_id IS 'Key of the row in that view';
 COMMENT ON COLUMN tunnel_audit.entry.action IS 'insert, update or delete';
 COMMENT ON COLUMN tunnel_audit.entry.before IS 'Columns that changed, as they were; none of an insert';
 COMMENT ON COLUMN tunnel_audit.entry.after IS 'The same as they are now; none of a delete';
 COMMENT ON COLUMN tunnel_audit.entry.undoes IS 'Entry that this one takes back';
 COMMENT ON COLUMN tunnel_audit.entry.part_of IS 'Entry of the step that this one is a part of: a split, a merge or a delete';
-COMMENT ON COLUMN tunnel_audit.entry.kept IS 'What had been measured of a finding before its outline changed';
-COMMENT ON COLUMN tunnel_audit.entry.imported_by IS 'Who brought it in with an archive of the survey';
+COMMENT ON COLUMN tunnel_audit.entry.kept IS 'Measured values of a finding before its outline changed';
+COMMENT ON COLUMN tunnel_audit.entry.imported_by IS 'Role that imported it with an archive of the survey';
 COMMENT ON COLUMN tunnel_audit.entry.imported_at IS 'When; who and at are then what the archive says';
 CREATE INDEX entry_part_of_idx ON tunnel_audit.entry (part_of) WHERE part_of IS NOT NULL;
 CREATE INDEX entry_survey_at_idx ON tunnel_audit.entry (survey, at);
@@ -218,9 +218,9 @@ COMMENT ON COLUMN tunnel.alignment_element.plane IS 'horizontal or vertical';
 COMMENT ON COLUMN tunnel.alignment_element.n IS 'Number along the alignment, from 1';
 COMMENT ON COLUMN tunnel.alignment_element.kind IS 'line, arc, clothoid (horizontal); grade, parabola, circle (vertical)';
 COMMENT ON COLUMN tunnel.alignment_element.chainage IS 'Chainage of its beginning, m';
-COMMENT ON COLUMN tunnel.alignment_element.length IS 'Its length in plan, m';
-COMMENT ON COLUMN tunnel.alignment_element.x IS 'Where a horizontal one begins, tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel.alignment_element.y IS 'Where a horizontal one begins, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel.alignment_element.length IS 'Length in plan, m';
+COMMENT ON COLUMN tunnel.alignment_element.x IS 'Easting of the beginning of a horizontal element, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel.alignment_element.y IS 'Northing of the beginning of a horizontal element, tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel.alignment_element.bearing IS 'Direction in which a horizontal one begins, radians from the x axis towards y';
 COMMENT ON COLUMN tunnel.alignment_element.curvature_from IS 'Curvature of a horizontal one at its beginning, 1/m, positive to the left; in between it is linear';
 COMMENT ON COLUMN tunnel.alignment_element.curvature_to IS 'The same at its end, 1/m';
@@ -248,13 +248,13 @@ CREATE TABLE tunnel.design_profile (
 COMMENT ON TABLE tunnel.design_profile IS 'Design profiles of a tunnel, by layer; between two of a layer the one goes over into the other linearly';
 COMMENT ON COLUMN tunnel.design_profile.id IS 'Key';
 COMMENT ON COLUMN tunnel.design_profile.tunnel_id IS 'Tunnel that the row belongs to';
-COMMENT ON COLUMN tunnel.design_profile.name IS 'Its name';
+COMMENT ON COLUMN tunnel.design_profile.name IS 'Name';
 COMMENT ON COLUMN tunnel.design_profile.layer IS 'lining, shotcrete or excavation';
 COMMENT ON COLUMN tunnel.design_profile.chainage_from IS 'Chainage of the given axis from which it holds, m';
 COMMENT ON COLUMN tunnel.design_profile.chainage_to IS 'Chainage up to which it holds, m';
-COMMENT ON COLUMN tunnel.design_profile.outline IS 'Of each vertex: right of the axis, above it, m, and bulge of what leads to the next; clockwise looking up-chainage, closed where the last vertex is the first';
+COMMENT ON COLUMN tunnel.design_profile.outline IS 'Vertices: to the right of the axis, above it, m, and bulge of the edge to the next vertex; clockwise looking up-chainage';
 COMMENT ON COLUMN tunnel.design_profile.source IS 'File that it was read from';
-COMMENT ON COLUMN tunnel.design_profile.added_at IS 'When it was added';
+COMMENT ON COLUMN tunnel.design_profile.added_at IS 'Time when it was added';
 
 CREATE TABLE tunnel.gauge (
     id INTEGER GENERATED ALWAYS AS IDENTITY,
@@ -271,11 +271,11 @@ CREATE TABLE tunnel.gauge (
 COMMENT ON TABLE tunnel.gauge IS 'Outlines that are to be clear about tracks or lanes';
 COMMENT ON COLUMN tunnel.gauge.id IS 'Key';
 COMMENT ON COLUMN tunnel.gauge.tunnel_id IS 'Tunnel that the row belongs to';
-COMMENT ON COLUMN tunnel.gauge.name IS 'Its name';
-COMMENT ON COLUMN tunnel.gauge.outline IS 'Of each vertex: right of the track''s middle, above its running surface, m, and bulge of what leads to the next';
+COMMENT ON COLUMN tunnel.gauge.name IS 'Name';
+COMMENT ON COLUMN tunnel.gauge.outline IS 'Vertices: to the right of the track''s centre, above its running surface, m, and bulge of the edge to the next vertex';
 COMMENT ON COLUMN tunnel.gauge.source IS 'File that it was read from';
 COMMENT ON COLUMN tunnel.gauge.checksum IS 'MD5 of the outline';
-COMMENT ON COLUMN tunnel.gauge.added_at IS 'When it was added';
+COMMENT ON COLUMN tunnel.gauge.added_at IS 'Time when it was added';
 
 CREATE TABLE tunnel.learned_model (
     id INTEGER GENERATED ALWAYS AS IDENTITY,
@@ -303,14 +303,14 @@ COMMENT ON COLUMN tunnel.learned_model.base IS 'Version of the model that it adj
 COMMENT ON COLUMN tunnel.learned_model.way IS 'recalibrated (slope and offset of the logarithm of the odds), refit (a factor for each reason, and an offset) or extended (terms of features, too)';
 COMMENT ON COLUMN tunnel.learned_model.parameters IS 'Slope, offset, factors by reason; centre, scale and weight by feature';
 COMMENT ON COLUMN tunnel.learned_model.surveys IS 'Surveys whose reviews it was learned from';
-COMMENT ON COLUMN tunnel.learned_model.reviews IS 'How many reviews of each kind';
+COMMENT ON COLUMN tunnel.learned_model.reviews IS 'Number of reviews of each kind';
 COMMENT ON COLUMN tunnel.learned_model.loss_base IS 'Mean negative logarithm of the probability of what was said, by the model that it adjusts';
 COMMENT ON COLUMN tunnel.learned_model.loss IS 'The same, adjusted to reviews of other places';
-COMMENT ON COLUMN tunnel.learned_model.note IS 'What its maker says of it';
-COMMENT ON COLUMN tunnel.learned_model.applied_by IS 'Who applied it';
+COMMENT ON COLUMN tunnel.learned_model.note IS 'Note of the person who applied it';
+COMMENT ON COLUMN tunnel.learned_model.applied_by IS 'Role that applied it';
 COMMENT ON COLUMN tunnel.learned_model.active_from IS 'Since when it is in force';
-COMMENT ON COLUMN tunnel.learned_model.undone_by IS 'Who took it back';
-COMMENT ON COLUMN tunnel.learned_model.undone_at IS 'When it was taken back';
+COMMENT ON COLUMN tunnel.learned_model.undone_by IS 'Role that undid it';
+COMMENT ON COLUMN tunnel.learned_model.undone_at IS 'Time when it was undone';
 CREATE INDEX learned_model_tunnel_id_idx ON tunnel.learned_model (tunnel_id);
 
 CREATE TABLE tunnel.stage_input (
@@ -376,11 +376,11 @@ COMMENT ON COLUMN tunnel.survey.intensity_dimension IS 'Dimension of the scan fi
 COMMENT ON COLUMN tunnel.survey.intensity_kind IS 'amplitude (dB, falls with range), reflectance (dB, range removed), linear (counts) or none';
 COMMENT ON COLUMN tunnel.survey.platform IS 'static (rows in station), mobile (rows in pose), or unknown: range and incidence are not corrected';
 COMMENT ON COLUMN tunnel.survey.reference IS 'Range curve: none, measured on a target (rows in reference) or auto, from the lining of each kilometre';
-COMMENT ON COLUMN tunnel.survey.created_at IS 'When it was added';
+COMMENT ON COLUMN tunnel.survey.created_at IS 'Time when it was added';
 COMMENT ON COLUMN tunnel.survey.positions_note IS 'Notes on its scanner positions: poses left out, gaps';
 COMMENT ON COLUMN tunnel.survey.longest_interval IS 'Longest interval of its trajectory that is interpolated over, s; NULL without a trajectory';
 COMMENT ON COLUMN tunnel.survey.trajectory_gaps IS 'Longer intervals of its trajectory: times from and to, one after the other, s; NULL without a trajectory';
-COMMENT ON COLUMN tunnel.survey.settings_at IS 'When scanner positions, reference or intensity were last set to others';
+COMMENT ON COLUMN tunnel.survey.settings_at IS 'Time of the last change of scanner positions, reference or intensity';
 CREATE INDEX survey_tunnel_id_idx ON tunnel.survey (tunnel_id);
 
 CREATE TABLE tunnel.axis_vertex (
@@ -406,12 +406,12 @@ COMMENT ON COLUMN tunnel.axis_vertex.survey_id IS 'Survey that the row belongs t
 COMMENT ON COLUMN tunnel.axis_vertex.n IS 'Number along the axis; its chainage is n * tunnel.spacing';
 COMMENT ON COLUMN tunnel.axis_vertex.km IS 'Kilometre: floor(chainage / 1000)';
 COMMENT ON COLUMN tunnel.axis_vertex.geom IS 'Position, tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel.axis_vertex.given IS 'Where the given axis has this chainage, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel.axis_vertex.given IS 'Position on the given axis at this chainage, tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel.axis_vertex.points IS 'Points that were averaged; 0 unless measured';
 COMMENT ON COLUMN tunnel.axis_vertex.source IS 'measured (averaged), interpolated (too few points) or edited (by hand, kept by a rerun)';
 COMMENT ON COLUMN tunnel.axis_vertex.remark IS 'Why the place that was measured is not taken, if it is not';
-COMMENT ON COLUMN tunnel.axis_vertex.edited_by IS 'Who moved it';
-COMMENT ON COLUMN tunnel.axis_vertex.edited_at IS 'When it was moved';
+COMMENT ON COLUMN tunnel.axis_vertex.edited_by IS 'Role that moved it';
+COMMENT ON COLUMN tunnel.axis_vertex.edited_at IS 'Time of the last move';
 CREATE INDEX axis_vertex_geom_idx ON tunnel.axis_vertex USING gist (geom);
 
 CREATE TABLE tunnel.bed (
@@ -435,7 +435,7 @@ COMMENT ON COLUMN tunnel.bed.km IS 'Kilometre: floor(chainage / 1000)';
 COMMENT ON COLUMN tunnel.bed.n IS 'Metre of chainage at which it begins';
 COMMENT ON COLUMN tunnel.bed.across_n IS 'Tenth of a metre right of the axis at which it begins';
 COMMENT ON COLUMN tunnel.bed.height IS 'Median height of the bed, m';
-COMMENT ON COLUMN tunnel.bed.depth IS 'Of the bed below the water, m';
+COMMENT ON COLUMN tunnel.bed.depth IS 'Depth of the bed below the water, m';
 COMMENT ON COLUMN tunnel.bed.sigma IS 'Standard deviation of its height, that of the scans'' poses included, m';
 COMMENT ON COLUMN tunnel.bed.points IS 'Points of the bed in it';
 CREATE INDEX bed_survey_id_km_idx ON tunnel.bed (survey_id, km);
@@ -549,17 +549,17 @@ COMMENT ON COLUMN tunnel.change_section.seen_new IS 'Lining that the newer surve
 COMMENT ON COLUMN tunnel.change_section.seen_both IS 'Lining that both saw: what was compared, m²';
 COMMENT ON COLUMN tunnel.change_section.shift IS 'Shift at right angles to the axis, m';
 COMMENT ON COLUMN tunnel.change_section.shift_right IS 'Shift of the whole to the right, m; NULL: not determined';
-COMMENT ON COLUMN tunnel.change_section.shift_right_se IS 'Its standard error, m';
+COMMENT ON COLUMN tunnel.change_section.shift_right_se IS 'Standard error of shift_right, m';
 COMMENT ON COLUMN tunnel.change_section.shift_up IS 'Shift up, m; NULL: not determined';
-COMMENT ON COLUMN tunnel.change_section.shift_up_se IS 'Its standard error, m';
+COMMENT ON COLUMN tunnel.change_section.shift_up_se IS 'Standard error of shift_up, m';
 COMMENT ON COLUMN tunnel.change_section.shift_along IS 'Shift up-chainage, m; NULL: not determined';
-COMMENT ON COLUMN tunnel.change_section.shift_along_se IS 'Its standard error, m';
+COMMENT ON COLUMN tunnel.change_section.shift_along_se IS 'Standard error of shift_along, m';
 COMMENT ON COLUMN tunnel.change_section.roll IS 'Turn about the axis, rad; NULL: not determined';
-COMMENT ON COLUMN tunnel.change_section.roll_se IS 'Its standard error, rad';
+COMMENT ON COLUMN tunnel.change_section.roll_se IS 'Standard error of roll, rad';
 COMMENT ON COLUMN tunnel.change_section.yaw IS 'Turn about the upward direction, rad; NULL: not determined';
-COMMENT ON COLUMN tunnel.change_section.yaw_se IS 'Its standard error, rad';
+COMMENT ON COLUMN tunnel.change_section.yaw_se IS 'Standard error of yaw, rad';
 COMMENT ON COLUMN tunnel.change_section.pitch IS 'Turn about the direction to the right, rad; NULL: not determined';
-COMMENT ON COLUMN tunnel.change_section.pitch_se IS 'Its standard error, rad';
+COMMENT ON COLUMN tunnel.change_section.pitch_se IS 'Standard error of pitch, rad';
 COMMENT ON COLUMN tunnel.change_section.change_rms IS 'Root mean square of what remains beyond noise, m; NULL where nothing was compared';
 COMMENT ON COLUMN tunnel.change_section.change_least IS 'Least mean of a window of 3 by 3 cells, m: greatest outwards';
 COMMENT ON COLUMN tunnel.change_section.change_greatest IS 'Greatest mean of a window, m: greatest inwards';
@@ -598,14 +598,14 @@ COMMENT ON COLUMN tunnel.clearance_infringement.gauge IS 'Name of the outline';
 COMMENT ON COLUMN tunnel.clearance_infringement.track IS 'As of clearance_section';
 COMMENT ON COLUMN tunnel.clearance_infringement.chainage_from IS 'First place along the given axis, m';
 COMMENT ON COLUMN tunnel.clearance_infringement.chainage_to IS 'Last place, m';
-COMMENT ON COLUMN tunnel.clearance_infringement.depth IS 'How deep it reaches in, m';
+COMMENT ON COLUMN tunnel.clearance_infringement.depth IS 'Greatest depth inside the gauge, m';
 COMMENT ON COLUMN tunnel.clearance_infringement.clock IS 'Direction of its deepest point, degrees from straight above to the right';
 COMMENT ON COLUMN tunnel.clearance_infringement.class IS 'Class of its points';
 COMMENT ON COLUMN tunnel.clearance_infringement.counts IS 'False of objects and spheres, which may be gone';
 COMMENT ON COLUMN tunnel.clearance_infringement.cluster_id IS 'Cluster of stage ground with its deepest point, if any';
-COMMENT ON COLUMN tunnel.clearance_infringement.points IS 'How many';
-COMMENT ON COLUMN tunnel.clearance_infringement.unrolled IS 'What it covers of the unrolled plane, chainage and arc; NULL where not on the lining';
-COMMENT ON COLUMN tunnel.clearance_infringement.geom IS 'Its points, at most 200, deepest first';
+COMMENT ON COLUMN tunnel.clearance_infringement.points IS 'Number of points';
+COMMENT ON COLUMN tunnel.clearance_infringement.unrolled IS 'Area covered in the unrolled plane (chainage and arc); NULL away from the lining';
+COMMENT ON COLUMN tunnel.clearance_infringement.geom IS 'Points, at most 200, deepest first';
 CREATE INDEX clearance_infringement_survey_id_gauge_depth_idx ON tunnel.clearance_infringement (survey_id, gauge, depth);
 
 CREATE TABLE tunnel.clearance_section (
@@ -651,20 +651,20 @@ COMMENT ON COLUMN tunnel.clearance_section.chainage_from IS 'Chainage of its beg
 COMMENT ON COLUMN tunnel.clearance_section.chainage_to IS 'Chainage of its end, m';
 COMMENT ON COLUMN tunnel.clearance_section.track_right IS 'Middle of the track right of the given axis, m';
 COMMENT ON COLUMN tunnel.clearance_section.track_up IS 'Plane of the running surface there above the given axis, m';
-COMMENT ON COLUMN tunnel.clearance_section.cant IS 'How much higher the left rail lies, m';
-COMMENT ON COLUMN tunnel.clearance_section.curvature IS 'Of the track in plan, positive to the right, 1/m';
+COMMENT ON COLUMN tunnel.clearance_section.cant IS 'Height of the left rail above the right rail, m';
+COMMENT ON COLUMN tunnel.clearance_section.curvature IS 'Curvature of the track in plan, positive to the right, 1/m';
 COMMENT ON COLUMN tunnel.clearance_section.widened_left IS 'By how much the outline is wider on the left, without roll, m';
 COMMENT ON COLUMN tunnel.clearance_section.widened_right IS 'By how much on the right, m';
 COMMENT ON COLUMN tunnel.clearance_section.roll IS 'Roll of the vehicle, positive to the right, rad';
 COMMENT ON COLUMN tunnel.clearance_section.margin IS 'Least distance, m, negative inside; NULL where nothing that counts';
-COMMENT ON COLUMN tunnel.clearance_section.margin_se IS 'Its standard error by that of the track alone, m';
+COMMENT ON COLUMN tunnel.clearance_section.margin_se IS 'Standard error of the margin from the track only, m';
 COMMENT ON COLUMN tunnel.clearance_section.clock IS 'Direction of that point, degrees from straight above to the right';
 COMMENT ON COLUMN tunnel.clearance_section.class IS 'Class of that point';
 COMMENT ON COLUMN tunnel.clearance_section.cluster_id IS 'Cluster of stage ground that it lies in, if any';
 COMMENT ON COLUMN tunnel.clearance_section.margins IS 'Least distance in each 5° by clock, from straight above, m; NaN: nothing';
 COMMENT ON COLUMN tunnel.clearance_section.seen_share IS 'Share of the directions with a return of anything, 0 to 1';
 COMMENT ON COLUMN tunnel.clearance_section.points IS 'Points that count';
-COMMENT ON COLUMN tunnel.clearance_section.inside IS 'Of them inside';
+COMMENT ON COLUMN tunnel.clearance_section.inside IS 'Number of these inside the gauge';
 COMMENT ON COLUMN tunnel.clearance_section.stray IS 'Points inside without company, or noise: they do not count';
 COMMENT ON COLUMN tunnel.clearance_section.passing IS 'Points inside of objects and spheres, which may be gone: they do not count';
 COMMENT ON COLUMN tunnel.clearance_section.ground IS 'Points inside that are ground or rail: they do not count';
@@ -695,8 +695,8 @@ COMMENT ON COLUMN tunnel.cluster.km IS 'Kilometre: floor(chainage / 1000) of its
 COMMENT ON COLUMN tunnel.cluster.class IS 'Class of its points (tunnel_api.class)';
 COMMENT ON COLUMN tunnel.cluster.chainage_from IS 'Least chainage, m';
 COMMENT ON COLUMN tunnel.cluster.chainage_to IS 'Greatest chainage, m';
-COMMENT ON COLUMN tunnel.cluster.height_from IS 'Its lowest point above the ground, m; none without ground';
-COMMENT ON COLUMN tunnel.cluster.height_to IS 'Its highest point above the ground, m; none without ground';
+COMMENT ON COLUMN tunnel.cluster.height_from IS 'Lowest point above the ground, m; NULL without ground';
+COMMENT ON COLUMN tunnel.cluster.height_to IS 'Highest point above the ground, m; NULL without ground';
 COMMENT ON COLUMN tunnel.cluster.points IS 'Points of survey density in it';
 COMMENT ON COLUMN tunnel.cluster.cell IS 'Edge of its cells, m';
 COMMENT ON COLUMN tunnel.cluster.cells IS 'Cells that its points fill: floor(x / cell), floor(y / cell), floor(z / cell) of each';
@@ -725,8 +725,8 @@ COMMENT ON COLUMN tunnel.coverage.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.coverage.km IS 'Kilometre: floor(chainage / 1000)';
 COMMENT ON COLUMN tunnel.coverage.step IS 'Length of a step, m; the first begins with the kilometre';
 COMMENT ON COLUMN tunnel.coverage.lining IS 'Lining in each step, seen or not, in the unrolled plane, m²';
-COMMENT ON COLUMN tunnel.coverage.seen IS 'What of it was seen within the limits of range and incidence, m²';
-COMMENT ON COLUMN tunnel.coverage.wet IS 'What of that is wet: pixels below the threshold, after the median filter, m²';
+COMMENT ON COLUMN tunnel.coverage.seen IS 'Inspected part of it, within the limits of range and incidence, m²';
+COMMENT ON COLUMN tunnel.coverage.wet IS 'Wet part of the inspected lining (pixels below the threshold, after the median filter), m²';
 COMMENT ON COLUMN tunnel.coverage.lining_total IS 'Sum of lining, m²';
 COMMENT ON COLUMN tunnel.coverage.seen_total IS 'Sum of seen, m²';
 COMMENT ON COLUMN tunnel.coverage.wet_total IS 'Sum of wet, m²';
@@ -774,7 +774,7 @@ COMMENT ON COLUMN tunnel.deviation_section.profile IS 'Name of the profile, of a
 COMMENT ON COLUMN tunnel.deviation_section.chainage_from IS 'Chainage of its beginning, m';
 COMMENT ON COLUMN tunnel.deviation_section.chainage_to IS 'Chainage of its end, m';
 COMMENT ON COLUMN tunnel.deviation_section.design_length IS 'Length of the profile in its middle, m';
-COMMENT ON COLUMN tunnel.deviation_section.seen_length IS 'What of that is seen, m';
+COMMENT ON COLUMN tunnel.deviation_section.seen_length IS 'Inspected length of the profile, m';
 COMMENT ON COLUMN tunnel.deviation_section.overbreak IS 'Area outside the profile, of what is seen, m²';
 COMMENT ON COLUMN tunnel.deviation_section.underbreak IS 'Area inside the profile, of what is seen, m²';
 COMMENT ON COLUMN tunnel.deviation_section.noise_area IS 'Standard deviation of underbreak less overbreak by the scatter of pixels, m²';
@@ -783,13 +783,13 @@ COMMENT ON COLUMN tunnel.deviation_section.over_up IS 'By how much overbreak gro
 COMMENT ON COLUMN tunnel.deviation_section.under_right IS 'By how much underbreak grows when the axis moves to the right, m²/m';
 COMMENT ON COLUMN tunnel.deviation_section.under_up IS 'By how much underbreak grows when the axis moves up, m²/m';
 COMMENT ON COLUMN tunnel.deviation_section.sigma IS 'Scatter of pixels within cells: noise, and the lining''s texture, m; NULL where nothing is seen';
-COMMENT ON COLUMN tunnel.deviation_section.shift_right IS 'How far the lining as a whole lies right of the profile, m; NULL where too little is seen';
-COMMENT ON COLUMN tunnel.deviation_section.shift_up IS 'How far it lies above it, m';
+COMMENT ON COLUMN tunnel.deviation_section.shift_right IS 'Shift of the lining as a whole to the right of the profile, m; NULL if too little was inspected';
+COMMENT ON COLUMN tunnel.deviation_section.shift_up IS 'Shift of the lining as a whole above the profile, m';
 COMMENT ON COLUMN tunnel.deviation_section.deviation_mean IS 'Mean deviation of the cells seen, m; NULL where nothing is seen';
 COMMENT ON COLUMN tunnel.deviation_section.deviation_least IS 'Least mean of a cell, m: the greatest overbreak';
-COMMENT ON COLUMN tunnel.deviation_section.least_at IS 'How far along the profile that is, m';
+COMMENT ON COLUMN tunnel.deviation_section.least_at IS 'Distance of that cell along the profile, m';
 COMMENT ON COLUMN tunnel.deviation_section.deviation_greatest IS 'Greatest mean of a cell, m: the greatest underbreak';
-COMMENT ON COLUMN tunnel.deviation_section.greatest_at IS 'How far along the profile that is, m';
+COMMENT ON COLUMN tunnel.deviation_section.greatest_at IS 'Distance of that cell along the profile, m';
 COMMENT ON COLUMN tunnel.deviation_section.deviation IS 'Mean deviation in cells of equal length along the profile, from its beginning, m, positive inside; NaN: not inspected';
 CREATE INDEX deviation_section_survey_id_layer_overbreak_idx ON tunnel.deviation_section (survey_id, layer, overbreak);
 CREATE INDEX deviation_section_survey_id_layer_underbreak_idx ON tunnel.deviation_section (survey_id, layer, underbreak);
@@ -813,7 +813,7 @@ COMMENT ON COLUMN tunnel.evenness_area.id IS 'Key';
 COMMENT ON COLUMN tunnel.evenness_area.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.evenness_area.km IS 'Kilometre: floor(chainage / 1000)';
 COMMENT ON COLUMN tunnel.evenness_area.layer IS 'Layer whose profiles are the template';
-COMMENT ON COLUMN tunnel.evenness_area.area IS 'Its area, m²';
+COMMENT ON COLUMN tunnel.evenness_area.area IS 'Area, m²';
 COMMENT ON COLUMN tunnel.evenness_area.gap IS 'Greatest gap in it, m';
 COMMENT ON COLUMN tunnel.evenness_area.direction IS 'along or around: how the straightedge lay';
 COMMENT ON COLUMN tunnel.evenness_area.geom IS 'In the unrolled plane, m';
@@ -859,8 +859,8 @@ COMMENT ON COLUMN tunnel.evenness_section.chainage_to IS 'Chainage of its end, m
 COMMENT ON COLUMN tunnel.evenness_section.arc_from IS 'Arc of the first cell''s edge, m';
 COMMENT ON COLUMN tunnel.evenness_section.cell IS 'Side of a cell, m';
 COMMENT ON COLUMN tunnel.evenness_section.lining_area IS 'Lining that was seen, m²';
-COMMENT ON COLUMN tunnel.evenness_section.measured_area IS 'What of that lay beneath a straightedge, along or around, m²';
-COMMENT ON COLUMN tunnel.evenness_section.over_area IS 'What of that has a greater gap than the limit, m²';
+COMMENT ON COLUMN tunnel.evenness_section.measured_area IS 'Part of it beneath a straightedge, along or around, m²';
+COMMENT ON COLUMN tunnel.evenness_section.over_area IS 'Part of it with a gap greater than the limit, m²';
 COMMENT ON COLUMN tunnel.evenness_section.gap_along IS 'Greatest gap beneath a straightedge laid along the tunnel, m; NULL where none could be laid';
 COMMENT ON COLUMN tunnel.evenness_section.gap_along_at IS 'Arc of that, m';
 COMMENT ON COLUMN tunnel.evenness_section.gap_around IS 'Greatest gap beneath one laid around the section, m; NULL where none could be laid';
@@ -890,11 +890,11 @@ COMMENT ON TABLE tunnel.finding_sum IS 'What each change of findings adds to the
 COMMENT ON COLUMN tunnel.finding_sum.id IS 'Key';
 COMMENT ON COLUMN tunnel.finding_sum.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.finding_sum.kind IS 'Kind, as judged';
-COMMENT ON COLUMN tunnel.finding_sum.wet IS 'Whether it counts as wet';
-COMMENT ON COLUMN tunnel.finding_sum.origin IS 'How their outlines came about';
+COMMENT ON COLUMN tunnel.finding_sum.wet IS 'True if they count as wet';
+COMMENT ON COLUMN tunnel.finding_sum.origin IS 'Origin of their outlines';
 COMMENT ON COLUMN tunnel.finding_sum.severity IS 'Severity';
 COMMENT ON COLUMN tunnel.finding_sum.state IS 'open or confirmed, which count, rejected, gone, dry, same or merged';
-COMMENT ON COLUMN tunnel.finding_sum.measured IS 'Whether they were measured on the image';
+COMMENT ON COLUMN tunnel.finding_sum.measured IS 'True if they were measured on the image';
 COMMENT ON COLUMN tunnel.finding_sum.findings IS 'By how many they became more';
 COMMENT ON COLUMN tunnel.finding_sum.area IS 'By how much their area grew, m²';
 COMMENT ON COLUMN tunnel.finding_sum.length IS 'By how much the length of lines grew, m';
@@ -916,7 +916,7 @@ COMMENT ON COLUMN tunnel.goal.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.goal.km IS 'Kilometre: floor(chainage / 1000)';
 COMMENT ON COLUMN tunnel.goal.stage IS 'Stage up to which the kilometre is to be brought';
 COMMENT ON COLUMN tunnel.goal.parameters IS 'Parameters of the stages';
-COMMENT ON COLUMN tunnel.goal.requested_at IS 'When it was asked for';
+COMMENT ON COLUMN tunnel.goal.requested_at IS 'Time of the request';
 COMMENT ON COLUMN tunnel.goal.retry_after IS 'Stages that failed before this moment are tried again';
 
 CREATE TABLE tunnel.ground (
@@ -938,11 +938,11 @@ COMMENT ON TABLE tunnel.ground IS 'The ground at each metre along the tunnel tha
 COMMENT ON COLUMN tunnel.ground.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.ground.n IS 'Metre: plan distance along the axis, m';
 COMMENT ON COLUMN tunnel.ground.km IS 'Kilometre: floor(chainage / 1000)';
-COMMENT ON COLUMN tunnel.ground.across IS 'Where the first height stands, m right of the axis; the next ones every 0.1 m';
+COMMENT ON COLUMN tunnel.ground.across IS 'Position of the first height, m right of the axis; the next ones every 0.1 m';
 COMMENT ON COLUMN tunnel.ground.height IS 'Height (z) of the ground, m; NaN where there is none';
 COMMENT ON COLUMN tunnel.ground.gamma IS 'Points up to this height above it are ground, m';
-COMMENT ON COLUMN tunnel.ground.foot IS 'Where the left and the right wall meet the ground, m right of the axis; NaN where there is no wall';
-COMMENT ON COLUMN tunnel.ground.lean IS 'How far the left and the right wall lean to the right for each metre up there';
+COMMENT ON COLUMN tunnel.ground.foot IS 'Feet of the left and the right wall, m right of the axis; NaN where there is no wall';
+COMMENT ON COLUMN tunnel.ground.lean IS 'Inclination of the left and the right wall at their feet: m to the right for each metre up';
 COMMENT ON COLUMN tunnel.ground.arc_left IS 'Arc at which the ground begins on the left, m';
 COMMENT ON COLUMN tunnel.ground.arc_right IS 'Arc at which the ground begins on the right, m';
 COMMENT ON COLUMN tunnel.ground.geom IS 'The ground from the left to the right, tunnel''s SRID, m';
@@ -966,14 +966,14 @@ CREATE TABLE tunnel.incoming (
 COMMENT ON TABLE tunnel.incoming IS 'Files that a batch is to read, until they are read';
 COMMENT ON COLUMN tunnel.incoming.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.incoming.name IS 'File name without its folder';
-COMMENT ON COLUMN tunnel.incoming.path IS 'Where the file lies';
+COMMENT ON COLUMN tunnel.incoming.path IS 'Path of the file';
 COMMENT ON COLUMN tunnel.incoming.bytes IS 'Size of the file, bytes';
 COMMENT ON COLUMN tunnel.incoming.points IS 'Points that its header announces; 0 if it is unreadable';
 COMMENT ON COLUMN tunnel.incoming.km_from IS 'First kilometre that it may touch, by its header''s box';
 COMMENT ON COLUMN tunnel.incoming.km_to IS 'Last kilometre that it may touch, by its header''s box';
-COMMENT ON COLUMN tunnel.incoming.parameters IS 'How it is to be read';
-COMMENT ON COLUMN tunnel.incoming.requested_at IS 'When it was asked for';
-COMMENT ON COLUMN tunnel.incoming.failed_at IS 'When reading it failed';
+COMMENT ON COLUMN tunnel.incoming.parameters IS 'Parameters of reading';
+COMMENT ON COLUMN tunnel.incoming.requested_at IS 'Time of the request';
+COMMENT ON COLUMN tunnel.incoming.failed_at IS 'Time of the failure';
 COMMENT ON COLUMN tunnel.incoming.message IS 'Why it failed';
 
 CREATE TABLE tunnel.ladder (
@@ -992,10 +992,10 @@ CREATE TABLE tunnel.ladder (
 COMMENT ON TABLE tunnel.ladder IS 'Ladders that stand in the water, as the laser sees them above it';
 COMMENT ON COLUMN tunnel.ladder.id IS 'Key';
 COMMENT ON COLUMN tunnel.ladder.survey_id IS 'Survey that the row belongs to';
-COMMENT ON COLUMN tunnel.ladder.name IS 'Its name in the file of ladders';
+COMMENT ON COLUMN tunnel.ladder.name IS 'Name in the file of ladders';
 COMMENT ON COLUMN tunnel.ladder.origin IS 'Middle between its stiles at its height zero, tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel.ladder.axes IS '3 × 3, row by row: unit vectors across, up and out to the water';
-COMMENT ON COLUMN tunnel.ladder.rms IS 'Of the laser''s points from it, m';
+COMMENT ON COLUMN tunnel.ladder.rms IS 'Root mean square distance of the laser''s points, m';
 COMMENT ON COLUMN tunnel.ladder.rungs IS 'Numbers of the rungs that the laser saw';
 COMMENT ON COLUMN tunnel.ladder.scans IS 'Names of the sonar scans that saw it';
 
@@ -1038,15 +1038,15 @@ COMMENT ON COLUMN tunnel.leak_change.new_ids IS 'Findings of the newer survey';
 COMMENT ON COLUMN tunnel.leak_change.old_kinds IS 'Their kinds';
 COMMENT ON COLUMN tunnel.leak_change.new_kinds IS 'Their kinds';
 COMMENT ON COLUMN tunnel.leak_change.area_old IS 'Wet area in the older survey, m²';
-COMMENT ON COLUMN tunnel.leak_change.area_old_se IS 'Its standard error by resolution and threshold, m²';
+COMMENT ON COLUMN tunnel.leak_change.area_old_se IS 'Standard error of area_old from resolution and threshold, m²';
 COMMENT ON COLUMN tunnel.leak_change.area_new IS 'Wet area in the newer survey, m²';
-COMMENT ON COLUMN tunnel.leak_change.area_new_se IS 'Its standard error by resolution and threshold, m²';
+COMMENT ON COLUMN tunnel.leak_change.area_new_se IS 'Standard error of area_new from resolution and threshold, m²';
 COMMENT ON COLUMN tunnel.leak_change.seen_old IS 'Share of the place that the older survey saw, 0 to 1';
 COMMENT ON COLUMN tunnel.leak_change.seen_new IS 'Share of the place that the newer survey saw, 0 to 1';
 COMMENT ON COLUMN tunnel.leak_change.chainage_from IS 'Least chainage, of the older survey, m';
 COMMENT ON COLUMN tunnel.leak_change.chainage_to IS 'Greatest chainage, m';
 COMMENT ON COLUMN tunnel.leak_change.clock IS 'Clock position of its largest part, hours';
-COMMENT ON COLUMN tunnel.leak_change.unrolled IS 'What is wet in either, in the unrolled plane of the older survey, m';
+COMMENT ON COLUMN tunnel.leak_change.unrolled IS 'Wet area in either survey, in the unrolled plane of the older survey, m';
 COMMENT ON COLUMN tunnel.leak_change.map IS 'On the map strip beside the axis, tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel.leak_change.surface IS 'On the lining in space, tunnel''s SRID, m';
 CREATE INDEX leak_change_map_idx ON tunnel.leak_change USING gist (map);
@@ -1091,13 +1091,13 @@ CREATE TABLE tunnel.member (
 COMMENT ON TABLE tunnel.member IS 'Members of structures: faces that belong together, joined where others hide them';
 COMMENT ON COLUMN tunnel.member.id IS 'Key';
 COMMENT ON COLUMN tunnel.member.survey_id IS 'Survey that the row belongs to';
-COMMENT ON COLUMN tunnel.member.number IS 'Its number in the survey, from 1; dimension member of files written';
+COMMENT ON COLUMN tunnel.member.number IS 'Number in the survey, from 1; dimension member in written files';
 COMMENT ON COLUMN tunnel.member.kind IS 'flat (planes that lie in one), pipe (cylinders about one axis) or profile (sides of one beam)';
 COMMENT ON COLUMN tunnel.member.length IS 'Length along its line, gaps counted, m';
 COMMENT ON COLUMN tunnel.member.area IS 'Area of its faces, m²';
-COMMENT ON COLUMN tunnel.member.bimodal IS 'Whether so much of it differs from the rest that neither is known to be its own surface';
+COMMENT ON COLUMN tunnel.member.bimodal IS 'True if so much of its surface differs from the rest that the reference surface is unknown';
 COMMENT ON COLUMN tunnel.member.chainage IS 'Chainage of its middle, m; NULL of a site or beyond the sections';
-COMMENT ON COLUMN tunnel.member.line IS 'Its middle line; of a flat one along its longest side; tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel.member.line IS 'Middle line, tunnel''s SRID, m; for a flat member, along its longest side';
 
 CREATE TABLE tunnel.pose (
     survey_id INTEGER NOT NULL,
@@ -1132,7 +1132,7 @@ COMMENT ON COLUMN tunnel.radiometry.survey_id IS 'Survey that the row belongs to
 COMMENT ON COLUMN tunnel.radiometry.km IS 'Kilometre: floor(chainage / 1000)';
 COMMENT ON COLUMN tunnel.radiometry.roughness IS 'Oren-Nayar roughness, degrees';
 COMMENT ON COLUMN tunnel.radiometry.dry_mean IS 'Mean corrected intensity of dry lining, dB';
-COMMENT ON COLUMN tunnel.radiometry.dry_sigma IS 'Its standard deviation, dB';
+COMMENT ON COLUMN tunnel.radiometry.dry_sigma IS 'Standard deviation of the dry lining, dB';
 COMMENT ON COLUMN tunnel.radiometry.threshold IS 'Corrected intensity below which lining is wet, dB';
 COMMENT ON COLUMN tunnel.radiometry.sigma_raw IS 'Standard deviation of dry lining before correction, dB';
 COMMENT ON COLUMN tunnel.radiometry.sigma_lambert IS 'The same, incidence by Lambert, dB';
@@ -1189,10 +1189,10 @@ COMMENT ON COLUMN tunnel.region.id IS 'Key';
 COMMENT ON COLUMN tunnel.region.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.region.kind IS 'homogeneous (one material, for the roughness) or dry (for the threshold)';
 COMMENT ON COLUMN tunnel.region.geom IS 'Region in the unrolled plane (chainage, arc), m';
-COMMENT ON COLUMN tunnel.region.drawn_by IS 'Who drew it';
-COMMENT ON COLUMN tunnel.region.drawn_at IS 'When it was drawn';
+COMMENT ON COLUMN tunnel.region.drawn_by IS 'Role that drew it';
+COMMENT ON COLUMN tunnel.region.drawn_at IS 'Time of the drawing';
 COMMENT ON COLUMN tunnel.region.reason IS 'Why; a dry region larger than the tunnel''s limit needs one';
-COMMENT ON COLUMN tunnel.region.pending_approval IS 'Whether it waits for an operator, being larger than the tunnel''s limit: until then it marks nothing';
+COMMENT ON COLUMN tunnel.region.pending_approval IS 'True if it waits for the approval of an operator, being larger than the tunnel''s limit; until then it has no effect';
 COMMENT ON COLUMN tunnel.region.approved_by IS 'Operator who put it in force, where it had to wait';
 COMMENT ON COLUMN tunnel.region.approved_at IS 'When';
 CREATE INDEX region_geom_idx ON tunnel.region USING gist (geom);
@@ -1261,13 +1261,13 @@ COMMENT ON COLUMN tunnel.ring.km IS 'Kilometre: floor(chainage / 1000)';
 COMMENT ON COLUMN tunnel.ring.number IS 'Number of the ring';
 COMMENT ON COLUMN tunnel.ring.chainage_from IS 'Chainage of the joint at its beginning, m';
 COMMENT ON COLUMN tunnel.ring.chainage_to IS 'Chainage of the joint at its end, m';
-COMMENT ON COLUMN tunnel.ring.origin IS 'How the rings were given: length, file, or found';
+COMMENT ON COLUMN tunnel.ring.origin IS 'Source of the rings: length, file, or found';
 COMMENT ON COLUMN tunnel.ring.joint IS 'Joint at its beginning: given, seen, or missing';
 COMMENT ON COLUMN tunnel.ring.seen_share IS 'Share of its circumference that is seen; NULL: not measured';
-COMMENT ON COLUMN tunnel.ring.shape IS 'What was fitted: ellipse, circle, or none';
-COMMENT ON COLUMN tunnel.ring.centre_right IS 'How far its centre lies right of the given axis, m';
+COMMENT ON COLUMN tunnel.ring.shape IS 'Fitted shape: ellipse, circle, or none';
+COMMENT ON COLUMN tunnel.ring.centre_right IS 'Distance of the centre to the right of the given axis, m';
 COMMENT ON COLUMN tunnel.ring.centre_right_se IS 'Standard error, m';
-COMMENT ON COLUMN tunnel.ring.centre_up IS 'How far its centre lies above the given axis, m';
+COMMENT ON COLUMN tunnel.ring.centre_up IS 'Height of the centre above the given axis, m';
 COMMENT ON COLUMN tunnel.ring.centre_up_se IS 'Standard error, m';
 COMMENT ON COLUMN tunnel.ring.radius IS 'Mean radius, m';
 COMMENT ON COLUMN tunnel.ring.radius_se IS 'Standard error, m';
@@ -1280,16 +1280,16 @@ COMMENT ON COLUMN tunnel.ring.largest_clock_se IS 'Standard error, degrees';
 COMMENT ON COLUMN tunnel.ring.ovality IS 'Largest less smallest diameter over the design diameter';
 COMMENT ON COLUMN tunnel.ring.ovality_se IS 'Standard error';
 COMMENT ON COLUMN tunnel.ring.design_diameter IS 'Diameter that ovality is a share of, m';
-COMMENT ON COLUMN tunnel.ring.diameter_from IS 'Where that is from: option, profile, or ring: its own mean';
+COMMENT ON COLUMN tunnel.ring.diameter_from IS 'Source of the design diameter: option, profile, or ring (its own mean)';
 COMMENT ON COLUMN tunnel.ring.harmonic IS 'Amplitudes of the radius by order, from 2, m; NaN untold';
 COMMENT ON COLUMN tunnel.ring.harmonic_se IS 'Their standard errors, m';
 COMMENT ON COLUMN tunnel.ring.harmonic_clock IS 'First clock position where each is outwards most, degrees';
 COMMENT ON COLUMN tunnel.ring.inward IS 'Least departure from the circle of the mean radius, m, negative inside';
 COMMENT ON COLUMN tunnel.ring.inward_se IS 'Standard error, m';
-COMMENT ON COLUMN tunnel.ring.inward_clock IS 'Its clock position, degrees';
+COMMENT ON COLUMN tunnel.ring.inward_clock IS 'Clock position of inward, degrees';
 COMMENT ON COLUMN tunnel.ring.outward IS 'Greatest departure from that circle, m';
 COMMENT ON COLUMN tunnel.ring.outward_se IS 'Standard error, m';
-COMMENT ON COLUMN tunnel.ring.outward_clock IS 'Its clock position, degrees';
+COMMENT ON COLUMN tunnel.ring.outward_clock IS 'Clock position of outward, degrees';
 COMMENT ON COLUMN tunnel.ring.sigma IS 'Scatter of cells about what was fitted, m';
 COMMENT ON COLUMN tunnel.ring.step IS 'Steps from the ring before to this one in cells of arc, m, positive where this one stands in; NaN untold';
 COMMENT ON COLUMN tunnel.ring.step_se IS 'Their standard errors, m';
@@ -1332,11 +1332,11 @@ COMMENT ON COLUMN tunnel.run.km IS 'Kilometre; none for the whole survey';
 COMMENT ON COLUMN tunnel.run.stage IS 'Name of the stage (tunnel.stage), or read, spheres, members, import';
 COMMENT ON COLUMN tunnel.run.parameters IS 'Parameters that it ran with';
 COMMENT ON COLUMN tunnel.run.versions IS 'Versions of the program and of its libraries';
-COMMENT ON COLUMN tunnel.run.counts IS 'What it counted and measured';
+COMMENT ON COLUMN tunnel.run.counts IS 'Counts and measured values';
 COMMENT ON COLUMN tunnel.run.backend_pid IS 'Server process that it ran in';
-COMMENT ON COLUMN tunnel.run.backend_start IS 'When that process began, as in pg_stat_activity; tells a run that was cut off';
-COMMENT ON COLUMN tunnel.run.started_at IS 'When it began';
-COMMENT ON COLUMN tunnel.run.finished_at IS 'When it ended';
+COMMENT ON COLUMN tunnel.run.backend_start IS 'Start time of that process, as in pg_stat_activity; identifies interrupted runs';
+COMMENT ON COLUMN tunnel.run.started_at IS 'Beginning of the run';
+COMMENT ON COLUMN tunnel.run.finished_at IS 'End of the run';
 COMMENT ON COLUMN tunnel.run.outcome IS 'running, done or failed';
 COMMENT ON COLUMN tunnel.run.message IS 'Why it failed';
 COMMENT ON COLUMN tunnel.run.worker IS 'Machine and process that it ran on';
@@ -1377,7 +1377,7 @@ COMMENT ON TABLE tunnel.scan_file IS 'Scan files that were loaded, with what was
 COMMENT ON COLUMN tunnel.scan_file.id IS 'Key';
 COMMENT ON COLUMN tunnel.scan_file.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.scan_file.name IS 'File name without its folder';
-COMMENT ON COLUMN tunnel.scan_file.path IS 'Where the file lay when it was loaded; read again at full density';
+COMMENT ON COLUMN tunnel.scan_file.path IS 'Path of the file';
 COMMENT ON COLUMN tunnel.scan_file.checksum IS 'SHA-256 of the file, hexadecimal';
 COMMENT ON COLUMN tunnel.scan_file.bytes IS 'Size of the file, bytes';
 COMMENT ON COLUMN tunnel.scan_file.points IS 'Points in the file';
@@ -1390,13 +1390,13 @@ COMMENT ON COLUMN tunnel.scan_file.kept IS 'Points kept, the rows in point';
 COMMENT ON COLUMN tunnel.scan_file.chainage_from IS 'Least chainage of the kept points, m';
 COMMENT ON COLUMN tunnel.scan_file.chainage_to IS 'Greatest chainage of the kept points, m';
 COMMENT ON COLUMN tunnel.scan_file.extent IS 'Box of the kept points: xmin, ymin, zmin, xmax, ymax, zmax, tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel.scan_file.beyond_before IS 'Of the points outside, those before the beginning of the given axis, drawn on';
-COMMENT ON COLUMN tunnel.scan_file.beyond_after IS 'Of the points outside, those after the end of the given axis, drawn on';
-COMMENT ON COLUMN tunnel.scan_file.reach_before IS 'How far before the beginning of the given axis nearly all of these lie, m';
-COMMENT ON COLUMN tunnel.scan_file.reach_after IS 'How far after the end of the given axis nearly all of these lie, m';
-COMMENT ON COLUMN tunnel.scan_file.intensity_note IS 'What its intensity gives to doubt: saturated, another kind by its values';
+COMMENT ON COLUMN tunnel.scan_file.beyond_before IS 'Number of points outside that lie before the beginning of the extended given axis';
+COMMENT ON COLUMN tunnel.scan_file.beyond_after IS 'Number of points outside that lie after the end of the extended given axis';
+COMMENT ON COLUMN tunnel.scan_file.reach_before IS 'Distance before the beginning of the given axis within which nearly all of these lie, m';
+COMMENT ON COLUMN tunnel.scan_file.reach_after IS 'Distance after the end of the given axis within which nearly all of these lie, m';
+COMMENT ON COLUMN tunnel.scan_file.intensity_note IS 'Doubts about its intensity: saturated, or another kind by its values';
 COMMENT ON COLUMN tunnel.scan_file.srid IS 'Spatial reference that the file states, if it states one';
-COMMENT ON COLUMN tunnel.scan_file.loaded_at IS 'When it was loaded';
+COMMENT ON COLUMN tunnel.scan_file.loaded_at IS 'Time of loading';
 
 CREATE TABLE tunnel.section (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
@@ -1422,7 +1422,7 @@ COMMENT ON COLUMN tunnel.section.id IS 'Key';
 COMMENT ON COLUMN tunnel.section.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.section.km IS 'Kilometre: floor(chainage / 1000)';
 COMMENT ON COLUMN tunnel.section.segment IS 'Number of its segment (segment.n)';
-COMMENT ON COLUMN tunnel.section.half IS 'Where in the segment: 25 or 75 %';
+COMMENT ON COLUMN tunnel.section.half IS 'Position in the segment: 25 or 75 %';
 COMMENT ON COLUMN tunnel.section.chainage IS 'Chainage of its plane, m';
 COMMENT ON COLUMN tunnel.section.half_width IS 'Half the thickness of the slab that its points are from, m';
 COMMENT ON COLUMN tunnel.section.angle_step IS 'Width of an angular class, degrees';
@@ -1496,10 +1496,10 @@ COMMENT ON TABLE tunnel.sonar_scan IS 'Sonar scans below the water, with their p
 COMMENT ON COLUMN tunnel.sonar_scan.id IS 'Key';
 COMMENT ON COLUMN tunnel.sonar_scan.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.sonar_scan.name IS 'Name of the file';
-COMMENT ON COLUMN tunnel.sonar_scan.path IS 'Where the file lay when it was registered';
+COMMENT ON COLUMN tunnel.sonar_scan.path IS 'Path of the file at registration';
 COMMENT ON COLUMN tunnel.sonar_scan.checksum IS 'SHA-256 of the file, hexadecimal';
 COMMENT ON COLUMN tunnel.sonar_scan.bytes IS 'Size of the file';
-COMMENT ON COLUMN tunnel.sonar_scan.up IS 'Whether the file''s z axis points up (1) or down (-1), as was said';
+COMMENT ON COLUMN tunnel.sonar_scan.up IS '1 if the file''s z axis points up, -1 if down, as given';
 COMMENT ON COLUMN tunnel.sonar_scan.water_level IS 'Height of the water, as was said, m';
 COMMENT ON COLUMN tunnel.sonar_scan.state IS 'determined, weak (known worse than it should be), undetermined, or given (the file is in the tunnel''s system)';
 COMMENT ON COLUMN tunnel.sonar_scan.undetermined IS 'Directions that are known badly or not at all';
@@ -1507,12 +1507,12 @@ COMMENT ON COLUMN tunnel.sonar_scan.rotation IS '3 × 3, row by row; NULL where 
 COMMENT ON COLUMN tunnel.sonar_scan.translation IS 'Place of the sonar in the tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel.sonar_scan.scale IS 'Factor of its coordinates: speed of sound over that assumed';
 COMMENT ON COLUMN tunnel.sonar_scan.covariance IS '7 × 7, row by row: turns about x, y, z through the sonar, rad, shifts along them, m, and scale';
-COMMENT ON COLUMN tunnel.sonar_scan.registered_at IS 'When it was registered';
+COMMENT ON COLUMN tunnel.sonar_scan.registered_at IS 'Time of the registration';
 COMMENT ON COLUMN tunnel.sonar_scan.points IS 'Points of the file; NULL before it is loaded';
-COMMENT ON COLUMN tunnel.sonar_scan.false_echoes IS 'Of these, false echoes, which are left out';
-COMMENT ON COLUMN tunnel.sonar_scan.outside IS 'Of these, beyond the axis or too far from the sonar';
+COMMENT ON COLUMN tunnel.sonar_scan.false_echoes IS 'Number of false echoes, which are left out';
+COMMENT ON COLUMN tunnel.sonar_scan.outside IS 'Number of points beyond the axis or too far from the sonar';
 COMMENT ON COLUMN tunnel.sonar_scan.kept IS 'Rows of it in tunnel.sonar_point';
-COMMENT ON COLUMN tunnel.sonar_scan.loaded_at IS 'When its points were loaded with this pose';
+COMMENT ON COLUMN tunnel.sonar_scan.loaded_at IS 'Time when its points were loaded with this pose';
 
 CREATE TABLE tunnel.station (
     survey_id INTEGER NOT NULL,
@@ -1559,7 +1559,7 @@ COMMENT ON COLUMN tunnel.target_sphere.rms IS 'Root mean square of its points'' 
 COMMENT ON COLUMN tunnel.target_sphere.sigma IS 'Standard deviation of the centre, from the fit, m';
 COMMENT ON COLUMN tunnel.target_sphere.coverage IS 'Share of the sphere''s surface that is seen, 0 to 1';
 COMMENT ON COLUMN tunnel.target_sphere.points IS 'Points that it was fitted to';
-COMMENT ON COLUMN tunnel.target_sphere.found_at IS 'When it was found';
+COMMENT ON COLUMN tunnel.target_sphere.found_at IS 'Time when it was found';
 CREATE INDEX target_sphere_geom_idx ON tunnel.target_sphere USING gist (geom);
 
 CREATE TABLE tunnel.thickness_section (
@@ -1595,14 +1595,14 @@ COMMENT ON COLUMN tunnel.thickness_section.layer IS 'Layer whose profiles both w
 COMMENT ON COLUMN tunnel.thickness_section.chainage_from IS 'Chainage of its beginning, m';
 COMMENT ON COLUMN tunnel.thickness_section.chainage_to IS 'Chainage of its end, m';
 COMMENT ON COLUMN tunnel.thickness_section.design_length IS 'Length of the profile in its middle, m';
-COMMENT ON COLUMN tunnel.thickness_section.compared_length IS 'What of that both surveys saw, m';
+COMMENT ON COLUMN tunnel.thickness_section.compared_length IS 'Length that both surveys inspected, m';
 COMMENT ON COLUMN tunnel.thickness_section.area IS 'Area between the two surfaces, of what both saw, m²';
 COMMENT ON COLUMN tunnel.thickness_section.noise_area IS 'Standard deviation of the area by the scatter of pixels, m²';
 COMMENT ON COLUMN tunnel.thickness_section.by_right IS 'By how much the area grows when the later survey moves to the right, m²/m';
 COMMENT ON COLUMN tunnel.thickness_section.by_up IS 'By how much the area grows when the later survey moves up, m²/m';
 COMMENT ON COLUMN tunnel.thickness_section.thickness_mean IS 'Mean of the cells that both saw, m; NULL without any';
 COMMENT ON COLUMN tunnel.thickness_section.thickness_least IS 'Least of a cell, m';
-COMMENT ON COLUMN tunnel.thickness_section.least_at IS 'How far along the profile that is, m';
+COMMENT ON COLUMN tunnel.thickness_section.least_at IS 'Distance of that cell along the profile, m';
 COMMENT ON COLUMN tunnel.thickness_section.thickness IS 'In cells of equal length along the profile, from its beginning, m; NaN where either saw nothing';
 CREATE INDEX thickness_section_before_id_idx ON tunnel.thickness_section (before_id);
 CREATE INDEX thickness_section_survey_id_thickness_least_idx ON tunnel.thickness_section (survey_id, thickness_least);
@@ -1621,8 +1621,8 @@ COMMENT ON TABLE tunnel.water_level IS 'The water in kilometres into which sonar
 COMMENT ON COLUMN tunnel.water_level.id IS 'Key';
 COMMENT ON COLUMN tunnel.water_level.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.water_level.km IS 'Kilometre: floor(chainage / 1000)';
-COMMENT ON COLUMN tunnel.water_level.height IS 'Of the water, m; NULL where sonar scans were loaded and none is left';
-COMMENT ON COLUMN tunnel.water_level.changed_at IS 'When points of sonar scans were last loaded into the kilometre, or taken out of it';
+COMMENT ON COLUMN tunnel.water_level.height IS 'Height of the water surface, m; NULL if sonar scans were loaded and none is left';
+COMMENT ON COLUMN tunnel.water_level.changed_at IS 'Time when sonar points were last loaded into the kilometre, or removed from it';
 
 CREATE TABLE tunnel.waterproof (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
@@ -1649,18 +1649,18 @@ COMMENT ON TABLE tunnel.waterproof IS 'Statistics of waterproofing of kilometres
 COMMENT ON COLUMN tunnel.waterproof.id IS 'Key';
 COMMENT ON COLUMN tunnel.waterproof.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.waterproof.km IS 'Kilometre: floor(chainage / 1000)';
-COMMENT ON COLUMN tunnel.waterproof.chainage_from IS 'Where its stretch begins, m; NULL in a row that notes a change';
-COMMENT ON COLUMN tunnel.waterproof.chainage_to IS 'Where it ends, m';
+COMMENT ON COLUMN tunnel.waterproof.chainage_from IS 'Beginning of the stretch, m; NULL in a row that marks a change';
+COMMENT ON COLUMN tunnel.waterproof.chainage_to IS 'End of the stretch, m';
 COMMENT ON COLUMN tunnel.waterproof.lining_area IS 'Lining, seen or not, m²';
 COMMENT ON COLUMN tunnel.waterproof.seen_share IS 'Share of it that was seen';
 COMMENT ON COLUMN tunnel.waterproof.wet_area IS 'Area of the leaks within the kilometre, m²';
 COMMENT ON COLUMN tunnel.waterproof.wet_ratio IS 'wet_area, of the lining seen';
 COMMENT ON COLUMN tunnel.waterproof.patches IS 'Leaks in the kilometre or over its ends';
 COMMENT ON COLUMN tunnel.waterproof.largest_area IS 'Area of the largest of them, whole, m²';
-COMMENT ON COLUMN tunnel.waterproof.largest_leak IS 'Its id';
+COMMENT ON COLUMN tunnel.waterproof.largest_leak IS 'Id of the largest leak';
 COMMENT ON COLUMN tunnel.waterproof.window_patches IS 'Most leaks in any 100 m² of lining';
-COMMENT ON COLUMN tunnel.waterproof.window_from IS 'Where those 100 m² begin, m';
-COMMENT ON COLUMN tunnel.waterproof.window_to IS 'Where they end, m';
+COMMENT ON COLUMN tunnel.waterproof.window_from IS 'Chainage at which those 100 m² begin, m';
+COMMENT ON COLUMN tunnel.waterproof.window_to IS 'Chainage at which those 100 m² end, m';
 COMMENT ON COLUMN tunnel.waterproof.window_wet_area IS 'Greatest wet area in any 100 m² of lining, m²';
 COMMENT ON COLUMN tunnel.waterproof.class IS 'Best class of waterproofing that the lining seen keeps';
 CREATE INDEX waterproof_survey_id_km_idx ON tunnel.waterproof (survey_id, km);
@@ -1699,23 +1699,23 @@ COMMENT ON TABLE tunnel.face IS 'Faces of members: planes and cylinders grown in
 COMMENT ON COLUMN tunnel.face.id IS 'Key';
 COMMENT ON COLUMN tunnel.face.survey_id IS 'Survey that the row belongs to';
 COMMENT ON COLUMN tunnel.face.member_id IS 'Member that it belongs to';
-COMMENT ON COLUMN tunnel.face.number IS 'Its number in the survey, from 1; dimension face of files written';
+COMMENT ON COLUMN tunnel.face.number IS 'Number in the survey, from 1; dimension face in written files';
 COMMENT ON COLUMN tunnel.face.side IS 'Side of its member, from 1: faces of one plane or pipe are of one side';
 COMMENT ON COLUMN tunnel.face.kind IS 'flat (a plane) or pipe (a part of a cylinder)';
-COMMENT ON COLUMN tunnel.face.origin IS 'Where its unrolled coordinates are (0, 0) or on its axis: x, y, z, m';
+COMMENT ON COLUMN tunnel.face.origin IS 'Origin of its unrolled coordinates, on the axis of a pipe: x, y, z, m';
 COMMENT ON COLUMN tunnel.face.axis IS 'Axis of a pipe; of a plane its normal, towards the scanners';
 COMMENT ON COLUMN tunnel.face.across IS 'Direction at right angles to it from which unrolled coordinates count: u of a plane, v = 0 of a pipe';
 COMMENT ON COLUMN tunnel.face.radius IS 'Radius of a pipe, m; NULL of a plane';
-COMMENT ON COLUMN tunnel.face.inside IS 'Whether a pipe is seen from inside';
+COMMENT ON COLUMN tunnel.face.inside IS 'True if a pipe was scanned from inside';
 COMMENT ON COLUMN tunnel.face.rms IS 'Root mean square of its points'' distances from it, m';
 COMMENT ON COLUMN tunnel.face.points IS 'Points of the scans on it';
 COMMENT ON COLUMN tunnel.face.area IS 'Area within its outline, m²';
 COMMENT ON COLUMN tunnel.face.seen_share IS 'Share of it that could be judged, 0 to 1';
 COMMENT ON COLUMN tunnel.face.incidence_from IS 'Least angle of incidence at which it was judged, degrees';
 COMMENT ON COLUMN tunnel.face.incidence_to IS 'Greatest angle of incidence at which it was judged, degrees';
-COMMENT ON COLUMN tunnel.face.level IS 'Its own level of intensity, dB; NULL where none could be found';
+COMMENT ON COLUMN tunnel.face.level IS 'Intensity of its own surface, dB; NULL if it could not be determined';
 COMMENT ON COLUMN tunnel.face.sigma IS 'Standard deviation about it, dB';
-COMMENT ON COLUMN tunnel.face.bimodal IS 'Whether more than half of what was judged differs, so that nobody knows which half is its own';
+COMMENT ON COLUMN tunnel.face.bimodal IS 'True if more than half of the inspected part differs, so that the reference surface is unknown';
 COMMENT ON COLUMN tunnel.face.chainage IS 'Chainage of its middle, m; NULL of a site or beyond the sections';
 COMMENT ON COLUMN tunnel.face.outline IS 'In its own plane, of a cylinder unrolled, m';
 COMMENT ON COLUMN tunnel.face.surface IS 'In space, tunnel''s SRID, m';
@@ -1737,10 +1737,10 @@ COMMENT ON TABLE tunnel.file_km IS 'Which kilometres a file touches. Points read
 COMMENT ON COLUMN tunnel.file_km.file_id IS 'File (scan_file.id)';
 COMMENT ON COLUMN tunnel.file_km.km IS 'Kilometre: floor(chainage / 1000)';
 COMMENT ON COLUMN tunnel.file_km.rows IS 'Points of the file that wait or waited to be loaded there';
-COMMENT ON COLUMN tunnel.file_km.points IS 'Where in the file the points of the kilometre and 10 m to both sides are: ranges of point numbers from 0';
-COMMENT ON COLUMN tunnel.file_km.seconds IS 'When these were measured: whole seconds between which their gps_time lies; NULL where not known';
-COMMENT ON COLUMN tunnel.file_km.read_at IS 'When the file was read';
-COMMENT ON COLUMN tunnel.file_km.loaded_at IS 'When they were loaded into the kilometre; none while they wait';
+COMMENT ON COLUMN tunnel.file_km.points IS 'Ranges of point numbers, from 0, of the kilometre and 10 m on both sides';
+COMMENT ON COLUMN tunnel.file_km.seconds IS 'Time range of these points: whole seconds around their gps_time; NULL if unknown';
+COMMENT ON COLUMN tunnel.file_km.read_at IS 'Time of reading';
+COMMENT ON COLUMN tunnel.file_km.loaded_at IS 'Time of loading';
 
 CREATE TABLE tunnel.finding (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
@@ -1827,10 +1827,10 @@ COMMENT ON COLUMN tunnel.finding.unrolled IS 'In the unrolled plane (chainage, a
 COMMENT ON COLUMN tunnel.finding.map IS 'On the map strip beside the axis, tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel.finding.surface IS 'On the lining in space, tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel.finding.feature_list_id IS 'Order of its features; none from before they were stored';
-COMMENT ON COLUMN tunnel.finding.features IS 'What was measured of it; NaN what could not be';
+COMMENT ON COLUMN tunnel.finding.features IS 'Measured properties; NaN if one could not be measured';
 COMMENT ON COLUMN tunnel.finding.evidence IS 'Contribution of each reason to the logarithm of the odds of a leak';
 COMMENT ON COLUMN tunnel.finding.model IS 'Version of the model of evidence that classified it';
-COMMENT ON COLUMN tunnel.finding.origin IS 'How its outline came about: detected, drawn, redrawn, split or merged; detection changes the first alone';
+COMMENT ON COLUMN tunnel.finding.origin IS 'Origin of its outline: detected, drawn, redrawn, split or merged; detection changes detected outlines only';
 COMMENT ON COLUMN tunnel.finding.manual IS 'True if it was drawn, or split off from what was drawn: never detected';
 COMMENT ON COLUMN tunnel.finding.severity IS 'Severity, 1 to 4';
 COMMENT ON COLUMN tunnel.finding.width IS 'Width of a line, such as a crack, m';
@@ -1838,8 +1838,8 @@ COMMENT ON COLUMN tunnel.finding.length IS 'Length of a line on the surface, m';
 COMMENT ON COLUMN tunnel.finding.shape IS 'The line or point that it is, if it is no polygon, in the unrolled plane, m';
 COMMENT ON COLUMN tunnel.finding.shape_map IS 'The same on the map strip, tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel.finding.shape_surface IS 'The same in space, tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel.finding.drawn_by IS 'Who drew its outline last; none of what was detected';
-COMMENT ON COLUMN tunnel.finding.drawn_at IS 'When its outline was drawn last';
+COMMENT ON COLUMN tunnel.finding.drawn_by IS 'Role that drew its outline last; NULL if it was detected only';
+COMMENT ON COLUMN tunnel.finding.drawn_at IS 'Time of the last drawing of its outline';
 COMMENT ON COLUMN tunnel.finding.parent_id IS 'Finding that it was split off';
 COMMENT ON COLUMN tunnel.finding.merged_into IS 'Finding that it is merged into: that one counts';
 COMMENT ON COLUMN tunnel.finding.same_as IS 'Finding that is the same: that one counts';
@@ -1847,12 +1847,12 @@ COMMENT ON COLUMN tunnel.finding.dry_region_id IS 'Dry region that it lies in: i
 COMMENT ON COLUMN tunnel.finding.wet IS 'True if its kind counts as wet: kept by the database, from finding_kind';
 COMMENT ON COLUMN tunnel.finding.superseded IS 'True if another finding or a dry region takes its place';
 COMMENT ON COLUMN tunnel.finding.review IS 'open, confirmed or rejected, by an inspector';
-COMMENT ON COLUMN tunnel.finding.reviewed_by IS 'Who reviewed it';
-COMMENT ON COLUMN tunnel.finding.reviewed_at IS 'When it was reviewed';
+COMMENT ON COLUMN tunnel.finding.reviewed_by IS 'Role that reviewed it';
+COMMENT ON COLUMN tunnel.finding.reviewed_at IS 'Time of the last review';
 COMMENT ON COLUMN tunnel.finding.remark IS 'Inspector''s remark';
-COMMENT ON COLUMN tunnel.finding.detected IS 'Whether the last detection found it again';
-COMMENT ON COLUMN tunnel.finding.created_at IS 'When it was first found';
-COMMENT ON COLUMN tunnel.finding.detected_at IS 'When it was last found';
+COMMENT ON COLUMN tunnel.finding.detected IS 'True if the last detection found it again';
+COMMENT ON COLUMN tunnel.finding.created_at IS 'Time when it was first found';
+COMMENT ON COLUMN tunnel.finding.detected_at IS 'Time when it was last found';
 CREATE INDEX finding_dry_region_id_idx ON tunnel.finding (dry_region_id);
 CREATE INDEX finding_feature_list_id_idx ON tunnel.finding (feature_list_id);
 CREATE INDEX finding_gone_idx ON tunnel.finding (survey_id) WHERE NOT detected;
@@ -1893,7 +1893,7 @@ COMMENT ON COLUMN tunnel.registration_residual.kind IS 'wall, ladder, waterline 
 COMMENT ON COLUMN tunnel.registration_residual.name IS 'Side of the wall, name of the ladder or of the other scan''s file';
 COMMENT ON COLUMN tunnel.registration_residual.count IS 'Patches or points that were compared';
 COMMENT ON COLUMN tunnel.registration_residual.median IS 'Median of the absolute distances, m';
-COMMENT ON COLUMN tunnel.registration_residual.p95 IS 'Of which 95 % are no more, m';
+COMMENT ON COLUMN tunnel.registration_residual.p95 IS '95th percentile of the residuals, m';
 CREATE INDEX registration_residual_scan_id_idx ON tunnel.registration_residual (scan_id);
 
 CREATE TABLE tunnel.ring_chord (
@@ -1931,7 +1931,7 @@ CREATE TABLE tunnel.section_class (
 COMMENT ON TABLE tunnel.section_class IS 'Angular classes of a section, with two-sigma rejection (Gonçalves et al. 2012)';
 COMMENT ON COLUMN tunnel.section_class.section_id IS 'Section that it belongs to';
 COMMENT ON COLUMN tunnel.section_class.class IS 'Number of the class, from the lowest angle';
-COMMENT ON COLUMN tunnel.section_class.angle IS 'Its angle from the crown, degrees, positive right';
+COMMENT ON COLUMN tunnel.section_class.angle IS 'Angle from the crown, degrees, positive right';
 COMMENT ON COLUMN tunnel.section_class.radius IS 'Distance of the surface from the axis at the angle, m';
 COMMENT ON COLUMN tunnel.section_class.slope IS 'Inclination of the line through its points: outwards per metre to the right; none if empty';
 COMMENT ON COLUMN tunnel.section_class.sigma IS 'Standard deviation of its points from the line, m; none if empty';
@@ -1986,8 +1986,8 @@ COMMENT ON COLUMN tunnel.boundary_region.survey_id IS 'Survey that the row belon
 COMMENT ON COLUMN tunnel.boundary_region.km IS 'Kilometre: floor(chainage / 1000)';
 COMMENT ON COLUMN tunnel.boundary_region.pixel IS 'Edge of a pixel, m';
 COMMENT ON COLUMN tunnel.boundary_region.box IS 'First column (chainage / pixel), first row (arc / pixel), columns and rows of the mask';
-COMMENT ON COLUMN tunnel.boundary_region.mask IS 'Its dark pixels, a bit each, row by row from the lowest arc';
-COMMENT ON COLUMN tunnel.boundary_region.filled IS 'Its pixels that hold measured data';
+COMMENT ON COLUMN tunnel.boundary_region.mask IS 'Dark pixels, one bit each, row by row from the smallest arc';
+COMMENT ON COLUMN tunnel.boundary_region.filled IS 'Number of pixels with measured data';
 COMMENT ON COLUMN tunnel.boundary_region.darkening_sum IS 'Sum over them of the darkening, dB';
 COMMENT ON COLUMN tunnel.boundary_region.darkening_max IS 'Greatest darkening, dB';
 COMMENT ON COLUMN tunnel.boundary_region.properties IS 'Sums over its pixels: RegionProperties of tunneldb/anomalies/regions.py';
@@ -2010,9 +2010,9 @@ COMMENT ON TABLE tunnel.photo IS 'Photos of findings, by path or URL';
 COMMENT ON COLUMN tunnel.photo.id IS 'Key';
 COMMENT ON COLUMN tunnel.photo.finding_id IS 'Finding that it shows';
 COMMENT ON COLUMN tunnel.photo.path IS 'Path or URL';
-COMMENT ON COLUMN tunnel.photo.caption IS 'What it shows';
-COMMENT ON COLUMN tunnel.photo.added_by IS 'Who added it';
-COMMENT ON COLUMN tunnel.photo.added_at IS 'When it was added';
+COMMENT ON COLUMN tunnel.photo.caption IS 'Caption';
+COMMENT ON COLUMN tunnel.photo.added_by IS 'Role that added it';
+COMMENT ON COLUMN tunnel.photo.added_at IS 'Time when it was added';
 CREATE INDEX photo_finding_id_idx ON tunnel.photo (finding_id);
 
 CREATE TABLE tunnel.spot (
@@ -2049,7 +2049,7 @@ CREATE TABLE tunnel.spot (
 COMMENT ON TABLE tunnel.spot IS 'Spots that are darker or brighter than their own surface, in three geometries';
 COMMENT ON COLUMN tunnel.spot.id IS 'Key';
 COMMENT ON COLUMN tunnel.spot.survey_id IS 'Survey that the row belongs to';
-COMMENT ON COLUMN tunnel.spot.number IS 'Its number in the tunnel or site: the same in the next survey';
+COMMENT ON COLUMN tunnel.spot.number IS 'Number in the tunnel or site, the same in the next survey';
 COMMENT ON COLUMN tunnel.spot.face_id IS 'Face that it is on; NULL where the last run found it no more';
 COMMENT ON COLUMN tunnel.spot.kind IS 'dark or bright, against its own surface';
 COMMENT ON COLUMN tunnel.spot.reasons IS 'Evidence for and against it';
@@ -2065,12 +2065,12 @@ COMMENT ON COLUMN tunnel.spot.outline IS 'In its face''s own plane, m';
 COMMENT ON COLUMN tunnel.spot.map IS 'On the map, m; what stands upright is 2 cm wide';
 COMMENT ON COLUMN tunnel.spot.surface IS 'In space, tunnel''s SRID, m';
 COMMENT ON COLUMN tunnel.spot.review IS 'open, confirmed or rejected, by an inspector';
-COMMENT ON COLUMN tunnel.spot.reviewed_by IS 'Who reviewed it';
-COMMENT ON COLUMN tunnel.spot.reviewed_at IS 'When it was reviewed';
+COMMENT ON COLUMN tunnel.spot.reviewed_by IS 'Role that reviewed it';
+COMMENT ON COLUMN tunnel.spot.reviewed_at IS 'Time of the last review';
 COMMENT ON COLUMN tunnel.spot.remark IS 'Inspector''s remark';
-COMMENT ON COLUMN tunnel.spot.detected IS 'Whether the last detection found it again';
-COMMENT ON COLUMN tunnel.spot.created_at IS 'When it was first found';
-COMMENT ON COLUMN tunnel.spot.detected_at IS 'When it was last found';
+COMMENT ON COLUMN tunnel.spot.detected IS 'True if the last detection found it again';
+COMMENT ON COLUMN tunnel.spot.created_at IS 'Time when it was first found';
+COMMENT ON COLUMN tunnel.spot.detected_at IS 'Time when it was last found';
 CREATE INDEX spot_face_id_idx ON tunnel.spot (face_id);
 CREATE INDEX spot_map_idx ON tunnel.spot USING gist (map);
 CREATE INDEX spot_survey_id_number_idx ON tunnel.spot (survey_id, number);

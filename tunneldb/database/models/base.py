@@ -68,9 +68,9 @@ class Review:
     """Review of a finding by an inspector, and whether the last detection found it; a mixin of tables of findings."""
 
     review: Mapped[str] = mapped_column(server_default=text("'open'"), comment="open, confirmed or rejected, by an inspector")
-    reviewed_by: Mapped[str | None] = mapped_column(comment="Who reviewed it")
-    reviewed_at: Mapped[dt.datetime | None] = mapped_column(comment="When it was reviewed")
+    reviewed_by: Mapped[str | None] = mapped_column(comment="Role that reviewed it")
+    reviewed_at: Mapped[dt.datetime | None] = mapped_column(comment="Time of the last review")
     remark: Mapped[str | None] = mapped_column(comment="Inspector's remark")
-    detected: Mapped[bool] = mapped_column(server_default=text("true"), comment="Whether the last detection found it again")
-    created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was first found")
-    detected_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was last found")
+    detected: Mapped[bool] = mapped_column(server_default=text("true"), comment="True if the last detection found it again")
+    created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="Time when it was first found")
+    detected_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="Time when it was last found")

@@ -41,9 +41,9 @@ class Tunnel(Base):
         comment="Axis as given, in growing chainage, in the tunnel's SRID; NULL of a site",
     )
     design: Mapped[str | None] = mapped_column(
-        comment="What the given axis was read from or found in: file and alignment, file and layer, or scan; NULL of a table"
+        comment="Source of the given axis: file and alignment, file and layer, or scan; NULL for a table"
     )
-    created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was added")
+    created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="Time when it was added")
 
 
 class AlignmentElement(Base):
@@ -62,9 +62,9 @@ class AlignmentElement(Base):
     n: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment="Number along the alignment, from 1")
     kind: Mapped[str] = mapped_column(comment="line, arc, clothoid (horizontal); grade, parabola, circle (vertical)")
     chainage: Mapped[float] = mapped_column(comment="Chainage of its beginning, m")
-    length: Mapped[float] = mapped_column(comment="Its length in plan, m")
-    x: Mapped[float | None] = mapped_column(comment="Where a horizontal one begins, tunnel's SRID, m")
-    y: Mapped[float | None] = mapped_column(comment="Where a horizontal one begins, tunnel's SRID, m")
+    length: Mapped[float] = mapped_column(comment="Length in plan, m")
+    x: Mapped[float | None] = mapped_column(comment="Easting of the beginning of a horizontal element, tunnel's SRID, m")
+    y: Mapped[float | None] = mapped_column(comment="Northing of the beginning of a horizontal element, tunnel's SRID, m")
     bearing: Mapped[float | None] = mapped_column(
         comment="Direction in which a horizontal one begins, radians from the x axis towards y"
     )
@@ -126,7 +126,7 @@ class Survey(Base):
         server_default=text("'none'"),
         comment="Range curve: none, measured on a target (rows in reference) or auto, from the lining of each kilometre",
     )
-    created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was added")
+    created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="Time when it was added")
     positions_note: Mapped[str | None] = mapped_column(comment="Notes on its scanner positions: poses left out, gaps")
     longest_interval: Mapped[float | None] = mapped_column(
         comment="Longest interval of its trajectory that is interpolated over, s; NULL without a trajectory"
@@ -135,7 +135,7 @@ class Survey(Base):
         comment="Longer intervals of its trajectory: times from and to, one after the other, s; NULL without a trajectory"
     )
     settings_at: Mapped[dt.datetime | None] = mapped_column(
-        comment="When scanner positions, reference or intensity were last set to others"
+        comment="Time of the last change of scanner positions, reference or intensity"
     )
 
 

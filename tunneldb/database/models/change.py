@@ -46,17 +46,17 @@ class ChangeSection(Base):
         comment="Shift at right angles to the axis, m",
     )
     shift_right: Mapped[float | None] = mapped_column(comment="Shift of the whole to the right, m; NULL: not determined")
-    shift_right_se: Mapped[float | None] = mapped_column(comment="Its standard error, m")
+    shift_right_se: Mapped[float | None] = mapped_column(comment="Standard error of shift_right, m")
     shift_up: Mapped[float | None] = mapped_column(comment="Shift up, m; NULL: not determined")
-    shift_up_se: Mapped[float | None] = mapped_column(comment="Its standard error, m")
+    shift_up_se: Mapped[float | None] = mapped_column(comment="Standard error of shift_up, m")
     shift_along: Mapped[float | None] = mapped_column(comment="Shift up-chainage, m; NULL: not determined")
-    shift_along_se: Mapped[float | None] = mapped_column(comment="Its standard error, m")
+    shift_along_se: Mapped[float | None] = mapped_column(comment="Standard error of shift_along, m")
     roll: Mapped[float | None] = mapped_column(comment="Turn about the axis, rad; NULL: not determined")
-    roll_se: Mapped[float | None] = mapped_column(comment="Its standard error, rad")
+    roll_se: Mapped[float | None] = mapped_column(comment="Standard error of roll, rad")
     yaw: Mapped[float | None] = mapped_column(comment="Turn about the upward direction, rad; NULL: not determined")
-    yaw_se: Mapped[float | None] = mapped_column(comment="Its standard error, rad")
+    yaw_se: Mapped[float | None] = mapped_column(comment="Standard error of yaw, rad")
     pitch: Mapped[float | None] = mapped_column(comment="Turn about the direction to the right, rad; NULL: not determined")
-    pitch_se: Mapped[float | None] = mapped_column(comment="Its standard error, rad")
+    pitch_se: Mapped[float | None] = mapped_column(comment="Standard error of pitch, rad")
     change_rms: Mapped[float | None] = mapped_column(
         comment="Root mean square of what remains beyond noise, m; NULL where nothing was compared"
     )
@@ -150,16 +150,16 @@ class LeakChange(Base):
     old_kinds: Mapped[list[str]] = mapped_column(comment="Their kinds")
     new_kinds: Mapped[list[str]] = mapped_column(comment="Their kinds")
     area_old: Mapped[float] = mapped_column(comment="Wet area in the older survey, m²")
-    area_old_se: Mapped[float] = mapped_column(comment="Its standard error by resolution and threshold, m²")
+    area_old_se: Mapped[float] = mapped_column(comment="Standard error of area_old from resolution and threshold, m²")
     area_new: Mapped[float] = mapped_column(comment="Wet area in the newer survey, m²")
-    area_new_se: Mapped[float] = mapped_column(comment="Its standard error by resolution and threshold, m²")
+    area_new_se: Mapped[float] = mapped_column(comment="Standard error of area_new from resolution and threshold, m²")
     seen_old: Mapped[float] = mapped_column(comment="Share of the place that the older survey saw, 0 to 1")
     seen_new: Mapped[float] = mapped_column(comment="Share of the place that the newer survey saw, 0 to 1")
     chainage_from: Mapped[float] = mapped_column(comment="Least chainage, of the older survey, m")
     chainage_to: Mapped[float] = mapped_column(comment="Greatest chainage, m")
     clock: Mapped[float] = mapped_column(comment="Clock position of its largest part, hours")
     unrolled: Mapped[WKBElement] = mapped_column(
-        geometry("MULTIPOLYGON"), comment="What is wet in either, in the unrolled plane of the older survey, m"
+        geometry("MULTIPOLYGON"), comment="Wet area in either survey, in the unrolled plane of the older survey, m"
     )
     map: Mapped[WKBElement] = mapped_column(
         geometry("MULTIPOLYGON"), comment="On the map strip beside the axis, tunnel's SRID, m"

@@ -19,13 +19,14 @@ class Gauge(Base):
 
     id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
     tunnel_id: Mapped[int] = mapped_column(parent("tunnel"), comment=TUNNEL)
-    name: Mapped[str] = mapped_column(comment="Its name")
+    name: Mapped[str] = mapped_column(comment="Name")
     outline: Mapped[Floats] = mapped_column(
-        comment="Of each vertex: right of the track's middle, above its running surface, m, and bulge of what leads to the next"
+        comment="Vertices: to the right of the track's centre, above its running surface, m, and bulge of the edge to"
+        " the next vertex"
     )
     source: Mapped[str] = mapped_column(comment="File that it was read from")
     checksum: Mapped[str] = mapped_column(comment="MD5 of the outline")
-    added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When it was added")
+    added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time when it was added")
 
 
 class ClearanceSection(Base):
@@ -47,20 +48,20 @@ class ClearanceSection(Base):
     chainage_to: Mapped[float] = mapped_column(comment="Chainage of its end, m")
     track_right: Mapped[float] = mapped_column(comment="Middle of the track right of the given axis, m")
     track_up: Mapped[float] = mapped_column(comment="Plane of the running surface there above the given axis, m")
-    cant: Mapped[float] = mapped_column(comment="How much higher the left rail lies, m")
-    curvature: Mapped[float] = mapped_column(comment="Of the track in plan, positive to the right, 1/m")
+    cant: Mapped[float] = mapped_column(comment="Height of the left rail above the right rail, m")
+    curvature: Mapped[float] = mapped_column(comment="Curvature of the track in plan, positive to the right, 1/m")
     widened_left: Mapped[float] = mapped_column(comment="By how much the outline is wider on the left, without roll, m")
     widened_right: Mapped[float] = mapped_column(comment="By how much on the right, m")
     roll: Mapped[float] = mapped_column(comment="Roll of the vehicle, positive to the right, rad")
     margin: Mapped[float | None] = mapped_column(comment="Least distance, m, negative inside; NULL where nothing that counts")
-    margin_se: Mapped[float | None] = mapped_column(comment="Its standard error by that of the track alone, m")
+    margin_se: Mapped[float | None] = mapped_column(comment="Standard error of the margin from the track only, m")
     clock: Mapped[float | None] = mapped_column(comment="Direction of that point, degrees from straight above to the right")
     class_: Mapped[int | None] = mapped_column("class", comment="Class of that point")
     cluster_id: Mapped[int | None] = mapped_column(BigInteger, comment="Cluster of stage ground that it lies in, if any")
     margins: Mapped[Reals] = mapped_column(comment="Least distance in each 5° by clock, from straight above, m; NaN: nothing")
     seen_share: Mapped[float] = mapped_column(comment="Share of the directions with a return of anything, 0 to 1")
     points: Mapped[int] = mapped_column(comment="Points that count")
-    inside: Mapped[int] = mapped_column(comment="Of them inside")
+    inside: Mapped[int] = mapped_column(comment="Number of these inside the gauge")
     stray: Mapped[int] = mapped_column(comment="Points inside without company, or noise: they do not count")
     passing: Mapped[int] = mapped_column(comment="Points inside of objects and spheres, which may be gone: they do not count")
     ground: Mapped[int] = mapped_column(comment="Points inside that are ground or rail: they do not count")
@@ -84,13 +85,13 @@ class ClearanceInfringement(Base):
     track: Mapped[str] = mapped_column(comment="As of clearance_section")
     chainage_from: Mapped[float] = mapped_column(comment="First place along the given axis, m")
     chainage_to: Mapped[float] = mapped_column(comment="Last place, m")
-    depth: Mapped[float] = mapped_column(comment="How deep it reaches in, m")
+    depth: Mapped[float] = mapped_column(comment="Greatest depth inside the gauge, m")
     clock: Mapped[float] = mapped_column(comment="Direction of its deepest point, degrees from straight above to the right")
     class_: Mapped[int] = mapped_column("class", comment="Class of its points")
     counts: Mapped[bool] = mapped_column(comment="False of objects and spheres, which may be gone")
     cluster_id: Mapped[int | None] = mapped_column(BigInteger, comment="Cluster of stage ground with its deepest point, if any")
-    points: Mapped[int] = mapped_column(comment="How many")
+    points: Mapped[int] = mapped_column(comment="Number of points")
     unrolled: Mapped[Any | None] = mapped_column(
-        geometry("MultiPolygon"), comment="What it covers of the unrolled plane, chainage and arc; NULL where not on the lining"
+        geometry("MultiPolygon"), comment="Area covered in the unrolled plane (chainage and arc); NULL away from the lining"
     )
-    geom: Mapped[Any] = mapped_column(geometry("MultiPointZ"), comment="Its points, at most 200, deepest first")
+    geom: Mapped[Any] = mapped_column(geometry("MultiPointZ"), comment="Points, at most 200, deepest first")

@@ -24,7 +24,7 @@ class ScanFile(Base):
     id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     name: Mapped[str] = mapped_column(comment="File name without its folder")
-    path: Mapped[str] = mapped_column(comment="Where the file lay when it was loaded; read again at full density")
+    path: Mapped[str] = mapped_column(comment="Path of the file")
     checksum: Mapped[str] = mapped_column(comment="SHA-256 of the file, hexadecimal")
     bytes: Mapped[int] = mapped_column(BigInteger, comment="Size of the file, bytes")
     points: Mapped[int] = mapped_column(BigInteger, comment="Points in the file")
@@ -44,22 +44,24 @@ class ScanFile(Base):
         comment="Box of the kept points: xmin, ymin, zmin, xmax, ymax, zmax, tunnel's SRID, m"
     )
     beyond_before: Mapped[int] = mapped_column(
-        BigInteger, server_default="0", comment="Of the points outside, those before the beginning of the given axis, drawn on"
+        BigInteger,
+        server_default="0",
+        comment="Number of points outside that lie before the beginning of the extended given axis",
     )
     beyond_after: Mapped[int] = mapped_column(
-        BigInteger, server_default="0", comment="Of the points outside, those after the end of the given axis, drawn on"
+        BigInteger, server_default="0", comment="Number of points outside that lie after the end of the extended given axis"
     )
     reach_before: Mapped[float] = mapped_column(
-        server_default="0", comment="How far before the beginning of the given axis nearly all of these lie, m"
+        server_default="0", comment="Distance before the beginning of the given axis within which nearly all of these lie, m"
     )
     reach_after: Mapped[float] = mapped_column(
-        server_default="0", comment="How far after the end of the given axis nearly all of these lie, m"
+        server_default="0", comment="Distance after the end of the given axis within which nearly all of these lie, m"
     )
     intensity_note: Mapped[str | None] = mapped_column(
-        comment="What its intensity gives to doubt: saturated, another kind by its values"
+        comment="Doubts about its intensity: saturated, or another kind by its values"
     )
     srid: Mapped[int | None] = mapped_column(comment="Spatial reference that the file states, if it states one")
-    loaded_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was loaded")
+    loaded_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="Time of loading")
 
 
 class FileKm(Base):
@@ -75,16 +77,14 @@ class FileKm(Base):
     rows: Mapped[int] = mapped_column(BigInteger, comment="Points of the file that wait or waited to be loaded there")
     points: Mapped[Any] = mapped_column(
         INT8MULTIRANGE,
-        comment="Where in the file the points of the kilometre and 10 m to both sides are: ranges of point numbers from 0",
+        comment="Ranges of point numbers, from 0, of the kilometre and 10 m on both sides",
     )
     seconds: Mapped[Any | None] = mapped_column(
         INT8MULTIRANGE,
-        comment="When these were measured: whole seconds between which their gps_time lies; NULL where not known",
+        comment="Time range of these points: whole seconds around their gps_time; NULL if unknown",
     )
-    read_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When the file was read")
-    loaded_at: Mapped[dt.datetime | None] = mapped_column(
-        comment="When they were loaded into the kilometre; none while they wait"
-    )
+    read_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time of reading")
+    loaded_at: Mapped[dt.datetime | None] = mapped_column(comment="Time of loading")
 
 
 class Incoming(Base):
@@ -95,14 +95,14 @@ class Incoming(Base):
 
     survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
     name: Mapped[str] = mapped_column(primary_key=True, comment="File name without its folder")
-    path: Mapped[str] = mapped_column(comment="Where the file lies")
+    path: Mapped[str] = mapped_column(comment="Path of the file")
     bytes: Mapped[int] = mapped_column(BigInteger, comment="Size of the file, bytes")
     points: Mapped[int] = mapped_column(BigInteger, comment="Points that its header announces; 0 if it is unreadable")
     km_from: Mapped[int | None] = mapped_column(comment="First kilometre that it may touch, by its header's box")
     km_to: Mapped[int | None] = mapped_column(comment="Last kilometre that it may touch, by its header's box")
-    parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="How it is to be read")
-    requested_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When it was asked for")
-    failed_at: Mapped[dt.datetime | None] = mapped_column(comment="When reading it failed")
+    parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="Parameters of reading")
+    requested_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time of the request")
+    failed_at: Mapped[dt.datetime | None] = mapped_column(comment="Time of the failure")
     message: Mapped[str | None] = mapped_column(comment="Why it failed")
 
 

@@ -29,14 +29,16 @@ class FindingKind(Base):
     )
 
     id: Mapped[int] = mapped_column(Identity(), unique=True, comment="Key")
-    code: Mapped[str] = mapped_column(primary_key=True, comment="Its code, in lower case")
-    label: Mapped[str] = mapped_column(comment="Its name, in the owner's words")
-    geometries: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="What it may be drawn as: polygon, line, point")
+    code: Mapped[str] = mapped_column(primary_key=True, comment="Code, in lower case")
+    label: Mapped[str] = mapped_column(comment="Name, in the owner's words")
+    geometries: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Permitted geometries: polygon, line, point")
     wet: Mapped[bool] = mapped_column(
-        server_default=text("false"), comment="Whether it counts as wet in statistics and classes"
+        server_default=text("false"), comment="True if findings of this kind count as wet in statistics and classes"
     )
-    position: Mapped[int] = mapped_column(comment="Its place in lists")
-    active: Mapped[bool] = mapped_column(server_default=text("true"), comment="Whether it is offered for what is drawn")
+    position: Mapped[int] = mapped_column(comment="Position in lists")
+    active: Mapped[bool] = mapped_column(
+        server_default=text("true"), comment="True if new findings can be drawn with this kind"
+    )
 
 
 class Severity(Base):
@@ -49,8 +51,8 @@ class Severity(Base):
     )
 
     id: Mapped[int] = mapped_column(SmallInteger, primary_key=True, autoincrement=False, comment="1, the least, to 4")
-    label: Mapped[str] = mapped_column(comment="Its name, in the owner's words")
-    text: Mapped[str | None] = mapped_column(comment="What it means")
+    label: Mapped[str] = mapped_column(comment="Name, in the owner's words")
+    text: Mapped[str | None] = mapped_column(comment="Meaning")
 
 
 class FindingSum(Base):
@@ -68,11 +70,11 @@ class FindingSum(Base):
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     kind: Mapped[str] = mapped_column(comment="Kind, as judged")
-    wet: Mapped[bool] = mapped_column(comment="Whether it counts as wet")
-    origin: Mapped[str] = mapped_column(comment="How their outlines came about")
+    wet: Mapped[bool] = mapped_column(comment="True if they count as wet")
+    origin: Mapped[str] = mapped_column(comment="Origin of their outlines")
     severity: Mapped[int | None] = mapped_column(SmallInteger, comment="Severity")
     state: Mapped[str] = mapped_column(comment="open or confirmed, which count, rejected, gone, dry, same or merged")
-    measured: Mapped[bool] = mapped_column(comment="Whether they were measured on the image")
+    measured: Mapped[bool] = mapped_column(comment="True if they were measured on the image")
     findings: Mapped[int] = mapped_column(BigInteger, comment="By how many they became more")
     area: Mapped[float] = mapped_column(comment="By how much their area grew, m²")
     length: Mapped[float] = mapped_column(comment="By how much the length of lines grew, m")
@@ -180,14 +182,14 @@ class Finding(Review, Base):
     feature_list_id: Mapped[int | None] = mapped_column(
         ForeignKey(FeatureList.id), comment="Order of its features; none from before they were stored"
     )
-    features: Mapped[Floats | None] = mapped_column(comment="What was measured of it; NaN what could not be")
+    features: Mapped[Floats | None] = mapped_column(comment="Measured properties; NaN if one could not be measured")
     evidence: Mapped[dict[str, Any] | None] = mapped_column(
         comment="Contribution of each reason to the logarithm of the odds of a leak"
     )
     model: Mapped[str | None] = mapped_column(comment="Version of the model of evidence that classified it")
     origin: Mapped[str] = mapped_column(
         server_default=text("'detected'"),
-        comment="How its outline came about: detected, drawn, redrawn, split or merged; detection changes the first alone",
+        comment="Origin of its outline: detected, drawn, redrawn, split or merged; detection changes detected outlines only",
     )
     manual: Mapped[bool] = mapped_column(
         server_default=text("false"), comment="True if it was drawn, or split off from what was drawn: never detected"
@@ -205,8 +207,8 @@ class Finding(Review, Base):
     shape_surface: Mapped[WKBElement | None] = mapped_column(
         geometry("GEOMETRYZ"), comment="The same in space, tunnel's SRID, m"
     )
-    drawn_by: Mapped[str | None] = mapped_column(comment="Who drew its outline last; none of what was detected")
-    drawn_at: Mapped[dt.datetime | None] = mapped_column(comment="When its outline was drawn last")
+    drawn_by: Mapped[str | None] = mapped_column(comment="Role that drew its outline last; NULL if it was detected only")
+    drawn_at: Mapped[dt.datetime | None] = mapped_column(comment="Time of the last drawing of its outline")
     parent_id: Mapped[int | None] = mapped_column(
         ForeignKey("tunnel.finding.id", ondelete="SET NULL"), comment="Finding that it was split off"
     )
@@ -243,9 +245,9 @@ class Photo(Base):
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     finding_id: Mapped[int] = mapped_column(parent("finding"), comment="Finding that it shows")
     path: Mapped[str] = mapped_column(comment="Path or URL")
-    caption: Mapped[str | None] = mapped_column(comment="What it shows")
-    added_by: Mapped[str] = mapped_column(server_default=text("SESSION_USER"), comment="Who added it")
-    added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When it was added")
+    caption: Mapped[str | None] = mapped_column(comment="Caption")
+    added_by: Mapped[str] = mapped_column(server_default=text("SESSION_USER"), comment="Role that added it")
+    added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time when it was added")
 
 
 class BoundaryRegion(Base):
@@ -265,8 +267,8 @@ class BoundaryRegion(Base):
     box: Mapped[list[int]] = mapped_column(
         ARRAY(Integer), comment="First column (chainage / pixel), first row (arc / pixel), columns and rows of the mask"
     )
-    mask: Mapped[bytes] = mapped_column(comment="Its dark pixels, a bit each, row by row from the lowest arc")
-    filled: Mapped[int] = mapped_column(BigInteger, comment="Its pixels that hold measured data")
+    mask: Mapped[bytes] = mapped_column(comment="Dark pixels, one bit each, row by row from the smallest arc")
+    filled: Mapped[int] = mapped_column(BigInteger, comment="Number of pixels with measured data")
     darkening_sum: Mapped[float] = mapped_column(comment="Sum over them of the darkening, dB")
     darkening_max: Mapped[float] = mapped_column(comment="Greatest darkening, dB")
     properties: Mapped[Floats] = mapped_column(

@@ -28,15 +28,15 @@ class AxisVertex(Base):
     km: Mapped[int] = mapped_column(comment=KM)
     geom: Mapped[WKBElement] = mapped_column(geometry("POINTZ"), comment="Position, tunnel's SRID, m")
     given: Mapped[WKBElement] = mapped_column(
-        geometry("POINTZ"), comment="Where the given axis has this chainage, tunnel's SRID, m"
+        geometry("POINTZ"), comment="Position on the given axis at this chainage, tunnel's SRID, m"
     )
     points: Mapped[int] = mapped_column(comment="Points that were averaged; 0 unless measured")
     source: Mapped[str] = mapped_column(
         comment="measured (averaged), interpolated (too few points) or edited (by hand, kept by a rerun)"
     )
     remark: Mapped[str | None] = mapped_column(comment="Why the place that was measured is not taken, if it is not")
-    edited_by: Mapped[str | None] = mapped_column(comment="Who moved it")
-    edited_at: Mapped[dt.datetime | None] = mapped_column(comment="When it was moved")
+    edited_by: Mapped[str | None] = mapped_column(comment="Role that moved it")
+    edited_at: Mapped[dt.datetime | None] = mapped_column(comment="Time of the last move")
 
 
 class Segment(Base):
@@ -81,7 +81,7 @@ class Section(Base):
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     km: Mapped[int] = mapped_column(comment=KM)
     segment: Mapped[int] = mapped_column(comment="Number of its segment (segment.n)")
-    half: Mapped[int] = mapped_column(SmallInteger, comment="Where in the segment: 25 or 75 %")
+    half: Mapped[int] = mapped_column(SmallInteger, comment="Position in the segment: 25 or 75 %")
     chainage: Mapped[float] = mapped_column(comment="Chainage of its plane, m")
     half_width: Mapped[float] = mapped_column(comment="Half the thickness of the slab that its points are from, m")
     angle_step: Mapped[float] = mapped_column(comment="Width of an angular class, degrees")
@@ -113,7 +113,7 @@ class SectionClass(Base):
     class_: Mapped[int] = mapped_column(
         "class", primary_key=True, autoincrement=False, comment="Number of the class, from the lowest angle"
     )
-    angle: Mapped[float] = mapped_column(comment="Its angle from the crown, degrees, positive right")
+    angle: Mapped[float] = mapped_column(comment="Angle from the crown, degrees, positive right")
     radius: Mapped[float] = mapped_column(comment="Distance of the surface from the axis at the angle, m")
     slope: Mapped[float | None] = mapped_column(
         comment="Inclination of the line through its points: outwards per metre to the right; none if empty"

@@ -25,15 +25,15 @@ class Ground(Base):
     n: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment="Metre: plan distance along the axis, m")
     km: Mapped[int] = mapped_column(comment=KM)
     across: Mapped[float] = mapped_column(
-        comment="Where the first height stands, m right of the axis; the next ones every 0.1 m"
+        comment="Position of the first height, m right of the axis; the next ones every 0.1 m"
     )
     height: Mapped[Floats] = mapped_column(comment="Height (z) of the ground, m; NaN where there is none")
     gamma: Mapped[float] = mapped_column(comment="Points up to this height above it are ground, m")
     foot: Mapped[Floats] = mapped_column(
-        comment="Where the left and the right wall meet the ground, m right of the axis; NaN where there is no wall"
+        comment="Feet of the left and the right wall, m right of the axis; NaN where there is no wall"
     )
     lean: Mapped[Floats] = mapped_column(
-        comment="How far the left and the right wall lean to the right for each metre up there"
+        comment="Inclination of the left and the right wall at their feet: m to the right for each metre up"
     )
     arc_left: Mapped[float | None] = mapped_column(comment="Arc at which the ground begins on the left, m")
     arc_right: Mapped[float | None] = mapped_column(comment="Arc at which the ground begins on the right, m")
@@ -78,8 +78,8 @@ class Cluster(Base):
     class_: Mapped[int] = mapped_column("class", SmallInteger, comment="Class of its points (tunnel_api.class)")
     chainage_from: Mapped[float] = mapped_column(comment="Least chainage, m")
     chainage_to: Mapped[float] = mapped_column(comment="Greatest chainage, m")
-    height_from: Mapped[float | None] = mapped_column(comment="Its lowest point above the ground, m; none without ground")
-    height_to: Mapped[float | None] = mapped_column(comment="Its highest point above the ground, m; none without ground")
+    height_from: Mapped[float | None] = mapped_column(comment="Lowest point above the ground, m; NULL without ground")
+    height_to: Mapped[float | None] = mapped_column(comment="Highest point above the ground, m; NULL without ground")
     points: Mapped[int] = mapped_column(BigInteger, comment="Points of survey density in it")
     cell: Mapped[float] = mapped_column(comment="Edge of its cells, m")
     cells: Mapped[list[int]] = mapped_column(
@@ -111,4 +111,4 @@ class TargetSphere(Base):
     sigma: Mapped[float] = mapped_column(comment="Standard deviation of the centre, from the fit, m")
     coverage: Mapped[float] = mapped_column(comment="Share of the sphere's surface that is seen, 0 to 1")
     points: Mapped[int] = mapped_column(comment="Points that it was fitted to")
-    found_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was found")
+    found_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="Time when it was found")

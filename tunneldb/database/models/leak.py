@@ -23,7 +23,7 @@ class Radiometry(Base):
     km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=KM)
     roughness: Mapped[float | None] = mapped_column(comment="Oren-Nayar roughness, degrees")
     dry_mean: Mapped[float | None] = mapped_column(comment="Mean corrected intensity of dry lining, dB")
-    dry_sigma: Mapped[float | None] = mapped_column(comment="Its standard deviation, dB")
+    dry_sigma: Mapped[float | None] = mapped_column(comment="Standard deviation of the dry lining, dB")
     threshold: Mapped[float | None] = mapped_column(comment="Corrected intensity below which lining is wet, dB")
     sigma_raw: Mapped[float | None] = mapped_column(comment="Standard deviation of dry lining before correction, dB")
     sigma_lambert: Mapped[float | None] = mapped_column(comment="The same, incidence by Lambert, dB")
@@ -56,8 +56,10 @@ class Coverage(Base):
     km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=KM)
     step: Mapped[float] = mapped_column(comment="Length of a step, m; the first begins with the kilometre")
     lining: Mapped[Reals] = mapped_column(comment="Lining in each step, seen or not, in the unrolled plane, m²")
-    seen: Mapped[Reals] = mapped_column(comment="What of it was seen within the limits of range and incidence, m²")
-    wet: Mapped[Reals] = mapped_column(comment="What of that is wet: pixels below the threshold, after the median filter, m²")
+    seen: Mapped[Reals] = mapped_column(comment="Inspected part of it, within the limits of range and incidence, m²")
+    wet: Mapped[Reals] = mapped_column(
+        comment="Wet part of the inspected lining (pixels below the threshold, after the median filter), m²"
+    )
     lining_total: Mapped[float | None] = mapped_column(
         Computed("tunnel.total(lining)", persisted=True), comment="Sum of lining, m²"
     )
@@ -91,19 +93,19 @@ class Waterproof(Base):
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     km: Mapped[int] = mapped_column(comment=KM)
     chainage_from: Mapped[float | None] = mapped_column(
-        comment="Where its stretch begins, m; NULL in a row that notes a change"
+        comment="Beginning of the stretch, m; NULL in a row that marks a change"
     )
-    chainage_to: Mapped[float | None] = mapped_column(comment="Where it ends, m")
+    chainage_to: Mapped[float | None] = mapped_column(comment="End of the stretch, m")
     lining_area: Mapped[float | None] = mapped_column(comment="Lining, seen or not, m²")
     seen_share: Mapped[float | None] = mapped_column(comment="Share of it that was seen")
     wet_area: Mapped[float | None] = mapped_column(comment="Area of the leaks within the kilometre, m²")
     wet_ratio: Mapped[float | None] = mapped_column(comment="wet_area, of the lining seen")
     patches: Mapped[int | None] = mapped_column(comment="Leaks in the kilometre or over its ends")
     largest_area: Mapped[float | None] = mapped_column(comment="Area of the largest of them, whole, m²")
-    largest_leak: Mapped[int | None] = mapped_column(BigInteger, comment="Its id")
+    largest_leak: Mapped[int | None] = mapped_column(BigInteger, comment="Id of the largest leak")
     window_patches: Mapped[int | None] = mapped_column(comment="Most leaks in any 100 m² of lining")
-    window_from: Mapped[float | None] = mapped_column(comment="Where those 100 m² begin, m")
-    window_to: Mapped[float | None] = mapped_column(comment="Where they end, m")
+    window_from: Mapped[float | None] = mapped_column(comment="Chainage at which those 100 m² begin, m")
+    window_to: Mapped[float | None] = mapped_column(comment="Chainage at which those 100 m² end, m")
     window_wet_area: Mapped[float | None] = mapped_column(comment="Greatest wet area in any 100 m² of lining, m²")
     class_: Mapped[int | None] = mapped_column("class", comment="Best class of waterproofing that the lining seen keeps")
 
@@ -123,12 +125,13 @@ class Region(Base):
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     kind: Mapped[str] = mapped_column(comment="homogeneous (one material, for the roughness) or dry (for the threshold)")
     geom: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="Region in the unrolled plane (chainage, arc), m")
-    drawn_by: Mapped[str] = mapped_column(server_default=text("CURRENT_USER"), comment="Who drew it")
-    drawn_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was drawn")
+    drawn_by: Mapped[str] = mapped_column(server_default=text("CURRENT_USER"), comment="Role that drew it")
+    drawn_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="Time of the drawing")
     reason: Mapped[str | None] = mapped_column(comment="Why; a dry region larger than the tunnel's limit needs one")
     pending_approval: Mapped[bool] = mapped_column(
         server_default=text("false"),
-        comment="Whether it waits for an operator, being larger than the tunnel's limit: until then it marks nothing",
+        comment="True if it waits for the approval of an operator, being larger than the tunnel's limit; until then "
+        "it has no effect",
     )
     approved_by: Mapped[str | None] = mapped_column(comment="Operator who put it in force, where it had to wait")
     approved_at: Mapped[dt.datetime | None] = mapped_column(comment="When")
@@ -182,13 +185,13 @@ class LearnedModel(Base):
         comment="Slope, offset, factors by reason; centre, scale and weight by feature"
     )
     surveys: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Surveys whose reviews it was learned from")
-    reviews: Mapped[dict[str, Any]] = mapped_column(comment="How many reviews of each kind")
+    reviews: Mapped[dict[str, Any]] = mapped_column(comment="Number of reviews of each kind")
     loss_base: Mapped[float] = mapped_column(
         comment="Mean negative logarithm of the probability of what was said, by the model that it adjusts"
     )
     loss: Mapped[float] = mapped_column(comment="The same, adjusted to reviews of other places")
-    note: Mapped[str | None] = mapped_column(comment="What its maker says of it")
-    applied_by: Mapped[str] = mapped_column(comment="Who applied it")
+    note: Mapped[str | None] = mapped_column(comment="Note of the person who applied it")
+    applied_by: Mapped[str] = mapped_column(comment="Role that applied it")
     active_from: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Since when it is in force")
-    undone_by: Mapped[str | None] = mapped_column(comment="Who took it back")
-    undone_at: Mapped[dt.datetime | None] = mapped_column(comment="When it was taken back")
+    undone_by: Mapped[str | None] = mapped_column(comment="Role that undid it")
+    undone_at: Mapped[dt.datetime | None] = mapped_column(comment="Time when it was undone")

@@ -33,13 +33,13 @@ class Ring(Base):
     number: Mapped[int] = mapped_column(comment="Number of the ring")
     chainage_from: Mapped[float] = mapped_column(comment="Chainage of the joint at its beginning, m")
     chainage_to: Mapped[float] = mapped_column(comment="Chainage of the joint at its end, m")
-    origin: Mapped[str] = mapped_column(comment="How the rings were given: length, file, or found")
+    origin: Mapped[str] = mapped_column(comment="Source of the rings: length, file, or found")
     joint: Mapped[str] = mapped_column(comment="Joint at its beginning: given, seen, or missing")
     seen_share: Mapped[float | None] = mapped_column(comment="Share of its circumference that is seen; NULL: not measured")
-    shape: Mapped[str | None] = mapped_column(comment="What was fitted: ellipse, circle, or none")
-    centre_right: Mapped[float | None] = mapped_column(comment="How far its centre lies right of the given axis, m")
+    shape: Mapped[str | None] = mapped_column(comment="Fitted shape: ellipse, circle, or none")
+    centre_right: Mapped[float | None] = mapped_column(comment="Distance of the centre to the right of the given axis, m")
     centre_right_se: Mapped[float | None] = mapped_column(comment="Standard error, m")
-    centre_up: Mapped[float | None] = mapped_column(comment="How far its centre lies above the given axis, m")
+    centre_up: Mapped[float | None] = mapped_column(comment="Height of the centre above the given axis, m")
     centre_up_se: Mapped[float | None] = mapped_column(comment="Standard error, m")
     radius: Mapped[float | None] = mapped_column(comment="Mean radius, m")
     radius_se: Mapped[float | None] = mapped_column(comment="Standard error, m")
@@ -52,7 +52,9 @@ class Ring(Base):
     ovality: Mapped[float | None] = mapped_column(comment="Largest less smallest diameter over the design diameter")
     ovality_se: Mapped[float | None] = mapped_column(comment="Standard error")
     design_diameter: Mapped[float | None] = mapped_column(comment="Diameter that ovality is a share of, m")
-    diameter_from: Mapped[str | None] = mapped_column(comment="Where that is from: option, profile, or ring: its own mean")
+    diameter_from: Mapped[str | None] = mapped_column(
+        comment="Source of the design diameter: option, profile, or ring (its own mean)"
+    )
     harmonic: Mapped[Reals | None] = mapped_column(comment="Amplitudes of the radius by order, from 2, m; NaN untold")
     harmonic_se: Mapped[Reals | None] = mapped_column(comment="Their standard errors, m")
     harmonic_clock: Mapped[Reals | None] = mapped_column(comment="First clock position where each is outwards most, degrees")
@@ -60,10 +62,10 @@ class Ring(Base):
         comment="Least departure from the circle of the mean radius, m, negative inside"
     )
     inward_se: Mapped[float | None] = mapped_column(comment="Standard error, m")
-    inward_clock: Mapped[float | None] = mapped_column(comment="Its clock position, degrees")
+    inward_clock: Mapped[float | None] = mapped_column(comment="Clock position of inward, degrees")
     outward: Mapped[float | None] = mapped_column(comment="Greatest departure from that circle, m")
     outward_se: Mapped[float | None] = mapped_column(comment="Standard error, m")
-    outward_clock: Mapped[float | None] = mapped_column(comment="Its clock position, degrees")
+    outward_clock: Mapped[float | None] = mapped_column(comment="Clock position of outward, degrees")
     sigma: Mapped[float | None] = mapped_column(comment="Scatter of cells about what was fitted, m")
     step: Mapped[Reals | None] = mapped_column(
         comment="Steps from the ring before to this one in cells of arc, m, positive where this one stands in; NaN untold"

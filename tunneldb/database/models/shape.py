@@ -27,16 +27,16 @@ class DesignProfile(Base):
 
     id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
     tunnel_id: Mapped[int] = mapped_column(parent("tunnel"), comment=TUNNEL)
-    name: Mapped[str] = mapped_column(comment="Its name")
+    name: Mapped[str] = mapped_column(comment="Name")
     layer: Mapped[str] = mapped_column(comment="lining, shotcrete or excavation")
     chainage_from: Mapped[float] = mapped_column(comment="Chainage of the given axis from which it holds, m")
     chainage_to: Mapped[float] = mapped_column(comment="Chainage up to which it holds, m")
     outline: Mapped[Floats] = mapped_column(
-        comment="Of each vertex: right of the axis, above it, m, and bulge of what leads to the next; clockwise looking "
-        "up-chainage, closed where the last vertex is the first"
+        comment="Vertices: to the right of the axis, above it, m, and bulge of the edge to the next vertex; clockwise"
+        " looking up-chainage"
     )
     source: Mapped[str] = mapped_column(comment="File that it was read from")
-    added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When it was added")
+    added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time when it was added")
 
 
 class DeviationSection(Base):
@@ -59,7 +59,7 @@ class DeviationSection(Base):
     chainage_from: Mapped[float] = mapped_column(comment="Chainage of its beginning, m")
     chainage_to: Mapped[float] = mapped_column(comment="Chainage of its end, m")
     design_length: Mapped[float] = mapped_column(comment="Length of the profile in its middle, m")
-    seen_length: Mapped[float] = mapped_column(comment="What of that is seen, m")
+    seen_length: Mapped[float] = mapped_column(comment="Inspected length of the profile, m")
     overbreak: Mapped[float] = mapped_column(comment="Area outside the profile, of what is seen, m²")
     underbreak: Mapped[float] = mapped_column(comment="Area inside the profile, of what is seen, m²")
     noise_area: Mapped[float] = mapped_column(
@@ -73,16 +73,16 @@ class DeviationSection(Base):
         comment="Scatter of pixels within cells: noise, and the lining's texture, m; NULL where nothing is seen"
     )
     shift_right: Mapped[float | None] = mapped_column(
-        comment="How far the lining as a whole lies right of the profile, m; NULL where too little is seen"
+        comment="Shift of the lining as a whole to the right of the profile, m; NULL if too little was inspected"
     )
-    shift_up: Mapped[float | None] = mapped_column(comment="How far it lies above it, m")
+    shift_up: Mapped[float | None] = mapped_column(comment="Shift of the lining as a whole above the profile, m")
     deviation_mean: Mapped[float | None] = mapped_column(
         comment="Mean deviation of the cells seen, m; NULL where nothing is seen"
     )
     deviation_least: Mapped[float | None] = mapped_column(comment="Least mean of a cell, m: the greatest overbreak")
-    least_at: Mapped[float | None] = mapped_column(comment="How far along the profile that is, m")
+    least_at: Mapped[float | None] = mapped_column(comment="Distance of that cell along the profile, m")
     deviation_greatest: Mapped[float | None] = mapped_column(comment="Greatest mean of a cell, m: the greatest underbreak")
-    greatest_at: Mapped[float | None] = mapped_column(comment="How far along the profile that is, m")
+    greatest_at: Mapped[float | None] = mapped_column(comment="Distance of that cell along the profile, m")
     deviation: Mapped[Reals] = mapped_column(
         comment="Mean deviation in cells of equal length along the profile, from its beginning, m, positive inside; "
         "NaN: not inspected"

@@ -25,10 +25,10 @@ class SonarScan(Base):
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     name: Mapped[str] = mapped_column(comment="Name of the file")
-    path: Mapped[str] = mapped_column(comment="Where the file lay when it was registered")
+    path: Mapped[str] = mapped_column(comment="Path of the file at registration")
     checksum: Mapped[str] = mapped_column(comment="SHA-256 of the file, hexadecimal")
     bytes: Mapped[int] = mapped_column(BigInteger, comment="Size of the file")
-    up: Mapped[int] = mapped_column(comment="Whether the file's z axis points up (1) or down (-1), as was said")
+    up: Mapped[int] = mapped_column(comment="1 if the file's z axis points up, -1 if down, as given")
     water_level: Mapped[float] = mapped_column(comment="Height of the water, as was said, m")
     state: Mapped[str] = mapped_column(
         comment="determined, weak (known worse than it should be), undetermined, or given (the file is in the tunnel's system)"
@@ -42,12 +42,14 @@ class SonarScan(Base):
     covariance: Mapped[Floats | None] = mapped_column(
         comment="7 × 7, row by row: turns about x, y, z through the sonar, rad, shifts along them, m, and scale"
     )
-    registered_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="When it was registered")
+    registered_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="Time of the registration")
     points: Mapped[int | None] = mapped_column(BigInteger, comment="Points of the file; NULL before it is loaded")
-    false_echoes: Mapped[int | None] = mapped_column(BigInteger, comment="Of these, false echoes, which are left out")
-    outside: Mapped[int | None] = mapped_column(BigInteger, comment="Of these, beyond the axis or too far from the sonar")
+    false_echoes: Mapped[int | None] = mapped_column(BigInteger, comment="Number of false echoes, which are left out")
+    outside: Mapped[int | None] = mapped_column(
+        BigInteger, comment="Number of points beyond the axis or too far from the sonar"
+    )
     kept: Mapped[int | None] = mapped_column(BigInteger, comment="Rows of it in tunnel.sonar_point")
-    loaded_at: Mapped[dt.datetime | None] = mapped_column(comment="When its points were loaded with this pose")
+    loaded_at: Mapped[dt.datetime | None] = mapped_column(comment="Time when its points were loaded with this pose")
 
 
 class RegistrationResidual(Base):
@@ -66,7 +68,7 @@ class RegistrationResidual(Base):
     name: Mapped[str] = mapped_column(comment="Side of the wall, name of the ladder or of the other scan's file")
     count: Mapped[int] = mapped_column(comment="Patches or points that were compared")
     median: Mapped[float] = mapped_column(comment="Median of the absolute distances, m")
-    p95: Mapped[float] = mapped_column(comment="Of which 95 % are no more, m")
+    p95: Mapped[float] = mapped_column(comment="95th percentile of the residuals, m")
 
 
 class Ladder(Base):
@@ -80,10 +82,10 @@ class Ladder(Base):
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
-    name: Mapped[str] = mapped_column(comment="Its name in the file of ladders")
+    name: Mapped[str] = mapped_column(comment="Name in the file of ladders")
     origin: Mapped[Floats] = mapped_column(comment="Middle between its stiles at its height zero, tunnel's SRID, m")
     axes: Mapped[Floats] = mapped_column(comment="3 × 3, row by row: unit vectors across, up and out to the water")
-    rms: Mapped[float] = mapped_column(comment="Of the laser's points from it, m")
+    rms: Mapped[float] = mapped_column(comment="Root mean square distance of the laser's points, m")
     rungs: Mapped[list[int]] = mapped_column(ARRAY(BigInteger), comment="Numbers of the rungs that the laser saw")
     scans: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Names of the sonar scans that saw it")
 
@@ -127,7 +129,7 @@ class Bed(Base):
     n: Mapped[int] = mapped_column(comment="Metre of chainage at which it begins")
     across_n: Mapped[int] = mapped_column(comment="Tenth of a metre right of the axis at which it begins")
     height: Mapped[float] = mapped_column(comment="Median height of the bed, m")
-    depth: Mapped[float] = mapped_column(comment="Of the bed below the water, m")
+    depth: Mapped[float] = mapped_column(comment="Depth of the bed below the water, m")
     sigma: Mapped[float] = mapped_column(comment="Standard deviation of its height, that of the scans' poses included, m")
     points: Mapped[int] = mapped_column(comment="Points of the bed in it")
 
@@ -144,7 +146,9 @@ class WaterLevel(Base):
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     km: Mapped[int] = mapped_column(comment=KM)
-    height: Mapped[float | None] = mapped_column(comment="Of the water, m; NULL where sonar scans were loaded and none is left")
+    height: Mapped[float | None] = mapped_column(
+        comment="Height of the water surface, m; NULL if sonar scans were loaded and none is left"
+    )
     changed_at: Mapped[dt.datetime] = mapped_column(
-        comment="When points of sonar scans were last loaded into the kilometre, or taken out of it"
+        comment="Time when sonar points were last loaded into the kilometre, or removed from it"
     )

@@ -22,18 +22,18 @@ class Member(Base):
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
-    number: Mapped[int] = mapped_column(comment="Its number in the survey, from 1; dimension member of files written")
+    number: Mapped[int] = mapped_column(comment="Number in the survey, from 1; dimension member in written files")
     kind: Mapped[str] = mapped_column(
         comment="flat (planes that lie in one), pipe (cylinders about one axis) or profile (sides of one beam)"
     )
     length: Mapped[float] = mapped_column(comment="Length along its line, gaps counted, m")
     area: Mapped[float] = mapped_column(comment="Area of its faces, m²")
     bimodal: Mapped[bool] = mapped_column(
-        comment="Whether so much of it differs from the rest that neither is known to be its own surface"
+        comment="True if so much of its surface differs from the rest that the reference surface is unknown"
     )
     chainage: Mapped[float | None] = mapped_column(comment="Chainage of its middle, m; NULL of a site or beyond the sections")
     line: Mapped[WKBElement] = mapped_column(
-        geometry("LINESTRINGZ"), comment="Its middle line; of a flat one along its longest side; tunnel's SRID, m"
+        geometry("LINESTRINGZ"), comment="Middle line, tunnel's SRID, m; for a flat member, along its longest side"
     )
 
 
@@ -52,26 +52,26 @@ class Face(Base):
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     member_id: Mapped[int] = mapped_column(parent("member"), comment="Member that it belongs to")
-    number: Mapped[int] = mapped_column(comment="Its number in the survey, from 1; dimension face of files written")
+    number: Mapped[int] = mapped_column(comment="Number in the survey, from 1; dimension face in written files")
     side: Mapped[int] = mapped_column(comment="Side of its member, from 1: faces of one plane or pipe are of one side")
     kind: Mapped[str] = mapped_column(comment="flat (a plane) or pipe (a part of a cylinder)")
-    origin: Mapped[Floats] = mapped_column(comment="Where its unrolled coordinates are (0, 0) or on its axis: x, y, z, m")
+    origin: Mapped[Floats] = mapped_column(comment="Origin of its unrolled coordinates, on the axis of a pipe: x, y, z, m")
     axis: Mapped[Floats] = mapped_column(comment="Axis of a pipe; of a plane its normal, towards the scanners")
     across: Mapped[Floats] = mapped_column(
         comment="Direction at right angles to it from which unrolled coordinates count: u of a plane, v = 0 of a pipe"
     )
     radius: Mapped[float | None] = mapped_column(comment="Radius of a pipe, m; NULL of a plane")
-    inside: Mapped[bool] = mapped_column(comment="Whether a pipe is seen from inside")
+    inside: Mapped[bool] = mapped_column(comment="True if a pipe was scanned from inside")
     rms: Mapped[float] = mapped_column(comment="Root mean square of its points' distances from it, m")
     points: Mapped[int] = mapped_column(BigInteger, comment="Points of the scans on it")
     area: Mapped[float] = mapped_column(comment="Area within its outline, m²")
     seen_share: Mapped[float] = mapped_column(comment="Share of it that could be judged, 0 to 1")
     incidence_from: Mapped[float | None] = mapped_column(comment="Least angle of incidence at which it was judged, degrees")
     incidence_to: Mapped[float | None] = mapped_column(comment="Greatest angle of incidence at which it was judged, degrees")
-    level: Mapped[float | None] = mapped_column(comment="Its own level of intensity, dB; NULL where none could be found")
+    level: Mapped[float | None] = mapped_column(comment="Intensity of its own surface, dB; NULL if it could not be determined")
     sigma: Mapped[float | None] = mapped_column(comment="Standard deviation about it, dB")
     bimodal: Mapped[bool] = mapped_column(
-        comment="Whether more than half of what was judged differs, so that nobody knows which half is its own"
+        comment="True if more than half of the inspected part differs, so that the reference surface is unknown"
     )
     chainage: Mapped[float | None] = mapped_column(comment="Chainage of its middle, m; NULL of a site or beyond the sections")
     outline: Mapped[WKBElement] = mapped_column(geometry("MULTIPOLYGON"), comment="In its own plane, of a cylinder unrolled, m")
@@ -93,7 +93,7 @@ class Spot(Review, Base):
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
-    number: Mapped[int] = mapped_column(comment="Its number in the tunnel or site: the same in the next survey")
+    number: Mapped[int] = mapped_column(comment="Number in the tunnel or site, the same in the next survey")
     face_id: Mapped[int | None] = mapped_column(
         ForeignKey(Face.id, ondelete="SET NULL"), comment="Face that it is on; NULL where the last run found it no more"
     )

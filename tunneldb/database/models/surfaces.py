@@ -34,14 +34,14 @@ class ThicknessSection(Base):
     chainage_from: Mapped[float] = mapped_column(comment="Chainage of its beginning, m")
     chainage_to: Mapped[float] = mapped_column(comment="Chainage of its end, m")
     design_length: Mapped[float] = mapped_column(comment="Length of the profile in its middle, m")
-    compared_length: Mapped[float] = mapped_column(comment="What of that both surveys saw, m")
+    compared_length: Mapped[float] = mapped_column(comment="Length that both surveys inspected, m")
     area: Mapped[float] = mapped_column(comment="Area between the two surfaces, of what both saw, m²")
     noise_area: Mapped[float] = mapped_column(comment="Standard deviation of the area by the scatter of pixels, m²")
     by_right: Mapped[float] = mapped_column(comment="By how much the area grows when the later survey moves to the right, m²/m")
     by_up: Mapped[float] = mapped_column(comment="By how much the area grows when the later survey moves up, m²/m")
     thickness_mean: Mapped[float | None] = mapped_column(comment="Mean of the cells that both saw, m; NULL without any")
     thickness_least: Mapped[float | None] = mapped_column(comment="Least of a cell, m")
-    least_at: Mapped[float | None] = mapped_column(comment="How far along the profile that is, m")
+    least_at: Mapped[float | None] = mapped_column(comment="Distance of that cell along the profile, m")
     thickness: Mapped[Reals] = mapped_column(
         comment="In cells of equal length along the profile, from its beginning, m; NaN where either saw nothing"
     )
@@ -68,8 +68,8 @@ class EvennessSection(Base):
     arc_from: Mapped[float] = mapped_column(comment="Arc of the first cell's edge, m")
     cell: Mapped[float] = mapped_column(comment="Side of a cell, m")
     lining_area: Mapped[float] = mapped_column(comment="Lining that was seen, m²")
-    measured_area: Mapped[float] = mapped_column(comment="What of that lay beneath a straightedge, along or around, m²")
-    over_area: Mapped[float] = mapped_column(comment="What of that has a greater gap than the limit, m²")
+    measured_area: Mapped[float] = mapped_column(comment="Part of it beneath a straightedge, along or around, m²")
+    over_area: Mapped[float] = mapped_column(comment="Part of it with a gap greater than the limit, m²")
     gap_along: Mapped[float | None] = mapped_column(
         comment="Greatest gap beneath a straightedge laid along the tunnel, m; NULL where none could be laid"
     )
@@ -106,7 +106,7 @@ class EvennessArea(Base):
     survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
     km: Mapped[int] = mapped_column(comment=KM)
     layer: Mapped[str] = mapped_column(comment="Layer whose profiles are the template")
-    area: Mapped[float] = mapped_column(comment="Its area, m²")
+    area: Mapped[float] = mapped_column(comment="Area, m²")
     gap: Mapped[float] = mapped_column(comment="Greatest gap in it, m")
     direction: Mapped[str] = mapped_column(comment="along or around: how the straightedge lay")
     geom: Mapped[Any] = mapped_column(geometry("POLYGON"), comment="In the unrolled plane, m")

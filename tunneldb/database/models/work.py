@@ -17,7 +17,7 @@ class Stage(Base):
     __tablename__ = "stage"
     __table_args__ = {"comment": "Stages of a kilometre and measures, in their order; tunneldb init fills it anew"}  # noqa: RUF012
 
-    step: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment="Its number in their order, from 1")
+    step: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment="Number in the order of stages, from 1")
     name: Mapped[str] = mapped_column(unique=True, comment="Name")
     reads: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Stages whose results in the kilometre itself it rests on")
     reads_beside: Mapped[list[str]] = mapped_column(
@@ -59,7 +59,7 @@ class Goal(Base):
     km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=KM)
     stage: Mapped[str] = mapped_column(comment="Stage up to which the kilometre is to be brought")
     parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="Parameters of the stages")
-    requested_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When it was asked for")
+    requested_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time of the request")
     retry_after: Mapped[dt.datetime | None] = mapped_column(comment="Stages that failed before this moment are tried again")
 
 
@@ -73,10 +73,10 @@ class Worker(Base):
         BigInteger, primary_key=True, autoincrement=False, comment="Key: that of the queue's worker"
     )
     host: Mapped[str] = mapped_column(comment="Machine that it runs on")
-    pid: Mapped[int] = mapped_column(comment="Its process there")
-    started_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When it started")
+    pid: Mapped[int] = mapped_column(comment="Number of its process")
+    started_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time of the start")
     stop: Mapped[bool] = mapped_column(
-        server_default=text("false"), comment="Whether it was asked to finish what it is at and leave"
+        server_default=text("false"), comment="True if it was asked to finish its current job and exit"
     )
 
 
@@ -99,13 +99,13 @@ class Run(Base):
     versions: Mapped[dict[str, Any]] = mapped_column(
         server_default=text("'{}'"), comment="Versions of the program and of its libraries"
     )
-    counts: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="What it counted and measured")
+    counts: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="Counts and measured values")
     backend_pid: Mapped[int] = mapped_column(server_default=text("pg_backend_pid()"), comment="Server process that it ran in")
     backend_start: Mapped[dt.datetime | None] = mapped_column(
-        comment="When that process began, as in pg_stat_activity; tells a run that was cut off"
+        comment="Start time of that process, as in pg_stat_activity; identifies interrupted runs"
     )
-    started_at: Mapped[dt.datetime] = mapped_column(server_default=text("clock_timestamp()"), comment="When it began")
-    finished_at: Mapped[dt.datetime | None] = mapped_column(comment="When it ended")
+    started_at: Mapped[dt.datetime] = mapped_column(server_default=text("clock_timestamp()"), comment="Beginning of the run")
+    finished_at: Mapped[dt.datetime | None] = mapped_column(comment="End of the run")
     outcome: Mapped[str] = mapped_column(server_default=text("'running'"), comment="running, done or failed")
     message: Mapped[str | None] = mapped_column(comment="Why it failed")
     worker: Mapped[str | None] = mapped_column(comment="Machine and process that it ran on")
@@ -135,10 +135,10 @@ class Audit(Base):
 
     id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
     at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="When")
-    who: Mapped[str] = mapped_column(server_default=text("SESSION_USER"), comment="Who was logged in")
+    who: Mapped[str] = mapped_column(server_default=text("SESSION_USER"), comment="Role that was logged in")
     survey: Mapped[str] = mapped_column(comment="Name of the survey")
-    view: Mapped[str] = mapped_column(comment="What was changed: finding, spot, axis_vertex, region or photo")
-    row_id: Mapped[int] = mapped_column(BigInteger, comment="Its id there")
+    view: Mapped[str] = mapped_column(comment="Edited view: finding, spot, axis_vertex, region or photo")
+    row_id: Mapped[int] = mapped_column(BigInteger, comment="Key of the row in that view")
     action: Mapped[str] = mapped_column(comment="insert, update or delete")
     before: Mapped[dict[str, Any] | None] = mapped_column(comment="Columns that changed, as they were; none of an insert")
     after: Mapped[dict[str, Any] | None] = mapped_column(comment="The same as they are now; none of a delete")
@@ -146,8 +146,6 @@ class Audit(Base):
     part_of: Mapped[int | None] = mapped_column(
         BigInteger, comment="Entry of the step that this one is a part of: a split, a merge or a delete"
     )
-    kept: Mapped[dict[str, Any] | None] = mapped_column(
-        comment="What had been measured of a finding before its outline changed"
-    )
-    imported_by: Mapped[str | None] = mapped_column(comment="Who brought it in with an archive of the survey")
+    kept: Mapped[dict[str, Any] | None] = mapped_column(comment="Measured values of a finding before its outline changed")
+    imported_by: Mapped[str | None] = mapped_column(comment="Role that imported it with an archive of the survey")
     imported_at: Mapped[dt.datetime | None] = mapped_column(comment="When; who and at are then what the archive says")
