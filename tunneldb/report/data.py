@@ -260,10 +260,10 @@ def read_stale(conn: psycopg.Connection[Any], survey: Survey, low: float, high: 
     """Read which stages of which kilometres are out of date or have not succeeded, with the reason."""
     return _rows(
         conn,
-        "SELECT stage, coalesce(reason, CASE WHEN done_at IS NULL THEN 'not done: ' || outcome END) AS reason,"
+        "SELECT stage, coalesce(reason, 'not done: ' || outcome) AS reason, reason IS NOT NULL AND NOT outdated AS inherited,"
         " array_agg(km ORDER BY km) AS kilometres"
-        " FROM tunnel_api.stage_status WHERE survey_id = %s AND km BETWEEN %s AND %s AND (stale OR done_at IS NULL)"
-        " GROUP BY stage, step, 2 ORDER BY step, 2",
+        " FROM tunnel_internal.stage_state(%s) WHERE km BETWEEN %s AND %s AND (reason IS NOT NULL OR done_at IS NULL)"
+        " GROUP BY stage, step, 2, 3 ORDER BY step, 2",
         [survey.id, *kilometres_between(low, high)],
     )
 

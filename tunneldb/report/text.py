@@ -105,7 +105,7 @@ def stale(rows: Sequence[Row]) -> dict[str, list[tuple[str, str]]]:
     reasons: defaultdict[str, set[int]] = defaultdict(set)
     for row in rows:
         stages[row["stage"]].update(row["kilometres"])
-        if not row["reason"].endswith(" is stale"):
+        if not row["inherited"]:
             reasons[row["reason"]].update(row["kilometres"])
     return {
         "stages": [(stage, kilometres(numbers)) for stage, numbers in stages.items()],
