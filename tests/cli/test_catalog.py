@@ -127,7 +127,7 @@ def test_a_survey_and_its_tunnel_are_removed_in_this_order(tunnel: Path, conn: p
         ("x,y,z\n0,0,0\n10,0,-inf\n", ["line 3", "z is -inf"]),
         ("x,y,z\n0,0,0\n10,0\n", ["line 3", "2 values", "3 columns"]),
         ("x,y,z\n0,0,0\n\n10,0,0\n10,0,5\n", ["line 5", "same x,y"]),
-        ("x,y,z\n0,0,0\n10,0,0\n5,0,0\n", ["line 4", "turns back"]),
+        ("x,y,z\n0,0,0\n10,0,0\n5,0,0\n", ["line 4", "reverses"]),
     ],
 )
 def test_a_wrong_axis_is_refused(conn: psycopg.Connection, files: Path, text: str, parts: list[str]) -> None:

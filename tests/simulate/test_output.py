@@ -229,7 +229,7 @@ def test_full_disk_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         ({"seed": -1}, "seed is -1"),
         ({"straight": 300.0}, "straight is 300"),
         ({"leak_area": (2.0, 1.0)}, "leak area is 2 to 1"),
-        ({"invert": 5.0}, "invert lies 5 m"),
+        ({"invert": 5.0}, "invert is 5 m"),
         ({"section": "box", "height": 0.5}, "height of the box"),
         ({"section": "horseshoe", "wall_lean": 50.0}, "walls lean by 50"),
         ({"section": "horseshoe", "wall_lean": 30.0, "wall_height": 9.0}, "leave a floor"),
