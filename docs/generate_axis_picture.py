@@ -23,7 +23,7 @@ IMAGE = ROOT / "docs" / "images" / "axis-deviation.png"
 
 
 def parts(design: Design) -> list[Part]:
-    """The elements, as view alignment_element has them."""
+    """Return the elements, as in view alignment_element."""
     found = []
     for element, begin in zip(design.plan, design.start + design.distances, strict=False):
         radii = [1 / abs(c) if c else None for c in (element.curvature_from, element.curvature_to)]

@@ -146,7 +146,7 @@ def _views(conn: psycopg.Connection[Any]) -> Iterator[str]:
 
 
 def _columns(own: Columns, base: Columns, name: str) -> Iterator[str]:
-    """The table of a view's columns; of a sister view, whose other columns are those of its base view, only what differs."""
+    """Yield the table of a view's columns; for a sister view only the columns that differ from its base view."""
     if len(base.items() & own.items()) * 2 > len(own):
         geometry = [f"`{column}` ({kind}): {text}" for column, (kind, text) in own.items() if kind.startswith("geometry")]
         dropped = [f"`{column}`" for column, (kind, _) in base.items() if column not in own and not kind.startswith("geometry")]
@@ -163,7 +163,7 @@ def functions(conn: psycopg.Connection[Any]) -> str:
 
 
 def _functions(conn: psycopg.Connection[Any]) -> Iterator[str]:
-    """The paragraphs of the functions; files and database have them in the same order."""
+    """Yield the paragraphs of the functions, in the common order of files and database."""
     made = [
         (path, name)
         for path in sql_files()

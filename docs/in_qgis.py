@@ -24,7 +24,7 @@ VERTEX, SHIFT = 1235, 0.10  # the vertex at 12+350 and how far it is moved, m
 
 
 def overview(picture: str) -> Iterator[None]:
-    """The window as the project opens."""
+    """Show the window with the newly opened project."""
     yield from tidy()
     grab(picture)
 
@@ -93,7 +93,7 @@ def tidy() -> Iterator[None]:
 
 
 def editable(layer_id: str) -> QgsVectorLayer:
-    """A layer, selected and open for editing."""
+    """Return a layer, selected and open for editing."""
     layer = QgsProject.instance().mapLayer(f"tunneldb_layer_{layer_id}")
     iface.setActiveLayer(layer)
     assert layer.startEditing(), layer_id
