@@ -117,7 +117,7 @@ def judge_region(
 ) -> Anomaly | None:
     """Classify a region by its features and a model; None if it holds no point or is too small.
 
-    Leaks and dark spots must not be smaller than ``min_area``, m², joints no shorter than MIN_JOINT_LENGTH.
+    Leaks and dry dark areas must not be smaller than ``min_area``, m², joints no shorter than MIN_JOINT_LENGTH.
     """
     if not may_count(region, min_area):
         return None

@@ -75,7 +75,7 @@ def find_joints(dark: Bool, first: int, stop: int, pixel: float, spacing: float 
 
 
 def crossed_joints(chainage: Float, spacing: float) -> Float:
-    """Measure how evenly dark spots of single profiles repeat along the tunnel, as joints crossed by profiles do.
+    """Measure how evenly dry dark areas of single profiles repeat along the tunnel, as joints crossed by profiles do.
 
     A profile is never exactly parallel to the rings, and crosses the joint between two of them somewhere. The spot there looks
     like a leak narrower than the profile distance, but it repeats with the ring length.

@@ -42,7 +42,7 @@ def match(before: Sequence[Polygon], now: Sequence[Polygon], min_iou: float = MI
 def match_parts(
     before: Sequence[Polygon], reviewed: Sequence[bool], now: Sequence[Polygon], min_share: float = MIN_IOU
 ) -> dict[int, int]:
-    """Pair leaks across a kilometre boundary with earlier ones of which they are a part, or the reverse.
+    """Pair leaks across a kilometre boundary with earlier ones that contain them, or the reverse.
 
     They are the same if they share enough of the smaller one. Among several, a reviewed one is preferred, then the one
     with the largest overlap.

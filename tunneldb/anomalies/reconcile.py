@@ -166,7 +166,7 @@ def reconcile(
 
     An anomaly within the kilometre is an earlier finding if the two overlap best with each other, by at least 0.3 of their
     union, whatever their kinds. One across an end of the kilometre is an earlier finding if the two share 0.3 of the smaller:
-    so a leak of which only a part was known remains the same. Of the findings that are not found again, the reviewed ones are
+    so a leak that was known in part remains the same. Of the findings that are not found again, the reviewed ones are
     kept, and those that a dry region removes stay as they are.
 
     Parameters

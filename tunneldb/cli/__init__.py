@@ -1,1 +1,1 @@
-"""The command line: one module a verb, each thin."""
+"""The command line: one module a command, each thin."""

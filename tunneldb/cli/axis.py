@@ -1,4 +1,4 @@
-"""The verb ``axis``."""
+"""The command ``axis``."""
 
 from __future__ import annotations
 

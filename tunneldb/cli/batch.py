@@ -105,7 +105,7 @@ def batch(
 
 
 def _work(survey: Survey, dsn: str | None, count: int) -> Watch:
-    """Let workers do what is to be done, and show what becomes of it."""
+    """Start workers, and show the progress."""
     from tunneldb.cli.watch import Watch
     from tunneldb.queue.pool import WorkerPool, interrupts
     from tunneldb.queue.worker import Orders
@@ -131,7 +131,7 @@ def _busy(conn: psycopg.Connection[Any], survey: Survey) -> tuple[bool, dt.datet
 
 
 def _summary(conn: psycopg.Connection[Any], survey: Survey, watch: Watch, seconds: float, since: dt.datetime) -> int:
-    """Say what became of it; returns the exit code."""
+    """Print a summary, and return the exit code."""
     from tunneldb.cli.overview import advise, duration, number
     from tunneldb.queue.batch import failed_files, notes_of_files, results
 

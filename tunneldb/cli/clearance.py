@@ -1,4 +1,4 @@
-"""The verb ``clearance``."""
+"""The command ``clearance``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What verbs that state leaks say of them: where these can't be vouched for, and what else is to be known."""
+"""Statements of commands on leaks: where leaks could be missed, and notes and limitations."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_REMARKS = 6
 
 
 def say_remarks(remarks: Sequence[Remark], survey: Survey) -> None:
-    """Say on stderr what is to be known of the results, and tell it to ``--json``."""
+    """Print notes and limitations of the results on stderr, and add them to ``--json``."""
     tell(remarks=remarks)
     for remark in remarks[:MOST_REMARKS]:
         notify(printable(remark.said))
@@ -48,7 +48,7 @@ def say_coverage(coverage: Coverage, survey: Survey, *, on_stdout: bool = False)
 
 
 def say_no_crs(srid: int) -> None:
-    """Say on standard error what becomes of local coordinates in GeoJSON, which can't state that they are."""
+    """Warn on standard error that GeoJSON cannot state local coordinates."""
     if srid == LOCAL:
         notify(
             "GeoJSON can't say that coordinates are local: programs take them for longitude and latitude; a GeoPackage says it"

@@ -1,4 +1,4 @@
-"""The verb ``deviation``."""
+"""The command ``deviation``."""
 
 from __future__ import annotations
 

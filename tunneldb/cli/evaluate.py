@@ -1,4 +1,4 @@
-"""The verb ``evaluate``."""
+"""The command ``evaluate``."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ def evaluate(
     that an inspector rejected are left out. Nothing is changed.
 
     \b
-    recall      of the leaks or spots: share of which at least half was found; of the area: share that was found
-    precision   of the leaks or spots: share of which at least half is true; of the area: share that is true
+    recall      of the leaks or spots: share with at least half of the area found; of the area: share that was found
+    precision   of the leaks or spots: share with at least half of the area true; of the area: share that is true
     false       those that touch no true one
     area error  |found - true| / true area, median and 95 % quantile
     edge        distance between found and true outlines, median and 95 % quantile

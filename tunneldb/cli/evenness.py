@@ -1,4 +1,4 @@
-"""The verb ``evenness``."""
+"""The command ``evenness``."""
 
 from __future__ import annotations
 

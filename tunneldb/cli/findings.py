@@ -1,4 +1,4 @@
-"""The verbs ``findings`` and ``findings import``."""
+"""The commands ``findings`` and ``findings import``."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tunneldb.store.survey import Survey, get_survey
 
 
 class _FindingsGroup(VerbGroup):
-    """Its verb is ``list`` where none is named: ``tunneldb findings SURVEY``."""
+    """Its command is ``list`` where none is named: ``tunneldb findings SURVEY``."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if args and args[0] not in self.commands and args[0] not in ctx.help_option_names:
@@ -38,7 +38,7 @@ class _FindingsGroup(VerbGroup):
         return super().parse_args(ctx, args)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return a verb; what names none is a survey that is to be listed."""
+        """Return a command; what names none is a survey that is to be listed."""
         return super().get_command(ctx, cmd_name) or super().get_command(ctx, "list")
 
 

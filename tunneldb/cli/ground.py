@@ -1,4 +1,4 @@
-"""The verb ``ground``."""
+"""The command ``ground``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The verb ``image``."""
+"""The command ``image``."""
 
 from __future__ import annotations
 

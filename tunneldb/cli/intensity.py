@@ -1,4 +1,4 @@
-"""The verb ``intensity``."""
+"""The command ``intensity``."""
 
 from __future__ import annotations
 

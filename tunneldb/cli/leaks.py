@@ -1,4 +1,4 @@
-"""The verb ``leaks``."""
+"""The command ``leaks``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The verb ``learn``."""
+"""The command ``learn``."""
 
 from __future__ import annotations
 

@@ -177,7 +177,7 @@ def _summary(connection: psycopg.Connection[Any], survey: Survey, done: list[Loa
 
 
 def say_notes(notes: Iterable[tuple[str, str]]) -> None:
-    """Say what is to be known of files (name, note) on standard error, a line for all of which it is the same."""
+    """Print notes on files (name, note) on standard error, one line for equal notes."""
     noted: dict[str, list[str]] = {}
     for name, note in notes:
         noted.setdefault(note, []).append(name)

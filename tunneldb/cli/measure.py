@@ -30,7 +30,7 @@ layer_option = click.option("--layer", type=LAYERS, default="lining", show_defau
 
 
 def every_option(default: float = 100.0, text: str = "Length of the listed stretches, m.", shown: str | bool = True) -> Any:
-    """Return the option --every: a length in m, of which rows are listed."""
+    """Return the option --every: length of the listed rows, m."""
     return click.option("--every", type=FiniteRange(1.0), default=default, show_default=shown, metavar="M", help=text)
 
 

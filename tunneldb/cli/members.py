@@ -1,4 +1,4 @@
-"""The verb ``members``."""
+"""The command ``members``."""
 
 from __future__ import annotations
 

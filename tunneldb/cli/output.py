@@ -1,8 +1,8 @@
-"""What all verbs have in common: their help as a manual page, and ``--json``.
+"""What all commands have in common: their help as a manual page, and ``--json``.
 
-Under ``--json`` standard output holds exactly one JSON object, also when the verb fails; what the verb would print there
+Under ``--json`` standard output holds exactly one JSON object, also when the command fails; what the command would print there
 for people is left out. Keys that every object has: ``verb``, ``ok``, ``exit_code``, ``seconds``; ``error`` where there is
-one. The others are what the verb told.
+one. The others are what the command told.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class Verb(click.Command):
     examples : sequence of str
         Command lines to copy.
     wrong : str
-        What exit code 1 means; empty when the verb does not have it.
+        What exit code 1 means; empty when the command does not have it.
     """
 
     def __init__(self, *arguments: Any, examples: Sequence[str] = (), wrong: str = "", **options: Any) -> None:
@@ -114,12 +114,12 @@ class Verb(click.Command):
         self.params.append(click.Option([JSON], is_flag=True, expose_value=False, help=help_))
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Note which verb it is, before what stands after it can be wrong."""
+        """Note which command it is, before what stands after it can be wrong."""
         ctx.meta[_VERB] = ctx.command_path.partition(" ")[2]
         return super().parse_args(ctx, args)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write what the verb appends, then examples and exit codes."""
+        """Write what the command appends, then examples and exit codes."""
         super().format_epilog(ctx, formatter)
         write_lines(formatter, "Examples", self.examples)
         codes = {"0": DONE, "1": self.wrong, "2": AT_FAULT}
@@ -128,13 +128,13 @@ class Verb(click.Command):
 
 
 class VerbGroup(click.Group):
-    """A group whose commands are verbs."""
+    """A group whose commands are commands."""
 
     command_class = Verb
 
 
 def verb(name: str | None = None, cls: type[Verb] = Verb, **options: Any) -> Callable[[Callable[..., Any]], Verb]:
-    """Return the decorator that makes a verb of a function; options are those of `Verb`."""
+    """Return the decorator that makes a command of a function; options are those of `Verb`."""
     return click.command(name, cls=cls, **options)
 
 
@@ -147,14 +147,14 @@ def write_lines(formatter: click.HelpFormatter, title: str, lines: Sequence[str]
 
 
 def run_as_json(ctx: click.Context, run: Callable[[], Any], describe: Callable[[Exception], str | None]) -> int:
-    """Run a verb, print its JSON object, and return the exit code.
+    """Run a command, print its JSON object, and return the exit code.
 
     Parameters
     ----------
     ctx
         Context of the whole program.
     run
-        Runs the verb.
+        Runs the command.
     describe
         Returns the one line for an error that is not a bug. Bugs are raised on.
     """

@@ -61,7 +61,7 @@ def render(seen: Overview) -> RenderableType:
 
 
 def _kilometres(seen: Overview) -> FittedTable:
-    """Return a row a kilometre, or for several in a row of which the same is to be said."""
+    """Return a row for each kilometre, or for several consecutive ones with equal content."""
     entries = [
         (km, tuple(cells[stage].state for stage in STAGE_NAMES), remark(km, seen)) for km, cells in seen.kilometres.items()
     ]
@@ -175,7 +175,7 @@ def _to_do(advices: Iterable[Advice]) -> Group:
 
 
 def advise(seen: Overview) -> list[Advice]:
-    """Return what does not get done by itself, each with the command that mends it, and what that alone would not mend."""
+    """Return problems that need a command, each with that command and what it does not fix."""
     found: dict[tuple[str, str, str], list[int]] = {}
     for file in seen.files:
         if file.state == "failed":

@@ -1,4 +1,4 @@
-"""The verb ``profile``: design profiles of a tunnel."""
+"""The command ``profile``: design profiles of a tunnel."""
 
 from __future__ import annotations
 

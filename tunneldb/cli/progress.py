@@ -1,4 +1,4 @@
-"""How far a verb has come: a bar on the terminal with rate and time left, nothing in a pipe."""
+"""How far a command has come: a bar on the terminal with rate and time left, nothing in a pipe."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class _Notice:
         self.attached = True
 
     def count(self, step: int) -> None:
-        """Count a function, the compiling of which begins (1) or ends (-1) inside of others."""
+        """Count a function whose compilation begins (1) or ends (-1) inside others."""
         now = time.monotonic()
         self.seconds += now - self.since if self.depth else 0.0
         self.since = now

@@ -1,4 +1,4 @@
-"""The verb ``qgis``."""
+"""The command ``qgis``."""
 
 from __future__ import annotations
 

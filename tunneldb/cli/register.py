@@ -1,4 +1,4 @@
-"""The verb ``register``."""
+"""The command ``register``."""
 
 from __future__ import annotations
 

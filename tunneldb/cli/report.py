@@ -1,4 +1,4 @@
-"""The verb ``report``."""
+"""The command ``report``."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def report(
 def _write_site(
     conn: psycopg.Connection, survey: Survey, output: Path, browser: str | None, asked: str | None, owner: Owner
 ) -> None:
-    """Write the report of a site, of which structures are all there is, and say what it counts."""
+    """Write the report of a site, which has structures only, and print its counts."""
     if asked:
         raise UserError(f"{asked}: survey {survey.name} is of a site, which has no chainage: leave --from and --to out")
     with exit_on_sigterm(), replacing(output) as temporary, bar("reports") as shown:

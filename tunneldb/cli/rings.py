@@ -1,4 +1,4 @@
-"""The verb ``rings``."""
+"""The command ``rings``."""
 
 from __future__ import annotations
 

@@ -280,10 +280,10 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
     OUT/NAME.trajectory.csv  time,x,y,z (profiler)
     OUT/NAME.reference.csv   range_m,intensity_db of a 30 % target
     OUT/NAME.truth.npz       chainage, arc, offset, class and leak of each point, in file order;
-                             class 0 lining, 1 floor, 2 appendage, 3 niche, 4 outlier, 5 rail, 6 object, 7 target
+                             class 0 lining, 1 floor, 2 fixture, 3 niche, 4 outlier, 5 rail, 6 object, 7 target
                              sphere; leak -1 for none; thing, where something stands free: its number, 0 for none
     OUT/NAME.truth.geojson   leaks as polygons in the plane (chainage, arc), with drips as multipolygons
-    OUT/NAME.truth.gpkg      the same as layer leak; layer dry: what is dark but dry (joint, pocket, patch, paint,
+    OUT/NAME.truth.gpkg      the same as layer leak; layer dry: what is dry dark areas (joint, pocket, patch, paint,
                              stripe, soot, grime, halo, chamfer, shade); layer bright, if any: what is brighter
                              (salts, fringe, patch, paint, stripe, shade), its drop negative; layer deformation,
                              of a later scan: what moved (wall, ring, bulge), m inwards
@@ -291,7 +291,7 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
                              (right, up), radius, ovality (share of the diameter), largest_clock, and the greatest
                              step_greatest at its beginning and lip between segments, positive inwards, with their arc
     OUT/NAME.spheres.csv     id,x,y,z,radius,kind of the target spheres, if any; id is their number among the things
-    OUT/NAME.json            all parameters, appendages, niches, things that stand free
+    OUT/NAME.json            all parameters, fixtures, niches, objects
 
     The kind of a leak is wall, joint, niche, cable, foot, springline, pocket, ring or panel.
 

@@ -50,8 +50,8 @@ def _option(name: str, metavar: str, text: str, kind: Any = FINITE, nargs: int =
 def simulate_structure(out: Path, **given: Any) -> None:
     """Simulate a scan of a structure, with its reference data, in the folder OUT.
 
-    Profiles, pipes with elbows and flanges, a cable tray, a grating of wires and a bundle of cables stand before a wall of
-    two materials; posts and pipes in front hide strips of them. Painted, bare, galvanised and rusty steel, brick and
+    Profiles, pipes with elbows and flanges, a cable tray, a grating of wires and a bundle of cables are in front of
+    a wall of two materials; posts and pipes in front hide strips of them. Painted, bare, galvanised and rusty steel, brick and
     concrete each have a law of reflectance of their own. Some faces carry rust, stains, cracks or bright flakes.
 
     \b

@@ -1,4 +1,4 @@
-"""The verb ``spheres``."""
+"""The command ``spheres``."""
 
 from __future__ import annotations
 

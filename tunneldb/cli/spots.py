@@ -1,4 +1,4 @@
-"""The verb ``spots``."""
+"""The command ``spots``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rings of a survey, as the verb ``rings`` does them."""
+"""Rings of a survey, as the command ``rings`` does them."""
 
 from __future__ import annotations
 

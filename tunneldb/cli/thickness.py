@@ -1,4 +1,4 @@
-"""The verb ``thickness``."""
+"""The command ``thickness``."""
 
 from __future__ import annotations
 

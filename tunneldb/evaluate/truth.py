@@ -144,7 +144,7 @@ def _ids(meta: dict[str, Any], columns: list[NDArray[Any]], count: int) -> list[
 
 
 def _polygons(wkb: NDArray[np.object_], ids: list[str], where: str, noun: str) -> list[Polygon | MultiPolygon]:
-    """Parse geometries, each of which must be a polygon or a multipolygon."""
+    """Parse geometries, which must be polygons or multipolygons."""
     shapes = []
     for key, data in zip(ids, wkb, strict=True):
         try:

@@ -83,9 +83,9 @@ def work_at_stake(conn: psycopg.Connection[Any], survey: Survey, names: Sequence
 def remove_files(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[str], begin: Begin = silent) -> Removed:
     """Remove files from a survey, and from the list of those that a batch must read.
 
-    Thinning looks at all files of a kilometre together, so files that overlap one withdrawn are read again. That is one
+    Thinning looks at all files of a kilometre together, so files that overlap a removed one are read again. That is one
     transaction, each kilometre that is loaded anew without the files another. One that is left without points loses its
-    partition and all that was made of it. What was cut off is finished when the files are withdrawn again.
+    partition and all that was made of it. After an interruption, the next call completes the removal.
 
     Parameters
     ----------

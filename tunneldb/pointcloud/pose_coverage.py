@@ -137,7 +137,7 @@ def _covers(ends: tuple[float, float], time: Float) -> Bool:
 
 
 def _in_gap(gaps: Float, time: Float) -> Bool:
-    """Return True for times (n,) in gaps, of which there may be thousands."""
+    """Return True for times (n,) in gaps; there can be thousands."""
     if not len(gaps):
         return np.zeros(len(time), np.bool_)
     last = np.searchsorted(gaps[:, 0] + TIME_TOLERANCE, time) - 1  # last gap that begins before

@@ -43,7 +43,7 @@ def plain_statistics(values: NDArray[np.floating]) -> DryLevel:
 
 
 def robust_statistics(values: NDArray[np.floating], shorth: float = SHORTH, *, two_sided: bool = False) -> DryLevel:
-    """Compute mean and standard deviation of the dry part of values of which up to about 30 % are wet.
+    """Compute mean and standard deviation of the dry part of values; up to about 30 % may be wet.
 
     Wet lining is darker, so that it shifts mean, median and standard deviation. The shortest interval with 40 % of the values
     is within the dry part. Above its middle hardly anything is wet, so the median deviation there gives a first σ. Values

@@ -257,7 +257,7 @@ def read_runs(conn: psycopg.Connection[Any], survey: Survey, low: float, high: f
 
 
 def read_stale(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
-    """Read which stages of which kilometres are out of date or have not succeeded, with the reason."""
+    """Read stages that are out of date or have not succeeded, by kilometre, with the reason."""
     return _rows(
         conn,
         "SELECT stage, coalesce(reason, 'not done: ' || outcome) AS reason, reason IS NOT NULL AND NOT outdated AS inherited,"

@@ -313,8 +313,8 @@ def _seen(place: _Place, side: float, kilometre: _Kilometre) -> UInt8:
 def _accumulate(values: Single, state: UInt8, hidden: Bool, row: Intp, column: Intp) -> Single:
     """Sum up the pixels that fall into each coarser one.
 
-    How many hold points, their intensities added up, how many are lining, lining that was not seen, what hangs before it,
-    floor or water. (6, rows, columns).
+    How many hold points, their intensities added up, how many are lining, lining not inspected, fixtures, floor or
+    water. (6, rows, columns).
     """
     floor = (state == PixelState.FLOOR) | (state == PixelState.SUBMERGED) | (state == NO_STATE)
     off = state == PixelState.OFF

@@ -18,7 +18,7 @@ class Work:
     Attributes
     ----------
     anomalies : int
-        Leaks and other dark spots there, as detected.
+        Leaks and other dry dark areas there, as detected.
     reviewed : int
         Of them, those that somebody has reviewed.
     edited : int

@@ -20,7 +20,7 @@ class DryRegion:
 
     ``leak_ids`` are the open leaks that lie in it by half: they are kept,
     but not counted. One that has ``pending_approval`` for an
-    operator takes nothing away yet; ``approved_by`` is who put in force one that had to.
+    operator takes nothing away yet; ``approved_by`` is who approved it.
     """
 
     id: int

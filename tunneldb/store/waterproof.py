@@ -14,7 +14,7 @@ Begin = Callable[[str, float | None], Callable[[float], None]]
 def keep_missing(conn: psycopg.Connection[Any], begin: Begin) -> int:
     """Work out and keep the statistics of all kilometres that have none; each is committed by itself.
 
-    Views are right without them, and slower. Who is cut off has kept what was done: the next call goes on with the rest.
+    Views are right without them, and slower. After an interruption the next call continues with the rest.
 
     Parameters
     ----------

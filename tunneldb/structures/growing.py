@@ -1,7 +1,7 @@
 """Faces grown over voxels: planes and cylinders (Ono et al., 3.1, with models in the place of normals alone).
 
 From the flattest voxel on, a plane is grown over its neighbours, and where normals turn about an axis a cylinder, too; the
-one that explains more points stays. Each voxel is held against the face's own model: the distance of its centroid, the spread
+one that explains more points stays. Each voxel is compared with the face's own model: the distance of its centroid, the spread
 of its points and its normal.
 """
 

@@ -3,8 +3,8 @@
 Geometry alone cannot tell a brick wall from the concrete beside it, and the paper's histogram of both has two heads. A stain or
 rust does not end on a straight line over the whole of a wide face; a wall of another material does, and so does most of what is
 beyond the line where rust covers the line itself. The step is looked for between places that lie close to each other, so that
-neither incidence nor range has a part in it, and over the whole of a plane: what stands before a wall parts it into faces, of
-which each shows but a piece of the line.
+neither incidence nor range has a part in it, and over the whole of a plane: objects in front of a wall divide it
+into faces, and each shows only a part of the line.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Significant differences of a face's pixels: means over windows of several sizes.
 
 The paper asks 3σ of a single point (Ono et al., 3.4). Of hundred thousand pixels some hundred lie beyond that by chance, while
-a patch of a thousand that differ by 2σ each is none. So means over windows are held against the scatter of such means on the
+a patch of a thousand that differ by 2σ each is none. So means over windows are compared with the scatter of such means on the
 face itself, unevenness of the surface with it, and asked so much that in a whole structure hardly one window passes by chance.
 """
 

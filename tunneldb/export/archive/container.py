@@ -1,7 +1,7 @@
 """File of an archive: a ZIP (ZIP64) with Zstandard frames as members, and a manifest that describes each of them.
 
-Nothing is unpacked to disk: members are asked for by the names that the database's own tables give them. What a file from
-elsewhere says of itself is held against what is read of it, and no more is read than it announces.
+Nothing is unpacked to disk: members are asked for by the names that the database's own tables give them. The
+manifest of a file is compared with its content, and no more is read than it announces.
 """
 
 from __future__ import annotations

@@ -104,8 +104,9 @@ def write_survey_dxf(
 
     The tunnel lies in its SRID, lines in space at their height, what is flat at height 0. Below the map lies the unrolled
     lining, arc upwards and chainage to the right, and below that the profiles side by side, as seen looking up-chainage.
-    What an inspector rejected isn't drawn. Where leaks could be missed is drawn on the unrolled lining; in words, and with what
-    else is to be known of the results, it stands above the map, and in the properties ``Coverage`` and ``Remark 1``, ….
+    What an inspector rejected isn't drawn. Where leaks could be missed is drawn on the unrolled lining; in words,
+    and with notes and limitations of the results, it stands above the map,
+    and in the properties ``Coverage`` and ``Remark 1``, ….
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ APPLICATION = "TUNNELDB"
 
 @dataclass(frozen=True)
 class Spot:
-    """A leak, a joint or a dark spot.
+    """A leak, a joint or a dry dark area.
 
     Attributes
     ----------

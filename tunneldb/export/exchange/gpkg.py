@@ -73,8 +73,8 @@ def write_survey_gpkg(
     """Write a stretch of a survey as a GeoPackage, and return the number of rows of each layer.
 
     Layers on the map and in space are in the tunnel's SRID; those of the unrolled plane (chainage, arc; m), and of local
-    coordinates, in an undefined Cartesian system. QGIS finds the styles in the table ``layer_styles``. What is to be known of
-    the results is in the table ``remark``.
+    coordinates, in an undefined Cartesian system. QGIS finds the styles in the table ``layer_styles``. Notes and
+    limitations of the results are in the table ``remark``.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def write_survey_gpkg(
     surface : Surface
         The survey's surface, which holds the stretch.
     low, high : float
-        Chainage, m. What reaches into the stretch is written whole, only the axis is cut; of leaks and other dark spots what
+        Chainage, m. What reaches into the stretch is written whole, only the axis is cut; of leaks and dry dark areas what
         reaches into the survey's part of it.
     path : Path
         File that isn't there yet.

@@ -43,8 +43,9 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
 
     The GeoTIFFs hold dB or m as single-precision numbers, NaN where no point fell, the state of a pixel, or the code of a
     class, 0 where no point fell; x is the chainage and y the arc, m. Each file appears whole. Classes are there when stage
-    ground has run: they are computed from the offset image and what that stage has stored. Deviation is there of each layer
-    that the survey was held against. Where sonar scans were loaded, the bed and what they saw, unrolled, are written, too.
+    ground has run: they are computed from the offset image and what that stage has stored. Deviation is written for
+    each layer that the survey was compared with.
+    Where sonar scans were loaded, the bed and what they saw, unrolled, are written, too.
 
     Returns
     -------

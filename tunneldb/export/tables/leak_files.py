@@ -1,4 +1,4 @@
-"""Leaks, joints and other dark spots as CSV, GeoJSON or GeoPackage."""
+"""Leaks, joints and other dry dark areas as CSV, GeoJSON or GeoPackage."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def as_csv(leaks: LeakList) -> str:
     """Write leaks as CSV with a header; the last column, ``geometry``, is WKT.
 
     First come the stretches for which they can't be vouched for: their ``kind`` is the state of the stretch, ``reasons`` says
-    why, and ``counted`` is False. Then what else is to be known, of the kind ``remark``, in ``reasons``.
+    why, and ``counted`` is False. Then notes and limitations, of the kind ``remark``, in ``reasons``.
     """
     rows: list[dict[str, Any]] = []
     for gap in leaks.coverage.gaps:
@@ -62,7 +62,7 @@ def as_geojson(leaks: LeakList, geometry: Geometry, srid: int) -> str:
 
     Map and space carry the tunnel's coordinate system in a ``crs`` member, as GDAL and QGIS read it; the
     unrolled plane and local coordinates have none. Further members are what ``--json`` tells, too: ``statement`` and ``gaps``
-    say for which stretches the list can't be vouched for, ``remarks`` what else is to be known, ``count`` and ``area`` sum up.
+    say for which stretches the list can't be vouched for, ``remarks`` notes and limitations, ``count`` and ``area`` sum up.
     """
     collection: dict[str, Any] = {"type": "FeatureCollection", "name": layer_name(geometry, leaks.kind)}
     if geometry != "unrolled" and srid != LOCAL:
@@ -86,8 +86,8 @@ def as_geojson(leaks: LeakList, geometry: Geometry, srid: int) -> str:
 def write_gpkg(path: Path, leaks: LeakList, geometry: Geometry, srid: int) -> None:
     """Write leaks as a GeoPackage with one layer; the unrolled plane and local coordinates are undefined Cartesian there.
 
-    Where the list can't be vouched for, is in a table ``coverage_gap`` beside it, if there is such a stretch, and what else is
-    to be known in a table ``remark``, if there is anything; both are in the description of the layer, too.
+    Where the list can't be vouched for, is in a table ``coverage_gap`` beside it, if there is such a stretch, and
+    notes and limitations in a table ``remark``, if there is anything; both are in the description of the layer, too.
     """
     rows = leaks.rows
     data = {

@@ -1,4 +1,4 @@
-"""Leaks, joints and other dark spots laid out as a table; as files: leak_files."""
+"""Leaks, joints and other dry dark areas laid out as a table; as files: leak_files."""
 
 from __future__ import annotations
 

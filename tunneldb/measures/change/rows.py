@@ -68,7 +68,7 @@ def load_blocks(
 
 
 def load_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Leak]:
-    """Load the findings that count between two chainages (m), also partly: leaks, joints, other dark spots."""
+    """Load the findings that count between two chainages (m), also partly: leaks, joints, other dry dark areas."""
     rows = conn.execute(
         "SELECT id, coalesce(kind_override, kind), wet, area, contrast, public.ST_AsBinary(unrolled) FROM tunnel.finding"
         " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected'"

@@ -169,7 +169,7 @@ def _seen_parts(within: Float, cell: Int64, seen: Bool, half: float, closed: boo
 def _slope(mean: Float, closed: bool) -> Float:
     """Return the slope of the mean from cell to cell, (n,): the smaller of both sides, 0 where they differ in sign.
 
-    So a step, or an unseen neighbour, makes no slope.
+    So a step, or a neighbour not inspected, makes no slope.
     """
     rise = np.diff(mean, prepend=mean[-1] if closed else np.nan)
     after = np.roll(rise, -1)

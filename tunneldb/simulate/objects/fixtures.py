@@ -1,6 +1,6 @@
 """Fixtures on the lining and recesses in it: cables, trays, boxes, lamps, rails, refuge niches.
 
-An appendage is a tube or a bar swept along the tunnel: its cross-section is constant in (u, w) between two
+A fixture is a tube or a bar swept along the tunnel: its cross-section is constant in (u, w) between two
 chainages. A niche is a rectangular recess, straight (not curved with the tunnel), including its floor.
 """
 

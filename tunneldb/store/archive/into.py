@@ -44,7 +44,7 @@ def _copy_in(
 def insert_rows(conn: psycopg.Connection[Any], table: Table, old: int, new: int) -> tuple[int, int]:
     """Insert a table's staged rows; return how many, and how many were left out.
 
-    Of two surveys, the row of which one is not in this database is left out, and so is one that names a finding of it that is
+    A row of two surveys is left out if one is not in this database, and so is one that names a finding of it that is
     not there.
 
     Parameters

@@ -164,7 +164,7 @@ def with_hollows(old: CellSums, new: CellSums) -> tuple[Cells, Cells]:
 
 
 def without_edges(cells: Cells) -> Cells:
-    """Return cells without those beside unseen parts, where the unseen part is at least 3 by 3 cells.
+    """Return cells without those beside parts not inspected of at least 3 by 3 cells.
 
     At the foot of a wall, and beside fixtures, cells contain mixed pixels, which differ between epochs. The smoothing in
     the state of pixels reaches one cell further.

@@ -123,7 +123,7 @@ def state_of(group: Group, old: tuple[float, float], new: tuple[float, float], s
 
 
 def _named_otherwise(group: Group, was: bool) -> bool:
-    """Return True if half of the wet area of one survey is another kind in the other; a dark spot beside it does not count."""
+    """Return True if half of the wet area of one survey is another kind in the other."""
     there, beside = (group.old, group.new) if was else (group.new, group.old)
     wet = shapely.union_all([leak.outline for leak in there if leak.wet])
     other = shapely.union_all([leak.outline for leak in beside])

@@ -22,7 +22,7 @@ _BLOCK_ROWS = 64  # in a block of a thread
 
 @dataclass(frozen=True)
 class Gaps:
-    """Gaps beneath straightedges, arrays (rows, cells) like the heights; NaN where unseen or not measured.
+    """Gaps beneath straightedges, arrays (rows, cells) like the heights; NaN where not inspected or not measured.
 
     Attributes
     ----------

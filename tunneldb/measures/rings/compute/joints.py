@@ -261,7 +261,7 @@ def _chain(places: Float, weight: Float, local: Float) -> Int64:
 def _in_row(seen: Float, local: Float) -> Bool:
     """Return True for joints where the joints before or behind predict them, (n,).
 
-    A joint off from both sides is another peak beside an unseen joint: a ring of another length shifts all joints behind it.
+    A joint off from both sides is another peak beside a hidden joint: a ring of another length shifts all joints behind it.
     """
     kept = np.ones(len(seen), np.bool_)
     for _ in range(_STRAY_ROUNDS):
@@ -287,7 +287,7 @@ def _in_row(seen: Float, local: Float) -> Bool:
 
 
 def _filled(seen: Float, local: Float, pitch: float) -> Joints:
-    """Insert unseen joints evenly between seen ones."""
+    """Insert hidden joints evenly between detected ones."""
     if len(seen) < 4:
         raise NoRingsError("places that look like joints form no regular series")
     gaps = np.diff(seen)
