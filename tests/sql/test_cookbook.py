@@ -623,10 +623,10 @@ def most_uneven(rows: Rows, a: Asked) -> None:
     assert [row["gap_mm"] for row in rows] == [32 - n for n in range(10)]
 
 
-def deviation_stale(rows: Rows, a: Asked) -> None:
-    """An edited vertex makes the image stale on which it rests."""
-    (row,) = rows
-    assert (row["km"], row["layer"], row["done_at"]) == (12, "lining", None)
+def measures_stale(rows: Rows, a: Asked) -> None:
+    """An edited vertex makes the image stale that the deviation is computed from."""
+    (row,) = [row for row in rows if row["stage"] == "deviation"]
+    assert (row["km"], row["subject"], row["done_at"], row["blocked_by"]) == (12, "lining", None, "detect")
     assert row["reason"].startswith("detect is stale: ")
 
 
@@ -692,18 +692,18 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which leaks does a repair cover?": repaired,
     "Which leaks lie in a part of the map?": on_the_map,
     "Which leaks are near a niche?": by_the_niche,
-    "Which leaks may go on behind something that stands before them?": behind,
+    "Which leaks may continue behind an object in front of them?": behind,
     "Which deserve a second look?": second_look,
     "How much of each kilometre is wet?": kilometres,
-    "How much of each 100 m?": hundreds,
-    "Of a stretch?": stretch,
-    "Which class of waterproofing does a stretch keep, and what breaks the others?": classes,
+    "How much of each 100 m is wet?": hundreds,
+    "How much of a stretch is wet?": stretch,
+    "Which class of waterproofing does a stretch meet, and which limits are exceeded?": classes,
     "Where are the worst 100 m² of a stretch?": worst,
-    "Which class does each kilometre keep?": kilometre_classes,
+    "Which class does each kilometre meet?": kilometre_classes,
     "Which rings of a segmental lining are the wettest?": rings,
-    "How far is the review?": progress,
+    "What is the progress of the review?": progress,
     "Who confirmed which leaks of a stretch, and when?": confirmed,
-    "What became of a leak?": history,
+    "What is the history of a leak?": history,
     "Who reviewed how many leaks?": reviewers,
     "What changed since a date?": changes,
     "Which leaks were found for the first time in the last week?": new,
@@ -717,24 +717,24 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Where is the tunnel steepest?": steep,
     "Which vertices of the axis are not measured?": not_measured,
     "How many points lie in a stretch, and how bright are they?": points,
-    "On what do they lie?": lie_on,
+    "On which classes of objects do they lie?": lie_on,
     "Where are the points too sparse?": sparse,
-    "What stands in the tunnel?": tall,
+    "Which objects are in the tunnel?": tall,
     "How high is the ground, and how wide?": ground,
     "How well do the scans agree on a target sphere?": spheres,
     "Where does a loading gauge fail?": gauge_fails,
     "What is the least margin of each 100 m?": least_margins,
     "What causes the tightest places?": tightest,
     "How many m³ of underbreak are there per 100 m?": underbreaks,
-    "Which ten sections stand most inside the profile?": most_inside,
-    "Over which stretches does lining stand more than 50 mm inside?": bulges,
-    "What would an axis that is wrong by 10 mm change of it?": wrong_axis,
-    "How many m² of a stretch stand more than 50 mm off the profile?": off_the_profile,
-    "Where is less than 0.2 m put on since an earlier survey?": thin,
-    "How many m³ were put on per 100 m, and how many m² are thinner than 0.2 m?": put_on,
+    "Which ten sections have the most underbreak?": most_inside,
+    "In which stretches does the lining protrude more than 50 mm into the profile?": bulges,
+    "How does an axis error of 10 mm change the volumes?": wrong_axis,
+    "How many m² of a stretch deviate more than 50 mm from the profile?": off_the_profile,
+    "Where is the new layer thinner than 0.2 m?": thin,
+    "How many m³ were applied per 100 m, and how many m² are thinner than 0.2 m?": put_on,
     "How much of each 100 m is uneven?": uneven,
     "Which ten places are the most uneven?": most_uneven,
-    "Is the deviation of each kilometre up to date?": deviation_stale,
+    "Which measures are out of date, and why?": measures_stale,
     "Which rings are oval by more than 5 ‰?": oval,
     "Which are the ten greatest steps between rings?": great_steps,
     "How has a chord changed since another survey?": converged,
@@ -743,21 +743,21 @@ CHECKS: dict[str, Callable[[Rows, Asked], None]] = {
     "Which leaks grew most?": grown_leaks,
     "Which ten sections moved most, and which changed their shape most?": moved_sections,
     "How much of the lining changed, per 100 m?": changed_area,
-    "What did the newer survey not see?": not_seen,
+    "Which parts did the newer survey not inspect?": not_seen,
     "How many leaks per km do all tunnels have, by class of waterproofing?": all_by_class,
     "Which tunnels became wetter since their last survey?": wetter,
     "Which leaks of all tunnels are not reviewed yet?": open_of_all,
-    "How far is the review of each survey of all tunnels?": review_of_all,
-    "How many findings of each kind are there, and how did they come about?": kinds,
+    "What is the progress of the review in each survey of all tunnels?": review_of_all,
+    "How many findings of each kind and origin are there?": kinds,
     "Which cracks are longer than a metre, the most severe first?": cracks,
     "Which severe findings have no photo?": without_photo,
     "Who drew what, and when?": drawers,
-    "Which findings do not count, and what stands for them?": not_counted,
-    "What did detection find of what was drawn?": found_too,
+    "Which findings are not counted, and why?": not_counted,
+    "Which drawn findings were also detected?": found_too,
     "Which findings wait to be measured?": to_measure,
-    "What did dry regions take away?": dry_regions,
+    "Which leaks do dry regions exclude?": dry_regions,
     "How much of each element is in which condition?": conditions,
-    "How was a finding before it was redrawn?": before_redrawn,
+    "What was the outline of a finding before it was redrawn?": before_redrawn,
 }
 
 
