@@ -29,9 +29,7 @@ MAX_PATCH_DISTANCE = 0.3  # m; greatest distance between compared patches
 MAX_NEIGHBOURS = 3  # known scans that a scan is adjusted with
 MAX_SHIFT = 1.0  # m along the canal: greatest shift by the fit; beyond it, the scan has slid to another place
 SLIDES = np.arange(-6, 7) * 0.1  # m along the canal: shifts at which a fitted scan is tried again
-MIN_LOG_RATIO = float(
-    np.log(30.0 * MAX_PLACES * len(SLIDES))
-)  # required likelihood ratio of the best of so many trials to no match
+MIN_LOG_RATIO = float(np.log(30.0 * MAX_PLACES * len(SLIDES)))  # log likelihood ratio of the best trial to no match
 PLACE_TOLERANCE = 0.1  # m between two poses that are the same
 OUTLIER_SHARE = 0.05  # share of a bed's patches that differ from another scan: objects, false echoes
 STRIP_WIDTH = 0.5  # m across: width of strips in which the bed has one height along the canal

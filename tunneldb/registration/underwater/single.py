@@ -29,10 +29,7 @@ MIN_OTHER_PLACE_RATIO = 0.6  # share of the best likelihood below which another 
 WATERLINE_SIGMA = 0.15  # standard deviation of the top of a scan's walls, m
 MIN_EDGES, MAX_WATER_ERROR = 6, 0.2  # least number of wall edges; greatest error of the water level, m (less than a rung)
 PLACE_TOLERANCE, TURN_TOLERANCE = 0.15, np.radians(3.0)  # differences of two candidates with the same pose
-MIN_AIR_HEIGHT, MAX_AIR_SHARE = (
-    0.2,
-    0.15,
-)  # height above the water, m, and share of a scan's points there by echoes off the surface
+MIN_AIR_HEIGHT, MAX_AIR_SHARE = 0.2, 0.15  # height above the water, m; greatest share of a scan's points above it
 MAX_LADDER_RANGE = 12.0  # m from the scanner
 SIGHT_RANGE = 7.0  # m: a closer ladder must be visible, or the pose is wrong: its bars are two beams apart
 
