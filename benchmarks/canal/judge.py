@@ -13,7 +13,7 @@ from benchmarks.canal.scenes import CHECK_REACH, Case, check_points, true_places
 from tunneldb.arrays import Float
 from tunneldb.classification.underwater import WaterClass, classify, spacing_of_rays
 from tunneldb.errors import UserError
-from tunneldb.pipeline.load_sonar import FARTHEST
+from tunneldb.pipeline.load_sonar import MAX_SONAR_RANGE
 from tunneldb.registration.underwater import Registration, SonarPose
 from tunneldb.registration.underwater.block import register
 from tunneldb.simulate.canal import FALSE, SonarScan
@@ -105,7 +105,7 @@ def _classes(case: Case, pose: SonarPose, true: SonarScan) -> tuple[dict[str, An
     scene = case.scene
     space = pose.scale * true.points @ pose.rotation.T + pose.translation
     reach = np.linalg.norm(space - pose.translation, axis=1)
-    near = reach < FARTHEST
+    near = reach < MAX_SONAR_RANGE
     space, reach, kind = space[near], reach[near], true.kind[near]
     stationed = scene.line.stationed(scene.line.to_local(space))
     along, across = stationed[:, 0] + 0.5 * scene.parameters.length, -stationed[:, 1]

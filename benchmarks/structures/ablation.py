@@ -71,14 +71,14 @@ def _by_histogram(angle: Float, range_m: Float, value: Float, points: Float, *_:
 
     In place of `level_curve`, whose further arguments say nothing to it.
     """
-    usable = angle <= np.radians(level.STEEPEST)
+    usable = angle <= np.radians(level.MAX_INCIDENCE)
     which = (angle[usable] / CLASS).astype(np.int64)
-    held = [k for k in np.unique(which).tolist() if points[usable][which == k].sum() >= level.FEWEST]
+    held = [k for k in np.unique(which).tolist() if points[usable][which == k].sum() >= level.MIN_LEVEL_POINTS]
     if not held:
         return level.UNKNOWN
     modes = [robust_statistics(value[usable][which == k], level.SHORTH, two_sided=True) for k in held]
     middles = (np.array(held) + 0.5) * CLASS
-    sigma = np.maximum([mode.sigma for mode in modes], level.LEAST_SIGMA)
+    sigma = np.maximum([mode.sigma for mode in modes], level.MIN_SIGMA)
     return LevelCurve(middles, np.array([mode.mean for mode in modes]), sigma, np.array(held), 0.0, 0.0)
 
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from support.example_clearance import TIGHT
 
 from tunneldb.cli.main import main
-from tunneldb.report.clearance import APART, PLACES, read_clearance
+from tunneldb.report.clearance import MIN_PLACE_DISTANCE, PLACES, read_clearance
 from tunneldb.store.survey import get_survey
 
 
@@ -41,7 +41,7 @@ def test_the_chapter(example: str, conn: psycopg.Connection, tmp_path: Path) -> 
     assert one.tightest[0]["margin"] == -0.05
     assert len(one.tightest) == PLACES
     begins = sorted(row["chainage_from"] for row in one.tightest)
-    assert min(np.diff(begins)) >= APART
+    assert min(np.diff(begins)) >= MIN_PLACE_DISTANCE
     assert [(row["class"], row["depth"]) for row in one.counted] == [("appendage", 0.05)]
     assert [(row["class"], row["depth"]) for row in one.others] == [("object", 0.5)]
     assert one.plot.unmeasured == [(500.0, 100.0)]

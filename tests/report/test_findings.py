@@ -297,7 +297,7 @@ def test_digest_tells_another_dry_region_and_another_width(example: str, conn: p
 
 
 def test_of_too_many_the_gravest_have_rows(drawn: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(findings, "MOST", 2)
+    monkeypatch.setattr(findings, "MAX_ROWS", 2)
     with connect(drawn) as conn:
         chapter = findings.read_findings_chapter(
             conn, get_survey(conn, NAME), (0.0, 1e5), frozenset(), NONE, tmp_path, table=True

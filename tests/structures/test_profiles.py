@@ -11,7 +11,7 @@ from tunneldb.arrays import Float
 from tunneldb.simulate.structure.members import Section, box_section, i_section, l_section, u_section
 from tunneldb.structures.joining import Extent
 from tunneldb.structures.models import unroll, with_directions
-from tunneldb.structures.profiles import DEEPEST, SLENDER, THICKEST, box_of, group, middle_line
+from tunneldb.structures.profiles import MAX_FLANGE_THICKNESS, MAX_SECTION_DEPTH, SLENDER, box_of, group, middle_line
 
 NOISE = 0.001
 SECTIONS = {
@@ -87,7 +87,7 @@ def test_beams_that_cross_are_two() -> None:
 
 
 def test_beams_side_by_side_are_two() -> None:
-    apart = np.array([0.15 + 2.0 * THICKEST, 0.0, 0.0])
+    apart = np.array([0.15 + 2.0 * MAX_FLANGE_THICKNESS, 0.0, 0.0])
     one, other = (beam(SECTIONS["box"], 3.0, Rotation.identity(), start) for start in (np.zeros(3), apart))
     assert members(one + other) == [0] * 4 + [1] * 4
 
@@ -98,7 +98,7 @@ def test_parts_of_one_plane_are_no_two_sides() -> None:
     assert members([low, high]) == [0, 1]
 
 
-@pytest.mark.parametrize(("length", "depth"), [(10.0, 1.5 * DEEPEST), (0.9 * SLENDER * 0.5, 0.5)])
+@pytest.mark.parametrize(("length", "depth"), [(10.0, 1.5 * MAX_SECTION_DEPTH), (0.9 * SLENDER * 0.5, 0.5)])
 def test_walls_and_stubs_are_no_beams(length: float, depth: float) -> None:
     """A corridor is too deep, a pedestal too short."""
     sides = beam(box_section(depth, depth), length, Rotation.identity(), np.zeros(3))

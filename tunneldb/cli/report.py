@@ -19,7 +19,7 @@ from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import exit_on_sigterm, replacing
 from tunneldb.report.owner import Owner, read_owner
-from tunneldb.report.page import CARDS, LISTED, Written, write_html, write_site_html
+from tunneldb.report.page import CARDS, MAX_LISTED_LEAKS, Written, write_html, write_site_html
 from tunneldb.report.pdf import find_browser, print_pdf
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.survey import Survey, get_survey
@@ -60,7 +60,7 @@ _PRINTING = 1.2  # time in which it prints a page as a multiple of that in which
     "--list",
     "listed",
     type=click.IntRange(1, 1_000_000),
-    default=LISTED,
+    default=MAX_LISTED_LEAKS,
     show_default=True,
     metavar="N",
     help="Most leaks to list and draw, the largest, rejected ones last. Sums include all.",

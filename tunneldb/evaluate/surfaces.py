@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from tunneldb.arrays import Float
 from tunneldb.structures.models import RADIUS, to_space, unroll
-from tunneldb.structures.reconcile import NEAR
+from tunneldb.structures.reconcile import MAX_VERTEX_DISTANCE
 
 MAX_FACE_DISTANCE = 0.005
 """Distance behind the nearest face up to which a polygon is on a face, too, m."""
@@ -79,7 +79,7 @@ def project_on_faces(shape: BaseGeometry, faces: Sequence[FoundFace]) -> Project
     near: list[tuple[float, int, BaseGeometry, BaseGeometry]] = []
     for k, face in enumerate(faces):
         off = np.abs(unroll(face.model, at)[2])
-        if off.max() > NEAR:
+        if off.max() > MAX_VERTEX_DISTANCE:
             continue
         flat = project_on_face(shape, face)
         shared = shapely.intersection(flat, face.outline)

@@ -21,7 +21,7 @@ from tunneldb.pointcloud.voxels import Voxels
 EDGE = 0.5
 """Edge of the voxels whose centroids are used for the axis, m."""
 
-FARTHEST = 200_000.0
+MAX_POINT_DISTANCE = 200_000.0
 """Distance from most points beyond which a point does not belong to the scan, m."""
 
 TRUSTED_SHARE = 0.8
@@ -135,7 +135,7 @@ def _voxels(headers: Sequence[ScanHeader], begin: Begin) -> Float:
             if middle is None and len(chunk.xyz):
                 middle = np.median(chunk.xyz, axis=0)
             if middle is not None:
-                voxels.add(chunk.xyz[(np.abs(chunk.xyz - middle) < FARTHEST).all(axis=1)])
+                voxels.add(chunk.xyz[(np.abs(chunk.xyz - middle) < MAX_POINT_DISTANCE).all(axis=1)])
             done(len(chunk.xyz))
     return without_haze(voxels.centroids(), voxels.counts())
 

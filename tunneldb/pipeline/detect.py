@@ -56,10 +56,10 @@ from tunneldb.store.sources import sample, sources
 from tunneldb.store.surface import load_surface, survey_ends
 from tunneldb.store.survey import Survey
 
-ASIDE = 50.0
+SURFACE_MARGIN = 50.0
 """Length of the surface loaded beyond the ends, m: sections are checked with the three before and after them."""
 
-TOLD = 0.01
+MIN_NOTED_SPARSE_SHARE = 0.01
 """Share of the lining too sparse to be searched from which there is a note; less is only in the share not inspected."""
 
 
@@ -177,7 +177,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
     UserError
         If there are no sections, the ground was not sought, or a file is gone or was changed.
     """
-    surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
+    surface = load_surface(conn, survey, km * KILOMETRE - SURFACE_MARGIN, (km + 1) * KILOMETRE + SURFACE_MARGIN)
     grid = kilometre_grid(surface, km, values["image.pixel"])
     files = sources(conn, survey, km)
     radiometer = load_radiometer(conn, survey, km, values)
@@ -232,7 +232,7 @@ def compute_detection(
     if gaps is not None:
         counts["profile_spacing"] = round(gaps.spacing, 3)
     density = least_density(values["image.min_density"], inputs.grid.pixel)
-    if (sparse := leave_out_sparse(lining, density)) >= TOLD:
+    if (sparse := leave_out_sparse(lining, density)) >= MIN_NOTED_SPARSE_SHARE:
         counts |= {"sparse": round(sparse, 4), "least_density": round(density, 1)}
     background = map_background(lining, inputs.dry)
     contrast = contrast_image(lining, background)

@@ -222,8 +222,8 @@ def _shape(
         lacking = ", ".join(name for name in begun if name not in values)
         raise ValueError(f"it has no place: {lacking} is empty" if lacking else "it has no place: all columns of it are empty")
     if len(way) == 1:
-        if _depth(values[way[0]]) > _DEEPEST:  # by which GEOS, that reads it, would go down
-            raise ValueError(f"{way[0]} has more than {_DEEPEST} nested parentheses")
+        if _depth(values[way[0]]) > _MAX_NESTING:  # by which GEOS, that reads it, would go down
+            raise ValueError(f"{way[0]} has more than {_MAX_NESTING} nested parentheses")
         try:
             return shapely.from_wkt(values[way[0]])
         except shapely.errors.GEOSException as error:
@@ -236,7 +236,7 @@ def _shape(
     return shapely.box(place[0], place[2], place[1], place[3]) if len(place) == 4 else shapely.Point(place)
 
 
-_DEEPEST = 20
+_MAX_NESTING = 20
 """Maximum nesting of parentheses in WKT: a collection of polygons has four."""
 
 

@@ -22,7 +22,7 @@ FAR_APART = 0.1
 """Profile spacing from which missed leaks are worth a remark, m."""
 
 _NO_INTENSITY = "--intensity-kind none"
-_MOST_FILES = 5  # named one by one
+_MAX_FILES = 5  # named one by one
 _PREFERRED = ("reflectance", "amplitude", "linear")
 _INTENSITY = re.compile("intens|ampl|reflect|refl")
 _SAME_PLACE = 0.001  # m
@@ -133,7 +133,7 @@ def _quoted(path: Path) -> str:
 
 def _files(looks: Sequence[FileLook]) -> str:
     folders, suffixes = {look.path.parent for look in looks}, {look.path.suffix for look in looks}
-    if len(looks) > _MOST_FILES and len(folders) == 1 and len(suffixes) == 1:
+    if len(looks) > _MAX_FILES and len(folders) == 1 and len(suffixes) == 1:
         there = {path.name for path in looks[0].path.parent.glob(f"*{looks[0].path.suffix}")}
         if there == {look.path.name for look in looks}:
             folder = looks[0].path.parent

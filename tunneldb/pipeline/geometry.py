@@ -13,10 +13,10 @@ from tunneldb.stages.stage import Counts, Progress
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
-MOST_NAMED = 5
+MAX_NAMED = 5
 """Maximum number of rejected vertices that are named."""
 
-WIDEST = 20.0
+MAX_WIDTH = 20.0
 """Maximum width of a tunnel, m: four lanes or three tracks under one vault."""
 
 TOUCHING = 0.1
@@ -45,8 +45,8 @@ def axis(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping
         "SELECT label, remark FROM tunnel_api.axis_vertex WHERE survey_id = %s AND km = %s AND remark IS NOT NULL ORDER BY n",
         [survey.id, km],
     ).fetchall()
-    named = ", ".join(f"the vertex at {label} {remark}" for label, remark in rejected[:MOST_NAMED])
-    named += f" and {len(rejected) - MOST_NAMED} more" if len(rejected) > MOST_NAMED else ""
+    named = ", ".join(f"the vertex at {label} {remark}" for label, remark in rejected[:MAX_NAMED])
+    named += f" and {len(rejected) - MAX_NAMED} more" if len(rejected) > MAX_NAMED else ""
     if moved >= values["axis.tolerance"] or len(rejected) > max(1, values["axis.max_rejected"] * measured):
         raise UserError(
             f"the axis of kilometre {km} was not found in {len(passes)} passes: {named or f'it still moves by {moved:.3f} m'};"
@@ -152,21 +152,21 @@ def _without_roof(conn: psycopg.Connection[Any], survey: Survey, km: int, values
         else:
             stretches.append([low, high])
     named = []
-    for stretch in stretches[:MOST_NAMED]:
+    for stretch in stretches[:MAX_NAMED]:
         labels = conn.execute(
             "SELECT label FROM unnest(%s::float8[]) WITH ORDINALITY AS c (chainage, i),"
             " tunnel_api.stationing((SELECT tunnel_id FROM tunnel.survey WHERE id = %s), c.chainage) ORDER BY i",
             [[round(end, 1) for end in stretch], survey.id],
         ).fetchall()
         named.append(" and ".join(label for (label,) in labels))
-    more = f" and {len(stretches) - MOST_NAMED} stretches more" if len(stretches) > MOST_NAMED else ""
+    more = f" and {len(stretches) - MAX_NAMED} stretches more" if len(stretches) > MAX_NAMED else ""
     note = f"no roof between {', between '.join(named)}{more}: an open cut or a portal, without sections and lining"
     return sum(high - low for low, high in stretches), note if stretches else ""
 
 
 def _too_wide(width: float) -> str:
     """Question sections of an implausible width (m), for example from coordinates in feet."""
-    if width <= WIDEST:
+    if width <= MAX_WIDTH:
         return ""
     return (
         f"the sections are {width:.1f} m wide: are the coordinates in feet ({width * FOOT:.1f} m then), is it a cavern,"

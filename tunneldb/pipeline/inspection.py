@@ -22,7 +22,7 @@ from tunneldb.pointcloud.noise import noise_filter
 from tunneldb.pointcloud.reader import ScanHeader, read_header
 from tunneldb.radiometry.intensity_kind import KindGuess, ValueRange, contradiction, guess_kind, value_range
 
-WIDEST = 20.0
+MAX_WIDTH = 20.0
 """Width in metres from which a tunnel is probably in feet: three lanes with their shoulders have 16 to 18 m."""
 
 NARROWEST = 1.5
@@ -31,7 +31,7 @@ NARROWEST = 1.5
 LOWEST = 0.3
 """Height over width below which a cloud is open country and not a tunnel."""
 
-SHORTEST = 1.5
+MIN_LENGTH_RATIO = 1.5
 """Length over width below which a cloud is a room and not a stretch of a tunnel."""
 
 SEARCHED = 50_000_000
@@ -165,7 +165,7 @@ class FileLook:
         size = f"{self.length:.1f} long, {self.width:.1f} wide and {self.height:.1f} high"
         if self.height < LOWEST * self.width:
             return f"{size}: open country or a street rather than a tunnel"
-        if self.length < SHORTEST * self.width:
+        if self.length < MIN_LENGTH_RATIO * self.width:
             return f"{size}: a room or a single place rather than a tunnel"
         return None
 
@@ -293,7 +293,7 @@ def _unit(header: ScanHeader, contents: Contents, form: TunnelForm | None) -> st
     size = f"the tunnel is {form.width:.4g} wide and {form.height:.4g} high"
     if form.width > 1000.0 * NARROWEST:
         return f"looks like millimetres: {size}"
-    if form.width > WIDEST and form.height > LOWEST * form.width:
+    if form.width > MAX_WIDTH and form.height > LOWEST * form.width:
         return f"looks like feet: {size}, which in feet were {form.width * _FOOT:.1f} m and {form.height * _FOOT:.1f} m"
     return None
 

@@ -16,7 +16,7 @@ from tunneldb.arrays import Float, Int32, Single
 from tunneldb.errors import InputError, UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.calibration import UNKNOWN, Sample, find_range_curve, observe_sample, roughness_of
-from tunneldb.pipeline.detect import ASIDE, load_floor, load_radiometer
+from tunneldb.pipeline.detect import SURFACE_MARGIN, load_floor, load_radiometer
 from tunneldb.pointcloud.formats.table import has_scans, posed_scans
 from tunneldb.pointcloud.reader import Points, read_chunks, read_header
 from tunneldb.pointcloud.thinning import thin
@@ -36,7 +36,7 @@ from tunneldb.store.survey import Survey
 THINNEST = 0.05
 """Edge of the voxels for thinning a scan before fitting planes, m; larger for too many points."""
 
-MOST_POINTS = 2_000_000
+MAX_POINTS = 2_000_000
 """Maximum number of points of a thinned scan."""
 
 
@@ -107,7 +107,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
     """Load the input of a kilometre's diagnosis."""
     kind = cast(Kind, survey.intensity_kind)
     measured = load_reference(conn, survey) if needs_reference(kind) else None
-    surface = load_surface(conn, survey, km * KILOMETRE - ASIDE, (km + 1) * KILOMETRE + ASIDE)
+    surface = load_surface(conn, survey, km * KILOMETRE - SURFACE_MARGIN, (km + 1) * KILOMETRE + SURFACE_MARGIN)
     # Without a curve the lining itself is asked, whether or not detection is to go by it.
     radiometer = load_radiometer(conn, survey if measured else replace(survey, reference="auto"), km, values)
     depth = values["lining.tolerance"], values["lining.recess"]
@@ -294,10 +294,10 @@ def _thinned(path: Path, dimension: str, progress: Callable[[float], None]) -> t
     for chunk in read_chunks(path, dimension):
         kept.append(_thin(chunk, edge))
         count += len(kept[-1])
-        while count > 2 * MOST_POINTS:
+        while count > 2 * MAX_POINTS:
             kept = [_thin(_joined(kept), edge)]
             count = len(kept[0])
-            edge *= 1.0 if count <= MOST_POINTS else 2.0**0.5
+            edge *= 1.0 if count <= MAX_POINTS else 2.0**0.5
         progress(len(chunk))
     if not count:
         raise InputError(f"{path}: the file holds no points")

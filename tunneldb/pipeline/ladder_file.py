@@ -12,7 +12,7 @@ from tunneldb.errors import InputError
 from tunneldb.registration.underwater import Ladder, Near
 
 COLUMNS = ("rung", "height", "stile_gap", "diameter")
-LEAST_RUNGS = 3
+MIN_RUNGS = 3
 GAPS = (0.1, 0.6)  # between rungs, m
 WIDTHS = (0.1, 1.5)  # between stiles, m
 DIAMETERS = (0.005, 0.15)  # m
@@ -37,8 +37,8 @@ def read_ladders(path: Path) -> list[Ladder]:
 def _ladder(table: CsvTable, name: str, rows: list[int]) -> Ladder:
     if not name:
         raise table.error(rows[0], "ladder is empty")
-    if len(rows) < LEAST_RUNGS:
-        raise table.error(rows[0], f"ladder {name} has {len(rows)} rungs; {LEAST_RUNGS} are the least")
+    if len(rows) < MIN_RUNGS:
+        raise table.error(rows[0], f"ladder {name} has {len(rows)} rungs; {MIN_RUNGS} are the least")
     for before, row in pairwise(rows):
         gap = table["height"][row] - table["height"][before]
         if not GAPS[0] <= gap <= GAPS[1]:

@@ -27,7 +27,7 @@ from tunneldb.store.learned import (
 )
 from tunneldb.store.survey import Survey, get_survey
 
-LARGEST = 10
+MAX_LISTED_CHANGES = 10
 """Maximum number of listed changes."""
 
 
@@ -91,7 +91,7 @@ class Plan:
     changes : sequence of Changes
         Of all surveys of the tunnels, against what is in force.
     largest : sequence of Change
-        The largest changes of probability, LARGEST at the most, those to another kind first.
+        The largest changes of probability, MAX_LISTED_CHANGES at the most, those to another kind first.
     """
 
     tunnels: Mapping[int, str]
@@ -203,7 +203,7 @@ def _changes(
         for key, name in surveys_of(conn, tunnels).items()
     ]
     moved = np.where(judged, np.abs(after - before), 0.0) + (to_leak | from_leak)
-    first = [k for k in np.argsort(-moved, kind="stable")[:LARGEST].tolist() if moved[k] > 0.005]
+    first = [k for k in np.argsort(-moved, kind="stable")[:MAX_LISTED_CHANGES].tolist() if moved[k] > 0.005]
     places = places_of(conn, measured.id[first].tolist())
     line = measured.features[:, NAMES.index("line")] >= 0.5
 

@@ -23,7 +23,7 @@ from tunneldb.store.sonar import SonarRows, StoredScan, save_bed, save_points, s
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
-FARTHEST = 15.0  # m from the sonar: beyond, its rays graze bed and walls, and lie too far apart to tell false echoes
+MAX_SONAR_RANGE = 15.0  # m from the sonar: beyond, its rays graze bed and walls, and lie too far apart to tell false echoes
 VOXEL = 0.05  # of which one point is kept, m: a beam is as wide a few metres off
 
 
@@ -140,4 +140,4 @@ def _placed(path: Path, scan: StoredScan) -> tuple[Float, int, Bool, Float | Non
     points, invalid = read_sonar(path)
     arm = scan.scale * points @ scan.rotation.T
     reach = np.linalg.norm(arm, axis=1)
-    return arm + scan.translation, len(points) + invalid, reach < FARTHEST, reach
+    return arm + scan.translation, len(points) + invalid, reach < MAX_SONAR_RANGE, reach

@@ -15,7 +15,7 @@ from tunneldb.errors import InputError
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
 """Length of a unit, m."""
 
-NEAR = 0.001
+MAX_JOINED_GAP = 0.001
 """Maximum gap between ends that are joined, m."""
 
 _PLAIN = ("LINE", "ARC", "CIRCLE")
@@ -130,7 +130,7 @@ def _joined(path: Path, elements: Float, names: list[str]) -> tuple[Float, list[
     while left:
         ahead, behind = nearest(*chain[-1][2:4]), nearest(*chain[0][:2])
         away, k, at_end = min(ahead, behind)
-        if away > NEAR:
+        if away > MAX_JOINED_GAP:
             x, y = chain[-1][2:4] if away == ahead[0] else chain[0][:2]
             beside = order[-1] if away == ahead[0] else order[0]
             raise InputError(
@@ -149,7 +149,7 @@ def _joined(path: Path, elements: Float, names: list[str]) -> tuple[Float, list[
             chain.insert(0, element)
             order.insert(0, k)
         left.remove(k)
-    if len(chain) > 1 and np.hypot(*(chain[-1][2:4] - chain[0][:2])) <= NEAR:
+    if len(chain) > 1 and np.hypot(*(chain[-1][2:4] - chain[0][:2])) <= MAX_JOINED_GAP:
         chain[-1][2:4] = chain[0][:2]
     return np.array(chain), [names[k] for k in order]
 

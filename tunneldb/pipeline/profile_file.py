@@ -15,10 +15,10 @@ from tunneldb.errors import UserError
 from tunneldb.pipeline.profile_drawing import METRES, read_drawing
 from tunneldb.shape.outline import TOLERANCE, Outline
 
-LEAST_SIZE, MOST_SIZE = 1.0, 60.0
+MIN_SIZE, MAX_SIZE = 1.0, 60.0
 """Limits of an outline's width and height, m; outside them it is in another unit."""
 
-MOST_GAP = 0.5
+MAX_GAP = 0.5
 """Distance of consecutive points from which an outline is open there, m."""
 
 SIMPLIFIED = 0.02
@@ -143,7 +143,7 @@ def _read_points(path: Path, origin: tuple[float, float], unit: str | None) -> R
     ordered = points[np.argsort(np.arctan2(*(points - middle).T))]
     ordered = np.vstack([ordered, ordered[:1]])
     steps = np.hypot(*np.diff(ordered, axis=0).T)
-    gaps = np.flatnonzero(steps > max(MOST_GAP, 3.0 * float(np.percentile(steps, 90))))
+    gaps = np.flatnonzero(steps > max(MAX_GAP, 3.0 * float(np.percentile(steps, 90))))
     if len(gaps) > 1:
         raise UserError(
             f"{path}: points leave {len(gaps)} gaps, of {steps[gaps[0]]:.2f} m at {_place(ordered[gaps[0]])} and of "
@@ -175,11 +175,11 @@ def _require_sound(path: Path, elements: Float, where: Callable[[int], str]) -> 
     raw = Outline(elements)
     line = raw.flattened()
     size = np.ptp(line, axis=0)
-    if not (size.min() >= LEAST_SIZE / 2.0 and LEAST_SIZE <= size.max() <= MOST_SIZE):
+    if not (size.min() >= MIN_SIZE / 2.0 and MIN_SIZE <= size.max() <= MAX_SIZE):
         far = int(np.argmax(np.abs(elements[:, :4]).max(axis=1)))
         raise UserError(
             f"{path}, {where(far)}: {_place(elements[far, :2])} m makes an outline {size[0]:g} m wide and {size[1]:g} m high; "
-            f"tunnels have {LEAST_SIZE:g} to {MOST_SIZE:g} m: is it in another unit?"
+            f"tunnels have {MIN_SIZE:g} to {MAX_SIZE:g} m: is it in another unit?"
         )
     if (line.min(axis=0) > 0.5 * size).any() or (line.max(axis=0) < -0.5 * size).any():
         low, high = line.min(axis=0), line.max(axis=0)

@@ -40,7 +40,7 @@ from tunneldb.store.scan_files import (
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
-FEWEST_INTENSITIES = 20
+MIN_INTENSITIES = 20
 """Minimum number of values for a remark on their kind."""
 
 Counts = dict[str, Any]
@@ -124,7 +124,7 @@ def read_headers(paths: Sequence[Path]) -> list[ScanHeader]:
 def require_kind(survey: Survey, path: Path, sample: Single) -> None:
     """Refuse a file whose intensity values contradict the declared kind."""
     kind = survey.intensity_kind
-    if kind == "none" or len(sample) < FEWEST_INTENSITIES:
+    if kind == "none" or len(sample) < MIN_INTENSITIES:
         return
     reason = contradiction(kind, sample)
     if reason is not None:

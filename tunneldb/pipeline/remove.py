@@ -21,7 +21,7 @@ from tunneldb.store.partition import partition_exists
 from tunneldb.store.scan_files import Recorded, kilometres_of, recorded_files, withdraw_file
 from tunneldb.store.survey import Survey
 
-_MOST_NAMED = 10
+_MAX_NAMED = 10
 
 
 @dataclass
@@ -62,8 +62,8 @@ def known_names(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[s
     there = [row[0] for row in rows]
     unknown = [name for name in names if name not in there]
     if unknown:
-        more = f" and {len(there) - _MOST_NAMED} more" if len(there) > _MOST_NAMED else ""
-        listed = f"{', '.join(there[:_MOST_NAMED])}{more}" if there else "none"
+        more = f" and {len(there) - _MAX_NAMED} more" if len(there) > _MAX_NAMED else ""
+        listed = f"{', '.join(there[:_MAX_NAMED])}{more}" if there else "none"
         raise UserError(f"survey {survey.name} has no file {', '.join(unknown)}; nothing was removed. Its files: {listed}")
 
 

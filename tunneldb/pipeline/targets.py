@@ -33,7 +33,7 @@ Progress = Callable[[int], None]
 
 MEMORY = 256 << 20  # of points that wait to be looked at; beyond, they wait on disk
 WINDOW = 1_000_000  # points looked at at a time
-BESIDE = 1.0  # m; a window reaches so far into its neighbours, for spheres on its ends
+WINDOW_MARGIN = 1.0  # m; a window reaches so far into its neighbours, for spheres on its ends
 
 _KEPT = np.dtype([("xyz", "f8", (3,)), ("eye", "f8", (3,)), ("chainage", "f8"), ("scan", "i4")])
 
@@ -217,7 +217,7 @@ class _Kilometre:
             del curved
             first, counts = spool.counts()
             for low, high in windows(first, counts, WINDOW):
-                beside = int(BESIDE * BINS_PER_METRE)
+                beside = int(WINDOW_MARGIN * BINS_PER_METRE)
                 rows = spool.read(low - beside, high + beside)
                 for scan in np.unique(rows["scan"]):
                     one = rows[rows["scan"] == scan]

@@ -18,7 +18,7 @@ from tunneldb.store.survey import Survey
 WIDTH, HEIGHT = 1000.0, 120.0
 """Size of the drawing of sections, in its own unit."""
 
-LISTED = 40
+MAX_LISTED_REGIONS = 40
 """Maximum number of listed regions, the largest ones."""
 
 
@@ -81,7 +81,7 @@ def read_change(conn: psycopg.Connection[Any], survey: Survey, low: float, high:
     sections = change_rows(conn, "change_section", old, survey, low, high)
     regions = change_rows(conn, "change_region", old, survey, low, high)
     leaks = change_rows(conn, "leak_change", old, survey, low, high)
-    largest = sorted(regions, key=lambda region: -region["area"])[:LISTED]
+    largest = sorted(regions, key=lambda region: -region["area"])[:MAX_LISTED_REGIONS]
     most = max([row[name] for row in sections for name in ("shift", "change_rms") if row[name] is not None], default=0.0)
     scale = WIDTH / (high - low)
     series = _series(conn, survey, low, high)

@@ -25,9 +25,9 @@ from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
 PLACES = 10
-"""Number of tightest places listed, at least APART from each other."""
+"""Number of tightest places listed, at least MIN_PLACE_DISTANCE from each other."""
 
-APART = 5.0
+MIN_PLACE_DISTANCE = 5.0
 """Minimum distance between the beginnings of listed places, m."""
 
 ROWS = 40
@@ -36,7 +36,7 @@ ROWS = 40
 WIDTH, HEIGHT = 1000.0, 120.0
 """Size of the plot of margins, in its own unit."""
 
-AROUND = 2.0
+DRAWN_DISTANCE = 2.0
 """Maximum distance of drawn points from the outline, m."""
 
 POINT = 0.02
@@ -177,7 +177,7 @@ def _within(row: Row, low: float, high: float) -> float:
 def _tightest(rows: Sequence[Row]) -> list[Row]:
     chosen: list[Row] = []
     for row in sorted((row for row in rows if row["margin"] is not None), key=lambda row: float(row["margin"])):
-        if all(abs(row["chainage_from"] - one["chainage_from"]) >= APART for one in chosen):
+        if all(abs(row["chainage_from"] - one["chainage_from"]) >= MIN_PLACE_DISTANCE for one in chosen):
             chosen.append(row)
         if len(chosen) == PLACES:
             break
@@ -239,7 +239,7 @@ def _metre(conn: psycopg.Connection[Any], survey: Survey, axis: Alignment, gauge
     if point[0] is not None:
         at = metre_places(axis.across(np.array([point], np.float64)), *place)[0]
         nearest = (float(at[0, 0]), -float(at[0, 1])) if len(at) else None
-    (west, low), (east, high) = outline.min(axis=0) - AROUND, outline.max(axis=0) + AROUND
+    (west, low), (east, high) = outline.min(axis=0) - DRAWN_DISTANCE, outline.max(axis=0) + DRAWN_DISTANCE
     return TightestMetre(
         row, line_path(outline * [1.0, -1.0]) + "Z", _point_paths(places, classes[held], outline), nearest,
         f"{west:.2f} {-high:.2f} {east - west:.2f} {high - low:.2f}",
@@ -248,7 +248,7 @@ def _metre(conn: psycopg.Connection[Any], survey: Survey, axis: Alignment, gauge
 
 def _point_paths(places: Float, classes: Any, outline: Float) -> dict[str, str]:
     """Return paths of dots for the points (n, 2) around an outline, by class; noise is left out."""
-    (west, low), (east, high) = outline.min(axis=0) - AROUND, outline.max(axis=0) + AROUND
+    (west, low), (east, high) = outline.min(axis=0) - DRAWN_DISTANCE, outline.max(axis=0) + DRAWN_DISTANCE
     near = ((places > [west, low]) & (places < [east, high])).all(axis=1) & (classes != PointClass.NOISE)
     ground, passing = np.isin(classes, TRACK_CLASSES), np.isin(classes, TEMPORARY_CLASSES)
     counts = near & ~ground & ~passing

@@ -34,7 +34,7 @@ WORST = 4
 ROWS = 60
 """Maximum number of stretches in the table, of 100 m or a longer round length."""
 
-APART = 5.0
+MIN_SECTION_DISTANCE = 5.0
 """Minimum distance from a worse section, m."""
 
 WIDTH, HEIGHT = 1000.0, 90.0
@@ -229,7 +229,7 @@ class DeviationChapter:
         ).format(sql.Identifier(kind))
         chosen: list[dict[str, Any]] = []
         for row in self._rows(query, self._survey.id, self.layer, self._low, self._high, 20 * WORST):
-            if all(abs(row["chainage_from"] - other["chainage_from"]) >= APART for other in chosen):
+            if all(abs(row["chainage_from"] - other["chainage_from"]) >= MIN_SECTION_DISTANCE for other in chosen):
                 chosen.append(row)
         design = {part.name: part for part in stretches(load_profiles(self._conn, self._survey.tunnel_id, self.layer))}
         worst = sorted(chosen[:WORST], key=lambda row: row["chainage_from"])

@@ -24,7 +24,7 @@ from tunneldb.store.finding_kinds import read_kinds, read_severities, read_wet_k
 from tunneldb.store.findings import Chosen, Finding, stream_findings
 from tunneldb.store.survey import Survey
 
-MOST = 2000
+MAX_ROWS = 2000
 """Maximum number of rows of a kind; counted ones first, then by severity and size. A line gives the number without a row."""
 
 STATE_WORDS = {
@@ -248,7 +248,7 @@ class _Gathered:
             self.noted.append(finding)
             if digested:
                 self.digested.add(finding.id)
-            if len(self.noted) >= 2 * MOST + 1000:
+            if len(self.noted) >= 2 * MAX_ROWS + 1000:
                 self._leave_beyond()
         elif tabled:
             self.tabled += 1
@@ -258,8 +258,8 @@ class _Gathered:
     def _leave_beyond(self) -> None:
         """If there are too many, keep the most important, in order of chainage, and a digest of the others."""
         ranked = sorted(self.noted, key=_weight)
-        shown = {finding.id for finding in ranked[:MOST]}
-        for one in ranked[MOST:]:
+        shown = {finding.id for finding in ranked[:MAX_ROWS]}
+        for one in ranked[MAX_ROWS:]:
             noted = b"" if one.id in self.digested else hashlib.sha256(repr(_stated(one, [])).encode()).digest()
             self.beyond.append((one.id, noted))
         self.digested &= shown

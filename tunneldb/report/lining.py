@@ -26,7 +26,7 @@ from tunneldb.store.survey import Survey
 Form = Literal["WEBP", "JPEG"]
 """Format of pictures: WebP is smaller; JPEG goes into a PDF unchanged, while browsers unpack others to many times the size."""
 
-KEPT = 7
+CACHED_BLOCKS = 7
 """Number of blocks in memory: those of a strip of 250 m, the one before and the one after."""
 
 NO_STATE = 255
@@ -35,7 +35,7 @@ NO_STATE = 255
 FILLED = 0.14
 """Width of the square around a pixel without points whose mean it takes, m: about that of the median filter."""
 
-LEAST = 0.005
+MIN_OFFSET_RANGE = 0.005
 """Minimum range of offsets from black to white, m."""
 
 QUALITY = {"WEBP": 55, "JPEG": 70}
@@ -203,7 +203,7 @@ class Lining:
         else:  # without intensity, and from before there were states
             state = np.where(np.isfinite(shown.values), np.float32(PixelState.LINING), np.float32(PixelState.EMPTY))
         self._kept[number] = block = _Block(shown, state.astype(np.uint8))
-        while len(self._kept) > KEPT:
+        while len(self._kept) > CACHED_BLOCKS:
             self._kept.popitem(last=False)
         return block
 
@@ -213,7 +213,7 @@ class Lining:
             return np.zeros(self._block(number).state.shape, np.bool_)
         if number not in self._unseen:
             self._unseen[number] = self._block(number).unseen(size)
-            while len(self._unseen) > KEPT:
+            while len(self._unseen) > CACHED_BLOCKS:
                 self._unseen.popitem(last=False)
         self._unseen.move_to_end(number)
         return self._unseen[number]
@@ -280,7 +280,7 @@ def _inside(place: Intp, count: int) -> slice:
 def _offset_range(values: Single) -> tuple[float, float]:
     """Return the offsets, m, for black and white: the 1st and the 98th percentile."""
     low, high = (float(v) for v in np.percentile(values, [1, 98])) if len(values) else (0.0, 1.0)
-    return low, max(high, low + LEAST)
+    return low, max(high, low + MIN_OFFSET_RANGE)
 
 
 def _grey(values: Single, kilometre: _Kilometre) -> UInt8:

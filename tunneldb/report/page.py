@@ -39,7 +39,7 @@ from tunneldb.store.dry_regions import read_dry_regions
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey
 
-LISTED = 10_000
+MAX_LISTED_LEAKS = 10_000
 """Default number of leaks that a report lists and draws, the largest; the others are only counted."""
 
 CARDS = 400
@@ -77,7 +77,7 @@ def write_html(
     form: Form = "WEBP",
     owner: Owner | None = None,
     photos: Path | None = None,
-    listed: int = LISTED,
+    listed: int = MAX_LISTED_LEAKS,
 ) -> Written:
     """Write the report of a survey, or of the stretch between two chainages, m, as an HTML file; the connection must be idle.
 

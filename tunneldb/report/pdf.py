@@ -23,12 +23,12 @@ BROWSERS = (
 )
 """Names of browsers that can print."""
 
-PATIENCE = 1800
+PRINT_TIMEOUT = 1800
 """Maximum time for printing, s."""
 
 _TICK = 0.5  # seconds from one word on the wait to the next
 
-LONGEST = 60
+MAX_SOCKET_FOLDER_BYTES = 60
 """Maximum bytes of a folder's path in which a browser can open its socket: with its name at most 107."""
 
 
@@ -97,8 +97,8 @@ def print_pdf(browser: str, page: Path, pdf: Path, waiting: Callable[[float], No
             code, output = _run(command, profile, waiting)
         except subprocess.TimeoutExpired:
             raise UserError(
-                f"{browser} did not print the report within {PATIENCE // 60} minutes: report a shorter stretch (--from, --to),"
-                " or write it as .html"
+                f"{browser} did not print the report within {PRINT_TIMEOUT // 60} minutes: report a shorter stretch"
+                " (--from, --to), or write it as .html"
             ) from None
     if code != 0 or not pdf.exists():
         said = output.strip().splitlines()
@@ -119,7 +119,7 @@ def _run(command: Sequence[str], folder: str, waiting: Callable[[float], None]) 
 
     Whatever breaks off the wait ends the browser, with all that it has started.
     """
-    temporary = {"TMPDIR": folder} if len(os.fsencode(folder)) <= LONGEST else {}
+    temporary = {"TMPDIR": folder} if len(os.fsencode(folder)) <= MAX_SOCKET_FOLDER_BYTES else {}
     start = partial(
         subprocess.Popen, command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace",
         env=os.environ | temporary, start_new_session=True,
@@ -142,9 +142,9 @@ def _wait(process: subprocess.Popen[str], waiting: Callable[[float], None]) -> s
     began = time.monotonic()
     while True:
         try:
-            return process.communicate(timeout=min(_TICK, PATIENCE))[1]
+            return process.communicate(timeout=min(_TICK, PRINT_TIMEOUT))[1]
         except subprocess.TimeoutExpired:
             seconds = time.monotonic() - began
-            if seconds >= PATIENCE:
+            if seconds >= PRINT_TIMEOUT:
                 raise
             waiting(seconds)

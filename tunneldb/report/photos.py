@@ -25,7 +25,7 @@ from tunneldb.store.survey import Survey
 SIZE = 480
 """Maximum width and height, pixels: 6 cm on paper at 200 dpi."""
 
-LARGEST = 100_000_000
+MAX_BYTES = 100_000_000
 """Maximum bytes of a photo."""
 
 PATIENCE, TOGETHER = 10.0, 60.0
@@ -118,7 +118,7 @@ def _read(path: str, folder: Path, end: float) -> bytes:
         file = folder / path
         if not file.exists():
             raise _NotHadError("no such file")
-        if not file.is_file() or file.stat().st_size > LARGEST:
+        if not file.is_file() or file.stat().st_size > MAX_BYTES:
             raise _NotHadError("not a readable image")
         return file.read_bytes()
     except OSError as error:
@@ -141,7 +141,7 @@ def _fetch(url: str, end: float) -> bytes:
         with opener.open(asked, timeout=PATIENCE) as answer:
             while chunk := answer.read1(1 << 16):
                 data.write(chunk)
-                if time.monotonic() > end or data.tell() > LARGEST:
+                if time.monotonic() > end or data.tell() > MAX_BYTES:
                     raise _NotHadError("could not be fetched: too large or too slow")
     except HTTPError as error:
         raise _NotHadError(f"could not be fetched: {error.code} {error.reason}") from error

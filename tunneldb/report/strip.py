@@ -22,7 +22,7 @@ from tunneldb.store.survey import Survey
 PICTURE, SHAPE = 256, 4 / 3
 """Maximum width of a leak's picture, pixels, and ratio of its width to its height."""
 
-LEAST = 3.0
+MIN_PICTURE_WIDTH = 3.0
 """Minimum width of the lining in a leak's picture, m."""
 
 STRIP_PIXELS = 1600
@@ -213,7 +213,7 @@ class Strips:
         sections = self._sections(min(leak.middle for leak in leaks), max(leak.middle for leak in leaks))
         details = {}
         for leak in leaks:
-            window = Window(*near(leak, LEAST, SHAPE))
+            window = Window(*near(leak, MIN_PICTURE_WIDTH, SHAPE))
             picture = lining.picture(window, window.width / PICTURE)
             window = window if picture is None else picture.window
             detail: dict[str, Any] = {

@@ -19,7 +19,7 @@ WIDTH = 1000.0
 HIDDEN = 0.5
 """Inspected share below which a face or member is marked."""
 
-LARGEST = 25
+MAX_LISTED_MEMBERS = 25
 """Number of the largest members listed, with spots or not."""
 
 _BARS = 4  # the bar of a picture is at least a fourth of its width
@@ -128,7 +128,7 @@ def read_structures(
     if stretch is not None:
         rows = [row for row in rows if row["number"] in shown or _between(row["chainage"], stretch)]
     shown |= {row["number"] for row in rows if row["bimodal"]}
-    named = shown | {row["number"] for row in sorted(rows, key=lambda row: -row["area"])[:LARGEST]}
+    named = shown | {row["number"] for row in sorted(rows, key=lambda row: -row["area"])[:MAX_LISTED_MEMBERS]}
     listed = [row for row in rows if row["number"] in named]
     others = [row for row in rows if row["number"] not in named]
     return StructuresChapter(

@@ -24,7 +24,7 @@ from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.stations import read_stations
 
 FARTHEST_SCANNER = 50.0  # m from the axis; a scanner that was never nearer stood in another tunnel
-MOST_WILD = 0.05  # share of a trajectory's poses that may be left out as they cannot be
+MAX_WILD_SHARE = 0.05  # share of a trajectory's poses that may be left out as they cannot be
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def read_positions(
     _require_near(paths, xyz, alignment, tunnel)
     far = far_from_axis(xyz, alignment)
     wild = (far > 0.0) | jumps(time, xyz)
-    if wild.mean() > MOST_WILD:
+    if wild.mean() > MAX_WILD_SHARE:
         raise table.error(
             int(np.argmax(wild)),
             f"this pose and {np.count_nonzero(wild) - 1} others ({100 * wild.mean():.2g} %) lie more than"

@@ -23,7 +23,7 @@ from tunneldb.geometry.surface import Surface
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
-BESIDE = 20.0
+END_MARGIN = 20.0
 """Distance beyond the ends of a stretch that is loaded too, m: heights are interpolated, objects cross the ends."""
 
 
@@ -228,7 +228,7 @@ def load_scene(conn: psycopg.Connection[Any], survey: Survey, km_from: int, km_t
     UserError
         If there are no sections there.
     """
-    first, stop = km_from * KILOMETRE - BESIDE, (km_to + 1) * KILOMETRE + BESIDE
+    first, stop = km_from * KILOMETRE - END_MARGIN, (km_to + 1) * KILOMETRE + END_MARGIN
     surface = load_surface(conn, survey, first, stop)
     return Scene(
         line_of(surface),

@@ -18,7 +18,7 @@ from tunneldb.registration.underwater.observations import RANGE_NOISE
 from tunneldb.store.scan_files import checksum
 from tunneldb.store.survey import Survey
 
-LEAST_OF_CELL = 3  # points, of which the median bears one false echo
+MIN_CELL_POINTS = 3  # points, of which the median bears one false echo
 
 
 def save_registration(conn: psycopg.Connection[Any], survey: Survey, found: Registration, up: int) -> None:
@@ -230,7 +230,7 @@ def save_bed(conn: psycopg.Connection[Any], survey: Survey, kilometres: Sequence
                  GROUP BY 1, 2, 3, 4
                 HAVING count(*) >= %(least)s) cell
         """,
-        {"survey": survey.id, "km": list(kilometres), "noise": RANGE_NOISE, "least": LEAST_OF_CELL},
+        {"survey": survey.id, "km": list(kilometres), "noise": RANGE_NOISE, "least": MIN_CELL_POINTS},
     )
 
 

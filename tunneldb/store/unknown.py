@@ -8,7 +8,7 @@ import psycopg
 
 from tunneldb.errors import UserError, did_you_mean
 
-LISTED = 20
+MAX_LISTED_NAMES = 20
 """Maximum number of names in a message."""
 
 _OF_TUNNEL = (
@@ -43,5 +43,5 @@ def _sentence(what: str, name: str, known: list[str]) -> str:
 
 
 def _listed(names: list[str]) -> str:
-    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-    return ", ".join(names[:LISTED]) + more
+    more = f" and {len(names) - MAX_LISTED_NAMES} more" if len(names) > MAX_LISTED_NAMES else ""
+    return ", ".join(names[:MAX_LISTED_NAMES]) + more

@@ -15,13 +15,13 @@ from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import FaceGrid
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.structures.face_raster import BEAM, DIVERGENCE, STEP, TOLERANCE, Layout, Sums
-from tunneldb.structures.level import FEWEST, MOST_PAIRS, OWN, SHORTH, LevelCurve, level_curve
+from tunneldb.structures.level import MAX_PAIRS, MIN_LEVEL_POINTS, OWN, SHORTH, LevelCurve, level_curve
 from tunneldb.structures.models import RADIUS, normals_at, to_space
 
 LAGS = (2, 5)
 """Distance, in pixels, of places whose levels are compared: few of these pairs span the edge of a spot."""
 
-LEAST_OWN = 0.2
+MIN_OWN_SHARE = 0.2
 """Minimum share of a face at its member's level; otherwise its own level counts."""
 
 UNIFORM = 0.6
@@ -150,12 +150,12 @@ def member_levels(parts: list[list[Observed]], model: Float, *, by_range: bool) 
 def face_level(curve: LevelCurve, one: Observed) -> LevelCurve:
     """Return the level of a face: its member's, shifted by the face's offset; unshifted if the whole face is off."""
     use = np.flatnonzero(curve.known(one.angle))
-    if one.points[use].sum() < FEWEST:
+    if one.points[use].sum() < MIN_LEVEL_POINTS:
         return curve
     rest = one.value[use] - curve(one.angle[use], one.range_m[use])
     sigma = curve.sigmas(one.angle[use])
     own = np.abs(rest) < OWN * sigma
-    if own.mean() < LEAST_OWN:
+    if own.mean() < MIN_OWN_SHARE:
         mode = robust_statistics(rest, SHORTH, two_sided=True)
         own = np.abs(rest - mode.mean) < OWN * sigma
         if own.mean() < UNIFORM:
@@ -171,7 +171,7 @@ def curve_of(
         np.concatenate([getattr(one, name) for one in observed]) for name in ("angle", "range_m", "value", "points")
     )
     starts = np.cumsum([0, *(len(one.pixel) for one in observed)])
-    step = -(-2 * len(LAGS) * len(value) // MOST_PAIRS)
+    step = -(-2 * len(LAGS) * len(value) // MAX_PAIRS)
     pairs = np.concatenate([_pairs(one, step) + start for one, start in zip(observed, starts[:-1], strict=True)])
     by_range = by_range and model[RADIUS] > 0.0
     return level_curve(angle, range_m, value, points, pairs, own, by_range=by_range, one_surface=one_surface)

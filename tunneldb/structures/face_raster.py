@@ -21,7 +21,7 @@ CANDIDATES = 4
 TOLERANCE = 3.5
 """Standard deviations, of the noise along the oblique beam or of the face's own, within which a point is on a face."""
 
-LEAST_TOLERANCE = 0.0015
+MIN_POINT_TOLERANCE = 0.0015
 """Maximum distance of a point on a face, m."""
 
 BEAM, DIVERGENCE = 0.003, 0.0003
@@ -33,7 +33,7 @@ POINTS_A_PIXEL = 2.0
 FINEST, COARSEST = 0.003, 0.05
 """Limits of a pixel's side, m."""
 
-MOST_PIXELS = 40_000_000
+MAX_PIXELS = 40_000_000
 """Maximum number of pixels of all faces and scans; beyond it pixels are made larger."""
 
 BLOCK = 1 << 15
@@ -166,9 +166,9 @@ def lay_out(grid: VoxelGrid, faces: Faces, scans: int) -> Layout:
         high = np.ceil((box[:, 2:] + margin) / side[:, None]).astype(np.int64)
         size = high - low
         area = size.prod(axis=1)
-        if (total := int((area * seen.sum(axis=1)).sum())) <= MOST_PIXELS:
+        if (total := int((area * seen.sum(axis=1)).sum())) <= MAX_PIXELS:
             break
-        scale *= 1.05 * math.sqrt(total / MOST_PIXELS)
+        scale *= 1.05 * math.sqrt(total / MAX_PIXELS)
     pixels = (seen * area[:, None]).ravel()
     start = np.where(seen.ravel(), np.cumsum(pixels) - pixels, -1).reshape(count, scans)
     return Layout(faces.models, side, np.column_stack([low, size]), start, total)
@@ -252,7 +252,7 @@ def _find(
             off = abs(distance(models[f], x, y, z))
             gx, gy, gz = gradient(models[f], x, y, z)
             cosine = abs(gx * tx + gy * ty + gz * tz) / far
-            limit = max(TOLERANCE * noise * cosine, LEAST_TOLERANCE, min(TOLERANCE * rms[f], 0.006))
+            limit = max(TOLERANCE * noise * cosine, MIN_POINT_TOLERANCE, min(TOLERANCE * rms[f], 0.006))
             if off < nearest and off <= limit:
                 second = nearest
                 best, nearest = f, off

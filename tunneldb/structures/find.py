@@ -23,13 +23,13 @@ from tunneldb.structures.significance import Scatter
 from tunneldb.structures.solidity import closed, ray_densities, solid_faces
 from tunneldb.structures.spots import BIMODAL, FaceSpots, find_spots
 
-LEAST_AREA = 0.002
+MIN_FACE_AREA = 0.002
 """Minimum area of a face, m²."""
 
-LEAST_FILLED = 0.35
+MIN_FILLED_SHARE = 0.35
 """Minimum share of a face's pixels with points, with holes of two pixels closed: gratings and leaves have less."""
 
-LEAST_WIDTH = 2.0
+MIN_FACE_WIDTH = 2.0
 """Minimum mean width of a face, in pixels: cables and edges are narrower."""
 
 
@@ -219,13 +219,13 @@ def _extent(layout: Layout, face: int, held: Int64, scans: tuple[int, ...]) -> E
         return None
     side = float(layout.pixel[face])
     mask = closed(occupied, 2)
-    if mask.sum() * side**2 < 0.5 * LEAST_AREA:  # drawing outlines takes longest; straightened ones hardly have another area
+    if mask.sum() * side**2 < 0.5 * MIN_FACE_AREA:  # drawing outlines takes longest; straightened ones hardly have another area
         return None
     outline = outline_of(mask, int(layout.shape[face, 0]), int(layout.shape[face, 1]), side)
     area = outline.area
-    if area < LEAST_AREA or occupied.sum() * side**2 < LEAST_FILLED * area:
+    if area < MIN_FACE_AREA or occupied.sum() * side**2 < MIN_FILLED_SHARE * area:
         return None
-    if 2.0 * area / max(outline.length, 1e-9) < LEAST_WIDTH * side:
+    if 2.0 * area / max(outline.length, 1e-9) < MIN_FACE_WIDTH * side:
         return None
     return Extent(layout.models[face], outline, side, scans, float(held.sum()))
 

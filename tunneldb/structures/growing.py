@@ -22,28 +22,28 @@ from tunneldb.threads import in_blocks
 TOLERANCE = 2.5
 """Maximum distance of a centroid from the face, in standard deviations of the noise."""
 
-WIDEST = 2.5
+MAX_SPREAD = 2.5
 """Maximum spread of a voxel's points about the face, in standard deviations of the noise."""
 
-LEAST_TOLERANCE = 0.001
+MIN_TOLERANCE = 0.001
 """Lower limit of both, m: coordinates are rounded, and sheets are not perfectly flat."""
 
-LEAST_NOISE, MOST_NOISE, UNKNOWN_NOISE = 0.0003, 0.006, 0.002
+MIN_NOISE, MAX_NOISE, UNKNOWN_NOISE = 0.0003, 0.006, 0.002
 """Limits of the noise, m: rougher surfaces are rock or soil, and without flat surfaces it is unknown."""
 
 TURN = 18.0
 """Maximum angle between the normals of a face's voxels and its own, degrees: with few points they scatter."""
 
-LARGEST = 3.0
+MAX_RADIUS = 3.0
 """Maximum radius of a cylinder, m: vessels and ducts. Larger ones are flat over the width of a beam or pipe."""
 
-LEAST_RADIUS = 4.0
+MIN_RADIUS_SIGMAS = 4.0
 """Minimum radius of a cylinder, in standard deviations of the noise."""
 
-LEAST_ANGLE = 50.0
+MIN_ANGLE = 50.0
 """Minimum angle over which a cylinder is seen, degrees: with less its radius is unknown."""
 
-LEAST_POINTS, LEAST_VOXELS = 60, 8
+MIN_POINTS, MIN_VOXELS = 60, 8
 """Minimum number of points and of voxels of a face."""
 
 PATCH = 150
@@ -52,10 +52,10 @@ PATCH = 150
 VAIN = 3
 """Number of unsuccessful cylinder patches with a voxel from which no cylinder is tried at it."""
 
-TIMES = 6
+MAX_REGROWTHS = 6
 """Maximum number of times that a plane is grown again from its seed with the improved plane."""
 
-ROUGH = 0.06
+MAX_SURFACE_VARIATION = 0.06
 """Surface variation above which no face is started: vegetation, bundles of cables."""
 
 
@@ -91,7 +91,7 @@ def noise_of(planes: VoxelPlanes, towards: Float) -> float:
     flat = (planes.variation < 0.01) & (cosine > 0.5)
     if not flat.any():
         return UNKNOWN_NOISE
-    return float(np.clip(np.median(planes.rms[flat] / cosine[flat]), LEAST_NOISE, MOST_NOISE))
+    return float(np.clip(np.median(planes.rms[flat] / cosine[flat]), MIN_NOISE, MAX_NOISE))
 
 
 def grow(grid: VoxelGrid, starts: Int64, neighbours: Int32, planes: VoxelPlanes, towards: Float, noise: float) -> Grown:
@@ -108,7 +108,7 @@ def grow(grid: VoxelGrid, starts: Int64, neighbours: Int32, planes: VoxelPlanes,
     """
     # What is as flat as noise lets it be is equally so; of that, where most points are comes first.
     cosine = np.einsum("ni,ni->n", planes.normal, towards)
-    rough = np.maximum(planes.rms / np.maximum(noise * cosine, LEAST_NOISE), 1.2)
+    rough = np.maximum(planes.rms / np.maximum(noise * cosine, MIN_NOISE), 1.2)
     owner = np.full(len(grid), -1, np.int32)
     centroid, bounds = grid.centroids, np.append(np.unique(grid.scan, return_index=True)[1], len(grid))
     found: list[tuple[Float, Float]] = [(np.empty((0, WIDTH)), np.empty(0))] * (len(bounds) - 1)
@@ -116,9 +116,9 @@ def grow(grid: VoxelGrid, starts: Int64, neighbours: Int32, planes: VoxelPlanes,
     def of_scan(number: int, _: int) -> None:
         here = slice(bounds[number], bounds[number + 1])
         order = np.lexsort([-planes.support[here], np.round(rough[here], 1)])
-        order = order[planes.variation[here][order] < ROUGH]
+        order = order[planes.variation[here][order] < MAX_SURFACE_VARIATION]
         beside = starts[here.start : here.stop + 1]
-        most = (here.stop - here.start) // LEAST_VOXELS + 1
+        most = (here.stop - here.start) // MIN_VOXELS + 1
         models, rms = np.zeros((most, WIDTH)), np.zeros(most)
         count = _grow_all(
             order, grid.moments[here], centroid[here], planes.normal[here], towards[here], beside - beside[0],
@@ -176,9 +176,9 @@ def _spread_over(
                 tz = model[3] * gy - model[4] * gx
                 off += model[7] * max(_spread(moments[j], centroid[j], tx, ty, tz), 0.0) / (2.0 * model[6])
             sigma = noise * abs(gx * towards[j, 0] + gy * towards[j, 1] + gz * towards[j, 2])
-            if abs(off) > loose * max(TOLERANCE * sigma, LEAST_TOLERANCE):
+            if abs(off) > loose * max(TOLERANCE * sigma, MIN_TOLERANCE):
                 continue
-            widest = loose * max(WIDEST * sigma, 1.5 * LEAST_TOLERANCE) + sag
+            widest = loose * max(MAX_SPREAD * sigma, 1.5 * MIN_TOLERANCE) + sag
             if spread + off * off > widest * widest:
                 continue
             turn = normals[j, 0] * gx + normals[j, 1] * gy + normals[j, 2] * gz
@@ -224,7 +224,7 @@ def _turning(
             mark[j] = stamp
             queue[count] = j
             count += 1
-    if count < LEAST_VOXELS:
+    if count < MIN_VOXELS:
         return 0
     nn, weight = np.zeros(6), 0.0
     mean, middle = np.zeros(3), np.zeros(3)
@@ -264,7 +264,7 @@ def _turning(
     if square <= 0.0:
         return 0
     radius = product / square
-    if not 0.003 < abs(radius) < LARGEST:
+    if not 0.003 < abs(radius) < MAX_RADIUS:
         return 0
     for k in range(3):
         model[k] = middle[k] - radius * mean[k]
@@ -294,7 +294,7 @@ def _grow_all(
         count = 0
         deviation = 0.0
         before = 0
-        for turn in range(TIMES):
+        for turn in range(MAX_REGROWTHS):
             stamp += 1
             count = _spread_over(
                 seed, plane, cosine, 1.0, noise, 0.0, turn == 0, moments, centroid, normals, towards, starts,
@@ -322,24 +322,24 @@ def _grow_all(
                     seed, round_, limit, loose, noise, sag, False, moments, centroid, normals, towards, starts,
                     neighbours, owner, mark, stamp, other, sums,
                 )  # fmt: skip
-                if held < LEAST_VOXELS:
+                if held < MIN_VOXELS:
                     break
                 rest = fit_cylinder(moments, centroid, other, held, noise, round_, 8)
-                if not round_[6] < LARGEST:
+                if not round_[6] < MAX_RADIUS:
                     held = 0
                     break
             if (
-                held >= LEAST_VOXELS
+                held >= MIN_VOXELS
                 and sums[0] > 1.15 * points
                 and rest < 1.5 * noise + 0.0005
-                and round_[6] > LEAST_RADIUS * noise
-                and seen_angle(round_, centroid, other, held) >= math.radians(LEAST_ANGLE)
+                and round_[6] > MIN_RADIUS_SIGMAS * noise
+                and seen_angle(round_, centroid, other, held) >= math.radians(MIN_ANGLE)
             ):
                 kind, count, points, deviation = 1, held, sums[0], rest
             else:
                 for m in range(patch):
                     vain[near[m]] = min(vain[near[m]] + 1, VAIN)
-        if (kind == 0 and (count < LEAST_VOXELS or points < LEAST_POINTS)) or points < LEAST_POINTS:
+        if (kind == 0 and (count < MIN_VOXELS or points < MIN_POINTS)) or points < MIN_POINTS:
             tried[seed] = True
             continue
         for m in range(count):

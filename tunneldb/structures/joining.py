@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from tunneldb.arrays import Bool, Float, Int32, Int64, Single
 from tunneldb.compiled import kernel
-from tunneldb.structures.merging import ANGLE, APART
+from tunneldb.structures.merging import ANGLE, MAX_DISTANCE_IN_SCAN
 from tunneldb.structures.models import AXIS, POINT, RADIUS, SIDE, normals_at, to_space, unroll
 
 COMMON_ANGLE = 5.0
@@ -25,7 +25,7 @@ COMMON_ANGLE = 5.0
 COMMON_APART = 2.5
 """Maximum distance between rims on one line, in pixels."""
 
-LEAST_RIM = 6
+MIN_RIM_PIXELS = 6
 """Minimum length of a rim, in pixels."""
 
 GAP = 0.05
@@ -40,7 +40,7 @@ OCCLUDED = 0.8
 CLEARANCE = 0.02
 """Distance behind the surface from which a beam has passed through, m."""
 
-LEAST_FACING, LEAST_FACING_PIPE = 0.1, 0.5
+MIN_FACING_COSINE, MIN_PIPE_FACING_COSINE = 0.1, 0.5
 """Minimum cosine of the incidence for a line of sight to count: it always passes beside a thin pipe."""
 
 CELL = 0.1
@@ -143,7 +143,7 @@ def coplanar(faces: list[Extent], noise: float) -> list[tuple[int, int]]:
     """Pair faces on one plane or cylinder (3.2.1): the smaller is on the surface of the larger."""
     if not faces:
         return []
-    apart = max(APART, 3.0 * noise)
+    apart = max(MAX_DISTANCE_IN_SCAN, 3.0 * noise)
     models = np.array([face.model for face in faces])
     places = [_corners(face) for face in faces]
     middles = np.array([at.mean(axis=0) for at in places])
@@ -212,7 +212,7 @@ def _rims(outline: shapely.Geometry, pixel: float) -> Float:
         ring = shapely.get_coordinates(shapely.simplify(part.exterior, 2.0 * pixel))
         step = np.diff(ring, axis=0)
         length = np.linalg.norm(step, axis=1)
-        long = length >= LEAST_RIM * pixel
+        long = length >= MIN_RIM_PIXELS * pixel
         middle, along = 0.5 * (ring[:-1] + ring[1:])[long], step[long] / length[long, None]
         found.append(np.column_stack([middle, along, length[long]]))
     rims = np.concatenate(found)
@@ -269,7 +269,7 @@ def _occluded(one: Extent, moved: shapely.Geometry, scans: set[int], images: Ran
         return True  # they touch
     space = to_space(one.model, places[:, 0], places[:, 1])
     normal = normals_at(one.model, places[:, 0], places[:, 1])
-    least = LEAST_FACING_PIPE if one.model[RADIUS] > 0.0 else LEAST_FACING
+    least = MIN_PIPE_FACING_COSINE if one.model[RADIUS] > 0.0 else MIN_FACING_COSINE
     closed, faced = np.ones(len(space), np.bool_), np.zeros(len(space), np.bool_)
     for scan in sorted(scans):
         towards = images.stations[scan] - space

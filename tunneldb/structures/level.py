@@ -23,16 +23,16 @@ CLASS = 0.05
 
 CLASSES = int(np.pi / CLASS) + 1
 
-FEWEST = 30
+MIN_LEVEL_POINTS = 30
 """Minimum number of points of a level."""
 
-STEEPEST = 80.0
+MAX_INCIDENCE = 80.0
 """Maximum incidence, degrees: beyond it the beam covers over six times its width."""
 
 SHORTH = 0.25
 """Share of the values in the shortest interval, which locates the level: up to half of a surface may differ."""
 
-LEAST_SPAN = 0.01
+MIN_RANGE_SPAN = 0.01
 """Span of lg R below which range has no effect on a surface."""
 
 BEND = 0.3
@@ -48,10 +48,10 @@ RANGE_SLOPE = 20.0
 TUKEY = 4.0
 """Limits of weights, in standard deviations: differences count less beyond the first, and not at all beyond the second."""
 
-MOST_PAIRS, MOST_PIXELS = 20_000, 40_000
+MAX_PAIRS, MAX_PIXELS = 20_000, 40_000
 """Approximate number of pairs of places for the shape, and of pixels for the level."""
 
-MOST_POINTS = 8.0
+MAX_PIXEL_POINTS = 8.0
 """Maximum number of points that count in a pixel: a surface's unevenness does not depend on how often it is measured."""
 
 FITS = 8
@@ -60,7 +60,7 @@ FITS = 8
 SETTLED = 0.005
 """… which end when the level changes by less, dB."""
 
-MOST_WIDE = 1.5
+MAX_SCATTER_RATIO = 1.5
 """Ratio of the scatter to that elsewhere from which another material covers the surface."""
 
 OWN = 2.5
@@ -69,7 +69,7 @@ OWN = 2.5
 OWN_MAD = 0.98
 """Ratio of the median deviation of a normal distribution truncated there to that of the whole one."""
 
-LEAST_SIGMA = 0.05
+MIN_SIGMA = 0.05
 """Minimum scatter of the level, dB: most rounded values may be equal."""
 
 
@@ -100,7 +100,7 @@ class LevelCurve:
         enough[self.seen + 1] = True
         place = angle / CLASS
         at = np.floor(place + 0.5).astype(np.int64)
-        return np.asarray((enough[at] | enough[at + 1]) & (place <= np.radians(STEEPEST) / CLASS))
+        return np.asarray((enough[at] | enough[at + 1]) & (place <= np.radians(MAX_INCIDENCE) / CLASS))
 
     def __call__(self, angle: Float, range_m: Float) -> Float:
         """Return the level at angles of incidence, radians, and ranges (n,), dB."""
@@ -147,28 +147,28 @@ def level_curve(
         Whether most of it is of one surface, so that where most pixels lie is fitted once more. Of several materials each
         covers its own incidences, and such a fit would go from one to the other.
     """
-    usable = angle <= np.radians(STEEPEST)
+    usable = angle <= np.radians(MAX_INCIDENCE)
     seen = _seen(angle[usable], points[usable])
     if not len(seen):
         return UNKNOWN
     pairs = pairs[usable[pairs].all(axis=1)]
     taken = np.flatnonzero(usable)
-    taken = np.union1d(taken[:: -(-len(taken) // MOST_PIXELS)], pairs)
+    taken = np.union1d(taken[:: -(-len(taken) // MAX_PIXELS)], pairs)
     pairs = np.searchsorted(taken, pairs)
     angle, value, points, log_range = angle[taken], value[taken], points[taken], np.log10(range_m[taken])
     middle = float(np.median(log_range))
-    by_range = by_range and float(np.ptp(log_range)) > LEAST_SPAN
+    by_range = by_range and float(np.ptp(log_range)) > MIN_RANGE_SPAN
     low, high = float(angle.min()), float(angle.max())
     knots = np.linspace(low, max(high, low + 1e-6), max(int(np.ceil((high - low) / CLASS)), 1) + 1)
     basis = _Basis((angle - low) / (knots[1] - low), log_range - middle, len(knots), by_range)
-    weight = np.minimum(points, MOST_POINTS)
+    weight = np.minimum(points, MAX_PIXEL_POINTS)
     told = own[taken] if own is not None else np.zeros(len(value), np.bool_)
-    if points[told].sum() < FEWEST:
+    if points[told].sum() < MIN_LEVEL_POINTS:
         told = np.ones(len(value), np.bool_)
     found = _shape(basis, value, weight, pairs[told[pairs].all(axis=1)])
     start = robust_statistics((value - basis(found))[told], SHORTH, two_sided=True)
     found[: len(knots)] += start.mean
-    spread = max(start.sigma, LEAST_SIGMA)
+    spread = max(start.sigma, MIN_SIGMA)
     if one_surface:
         found, spread = _fit(basis, value, weight, found, spread)
     sigma = _sigmas(angle, value - basis(found), knots, spread)
@@ -178,7 +178,7 @@ def level_curve(
 def _seen(angle: Float, points: Float) -> Int64:
     """Return the classes of θ with enough points."""
     number = np.floor(angle / CLASS).astype(np.int64)
-    return np.flatnonzero(np.bincount(number, points) >= FEWEST)
+    return np.flatnonzero(np.bincount(number, points) >= MIN_LEVEL_POINTS)
 
 
 class _Basis:
@@ -233,7 +233,7 @@ def _shape(basis: _Basis, value: Float, weight: Float, pairs: Int64) -> Float:
     for turn in range(FITS):
         rest = value - basis(found)
         off = np.abs(rest[one] - rest[other])
-        sigma = max(MAD_TO_SIGMA * float(np.median(off)), LEAST_SIGMA)
+        sigma = max(MAD_TO_SIGMA * float(np.median(off)), MIN_SIGMA)
         size = off / (TUKEY * sigma)
         # The start may be far off.
         robust = np.minimum(1.0, 0.4 / np.maximum(size, 1e-12)) if turn < 3 else np.maximum(1.0 - size**2, 0.0) ** 2
@@ -250,9 +250,9 @@ def _fit(basis: _Basis, value: Float, weight: Float, found: Float, spread: float
     for _ in range(FITS):
         rest = value - basis(found)
         near = np.abs(rest) < OWN * spread
-        if near.sum() < FEWEST:
+        if near.sum() < MIN_LEVEL_POINTS:
             break
-        spread = max(float(MAD_TO_SIGMA * np.median(np.abs(rest[near]))) / OWN_MAD, LEAST_SIGMA)
+        spread = max(float(MAD_TO_SIGMA * np.median(np.abs(rest[near]))) / OWN_MAD, MIN_SIGMA)
         counted = weight * np.maximum(1.0 - (rest / (TUKEY * spread)) ** 2, 0.0) ** 2 / spread**2
         before, found = found, basis.solve(every, nothing, value, counted)
         if np.abs(found[:-1] - before[:-1]).max() < SETTLED:
@@ -295,6 +295,6 @@ def _sigmas(angle: Float, rest: Float, knots: Float, spread: float) -> Float:
     angle, rest = angle[order], rest[order]
     for k, knot in enumerate(knots):
         low, high = np.searchsorted(angle, [knot - CLASS, knot + CLASS])
-        if high - low >= FEWEST:
-            out[k] = np.clip(robust_statistics(rest[low:high], two_sided=True).sigma, LEAST_SIGMA, MOST_WIDE * spread)
+        if high - low >= MIN_LEVEL_POINTS:
+            out[k] = np.clip(robust_statistics(rest[low:high], two_sided=True).sigma, MIN_SIGMA, MAX_SCATTER_RATIO * spread)
     return out

@@ -23,13 +23,13 @@ from tunneldb.structures.face_raster import Layout
 from tunneldb.structures.level import SHORTH
 from tunneldb.structures.models import to_space, unroll
 
-LEAST_WIDTH = 0.4
+MIN_SIDE_WIDTH = 0.4
 """Minimum width of both sides of the line, and minimum length of the line, m: on a beam rust may span from rim to rim."""
 
-LEAST_STEP = 1.0
+MIN_STEP_SIGMAS = 1.0
 """Minimum step of the level, in standard deviations of a pixel."""
 
-LEAST_STEP_DB = 1.0
+MIN_STEP_DB = 1.0
 """Minimum step of the level, dB: smaller differences may be unevenness."""
 
 USUAL_STEPS = 4.0
@@ -47,13 +47,13 @@ ALONG, ACROSS = 8, 3
 BLOCKS = 4
 """Number of blocks to either side whose median counts: near enough for the same incidence."""
 
-FEWEST = 6
+MIN_BLOCKS = 6
 """Minimum number of blocks along the line."""
 
-MOST_PIXELS = 2_000_000
+MAX_PLANE_PIXELS = 2_000_000
 """Maximum number of pixels of a plane; beyond it they are made larger."""
 
-MANY = 12
+LINES_FOR_USUAL_STEP = 12
 """Number of lines that give the usual step: around the right one about four show its step."""
 
 DEPTH = 3
@@ -92,7 +92,7 @@ class Plane:
             places.append(np.column_stack(unroll(model, space)[:2]))
         low = np.min([at.min(axis=0) for at in places], axis=0)
         size = np.max([at.max(axis=0) for at in places], axis=0) - low
-        pixel = max(float(np.median(layout.pixel[faces])), float(np.sqrt(size.prod() / MOST_PIXELS)))
+        pixel = max(float(np.median(layout.pixel[faces])), float(np.sqrt(size.prod() / MAX_PLANE_PIXELS)))
         columns, rows = (np.floor(size / pixel).astype(np.int64) + 1).tolist()
         cells = [np.floor((at - low) / pixel).astype(np.int64) for at in places]
         return cls(pixel, [at[:, 1] * columns + at[:, 0] for at in cells], (rows, columns))
@@ -109,7 +109,7 @@ def parts_of_plane(layout: Layout, faces: list[int], seen: list[list[Observed]])
         Each of the faces as the scans saw it.
     """
     plane = Plane.of(layout, faces)
-    if max(plane.shape) * plane.pixel < 2.0 * LEAST_WIDTH:
+    if max(plane.shape) * plane.pixel < 2.0 * MIN_SIDE_WIDTH:
         return None
     images = []
     for scan in sorted({one.scan for by_scan in seen for one in by_scan}):  # by itself: what one saw most of is its level
@@ -168,12 +168,12 @@ def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
     for axis in (0, 1):
         turned = [np.moveaxis(image, axis, 0) for image in images]
         place = np.flatnonzero(np.any([np.isfinite(lines).any(axis=1) for lines in turned], axis=0))
-        if len(place) * pixel < 2.0 * LEAST_WIDTH:
+        if len(place) * pixel < 2.0 * MIN_SIDE_WIDTH:
             continue
         first = int(place[0])
         blocks, sigmas = zip(*(_blocks(lines[first : place[-1] + 1]) for lines in turned), strict=True)
         sigma = float(np.median(sigmas))
-        edge = max(BLOCKS, int(np.ceil(LEAST_WIDTH / (ACROSS * pixel))))
+        edge = max(BLOCKS, int(np.ceil(MIN_SIDE_WIDTH / (ACROSS * pixel))))
         if len(blocks[0]) <= 2 * edge:
             continue
         medians = _medians(np.moveaxis(sliding_window_view(np.array(blocks), BLOCKS, axis=1), -1, 0))
@@ -181,10 +181,12 @@ def _best_line(images: list[Float], pixel: float) -> tuple[int, int] | None:
         for k in range(edge, len(blocks[0]) - edge):
             steps = medians[:, k] - medians[:, k - BLOCKS]
             length = int(np.isfinite(steps).any(axis=0).sum())
-            if length >= FEWEST and length * ALONG * pixel >= LEAST_WIDTH:
+            if length >= MIN_BLOCKS and length * ALONG * pixel >= MIN_SIDE_WIDTH:
                 found.append((k, steps, float(np.nanmedian(steps))))
-        usual = MAD_TO_SIGMA * float(np.median([abs(step) for _, _, step in found])) if len(found) >= MANY else 0.0
-        least = max(LEAST_STEP * sigma, LEAST_STEP_DB, USUAL_STEPS * usual)
+        usual = (
+            MAD_TO_SIGMA * float(np.median([abs(step) for _, _, step in found])) if len(found) >= LINES_FOR_USUAL_STEP else 0.0
+        )
+        least = max(MIN_STEP_SIGMAS * sigma, MIN_STEP_DB, USUAL_STEPS * usual)
         for k, steps, local in found:
             seen = int(np.isfinite(steps).sum())
             if max((steps > 0.5 * least).sum(), (steps < -0.5 * least).sum()) < PARTLY * seen:
@@ -207,7 +209,7 @@ def _apart(blocks: Sequence[Float], k: int) -> float:
     steps, weights = [0.0], [0.0]
     for scan in blocks:
         sides = [side[np.isfinite(side)] for side in (scan[:k], scan[k:])]
-        if min(len(side) for side in sides) >= FEWEST:
+        if min(len(side) for side in sides) >= MIN_BLOCKS:
             before, beyond = (robust_statistics(side, SHORTH, two_sided=True).mean for side in sides)
             steps.append(beyond - before)
             weights.append(float(sum(len(side) for side in sides)))

@@ -9,14 +9,14 @@ import numpy as np
 
 from tunneldb.arrays import Float, Int32, Int64
 from tunneldb.compiled import kernel
-from tunneldb.structures.growing import MOST_NOISE, Grown
+from tunneldb.structures.growing import MAX_NOISE, Grown
 from tunneldb.structures.models import AXIS, POINT, RADIUS, SIDE, distance, fit_cylinder, fit_plane
 from tunneldb.structures.voxel_grid import AXIS_BITS, VoxelGrid
 
 ANGLE = 10.0
 """Maximum angle between two such faces, degrees (Ono et al., Table 1)."""
 
-APART = 0.005
+MAX_DISTANCE_IN_SCAN = 0.005
 """Maximum mean distance between two such faces, m (Table 1): registered scans fit that well."""
 
 STEP = 0.002
@@ -27,7 +27,7 @@ ROUNDS = 6
 BLOCK = 100_000
 """Number of voxels whose neighbours are examined together."""
 
-LARGE = 250
+MIN_VOXELS_OF_ROUGH = 250
 """Minimum number of voxels of a face if the flattest surfaces are rougher than scanner noise, as rock or soil."""
 
 
@@ -70,7 +70,9 @@ def merge(grid: VoxelGrid, starts: Int64, neighbours: Int32, towards: Float, gro
     centroid = grid.centroids
     within = _touching(owner, starts, neighbours)
     across = _at_one_place(grid.keys, owner)
-    tolerance = np.concatenate([np.full(len(within), max(STEP, 3.0 * noise)), np.full(len(across), max(APART, 3.0 * noise))])
+    tolerance = np.concatenate(
+        [np.full(len(within), max(STEP, 3.0 * noise)), np.full(len(across), max(MAX_DISTANCE_IN_SCAN, 3.0 * noise))]
+    )
     pairs = np.concatenate([within, across])
     merged_into = np.arange(count)
     for _ in range(ROUNDS):
@@ -120,7 +122,7 @@ def _ordered(grid: VoxelGrid, centroid: Float, towards: Float, owner: Int32, mod
         else:
             rms[k] = float(np.sqrt(np.mean(distances(models[k], centroid[voxels]) ** 2)))
             cosine = 1.0
-        good[k] = rms[k] < 3.0 * max(noise * cosine, 0.0005) and (noise < MOST_NOISE or len(voxels) >= LARGE)
+        good[k] = rms[k] < 3.0 * max(noise * cosine, 0.0005) and (noise < MAX_NOISE or len(voxels) >= MIN_VOXELS_OF_ROUGH)
     order = np.lexsort([models[:, 0], -sums[:, 0]])
     order = order[good[order]]
     number = np.full(count + 1, -1, np.int32)

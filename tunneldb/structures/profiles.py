@@ -15,16 +15,16 @@ from scipy.cluster.hierarchy import DisjointSet
 
 from tunneldb.arrays import Float, Int64
 from tunneldb.structures.joining import COMMON_ANGLE, Extent, numbered
-from tunneldb.structures.merging import ANGLE, APART
+from tunneldb.structures.merging import ANGLE, MAX_DISTANCE_IN_SCAN
 from tunneldb.structures.models import AXIS, RADIUS, to_space, unroll
 
 SLENDER = 3.0
 """Minimum ratio of a beam's length to the depth of its section (EN 1992-1-1, 5.3.1)."""
 
-DEEPEST = 1.2
+MAX_SECTION_DEPTH = 1.2
 """Maximum depth of sections, m: the deepest rolled one has 1118 mm (EN 10365, HL 1100)."""
 
-THICKEST = 0.04
+MAX_FLANGE_THICKNESS = 0.04
 """Maximum distance of edges of two sides, m: the thickest rolled flange (EN 10365, HE 1000 M)."""
 
 OVERLAP = 0.5
@@ -97,9 +97,11 @@ def group(surfaces: list[list[Extent]], noise: float) -> Int64:
         Of ranges, m.
     """
     boxes = {number: box_of(surface) for number, surface in enumerate(surfaces) if surface[0].model[RADIUS] == 0.0}
-    boxes = {number: box for number, box in boxes.items() if box.length >= SLENDER * box.width and box.width <= DEEPEST}
+    boxes = {
+        number: box for number, box in boxes.items() if box.length >= SLENDER * box.width and box.width <= MAX_SECTION_DEPTH
+    }
     found = DisjointSet(range(len(surfaces)))
-    for a, b in _touching(boxes, max(APART, 3.0 * noise)):
+    for a, b in _touching(boxes, max(MAX_DISTANCE_IN_SCAN, 3.0 * noise)):
         together = found.subset(a) | found.subset(b)
         if not found.connected(a, b) and _slender([boxes[number] for number in together]):
             found.merge(a, b)
@@ -117,7 +119,7 @@ def _slender(boxes: list[Box]) -> bool:
     """Return True if sides together are as long and as deep as a beam."""
     _, (first, last), section = _section(boxes)
     depth = float(np.linalg.norm(np.diff(section[:3], axis=0), axis=1).max())
-    return depth <= DEEPEST and last - first >= SLENDER * depth
+    return depth <= MAX_SECTION_DEPTH and last - first >= SLENDER * depth
 
 
 def _section(boxes: list[Box]) -> tuple[Float, Float, Float]:
@@ -154,15 +156,15 @@ def _touching(boxes: dict[int, Box], apart: float) -> Iterable[tuple[int, int]]:
     found = []
     for a, b in zip(i[parallel & ~one_plane].tolist(), j[parallel & ~one_plane].tolist(), strict=True):
         distance, beside = _distance(boxes[numbers[a]], boxes[numbers[b]])
-        if distance <= THICKEST and beside > 0.0:
+        if distance <= MAX_FLANGE_THICKNESS and beside > 0.0:
             found.append((distance, -beside, numbers[a], numbers[b]))
     return [(a, b) for _, _, a, b in sorted(found)]
 
 
 def _bounds(boxes: dict[int, Box]) -> Float:
-    """Return least and greatest x and y of boxes (n, 4), enlarged by half of `THICKEST`."""
+    """Return least and greatest x and y of boxes (n, 4), enlarged by half of `MAX_FLANGE_THICKNESS`."""
     at = np.array([box.corners[:, :2] for box in boxes.values()]).reshape(-1, 4, 2)
-    return np.column_stack([at.min(axis=1) - 0.5 * THICKEST, at.max(axis=1) + 0.5 * THICKEST])
+    return np.column_stack([at.min(axis=1) - 0.5 * MAX_FLANGE_THICKNESS, at.max(axis=1) + 0.5 * MAX_FLANGE_THICKNESS])
 
 
 def _distance(one: Box, other: Box) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from tunneldb.structures.models import unroll
 from tunneldb.structures.records import EarlierSpot, SpotReconciliation
 from tunneldb.structures.results import Face, Spot, Structures
 
-NEAR = 0.05
+MAX_VERTEX_DISTANCE = 0.05
 """Maximum distance of the vertices of an earlier spot from its face, m: registration of scans is better than that."""
 
 
@@ -67,7 +67,9 @@ def _matches(spots: Sequence[Spot], faces: dict[int, Face], earlier: Sequence[Ea
     of_face: dict[tuple[int, str], list[int]] = {}
     for k, spot in enumerate(spots):
         of_face.setdefault((spot.face, spot.kind), []).append(k)
-    boxes = [(one.vertices.min(axis=0) - NEAR, one.vertices.max(axis=0) + NEAR) for one in earlier]
+    boxes = [
+        (one.vertices.min(axis=0) - MAX_VERTEX_DISTANCE, one.vertices.max(axis=0) + MAX_VERTEX_DISTANCE) for one in earlier
+    ]
     for (number, kind), of in of_face.items():
         face = faces[number]
         low, high = _box(face)
@@ -89,7 +91,7 @@ def _box(face: Face) -> tuple[NDArray[Any], NDArray[Any]]:
 def _on_face(face: Face, vertices: Float) -> Polygon | None:
     """Return the outline of these vertices in a face's unrolled coordinates; None if they do not lie on it."""
     u, v, off = unroll(face.model, vertices - face.origin)
-    if np.abs(off).max() > NEAR:
+    if np.abs(off).max() > MAX_VERTEX_DISTANCE:
         return None
     outline = shapely.make_valid(Polygon(np.column_stack([u, v])))
     return outline if outline.area > 0.0 else None

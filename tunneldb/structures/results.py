@@ -17,7 +17,7 @@ from tunneldb.structures.models import RADIUS, to_space
 SIMPLIFY = 0.75
 """Tolerance for simplifying outlines of faces, pixels."""
 
-UPRIGHT = 0.02
+VERTICAL_STRIP_WIDTH = 0.02
 """Width on the map of vertical faces, m."""
 
 _CHORD = 0.005  # m by which an edge of a polygon may cut the corner of a curved face
@@ -125,10 +125,10 @@ class Face:
         return shapely.set_coordinates(lifted, raised)
 
     def on_map(self, shape: Polygon) -> Polygon:
-        """Return a polygon of unrolled coordinates in plan, m; a vertical one is a strip `UPRIGHT` wide."""
+        """Return a polygon of unrolled coordinates in plan, m; a vertical one is a strip `VERTICAL_STRIP_WIDTH` wide."""
         placed = shapely.force_2d(self.in_space(shape))
         plan = placed if placed.is_valid and placed.area > 0.05 * shape.area else placed.convex_hull
-        return plan if isinstance(plan, Polygon) else plan.buffer(UPRIGHT / 2.0, cap_style="flat")
+        return plan if isinstance(plan, Polygon) else plan.buffer(VERTICAL_STRIP_WIDTH / 2.0, cap_style="flat")
 
 
 @dataclass(frozen=True)

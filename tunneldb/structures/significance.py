@@ -23,7 +23,7 @@ WINDOWS = (3, 5, 9)
 ALARMS = 0.05
 """Mean number of windows of each size that pass by chance in a whole structure."""
 
-LEAST_FILLED = 0.5
+MIN_FILLED_SHARE = 0.5
 """Minimum share of a window's pixels with a value."""
 
 USUAL = 30.0
@@ -32,7 +32,7 @@ USUAL = 30.0
 LEVEL_SIGMA = 0.15
 """Minimum standard error of a level, dB."""
 
-MOST_SAMPLES = 50_000
+MAX_SAMPLES = 50_000
 
 
 @dataclass
@@ -95,14 +95,14 @@ def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter
     usual = float(np.median(sigma[judged])) if judged.any() else 1.0
     for window in WINDOWS:
         filled = ndimage.uniform_filter(count, window, mode="constant")
-        known = filled >= LEAST_FILLED
+        known = filled >= MIN_FILLED_SHARE
         mean = ndimage.uniform_filter(ratio, window, mode="constant")
         # Of fewer pixels a mean scatters more.
-        mean = np.where(known, mean / np.sqrt(np.maximum(filled, LEAST_FILLED)), np.float32(0.0))
+        mean = np.where(known, mean / np.sqrt(np.maximum(filled, MIN_FILLED_SHARE)), np.float32(0.0))
         whole = mean[known & judged]
         if not len(whole):
             continue
-        step = -(-len(whole) // MOST_SAMPLES)
+        step = -(-len(whole) // MAX_SAMPLES)
         own = robust_statistics(whole[::step], SHORTH, two_sided=True).sigma
         wide = scatter.blended(window, own, len(whole) / window**2)
         wide = float(np.hypot(wide, LEVEL_SIGMA / max(usual, 1e-3)))

@@ -14,7 +14,7 @@ from tunneldb.structures.contrast import Observed
 from tunneldb.structures.face_raster import Layout
 from tunneldb.structures.models import to_space
 
-LEAST_RETURNED = 0.7
+MIN_RETURNED_SHARE = 0.7
 """Minimum share of the beams that a solid face returns."""
 
 EVEN = 0.3
@@ -23,7 +23,7 @@ EVEN = 0.3
 QUANTILES = (0.25, 0.5, 0.95)
 """Quantiles for low, usual and high density: up to a quarter of what a scan sees may be gratings and fences."""
 
-FEWEST = 60
+MIN_DENSITY_POINTS = 60
 """Minimum number of points of a face for a density."""
 
 
@@ -40,7 +40,7 @@ def ray_densities(layout: Layout, face: int, seen: list[Observed], stations: Flo
     out = np.full((len(stations), 2), np.nan)
     for one in seen:
         points = float(one.points.sum())
-        if points < FEWEST:
+        if points < MIN_DENSITY_POINTS:
             continue
         row, column = np.divmod(one.pixel, one.columns)
         towards = stations[one.scan] - to_space(layout.models[face], u[column], v[row])
@@ -75,4 +75,4 @@ def solid_faces(densities: Float) -> Bool:
             continue
         total[held] += points
         came_back[held] += points * np.minimum(density / usual, 1.0)
-    return came_back >= LEAST_RETURNED * total
+    return came_back >= MIN_RETURNED_SHARE * total

@@ -21,13 +21,13 @@ from tunneldb.structures.contrast import FaceContrast
 from tunneldb.structures.face_raster import STEP
 from tunneldb.structures.significance import Scatter, significance
 
-LEAST_AREA = 0.0016
+MIN_SPOT_AREA = 0.0016
 """Minimum area of a spot, m²: 4 cm × 4 cm."""
 
-LEAST_POINTS = 30
+MIN_SPOT_POINTS = 30
 """Minimum number of points of a spot."""
 
-LEAST_JUDGED = 150
+MIN_FACE_POINTS = 150
 """Minimum number of points of a face: the smallest spot would be a fifth of it."""
 
 RIM = 0.75
@@ -90,7 +90,7 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
     """
     numbers = np.zeros(face.face.shape, np.int32)
     judged = int(face.judged.sum())
-    if not judged or face.points[face.judged].sum() < LEAST_JUDGED:
+    if not judged or face.points[face.judged].sum() < MIN_FACE_POINTS:
         return FaceSpots([], numbers, 0.0, 0)
     told = face.image.state == PixelState.LINING
     drop = np.where(told, face.image.drop, np.int16(0)) * np.float32(STEP)
@@ -109,7 +109,7 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
         if not marked.any():
             continue
         marked = refine_boundary(marked, image, size)
-        for region in find_regions(marked, marked, image, LEAST_AREA, None):
+        for region in find_regions(marked, marked, image, MIN_SPOT_AREA, None):
             spot = _judge(region, kind, face, sign * differs[::-1], rim)
             if spot is None:
                 continue
@@ -130,7 +130,7 @@ def _judge(region: Region, kind: Literal["dark", "bright"], face: FaceContrast, 
     corner = (region.row - grid.bottom, region.column - grid.first_column)
     box = tuple(slice(at, at + size) for at, size in zip(corner, region.mask.shape, strict=True))
     points = int(face.points[box][region.mask].sum())
-    if points < LEAST_POINTS:
+    if points < MIN_SPOT_POINTS:
         return None
     shape = measure_shape(region.mask, region.pixel)
     degrees = degrees_of(region, shape)

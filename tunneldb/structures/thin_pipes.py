@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int64
-from tunneldb.structures.growing import LEAST_RADIUS, Grown, grow
+from tunneldb.structures.growing import MIN_RADIUS_SIGMAS, Grown, grow
 from tunneldb.structures.merging import Faces, merge
 from tunneldb.structures.models import RADIUS, WIDTH
 from tunneldb.structures.voxel_grid import VoxelGrid, voxel_planes
@@ -42,7 +42,7 @@ def with_thin_pipes(moments: VoxelMoments, level: int, grid: VoxelGrid, faces: F
     """
     for finer in range(level + 1, moments.level + 1):
         widest = THIN * 2.0 ** (1 - finer)
-        if widest < LEAST_RADIUS * noise:
+        if widest < MIN_RADIUS_SIGMAS * noise:
             break
         fine, place = moments.within(grid, level, _open(grid, faces, widest), finer)
         if len(fine):

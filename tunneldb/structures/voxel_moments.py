@@ -26,7 +26,7 @@ FINEST = 7
 COARSEST = 2
 """Edge of the coarsest is 2^-COARSEST m."""
 
-MOST = 3_000_000
+MAX_VOXELS = 3_000_000
 """Maximum number of voxels in memory; beyond it the next coarser ones are used."""
 
 SCANS = 1 << 10
@@ -126,8 +126,8 @@ class VoxelMoments:
         return count
 
     def _make_room(self) -> None:
-        if self._size < MOST:
-            room = min(len(self._keys) + len(self._keys) // 2, MOST)
+        if self._size < MAX_VOXELS:
+            room = min(len(self._keys) + len(self._keys) // 2, MAX_VOXELS)
             for name in ("_keys", "_sums"):
                 old = getattr(self, name)
                 new = np.zeros((room, *old.shape[1:]), old.dtype)
@@ -142,7 +142,7 @@ class VoxelMoments:
             self._sums[len(keys) :] = 0
         else:
             raise UserError(
-                f"more than {MOST:,} voxels of {2.0**-COARSEST:g} m have points, too many for a structure; cut the file"
+                f"more than {MAX_VOXELS:,} voxels of {2.0**-COARSEST:g} m have points, too many for a structure; cut the file"
             )
         size = len(self._table)
         while size < 2 * len(self._keys):

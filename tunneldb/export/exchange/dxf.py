@@ -50,7 +50,7 @@ LETTERS, LINE = 120, 1.6
 PARTS = 7
 """Steps of writing: map, leaks on it and in space, unrolled lining, profiles, sections in space, the file."""
 
-FEW = 20
+MAX_TICKS_ALL_LABELLED = 20
 """Number of ticks below which all have a station label, not only those of whole hundreds."""
 
 _BLACK, _RED, _GREEN, _CYAN, _BLUE, _MAGENTA, _GREY = 7, 1, 94, 4, 150, 6, 8
@@ -260,7 +260,7 @@ def _draw_map(
         ticks(surface, chainages)[:, :, :2], is_hundred(chainages), labels(conn, survey, chainages), strict=True
     ):
         space.add_line(left, right, dxfattribs={"layer": "CHAINAGE"})
-        if long or len(chainages) < FEW:
+        if long or len(chainages) < MAX_TICKS_ALL_LABELLED:
             away = right - left
             turned = away[0] < 0  # text that would stand on its head is written towards the tick instead
             align = Align.MIDDLE_RIGHT if turned else Align.MIDDLE_LEFT

@@ -17,13 +17,13 @@ from tunneldb.geometry.surface import Surface
 Box = tuple[float, float, float, float]
 """Bounds: west, south, east, north, m."""
 
-SMALL = 0.25
+TEXT_HEIGHT = 0.25
 """Height of the text at leaks and profiles, m."""
 
 GAP = 2.0
 """Distance between profiles, m."""
 
-WIDE = 2.0
+SHEET_ASPECT = 2.0
 """Approximate ratio of width to height of the sheet of profiles."""
 
 
@@ -56,7 +56,7 @@ def draw_unrolled(
         return corner[0], corner[1], corner[0], corner[1]
     ends = np.concatenate([side for sides in parts for side in sides])
     low, high = ends.min(axis=0), ends.max(axis=0)
-    shift = np.array([corner[0] - low[0], corner[1] - high[1] - 4 * SMALL])
+    shift = np.array([corner[0] - low[0], corner[1] - high[1] - 4 * TEXT_HEIGHT])
     for left, right in parts:
         for edge in (left, right, left * [1.0, 0.0]):
             space.add_lwpolyline(edge + shift, format="xy", dxfattribs={"layer": "UNROLLED"})
@@ -64,19 +64,19 @@ def draw_unrolled(
             if left[0, 0] <= chainage <= left[-1, 0]:
                 bottom, top = (np.array([chainage, np.interp(chainage, *side.T)]) + shift for side in (left, right))
                 space.add_line(bottom, top, dxfattribs={"layer": "UNROLLED_CHAINAGE"})
-                above = top + np.array([0.0, SMALL])
-                write(space, label.partition(".")[0], above, 2 * SMALL, "UNROLLED_CHAINAGE", Align.BOTTOM_CENTER)
+                above = top + np.array([0.0, TEXT_HEIGHT])
+                write(space, label.partition(".")[0], above, 2 * TEXT_HEIGHT, "UNROLLED_CHAINAGE", Align.BOTTOM_CENTER)
     for first, last, why in gaps:
         west, east = max(first, low[0]), min(last, high[0])
         if west < east:
             corners = np.array([(west, low[1]), (east, low[1]), (east, high[1]), (west, high[1])]) + shift
             space.add_lwpolyline(corners, format="xy", close=True, dxfattribs={"layer": "COVERAGE_GAP"})
-            write(space, why, corners[0] + SMALL, 2 * SMALL, "COVERAGE_GAP")
+            write(space, why, corners[0] + TEXT_HEIGHT, 2 * TEXT_HEIGHT, "COVERAGE_GAP")
     for spot in spots:
         draw_spot(space, spot, "UNROLLED", shift)
         if spot.kind == "leak":
             east, north = spot.shape.bounds[2:]
-            write(space, spot.text, np.array([east, north]) + shift, SMALL, "LEAK_TEXT", Align.BOTTOM_LEFT)
+            write(space, spot.text, np.array([east, north]) + shift, TEXT_HEIGHT, "LEAK_TEXT", Align.BOTTOM_LEFT)
     return corner[0], float(shift[1] + low[1]), float(shift[0] + high[0]), corner[1]
 
 
@@ -89,8 +89,8 @@ def draw_profiles(
     bounds = np.array([(p.right.min(), p.up.min(), p.right.max(), p.up.max()) for p, _ in named])
     west, south = bounds[:, :2].min(axis=0)
     east, north = bounds[:, 2:].max(axis=0)
-    width, height = east - west + GAP, north - south + GAP + 8 * SMALL
-    columns = max(1, min(len(named), round(math.sqrt(WIDE * len(named) * height / width))))
+    width, height = east - west + GAP, north - south + GAP + 8 * TEXT_HEIGHT
+    columns = max(1, min(len(named), round(math.sqrt(SHEET_ASPECT * len(named) * height / width))))
     leaks = [spot for spot in spots if spot.kind == "leak"]
     ends = np.array([spot.shape.bounds for spot in leaks]).reshape(-1, 4)
     for k, (profile, label) in enumerate(named):
@@ -110,8 +110,13 @@ def _draw_profile(space: Any, axis: Float, profile: Profile, label: str, south: 
     for end in (np.array([0.5, 0.0]), np.array([0.0, 0.5])):
         space.add_line(axis - end, axis + end, dxfattribs={"layer": "PROFILE_AXIS"})
     size = np.ptp(profile.right), np.ptp(profile.up)
-    below = axis + np.array([0.0, south - SMALL])
-    write(space, label, below, 2 * SMALL, "PROFILE_TEXT", Align.TOP_CENTER)
+    below = axis + np.array([0.0, south - TEXT_HEIGHT])
+    write(space, label, below, 2 * TEXT_HEIGHT, "PROFILE_TEXT", Align.TOP_CENTER)
     write(
-        space, f"{size[0]:.2f} × {size[1]:.2f} m", below - np.array([0.0, 3.5 * SMALL]), SMALL, "PROFILE_TEXT", Align.TOP_CENTER
+        space,
+        f"{size[0]:.2f} × {size[1]:.2f} m",
+        below - np.array([0.0, 3.5 * TEXT_HEIGHT]),
+        TEXT_HEIGHT,
+        "PROFILE_TEXT",
+        Align.TOP_CENTER,
     )

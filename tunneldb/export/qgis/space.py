@@ -20,7 +20,7 @@ DISTANCE = 60.0
 PITCH = 65.0
 """Angle between the camera's direction and the vertical, degrees."""
 
-ASIDE = 50.0
+CAMERA_AZIMUTH = 50.0
 """Angle between the camera's direction and the axis', in plan, degrees."""
 
 VIEW_SIZES = 1.2
@@ -52,7 +52,7 @@ class Viewpoint:
     @property
     def yaw(self) -> float:
         """Rotation of the camera from grid north, anticlockwise as in QGIS; degrees."""
-        return (ASIDE - self.bearing) % 360.0
+        return (CAMERA_AZIMUTH - self.bearing) % 360.0
 
 
 def viewpoint(conn: psycopg.Connection, survey: str, chainage: float | None) -> Viewpoint:
@@ -82,7 +82,7 @@ def viewpoint(conn: psycopg.Connection, survey: str, chainage: float | None) -> 
 def site_viewpoint(conn: psycopg.Connection, survey: str) -> Viewpoint:
     """Return the middle of a survey's faces, a distance from which all are visible, and the direction that most of them face.
 
-    The camera looks against the normals of its planes, by area; ASIDE is taken off again.
+    The camera looks against the normals of its planes, by area; CAMERA_AZIMUTH is taken off again.
     """
     row = conn.execute(
         "SELECT (ST_XMin(e) + ST_XMax(e)) / 2, (ST_YMin(e) + ST_YMax(e)) / 2, (ST_ZMin(e) + ST_ZMax(e)) / 2, "
@@ -93,7 +93,7 @@ def site_viewpoint(conn: psycopg.Connection, survey: str) -> Viewpoint:
     ).fetchone()
     assert row is not None
     x, y, z, size, east, north = row
-    return Viewpoint(x, y, z, math.degrees(math.atan2(-east, -north)) + ASIDE, VIEW_SIZES * size)
+    return Viewpoint(x, y, z, math.degrees(math.atan2(-east, -north)) + CAMERA_AZIMUTH, VIEW_SIZES * size)
 
 
 def filled_layers(conn: psycopg.Connection, survey: str, layers: Sequence[VectorLayer]) -> set[str]:

@@ -17,10 +17,10 @@ from xlsxwriter.worksheet import Worksheet
 from tunneldb import __version__
 from tunneldb.errors import UserError
 
-MOST_ROWS = 1_048_576
+MAX_ROWS = 1_048_576
 """Maximum number of rows of a sheet, by ECMA-376."""
 
-LONGEST = 32_767
+MAX_CELL_LENGTH = 32_767
 """Maximum number of characters of a cell."""
 
 _NARROWEST, _WIDEST = 8, 50  # columns, in characters
@@ -52,9 +52,9 @@ def write_workbook(path: Path, sheets: Sequence[Sheet], title: str) -> None:
         If a sheet has more rows than Excel knows.
     """
     for sheet in sheets:
-        if len(sheet.rows) >= MOST_ROWS:
+        if len(sheet.rows) >= MAX_ROWS:
             raise UserError(
-                f"{path.name}: {len(sheet.rows)} rows, but an Excel sheet has {MOST_ROWS}: write .csv, or a shorter stretch"
+                f"{path.name}: {len(sheet.rows)} rows, but an Excel sheet has {MAX_ROWS}: write .csv, or a shorter stretch"
             )
     options = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
     # whole in memory first: on a full disk the library would leave a file half open, and complain when it is collected
@@ -102,7 +102,7 @@ def _write_cell(page: Worksheet, y: int, x: int, value: Any, form: Format, momen
         page.write_number(y, x, value, form)
     else:
         text = str(value)
-        page.write_string(y, x, text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…", form)
+        page.write_string(y, x, text if len(text) <= MAX_CELL_LENGTH else f"{text[: MAX_CELL_LENGTH - 1]}…", form)
 
 
 def _shown(value: Any) -> str:
