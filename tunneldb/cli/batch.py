@@ -18,6 +18,7 @@ from tunneldb.cli.output import tell, verb, wants_json
 from tunneldb.cli.param_types import FilePath
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.queue.watching import is_busy, server_time
 from tunneldb.stages.parameters import PARAMETERS, settings
 from tunneldb.store.survey import Survey, get_survey
 
@@ -125,9 +126,7 @@ def _work(survey: Survey, dsn: str | None, count: int) -> Watch:
 
 def _busy(conn: psycopg.Connection[Any], survey: Survey) -> tuple[bool, dt.datetime]:
     """Return whether there is work to do, and the server's time."""
-    row = conn.execute("SELECT tunnel_internal.queue_busy(%s), clock_timestamp()", [survey.id]).fetchone()
-    assert row is not None
-    return bool(row[0]), row[1]
+    return is_busy(conn, survey.id), server_time(conn)
 
 
 def _summary(conn: psycopg.Connection[Any], survey: Survey, watch: Watch, seconds: float, since: dt.datetime) -> int:

@@ -19,9 +19,9 @@ from tunneldb.cli.tables import print_classes
 from tunneldb.database import connect
 from tunneldb.errors import NotReadyError, UserError
 from tunneldb.files import exit_on_sigterm, made_folder, replacing
-from tunneldb.finding_kind import DETECTED
 from tunneldb.stages.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
+from tunneldb.store.listing import count_dry_findings
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
@@ -113,11 +113,7 @@ def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, st
 
 def _say_left_out(conn: psycopg.Connection[Any], survey: Survey, output: Path, stretch: Stretch) -> None:
     """Say how many findings that are no water the file doesn't hold: cracks, spalls, bolts."""
-    (left_out,) = conn.execute(
-        "SELECT count(*) FROM tunnel_api.finding f WHERE survey_id = %s AND counted AND chainage_to >= %s"
-        " AND chainage_from <= %s AND NOT (wet OR coalesce(kind_detected, kind) = ANY (%s))",
-        [survey.id, stretch.low, stretch.high, list(map(str, DETECTED))],
-    ).fetchone() or (0,)
+    left_out = count_dry_findings(conn, survey, stretch.low, stretch.high)
     tell(findings_left_out=left_out)
     if left_out:
         notify(

@@ -23,9 +23,11 @@ from tunneldb.export.tables.leaks import clock_label
 from tunneldb.export.tables.workbooks import write_findings
 from tunneldb.files import replacing
 from tunneldb.pipeline.findings import import_findings
+from tunneldb.store.drawn_findings import undo_finding
 from tunneldb.store.dry_regions import read_dry_regions
 from tunneldb.store.finding_kinds import read_kinds, read_severities
 from tunneldb.store.findings import COUNTED, Chosen, Finding, Geometry, State, read_findings
+from tunneldb.store.listing import list_finding_counts, require_finding_kinds
 from tunneldb.store.survey import Survey, get_survey
 
 
@@ -130,9 +132,7 @@ def list_findings(
     hours = parse_clock(clock) if clock else None
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
-        if unknown := set(kinds) - {code for (code,) in conn.execute("SELECT code FROM tunnel_api.finding_kind")}:
-            names = ", ".join(map(repr, sorted(unknown)))
-            raise UserError(f"there is no kind {names} of findings: SELECT code FROM tunnel_api.finding_kind")
+        require_finding_kinds(conn, kinds)
         if count:
             _print_counts(conn, found, kinds, origins)
             return
@@ -221,13 +221,7 @@ def _print_counts(conn: psycopg.Connection, survey: Survey, kinds: Sequence[str]
         "to_measure",
         "area",
     ]
-    rows = conn.execute(
-        "SELECT c.kind, c.origin, counted, open, confirmed, rejected, merged, same, dry, gone, to_measure, area"
-        " FROM tunnel_api.finding_count c JOIN tunnel_api.finding_kind k ON k.code = c.kind"
-        " WHERE survey_id = %s AND (%s::text[] = '{}' OR c.kind = ANY (%s)) AND (%s::text[] = '{}' OR c.origin = ANY (%s))"
-        " ORDER BY k.position, c.kind, c.origin",
-        [survey.id, list(kinds), list(kinds), list(origins), list(origins)],
-    ).fetchall()
+    rows = list_finding_counts(conn, survey, kinds, origins)
     tell(survey=survey.name, counts=records(names, rows))
     print_table([*names[:-2], "to measure", "area m²"], [[*row[:-1], f"{row[-1]:.3f}"] for row in rows], right=range(2, 12))
 
@@ -282,13 +276,9 @@ def undo(settings: Settings, number: int) -> None:
     later change depends on it. Undo a split or merge on the finding that kept its number.
     """
     with connect(settings.dsn) as conn:
-        try:
-            row = conn.execute("SELECT tunnel_api.finding_undo(%s)", [number]).fetchone()
-        except (psycopg.errors.FeatureNotSupported, psycopg.errors.InvalidParameterValue) as error:
-            raise UserError(error.diag.message_primary or str(error)) from error
-    assert row is not None
-    tell(finding=number, undone=row[0])
-    click.echo(f"finding {number}: what was {row[0]} is taken back")
+        undone = undo_finding(conn, number)
+    tell(finding=number, undone=undone)
+    click.echo(f"finding {number}: change undone: {undone}")
 
 
 def _pairs(given: tuple[str, ...], option: str) -> dict[str, str]:

@@ -10,7 +10,6 @@ from typing import cast
 
 import click
 import psycopg
-from psycopg import sql
 from rich.console import Console
 
 from tunneldb.cli.coverage import say_coverage, say_no_crs, say_remarks
@@ -31,6 +30,7 @@ from tunneldb.store.coverage import read_coverage
 from tunneldb.store.dry_regions import DryRegion, read_dry_regions
 from tunneldb.store.findings import Geometry
 from tunneldb.store.leaks import Kind, LeakList, Selection, read_leaks
+from tunneldb.store.listing import list_leak_statistics
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
@@ -206,19 +206,7 @@ _BY_KM = (
 
 
 def _print_classes(conn: psycopg.Connection, survey: Survey, low: float, high: float) -> None:
-    place = {"survey": survey.id, "name": survey.name, "low": low, "high": high}
-    stated = sql.SQL(", ").join(
-        sql.SQL("1000 * t.wet_ratio") if name == "wet_per_mille" else sql.Identifier("t", name) for name, _, _ in _BY_KM
-    )
-    rows = conn.execute(
-        sql.SQL(
-            "SELECT t.km::text, {} FROM tunnel_api.km_waterproof t"
-            " WHERE t.survey_id = %(survey)s AND t.chainage_to > %(low)s AND t.chainage_from < %(high)s ORDER BY t.km"
-        ).format(stated),
-        place,
-    ).fetchall()
-    whole = sql.SQL("SELECT 'all', {} FROM tunnel_api.leak_statistics(%(name)s, %(low)s, %(high)s) t").format(stated)
-    total = conn.execute(whole, place).fetchall()
+    rows, total = list_leak_statistics(conn, survey, low, high, [name for name, _, _ in _BY_KM])
     names = ["km", *(name for name, _, _ in _BY_KM)]
     kilometres = [{**row, "km": int(row["km"])} for row in records(names, rows)]
     tell(survey=survey.name, kilometres=kilometres, total=records(names, total)[0] if total else None)

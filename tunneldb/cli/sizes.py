@@ -9,6 +9,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import notify, records, tell, verb
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
+from tunneldb.store.listing import list_sizes
 from tunneldb.store.survey import get_survey
 
 KINDS = ("points", "images", "sections", "results", "runs", "inputs")
@@ -25,16 +26,9 @@ def sizes(settings: Settings, name: str | None) -> None:
     """
     with connect(settings.dsn) as connection:
         survey_id = None if name is None else get_survey(connection, name, site=True).id
-        rows = connection.execute(
-            "SELECT s.name, z.kind, z.rows, z.bytes, z.estimated FROM tunnel_api.survey_size z"
-            " LEFT JOIN tunnel.survey s ON s.id = z.survey_id WHERE %(survey)s::int IS NULL OR z.survey_id = %(survey)s"
-            " ORDER BY s.name NULLS LAST, z.id",
-            {"survey": survey_id},
-        ).fetchall()
-        database = connection.execute("SELECT pg_database_size(current_database())").fetchone()
-    assert database is not None
+        rows, database = list_sizes(connection, survey_id)
     names = ("survey", "kind", "rows", "bytes", "estimated")
-    tell(sizes=records(names, rows), database_bytes=database[0])
+    tell(sizes=records(names, rows), database_bytes=database)
     table: dict[str | None, dict[str, tuple[int, bool]]] = {}
     for survey, kind, _, size, estimated in rows:
         there, about = table.setdefault(survey, {}).get(kind, (0, False))
@@ -48,7 +42,7 @@ def sizes(settings: Settings, name: str | None) -> None:
         right=range(1, len(KINDS) + 2),
     )
     if name is None:
-        click.echo(f"database: {decimal(database[0])}")
+        click.echo(f"database: {decimal(database)}")
     if None in table:
         notify("unknown survey: tables that were never analyzed; tunneldb vacuum --yes analyzes them")
 

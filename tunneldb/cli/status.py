@@ -17,6 +17,7 @@ from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.stages.registry import STAGE_NAMES
+from tunneldb.store.listing import describe_survey, list_progress
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import get_survey
 
@@ -70,24 +71,7 @@ def status(settings: Settings, survey: str | None, watch: bool, interval: float)
 
 def _all(connection: psycopg.Connection[Any]) -> None:
     """Print a line for each survey: loaded data, and the number of kilometres that each stage has done."""
-    rows = connection.execute(
-        """
-        SELECT s.name, s.tunnel, s.date, s.files, s.points, tunnel_api.station_label(s.tunnel_id, s.chainage_from),
-               tunnel_api.station_label(s.tunnel_id, s.chainage_to), k.kilometres, k.done
-          FROM tunnel_api.survey s
-          LEFT JOIN (
-               SELECT d.survey_id, max(d.there) AS kilometres, array_agg(d.done ORDER BY d.step) AS done
-                 FROM (SELECT t.survey_id, t.step, count(*) AS there,
-                              count(*) FILTER (WHERE t.outcome = 'done' AND t.reason IS NULL) AS done
-                         FROM (SELECT array_agg(a.id) AS ids FROM tunnel_api.survey a GROUP BY a.id / %s) p
-                        CROSS JOIN LATERAL tunnel_internal.stage_states(p.ids) t
-                        WHERE t.stage = ANY (%s)
-                        GROUP BY t.survey_id, t.step) d
-                GROUP BY d.survey_id) k ON k.survey_id = s.id
-         ORDER BY s.tunnel, s.date, s.name
-        """,
-        [AT_ONCE, list(STAGE_NAMES)],
-    ).fetchall()
+    rows = list_progress(connection, STAGE_NAMES, AT_ONCE)
     names = ("name", "tunnel", "date", "files", "points", "label_from", "label_to", "kilometres", "done")
     tell(surveys=[row | {"done": dict(zip(STAGE_NAMES, row["done"] or (), strict=False))} for row in records(names, rows)])
     table = [[*fixed, there, *(done or [None] * len(STAGE_NAMES))] for *fixed, there, done in rows]
@@ -106,14 +90,7 @@ def _one(connection: psycopg.Connection[Any], survey: str) -> None:
 
     seen = overview(connection, survey)
     tell(**{field.name: getattr(seen, field.name) for field in dataclasses.fields(seen)})
-    rows = connection.execute(
-        """
-        SELECT name, tunnel, date, files, points, tunnel_api.station_label(tunnel_id, chainage_from),
-               tunnel_api.station_label(tunnel_id, chainage_to)
-          FROM tunnel_api.survey WHERE name = %s
-        """,
-        [survey],
-    ).fetchall()
+    rows = describe_survey(connection, survey)
     print_table(["survey", "tunnel", "date", "files", "points", "from", "to"], rows, right=(3, 4, 5, 6))
     if seen.kilometres or seen.files:
         console = Console()

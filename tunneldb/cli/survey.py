@@ -17,6 +17,7 @@ from tunneldb.cli.survey_archive import export, import_
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.store.listing import count_holdings, count_stale, list_surveys
 from tunneldb.store.survey import UNPOSED, get_survey
 
 FILE = FilePath()
@@ -188,15 +189,12 @@ def set_(
         raise UserError("nothing to set: give --date, --trajectory, --stations, --reference, --intensity or --intensity-kind")
     with connect(settings.dsn) as connection:
         notes, reload = set_survey(connection, name, change)
-        stale = connection.execute(
-            "SELECT count(*) FROM tunnel_api.stage_status WHERE survey = %s AND stale", [name]
-        ).fetchone()
-    assert stale is not None
+        stale = count_stale(connection, get_survey(connection, name, site=True).id)
     if reload:
         notes.append(f"{reload} of its files have to be loaded again: tunneldb load {name} FILE...")
-    if stale[0]:
-        notes.append(f"{stale[0]} stages are stale: tunneldb run {name} --stale")
-    tell(survey=name, notes=notes, reload=reload, stale=stale[0])
+    if stale:
+        notes.append(f"{stale} stages are stale: tunneldb run {name} --stale")
+    tell(survey=name, notes=notes, reload=reload, stale=stale)
     notify(f"{name}: set")
     for note in notes:
         notify(f"{name}: {note}")
@@ -245,10 +243,7 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
                 raise click.Abort
         with bar("points") as progress:
             removed = remove_files(connection, found, names, step(progress))
-        stale = connection.execute(
-            "SELECT count(*) FROM tunnel_api.stage_status WHERE survey_id = %s AND stale", [found.id]
-        ).fetchone()
-    assert stale is not None
+        stale = count_stale(connection, found.id)
     tell(
         survey=name,
         files=names,
@@ -259,7 +254,7 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
         reviewed=removed.lost.reviewed,
         edited=removed.lost.edited,
         kept=removed.lost.drawn,
-        stale=stale[0],
+        stale=stale,
     )
     again = f"; read again: {', '.join(removed.reread)}" if removed.reread else ""
     notify(f"{name}: removed {', '.join(names)}{again}")
@@ -270,8 +265,8 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
             f" gone: {lost.anomalies} leaks and dry dark areas, {lost.reviewed} of them reviewed; {lost.drawn} findings"
             " drawn by hand are kept"
         )
-    if stale[0]:
-        notify(f"{name}: {stale[0]} stages are stale: tunneldb run {name} --stale")
+    if stale:
+        notify(f"{name}: {stale} stages are stale: tunneldb run {name} --stale")
 
 
 @survey.command("list", examples=["tunneldb survey list"])
@@ -279,13 +274,7 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
 def list_(settings: Settings) -> None:
     """List the surveys."""
     with connect(settings.dsn) as connection:
-        rows = connection.execute(
-            """
-            SELECT name, tunnel, date, platform, intensity_kind, files, points,
-                   tunnel_api.station_label(tunnel_id, chainage_from), tunnel_api.station_label(tunnel_id, chainage_to)
-              FROM tunnel_api.survey ORDER BY tunnel, date, name
-            """
-        ).fetchall()
+        rows = list_surveys(connection)
     names = (
         "name", "tunnel", "date", "platform", "intensity_kind", "files", "points", "label_from", "label_to",
     )  # fmt: skip
@@ -304,19 +293,13 @@ def remove(settings: Settings, name: str, yes: bool) -> None:
 
     with connect(settings.dsn) as connection:
         found = get_survey(connection, name, site=True)
-        row = connection.execute(
-            """
-            SELECT (SELECT coalesce(sum(kept), 0) FROM tunnel.scan_file WHERE survey_id = %(id)s),
-                   (SELECT count(*) FROM tunnel.finding WHERE survey_id = %(id)s),
-                   (SELECT count(*) FROM tunnel.finding WHERE survey_id = %(id)s
-                     AND (review <> 'open' OR kind_override IS NOT NULL))
-            """,
-            {"id": found.id},
-        ).fetchone()
-        assert row is not None
+        held = count_holdings(connection, found.id)
         connection.rollback()
-        question = f"Remove {name} with {row[0]} points and {row[1]} leaks and dry dark areas, {row[2]} of them reviewed?"
+        question = (
+            f"Remove {name} with {held.points} points and {held.findings} leaks and dry dark areas, {held.reviewed} of them"
+            " reviewed?"
+        )
         if not yes and not click.confirm(question, err=True):
             raise click.Abort
         remove_survey(connection, name)
-    tell(survey=name, points=row[0], anomalies=row[1], reviewed=row[2])
+    tell(survey=name, points=held.points, anomalies=held.findings, reviewed=held.reviewed)

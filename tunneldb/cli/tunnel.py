@@ -16,6 +16,7 @@ from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import exit_on_sigterm
+from tunneldb.store.listing import list_station_pieces, list_tunnels
 
 if TYPE_CHECKING:
     from tunneldb.alignment.found import FoundAxis
@@ -299,14 +300,7 @@ def stationing(settings: Settings, name: str, file: Path | None, show: bool, cle
         tunnel_id = get_tunnel(connection, name)
         if not show:
             save_equations(connection, tunnel_id, read_equations(file) if file else [])
-        rows = connection.execute(
-            """
-            SELECT to_char(p.chainage_from, 'FM999999990.000'), to_char(p.chainage_to, 'FM999999990.000'), p.label_from,
-                   p.label_to, CASE p.direction WHEN 1 THEN 'up' ELSE 'back' END
-              FROM tunnel_api.station_pieces(%s) p
-            """,
-            [tunnel_id],
-        ).fetchall()
+        rows = list_station_pieces(connection, tunnel_id)
     names = ("chainage_from", "chainage_to", "label_from", "label_to", "direction")
     tell(tunnel=name, pieces=records(names, rows))
     print_table(["chainage from", "to", "station from", "to", "runs"], rows, right=(0, 1, 2, 3))
@@ -319,14 +313,7 @@ def list_(settings: Settings) -> None:
     from tunneldb.geometry.crs import LOCAL
 
     with connect(settings.dsn) as connection:
-        rows = connection.execute(
-            """
-            SELECT t.name, t.srid, tunnel_api.station_label(t.id, t.start_chainage), round(ST_Length(t.geom)::numeric, 1),
-                   t.spacing, count(s.id)
-              FROM tunnel_api.tunnel t LEFT JOIN tunnel_api.survey s ON s.tunnel_id = t.id
-             GROUP BY t.id, t.name, t.srid, t.start_chainage, t.geom, t.spacing ORDER BY t.name
-            """
-        ).fetchall()
+        rows = list_tunnels(connection)
     tell(tunnels=records(("name", "srid", "label_from", "length", "spacing", "surveys"), rows))
     shown = [(name, "local" if srid == LOCAL else srid, *others) for name, srid, *others in rows]
     print_table(["tunnel", "SRID", "starts at", "length m", "spacing m", "surveys"], shown, right=(1, 2, 3, 4, 5))

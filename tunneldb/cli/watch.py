@@ -16,6 +16,7 @@ from tunneldb.cli.overview import duration, render, summary
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.queue.progress import Overview, overview
+from tunneldb.queue.watching import list_ended_runs, server_time
 
 
 class Watch:
@@ -150,21 +151,11 @@ class Ledger:
     def __init__(self, conn: psycopg.Connection[Any], survey: str) -> None:
         self.survey = survey
         self.points = 0
-        row = conn.execute("SELECT clock_timestamp()").fetchone()
-        assert row is not None
-        self.told = row[0]
+        self.told = server_time(conn)
 
     def ended(self, conn: psycopg.Connection[Any]) -> list[tuple[bool, str]]:
         """Return whether it was a stage of a kilometre that is done, and a line, for each."""
-        rows = conn.execute(
-            """
-            SELECT stage, coalesce('km ' || km, parameters ->> 'file'), outcome, message,
-                   extract(epoch FROM duration)::float8, finished_at, km IS NOT NULL, coalesce((counts ->> 'points')::bigint, 0)
-              FROM tunnel_api.run
-             WHERE survey = %s AND finished_at > %s AND (km IS NOT NULL OR stage = 'read') ORDER BY finished_at
-            """,
-            [self.survey, self.told],
-        ).fetchall()
+        rows = list_ended_runs(conn, self.survey, self.told)
         lines = []
         for stage, what, outcome, message, seconds, finished_at, of_km, points in rows:
             said = f"{seconds:.1f} s" if outcome == "done" else f"{outcome}: {message}"

@@ -14,6 +14,7 @@ from tunneldb.cli.output import tell, verb
 from tunneldb.cli.progress import bar
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.queue.watching import ask_workers_to_stop, count_jobs, server_time, workers_left
 
 
 @verb(examples=["tunneldb worker --concurrency 8"])
@@ -62,23 +63,13 @@ class _Jobs:
         self.crew: set[int] = set()
         self.seen = (0, 0)
         with connect(dsn) as conn:
-            row = conn.execute("SELECT clock_timestamp()").fetchone()
-            assert row is not None
-            self.began = row[0]
+            self.began = server_time(conn)
 
     def count(self) -> tuple[int, int]:
         """Return the jobs done, and those of the database that are ready or under way; as before when the server is away."""
         names = [f"{platform.node()}/{pid}" for pid in self.crew]
         with suppress(psycopg.OperationalError, UserError), connect(self.dsn) as conn:
-            row = conn.execute(
-                """
-                SELECT (SELECT count(*) FROM tunnel_api.run WHERE worker = ANY (%s) AND finished_at > %s),
-                       (SELECT count(*) FROM tunnel_api.job WHERE state IN ('queued', 'running'))
-                """,
-                [names, self.began],
-            ).fetchone()
-            assert row is not None
-            self.seen = (row[0], row[1])
+            self.seen = count_jobs(conn, names, self.began)
         return self.seen
 
 
@@ -89,10 +80,8 @@ def stop(settings: Settings, wait: bool) -> None:
     """Ask all workers of the database to finish their current stage and exit. Goals are kept."""
     with connect(settings.dsn) as conn:
         conn.autocommit = True
-        conn.execute("SELECT tunnel_internal.queue_rescue()")
-        asked = conn.execute("UPDATE tunnel.worker SET stop = true RETURNING id").fetchall()
+        asked = ask_workers_to_stop(conn)
         tell(workers=len(asked))
         click.echo(f"{len(asked)} worker{'s' * (len(asked) != 1)} asked to stop")
-        while wait and conn.execute("SELECT 1 FROM tunnel.worker WHERE id = ANY (%s)", [[row[0] for row in asked]]).fetchone():
+        while wait and workers_left(conn, asked):
             time.sleep(0.5)
-            conn.execute("SELECT tunnel_internal.queue_rescue()")

@@ -12,6 +12,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.measure import Measurement
+from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.store.survey import Survey
 
@@ -68,3 +69,19 @@ def settle_findings(conn: psycopg.Connection[Any], survey: Survey, km: int) -> N
     conn.execute("SELECT tunnel_internal.renew_findings(%s, %s)", (survey.id, km))
     conn.execute("SELECT tunnel_internal.settle_findings(%s, public.ST_MakeEnvelope(%s, -1e4, %s, 1e4))", (survey.id, *place))
     conn.execute("SELECT tunnel_internal.pack_sums(%s)", (survey.id,))
+
+
+def undo_finding(conn: psycopg.Connection[Any], number: int) -> str:
+    """Undo the last change of a finding, and return what was undone.
+
+    Raises
+    ------
+    UserError
+        If there is nothing to undo, or this user may not undo it.
+    """
+    try:
+        row = conn.execute("SELECT tunnel_api.finding_undo(%s)", [number]).fetchone()
+    except (psycopg.errors.FeatureNotSupported, psycopg.errors.InvalidParameterValue) as error:
+        raise UserError(error.diag.message_primary or str(error)) from error
+    assert row is not None
+    return str(row[0])
