@@ -319,7 +319,7 @@ def test_the_last_change_is_taken_back_or_why_not_is_one_line(conn: psycopg.Conn
     assert import_csv(tmp_path, "kind,chainage,arc\nmissing_bolt,12350,1\n").exit_code == 0
     (key,) = conn.execute("SELECT max(id) FROM tunnel_api.finding").fetchone()  # type: ignore[misc]
     conn.rollback()
-    assert run("findings", "undo", key).output == f"finding {key}: what was drawn is taken back\n"
+    assert run("findings", "undo", key).output == f"finding {key}: change undone: drawn\n"
     assert conn.execute("SELECT count(*) FROM tunnel_api.finding WHERE id = %s", [key]).fetchone() == (0,)
     refused = run("findings", "undo", key)
     assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
