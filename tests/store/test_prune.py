@@ -22,8 +22,8 @@ HISTORIES = {"run", "change", "job", "survey_size"}
 INPUTS = """
     SELECT k, r.stage, tunnel_internal.result_inputs(n.id, r.stage, k, r.subject)
       FROM tunnel.survey n, tunnel.survey o, generate_series(11, 13) k,
-           (VALUES ('compare', o.id::text), ('rings', ''), ('deviation', 'lining'), ('evenness', 'lining'),
-                   ('thickness', o.id || ' lining'), ('clearance', 'single example')) r (stage, subject)
+           LATERAL (VALUES ('compare', o.id::text), ('rings', ''), ('deviation', 'lining'), ('evenness', 'lining'),
+                           ('thickness', o.id || ' lining'), ('clearance', 'single example')) r (stage, subject)
 """
 """What results made now would be made from."""
 

@@ -19,7 +19,7 @@ from tunneldb.cli.measure import (
     say_written,
     surveys_in,
     with_progress,
-    write_text,
+    write_rows,
 )
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.stretch import Stretch, stretch_options
@@ -67,7 +67,7 @@ def deviation(
     docs/howto-shape.md describes the columns.
     """
     from tunneldb.measures.deviation.measure import measure_deviation
-    from tunneldb.measures.deviation.tables import COLUMNS, rows_csv, section_rows, stretch_rows, volume
+    from tunneldb.measures.deviation.tables import COLUMNS, section_rows, stretch_rows, volume
 
     require_ending(output, "deviation", (".csv", ".tif", ".dxf"))
     with surveys_in(settings, [survey], start, end) as (conn, [found], part):
@@ -81,7 +81,7 @@ def deviation(
         if output is None:
             tell(sections=section_rows(conn, found, layer, part.low, part.high))
         elif output.suffix.lower() == ".csv":
-            files = write_text(output, rows_csv(COLUMNS, section_rows(conn, found, layer, part.low, part.high)))
+            files = write_rows(output, COLUMNS, section_rows(conn, found, layer, part.low, part.high))
         else:
             given = context.get_parameter_source("every") is not click.core.ParameterSource.DEFAULT
             files = _write(conn, found, layer, part, every if given else 10.0, output)

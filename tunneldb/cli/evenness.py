@@ -16,7 +16,7 @@ from tunneldb.cli.measure import (
     say_written,
     surveys_in,
     with_progress,
-    write_text,
+    write_rows,
 )
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.param_types import FiniteRange
@@ -61,7 +61,6 @@ def evenness(
     gap is measured between these points. Each cell has the greatest gap of all straightedges over it. Missing or
     outdated deviation is computed first; docs/howto-shape.md describes the columns.
     """
-    from tunneldb.measures.deviation.tables import rows_csv
     from tunneldb.measures.evenness.measure import measure_evenness
     from tunneldb.measures.evenness.tables import COLUMNS, section_rows, stretch_rows
 
@@ -75,7 +74,7 @@ def evenness(
     tell(survey=survey, layer=layer, made=made, length=length, limit=limit, stretches=rows)
     if output is None:
         tell(sections=sections)
-    files = [] if output is None else write_text(output, rows_csv(COLUMNS, sections))
+    files = [] if output is None else write_rows(output, COLUMNS, sections)
     print_table(
         ["from", "seen m²", "not measured m²", "over limit m²", "gap along mm", "gap around mm", "waviness %"],
         [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -81,6 +81,13 @@ def write_text(output: Path, text: str) -> list[Path]:
     with replacing(output) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return [output]
+
+
+def write_rows(output: Path, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> list[Path]:
+    """Write these columns of rows as CSV; return the path as a list."""
+    from tunneldb.csvfile import write_csv
+
+    return write_text(output, write_csv(columns, ([row[name] for name in columns] for row in rows)))
 
 
 def say_written(files: Sequence[Path]) -> None:

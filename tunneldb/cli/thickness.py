@@ -18,7 +18,7 @@ from tunneldb.cli.measure import (
     say_written,
     surveys_in,
     with_progress,
-    write_text,
+    write_rows,
 )
 from tunneldb.cli.output import tell, verb
 from tunneldb.cli.param_types import FiniteRange
@@ -60,7 +60,6 @@ def thickness(
     measured at right angles to these. Missing or outdated results are computed first. Volumes and areas include only
     lining that both inspected.
     """
-    from tunneldb.measures.deviation.tables import rows_csv
     from tunneldb.measures.thickness.measure import measure_thickness
     from tunneldb.measures.thickness.tables import COLUMNS, section_rows, stretch_rows
 
@@ -74,7 +73,7 @@ def thickness(
     tell(before=before, after=after, layer=layer, made=made, minimum=minimum, axis_sigma=axis_sigma, stretches=rows)
     if output is None:
         tell(sections=sections)
-    files = [] if output is None else write_text(output, rows_csv(COLUMNS, sections))
+    files = [] if output is None else write_rows(output, COLUMNS, sections)
     print_table(
         ["from", "length m", "compared %", "volume m³", "±", "mean m", "least m", *(["thinner m²"] if minimum else [])],
         [

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import psycopg
 from psycopg import sql
 from psycopg.rows import dict_row
 
-from tunneldb.csvfile import write_csv
 from tunneldb.store.survey import Survey
 
 Row = dict[str, Any]
@@ -54,11 +52,6 @@ def volume(conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float
             "SELECT * FROM tunnel_api.deviation_volume(%s, %s, %s, %s, %s) v WHERE v.length IS NOT NULL",
             [survey.name, layer, low, high, axis_sigma],
         ).fetchone()
-
-
-def rows_csv(columns: Sequence[str], rows: Sequence[Row]) -> str:
-    """Return rows as CSV with a header; unknown values are empty."""
-    return write_csv(columns, ([row[name] for name in columns] for row in rows))
 
 
 def _rounded(value: Any) -> Any:
