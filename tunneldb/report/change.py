@@ -36,9 +36,9 @@ class ChangeChapter:
     Attributes
     ----------
     old : Survey
-        That it is compared with: of those that it was, the last before it.
+        The compared older survey: the last one before this.
     summary : dict
-        Sums, as `tunneldb compare` tells them.
+        Totals as in `tunneldb compare`.
     leaks, regions : list of dict
         Leaks that are not the same, and the largest regions.
     more : int

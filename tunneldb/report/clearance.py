@@ -50,7 +50,7 @@ class MarginPlot:
     Attributes
     ----------
     outside, inside : str
-        Paths of bars from the outline, which lies at ``zero``.
+        Paths of bars from the outline at ``zero``.
     zero : float
     seen : str
         Path of the share of directions seen, from 0 at y = HEIGHT + 30 up to 1 at HEIGHT + 10.
@@ -93,9 +93,9 @@ class TrackChapter:
     gauge, track, source : str
         The outline's name, the track's, and the file of the outline.
     length, measured : float
-        Of the stretch, and how much of it was measured, m.
+        Length of the stretch, and its measured part, m.
     seen_share : float
-        Mean share of the directions with a return, of what was measured.
+        Mean share of the directions with a return, in the measured part.
     metres_inside, metres_without : int
         Metres with something inside that counts, and in which nothing was seen that counts.
     stray, passing, ground : int

@@ -44,13 +44,13 @@ class Leak:
     darkening_mean, darkening_max : float or None
         dB below dry lining.
     contrast, confidence : float or None
-        Drop in standard deviations of dry lining; 0 to 1.
+        Darkening in standard deviations of dry lining; 0 to 1.
     image_share : float or None
-        Share of it on which the image holds measurements, 0 to 1.
+        Share of it with measurements in the image, 0 to 1.
     review : str
         open, confirmed or rejected.
     reviewed_by, reviewed_at, remark
-        Who, when and what he noted.
+        Reviewer, time and note.
     detected : bool
         False where the last detection found it no more.
     outline : Polygon
@@ -126,7 +126,7 @@ def find_stretch(conn: psycopg.Connection[Any], survey: Survey, low: float, high
     Raises
     ------
     UserError
-        If the survey has no segments, or none of them lies in the stretch.
+        If the survey has no segments, or none of them is in the stretch.
     """
     ends = survey_ends(conn, survey)
     if ends is None:
@@ -170,7 +170,7 @@ def read_leaks(conn: psycopg.Connection[Any], survey: Survey, low: float, high: 
     Parameters
     ----------
     most : int
-        So many at most: those not found again first, then the largest, those rejected last.
+        Maximum number: those not found again first, then the largest, rejected ones last.
     """
     rows = _rows(conn, _LEAK, {"survey": survey.id, "low": low, "high": high, "most": most})
     return [Leak(**{**row, "outline": shapely.from_wkb(bytes(row["outline"]))}) for row in rows]

@@ -88,7 +88,7 @@ class DeviationChapter:
     Parameters
     ----------
     conn, survey, layer, low, high
-        Where from; chainages, m.
+        Source; chainages, m.
     form : {'WEBP', 'JPEG'}
         Format of the pictures.
 
@@ -97,16 +97,16 @@ class DeviationChapter:
     whole : dict
         Columns of ``deviation_volume``.
     stretches : list of dict
-        Columns of ``deviation_stretches``, of whole stretches that lie in the report's.
+        Columns of ``deviation_stretches``, of whole stretches within the report's.
     limit : float
         Deviation at which colours are full, m.
     plot : Plot
     worst : list of list of WorstSection
-        Of overbreak, and of underbreak.
+        Sections with the greatest overbreak, and underbreak.
     stale : list of str
-        Why what is stated is out of date.
+        Reason why the results are out of date.
     evenness, thickness : list of dict
-        What was made of either, of the stretch as a whole; of thickness by earlier survey.
+        Results on either for the whole stretch; of thickness by earlier survey.
     """
 
     def __init__(self, conn: psycopg.Connection[Any], survey: Survey, layer: str, low: float, high: float, form: Form) -> None:

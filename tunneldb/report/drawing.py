@@ -54,7 +54,7 @@ class Section:
     arc : (n,) array
         Arc of its nodes, growing, m.
     x, y : (n,) arrays
-        Where they lie.
+        Their places.
     """
 
     arc: Float
@@ -89,7 +89,7 @@ class Section:
 def share_path(coverage: CoverageBins, low: float, high: float, base: float, height: float, scale: float = 1.0) -> str:
     """Return the path of the area under the inspected share of lining, in steps; ``base`` is at 0, ``height`` the height of 1.
 
-    x is the chainage from ``low``, times ``scale``; only what lies between ``low`` and ``high``.
+    x is the chainage from ``low``, times ``scale``; limited to ``low`` and ``high``.
     """
     share = np.nan_to_num(coverage.share)
     parts = []
@@ -115,9 +115,9 @@ def wet_bins(low: Float, high: Float, area: Float, edges: Float) -> Float:
     Parameters
     ----------
     low, high, area : (k,) float64 arrays
-        Where leaks begin and end, m, and their area in the stretch, m².
+        Begin and end of leaks, m, and their area in the stretch, m².
     edges : (n + 1,) float64 array
-        Of the bins, m.
+        Edges of the bins, m.
     """
     count = len(edges) - 1
     total = np.zeros(count)
@@ -145,9 +145,9 @@ class Sign:
     id : int
         The leak's.
     x, at : float
-        Where it stands and where the leak's middle is, m.
+        Its place and the place of the leak's middle, m.
     row : int
-        Row in which it stands, from 0, the one next to the picture.
+        Its row, from 0, the one next to the picture.
     """
 
     id: int
@@ -159,7 +159,7 @@ class Sign:
 def place_signs(leaks: Sequence[Leak], low: float, high: float, width: float) -> list[Sign]:
     """Place numbers of leaks along a strip, those of the largest nearest to it; a digit is ``width`` m wide.
 
-    Where they don't fit beside one another they stand in rows, ROWS at most: only a leak that finds no room there has none.
+    If they do not fit side by side they are in several rows, at most ROWS; a leak without space there has no number.
     """
     placed: list[list[tuple[float, float]]] = [[] for _ in range(ROWS)]
     signs = []

@@ -46,17 +46,17 @@ class KindChapter:
     Attributes
     ----------
     count : KindCount
-        What there is of it.
+        Counts of the kind.
     groups : list of (str, list of Finding)
-        Those listed by their state, in order of chainage: confirmed, open, and what no sum counts.
+        Listed findings by state, in order of chainage: confirmed, open, and not included in totals.
     tabled : int
-        How many stand here without a row, for all that is to be said of them is in the table of leaks.
+        Number without a row, because the table of leaks has all information on them.
     plain : int
-        How many stand here without a row: detected, and nobody has said anything of them.
+        Number without a row, because they are only detected, without any edit.
     beyond : list of (int, bytes)
-        Those for which there is no row, as there are too many: their ids, and a digest of what was noted of each.
+        Findings without a row, because there are too many: their ids, and a digest of their notes.
     digested : set of int
-        Ids of those with a row of which the digest of leaks has all.
+        Ids of those with a row that the digest of leaks includes completely.
     """
 
     count: KindCount
@@ -74,17 +74,17 @@ class FindingsChapter:
     Attributes
     ----------
     kinds : list of KindChapter
-        Of those kinds that occur.
+        Counts of the kinds that occur.
     severities : dict of int to str
         The owner's words for them.
     photos : dict of int to list of Thumbnail
         Photos of findings, by their id.
     by_id : dict of int to Finding
-        Those in the table of leaks.
+        Findings in the table of leaks.
     total : int
-        How many findings there are.
+        Number of findings.
     people : list of dict
-        Who reviewed how many of them, and when first and last.
+        Reviewers with the number of their reviews, and the first and the last time.
     leaks : frozenset of int
         Ids of those in the table of leaks.
     merged : dict of int to list of int
@@ -170,7 +170,7 @@ def read_findings_chapter(
     Parameters
     ----------
     conn, survey
-        Where from.
+        Source.
     stretch : (float, float)
         Only those that reach between these chainages, m.
     leaks : frozenset of int
@@ -180,7 +180,7 @@ def read_findings_chapter(
     photos : Path
         Folder in which relative paths of photos begin.
     table : bool
-        Whether the report has a table of the leaks.
+        True if the report has a table of the leaks.
     """
     order = read_kinds(conn)
     kinds: defaultdict[str, _Gathered] = defaultdict(_Gathered)
@@ -333,7 +333,7 @@ class Mark:
     x, y : float
         Its middle.
     top : float
-        Above which its number stands.
+        Bottom of its number.
     """
 
     finding: Finding

@@ -42,9 +42,9 @@ class LeakSums:
     edges : (n + 1,) float64 array
         Bins of chainage, m.
     digest : hash
-        Gets what is reported of each leak, in the order of their ids.
+        Called with each reported leak, in the order of their ids.
     leaks, counted, lost : int
-        How many there are; those that sums count, found last and not rejected; those confirmed that were not found again.
+        Number in total; number included in totals, found last and not rejected; number confirmed and not found again.
     ids : (leaks,) int64 array
         Their ids, growing.
     reach : float
@@ -119,7 +119,7 @@ def sum_leaks(
     low, high : float
         The stretch, m.
     edges, digest
-        As `LeakSums` has them.
+        As in `LeakSums`.
     """
     sums = LeakSums(edges, digest)
     with conn.cursor(name="reported_leaks", binary=True) as cursor:

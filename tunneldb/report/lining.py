@@ -134,7 +134,7 @@ class Lining:
     Parameters
     ----------
     conn, survey
-        Where from.
+        Source.
     form : {'WEBP', 'JPEG'}
         Format of the pictures.
     """
@@ -242,7 +242,7 @@ class _Place:
     there : (slice, slice)
         Rows and columns of the window's picture.
     values, state, hidden : (rows, columns) arrays
-        Of the block's pixels in it; hidden are those of lining that was not seen.
+        Of the block's pixels in it; hidden are those of lining not inspected.
     row, column : (rows,), (columns,) arrays
         Row and column of the picture that they fall into, from the first of these on; both grow without gaps.
     """
@@ -313,7 +313,7 @@ def _seen(place: _Place, side: float, kilometre: _Kilometre) -> UInt8:
 def _accumulate(values: Single, state: UInt8, hidden: Bool, row: Intp, column: Intp) -> Single:
     """Sum up the pixels that fall into each coarser one.
 
-    How many hold points, their intensities added up, how many are lining, lining not inspected, fixtures, floor or
+    Number with points, sum of their intensities, number of lining, of lining not inspected, of fixtures, floor or
     water. (6, rows, columns).
     """
     floor = (state == PixelState.FLOOR) | (state == PixelState.SUBMERGED) | (state == NO_STATE)

@@ -58,7 +58,7 @@ class Owner:
     words : Words
         The language of its headings.
     client, project, standard : str or None
-        For whom and what it is made, and by which standard it was inspected.
+        Client, project, and standard of the inspection.
     logo : str or None
         The owner's, as a data URL.
     chapters : tuple of str
@@ -85,7 +85,7 @@ def read_owner(path: Path) -> Owner:
     Raises
     ------
     InputError
-        If it cannot be read, or something in it is wrong: file, key and value are told.
+        If it cannot be read, or something in it is wrong: with file, key and value.
     """
     given = _Given(path, _load(path))
     given.refuse_others(_KEYS)

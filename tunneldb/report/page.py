@@ -56,7 +56,7 @@ class Written:
     Attributes
     ----------
     leaks, findings : int
-        How many leaks, and findings of all kinds, sums count: there, and not rejected.
+        Number of leaks, and of findings of all kinds, that are included in totals: existing, and not rejected.
     missing : list of Thumbnail
         Photos that can't be had.
     """
@@ -84,19 +84,19 @@ def write_html(
     Parameters
     ----------
     conn, survey, path, low, high
-        What, where to.
+        Content, and target.
     progress : callable
-        Told after each strip.
+        Called after each strip.
     pictures : int, optional
-        Only of so many leaks, the largest, pictures go into the file.
+        Maximum number of leaks, the largest, with pictures in the file.
     form : {'WEBP', 'JPEG'}
         Format of the pictures.
     owner : Owner, optional
-        What the owner wants of it.
+        Owner's settings.
     photos : Path, optional
         Folder in which relative paths of photos begin; else the current one.
     listed : int
-        Only so many leaks, the largest, are listed and drawn; those rejected last. Sums and digest are of all.
+        Maximum number of leaks, the largest, that are listed and drawn; rejected ones last. Totals and digest include all.
     """
     wanted = Owner() if owner is None else owner
     with snapshot(conn):
@@ -180,9 +180,9 @@ class _Report:
     Parameters
     ----------
     conn, survey, low, high, progress, pictures, form, owner, photos, listed
-        As in :func:`write_html`; the stretch as far as the survey reaches.
+        As in :func:`write_html`; the stretch limited to the survey.
     search : Coverage
-        What can be said of the stretch asked for, also where the survey does not reach.
+        Statement on the requested stretch, also beyond the survey.
     """
 
     def __init__(

@@ -38,7 +38,7 @@ def find_browser() -> str:
     Raises
     ------
     UserError
-        If there is none, or none but snaps.
+        If there is none, or only snaps.
     """
     stated = os.environ.get("TUNNELDB_BROWSER")
     found = [path for name in ((stated,) if stated else BROWSERS) if (path := shutil.which(name))]
@@ -74,9 +74,9 @@ def print_pdf(browser: str, page: Path, pdf: Path, waiting: Callable[[float], No
     Parameters
     ----------
     browser, page, pdf
-        What prints, what is printed, and where to.
+        Browser, page, and target.
     waiting : callable
-        Told now and then for how many seconds it has printed; how far it is, a browser does not say.
+        Called now and then with the seconds of printing so far; the browser does not report its progress.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def _is_whole(pdf: Path) -> bool:
 def _run(command: Sequence[str], folder: str, waiting: Callable[[float], None]) -> tuple[int, str]:
     """Run a browser, its temporary files in a folder; returns exit code and standard error.
 
-    Whatever breaks off the wait ends the browser, with all that it has started.
+    Any interruption of the wait ends the browser and all processes that it started.
     """
     temporary = {"TMPDIR": folder} if len(os.fsencode(folder)) <= MAX_SOCKET_FOLDER_BYTES else {}
     start = partial(

@@ -85,7 +85,7 @@ def make_thumbnails(photos: Iterable[Photo], folder: Path) -> list[Thumbnail]:
     photos : iterable of Photo
         Their paths are files, or addresses that begin with http:// or https://.
     folder : Path
-        Where relative paths begin.
+        Base of relative paths.
     """
     wanted = list(photos)
     paths = dict.fromkeys(photo.path for photo in wanted)

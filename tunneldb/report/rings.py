@@ -28,11 +28,11 @@ class Curve:
     Attributes
     ----------
     name : str
-        Which: ovality, deviation, or step.
+        Name: ovality, deviation, or step.
     paths : list of (str, str)
         Class and path of each line.
     heights, places : list of (float, str)
-        Where lines of equal size and ticks of chainage stand, and their labels.
+        Positions of lines of equal size and ticks of chainage, and their labels.
     """
 
     name: str
@@ -48,16 +48,16 @@ class RingsChapter:
     Attributes
     ----------
     count, measured, unseen, missing : int
-        Rings in the stretch; those with centre and radius, those of which nothing is seen, joints that were not seen.
+        Rings in the stretch; those with centre and radius, those without measured lining, joints that were not seen.
     length : float
         Median length, m.
     ovality : dict or None
-        Median and greatest, ‰, and what it is a share of; None where no ring has one.
+        Median and greatest, ‰, and the diameter that they refer to; None if no ring has one.
     worst : list of dict
         Columns of view ``ring`` of the worst rings, in order of chainage.
     curves : list of Curve
     stale : bool
-        Whether what they rest on has changed since.
+        True if their data have changed since.
     """
 
     count: int

@@ -51,7 +51,7 @@ class Strip:
     title : str
         Both, in the tunnel's stationing.
     picture : Picture or None
-        None where there is no image.
+        None without an image.
     ticks : list of (float, str)
         Chainage and label.
     leaks : list of (Leak, str)
@@ -61,15 +61,15 @@ class Strip:
     signs : list of Sign
         Numbers of the leaks.
     rows : int
-        Rows in which these stand, at least 1.
+        Number of their rows, at least 1.
     ribbon : str
         Path of the share seen.
     blank : list of (float, float)
-        Where detection did not run; nowhere of a survey without intensity.
+        Stretches without detection; none for a survey without intensity.
     summary : str
-        How many leaks, how much was seen; empty of a survey without intensity.
+        Number of leaks, and inspected share; empty for a survey without intensity.
     details : Markup
-        What the leaks whose middle lies in it show, as JSON.
+        Leaks with their middle in it, as JSON.
     """
 
     number: int
@@ -99,7 +99,7 @@ class Strips:
     Parameters
     ----------
     conn, survey
-        Where from.
+        Source.
     low, high : float
         The stretch, m.
     leaks : sequence of Leak
@@ -107,13 +107,13 @@ class Strips:
     findings : sequence of Finding
         Findings in it that are no leaks.
     coverage : Coverage
-        What was seen of it.
+        Inspected part of it.
     pictured : collection of int
         Leaks that get a picture, by their id.
     form : {'WEBP', 'JPEG'}
         Format of the pictures.
     progress : callable
-        Told after each strip.
+        Called after each strip.
     words : Words
         The language in which they are captioned.
     reach : float
@@ -126,7 +126,7 @@ class Strips:
     south, north : float
         Least and greatest arc, m.
     starts : list of float
-        Where the strips would begin if the stretch did not begin later, m.
+        Beginning of the strips if the stretch did not begin later, m.
     """
 
     def __init__(

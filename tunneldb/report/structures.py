@@ -51,9 +51,9 @@ class Picture:
     Attributes
     ----------
     number : int
-        Of the member.
+        Number of the member.
     height : float
-        Of the picture, whose width is WIDTH.
+        Height of the picture, whose width is WIDTH.
     faces, spots : list of Drawn
     bar, metres : float
         Length of the scale bar, in the picture and in truth, m.
@@ -74,13 +74,13 @@ class StructuresChapter:
     Attributes
     ----------
     spots : SpotList
-        As `tunneldb spots` lists them.
+        As listed by `tunneldb spots`.
     members : list of dict
         The largest, those with spots, and those that are bimodal; columns of view ``member_statistics``.
     others, others_area, others_seen : int, float, float
-        The rest: how many, their area, and what of it was judged, m².
+        The rest: number, area, and inspected area, m².
     pictures : list of Picture
-        Of the members with spots, and of bimodal ones.
+        Pictures of the members with spots, and of bimodal ones.
     by_review : dict of str to int
     """
 
@@ -111,9 +111,9 @@ def read_structures(
     Parameters
     ----------
     conn, survey
-        Where from.
+        Source.
     stretch : (float, float), optional
-        Only spots, faces and members whose middles lie between these chainages, m, and members that spots in there are on.
+        Only spots, faces and members with their middle between these chainages, m, and members of these spots.
     """
     spots = read_spots(conn, survey, selection=SpotSelection(stretch=stretch))
     with conn.cursor(row_factory=dict_row) as cursor:

@@ -32,7 +32,7 @@ class Profile:
     water : float
         Height of the water in the picture.
     depths, places : list of (float, str)
-        Where lines of equal depth and ticks of chainage stand, and their labels.
+        Positions of lines of equal depth and ticks of chainage, and their labels.
     """
 
     range: str
@@ -67,7 +67,7 @@ class UnderwaterChapter:
     sections : list of dict
         Columns of view ``closed_section``.
     drawn : list of ClosedSection
-        SECTIONS of them at most.
+        At most SECTIONS of them.
     """
 
     scans: list[dict[str, Any]]

@@ -24,9 +24,9 @@ class Words:
     language : str
         Its code, as ``de``.
     texts : mapping of str to str
-        By the English text; what is not in it stays English.
+        By the English text; missing ones stay English.
     date : str or None
-        How days are written, as ``strftime`` wants it; None for 4 May 2024.
+        Date format for ``strftime``; None for 4 May 2024.
     """
 
     language: str = ENGLISH

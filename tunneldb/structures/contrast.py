@@ -39,11 +39,11 @@ class Observed:
     ----------
     scan : int
     columns : int
-        Of the face.
+        Pixels of the face.
     pixel : (n,) int array
         Row × columns + column, in growing order.
     angle, range_m, value, points : (n,) float arrays
-        Of incidence, radians, m, mean level corrected for range where that is known, dB, number of points.
+        Classes of incidence, radians, range, m, mean level, corrected for range if known, dB, number of points.
     """
 
     scan: int
@@ -64,9 +64,9 @@ class FaceContrast:
     image : ContrastImage
         Rows downwards, as detection takes it; positive is darker.
     face : (rows, columns) bool array
-        What belongs to the face.
+        Pixels that belong to the face.
     judged : (rows, columns) bool array
-        Where its level is known and points are.
+        Pixels with points and a known level.
     rim : int
         Pixels along its edge that are not judged.
     points : (rows, columns) int array
@@ -117,16 +117,16 @@ def observe_face(layout: Layout, sums: Sums, face: int, stations: Float, referen
 def member_levels(parts: list[list[Observed]], model: Float, *, by_range: bool) -> dict[int, LevelCurve]:
     """Return the level of a member's surface as each scan saw it: of all its faces, from the same places for all scans.
 
-    Where one scan saw more rust than paint, the others tell it which is which.
+    If one scan saw more rust than paint, the others show which is which.
 
     Parameters
     ----------
     parts : list of list of Observed
         Each face as the scans saw it.
     model : (WIDTH,) float array
-        Of the largest of the faces.
+        Model of the largest face.
     by_range : bool
-        Whether levels go by range.
+        True if levels depend on range.
     """
     by_scan: dict[int, list[tuple[int, Observed]]] = {}
     for face, part in enumerate(parts):
@@ -208,13 +208,13 @@ def contrast_of(layout: Layout, face: int, observed: list[Observed], curves: lis
     Parameters
     ----------
     layout, face
-        Which.
+        Number of the face.
     observed : list of Observed
-        By scan.
+        Levels by scan.
     curves : list of LevelCurve
         The face's level for each of these.
     noise : float
-        Of ranges, m: so near its edge what adjoins a face may lie on it.
+        Standard deviation of ranges, m: near its edge, points of an adjoining face may be on it.
     """
     left, bottom, columns, rows = layout.shape[face].tolist()
     side, size = float(layout.pixel[face]), rows * columns

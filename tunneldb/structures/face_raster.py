@@ -101,7 +101,7 @@ class PointFinder:
     stations : (scans, 3) float array
         m from the grid's origin.
     noise : float
-        Of ranges, m.
+        Standard deviation of ranges, m.
     """
 
     def __init__(self, grid: VoxelGrid, candidates: Int32, faces: Faces, layout: Layout, stations: Float, noise: float) -> None:

@@ -87,11 +87,11 @@ def find_structures(
     sums : Sums
         Points and levels of all pixels, dB.
     images : RangeImages
-        Of all points.
+        Sums of all points.
     reference : ReferenceCurve or None
-        By which levels are corrected for range.
+        Curve for correcting levels for range.
     by_range : bool
-        Whether levels go by range otherwise.
+        True if levels depend on range otherwise.
     """
     layout = found.layout
     parts = _parts(found, sums, images, reference)
@@ -143,7 +143,7 @@ class _Part:
         Its pixels; None for all.
     extent : Extent
     surface : (int, int)
-        Number of what the whole face is joined to, and of the material.
+        Number of the joined surface, and of the material.
     """
 
     face: int
@@ -254,7 +254,7 @@ def _judge(
 ) -> list[tuple[FaceContrast, FaceSpots]]:
     """Compute contrast and spots of the faces of a member.
 
-    Where there are spots the level is found once more without them: it is bent by what they cover.
+    If there are spots the level is found again without them, because they distort it.
     """
     layout = found.layout
     observed = []

@@ -102,9 +102,9 @@ def grow(grid: VoxelGrid, starts: Int64, neighbours: Int32, planes: VoxelPlanes,
     grid, starts, neighbours, planes
         Voxels, which touch, and the plane of each.
     towards : (n, 3) float array
-        Unit vectors to the scanner: noise lies along the beam, so that a surface at a slant shows less of it.
+        Unit vectors to the scanner: noise is along the beam, so that an oblique surface shows less of it.
     noise : float
-        Of ranges, m.
+        Standard deviation of ranges, m.
     """
     # What is as flat as noise lets it be is equally so; of that, where most points are comes first.
     cosine = np.einsum("ni,ni->n", planes.normal, towards)

@@ -1,7 +1,7 @@
 """Surfaces: faces of one plane or pipe that something before it parts (Ono et al., 3.2.1 to 3.2.4).
 
-Two faces are joined if they lie on one plane or cylinder (3.2.1), have two rims in common, or one and a short gap along it
-(3.2.2 and 3.2.3), and if what was sent through the gap between them came back from nearer (3.2.4).
+Two faces are joined if they are on one plane or cylinder (3.2.1), have two rims in common, or one and a short gap along it
+(3.2.2 and 3.2.3), and if beams through the gap between them returned from nearer objects (3.2.4).
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ def join(faces: list[Extent], images: RangeImages, noise: float) -> Int64:
         The largest first.
     images : RangeImages
     noise : float
-        Of ranges, m.
+        Standard deviation of ranges, m.
     """
     found = DisjointSet(range(len(faces)))
     rims = [_rims(face.outline, face.pixel) if face.model[RADIUS] == 0.0 else np.empty((0, 5)) for face in faces]
@@ -262,7 +262,7 @@ def _gap_along(line: Float, one: shapely.Geometry, other: shapely.Geometry) -> f
 def _occluded(one: Extent, moved: shapely.Geometry, scans: set[int], images: RangeImages) -> bool:
     """Return True if no scan that saw one of two faces sees through between them (3.2.4).
 
-    What was sent there came back from nearer, or from the surface itself, which goes on where points are too few for a face.
+    Beams there returned from nearer objects, or from the surface itself, which continues where points are too few for a face.
     """
     places = _gap_places(one.outline, moved, one.pixel)
     if not len(places):

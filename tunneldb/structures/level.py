@@ -1,10 +1,10 @@
 """Level of an intact surface by incidence (Ono et al., 3.3 and 3.4).
 
-The paper parts a cluster into classes of cos θ and fits a normal distribution to the histogram of each. A class may be covered
-by rust altogether, though, and then its own histogram cannot tell; and 0.05 of cos θ is 18° at right angles to a surface, over
-which gloss loses several decibels. Here the shape of the level over θ comes from differences between places that lie close to
-each other: those across the edge of a spot are few, and outliers, however large the spot is. Where most pixels then lie is the
-level, and what lies there fits it once more.
+The paper divides a cluster into classes of cos θ and fits a normal distribution to the histogram of each. But a class may be
+covered by rust completely, which its own histogram cannot show; and 0.05 of cos θ is 18° at right angles to a surface, over
+which gloss loses several decibels. Here the shape of the level over θ comes from differences between nearby places: pairs
+across the edge of a spot are few, and outliers, however large the spot is. The level is where most pixels then are, and is
+fitted again to these.
 """
 
 from __future__ import annotations
@@ -82,9 +82,9 @@ class LevelCurve:
     angle, level, sigma : (k,) float arrays
         Angles of incidence, radians, in growing order; the level there and the standard deviation about it, dB.
     seen : (n,) int array
-        Classes of θ that hold enough points.
+        Classes of θ with enough points.
     middle, slope : float
-        lg R of the middle of the surface, and what the level changes by over lg R, dB; 0 where range has no part in it.
+        lg R of the middle of the surface, and the level's slope over lg R, dB; 0 if range has no effect.
     """
 
     angle: Float
@@ -138,14 +138,14 @@ def level_curve(
     angle, range_m, value, points : (n,) float arrays
         Angle of incidence, radians, range, m, mean level, dB, and number of points of each pixel.
     pairs : (m, 2) int array
-        Pixels that lie close to each other.
+        Pairs of nearby pixels.
     own : (n,) bool array or None
         Pixels that another scan knows to be of the surface itself; None where none does.
     by_range : bool
-        Whether the level may also go by range. On a plane it need not: there θ tells the range.
+        True if the level may also depend on range. On a plane it need not: there θ determines the range.
     one_surface : bool
-        Whether most of it is of one surface, so that where most pixels lie is fitted once more. Of several materials each
-        covers its own incidences, and such a fit would go from one to the other.
+        True if most of it is one surface, so that the level is fitted again to most pixels. With several materials each
+        covers its own incidences, and such a fit would jump from one to the other.
     """
     usable = angle <= np.radians(MAX_INCIDENCE)
     seen = _seen(angle[usable], points[usable])
@@ -187,7 +187,7 @@ class _Basis:
     Parameters
     ----------
     place : (n,) float array
-        Of the pixels, in knots from the first.
+        Classes of the pixels, in knots from the first.
     along : (n,) float array
         lg R.
     knots : int

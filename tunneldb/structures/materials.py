@@ -1,10 +1,9 @@
 """Faces of two materials in one plane, split where the level steps along a straight line from rim to rim.
 
-Geometry alone cannot tell a brick wall from the concrete beside it, and the paper's histogram of both has two heads. A stain or
-rust does not end on a straight line over the whole of a wide face; a wall of another material does, and so does most of what is
-beyond the line where rust covers the line itself. The step is looked for between places that lie close to each other, so that
-neither incidence nor range has a part in it, and over the whole of a plane: objects in front of a wall divide it
-into faces, and each shows only a part of the line.
+Geometry alone cannot separate a brick wall from the concrete beside it, and the paper's histogram of both has two peaks. A
+stain or rust does not end on a straight line over the whole of a wide face. A wall of another material does, and so does most
+of it beyond a line that rust covers. The step is measured between nearby places, so that neither incidence nor range has an
+effect, and over the whole plane: objects in front of a wall divide it into faces, and each shows only a part of the line.
 """
 
 from __future__ import annotations
@@ -69,7 +68,7 @@ class Plane:
     pixel : float
         Side of a pixel, m.
     place : list of int arrays
-        Pixel of the plane in which each pixel of each face lies.
+        Pixel of the plane for each pixel of each face.
     shape : (int, int)
         Rows and columns.
     """

@@ -63,7 +63,7 @@ def merge(grid: VoxelGrid, starts: Int64, neighbours: Int32, towards: Float, gro
         Unit vectors to the scanner.
     grown : Grown
     noise : float
-        Of ranges, m.
+        Standard deviation of ranges, m.
     """
     owner, models = grown.owner.copy(), grown.models.copy()
     count = len(models)
@@ -155,7 +155,7 @@ def refine(fine: VoxelGrid, face: Int32, faces: Faces, noise: float) -> None:
         Face of each of its voxels.
     faces : Faces
     noise : float
-        Of ranges, m.
+        Standard deviation of ranges, m.
     """
     centroid = fine.centroids
     held = _Members(face, len(faces.models))

@@ -1,6 +1,6 @@
 """Planes and cylinders as rows of numbers: distance, unrolling and its inverse, fits from moments.
 
-A row holds a point (3), the normal of a plane or the axis of a cylinder (3), the radius (0 of a plane), the side from which it
+A row has a point (3), the normal of a plane or the axis of a cylinder (3), the radius (0 for a plane), the side from which it
 is seen (1: from outside, -1: from inside) and a direction of the plane from which arcs count (3). Lengths are metres from the
 origin of the voxels.
 """
@@ -27,8 +27,8 @@ ANGLES = 36
 def with_directions(models: Float, middles: Float) -> Float:
     """Set the direction from which each model's (k, WIDTH) unrolled coordinates count.
 
-    Of a plane u runs as level as can be and v upwards, to the left of u seen from the scanner's side. Of a cylinder u runs
-    along its axis and v = r·φ around it, 0 in the direction of the middle (k, 3) of what is seen, so that the cut lies behind.
+    For a plane u is as horizontal as possible and v upwards, to the left of u seen from the scanner's side. For a cylinder u is
+    along its axis and v = r·φ around it, 0 in the direction of the middle (k, 3) of its seen part, so that the cut is behind.
     """
     out = models.copy()
     axis = out[:, AXIS]
@@ -140,8 +140,8 @@ def fit_cylinder(
 ) -> float:  # pragma: no cover - compiled
     """Fit a cylinder to voxels ``held`` (count,), Gauss-Newton with Tukey's weights, and return the rms distance, m.
 
-    The centroid of a voxel's points lies inside the surface by the variance of these along the tangent over twice the radius,
-    which is added.
+    The centroid of a voxel's points is inside the surface by their variance along the tangent over twice the radius, which is
+    added.
     """
     system, right = np.empty((5, 5)), np.empty(5)
     rms = np.inf

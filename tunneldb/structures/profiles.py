@@ -94,7 +94,7 @@ def group(surfaces: list[list[Extent]], noise: float) -> Int64:
     surfaces : list of lists of Extent
         Faces of one plane or pipe each, the largest first.
     noise : float
-        Of ranges, m.
+        Standard deviation of ranges, m.
     """
     boxes = {number: box_of(surface) for number, surface in enumerate(surfaces) if surface[0].model[RADIUS] == 0.0}
     boxes = {

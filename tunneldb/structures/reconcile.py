@@ -30,9 +30,9 @@ def reconcile_spots(found: Structures, own: Sequence[EarlierSpot], others: Seque
     ----------
     found : Structures
     own : sequence of EarlierSpot
-        Those of an earlier run of the survey.
+        Spots of an earlier run of the survey.
     others : sequence of EarlierSpot
-        Those of the other surveys, one of each number.
+        Spots of the other surveys, one of each number.
     """
     faces = {face.number: face for face in found.faces}
     again = _matches(found.spots, faces, own)

@@ -44,7 +44,7 @@ class Member:
     line : (2, 3) float array
         The ends of that, m.
     bimodal : bool
-        Whether so much of it differs from the rest that neither is known to be its own surface.
+        True if so much of it differs from the rest that its own surface cannot be identified.
     """
 
     number: int
@@ -65,7 +65,7 @@ class Face:
     number, member : int
         From 1, and that of its member.
     side : int
-        Of its member, from 1, the largest first: faces of one plane or pipe are of one side.
+        Side number within its member, from 1, the largest first: faces of one plane or pipe are of one side.
     kind : {'flat', 'pipe'}
     model : (11,) float array
         See `models`; lengths are m from ``origin``.
@@ -78,7 +78,7 @@ class Face:
     radius : float
         m; 0 of a plane.
     rms : float
-        Of the voxels' centroids about a cylinder, of the points about a plane, m: its roughness and the noise.
+        Standard deviation of the voxels' centroids about a cylinder, of the points about a plane, m: roughness and noise.
     seen_share : float
         Share of its area that was judged, 0 to 1; of the rest too little is known for an all-clear.
     incidence : (float, float)
@@ -86,9 +86,9 @@ class Face:
     level, sigma : float
         Median of its own level where it was judged, and of the standard deviation about it, dB; NaN where none of it was.
     bimodal : bool
-        Whether more than half of what was judged differs from the level.
+        True if more than half of its inspected part differs from the level.
     outline : MultiPolygon
-        Of unrolled (u, v), m.
+        Outline in unrolled (u, v), m.
     """
 
     number: int
@@ -142,9 +142,9 @@ class Spot:
     kind : {'dark', 'bright'}
         Against its own surface.
     reasons : tuple of str
-        What is to be known of its shape, the strongest first: ``thin``, ``gradual``, ``rectangular``.
+        Descriptions of its shape, the strongest first: ``thin``, ``gradual``, ``rectangular``.
     confidence : float
-        That there is a difference, 0 to 1.
+        Probability of a difference, 0 to 1.
     contrast : float
         Mean difference in standard deviations of the surface.
     difference : float
@@ -155,7 +155,7 @@ class Spot:
     scans : int
         Scans that saw it.
     outline : Polygon
-        Of unrolled (u, v), m.
+        Outline in unrolled (u, v), m.
     rgb : (int, int, int) or None
         Mean colour of its points, 0 to 255; None where they have none.
     """

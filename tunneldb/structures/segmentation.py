@@ -31,7 +31,7 @@ class Segmentation:
     noise : float
         Standard deviation of ranges, m.
     origin : (3,) float array
-        Where the models' lengths count from, m.
+        Origin of the models' lengths, m.
     stations : (k, 3) float array
         m from there.
     faces : Faces
@@ -55,9 +55,9 @@ def find_faces(moments: VoxelMoments, stations: Float) -> Segmentation:
     Parameters
     ----------
     moments : VoxelMoments
-        Of all points.
+        Moments of all points.
     stations : (k, 3) float array
-        Where the scanner stood, by the numbers of the scans, m.
+        Scanner positions, by the numbers of the scans, m.
     """
     level = level_of(moments)
     grid = moments.grid(level)

@@ -1,8 +1,9 @@
 """Significant differences of a face's pixels: means over windows of several sizes.
 
-The paper asks 3σ of a single point (Ono et al., 3.4). Of hundred thousand pixels some hundred lie beyond that by chance, while
-a patch of a thousand that differ by 2σ each is none. So means over windows are compared with the scatter of such means on the
-face itself, unevenness of the surface with it, and asked so much that in a whole structure hardly one window passes by chance.
+The paper requires 3σ of a single point (Ono et al., 3.4). Some hundred of a hundred thousand pixels exceed that by chance,
+while a patch of a thousand that differ by 2σ each does not. So means over windows are compared with the scatter of such means
+on the face itself, including the surface's unevenness, with a limit that hardly one window in a whole structure passes by
+chance.
 """
 
 from __future__ import annotations
@@ -80,14 +81,14 @@ def significance(drop: Single, judged: Bool, sigma: Single, pixels: int, scatter
     sigma : (rows, columns) float32 array
         Standard deviation of a pixel, dB.
     pixels : int
-        Of all faces together.
+        Number of pixels of all faces together.
     scatter : Scatter
-        Of the faces before; this one's is added.
+        Scatter of the faces before; this one's is added.
 
     Returns
     -------
     (rows, columns) float32 array
-        With the sign of the drop.
+        Signed as the darkening.
     """
     most = np.zeros(drop.shape, np.float32)
     count = judged.astype(np.float32)

@@ -1,7 +1,7 @@
 """Solid faces, which return every beam; a grating, a fence or leaves let most of them through.
 
-A scanner turns by even steps, so that what is solid holds the same number of points in the same angle, wherever it is and
-however it is turned. Of a scan in which that does not hold, one that was thinned out, nothing is told.
+A scanner turns in equal steps, so that a solid face has the same number of points per angle, at any place and orientation.
+For a scan without that property, because it was thinned out, there is no result.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def solid_faces(densities: Float) -> Bool:
     Parameters
     ----------
     densities : (n, k, 2) float array
-        Of all faces and scans, see `ray_densities`.
+        Densities of all faces and scans, see `ray_densities`.
     """
     total, came_back = np.zeros(len(densities)), np.zeros(len(densities))
     for scan in range(densities.shape[1]):

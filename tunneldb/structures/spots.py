@@ -68,7 +68,7 @@ class FaceSpots:
     share : float
         Share of the pixels judged that are in spots.
     seen : int
-        Pixels of which it is known whether they differ: they were judged, or enough about them was.
+        Pixels that are known to differ or not: with contrast, or with enough contrast around them.
     """
 
     spots: list[FoundSpot]
@@ -84,9 +84,9 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
     ----------
     face : FaceContrast
     pixels : int
-        Of all faces of the structure that hold points.
+        Number of pixels with points of all faces of the structure.
     scatter : Scatter
-        Of the faces before.
+        Scatter of the faces before.
     """
     numbers = np.zeros(face.face.shape, np.int32)
     judged = int(face.judged.sum())

@@ -1,7 +1,7 @@
 """Pipes too thin for the voxels, found in finer ones.
 
-Faces are grown in voxels of one width, by the density of most points. A pipe whose radius is a few of them at most shows as
-narrow strips, or as nothing. What is no face, and what may be such a strip, is looked at again in voxels half as wide, and in
+Faces are grown in voxels of one width, from the density of most points. A pipe with a radius of a few voxels at most shows as
+narrow strips, or not at all. Points on no face, or on a possible strip, are examined again in voxels half as wide, and in
 others half as wide as these.
 """
 
@@ -30,7 +30,7 @@ def with_thin_pipes(moments: VoxelMoments, level: int, grid: VoxelGrid, faces: F
     ----------
     moments : VoxelMoments
     level : int
-        Of the usual voxels.
+        Faces in the usual voxels.
     grid : VoxelGrid
         These.
     faces : Faces
@@ -38,7 +38,7 @@ def with_thin_pipes(moments: VoxelMoments, level: int, grid: VoxelGrid, faces: F
     stations : (k, 3) float array
         m from the grid's origin.
     noise : float
-        Of ranges, m.
+        Standard deviation of ranges, m.
     """
     for finer in range(level + 1, moments.level + 1):
         widest = THIN * 2.0 ** (1 - finer)

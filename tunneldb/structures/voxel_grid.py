@@ -29,7 +29,7 @@ class VoxelGrid:
     edge : float
         m.
     origin : (3,) float array
-        Where places are counted from, m.
+        Origin of places, m.
     keys : (n,) int64 array
         Scan and place.
     moments : (n, 10) float array
@@ -71,7 +71,7 @@ class VoxelPlanes:
     Attributes
     ----------
     normal : (n, 3) float array
-        Unit normal, towards the scanner; zero where there is none.
+        Unit normal, towards the scanner; zero without one.
     rms : (n,) float array
         Distance of the points of the neighbourhood from it, m.
     variation : (n,) float array
@@ -89,15 +89,15 @@ class VoxelPlanes:
 def voxel_planes(grid: VoxelGrid, starts: Int64, neighbours: Int32, stations: Float, noise: float) -> VoxelPlanes:
     """Fit planes to the neighbourhoods of voxels, robustly.
 
-    The plane of a voxel is that of its own neighbourhood or of the one beside it that fits better and holds it, so that
-    normals stay sharp at creases (Kuwahara et al., 1976, choose a pixel's window so).
+    The plane of a voxel is that of its own neighbourhood or of an adjacent one that contains it and fits better, so that
+    normals stay sharp at creases (Kuwahara et al., 1976, choose a pixel's window in this way).
 
     Parameters
     ----------
     grid, starts, neighbours
         Voxels, and which touch.
     stations : (k, 3) float array
-        Where the scanner stood, by scan, m from the origin of the grid.
+        Scanner positions, by scan, m from the origin of the grid.
     noise : float
         Neighbours farther than three times this off the plane are left out, m.
     """

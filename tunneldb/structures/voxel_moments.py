@@ -1,9 +1,9 @@
 """Moments of the points in each voxel of each scan, summed in one pass, independent of the order.
 
-A voxel keeps the number of its points, their sum and the sum of their products (planes and their
-residuals follow from these alone, and those of a neighbourhood are sums). All are whole numbers of `QUANTUM`, so neither the
-order of the points nor that of the threads shows. Voxels of several scans are kept apart: one scan sees one side of a plate,
-and scans that do not fit together to the millimetre are fitted each by itself.
+A voxel stores the number of its points, their sum and the sum of their products (planes and their residuals follow from
+these, and those of a neighbourhood are sums). All are whole numbers of `QUANTUM`, so the result does not depend on the order of
+points or threads. Voxels of several scans are separate: one scan sees one side of a plate, and scans that do not fit to the
+millimetre are fitted separately.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ class VoxelMoments:
         level : int
             Its voxels have an edge of 2^-level m.
         wanted : (n,) bool array
-            Which of them.
+            Indices of their voxels.
         finer : int
             The finer ones have an edge of 2^-finer m, no finer than those kept.
         """
