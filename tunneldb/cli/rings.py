@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
 from tunneldb.cli.stretch import stretch_options
 from tunneldb.cli.tables import print_table
@@ -146,7 +146,7 @@ def rings(
         print_table(("", *SUMMARY), summary(found), right=(1, 2, 3, 4, 5))
         click.echo(_said(found))
     for note in found.notes:
-        click.echo(note, err=True)
+        notify(note)
 
 
 _OF_SURVEY = {
