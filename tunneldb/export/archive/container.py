@@ -53,13 +53,13 @@ class Manifest:
     tunneldb, schema : str
         Version of the program that wrote it, and revision of the schema that its rows are of.
     exported_at : str
-        When, ISO 8601.
+        Time of the export, ISO 8601.
     survey, tunnel : str
         Their names.
     survey_id, tunnel_id : int
         Their numbers there, as in the rows.
     srid : int
-        Of the tunnel.
+        SRID of the tunnel.
     members : mapping
     """
 
@@ -120,7 +120,7 @@ class ArchiveReader:
     Raises
     ------
     InputError
-        For a file that is none, is cut off, of another version of the format, or says what cannot be.
+        If the file is no archive, is incomplete, has another version of the format, or is inconsistent.
     """
 
     def __init__(self, path: Path) -> None:
@@ -152,7 +152,7 @@ class ArchiveReader:
         Raises
         ------
         InputError
-            At the end, if they are not what the manifest announces; before it, as soon as they are more.
+            At the end, if they differ from the manifest; earlier, as soon as they are more.
         """
         member = self.manifest.members[name]
         digest, size = hashlib.sha256(), 0

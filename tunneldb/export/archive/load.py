@@ -59,15 +59,15 @@ class Loaded:
     survey_id : int
         The survey's number here.
     new_tunnel : bool
-        Whether its tunnel was added.
+        True if its tunnel was added.
     kept : bool
-        Whether all rows have the numbers that they had, as in the database that they came from.
+        True if all rows kept their numbers, as in the database that they came from.
     rows : dict
         Rows by table.
     left_out : dict
         Rows of comparisons with surveys that are not here, by table.
     kilometres : list of int
-        Those that have points.
+        Kilometres with points.
     notes : list of str
     """
 
@@ -85,7 +85,7 @@ class Loaded:
 def load_survey(conn: psycopg.Connection[Any], path: Path, name: str | None, begin: Begin) -> Loaded:
     """Import a survey into the database, completely or not at all.
 
-    Points and images go into tables that nobody else sees; what others use is locked at the end alone.
+    Points and images go into tables that nobody else sees; shared tables are locked only at the end.
 
     Parameters
     ----------
@@ -94,14 +94,14 @@ def load_survey(conn: psycopg.Connection[Any], path: Path, name: str | None, beg
     path : Path
         An archive that `save_survey` wrote.
     name : str or None
-        What the survey is to be called here; None for its own name.
+        New name of the survey; None for its own name.
     begin : callable
-        Told of each member that begins; returns what is told of its bytes.
+        Called with each member that begins; returns a function that takes its bytes.
 
     Raises
     ------
     InputError
-        For a file that is none, is damaged, of another schema, or does not fit this database. Nothing is changed then.
+        If the file is no archive, is damaged, has another schema, or does not fit this database. Nothing is changed then.
     """
     conn.rollback()
     with ArchiveReader(path) as archive:

@@ -40,14 +40,14 @@ def save_survey(conn: psycopg.Connection[Any], survey: Survey, path: Path, begin
     path : Path
         There whole when this returns, or not at all.
     begin : callable
-        Told of each member that begins; returns what is told of its bytes.
+        Called with each member that begins; returns a function that takes its bytes.
 
     Raises
     ------
     BusyError
-        When a stage is at work on it.
+        If a stage is running on it.
     InputError
-        When points wait to be loaded, or the file cannot be written.
+        If points wait to be loaded, or the file cannot be written.
     """
     conn.rollback()
     rows: dict[str, int] = {}

@@ -26,13 +26,13 @@ def write_survey(
     Parameters
     ----------
     conn, survey
-        What is read.
+        Survey to export.
     low, high : float
         Chainage, m; infinite for the whole survey.
     path : Path
         File that isn't there yet, ``.gpkg`` or ``.dxf``.
     begin : callable
-        Called with a text and the number of parts that are written; returns what takes those that are done.
+        Called with a text and the number of parts; returns a function that takes the written ones.
 
     Raises
     ------

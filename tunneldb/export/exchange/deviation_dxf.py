@@ -34,7 +34,7 @@ def write_sections(
 ) -> int:
     """Write a section every so many metres of a stretch, side by side in rows, in metres; return how many.
 
-    What of the lining was not seen is not drawn.
+    Lining that was not measured is not drawn.
     """
     design = load_design(conn, survey.tunnel_id, survey.tunnel, layer)
     rows = conn.execute(

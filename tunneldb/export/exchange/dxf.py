@@ -102,18 +102,17 @@ def write_survey_dxf(
 ) -> dict[str, int]:
     """Write a stretch of a survey as a DXF drawing (2010, metres), and return the number of entities on each layer.
 
-    The tunnel lies in its SRID, lines in space at their height, what is flat at height 0. Below the map lies the unrolled
-    lining, arc upwards and chainage to the right, and below that the profiles side by side, as seen looking up-chainage.
-    What an inspector rejected isn't drawn. Where leaks could be missed is drawn on the unrolled lining; in words,
-    and with notes and limitations of the results, it stands above the map,
-    and in the properties ``Coverage`` and ``Remark 1``, ….
+    The tunnel is in its SRID, lines in space at their height, flat ones at height 0. Below the map is the unrolled lining, arc
+    upwards and chainage to the right, and below that the profiles side by side, as seen looking up-chainage. Rejected findings
+    are not drawn. Stretches in which leaks could be missed are drawn on the unrolled lining. They are also listed, with notes
+    and limitations of the results, above the map and in the properties ``Coverage`` and ``Remark 1``, ….
 
     Parameters
     ----------
     conn, survey
-        What is read.
+        Survey to draw.
     surface : Surface
-        The survey's surface, which holds the stretch.
+        The survey's surface, for the whole stretch.
     low, high : float
         Chainage, m.
     path : Path

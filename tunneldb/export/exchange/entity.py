@@ -24,11 +24,11 @@ class Spot:
     Attributes
     ----------
     id, kind, review : int, str, str
-        As in the database.
+        Attributes as in the database.
     text : str
-        What is written beside it.
+        Label beside it.
     facts : list of str
-        What it bears as extended data.
+        Extended data.
     shape : Polygon
         In the coordinates asked for.
     """

@@ -79,12 +79,12 @@ def write_survey_gpkg(
     Parameters
     ----------
     conn, survey
-        What is read.
+        Survey to export.
     surface : Surface
-        The survey's surface, which holds the stretch.
+        The survey's surface, for the whole stretch.
     low, high : float
-        Chainage, m. What reaches into the stretch is written whole, only the axis is cut; of leaks and dry dark areas what
-        reaches into the survey's part of it.
+        Chainage, m. Objects that reach into the stretch are written whole, only the axis is cut; leaks and dry dark areas must
+        reach into the survey's part of it.
     path : Path
         File that isn't there yet.
     progress : callable

@@ -33,7 +33,7 @@ class Profile:
     Attributes
     ----------
     chainage : float
-        Where it stands, m.
+        Its place, m.
     right, up : (n,) float arrays
         Vertices from straight below the axis over the left wall and the crown, m from the axis; not closed.
     """

@@ -35,7 +35,7 @@ def write_members(path: Path, found: Structures, crs: CRS | None, geometry: Geom
         File that isn't there yet.
     found : Structures
     crs : CRS or None
-        Of the points, where it is known; a face's own plane has none.
+        Coordinate system of the points, if known; a face's own plane has none.
     geometry : {'face', 'map', '3d'}
         Members have no plane of their own: with ``face`` their layer has the faces' outlines, each in its own plane.
     """

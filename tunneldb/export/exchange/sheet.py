@@ -40,17 +40,17 @@ def draw_unrolled(
     Parameters
     ----------
     space
-        Where to draw.
+        Space to draw in.
     corner : (float, float)
         Left upper corner of its box, m.
     parts : sequence of two (n, 2) float arrays
         Left and right edge of each part of the lining without a gap: chainage and arc, m.
     named : sequence of (float, str)
-        Chainages to draw a line at, and what to write there.
+        Chainages of lines, and their labels.
     spots : sequence of Spot
-        What lies on it.
+        Spots on it.
     gaps : sequence of (float, float, str)
-        Where leaks could be missed: chainages from and to, m, and why.
+        Stretches in which leaks could be missed: chainages from and to, m, and the reason.
     """
     if not parts:
         return corner[0], corner[1], corner[0], corner[1]

@@ -37,11 +37,11 @@ class Table:
     Attributes
     ----------
     columns : list of Column
-        What is said of them.
+        Remarks on them.
     geometry : (n,) array of bytes
         WKB.
     description : str
-        What the rows are, for whoever opens the file.
+        Description of the rows, for users of the file.
     """
 
     columns: list[Column]
@@ -57,12 +57,12 @@ def read_table(
     Parameters
     ----------
     conn, survey
-        Where from.
+        Connection.
     view : str
         A view with a column ``survey_id``.
     low, high : float
-        Chainage, m; rows that reach into the stretch are read, whole. A view without chainages is cut by its geometry, which
-        is taken to lie in the unrolled plane.
+        Chainage, m; rows that reach into the stretch are read whole. A view without chainages is cut by its geometry, which
+        must be in the unrolled plane.
     where : str
         One more condition, in SQL.
     geometry : str
@@ -101,7 +101,7 @@ def table_of(names: Sequence[str], rows: Sequence[tuple[Any, ...]], description:
     rows
         Values as psycopg gives them.
     description
-        What the rows are.
+        Description of the rows.
     """
     columns = []
     for k, (name, type_code) in enumerate(zip(names, types, strict=True)):

@@ -34,7 +34,7 @@ def check_format(path: Path) -> None:
 def write_deviation(deviation: Deviation, path: Path) -> None:
     """Write the deviation in the format of the file's extension: a figure, or a table of all vertices.
 
-    The file appears whole. Raises UserError if its ending stands for no format or it can't be written.
+    The file appears when complete. Raises UserError if its extension is no known format or it cannot be written.
     """
     check_format(path)
     with replacing(path) as temporary:

@@ -26,7 +26,7 @@ def write_found(found: FoundAxis, path: Path, start: float, title: str) -> None:
     start
         Chainage of the first vertex, m.
     title
-        What it was found in.
+        Points it was found in.
     """
     from matplotlib.figure import Figure
 

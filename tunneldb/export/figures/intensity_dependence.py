@@ -34,7 +34,7 @@ def check_format(path: Path) -> None:
 def write_figure(look: Diagnosis, path: Path) -> None:
     """Write the figure: raw and corrected intensity over range and incidence, range curve and incidence effect.
 
-    The file appears whole. Raises UserError if its ending stands for no format or it can't be written.
+    The file appears when complete. Raises UserError if its extension is no known format or it cannot be written.
     """
     from matplotlib.figure import Figure
 

@@ -50,7 +50,7 @@ def write_cog(path: Path, kind: str, extent: Extent, blocks: Iterable[tuple[int,
     blocks : iterable of (int, (rows, columns) array)
         First column and pixels of each block.
     name : str
-        What the band is called, if not by its kind.
+        Name of the band, if not its kind.
     """
     plain = path.with_name(f"plain-{path.name}")
     palette = PALETTES.get(kind)

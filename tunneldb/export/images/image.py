@@ -41,11 +41,10 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
 
     All are of one moment; the connection must be idle.
 
-    The GeoTIFFs hold dB or m as single-precision numbers, NaN where no point fell, the state of a pixel, or the code of a
-    class, 0 where no point fell; x is the chainage and y the arc, m. Each file appears whole. Classes are there when stage
-    ground has run: they are computed from the offset image and what that stage has stored. Deviation is written for
-    each layer that the survey was compared with.
-    Where sonar scans were loaded, the bed and what they saw, unrolled, are written, too.
+    The GeoTIFFs have dB or m as single-precision numbers, NaN without a point; or the state of a pixel; or the code of a class,
+    0 without a point. x is the chainage and y the arc, m. Each file appears when complete. Classes exist if stage ground has
+    run: they are computed from the offset image and the results of that stage. Deviation is written for each layer that the
+    survey was compared with. If sonar scans were loaded, the bed and their unrolled points are written too.
 
     Returns
     -------
@@ -65,9 +64,9 @@ def export_kilometre(conn: psycopg.Connection, survey: Survey, km: int, folder: 
 def export_filled(conn: psycopg.Connection, survey: Survey, km: int, folder: Path) -> list[Path]:
     """Write the images of a kilometre with filled gaps, ``SURVEY-kmNNN-KIND-filled.tif``, and return their paths.
 
-    The kinds are corrected intensity, or the offset where there is none, and deviation. Their pixels are those of a preview:
-    they are there to be looked at, under the image that was measured. Their band's name and metadata say what they are. A
-    profile beyond the end of the kilometre fills, too. The connection must be idle.
+    The kinds are corrected intensity, or the offset without intensity, and deviation. Their pixels are those of a preview: they
+    are only for display, below the measured image. Name and metadata of the band state this. A profile beyond the end of the
+    kilometre fills too. The connection must be idle.
     """
     with snapshot(conn):
         seen = "corrected" if image_blocks(conn, survey, km, "corrected") else "offset"

@@ -31,7 +31,7 @@ class Palette:
     entries : dict of int to (str, Colour)
         Name and colour of each code.
     nodata : int
-        Code of pixels of which the image says nothing.
+        Code of pixels without data.
     """
 
     entries: dict[int, tuple[str, Colour]]

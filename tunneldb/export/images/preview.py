@@ -47,7 +47,7 @@ class Strip:
     start : float
         Chainage of its beginning, m.
     values : (rows, columns) float32 array
-        From the greatest arc downwards, NaN where there is none.
+        From the greatest arc downwards, NaN without data.
     """
 
     start: float
@@ -115,8 +115,8 @@ def draw(
     strips : sequence of Strip
         In order of chainage.
     stationing : Stationing
-        What is written at their ticks, which stand every 10 m of chainage. What none of the strips holds before the first
-        tick or behind the last is left out.
+        Labels of their ticks, every 10 m of chainage. Parts without any content before the first tick or behind the last are
+        left out.
     top : float
         Arc of the upper edge, m.
     pixel : float

@@ -47,23 +47,23 @@ def export_copc(
 ) -> Iterator[Written]:
     """Write each kilometre as ``SURVEY-kmNNN.copc.laz`` into a folder, with ``SURVEY.vpc``, which lists all.
 
-    Each point of a file is in one of the kilometres that the file touches, that in which its chainage is or the nearest; it
-    has the class that `export_classified` gives it. Those of a kilometre that is not in the database yet are left to it. A file
-    appears when it is complete. Memory doesn't grow with the points, except that those of a single cell of 1 m³ are held whole.
-    A kilometre takes as much room in the folder besides, for a time, as its points do uncompressed.
+    Each point of a file is in the kilometre of its chainage, or the nearest one that the file touches; its class is that of
+    `export_classified`. Points of a kilometre that is not in the database yet are left to it. A file appears when it is
+    complete. Memory does not grow with the number of points, except that those of a single cell of 1 m³ are in memory together.
+    A kilometre temporarily takes as much additional space in the folder as its points uncompressed.
 
     Parameters
     ----------
     conn, folder, kilometres
-        As of `export_classified`.
+        As for `export_classified`.
     begin : callable
-        Called with a text and a number of points before each pass; returns what takes the points that are done.
+        Called with a text and a number of points before each pass; returns a function that takes the points done.
 
     Raises
     ------
     UserError
-        As of `export_classified`; if a file's points have waveforms, or the files of a kilometre can't be brought together; if
-        there is something else in the place of the virtual point cloud.
+        As for `export_classified`; if a file's points have waveforms, or the files of a kilometre cannot be combined; if
+        another file has the name of the virtual point cloud.
     """
     files = [file for file in survey_files(conn, survey) if set(file.kilometres) & set(file.touched) & set(kilometres)]
     wanted = sorted(set(kilometres) & {km for file in files for km in set(file.kilometres) & set(file.touched)})
@@ -116,7 +116,7 @@ class _Source:
     Attributes
     ----------
     chunks : dict of int to list of int
-        By kilometre, numbers of the chunks with points of it.
+        Numbers of the chunks with points of each kilometre.
     """
 
     def __init__(self, file: ScanFile, number: int, of: int) -> None:

@@ -55,7 +55,7 @@ class Dimension:
     size : int
         Bytes of a value.
     count, average, squares, least, greatest
-        Of the values so far; squares are summed from the average.
+        Statistics of the values so far; squares are summed about the average.
     """
 
     name: str
@@ -97,7 +97,7 @@ class Dimensions:
     Parameters
     ----------
     head : Head
-        What surrounds the points.
+        Polygon around the points.
     """
 
     def __init__(self, head: Head) -> None:

@@ -34,7 +34,7 @@ class Classified:
     counts : (256,) int64 array
         Points by class.
     ground, lining : bool
-        Whether there is any.
+        True if there is any.
     """
 
     counts: Int64
@@ -57,13 +57,13 @@ def classify_file(source: Path, target: Path, values: Mapping[str, float], begin
     values : mapping of str to float
         Parameters ``ground.…`` and ``cluster.…``.
     begin : callable
-        Called with a text and the number of points before each pass; returns what takes the points that are done.
+        Called with a text and the number of points before each pass; returns a function that takes the points done.
 
     Raises
     ------
     UserError
-        If the source cannot be read, holds neither ground nor lining, or is the target; if the target is no ``.laz``, or
-        cannot be written.
+        If the source cannot be read, has neither ground nor lining, or is the target; if the target is no ``.laz``, or cannot
+        be written.
     """
     if target.suffix.lower() != ".laz":
         raise UserError(f"{target}: the output is LAZ; use the extension .laz")
@@ -94,7 +94,7 @@ def find_scene_of(source: Path, values: Mapping[str, float], progress: Callable[
     Raises
     ------
     UserError
-        If the file cannot be read, or its points lie too far apart.
+        If the file cannot be read, or its points are too far apart.
     """
     settings = GroundSettings.of(values)
     voxels = Voxels(settings.voxel)

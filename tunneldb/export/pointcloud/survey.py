@@ -36,11 +36,11 @@ class ScanFile:
     ----------
     name, path, checksum : str
     bytes, points : int
-        As they were loaded.
+        Files as loaded.
     kilometres : tuple of int
-        Those with points of it that are in the database.
+        Kilometres with points of it that are in the database.
     touched : tuple of int
-        Those with points of it, noise aside, whether they are in the database or not yet.
+        Kilometres with points of it, without noise, in the database or not yet.
     """
 
     name: str
@@ -70,7 +70,7 @@ def export_classified(
 ) -> Iterator[Written]:
     """Write the files that touch some kilometres into a folder, each whole and once, under its own name as ``.laz``.
 
-    Whether all can be written is looked at before the first one is. A file appears when it is complete.
+    All files are checked before the first one is written. A file appears when it is complete.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def export_classified(
         It exists.
     kilometres : collection of int
     begin : callable
-        Called with a text and the number of points before each file; returns what takes the points written.
+        Called with a text and the number of points before each file; returns a function that takes the points written.
 
     Raises
     ------

@@ -36,7 +36,7 @@ class Cloud:
     Attributes
     ----------
     name : str
-        Of its file.
+        Size of its file.
     low, high : (3,) float arrays
         Corners of its box, m.
     points : int
@@ -65,9 +65,9 @@ def write_vpc(path: Path, cloud: Cloud, date: dt.date, folder: Path) -> None:
     cloud : Cloud
         In that folder.
     date : date
-        When it was scanned.
+        Date of the scan.
     folder : Path
-        Where the file is going to be.
+        Target folder.
     """
     listed = {name: item for name, item in listed_clouds(folder / path.name).items() if (folder / name).is_file()}
     listed[cloud.name] = _item(cloud, date)

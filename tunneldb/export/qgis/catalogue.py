@@ -74,7 +74,7 @@ class Catalogue:
     Attributes
     ----------
     kinds : tuple of Kind
-        Those offered, in the owner's order.
+        Offered kinds, in the owner's order.
     severities : dict of int to str
         Word of each degree, 1 to 4.
     dry_region_limit : float

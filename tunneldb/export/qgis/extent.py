@@ -53,7 +53,7 @@ class View:
     Attributes
     ----------
     name : str
-        What the user sees in the list of bookmarks.
+        Name in the list of bookmarks.
     theme : str
         Map theme that it belongs to.
     extent : Extent
@@ -71,7 +71,7 @@ def map_extent(conn: psycopg.Connection, survey: Survey) -> Extent:
     Raises
     ------
     UserError
-        The survey has neither an axis nor faces yet.
+        If the survey has neither an axis nor faces yet.
     """
     row = conn.execute(
         "SELECT ST_XMin(e), ST_YMin(e), ST_XMax(e), ST_YMax(e) FROM (SELECT ST_Extent(g) AS e FROM ("
@@ -136,7 +136,7 @@ def first_window(conn: psycopg.Connection, survey: str, kilometres: list[tuple[i
     survey : str
         Name of the survey.
     kilometres : list of (int, Extent)
-        As :func:`unrolled_extents` returns them, at least one.
+        From :func:`unrolled_extents`, at least one.
     """
     leak = largest_leak(conn, survey)
     low, high = kilometres[0][1].xmin, kilometres[-1][1].xmax

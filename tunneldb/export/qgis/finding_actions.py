@@ -80,7 +80,7 @@ _ACTIONS = (
 def finding_actions() -> ET.Element:
     """Return the element ``attributeactions`` of a layer of findings.
 
-    Each runs a function of ``tunnel_api`` with the rights of whoever uses QGIS, and says in one line what that said.
+    Each runs a function of ``tunnel_api`` with the rights of the QGIS user, and shows its answer in one line.
     """
     root = ET.Element("attributeactions")
     for name, short, code, scopes in _ACTIONS:

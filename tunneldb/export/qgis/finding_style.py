@@ -24,7 +24,7 @@ Layer = tuple[str, dict[str, str]]
 def finding_style(catalogue: Catalogue, geometry: str, *, in_space: bool, on_sheet: bool = False) -> list[ET.Element]:
     """Return the style of a layer of findings, optionally with a 3D view.
 
-    On sheets leaks have outlines and numbers of their own: of these only what is severe is drawn, and drips as points.
+    On sheets leaks have outlines and numbers of their own: only severe ones are drawn here, and drips as points.
     """
     if on_sheet:
         return [_renderer(catalogue, geometry, on_sheet=True), _labeling(geometry, DRY)]
@@ -42,7 +42,7 @@ def _renderer(catalogue: Catalogue, geometry: str, *, on_sheet: bool = False) ->
     geometry : str
         Point, Line or Polygon.
     on_sheet : bool
-        Whether it is a layer of the sheets, which has what is shown and no more.
+        True for a layer of the sheets, which has only visible findings.
     """
     root = ET.Element("renderer-v2", type="RuleRenderer", forceraster="0", enableorderby="0", symbollevels="0")
     rules = ET.SubElement(root, "rules", key=_key("root", geometry))

@@ -46,7 +46,7 @@ class VectorLayer:
     id : str
         Unique in the project.
     title : str
-        What the legend says.
+        Title in the legend.
     view : str
         View in tunnel_api, whose integer key is the column ``id``.
     column : str
@@ -60,11 +60,11 @@ class VectorLayer:
     themes : tuple of str
         Map themes that show it.
     edited : bool
-        Whether it is for editing; the others are read-only in QGIS.
+        True if it is for editing; the others are read-only in QGIS.
     where : str
         Condition on the rows that it shows, beside that on the survey.
     part : str
-        Group within the group that it stands in, if any.
+        Subgroup in its group, if any.
     """
 
     id: str

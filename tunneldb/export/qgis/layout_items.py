@@ -99,15 +99,15 @@ def table(
     order : str
         Expression by which rows are sorted.
     rows : int
-        So many at most.
+        Maximum number of rows.
     condition : str
         Expression: which rows.
     name : str
-        What the layer is called.
+        Name of the layer.
     touching : bool
-        Whether only rows whose geometry touches that of the page are meant.
+        True if only rows whose geometry touches that of the page are listed.
     own : str
-        Name of the table in the layout, of which its key is made.
+        Name of the table in the layout, which determines its key.
     """
     own_key = key(layout, own)
     element = ET.Element(

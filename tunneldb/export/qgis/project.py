@@ -162,14 +162,14 @@ def store_project(
     conn : psycopg.Connection
         Connection whose transaction this joins.
     survey, images, service
-        As in :func:`write_project`, but the project holds the images' absolute paths.
+        As in :func:`write_project`, but the project has absolute paths of the images.
     name : str
-        What it is called there.
+        Name of the project there.
 
     Raises
     ------
     UserError
-        As in :func:`write_project`, or the table is missing.
+        As in :func:`write_project`, or if the table is missing.
     """
     require_table(conn, "public.qgis_projects")
     content = _archive(_text(_project(conn, survey, images, None, service)), name)
@@ -360,7 +360,7 @@ def _rasters(images: Sequence[Path], folder: Path | None, crs: ET.Element) -> li
 
     Theme Deviation shows deviation from the innermost layer of the design that there is, theme Change the change.
 
-    It lies over the same with gaps filled.
+    It is above the same image with filled gaps.
     """
     entries = []
     of_kind = {kind: sorted(path for path in images if image_kind(path) == kind) for kind in KINDS}

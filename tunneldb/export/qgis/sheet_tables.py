@@ -45,7 +45,7 @@ class _Words:
     width : float
         Width, mm.
     one, more : int
-        Letters that a single line holds, and each of several lines, which break between words.
+        Number of letters on a single line, and on each of several lines, which break between words.
     """
 
     heading: str
@@ -67,15 +67,15 @@ class SheetTable:
     Attributes
     ----------
     name : str
-        What its rows are called.
+        Name of its rows.
     count : str
         Column of the sheets that has their number.
     columns : tuple
-        What it lists.
+        Columns.
     order, condition : str
-        Expressions: what rows are sorted by, and which are meant.
+        Expressions for the order and the selection of rows.
     touching : bool
-        Whether only rows whose geometry touches the sheet's are meant.
+        True if only rows whose geometry touches the sheet's are listed.
     """
 
     name: str
@@ -148,7 +148,7 @@ def table_width(listed: SheetTable) -> float:
 def sheet_table(listed: SheetTable, source: tuple[str, str], place: Frames) -> list[ET.Element]:
     """Return a table and its frames, with a note on its last page if there are more rows than fit.
 
-    What is empty is not printed, but for the first page.
+    Empty pages are not printed, except the first.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def sheet_table(listed: SheetTable, source: tuple[str, str], place: Frames) -> l
     source : (str, str)
         Id and data source of the layer whose rows it lists.
     place : Frames
-        Where it stands.
+        Its place.
     """
     count, width, own = ON_PAGE.format(listed.count), table_width(listed), key(SHEETS, listed.name)
     frames = []

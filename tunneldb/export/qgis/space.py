@@ -65,7 +65,7 @@ def viewpoint(conn: psycopg.Connection, survey: str, chainage: float | None) -> 
     survey : str
         Name of a survey that has an axis.
     chainage : float, optional
-        What to look at, m.
+        Target of the camera, m.
     """
     near = conn.execute(
         "SELECT chainage, ST_X(geom), ST_Y(geom), ST_Z(geom) FROM tunnel_api.axis_vertex WHERE survey = %s "
@@ -116,14 +116,14 @@ def has_rows(conn: psycopg.Connection, survey: str, layer: VectorLayer) -> bool:
 def scene(view: Viewpoint, extent: Extent, crs: ET.Element, layers: Sequence[str]) -> ET.Element:
     """Return the element ``qgis3d``: heights as they are, without terrain.
 
-    Its height would shift all layers in QGIS 3.22, those of absolute heights too, and hide what lies below it.
+    Its height would shift all layers in QGIS 3.22, including those with absolute heights, and hide layers below it.
 
     Parameters
     ----------
     view : Viewpoint
-        Place that becomes the origin; only in plan, for layers keep their heights.
+        Origin; only in plan, because layers keep their heights.
     extent : Extent
-        What the scene holds, in the tunnel's SRID, m.
+        Extent of the scene, in the tunnel's SRID, m.
     crs : xml.etree.ElementTree.Element
         The tunnel's SRID, as :func:`tunneldb.export.qgis.crs.crs_element` returns it.
     layers : sequence of str

@@ -96,7 +96,7 @@ def _store_style(conn: psycopg.Connection, style: dict[str, str]) -> None:
 def styled_columns() -> list[tuple[str, str, str, str]]:
     """Return view, geometry column, style and title of everything with a style; some views have several geometries.
 
-    Of a view that is in a project twice, the layer of its own name has the style.
+    If a view is in a project twice, the layer of its own name has the style.
     """
     return [
         (layer.view, layer.column, layer.style, layer.title)

@@ -29,15 +29,15 @@ class KindCount:
     kind, label : str
         Its code, and its name in the owner's words.
     states : dict of str to int
-        How many are in each state.
+        Number in each state.
     origins : dict of str to int
-        Of those that count, how many came about how.
+        Number of included findings by origin.
     severities : dict of int to int
-        Of those that count, how many have which severity; 0 for none.
+        Number of included findings by severity; 0 for none.
     counted : int
-        How many sums count: open and confirmed.
+        Number included in totals: open and confirmed.
     area, length : float
-        Of those that count, as far as they lie in the stretch asked for, m² and m.
+        Area and length of included findings within the requested stretch, m² and m.
     """
 
     kind: str
@@ -93,7 +93,7 @@ def count_findings(findings: Iterable[Finding], order: Sequence[str] = ()) -> li
     Parameters
     ----------
     findings : iterable of Finding
-        As they were read, of whatever states.
+        Findings of any state.
     order : sequence of str
         Codes of kinds in the order in which they are wanted; others follow by their code.
     """

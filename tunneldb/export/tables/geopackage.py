@@ -39,7 +39,7 @@ def write_remarks(path: Path, remarks: Sequence[Remark], **options: str) -> None
     path : Path
         GeoPackage.
     remarks : sequence of Remark
-        What is to be known, perhaps nothing.
+        Remarks, may be empty.
     **options : str
         Options of the driver.
     """

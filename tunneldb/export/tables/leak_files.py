@@ -60,9 +60,9 @@ def _facts(leak: Finding) -> dict[str, Any]:
 def as_geojson(leaks: LeakList, geometry: Geometry, srid: int) -> str:
     """Write leaks as a GeoJSON FeatureCollection in the coordinates of the chosen geometry.
 
-    Map and space carry the tunnel's coordinate system in a ``crs`` member, as GDAL and QGIS read it; the
-    unrolled plane and local coordinates have none. Further members are what ``--json`` tells, too: ``statement`` and ``gaps``
-    say for which stretches the list can't be vouched for, ``remarks`` notes and limitations, ``count`` and ``area`` sum up.
+    Map and space have the tunnel's coordinate system in a ``crs`` member, as GDAL and QGIS read it; the unrolled plane and
+    local coordinates have none. Further members as in ``--json``: ``statement`` and ``gaps`` for stretches in which leaks could
+    be missed, ``remarks`` for notes and limitations, ``count`` and ``area`` as totals.
     """
     collection: dict[str, Any] = {"type": "FeatureCollection", "name": layer_name(geometry, leaks.kind)}
     if geometry != "unrolled" and srid != LOCAL:
@@ -86,8 +86,8 @@ def as_geojson(leaks: LeakList, geometry: Geometry, srid: int) -> str:
 def write_gpkg(path: Path, leaks: LeakList, geometry: Geometry, srid: int) -> None:
     """Write leaks as a GeoPackage with one layer; the unrolled plane and local coordinates are undefined Cartesian there.
 
-    Where the list can't be vouched for, is in a table ``coverage_gap`` beside it, if there is such a stretch, and
-    notes and limitations in a table ``remark``, if there is anything; both are in the description of the layer, too.
+    Stretches in which leaks could be missed are in a table ``coverage_gap``, if there are any, and notes and limitations in a
+    table ``remark``; both are also in the description of the layer.
     """
     rows = leaks.rows
     data = {

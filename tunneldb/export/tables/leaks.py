@@ -17,9 +17,9 @@ def as_table(leaks: LeakList, title: str, width: int | None = None) -> Table:
     Parameters
     ----------
     leaks, title
-        What was read, and from where.
+        Leaks to print.
     width : int, optional
-        Columns of the terminal. Where there is no room for all, the least important are left out and named below.
+        Columns of the terminal. If there is not enough space, the least important are left out and named below.
     """
     cells = {heading: [cell(leak) for leak in leaks.rows] for heading, cell in _CELLS.items()}
     hidden = []

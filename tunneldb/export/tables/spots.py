@@ -22,7 +22,7 @@ from tunneldb.store.spots import COLUMNS, Geometry, SpotList
 def as_csv(spots: SpotList) -> str:
     """Write spots as CSV with a header; the last column, ``geometry``, is WKT.
 
-    Where the list can't be vouched for, its first row says so: ``kind`` is unseen, ``remark`` says why, ``counted`` is False.
+    If the inspection has gaps, the first row says so: ``kind`` is unseen, ``remark`` the reason, ``counted`` is False.
     """
     rows: list[dict[str, Any]] = []
     if spots.statement:

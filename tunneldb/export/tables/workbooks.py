@@ -57,15 +57,15 @@ def write_findings(
     Parameters
     ----------
     path, title
-        Where to, and what it is called.
+        Target, and its title.
     findings, others : sequence of Finding
-        What was asked for, and what else fits but for its state: rejected, gone, merged, …
+        Requested findings, and those excluded only by their state: rejected, gone, merged, …
     counts : sequence of KindCount
-        Of both together.
+        Counts of both together.
     severities : dict of int to str
         The owner's words.
     regions : sequence of DryRegion
-        Those of the stretch.
+        Dry regions of the stretch.
     """
     columns = [column for column, _ in _FINDING]
     write_workbook(
