@@ -44,9 +44,9 @@ def search_axis(files: Sequence[Path], srid: int | None, begin: Begin, along: Fl
     files
         Scan files of one tunnel.
     srid
-        EPSG code that their coordinate systems are held against; None: against each other.
+        EPSG code that their coordinate systems must have; None: they must agree with each other.
     begin
-        Called with a text and the number of points; returns what takes the points that are done.
+        Called with a text and the number of points; returns a function that takes the points done.
     along : (k, 2) float array or None
         A line drawn in plan, which the axis follows, m.
 
@@ -75,11 +75,11 @@ def found_given(
     Parameters
     ----------
     files, srid, begin
-        As of `search_axis`.
+        As for `search_axis`.
     start
         Chainage of its beginning, m; None: 0.
     reverse
-        Whether chainage grows from its end farther east.
+        True if chainage increases from its end farther east.
     """
     if not files:
         raise UserError("--axis auto finds the axis in scan files; name them after the tunnel: --axis auto SCAN...")

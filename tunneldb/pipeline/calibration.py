@@ -52,11 +52,11 @@ class Sample:
     Attributes
     ----------
     seen : ObservedPoints
-        Where they lie and what they show.
+        Places and values of the points.
     scan_id : (n,) int array
         Scan that each is of.
     clear : (n,) bool array
-        Those on the lining, clear of its foot.
+        Points on the lining, away from its foot.
     """
 
     seen: ObservedPoints
@@ -88,11 +88,11 @@ class Calibration:
     Attributes
     ----------
     observer : Observer
-        Sees points with the range curve that holds here.
+        Observation of points with the valid range curve.
     view : Sample
-        What it sees at survey density.
+        Observed points of survey density.
     roughness : Roughness
-        Of the lining.
+        Roughness of the lining.
     found : RangeCurve or None
         Range curve found on this kilometre's lining; None where it was measured, or isn't needed.
     """
@@ -144,12 +144,12 @@ def calibrate(points: Points, observer: Observer, drawn: list[Polygon], survey: 
     survey : str
         Name of the survey, for errors.
     own_curve : bool
-        Whether the range curve is to be found on these points.
+        True if the range curve must be estimated from these points.
 
     Raises
     ------
     UserError
-        If nothing is seen of the lining, it lies outside the reference curve, or its own curve can't be found on it.
+        If no lining was seen, it is outside the reference curve, or its own curve cannot be estimated.
     """
     view = observe_sample(points, observer)
     assert observer.radiometer is not None
@@ -170,7 +170,7 @@ def calibrate(points: Points, observer: Observer, drawn: list[Polygon], survey: 
 def find_range_curve(view: Sample, observer: Observer) -> RangeCurve:
     """Estimate range curve and roughness from the lining itself; see :func:`estimate_range_curve`.
 
-    It spans the ranges of all that full density may hold as lining: what stands out from it or back behind it too.
+    It covers the ranges of all points that may be lining at full density: also those inside and behind the surface.
     """
     seen, observations, near = view.seen, view.observations, view.telling
     ranges = observations.range_m[seen.lining].astype(np.float64)

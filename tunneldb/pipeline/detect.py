@@ -72,19 +72,19 @@ class DetectionInputs:
     survey : str
         Its name, for errors.
     observer : Observer
-        The surface, the floor and the scanner; without a radiometer where there is no intensity.
+        Surface, floor and scanner; without a radiometer if there is no intensity.
     grid : Grid
         Pixels of the kilometre and its halo.
     files : list of ScanSource
-        What is read at full density.
+        Files to read at full density.
     sample : Points or None
-        Points of survey density; None where there is no intensity.
+        Points of survey density; None without intensity.
     own_curve : bool
-        Whether the range curve is to be found on the lining.
+        True if the range curve must be estimated from the lining.
     homogeneous, dry : list of Polygon
         Regions that the user drew.
     judge : InForce
-        The model of evidence, with what was learned for the tunnel.
+        Evidence model, with the tunnel's adjustments.
     drawn : list of Drawn
         Findings whose outlines people drew, to be measured.
     """
@@ -110,7 +110,7 @@ class DetectionResult:
     counts : dict
         Points that were read and seen.
     calibration : Calibration
-        What the intensity was corrected with.
+        Intensity correction used.
     background : BackgroundMap
         The dry lining.
     state : (rows, columns) uint8 array
@@ -120,7 +120,7 @@ class DetectionResult:
         Dry lining points, raw and corrected by Lambert's law and Oren–Nayar.
     coverage : Coverage
     drawn : list of Measurement
-        What the image shows of the outlines that people drew.
+        Measurements of drawn outlines.
     """
 
     counts: Counts
@@ -147,7 +147,7 @@ def detect(
     Raises
     ------
     UserError
-        If there are no sections, the ground was not sought, a file is gone or was changed, or intensity can't be corrected.
+        If there are no sections, stage ground has not run, a file is gone or was changed, or intensity cannot be corrected.
     """
     inputs = load_inputs(conn, survey, km, values)
     if inputs.sample is None:
@@ -175,7 +175,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
     Raises
     ------
     UserError
-        If there are no sections, the ground was not sought, or a file is gone or was changed.
+        If there are no sections, stage ground has not run, or a file is gone or was changed.
     """
     surface = load_surface(conn, survey, km * KILOMETRE - SURFACE_MARGIN, (km + 1) * KILOMETRE + SURFACE_MARGIN)
     grid = kilometre_grid(surface, km, values["image.pixel"])

@@ -46,9 +46,9 @@ class Row:
     number : int
         Its number: of a CSV the line, else the feature, from 1.
     values : mapping of str to str
-        What it says, by our names; empty values are left out.
+        Its values, by our names; empty ones are left out.
     shape : geometry or None
-        Where it lies.
+        Its place.
     view : {'unrolled', '3d'}
         In which coordinates.
     wrong : str
@@ -84,14 +84,14 @@ def import_findings(
     Parameters
     ----------
     conn, survey
-        Where to. The connection must not be in autocommit.
+        Target. The connection must not be in autocommit.
     path : Path
-        The file. A CSV says where each lies by ``wkt`` or ``geometry`` (WKT: chainage and arc; with heights in space), by
+        The file. A CSV gives places by ``wkt`` or ``geometry`` (WKT: chainage and arc; with heights in space), by
         ``chainage_from``, ``chainage_to``, ``arc_from`` and ``arc_to`` (a rectangle), by ``chainage`` and ``arc``, or by ``x``,
-        ``y``, ``z`` (points); a chainage may be a station of the tunnel. Shapes of other files lie in the unrolled plane if
+        ``y``, ``z`` (points); a chainage may be a station of the tunnel. Shapes of other files are in the unrolled plane if
         they have no coordinate system, else in space, in the tunnel's.
     kinds : mapping
-        Our kind by theirs; what is not in it is ours.
+        Our kind by theirs; missing ones are ours.
     columns : mapping
         Their column by ours.
     layer : str, optional

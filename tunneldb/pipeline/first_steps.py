@@ -35,11 +35,11 @@ class FirstSteps:
     Attributes
     ----------
     missing : list of str
-        What the files do not say, and who has it.
+        Missing information, and its sources.
     doubts : list of str
-        What may be wrong with them.
+        Possible errors.
     commands : list of str
-        What to type; words in capitals stand for what is missing.
+        Commands; words in capitals are placeholders of missing information.
     """
 
     missing: list[str]

@@ -35,8 +35,8 @@ def ground(
 ) -> Counts:
     """Find ground, lining and other objects in a kilometre (Li et al., 2023), and classify its points.
 
-    Points and sections so far beyond its ends as the ground depends on (``MARGIN``) are looked at too, so that its neighbours
-    find the same there. A tunnel without ground has none in the database, and all else.
+    Points and sections beyond its ends within ``MARGIN`` are used too, so that its neighbours have the same result there. A
+    tunnel without ground has none in the database, but all other results.
 
     Raises
     ------

@@ -60,11 +60,11 @@ class IntensityLook:
     Attributes
     ----------
     name, type : str
-        As the file has it, and what its numbers are: ``uint16``, ``float32``, ….
+        Name in the file, and type of its numbers: ``uint16``, ``float32``, ….
     values : ValueRange or None
-        Of a sample; None where it cannot be read.
+        Statistics of a sample; None if it cannot be read.
     guesses : list of KindGuess
-        What it may be, the likeliest first.
+        Possible kinds, the likeliest first.
     fault : str or None
         Why it cannot be read.
     """
@@ -96,27 +96,27 @@ class FileLook:
     misplaced : int
         Points with a coordinate that is NaN or infinite.
     crs, unread_crs : str or None
-        Name of its coordinate system; what it has in the place of one.
+        Name of its coordinate system; or the reason why there is none.
     srid : int or None
         EPSG code of the coordinate system in plan.
     low, high : (3,) float64 array
         Box, in the file's unit.
     length, width, height : float or None
-        Of the tunnel, as `tunnel_form` finds it.
+        Form of the tunnel, from `tunnel_form`.
     density : tuple of three floats
         Points per square unit of surface: 10th percentile, median, 90th; see `surface_density`.
     sampled : int
         Points that these were found on.
     foreign_unit : bool
-        Whether its coordinate system is in another unit than metres, in which no tunnel can be.
+        True if its coordinate system has another unit than metres, which is not possible for a tunnel.
     profile_spacing : float or None
-        Distance of the profiles along the tunnel; None where it can't be told.
+        Distance of the profiles along the tunnel; None if unknown.
     unit : str or None
-        What the unit of length seems to be, where it is not the metre, and why.
+        Probable unit of length, if not the metre, and the reason.
     times : (float, float) or None
         First and last time, s.
     time_kind : str or None
-        What the file says they are.
+        Kind of the times, from the file.
     untimed : int
         Points whose time is NaN or infinite.
     date : datetime.date or None
@@ -127,7 +127,7 @@ class FileLook:
         Scans that the file knows, with the positions that it gives them.
     intensities : list of IntensityLook
     only_noise : bool
-        Whether all points would be left out as noise, each too far from others; False where not all were looked at.
+        True if all points would be left out as noise, each too far from others; False if not all were examined.
     """
 
     path: Path
@@ -177,7 +177,7 @@ def inspect_file(path: Path, begin: Callable[[str, float | None], Callable[[floa
     ----------
     path : Path
     begin : callable
-        Called with a text and a number of points before each step; returns what takes the points done.
+        Called with a text and a number of points before each step; returns a function that takes the points done.
 
     Raises
     ------

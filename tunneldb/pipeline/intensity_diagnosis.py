@@ -52,7 +52,7 @@ def diagnose_survey(
     Parameters
     ----------
     conn, survey, kilometres
-        Where.
+        Survey.
     values : mapping
         Parameters of the stages.
     progress : callable
@@ -83,16 +83,16 @@ class DiagnosisInputs:
     Attributes
     ----------
     title : str
-        What is looked at.
+        Points.
     kind : {'amplitude', 'reflectance', 'linear'}
-        What the intensity is.
+        Kind of the intensity.
     measured : ReferenceCurve or None
         Curve measured on a target, where the kind needs one and it was given.
     observer : Observer
     view : Sample
         Lining points of survey density.
     regions : list of Polygon
-        Those drawn as homogeneous.
+        Regions drawn as homogeneous.
     """
 
     title: str
@@ -154,13 +154,13 @@ def diagnose_file(
     path : Path
         Scan file.
     dimension : str
-        Dimension that holds the intensity.
+        Dimension of the intensity.
     kind : {'amplitude', 'reflectance', 'linear'}
-        What it is.
+        Kind of the intensity.
     scanner : three floats or None
-        Where the scanner stood, in the file's coordinates, m; None to take the poses of an E57 or PTX file.
+        Scanner position, in the file's coordinates, m; None to use the poses of an E57 or PTX file.
     begin : callable
-        Called with a text and a number of points, None if unknown, before each step; returns what takes the points done.
+        Called with a text and a number of points, None if unknown, before each step; returns a function that takes the points done.
 
     Raises
     ------

@@ -39,7 +39,7 @@ class Change:
     ----------
     id : int
     survey, label : str
-        Where it is.
+        Place of the finding.
     was, will_be : str
         leak, joint or dark.
     before, after : float
@@ -63,7 +63,7 @@ class Changes:
     ----------
     survey : str
     anomalies : int
-        Those that were found last and have features.
+        Findings of the last detection with features.
     to_leak, from_leak : int
     """
 
@@ -82,14 +82,14 @@ class Plan:
     tunnels : mapping
         Names of the tunnels that it is for, by their keys.
     surveys : sequence of str
-        Whose reviews were taken.
+        Surveys whose reviews were used.
     lesson : Lesson
     reviews : mapping
-        How many reviews of each sort were used.
+        Number of used reviews of each sort.
     without : mapping
         Number of reviewed findings without features, by survey.
     changes : sequence of Changes
-        Of all surveys of the tunnels, against what is in force.
+        Changes in all surveys of the tunnels, compared with the current model.
     largest : sequence of Change
         The largest changes of probability, MAX_LISTED_CHANGES at the most, those to another kind first.
     """
@@ -169,7 +169,7 @@ def undo_learning(conn: psycopg.Connection[Any], surveys: Sequence[Survey]) -> d
     Raises
     ------
     UserError
-        If for one of them nothing is in force.
+        If one of them has no adjustment.
     """
     undone = {}
     for key, tunnel in {survey.tunnel_id: survey.tunnel for survey in surveys}.items():

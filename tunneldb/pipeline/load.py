@@ -55,9 +55,8 @@ BATCH = 20_000_000  # points of files of the same kilometre that are loaded in o
 def load_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int, settings: FilterSettings) -> Counts:
     """Load the points that wait for a kilometre, in the caller's transaction.
 
-    The rows that were read of files and wait there, and those that it has of other files, are thinned as a whole,
-    written aside and swapped in. Which rows a kilometre has in the end does not depend on the order in which its files
-    are read or loaded.
+    Rows that were read of files and wait there, and existing rows of other files, are thinned as a whole, written separately
+    and swapped in. The resulting rows of a kilometre do not depend on the order in which its files are read or loaded.
 
     Returns
     -------
@@ -83,11 +82,11 @@ class Merged:
     Attributes
     ----------
     km, files, kept : int
-        Number of the kilometre; files that waited for it; rows that it has now.
+        Number of the kilometre; files that waited for it; its current number of rows.
     changes : dict of int to (int, int, int)
-        By how much the rows kept, thinned and outside of files (by id) change.
+        Changes of the rows kept, thinned and outside, by file id.
     note : dict
-        What is to be known of it, for the ledger: ``second_tube``, the rows left out, and ``note``; empty if nothing is.
+        Remarks for the ledger: ``second_tube``, the rows left out, and ``note``; may be empty.
     """
 
     km: int
@@ -108,7 +107,7 @@ def merge(
 ) -> Merged:
     """Build a kilometre with the points that wait for it; `finish` puts it in place.
 
-    What was read of the files in `held`, by id, is there and not in fragments.
+    Rows of the files in `held`, by id, are in the kilometre and not in fragments.
     """
     held = held or {}
     lock(conn, survey.id, km)
@@ -197,8 +196,8 @@ def load_files(
 ) -> Iterator[Loaded]:
     """Read scan files and load the kilometres that they touch.
 
-    Files of the same kilometre are loaded together, as long as they have no more than BATCH points; each such batch is
-    one transaction. Which points a survey holds does not depend on the order in which its files are loaded.
+    Files of the same kilometre are loaded together, up to BATCH points; each such batch is one transaction. The points of a
+    survey do not depend on the order in which its files are loaded.
 
     Parameters
     ----------
@@ -210,9 +209,9 @@ def load_files(
         loaded before is replaced, one of the same content is left as it is; a copy of another file is left out.
     settings : FilterSettings
     begin : callable
-        Told of each step that begins; returns what is told of its progress.
+        Called with each step that begins; returns a function that takes its progress.
     memory : int
-        Bytes of points held in memory by each of two spools.
+        Bytes of points in the memory of each of two spools.
 
     Yields
     ------
@@ -222,8 +221,8 @@ def load_files(
     Raises
     ------
     UserError
-        For a file that is unreadable or does not fit the survey. All are looked at before the first one is read; files
-        that were yielded stay loaded, of the others nothing is.
+        If a file is unreadable or does not fit the survey. All are checked before the first one is read; files that were
+        yielded stay loaded, of the others nothing is.
     """
     require_same_density(conn, survey, settings)
     reading = Reading.of(conn, survey, settings, memory)
@@ -275,7 +274,7 @@ def header_kilometres(header: ScanHeader, alignment: Alignment, reach: float) ->
     alignment : Alignment
         The given axis.
     reach : float
-        How far from the axis the tunnel reaches, m.
+        Maximum distance of the tunnel from the axis, m.
     """
     touched = np.floor(chainages_near(header, alignment, reach) / KILOMETRE).astype(int)
     return range(int(touched.min()), int(touched.max()) + 1) if len(touched) else range(0)

@@ -42,7 +42,7 @@ def require_same_density(conn: psycopg.Connection[Any], survey: Survey, settings
     Raises
     ------
     UserError
-        If the survey holds files that were loaded with another one.
+        If the survey has files that were loaded with another one.
     """
     row = conn.execute(
         """

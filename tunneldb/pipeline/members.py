@@ -61,12 +61,12 @@ class Inputs:
     paths : tuple of Path
         Scan files, of one coordinate system and one numbering of scans.
     dimension : str
-        That holds the intensity.
+        Dimension of the intensity.
     kind : {'amplitude', 'reflectance', 'linear'}
     poses : PoseModel
         Stations.
     reference : ReferenceCurve or 'auto' or None
-        By what levels are corrected for range.
+        Curve for correcting levels for range.
     """
 
     paths: tuple[Path, ...]
@@ -115,7 +115,7 @@ def find_members(inputs: Inputs, begin: Begin) -> FileMembers:
     ----------
     inputs : Inputs
     begin : callable
-        Called with a text and the number of points before each pass; returns what takes the points that are done.
+        Called with a text and the number of points before each pass; returns a function that takes the points done.
 
     Raises
     ------

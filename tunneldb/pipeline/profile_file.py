@@ -34,7 +34,7 @@ class ReadProfile:
     outline : Outline
         About the axis.
     notes : tuple of str
-        What is to be known of the reading.
+        Remarks on the reading.
     """
 
     outline: Outline
@@ -49,9 +49,9 @@ def read_profile(
     Parameters
     ----------
     path
-        Its ending says what it is: .csv, .dxf, .txt.
+        File; its extension is the format: .csv, .dxf, .txt.
     origin
-        Where the file has the axis, in its own unit.
+        Place of the axis in the file, in its own unit.
     unit
         Unit of a drawing that states none, or of points: one of METRES.
     layer
@@ -60,8 +60,8 @@ def read_profile(
     Raises
     ------
     UserError
-        If the file can't be read, the outline has a gap, crosses itself, is no tunnel's in metres, or lies elsewhere than the
-        axis; one line names file, line or entity, and value.
+        If the file cannot be read, the outline has a gap, crosses itself, has an implausible size in metres, or is away from
+        the axis; with file, line or entity, and value.
     """
     suffix = path.suffix.lower()
     if suffix != ".dxf" and layer is not None:

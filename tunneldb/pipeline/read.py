@@ -64,8 +64,7 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
     -------
     dict
         ``file``, ``state`` (see `tunneldb.store.scan_files.Loaded`), ``points``, ``noise``, ``outside``, ``invalid`` and
-        ``unposed`` if any, ``kilometres``, those that wait to be loaded with it, and ``note``, if something was taken for
-        granted.
+        ``unposed`` if any, ``kilometres``, those that wait to be loaded with it, and ``note``, if there were assumptions.
 
     Raises
     ------
@@ -111,7 +110,7 @@ def read_headers(paths: Sequence[Path]) -> list[ScanHeader]:
     Raises
     ------
     UserError
-        For a file that is unreadable, or two of one name.
+        If a file is unreadable, or two have one name.
     """
     names: dict[str, Path] = {}
     for path in paths:
@@ -143,11 +142,11 @@ class Read:
     id : int
         Its row.
     state : str
-        What became of it, see `tunneldb.store.scan_files.Loaded`.
+        Result, see `tunneldb.store.scan_files.Loaded`.
     seconds : float
         Time that it took.
     note : str or None
-        What is to be known of its points.
+        Remarks on its points.
     """
 
     id: int
@@ -196,9 +195,9 @@ class Reading:
         headers : sequence of ScanHeader
             At least one.
         given : sequence of Path
-            Where files may lie now that have to be read again.
+            Possible current places of files that must be read again.
         begin : callable
-            Told of each file that begins; returns what is told of its progress.
+            Called with each file that begins; returns a function that takes its progress.
         """
         for header in headers:
             self.claim(header.path.name)
@@ -238,7 +237,7 @@ class Reading:
         Raises
         ------
         UserError
-            If it is not there as it was loaded; why it is wanted and what to do are told.
+            If it is not there as it was loaded; with the reason for reading it and the command to type.
         """
         path = next((path for path in given if path.name == file.name), Path(file.path))
         if not path.is_file() or checksum(path) != file.checksum:

@@ -42,7 +42,7 @@ class SonarInput:
     start : Path or None
         See `tunneldb.pipeline.ladder_file.read_start`.
     sound_speed : (float, float) or None
-        That which the sonar assumed, and that which was measured, m/s.
+        Sound speed assumed by the sonar, and measured one, m/s.
     """
 
     paths: tuple[Path, ...]

@@ -31,13 +31,13 @@ class Removed:
     Attributes
     ----------
     reread : list of str
-        Files that overlap those withdrawn, and were read again.
+        Files that overlap the removed ones, and were read again.
     kilometres : list of int
         Kilometres that were loaded anew.
     emptied : list of int
-        Those that hold no points any more, whose results are gone.
+        Kilometres without points, whose results are gone.
     lost : Work
-        What went with these results.
+        Manual edits lost with these results.
     """
 
     reread: list[str] = field(default_factory=list)
@@ -52,7 +52,7 @@ def known_names(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[s
     Raises
     ------
     UserError
-        For a name that is neither's; it says which there are.
+        If a name is neither's; with the existing names.
     """
     rows = conn.execute(
         "SELECT name FROM tunnel.scan_file WHERE survey_id = %(survey)s"
@@ -95,13 +95,13 @@ def remove_files(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[
     names : sequence of str
         Names of files, see `known_names`.
     begin : callable
-        Told of each step that begins; returns what is told of its progress.
+        Called with each step that begins; returns a function that takes its progress.
 
     Raises
     ------
     UserError
-        For a name that the survey does not know, a file that has to be read again and is not where it was, or another
-        process at work on the survey.
+        If a name is unknown in the survey, a file that must be read again is not where it was, or another process works on the
+        survey.
     """
     known_names(conn, survey, names)
     former = [file for name, file in recorded_files(conn, survey).items() if name in names]

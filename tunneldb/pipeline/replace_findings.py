@@ -37,13 +37,13 @@ def replace_findings(
 ) -> tuple[Summary, list[int]]:
     """Replace the findings of a kilometre and those across its ends; one found again keeps its number and review.
 
-    :func:`tunneldb.anomalies.reconcile.reconcile` decides which is which. What people drew, redrew, split or merged is left
-    alone; what is found of it is counted once, with that (``link_findings``).
+    :func:`tunneldb.anomalies.reconcile.reconcile` matches them. Findings that people drew, redrew, split or merged stay
+    unchanged; detections of them are counted once, with them (``link_findings``).
 
     Parameters
     ----------
     conn, survey, km
-        Where.
+        Place.
     surface : Surface
         The tunnel about the kilometre.
     found : sequence of Anomaly

@@ -46,21 +46,21 @@ def register_files(
 ) -> Iterator[Loaded]:
     """Record scan files of a site, each in a transaction of its own.
 
-    There is no axis by which points could be filtered, thinned and put in order, and nothing that would read them so: what
-    is found on a site is found in the files.
+    There is no axis for filtering, thinning and sorting points, and no stage would read them: results of a site come from the
+    files.
 
     Parameters
     ----------
     conn : Connection
         Idle.
     survey : Survey
-        Of a site.
+        Survey of a site.
     paths : sequence of Path
         Known by their names, as with `tunneldb.pipeline.load.load_files`.
     max_left_out : float
         Share of a file's points that may be invalid or without a scanner position.
     begin : callable
-        Told of each file that begins; returns what is told of its progress.
+        Called with each file that begins; returns a function that takes its progress.
 
     Yields
     ------
@@ -70,7 +70,7 @@ def register_files(
     Raises
     ------
     UserError
-        For a file that is unreadable or does not fit the survey. The headers of all are looked at before the first is read.
+        If a file is unreadable or does not fit the survey. The headers of all are checked before the first is read.
     """
     poses = load_pose_coverage(conn, survey)
     headers = read_headers(paths)

@@ -33,16 +33,16 @@ class SurveyMembers:
 def find_survey_members(conn: psycopg.Connection[Any], survey: Survey, begin: Begin) -> SurveyMembers:
     """Find the members of a survey in its scan files, and put them in the place of those found before.
 
-    What is found is written in one short transaction, after the files have been read; cut off before, it leaves what was there.
+    Results are written in one short transaction, after the files have been read; an interruption before changes nothing.
 
     Parameters
     ----------
     conn : Connection
         Idle.
     survey : Survey
-        Of a site or of a tunnel; of the latter members have a chainage after stage sections.
+        Survey of a site or of a tunnel; members in a tunnel have a chainage after stage sections.
     begin : callable
-        Called with a text and the number of points before each pass; returns what takes the points that are done.
+        Called with a text and the number of points before each pass; returns a function that takes the points done.
 
     Raises
     ------

@@ -46,9 +46,9 @@ class Comparison:
     match : Match
         Pairs of places in `numbers` and in `control`.
     motion : Motion or None
-        Of all spheres that have a control point; None if none has.
+        Motion of all spheres with a control point; None if none has one.
     scans : dict of int to (int, Motion)
-        Of the spheres that one scan saw: how many have a control point, and their motion.
+        For each scan: number of its spheres with a control point, and their motion.
     """
 
     control: Control
@@ -65,8 +65,8 @@ def read_control(path: Path) -> Control:
     Raises
     ------
     UserError
-        If it cannot be read, holds no point, an id is missing or stands twice, or two points are at one place; names
-        file, line and value.
+        If it cannot be read, has no point, an id is missing or occurs twice, or two points are at one place; with file, line
+        and value.
     """
     table = read_csv(path, ("x", "y", "z"))
     if len(table) == 0:

@@ -49,9 +49,9 @@ class TargetObservation:
     scan : int
         Scan that saw it.
     km : int
-        Kilometre that holds its centre.
+        Kilometre of its centre.
     chainage : float or None
-        Of its centre, m; None where the tunnel has no segment.
+        Chainage of its centre, m; None if the tunnel has no segment.
     sphere : Sphere
     """
 
@@ -71,7 +71,7 @@ class Search:
     spheres : list of TargetObservation
         By number and scan.
     refusals : list of (int, Refusal)
-        What is nearly a target sphere and isn't one, and the scan that saw it.
+        Rejected candidates, and the scans that saw them.
     points : int
         Points read.
     """
@@ -90,8 +90,8 @@ def search(
 ) -> Search:
     """Find the target spheres of a survey in its scan files, and put them in the place of those found before.
 
-    The files are read twice, kilometre by kilometre: once for where they aren't flat, once for the points there, of which
-    those on the ground are left out if stage ``ground`` has been run. What is found is written in one short transaction.
+    The files are read twice, kilometre by kilometre: once for parts that are not flat, once for the points there, without those
+    on the ground if stage ``ground`` has run. Results are written in one short transaction.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def search(
     radius, tolerance : float
         Nominal radius, and how far the fitted one may be from it, m.
     begin : callable
-        Takes a step's name and its points; returns what takes the points done.
+        Called with a step's name and its points; returns a function that takes the points done.
 
     Raises
     ------

@@ -26,7 +26,7 @@ def read_equations(path: Path) -> list[Equation]:
     Raises
     ------
     UserError
-        For a file that cannot be read or has no rows, chainages that do not grow, or another direction; names the line.
+        If a file cannot be read or has no rows, chainages do not increase, or a direction is unknown; with the line.
     """
     table = read_csv(path, ("chainage", "station", "direction"), default={"direction": 1.0})
     if len(table) == 0:
@@ -62,8 +62,8 @@ def save_equations(connection: psycopg.Connection[Any], tunnel_id: int, equation
     Raises
     ------
     UserError
-        For numbers that are not finite, chainages that do not grow, a direction other than 1 and -1, or an equation where
-        the tunnel has ended.
+        If numbers are not finite, chainages do not increase, a direction is not 1 or -1, or an equation is beyond the end of
+        the tunnel.
     """
     for equation in equations:
         if not (math.isfinite(equation.chainage) and math.isfinite(equation.station)):
@@ -159,7 +159,7 @@ def load_deviation(
     Raises
     ------
     UserError
-        When the survey has no axis there.
+        If the survey has no axis there.
     """
     rows = connection.execute(
         """

@@ -58,7 +58,7 @@ def add_tunnel(
     Raises
     ------
     UserError
-        For a name that is taken, an SRID that is unknown or not in metres, or an axis that is none.
+        If a name exists, an SRID is unknown or not in metres, or an axis is invalid.
     """
     require_new_tunnel(connection, name, srid)
     if not math.isfinite(axis.start) or not math.isfinite(spacing):
@@ -86,7 +86,7 @@ def add_site(connection: psycopg.Connection[Any], name: str, srid: int) -> None:
     Raises
     ------
     UserError
-        For a name that is taken, or an SRID that is unknown or not in metres.
+        If a name exists, or an SRID is unknown or not in metres.
     """
     require_new_tunnel(connection, name, srid)
     try:
@@ -160,14 +160,14 @@ def add_survey(
         The one CSV of the trajectory (time,x,y,z) when `mobile`, else the files of the stations, see
         `tunneldb.pointcloud.stations.read_stations`; None where nobody knows where the scanner was.
     backwards
-        Whether the trajectory was driven towards falling chainage.
+        True if the trajectory runs towards decreasing chainage.
     reference
         CSV with range_m,intensity_db; or auto, to find the curve on the lining of each kilometre.
 
     Raises
     ------
     UserError
-        For a name that is taken, an unknown tunnel, files that do not fit it, or an intensity without a range curve to find.
+        If a name exists, a tunnel is unknown, files do not fit it, or an intensity is unsuitable for estimating a range curve.
     """
     _require_name(name)
     tunnel_id, srid, alignment = _alignment(connection, tunnel)
@@ -214,10 +214,10 @@ class SurveyChange:
     poses : sequence of Path
         Files of the scanner's positions, see `add_survey`; empty leaves them.
     mobile, backwards : bool
-        What they are.
+        Kind of the positions.
     reference : Path, 'auto' or None
     kind, dimension : str or None
-        Of the intensity.
+        Dimension and kind of the intensity.
     """
 
     date: dt.date | None = None
@@ -235,15 +235,15 @@ def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyCha
     Returns
     -------
     notes : list of str
-        What the user is to know of the positions.
+        Remarks on the positions.
     reload : int
-        How many of its files have to be loaded again: those of which another dimension is read now, or of which points were
-        left out for lack of a position.
+        Number of its files that must be loaded again: another dimension is read now, or points were left out for lack of a
+        position.
 
     Raises
     ------
     UserError
-        As `add_survey` does; nothing is changed then.
+        As for `add_survey`; nothing is changed then.
     """
     row = connection.execute(
         "SELECT s.id, t.name, s.intensity_kind, s.intensity_dimension, s.reference, s.platform FROM tunnel.survey s"
@@ -318,7 +318,7 @@ def get_tunnel(connection: psycopg.Connection[Any], name: str) -> int:
     Raises
     ------
     UserError
-        When there is none; the message lists those that exist.
+        If there is none; with the existing ones.
     """
     row = connection.execute("SELECT id FROM tunnel.tunnel WHERE name = %s", [name]).fetchone()
     if row is None:

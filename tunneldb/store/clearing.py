@@ -20,11 +20,11 @@ class Work:
     anomalies : int
         Leaks and other dry dark areas there, as detected.
     reviewed : int
-        Of them, those that somebody has reviewed.
+        Number of these with a review.
     edited : int
         Vertices of the axis that somebody has moved.
     drawn : int
-        Findings that people drew, redrew, split or merged there, and what is merged into them: these stay.
+        Drawn, redrawn, split or merged findings there, and those merged into them: these stay.
     """
 
     anomalies: int
@@ -62,8 +62,8 @@ def has_results(conn: psycopg.Connection[Any], survey: Survey, km: int) -> bool:
 def clear_kilometre(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Work:
     """Delete the results and runs of all stages after ``load`` in a kilometre, and its requests of a batch.
 
-    That points were loaded, and are gone, stays in the ledger: what the neighbours have is stale by that. Findings that people
-    drew stay where they are, and what they have changed by hand stays in the audit.
+    The ledger keeps that points were loaded and are gone, which makes the neighbours' results stale. Findings that people drew
+    stay, and manual edits stay in the audit.
     """
     lost = work_in(conn, survey, [km])
     tables = conn.execute(

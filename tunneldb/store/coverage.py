@@ -28,7 +28,7 @@ class CoverageGap:
     reason : str
         Why.
     searched : bool
-        Whether the result of a search for leaks stands there nevertheless.
+        True if there is a result of a search for leaks nevertheless.
     seen_share : float or None
         Share of the lining seen, 0 to 1, where that is little.
     """
@@ -50,13 +50,13 @@ class Coverage:
     Attributes
     ----------
     gaps : list of CoverageGap
-        Where they can't be vouched for, those not searched first.
+        Stretches in which leaks could be missed, those not searched first.
     statement : str or None
         The same in words; None where there is nothing to say.
     seen_area : float
         Lining seen, m².
     seen_share : float
-        Of the lining of the whole stretch, 0 to 1; what was not searched counts as unseen.
+        Inspected share of the lining of the whole stretch, 0 to 1; parts not searched count as not inspected.
     searched_share : float
         Share of the length that was searched for leaks, 0 to 1.
     """

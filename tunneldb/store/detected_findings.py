@@ -35,7 +35,7 @@ def load_earlier_findings(
     Parameters
     ----------
     conn, survey, km
-        Where.
+        Place.
     reach : (int, int)
         First and last kilometre that the regions across its ends reach.
     across : set of int
@@ -101,7 +101,7 @@ def save_finding(
     Parameters
     ----------
     conn, survey
-        Where.
+        Place.
     found : PlacedAnomaly
     features : int
         Key of the order of its features (:func:`tunneldb.store.learned.feature_list`).

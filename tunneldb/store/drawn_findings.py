@@ -26,7 +26,7 @@ class Drawn:
     id : int
         Key.
     drawn_at : datetime
-        When it was drawn last: what is measured of an outline holds only for that.
+        Time of the last drawing: measurements of an outline are valid only for that.
     outline : Polygon
         (chainage, arc), m.
     """
@@ -62,8 +62,8 @@ def save_measured(conn: psycopg.Connection[Any], drawn: Sequence[Drawn], measure
 def settle_findings(conn: psycopg.Connection[Any], survey: Survey, km: int) -> None:
     """Reconcile drawn findings in a kilometre with those of detection.
 
-    Outlines in the unrolled plane stay; where they lie on the map and in space follows the surface of now. What is the same
-    counts once, and what lies in dry regions is marked.
+    Outlines in the unrolled plane stay; their places on the map and in space follow the current surface. Duplicates count once,
+    and findings in dry regions are marked.
     """
     place = (km * KILOMETRE, (km + 1) * KILOMETRE)
     conn.execute("SELECT tunnel_internal.renew_findings(%s, %s)", (survey.id, km))

@@ -18,9 +18,8 @@ from tunneldb.store.survey import Survey
 class DryRegion:
     """A dry region, as tunnel_api.dry_region has it; lengths in m, areas in m².
 
-    ``leak_ids`` are the open leaks that lie in it by half: they are kept,
-    but not counted. One that has ``pending_approval`` for an
-    operator takes nothing away yet; ``approved_by`` is who approved it.
+    ``leak_ids`` are the open leaks with at least half of their area in it: they are kept, but not counted. A region with
+    ``pending_approval`` removes nothing yet; ``approved_by`` is the operator who approved it.
     """
 
     id: int

@@ -109,17 +109,17 @@ class Chosen:
     Attributes
     ----------
     kinds, origins : sequence of str
-        Of these kinds and origins; all if there are none.
+        Kinds and origins; empty for all.
     states : sequence of str
-        In these states; all if there are none.
+        States; empty for all.
     low, high : float
-        That reach between these chainages, m.
+        Limits of chainage, m; findings must reach between them.
     clock : (float, float) or None
-        Whose middles lie between these hours, clockwise.
+        Limits of the hours of their middles, clockwise.
     min_area : float
-        Of at least so many m².
+        Minimum area, m².
     min_severity : int
-        Of at least this severity; 0 for those without one, too.
+        Minimum severity; 0 includes those without one.
     """
 
     kinds: Sequence[str] = ()

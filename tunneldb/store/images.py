@@ -84,16 +84,16 @@ class ImageStore:
     Parameters
     ----------
     conn, survey
-        Where.
+        Place.
     grid : Grid
         The pixels.
     kinds : sequence of str
-        What images there are to be.
+        Kinds of images.
 
     Attributes
     ----------
     pixels : int
-        How many pixels of what was saved hold points.
+        Number of saved pixels with points.
     """
 
     def __init__(self, conn: psycopg.Connection[Any], survey: Survey, grid: Grid, kinds: Sequence[str]) -> None:
@@ -152,13 +152,13 @@ def save_radiometry(
     Parameters
     ----------
     conn, survey, km
-        Where.
+        Place.
     roughness : Roughness
         Stored as NULL where the incidence angles don't determine it.
     dry : BackgroundMap
         Dry lining: the medians of its level and standard deviation, with the threshold by them.
     pixels, wet_pixels : int
-        Pixels that show lining, and those of them that leaks cover.
+        Pixels of lining, and of these covered by leaks.
     sigma : three Dry
         Dry lining points raw, corrected by Lambert's law and by Oren–Nayar (Table 1 of Xu et al., 2018).
     """

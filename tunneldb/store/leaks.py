@@ -29,11 +29,11 @@ class Selection:
     Attributes
     ----------
     kind : {'leak', 'joint', 'dark', 'all'}
-        Of which kind.
+        Kind.
     low, high : float
         Only those that reach between these chainages, m.
     clock : (float, float) or None
-        Only those whose middle lies between these hours, clockwise.
+        Limits of the hours of their middles, clockwise.
     min_area : float
         Smaller ones are left out, m².
     min_confidence : float
@@ -55,17 +55,17 @@ class LeakList:
     Attributes
     ----------
     kind : {'leak', 'joint', 'dark', 'all'}
-        What they are.
+        Kind.
     rows : list of Finding
         In order of chainage: those that the last detection found, and those that an inspector confirmed although it did not.
     count : int
-        How many of them sums count: found last, and not rejected.
+        Number included in totals: found last, and not rejected.
     area : float
         Area of these within the stretch, m².
     coverage : Coverage
-        What can be said of the stretch.
+        Statement on the stretch.
     remarks : list of Remark
-        What else is to be known of the results there.
+        Remarks on the results there.
     """
 
     kind: Kind
@@ -107,11 +107,11 @@ def read_leaks(
     Parameters
     ----------
     conn, survey
-        Where from.
+        Source.
     geometry : {'unrolled', 'map', '3d'}
-        Which coordinates.
+        Coordinates.
     selection : Selection, optional
-        Which; else all leaks.
+        Selection; else all leaks.
     """
     chosen = Selection() if selection is None else selection
     ends = survey_ends(conn, survey) or (-math.inf, math.inf)

@@ -33,20 +33,20 @@ class Measured:
     id, survey, tunnel : (n,) int arrays
         Keys.
     chainage : (n,) float array
-        Where their middles are, m.
+        Chainages of their middles, m.
     detected : (n,) bool array
-        Whether the last detection found them.
+        True for those found by the last detection.
     crossed : (n,) bool array
-        Whether they are joints that profiles cross: told by how they repeat, whatever the model says.
+        True for joints that profiles cross, identified by repetition, whatever the model.
     said : (n,) object array
-        What an inspector said, as a sort of review: "confirmed leak", "renamed to joint" …; empty where nobody did.
+        Inspectors' answers as sorts of review: "confirmed leak", "renamed to joint" …; empty without one.
     leak : (n,) bool array
-        Whether he said that it is a leak.
+        True if the inspector called it a leak.
     known : (n,) bool array
-        Whether its features are stored, all that the model asks for.
+        True if all features of the model are stored.
     features : (n, len(FEATURES)) float array
     outline : (n,) float array
-        How much the outline tells, 0 to 1.
+        Reliability of the outline, 0 to 1.
     """
 
     id: Int64
@@ -90,10 +90,10 @@ class InForce:
     Attributes
     ----------
     id : int or None
-        Number of what was learned, if anything was.
+        Number of the adjustment, if any.
     model : EvidenceModel
     note : str or None
-        Why what was learned is not used, if it is not.
+        Reason why the adjustment is not used, if it is not.
     """
 
     id: int | None
@@ -112,7 +112,7 @@ def feature_list(conn: psycopg.Connection[Any]) -> int:
 def load_measured(conn: psycopg.Connection[Any], tunnels: Iterable[int]) -> Measured:
     """Read the findings of all surveys of some tunnels, in order of tunnel, survey and chainage.
 
-    What stands for one, as redrawn or merged, says of it what was said of that. What people drew has no features.
+    Reviews of a replacement, redrawn or merged, apply to the original. Drawn findings have no features.
     """
     orders = {key: _order(names) for key, names in conn.execute("SELECT id, names FROM tunnel.feature_list")}
     rows = conn.execute(
@@ -183,7 +183,7 @@ def apply_learned(
     Parameters
     ----------
     losses : (float, float)
-        Of the model as it is, and adjusted, on reviews held out.
+        Losses of the unchanged and the adjusted model on held-out reviews.
     """
     row = conn.execute(
         "SELECT tunnel_internal.learned_apply(%s, %s, %s, %s, %s, %s, %s, %s, %s)",

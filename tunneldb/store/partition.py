@@ -1,7 +1,7 @@
 """Points of a kilometre: its partition of tunnel.point, and fragments, points of a file that wait to be loaded there.
 
-A partition is written anew as a whole, from rows that are there and rows that come. A fragment is a table of its own, in which
-rows lie packed in blocks as they lie in memory, in the order of chainage: writing and reading them is copying bytes.
+A partition is written as a whole, from existing and new rows. A fragment is a table of its own, with rows in blocks in their
+memory format, in the order of chainage: writing and reading them is copying bytes.
 """
 
 from __future__ import annotations
@@ -111,14 +111,14 @@ def write_partition(
     parts : sequence of (Spool, int or None)
         Rows of at least this kilometre, and the tag that those of a spool get; None leaves them theirs.
     edge : float or None
-        Voxel edge of thinning, m; None keeps every row.
+        Voxel edge of thinning, m; None for no thinning.
     file_ids : (k,) int32 array
         scan_file.id for each tag; tags are in the order of the files' names, which decides between points that are
         equal in all else.
     progress : callable
         Called with the number of rows looked at.
     own : callable or None
-        Tells which rows are of the tunnel; others are left out. None: all are.
+        Returns the rows in the tunnel; others are left out. None: all are.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def _read(parts: Sequence[tuple[Spool, int | None]], low: int, high: int) -> Row
 def swap_partition(conn: psycopg.Connection[Any], survey: Survey, km: int, rows: int) -> None:
     """Replace a kilometre by the partition that `write_partition` has built; one without rows is removed.
 
-    To be called late in a transaction: others see the old kilometre until its end, but wait for it from here on.
+    Call it late in a transaction: others see the old kilometre until its end, but wait for it from here on.
 
     Raises
     ------

@@ -55,7 +55,7 @@ def pack_rows(survey: Survey, km: int, rows: Rows, file_ids: Int32) -> Iterator[
     Parameters
     ----------
     rows : (n,) array of ROW
-        Their tags tell the file.
+        Tags are the files' ids.
     file_ids : (k,) int32 array
         scan_file.id for each tag.
 

@@ -86,8 +86,8 @@ def load_pose_coverage(conn: psycopg.Connection[Any], survey: Survey) -> PoseCov
 def load_poses(conn: psycopg.Connection[Any], survey: Survey, km: int | None = None) -> PoseModel:
     """Read the stations of a static survey, or the trajectory of a mobile one; nothing of one without.
 
-    Of the trajectory, a kilometre needs the ends, and what lies about the times of its points: they have the same positions by
-    that as by the whole.
+    Of the trajectory, a kilometre needs the ends, and the parts around the times of its points: positions from these are the
+    same as from the whole.
 
     Raises
     ------

@@ -23,14 +23,14 @@ class Superseded:
         None for jobs of surveys that are gone.
     survey : str or None
     what : str
-        ``runs``, or ``jobs`` of the queue, with what happened to them.
+        ``runs``, or ``jobs`` of the queue, with their states.
     stage : str or None
         Stage of the runs; None for jobs.
     count : int
     rows, bytes : int
         Rows of tables, and their length.
     since, until : datetime or None
-        When the first and the last began, or of jobs ended.
+        Begin of the first and the last run, or end of jobs.
     """
 
     survey_id: int | None
@@ -50,7 +50,7 @@ def superseded(conn: psycopg.Connection[Any], survey: Survey | None, before: dt.
     Parameters
     ----------
     before : date or None
-        Only what began, or of jobs ended, before that day.
+        Only runs that began, or jobs that ended, before that day.
     """
     with conn.cursor(row_factory=class_row(Superseded)) as cursor:
         return cursor.execute(

@@ -25,7 +25,7 @@ class Remark:
     kilometres : list of int
         Empty for a file.
     remark : str
-        What is to be known.
+        Text of the remark.
     said : str
         The same, after the file or the kilometres and stage that it is about.
     """

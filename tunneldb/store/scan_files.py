@@ -29,16 +29,15 @@ class Loaded:
     ----------
     name : str
     state : str
-        ``loaded``, ``replaced`` (there was a file of this name with other content), ``reread`` (because of a file that
-        was replaced), ``unchanged``, ``moved`` (unchanged, but it lies elsewhere now, which was noted) or ``a copy`` (of
-        another file, left out).
+        ``loaded``, ``replaced`` (a file of this name had other content), ``reread`` (because of a replaced file),
+        ``unchanged``, ``moved`` (unchanged, with a new path, which was recorded) or ``a copy`` (of another file, left out).
     points, noise, outside, invalid, unposed, thinned, kept : int
-        Its points, and what they came to, see `tunneldb.pointcloud.selection.FilterCounts`; points is the sum of the others
-        once all its kilometres are loaded.
+        Counts of its points, see `tunneldb.pointcloud.selection.FilterCounts`; points is the sum of the others once all its
+        kilometres are loaded.
     seconds : float
-        Time that it took, its share of what was done for several files at once included; 0 when unchanged.
+        Time, with its share of the work for several files; 0 if unchanged.
     note : str or None
-        What was taken for granted of it.
+        Assumptions about it.
     """
 
     name: str
@@ -71,7 +70,7 @@ class Recorded:
 class Content:
     """A file that was read, as it is to be recorded; srid is that of the tunnel, if the file states one.
 
-    intensity_note is what its intensity gives to doubt.
+    intensity_note is a doubt about its intensity.
     """
 
     path: Path
@@ -217,9 +216,9 @@ def record_kilometres(
     held : mapping of int to int
         Rows that wait to be loaded, by kilometre.
     counts : FilterCounts
-        Where in the file the points of each kilometre and a little beyond are, and when they were measured.
+        Places in the file of the points of each kilometre and its surroundings, and their times.
     left : iterable of int
-        Kilometres that may hold rows of the file's former content, which have to go.
+        Kilometres that may have rows of the file's former content, which must be removed.
     """
     conn.execute("DELETE FROM tunnel.file_km WHERE file_id = %s", [file_id])
     left = set(left)

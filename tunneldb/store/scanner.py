@@ -34,13 +34,13 @@ class Positions:
     Attributes
     ----------
     mobile : bool
-        Whether they are poses of a trajectory; else stations.
+        True for poses of a trajectory; else stations.
     keys : (n,) array
         Times, s, or numbers of the scans.
     xyz : (n, 3) float64 array
         m, in the tunnel's SRID.
     notes : tuple of str
-        What the user is to know: poses that were left out, gaps.
+        Remarks: poses that were left out, gaps.
     """
 
     mobile: bool
@@ -60,17 +60,18 @@ def read_positions(
     Parameters
     ----------
     paths
-        The one CSV of the trajectory (time,x,y,z) when `mobile`, else the files of the stations, see
-        `tunneldb.pointcloud.stations.read_stations`; None where nobody knows where the scanner was: there are none then.
+        The only CSV of the trajectory (time,x,y,z) if `mobile`, else the files of the stations, see
+        `tunneldb.pointcloud.stations.read_stations`; None for unknown scanner positions.
     alignment, tunnel
-        The given axis, None of a site, of which it is not asked where they lie; and the tunnel's name, for errors.
+        Given axis, None for a site, whose positions are not checked; and the tunnel's name, for errors.
     backwards
-        Whether the trajectory was driven towards falling chainage.
+        True if the trajectory runs towards decreasing chainage.
 
     Raises
     ------
     UserError
-        If a file cannot be read, the scanner was never near the axis, a station lies where none can be, or too many poses do.
+        If a file cannot be read, the scanner was never near the axis, or a station, or too many poses, are at impossible
+        places.
     """
     if paths is None:
         return Positions(False, np.empty(0, np.int32), np.empty((0, 3)))

@@ -43,7 +43,7 @@ def save_ground(
     Parameters
     ----------
     ground : Ground or None
-        Of that kilometre and more; None if there is none.
+        Columns of that kilometre and more; None if there is none.
     arcs : (rows, 2) float array
         Arcs at which it begins on the left and on the right, m; NaN for none.
     """
@@ -77,8 +77,8 @@ def save_ground(
 def load_ground(conn: psycopg.Connection[Any], survey: Survey, first: float, stop: float) -> Ground | None:
     """Load the ground of a survey between two chainages, m; None if there is none.
 
-    What lies between metres that have one is as wide as all of them together, NaN where nothing is known. Where a kilometre
-    has ground to its last metre and the next one has none, or has not been worked on, it goes on straight to the end.
+    Rows between metres with ground are as wide as all of them together, NaN where unknown. If a kilometre has ground to its
+    last metre and the next one has none, or was not processed, it continues straight to the end.
     """
     rows = conn.execute(
         "SELECT n, across, array_send(height), gamma, array_send(foot), array_send(lean) FROM tunnel.ground"
@@ -269,7 +269,7 @@ def save_spheres(
     Parameters
     ----------
     spheres : sequence of (int, int, int, float or None, Sphere)
-        Of each scan that saw one: kilometre, number of the sphere, scan, chainage (m) and the sphere.
+        For each scan that saw one: kilometre, number of the sphere, scan, chainage (m) and the sphere.
     nominal : float
         Radius that was looked for, m.
     """

@@ -31,7 +31,7 @@ def save_registration(conn: psycopg.Connection[Any], survey: Survey, found: Regi
     conn : Connection
         In a transaction.
     up : int
-        As the scans were taken: 1 or -1.
+        Side of the scans: 1 or -1.
     """
     save_scans(conn, survey, found.scans, found.water_level, up)
     conn.execute("DELETE FROM tunnel.ladder WHERE survey_id = %s", [survey.id])
@@ -128,7 +128,7 @@ class SonarRows:
     classes : (n,) int array
         See `tunneldb.classification.underwater.WaterClass`.
     points, outside, thinned : int
-        Of the file; of these, beyond the axis' ends or too far from the sonar, and left out for others beside them.
+        Points of the file; of these, beyond the axis' ends or too far from the sonar, and left out for other reasons.
     """
 
     chainage: Float
@@ -241,7 +241,7 @@ class BedCells:
     Attributes
     ----------
     chainage, across : (n,) float64 arrays
-        Of the cells' middles, m.
+        Places of the cells' middles, m.
     values : (n, 3) float64 array
         Height, depth below the water and standard deviation, m.
     """

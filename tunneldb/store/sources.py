@@ -39,7 +39,7 @@ def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Scan
     Raises
     ------
     UserError
-        If there is none, or one is gone or has other contents than when it was loaded.
+        If there is none, or one is gone or has other content than at loading.
     """
     rows = conn.execute(
         "SELECT f.path, f.bytes, f.checksum, k.points FROM tunnel.scan_file f JOIN tunnel.file_km k ON k.file_id = f.id"
@@ -85,7 +85,7 @@ def sample(conn: psycopg.Connection[Any], survey: Survey, km: int, count: int = 
     Raises
     ------
     UserError
-        If the kilometre holds no points.
+        If the kilometre has no points.
     """
     # The partition by its name: no lock on its parent, whose other partitions may be swapped meanwhile.
     count_there = rows_in(conn, survey, km)
@@ -114,7 +114,7 @@ def load_points(conn: psycopg.Connection[Any], survey: Survey, km: int, begin: f
     points : (n, 3) float array
         m.
     own : int
-        How many are the kilometre's own.
+        Number of the kilometre's own points.
 
     Raises
     ------

@@ -61,9 +61,9 @@ class SpotSelection:
     ----------
     kind : {'dark', 'bright', 'all'}
     min_area, min_confidence : float
-        Of at least so many m², of which detection is at least so sure.
+        Minimum area, m², and minimum confidence of detection.
     stretch : (float, float) or None
-        Those whose middle has a chainage in between, m, and faces and members likewise; None for all, also those without one.
+        Limits of the chainage of middles, m, of faces and members likewise; None for all, including those without one.
     """
 
     kind: Kind = "all"
@@ -79,17 +79,17 @@ class SpotList:
     Attributes
     ----------
     rows : list of ListedSpot
-        By member and number: those that the last run found, and those that an inspector confirmed although it did not.
+        By member and number: those of the last run, and confirmed ones that it did not find.
     count : int
-        How many of them sums count: found last, and not rejected.
+        Number included in totals: found last, and not rejected.
     area : float
         Area of these, m².
     face_area, seen_area : float
-        Area of all faces, and what of it could be judged, m².
+        Area of all faces, and inspected area, m².
     statement : str or None
-        For what the list can't be vouched for, if for anything.
+        Gaps of the inspection, if any.
     searched : bool
-        Whether members were found at all, in the files and with the settings that the survey has now.
+        True if members were found in the current files with the current settings.
     """
 
     rows: list[ListedSpot]

@@ -36,10 +36,9 @@ def save_structures(
         In a transaction.
     survey : Survey
     placed : PlacedStructures
-        What was found, and where it lies.
+        Result, and its places.
     changes : SpotReconciliation
-        Spots that are updated keep their number and their review; those that are kept are marked as not detected, and lie on
-        no face.
+        Updated spots keep their number and their review; kept ones are marked as not detected, and are on no face.
     """
     conn.execute("DELETE FROM tunnel.member WHERE survey_id = %s", [survey.id])
     found = placed.structures

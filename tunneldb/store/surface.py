@@ -38,7 +38,7 @@ def load_surface(conn: psycopg.Connection[Any], survey: Survey, first: float = -
     Raises
     ------
     UserError
-        When the stages ``segments`` and ``sections`` have not been run there.
+        If the stages ``segments`` and ``sections`` have not run there.
     """
     low, high = first - survey.spacing, last + survey.spacing
     segments = conn.execute(

@@ -32,7 +32,7 @@ class Survey:
     srid
         Spatial reference of the tunnel, projected, metres.
     site
-        Whether it is of a site, which has no axis, and so no chainage, sections or unrolled lining.
+        True for a site, which has no axis, and so no chainage, sections or unrolled lining.
     start_chainage
         Chainage of the given axis's first vertex, m.
     spacing
@@ -40,7 +40,7 @@ class Survey:
     date
         Day of the scan.
     intensity_dimension
-        Dimension of the scan files that holds the intensity, None when the kind is ``none``.
+        Dimension of the intensity in the scan files, None if the kind is ``none``.
     intensity_kind
         ``amplitude``, ``reflectance``, ``linear`` or ``none``.
     platform
@@ -75,12 +75,12 @@ def get_survey(conn: psycopg.Connection[Any], name: str, *, site: bool = False) 
     Parameters
     ----------
     site
-        Whether it may be of a site; else the survey of one is refused, as what is asked for needs an axis.
+        True if a site is allowed; else a survey of one is refused, because the command needs an axis.
 
     Raises
     ------
     UserError
-        When there is none, the message lists those that exist and asks for the nearest; or when it is of a site and may not be.
+        If there is none, with the existing and the nearest name; or if it is of a site and must not be.
     """
     with conn.cursor(row_factory=class_row(Survey)) as cursor:
         survey = cursor.execute(

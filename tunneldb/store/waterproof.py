@@ -21,7 +21,7 @@ def keep_missing(conn: psycopg.Connection[Any], begin: Begin) -> int:
     conn : Connection
         Idle; as the owner of schema `tunnel_api`.
     begin : callable
-        Told of each survey that begins, and of how many kilometres.
+        Called with each survey that begins, and its number of kilometres.
 
     Returns
     -------

@@ -25,8 +25,8 @@ def staged(table: str) -> sql.Identifier:
 def keeps_numbers(conn: psycopg.Connection[Any], tables: Sequence[Table], name: str) -> bool:
     """Return True if all rows can keep their numbers, in the database that they came from.
 
-    That is so when each number was dealt out here and is free, and the audit has the archive's entries, and none of another
-    survey on any of these rows.
+    This requires that each number was assigned here and is free, and that the audit has the archive's entries, and none of
+    another survey on any of these rows.
     """
     for table in tables:
         if not table.identity:

@@ -85,9 +85,9 @@ def still(conn: psycopg.Connection[Any], survey: Survey) -> Iterator[None]:
     Raises
     ------
     BusyError
-        When a stage is at work on it.
+        If a stage is running on it.
     UserError
-        When points of it were read, and wait to be loaded.
+        If points of it were read, and wait to be loaded.
     """
     kms = [-1, *kilometres(conn, survey)]
     row = conn.execute(

@@ -58,11 +58,11 @@ class Table:
         ``survey``: rows of the survey; ``tunnel``: rows of its tunnel; ``shared``: see `SHARED`.
     columns : tuple of Column
     identity : bool
-        Whether its column ``id`` is numbered by the database.
+        True if its column ``id`` is numbered by the database.
     key : tuple of str
         Columns of its primary key; of all, where it has none.
     refers : mapping
-        Columns that hold ids of another table, or arrays of them, and that table.
+        Columns with ids of another table, or arrays of them, and that table.
     """
 
     name: str
