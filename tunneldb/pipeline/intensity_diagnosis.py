@@ -160,7 +160,7 @@ def diagnose_file(
     scanner : three floats or None
         Scanner position, in the file's coordinates, m; None to use the poses of an E57 or PTX file.
     begin : callable
-        Called with a text and a number of points, None if unknown, before each step; returns a function that takes the points done.
+        Called with a text and a number of points (or None) before each step; returns a function that takes the points done.
 
     Raises
     ------

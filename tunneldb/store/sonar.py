@@ -31,7 +31,7 @@ def save_registration(conn: psycopg.Connection[Any], survey: Survey, found: Regi
     conn : Connection
         In a transaction.
     up : int
-        Side of the scans: 1 or -1.
+        Direction of up in the scan files, as they were registered: 1 or -1.
     """
     save_scans(conn, survey, found.scans, found.water_level, up)
     conn.execute("DELETE FROM tunnel.ladder WHERE survey_id = %s", [survey.id])
