@@ -7,6 +7,7 @@ Python calls a kernel with arrays of one type each, so that it is compiled once.
 from __future__ import annotations
 
 from numba import njit
+from numba.extending import register_jitable
 
 from tunneldb.arrays import Int64
 from tunneldb.compiled_cache import require_own_cache
@@ -31,6 +32,10 @@ inner_sums = njit(
     cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "nnan"}, no_cpython_wrapper=True, no_cfunc_wrapper=True
 )
 """Decorator of a function that adds up many numbers in any order (vectorised)."""
+
+
+both = register_jitable
+"""Decorator of a function that Python calls on arrays, and compiled functions on single numbers."""
 
 
 @inner

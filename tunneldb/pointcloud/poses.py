@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from tunneldb.arrays import Float, Int64
-from tunneldb.compiled import point_inner, point_kernel
-from tunneldb.pointcloud.pose_coverage import PoseCoverage
+from tunneldb.compiled import inner, lower_bound, point_inner, point_kernel
+from tunneldb.pointcloud.pose_coverage import TIME_TOLERANCE, PoseCoverage
 from tunneldb.pointcloud.reader import Points
 from tunneldb.threads import in_blocks
 
@@ -134,6 +134,26 @@ def position_at(time: Float, track: Float, moment: float, k: int) -> tuple[float
         track[k, 1] + share * (track[j, 1] - track[k, 1]),
         track[k, 2] + share * (track[j, 2] - track[k, 2]),
     )
+
+
+@point_inner
+def known_interval(time: Float, longest: float, wanted: float, hint: int) -> tuple[int, bool]:  # pragma: no cover - compiled
+    """Return the trajectory's interval at a time, and True if the position there is known: between its ends, not in a gap."""
+    if not (time[0] - TIME_TOLERANCE <= wanted <= time[-1] + TIME_TOLERANCE):
+        return hint, False
+    k = interval(time, wanted, hint)
+    if k + 1 < time.shape[0]:
+        since, until = wanted - time[k], time[k + 1] - wanted
+        if since + until > longest and since > TIME_TOLERANCE and until > TIME_TOLERANCE:
+            return k, False
+    return k, True
+
+
+@inner
+def station_of(scans: Int64, scan: int) -> int:  # pragma: no cover - compiled
+    """Return the number of a scan's station in the increasing ``scans``, -1 if it has none."""
+    station = lower_bound(scans, scan, 0, scans.shape[0])
+    return station if station < scans.shape[0] and scans[station] == scan else -1
 
 
 @point_kernel

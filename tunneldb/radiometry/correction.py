@@ -41,6 +41,14 @@ def to_decibel(raw: Single | Float, kind: Kind) -> Float:
     return np.asarray(np.where(positive, 10.0 * np.log10(np.where(positive, raw, 1.0)), np.nan), dtype=np.float64)
 
 
+@point_inner
+def decibel(raw: float, linear: bool) -> float:  # pragma: no cover - compiled
+    """Return the raw intensity of a point in dB, see `to_decibel`."""
+    if linear:
+        return 10.0 * np.log10(raw) if raw > 0.0 else np.nan
+    return float(raw)
+
+
 @dataclass(frozen=True)
 class Observations:
     """How the scanner saw each point; all arrays (n,).

@@ -58,9 +58,14 @@ class ReferenceCurve:
         """Return the intensity of the target at the given ranges (m), dB (eq. 9); beyond the ends, the end values."""
         return np.interp(ranges, self.range_m, self.intensity_db)
 
+    @property
+    def span(self) -> tuple[float, float]:
+        """Minimum and maximum range of the curve's use, m: SPAN_TOLERANCE beyond its ends."""
+        return float(self.range_m[0]) - SPAN_TOLERANCE, float(self.range_m[-1]) + SPAN_TOLERANCE
+
     def outside(self, ranges: Float) -> Bool:
         """Return True for ranges (m) outside the curve's span by more than SPAN_TOLERANCE."""
-        low, high = self.range_m[0] - SPAN_TOLERANCE, self.range_m[-1] + SPAN_TOLERANCE
+        low, high = self.span
         return np.asarray((ranges < low) | (ranges > high), dtype=np.bool_)
 
     def outside_text(self, nearest: float, farthest: float, outside: int, count: int) -> str:

@@ -125,7 +125,7 @@ class Accumulator:
         UserError
             If the temporary folder has no space for the blocks that do not fit in memory.
         """
-        pixels = pixels.first(count)
+        pixels = pixels.part(0, count)
         width = self.grid.block_columns
         marked = np.zeros(self.grid.columns // width, np.bool_)
         _touched(pixels.column, width, marked)

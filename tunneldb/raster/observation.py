@@ -17,6 +17,7 @@ from tunneldb.radiometry.correction import Kind, Observations, observe, unposed
 from tunneldb.radiometry.edge_normals import Edges
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.raster.floor import Floor
+from tunneldb.raster.limits import Limits, near_surface, steep_enough, within_range
 
 
 @dataclass(frozen=True)
@@ -143,6 +144,14 @@ class Observer:
             ends,
         )
 
+    @property
+    def limits(self) -> Limits:
+        """Limits of the points that the image takes."""
+        if self.radiometer is None:
+            return Limits(self.tolerance, self.recess, 0.0, math.inf)
+        cosine = np.cos(np.radians(self.radiometer.max_incidence))  # a Python float would compare as float32
+        return Limits(self.tolerance, self.recess, cosine, self.radiometer.max_range)
+
     def near(self, points: Points) -> Points:
         """Points in the kilometre's bounding box."""
         if not len(points) or np.all((points.xyz.min(0) >= self.box[0]) & (points.xyz.max(0) <= self.box[1])):
@@ -161,7 +170,7 @@ class Observer:
         unrolled = self.surface.unroll(points.xyz)
         start = self.km * KILOMETRE
         with np.errstate(invalid="ignore"):
-            use = (unrolled.offset <= self.tolerance) & (unrolled.offset >= -self.recess)
+            use = near_surface(unrolled.offset, self.limits)
             use &= (unrolled.chainage >= start) & (unrolled.chainage < start + KILOMETRE)
         observations = None
         if self.radiometer:
@@ -173,8 +182,7 @@ class Observer:
                 normals = self.edges.normals_of(points.xyz, unrolled)
                 observations = observe(points.xyz, scanner, normals, points.intensity, radiometer.kind, radiometer.reference)
             with np.errstate(invalid="ignore"):
-                use &= observations.cosine >= np.cos(np.radians(radiometer.max_incidence))
-                use &= observations.range_m <= radiometer.max_range
+                use &= steep_enough(observations.cosine, self.limits) & within_range(observations.range_m, self.limits)
             use &= np.isfinite(observations.raw_db)
         lining = use & ~self.floor.covers(unrolled.chainage, unrolled.arc)
         return ObservedPoints(unrolled.chainage, unrolled.arc, unrolled.offset, use, lining, observations)

@@ -16,13 +16,13 @@ import numpy as np
 from tunneldb.arrays import Bool, Float, Int32, Int64, Single
 from tunneldb.compiled import point_inner, point_kernel
 from tunneldb.geometry.unrolling import to_plane
-from tunneldb.pointcloud.pose_coverage import TIME_TOLERANCE
-from tunneldb.pointcloud.poses import interval, position_at
-from tunneldb.radiometry.correction import reference_at
+from tunneldb.pointcloud.poses import known_interval, position_at, station_of
+from tunneldb.radiometry.correction import decibel, reference_at
 from tunneldb.radiometry.edge_normals import face_at, face_normal
+from tunneldb.raster.limits import Limits, near_surface, steep_enough, within_range
 from tunneldb.threads import in_blocks
 
-BLOCK = 4096
+BLOCK = 8192
 """Points that a thread takes at a time."""
 
 WEIGHT = 64
@@ -73,8 +73,7 @@ class CorrectionArrays(NamedTuple):
 
     ``wanted`` is False for a survey without it, then nothing below counts. ``knots`` (m) and ``values`` (dB) are the
     reference curve, empty where none is needed; ``low`` and ``high`` (m) the ranges that it serves for; ``loss`` is the
-    loss by incidence at each of COSINES steps of the cosine from 0 to 1, dB; points seen at a lower cosine than ``cosine``
-    or from farther than ``far`` (m) are left out.
+    loss by incidence at each of COSINES steps of the cosine from 0 to 1, dB.
     """
 
     wanted: bool
@@ -84,23 +83,20 @@ class CorrectionArrays(NamedTuple):
     low: float
     high: float
     loss: Float
-    cosine: float
-    far: float
 
 
 class PixelTarget(NamedTuple):
     """Where points go.
 
-    ``low`` and ``high`` (3) are the box of points to look at, m; ``tolerance`` and ``recess`` the greatest distances in
-    front of the surface and behind it, m; ``west`` the chainage at column 0, m; ``bottom`` the arc of the lower edge of the
-    last row, in pixels; ``first`` to ``stop`` are the columns that take points, ``start`` to ``end`` those of the kilometre
-    itself. The floor begins at the arcs ``left`` and ``right`` (m) at each metre from ``floor`` on.
+    ``low`` and ``high`` (3) are the box of points to look at, m; ``limits`` are those of depth, range and incidence; ``west``
+    is the chainage at column 0, m; ``bottom`` the arc of the lower edge of the last row, in pixels; ``first`` to ``stop`` are
+    the columns that take points, ``start`` to ``end`` those of the kilometre itself. The floor begins at the arcs ``left`` and
+    ``right`` (m) at each metre from ``floor`` on.
     """
 
     low: Float
     high: Float
-    tolerance: float
-    recess: float
+    limits: Limits
     west: float
     per_metre: float
     bottom: int
@@ -112,6 +108,17 @@ class PixelTarget(NamedTuple):
     floor: float
     left: Float
     right: Float
+
+
+class BlockPoints(NamedTuple):
+    """Points of a block: ``xyz``, ``unrolled`` and the surface's ``normals`` (n, 3), m, and columns of the file (n,)."""
+
+    xyz: Float
+    unrolled: Float
+    normals: Float
+    time: Float
+    scan_id: Int32
+    intensity: Single
 
 
 class Pixels(NamedTuple):
@@ -133,11 +140,11 @@ class Pixels(NamedTuple):
         whole, single = np.empty((3, count), np.int32), np.empty((3, count), np.float32)
         return cls(whole[0], whole[1], whole[2], single[0], single[1], single[2])
 
-    def first(self, count: int) -> Pixels:
-        """Return the pixels of the first so many points."""
+    def part(self, begin: int, end: int) -> Pixels:
+        """Return the pixels of the points from ``begin`` to before ``end``, as views."""
         return Pixels(
-            self.row[:count], self.column[:count], self.weight[:count],
-            self.offset[:count], self.raw[:count], self.corrected[:count],
+            self.row[begin:end], self.column[begin:end], self.weight[begin:end],
+            self.offset[begin:end], self.raw[begin:end], self.corrected[begin:end],
         )  # fmt: skip
 
 
@@ -186,12 +193,8 @@ def project(
         part = slice(begin, end)
         unrolled, normals = np.empty((end - begin, 3)), np.empty((end - begin, 3))
         to_plane(*shape, target.low, target.high, xyz[part], unrolled, normals)
-        found.append(
-            _project(
-                *faces, *scanner, *optics, *target[2:],
-                xyz[part], unrolled, normals, time[part], scan_id[part], intensity[part], *(array[part] for array in pixels),
-            )
-        )  # fmt: skip
+        points = BlockPoints(xyz[part], unrolled, normals, time[part], scan_id[part], intensity[part])
+        found.append(_project(faces, scanner, optics, target, points, pixels.part(begin, end)))
 
     in_blocks(block, len(xyz), BLOCK)
     used, lost, lining, outside, nearest, farthest = zip(*found, strict=True) if found else ((),) * 6
@@ -223,151 +226,110 @@ def pixel_weight(cosine: float, distance: float, least: float, far: float) -> in
     return 1 + int((WEIGHT - 1) * slant * fade + 0.5)
 
 
+@point_inner
+def loss_at(loss: Float, cosine: float) -> float:  # pragma: no cover - compiled
+    """Return the loss by incidence at a cosine, dB, interpolated in the table ``loss`` of COSINES steps."""
+    place = cosine * COSINES
+    step = int(place)
+    if step > COSINES - 1:
+        step = COSINES - 1
+    return loss[step] + (place - step) * (loss[step + 1] - loss[step])
+
+
+@point_inner
+def on_floor(left: Float, right: Float, place: float, arc: float) -> bool:  # pragma: no cover - compiled
+    """Return True if an arc (m) belongs to the floor, which begins at ``left`` and ``right`` at each metre of ``place``."""
+    metre = int(np.rint(place))
+    metre = 0 if metre < 0 else (metre if metre < left.shape[0] else left.shape[0] - 1)
+    return not left[metre] < arc < right[metre]
+
+
 @point_kernel
 def _project(
-    bends: bool,
-    edges_start: float,
-    edges_first: float,
-    feet: Float,
-    face_normals: Float,
-    sharp: Bool,
-    known_scans: Int64,
-    stations: Float,
-    trajectory: Float,
-    track: Float,
-    longest: float,
-    wanted: bool,
-    linear: bool,
-    knots: Float,
-    values: Float,
-    low: float,
-    high: float,
-    loss: Float,
-    least_cosine: float,
-    far: float,
-    tolerance: float,
-    recess: float,
-    west: float,
-    per_metre: float,
-    bottom: int,
-    rows: int,
-    first: int,
-    stop: int,
-    start: int,
-    end: int,
-    floor_start: float,
-    left: Float,
-    right: Float,
-    xyz: Float,
-    unrolled: Float,
-    normals: Float,
-    time: Float,
-    scan_id: Int32,
-    intensity: Single,
-    row: Int32,
-    column: Int32,
-    weights: Int32,
-    offsets: Single,
-    raws: Single,
-    correcteds: Single,
+    faces: EdgeArrays,
+    scanner: PoseArrays,
+    optics: CorrectionArrays,
+    target: PixelTarget,
+    points: BlockPoints,
+    pixels: Pixels,
 ) -> tuple[int, int, int, int, float, float]:  # pragma: no cover - compiled
-    """Process a block of unrolled points for `project`; plain arrays compile faster than tuples of them."""
-    mobile = trajectory.shape[0] > 0
-    posed = mobile or known_scans.shape[0] > 0
+    """Project a block of unrolled points, see `project`."""
+    limits = target.limits
+    feet, face_normals, sharp = faces.feet, faces.normals, faces.sharp
+    trajectory, track, scans = scanner.time, scanner.track, scanner.scan_id
+    knots, values, loss = optics.knots, optics.values, optics.loss
+    left, right = target.left, target.right
+    posed = trajectory.shape[0] > 0 or scans.shape[0] > 0
     curve = knots.shape[0] > 0
     moment, knot, station, scan = np.int64(0), np.int64(0), np.int64(-1), np.int64(-1)
     used, lost, lining, outside = 0, 0, 0, 0
     nearest, farthest = np.inf, -np.inf
-    for k in range(xyz.shape[0]):
-        column[k] = -1
-        chainage, arc, offset = unrolled[k, 0], unrolled[k, 1], unrolled[k, 2]
-        if not (-recess <= offset <= tolerance):
+    for k in range(points.xyz.shape[0]):
+        pixels.column[k] = -1
+        chainage, arc, offset = points.unrolled[k, 0], points.unrolled[k, 1], points.unrolled[k, 2]
+        if not near_surface(offset, limits):
             continue
-        c = np.floor((chainage - west) * per_metre)
-        r = rows - 1 - (np.floor(arc * per_metre) - bottom)
-        if c < first or c >= stop or r < 0 or r >= rows:
+        c = np.floor((chainage - target.west) * target.per_metre)
+        r = target.rows - 1 - (np.floor(arc * target.per_metre) - target.bottom)
+        if c < target.first or c >= target.stop or r < 0 or r >= target.rows:
             continue
         raw, corrected, weight = 0.0, 0.0, 1
-        if wanted and not posed:
-            raw = float(intensity[k])
-            if linear:
-                raw = 10.0 * np.log10(intensity[k]) if raw > 0.0 else np.nan
+        if optics.wanted and not posed:
+            raw = decibel(points.intensity[k], optics.linear)
             if not np.isfinite(raw):
                 continue
             corrected = raw
-        elif wanted:
-            x, y, z = xyz[k, 0], xyz[k, 1], xyz[k, 2]
-            if mobile:
-                t = time[k]
-                if not (trajectory[0] - TIME_TOLERANCE <= t <= trajectory[-1] + TIME_TOLERANCE):
+        elif optics.wanted:
+            x, y, z = points.xyz[k, 0], points.xyz[k, 1], points.xyz[k, 2]
+            if trajectory.shape[0] > 0:
+                moment, known = known_interval(trajectory, scanner.longest, points.time[k], moment)
+                if not known:
                     lost += 1
                     continue
-                moment = interval(trajectory, t, moment)
-                if moment + 1 < trajectory.shape[0]:
-                    since, until = t - trajectory[moment], trajectory[moment + 1] - t
-                    if since + until > longest and since > TIME_TOLERANCE and until > TIME_TOLERANCE:
-                        lost += 1
-                        continue
-                dx, dy, dz = position_at(trajectory, track, t, moment)
+                dx, dy, dz = position_at(trajectory, track, points.time[k], moment)
             else:
-                if station < 0 or scan_id[k] != scan:
-                    scan = np.int64(scan_id[k])
-                    station, stop_at = np.int64(0), np.int64(known_scans.shape[0])
-                    while station < stop_at:
-                        middle = (station + stop_at) >> 1
-                        if known_scans[middle] < scan:
-                            station = middle + 1
-                        else:
-                            stop_at = middle
-                    if station == known_scans.shape[0] or known_scans[station] != scan:
-                        station = np.int64(-1)
+                if station < 0 or points.scan_id[k] != scan:
+                    scan = np.int64(points.scan_id[k])
+                    station = station_of(scans, scan)
                 if station < 0:
                     lost += 1
                     continue
-                dx, dy, dz = stations[station, 0], stations[station, 1], stations[station, 2]
+                dx, dy, dz = scanner.station[station, 0], scanner.station[station, 1], scanner.station[station, 2]
             dx, dy, dz = dx - x, dy - y, dz - z
             distance = np.sqrt(dx * dx + dy * dy + dz * dz)
-            if distance > far:
+            if not within_range(distance, limits):
                 continue
-            nx, ny, nz = normals[k, 0], normals[k, 1], normals[k, 2]
-            if bends:
-                along, across = face_at(edges_start, edges_first, sharp, chainage, arc)
+            nx, ny, nz = points.normals[k, 0], points.normals[k, 1], points.normals[k, 2]
+            if faces.any:
+                along, across = face_at(faces.start, faces.first, sharp, chainage, arc)
                 if along >= 0:
                     nx, ny, nz = face_normal(feet, face_normals, along, across, x, y, z)
             cosine = (dx * nx + dy * ny + dz * nz) / (distance if distance > 1e-9 else 1e-9)
             if cosine > 1.0:
                 cosine = 1.0
-            raw = float(intensity[k])
-            if linear:
-                raw = 10.0 * np.log10(intensity[k]) if raw > 0.0 else np.nan
-            if not cosine >= least_cosine or not np.isfinite(raw):
+            raw = decibel(points.intensity[k], optics.linear)
+            if not steep_enough(cosine, limits) or not np.isfinite(raw):
                 continue
-            place = cosine * COSINES
-            step = int(place)
-            if step > COSINES - 1:
-                step = COSINES - 1
-            corrected = raw - (loss[step] + (place - step) * (loss[step + 1] - loss[step]))
-            weight = pixel_weight(cosine, distance, least_cosine, far)
+            corrected = raw - loss_at(loss, cosine)
+            weight = pixel_weight(cosine, distance, limits.cosine, limits.far)
             if curve:
                 level, knot = reference_at(knots, values, distance, knot)
                 corrected -= level
-                metre = int(np.rint(chainage - floor_start))
-                metre = 0 if metre < 0 else (metre if metre < left.shape[0] else left.shape[0] - 1)
-                if left[metre] < arc < right[metre]:
+                if not on_floor(left, right, chainage - target.floor, arc):
                     lining += 1
                     if distance < nearest:
                         nearest = distance
                     if distance > farthest:
                         farthest = distance
-                    if distance < low or distance > high:
+                    if distance < optics.low or distance > optics.high:
                         outside += 1
                         continue
-        row[k] = int(r)
-        column[k] = int(c)
-        weights[k] = weight
-        offsets[k] = offset
-        raws[k] = raw
-        correcteds[k] = corrected
-        if start <= c < end:
+        pixels.row[k] = int(r)
+        pixels.column[k] = int(c)
+        pixels.weight[k] = weight
+        pixels.offset[k] = offset
+        pixels.raw[k] = raw
+        pixels.corrected[k] = corrected
+        if target.start <= c < target.end:
             used += 1
     return used, lost, lining, outside, nearest, farthest

@@ -11,7 +11,6 @@ import numpy as np
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.reader import Points, ScanSource, read_chunks
 from tunneldb.radiometry.oren_nayar import incidence_db
-from tunneldb.radiometry.reference_curve import SPAN_TOLERANCE
 from tunneldb.raster.accumulator import Accumulator
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.observation import Observer, RangeSpan
@@ -114,8 +113,7 @@ class Projector:
             PixelTarget(
                 observer.box[0],
                 observer.box[1],
-                observer.tolerance,
-                observer.recess,
+                observer.limits,
                 grid.west,
                 1.0 / grid.pixel,
                 grid.bottom,
@@ -160,16 +158,15 @@ def _scanner(observer: Observer) -> PoseArrays:
 def _optics(observer: Observer, roughness: float) -> CorrectionArrays:
     nothing = np.zeros(0)
     if observer.radiometer is None:
-        return CorrectionArrays(False, False, nothing, nothing, -np.inf, np.inf, nothing, 0.0, np.inf)
+        return CorrectionArrays(False, False, nothing, nothing, -np.inf, np.inf, nothing)
     radiometer, curve = observer.radiometer, observer.radiometer.reference
+    low, high = curve.span if curve else (-np.inf, np.inf)
     return CorrectionArrays(
         True,
         radiometer.kind == "linear",
         curve.range_m if curve else nothing,
         curve.intensity_db if curve else nothing,
-        float(curve.range_m[0]) - SPAN_TOLERANCE if curve else -np.inf,
-        float(curve.range_m[-1]) + SPAN_TOLERANCE if curve else np.inf,
+        low,
+        high,
         incidence_db(np.arange(COSINES + 1) / COSINES, roughness),
-        float(np.cos(np.radians(radiometer.max_incidence))),
-        radiometer.max_range,
     )
