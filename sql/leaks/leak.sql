@@ -1,7 +1,6 @@
--- Sums over leaks, and the leaks nearest to a point.
+-- Wet area of a stretch, and the leaks nearest to a point.
 
--- Distances are taken in the unrolled plane, along the lining, so that a leak behind a corner or on the other wall is as far as
--- one has to go. There the index on the polygons gives the nearest ones first.
+-- Distances are measured in the unrolled plane, along the lining. There the index of the polygons returns the nearest ones first.
 CREATE OR REPLACE FUNCTION tunnel_api.nearest_leaks(survey_id int, point geometry, wanted int DEFAULT 5)
 RETURNS TABLE (id bigint, label text, chainage_from float8, chainage_to float8, clock float8, area float8, distance float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
@@ -24,9 +23,9 @@ COMMENT ON FUNCTION tunnel_api.nearest_leaks(int, geometry, int) IS
 'Leaks nearest to a 3D point in the tunnel''s SRID, nearest first. Rejected leaks and leaks that the last detection did not find are left out. distance: along the lining, m, 0 on a leak, never across the seam in the middle of the floor. No rows if the point lies off the tunnel';
 
 
--- Wet area of a stretch of a survey, m² on the lining: the leaks (of kind leak, after judging) that were found last and are
--- not rejected, cut at both ends, those of the survey among them. Runs with the owner's rights, for it reads the tables
--- themselves. Those that are not cut come from the index alone, of which no more is read than the longest leak can reach.
+-- Wet area of a stretch of a survey, m² on the lining: leaks that the last detection found and nobody rejected, cut at both ends
+-- of the stretch and of the survey. Leaks that are not cut are read from the index only, no farther than the longest leak can
+-- reach.
 CREATE OR REPLACE FUNCTION tunnel_api.wet_area(survey text, chainage_from float8, chainage_to float8)
 RETURNS float8
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER
@@ -35,7 +34,7 @@ AS $$
     WITH given AS MATERIALIZED (
         SELECT s.id, greatest($2, e.chainage_from) AS low, least($3, e.chainage_to) AS high,
             (SELECT max(l.chainage_to - l.chainage_from) FROM tunnel.finding l WHERE l.survey_id = s.id) AS longest
-        FROM tunnel.survey s CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e WHERE s.name = $1
+        FROM tunnel.survey s CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e WHERE s.id = tunnel_api.survey_id($1)
     )
     SELECT coalesce(sum(CASE WHEN l.chainage_from >= g.low AND l.chainage_to <= g.high THEN l.area
         ELSE (SELECT tunnel_internal.area_between(a.unrolled, a.area, g.low, g.high) FROM tunnel.finding a WHERE a.id = l.id) END), 0)

@@ -199,7 +199,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 10 SECURITY DEFINER SET search_pat
       JOIN tunnel.survey s ON s.tunnel_id = t.id
      CROSS JOIN LATERAL (SELECT q.* FROM tunnel.ring q WHERE q.survey_id = s.id AND q.chainage_from <= $2
                           ORDER BY q.chainage_from DESC LIMIT 1) r
-     WHERE t.name = $1 AND r.chainage_to > $2
+     WHERE t.id = tunnel_api.tunnel_id($1) AND r.chainage_to > $2
      ORDER BY s.date, s.name
 $$;
 COMMENT ON FUNCTION tunnel_api.ring_series(text, float8) IS
@@ -214,7 +214,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 1000 SECURITY DEFINER SET search_p
               FROM tunnel.tunnel t
               JOIN tunnel.survey s ON s.tunnel_id = t.id
               JOIN tunnel.finding a ON a.survey_id = s.id AND a.detected AND a.review <> 'rejected' AND a.wet AND NOT a.superseded
-             WHERE t.name = $1 AND $2 > 0
+             WHERE t.id = tunnel_api.tunnel_id($1) AND $2 > 0
              GROUP BY s.tunnel_id, s.id, s.name, s.date, 4) q
      ORDER BY q.k, q.date, q.name
 $$;

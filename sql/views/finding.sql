@@ -128,7 +128,7 @@ BEGIN
         ('superseded', 'True if another finding (merged_into, same_as) or a dry region replaces it'),
         ('unrolled', 'Geometry in the unrolled plane (chainage, arc), m, SRID 0'),
         ('map', 'Geometry on the map strip beside the axis, tunnel''s SRID'),
-        ('surface', 'Geometry on the lining in space (3D), tunnel''s SRID')) AS t (name, text)
+        ('surface', 'Geometry on the lining in space (3D), tunnel''s SRID. ST_Area of it is 0 on a vertical wall: use area')) AS t (name, text)
       JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
       JOIN pg_class c ON c.oid = a.attrelid
      WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname = 'finding'
@@ -229,7 +229,10 @@ BEGIN
         ('wet', 'True if its kind counts as wet: those are in the views of leaks'),
         ('origin', 'Origin of its outline: detected, drawn, redrawn, split or merged'),
         ('evidence', 'Evidence for a leak (+) and against it (-): logarithms of odds by reason, the strongest first'),
-        ('model', 'Version of the model of evidence that classified it')) AS t (name, text)
+        ('model', 'Version of the model of evidence that classified it'),
+        ('unrolled', 'Polygon in the unrolled plane (chainage, arc), m, SRID 0: measure and compare leaks here'),
+        ('map', 'Polygon on the map strip beside the axis, tunnel''s SRID'),
+        ('surface', 'Polygon on the lining in space (3D), tunnel''s SRID. ST_Area of it is 0 on a vertical wall: use area')) AS t (name, text)
       JOIN pg_attribute a ON a.attname = t.name AND a.attnum > 0
       JOIN pg_class c ON c.oid = a.attrelid
      WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v' AND c.relname = 'leak'

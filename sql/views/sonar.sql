@@ -83,7 +83,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
     SELECT b.depth, b.sigma
       FROM tunnel.bed b
       JOIN tunnel.survey s ON s.id = b.survey_id
-     WHERE s.name = $1 AND b.n = floor($2) AND b.across_n = floor($3 * 10)
+     WHERE s.id = tunnel_api.survey_id($1) AND b.n = floor($2) AND b.across_n = floor($3 * 10)
 $$;
 COMMENT ON FUNCTION tunnel_api.depth(text, float8, float8) IS
     'Depth of water over the bed (m) at a chainage and a distance to the right of the given axis (m), with its standard deviation; NULL without sonar';
@@ -97,7 +97,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_c
                0.1 * (least($3, b.n + 1) - greatest($2, b.n)) AS area
           FROM tunnel.bed b
           JOIN tunnel.survey s ON s.id = b.survey_id
-         WHERE s.name = $1 AND b.n >= floor($2) AND b.n < $3 AND tunnel_internal.in_order($2, $3)),
+         WHERE s.id = tunnel_api.survey_id($1) AND b.n >= floor($2) AND b.n < $3 AND tunnel_internal.in_order($2, $3)),
     width AS (
         SELECT percentile_cont(0.95) WITHIN GROUP (ORDER BY span) AS span
           FROM (SELECT 0.1 * (max(across_n) - min(across_n) + 1) AS span FROM cell GROUP BY n) metre)

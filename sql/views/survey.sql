@@ -52,16 +52,15 @@ COMMENT ON COLUMN tunnel_api.file.unposed IS
     'Points dropped because the scanner position is unknown: outside the trajectory, in its gaps, or in a scan without a station';
 COMMENT ON COLUMN tunnel_api.file.thinned IS 'Points dropped by thinning to survey density';
 
--- The key is the row's place in its partition: loading or a stage that rewrites the kilometre deals it out anew.
--- There is no join, so that a condition on survey_id and km reads those partitions only, and one on chainage
--- (BRIN) only its part of them.
+-- The key is the position of the row in its partition; it changes when the kilometre is rewritten. A condition on survey_id and km
+-- reads these partitions only, one on chainage (BRIN) only a part of them.
 CREATE OR REPLACE VIEW tunnel_api.point AS
 SELECT ((p.km::bigint & 65535) << 44) | ((p.ctid::text::pg_catalog.point)[0]::bigint << 12)
          | (p.ctid::text::pg_catalog.point)[1]::bigint AS id,
        p.survey_id, s.name AS survey, p.km, p.chainage, p.segment, p.gps_time, p.scan_id, p.file_id, p.intensity,
        p.classification, p.class, p.geom::public.geometry AS geom
   FROM tunnel.point p
-  LEFT JOIN tunnel.survey s ON s.id = p.survey_id;  -- LEFT: the planner leaves the table out where the name is not asked for
+  LEFT JOIN tunnel.survey s ON s.id = p.survey_id;  -- LEFT: the planner omits the table if the name is not used
 COMMENT ON VIEW tunnel_api.point IS
     'Points at survey density, in chainage order. Filter by survey_id and km (and chainage), or use the function points, to read one partition only';
 COMMENT ON COLUMN tunnel_api.point.survey IS 'Name of the survey. A filter by it alone reads the points of all surveys: use survey_id = tunnel_api.survey_id(name)';
@@ -108,7 +107,7 @@ COMMENT ON COLUMN tunnel_api.axis_vertex.remark IS
 COMMENT ON COLUMN tunnel_api.axis_vertex.edited_by IS 'Role that moved it last, set by the database';
 COMMENT ON COLUMN tunnel_api.axis_vertex.edited_at IS 'Time of the last move, set by the database';
 
--- A segment is stale when its planes are not those of the axis any more (segment_moved).
+-- A segment is stale if its planes differ from those of the present axis (segment_moved).
 CREATE OR REPLACE VIEW tunnel_api.segment AS
 SELECT g.id, g.survey_id, s.name AS survey, g.n, g.km, g.chainage_from, g.chainage_to,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, g.chainage_from) l) AS label_from,
