@@ -59,6 +59,18 @@ def test_a_name_that_is_none_is_refused(conn: psycopg.Connection[Any], example: 
             conn.execute(f"SELECT tunnel_api.{function}({arguments})".encode())
 
 
+def test_a_wrong_name_gives_no_empty_answer(conn: psycopg.Connection[Any], example: str) -> None:
+    for call in (
+        "wet_area('none', 12300, 12400)",
+        "depth('none', 12300, 0)",
+        "bed_volume('none', 12300, 12400, 0)",
+        "ring_series('none', 12300)",
+        "leak_area_series('none')",
+    ):
+        with pytest.raises(psycopg.errors.RaiseException, match="there is no (survey|tunnel) none"), conn.transaction():
+            conn.execute(f"SELECT * FROM tunnel_api.{call}".encode())
+
+
 @pytest.mark.parametrize(
     "point", ["ST_MakePoint(272039.859, 4765020.741)", "ST_SetSRID(ST_MakePoint(272039.859, 4765020.741), 25830)"]
 )
