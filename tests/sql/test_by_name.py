@@ -43,7 +43,7 @@ def test_a_name_gives_what_its_key_gives(conn: psycopg.Connection[Any], example:
                     conn.execute(
                         sql.SQL("SELECT f::text FROM {}({}) f").format(
                             sql.Identifier("tunnel_api", function),
-                            sql.SQL(", ").join([sql.Literal(first), sql.SQL(arguments)] if arguments else [sql.Literal(first)]),  # type: ignore[arg-type]
+                            sql.SQL(", ").join([sql.Literal(first), sql.SQL(arguments)] if arguments else [sql.Literal(first)]),
                         )
                     ).fetchall()
                     for first in (name, number)
@@ -67,7 +67,7 @@ def test_a_wrong_name_gives_no_empty_answer(conn: psycopg.Connection[Any], examp
         "ring_series('none', 12300)",
         "leak_area_series('none')",
     ):
-        with pytest.raises(psycopg.errors.RaiseException, match="there is no (survey|tunnel) none"), conn.transaction():
+        with pytest.raises(psycopg.errors.RaiseException, match=r"there is no (survey|tunnel) none"), conn.transaction():
             conn.execute(f"SELECT * FROM tunnel_api.{call}".encode())
 
 
