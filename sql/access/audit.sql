@@ -1,5 +1,5 @@
--- The audit: what people changed by hand, through the views. Its table (tunnel_audit.entry) is the database owner's alone, takes
--- new rows only, and is written by the triggers of views/edit.sql. What stages do is in the ledger (tunnel_api.run).
+-- Audit: edits that people made through the views. The table tunnel_audit.entry belongs to the owner of the database, accepts
+-- new rows only, and is written by the triggers of the views. Runs of stages are in the ledger (tunnel_api.run).
 
 CREATE OR REPLACE VIEW tunnel_api.audit AS
 SELECT e.id, e.at, e.who, e.survey, e.view, e.row_id, e.action, e.before, e.after, e.undoes, e.part_of, e.kept,
@@ -23,8 +23,8 @@ COMMENT ON COLUMN tunnel_api.audit.imported_by IS
     'Role that imported the entry with an archive (survey import); at and who are then those of the archive. NULL for edits made here';
 COMMENT ON COLUMN tunnel_api.audit.imported_at IS 'Time of the import; NULL for edits made here';
 
--- Notes an edit: of what was and is, the columns that differ; nothing when none does. Without before it is an insert, without
--- after a delete. Only the triggers, which run with the owner's rights, get through to the table. Returns the entry's id.
+-- Write an entry with the columns that differ; nothing if none does. Without before it is an insert, without after a delete.
+-- Only the triggers, which run with the owner's rights, can write to the table. Returns the id of the entry.
 CREATE OR REPLACE FUNCTION tunnel_internal.note_edit(
     survey text, view text, row_id bigint, before jsonb, after jsonb, undoes bigint DEFAULT NULL, part_of bigint DEFAULT NULL,
     kept jsonb DEFAULT NULL) RETURNS bigint

@@ -1,6 +1,5 @@
--- Entries of the audit that come with an archived survey (tunneldb survey import). The audit takes new rows only, and from nobody
--- but the triggers of the views; those of an archive are taken from operators, and each says who brought it in and when, so that
--- none is taken for what was seen to be done here.
+-- Entries of the audit from an archived survey (tunneldb survey import). Operators can import them; each states who imported
+-- it and when, so that it cannot pass for an edit made here.
 
 CREATE OR REPLACE FUNCTION tunnel_internal.audit_reserve(count int) RETURNS SETOF bigint
 LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER ROWS 1000 SET search_path = pg_catalog, pg_temp AS $$

@@ -1,8 +1,8 @@
--- Layers that state their type and coordinate system. Tunnels differ in theirs, so the geometries of tunnel_api's views carry their
--- own, and geometry_columns has none for them: a program has to look at the rows, and one that does not takes them for none. So each
--- coordinate system in use has a schema of its own, tunnel_25830 or tunnel_local: each layer under its name in tunnel_api, with
--- the tunnels of that system alone, one geometry, typed. Made by tunneldb init, tunnel add and tunnel remove, from the list here.
--- Needs all views; rights are copied, so it is called at the end of access/role.sql.
+-- Typed layers. Tunnels can have different coordinate systems, so geometry_columns states no SRID for the views of
+-- tunnel_api, and some programs then see no geometry. Each coordinate system in use therefore has a schema, tunnel_25830 or
+-- tunnel_local, with each layer under its name in tunnel_api, limited to the tunnels of that system, with one typed geometry.
+-- tunneldb init, tunnel add and tunnel remove create them from the list here. Needs all views; copies rights, so it is called
+-- at the end of access/role.sql.
 
 CREATE OR REPLACE FUNCTION tunnel_api.layer_types() RETURNS TABLE (layer text, type text, plane boolean)
 LANGUAGE sql IMMUTABLE PARALLEL SAFE ROWS 60 SET search_path = pg_catalog, pg_temp AS $$
@@ -82,7 +82,7 @@ $$;
 COMMENT ON FUNCTION tunnel_api.layer_schemas() IS
     'Schemas of typed layers, one for each coordinate system in use, with its SRID (0: local coordinates)';
 
--- With the rights of the owner, as operators add tunnels and only the owner makes schemas; it takes nothing that a caller could say.
+-- Runs with the owner's rights: operators add tunnels, but only the owner creates schemas. It takes no arguments.
 CREATE OR REPLACE PROCEDURE tunnel_api.make_layers()
 LANGUAGE plpgsql SECURITY DEFINER SET search_path = pg_catalog, pg_temp SET lock_timeout = '5s' AS $$
 DECLARE

@@ -1,4 +1,4 @@
--- What only operators are to see in a view that all read: where files lie on the machines of those who process.
+-- Values that only operators see in views that everybody reads: paths of files on processing machines.
 
 CREATE OR REPLACE FUNCTION tunnel_internal.for_operators(said text) RETURNS text
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SET search_path = pg_catalog, pg_temp AS $$

@@ -1,5 +1,5 @@
--- Tables in which QGIS looks for the style of a layer that somebody adds by hand, and for projects; `tunneldb qgis` fills
--- them. Laid out as QGIS makes them, in their place: schema public. Runs after access/role.sql, for its grants.
+-- Tables in which QGIS looks for styles and projects; `tunneldb qgis` fills them. They have QGIS's layout and are in schema
+-- public. Runs after access/role.sql, for its grants.
 
 DO $$
 BEGIN

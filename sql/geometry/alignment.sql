@@ -1,8 +1,8 @@
--- Design alignments, and how far the axis as measured lies from the axis as given. Needs axis_frame (geometry/axis.sql) and
+-- Design alignments, and deviation of the measured axis from the given axis. Needs axis_frame (geometry/axis.sql) and
 -- stationing (geometry/stationing.sql).
 
--- How far each vertex of a survey's axis lies from the axis as given, right and up in the plane of the given axis at its
--- chainage, m. Vertices beyond the ends of the given axis are left out: there it is only drawn on.
+-- Deviation of each vertex of a survey's axis from the given axis, right and up in the plane of the given axis, m. Vertices
+-- beyond the ends of the given axis, where it is extended, are left out.
 CREATE OR REPLACE FUNCTION tunnel_api.axis_deviation(survey_id int)
 RETURNS TABLE (n int, chainage float8, source text, to_right float8, up float8)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
@@ -44,7 +44,7 @@ COMMENT ON COLUMN tunnel_api.axis_deviation.distance IS 'Distance of the measure
 COMMENT ON COLUMN tunnel_api.axis_deviation.geom IS 'Measured vertex, in the tunnel''s SRID';
 
 
--- The given axis holds a vertex each metre, so that its substring by length lies where the element does.
+-- The given axis has a vertex for each metre, so that its substring by length matches the element.
 CREATE OR REPLACE VIEW tunnel_api.alignment_element AS
 SELECT e.tunnel_id::bigint * 1000000 + CASE e.plane WHEN 'vertical' THEN 500000 ELSE 0 END + e.n AS id,
        e.tunnel_id, t.name AS tunnel, e.plane, e.n, e.kind, e.chainage AS chainage_from, e.chainage + e.length AS chainage_to,

@@ -1,4 +1,4 @@
--- Stage 1 of Gonçalves et al. (2012): the axis, averaged from the points near each vertex, again and again until it rests.
+-- Stage 1 of Gonçalves et al. (2012): axis from averaged points near each vertex, iterated until it converges.
 
 -- Vertices with their frames. Tangent: from the vertex before to the one after (Gonçalves et al., 2012, fig. 5); at an end,
 -- the parabola through three vertices; of two vertices, the chord. Right = tangent × vertical, up = right × tangent.
@@ -49,8 +49,8 @@ COMMENT ON FUNCTION tunnel_internal.axis_frame(int[], float8[], float8[], float8
 'Vertices of an axis with unit vectors: tangent (t), right (u), up (w), in the tunnel''s SRID. Neighbours are vertices whose numbers differ by one. Source: Gonçalves et al. (2012), fig. 5';
 
 
--- The points that may lie at most half_width (m) from the planes of vertices n, by their chainage, as text for FROM: number of
--- the vertex and coordinates.
+-- FROM expression for the points that can lie within half_width (m) of the planes of vertices n, by chainage: number of the
+-- vertex and coordinates.
 CREATE OR REPLACE FUNCTION tunnel_internal.axis_source(survey_id int, n int[], half_width float8)
 RETURNS text
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
@@ -76,7 +76,7 @@ COMMENT ON FUNCTION tunnel_internal.axis_source(int, int[], float8) IS
 'FROM expression that reads the points near the planes of axis vertices n, by chainage: n, x, y, z (m)';
 
 
--- The table in which axis_near sets points of a kilometre aside.
+-- Table to which axis_near copies points of a kilometre.
 CREATE OR REPLACE FUNCTION tunnel_internal.axis_near_name(survey_id int, km int)
 RETURNS text
 LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
@@ -87,9 +87,9 @@ COMMENT ON FUNCTION tunnel_internal.axis_near_name(int, int) IS
 'Name of the temporary table of stage axis for a kilometre, in schema tunnel';
 
 
--- Sets the points near the planes of vertices aside in a table, in the place of an older one, for the passes of axis_refine:
--- those within half a metre more than half_width of their plane, and those 30 m and more from their vertex. Not a temporary
--- table, which no parallel worker could read; it is there until the transaction ends.
+-- Copy the points near the planes of vertices to a table, replacing an older one, for the passes of axis_refine: those within
+-- half_width + 0.5 m of their plane, and those 30 m or more from their vertex. Not a temporary table, which parallel workers
+-- cannot read; it exists until the transaction ends.
 CREATE OR REPLACE FUNCTION tunnel_internal.axis_near(
     survey_id int, km int, n int[], x float8[], y float8[], z float8[], half_width float8)
 RETURNS void
@@ -114,8 +114,8 @@ COMMENT ON FUNCTION tunnel_internal.axis_near(int, int, int[], float8[], float8[
 'Copy the points near the planes of a kilometre''s axis vertices to the table axis_near_name: n, x, y, z (m)';
 
 
--- Whether the planes of vertices have moved since points were set aside, so far that one within half_width of its plane may be
--- missing: by half a metre within 30 m of the vertex. ox, oy, oz: where the vertices were then.
+-- True if the planes of vertices moved since points were copied by so much (0.5 m within 30 m of the vertex) that a point
+-- within half_width can be missing. ox, oy, oz: vertices at that time.
 CREATE OR REPLACE FUNCTION tunnel_internal.axis_astray(
     n int[], x float8[], y float8[], z float8[], ox float8[], oy float8[], oz float8[])
 RETURNS boolean
@@ -225,13 +225,12 @@ COMMENT ON FUNCTION tunnel_internal.axis_shift(int, int[], float8[], float8[], f
 'One pass of stage axis: offset of the tunnel''s centre from each vertex, to the right and up in its plane, m, from the points within half_width of the plane, averaged by angular class. After Gonçalves et al. (2012), stage 1';
 
 
--- How far each vertex lies off where its neighbours lead, m.
---
--- The lesser of two: how far its shift from the given axis is from the mean of its neighbours' shifts, and how far its place is
--- from the parabola or the cubic through its neighbours' places. A given axis that bends where the tunnel does not makes the
--- first great, a curve of the tunnel that begins at once the second; a vertex that is out of place both. At an end the first
--- compares with the one neighbour, the second continues the parabola through three.
--- x, y, z: places; gx, gy, gz: where the given axis has them, m. Neighbours are the next in the arrays.
+-- Deviation of each vertex from its neighbours, m: the smaller of two values. First, the difference between its shift from
+-- the given axis and the mean shift of its neighbours. Second, its distance from the parabola or cubic through its
+-- neighbours. A given axis that bends where the tunnel does not makes the first large, a sudden curve of the tunnel the
+-- second; a wrong vertex makes both large. At an end, the first uses the one neighbour, and the second extrapolates the
+-- parabola through three vertices. x, y, z: positions; gx, gy, gz: positions on the given axis, m. Neighbours are adjacent in
+-- the arrays.
 CREATE OR REPLACE FUNCTION tunnel_internal.axis_residual(
     n int[], x float8[], y float8[], z float8[], gx float8[], gy float8[], gz float8[])
 RETURNS TABLE (n int, deviation float8)
@@ -259,14 +258,13 @@ COMMENT ON FUNCTION tunnel_internal.axis_residual(int[], float8[], float8[], flo
 'Deviation of each vertex of an axis from its neighbours, m: the smaller of the difference between its shift and theirs, and its distance from the curve through them';
 
 
--- Moves the vertices of a kilometre onto the tunnel's centre, pass by pass, and writes them to tunnel.axis_vertex.
---
--- Every run starts from the given axis (or the vertex as edited by hand, which stays), and the vertices two spacings beyond
--- the kilometre are found along with it, so the result doesn't depend on which neighbours were done before.
--- A vertex without points takes the shift of its neighbours, and is marked interpolated. So is one that does not come to rest
--- in max_iterations passes, or lies farther than max_deviation off where its neighbours lead (axis_residual); of several side
--- by side the worst first, then the others are asked again. axis_vertex.remark says why. It ends when all others rest, or when
--- a greater share than max_rejected (and more than one) was taken out.
+-- Move the vertices of a kilometre to the tunnel's centre, pass by pass, and write them to tunnel.axis_vertex. Every run
+-- starts from the given axis (or from vertices edited by hand, which stay). Vertices up to two spacings beyond the kilometre
+-- are computed as well, so that the result does not depend on the order of kilometres. A vertex without points gets the shift
+-- of its neighbours and is marked interpolated. So is one that does not converge in max_iterations passes or deviates from
+-- its neighbours by more than max_deviation (axis_residual); among adjacent ones the worst first, then the others are checked
+-- again. axis_vertex.remark states the reason. Ends when all others converged, or when more than max_rejected (and more than
+-- one) were rejected.
 CREATE OR REPLACE FUNCTION tunnel_internal.axis_refine(
     survey_id int, km int,
     half_width float8 DEFAULT 1.0, angle_step float8 DEFAULT 5.0,

@@ -1,4 +1,4 @@
--- Chainage as it is written and read.
+-- Chainage as text.
 
 -- Chainage written as km + m: 12345.678 m is 12+345.678, -5 m is -0+005.000. Rounded to mm first, so that 12999.9999 m
 -- is 13+000.000. One call of to_char on whole mm, which the planner puts in its place: ten times as fast as arithmetic on
@@ -13,7 +13,7 @@ COMMENT ON FUNCTION tunnel_api.chainage_label(float8) IS
 'Chainage (m) as text, km + m with mm: 12345.678 → 12+345.678';
 
 
--- The way back: '12+345.678', '12+345', '-0+005' or plain metres ('12345.678') -> m. Anything else is an error.
+-- Inverse: '12+345.678', '12+345', '-0+005' or plain metres ('12345.678') → m. Anything else is an error.
 CREATE OR REPLACE FUNCTION tunnel_api.chainage_parse(label text)
 RETURNS float8
 LANGUAGE plpgsql IMMUTABLE STRICT PARALLEL SAFE
@@ -37,7 +37,7 @@ COMMENT ON FUNCTION tunnel_api.chainage_parse(text) IS
 'Chainage (m) from text: 12+345.678 → 12345.678. Plain metres are accepted';
 
 
--- What functions of a stretch or of kilometres begin with: one that runs backwards would be an empty one, with no leak in it.
+-- Check of functions over a stretch or a range of kilometres: a reversed range would silently be empty.
 CREATE OR REPLACE FUNCTION tunnel_internal.in_order(first float8, last float8, unit text DEFAULT 'm')
 RETURNS boolean
 LANGUAGE plpgsql IMMUTABLE STRICT PARALLEL SAFE

@@ -1,9 +1,9 @@
--- What is drawn on the lining, on the unrolled image or on the map strip, and all that follows from it. Needs roll, unroll and
--- carry_over (geometry/shape.sql).
+-- Values derived from shapes that people draw on the lining, on the unrolled image or on the map strip. Needs roll, unroll
+-- and carry_over (geometry/shape.sql).
 
--- A point of the map strip (tunnel's SRID) in the unrolled plane (chainage, arc; SRID 0), from a chainage near it: the plane of
--- the axis through it is sought step by step, each of which leaves the arc's share of the radius of curvature. NULL where there
--- is no axis. The inverse of map_point.
+-- Unrolled coordinates (chainage, arc; SRID 0) of a point of the map strip (tunnel's SRID), from a near chainage: the plane
+-- of the axis through the point is found by iteration; each step reduces the error to the ratio of arc to radius of
+-- curvature. NULL where there is no axis. Inverse of map_point.
 CREATE OR REPLACE FUNCTION tunnel_internal.unmap_point(survey_id int, point geometry, near float8)
 RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
@@ -78,7 +78,7 @@ COMMENT ON FUNCTION tunnel_internal.unmap_strip(int, geometry) IS
 'Unrolled plane (chainage, arc; m; SRID 0) of a point, line or polygon of the map strip (tunnel''s SRID). Edges are split into pieces of 1 m. NULL if a vertex lies beyond the ends of the axis. Inverse of map_strip';
 
 
--- Clock position of a place on the lining, as detection has it: of the ray from the axis to it, above 0 up to 12.
+-- Clock position of a point on the lining, as in detection: of the ray from the axis to it, more than 0 to 12.
 CREATE OR REPLACE FUNCTION tunnel_internal.clock_at(survey_id int, chainage float8, arc float8)
 RETURNS float8
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
@@ -107,9 +107,9 @@ COMMENT ON FUNCTION tunnel_internal.clock_at(int, float8, float8) IS
 'Clock position (hours, more than 0 to 12; 12 is the crown, 3 is right looking up-chainage) of a point of the unrolled plane (m); NULL off the tunnel';
 
 
--- A polygon drawn is its own outline; a line has one as wide as it is, at least a centimetre, and a point one of 5 cm about it, so
--- that all can be found, drawn and exported as polygons. Area on the surface: that in the unrolled plane times the mean stretch
--- of the surface against it (slope, curve) at 16 places.
+-- A polygon is its own outline. A line has an outline of its width, at least 1 cm; a point one of 5 cm radius: so all can be
+-- found, drawn and exported as polygons. The area on the surface is the area in the unrolled plane times the mean stretch of
+-- the surface (slope, curve) at 16 places.
 CREATE OR REPLACE FUNCTION tunnel_internal.drawn_figures(
     survey_id int, drawn geometry, width float8,
     OUT km int, OUT chainage_from float8, OUT chainage_to float8, OUT arc_from float8, OUT arc_to float8, OUT clock float8,

@@ -1,7 +1,6 @@
--- Places as people in a tunnel speak of them: by the clock and by the ring. Short enough for the planner to put them in the
--- place of a call.
+-- Clock positions and ring numbers. Short enough for the planner to inline them.
 
--- Clock position (hours) as it is written: 12.5 and 0.5 are 12:30, 11.999 is 12:00.
+-- Clock position (hours) as text: 12.5 and 0.5 are 12:30, 11.999 is 12:00.
 CREATE OR REPLACE FUNCTION tunnel_api.clock_text(clock float8)
 RETURNS text
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
@@ -13,7 +12,7 @@ COMMENT ON FUNCTION tunnel_api.clock_text(float8) IS
 'Clock position (hours; 12 is the crown, 3 the right wall looking up-chainage) as text: 0.5 → 12:30';
 
 
--- Whether a clock position lies on the way round from one to another, ends included; all in hours.
+-- True if a clock position lies between two others, clockwise, ends included; all in hours.
 CREATE OR REPLACE FUNCTION tunnel_api.clock_between(clock float8, clock_from float8, clock_to float8)
 RETURNS boolean
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
@@ -24,8 +23,8 @@ COMMENT ON FUNCTION tunnel_api.clock_between(float8, float8, float8) IS
 'True if a clock position lies between two others (hours), clockwise, ends included: 10 to 2 passes the crown, 2 to 10 the floor';
 
 
--- Number of the ring that holds a chainage, of a lining of rings of one length, the first of which begins at
--- first_chainage; all in m. A joint belongs to the ring that begins there, also where its chainage was rounded.
+-- Number of the ring at a chainage, for rings of one length, the first of which begins at first_chainage; all in m. A joint
+-- belongs to the ring that begins there, also after rounding.
 CREATE OR REPLACE FUNCTION tunnel_api.ring_number(chainage float8, ring_length float8, first_chainage float8)
 RETURNS int
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE

@@ -1,7 +1,7 @@
--- Stage 4 of Gonçalves et al. (2012): two cross-sections a segment, from angular classes, as smooth curves.
+-- Stage 4 of Gonçalves et al. (2012): two cross-sections for each segment, from angular classes.
 
--- The planes of the sections of a kilometre, at 25 % and 75 % of each segment, within what was scanned: beyond its end a slab
--- would show the portal's face and what stands before it. Needs km_ends (geometry/survey_ends.sql).
+-- Planes of the sections of a kilometre, at 25 % and 75 % of each segment, within the scanned part: beyond its end a slab
+-- would contain the portal's face. Needs km_ends (geometry/survey_ends.sql).
 CREATE OR REPLACE FUNCTION tunnel_internal.section_plane(survey_id int, km int)
 RETURNS TABLE (segment int, half int2, chainage float8, frame float8[])
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
@@ -19,10 +19,9 @@ COMMENT ON FUNCTION tunnel_internal.section_plane(int, int) IS
 'Planes of the cross-sections of a kilometre, at 25 % and 75 % of each segment, within the scanned part: chainage (m) and frame (origin, tangent, right, up; 12 numbers). Source: Gonçalves et al. (2012), stage 4';
 
 
--- The points of a slab: those at most half_width (in chainage, m) from a plane, in the plane's own frame, right and up, and how
--- far from it they are in chainage, m. Where
--- sonar scans were loaded, those on the bed and on the submerged lining belong to it; what the laser has below 0.1 m above
--- the water there are images mirrored by it, or the water itself.
+-- Points of a slab: within half_width (in chainage, m) of a plane, in its frame (right, up), with their distance from it in
+-- chainage, m. If sonar scans were loaded, points on the bed and the submerged lining are included, and laser points below
+-- 0.1 m above the water are excluded: they are reflections, or the water itself.
 CREATE OR REPLACE FUNCTION tunnel_internal.section_slab(survey_id int, chainage float8, frame float8[], half_width float8)
 RETURNS TABLE (u float8, w float8, away float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
@@ -55,14 +54,13 @@ COMMENT ON FUNCTION tunnel_internal.section_slab(int, float8, float8[], float8) 
 
 -- Angular classes of the sections of a kilometre.
 --
--- The points at most half_width from a section's plane are taken in polar coordinates about the axis, angle 0 at the upward
--- direction and positive to the right, and grouped by classes of angle_step degrees, class 0 beginning at -180°. Each class
--- is described by a straight line through its points: radius is where the line meets the middle of the class, slope its
--- inclination there (outwards per metre to the right, in the class' own frame), so the class' width cuts no corner. Points
--- are kept within two standard deviations, taken robustly from the median distance to the line through the median
--- radius, parallel to that through the medians of the classes beside it; what the median leaves out can't shift it.
--- sigma: standard deviation of the points kept from the line, m; spread: variance of their position along it, m².
--- only: the sections wanted, as segment * 100 + half.
+-- Points within half_width of a section's plane, in polar coordinates about the axis (angle 0 upwards, positive right), are
+-- grouped into classes of angle_step degrees; class 0 begins at -180°. Each class is described by a straight line through its
+-- points: radius is its intersection with the middle of the class, slope its inclination there (outwards per metre to the
+-- right, in the frame of the class), so that wide classes cut no corner. Points within two standard deviations are kept; the
+-- standard deviation is estimated from the median distance to the line through the median radius, parallel to the line
+-- through the medians of the neighbouring classes. sigma: standard deviation of the kept points from the line, m; spread:
+-- variance of their position along it, m². only: requested sections, as segment * 100 + half.
 CREATE OR REPLACE FUNCTION tunnel_internal.section_classes(
     survey_id int, km int, half_width float8, angle_step float8, "only" int[])
 RETURNS TABLE (

@@ -1,4 +1,4 @@
--- Stage 4 of Gonçalves et al. (2012) for a whole kilometre: classes gathered, curves drawn, neighbours compared, rows written.
+-- Stage 4 of Gonçalves et al. (2012) for a kilometre: collect classes, compute curves, compare neighbours, write rows.
 
 -- The narrowest slab in which each section of a kilometre may have what section_gather asks for: half_width, twice that, or
 -- four times where nine classes of ten do not hold enough points even before any is left out. For who need not try the others.
@@ -37,7 +37,7 @@ COMMENT ON FUNCTION tunnel_internal.section_least_width(int, int, float8, float8
 'Narrowest slab of each section (segment * 100 + half) of a kilometre in which 90 % of the angular classes hold four times min_points points: half_width, or a width of at least four times that, m';
 
 
--- The angular classes of each section of a kilometre, as arrays over the classes (NULL for an empty one).
+-- Angular classes of each section of a kilometre, as arrays over the classes (NULL for an empty one).
 --
 -- The slab of a section begins at half_width to both sides of its plane and doubles, up to four times that, until nine classes
 -- of ten hold four times min_points points: enough for their median to tell the wall from the cables and brackets before it,
@@ -99,8 +99,8 @@ COMMENT ON FUNCTION tunnel_internal.section_gather(int, int, float8, float8, flo
 'Angular classes of each section of a kilometre as arrays. The slab (width: half its length, m) is widened until 90 % of the classes hold four times min_points points, or min_points points from four times half_width on. Classes with that many points are used';
 
 
--- Whether a section has a roof: at least a third of the classes within 45° of the upward direction are filled (radius: over the
--- classes, NULL for an empty one). A portal or an open cut has none, and no lining.
+-- True if a section has a roof: at least a third of the classes within 45° of upwards are filled (radius: of the classes,
+-- NULL for an empty one). Portals and open cuts have no roof and no lining.
 CREATE OR REPLACE FUNCTION tunnel_internal.section_roofed(angle_step float8, radius float8[])
 RETURNS boolean
 LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
@@ -113,7 +113,7 @@ COMMENT ON FUNCTION tunnel_internal.section_roofed(float8, float8[]) IS
 'True if at least a third of the angular classes within 45° of upwards are filled; without a roof there is no lining. radius: of the classes from -180°, NULL for an empty class';
 
 
--- Where a kilometre has a floor and no roof, so no section: the chainage that each such plane stands for, m.
+-- Parts of a kilometre with a floor and no roof, and therefore without sections: chainage that each such plane represents, m.
 CREATE OR REPLACE FUNCTION tunnel_internal.section_open(
     survey_id int, km int, angle_step float8, max_half_width float8, min_points int)
 RETURNS TABLE (chainage_from float8, chainage_to float8)
@@ -147,15 +147,12 @@ COMMENT ON FUNCTION tunnel_internal.section_open(int, int, float8, float8, int) 
 'Parts of a kilometre with a floor but no roof (portals, open cuts), which have no sections: chainage from and to of each plane, m';
 
 
--- The curves of the sections of a kilometre.
---
--- A section without a roof is left out: there is no lining.
--- Each section is compared with the two before and the two after it (at the ends of the kilometre, with the nearest four),
--- class by class. A class that stands in from their median
--- by more than protrusion, and by more than the lining differs there from section to section, holds something hung on the
--- wall that the section by itself did not tell from it: it is rejected, and the curve drawn again. Where more than a quarter
--- of the classes stand in, it is the tunnel that is narrower, and nothing is rejected. Below the water nothing is, either: what
--- stands there before the wall or on the bed was left out by the class of its points, and a bed has its own shape anywhere.
+-- Curves of the sections of a kilometre. Sections without a roof are left out. Each section is compared with the two before
+-- and the two after it (at the ends of the kilometre, with the nearest four), class by class. A class that protrudes from
+-- their median by more than protrusion, and by more than the usual difference between sections there, contains a fixture that
+-- the section alone did not separate from the wall: it is rejected, and the curve is computed again. If more than a quarter
+-- of the classes protrude, the tunnel is narrower there, and nothing is rejected. Below the water nothing is rejected:
+-- objects there were removed by the class of their points, and the bed varies freely.
 CREATE OR REPLACE FUNCTION tunnel_internal.section_curves(
     survey_id int, km int, angle_step float8, half_width float8, max_half_width float8, min_points int, protrusion float8)
 RETURNS TABLE (
@@ -227,7 +224,8 @@ COMMENT ON FUNCTION tunnel_internal.section_curves(int, int, float8, float8, flo
 'Curves of the sections of a kilometre, each checked against its neighbours: radius and arc (m) at each degree from -180° to 180°; radius and state of each angular class';
 
 
--- Writes the sections of a kilometre to tunnel.section and tunnel.section_class, replacing those there; returns how many.
+-- Write the sections of a kilometre to tunnel.section and tunnel.section_class, replacing existing ones, and return their
+-- number.
 CREATE OR REPLACE FUNCTION tunnel_internal.section_build(
     survey_id int, km int,
     angle_step float8 DEFAULT 5.0, half_width float8 DEFAULT 0.15, max_half_width float8 DEFAULT 2.5, min_points int DEFAULT 5,

@@ -1,4 +1,4 @@
--- The curve of a cross-section through its angular classes.
+-- Curve of a cross-section through its angular classes.
 
 -- Radius between two classes, by the cubic through both with their slopes: s from 0 to 1 is the share of the way, slopes are
 -- in m over the whole way.

@@ -46,11 +46,9 @@ COMMENT ON FUNCTION tunnel_internal.segment_frame(float8[], float8) IS
 'Plane at the fraction f (0-1) of a segment: origin, tangent, right and up (12 numbers), tunnel''s SRID, m. segment: vertex_from, vertex_to, tangent_from, tangent_to';
 
 
--- The segments of a kilometre as they follow from the axis vertices, without writing them.
---
--- Chainage is measured in plan along the axis found, arc by arc, from the start of the kilometre; where the axis goes on
--- beyond its end, the kilometre is closed on the given axis' whole kilometre, so that no kilometre depends on another one.
--- line: vertex_from, vertex_to, tangent_from, tangent_to.
+-- Segments of a kilometre computed from the axis vertices. Chainage is measured in plan along the measured axis, arc by arc,
+-- from the start of the kilometre. If the axis continues beyond its end, the kilometre is closed at the given axis' full
+-- kilometre, so that kilometres are independent. line: vertex_from, vertex_to, tangent_from, tangent_to.
 CREATE OR REPLACE FUNCTION tunnel_internal.segment_plan(survey_id int, km int)
 RETURNS TABLE (n int, chainage_from float8, chainage_to float8, line float8[])
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
@@ -93,10 +91,10 @@ COMMENT ON FUNCTION tunnel_internal.segment_plan(int, int) IS
 'Segments of a kilometre computed from the axis vertices: number, chainage of both planes (m, in plan), vertex_from, vertex_to, tangent_from, tangent_to (12 numbers, tunnel''s SRID). Source: Gonçalves et al. (2012), stage 3';
 
 
--- Whether the planes of a segment are not those of the axis any more: a vertex at one of its ends has moved by more than 0.1 mm
--- since it was made, or a plane has turned because of the vertex beyond, by as much there. A plane at the axis' end has no
--- vertex beyond: it turns with the vertices of the other plane.
--- What the neighbouring segments were made of says nothing: they may be of another kilometre, and made anew since.
+-- True if the planes of a segment differ from the present axis: a vertex at one of its ends moved by more than 0.1 mm since
+-- the segment was made, or a plane turned by as much there because the vertex beyond moved. A plane at the end of the axis
+-- turns with the vertices of the other plane. The neighbouring segments are not used: they can belong to another kilometre
+-- and be newer.
 CREATE OR REPLACE FUNCTION tunnel_internal.segment_moved(survey_id int, n int, segment float8[])
 RETURNS boolean
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER
@@ -122,7 +120,7 @@ COMMENT ON FUNCTION tunnel_internal.segment_moved(int, int, float8[]) IS
 'True if the planes of a segment differ from those of the present axis. n: number of the segment; segment: vertex_from, vertex_to, tangent_from, tangent_to, 3 numbers each';
 
 
--- Writes the segments of a kilometre to tunnel.segment, replacing those there; returns how many.
+-- Write the segments of a kilometre to tunnel.segment, replacing existing ones, and return their number.
 CREATE OR REPLACE FUNCTION tunnel_internal.segment_build(survey_id int, km int)
 RETURNS int
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
@@ -149,14 +147,11 @@ COMMENT ON FUNCTION tunnel_internal.segment_build(int, int) IS
 'Stage segments for one kilometre: rewrite tunnel.segment from the axis vertices, and return the number of segments. Source: Gonçalves et al. (2012), stage 3';
 
 
--- Segment and chainage of every point of a kilometre: the partition is rewritten with both and swapped in. Rows keep their
--- order, that of the chainage known so far, which is nearly that of the new one: near enough for a BRIN index, and not sorting
--- them spares a fifth.
---
--- A point's fraction of the way through a segment is its distance from the first plane over the sum of its distances from
--- both, so it is 0 and 1 on the planes. The segment is first looked up by the chainage known so far; a point that lies before
--- its first plane or beyond its second one belongs to the segment beside. Points before the first or after the last plane of
--- the tunnel keep their chainage and have no segment.
+-- Segment and chainage of every point of a kilometre: the partition is rewritten with both and swapped in. Rows keep the
+-- order of the previous chainage, which is close enough for a BRIN index; not sorting saves a fifth of the time. The fraction
+-- of a point in a segment is its distance from the first plane over the sum of its distances from both planes. The segment is
+-- first found by the previous chainage; a point before its first plane or beyond its second one belongs to the neighbour.
+-- Points before the first or after the last plane of the tunnel keep their chainage and have no segment.
 CREATE OR REPLACE FUNCTION tunnel_internal.segment_tag(survey_id int, km int)
 RETURNS bigint
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT

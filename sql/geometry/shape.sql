@@ -1,6 +1,6 @@
--- Lines and polygons between space, the unrolled plane and the map: vertex by vertex, edges cut to short pieces first.
+-- Lines and polygons between space, the unrolled plane and the map, transformed vertex by vertex after splitting long edges.
 
--- The id of a survey, by its name.
+-- Key of a survey, by its name.
 CREATE OR REPLACE FUNCTION tunnel_api.survey_id(survey text)
 RETURNS int
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
@@ -19,9 +19,9 @@ $$;
 COMMENT ON FUNCTION tunnel_api.survey_id(text) IS 'Key of a survey, by its name. Raises an error if there is none';
 
 
--- A point, line or polygon with each vertex carried over: 'roll' (unrolled plane to surface), 'map' (unrolled plane to map
--- strip) or 'unroll' (space to unrolled plane). Edges are cut to pieces of at most step metres first, so that they follow
--- the surface. NULL if any vertex lies off the tunnel.
+-- Transform each vertex of a point, line or polygon: 'roll' (unrolled plane to surface), 'map' (unrolled plane to map strip)
+-- or 'unroll' (space to unrolled plane). Edges are split into pieces of at most step metres first, so that they follow the
+-- surface. NULL if a vertex lies off the tunnel.
 CREATE OR REPLACE FUNCTION tunnel_internal.carry_over(survey_id int, shape geometry, way text, step float8)
 RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT

@@ -1,10 +1,10 @@
--- Stationing: what places along a tunnel are called. All is stored and reckoned in chainage, which is distance; stations
--- are for showing and asking. They jump where a tunnel was measured anew, and may run against the chainage: each row of
--- tunnel.station_equation begins a piece in which the station is station + direction × (chainage - its chainage). The first
--- piece holds before its row, too. A tunnel without rows has its chainage for station. Needs chainage_label and
--- chainage_parse (geometry/chainage.sql).
+-- Stationing. All positions are stored and computed as chainage, i.e. distance; stations are for display and queries.
+-- Stations jump where a tunnel was measured again, and can decrease with chainage. Each row of tunnel.station_equation begins
+-- a piece with station = station of the row + direction × (chainage − chainage of the row). The first piece also applies
+-- before its row. In a tunnel without rows, station equals chainage. Needs chainage_label and chainage_parse
+-- (geometry/chainage.sql).
 
--- The id of a tunnel, by its name.
+-- Key of a tunnel, by its name.
 CREATE OR REPLACE FUNCTION tunnel_api.tunnel_id(tunnel text)
 RETURNS int
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
@@ -23,7 +23,7 @@ $$;
 COMMENT ON FUNCTION tunnel_api.tunnel_id(text) IS 'Key of a tunnel, by its name. Raises an error if there is none';
 
 
--- Also what `stationing` reads: a view, for it runs with the rights of who calls it. What is not asked for is not reckoned.
+-- Read by `stationing` as well: a view, because `stationing` runs with the caller's rights. Unused columns are not computed.
 CREATE OR REPLACE VIEW tunnel_api.station_equation AS
 SELECT e.tunnel_id::bigint * 10000000000 + 5000000000 + round(e.chainage * 1000)::bigint AS id, e.tunnel_id,
        (SELECT t.name FROM tunnel.tunnel t WHERE t.id = e.tunnel_id) AS tunnel, e.chainage,
@@ -75,7 +75,7 @@ COMMENT ON FUNCTION tunnel_api.station(int, float8) IS
 'Station (m) at a chainage (m) of a tunnel; at a station equation, the station ahead';
 
 
--- The same as it is written.
+-- The same as text.
 CREATE OR REPLACE FUNCTION tunnel_api.station_label(tunnel_id int, chainage float8)
 RETURNS text
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
@@ -86,7 +86,7 @@ COMMENT ON FUNCTION tunnel_api.station_label(int, float8) IS
 'Station at a chainage (m) of a tunnel, as 12+345.678';
 
 
--- The pieces of a tunnel's stationing between its ends, in growing chainage (m); one if it has no equations.
+-- Pieces of a tunnel's stationing between its ends, by increasing chainage (m); one piece without equations.
 CREATE OR REPLACE FUNCTION tunnel_api.station_pieces(tunnel_id int)
 RETURNS TABLE (n int, chainage_from float8, chainage_to float8, station_from float8, station_to float8, direction int,
                label_from text, label_to text)
@@ -118,10 +118,9 @@ COMMENT ON FUNCTION tunnel_api.station_pieces(int) IS
 'Pieces of a tunnel''s stationing: chainages and stations (m) of their ends; direction is -1 where stations decrease';
 
 
--- Chainages (m) of the places of a tunnel that have a station, given as 12+345.678 or in metres: none, one, or several
--- where stations overlap. At an equation both the station back and the one ahead are the place's. Half a millimetre is
--- allowed for, to which labels are rounded, and at the tunnel's ends the spacing of its vertices, for the axis as measured
--- may be longer than the one given.
+-- Chainages (m) of a tunnel that have a station, given as 12+345.678 or in metres: none, one, or several where stations
+-- overlap. At an equation both the station back and the station ahead apply. Tolerances: 0.5 mm, to which labels are rounded,
+-- and the vertex spacing at the tunnel's ends, because the measured axis can be longer than the given one.
 CREATE OR REPLACE FUNCTION tunnel_api.station_chainages(tunnel_id int, station text)
 RETURNS SETOF float8
 LANGUAGE sql STABLE PARALLEL SAFE STRICT

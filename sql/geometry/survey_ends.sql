@@ -1,8 +1,8 @@
--- Where a survey begins and ends: at its first and last point, within its segments. Segments end at vertices, up to a spacing
--- beyond the points, and lining out there is nothing that a survey should have seen. Files know where they reach along the
--- given axis, on which segment n goes from n to n + 1 times the spacing; that is carried over to the axis found. A kilometre
--- without segments of a survey that has some, whose axis failed, say, goes as far as its points along the given axis: it is a
--- part of what was scanned, and must not be missing where that is stated.
+-- Ends of a survey: its first and last point, within its segments. Segments end at vertices, up to one spacing beyond the
+-- points; lining out there does not count as missing. Files state their range along the given axis, where segment n extends
+-- from n to n + 1 times the spacing; the fraction is applied to the measured axis. A kilometre without segments, in a survey
+-- that has some, extends as far as its points along the given axis: it was scanned, and must appear where results are
+-- missing.
 CREATE OR REPLACE VIEW tunnel_internal.km_ends AS
 SELECT k.survey_id::bigint * 1000000 + 500000 + k.km AS id, k.survey_id, k.km, k.chainage_from, k.chainage_to
   FROM (

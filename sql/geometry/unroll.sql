@@ -1,7 +1,8 @@
--- Stage 5 of Gonçalves et al. (2012): between space and the unrolled plane. The same steps as tunneldb/geometry/unrolling.py.
+-- Stage 5 of Gonçalves et al. (2012): transformation between space and the unrolled plane. The same steps as
+-- tunneldb/geometry/unrolling.py.
 
--- Sections before and after a chainage, blended: node radii and arcs (361 each), m. NULL where no section is near.
--- Two sections bound a stretch when at most one vertex spacing apart; beyond the last one it goes on for half of that.
+-- Section at a chainage, interpolated between its neighbours: radius and arc at 361 nodes, m. NULL if no section is near. Two
+-- sections are neighbours if at most one vertex spacing apart; the last one extends for half of that.
 CREATE OR REPLACE FUNCTION tunnel_api.section_at(survey_id int, chainage float8, OUT radius float8[], OUT arc float8[])
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 SECURITY DEFINER SET search_path = pg_catalog, pg_temp
@@ -36,7 +37,7 @@ COMMENT ON FUNCTION tunnel_api.section_at(int, float8) IS
 'Section at a chainage, interpolated between its neighbours: radius and arc (m) at each degree from -180° to 180°; NULL if no section is near';
 
 
--- Node of a section (taken round the circle) and the unit direction of the section there, towards growing angle: u, w, du, dw.
+-- Node of a section (modulo 360) and the unit direction of the section there, towards increasing angle: u, w, du, dw.
 CREATE OR REPLACE FUNCTION tunnel_internal.section_node(radius float8[], k int)
 RETURNS float8[]
 LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE STRICT
@@ -56,11 +57,10 @@ COMMENT ON FUNCTION tunnel_internal.section_node(float8[], int) IS
 'Node k (0-359, at -180° + k) of a section, right and up of the axis (m), and the unit direction of the section there';
 
 
--- Chainage, arc and offset of a point of a survey's tunnel; NULL where it lies off the tunnel.
---
--- chainage: m in plan along the axis; arc: m along the section from the crown, positive right looking up-chainage;
--- offset: m from the section's surface, positive into the tunnel. The point must have the tunnel's SRID (or none).
--- A point beyond the ends, or more than 3 m outside the surface, is off the tunnel.
+-- Chainage, arc and offset of a point of a survey's tunnel; NULL off the tunnel. chainage: m in plan along the axis; arc: m
+-- along the section from the crown, positive right looking up-chainage; offset: m from the section's surface, positive into
+-- the tunnel. The point must be 3D, in the tunnel's SRID (or without one). Points beyond the ends, or more than 3 m outside
+-- the surface, are off the tunnel.
 CREATE OR REPLACE FUNCTION tunnel_api.unroll(
     survey_id int, point geometry, OUT chainage float8, OUT arc float8, OUT "offset" float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
@@ -183,7 +183,7 @@ COMMENT ON FUNCTION tunnel_api.unroll(int, geometry) IS
 'Chainage (m in plan along the axis), arc (m along the section from the crown, positive right looking up-chainage) and offset (m from the surface, positive into the tunnel) of a 3D point in the tunnel''s SRID; NULL off the tunnel. After Gonçalves et al. (2012), stage 5';
 
 
--- The point at chainage, arc and offset, in the tunnel's SRID; NULL where they lie off the tunnel. The inverse of unroll.
+-- Point at chainage, arc and offset, in the tunnel's SRID; NULL off the tunnel. Inverse of unroll.
 CREATE OR REPLACE FUNCTION tunnel_api.roll(survey_id int, chainage float8, arc float8, "offset" float8 DEFAULT 0)
 RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
@@ -239,8 +239,8 @@ COMMENT ON FUNCTION tunnel_api.roll(int, float8, float8, float8) IS
 'Point at chainage, arc and offset, m: 3D, tunnel''s SRID; NULL off the tunnel. Inverse of unroll';
 
 
--- A point of the unrolled plane laid on the map beside the axis, in the tunnel's SRID (Gonçalves et al., 2012, eq. 1):
--- from the axis at its chainage by its arc, horizontally to the right. NULL where there is no axis.
+-- Point of the unrolled plane on the map beside the axis, in the tunnel's SRID (Gonçalves et al., 2012, eq. 1): at its
+-- chainage, arc metres to the right of the axis. NULL where there is no axis.
 CREATE OR REPLACE FUNCTION tunnel_internal.map_point(survey_id int, chainage float8, arc float8)
 RETURNS geometry
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT

@@ -1,4 +1,4 @@
--- How much of the lining was seen, from what detection notes of each kilometre by steps of chainage (tunnel.coverage).
+-- Inspected part of the lining, from the counts of detection by steps of chainage (tunnel.coverage).
 
 -- What is known of each kilometre, and what was summed up before it. Over kilometres without detection the sums stay as they
 -- are. Read by coverage_at below and stretch_statistics (leaks/statistics.sql).
@@ -100,9 +100,8 @@ COMMENT ON FUNCTION tunnel_api.coverage(text, float8, float8) IS
 'Lining of a survey between two chainages (m) that was searched for leaks, its inspected part, and its wet pixels after the median filter (m²). seen_share: inspected share of the lining of the whole stretch; kilometres without detection count as not inspected, as in leak_statistics. wet_pixel_share: share of wet pixels in the inspected lining (Xu et al., 2018). Steps of chainage that are cut count in proportion';
 
 
--- Of an area on the lining (m²) whose outline lies in the unrolled plane, the part between two chainages (m). The planner puts
--- the body in the place of a call; one that is not cut is not clipped. Callers ask with what of a stretch lies in a survey: of none,
--- which runs backwards then, there is no part.
+-- Part of an area on the lining (m²) between two chainages (m), by its outline in the unrolled plane. The planner inlines the
+-- body; outlines that are not cut are not clipped. For an empty or reversed stretch the part is 0.
 CREATE OR REPLACE FUNCTION tunnel_internal.area_between(outline geometry, area float8, chainage_from float8, chainage_to float8)
 RETURNS float8
 LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT

@@ -1,10 +1,10 @@
--- Where a survey cannot vouch for its list of leaks: what was not loaded, not searched, searched in vain or before something
--- changed, and lining that was hardly seen. Every document that states leaks asks here. Needs stage_state (stages/status.sql),
--- coverage_at and km_ends (leaks/coverage.sql).
+-- Stretches where leaks could be missed: not loaded, not searched, failed, searched before something changed, or with little
+-- inspected lining. Every document that lists leaks reads this. Needs stage_state (stages/status.sql), coverage_at and
+-- km_ends (leaks/coverage.sql).
 
--- A kilometre was searched when detection noted what it saw of the lining there (tunnel.coverage). That of a kilometre which was
--- not, begins and ends with its segments, or else with the points of its files along the given axis: the two differ by
--- centimetres, and what is shorter than a metre is left out for that. Lining is looked at by bins of a metre.
+-- A kilometre was searched if detection wrote the inspected lining (tunnel.coverage). A kilometre that was not searched
+-- begins and ends with its segments, or else with the points of its files along the given axis; the two differ by
+-- centimetres, so gaps shorter than 1 m are ignored. Lining is examined in bins of 1 m.
 CREATE OR REPLACE FUNCTION tunnel_internal.coverage_gaps_of(survey_id int, starts float8[], ends float8[])
 RETURNS TABLE (
     n int, chainage_from float8, chainage_to float8, state text, reason text, searched boolean, seen_share float8)
@@ -170,7 +170,7 @@ COMMENT ON FUNCTION tunnel_internal.coverage_gaps_of(int, float8[], float8[]) IS
 'Result of coverage_gaps for several stretches of a survey, given by their beginnings and ends (m). n: number of the stretch, from 1';
 
 
--- The planner puts the body in the place of a call.
+-- The planner inlines the body.
 CREATE OR REPLACE FUNCTION tunnel_api.coverage_gaps(
     survey_id int, stretch_from float8 DEFAULT '-Infinity', stretch_to float8 DEFAULT 'Infinity')
 RETURNS TABLE (chainage_from float8, chainage_to float8, state text, reason text, searched boolean, seen_share float8)
@@ -228,7 +228,7 @@ COMMENT ON FUNCTION tunnel_api.coverage_statement(int, float8, float8) IS
 'Result of coverage_gaps for a stretch of a survey (m) in words, at most six stretches of each kind; NULL if there are no gaps. Every document states it before it counts leaks';
 
 
--- Numbered by name, too, so that a condition on it leaves the other surveys out.
+-- Numbered by name as well, so that a condition on the name excludes the other surveys.
 CREATE OR REPLACE VIEW tunnel_api.coverage_gap AS
 SELECT s.id::bigint * 1000000 + row_number() OVER (PARTITION BY s.id, s.name) AS id, s.id AS survey_id, s.name AS survey,
        g.chainage_from, g.chainage_to, tunnel_api.station_label(s.tunnel_id, g.chainage_from) AS label_from,

@@ -1,8 +1,8 @@
--- What the unrolled images hold at a place. They are kept as GeoTIFF, in blocks of 50 m (tunnel.image), which the extension
--- postgis_raster reads; what else there is of a database does without it.
+-- Values of the unrolled images. They are stored as GeoTIFF, in blocks of 50 m (tunnel.image), and read with the extension
+-- postgis_raster; nothing else needs it.
 
--- A block is decoded once, for all places in it. The scale of its whole numbers is taken from where GDAL has written it, for
--- PostGIS ignores it. Which formats GDAL may read is a superuser's to set: where the owner is none, it has to be set for the database.
+-- A block is decoded once for all places in it. The scale of its integers is read from GDAL's metadata, which PostGIS
+-- ignores. A superuser sets which formats GDAL may read; if the owner is not one, it must be set for the database.
 CREATE OR REPLACE FUNCTION tunnel_api.image_values(survey_id int, kind text, chainage float8[], arc float8[])
 RETURNS TABLE (n int, value float8)
 LANGUAGE plpgsql STABLE STRICT PARALLEL UNSAFE
@@ -88,8 +88,8 @@ COMMENT ON FUNCTION tunnel_api.image_value(int, text, float8, float8) IS
 'Value of an unrolled image (raw, corrected, offset, state, deviation_lining, …) at one place (chainage, arc; m). Each call reads a block of 50 m: for many places use image_values';
 
 
--- Images lie in a partition for each survey. A plan for all surveys would open them all, each time: this one is made for the survey
--- that is asked for.
+-- Images are partitioned by survey. A generic plan would open the partitions of all surveys: this function plans for the
+-- given one.
 CREATE OR REPLACE FUNCTION tunnel_internal.image_kilometres(survey_id int, kind text) RETURNS SETOF int
 LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 25
 SET search_path = pg_catalog, pg_temp

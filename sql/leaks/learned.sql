@@ -1,8 +1,8 @@
--- What the model of evidence learned from the reviews of a tunnel: applied and taken back by operators, noted in the audit of each
--- survey of the tunnel. The last that was not taken back is in force; stage detect goes by it (stages/status.sql: stale).
--- Needs note_edit (access/audit.sql).
+-- Model of evidence adapted to the reviews of a tunnel: applied and undone by operators, with entries in the audit of each
+-- survey of the tunnel. The last one that was not undone is in force; stage detect uses it (stages/status.sql: stale). Needs
+-- note_edit (access/audit.sql).
 
--- Number of what is in force for a tunnel; NULL where nothing was learned.
+-- Number of the model in force for a tunnel; NULL if there is none.
 CREATE OR REPLACE FUNCTION tunnel_internal.learned_in_force(tunnel_id integer) RETURNS integer
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT max(m.id) FROM tunnel.learned_model m WHERE m.tunnel_id = $1 AND m.undone_at IS NULL
@@ -19,7 +19,7 @@ COMMENT ON VIEW tunnel_api.learned_model IS 'Models of evidence that were adapte
 COMMENT ON COLUMN tunnel_api.learned_model.in_force IS
     'True if stage detect uses the model: the last of its tunnel that was not undone';
 
--- Notes an edit of what was learned in the audit of each survey of a tunnel.
+-- Write an entry to the audit of each survey of a tunnel.
 CREATE OR REPLACE FUNCTION tunnel_internal.note_learned(tunnel_id integer, id integer, before jsonb, after jsonb) RETURNS void
 LANGUAGE sql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp AS $$
     SELECT tunnel_internal.note_edit(s.name, 'learned_model', $2, $3, $4) FROM tunnel.survey s WHERE s.tunnel_id = $1 ORDER BY s.id
@@ -27,7 +27,7 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.note_learned(integer, integer, jsonb, jsonb) IS
     'Write an entry of the audit for each survey of a tunnel whose model of evidence was adapted or reset. Only other functions call it';
 
--- Puts in force what was learned; returns its number.
+-- Put an adapted model in force and return its number.
 CREATE OR REPLACE FUNCTION tunnel_internal.learned_apply(tunnel_id integer, base text, way text, parameters jsonb, surveys text[],
                                                     reviews jsonb, loss_base double precision, loss double precision, note text)
 RETURNS integer
@@ -46,7 +46,7 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.learned_apply(integer, text, text, jsonb, text[], jsonb, double precision, double precision, text) IS
     'Put an adapted model of evidence in force for a tunnel, write it to the audit, and return its number';
 
--- Takes back what is in force; what was in force before it is again. Returns its number; NULL when nothing was in force.
+-- Undo the model in force; the one before is in force again. Returns its number; NULL if none was in force.
 CREATE OR REPLACE FUNCTION tunnel_internal.learned_undo(tunnel_id integer) RETURNS integer
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE

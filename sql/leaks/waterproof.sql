@@ -47,9 +47,9 @@ COMMENT ON COLUMN tunnel_api.km_waterproof.window_wet_area IS 'Largest wet area 
 COMMENT ON COLUMN tunnel_api.km_waterproof.class IS
     'Best class that the inspected lining meets; NULL if nothing was inspected';
 
--- Works out a kilometre anew and keeps it, in place of what was noted and kept. What goes wrong is said, but is no reason to
--- refuse the change that brought it about. One that has no segments, or whose segments reach beyond the kilometre's ends (leaks
--- out there are noted elsewhere), is not kept: a row of no stretch stands for it (NaN is nobody's end), in place of its notes.
+-- Compute the statistics of a kilometre and store them, replacing its marks and old values. An error is reported as a warning
+-- and does not prevent the change that caused the call. A kilometre without segments, or whose segments extend beyond its
+-- ends (leaks out there are marked elsewhere), is not stored: a row with NaN ends replaces its marks.
 CREATE OR REPLACE FUNCTION tunnel_internal.keep_waterproof(survey_id int, km int) RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
@@ -87,8 +87,9 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.keep_waterproof(int, int) IS
 'Store the statistics of a kilometre so that the view km_waterproof is fast; the view is correct without it. Called at the end of each transaction that changes leaks or coverage, and by tunneldb init';
 
--- At the end of a transaction, once a kilometre: the first call takes the notes of the others away. Under a stricter isolation
--- than read committed it would make transactions fail that only look at each other's kilometres, so there nothing is kept.
+-- At the end of a transaction, once for each kilometre: the first call removes the marks of the others. Under an isolation
+-- level stricter than read committed this would make transactions fail that only read each other's kilometres, so nothing is
+-- stored there.
 CREATE OR REPLACE FUNCTION tunnel_internal.keep_at_commit() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
@@ -107,8 +108,8 @@ DROP TRIGGER IF EXISTS keep ON tunnel.waterproof;
 CREATE CONSTRAINT TRIGGER keep AFTER INSERT ON tunnel.waterproof DEFERRABLE INITIALLY DEFERRED
     FOR EACH ROW WHEN (NEW.chainage_from IS NULL) EXECUTE FUNCTION tunnel_internal.keep_at_commit();
 
--- Kilometres of a survey of which nothing is kept that holds: tunneldb init works them out, each in a transaction of its own.
--- What is not to be kept (NaN) stays so until something changes there.
+-- Kilometres of a survey without valid stored statistics: tunneldb init computes them, each in a transaction of its own.
+-- Kilometres that are never stored (NaN) are left out until something changes.
 CREATE OR REPLACE FUNCTION tunnel_internal.waterproof_unkept(survey_id int) RETURNS SETOF int
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 25 SET search_path = pg_catalog, pg_temp
 AS $$

@@ -1,5 +1,5 @@
--- Change between two surveys of a tunnel: of the lining by section and region, and of its leaks; how up to date it is; series over
--- any number of surveys. Needs stationing (geometry/stationing.sql), survey_id and stage_state (stages/status.sql).
+-- Change between two surveys of a tunnel: of the lining, by section and region, and of leaks; series over several surveys.
+-- Needs stationing (geometry/stationing.sql), survey_id and stage_state (stages/status.sql).
 
 CREATE OR REPLACE VIEW tunnel_api.change_section AS
 SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_survey, c.km, c.chainage_from, c.chainage_to,

@@ -1,5 +1,5 @@
--- Outlines about tracks, and how near to them what stands in a tunnel is. Needs stationing (geometry/stationing.sql), survey_id and
--- stage_state (stages/status.sql).
+-- Clearance: gauges around tracks, and the distance of objects in the tunnel from them. Needs stationing
+-- (geometry/stationing.sql), survey_id and stage_state (stages/status.sql).
 
 CREATE OR REPLACE FUNCTION tunnel_internal.class_name(class int) RETURNS text
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE

@@ -1,6 +1,6 @@
--- Clearance to be drawn: margins along the track on the map and beside the unrolled lining, infringements in space and on the
--- lining. Needs clearance_section and clearance_infringement (measures/clearance.sql), whose columns'
--- comments these views take over (views/comment.sql).
+-- Layers of clearance: margins along the track on the map and below the unrolled lining, infringements in space and on the
+-- lining. Needs clearance_section and clearance_infringement (measures/clearance.sql), whose comments these views take over
+-- (views/comment.sql).
 
 -- A metre of the track lies beside the chord of the given axis that holds its middle.
 CREATE OR REPLACE VIEW tunnel_api.clearance_map AS

@@ -1,4 +1,4 @@
--- Design profiles, and how far the linings of surveys deviate from them: by section, by stretch, between surveys. Needs stationing
+-- Design profiles, and deviation of the linings of surveys from them, by section and stretch. Needs stationing
 -- (geometry/stationing.sql), survey_id, survey_ends and stage_state (stages/status.sql).
 
 CREATE OR REPLACE VIEW tunnel_api.design_profile AS
@@ -136,7 +136,7 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.deviation_places(int, text) IS
     'Kilometres with an offset image, and each layer with a profile or sections in them';
 
--- Steps that an end of the stretch cuts count by their share.
+-- Steps that an end of the stretch cuts count in proportion.
 CREATE OR REPLACE FUNCTION tunnel_api.deviation_volume(
     survey text, layer text, chainage_from float8, chainage_to float8, axis_sigma float8 DEFAULT 0,
     OUT length float8, OUT design_area float8, OUT seen_area float8, OUT seen_share float8, OUT overbreak float8,

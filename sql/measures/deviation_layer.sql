@@ -1,7 +1,7 @@
--- Over- and underbreak as QGIS draws them: bars beside the unrolled lining, and the axis coloured on the map. Needs stationing
+-- Layers of overbreak and underbreak: bars beside the unrolled lining, and the axis on the map. Needs stationing
 -- (geometry/stationing.sql).
 
--- The bars stand beyond the median of the kilometre's sections: those that open at a portal must not push them away.
+-- The bars begin at the median width of the kilometre's sections, so that sections at a portal do not move them.
 CREATE OR REPLACE VIEW tunnel_api.deviation_bar AS
 SELECT d.id * 2 + b.side AS id, d.survey_id, s.name AS survey, d.km, d.layer, d.profile, d.chainage_from, d.chainage_to,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (d.chainage_from + d.chainage_to) / 2) l) AS label,

@@ -1,5 +1,5 @@
--- How even the linings of surveys are. Needs deviation_state (measures/deviation.sql), station_label (geometry/stationing.sql),
--- survey_id and map_strip (geometry/shape.sql).
+-- Evenness of linings. Needs deviation (measures/deviation.sql), station_label (geometry/stationing.sql), survey_id and
+-- map_strip (geometry/shape.sql).
 
 CREATE OR REPLACE VIEW tunnel_api.evenness_section AS
 SELECT d.id, d.survey_id, s.name AS survey, d.km, d.layer, d.straightedge, d.gap_limit, d.chainage_from, d.chainage_to,

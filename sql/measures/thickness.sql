@@ -1,4 +1,4 @@
--- What lies between the linings of two surveys that were held against one layer's profiles. Needs deviation_state
+-- Layer thickness between the linings of two surveys that were compared with the same profiles. Needs deviation
 -- (measures/deviation.sql), station_label (geometry/stationing.sql) and survey_id (geometry/shape.sql).
 
 CREATE OR REPLACE VIEW tunnel_api.thickness_section AS

@@ -1,9 +1,8 @@
--- Stage ground: the class of each point. The models themselves are made outside the database (tunneldb.classification).
+-- Stage ground: write the class of each point. The models are computed outside the database (tunneldb.classification).
 
--- Gives the points of a kilometre their classes: the partition is rewritten, its rows in the order that they have, and swapped
--- in. An UPDATE of as many rows takes four times as long and leaves the old ones behind.
---
--- classes: one byte a row, in the order in which a scan of the partition by itself comes upon them.
+-- Write the classes of the points of a kilometre: the partition is rewritten in the order of its rows and swapped in. An
+-- UPDATE takes four times as long and leaves dead rows. classes: one byte for each row, in the order of a sequential scan of
+-- the partition.
 CREATE OR REPLACE FUNCTION tunnel_internal.class_write(survey_id int, km int, classes bytea)
 RETURNS bigint
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT

@@ -1,4 +1,5 @@
--- Partitions of tunnel.point: one per survey and kilometre, built aside and swapped in whole; and what waits to go into them.
+-- Partitions of tunnel.point: one for each survey and kilometre, built beside the old one and swapped in; and tables of
+-- points that wait to be loaded.
 
 -- Name of the partition that holds a survey's kilometre.
 CREATE OR REPLACE FUNCTION tunnel_internal.partition_name(survey_id int, km int)
@@ -9,8 +10,8 @@ COMMENT ON FUNCTION tunnel_internal.partition_name(int, int) IS
 'Name of the partition of tunnel.point that holds a kilometre of a survey';
 
 
--- The partitions of a survey's kilometres as text for FROM: each by its name, so that what reads them holds no lock on their
--- parent, whose other partitions may be swapped meanwhile; with none there, nothing to read.
+-- FROM expression for the partitions of several kilometres, by name: the reader locks no parent table, whose other partitions may
+-- be swapped meanwhile. Without partitions, an empty set.
 CREATE OR REPLACE FUNCTION tunnel_internal.partition_source(survey_id int, km_from int, km_to int)
 RETURNS text
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
@@ -24,12 +25,9 @@ COMMENT ON FUNCTION tunnel_internal.partition_source(int, int, int) IS
 'FROM expression that reads the points of the kilometres km_from to km_to of a survey: their partitions by name, without a lock on the parent table';
 
 
--- Locks a survey's kilometre, and the table that holds its partitions, against readers: as late as possible in a transaction,
--- for others wait until it ends.
---
--- Behind a lock that waits, everybody else waits too. So it waits for no more than a tenth of a second, lets those who came
--- meanwhile pass, and tries again: who reads for long delays the swap alone. Gives up after the session's lock_timeout, or
--- 10 minutes if it has none.
+-- Lock a kilometre of a survey and its parent table against readers, as late as possible in a transaction, because others
+-- wait until it ends. A waiting lock blocks all later readers. Therefore each attempt waits 0.1 s at most, lets waiting
+-- readers pass, and tries again: long readers delay the swap only. Gives up after the session's lock_timeout, or 10 minutes.
 CREATE OR REPLACE FUNCTION tunnel_internal.partition_lock(survey_id int, km int)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
@@ -70,7 +68,7 @@ COMMENT ON FUNCTION tunnel_internal.partition_lock(int, int) IS
 'Lock a kilometre of a survey and its parent table before a swap or a drop, without blocking readers while it waits. Gives up after the session''s lock_timeout, or 10 minutes';
 
 
--- Makes the table that holds a survey's partitions, if there is none. Attached, for that lets others read on meanwhile.
+-- Create the parent table of a survey's partitions if it is missing, and attach it, which does not block readers.
 CREATE OR REPLACE FUNCTION tunnel_internal.partition_parent(survey_id int)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
@@ -93,8 +91,8 @@ COMMENT ON FUNCTION tunnel_internal.partition_parent(int) IS
 'Create the parent table of a survey''s partitions if there is none';
 
 
--- Makes the empty table <partition>_new, in which a survey's kilometre is built aside. Its check spares ATTACH a scan while others
--- wait, and costs least while rows are written.
+-- Create the empty table <partition>_new for the new points of a kilometre. Its check constraint saves ATTACH a scan under
+-- the lock, and costs least while rows are written.
 CREATE OR REPLACE FUNCTION tunnel_internal.partition_new(survey_id int, km int)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
@@ -113,9 +111,9 @@ COMMENT ON FUNCTION tunnel_internal.partition_new(int, int) IS
 'Create the empty table <partition>_new, in which partition_swap expects the new points of a kilometre';
 
 
--- Puts the table <partition>_new, made by partition_new and filled in about the order of chainage, in the place of a survey's
--- kilometre: BRIN index and statistics are made first, then the old partition is dropped and the new one attached, all in the
--- caller's transaction. Those who read see the old kilometre until it ends, then the new one.
+-- Replace the partition of a kilometre by <partition>_new, which partition_new created and which was filled roughly in order of
+-- chainage: create the BRIN index and statistics, drop the old partition and attach the new one, in the caller's transaction.
+-- Readers see the old kilometre until it commits, then the new one.
 CREATE OR REPLACE FUNCTION tunnel_internal.partition_swap(survey_id int, km int)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT
@@ -144,8 +142,8 @@ COMMENT ON FUNCTION tunnel_internal.partition_swap(int, int) IS
 'Replace the partition of a survey''s kilometre by the table <partition>_new, with its index, in the caller''s transaction. Call it as late as possible. Long readers delay it and are not blocked';
 
 
--- Makes the empty table tunnel.fragment_s<survey>_f<file>_km<km>, in the place of an older one. It belongs to the owner of
--- tunnel.point, so that any operator may load what another one read.
+-- Create the empty table tunnel.fragment_s<survey>_f<file>_km<km>, replacing an older one. It belongs to the owner of
+-- tunnel.point, so that any operator can load it.
 CREATE OR REPLACE FUNCTION tunnel_internal.fragment_create(survey_id int, file_id int, km int)
 RETURNS void
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT

@@ -1,9 +1,9 @@
--- The queue of jobs: which are ready, and their deferring; workers that were lost. What is wanted is in tunnel.goal and
--- tunnel.incoming, what is done in tunnel.run; the jobs themselves are procrastinate's (schema tunnel_queue).
+-- Queue of jobs: jobs that are ready, and lost workers. Goals are in tunnel.goal and tunnel.incoming, results in tunnel.run;
+-- the jobs are procrastinate's (schema tunnel_queue).
 
--- Puts results of a survey in order: whoever commits one takes this lock first and holds it to the commit, and each run
--- takes it just before it begins. A run thus sees every result that bears an earlier time than its own beginning, and the
--- jobs that follow are found by one at a time.
+-- Order the results of a survey: a transaction that commits a result takes this lock first and holds it until the commit, and
+-- each run takes it just before it begins. A run therefore sees every result with an earlier time, and one transaction at a
+-- time determines the next jobs.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_lock(survey_id integer) RETURNS void
 LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
 AS $$ SELECT pg_advisory_xact_lock(-2, survey_id) $$;
@@ -123,20 +123,18 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.queue_state(integer, integer, integer) IS
     'State of each requested stage in each kilometre of a survey: done, running, queued, ready, waits, failed, blocked or empty';
 
--- How far a result reaches: to so many kilometres on both sides the readiness of a stage may depend on it.
+-- Reach of a result: number of kilometres on both sides in which a stage can become ready.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_reach() RETURNS integer
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$ SELECT count(*)::integer - 1 FROM tunnel.stage WHERE NOT on_demand $$;
 COMMENT ON FUNCTION tunnel_internal.queue_reach() IS
     'Number of kilometres on both sides in which a stage can become ready after a result in one kilometre: one for each later stage';
 
--- Defers a job for each file to be read and for each stage of the kilometres that is ready; returns how many. Whoever commits
--- a result calls it last, for the kilometre and queue_reach to both sides, so that the jobs come to be with what made them
--- ready.
---
--- A kilometre goes before the next one, and in it a later stage before an earlier one, so that kilometres are finished one
--- after the other and few fragments wait. The last stage lags by eight kilometres: it holds up nothing, and fills the workers'
--- time at the end, when each of the other stages waits for the one before.
+-- Queue a job for each file to read and each ready stage, and return the number of jobs. A transaction that commits a result
+-- calls it last, for the kilometre and queue_reach on both sides, so that the new jobs commit together with the result. A
+-- kilometre precedes the next one, and a later stage precedes an earlier one, so that kilometres are finished one after the
+-- other and few fragments wait. The last stage lags by eight kilometres: nothing waits for it, and it keeps workers busy at
+-- the end.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_plan(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
 RETURNS integer
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
@@ -171,8 +169,8 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.queue_plan(integer, integer, integer) IS
     'Queue the jobs of a survey that are ready (files to read, stages of kilometres), and return their number. Holds queue_lock until the transaction ends';
 
--- Locks a job's row to the end of the transaction; true when the worker is still at it. False when it was taken to be lost, and
--- another has the job: then the result must not be committed.
+-- Lock the row of a job until the end of the transaction. True if the worker still runs it; false if the worker was
+-- considered lost and another one has the job: then the result must not be committed.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_hold(job_id bigint, worker_id bigint) RETURNS boolean
 LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
@@ -182,9 +180,8 @@ AS $$
 $$;
 COMMENT ON FUNCTION tunnel_internal.queue_hold(bigint, bigint) IS 'Lock a job, and return true if the worker still runs it';
 
--- Ends a job that has done its work, and defers what is ready now. A file that was read is taken off the list, unless it was
--- asked for anew after the job began; kilometres that points of it wait for are loaded, whether a batch has asked for them or
--- not.
+-- Finish a job that succeeded, and queue what is ready now. A file that was read is removed from the list, unless it was
+-- requested again after the job began. Kilometres with new points are loaded, also without a goal.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_done(job_id bigint, started_at timestamptz) RETURNS void
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
@@ -223,7 +220,7 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.queue_done(bigint, timestamptz) IS
     'Finish a job that succeeded since a moment, and queue what is ready now';
 
--- Ends a job that has failed for good, and defers what need not wait for it any more.
+-- Mark a job as failed for good, and queue what need not wait for it any more.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_fail(job_id bigint, message text) RETURNS void
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
@@ -246,8 +243,7 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.queue_fail(bigint, text) IS
     'Mark a job as failed for good, and queue what need not wait for it any more';
 
--- Puts a job back into the queue whose worker, or the worker's session, was lost; the 20th time it fails for good, for then it
--- is likely to be the job that kills them.
+-- Return the job of a lost worker to the queue. The 20th time it fails for good, since the job probably kills its workers.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_return(job_id bigint) RETURNS void
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
@@ -270,7 +266,7 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.queue_return(bigint) IS
     'Return the job of a lost worker to the queue; the 20th time it fails';
 
--- Whether a worker is there: while it lives, a session of its own holds this lock (queue_register).
+-- True if a worker is present: a session of its own holds this lock while it lives (queue_register).
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_present(worker_id bigint) RETURNS boolean
 LANGUAGE sql VOLATILE STRICT PARALLEL RESTRICTED
 AS $$
@@ -281,7 +277,7 @@ AS $$
 $$;
 COMMENT ON FUNCTION tunnel_internal.queue_present(bigint) IS 'True if the session that a worker keeps open is alive';
 
--- Enters a worker; the session that calls it must live as long as the worker does.
+-- Register a worker. The calling session must live as long as the worker.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_register(worker_id bigint, host text, pid integer) RETURNS void
 LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
@@ -291,9 +287,8 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.queue_register(bigint, text, integer) IS
     'Register a worker, which is present as long as the calling session lives';
 
--- Takes jobs from workers that are lost: those without a heartbeat for the given time, whose sessions are ended, and those
--- that were killed, so that both their own session and that of their job are gone. Returns how many jobs. Rows of lost workers
--- go.
+-- Take jobs from lost workers: those without a heartbeat for the given time, whose sessions are terminated, and killed ones,
+-- whose own session and job session are gone. Deletes the rows of lost workers. Returns the number of jobs.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_rescue(patience interval DEFAULT '25 seconds') RETURNS integer
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
@@ -333,8 +328,8 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.queue_rescue(interval) IS
     'Take jobs from lost workers, return them to the queue, and return their number';
 
--- Whether there are jobs of a survey that wait or run. When there are none, there is nothing left to be done: each result brings
--- along the jobs that it makes possible.
+-- True if a survey has waiting or running jobs. If there are none, the batch is finished: each result queues the jobs that it
+-- makes possible.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_busy(survey_id integer) RETURNS boolean
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$

@@ -1,8 +1,8 @@
--- The last runs of stages: what the views of status, remarks and all that asks how up to date a result is go by. The ledger keeps
--- all runs; the last ones are found from place to place in its index (survey_id, stage, km, subject, started_at, id), and cost
--- what there is of places, not of runs. Runs are put in order by the time of their beginning, as everywhere.
+-- Last runs of stages, from which status, notes and staleness are derived. The ledger contains all runs. The last ones are
+-- read by skipping through its index (survey_id, stage, km, subject, started_at, id), so that the cost depends on the number
+-- of places, not of runs. Runs are ordered by their start time.
 
--- From a run the index is read backwards to the first of the place before, which is the last run there.
+-- The index is read backwards from a run to the first run of the previous place, which is the last run there.
 CREATE OR REPLACE FUNCTION tunnel_internal.last_runs_of(
     survey_ids int[], stages text[], succeeded boolean DEFAULT true, km_from int DEFAULT -1000000, km_to int DEFAULT 1000000)
 RETURNS SETOF tunnel.run
@@ -41,7 +41,7 @@ COMMENT ON FUNCTION tunnel_internal.last_runs_of(int[], text[], boolean, int, in
 'Result of last_runs for several stages and surveys';
 
 
--- The planner puts the body in the place of a call.
+-- The planner inlines the body.
 CREATE OR REPLACE FUNCTION tunnel_internal.last_runs(
     survey_id int, stage text, succeeded boolean DEFAULT true, km_from int DEFAULT -1000000, km_to int DEFAULT 1000000)
 RETURNS SETOF tunnel.run
@@ -63,7 +63,7 @@ COMMENT ON FUNCTION tunnel_internal.last_run(int, text, int, text) IS
 'Last successful run of a stage in one kilometre of a survey, for one subject; NULL if there is none';
 
 
--- Stages that ran in kilometres of a survey, from one to the next in the same index.
+-- Stages with runs in kilometres of a survey, by skipping through the same index.
 CREATE OR REPLACE FUNCTION tunnel_internal.stages_run(survey_id int) RETURNS SETOF text
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 10
 SET search_path = pg_catalog, pg_temp

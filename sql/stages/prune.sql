@@ -1,6 +1,6 @@
--- What of the ledger and the queue nobody needs any more. What is kept of runs, of each result (survey, kilometre, stage and subject)
--- by itself: the last attempt, the last success, and that which ended last; what runs; what a run that is kept was made from; and
--- every import. What is loaded or read has no one result: there each list of files and each setting counts by itself.
+-- Runs and jobs that are no longer needed. For each result (survey, kilometre, stage and subject) these runs are kept: the
+-- last attempt, the last success, the one that ended last, running ones, inputs of kept runs, and every import. Loading and
+-- reading have no single result: each list of files and each setting is kept separately.
 
 -- The parameters by which a run says which runs it was made from are those of tunnel.stage_input.
 CREATE OR REPLACE FUNCTION tunnel_internal.run_inputs(stage text, parameters jsonb) RETURNS bigint[]
@@ -15,7 +15,7 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.run_inputs(text, jsonb) IS
     'Runs that a run used, by its stage and parameters; NULL if it used none';
 
--- Of one survey the runs of all surveys of its tunnel are looked at: only those name each other.
+-- For one survey, the runs of all surveys of its tunnel are examined, since only those refer to each other.
 CREATE OR REPLACE FUNCTION tunnel_internal.superseded_runs(survey_id int DEFAULT NULL, before timestamptz DEFAULT 'infinity')
 RETURNS TABLE (id bigint, survey_id integer, km integer, stage text, outcome text, started_at timestamptz, bytes integer)
 LANGUAGE sql STABLE PARALLEL RESTRICTED SECURITY DEFINER ROWS 5000 SET search_path = pg_catalog, pg_temp SET jit = off

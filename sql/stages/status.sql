@@ -1,7 +1,7 @@
--- Views of the work: the ledger of runs and how far each kilometre has come.
+-- Ledger of runs, and state of each stage in each kilometre.
 
--- True when the database session that started a run still lives. Runs with the owner's rights, for pg_stat_activity
--- hides the sessions of others.
+-- True if the database session that started a run is alive. Runs with the owner's rights, because pg_stat_activity hides
+-- other sessions.
 CREATE OR REPLACE FUNCTION tunnel_internal.session_lives(pid integer, started timestamptz) RETURNS boolean
 LANGUAGE sql STABLE STRICT PARALLEL RESTRICTED SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT EXISTS (SELECT FROM pg_stat_activity a
@@ -24,16 +24,14 @@ COMMENT ON COLUMN tunnel_api.run.outcome IS 'running, done, failed, or interrupt
 COMMENT ON COLUMN tunnel_api.run.worker IS 'Machine and process that ran it';
 COMMENT ON COLUMN tunnel_api.run.job_id IS 'Job of the queue (tunnel_api.job); NULL if run by hand';
 
--- Last run of each stage on each kilometre of some surveys that was ever loaded or worked on, waits to be loaded or is wanted,
--- and whether its result is out of date. Load rests on the files that touch the kilometre; what the others rest on, here and on
--- both neighbours, is in tunnel.stage; what reads the survey rests on its positions, reference and intensity, what reads sonar on
--- the points below the water, what judges on what was learned from reviews (leaks/learned.sql: which, and not when).
--- A result is stale when one of these came to be since its run began, is stale itself, or is of a stage that never ran here, as
--- ground in a database that was made before there was that stage. Runs are put in order by their times:
--- a result commits under a lock that each run takes just before it begins (see queue_lock), so that none which it did not
--- see bears an earlier time. An edit of a vertex takes no such lock; it shows in the segments, whose planes are not those
--- of the axis any more (segment_moved), and what rests on them is stale with them. Only those that a vertex moved by hand
--- can turn are looked at: what a run has moved, its time tells.
+-- Last run of each stage in each kilometre that was ever loaded, waits to be loaded, or is a goal, and whether its result is
+-- out of date. load depends on the files that touch the kilometre. tunnel.stage lists what the other stages depend on, in the
+-- kilometre and in both neighbours; stages that read the survey depend on its positions, reference and intensity; those that
+-- read sonar, on the points below the water; those that classify, on the adapted model (leaks/learned.sql). A result is stale
+-- if one of these was made after its run began, is stale itself, or belongs to a stage that never ran here. Runs are ordered
+-- by time: a result commits under a lock that each run takes just before it begins (queue_lock), so a run never misses a
+-- result with an earlier time. An edit of a vertex takes no such lock; it shows in the segments, whose planes then differ
+-- from the axis (segment_moved). Only segments next to a vertex moved by hand are checked.
 CREATE OR REPLACE FUNCTION tunnel_internal.stage_states(
     survey_ids integer[], km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
 RETURNS TABLE (survey_id integer, km integer, step integer, stage text, run_id bigint, outcome text, done_id bigint,
@@ -197,7 +195,7 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.stage_states(integer[], integer, integer) IS
     'Result of stage_state for several surveys. run_id: last run; done_id: last successful run (tunnel_api.run)';
 
--- The same of one survey, with what the ledger has of the runs.
+-- State of one survey, with the columns of the ledger.
 CREATE OR REPLACE FUNCTION tunnel_internal.stage_state(survey_id integer, km_from integer DEFAULT -1000000, km_to integer DEFAULT 1000000)
 RETURNS TABLE (km integer, step integer, stage text, run_id bigint, outcome text, started_at timestamptz,
                finished_at timestamptz, message text, parameters jsonb, done_at timestamptz, done_parameters jsonb,

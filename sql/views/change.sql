@@ -1,4 +1,4 @@
--- What happened to a survey: what people changed through the views (access/audit.sql) and the stages that ran, in one list by time.
+-- History of a survey: edits through the views (access/audit.sql) and runs of stages, in one list by time.
 
 CREATE OR REPLACE VIEW tunnel_api.change AS
 SELECT e.id * 2 AS id, e.survey, e.at, e.who, e.view AS what,

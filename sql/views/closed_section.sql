@@ -1,7 +1,7 @@
--- Sections of canal tunnels, closed below the water by what sonar scans saw there.
+-- Sections of canal tunnels, closed below the water with sonar scans.
 
--- The pieces of each section in kilometres with water, from node to node (one per degree, from straight below the axis round to
--- the left): what it rests on, its length, and how deep it lies below the water.
+-- Pieces of each section in kilometres with water, from node to node (one for each degree, from straight below the axis to
+-- the left): origin, length, and depth below the water.
 CREATE OR REPLACE VIEW tunnel_api.section_piece AS
 SELECT c.id * 1000 + n.n AS id, c.id AS section_id, c.survey_id, c.km, n.n,
        CASE WHEN k.state = 'interpolated' THEN 'unseen'
@@ -75,7 +75,7 @@ COMMENT ON COLUMN tunnel_api.section_part.part IS
 COMMENT ON COLUMN tunnel_api.section_part.length IS 'Length, m';
 COMMENT ON COLUMN tunnel_api.section_part.geom IS 'Line in space, tunnel''s SRID, m';
 
--- Where sections meet the water, joined from section to section; a line ends where a segment has no section.
+-- Intersection of sections with the water, joined from section to section; a line ends where a segment has no section.
 CREATE OR REPLACE VIEW tunnel_api.waterline AS
 SELECT min(p.id) AS id, p.survey_id, s.name AS survey, p.side, min(p.chainage) AS chainage_from, max(p.chainage) AS chainage_to,
        p.height, public.ST_MakeLine(p.geom ORDER BY p.chainage)::public.geometry AS geom

@@ -1,5 +1,5 @@
--- Comments of the views' columns that have none of their own, for psql, QGIS and the reference: what the view behind it says, else
--- what a name means in every view, else what the column of the same name in the table behind it is said to be. Needs all views.
+-- Comments of columns that have none of their own, for psql, QGIS and the reference: from the view behind it, else from this
+-- list of common names, else from the table behind it. Needs all views.
 
 COMMENT ON COLUMN tunnel_api.axis.geom IS 'Axis, tunnel''s SRID';
 COMMENT ON COLUMN tunnel_api.section_unrolled.geom IS 'Section from its left to its right end, in the unrolled plane';

@@ -1,9 +1,9 @@
--- Findings on the lining: what was detected and what people drew, of all kinds and states; leaks are the wet ones. A finding on a
--- vertical wall has no area in plan, so there are three geometries, each with a view of its own for QGIS: unrolled (chainage,
+-- Findings on the lining, detected and drawn, of all kinds and states; leaks are the wet ones. A finding on a vertical wall has no
+-- area in plan, so there are three geometries, each with a view of its own for QGIS: unrolled (chainage,
 -- arc; SRID 0), on the map beside the axis, and in space. Findings are drawn and edited through finding_unrolled, finding_map and
 -- finding_3d (findings/draw.sql). Needs stationing (geometry/stationing.sql) and make_geometry_views (views/geometry.sql).
 
--- What each reason adds to the logarithm of the odds of a leak, the strongest first, as "faint +2.3, rectangular -1.2".
+-- Contribution of each reason to the logarithm of the odds of a leak, the strongest first, as "faint +2.3, rectangular -1.2".
 CREATE OR REPLACE FUNCTION tunnel_internal.evidence_text(evidence jsonb) RETURNS text
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE SET search_path = pg_catalog, pg_temp AS $$
     SELECT string_agg(e.key || ' ' || to_char(e.value::numeric, 'FMSG990.0'), ', ' ORDER BY abs(e.value::numeric) DESC, e.key)
@@ -256,7 +256,7 @@ COMMENT ON COLUMN tunnel_api.finding_photo.caption IS 'Caption';
 COMMENT ON COLUMN tunnel_api.finding_photo.added_by IS 'Role that added it, set by the database';
 COMMENT ON COLUMN tunnel_api.finding_photo.added_at IS 'Time when it was added, set by the database';
 
--- How many there are of each kind and origin, and what becomes of each, from the sums that triggers on tunnel.finding keep.
+-- Numbers of findings by kind, origin and state, from the sums that triggers on tunnel.finding maintain.
 CREATE OR REPLACE VIEW tunnel_api.finding_count AS
 SELECT (a.survey_id::bigint * 100000 + min(k.id)) * 10
            + array_position('{detected,drawn,redrawn,split,merged}'::text[], a.origin) AS id,
@@ -325,8 +325,8 @@ COMMENT ON COLUMN tunnel_api.dry_region.leaks_area IS 'Area of those leaks, m²'
 COMMENT ON COLUMN tunnel_api.dry_region.leak_ids IS 'Ids of those leaks (finding)';
 COMMENT ON COLUMN tunnel_api.dry_region.geom IS 'Polygon in the unrolled plane (chainage, arc), m';
 
--- An example of an owner's view, by the Specifications for the National Tunnel Inventory (FHWA): severity 1 to 4 as condition
--- states CS1 to CS4, findings without one as CS2. Of the liner what no finding touches is in CS1, too.
+-- Example of an owner's view, by the Specifications for the National Tunnel Inventory (FHWA): severity 1 to 4 as condition states
+-- CS1 to CS4, findings without severity as CS2. The liner without findings is in CS1.
 CREATE OR REPLACE VIEW tunnel_api.snti_condition AS
 SELECT s.id::bigint * 10 + q.n AS id, s.id AS survey_id, s.name AS survey, q.element, q.unit,
        q.cs1 + CASE WHEN q.n = 1 THEN greatest(coalesce((SELECT sum(c.lining_total) FROM tunnel.coverage c

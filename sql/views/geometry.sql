@@ -1,5 +1,5 @@
--- The views of one geometry that QGIS and other programs show: a layer has one. Of each view with three geometries – in a plane, on
--- the map, in space – there are three, of the same columns and with the same comments, whose geometry is geom. Needs nothing.
+-- Views with one geometry for QGIS and other programs, whose layers have one geometry. For each view with three geometries
+-- (plane, map, space) there are three views with the same columns and comments, whose geometry is geom. Needs nothing.
 
 CREATE OR REPLACE PROCEDURE tunnel_internal.make_geometry_views(
     base text, stem text, subject text, remark text DEFAULT '', plane text DEFAULT 'unrolled', plane_suffix text DEFAULT 'unrolled',

@@ -1,5 +1,5 @@
--- Views of what stage ground and `tunneldb spheres` find: the classes of points, the ground, clusters, target spheres.
--- Needs stationing (geometry/stationing.sql).
+-- Results of stage ground and `tunneldb spheres`: classes of points, ground, clusters, target spheres. Needs stationing
+-- (geometry/stationing.sql).
 
 CREATE OR REPLACE VIEW tunnel_api.class AS
 SELECT c.id, c.name, c.description
@@ -29,7 +29,7 @@ COMMENT ON VIEW tunnel_api.ground IS 'Ground at each metre of chainage where the
 COMMENT ON COLUMN tunnel_api.ground.foot_left IS 'Foot of the left wall, m right of the axis; NaN where there is no wall';
 COMMENT ON COLUMN tunnel_api.ground.foot_right IS 'Foot of the right wall, m right of the axis; NaN where there is no wall';
 
--- The cells that a cluster's points fill are for the export of classified files, and stay in the table.
+-- The cells that contain a cluster's points are for the export of classified files, and stay in the table.
 CREATE OR REPLACE VIEW tunnel_api.cluster AS
 SELECT c.id, c.survey_id, s.name AS survey, c.km,
        (SELECT min(g.n) FROM tunnel.segment g

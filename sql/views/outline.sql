@@ -1,7 +1,7 @@
--- The walls of the tunnel in plan. Needs survey_ends (geometry/survey_ends.sql) and map_point (geometry/unroll.sql).
+-- Walls of the tunnel in plan. Needs survey_ends (geometry/survey_ends.sql) and map_point (geometry/unroll.sql).
 
--- At each section the lining is drawn where it is widest, left and right of the axis. A line ends where segments without
--- sections begin; its first and last section hold on to the end of their segments, as far as these were scanned.
+-- The widest place of the lining at each section, left and right of the axis. A line ends where segments without sections
+-- begin; its first and last section extend to the end of their segments, as far as these were scanned.
 CREATE OR REPLACE VIEW tunnel_api.outline AS
 SELECT s.id::bigint * 100000000 + 50000000 + 2 * w.first + (w.side = 'right')::integer AS id, s.id AS survey_id, s.name AS survey,
        w.side, w.chainage_from, w.chainage_to,

@@ -1,7 +1,5 @@
--- Points of a stretch of a survey, by its name. Needs the view point (views/survey.sql).
---
--- The view is planned anew with each call's own survey and kilometres, so that no other's partitions are looked at: a name that
--- stands in a query has the planner open that kilometre of each survey of the database.
+-- Points of a stretch of a survey, by its name. Needs the view point (views/survey.sql). The query is planned at each call
+-- for the survey and its kilometres, so that partitions of other surveys are not opened.
 CREATE OR REPLACE FUNCTION tunnel_api.points(survey text, chainage_from float8, chainage_to float8)
 RETURNS SETOF tunnel_api.point
 LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE ROWS 100000

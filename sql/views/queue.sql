@@ -1,5 +1,5 @@
--- Views of the queue: what is wanted of each kilometre, files that wait to be read, jobs and workers. They read
--- tunnel_queue, which is procrastinate's, with the rights of their owner.
+-- Views of the queue: goals, files that wait to be read, jobs and workers. They read tunnel_queue (procrastinate's schema)
+-- with their owner's rights.
 
 CREATE OR REPLACE VIEW tunnel_api.goal AS
 SELECT (g.survey_id::bigint * 1000000 + 500000 + g.km) AS id, g.survey_id, s.name AS survey, g.km, g.stage, g.parameters,
@@ -25,7 +25,7 @@ COMMENT ON COLUMN tunnel_api.incoming.km_from IS 'First kilometre that it can to
 COMMENT ON COLUMN tunnel_api.incoming.state IS 'waiting, or failed';
 COMMENT ON COLUMN tunnel_api.incoming.message IS 'Reason of the failure, and what to do';
 
--- Apart by their state, for which jobs that wait or run have indexes: who asks for these is not to look at those that are done.
+-- Separate by state: waiting and running jobs have indexes, so that queries for them do not read finished jobs.
 CREATE OR REPLACE VIEW tunnel_api.job AS
 SELECT j.id, (j.args->>'survey_id')::integer AS survey_id, s.name AS survey, (j.args->>'km')::integer AS km,
        j.args->>'file' AS file, coalesce(j.args->>'stage', j.task_name) AS stage, j.state,

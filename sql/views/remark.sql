@@ -1,9 +1,9 @@
--- What a reader of a survey's results is to know, as every document says it.
+-- Notes on the results of surveys, as every document states them.
 
--- Notes of the stages whose results are in the database, points that were left out of files, and what gives to doubt about
--- their intensity. A fifth of a scan's points is noise only where the filter does not suit the scan: it is made for those that
--- strike nothing (dust, edges, people), which are a few percent. Of points beyond the ends of the given axis one in a hundred is
--- told: a scan sees some of what lies before a portal, but a tunnel that goes on is to be looked at.
+-- Notes of the stages whose results are in the database, points that were left out of files, and doubts about their
+-- intensity. More than 20 % noise means that the filter does not suit the scan: it is made for isolated returns (dust, edges,
+-- people), which are a few percent. Points beyond the ends of the given axis are reported from 1 % on: a scan contains some
+-- points before a portal, but a tunnel that continues needs attention.
 CREATE OR REPLACE VIEW tunnel_api.remark AS
 SELECT 16 * r.id AS id, s.id AS survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file,
        concat_ws('; ', r.counts ->> 'note', r.counts ->> 'place') AS remark
@@ -59,7 +59,7 @@ COMMENT ON COLUMN tunnel_api.remark.file IS 'Name of the scan file; NULL for a k
 COMMENT ON COLUMN tunnel_api.remark.remark IS 'Text of the note';
 
 
--- Files first, then by kilometre; what is the same in several kilometres is said once.
+-- Files first, then kilometres; the same note of several kilometres is one row.
 CREATE OR REPLACE FUNCTION tunnel_internal.remarks_of(survey_id int, starts float8[], ends float8[])
 RETURNS TABLE (n int, file text, stage text, kilometres int[], remark text, said text)
 LANGUAGE plpgsql STABLE STRICT PARALLEL RESTRICTED
@@ -112,7 +112,7 @@ COMMENT ON FUNCTION tunnel_internal.remarks_of(int, float8[], float8[]) IS
 'Result of remarks for several stretches of a survey, given by their beginnings and ends (m). n: number of the stretch, from 1';
 
 
--- The planner puts the body in the place of a call.
+-- The planner inlines the body.
 CREATE OR REPLACE FUNCTION tunnel_api.remarks(
     survey_id int, stretch_from float8 DEFAULT '-Infinity', stretch_to float8 DEFAULT 'Infinity')
 RETURNS TABLE (file text, stage text, kilometres int[], remark text, said text)

@@ -1,7 +1,7 @@
--- Where the scanner was: its stations, and the trajectory of a mobile one. Needs stationing (geometry/stationing.sql) and unroll
--- (geometry/unroll.sql).
+-- Positions of the scanner: stations, and the trajectory of a mobile one. Needs stationing (geometry/stationing.sql) and
+-- unroll (geometry/unroll.sql).
 
--- Of what has no sections yet, or lies off them, the chainage is that on the axis as given, in plan.
+-- Without sections, or off them, the chainage is measured along the given axis, in plan.
 CREATE OR REPLACE FUNCTION tunnel_internal.scanner_chainage(survey_id int, place geometry) RETURNS float8
 LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT coalesce((SELECT u.chainage FROM tunnel_api.unroll($1, $2) u),
@@ -29,8 +29,8 @@ COMMENT ON COLUMN tunnel_api.scan_station.label IS 'Station, as 12+345.678; NULL
 COMMENT ON COLUMN tunnel_api.scan_station.height IS 'Height of the scanner, m';
 COMMENT ON COLUMN tunnel_api.scan_station.geom IS 'Position of the scanner, tunnel''s SRID';
 
--- A vertex a second is enough for a map, and a line a minute for its times. Of a minute the line goes on to where the next one
--- begins. It ends where a gap does: an interval longer than survey.longest_interval.
+-- One vertex for each second is enough for a map, and one line for each minute for its times. A line continues to the
+-- beginning of the next one, and ends at gaps: intervals longer than survey.longest_interval.
 CREATE OR REPLACE VIEW tunnel_api.trajectory AS
 SELECT (s.id::bigint << 38) | ((m.minute & 4294967295) << 6) | m.part AS id, s.id AS survey_id, s.name AS survey, s.date,
        m.time_from, m.time_to, least(a.chainage, b.chainage) AS chainage_from, greatest(a.chainage, b.chainage) AS chainage_to,

@@ -1,8 +1,8 @@
--- The sheets on which a survey is drawn and printed: 50 m of tunnel each, as the blocks of its images. Needs stationing
+-- Sheets on which a survey is drawn and printed: 50 m of tunnel each, as the blocks of its images. Needs stationing
 -- (geometry/stationing.sql).
 
--- Joints and dark spots are found by the hundred: on sheets they stand if people redrew them or gave them a severity. Leaks have
--- the table of leaks (sheet_leak), and of these people's severities are drawn, and drips as what they are, points.
+-- Joints and dry dark areas are numerous: sheets show them only if people redrew them or gave them a severity. Leaks have the
+-- table of leaks (sheet_leak); their severities are drawn, and drips as points.
 CREATE OR REPLACE VIEW tunnel_api.sheet_finding AS
 SELECT f.id, f.survey_id, f.survey, f.km, f.chainage_from, f.chainage_to, f.label, f.arc_from, f.arc_to, f.clock,
        f.kind, f.kind_label, k.position, f.wet, f.origin, f.manual, f.severity, f.severity_label, f.width, f.length, f.area,
@@ -34,10 +34,10 @@ COMMENT ON COLUMN tunnel_api.sheet_leak.note IS
     'Kind, unless it is leak, severity in the owner''s words, and remark; empty if there are none';
 COMMENT ON COLUMN tunnel_api.sheet_leak.geom IS 'Polygon in the unrolled plane (chainage, arc), m';
 
--- All sheets of a survey are as high as its widest place, so that they have one scale. Each section is taken for the middle
--- one of itself and its neighbours: a single one that went astray, say at a portal, must not blow up all sheets.
--- What is drawn needs no figures, and they are not reckoned then: they are joined so that the planner can leave them out. What is
--- to be said of sheets is asked of all those of a survey together, before they are parted: it costs as much of one.
+-- All sheets of a survey have the width of its widest section, for a common scale. Each section counts as the median of
+-- itself and its neighbours, so that a single wrong one (e.g. at a portal) does not enlarge all sheets. Statistics are joined
+-- so that the planner can omit them for drawing. Gaps and notes are computed for all sheets of a survey at once, which costs
+-- no more than for one.
 CREATE OR REPLACE VIEW tunnel_api.sheet AS
 SELECT s.id::bigint * 1000000 + 500000 + r.number AS id, s.id AS survey_id, s.name AS survey, r.number, b.km,
        b.chainage_from, b.chainage_to, k.labels[1] AS label_from, k.labels[6] AS label_to, k.labels AS ticks,

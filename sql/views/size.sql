@@ -1,7 +1,7 @@
--- What surveys take of the database's room. Nothing is read but the catalogue, its statistics and the length of files: a survey of
--- thousands of kilometres has as many partitions of points.
+-- Disk space of surveys. Reads the catalogue, its statistics and file sizes only: a survey of thousands of kilometres has as
+-- many partitions.
 
--- What the tables hold. A table that is not named is a result.
+-- Kind of data in each table. A table that is not listed is a result.
 CREATE OR REPLACE FUNCTION tunnel_internal.table_kind(name text) RETURNS text
 LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
 AS $$
@@ -16,10 +16,9 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.table_kind(text) IS
     'Kind of data in a table of schema tunnel: points, images, sections, results, runs or inputs';
 
--- Points and images have tables of each survey. Of another, surveys are given the share that they have of its rows by the
--- statistics of the planner: of a survey among the most common values its frequency, of the others what is left, in equal parts.
--- A table without a survey's key takes the shares of that which it belongs to. One that was never analyzed has no statistics: its
--- bytes are nobody's.
+-- Points and images have tables for each survey. For other tables, surveys get their share of the rows by the planner's
+-- statistics: the frequency of a survey among the most common values, equal parts of the rest for the others. A table without
+-- a survey's key takes the shares of its parent table. A table without statistics belongs to no survey.
 CREATE OR REPLACE FUNCTION tunnel_internal.survey_sizes()
 RETURNS TABLE (survey_id integer, kind text, rows bigint, bytes bigint, estimated boolean)
 LANGUAGE sql STABLE PARALLEL RESTRICTED STRICT SECURITY DEFINER ROWS 100 SET search_path = pg_catalog, pg_temp SET jit = off

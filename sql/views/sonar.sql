@@ -1,4 +1,4 @@
--- Views of sonar scans below the water: where they stood, how well that is known and by what, and the ladders (Moisan et al., 2015).
+-- Views of sonar scans below the water: positions with their accuracy, residuals, ladders (Moisan et al., 2015).
 
 CREATE OR REPLACE VIEW tunnel_api.sonar_scan AS
 SELECT c.id, c.survey_id, s.name AS survey, c.name, c.up, c.water_level, c.state, c.undetermined, c.rotation,

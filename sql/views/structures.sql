@@ -1,10 +1,10 @@
--- Views of structures: members, faces, and spots that differ from their own surface (Ono et al.). A spot has three geometries,
--- each with a view of its own for QGIS: in its face's own plane (SRID 0), on the map and in space. A fourth view has those of
--- the face laid out to be drawn, member below member, as *_sheet has members and faces. Needs stationing
+-- Views of structures: members, faces, and spots that differ from their own surface (Ono et al.). A spot has three
+-- geometries, each with a view of its own for QGIS: in the plane of its face (SRID 0), on the map and in space. A fourth view
+-- has it on a drawing plane, member below member, like *_sheet of members and faces. Needs stationing
 -- (geometry/stationing.sql).
 
--- What members of a survey are found from: its files' checksums by name, and when its settings were last changed. A search is up
--- to date as long as these are the same as in its row of the ledger.
+-- Inputs of the members of a survey: checksums of its files by name, and the last change of its settings. A search is up to
+-- date as long as these equal the values in its run.
 CREATE OR REPLACE FUNCTION tunnel_internal.members_inputs(survey_id int) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(
@@ -114,7 +114,7 @@ COMMENT ON COLUMN tunnel_api.member_statistics.bright_area IS 'Area of brighter 
 COMMENT ON COLUMN tunnel_api.member_statistics.spot_share IS 'Share of the inspected part that differs, 0 to 1';
 COMMENT ON COLUMN tunnel_api.member_statistics.geom IS 'Middle line, tunnel''s SRID';
 
--- Products of vectors in space, as arrays of three numbers.
+-- Dot and cross product of vectors in space, as arrays of three numbers.
 CREATE OR REPLACE FUNCTION tunnel_internal.dot(a float8[], b float8[]) RETURNS float8
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
 RETURN a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
@@ -125,7 +125,7 @@ LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE
 RETURN ARRAY[a[2] * b[3] - a[3] * b[2], a[3] * b[1] - a[1] * b[3], a[1] * b[2] - a[2] * b[1]];
 COMMENT ON FUNCTION tunnel_internal.cross_product(float8[], float8[]) IS 'Cross product of two vectors in space';
 
--- A spot lies on its face, and of two surfaces in one place a 3D view shows now the one, now the other.
+-- A spot lies on its face; two surfaces in the same place flicker in a 3D view.
 CREATE OR REPLACE VIEW tunnel_api.face_3d AS
 SELECT f.id, f.survey_id, s.name AS survey, m.number AS member, f.number, f.kind, f.radius, f.area, f.seen_share, f.bimodal,
        CASE WHEN f.kind = 'flat' THEN public.st_translate(f.surface, -0.01 * f.axis[1], -0.01 * f.axis[2], -0.01 * f.axis[3])
@@ -277,7 +277,7 @@ COMMENT ON COLUMN tunnel_api.face_sheet.bimodal IS
     'True if more than half of it differs, so that the reference surface is unknown';
 COMMENT ON COLUMN tunnel_api.face_sheet.geom IS 'Outline on the drawing plane; SRID 0, m';
 
--- Where face_sheet draws its face.
+-- Drawing plane of face_sheet.
 DO $$
 BEGIN
     EXECUTE format('CREATE OR REPLACE VIEW tunnel_api.spot_sheet AS SELECT %s, public.st_affine(q.outline, f.xx, f.xy, f.yx, f.yy, f.x,'
