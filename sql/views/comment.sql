@@ -39,7 +39,7 @@ BEGIN
                 ('leaks_confirmed', 'Number of these confirmed'),
                 ('leaks_rejected', 'Number of rejected leaks'),
                 ('largest_area', 'Area of the largest leak, m²'),
-                ('greatest_drop', 'Greatest drop of intensity, dB'),
+                ('greatest_darkening', 'Greatest darkening, dB'),
                 ('remark', 'Remark of the reviewer'),
                 ('created_at', 'Time when the row was created'),
                 ('detected_at', 'Time of the last detection that found it'),

@@ -47,7 +47,7 @@ CREATE OR REPLACE VIEW tunnel_api.km_statistics AS
 SELECT g.id, g.survey_id, g.survey, g.km, g.chainage_from, g.chainage_to, g.lining_area, d.seen AS seen_area,
        d.seen / nullif(g.lining_area, 0) AS seen_share, g.wet_area, g.wet_area / nullif(d.seen, 0) AS wet_share,
        c.wet / nullif(c.seen, 0) AS wet_pixel_share, g.patches AS leaks, l.leaks_open, l.leaks_confirmed, l.leaks_rejected,
-       g.largest_area, l.greatest_drop
+       g.largest_area, l.greatest_darkening
   FROM tunnel_api.km_waterproof g
   LEFT JOIN LATERAL (
         SELECT max(q.seen) - min(q.seen) AS seen, max(q.wet) - min(q.wet) AS wet
@@ -61,7 +61,7 @@ SELECT g.id, g.survey_id, g.survey, g.km, g.chainage_from, g.chainage_to, g.lini
         SELECT count(*) FILTER (WHERE k.detected AND k.review = 'open') AS leaks_open,
                count(*) FILTER (WHERE k.detected AND k.review = 'confirmed') AS leaks_confirmed,
                count(*) FILTER (WHERE k.detected AND k.review = 'rejected') AS leaks_rejected,
-               max(k.darkening_max) FILTER (WHERE k.detected AND k.review <> 'rejected') AS greatest_drop
+               max(k.darkening_max) FILTER (WHERE k.detected AND k.review <> 'rejected') AS greatest_darkening
           FROM tunnel.finding k
          WHERE k.survey_id = g.survey_id AND k.chainage_to > g.chainage_from AND k.chainage_from < g.chainage_to
            AND k.chainage_from >= g.chainage_from - (  -- no more of the index is read than the longest can reach
