@@ -221,7 +221,7 @@ def test_stations_are_read_and_what_is_no_place_is_told(conn: psycopg.Connection
     assert (done.exit_code, done.stderr.count("\n")) == (2, 7)
     for line, said in zip(
         done.stderr.splitlines(),
-        ("wkt is 'LINESTRING(1 2,', which is no WKT", "arc is empty", "chainage is 99+000: tunnel demo has no such station",
+        ("wkt is 'LINESTRING(1 2,', which is not WKT", "arc is empty", "chainage is 99+000: tunnel demo has no such station",
          "chainage is '12+3'", "all columns of it are empty", "arc is 'up', not a number"),
         strict=False,
     ):  # fmt: skip

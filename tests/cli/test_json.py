@@ -188,7 +188,7 @@ def test_scans_that_cannot_be_registered_are_told(example: str, tmp_path: Path) 
     ladders = tmp_path / "ladders.csv"
     ladders.write_text("ladder,rung,height,stile_gap,diameter\n")
     said = told(2, "register", example, tmp_path / "a.xyz", "--ladders", ladders, "--up", "+z", "--water-level", 1.0)
-    assert "holds no ladder" in said["error"]
+    assert "has no ladder" in said["error"]
 
 
 def test_what_is_pruned_and_vacuumed_is_told_in_rows_and_bytes(example: str, conn: psycopg.Connection) -> None:

@@ -99,7 +99,7 @@ def test_what_is_wrong_as_a_whole_is_one_line(files: tuple[Path, Path], rows: li
         ("chainage,x,y,z\n0,0,0,0\n5,5,0,0\n4,9,0,0\n", "line 4: chainage 4 is less than"),
         (
             "chainage,x,y,z\n0,0,0,0\n10,10,0,0\n20,20000,0,0\n30,30,0,0\n40,40,0,0\n50,50,0,0\n",
-            "line 4: 19990.000 m from the point",
+            "line 4: 19990.000 m from the previous point",
         ),
         ("chainage,x,y,z\n0,0,0,0\n10,32.808,0,0\n", "the axis is 3.281 long in plan: are the points in feet?"),
         ("chainage,x,y,z\n0,0,0,0\n", "at least 2 points"),

@@ -54,7 +54,7 @@ def test_leaks_of_a_merged_cloud(cloud: Path, conn: psycopg.Connection) -> None:
     command("tunnel", "add", "t", "--srid", 25830, "--axis", cloud / "t.axis.csv")
     add = ("survey", "add", "s", "--tunnel", "t", "--date", "2024-05-04", "--intensity", "Reflectance", "--intensity-kind")
     refused = command(*add, "amplitude", "--no-poses", code=2)
-    assert "--no-poses takes --intensity-kind reflectance" in refused.stderr
+    assert "--no-poses needs --intensity-kind reflectance" in refused.stderr
     assert "exactly one of" in command(*add, "reflectance", code=2).stderr
     assert "exactly one of" in command(*add, "reflectance", "--no-poses", "--stations", cloud / "t.laz", code=2).stderr
     assert SAID in command(*add, "reflectance", "--no-poses").stderr

@@ -160,7 +160,7 @@ def test_what_cannot_be_registered_is_refused_and_nothing_stored(
         "ladder,rung,height,stile_gap,diameter\nA,1,0,320,35\nA,2,280,320,35\nA,3,560,320,35\n": "line 3: rung 2",
         "ladder,rung,height,stile_gap,diameter\nA,1,0,0.3,0.03\nA,2,0.28,0.4,0.03\nA,3,0.56,0.3,0.03\n": "line 3: stile_gap",
         "ladder,rung,height,stile_gap\nA,1,0,0.3\n": "no column diameter",
-        "ladder,rung,height,stile_gap,diameter\n": "holds no ladder",
+        "ladder,rung,height,stile_gap,diameter\n": "has no ladder",
     }
     for text, said in cases.items():
         ladders.write_text(text)

@@ -264,7 +264,7 @@ def test_what_another_wrote_alike_is_no_step_of_the_dock(
     for how in ("ines", "at_once"):
         confirmed, undone = seen[how]["confirmed"], seen[how]["undone"]
         assert [confirmed[name] for name in ("went_on", "steps", "counted", "said")] == [True, 0, 0, ""], how
-        assert "nothing was reviewed here" in undone["said"], how
+        assert "there is no review to undo" in undone["said"], how
         assert rows[confirmed["finding"]] == ["confirmed", "ines"], how
     confirmed, undone = seen["otto"]["confirmed"], seen["otto"]["undone"]  # as if the answer had been lost
     assert (confirmed["steps"], confirmed["counted"], undone["steps"]) == (1, 1, -1)

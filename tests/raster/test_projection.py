@@ -280,7 +280,7 @@ def test_a_time_just_beyond_the_trajectory_is_that_of_its_end(monkeypatch: pytes
 
 def test_points_that_the_curve_does_not_span_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     short = ReferenceCurve.from_rows(np.array([0.5, 3.0]), np.array([30.0, 28.0]))
-    with pytest.raises(UserError, match=r"spans 0\.5 to 3 m, the lining lies .* % "):
+    with pytest.raises(UserError, match=r"covers 0\.5 to 3 m, the lining is .* % "):
         read(monkeypatch, observer("amplitude", True, short), [[cloud(20_000, 9)]])
 
 

@@ -188,7 +188,7 @@ def test_each_finding_has_a_row_or_is_in_a_line_that_says_so(drawn: str, report:
             listed = {
                 int(key): cells(row) for key, row in re.findall(r'<tr id="finding-(\d+)".*?>(.*?)</tr>', chapter, re.DOTALL)
             }
-            without = sum(map(int, re.findall(r"Without a row here, [^:]*: (\d+)", chapter)))
+            without = sum(map(int, re.findall(r"Not listed here, [^:]*: (\d+)", chapter)))
             assert len(listed) + without == len(rows), kind
             order = re.findall(r'<span class="review \w+">([^,]*), (\d+)', chapter)
             states = {findings.STATE_WORDS[row[1]] for row in rows if row[0] in listed}
@@ -350,9 +350,9 @@ def test_an_owners_template(drawn: str, folder: Path, tmp_path: Path) -> None:
     logo = base64.b64decode(re.findall(r'class="logo" src="data:image/png;base64,([^"]+)"', text)[0])
     assert Image.open(io.BytesIO(logo)).size == (640, 160)
     assert re.findall(r'<section id="(\w+)"(?! class="kind)', text) == ["findings", "leaks", "sheets", "dry", "signatures"]
-    left_out = re.findall(r"nicht in diesem Bericht:(.*)</p>", text)[0]
+    left_out = re.findall(r"in diesem Bericht nicht enthalten:(.*)</p>", text)[0]
     assert [name.strip() for name in left_out.split(",")] == [
-        "Zusammenfassung", "Gesehenes und nicht Gesehenes", "Dichtheit", "Auskleidung", "Statistik", "Lichtraum", "Ringe",
+        "Zusammenfassung", "Erfasste Auskleidung", "Dichtheit", "Auskleidung", "Statistik", "Lichtraum", "Ringe",
         "Verfahren", "Prüfungen",
     ]  # fmt: skip
     for said in ("<h2>Spalt</h2>", "<dd>Bahn &amp; Söhne</dd>", "<h2>Unterschriften</h2>", "--severity: #123456", 'lang="de"'):

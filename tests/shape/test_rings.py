@@ -152,7 +152,7 @@ def test_prisms_before_the_lining_are_set_back() -> None:
     ("clock", "said"),
     [
         (EIGHT[:4], "4 points"),
-        (np.linspace(0.0, 60.0, 8), "does not determine it"),
+        (np.linspace(0.0, 60.0, 8), "too little to determine it"),
     ],
 )
 def test_what_makes_no_ring_is_refused(clock: Float, said: str) -> None:

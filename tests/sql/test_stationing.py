@@ -349,7 +349,7 @@ def test_what_is_no_part_of_the_clock_is_refused(example: str) -> None:
         ("chainage,station,direction,direction\n0,1,1,1\n", ["column direction twice"]),
         (
             "chainage,station\n0,12000\n12500,13000\n",
-            ["12500.000 m lies beyond the end", "0.000 to 1000.000 m", "not a station"],
+            ["12500.000 m is beyond the end", "0.000 to 1000.000 m", "not a station"],
         ),
     ],
 )
