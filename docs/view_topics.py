@@ -40,9 +40,6 @@ LEADS_TO = {
 }
 """Views that a key leads to, where it is not named after the view."""
 
-HELPERS = {"face_placement"}
-"""Views that only say where others draw."""
-
 PLACES = ("_unrolled", "_map", "_3d", "_face", "_sheet")
 """Endings of views that show the rows of another with one geometry."""
 
@@ -96,8 +93,7 @@ def base_views(conn: psycopg.Connection[Any]) -> dict[str, str]:
         " JOIN pg_class o ON o.oid = d.refobjid AND o.oid <> v.oid AND o.relkind = 'v'"
         " WHERE v.relnamespace = 'tunnel_api'::regnamespace AND o.relnamespace = v.relnamespace"
     ):
-        if other not in HELPERS:
-            rests[view].add(other)
+        rests[view].add(other)
     bases = {}
     for view in rests:
         found = view

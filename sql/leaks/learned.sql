@@ -31,7 +31,7 @@ COMMENT ON FUNCTION tunnel_internal.note_learned(integer, integer, jsonb, jsonb)
 CREATE OR REPLACE FUNCTION tunnel_internal.learned_apply(tunnel_id integer, base text, way text, parameters jsonb, surveys text[],
                                                     reviews jsonb, loss_base double precision, loss double precision, note text)
 RETURNS integer
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     made tunnel.learned_model;
 BEGIN

@@ -2,7 +2,7 @@
 
 -- Pieces of each section in kilometres with water, from node to node (one for each degree, from straight below the axis to
 -- the left): origin, length, and depth below the water.
-CREATE OR REPLACE VIEW tunnel_api.section_piece AS
+CREATE OR REPLACE VIEW tunnel_internal.section_piece AS
 SELECT c.id * 1000 + n.n AS id, c.id AS section_id, c.survey_id, c.km, n.n,
        CASE WHEN k.state = 'interpolated' THEN 'unseen'
             WHEN w.height > (public.ST_Z(n.here) + public.ST_Z(n.next)) / 2 THEN 'submerged'
@@ -18,18 +18,18 @@ SELECT c.id * 1000 + n.n AS id, c.id AS section_id, c.survey_id, c.km, n.n,
     SELECT i AS n, public.ST_PointN(c.geom, i) AS here, public.ST_PointN(c.geom, i + 1) AS next
       FROM generate_series(1, 360) AS i) n
   JOIN tunnel.section_class k ON k.section_id = c.id AND k.class = floor((n.n - 0.5::float8) / c.angle_step);
-COMMENT ON VIEW tunnel_api.section_piece IS
+COMMENT ON VIEW tunnel_internal.section_piece IS
     'Pieces of closed sections, one for each degree from straight below the axis to the left, in kilometres with sonar scans. closed_section and section_part consist of them';
-COMMENT ON COLUMN tunnel_api.section_piece.section_id IS 'Key of the section';
-COMMENT ON COLUMN tunnel_api.section_piece.n IS 'Number in the section, from 1';
-COMMENT ON COLUMN tunnel_api.section_piece.part IS
+COMMENT ON COLUMN tunnel_internal.section_piece.section_id IS 'Key of the section';
+COMMENT ON COLUMN tunnel_internal.section_piece.n IS 'Number in the section, from 1';
+COMMENT ON COLUMN tunnel_internal.section_piece.part IS
     'lining (above the water), submerged (inspected by sonar) or unseen (interpolated across a gap)';
-COMMENT ON COLUMN tunnel_api.section_piece.below IS 'True if it lies below the water';
-COMMENT ON COLUMN tunnel_api.section_piece.length IS 'Length, m';
-COMMENT ON COLUMN tunnel_api.section_piece.here IS 'Beginning of the piece, tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel_api.section_piece.next IS 'End of the piece, tunnel''s SRID, m';
-COMMENT ON COLUMN tunnel_api.section_piece.wet_area IS 'Area of the water above it, m²';
-COMMENT ON COLUMN tunnel_api.section_piece.depth IS 'Depth of its lower end below the water, m';
+COMMENT ON COLUMN tunnel_internal.section_piece.below IS 'True if it lies below the water';
+COMMENT ON COLUMN tunnel_internal.section_piece.length IS 'Length, m';
+COMMENT ON COLUMN tunnel_internal.section_piece.here IS 'Beginning of the piece, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel_internal.section_piece.next IS 'End of the piece, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel_internal.section_piece.wet_area IS 'Area of the water above it, m²';
+COMMENT ON COLUMN tunnel_internal.section_piece.depth IS 'Depth of its lower end below the water, m';
 
 CREATE OR REPLACE VIEW tunnel_api.closed_section AS
 SELECT c.id, c.survey_id, s.name AS survey, c.km, c.chainage,
@@ -42,7 +42,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.km, c.chainage,
   JOIN LATERAL (
     SELECT coalesce(sum(q.length) FILTER (WHERE q.below AND q.part = 'unseen'), 0) / sum(q.length) FILTER (WHERE q.below) AS unseen,
            sum(q.wet_area) AS wet_area, max(q.depth) FILTER (WHERE q.part = 'submerged') AS depth
-      FROM tunnel_api.section_piece q
+      FROM tunnel_internal.section_piece q
      WHERE q.section_id = c.id
     HAVING bool_or(q.part = 'submerged')) p ON true
  WHERE w.height IS NOT NULL;
@@ -62,7 +62,7 @@ SELECT min(r.id) AS id, r.survey_id, s.name AS survey, r.km, r.section_id, c.cha
        public.ST_MakeLine(array_agg(r.here ORDER BY r.n) || (array_agg(r.next ORDER BY r.n DESC))[1])
            ::public.geometry AS geom
   FROM (SELECT q.*, q.n - row_number() OVER (PARTITION BY q.section_id, q.part ORDER BY q.n) AS run
-          FROM tunnel_api.section_piece q) r
+          FROM tunnel_internal.section_piece q) r
   JOIN tunnel.section c ON c.id = r.section_id
   JOIN tunnel.survey s ON s.id = r.survey_id
  GROUP BY r.survey_id, s.name, r.km, r.section_id, c.chainage, r.part, r.run;
@@ -86,7 +86,7 @@ SELECT min(p.id) AS id, p.survey_id, s.name AS survey, p.side, min(p.chainage) A
                    (public.ST_Z(q.here) - w.height) / (public.ST_Z(q.here) - public.ST_Z(q.next))) AS geom
           FROM tunnel.section c
           JOIN tunnel.water_level w ON w.survey_id = c.survey_id AND w.km = c.km
-          JOIN tunnel_api.section_piece q ON q.section_id = c.id
+          JOIN tunnel_internal.section_piece q ON q.section_id = c.id
          WHERE (public.ST_Z(q.here) > w.height) <> (public.ST_Z(q.next) > w.height)) p
   JOIN tunnel.survey s ON s.id = p.survey_id
  GROUP BY p.survey_id, s.name, p.side, p.piece, p.height

@@ -60,10 +60,11 @@ COMMENT ON VIEW tunnel_api.ladder IS 'Ladders in the water, as the laser shows t
 COMMENT ON COLUMN tunnel_api.ladder.geom IS 'Origin of the ladder, tunnel''s SRID';
 
 CREATE OR REPLACE VIEW tunnel_api.sonar_point AS
-SELECT p.id, p.survey_id, p.km, p.scan_id, c.name AS scan, p.chainage, p.across, p.classification,
+SELECT p.id, p.survey_id, s.name AS survey, p.km, p.scan_id, c.name AS scan, p.chainage, p.across, p.classification,
        public.ST_Z(p.geom) - c.water_level AS over_water, p.geom::public.geometry AS geom
   FROM tunnel.sonar_point p
-  JOIN tunnel.sonar_scan c ON c.id = p.scan_id;
+  JOIN tunnel.sonar_scan c ON c.id = p.scan_id
+  LEFT JOIN tunnel.survey s ON s.id = p.survey_id;
 COMMENT ON VIEW tunnel_api.sonar_point IS 'Points of sonar scans in the tunnel, thinned, without false echoes';
 COMMENT ON COLUMN tunnel_api.sonar_point.scan IS 'Name of the sonar scan';
 COMMENT ON COLUMN tunnel_api.sonar_point.over_water IS 'Height above the water, m; negative below it';

@@ -169,7 +169,7 @@ def _draw_profile(metres: Float) -> Profile:
 def _draw(conn: psycopg.Connection[Any], row: dict[str, Any]) -> ClosedSection:
     """Draw a closed section: its parts in its own plane, seen up-chainage."""
     parts = conn.execute(
-        "SELECT q.part, q.n, c.radius[q.n], c.radius[q.n + 1] FROM tunnel_api.section_piece q"
+        "SELECT q.part, q.n, c.radius[q.n], c.radius[q.n + 1] FROM tunnel_internal.section_piece q"
         " JOIN tunnel.section c ON c.id = q.section_id WHERE q.section_id = %s ORDER BY q.n",
         [row["id"]],
     ).fetchall()
