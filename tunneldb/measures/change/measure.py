@@ -76,7 +76,7 @@ def compare(
     conn : Connection
         Idle.
     old, new : Survey
-        Of one tunnel.
+        Surveys of one tunnel.
     low, high : float
         Chainage, m.
     cell, length : float

@@ -82,7 +82,7 @@ def measurable_kilometres(
     Raises
     ------
     UserError
-        As `measure_deviation` does.
+        As for `measure_deviation`.
     """
     load_design(conn, survey.tunnel_id, survey.tunnel, layer)
     states = result_states(conn, deviation_from(survey, layer), low, high)

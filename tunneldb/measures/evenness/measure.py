@@ -41,9 +41,9 @@ def measure_evenness(
     conn : Connection
         Idle.
     layer : str
-        Layer of the profiles that are the template; the survey is first held against them.
+        Layer of the template profiles; the survey is first compared with them.
     length, limit : float
-        Of the straightedge, and of the gap beneath it, m.
+        Length of the straightedge, and limit of the gap beneath it, m.
     low, high : float
         Chainage, m.
     begin : callable
@@ -52,7 +52,7 @@ def measure_evenness(
     Raises
     ------
     UserError
-        As :func:`measure_deviation` does, or if the straightedge is too short for the image's pixels.
+        As for :func:`measure_deviation`, or if the straightedge is too short for the image's pixels.
     """
     refuse_beyond(conn, survey, low, high)
     # The kilometres beside are part of what a straightedge near an end lies on.

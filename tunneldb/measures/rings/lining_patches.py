@@ -34,7 +34,7 @@ class LiningPatches:
     Parameters
     ----------
     conn, survey, km
-        Where.
+        Place.
     axis : Alignment
         The given one.
     """

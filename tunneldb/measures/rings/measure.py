@@ -51,7 +51,7 @@ class RingOptions:
     Attributes
     ----------
     diameter : float or None
-        Of the design, m; None: that of a profile that is a circle, else the ring's own.
+        Design diameter, m; None: that of a circular profile, else the ring's own.
     chords : tuple of (float, float)
         Clock positions of the ends, °.
     """
@@ -102,7 +102,7 @@ def find_rings(conn: psycopg.Connection[Any], survey: Survey, begin: Begin) -> t
     Raises
     ------
     UserError
-        If no length of rings can be told.
+        If no ring length is found.
     """
     blocks = survey_blocks(conn, survey, "offset")
     if not blocks:

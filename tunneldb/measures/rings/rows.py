@@ -24,11 +24,11 @@ class RingBounds:
     Attributes
     ----------
     number : int
-        Of the ring.
+        Number of the ring.
     low, high : float
         Chainage of its joints, m.
     joint : str
-        How the one at its beginning is known: given, seen, or missing.
+        Source of the joint at its beginning: given, seen, or missing.
     """
 
     number: int
@@ -51,7 +51,7 @@ class MeasuredRing:
 def save_definition(conn: psycopg.Connection[Any], survey: Survey, rings: Sequence[RingBounds], origin: str) -> int:
     """Replace the rings of a survey that differ from the stored ones; return the number of new ones.
 
-    Rings that stay keep what was measured of them.
+    Unchanged rings keep their measures.
     """
     conn.execute("CREATE TEMP TABLE ring_given (number int, low float8, high float8, joint text) ON COMMIT DROP")
     with conn.cursor() as cursor, cursor.copy("COPY ring_given FROM STDIN") as copy:

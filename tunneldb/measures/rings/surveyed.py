@@ -41,7 +41,7 @@ class RingPlace:
     chainage, right, up : Placed
         Place of the centre along the axis, and its deviations from it, m.
     turn_right, turn_up : Placed
-        How far the plane is turned from across the axis: what points up-chainage turned to the right, or upwards, °.
+        Turn of the plane from across the axis: its up-chainage direction turned to the right, or upwards, °.
     """
 
     chainage: Placed
@@ -62,11 +62,11 @@ class RingRow:
     points : tuple of str
         Names of its points, those counted twice left out.
     ring : Ring or None
-        Its shape; None where there is none.
+        Shape; None without one.
     place : RingPlace or None
-        None where there is no ring, or no axis beside it.
+        None without a ring, or without an axis beside it.
     remarks : tuple of str
-        What is to be known of it.
+        Remarks on it.
     """
 
     name: str
@@ -85,13 +85,13 @@ class SurveyedRings:
     rows : list of RingRow
         In the order of the file.
     diameter : float
-        Of the design, m.
+        Design diameter, m.
     sigma : float or None
-        What a point was taken to be good for, m.
+        Standard deviation of a point that was used, m.
     sigma_given : bool
-        Whether that was given; else all rings together say it.
+        True if that was given; else it is estimated from all rings.
     notes : tuple of str
-        What is to be known of all of them.
+        Remarks on all of them.
     """
 
     rows: list[RingRow]
@@ -111,14 +111,14 @@ def measure_rings(points: Path, axis: Path, diameter: float, sigma: float | None
     diameter : float
         Inner diameter of the design, m.
     sigma : float, optional
-        What a point is good for, m; None: all rings together say it.
+        Standard deviation of a point, m; None: estimated from all rings.
     orders : int
         Harmonics of the radius that are wanted.
 
     Raises
     ------
     UserError
-        When a file can't be read, or all that would come of them were wrong.
+        If a file cannot be read, or all results would be wrong.
     """
     line, surveyed = read_axis(axis), read_points(points)
     middle = np.array([np.median(ring.xyz, axis=0) for ring in surveyed])

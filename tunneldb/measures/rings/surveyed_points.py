@@ -27,15 +27,15 @@ class SurveyedRing:
     Attributes
     ----------
     name : str
-        As the file has it.
+        Name in the file.
     points : tuple of str
         Names of its points.
     xyz : (n, 3) float array
         m.
     offset : (n,) float array
-        How far each stands before the lining, m.
+        Distance of each point from the lining, m.
     remarks : tuple of str
-        What was left out.
+        Points left out.
     refused : str or None
         Why nothing can be made of it.
     """
@@ -54,7 +54,7 @@ def read_points(path: Path) -> list[SurveyedRing]:
     Raises
     ------
     UserError
-        When the file can't be read, lacks a column or holds no point, or an offset is none in metres.
+        If the file cannot be read, has no such column or no point, or an offset is implausible in metres.
     """
     hint = dict.fromkeys(("x", "y", "z"), "required are ring,point,x,y,z and perhaps offset")
     table = read_csv(path, ("x", "y", "z", "offset"), {"offset": 0.0}, hint)
@@ -104,7 +104,7 @@ def read_axis(path: Path) -> DesignAxis:
     Raises
     ------
     UserError
-        When the file can't be read, chainage does not grow, or vertices lie apart by something else than chainage says.
+        If the file cannot be read, chainage does not increase, or the distance of vertices contradicts it.
     """
     table = read_csv(path, ("chainage", "x", "y", "z"))
     if len(table) < 2:

@@ -35,7 +35,7 @@ def measure_thickness(
     conn : Connection
         Idle.
     before, after : Survey
-        Of one tunnel. Both are first held against the layer's profiles, where that is missing or out of date.
+        Surveys of one tunnel. Both are first compared with the layer's profiles, if that is missing or out of date.
     layer : str
         Layer of the profiles along whose normals thickness is measured.
     low, high : float

@@ -51,9 +51,9 @@ class Change:
     ----------
     grid : CellGrid
     old, new : Cells
-        Of both epochs, in the plane of the older one.
+        Cells of both epochs, in the plane of the older one.
     difference : m
-        New less old offset without the rigid motions; NaN where one of them did not see.
+        New minus old offset without the rigid motions; NaN where one of them has no measurement.
     variance, removed_error, lod : m², m, m
     scatter : Scatter
     place_error : m
@@ -77,8 +77,8 @@ class Change:
 def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, length: float, pixel: float) -> Change:
     """Remove the rigid motion of each section from the difference of two epochs, and compute its level of detection.
 
-    A pixel, of a side in m, stands for its points as if they lay in its middle. Where profiles are about a pixel apart, all of
-    a place lie to one side of it, and in the other epoch to another: uniform within the pixel, in both.
+    A pixel, of a side in m, represents its points as if they were in its middle. If profiles are about a pixel apart, all
+    points of a place are on one side of it, and on another in the other epoch: uniformly distributed within the pixel, in both.
     """
     difference, variance = new.offset - old.offset, old.variance + new.variance
     noise = shape_change.measure_scatter(difference, variance).factors[0]
@@ -123,7 +123,7 @@ def measure_change(surface: Surface, grid: CellGrid, old: Cells, new: Cells, len
 def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells, relief: tuple[Single, Single]) -> Float:
     """Return the effect of a section's motions on its cells, (n, 6), about the middle of its seen part.
 
-    A lining with relief changes its offset where it moves along itself, too, and so tells how far it did.
+    A lining with relief also changes its offset when it moves along itself, which determines this motion.
     """
     chainage, arc = grid.chainage[at[1]], grid.arc[at[0]]
     points = surface.to_space(chainage, arc, old.offset[at].astype(np.float64))

@@ -51,7 +51,7 @@ class Steps:
     arc : (k,) float array
         Middles of the cells, m.
     Inward step of the lining behind the joint relative to that before it, and its standard error, m; NaN if not determined.
-        How far the lining behind the joint stands in before that before it, and its standard error, m; NaN untold.
+        Inward step of the lining behind the joint relative to that before it, and its standard error, m; NaN if not determined.
     """
 
     arc: Float
