@@ -178,9 +178,9 @@ def _new_sums(
         seen, lining = classes.seen(raster, state)
         for part in _parts(raster, seen):
             points = surface.to_space(*_places(raster, part))
-            held = np.isfinite(points[:, 0])
-            there = old.unroll(points[held])
-            sums.add(there.chainage, there.arc, there.offset, lining[part][held])
+            valid = np.isfinite(points[:, 0])
+            there = old.unroll(points[valid])
+            sums.add(there.chainage, there.arc, there.offset, lining[part][valid])
     return sums
 
 

@@ -159,10 +159,10 @@ def measure_kilometre(
     first, stop = max(first, np.floor(ends[0])), min(stop, np.ceil(ends[1]))
     track = tracks.given or _fitted(conn, survey, km, axis, tracks.rough[name], options.track_gauge)
     begins = np.arange(first, stop, STEP)
-    held = np.isfinite(track.at(begins + STEP / 2.0)[:, 0]) if len(track.chainage) else np.zeros(len(begins), np.bool_)
-    seen = _share_seen(track, begins, held)
-    counts: dict[str, Any] = {"metres": len(begins), "track_metres": int(held.sum()), "track_seen": round(seen, 4)}
-    begins = begins[held]
+    valid = np.isfinite(track.at(begins + STEP / 2.0)[:, 0]) if len(track.chainage) else np.zeros(len(begins), np.bool_)
+    seen = _share_seen(track, begins, valid)
+    counts: dict[str, Any] = {"metres": len(begins), "track_metres": int(valid.sum()), "track_seen": round(seen, 4)}
+    begins = begins[valid]
     if not len(begins):
         save_clearance(conn, survey, km, gauge, name, [], [])
         return counts

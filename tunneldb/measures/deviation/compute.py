@@ -212,10 +212,10 @@ class Design:
         """
         right, up = self.surface.section_points(chainage, arc, offset.values)
         origin, _, to_right, upwards = np.moveaxis(self.surface.frames(chainage), 1, 0)
-        held = np.isfinite(origin[:, 0])
+        valid = np.isfinite(origin[:, 0])
         moved = np.full((3, len(chainage), 3), np.nan)
         for k, points in enumerate((origin, origin + _ARM * to_right, origin + _ARM * upwards)):
-            moved[k, held] = self.axis.across(points[held])
+            moved[k, valid] = self.axis.across(points[valid])
         base, by_right, by_up = moved[0], (moved[1] - moved[0]) / _ARM, (moved[2] - moved[0]) / _ARM
         placed = [base[:, k, None] + by_right[:, k, None] * right + by_up[:, k, None] * up for k in (1, 2)]
         return base[:, 0], placed[0], placed[1]
@@ -227,10 +227,14 @@ class Design:
         along, right, up = self.places(chainage, arc, shown)
         found = Deviation(*(np.full(right.shape, np.nan) for _ in range(3)))
         for stretch in self.stretches:
-            held = np.flatnonzero((along >= stretch.low) & (along < stretch.high))
-            if len(held):
-                part = deviation(stretch, along[held], right[held], up[held])
-                found.distance[held], found.share[held], found.curvature[held] = part.distance, part.share, part.curvature
+            indices = np.flatnonzero((along >= stretch.low) & (along < stretch.high))
+            if len(indices):
+                part = deviation(stretch, along[indices], right[indices], up[indices])
+                found.distance[indices], found.share[indices], found.curvature[indices] = (
+                    part.distance,
+                    part.share,
+                    part.curvature,
+                )
         return along, found
 
 
@@ -245,11 +249,11 @@ def block_steps(
         here = slice(first, stop)
         begin = west + STEP * float(number[first])
         for stretch in stretches:
-            held = (along[here] >= stretch.low) & (along[here] < stretch.high)
-            held &= (chainage[here] >= ends[0]) & (chainage[here] <= ends[1])
-            if not held.any():
+            selected = (along[here] >= stretch.low) & (along[here] < stretch.high)
+            selected &= (chainage[here] >= ends[0]) & (chainage[here] <= ends[1])
+            if not selected.any():
                 continue
-            k = first + np.flatnonzero(held)
+            k = first + np.flatnonzero(selected)
             low, high = float(chainage[k[0]] - pixel / 2.0), float(chainage[k[-1]] + pixel / 2.0)
             low, high = max(low, begin), min(high, begin + STEP)
             part = Deviation(found.distance[k], found.share[k], found.curvature[k])

@@ -141,9 +141,9 @@ def lining_by_class(conn: psycopg.Connection[Any], survey: Survey, km: int, surf
         chainage, arc = offset.places()
         row, column = np.nonzero(np.isfinite(offset.values))
         points = surface.to_space(chainage[column], arc[row], offset.values[row, column].astype(np.float64))
-        held = np.isfinite(points[:, 0])
+        valid = np.isfinite(points[:, 0])
         shown = np.zeros(offset.values.shape, np.bool_)
-        shown[row[held], column[held]] = scene.classes(points[held]) == PointClass.LINING
+        shown[row[valid], column[valid]] = scene.classes(points[valid]) == PointClass.LINING
         return shown
 
     return lining

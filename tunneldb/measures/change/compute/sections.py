@@ -128,8 +128,8 @@ def _columns(surface: Surface, grid: CellGrid, at: tuple[Any, Any], old: Cells, 
     chainage, arc = grid.chainage[at[1]], grid.arc[at[0]]
     points = surface.to_space(chainage, arc, old.offset[at].astype(np.float64))
     normals = np.full_like(points, np.nan)
-    held = np.isfinite(points[:, 0])
-    normals[held] = surface.unroll(points[held]).normal
+    valid = np.isfinite(points[:, 0])
+    normals[valid] = surface.unroll(points[valid]).normal
     middle = float(np.median(chainage)) if len(chainage) else np.nan
     frame = surface.frames(np.array([middle]))[0]
     along, around = (slope[at][:, None] for slope in relief)
@@ -143,8 +143,8 @@ def _bent(surface: Surface, grid: CellGrid, chainage: float) -> Float:
     for beside in (-grid.cell, grid.cell):
         points = surface.to_space(np.full(grid.rows, chainage), grid.arc + beside, np.zeros(grid.rows))
         normal = np.full_like(points, np.nan)
-        held = np.isfinite(points[:, 0])
-        normal[held] = surface.unroll(points[held]).normal
+        valid = np.isfinite(points[:, 0])
+        normal[valid] = surface.unroll(points[valid]).normal
         normals.append(normal)
     turn = np.arccos(np.clip(np.einsum("ij,ij->i", *normals), -1.0, 1.0))
     return np.nan_to_num(turn / (2.0 * grid.cell))
@@ -161,14 +161,14 @@ def section_figures(found: Change) -> list[Section]:
         seen_old, seen_new = (float(np.isfinite(cells.offset[:, columns]).sum()) * cell**2 for cells in (found.old, found.new))
         if seen_old == seen_new == 0.0:
             continue
-        held = both[:, columns]
-        change = found.difference[:, columns][held].astype(np.float64)
-        noise = found.variance[:, columns][held].astype(np.float64) * found.scatter.factors[0] ** 2
+        selected = both[:, columns]
+        change = found.difference[:, columns][selected].astype(np.float64)
+        noise = found.variance[:, columns][selected].astype(np.float64) * found.scatter.factors[0] ** 2
         means = window[:, columns][np.isfinite(window[:, columns])]
         low, high = (grid.west + place * cell for place in (columns.start, columns.stop))
         rows.append(
             Section(
-                round(low, 6), round(high, 6), seen_old, seen_new, float(held.sum()) * cell**2, motion,
+                round(low, 6), round(high, 6), seen_old, seen_new, float(selected.sum()) * cell**2, motion,
                 float(np.sqrt(max(np.mean(change**2 - noise), 0.0))) if len(change) else np.nan,
                 float(means.min()) if len(means) else np.nan, float(means.max()) if len(means) else np.nan,
                 median(found.lod[:, columns]), cell, grid.south, _along(found.difference[:, columns]),
@@ -186,5 +186,5 @@ def _along(change: Single) -> Float:
 
 def median(values: Single) -> float:
     """Return the median of the finite values; NaN without any."""
-    held = values[np.isfinite(values)]
-    return float(np.median(held)) if len(held) else float("nan")
+    valid = values[np.isfinite(values)]
+    return float(np.median(valid)) if len(valid) else float("nan")

@@ -175,8 +175,8 @@ def _with_changed(
             if own is not None:
                 # Cells that only a part of the section shares count less, the farther they are from the neighbours' motion.
                 found, variance = axes.along(own)
-                apart = (found - even.values[k]) ** 2 / (_BREAK_LEVEL**2 * (variance + even.variances[k]))
-                values[k], variances[k] = found, variance * (1.0 + apart) ** 2
+                separation = (found - even.values[k]) ** 2 / (_BREAK_LEVEL**2 * (variance + even.variances[k]))
+                values[k], variances[k] = found, variance * (1.0 + separation) ** 2
         before, even = even, _even(number, values, variances, wander, even.ties)
         if float(np.abs(even.values - before.values).max()) < _CONVERGED:
             break

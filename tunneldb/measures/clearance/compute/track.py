@@ -186,8 +186,8 @@ def follow(pairs: Pairs) -> list[Pairs]:
     for one, two in pairwise(found):
         shared = np.intersect1d(one.chainage, two.chainage)
         if len(shared) and abs(float(np.median(two.middle)) - float(np.median(one.middle))) < GAUGE:
-            apart = float(np.median(two.middle) - np.median(one.middle))
-            raise ValueError(f"near chainage {shared[0]:.0f} two tracks would be {apart:.2f} m apart")
+            separation = float(np.median(two.middle) - np.median(one.middle))
+            raise ValueError(f"near chainage {shared[0]:.0f} two tracks would be {separation:.2f} m apart")
     return found
 
 
@@ -303,15 +303,15 @@ def _continued(pairs: Pairs, track: list[int], chainage: float) -> float:
 def _measured(points: Float, stations: Float, head: Float, top: Float) -> Float:
     """Measure middle and top of a rail at stations, (n, 2), m, NaN where not seen; ``head`` and ``top`` are approximate."""
     expected, level = _linear(points[:, 0], stations, head), _linear(points[:, 0], stations, top)
-    aside, above = points[:, 1] - expected, points[:, 2] - level
-    near = np.flatnonzero((np.abs(aside) <= HEAD / 2.0 + 0.04) & (np.abs(above) <= 2.0 * _HEAD_DEPTH))
+    offset, above = points[:, 1] - expected, points[:, 2] - level
+    near = np.flatnonzero((np.abs(offset) <= HEAD / 2.0 + 0.04) & (np.abs(above) <= 2.0 * _HEAD_DEPTH))
     number = np.floor(points[near, 0] / STATION).astype(np.int64) - int(np.floor(stations[0] / STATION))
     near, number = near[(number >= 0) & (number < len(stations))], number[(number >= 0) & (number < len(stations))]
     order = np.argsort(number, kind="stable")
     near, number = near[order], number[order]
     found = np.full((len(stations), 2), np.nan)
     for first, stop in _runs(number):
-        x, y = aside[near[first:stop]], above[near[first:stop]]
+        x, y = offset[near[first:stop]], above[near[first:stop]]
         if len(x) < _MIN_HEAD_POINTS:
             continue
         crown = np.abs(y - np.quantile(y, 0.7)) <= _HEAD_DEPTH / 2.0 + 0.005
