@@ -18,7 +18,7 @@ class Scene(NamedTuple):
     plan: Float
     profile: Float
     parts: Float
-    # chainage of both ends, arc of the floor's corner, reach of the appendages off the lining, half a leak's edge,
+    # chainage of both ends, arc of the floor's corner, reach of fixtures off the lining, half a leak's edge,
     # number of leaks in niches
     ends: Float
     items: Float
