@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
 
 from tunneldb.cli.output import Verb, tell, verb
-from tunneldb.cli.param_types import FINITE, SEED, FilePath
+from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import bar
+from tunneldb.cli.simulate_options import NAME, SEED_NUMBER, SRID, parameter_option
 from tunneldb.simulate import PRESETS, Parameters, Simulation, write
 from tunneldb.simulate.parameters import CHOICES
 
@@ -37,14 +37,14 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option("start_chainage", "M", "Chainage of the start."),
         _Option("azimuth", "DEG", "Direction of the start, from north, clockwise."),
         _Option("origin", "E N Z", "Coordinates of the axis at the start.", FINITE, 3),
-        _Option("srid", "EPSG", "Coordinate system, projected in metres.", int),
+        _Option(*SRID),
     ],
     "Section": [
         _Option(
             "section",
             "NAME",
             "circular (flat invert), horseshoe (arch, walls, flat floor) or box (sharp corners).",
-            click.Choice(["circular", "horseshoe", "box"]),
+            click.Choice(list(CHOICES["section"])),
         ),
         _Option("section_radius", "M", "Radius of circular and of the horseshoe's arch."),
         _Option("invert", "M", "Floor of circular, below the centre of the circle."),
@@ -58,7 +58,7 @@ _GROUPS: dict[str, list[_Option]] = {
             "scanner",
             "NAME",
             "static (tripod on stations) or profiler (on a trolley, one turn of the mirror a profile).",
-            click.Choice(["static", "profiler"]),
+            click.Choice(list(CHOICES["scanner"])),
         ),
         _Option("station_spacing", "M", "static: greatest distance between stations."),
         _Option("angular_step", "DEG", "static: step of azimuth and zenith."),
@@ -82,7 +82,7 @@ _GROUPS: dict[str, list[_Option]] = {
             "range_curve",
             "NAME",
             "How intensity falls with range: near_loss (with the loss of near ranges) or inverse_square.",
-            click.Choice(["near_loss", "inverse_square"]),
+            click.Choice(list(CHOICES["range_curve"])),
         ),
     ],
     "Intensity and contents": [
@@ -193,8 +193,8 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option("pose_turn", "DEG", "By how much the poses are turned, about the axis and at most across it."),
     ],
     "Other": [
-        _Option("name", "NAME", "First part of the file names.", str),
-        _Option("seed", "N", "Seed; the same seed gives the same points.", SEED),
+        _Option(*NAME),
+        _Option(*SEED_NUMBER),
     ],
 }
 _FLAGS = {
@@ -226,19 +226,9 @@ class _GroupedVerb(Verb):
 
 def _options(command: Callable[..., None]) -> Callable[..., None]:
     """Add all options of the groups to a command."""
-    defaults: dict[str, Any] = {f.name: f.default for f in fields(Parameters)}
     for options in reversed(_GROUPS.values()):
         for o in reversed(options):
-            default = defaults[o.field]
-            shown = " ".join(f"{v:.10g}" if isinstance(v, float) else str(v) for v in (default if o.nargs > 1 else [default]))
-            command = click.option(
-                "--" + o.field.replace("_", "-"),
-                o.field,
-                type=o.type,
-                nargs=o.nargs,
-                metavar=o.metavar,
-                help=o.help if default is None else f"{o.help} [{shown}]",
-            )(command)
+            command = parameter_option(Parameters, *o)(command)
     for field, (flag, value, text, _) in _FLAGS.items():
         command = click.option(flag, field, flag_value=value, type=bool, default=None, help=text)(command)
     return command

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.param_types import FINITE, SEED, FilePath
+from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import say
+from tunneldb.cli.simulate_options import NAME, SEED_NUMBER, SRID, parameter_option
 from tunneldb.files import exit_on_sigterm, made_folder
 from tunneldb.simulate.canal import CanalParameters, simulate, write
 
-
-def _option(name: str, metavar: str, text: str, kind: Any = FINITE) -> Any:
-    """Option that sets a field of the parameters; its default is taken from there."""
-    default = getattr(CanalParameters(), name)
-    shown = f"{default:.10g}" if isinstance(default, float) else default
-    return click.option("--" + name.replace("_", "-"), name, type=kind, metavar=metavar, help=f"{text} [{shown}]")
+_option = partial(parameter_option, CanalParameters)
 
 
 @verb(
@@ -53,9 +50,9 @@ def _option(name: str, metavar: str, text: str, kind: Any = FINITE) -> Any:
 @_option("sonar_noise", "M", "Standard deviation of a range.")
 @click.option("--sonar-z-down", is_flag=True, help="The files' z axis points down.")
 @_option("false_share", "SHARE", "Of false echoes.")
-@_option("srid", "EPSG", "Coordinate system, projected in metres.", int)
-@_option("name", "NAME", "First part of the file names.", str)
-@_option("seed", "N", "Seed; the same seed gives the same points.", SEED)
+@_option(*SRID)
+@_option(*NAME)
+@_option(*SEED_NUMBER)
 def simulate_canal(out: Path, **given: Any) -> None:
     """Simulate scans of a canal tunnel, with their reference data, in the folder OUT.
 

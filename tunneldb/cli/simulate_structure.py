@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from tunneldb.cli.output import tell, verb
-from tunneldb.cli.param_types import FINITE, SEED, FilePath
+from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import bar
+from tunneldb.cli.simulate_options import NAME, SEED_NUMBER, SRID, parameter_option
 from tunneldb.simulate.structure import StructureParameters, StructureScan, write_structure
 
-
-def _option(name: str, metavar: str, text: str, kind: Any = FINITE, nargs: int = 1) -> Any:
-    """Option that sets a field of the parameters; its default is taken from there."""
-    default = getattr(StructureParameters(), name)
-    shown = " ".join(f"{v:.10g}" if isinstance(v, float) else str(v) for v in (default if nargs > 1 else [default]))
-    flag = "--" + name.replace("_", "-")
-    return click.option(flag, name, type=kind, nargs=nargs, metavar=metavar, help=f"{text} [{shown}]")
+_option = partial(parameter_option, StructureParameters)
 
 
 @verb(
@@ -44,9 +40,9 @@ def _option(name: str, metavar: str, text: str, kind: Any = FINITE, nargs: int =
 @_option("contrast", "MIN MAX", "By how much they differ, dB.", FINITE, 2)
 @_option("fronts", "N", "Objects in front that split what is behind.", int)
 @click.option("--night", is_flag=True, help="No colours, and other noise; structure and anomalies stay.")
-@_option("srid", "EPSG", "Coordinate system, projected in metres.", int)
-@_option("name", "NAME", "First part of the file names.", str)
-@_option("seed", "N", "Seed; the same seed gives the same points.", SEED)
+@_option(*SRID)
+@_option(*NAME)
+@_option(*SEED_NUMBER)
 def simulate_structure(out: Path, **given: Any) -> None:
     """Simulate a scan of a structure, with its reference data, in the folder OUT.
 

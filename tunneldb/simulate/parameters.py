@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
 import numpy as np
 import pyproj
-from pyproj.exceptions import CRSError
 
 from tunneldb.errors import UserError
+from tunneldb.simulate.checks import metric_crs, require_within
 from tunneldb.simulate.radiometry import Radiometry
 from tunneldb.simulate.tunnel import section
 from tunneldb.simulate.tunnel.centreline import CentreLine
@@ -239,11 +238,7 @@ class Parameters:
     pose_turn: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, (low, high, unit) in LIMITS.items():
-            value = getattr(self, name)
-            if value is not None and not low <= value <= high:
-                shown = f"{value:g}" if abs(value) < 1e15 else f"{str(value)[:12]}…"  # whole numbers may have any length
-                raise UserError(f"{name.replace('_', ' ')} is {shown}: give {low:g} to {high:g} {unit}")
+        require_within(self, LIMITS, " ")
         if not self.name or any(c in self.name for c in "/\\\0") or self.name.startswith("."):
             raise UserError(f"name {self.name!r} is not valid in a file name: use letters, digits, - and _")
         for name, names in CHOICES.items():
@@ -301,13 +296,7 @@ class Parameters:
 
     def crs(self) -> pyproj.CRS:
         """Return the coordinate system; projected, in metres."""
-        try:
-            crs = pyproj.CRS.from_epsg(self.srid)
-        except CRSError:
-            raise UserError(f"SRID {self.srid} is unknown: give the EPSG code of a projected system") from None
-        if not crs.is_projected or not math.isclose(crs.axis_info[0].unit_conversion_factor, 1.0):
-            raise UserError(f"SRID {self.srid} ({crs.name}) is not projected in metres: give one that is")
-        return crs
+        return metric_crs(self.srid)
 
     def tunnel(self) -> Tunnel:
         """Return the geometry of the tunnel."""

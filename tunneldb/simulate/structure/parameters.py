@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import pyproj
-from pyproj.exceptions import CRSError
 
 from tunneldb.errors import UserError
+from tunneldb.simulate.checks import metric_crs, require_within
 
 # Allowed values: low, high, unit.
 LIMITS: dict[str, tuple[float, float, str]] = {
@@ -80,23 +79,14 @@ class StructureParameters:
     night: bool = False
 
     def __post_init__(self) -> None:
-        for name, (low, high, unit) in LIMITS.items():
-            value = getattr(self, name)
-            if not (math.isfinite(value) and low <= value <= high):
-                raise UserError(f"{name.replace('_', '-')} is {value:g}: give {low:g} to {high:g} {unit}")
+        require_within(self, LIMITS)
         low, high = self.contrast
         if not 0.0 < low <= high <= 20.0:
             raise UserError(f"contrast is {low:g} to {high:g} dB: give two ascending values above 0 and up to 20")
 
     def crs(self) -> pyproj.CRS:
         """Return the coordinate system; projected, in metres."""
-        try:
-            crs = pyproj.CRS.from_epsg(self.srid)
-        except CRSError:
-            raise UserError(f"SRID {self.srid} is unknown: give the EPSG code of a projected system") from None
-        if not crs.is_projected or not math.isclose(crs.axis_info[0].unit_conversion_factor, 1.0):
-            raise UserError(f"SRID {self.srid} ({crs.name}) is not projected in metres: give one that is")
-        return crs
+        return metric_crs(self.srid)
 
     def as_dict(self) -> dict[str, Any]:
         """Return all parameters, for the record."""
