@@ -18,8 +18,9 @@ from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import exit_on_sigterm, replacing
+from tunneldb.report.leak_table import CARDS
 from tunneldb.report.owner import Owner, read_owner
-from tunneldb.report.page import CARDS, MAX_LISTED_LEAKS, Written, write_html, write_site_html
+from tunneldb.report.page import MAX_LISTED_LEAKS, Written, write_html, write_site_html
 from tunneldb.report.pdf import find_browser, print_pdf
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.survey import Survey, get_survey
