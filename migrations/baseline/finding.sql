@@ -13,7 +13,7 @@ INSERT INTO tunnel.finding_kind (code, label, geometries, wet, position) VALUES
     ('obstruction', 'Obstruction', '{polygon, line, point}', false, 100),
     ('other', 'Other', '{polygon, line, point}', false, 110),
     ('joint', 'Joint', '{polygon, line}', false, 120),
-    ('dark', 'Dark, but dry', '{polygon}', false, 130);
+    ('dark', 'Dry dark area', '{polygon}', false, 130);
 INSERT INTO tunnel.severity (id, label, text) VALUES
     (1, 'minor', 'No action; to be looked at in the next inspection'),
     (2, 'moderate', 'To be watched, or repaired with other works'),

@@ -101,6 +101,6 @@ def test_agreement_counts_points_and_gives_cohens_kappa():
     sklearn = pytest.importorskip("sklearn.metrics")
     assert a.kappa == pytest.approx(sklearn.cohen_kappa_score(truth, found))
     assert (a + a).total == pytest.approx(a.total)
-    with pytest.raises(ValueError, match="fit"):
+    with pytest.raises(ValueError, match="do not match"):
         Agreement.of(truth, found[:5])
     assert np.isnan(Agreement.of([], []).kappa)

@@ -151,7 +151,7 @@ def test_a_station_that_cannot_be_is_refused_by_its_number(folder: Path, conn: p
         "none",
     )
     line = command(*arguments, code=2).stderr.strip()
-    assert "the station of scan_id 1 lies" in line
+    assert "the station of scan_id 1 is" in line
     assert conn.execute("SELECT count(*) FROM tunnel.survey").fetchone() == (0,)
 
 

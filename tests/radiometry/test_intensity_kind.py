@@ -86,6 +86,6 @@ def test_a_name_decides_what_values_leave_open() -> None:
 
 def test_values_that_are_none_are_counted_and_left_out() -> None:
     found = value_range(np.array([1.0, np.nan, 3.0, np.inf, 2.0]))
-    assert (found.count, found.missing, found.minimum, found.median, found.maximum, found.whole) == (5, 2, 1.0, 2.0, 3.0, True)
+    assert (found.count, found.missing, found.least, found.median, found.most, found.whole) == (5, 2, 1.0, 2.0, 3.0, True)
     assert guess_kind(np.full(3, np.nan))[0].kind == "none"
     assert contradiction("linear", np.full(3, np.nan)) == "no value is a number"

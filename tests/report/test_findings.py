@@ -102,7 +102,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     exif = Image.Exif()
     exif[0x0112] = 6  # to be turned by a quarter
     (folder / "upright.jpg").write_bytes(image((1600, 1200), "JPEG", exif=exif))
-    (folder / "broken.jpg").write_text("no image")
+    (folder / "broken.jpg").write_text("not a readable image")
     return folder
 
 
@@ -251,8 +251,8 @@ def test_photos_are_small_and_upright_and_what_is_missing_is_a_line(report: Path
 @pytest.mark.parametrize(
     ("path", "trouble"),
     [
-        ("{web}/away", "could not be fetched: "), ("file://{folder}/gone.jpg", "no such file"), ("", "no image"),
-        ("/dev/zero", "no image"), ("ftp://nowhere/1.jpg", "neither a file nor"), ("a\0b", "no such file"),
+        ("{web}/away", "could not be fetched: "), ("file://{folder}/gone.jpg", "no such file"), ("", "not a readable image"),
+        ("/dev/zero", "not a readable image"), ("ftp://nowhere/1.jpg", "neither a file nor"), ("a\0b", "no such file"),
         ("http://[", "could not be fetched: "), ("file://{folder}/upright.jpg", ""),
     ],
 )  # fmt: skip

@@ -67,7 +67,7 @@ def _print_file(look: FileLook) -> None:
             rows.append([one.name, "", "", "", "", "", "", "", one.fault])
             continue
         values = one.values
-        numbers = [f"{value:.5g}" for value in (values.minimum, values.low, values.median, values.high, values.maximum)]
+        numbers = [f"{value:.5g}" for value in (values.least, values.low, values.median, values.high, values.most)]
         missing = f"{100.0 * values.missing / values.count:.3g} %"
         kind = f"{one.type}, whole" if values.whole and "float" in one.type else one.type
         rows.append([one.name, kind, *numbers, missing, " or ".join(guess.what for guess in one.guesses) or "neither"])

@@ -52,7 +52,7 @@ class ValueRange:
     ----------
     count, missing : int
         Number of values, and of these the number of NaN or infinite ones.
-    minimum, low, median, high, maximum : float
+    least, low, median, high, most : float
         Minimum, 1st percentile, median, 99th percentile, maximum of the finite values; NaN if there are none.
     whole : bool
         True if all finite values are whole numbers.
@@ -60,11 +60,11 @@ class ValueRange:
 
     count: int
     missing: int
-    minimum: float
+    least: float
     low: float
     median: float
     high: float
-    maximum: float
+    most: float
     whole: bool
 
     @property
@@ -121,8 +121,8 @@ def guess_kind(values: NDArray[Any] | ValueRange, name: str = "") -> list[KindGu
     found = values if isinstance(values, ValueRange) else value_range(values)
     if not np.isfinite(found.median):
         return [KindGuess("none", "no intensity", "no value is a number")]
-    if found.minimum == found.maximum:
-        return [KindGuess("none", "no intensity", f"all values are {found.minimum:g}")]
+    if found.least == found.most:
+        return [KindGuess("none", "no intensity", f"all values are {found.least:g}")]
     guesses = [guess for guess in (_linear(found), *_decibels(found)) if guess is not None]
     # dB usually have fractions; powers are usually whole numbers, or all within 0 … 1.
     if not found.whole and found.high > 1.0:
@@ -149,8 +149,8 @@ def contradiction(kind: str, values: NDArray[Any] | ValueRange) -> str | None:
         return None
     if not np.isfinite(found.median):
         return "no value is a number"
-    if found.minimum == found.maximum:
-        return f"all values are {found.minimum:g}"
+    if found.least == found.most:
+        return f"all values are {found.least:g}"
     reason = _not_linear(found) if kind == "linear" else _not_decibels(found)
     if reason is None:
         return None
@@ -200,7 +200,7 @@ def doubt(kind: str, values: NDArray[Any]) -> str | None:
 
 def _not_linear(found: ValueRange) -> str | None:
     if found.low < 0.0:
-        return f"values go below zero ({found.minimum:g}), but linear intensity is never negative"
+        return f"values go below zero ({found.least:g}), but linear intensity is never negative"
     return None
 
 
@@ -217,15 +217,15 @@ def _not_decibels(found: ValueRange) -> str | None:
 
 
 def _linear(found: ValueRange) -> KindGuess | None:
-    limits = f"from {found.minimum:g} to {found.maximum:g}"
+    limits = f"from {found.least:g} to {found.most:g}"
     if _not_linear(found) is None:
         if not found.whole:
             what = "0–1 float: linear" if found.high <= 1.0 else "linear"
             return KindGuess("linear", what, f"fractions {limits}")
-        bits = next((bits for bits in _BITS if found.maximum < 2**bits), None)
+        bits = next((bits for bits in _BITS if found.most < 2**bits), None)
         what = "counts: linear" if bits is None else f"{bits}-bit counts: linear"
         return KindGuess("linear", what, f"whole numbers {limits}")
-    if found.whole and found.spread > MAX_SPREAD_DB and _SHIFTED[0] <= found.minimum and found.maximum <= _SHIFTED[1]:
+    if found.whole and found.spread > MAX_SPREAD_DB and _SHIFTED[0] <= found.least and found.most <= _SHIFTED[1]:
         what = "12-bit counts, shifted below zero: linear after adding 2048 to each"
         return KindGuess("linear", what, f"whole numbers {limits}")
     return None
