@@ -42,7 +42,7 @@ def test_the_chapter(example: str, conn: psycopg.Connection, tmp_path: Path) -> 
     worst = re.findall(r"<figcaption>12\+(\d+\.\d+): [\d.]+ / ([\d.]+) m²", chapter)
     assert {round((float(at) - 299.5) * UNDER, 3) for at, _ in worst} == {float(under) for _, under in worst}
     assert max(float(at) for at, _ in worst) == 499.5
-    assert f"over 20 mm on {200 * UNEVEN:.1f} m²" in chapter
+    assert f"exceeds 20 mm on {200 * UNEVEN:.1f} m²" in chapter
     (row,) = re.findall(r"<td>demo-2023</td>(.*?)</tr>", chapter)
     assert re.findall(r"<td class=\"n\">([^<]*)", row) == ["4\u202f500.0", "1\u202f500.00", f"{THICK:.3f}", f"{THIN:.3f}"]
 
