@@ -81,7 +81,7 @@ def test_many_points_in_one_place() -> None:
 
 @pytest.mark.parametrize(("radius", "least"), [(0.0, 5), (-1.0, 5), (float("nan"), 5), (0.1, 0)])
 def test_bounds(radius: float, least: int) -> None:
-    with pytest.raises(ValueError, match="radius above 0"):
+    with pytest.raises(ValueError, match="must be above 0"):
         dbscan(np.zeros((3, 3)), radius, least)
 
 

@@ -203,7 +203,7 @@ def test_pixels_of_two_sizes_are_not_put_together(sections: psycopg.Connection, 
     command("run", NAME, "--from", "detect")
     whole = over_end(conn)
     command("run", NAME, "--from", "detect", "--km", 12, "--set", "image.pixel=0.025")
-    assert "towards kilometre 13 are in two pieces" in counts(conn)["note"]
+    assert "to kilometre 13 are in two pieces" in counts(conn)["note"]
     assert not over_end(conn)
     assert len(outlines(conn)) == len(uncut) + 1  # the smaller leak has too little in kilometre 12 for one of its own
     command("run", NAME, "--from", "detect", "--km", 12)

@@ -55,11 +55,11 @@ def test_a_scan_whose_receiver_is_at_its_stop_is_called_saturated(share: float, 
 
 
 def test_decibels_that_are_declared_counts_are_doubted() -> None:
-    assert "--intensity-kind amplitude?" in str(doubt("linear", AMPLITUDE))
+    assert "--intensity-kind amplitude" in str(doubt("linear", AMPLITUDE))
 
 
 def test_lining_brighter_than_white_is_doubted() -> None:
-    assert "--intensity-kind amplitude?" in str(doubt("reflectance", AMPLITUDE))
+    assert "--intensity-kind amplitude" in str(doubt("reflectance", AMPLITUDE))
 
 
 @pytest.mark.parametrize("kind", ["amplitude", "reflectance"])

@@ -117,7 +117,7 @@ class LevelCurve:
 
 
 UNKNOWN = LevelCurve(np.zeros(1), np.zeros(1), np.ones(1), np.empty(0, np.int64), 0.0, 0.0)
-"""Level of a surface of which too little was seen."""
+"""Level of a surface with too few pixels."""
 
 
 def level_curve(

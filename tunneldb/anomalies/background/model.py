@@ -24,7 +24,7 @@ SAMPLE, LINES = 15_000_000, 6_000_000
 """Approximate number of pixels used for tiles; rows and columns use the same, and have far more each."""
 
 BLOCKS_TO_EITHER_SIDE = 1
-"""Number of blocks to either side for a band: with the block itself 150 m, of which a leak is a small part."""
+"""Number of blocks to either side for a band: with the block itself 150 m, much more than a leak."""
 
 ROW_MEDIAN_LENGTH = 0.1
 """Length of the running median across bands, m: joints along the tunnel are narrower than half of it."""

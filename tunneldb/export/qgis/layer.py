@@ -181,7 +181,7 @@ SCANNER_LAYERS = (
     VectorLayer("scan_station", "Where the scanner stood", "scan_station", "PointZ", "scan_station", MAP, (MAP, SPACE)),
     VectorLayer("trajectory", "The scanner's way", "trajectory", "LineStringZ", "trajectory", MAP, ()),
 )
-"""The same of a survey of which it is known where the scanner was. The way is off at first: each view of it reads all of it."""
+"""Layers of a survey with known scanner positions. The trajectory is off at first: each view of it reads all of it."""
 
 STRUCTURE_LAYERS = (
     VectorLayer("spot_map", "Spots on the map (review)", "spot_map", "Polygon", "spot", STRUCTURES, (MAP,), True),
@@ -193,7 +193,7 @@ STRUCTURE_LAYERS = (
     VectorLayer("member_sheet", "Pages of members", "member_sheet", "Polygon", "member_sheet", FACES, (FACES,)),
     VectorLayer("face_sheet", "Faces, unrolled", "face_sheet", "MultiPolygon", "face_sheet", FACES, (FACES,)),
 )
-"""The same of structures: of a site, and of a survey of a tunnel in which members were found."""
+"""Layers of structures: of a site, and of a survey of a tunnel in which members were found."""
 
 UNDERWATER_LAYERS = (
     VectorLayer("sonar_scan", "Sonar stations", "sonar_scan", "PointZ", "sonar_scan", UNDERWATER, (MAP, SPACE)),
@@ -208,7 +208,7 @@ UNDERWATER_LAYERS = (
         where="\"part\" <> 'lining'",
     ),
 )  # fmt: skip
-"""The same of a survey of a canal tunnel for which sonar scans were registered."""
+"""Layers of a survey of a canal tunnel with registered sonar scans."""
 
 CLEARANCE_LAYERS = (
     VectorLayer(
@@ -225,12 +225,12 @@ CLEARANCE_LAYERS = (
         "clearance_unrolled", UNROLLED, (UNROLLED,),
     ),
 )  # fmt: skip
-"""The same of a survey whose clearance was measured; each only where it has rows."""
+"""Layers of a survey with measured clearance; each only if it has rows."""
 RING_LAYERS = (
     VectorLayer("ring_map", "Rings beside the axis, by ovality", "ring_map", "Polygon", "ring", MAP, ()),
     VectorLayer("ring_unrolled", "Rings, by ovality", "ring_unrolled", "Polygon", "ring", UNROLLED, ()),
 )
-"""The same of a survey whose lining has rings."""
+"""Layers of a survey whose lining has rings."""
 DEVIATION_LAYERS = (
     VectorLayer("deviation_map", "Over- and underbreak", "deviation_map", "LineString", "deviation_map", MAP, ()),
     VectorLayer(
@@ -240,7 +240,7 @@ DEVIATION_LAYERS = (
         "deviation_bar", "Over- and underbreak by metre", "deviation_bar", "Polygon", "deviation_bar", UNROLLED, (DEVIATION,)
     ),
 )
-"""The same of a survey that was held against a design."""
+"""Layers of a survey that was compared with a design."""
 
 CHANGE_LAYERS = (
     VectorLayer(
@@ -262,7 +262,7 @@ CHANGE_LAYERS = (
         "change_region_3d", "Changed lining, in space", "change_region_3d", "PolygonZ", "change_region_3d", SPACE, (SPACE,)
     ),
 )  # fmt: skip
-"""The same of a survey that was compared with an older one; each only where it has rows."""
+"""Layers of a survey that was compared with an older one; each only if it has rows."""
 
 UNDER_CHANGE = {"axis": (CHANGE_MAP,), "outline": (CHANGE_MAP,), "sheet": (CHANGE,)}
-"""Other layers that the themes of change show, with those."""
+"""Other layers in the themes of change."""

@@ -19,7 +19,7 @@ SEEN = 0.5
 """Minimum inspected share of a place for it to be called new or dry."""
 
 NAMED = 0.5
-"""Minimum share of a leak that must be a joint or a dark spot in the other survey for it to be of another kind there."""
+"""Minimum share of a leak that must be a joint or a dry dark area in the other survey for it to be of another kind there."""
 
 EDGE = 4.0
 """Width of the edge of a leak in the image, in pixels: with half of it, two of 15 unchanged leaks between two scans would be

@@ -32,7 +32,7 @@ MIN_EXPLAINED_SHARE = 0.75
 """Share of the neighbours' residual explained by its own motion from which a section moved as a whole."""
 
 MIN_SECTIONS = 8
-"""Minimum number of sections that kept their shape, for the smoothness of the motion to be known."""
+"""Minimum number of sections that kept their shape, for estimating the smoothness of the motion."""
 
 MIN_DETERMINED_SHARE = 0.5
 """Share of sections in which a motion must be determined to be tied."""
