@@ -187,7 +187,7 @@ def test_an_inspector_reviews_by_keys(
     assert seen["images"]["drawn_as_before"]
     assert seen["leaks"]["EXIT_CODE"] in (0, 1)
     assert "leak_unrolled" in seen["leaks"]["loaded"]
-    assert re.match(r"no survey 'nowhere-2024'", seen["wrong"]["error"])
+    assert re.match(r"there is no survey 'nowhere-2024'", seen["wrong"]["error"])
     assert seen["left"] == []
     assert not [key for key in seen["settings"] if "password" in key]
 
