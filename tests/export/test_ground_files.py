@@ -111,7 +111,7 @@ def test_field_has_no_lining(tmp_path: Path) -> None:
         (np.empty((0, 3)), "holds no points"),
         (np.array([[1.0, 2.0, 3.0]]), "neither ground nor lining"),
         (np.tile([[1.0, 2.0, 3.0]], (1000, 1)), "neither ground nor lining"),
-        (np.array([[0.0, 0.0, 0.0], [1.0e6, 0.0, 0.0]]), "farther apart"),
+        (np.array([[0.0, 0.0, 0.0], [1.0e6, 0.0, 0.0]]), "voxels apart"),
         (np.random.default_rng(2).uniform(0, 50, (2000, 3)), "neither ground nor lining"),
     ],
     ids=["empty", "one point", "one place", "far apart", "dust"],

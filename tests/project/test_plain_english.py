@@ -126,6 +126,10 @@ SCOPES: dict[str, Callable[[], Iterator[tuple[str, str]]]] = {
 }
 
 
+SLOW = {"help", "docstrings", "messages"}
+"""Scopes that import or parse the whole package."""
+
+
 def found(texts: Iterator[tuple[str, str]]) -> list[str]:
     """Return phrases of the list in texts, with place and replacement."""
     return [
@@ -136,7 +140,7 @@ def found(texts: Iterator[tuple[str, str]]) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("scope", SCOPES)
+@pytest.mark.parametrize("scope", [pytest.param(scope, marks=pytest.mark.slow if scope in SLOW else ()) for scope in SCOPES])
 def test_no_phrase_of_the_list(scope: str) -> None:
     wrong = found(SCOPES[scope]())
     assert not wrong, "\n".join(wrong)
@@ -147,6 +151,7 @@ def test_phrases_are_found() -> None:
     assert [line.partition(":")[0] for line in found(iter(texts))] == ["a", "a"]
 
 
+@pytest.mark.slow
 def test_function_docstrings_begin_with_a_verb() -> None:
     all_of_them = [
         f"{path}:{node.lineno} {text.splitlines()[0]}"
