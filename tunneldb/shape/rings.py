@@ -16,7 +16,7 @@ from tunneldb.shape.harmonics import Harmonics, fit_harmonics
 from tunneldb.shape.limits import MAX_TESTED_SINGLY
 from tunneldb.shape.plane import RingPlane, fit_plane
 
-LEAST_POINTS = 5
+MIN_POINTS = 5
 """Minimum number of points: a circle and two points to check it."""
 
 FLAT = RingPlane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), 0.0)
@@ -113,8 +113,8 @@ def fit_ring(
     RingRefusedError
         If there are fewer than 5 points, or they determine no circle.
     """
-    if len(points) < LEAST_POINTS:
-        raise RingRefusedError(f"only {len(points)} points; a ring needs {LEAST_POINTS}")
+    if len(points) < MIN_POINTS:
+        raise RingRefusedError(f"only {len(points)} points; a ring needs {MIN_POINTS}")
     plane = _plane(points, ahead, across)
     xy = points if points.shape[1] == 2 else plane.project(points)
     start = begin(xy)

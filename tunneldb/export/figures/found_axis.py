@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _POINTS, _LINE, _DOUBT = "#7f8c8d", "#c0392b", "#f1c40f"
-_MOST = 400_000  # points that are drawn
+_MAX_POINTS = 400_000  # points that are drawn
 
 
 def write_found(found: FoundAxis, path: Path, start: float, title: str) -> None:
@@ -33,7 +33,7 @@ def write_found(found: FoundAxis, path: Path, start: float, title: str) -> None:
     extent = np.ptp(found.xyz[:, :2], axis=0)
     figure = Figure(figsize=(14, 5.0 + min(max(12.0 * extent[1] / max(extent[0], 1.0), 4.0), 10.0)), layout="constrained")
     plan, profile = figure.subplots(2, 1, height_ratios=[2.5, 1])
-    points = found.points[:: max(1, len(found.points) // _MOST)]
+    points = found.points[:: max(1, len(found.points) // _MAX_POINTS)]
     _draw_plan(plan, found, points, start)
     _draw_profile(profile, found, points, start)
     figure.suptitle(f"{title}: chainage grows with the arrow; yellow: look there", fontsize=11)

@@ -33,7 +33,7 @@ BANDS = ("height", "depth", "sigma")
 """Bounds of the raster of the bed, all in m."""
 
 _TILE = 256  # pixels
-_BESIDE = 50.0  # m of the surface beyond a kilometre's ends
+_MARGIN = 50.0  # m of the surface beyond a kilometre's ends
 
 
 def export_bed(conn: psycopg.Connection[Any], survey: Survey, km: int, folder: Path) -> Path | None:
@@ -103,7 +103,7 @@ def export_submerged(conn: psycopg.Connection[Any], survey: Survey, km: int, fol
     points = load_sonar_points(conn, survey, km)
     if len(points) == 0:
         return None
-    surface = load_surface(conn, survey, km * KILOMETRE - _BESIDE, (km + 1) * KILOMETRE + _BESIDE)
+    surface = load_surface(conn, survey, km * KILOMETRE - _MARGIN, (km + 1) * KILOMETRE + _MARGIN)
     unrolled = surface.unroll(points)
     inside = np.isfinite(unrolled.offset)
     if not inside.any():

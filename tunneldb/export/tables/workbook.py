@@ -23,7 +23,7 @@ MAX_ROWS = 1_048_576
 MAX_CELL_LENGTH = 32_767
 """Maximum number of characters of a cell."""
 
-_NARROWEST, _WIDEST = 8, 50  # columns, in characters
+_MIN_WIDTH, _MAX_WIDTH = 8, 50  # columns, in characters
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def _write_sheet(page: Worksheet, sheet: Sheet, forms: dict[str, Format], head: 
     for n, column in enumerate(sheet.columns):
         page.write_string(0, n, column.heading, head)
         longest = max((len(_shown(row[n])) for row in sheet.rows[:1000]), default=0)
-        page.set_column(n, n, min(max(longest, len(column.heading), _NARROWEST) + 2, _WIDEST))
+        page.set_column(n, n, min(max(longest, len(column.heading), _MIN_WIDTH) + 2, _MAX_WIDTH))
     for y, row in enumerate(sheet.rows, start=1):
         for x, (value, column) in enumerate(zip(row, sheet.columns, strict=True)):
             _write_cell(page, y, x, value, forms[column.form] if column.form else plain, moment)

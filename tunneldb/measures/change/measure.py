@@ -49,7 +49,7 @@ from tunneldb.store.images import image_blocks, load_block
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
-BESIDE = 5.0
+NEWER_SURVEY_MARGIN = 5.0
 """Distance beyond the ends of a kilometre, m, from which parts of the newer survey may be in it by the older one's axis."""
 
 
@@ -114,7 +114,10 @@ def change_between(old: Survey, new: Survey) -> Result:
 def _kilometre(conn: psycopg.Connection[Any], old: Survey, new: Survey, km: int, cell: float, length: float) -> dict[str, Any]:
     clear_change(conn, old, new, km)
     low, high = km * KILOMETRE, (km + 1) * KILOMETRE
-    surface, other = load_surface(conn, old, low, high), load_surface(conn, new, low - BESIDE, high + BESIDE)
+    surface, other = (
+        load_surface(conn, old, low, high),
+        load_surface(conn, new, low - NEWER_SURVEY_MARGIN, high + NEWER_SURVEY_MARGIN),
+    )
     sums = _old_sums(conn, old, km, surface, cell)
     if sums is None:  # it was there when it was asked for
         return {"sections": 0}
@@ -174,7 +177,9 @@ def _new_sums(
     """Sum the newer survey in the cells of the older one's plane; each pixel is transformed through space."""
     sums = CellSums(grid, pixel)
     classes = _Lining(conn, new, km, surface)
-    for raster, state in load_blocks(conn, new, km * KILOMETRE - BESIDE, (km + 1) * KILOMETRE + BESIDE):
+    for raster, state in load_blocks(
+        conn, new, km * KILOMETRE - NEWER_SURVEY_MARGIN, (km + 1) * KILOMETRE + NEWER_SURVEY_MARGIN
+    ):
         seen, lining = classes.seen(raster, state)
         for part in _parts(raster, seen):
             points = surface.to_space(*_places(raster, part))

@@ -21,7 +21,7 @@ from tunneldb.shape.outline import Outline
 from tunneldb.store.partition import partition, partition_exists
 from tunneldb.store.survey import Survey
 
-MOST_POINTS = 200
+MAX_POINTS = 200
 """Maximum number of stored points of an infringement."""
 
 _XYZ = tuple((axis, "f8", sql.SQL(f"public.ST_{axis.upper()}(geom)")) for axis in "xyz")
@@ -133,7 +133,7 @@ def save_clearance(
     ) as copy:  # fmt: skip
         for one in infringements:
             plane = None if one.unrolled is None else _ewkb(one.unrolled, 0)
-            copy.write_row((*head, *one.values, plane, _ewkb(shapely.MultiPoint(one.points[:MOST_POINTS]), survey.srid)))
+            copy.write_row((*head, *one.values, plane, _ewkb(shapely.MultiPoint(one.points[:MAX_POINTS]), survey.srid)))
 
 
 def flat_outline(outline: Outline) -> list[float]:

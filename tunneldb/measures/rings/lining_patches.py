@@ -22,10 +22,10 @@ from tunneldb.store.images import load_kinds
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey
 
-_BESIDE = 100.0
+_RING_MARGIN = 100.0
 """Maximum length by which rings extend over a kilometre's ends, m."""
 
-_KEPT = 4  # blocks
+_CACHED_BLOCKS = 4  # blocks
 
 
 class LiningPatches:
@@ -41,10 +41,10 @@ class LiningPatches:
 
     def __init__(self, conn: psycopg.Connection[Any], survey: Survey, km: int, axis: Alignment) -> None:
         self.conn, self.survey = conn, survey
-        surface = load_surface(conn, survey, km * KILOMETRE - _BESIDE, (km + 1) * KILOMETRE + _BESIDE)
+        surface = load_surface(conn, survey, km * KILOMETRE - _RING_MARGIN, (km + 1) * KILOMETRE + _RING_MARGIN)
         self.surface, self._design = surface, Design(surface, axis, ())
         self._classes: dict[int, Callable[[Raster], Bool]] = {}
-        self._block = lru_cache(_KEPT)(self._load)
+        self._block = lru_cache(_CACHED_BLOCKS)(self._load)
 
     def between(self, low: float, high: float) -> Patches | None:
         """Return the patches between two chainages, m; None without an image."""

@@ -38,7 +38,7 @@ from tunneldb.store.images import survey_blocks
 from tunneldb.store.surface import load_alignment, survey_ends
 from tunneldb.store.survey import Survey
 
-LEAST_LENGTH, MOST_LENGTH = 0.3, 20.0
+MIN_LENGTH, MAX_LENGTH = 0.3, 20.0
 """Limits of a ring's length, m."""
 
 _ROUND = 0.002  # m: so near to one circle lies each point of a profile that is one
@@ -79,8 +79,8 @@ def rings_of_file(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> 
     low, high = _ends(conn, survey)
     numbers = table["number"]
     for row, (begin, end) in enumerate(table.columns(("chainage_from", "chainage_to")).tolist()):
-        if not LEAST_LENGTH <= end - begin <= MOST_LENGTH:
-            raise table.error(row, f"a ring must be {LEAST_LENGTH:g} to {MOST_LENGTH:g} m long, not {end - begin:g}")
+        if not MIN_LENGTH <= end - begin <= MAX_LENGTH:
+            raise table.error(row, f"a ring must be {MIN_LENGTH:g} to {MAX_LENGTH:g} m long, not {end - begin:g}")
         if numbers[row] != round(numbers[row]) or abs(numbers[row]) > np.iinfo(np.int32).max:
             raise table.error(row, f"a ring's number must be whole, of at most nine digits, not {numbers[row]:g}")
     order = np.argsort(table["chainage_from"], kind="stable")

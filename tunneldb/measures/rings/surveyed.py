@@ -13,9 +13,9 @@ from tunneldb.errors import UserError
 from tunneldb.measures.rings.surveyed_points import SurveyedRing, read_axis, read_points, require_near, require_size
 from tunneldb.shape.axis import DesignAxis
 from tunneldb.shape.plane import OFF_PLANE_LIMIT
-from tunneldb.shape.rings import LEAST_POINTS, Ring, RingPoints, fit_rings
+from tunneldb.shape.rings import MIN_POINTS, Ring, RingPoints, fit_rings
 
-MOST_TURN = 10.0
+MAX_TURN = 10.0
 """Maximum angle of a ring's plane to the axis, °."""
 
 OTHER_SIZE = 0.1
@@ -125,7 +125,7 @@ def measure_rings(points: Path, axis: Path, diameter: float, sigma: float | None
     chainage, right, up = line.place(middle)
     radii = [np.median(np.linalg.norm(ring.xyz - at, axis=1)) for ring, at in zip(surveyed, middle, strict=True)]
     require_size(
-        points, np.array([r for r, ring in zip(radii, surveyed, strict=True) if len(ring.xyz) >= LEAST_POINTS]), diameter
+        points, np.array([r for r, ring in zip(radii, surveyed, strict=True) if len(ring.xyz) >= MIN_POINTS]), diameter
     )
     away = np.hypot(
         np.hypot(right, up), np.maximum(line.chainage[0] - chainage, 0) + np.maximum(chainage - line.chainage[-1], 0)
@@ -147,8 +147,8 @@ def _refusal(ring: SurveyedRing, away: float, diameter: float) -> str | None:
     """Return why a ring cannot be fitted; None if it can."""
     if ring.refused is not None:
         return ring.refused
-    if len(ring.xyz) < LEAST_POINTS:
-        return f"only {len(ring.xyz)} points; a ring needs {LEAST_POINTS}"
+    if len(ring.xyz) < MIN_POINTS:
+        return f"only {len(ring.xyz)} points; a ring needs {MIN_POINTS}"
     return f"the points are {away:.1f} m from the axis" if away > diameter else None
 
 
@@ -159,7 +159,7 @@ def _row(surveyed: SurveyedRing, ring: Ring | str | None, line: DesignAxis, diam
     (chainage,), _, _ = line.place(ring.centre[None])
     tangent = line.tangent(np.array([chainage]))[0]
     turn = np.degrees(np.arccos(min(1.0, abs(float(ring.plane.normal @ tangent)))))
-    if turn > MOST_TURN:
+    if turn > MAX_TURN:
         askew = f"the points' plane is {turn:.0f}° askew to the axis: check that they are of one ring"
         return RingRow(surveyed.name, surveyed.points, None, None, (*remarks, askew))
     remarks += _remarks(surveyed, ring, diameter)
@@ -202,7 +202,7 @@ def _remarks(surveyed: SurveyedRing, ring: Ring, diameter: float) -> Iterator[st
         off = 1e3 * abs(ring.along[k])
         yield f"point {surveyed.points[k]} is {off:.0f} mm along the tunnel from the plane of the others"
     if not ring.is_ellipse:
-        why = f"{int(ring.used.sum())} points" if len(ring.used) <= LEAST_POINTS else f"a gap of {ring.gap:.0f}° between points"
+        why = f"{int(ring.used.sum())} points" if len(ring.used) <= MIN_POINTS else f"a gap of {ring.gap:.0f}° between points"
         yield f"ellipse not determined ({why}): centre and radius are from a circle and biased if the ring is oval"
     ratio = adjustment.ellipse.radius / (diameter / 2.0)
     if abs(ratio - 1.0) > OTHER_SIZE:

@@ -13,7 +13,7 @@ from tunneldb.csvfile import CsvTable, read_csv, read_texts
 from tunneldb.errors import UserError
 from tunneldb.shape.axis import DesignAxis
 
-MOST_OFFSET = 1.0
+MAX_OFFSET = 1.0
 """Maximum distance of prisms from the lining, m."""
 
 _UNITS = {1000.0: "millimetres", 100.0: "centimetres", 3.2808: "feet"}
@@ -61,7 +61,7 @@ def read_points(path: Path) -> list[SurveyedRing]:
     rings, points = read_texts(path, "ring"), read_texts(path, "point")
     if not len(table):
         raise UserError(f"{path} has no point")
-    far = np.flatnonzero(np.abs(table["offset"]) > MOST_OFFSET)
+    far = np.flatnonzero(np.abs(table["offset"]) > MAX_OFFSET)
     if len(far):
         row = int(far[0])
         raise table.error(

@@ -28,7 +28,7 @@ reported as shrunk (docs/figures.md)."""
 CONFIDENT = 1.96
 """Standard deviations that include 95 % of normal errors."""
 
-LEAST_CONTRAST = 3.0
+MIN_CONTRAST = 3.0
 """Contrast of a leak, in standard deviations of dry lining, if none is stored: the threshold of detection."""
 
 
@@ -88,7 +88,7 @@ def wet_area(leaks: Sequence[Leak], pixel: float) -> tuple[float, float]:
     for leak in leaks:
         if leak.wet:
             length = leak.outline.length
-            contrast = max(leak.contrast or LEAST_CONTRAST, 1.0)
+            contrast = max(leak.contrast or MIN_CONTRAST, 1.0)
             area += leak.area
             variance += length * pixel**3 / 12.0 + (length * EDGE * pixel / contrast) ** 2
     return area, float(np.sqrt(variance))

@@ -12,7 +12,7 @@ from tunneldb.measures.rings.compute.joint_steps import MARGIN, Lip, greatest_li
 from tunneldb.measures.rings.compute.patches import Patches, row_medians, straightened
 from tunneldb.robust import MAD_TO_SIGMA
 from tunneldb.shape.departures import clock_of
-from tunneldb.shape.rings import LEAST_POINTS, Ring, RingRefusedError, fit_ring
+from tunneldb.shape.rings import MIN_POINTS, Ring, RingRefusedError, fit_ring
 
 MAX_DEPARTURE_SHARE = 0.03
 """Maximum departure of a tenth of a ring from its ellipse, as a share of the radius; beyond it centre and radius mean nothing.
@@ -83,7 +83,7 @@ def measure_ring(
     seen = np.isfinite(places[:, 0])
     side = float(np.median(np.diff(own.arc))) if len(own.arc) > 1 else 0.0
     share = min(float(seen.sum()) * side / girth, 1.0) if girth > 0.0 else 0.0
-    if seen.sum() < LEAST_POINTS:
+    if seen.sum() < MIN_POINTS:
         none = tuple(RingChord(*chord, np.nan, np.nan) for chord in chords)
         return LiningRing(share, None, None, none, "lining not seen")
     points = places[seen]
