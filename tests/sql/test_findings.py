@@ -442,7 +442,8 @@ def undo(conn: psycopg.Connection, key: int) -> str:
 def everything(conn: psycopg.Connection) -> list[tuple[Any, ...]]:
     """All findings and photos, with all that is known of them but when."""
     return conn.execute(
-        "SELECT to_jsonb(a) - ARRAY['drawn_at', 'reviewed_at', 'created_at', 'detected_at', 'map', 'surface', 'area', 'clock']"
+        "SELECT to_jsonb(a) - ARRAY['drawn_at', 'reviewed_at', 'created_at', 'detected_at', 'map', 'surface', 'area', 'clock',"
+        " 'easting', 'northing', 'height']"
         " || jsonb_build_object('area', round(a.area::numeric, 5), 'clock', round(a.clock::numeric, 4),"
         " 'unrolled', ST_AsText(a.unrolled, 6)),"
         " (SELECT jsonb_agg(to_jsonb(p) - 'added_at') FROM tunnel_api.finding_photo p WHERE p.finding_id = a.id)"
