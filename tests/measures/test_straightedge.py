@@ -25,6 +25,7 @@ def test_of_a_sinusoid_the_gap_is_that_between_crests_or_of_the_chord(wave: floa
     assert gap.max() == pytest.approx(wanted, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_beside_a_bump_and_below_a_step_it_falls_linearly_to_the_length() -> None:
     bump, step = np.zeros(100), np.where(np.arange(100) < 50, 0.03, 0.0)
     bump[50] = 0.03

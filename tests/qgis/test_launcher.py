@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from support.qgis import ENVIRONMENT
 from support.system import missing
 
@@ -32,11 +33,13 @@ def test_no_other_program_comes_into_the_path() -> None:
     assert [path.name for path in BIN.iterdir()] == ["tunneldb"]
 
 
+@pytest.mark.slow
 def test_qgis_starts_with_python_from_such_a_shell(tmp_path: Path) -> None:
     done = _plugins(f"{BIN}:{SYSTEM}", tmp_path)
     assert "* processing" in done, done  # loaded, by Python
 
 
+@pytest.mark.slow
 def test_qgis_finds_no_modules_where_an_environment_comes_first(tmp_path: Path) -> None:
     """Why `.venv/bin` must not be in PATH: QGIS takes the first python3 for its own."""
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv"], check=True)

@@ -48,6 +48,7 @@ def test_the_zip_holds_the_plugin_and_its_licence_in_one_folder(unpacked: Path) 
     assert f"\nversion={tunneldb.__version__}\n" in (folder / "metadata.txt").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_what_is_published_keeps_the_rules_of_plugins_qgis_org(tmp_path: Path) -> None:
     """Rules of its validator that need no network; the pages must be reachable, too."""
     told = {

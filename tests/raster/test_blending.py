@@ -53,6 +53,7 @@ def step(x: np.ndarray, level: np.ndarray, at: float) -> float:
     return float(np.nanmean(level[(x > at) & (x < at + 0.5)]) - np.nanmean(level[(x < at) & (x > at - 0.5)]))
 
 
+@pytest.mark.slow
 def test_no_seam_shows_where_the_view_of_a_station_ends() -> None:
     window, points, corrected = scan([10.0, 25.0], np.radians(3.0))
     chainage = GRID.chainages(slice(0, 1200))

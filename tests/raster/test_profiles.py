@@ -94,6 +94,7 @@ def test_a_cable_along_the_tunnel_hangs_on_the_lining_between_profiles_too() -> 
     assert off[:, 20:480].mean() < 0.05
 
 
+@pytest.mark.slow
 def test_a_leak_over_several_profiles_is_one_leak_and_says_how_they_lie() -> None:
     """Seen on profiles 0.5 m apart; a joint that a profile hits is none, and no more is seen than profiles stand for."""
     rng = np.random.default_rng(4)
