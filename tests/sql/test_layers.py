@@ -107,7 +107,7 @@ def test_each_layer_states_what_its_rows_are(filled: str) -> None:
             counts = sql.SQL("SELECT (SELECT count(*) FROM {}), (SELECT count(*) FROM {})")
             here, there = conn.execute(counts.format(place, sql.Identifier("tunnel_api", name))).fetchone()  # type: ignore[misc]
             assert here == there, name
-        assert filled_layers > 40
+        assert filled_layers >= 40
 
 
 def test_gdal_lists_and_copies_them(filled: str, tmp_path: object) -> None:
