@@ -522,6 +522,39 @@
         </config>
       </editWidget>
     </field>
+    <field name="easting" configurationFlags="None">
+      <editWidget type="Range">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="AllowNull" value="true"/>
+            <Option type="int" name="Precision" value="2"/>
+            <Option type="QString" name="Style" value="SpinBox"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="northing" configurationFlags="None">
+      <editWidget type="Range">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="AllowNull" value="true"/>
+            <Option type="int" name="Precision" value="2"/>
+            <Option type="QString" name="Style" value="SpinBox"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="height" configurationFlags="None">
+      <editWidget type="Range">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="AllowNull" value="true"/>
+            <Option type="int" name="Precision" value="2"/>
+            <Option type="QString" name="Style" value="SpinBox"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
   </fieldConfiguration>
   <expressionfields>
     <field name="clock_text" expression="with_variable('minutes', round(&quot;clock&quot; * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0'))" type="10" typeName="string" subType="0" length="0" precision="0" comment=""/>
@@ -579,6 +612,9 @@
     <alias index="49" field="model" name="Classified by model"/>
     <alias index="50" field="superseded" name="Superseded"/>
     <alias index="51" field="clock_text" name="Clock position"/>
+    <alias index="52" field="easting" name="Easting (m)"/>
+    <alias index="53" field="northing" name="Northing (m)"/>
+    <alias index="54" field="height" name="Height (m)"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -632,6 +668,9 @@
     <field name="evidence" editable="0"/>
     <field name="model" editable="0"/>
     <field name="superseded" editable="0"/>
+    <field name="easting" editable="0"/>
+    <field name="northing" editable="0"/>
+    <field name="height" editable="0"/>
   </editable>
   <editorlayout>tablayout</editorlayout>
   <attributeEditorForm>
