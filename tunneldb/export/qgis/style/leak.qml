@@ -414,6 +414,39 @@
         </config>
       </editWidget>
     </field>
+    <field name="easting" configurationFlags="None">
+      <editWidget type="Range">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="AllowNull" value="true"/>
+            <Option type="int" name="Precision" value="2"/>
+            <Option type="QString" name="Style" value="SpinBox"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="northing" configurationFlags="None">
+      <editWidget type="Range">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="AllowNull" value="true"/>
+            <Option type="int" name="Precision" value="2"/>
+            <Option type="QString" name="Style" value="SpinBox"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
+    <field name="height" configurationFlags="None">
+      <editWidget type="Range">
+        <config>
+          <Option type="Map">
+            <Option type="bool" name="AllowNull" value="true"/>
+            <Option type="int" name="Precision" value="2"/>
+            <Option type="QString" name="Style" value="SpinBox"/>
+          </Option>
+        </config>
+      </editWidget>
+    </field>
   </fieldConfiguration>
   <expressionfields>
     <field name="clock_text" expression="with_variable('minutes', round(&quot;clock&quot; * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0'))" type="10" typeName="string" subType="0" length="0" precision="0" comment=""/>
@@ -452,6 +485,9 @@
     <alias index="30" field="wet" name="Wet"/>
     <alias index="31" field="origin" name="Origin of the outline"/>
     <alias index="32" field="clock_text" name="Clock position"/>
+    <alias index="33" field="easting" name="Easting (m)"/>
+    <alias index="34" field="northing" name="Northing (m)"/>
+    <alias index="35" field="height" name="Height (m)"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -486,6 +522,9 @@
     <field name="model" editable="0"/>
     <field name="wet" editable="0"/>
     <field name="origin" editable="0"/>
+    <field name="easting" editable="0"/>
+    <field name="northing" editable="0"/>
+    <field name="height" editable="0"/>
   </editable>
   <editorlayout>tablayout</editorlayout>
   <attributeEditorForm>
