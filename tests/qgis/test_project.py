@@ -642,8 +642,7 @@ def test_inspector_edits_and_what_is_stale_can_be_recomputed(conn: psycopg.Conne
 @pytest.mark.parametrize(
     "view",
     [
-        "leak_map", "leak_3d", "leak_unrolled", "dark_map", "dark_unrolled", "axis_vertex", "segment", "section",
-        "target_sphere", "cluster", "ground",
+        "leak_map", "leak_3d", "leak_unrolled", "axis_vertex", "segment", "section", "target_sphere", "cluster", "ground",
     ],
 )  # fmt: skip
 def test_layer_added_by_hand_finds_its_style_srid_and_height(shared: Path, view: str) -> None:
