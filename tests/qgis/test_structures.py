@@ -66,7 +66,7 @@ def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
     assert act(project, "atlas", str(pdf), "Members") == {"saved": True, "error": "", "sheets": 2}
     wall, pipe = (" ".join(unicodedata.normalize("NFKC", page.extract_text()).split()) for page in pypdf.PdfReader(pdf).pages)
     assert "Member 1, flat" in wall
-    assert "2 faces, 6.00 m2, 96.7 % was inspected; 1 spot, dark 0.0000 m2, bright 0.1255 m2" in wall
+    assert "2 faces, 6.00 m2, 96.7 % inspected; 1 spot, dark 0.0000 m2, bright 0.1255 m2" in wall
     assert "shadow" in wall
     assert "rejected 1" not in pipe
     assert "2 dark" not in wall
