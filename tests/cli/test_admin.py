@@ -270,7 +270,7 @@ def test_the_wheel_brings_both_folders() -> None:
 def test_a_password_on_the_command_line_is_warned_of(dsn: str, monkeypatch: pytest.MonkeyPatch) -> None:
     secret = make_conninfo(dsn, password="swordfish")
     said = run("--dsn", secret, "status").stderr
-    assert "everybody on this machine can read the password in --dsn" in said
+    assert "all users of this machine can read the password in --dsn" in said
     assert "swordfish" not in said
     assert "password" not in run("--dsn", dsn, "status").stderr
     monkeypatch.setenv("TUNNELDB_DSN", secret)

@@ -435,7 +435,7 @@ def test_bad_input_is_one_line_and_changes_nothing(
     refused("changed.laz", "changed since it was loaded")
     conn.execute("UPDATE tunnel.scan_file SET path = %s", [str(path)])
     conn.execute("DELETE FROM tunnel.reference WHERE range_m > 4")
-    refused("spans 3 to 4 m", "% ")
+    refused("covers 3 to 4 m", "% ")
     conn.execute("DELETE FROM tunnel.reference")
     refused("no reference curve")
     message = command("run", NAME, "--from", "detect", "--set", "image.pixel=0.03", code=2).stderr
