@@ -71,7 +71,7 @@ class CsvTable:
         return InputError(f"{self.path}, line {self.lines[row]}: {text}")
 
     def require_growing(self, name: str) -> None:
-        """Raise a InputError unless a column grows strictly from row to row."""
+        """Raise an InputError unless a column grows strictly from row to row."""
         column = self[name]
         wrong = np.flatnonzero(np.diff(column) <= 0)
         if len(wrong):

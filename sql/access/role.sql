@@ -112,8 +112,9 @@ BEGIN
 END
 $$;
 
--- Operators: all functions but what writes the audit, the queue, and schema tunnel as its owners, for to swap a partition one must own the table. Partitions
--- that an operator makes are his own; another may drop them as owner of the schema.
+-- Operators may call all functions except those that write the audit, may change the queue, and own schema tunnel, because
+-- only the owner of a table can swap its partitions. A partition belongs to the operator who made it; other operators can
+-- drop it as owners of the schema.
 DO $$
 DECLARE
     t record;

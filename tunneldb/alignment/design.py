@@ -70,7 +70,7 @@ class Design:
         return self.start + low, self.start + high
 
     def check(self) -> None:
-        """Raise a InputError if elements don't join end to end, or plan and profile have no common stretch."""
+        """Raise an InputError if elements don't join end to end, or plan and profile have no common stretch."""
         for number, (before, after) in enumerate(zip(self.plan, self.plan[1:], strict=False), start=1):
             gap = float(np.hypot(*(before.end - (after.x, after.y))))
             if gap > GAP:

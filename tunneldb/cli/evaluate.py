@@ -40,7 +40,7 @@ MIN_LEAK, MIN_SPOT = 0.1, 0.01  # m²
 @click.argument("truth", type=FilePath(dir_okay=False))
 @click.option("--layer", metavar="NAME", help="Layer of the file with the reference [the only one, or leak; for spots spot].")
 @click.option("--km", metavar="A-B", help="Only these kilometres: 12 or 12-14.")
-@click.option("--spots", is_flag=True, help="Compare spots of structures instead of leaks; always for a site.")
+@click.option("--spots", is_flag=True, help="Compare spots of structures instead of leaks (default for a site).")
 @click.option(
     "--min-area",
     type=FiniteRange(min=0),

@@ -51,7 +51,8 @@ UP = {"+z": 1, "-z": -1}
 @click.option(
     "--sound-speed",
     metavar="ASSUMED=MEASURED",
-    help="Speed of sound of the sonar's setting and of the water, m/s; needed if they differ by more than 3 %.",
+    help="Speed of sound that the sonar assumed, and the speed measured in the water, m/s. Required if they differ by more "
+    "than 3 %.",
 )
 @click.option("--report", type=FilePath(dir_okay=False), metavar="FILE", help="Report to write, as Markdown.")
 @click.pass_context

@@ -42,7 +42,7 @@ def table_format(form: str | None, output: Path | None, what: str, files: Sequen
     if form is None or (output is not None and form not in files):
         endings = [suffix for suffix, name in _BY_SUFFIX.items() if name in files and suffix != ".json"]
         raise UserError(
-            f"{output}: {what} are written as {', '.join(endings[:-1])} or {endings[-1]}: let its name end so, or say --format"
+            f"{output}: {what} are written as {', '.join(endings[:-1])} or {endings[-1]}: use one of these endings, or --format"
         )
     return form
 

@@ -87,7 +87,7 @@ def tunnel() -> None:
 @click.option(
     "--alignment",
     metavar="NAME",
-    help="Alignment of a LandXML or IFC file with several; number of one of several lines that do not meet.",
+    help="Name of the alignment, if a LandXML or IFC file has several; number of the line, if lines are not connected.",
 )
 @click.option("--profile", metavar="NAME", help="Profile of the alignment, if it has several.")
 @click.option("--reverse", is_flag=True, help="Reverse the direction of chainage; not for a design alignment.")

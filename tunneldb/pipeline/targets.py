@@ -166,7 +166,7 @@ class _Place:
 
 
 def _if_there(load: Callable[..., Any], conn: psycopg.Connection[Any], survey: Survey) -> Any:
-    """Return what a loader loads, None if it reports that there is nothing: a search needs only points."""
+    """Call a loader; return None if its result does not exist. A search needs only points."""
     try:
         return load(conn, survey)
     except UserError:

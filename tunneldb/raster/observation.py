@@ -116,7 +116,9 @@ class Observer:
         ends: tuple[float, float] = (-math.inf, math.inf),
         water: float = -math.inf,
     ) -> Observer:
-        """Make the eye for a kilometre that the surface covers at least in part, and so many metres beyond its ends.
+        """Return the observer of a kilometre and of ``halo`` metres beyond its ends.
+
+        The surface must cover the kilometre at least in part.
 
         ``depth`` is how far in front of the surface and behind it lining is looked for, m: tolerance and recess; ``ends`` is
         where the survey begins and ends; ``water`` the height of the water, m: what a laser shows below it are images that it

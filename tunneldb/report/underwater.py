@@ -81,7 +81,7 @@ class UnderwaterChapter:
 
     @property
     def left_out(self) -> list[dict[str, Any]]:
-        """Number of scans outside the tunnel: without a pose, or not loaded with their current pose."""
+        """Scans that were left out: without a pose, or not loaded with their current pose."""
         return [scan for scan in self.scans if not scan["kept"]]
 
 

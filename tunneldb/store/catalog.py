@@ -111,7 +111,7 @@ def _taken(name: str) -> UserError:
 def _require_name(name: str) -> None:
     """Refuse names that are unsuitable for file names and the command line."""
     if not re.fullmatch(r"[A-Za-z0-9][\w.-]*", name):
-        raise UserError(f"invalid name {name!r}: use letters, digits, and - _ . inside")
+        raise UserError(f"invalid name {name!r}: begin with a letter or a digit (A-Z, 0-9); then - _ . may follow, too")
 
 
 def _require_metres(connection: psycopg.Connection[Any], srid: int) -> None:

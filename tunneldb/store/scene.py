@@ -140,7 +140,7 @@ def load_arcs(conn: psycopg.Connection[Any], survey: Survey, first: int, stop: i
 
 
 def save_relief(conn: psycopg.Connection[Any], survey: Survey, km: int, relief: Relief | None) -> None:
-    """Replace the lining of a kilometre by its columns of a relief; None if there is none."""
+    """Replace the stored lining of a kilometre by its part of a relief; delete it if ``relief`` is None."""
     _forget(conn, survey, km, "lining")
     if relief is None:
         return

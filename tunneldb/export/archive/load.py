@@ -136,8 +136,9 @@ def _require_schema(archive: ArchiveReader) -> None:
     manifest = archive.manifest
     if manifest.schema != HEAD:
         raise InputError(
-            f"{archive.path} is of schema {manifest.schema}, this tunneldb has {HEAD}: import it with tunneldb"
-            f" {manifest.tunneldb} into a database of its own, upgrade that (tunneldb init of this one), and export it again"
+            f"{archive.path} has schema {manifest.schema}, but this version of tunneldb needs {HEAD}: import the file"
+            f" with tunneldb {manifest.tunneldb} into a separate database, upgrade that database with this version (tunneldb init),"
+            " and export the survey again"
         )
 
 

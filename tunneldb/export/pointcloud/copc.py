@@ -137,6 +137,7 @@ class _Source:
         Raises
         ------
         UserError
+            If the file was changed since it was loaded, or has coordinates that the merged file cannot store.
         """
         progress = begin(f"{self.name}: cells", self.file.points)
         forms = [(group, group.placement(self)) for group in groups]

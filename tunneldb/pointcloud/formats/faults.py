@@ -38,7 +38,7 @@ def line_of(error: BaseException) -> str:
 def require_dimension(
     path: Path, dimension: str | None, dimensions: Collection[str], use: str | None = None, mend: str | None = None
 ) -> None:
-    """Raise a InputError that lists the file's dimensions unless `dimension`, needed for `use`, is one of them.
+    """Raise an InputError that lists the file's dimensions unless `dimension`, needed for `use`, is one of them.
 
     `mend` with the most similar dimension is the command to type.
     """
