@@ -137,8 +137,8 @@ def _require_schema(archive: ArchiveReader) -> None:
     if manifest.schema != HEAD:
         raise InputError(
             f"{archive.path} has schema {manifest.schema}, but this version of tunneldb needs {HEAD}: import the file"
-            f" with tunneldb {manifest.tunneldb} into a separate database, upgrade that database with this version (tunneldb init),"
-            " and export the survey again"
+            f" with tunneldb {manifest.tunneldb} into a separate database, upgrade that database with this version"
+            " (tunneldb init), and export the survey again"
         )
 
 
