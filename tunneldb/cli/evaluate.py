@@ -17,14 +17,12 @@ from tunneldb.errors import UserError
 from tunneldb.store.survey import get_survey
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import psycopg
 
     from tunneldb.evaluate.report import Report
+    from tunneldb.progress import StartProgress
     from tunneldb.store.survey import Survey
 
-    Begin = Callable[[str, float | None], Callable[[float], None]]
 
 MIN_LEAK, MIN_SPOT = 0.1, 0.01  # m²
 
@@ -111,7 +109,13 @@ def evaluate(
 
 
 def _of_leaks(
-    conn: psycopg.Connection[Any], survey: Survey, truth: Path, layer: str | None, km: str | None, min_area: float, begin: Begin
+    conn: psycopg.Connection[Any],
+    survey: Survey,
+    truth: Path,
+    layer: str | None,
+    km: str | None,
+    min_area: float,
+    begin: StartProgress,
 ) -> tuple[Report, dict[str, Any], list[str]]:
     """Report on leaks, what it is about, and what is to be said of it."""
     from tunneldb.evaluate.measure import compare
@@ -140,7 +144,7 @@ def _of_leaks(
 
 
 def _of_spots(
-    conn: psycopg.Connection[Any], survey: Survey, truth: Path, layer: str | None, min_area: float, begin: Begin
+    conn: psycopg.Connection[Any], survey: Survey, truth: Path, layer: str | None, min_area: float, begin: StartProgress
 ) -> tuple[Report, dict[str, Any], list[str]]:
     """Report on spots, what it is about, and what is to be said of it."""
     from tunneldb.evaluate.spots import evaluate_spots

@@ -21,7 +21,7 @@ from tunneldb.files import exit_on_sigterm, replacing
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
-    from tunneldb.stages.on_demand import Begin
+    from tunneldb.progress import StartProgress
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -70,7 +70,7 @@ def surveys_in(
         yield conn, surveys, part
 
 
-def with_progress(measure: Callable[[Begin], list[int]]) -> list[int]:
+def with_progress(measure: Callable[[StartProgress], list[int]]) -> list[int]:
     """Run a measure under a bar of kilometres, and return those that were made."""
     with exit_on_sigterm(), bar("km") as progress:
         return measure(step(progress))

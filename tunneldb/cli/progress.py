@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.progress import Progress
 
+    from tunneldb.progress import StartProgress
+
 _REMEMBERED = 600.0  # time over which the rate is taken, s: steps of a kilometre come minutes apart
 _PATIENCE = 1.0  # time that Numba may compile unmentioned, s: on first use it is a minute or two, later nothing
 
@@ -114,7 +116,7 @@ class _Notice:
             self.say("compiling, on first use only: takes a minute or two")
 
 
-def step(progress: Progress) -> Callable[[str, float | None], Callable[[float], None]]:
+def step(progress: Progress) -> StartProgress:
     """Show one step at a time: what it returns takes a text and a total, None if unknown, and returns what takes the counts."""
 
     def begin(text: str, total: float | None) -> Callable[[float], None]:

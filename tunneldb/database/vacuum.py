@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +12,7 @@ from psycopg import sql
 from psycopg.rows import class_row
 
 from tunneldb.errors import UserError
+from tunneldb.progress import StartProgress
 
 _LOCKED = psycopg.errors.LockNotAvailable.sqlstate
 _MAINTAIN = 170000  # first version of PostgreSQL in which others than the owner can have the right
@@ -75,9 +76,7 @@ def tables_to_vacuum(conn: psycopg.Connection[Any]) -> list[DeadRows]:
         return cursor.execute(query).fetchall()
 
 
-def vacuum(
-    conn: psycopg.Connection[Any], tables: Sequence[DeadRows], begin: Callable[[str, float | None], Callable[[float], None]]
-) -> list[DeadRows]:
+def vacuum(conn: psycopg.Connection[Any], tables: Sequence[DeadRows], begin: StartProgress) -> list[DeadRows]:
     """VACUUM (ANALYZE) tables one by one; return those locked by others, which are left unchanged.
 
     Parameters

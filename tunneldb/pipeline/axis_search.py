@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from tunneldb.geometry.crs import describe_crs, horizontal, same_horizontally
 from tunneldb.geometry.stationing import chainage_label
 from tunneldb.pointcloud.reader import ScanHeader, check_header, read_chunks, read_header
 from tunneldb.pointcloud.voxels import Voxels
+from tunneldb.progress import StartProgress
 
 EDGE = 0.5
 """Edge of the voxels whose centroids are used for the axis, m."""
@@ -33,10 +34,8 @@ TRUSTED_DISTANCE = 0.5
 TRUSTED_ASIDE = 0.03
 """Share of roofed area off the line from which it is reported."""
 
-Begin = Callable[[str, float | None], Callable[[float], None]]
 
-
-def search_axis(files: Sequence[Path], srid: int | None, begin: Begin, along: Float | None = None) -> FoundAxis:
+def search_axis(files: Sequence[Path], srid: int | None, begin: StartProgress, along: Float | None = None) -> FoundAxis:
     """Find the axis of the tunnel in scan files.
 
     Parameters
@@ -68,7 +67,7 @@ def search_axis(files: Sequence[Path], srid: int | None, begin: Begin, along: Fl
 
 
 def found_given(
-    files: Sequence[Path], srid: int | None, begin: Begin, start: float | None, reverse: bool
+    files: Sequence[Path], srid: int | None, begin: StartProgress, start: float | None, reverse: bool
 ) -> tuple[GivenAxis, FoundAxis]:
     """Return the axis found in scan files, in the form of a given axis.
 
@@ -88,7 +87,7 @@ def found_given(
     return GivenAxis(found.xyz, start or 0.0, source=f"the axis found in {_names(files)}"), found
 
 
-def complete(given: GivenAxis, files: Sequence[Path], srid: int, begin: Begin) -> tuple[GivenAxis, FoundAxis]:
+def complete(given: GivenAxis, files: Sequence[Path], srid: int, begin: StartProgress) -> tuple[GivenAxis, FoundAxis]:
     """Set the middle and heights of a line drawn in plan from scan files; ends and direction stay."""
     found = search_axis(files, srid, begin, given.xyz[:, :2])
     note = f"its middle and heights are from {_names(files)}"
@@ -125,7 +124,7 @@ def write_axis(path: Path, xyz: Float) -> None:
         table.writerows([f"{value:.3f}" for value in vertex] for vertex in xyz.tolist())
 
 
-def _voxels(headers: Sequence[ScanHeader], begin: Begin) -> Float:
+def _voxels(headers: Sequence[ScanHeader], begin: StartProgress) -> Float:
     """Return centroids of the voxels on surfaces."""
     done = begin("reading", float(sum(header.points for header in headers)))
     voxels = Voxels(EDGE)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from tunneldb.pointcloud.formats.scans import PosedScan
 from tunneldb.pointcloud.formats.table import format_of, posed_scans
 from tunneldb.pointcloud.noise import noise_filter
 from tunneldb.pointcloud.reader import ScanHeader, read_header
+from tunneldb.progress import StartProgress
 from tunneldb.radiometry.intensity_kind import KindGuess, ValueRange, contradiction, guess_kind, value_range
 
 MAX_WIDTH = 20.0
@@ -170,7 +171,7 @@ class FileLook:
         return None
 
 
-def inspect_file(path: Path, begin: Callable[[str, float | None], Callable[[float], None]]) -> FileLook:
+def inspect_file(path: Path, begin: StartProgress) -> FileLook:
     """Inspect a scan file, read in chunks with constant memory.
 
     Parameters
@@ -219,7 +220,7 @@ def inspect_file(path: Path, begin: Callable[[str, float | None], Callable[[floa
     )
 
 
-def find_axis_fault(looks: Sequence[FileLook], begin: Callable[[str, float | None], Callable[[float], None]]) -> str | None:
+def find_axis_fault(looks: Sequence[FileLook], begin: StartProgress) -> str | None:
     """Return why ``--axis auto`` would be refused for files; None if not, or if they have more than SEARCHED points."""
     from tunneldb.pipeline.axis_search import search_axis
 

@@ -18,11 +18,12 @@ from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.crs import outside_area
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import parameters_of, require_same_density, settings_of
-from tunneldb.pipeline.read import Begin, Counts, Reading, read_headers, silent
+from tunneldb.pipeline.read import Counts, Reading, read_headers
 from tunneldb.pointcloud.reader import ScanHeader, crs_note
 from tunneldb.pointcloud.second_tube import find_second_tubes
 from tunneldb.pointcloud.selection import MEMORY, FilterSettings
 from tunneldb.pointcloud.spool import Spool
+from tunneldb.progress import StartProgress, silent
 from tunneldb.stages.ledger import Run, lock, stage_run
 from tunneldb.store.partition import (
     drop_fragments,
@@ -101,7 +102,7 @@ def merge(
     survey: Survey,
     km: int,
     settings: FilterSettings,
-    begin: Begin = silent,
+    begin: StartProgress = silent,
     memory: int = MEMORY,
     held: Mapping[int, Spool] | None = None,
 ) -> Merged:
@@ -191,7 +192,7 @@ def load_files(
     survey: Survey,
     paths: Sequence[Path],
     settings: FilterSettings,
-    begin: Begin = silent,
+    begin: StartProgress = silent,
     memory: int = MEMORY,
 ) -> Iterator[Loaded]:
     """Read scan files and load the kilometres that they touch.
@@ -287,7 +288,7 @@ def chainages_near(header: ScanHeader, alignment: Alignment, reach: float) -> Fl
     return np.asarray(alignment.number[inside] * alignment.spacing, dtype=np.float64)
 
 
-def _load_batch(reading: Reading, headers: Sequence[ScanHeader], given: Sequence[Path], begin: Begin) -> list[Loaded]:
+def _load_batch(reading: Reading, headers: Sequence[ScanHeader], given: Sequence[Path], begin: StartProgress) -> list[Loaded]:
     """Read files and load their kilometres in one transaction."""
     conn, survey, settings = reading.conn, reading.survey, reading.settings
     parameters = {**parameters_of(settings), "files": [header.path.name for header in headers]}

@@ -14,8 +14,8 @@ from tunneldb.arrays import Bool, Float
 from tunneldb.classification.underwater import WaterClass, classify, spacing_of_rays, spacing_of_soundings
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
-from tunneldb.pipeline.read import Begin, silent
 from tunneldb.pointcloud.sonar import read_sonar, read_soundings
+from tunneldb.progress import StartProgress, silent
 from tunneldb.registration.underwater import GIVEN, SonarPose
 from tunneldb.stages.ledger import stage_run
 from tunneldb.store.scan_files import Loaded, checksum
@@ -56,7 +56,9 @@ def record_soundings(conn: psycopg.Connection[Any], survey: Survey, paths: Seque
                 save_scans(conn, survey, [scan], water_level, 1)
 
 
-def load_sonar(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path], begin: Begin = silent) -> Iterator[Loaded]:
+def load_sonar(
+    conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path], begin: StartProgress = silent
+) -> Iterator[Loaded]:
     """Load registered sonar scans, each in a transaction of its own, with the bed of the kilometres that it touches.
 
     Parameters
@@ -66,7 +68,7 @@ def load_sonar(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Pa
     paths : sequence of Path
         Registered by `tunneldb.pipeline.register.register_survey`.
     begin : callable
-        See `tunneldb.pipeline.read.Begin`.
+        See `tunneldb.progress.StartProgress`.
 
     Yields
     ------

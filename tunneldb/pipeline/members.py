@@ -20,6 +20,7 @@ from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.prefetch import prefetch
 from tunneldb.pointcloud.reader import read_chunks, read_header
 from tunneldb.pointcloud.stations import read_stations
+from tunneldb.progress import StartProgress
 from tunneldb.radiometry.cells import IntensitySamples
 from tunneldb.radiometry.correction import Kind, needs_reference, to_decibel
 from tunneldb.radiometry.intensity_kind import contradiction, doubt
@@ -32,8 +33,6 @@ from tunneldb.structures.joining import RangeImages
 from tunneldb.structures.models import to_space
 from tunneldb.structures.segmentation import Segmentation, find_faces
 from tunneldb.structures.voxel_moments import REACH, SCANS, VoxelMoments
-
-Begin = Callable[[str, float | None], Callable[[float], None]]
 
 AUTO = "auto"
 
@@ -106,7 +105,7 @@ class FileMembers:
     notes: tuple[str, ...]
 
 
-def find_members(inputs: Inputs, begin: Begin) -> FileMembers:
+def find_members(inputs: Inputs, begin: StartProgress) -> FileMembers:
     """Find the members of scan files, their faces and spots.
 
     Memory grows with the surface that was scanned, not with the points.

@@ -23,6 +23,7 @@ from tunneldb.pointcloud.pose_coverage import PoseCoverage
 from tunneldb.pointcloud.reader import ScanHeader, check_header, crs_note, read_header
 from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
 from tunneldb.pointcloud.spool import Spool
+from tunneldb.progress import StartProgress, silent
 from tunneldb.radiometry.intensity_kind import contradiction, doubt
 from tunneldb.stages.parameters import PARAMETERS
 from tunneldb.store.partition import drop_fragments, write_fragments
@@ -44,13 +45,6 @@ MIN_INTENSITIES = 20
 """Minimum number of values for a remark on their kind."""
 
 Counts = dict[str, Any]
-Begin = Callable[[str, int], Callable[[int], None]]
-"""Called with a step and its size; returns a function that takes the progress."""
-
-
-def silent(text: str, total: int) -> Callable[[int], None]:
-    """Begin a step without a progress display."""
-    return lambda done: None
 
 
 def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, settings: FilterSettings) -> Counts:
@@ -187,7 +181,7 @@ class Reading:
         require_dimension(header.path, dimension, header.dimensions, "the survey's intensity", mend)
         check_header(header, dimension, self.survey.srid, needs_time=self.poses.mobile)
 
-    def read(self, headers: Sequence[ScanHeader], given: Sequence[Path], begin: Begin = silent) -> list[Read]:
+    def read(self, headers: Sequence[ScanHeader], given: Sequence[Path], begin: StartProgress = silent) -> list[Read]:
         """Read new or changed files, then those that must be read again because of them.
 
         Parameters
@@ -246,11 +240,11 @@ class Reading:
         self.check(header)
         return header
 
-    def reread(self, header: ScanHeader, former: Recorded, begin: Begin = silent) -> Read:
+    def reread(self, header: ScanHeader, former: Recorded, begin: StartProgress = silent) -> Read:
         """Read a file again that is there."""
         return self._one(header, former, "reread", begin)
 
-    def _one(self, header: ScanHeader, former: Recorded | None, state: str, begin: Begin) -> Read:
+    def _one(self, header: ScanHeader, former: Recorded | None, state: str, begin: StartProgress) -> Read:
         path, started = header.path, time.monotonic()
         survivors = Spool(self.memory // self.share)
         try:

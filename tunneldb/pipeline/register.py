@@ -12,10 +12,10 @@ import psycopg
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.pipeline.ladder_file import read_ladders, read_start
-from tunneldb.pipeline.read import Begin
 from tunneldb.pointcloud.reader import read_chunks, read_header
 from tunneldb.pointcloud.sonar import read_sonar
 from tunneldb.pointcloud.voxels import Voxels
+from tunneldb.progress import StartProgress
 from tunneldb.registration.underwater import Registration, SonarCloud, SonarPose, register
 from tunneldb.store.sonar import save_registration
 from tunneldb.store.sources import unchanged_file
@@ -69,7 +69,7 @@ class SonarInput:
         return 1.0 if self.sound_speed is None else self.sound_speed[1] / self.sound_speed[0]
 
 
-def register_survey(conn: psycopg.Connection[Any], survey: Survey, given: SonarInput, begin: Begin) -> Registration:
+def register_survey(conn: psycopg.Connection[Any], survey: Survey, given: SonarInput, begin: StartProgress) -> Registration:
     """Register sonar scans and store their poses, in the place of those that files of these names had.
 
     Parameters
@@ -77,7 +77,7 @@ def register_survey(conn: psycopg.Connection[Any], survey: Survey, given: SonarI
     conn : Connection
         Idle.
     begin : callable
-        See `tunneldb.pipeline.read.Begin`.
+        See `tunneldb.progress.StartProgress`.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def _of_file(scan: SonarPose, factor: float) -> SonarPose:
     return replace(scan, scale=scan.scale * factor, covariance=scan.covariance * unit * unit[:, None])
 
 
-def _laser_points(conn: psycopg.Connection[Any], survey: Survey, water_level: float, begin: Begin) -> Float:
+def _laser_points(conn: psycopg.Connection[Any], survey: Survey, water_level: float, begin: StartProgress) -> Float:
     """Return points (n, 3) of the survey's scan files near the water level, one per small voxel."""
     rows = conn.execute(
         "SELECT path, bytes, checksum FROM tunnel.scan_file WHERE survey_id = %s AND bytes > 0 ORDER BY name", [survey.id]

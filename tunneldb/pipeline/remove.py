@@ -13,8 +13,9 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load import load_kilometre
 from tunneldb.pipeline.load_settings import parameters_of, settings_of
-from tunneldb.pipeline.read import Begin, Reading, silent
+from tunneldb.pipeline.read import Reading
 from tunneldb.pointcloud.selection import FilterSettings
+from tunneldb.progress import StartProgress, silent
 from tunneldb.stages.ledger import stage_run
 from tunneldb.store.clearing import Work, clear_kilometre, has_results, work_in
 from tunneldb.store.partition import partition_exists
@@ -80,7 +81,7 @@ def work_at_stake(conn: psycopg.Connection[Any], survey: Survey, names: Sequence
     return emptied, work_in(conn, survey, emptied)
 
 
-def remove_files(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[str], begin: Begin = silent) -> Removed:
+def remove_files(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[str], begin: StartProgress = silent) -> Removed:
     """Remove files from a survey, and from the list of those that a batch must read.
 
     Thinning looks at all files of a kilometre together, so files that overlap a removed one are read again. That is one
@@ -123,7 +124,9 @@ def remove_files(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[
     return result
 
 
-def _reload(conn: psycopg.Connection[Any], survey: Survey, former: Sequence[Recorded], result: Removed, begin: Begin) -> None:
+def _reload(
+    conn: psycopg.Connection[Any], survey: Survey, former: Sequence[Recorded], result: Removed, begin: StartProgress
+) -> None:
     names = [file.name for file in former]
     settings = _settings(conn, survey, None)
     conn.rollback()
@@ -158,7 +161,7 @@ def _reload(conn: psycopg.Connection[Any], survey: Survey, former: Sequence[Reco
 
 
 def _withdraw(
-    conn: psycopg.Connection[Any], survey: Survey, former: Sequence[Recorded], settings: FilterSettings, begin: Begin
+    conn: psycopg.Connection[Any], survey: Survey, former: Sequence[Recorded], settings: FilterSettings, begin: StartProgress
 ) -> list[str]:
     """Read overlapping files again, and mark that the removed ones left their kilometres; all or nothing."""
     reading = Reading.of(conn, survey, settings)

@@ -14,12 +14,13 @@ import psycopg
 
 from tunneldb.errors import UserError
 from tunneldb.geometry.crs import outside_area
-from tunneldb.pipeline.read import Begin, read_headers, require_kind, silent
+from tunneldb.pipeline.read import read_headers, require_kind
 from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.pose_coverage import PoseCoverage, PoseFaults
 from tunneldb.pointcloud.reader import CHUNK, ScanHeader, check_header, crs_note
 from tunneldb.pointcloud.selection import SAMPLE_STEP, FilterCounts
+from tunneldb.progress import StartProgress, silent
 from tunneldb.radiometry.intensity_kind import doubt
 from tunneldb.stages.ledger import stage_run
 from tunneldb.store.poses import load_pose_coverage
@@ -42,7 +43,7 @@ def register_files(
     survey: Survey,
     paths: Sequence[Path],
     max_left_out: float,
-    begin: Begin = silent,
+    begin: StartProgress = silent,
 ) -> Iterator[Loaded]:
     """Record scan files of a site, each in a transaction of its own.
 
@@ -103,7 +104,7 @@ def _register(
     header: ScanHeader,
     poses: PoseCoverage,
     max_left_out: float,
-    begin: Begin,
+    begin: StartProgress,
     *,
     replaces: bool,
 ) -> Loaded:
@@ -122,7 +123,9 @@ def _register(
     return loaded
 
 
-def _look_through(survey: Survey, header: ScanHeader, poses: PoseCoverage, max_left_out: float, begin: Begin) -> FilterCounts:
+def _look_through(
+    survey: Survey, header: ScanHeader, poses: PoseCoverage, max_left_out: float, begin: StartProgress
+) -> FilterCounts:
     """Count unusable points of a file, and its extent; refuse it if there are too many."""
     counts, faults = FilterCounts(), PoseFaults()
     low, high = counts.extent[:3], counts.extent[3:]

@@ -8,15 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from tunneldb.arrays import Float, Int64
-from tunneldb.pipeline.members import Begin, FileMembers, Inputs, find_members, read_all
+from tunneldb.pipeline.members import FileMembers, Inputs, find_members, read_all
 from tunneldb.pointcloud.formats.table import has_colours
 from tunneldb.pointcloud.reader import read_header
+from tunneldb.progress import StartProgress
 
 EIGHT_BITS = 255
 """Maximum value of 8-bit colours, which some files have although LAS has 16 bits."""
 
 
-def find_coloured_members(inputs: Inputs, begin: Begin) -> FileMembers:
+def find_coloured_members(inputs: Inputs, begin: StartProgress) -> FileMembers:
     """Find the members of scan files, with the mean colours of spots; see `find_members`.
 
     Only points with a colour count; exporters write black for a point that has none.

@@ -9,9 +9,10 @@ import psycopg
 
 from tunneldb.database import snapshot
 from tunneldb.errors import NotReadyError, UserError
-from tunneldb.pipeline.members import AUTO, Begin, FileMembers, Inputs
+from tunneldb.pipeline.members import AUTO, FileMembers, Inputs
 from tunneldb.pipeline.replace_structures import replace_structures
 from tunneldb.pipeline.spot_colours import find_coloured_members
+from tunneldb.progress import StartProgress
 from tunneldb.radiometry.correction import Kind
 from tunneldb.stages.ledger import stage_run
 from tunneldb.store.images import load_reference
@@ -30,7 +31,7 @@ class SurveyMembers:
     spots: SavedSpots
 
 
-def find_survey_members(conn: psycopg.Connection[Any], survey: Survey, begin: Begin) -> SurveyMembers:
+def find_survey_members(conn: psycopg.Connection[Any], survey: Survey, begin: StartProgress) -> SurveyMembers:
     """Find the members of a survey in its scan files, and put them in the place of those found before.
 
     Results are written in one short transaction, after the files have been read; an interruption before changes nothing.

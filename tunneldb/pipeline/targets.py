@@ -21,6 +21,7 @@ from tunneldb.geometry.surface import Surface
 from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.reader import CHUNK, Points, ScanSource, read_chunks
 from tunneldb.pointcloud.spool import BINS_PER_METRE, Spool, bin_of, windows
+from tunneldb.progress import StartProgress
 from tunneldb.stages.ledger import stage_run
 from tunneldb.stages.run import loaded_kilometres
 from tunneldb.store.poses import load_poses
@@ -28,8 +29,6 @@ from tunneldb.store.scene import line_of, load_ground, save_spheres
 from tunneldb.store.sources import sources
 from tunneldb.store.surface import load_alignment, load_surface
 from tunneldb.store.survey import Survey
-
-Progress = Callable[[int], None]
 
 MEMORY = 256 << 20  # of points that wait to be looked at; beyond, they wait on disk
 WINDOW = 1_000_000  # points looked at at a time
@@ -86,7 +85,7 @@ def search(
     survey: Survey,
     radius: float,
     tolerance: float,
-    begin: Callable[[str, int], Progress],
+    begin: StartProgress,
 ) -> Search:
     """Find the target spheres of a survey in its scan files, and put them in the place of those found before.
 
@@ -199,7 +198,7 @@ class _Kilometre:
     tolerance: float
     on_ground: Callable[[Float], Bool] | None
 
-    def search(self, begin: Callable[[str, int], Progress]) -> tuple[list[TargetObservation], list[tuple[int, Refusal]]]:
+    def search(self, begin: StartProgress) -> tuple[list[TargetObservation], list[tuple[int, Refusal]]]:
         total = sum(file.points for file in self.files)
         curved = CurvedCells(self.radius, MIN_POINTS)
         step = begin(f"km {self.km}: parts that are not flat", total)

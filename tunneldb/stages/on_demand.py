@@ -8,13 +8,11 @@ from typing import Any
 import psycopg
 
 from tunneldb.errors import UserError
+from tunneldb.progress import StartProgress
 from tunneldb.stages.ledger import stage_run
 from tunneldb.stages.stale import Result, ResultState, result_inputs
 from tunneldb.store.surface import survey_ends
 from tunneldb.store.survey import Survey
-
-Begin = Callable[[str, float], Callable[[float], None]]
-"""Called with a text and the number of kilometres; returns a function that takes the progress."""
 
 
 def measure_kilometres(
@@ -24,7 +22,7 @@ def measure_kilometres(
     options: Callable[[int], Mapping[str, Any]],
     measure: Callable[[int], Mapping[str, Any]],
     title: str,
-    begin: Begin,
+    begin: StartProgress,
 ) -> list[int]:
     """Make a result where it is out of date or was made with other options, and return in which kilometres.
 

@@ -7,11 +7,10 @@ from typing import Any
 
 import psycopg
 
-Begin = Callable[[str, float | None], Callable[[float], None]]
-"""Called with a text and a total; returns a function that takes the progress."""
+from tunneldb.progress import StartProgress
 
 
-def keep_missing(conn: psycopg.Connection[Any], begin: Begin) -> int:
+def keep_missing(conn: psycopg.Connection[Any], begin: StartProgress) -> int:
     """Work out and keep the statistics of all kilometres that have none; each is committed by itself.
 
     Views are right without them, and slower. After an interruption the next call continues with the rest.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from tunneldb.database.failures import first_line
 from tunneldb.database.schema import HEAD
 from tunneldb.errors import InputError
 from tunneldb.export.archive.container import ArchiveReader, Manifest
+from tunneldb.progress import StartProgress
 from tunneldb.stages.ledger import stage_run
 from tunneldb.store.archive.into import (
     attach_images,
@@ -45,8 +46,6 @@ _MISFITS = (
     psycopg.errors.InternalError_,  # of PostGIS, for bytes that are no geometry
 )
 """Errors of the server for rows that it cannot have written."""
-
-Begin = Callable[[str, float | None], Callable[[float], None]]
 
 
 @dataclass
@@ -82,7 +81,7 @@ class Loaded:
     notes: list[str] = field(default_factory=list)
 
 
-def load_survey(conn: psycopg.Connection[Any], path: Path, name: str | None, begin: Begin) -> Loaded:
+def load_survey(conn: psycopg.Connection[Any], path: Path, name: str | None, begin: StartProgress) -> Loaded:
     """Import a survey into the database, completely or not at all.
 
     Points and images go into tables that nobody else sees; shared tables are locked only at the end.
@@ -145,7 +144,7 @@ def _require_schema(archive: ArchiveReader) -> None:
 class _Loading:
     """Steps of an import, which share the tables, the archive and the counts."""
 
-    def __init__(self, conn: psycopg.Connection[Any], archive: ArchiveReader, name: str, begin: Begin) -> None:
+    def __init__(self, conn: psycopg.Connection[Any], archive: ArchiveReader, name: str, begin: StartProgress) -> None:
         self.conn, self.archive, self.begin = conn, archive, begin
         self.manifest: Manifest = archive.manifest
         self.tables: Sequence[Table] = archive_tables(conn)

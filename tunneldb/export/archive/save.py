@@ -14,10 +14,9 @@ from tunneldb import __version__
 from tunneldb.database.schema import HEAD
 from tunneldb.export.archive.container import FORMAT, ArchiveWriter, Manifest
 from tunneldb.files import replacing
+from tunneldb.progress import StartProgress
 from tunneldb.store.archive.out import Rows, still, streams
 from tunneldb.store.survey import Survey
-
-Begin = Callable[[str, float | None], Callable[[float], None]]
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,7 @@ class Saved:
     kilometres: list[int]
 
 
-def save_survey(conn: psycopg.Connection[Any], survey: Survey, path: Path, begin: Begin) -> Saved:
+def save_survey(conn: psycopg.Connection[Any], survey: Survey, path: Path, begin: StartProgress) -> Saved:
     """Write a survey with all that belongs to it into one file, as it is at one moment.
 
     Parameters

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import psycopg
 
 from tunneldb.errors import UserError
+from tunneldb.progress import StartProgress, silent
 from tunneldb.store.surface import load_surface, survey_ends
 from tunneldb.store.survey import Survey
 
@@ -19,7 +19,7 @@ def write_survey(
     low: float,
     high: float,
     path: Path,
-    begin: Callable[[str, float | None], Callable[[float], None]] = lambda text, total: lambda count: None,
+    begin: StartProgress = silent,
 ) -> dict[str, int]:
     """Write a stretch of a survey in the format of the file's extension, and return the counts of each layer.
 

@@ -34,16 +34,15 @@ from tunneldb.pointcloud.formats.las_merge import Placement, merge_heads
 from tunneldb.pointcloud.formats.las_records import coordinates, fields
 from tunneldb.pointcloud.octree import GRID, CellCounts, Nodes, Tiling
 from tunneldb.pointcloud.rewrite import read_coordinates, records_of
+from tunneldb.progress import StartProgress
 from tunneldb.store.scene import load_scene
 from tunneldb.store.sources import unchanged_file
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
-Begin = Callable[[str, int], Callable[[int], None]]
-
 
 def export_copc(
-    conn: psycopg.Connection[Any], survey: Survey, folder: Path, kilometres: Collection[int], begin: Begin
+    conn: psycopg.Connection[Any], survey: Survey, folder: Path, kilometres: Collection[int], begin: StartProgress
 ) -> Iterator[Written]:
     """Write each kilometre as ``SURVEY-kmNNN.copc.laz`` into a folder, with ``SURVEY.vpc``, which lists all.
 
@@ -131,7 +130,7 @@ class _Source:
         """Return its path, after checking that the file is the one that was loaded."""
         return unchanged_file(self.file.path, self.file.bytes, self.file.checksum)
 
-    def count(self, groups: Sequence[_Group], divide: _Divide, begin: Begin) -> None:
+    def count(self, groups: Sequence[_Group], divide: _Divide, begin: StartProgress) -> None:
         """Count its points by cells for each of the kilometres.
 
         Raises

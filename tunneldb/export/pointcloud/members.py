@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from tunneldb.errors import UserError
@@ -13,8 +12,7 @@ from tunneldb.pipeline.members import AT_ONCE, FileMembers, Inputs, numbers_of_p
 from tunneldb.pipeline.spot_colours import find_coloured_members
 from tunneldb.pointcloud.reader import read_header
 from tunneldb.pointcloud.rewrite import rewrite_with_numbers
-
-Begin = Callable[[str, float | None], Callable[[float], None]]
+from tunneldb.progress import StartProgress
 
 DIMENSIONS = {
     "face": "face, 0: none",
@@ -39,7 +37,7 @@ def check_target(source: Path, target: Path) -> None:
         raise UserError(f"{target.parent}: no such folder")
 
 
-def export_members(inputs: Inputs, target: Path | None, begin: Begin, geometry: Geometry = "3d") -> FileMembers:
+def export_members(inputs: Inputs, target: Path | None, begin: StartProgress, geometry: Geometry = "3d") -> FileMembers:
     """Find the members of one scan file, and write its points, or polygons of a geometry, if a target is given.
 
     Raises

@@ -21,8 +21,7 @@ from tunneldb.geometry.centreline import centreline_through
 from tunneldb.pointcloud.reader import read_header
 from tunneldb.pointcloud.rewrite import read_coordinates, rewrite
 from tunneldb.pointcloud.voxels import Voxels
-
-Begin = Callable[[str, int], Callable[[int], None]]
+from tunneldb.progress import StartProgress
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ class Classified:
     lining: bool
 
 
-def classify_file(source: Path, target: Path, values: Mapping[str, float], begin: Begin) -> Classified:
+def classify_file(source: Path, target: Path, values: Mapping[str, float], begin: StartProgress) -> Classified:
     """Write a scan file again with the classes that are found from its points alone.
 
     It is read twice: into voxels, from which the models are made, and once more to be written. Memory grows with the

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -17,6 +17,7 @@ from tunneldb.database import snapshot
 from tunneldb.errors import NotReadyError, UserError
 from tunneldb.files import replacing
 from tunneldb.pointcloud.rewrite import rewrite
+from tunneldb.progress import StartProgress
 from tunneldb.stages.run import loaded_kilometres
 from tunneldb.store.scene import load_scene
 from tunneldb.store.sources import unchanged_file
@@ -66,7 +67,7 @@ def export_classified(
     survey: Survey,
     folder: Path,
     kilometres: Collection[int],
-    begin: Callable[[str, int], Callable[[int], None]],
+    begin: StartProgress,
 ) -> Iterator[Written]:
     """Write the files that touch some kilometres into a folder, each whole and once, under its own name as ``.laz``.
 

@@ -41,9 +41,10 @@ from tunneldb.measures.change.rows import (
     save_sections,
 )
 from tunneldb.measures.deviation.measure import lining_by_class
+from tunneldb.progress import StartProgress
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.pixel_state import PixelState, shows_lining
-from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond, refuse_different_tunnels
+from tunneldb.stages.on_demand import measure_kilometres, refuse_beyond, refuse_different_tunnels
 from tunneldb.stages.stale import Result, refuse_blocked, result_states
 from tunneldb.store.images import image_blocks, load_block
 from tunneldb.store.surface import load_surface
@@ -67,7 +68,7 @@ def compare(
     high: float,
     cell: float,
     length: float,
-    begin: Begin,
+    begin: StartProgress,
 ) -> list[int]:
     """Bring the change of a stretch up to date, each kilometre in one transaction; return those that were made.
 
@@ -82,7 +83,7 @@ def compare(
     cell, length : float
         Side of a cell, and length of a section, m.
     begin : callable
-        See `tunneldb.stages.on_demand.Begin`.
+        See `tunneldb.progress.StartProgress`.
 
     Raises
     ------

@@ -31,8 +31,9 @@ from tunneldb.measures.clearance.rows import (
     load_classed,
     save_clearance,
 )
+from tunneldb.progress import StartProgress
 from tunneldb.shape.outline import Outline
-from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond
+from tunneldb.stages.on_demand import measure_kilometres, refuse_beyond
 from tunneldb.stages.run import nothing_yet
 from tunneldb.stages.stale import Result, refuse_blocked, result_states
 from tunneldb.store.surface import load_alignment, load_surface, survey_ends
@@ -126,7 +127,7 @@ def read_track(path: Path, axis: Alignment) -> Tracks:
 
 def measure_clearance(
     conn: psycopg.Connection[Any], survey: Survey, tracks: Tracks, track: str, gauge: str, outline: Outline, options: Options,
-    low: float, high: float, begin: Begin,
+    low: float, high: float, begin: StartProgress,
 ) -> list[int]:  # fmt: skip
     """Bring the clearance of a stretch up to date, each kilometre in one transaction; return those that were made.
 

@@ -14,9 +14,10 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.measures.deviation.compute import STATIONS, Design, Step, block_steps
 from tunneldb.measures.deviation.rows import load_offsets, replace_image, save_steps
+from tunneldb.progress import StartProgress
 from tunneldb.raster.geotiff import Raster
 from tunneldb.shape.profile import Deviation
-from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond
+from tunneldb.stages.on_demand import measure_kilometres, refuse_beyond
 from tunneldb.stages.run import nothing_yet
 from tunneldb.stages.stale import Result, ResultState, refuse_blocked, result_states
 from tunneldb.store.design import load_design
@@ -31,7 +32,7 @@ def measure_deviation(
     layer: str,
     low: float,
     high: float,
-    begin: Begin,
+    begin: StartProgress,
 ) -> list[int]:
     """Bring the deviation of a stretch up to date, each kilometre in one transaction; return those that were made.
 
@@ -44,7 +45,7 @@ def measure_deviation(
     low, high : float
         Chainage, m.
     begin : callable
-        See `tunneldb.stages.on_demand.Begin`.
+        See `tunneldb.progress.StartProgress`.
 
     Raises
     ------

@@ -15,9 +15,10 @@ from tunneldb.measures.evenness.compute.evenness import evenness
 from tunneldb.measures.evenness.compute.sections import CellGrid, cells_in, polygons_of, steps_of
 from tunneldb.measures.evenness.compute.straightedge import Cells, cell_means
 from tunneldb.measures.evenness.rows import save_evenness
+from tunneldb.progress import StartProgress
 from tunneldb.raster.geotiff import DEVIATION_KINDS, laid
 from tunneldb.raster.grid import BLOCK
-from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond
+from tunneldb.stages.on_demand import measure_kilometres, refuse_beyond
 from tunneldb.stages.stale import Result, result_states
 from tunneldb.store.images import image_blocks, load_block
 from tunneldb.store.surface import survey_ends
@@ -32,7 +33,7 @@ def measure_evenness(
     limit: float,
     low: float,
     high: float,
-    begin: Begin,
+    begin: StartProgress,
 ) -> list[int]:
     """Bring the evenness of a stretch up to date, each kilometre in one transaction; return those that were made.
 
@@ -47,7 +48,7 @@ def measure_evenness(
     low, high : float
         Chainage, m.
     begin : callable
-        See `tunneldb.stages.on_demand.Begin`.
+        See `tunneldb.progress.StartProgress`.
 
     Raises
     ------

@@ -27,10 +27,11 @@ from tunneldb.measures.rings.rows import (
     save_definition,
     save_rings,
 )
+from tunneldb.progress import StartProgress
 from tunneldb.raster.pixel_state import shows_lining
 from tunneldb.shape.circle import taubin
 from tunneldb.shape.profile import Profile
-from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond
+from tunneldb.stages.on_demand import measure_kilometres, refuse_beyond
 from tunneldb.stages.run import nothing_yet
 from tunneldb.stages.stale import Result, refuse_blocked, result_states
 from tunneldb.store.design import load_profiles
@@ -96,7 +97,7 @@ def rings_of_file(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> 
     return rings
 
 
-def find_rings(conn: psycopg.Connection[Any], survey: Survey, begin: Begin) -> tuple[list[RingBounds], Joints]:
+def find_rings(conn: psycopg.Connection[Any], survey: Survey, begin: StartProgress) -> tuple[list[RingBounds], Joints]:
     """Find rings between the joints that the images show.
 
     Raises
@@ -153,7 +154,7 @@ def define_rings(conn: psycopg.Connection[Any], survey: Survey, rings: Sequence[
 
 
 def measure_survey_rings(
-    conn: psycopg.Connection[Any], survey: Survey, low: float, high: float, options: RingOptions | None, begin: Begin
+    conn: psycopg.Connection[Any], survey: Survey, low: float, high: float, options: RingOptions | None, begin: StartProgress
 ) -> list[int]:
     """Bring the rings of a stretch up to date, each kilometre in one transaction; return those that were made.
 
@@ -166,7 +167,7 @@ def measure_survey_rings(
     options : RingOptions or None
         None: those by which rings were measured last.
     begin : callable
-        See `tunneldb.stages.on_demand.Begin`.
+        See `tunneldb.progress.StartProgress`.
     """
     refuse_beyond(conn, survey, low, high)
     result = Result(survey, "rings")

@@ -13,7 +13,8 @@ from tunneldb.measures.thickness.rows import (
     load_cells,
     save_thickness,
 )
-from tunneldb.stages.on_demand import Begin, measure_kilometres, refuse_beyond, refuse_different_tunnels
+from tunneldb.progress import StartProgress
+from tunneldb.stages.on_demand import measure_kilometres, refuse_beyond, refuse_different_tunnels
 from tunneldb.stages.stale import Result, result_states
 from tunneldb.store.design import load_design
 from tunneldb.store.survey import Survey
@@ -26,7 +27,7 @@ def measure_thickness(
     layer: str,
     low: float,
     high: float,
-    begin: Begin,
+    begin: StartProgress,
 ) -> list[int]:
     """Bring the thickness between two surveys up to date, each kilometre in one transaction; return those that were made.
 
@@ -41,7 +42,7 @@ def measure_thickness(
     low, high : float
         Chainage, m.
     begin : callable
-        See `tunneldb.stages.on_demand.Begin`.
+        See `tunneldb.progress.StartProgress`.
 
     Raises
     ------
