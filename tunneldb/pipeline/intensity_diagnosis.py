@@ -20,13 +20,14 @@ from tunneldb.pipeline.detect import SURFACE_MARGIN, load_floor, load_radiometer
 from tunneldb.pointcloud.formats.table import has_scans, posed_scans
 from tunneldb.pointcloud.reader import Points, read_chunks, read_header
 from tunneldb.pointcloud.thinning import thin
+from tunneldb.progress import StartProgress, silent
 from tunneldb.radiometry.cells import IntensitySamples
 from tunneldb.radiometry.correction import Kind, needs_reference, to_decibel
 from tunneldb.radiometry.diagnosis import Diagnosis, pool
-from tunneldb.radiometry.incidence import incidence_cosine
 from tunneldb.radiometry.oren_nayar import incidence_db
 from tunneldb.radiometry.range_curve import MAX_SIGMA_FOR_DETECTION, RangeCurve, estimate_range_curve
 from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.radiometry.scan_incidence import incidence_cosine
 from tunneldb.raster.observation import Observer
 from tunneldb.store.images import load_reference, load_regions
 from tunneldb.store.sources import SAMPLE, sample
@@ -145,7 +146,7 @@ def diagnose_file(
     dimension: str,
     kind: Kind,
     scanner: tuple[float, float, float] | None,
-    begin: Callable[[str, float | None], Callable[[float], None]] = lambda text, total: lambda count: None,
+    begin: StartProgress = silent,
 ) -> Diagnosis:
     """Diagnose a single scan file: normals are those of planes through neighbouring points.
 
