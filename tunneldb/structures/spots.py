@@ -36,7 +36,7 @@ RIM = 0.75
 BIMODAL = 0.5
 """Share of the surface that differs from which it is uncertain which part is the surface itself."""
 
-_TOLD = ("thin", "gradual", "rectangular")
+_REASONS = ("thin", "gradual", "rectangular")
 
 
 @dataclass(frozen=True)
@@ -92,9 +92,9 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
     judged = int(face.judged.sum())
     if not judged or face.points[face.judged].sum() < MIN_FACE_POINTS:
         return FaceSpots([], numbers, 0.0, 0)
-    told = face.image.state == PixelState.LINING
-    drop = np.where(told, face.image.drop, np.int16(0)) * np.float32(STEP)
-    differs = significance(drop, told, face.image.sigma, pixels, scatter)
+    has_contrast = face.image.state == PixelState.LINING
+    drop = np.where(has_contrast, face.image.drop, np.int16(0)) * np.float32(STEP)
+    limit_ratio = significance(drop, has_contrast, face.image.sigma, pixels, scatter)
     on_face = face.image.state != PixelState.OFF
     empty = int((face.image.state == PixelState.EMPTY).sum())
     size = filter_size(judged / (judged + empty))
@@ -105,12 +105,12 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
         image = face.image
         if sign < 0:
             image = replace(image, drop=np.where(image.drop == NODATA, np.int16(NODATA), -image.drop).astype(np.int16))
-        marked = (sign * differs > 1.0) & on_face
+        marked = (sign * limit_ratio > 1.0) & on_face
         if not marked.any():
             continue
         marked = refine_boundary(marked, image, size)
         for region in find_regions(marked, marked, image, MIN_SPOT_AREA, None):
-            spot = _judge(region, kind, face, sign * differs[::-1], rim)
+            spot = _judge(region, kind, face, sign * limit_ratio[::-1], rim)
             if spot is None:
                 continue
             found.append(spot)
@@ -122,7 +122,9 @@ def find_spots(face: FaceContrast, pixels: int, scatter: Scatter) -> FaceSpots:
     return FaceSpots(found, numbers, share, seen)
 
 
-def _judge(region: Region, kind: Literal["dark", "bright"], face: FaceContrast, differs: Single, rim: Bool) -> FoundSpot | None:
+def _judge(
+    region: Region, kind: Literal["dark", "bright"], face: FaceContrast, limit_ratio: Single, rim: Bool
+) -> FoundSpot | None:
     """Classify a region; return None if it is nothing."""
     if not region.filled:
         return None
@@ -137,12 +139,12 @@ def _judge(region: Region, kind: Literal["dark", "bright"], face: FaceContrast, 
     along = float(rim[box][region.mask].mean())
     if along > RIM and not rim[face.judged].mean() > 0.5:
         return None
-    told = sorted((name for name in _TOLD if degrees[name] > 0.5), key=lambda name: -degrees[name])
+    reasons = sorted((name for name in _REASONS if degrees[name] > 0.5), key=lambda name: -degrees[name])
     seen = int(np.bitwise_or.reduce(face.scans[box][region.mask]))
     return FoundSpot(
         kind,
-        tuple(told),
-        1.0 - 0.5 * float(np.exp(1.0 - max(differs[box][region.mask].max(), 1.0))),
+        tuple(reasons),
+        1.0 - 0.5 * float(np.exp(1.0 - max(limit_ratio[box][region.mask].max(), 1.0))),
         region.contrast,
         region.darkening_mean,
         region.area,
