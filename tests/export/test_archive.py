@@ -309,7 +309,7 @@ def test_damaged_and_hostile_files_are_refused_in_one_line(example: str, conn: p
     refused(rewritten(path, lambda n, d: (n, other if n == "rows/section.zst" else d)), "section.zst|unpack")
     refused(rewritten(path, lambda n, d: None if n == "rows/run.zst" else (n, d)), "rows/run.zst")
     refused(rewritten(path, lambda n, d: (n, d), "../../etc/cron.d/x"), "not in both")
-    refused(rewritten(path, said("schema", "0001")), "has schema 0001")
+    refused(rewritten(path, said("schema", "0000")), "has schema 0000")
     refused(rewritten(path, said("format", 9)), "version 9 of the format")
     refused(rewritten(path, said("survey_id", -1)), "whole number")
     refused(rewritten(path, said("survey_id", 4711)), "does not have exactly one survey")
