@@ -129,10 +129,9 @@ def test_of_stretches_together_is_said_what_is_said_of_each(conn: psycopg.Connec
     starts = [*np.arange(150.0, 550.0, 50.0), 200.0, 250.0, -np.inf, 247.0, 300.0]
     ends = [*np.arange(200.0, 600.0, 50.0), 300.0, 252.0, np.inf, 253.0, 300.0]
     said = {}
-    for name in ("coverage_statement", "remark_statement"):
-        function = sql.Identifier("tunnel_api", name)
-        each = sql.SQL("SELECT {}(%s, %s, %s)").format(function)
-        together = sql.SQL("SELECT * FROM {}(%s, %s, %s)").format(sql.Identifier("tunnel_api", f"{name}s"))
+    for schema, name in (("tunnel_api", "coverage_statement"), ("tunnel_internal", "remark_statement")):
+        each = sql.SQL("SELECT {}(%s, %s, %s)").format(sql.Identifier(schema, name))
+        together = sql.SQL("SELECT * FROM {}(%s, %s, %s)").format(sql.Identifier("tunnel_internal", f"{name}s"))
         found = dict(conn.execute(together, [scanned, starts, ends]).fetchall())
         said[name] = [found.get(n) for n in range(1, len(starts) + 1)]
         singly = [conn.execute(each, [scanned, *stretch]).fetchone() for stretch in zip(starts, ends, strict=True)]

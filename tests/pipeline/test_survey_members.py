@@ -87,7 +87,7 @@ def spots(conn: psycopg.Connection, survey: str) -> dict[str, tuple[int, int, fl
 def test_spots_of_a_site(files: Path, conn: psycopg.Connection, tmp_path: Path) -> None:
     command("tunnel", "add", "hall", "--srid", 25829, "--site")
     add(files, "hall-1", "2024-05-04", "first.laz")
-    assert "never looked for" in command("spots", "hall-1", code=1).output
+    assert "have not been searched for" in command("spots", "hall-1", code=1).output
     command("members", "hall-1")
     found = spots(conn, "hall-1")
     assert set(found) == {"dark", "bright"}

@@ -64,7 +64,7 @@ def test_files_kilometres_and_gaps(tunnel: str, tmp_path: Path) -> None:
     low, high = (float(word) for word in gap.split() if word.isdigit())
     assert low == pytest.approx(5400, abs=40)
     assert high == pytest.approx(5700, abs=40)
-    assert "points to be read: 8 000, of which at most 8 000 rows" in result.output
+    assert "points to be read: 8 000, at most 8 000 rows" in result.output
     assert "does not begin with LASF" in result.output[result.output.index("problems") :]
 
 
