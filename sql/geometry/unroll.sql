@@ -91,7 +91,7 @@ BEGIN
         RAISE EXCEPTION 'there is no survey %', survey_id;
     ELSIF public.ST_CoordDim(point) < 3 THEN
         RAISE EXCEPTION 'the point has no height: it must be 3D, in metres of the tunnel''s coordinate system'
-            USING ERRCODE = 'invalid_parameter_value', HINT = 'ST_SetSRID(ST_MakePoint(x, y, z), srid)';
+            USING ERRCODE = 'invalid_parameter_value', HINT = 'public.ST_SetSRID(public.ST_MakePoint(x, y, z), srid)';
     ELSIF public.ST_SRID(point) NOT IN (0, srid) THEN
         RAISE EXCEPTION 'the point has SRID %, the tunnel %: use ST_Transform(point, %)', public.ST_SRID(point), srid, srid;
     END IF;
