@@ -99,7 +99,7 @@ def test_a_curve_that_does_not_span_the_lining_is_told_with_both_spans():
     span = range_span(views, np.ones(100, bool), CURVE)
     assert span[3] == 100
     assert span[2] == np.count_nonzero(points[:, 2] > 30.05)
-    assert re.search(r"spans 1 to 30 m.*2\.00 to 40\.00 m.*26 %", CURVE.outside_text(*span))
+    assert re.search(r"covers 1 to 30 m.*2\.00 to 40\.00 m.*26 %", CURVE.outside_text(*span))
     assert range_span(views, points[:, 2] < 30.04, CURVE)[2] == 0
 
 

@@ -180,7 +180,7 @@ def test_an_uncertain_curve_is_remarked_and_a_useless_one_refused(uncertain, rem
 
 def test_too_little_lining_is_refused():
     samples = _sight()
-    with pytest.raises(UserError, match="it takes 200"):
+    with pytest.raises(UserError, match="needs at least 200"):
         estimate_range_curve(samples.some(samples.place[:, 0] < 2.0))
 
 

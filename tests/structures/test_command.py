@@ -88,7 +88,7 @@ def test_polygons_lie_where_the_points_do(plant: Path, tmp_path: Path) -> None:
         ("saturated", lambda n: np.where(np.arange(n) % 5 == 0, 20.0, 45.0), 25829, "saturated: 80 %"),
         ("nothing", lambda n: np.full(n, np.nan), 25829, "no value is a number"),
         ("degrees", lambda n: np.linspace(10, 20, n), 4326, "coordinates are degrees"),
-        ("counts", lambda n: np.linspace(0, 4000, n), 25829, "no amplitude"),
+        ("counts", lambda n: np.linspace(0, 4000, n), 25829, "is not amplitude"),
     ],
 )
 def test_bad_input_is_one_line(tmp_path: Path, name: str, level, crs: int, says: str) -> None:
