@@ -88,7 +88,7 @@ COMMENT ON COLUMN tunnel_api.ring_chord.clock_to IS 'Clock position of the other
 COMMENT ON COLUMN tunnel_api.ring_chord.length IS 'Length, m; NULL if an end is not inspected';
 COMMENT ON COLUMN tunnel_api.ring_chord.length_se IS 'Standard error of length, m';
 
--- Rings of other kilometres whose end is next to this one belong to it, too: the step at its beginning goes by both.
+-- Rings of other kilometres whose end is next to this one belong to it, too: the step at its beginning depends on both.
 CREATE OR REPLACE FUNCTION tunnel_internal.rings_inputs(survey_id int, km int, subject text) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_build_object(

@@ -1,4 +1,4 @@
-"""Which findings of an earlier run are found again, and what becomes of the others: decided without a database."""
+"""Matching of findings with those of an earlier run, and the fate of the others, without a database."""
 
 from __future__ import annotations
 

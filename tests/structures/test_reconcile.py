@@ -1,4 +1,4 @@
-"""Which spots of earlier runs and surveys are found again, and which numbers the others get: decided without a database."""
+"""Matching of spots with those of earlier runs and surveys, and the numbers of the others, without a database."""
 
 from __future__ import annotations
 

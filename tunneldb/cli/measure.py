@@ -1,4 +1,4 @@
-"""What the commands of measures share: options, the run with its progress, and how rows are printed and written."""
+"""Shared parts of the commands of measures: options, the run with its progress, printing and writing of rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all commands have in common: their help as a manual page, and ``--json``.
+"""Shared parts of all commands: help as a manual page, and ``--json``.
 
 Under ``--json`` standard output holds exactly one JSON object, also when the command fails; what the command would print there
 for people is left out. Keys that every object has: ``verb``, ``ok``, ``exit_code``, ``seconds``; ``error`` where there is

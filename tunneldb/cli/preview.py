@@ -1,4 +1,4 @@
-"""What `tunneldb batch --preview` shows."""
+"""Output of `tunneldb batch --preview`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a command has come: a bar on the terminal with rate and time left, nothing in a pipe."""
+"""Progress of a command: a bar with rate and time left on a terminal, nothing in a pipe."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``run`` says of a stage when it is done: a sentence of its counts, which ``--json`` and the ledger have whole."""
+"""Sentence that ``run`` prints for a finished stage, from its counts; ``--json`` and the ledger have all counts."""
 
 from __future__ import annotations
 

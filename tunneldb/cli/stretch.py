@@ -20,7 +20,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 class OfTunnel(Protocol):
-    """What has chainages: a survey, or a tunnel by itself."""
+    """Object with chainages: a survey, or a tunnel by itself."""
 
     @property
     def tunnel_id(self) -> int:

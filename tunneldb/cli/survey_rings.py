@@ -28,7 +28,7 @@ _FILES = (".csv", ".gpkg", ".xlsx")
 
 @dataclass(frozen=True)
 class Definition:
-    """What was said of where rings lie: their length and a joint (m), a file, or that they are to be found."""
+    """Given positions of rings: their length and a joint (m), a file, or a search for them."""
 
     length: float | None
     start: float | None

@@ -56,7 +56,7 @@ def worker(settings: Settings, concurrency: int, threads: int) -> None:
 
 
 class _Jobs:
-    """How many jobs some worker processes of this machine have done since this was made."""
+    """Number of jobs that some worker processes of this machine have done since the object was created."""
 
     def __init__(self, dsn: str | None) -> None:
         self.dsn = dsn

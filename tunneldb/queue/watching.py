@@ -1,4 +1,4 @@
-"""What commands ask of the queue: the time of the server, jobs done, runs that ended, workers that are to stop."""
+"""Queries of the commands about the queue: time of the server, finished jobs, ended runs, workers to stop."""
 
 from __future__ import annotations
 

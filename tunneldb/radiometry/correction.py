@@ -51,7 +51,7 @@ def decibel(raw: float, linear: bool) -> float:  # pragma: no cover - compiled
 
 @dataclass(frozen=True)
 class Observations:
-    """How the scanner saw each point; all arrays (n,).
+    """Range and incidence of each point; all arrays (n,).
 
     Attributes
     ----------

@@ -22,7 +22,7 @@ from tunneldb.raster.limits import Limits, near_surface, steep_enough, within_ra
 
 @dataclass(frozen=True)
 class Radiometer:
-    """What intensity is corrected with.
+    """Data for the correction of intensity.
 
     Attributes
     ----------

@@ -69,7 +69,7 @@ class PoseArrays(NamedTuple):
 
 
 class CorrectionArrays(NamedTuple):
-    """How intensity is corrected.
+    """Correction of intensity.
 
     ``wanted`` is False for a survey without it, then nothing below counts. ``knots`` (m) and ``values`` (dB) are the
     reference curve, empty where none is needed; ``low`` and ``high`` (m) the ranges that it serves for; ``loss`` is the
@@ -86,7 +86,7 @@ class CorrectionArrays(NamedTuple):
 
 
 class PixelTarget(NamedTuple):
-    """Where points go.
+    """Destination of points.
 
     ``low`` and ``high`` (3) are the box of points to look at, m; ``limits`` are those of depth, range and incidence; ``west``
     is the chainage at column 0, m; ``bottom`` the arc of the lower edge of the last row, in pixels; ``first`` to ``stop`` are
@@ -149,7 +149,7 @@ class Pixels(NamedTuple):
 
 
 class ProjectionCounts(NamedTuple):
-    """What `project` counts.
+    """Counts of `project`.
 
     Points used in the kilometre itself; those whose scanner position is unknown (they go nowhere); of the others, in the
     halo too, that are not floor, how many there are, how many lie outside the reference curve's ranges (they go nowhere

@@ -24,7 +24,7 @@ _PLURAL = {"leak": "leaks", "joint": "joints", "dark": "dark spots", "all": "ano
 
 @dataclass(frozen=True)
 class Selection:
-    """Which leaks, joints and dry dark areas to read.
+    """Selection of leaks, joints and dry dark areas to read.
 
     Attributes
     ----------
