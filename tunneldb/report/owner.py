@@ -101,9 +101,17 @@ def read_owner(path: Path) -> Owner:
     )
 
 
+_DEEP = re.compile(r"(?:[\[{]\s*){100}")
+"""Lists in each other, deeper than any settings need."""
+
+
 def _load(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text("utf-8"))
+        text = path.read_text("utf-8")
+        # Else the parser would use up the stack, and what is collected meanwhile would fail in its finalizer.
+        if _DEEP.search(text):
+            raise RecursionError
+        return tomllib.loads(text)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
