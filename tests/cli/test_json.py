@@ -67,6 +67,21 @@ def test_what_is_listed_is_what_the_views_hold(example: str, conn: psycopg.Conne
     assert told(0, "tunnel", "stationing", "demo", "--show")["tunnel"] == "demo"
 
 
+LEAK = (
+    "id", "km", "chainage_from", "chainage_to", "label", "arc_from", "arc_to", "clock", "kind", "confidence", "reasons",
+    "contrast", "area", "drop_mean", "drop_max", "image_share", "review", "reviewed_by", "reviewed_at", "detected", "counted",
+)  # fmt: skip
+"""Columns that programs rely on."""
+
+
+def test_a_leak_has_the_same_names_in_json_and_in_files(example: str) -> None:
+    leaks = told(0, "leaks", example, "--kind", "all")["leaks"]
+    header = CliRunner().invoke(main, ["leaks", example, "--kind", "all", "--format", "csv"]).stdout.splitlines()[0]
+    assert leaks
+    assert all(tuple(leak) == (*LEAK, "geometry") for leak in leaks)
+    assert header == ",".join((*LEAK, "geometry"))
+
+
 def test_what_is_written_is_named(example: str, tmp_path: Path, conn: psycopg.Connection) -> None:
     images = told(0, "image", example, "-o", tmp_path / "images")["files"]
     assert {Path(path).suffix for path in images} == {".tif", ".png"}

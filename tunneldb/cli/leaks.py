@@ -20,7 +20,7 @@ from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.export.tables.leak_files import as_csv, as_geojson, write_gpkg
+from tunneldb.export.tables.leak_files import as_csv, as_geojson, as_record, write_gpkg
 from tunneldb.export.tables.leaks import as_table
 from tunneldb.export.tables.workbooks import write_leaks
 from tunneldb.files import replacing
@@ -220,7 +220,7 @@ def _print_classes(conn: psycopg.Connection, survey: Survey, low: float, high: f
 
 
 def _print(listed: LeakList, form: str, geometry: Geometry, survey: Survey) -> None:
-    tell(geometry=geometry, leaks=listed.rows)
+    tell(geometry=geometry, leaks=[as_record(leak) for leak in listed.rows])
     if form != "table":
         click.echo(_text(listed, form, geometry, survey), nl=False)
     elif listed.rows or listed.coverage.seen_area:

@@ -31,7 +31,12 @@ COLUMNS = {
     "drop_max": "darkening_max",
     **{name: name for name in ("image_share", "review", "reviewed_by", "reviewed_at", "detected", "counted")},
 }
-"""Columns of the files, and the attribute of a finding that each has: programs rely on these names."""
+"""Columns of the files and keys of JSON, and the attribute of a finding that each has: programs rely on these names."""
+
+
+def as_record(leak: Finding) -> dict[str, Any]:
+    """Return a leak under the names of the files, with its geometry, for ``--json``."""
+    return {**{column: getattr(leak, attribute) for column, attribute in COLUMNS.items()}, "geometry": leak.geometry}
 
 
 def as_csv(leaks: LeakList) -> str:
