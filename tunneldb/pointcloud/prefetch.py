@@ -38,7 +38,12 @@ def prefetch(items: Iterable[T], ahead: int = 1) -> Generator[T, None, None]:
             if good:
                 yield item  # type: ignore[misc]
             elif isinstance(item, BaseException):
-                raise item
+                try:
+                    raise item
+                finally:
+                    # Else this frame and the traceback refer to each other, and what the thread made is freed by the garbage
+                    # collector in any order: objects of PROJ after their context, which corrupts memory.
+                    del item
             else:
                 return
     finally:
