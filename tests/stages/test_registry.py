@@ -1,4 +1,4 @@
-"""What follows from a row of the registry is there: code, command, tables and functions of the database."""
+"""Code, command, tables and functions that each row of the registry names exist."""
 
 from __future__ import annotations
 

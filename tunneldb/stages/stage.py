@@ -62,7 +62,7 @@ class Stage:
     name : str
     function : str
         ``module:function`` that does one kilometre; connection, survey, km, values of the parameters and progress go in, counts
-        come out. Empty for ``load``, which goes by the files (`tunneldb.pipeline.load`), and for measures.
+        come out. Empty for ``load``, which works on files (`tunneldb.pipeline.load`), and for measures.
     reads : tuple of str
         Stages whose results in the kilometre itself it rests on, directly or through another; ``survey`` where it rests on the
         scanner's positions, the reference curve or the kind of intensity, ``sonar`` on what sonar scans saw below the water,
@@ -78,7 +78,7 @@ class Stage:
     subject : tuple of str
         Parameters that distinguish results of the stage in one kilometre; the older survey first, the layer last.
     inputs : tuple of Input
-        What the results are compared with to be known as out of date, in this order.
+        Inputs whose change makes the results out of date, in the order of comparison.
     command : str
         ``module:command`` of the command line; empty for a stage of a kilometre.
     summary : str

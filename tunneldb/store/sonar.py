@@ -18,7 +18,7 @@ from tunneldb.registration.underwater.observations import RANGE_NOISE
 from tunneldb.store.scan_files import checksum
 from tunneldb.store.survey import Survey
 
-MIN_CELL_POINTS = 3  # points, of which the median bears one false echo
+MIN_CELL_POINTS = 3  # points: their median tolerates one false echo
 
 
 def save_registration(conn: psycopg.Connection[Any], survey: Survey, found: Registration, up: int) -> None:

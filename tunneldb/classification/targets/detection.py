@@ -39,7 +39,7 @@ NEIGHBOURS = 4  # of a point, whose residuals are compared with its own
 
 # Cylinders around the centre: their rim in sectors of 22.5°, of which 8 are visible; the wall behind a sphere fills at most 3.
 SECTORS, RIM = 16, 5
-SLICES = 3  # along it, which must all have points, so that a plane across it is not taken for a cylinder
+SLICES = 3  # along it; all must have points, so that a plane across it is not classified as a cylinder
 
 
 @dataclass(frozen=True)

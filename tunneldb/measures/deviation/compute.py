@@ -30,7 +30,7 @@ STEP = 1.0
 STATIONS = 1.0
 """Distance of stations of the given axis, m: between them its curve is followed to 0.01 mm."""
 
-_ARM = 5.0  # m from the axis, where the planes of the measured axis are held against those of the given one
+_ARM = 5.0  # m from the axis, where planes of the measured axis are compared with those of the given axis
 
 
 @dataclass(frozen=True)
