@@ -1245,6 +1245,10 @@ CREATE TABLE tunnel.ring (
     lip_se DOUBLE PRECISION,
     lip_arc DOUBLE PRECISION,
     remark TEXT,
+    circle_x DOUBLE PRECISION,
+    circle_y DOUBLE PRECISION,
+    circle_z DOUBLE PRECISION,
+    circle_radius DOUBLE PRECISION,
     CONSTRAINT ring_pkey PRIMARY KEY (id),
     CONSTRAINT ring_survey_id_number_key UNIQUE (survey_id, number),
     CONSTRAINT ring_origin_check CHECK (origin IN ('length', 'file', 'found')),
@@ -1301,6 +1305,10 @@ COMMENT ON COLUMN tunnel.ring.lip IS 'Greatest step within the ring, between seg
 COMMENT ON COLUMN tunnel.ring.lip_se IS 'Standard error, m';
 COMMENT ON COLUMN tunnel.ring.lip_arc IS 'Arc of its place, m';
 COMMENT ON COLUMN tunnel.ring.remark IS 'Notes and limitations';
+COMMENT ON COLUMN tunnel.ring.circle_x IS 'Centre of the best-fit circle of all points, least squares of distances; tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel.ring.circle_y IS 'Its y, m';
+COMMENT ON COLUMN tunnel.ring.circle_z IS 'Its height, m';
+COMMENT ON COLUMN tunnel.ring.circle_radius IS 'Radius of that circle, m';
 CREATE INDEX ring_survey_id_chainage_from_idx ON tunnel.ring (survey_id, chainage_from);
 CREATE INDEX ring_survey_id_ovality_idx ON tunnel.ring (survey_id, ovality);
 

@@ -9,7 +9,7 @@ SELECT r.id, r.survey_id, s.name AS survey, r.km,
        r.diameter_smallest_se, r.largest_clock, r.largest_clock_se, r.ovality, r.ovality_se, r.design_diameter,
        r.diameter_from, r.harmonic, r.harmonic_se, r.harmonic_clock, r.inward, r.inward_se, r.inward_clock, r.outward,
        r.outward_se, r.outward_clock, r.sigma, r.step_greatest, r.step_greatest_se, r.step_greatest_arc, r.lip, r.lip_se,
-       r.lip_arc, r.remark
+       r.lip_arc, r.remark, r.circle_x, r.circle_y, r.circle_z, r.circle_radius
   FROM tunnel.ring r
   JOIN tunnel.survey s ON s.id = r.survey_id;
 COMMENT ON VIEW tunnel_api.ring IS
@@ -55,6 +55,11 @@ COMMENT ON COLUMN tunnel_api.ring.lip IS
 COMMENT ON COLUMN tunnel_api.ring.lip_se IS 'Standard error of lip, m';
 COMMENT ON COLUMN tunnel_api.ring.lip_arc IS 'Arc of lip, m';
 COMMENT ON COLUMN tunnel_api.ring.remark IS 'Note on the ring';
+COMMENT ON COLUMN tunnel_api.ring.circle_x IS
+    'X (east) of the centre of the best-fit circle of all points of the ring, tunnel''s SRID, m; least squares of distances';
+COMMENT ON COLUMN tunnel_api.ring.circle_y IS 'Y (north) of the centre of the best-fit circle, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel_api.ring.circle_z IS 'Height of the centre of the best-fit circle, m';
+COMMENT ON COLUMN tunnel_api.ring.circle_radius IS 'Radius of the best-fit circle, m';
 
 -- In a cell of arc each; the joint is the one at the ring's beginning.
 CREATE OR REPLACE VIEW tunnel_api.ring_step AS

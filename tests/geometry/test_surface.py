@@ -120,6 +120,15 @@ def test_surface_is_continuous_across_planes() -> None:
         assert np.linalg.norm(after - before, axis=1).max() < 1e-5
 
 
+def test_a_place_about_the_given_axis_is_found_again_in_space() -> None:
+    turn = np.linspace(0.0, 1.0, 12)
+    axis = Alignment.from_polyline(
+        np.column_stack([300 * np.sin(turn), 300 * (1 - np.cos(turn)), 15 * turn]) + 1000.0, 40.0, 5.0
+    )
+    places = np.column_stack([np.linspace(45.0, 330.0, 60), np.linspace(-4.0, 4.0, 60), np.linspace(3.0, -2.0, 60)])
+    np.testing.assert_allclose(axis.across(axis.in_space(places)), places, atol=1e-6)
+
+
 def test_off_the_tunnel() -> None:
     helix = Helix(300.0, 0.0)
     surface = circular_surface(helix, 100.0)

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import psycopg
 import pyogrio
 import pyogrio.raw
@@ -25,6 +26,7 @@ JOINT, STEP = 1000.7, 0.012
 """The ring behind this chainage and all that follow stand in by so much, m."""
 
 LENGTH = 1.7
+CIRCLE = ["circle_x", "circle_y", "circle_z", "circle_radius"]
 
 
 @pytest.fixture
@@ -79,6 +81,9 @@ def test_rings_are_measured_over_the_end_of_a_kilometre(survey: str, conn: psyco
         assert row["centre_right"] == pytest.approx(0.0, abs=0.0005)
         assert row["seen_share"] == pytest.approx(HIDDEN / np.pi / RADIUS, abs=0.02)
         assert row["chord_270_90"] == pytest.approx(2 * radius, abs=max(0.002, 5 * row["chord_270_90_se"]))
+        assert list(row)[-4:] == CIRCLE
+        middle = 4.64e6 + 0.5 * (row["chainage_from"] + row["chainage_to"])
+        assert [row[name] for name in CIRCLE] == pytest.approx([5e5, middle, 100.0, radius], abs=0.0006, rel=0)
     steps = [row["step_greatest"] for row in rows]
     assert steps[0] is None
     assert steps[at] == pytest.approx(STEP, abs=0.003)
@@ -91,9 +96,14 @@ def test_rings_are_measured_over_the_end_of_a_kilometre(survey: str, conn: psyco
 
     assert run("rings", survey, "-o", tmp_path / "r.csv")["made"] == []
     with (tmp_path / "r.csv").open(encoding="utf-8") as file:
-        assert len(list(csv.DictReader(file))) == len(rows)
+        table = list(csv.DictReader(file))
+    assert list(table[0]) == list(rows[0])
+    np.testing.assert_allclose(
+        [[float(row[name]) for name in CIRCLE] for row in table], [[row[c] for c in CIRCLE] for row in rows]
+    )
     run("rings", survey, "-o", tmp_path / "r.xlsx")
-    assert (tmp_path / "r.xlsx").stat().st_size > 5000
+    sheet = openpyxl.load_workbook(tmp_path / "r.xlsx", read_only=True)["rings"]
+    assert [cell.value for cell in next(sheet.iter_rows(max_row=1))] == list(rows[0])
     run("rings", survey, "-o", tmp_path / "r.gpkg")
     assert [tuple(layer) for layer in pyogrio.list_layers(tmp_path / "r.gpkg")] == [
         ("ring_map", "Polygon"), ("ring_unrolled", "Polygon"), ("ring_step", "Point")
@@ -103,7 +113,7 @@ def test_rings_are_measured_over_the_end_of_a_kilometre(survey: str, conn: psyco
     bounds = shapely.bounds(shapely.from_wkb(unrolled[2]))
     np.testing.assert_allclose(bounds[:, [0, 2]], np.column_stack([fields["chainage_from"], fields["chainage_to"]]), atol=1e-9)
     np.testing.assert_allclose(bounds[:, [1, 3]], [[-np.pi * RADIUS, np.pi * RADIUS]] * len(rows), atol=0.05)
-    for name in ("number", "radius", "ovality_se", "step_greatest", "chord_270_90"):
+    for name in ("number", "radius", "ovality_se", "step_greatest", "chord_270_90", *CIRCLE):
         wanted = [np.nan if row[name] is None else row[name] for row in rows]
         np.testing.assert_allclose(fields[name], wanted, atol=1e-6)
     assert [len(text.split()) for text in fields["harmonic"]] == [5] * len(rows)

@@ -71,6 +71,8 @@ def test_a_ring_lies_where_it_was_put(files: tuple[Path, Path]) -> None:
     assert (float(row["radius"]), float(row["chord_270_90"])) == (3.0, 6.0)
     assert float(row["radius_se"]) == pytest.approx(0.002 / np.sqrt(8), abs=1e-5)
     assert row["remark"] == ""
+    assert list(row)[-4:] == ["circle_x", "circle_y", "circle_z", "circle_radius"]
+    assert [float(row[name]) for name in list(row)[-4:]] == [20.0, -0.02, 0.01, 3.0]
 
 
 @pytest.mark.parametrize(

@@ -78,6 +78,11 @@ def test_it_follows_the_simulators_line(bend: tuple[Simulation, Path], tmp_path:
     assert said["length"] == pytest.approx(80.0, abs=0.5)
     assert said["whole_sections"] == said["sections"]
     assert said["doubtful"] == []
+    look = json.loads(done("inspect", scan, "--json").stdout)["files"][0]
+    assert (said["width"], said["height"]) == (look["width"], look["height"])
+    assert said["width"] == pytest.approx(
+        np.ptp(section.point(np.linspace(-1, 1, 400) * section.half_perimeter)[0][:, 0]), rel=0.03
+    )
     assert "chainage grows over" in result.stderr
     with Image.open(tmp_path / "a.png") as picture:
         assert min(picture.size) > 400

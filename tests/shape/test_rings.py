@@ -49,6 +49,34 @@ def test_an_exact_ellipse_in_a_tilted_plane_is_found() -> None:
     assert found.gap == pytest.approx(45.0, abs=0.3)
 
 
+@pytest.mark.parametrize("clock", [EIGHT, np.linspace(-75.0, 75.0, 9), np.linspace(-150.0, 150.0, 400)])
+def test_the_best_circle_of_exact_points_is_theirs(clock: Float) -> None:
+    at = np.array([271540.0, 2104023.0, -16.9])
+    points, ahead = in_space(ring(clock), 2.1, 0.05, at)
+    found = fit_ring(points, ahead)
+    assert found.circle_centre == pytest.approx(at, abs=1e-6)
+    assert found.circle[2] == pytest.approx(2.9, abs=1e-6)
+
+
+def test_the_best_circle_of_an_even_oval_has_its_centre_and_the_mean_distance_of_its_points() -> None:
+    points = ring(flattening=0.05, largest=20.0, centre=(3.0, -1.0))
+    found = fit_ring(points)
+    assert found.circle == pytest.approx((3.0, -1.0, np.hypot(*(points - [3.0, -1.0]).T).mean()), abs=1e-7)
+
+
+@pytest.mark.parametrize("clock", [EIGHT, np.linspace(-80.0, 80.0, 12), np.linspace(-135.0, 135.0, 500)])
+def test_the_best_circle_satisfies_the_normal_equations_of_all_points(clock: Float) -> None:
+    """Of least squares of distances: the mean of residuals, and of residuals times direction, is zero; gross errors count."""
+    points = ring(clock) + np.random.default_rng(3).normal(0.0, 0.004, (len(clock), 2))
+    points[len(points) // 3] *= 1.05
+    found = fit_ring(points, sigma=0.004)
+    away = points - found.circle[:2]
+    size = np.hypot(*away.T)
+    off = size - found.circle[2]
+    assert not found.used.all()
+    assert np.array([off.mean(), *(off[:, None] * away / size[:, None]).mean(axis=0)]) == pytest.approx(np.zeros(3), abs=1e-7)
+
+
 def test_distances_from_an_ellipse_are_those_of_its_normals() -> None:
     a, b, angle = 3.2, 2.7, 0.4
     s = np.linspace(0.0, 2.0 * np.pi, 50)

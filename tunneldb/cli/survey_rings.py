@@ -110,6 +110,8 @@ _SHOWN = 20
 
 
 def _print(rows: list[Row], output: Path | None) -> None:
+    from tunneldb.measures.rings.tables import CIRCLE_COLUMNS
+
     told = sorted((row for row in rows if row["ovality"] is not None), key=lambda row: -row["ovality"])
     shown = told[:_SHOWN] if len(rows) > _SHOWN else rows
     table = [
@@ -117,12 +119,13 @@ def _print(rows: list[Row], output: Path | None) -> None:
             row["number"], row["label"], number(row["seen_share"], 0, 100.0), number(row["centre_right"], 1, 1e3),
             number(row["centre_up"], 1, 1e3), number(row["radius"], 4), number(row["ovality"], 2, 1e3),
             number(row["ovality_se"], 2, 1e3), number(row["step_greatest"], 1, 1e3), number(row["lip"], 1, 1e3),
-            row["remark"] or "",
+            row["remark"] or "", *(number(row[name], 3 + (name == "circle_radius")) for name in CIRCLE_COLUMNS),
         )
         for row in shown
     ]  # fmt: skip
     header = ["ring", "middle", "seen %", "right mm", "up mm", "radius m", "ovality ‰", "±", "step mm", "lip mm", "remark"]
-    print_table(header, table, right=tuple(range(2, 10)))
+    header += ["circle x", "circle y", "circle z", "circle radius m"]
+    print_table(header, table, right=(*range(2, 10), *range(11, 15)))
     steps = [abs(row["step_greatest"]) for row in rows if row["step_greatest"] is not None]
     said = f"{len(rows)} rings, {len(told)} with an ellipse"
     if len(rows) > len(shown):

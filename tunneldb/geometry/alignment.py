@@ -124,6 +124,13 @@ class Alignment:
     def _segments(self) -> Float:
         return segment_rows(self.vertices, tangents(self.vertices))
 
+    def in_space(self, places: Float) -> Float:
+        """Return points (n, 3), m, of chainage, right and up across the axis (n, 3), m: the inverse of `across`."""
+        station = places[:, 0] / self.spacing - self.number[0]
+        k = np.clip(np.floor(station), 0, len(self.number) - 2).astype(np.int64)
+        frame = frames_at(self._segments, k, station - k)
+        return frame[:, 0] + np.einsum("ij,ijk->ik", places[:, 1:], frame[:, 2:])
+
     def _located(self, points: Float) -> tuple[Float, Float, Int32]:
         """Return chainage and distance from the axis, m, NaN beyond the ends, and index of the segment, each (n,)."""
         segments = self._segments

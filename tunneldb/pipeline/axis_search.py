@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,11 @@ from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.geometry.crs import describe_crs, horizontal, same_horizontally
 from tunneldb.geometry.stationing import chainage_label
-from tunneldb.pointcloud.reader import ScanHeader, check_header, read_chunks, read_header
+from tunneldb.pointcloud.contents import UniformSample
+from tunneldb.pointcloud.form import tunnel_form
+from tunneldb.pointcloud.formats.raw import read_raw
+from tunneldb.pointcloud.points import Points
+from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
 from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.progress import StartProgress
 
@@ -59,11 +64,13 @@ def search_axis(files: Sequence[Path], srid: int | None, begin: StartProgress, a
         if srid is not None:
             check_header(header, None, srid, needs_time=False)
     _require_one_system(headers)
-    points = _voxels(headers, begin)
+    points, sample = _voxels(headers, begin)
     try:
-        return find_axis(points) if along is None else follow_line(points, along)
+        found = find_axis(points) if along is None else follow_line(points, along)
     except UserError as error:
         raise UserError(f"{_names(files)}: {error}") from None
+    form = tunnel_form(sample)  # the size that `inspect` states
+    return found if form is None else replace(found, width=form.width, height=form.height)
 
 
 def found_given(
@@ -124,19 +131,22 @@ def write_axis(path: Path, xyz: Float) -> None:
         table.writerows([f"{value:.3f}" for value in vertex] for vertex in xyz.tolist())
 
 
-def _voxels(headers: Sequence[ScanHeader], begin: StartProgress) -> Float:
-    """Return centroids of the voxels on surfaces."""
+def _voxels(headers: Sequence[ScanHeader], begin: StartProgress) -> tuple[Float, Float]:
+    """Return centroids of the voxels on surfaces, and a uniform sample of the points."""
     done = begin("reading", float(sum(header.points for header in headers)))
-    voxels = Voxels(EDGE)
+    voxels, sample, read = Voxels(EDGE), UniformSample(), 0
     middle: Float | None = None
     for header in headers:
-        for chunk in read_chunks(header.path, None):
+        for raw in read_raw(header.path, None):
+            sample.add(raw, read)
+            read += len(raw)
+            chunk = Points.of(raw).located()
             if middle is None and len(chunk.xyz):
                 middle = np.median(chunk.xyz, axis=0)
             if middle is not None:
                 voxels.add(chunk.xyz[(np.abs(chunk.xyz - middle) < MAX_POINT_DISTANCE).all(axis=1)])
-            done(len(chunk.xyz))
-    return without_haze(voxels.centroids(), voxels.counts())
+            done(len(raw))
+    return without_haze(voxels.centroids(), voxels.counts()), sample.xyz
 
 
 def _require_one_system(headers: Sequence[ScanHeader]) -> None:

@@ -135,6 +135,11 @@ class Points:
             finite &= np.isfinite(values).reshape(len(self), -1).all(axis=1)
         return None if finite.all() else finite
 
+    def located(self) -> Points:
+        """Return the points without those of implausible coordinates."""
+        finite = self.finite(time=False, intensity=False)
+        return self if finite is None else self.some(finite)
+
     @classmethod
     def of(cls, raw: Raw) -> Points:
         """Return points with scaled coordinates, and each array in its own memory."""

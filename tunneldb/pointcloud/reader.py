@@ -96,9 +96,8 @@ def read_chunks(
     Points
         In file order within a range; points without finite coordinates are skipped.
     """
-    for points in map(Points.of, read_raw(path, dimension, size, ranges, colours=colours)):
-        finite = points.finite(time=False, intensity=False)
-        yield points if finite is None else points.some(finite)
+    for raw in read_raw(path, dimension, size, ranges, colours=colours):
+        yield Points.of(raw).located()
 
 
 @dataclass(frozen=True)

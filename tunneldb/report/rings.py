@@ -76,7 +76,8 @@ def read_rings(conn: psycopg.Connection[Any], survey: Survey, low: float, high: 
     with conn.cursor(row_factory=dict_row) as cursor:
         rows = cursor.execute(
             "SELECT number, label, chainage_from, chainage_to, joint, seen_share, shape, centre_right, centre_up, radius,"
-            " ovality, ovality_se, diameter_from, step_greatest, step_greatest_se, lip, remark FROM tunnel_api.ring"
+            " ovality, ovality_se, diameter_from, step_greatest, step_greatest_se, lip, remark, circle_x, circle_y, circle_z,"
+            " circle_radius FROM tunnel_api.ring"
             " WHERE survey_id = %s AND shape IS NOT NULL AND (chainage_from + chainage_to) / 2 BETWEEN %s AND %s"
             " ORDER BY chainage_from",
             [survey.id, low, high],

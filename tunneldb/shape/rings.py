@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from tunneldb.arrays import Bool, Float
 from tunneldb.shape.adjustment import MAX_ERROR_INFLATION, Adjustment, adjust, begin
 from tunneldb.shape.departures import Departure, clock_of, departures
-from tunneldb.shape.ellipse import CIRCLE, ELLIPSE
+from tunneldb.shape.ellipse import CIRCLE, ELLIPSE, solve
 from tunneldb.shape.harmonics import Harmonics, fit_harmonics
 from tunneldb.shape.limits import MAX_TESTED_SINGLY
 from tunneldb.shape.plane import RingPlane, fit_plane
@@ -48,6 +48,8 @@ class Ring:
         Widest angle at the centre without a point, °.
     along : (n,) float array
         Distance of each point from the plane, up-chainage, m.
+    circle : (3,) float array
+        Best-fit circle of all points: centre to the right and upwards in the plane, and radius, m.
     """
 
     plane: RingPlane
@@ -57,6 +59,7 @@ class Ring:
     outward: Departure
     gap: float
     along: Float
+    circle: Float
 
     @property
     def is_ellipse(self) -> bool:
@@ -72,6 +75,11 @@ class Ring:
     def centre(self) -> Float:
         """Centre in space (3,), m."""
         return self.plane.to_space(self.adjustment.ellipse.centre)
+
+    @property
+    def circle_centre(self) -> Float:
+        """Centre of the best-fit circle in space (3,), m."""
+        return self.plane.to_space(self.circle[:2])
 
     @property
     def centre_covariance(self) -> Float:
@@ -130,7 +138,8 @@ def fit_ring(
     radius = np.linalg.norm(xy[used] - ellipse.centre, axis=1)
     harmonics = fit_harmonics(clock, radius, orders, adjustment.scale)
     along = np.zeros(len(points)) if points.shape[1] == 2 else plane.along(points)
-    return Ring(plane, adjustment, harmonics, *departures(xy, adjustment), _gap(clock), along)
+    circle = solve(xy, start, CIRCLE)[:CIRCLE]
+    return Ring(plane, adjustment, harmonics, *departures(xy, adjustment), _gap(clock), along, circle)
 
 
 def _plane(points: Float, ahead: Float | None, across: bool) -> RingPlane:

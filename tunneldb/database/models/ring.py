@@ -81,6 +81,12 @@ class Ring(Base):
     lip_se: Mapped[float | None] = mapped_column(comment="Standard error, m")
     lip_arc: Mapped[float | None] = mapped_column(comment="Arc of its place, m")
     remark: Mapped[str | None] = mapped_column(comment="Notes and limitations")
+    circle_x: Mapped[float | None] = mapped_column(
+        comment="Centre of the best-fit circle of all points, least squares of distances; tunnel's SRID, m"
+    )
+    circle_y: Mapped[float | None] = mapped_column(comment="Its y, m")
+    circle_z: Mapped[float | None] = mapped_column(comment="Its height, m")
+    circle_radius: Mapped[float | None] = mapped_column(comment="Radius of that circle, m")
 
 
 class RingChord(Base):

@@ -14,7 +14,7 @@ from psycopg import sql
 
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
 from tunneldb.geometry.crs import LOCAL
-from tunneldb.measures.rings.tables import Row
+from tunneldb.measures.rings.tables import CIRCLE_COLUMNS, Row
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.survey import Survey
 
@@ -43,7 +43,8 @@ def write_rings_gpkg(conn: psycopg.Connection[Any], survey: Survey, rows: list[R
         ).fetchall()
     }
     whole = [row | harmonics[row["number"]] for row in rows]
-    names = list(dict.fromkeys(name for row in whole for name in row))
+    named = dict.fromkeys(name for row in whole for name in row)
+    names = [*(name for name in named if name not in CIRCLE_COLUMNS), *CIRCLE_COLUMNS]
     written = False
     for layer, on_map, text in _LAYERS:
         query = sql.SQL("SELECT number, public.ST_AsBinary(geom) FROM {} WHERE survey_id = %s AND number = ANY (%s)").format(

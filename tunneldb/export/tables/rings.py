@@ -36,7 +36,7 @@ def ring_records(surveyed: SurveyedRings, orders: int, chords: Sequence[Chord] =
         rest = dict(_empty_rest(orders, chords)) | dict(_rest(row, orders, chords))
         used = 0 if row.ring is None else int(row.ring.used.sum())
         last = {"points": len(row.points), "used": used, "rejected": 0 if row.ring is None else len(row.points) - used}
-        rows.append({"ring": row.name, **first, **rest, **last, "remark": "; ".join(row.remarks)})
+        rows.append({"ring": row.name, **first, **rest, **last, "remark": "; ".join(row.remarks), **_circle(row)})
     return rows
 
 
@@ -57,6 +57,7 @@ def summary(surveyed: SurveyedRings) -> Iterator[tuple[str, ...]]:
 
 
 _MAIN = ("x", "y", "z", "chainage", "deviation_right", "deviation_up", "radius", "ovality")
+_CIRCLE = ("circle_x", "circle_y", "circle_z", "circle_radius")
 _FIRST = (*_MAIN, *(f"{name}_se" for name in _MAIN))
 
 
@@ -73,6 +74,14 @@ def _first(row: RingRow, diameter: float) -> Iterator[tuple[str, Value]]:
         yield from _pair("deviation_up", row.place.up.value, row.place.up.se, _SMALL)
     yield from _pair("radius", ellipse.radius, math.sqrt(ellipse.covariance[2, 2]), _SMALL)
     yield from _pair("ovality", *_ovality(row, diameter), _PERMILLE)
+
+
+def _circle(row: RingRow) -> dict[str, Value]:
+    """Return the best-fit circle of all points: centre in the frame of the points, and radius, m."""
+    if row.ring is None:
+        return dict.fromkeys(_CIRCLE)
+    size = _rounded(row.ring.circle[2], _SMALL)
+    return dict(zip(_CIRCLE, (*(_rounded(value, _METRES) for value in row.ring.circle_centre), size), strict=True))
 
 
 def _radius(row: RingRow) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import psycopg
 
-from tunneldb.arrays import Bool
+from tunneldb.arrays import Bool, Float
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.measures.deviation.compute import Design
@@ -42,7 +42,7 @@ class LiningPatches:
     def __init__(self, conn: psycopg.Connection[Any], survey: Survey, km: int, axis: Alignment) -> None:
         self.conn, self.survey = conn, survey
         surface = load_surface(conn, survey, km * KILOMETRE - _RING_MARGIN, (km + 1) * KILOMETRE + _RING_MARGIN)
-        self.surface, self._design = surface, Design(surface, axis, ())
+        self.surface, self._axis, self._design = surface, axis, Design(surface, axis, ())
         self._classes: dict[int, Callable[[Raster], Bool]] = {}
         self._block = lru_cache(_CACHED_BLOCKS)(self._load)
 
@@ -57,6 +57,11 @@ class LiningPatches:
         """Return the length of the section at a chainage, m; 0 without one."""
         low, high = self.surface.arc_range(np.array([chainage]))
         return float(np.nan_to_num(high[0] - low[0]))
+
+    def in_space(self, chainage: float, right: float, up: float) -> Float:
+        """Return a point (3,) in the tunnel's SRID, m, from its chainage and place about the given axis, m; NaN beyond it."""
+        along = self._axis.across(self.surface.frames(np.array([chainage]))[:, 0])[:, 0]
+        return self._axis.in_space(np.array([[along[0], right, up]]))[0] if np.isfinite(along[0]) else np.full(3, np.nan)
 
     def _load(self, block: int) -> Patches | None:
         images = load_images(self.conn, self.survey, block, ("offset", "state"))

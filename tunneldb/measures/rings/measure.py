@@ -210,7 +210,8 @@ def _measured(
     else:
         ahead = before
     ring = measure_ring(patches, bounds.low, bounds.high, source.girth(middle), chords)
-    return MeasuredRing(bounds, ring, joint_steps(patches, bounds.low, ahead, length), diameter, whence)
+    centre = None if ring.ring is None else source.in_space(middle, *ring.ring.circle[:2].tolist())
+    return MeasuredRing(bounds, ring, joint_steps(patches, bounds.low, ahead, length), diameter, whence, centre)
 
 
 def _diameter(given: float | None, profiles: Sequence[Profile], chainage: float) -> tuple[float | None, str]:

@@ -10,7 +10,7 @@ import numpy as np
 import psycopg
 from psycopg import sql
 
-from tunneldb.arrays import known
+from tunneldb.arrays import Float, known
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.measures.rings.compute.joint_steps import Steps
 from tunneldb.measures.rings.compute.lining_ring import LiningRing
@@ -39,13 +39,17 @@ class RingBounds:
 
 @dataclass(frozen=True)
 class MeasuredRing:
-    """Ring with its measures, the step at its beginning, and the diameter that ovality refers to."""
+    """Ring with its measures, the step at its beginning, and the diameter that ovality refers to.
+
+    ``circle_centre`` is that of its best-fit circle, in the tunnel's SRID (3,), m; None without a shape.
+    """
 
     bounds: RingBounds
     ring: LiningRing
     steps: Steps
     diameter: float | None
     diameter_from: str
+    circle_centre: Float | None = None
 
 
 def save_definition(conn: psycopg.Connection[Any], survey: Survey, rings: Sequence[RingBounds], origin: str) -> int:
@@ -143,9 +147,12 @@ _ELLIPSE = (
 )  # fmt: skip
 
 
+_CIRCLE = ("circle_x", "circle_y", "circle_z", "circle_radius")
+
+
 def _shape_columns(measured: MeasuredRing) -> dict[str, Any]:
     ring = measured.ring.ring
-    values: dict[str, Any] = dict.fromkeys((*_SHAPE, *_ELLIPSE))
+    values: dict[str, Any] = dict.fromkeys((*_SHAPE, *_ELLIPSE, *_CIRCLE))
     if ring is None:
         return values | {"shape": "none"}
     ellipse = ring.adjustment.ellipse
@@ -156,6 +163,8 @@ def _shape_columns(measured: MeasuredRing) -> dict[str, Any]:
         outward.size, outward.size_se, outward.clock, ring.adjustment.sigma,
     )  # fmt: skip
     values |= dict(zip(_SHAPE, shape, strict=True))
+    if measured.circle_centre is not None:
+        values |= dict(zip(_CIRCLE, (*measured.circle_centre, ring.circle[2]), strict=True))
     if not ring.is_ellipse:
         return values | {"shape": "circle"}
     diameter = measured.diameter or 2.0 * ellipse.radius

@@ -21,6 +21,9 @@ COLUMNS = (
 )  # fmt: skip
 """Columns of a ring; m, °, and ovality as a share."""
 
+CIRCLE_COLUMNS = ("circle_x", "circle_y", "circle_z", "circle_radius")
+"""Columns after the chords: best-fit circle of all points, in the tunnel's SRID, m."""
+
 _DECIMALS = 6
 
 
@@ -32,7 +35,7 @@ def ring_rows(conn: psycopg.Connection[Any], survey: Survey, low: float, high: f
             " jsonb_build_array(c.length, c.length_se)) FROM tunnel_api.ring_chord c WHERE c.ring_id = r.id) AS chords"
             " FROM tunnel_api.ring r WHERE survey_id = %s AND (chainage_from + chainage_to) / 2 BETWEEN %s AND %s"
             " ORDER BY chainage_from"
-        ).format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)))
+        ).format(sql.SQL(", ").join(map(sql.Identifier, (*COLUMNS, *CIRCLE_COLUMNS))))
         rows = cursor.execute(query, [survey.id, low, high]).fetchall()
     return [_flat(row) for row in rows]
 
@@ -40,6 +43,7 @@ def ring_rows(conn: psycopg.Connection[Any], survey: Survey, low: float, high: f
 def _flat(row: Row) -> Row:
     chords = row.pop("chords") or {}
     flat = {name: round(value, _DECIMALS) if isinstance(value, float) else value for name, value in row.items()}
+    circle = {name: flat.pop(name) for name in CIRCLE_COLUMNS}
     for name, (length, se) in sorted(chords.items()):
         flat[name], flat[f"{name}_se"] = (None if value is None else round(value, _DECIMALS) for value in (length, se))
-    return flat
+    return flat | circle
