@@ -2,8 +2,8 @@
 --   tunnel_viewer     reads the views of tunnel_api and calls its read-only functions
 --   tunnel_inspector  and reviews leaks and spots, draws findings and regions, and moves axis vertices, through the views
 --   tunnel_operator   and loads and processes: owns schema tunnel and what lies in it
--- Runs last, after every function and view, as the database's owner. Where that may not create roles, it says what a
--- superuser has to run, and goes on: the owner can do everything without them.
+-- Runs last, after every function and view, as the database's owner. If the owner may not create roles, it prints what a
+-- superuser has to run, and continues: the owner can do everything without the roles.
 
 DO $$
 DECLARE
@@ -24,7 +24,7 @@ BEGIN
 END
 $$;
 
--- Each role holds the one before; the owner belongs to the operators, so that both may change schema tunnel.
+-- Each role includes the previous one; the owner is a member of the operators, so that both may change schema tunnel.
 DO $$
 DECLARE
     pair text[];
@@ -53,9 +53,9 @@ REVOKE EXECUTE ON ALL PROCEDURES IN SCHEMA tunnel_api, tunnel_internal FROM PUBL
 REVOKE ALL ON SCHEMA tunnel_queue FROM PUBLIC;
 REVOKE ALL ON SCHEMA tunnel_audit FROM PUBLIC;  -- nobody's but the owner's: operators, who own schema tunnel, could drop it there
 
--- Viewers: all views of tunnel_api, and its functions that only read. One that reads tables must itself run with the owner's
--- rights (SECURITY DEFINER) to be of use to them. Of tunnel_internal, only the functions that run with the viewer's own rights:
--- those that the views of tunnel_api call, and those that a function granted here names and that isn't SECURITY DEFINER.
+-- Viewers: all views of tunnel_api, and its functions that only read. A function that reads tables must run with the owner's
+-- rights (SECURITY DEFINER). Of tunnel_internal, viewers may call only the functions that run with their own rights: those that
+-- views of tunnel_api call, and those that a function granted here calls unless it is SECURITY DEFINER.
 DO $$
 DECLARE
     f regprocedure;
@@ -89,7 +89,7 @@ BEGIN
 END
 $$;
 
--- Inspectors: exactly the columns that are theirs to change.
+-- Inspectors: exactly the columns that they may change.
 DO $$
 BEGIN
     IF to_regrole('tunnel_inspector') IS NULL THEN
@@ -126,7 +126,7 @@ BEGIN
     GRANT SELECT ON ALL TABLES IN SCHEMA tunnel_internal TO tunnel_operator;
     GRANT EXECUTE ON ALL FUNCTIONS IN SCHEMA tunnel_api, tunnel_internal TO tunnel_operator;
     GRANT EXECUTE ON ALL PROCEDURES IN SCHEMA tunnel_api, tunnel_internal TO tunnel_operator;
-    -- who may execute the function of a trigger may put it on a view of his own, which says what was before and after
+    -- a user who may execute a trigger's function could attach it to an own view with forged old and new rows
     FOR f IN SELECT p.oid FROM pg_proc p
               WHERE p.pronamespace = 'tunnel_internal'::regnamespace
                 AND (p.prorettype = 'trigger'::regtype OR p.proname IN ('note_edit', 'note_learned')) LOOP
@@ -152,5 +152,5 @@ BEGIN
 END
 $$;
 
--- With the rights that were granted here.
+-- With the rights granted here.
 CALL tunnel_api.make_layers();

@@ -43,7 +43,7 @@ BEGIN
 END
 $$;
 
--- Rights on them, as far as their owner is who installs; they may have been QGIS' or another's before.
+-- Rights on them, if the installing user owns them; QGIS or another user may have created them before.
 DO $$
 DECLARE
     held regclass;

@@ -66,7 +66,7 @@ BEGIN
             clock_timestamp()  -- a fence that lets the scan be parallel: the coordinates are taken out once
         FROM %5$s p
         WHERE p.chainage BETWEEN %2$s AND %3$s
-          -- chainage is good to a metre or so until the axis rests; the plane decides
+          -- chainage is accurate to about a metre until the axis has converged; the plane decides
           AND abs(p.chainage - round(p.chainage / %1$s) * %1$s) <= %4$s + 1.5
     $query$, spacing, low, high, half_width,
         tunnel_internal.partition_source(survey_id, floor(low / 1000)::int, floor(high / 1000)::int));
@@ -130,18 +130,18 @@ COMMENT ON FUNCTION tunnel_internal.axis_astray(int[], float8[], float8[], float
 'True if a plane of an axis vertex moved by 0.5 m or more within 30 m of its vertex since the vertices were at ox, oy, oz';
 
 
--- Where the tunnel's centre lies, seen from given vertices: the shift of each, right and up in its plane, m.
+-- Shift from given vertices to the tunnel's centre, right and up in the plane of each vertex, m.
 --
 -- The points in the slab of the vertex (at most half_width from its plane) are averaged by angular class, so that a dense
--- floor weighs no more than a thin crown. The centre is where opposite classes are equally far: to the side the median over
--- pairs of classes mirrored in the upward direction, 45° to 135° from it; upwards the median over the classes of the
--- vault (45° about the upward direction) against the level of the floor. Medians leave niches, cables and
--- equipment without weight. In a tunnel more than twice as wide as high most of those pairs lie on vault and floor: there only
--- those count that are 0.8 of its width apart or more, and within 10 % as far as they are in the other slabs, where no train
--- stands before a wall; a vertex without any is left out. So is one with a floor and no roof, where others have one: in an open
--- cut the walls' tops and the slopes say nothing of the tunnel's centre. Where fewer than three pairs of classes are filled it is the plain
--- mean of the points, as the paper has it. A vertex whose slab holds fewer than min_points points is left out.
--- near: what axis_near has set aside of the points; without it all are looked at.
+-- floor weighs no more than a thin crown. Opposite classes are equally far from the centre. Sideways, the shift is the median
+-- over pairs of classes that are mirrored in the upward direction, 45° to 135° from it. Upwards, it is the median over the
+-- classes of the vault (45° about the upward direction) compared with the level of the floor. Medians ignore niches, cables and
+-- equipment. In a tunnel more than twice as wide as high, most pairs lie on vault and floor. There, a pair counts only if its
+-- distance is at least 0.8 of the width and within 10 % of that in the other slabs, so that a train in front of a wall is
+-- ignored; a vertex without such a pair is left out. A vertex with a floor and no roof is left out, too, if others have a roof:
+-- in an open cut, tops of walls and slopes do not show the tunnel's centre. If fewer than three pairs of classes are filled, the
+-- centre is the mean of the points, as in the paper. A vertex whose slab contains fewer than min_points points is left out.
+-- near: table of points that axis_near has copied; without it, all points are read.
 CREATE OR REPLACE FUNCTION tunnel_internal.axis_shift(
     survey_id int, n int[], x float8[], y float8[], z float8[],
     half_width float8 DEFAULT 1.0, angle_step float8 DEFAULT 5.0, min_points int DEFAULT 100, near regclass DEFAULT '-')
@@ -307,7 +307,7 @@ BEGIN
     why := array_fill(NULL::text, ARRAY[cardinality(vn)]);
 
     FOR pass IN 1 .. axis_refine.max_iterations * cardinality(vn) LOOP
-        -- a few millimetres may go to and fro for ever as points enter and leave the slab: later passes go a part of the way
+        -- a vertex may oscillate by a few millimetres as points enter and leave the slab: later passes move it a part of the way
         share := least(1.0, 5.0 / pass);
         IF ox IS NULL OR tunnel_internal.axis_astray(vn, vx, vy, vz, ox, oy, oz) THEN
             PERFORM tunnel_internal.axis_near(axis_refine.survey_id, axis_refine.km, vn, vx, vy, vz, axis_refine.half_width);
@@ -395,7 +395,7 @@ BEGIN
         source = CASE WHEN p.points > 0 THEN 'measured' ELSE 'interpolated' END,
         remark = p.why
     FROM unnest(vn, vx, vy, vz, counts, why) AS p (n, x, y, z, points, why)
-    -- vertices next door go along where that kilometre holds no points; else it places them itself, first or last
+    -- vertices of the next kilometre are written here if it has no points; else its own run writes them
     WHERE v.survey_id = axis_refine.survey_id AND v.n = p.n AND v.source <> 'edited'
       AND (v.km = axis_refine.km
            OR to_regclass(format('tunnel.%I', tunnel_internal.partition_name(v.survey_id, v.km))) IS NULL);

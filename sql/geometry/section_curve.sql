@@ -14,8 +14,8 @@ COMMENT ON FUNCTION tunnel_internal.section_between(float8, float8, float8, floa
 'Radius (m) at the fraction s (0-1) between two angular classes: cubic Hermite curve through their radii (m) and slopes (m over the interval)';
 
 
--- Where the lines of two classes meet: angle (degrees) and radius (m); NULL if they don't between the two classes.
--- The classes stand at angles a and b (degrees), their lines at radius (m) with slope (m/m) in each class' own frame.
+-- Intersection of the lines of two classes: angle (degrees) and radius (m); NULL if it is not between the two classes.
+-- The classes have the angles a and b (degrees); their lines have a radius (m) and a slope (m/m) in the frame of each class.
 CREATE OR REPLACE FUNCTION tunnel_internal.section_corner(
     angle_a float8, radius_a float8, slope_a float8, angle_b float8, radius_b float8, slope_b float8)
 RETURNS float8[]
@@ -51,19 +51,19 @@ COMMENT ON FUNCTION tunnel_internal.section_corner(float8, float8, float8, float
 'Angle (degrees) and radius (m) of the intersection of the lines of two angular classes; NULL if it does not lie between them';
 
 
--- The curve of a section: radius and arc at each whole degree from -180° to 180°, and what became of each class.
+-- Curve of a section: radius and arc at each whole degree from -180° to 180°, and the state of each class.
 --
 -- 1. Where the wall is curved, the points of a class lie inside its tangent by half the curvature times their variance
---    along it; the radius is put back by that much.
--- 2. A class that holds a corner (its points fit no line, the lines of its neighbours meet in it) gives way to the corner; so
---    do up to three in a row where a pipe or a cable runs beside the corner.
--- 3. Up to three classes that stand inwards of the smooth wall on both sides, by more than `protrusion` and by more than the
---    lining is uneven here, are something hung on it: they are rejected. Beside up to three that are empty, in a shadow, or
---    rejected the wall is looked for behind them. A chamfer between two walls is none: its points lie on a line.
--- 4. Between the classes left the curve is a cubic in polar coordinates, or two lines with a corner where the wall turns
+--    along it; the radius is corrected by this amount.
+-- 2. A class that contains a corner (its points fit no line, and the lines of its neighbours meet in it) is replaced by the
+--    corner. So are up to three adjacent classes if a pipe or a cable is next to the corner.
+-- 3. Up to three adjacent classes are rejected as fixtures if they lie inwards of the smooth wall on both sides, by more than
+--    `protrusion` and by more than the unevenness of the lining. The wall on both sides may begin behind up to three empty or
+--    rejected classes. A chamfer between two walls is not a fixture: its points lie on a line.
+-- 4. Between the remaining classes the curve is a cubic in polar coordinates, or two lines with a corner where the wall turns
 --    by more than 30° at once. Empty and rejected classes are bridged and marked.
--- Arc is the length of this curve from the upward direction, positive to the right. NULL if under a third of the classes
--- are filled or more than 120° in a row is empty.
+-- Arc is the length of this curve from the upward direction, positive to the right. NULL if less than a third of the classes
+-- are filled, or if more than 120° in a row are empty.
 -- radius (m), slope (m/m), sigma (m), spread (m²): of the classes in order from -180°, NULL for an empty one.
 CREATE OR REPLACE FUNCTION tunnel_internal.section_curve(
     angle_step float8, radius float8[], slope float8[], sigma float8[], spread float8[], protrusion float8 DEFAULT 0.03,
@@ -101,7 +101,7 @@ BEGIN
         CONTINUE WHEN r[k] IS NULL;
         a := (k + classes - 2) % classes + 1;
         c := k % classes + 1;
-        -- points bunched in under half of the class give no slope of their own
+        -- points in less than half of the class determine no slope
         IF b[k] IS NULL OR spread[k] < (r[k] * step) ^ 2 / 48 THEN
             b[k] := coalesce((r[c] - r[a]) / (2 * step), (r[c] - r[k]) / step, (r[k] - r[a]) / step, 0) / r[k];
         END IF;
@@ -119,7 +119,7 @@ BEGIN
             * least(spread[k], (radius[k] * step) ^ 2 * (1 + b[k] ^ 2) / 8);
     END LOOP;
 
-    -- how uneven the lining is here: each class against the curve through its neighbours
+    -- unevenness of the lining: distance of each class from the curve through its neighbours
     FOR k IN 1 .. classes LOOP
         a := (k + classes - 2) % classes + 1;
         c := k % classes + 1;
@@ -132,11 +132,11 @@ BEGIN
     SELECT percentile_cont(0.5) WITHIN GROUP (ORDER BY q) INTO usual FROM unnest(sigma) q;
     tolerance := greatest(protrusion, 3 * 1.4826 * uneven);
 
-    -- 2. corners inside a class, or inside some of which a corner and what hangs beside it leave no line
+    -- 2. corners inside a class, or inside several classes without a line because of a corner and a fixture next to it
     FOR g IN 1 .. 3 LOOP
         loose := greatest(3 * usual, CASE WHEN g = 1 THEN 0.01 ELSE protrusion END);
         FOR k IN 1 .. classes LOOP
-            -- classes k .. k+g-1 stand between i and j, whose points lie on lines
+            -- classes k .. k+g-1 are between i and j, whose points lie on lines
             i := (k + classes - 2) % classes + 1;
             j := (k + g - 1) % classes + 1;
             CONTINUE WHEN r[i] IS NULL OR r[j] IS NULL OR sigma[i] > loose OR sigma[j] > loose;
@@ -154,11 +154,11 @@ BEGIN
         END LOOP;
     END LOOP;
 
-    -- 3. what hangs on the wall
+    -- 3. fixtures on the wall
     FOR g IN 1 .. 3 LOOP
         FOR k IN 1 .. classes LOOP
             CONTINUE WHEN class_state[k] <> 'measured';
-            -- classes k .. k+g-1 stand between i and j, the next that are measured; the wall must go on smoothly before i and
+            -- classes k .. k+g-1 are between i and j, the next measured ones; the wall must be smooth before i and
             -- after j
             beside := ARRAY[k - 1, k - 2, k + g, k + g + 1];
             FOR c IN 1 .. 4 LOOP
@@ -178,7 +178,7 @@ BEGIN
             CONTINUE WHEN class_state[first] <> 'measured' OR class_state[i] <> 'measured'
                 OR class_state[j] <> 'measured' OR class_state[last] <> 'measured';
             way := (beside[3] - beside[1]) * step;
-            -- where it turns a corner between them, points that lie on lines are a chamfer
+            -- if there is a corner between them, points that lie on lines are a chamfer
             chamfer := abs(way - (atan(b[j]) - atan(b[i]))) > radians(45);
             apart := true;
             FOR c IN k .. k + g - 1 LOOP
@@ -203,7 +203,7 @@ BEGIN
         END LOOP;
     END LOOP;
 
-    -- the classes left, with the last ones repeated before -180° and the first ones after 180°
+    -- the remaining classes, with the last ones repeated before -180° and the first ones after 180°
     FOR k IN 1 - classes .. 2 * classes LOOP
         c := (k + classes - 1) % classes + 1;
         IF class_state[c] = 'measured' THEN

@@ -1,8 +1,8 @@
--- How far the results of a stage have come, of measures and of the stages of a kilometre alike: what tunnel.stage and
--- tunnel.stage_input say of the stage decides. Of each measure NAME two functions are called: NAME_places, where there can be
--- a result or still is one, and NAME_inputs, from what it would be made now (sql/measures/). Needs last_runs and stage_state.
+-- State of the results of stages and measures, as tunnel.stage and tunnel.stage_input define their inputs. Each measure NAME
+-- has two functions (sql/measures/): NAME_places returns the places where a result exists or can exist, NAME_inputs the inputs
+-- from which it would be made now. Needs last_runs and stage_state.
 
--- What a result is made from, as its run keeps it in its parameters.
+-- Inputs of a result, as its run stores them in its parameters.
 CREATE OR REPLACE FUNCTION tunnel_internal.result_inputs(survey_id int, stage text, km int, subject text) RETURNS jsonb
 LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
@@ -16,9 +16,9 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.result_inputs(int, text, int, text) IS
     'Runs and checksums that a new result of a measure in a kilometre would use';
 
--- A result is out of date when what it reads is out of date (then blocked_by names that stage), when it was never made, or when
--- one of its inputs is another now than in the parameters of its last run. The subject of what is read is the end of the
--- result's own: the layer, of a pair of surveys and a layer.
+-- A result is out of date if a stage that it reads is out of date (blocked_by names that stage), if it was never made, or if one
+-- of its inputs differs from the parameters of its last run. The subject of a stage that it reads is the end of its own subject:
+-- for a pair of surveys and a layer, the layer.
 CREATE OR REPLACE FUNCTION tunnel_internal.result_state(survey_id int, of_stage text, of_subject text DEFAULT NULL)
 RETURNS TABLE (km int, subject text, older_id int, run_id bigint, done_at timestamptz, parameters jsonb, blocked_by text, reason text)
 LANGUAGE plpgsql STABLE CALLED ON NULL INPUT PARALLEL RESTRICTED SECURITY DEFINER ROWS 50

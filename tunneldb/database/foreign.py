@@ -33,8 +33,8 @@ _OWN_TABLES = """
     SELECT c.oid FROM pg_class c
      WHERE c.relnamespace = 'tunnel'::regnamespace AND c.relkind IN ('r', 'p', 'v')
     UNION
-    SELECT CASE WHEN i.inhparent = held.oid THEN i.inhrelid ELSE i.inhparent END
-      FROM held JOIN pg_inherits i ON held.oid IN (i.inhparent, i.inhrelid)
+    SELECT CASE WHEN i.inhparent = owned.oid THEN i.inhrelid ELSE i.inhparent END
+      FROM owned JOIN pg_inherits i ON owned.oid IN (i.inhparent, i.inhrelid)
 """
 
 # Table, trigger, schema and name of its function.
@@ -52,52 +52,53 @@ _OWN = (
 _OURS = ", ".join(str(each) for each in _OWN)
 
 _TRIGGERS = f"""
-WITH RECURSIVE trusted AS ({_TRUSTED}), held AS ({_OWN_TABLES})
+WITH RECURSIVE trusted AS ({_TRUSTED}), owned AS ({_OWN_TABLES})
 SELECT format('%s on %s is not tunneldb''s: it runs what %s wrote', quote_ident(t.tgname), t.tgrelid::regclass,
               pg_get_userbyid(p.proowner)),
        format('DROP TRIGGER %I ON %s;', t.tgname, t.tgrelid::regclass)
-  FROM pg_trigger t JOIN held ON held.oid = t.tgrelid JOIN pg_proc p ON p.oid = t.tgfoid
+  FROM pg_trigger t JOIN owned ON owned.oid = t.tgrelid JOIN pg_proc p ON p.oid = t.tgfoid
  WHERE NOT t.tgisinternal AND t.tgparentid = 0
    AND NOT (p.proowner IN (SELECT oid FROM trusted)
             AND (t.tgrelid, t.tgname, p.pronamespace, p.proname) IN (
-                SELECT to_regclass('tunnel.' || o.held), o.trigger, o.namespace::regnamespace, o.function
-                  FROM (VALUES {_OURS}) AS o (held, trigger, namespace, function)))
+                SELECT to_regclass('tunnel.' || o.relation), o.trigger, o.namespace::regnamespace, o.function
+                  FROM (VALUES {_OURS}) AS o (relation, trigger, namespace, function)))
  ORDER BY 1
 """
 
-# Those of tunneldb that are not there to fire.
+# Triggers of tunneldb that are missing or disabled.
 _SILENT = f"""
-SELECT format('%s on tunnel.%s %s', o.trigger, o.held, CASE WHEN t.oid IS NULL THEN 'is missing' ELSE 'is switched off' END),
+SELECT format('%s on tunnel.%s %s', o.trigger, o.relation,
+              CASE WHEN t.oid IS NULL THEN 'is missing' ELSE 'is switched off' END),
        CASE WHEN t.oid IS NULL THEN 'restore schema tunnel from a backup, then tunneldb init'
-            ELSE format('ALTER TABLE tunnel.%I ENABLE TRIGGER %I; then tunneldb init', o.held, o.trigger) END
-  FROM (VALUES {_OURS}) AS o (held, trigger, namespace, function)
-  LEFT JOIN pg_trigger t ON t.tgrelid = to_regclass('tunnel.' || o.held) AND t.tgname = o.trigger
+            ELSE format('ALTER TABLE tunnel.%I ENABLE TRIGGER %I; then tunneldb init', o.relation, o.trigger) END
+  FROM (VALUES {_OURS}) AS o (relation, trigger, namespace, function)
+  LEFT JOIN pg_trigger t ON t.tgrelid = to_regclass('tunnel.' || o.relation) AND t.tgname = o.trigger
  WHERE t.tgenabled IS NULL OR t.tgenabled NOT IN ('O', 'A')
  ORDER BY 1
 """
 
 # Foreign keys of other tables: deleting or renumbering rows here deletes or changes rows there, and runs their triggers.
 _REFERENCES = f"""
-WITH RECURSIVE held AS ({_OWN_TABLES})
+WITH RECURSIVE owned AS ({_OWN_TABLES})
 SELECT format('foreign key %I of %s is not tunneldb''s: it runs triggers there', k.conname, k.conrelid::regclass),
        format('ALTER TABLE %s DROP CONSTRAINT %I;', k.conrelid::regclass, k.conname)
-  FROM pg_constraint k JOIN held ON held.oid = k.confrelid
- WHERE k.contype = 'f' AND k.conparentid = 0 AND k.conrelid NOT IN (SELECT oid FROM held)
+  FROM pg_constraint k JOIN owned ON owned.oid = k.confrelid
+ WHERE k.contype = 'f' AND k.conparentid = 0 AND k.conrelid NOT IN (SELECT oid FROM owned)
    AND (k.confdeltype NOT IN ('a', 'r') OR k.confupdtype NOT IN ('a', 'r'))
  ORDER BY 1
 """
 
 # Rules and policies: tunneldb has none; a view in a table's place is one, too.
 _RULES = f"""
-WITH RECURSIVE held AS ({_OWN_TABLES})
+WITH RECURSIVE owned AS ({_OWN_TABLES})
 SELECT format('rule %I on %s is not tunneldb''s: it runs', r.rulename, r.ev_class::regclass),
        CASE WHEN r.rulename = '_RETURN' THEN format('DROP VIEW %s;', r.ev_class::regclass)
             ELSE format('DROP RULE %I ON %s;', r.rulename, r.ev_class::regclass) END
-  FROM pg_rewrite r JOIN held ON held.oid = r.ev_class
+  FROM pg_rewrite r JOIN owned ON owned.oid = r.ev_class
 UNION ALL
 SELECT format('policy %I on %s is not tunneldb''s: it runs', y.polname, y.polrelid::regclass),
        format('DROP POLICY %I ON %s;', y.polname, y.polrelid::regclass)
-  FROM pg_policy y JOIN held ON held.oid = y.polrelid
+  FROM pg_policy y JOIN owned ON owned.oid = y.polrelid
  ORDER BY 1
 """
 
@@ -105,28 +106,28 @@ SELECT format('policy %I on %s is not tunneldb''s: it runs', y.polname, y.polrel
 # objects of PostgreSQL, such as query_to_xml, are not recorded. Those of tunneldb call only immutable functions, the clock,
 # and the id of the session.
 _EXPRESSIONS = f"""
-WITH RECURSIVE trusted AS ({_TRUSTED}), held AS ({_OWN_TABLES}),
+WITH RECURSIVE trusted AS ({_TRUSTED}), owned AS ({_OWN_TABLES}),
 expression (relation, what, tree, mend) AS (
     SELECT k.conrelid, format('check %I', k.conname), k.conbin::text,
            format('ALTER TABLE %s DROP CONSTRAINT %I;', k.conrelid::regclass, k.conname)
-      FROM pg_constraint k JOIN held ON held.oid = k.conrelid WHERE k.contype = 'c' AND k.conislocal
+      FROM pg_constraint k JOIN owned ON owned.oid = k.conrelid WHERE k.contype = 'c' AND k.conislocal
     UNION ALL
     SELECT d.adrelid, format('default of column %I', a.attname), d.adbin::text,
            format('ALTER TABLE %s ALTER COLUMN %I DROP %s;', d.adrelid::regclass, a.attname,
                   CASE a.attgenerated WHEN '' THEN 'DEFAULT' ELSE 'EXPRESSION' END)
-      FROM pg_attrdef d JOIN held ON held.oid = d.adrelid JOIN pg_attribute a ON a.attrelid = d.adrelid AND a.attnum = d.adnum
+      FROM pg_attrdef d JOIN owned ON owned.oid = d.adrelid JOIN pg_attribute a ON a.attrelid = d.adrelid AND a.attnum = d.adnum
     UNION ALL
     SELECT x.indrelid, format('index %s', x.indexrelid::regclass), concat(x.indexprs::text, x.indpred::text),
            format('DROP INDEX %s;', x.indexrelid::regclass)
-      FROM pg_index x JOIN held ON held.oid = x.indrelid JOIN pg_class i ON i.oid = x.indexrelid AND NOT i.relispartition
+      FROM pg_index x JOIN owned ON owned.oid = x.indrelid JOIN pg_class i ON i.oid = x.indexrelid AND NOT i.relispartition
     UNION ALL
     SELECT p.partrelid, 'partition key', p.partexprs::text, 'restore the table from a backup'
-      FROM pg_partitioned_table p JOIN held ON held.oid = p.partrelid
+      FROM pg_partitioned_table p JOIN owned ON owned.oid = p.partrelid
     UNION ALL
     SELECT a.attrelid, format('type of column %I', a.attname), format(':resulttype %s ', a.atttypid),
            format('ALTER TABLE %s ALTER COLUMN %I TYPE %s;', a.attrelid::regclass, a.attname,
                   format_type(coalesce(nullif(t.typbasetype, 0), 'text'::regtype), t.typtypmod))
-      FROM pg_attribute a JOIN held ON held.oid = a.attrelid JOIN pg_type t ON t.oid = a.atttypid
+      FROM pg_attribute a JOIN owned ON owned.oid = a.attrelid JOIN pg_type t ON t.oid = a.atttypid
      WHERE a.attnum > 0 AND NOT a.attisdropped
 ),
 named AS (

@@ -192,8 +192,8 @@ def _plot(conn: psycopg.Connection[Any], survey: Survey, rows: Sequence[Row], lo
     least, seen = np.full(count, np.inf), np.full(count, np.inf)
     np.minimum.at(least, bins, margin)
     np.minimum.at(seen, bins, np.array([row["seen_share"] for row in rows], np.float64))
-    held, judged = np.isfinite(seen), np.isfinite(least)
-    top, bottom = max(float(least[judged].max(initial=0.0)), 0.01), min(float(least[judged].min(initial=0.0)), 0.0)
+    covered, measured = np.isfinite(seen), np.isfinite(least)
+    top, bottom = max(float(least[measured].max(initial=0.0)), 0.01), min(float(least[measured].min(initial=0.0)), 0.0)
     scale = HEIGHT / (top - bottom)
     x = np.repeat(np.linspace(0.0, WIDTH, count + 1), 2)
 
@@ -201,13 +201,13 @@ def _plot(conn: psycopg.Connection[Any], survey: Survey, rows: Sequence[Row], lo
         y = base - height * np.concatenate([[0.0], np.repeat(values, 2), [0.0]])
         return line_path(np.column_stack([x, y]), 1) + "Z"
 
-    known = np.where(judged, least, 0.0)
+    known = np.where(measured, least, 0.0)
     step = step_for(1000.0 * (top - bottom), 6) / 1000.0
     at = ticks(low, high, step_for(high - low, 8))
     labels = label_chainages(conn, survey, at) if at else []
     return MarginPlot(
         path(np.maximum(known, 0.0), top * scale, scale), path(np.minimum(known, 0.0), top * scale, scale), top * scale,
-        path(np.where(held, seen, 0.0), HEIGHT + 30.0, 20.0), _runs(~held), _runs(held & ~judged),
+        path(np.where(covered, seen, 0.0), HEIGHT + 30.0, 20.0), _runs(~covered), _runs(covered & ~measured),
         [((top - value) * scale, f"{value:g}".replace("-", "−")) for value in ticks(bottom, top, step)],
         [((value - low) / (high - low) * WIDTH, label) for value, label in zip(at, labels, strict=True)],
     )  # fmt: skip
@@ -231,17 +231,17 @@ def _metre(conn: psycopg.Connection[Any], survey: Survey, axis: Alignment, gauge
     vertices = np.reshape(flat, (-1, 3))[:-1]
     outline = Outline.of(vertices[:, :2], vertices[:, 2], closed=True).flattened(0.005)
     begin = float(row["chainage_from"])
-    # Points are held by chainage along the measured axis, sections by that along the given one.
+    # Points are stored by chainage along the measured axis, sections by that along the given one.
     xyz, classes = load_classed(conn, survey, km, max(begin - 1.0, (km - 1) * KILOMETRE), begin + 2.0)
     place = (begin, row["track_right"], row["track_up"], row["cant"])
-    places, held = metre_places(axis.across(xyz), *place)
+    places, chosen = metre_places(axis.across(xyz), *place)
     nearest = None
     if point[0] is not None:
         at = metre_places(axis.across(np.array([point], np.float64)), *place)[0]
         nearest = (float(at[0, 0]), -float(at[0, 1])) if len(at) else None
     (west, low), (east, high) = outline.min(axis=0) - DRAWN_DISTANCE, outline.max(axis=0) + DRAWN_DISTANCE
     return TightestMetre(
-        row, line_path(outline * [1.0, -1.0]) + "Z", _point_paths(places, classes[held], outline), nearest,
+        row, line_path(outline * [1.0, -1.0]) + "Z", _point_paths(places, classes[chosen], outline), nearest,
         f"{west:.2f} {-high:.2f} {east - west:.2f} {high - low:.2f}",
     )  # fmt: skip
 

@@ -293,13 +293,13 @@ def _grey(values: Single, kilometre: _Kilometre) -> UInt8:
 
 def _seen(place: _Place, side: float, kilometre: _Kilometre) -> UInt8:
     """Return colours of corrected intensity and of lining not inspected, hidden or outside."""
-    held, level, lining, unseen, off, floor = place.sums()
+    known, level, lining, unseen, off, floor = place.sums()
     about = 2 * round(max(FILLED, kilometre.size * kilometre.pixel) / side / 2) + 1
 
     def smooth(what: Single) -> Single:
         return ndimage.uniform_filter(what, about, mode="nearest") if about > 1 else what
 
-    mean = np.where(held > 0, _ratio(level, held), _ratio(smooth(level), smooth(held)))
+    mean = np.where(known > 0, _ratio(level, known), _ratio(smooth(level), smooth(known)))
     shade = np.clip((mean - kilometre.low) / (kilometre.high - kilometre.low), 0.0, 1.0)
     grey = np.repeat(255.0 * np.nan_to_num(shade, nan=0.75), 3).reshape(*shade.shape, 3)
     other = lining + off + floor
@@ -318,8 +318,8 @@ def _accumulate(values: Single, state: UInt8, hidden: Bool, row: Intp, column: I
     """
     floor = (state == PixelState.FLOOR) | (state == PixelState.SUBMERGED) | (state == NO_STATE)
     off = state == PixelState.OFF
-    held = np.isfinite(values)
-    layers = (held, np.where(held, values, 0.0), ~(floor | off), hidden, off, floor)
+    known = np.isfinite(values)
+    layers = (known, np.where(known, values, 0.0), ~(floor | off), hidden, off, floor)
     first = [np.flatnonzero(np.diff(place, prepend=-1)) for place in (row, column)]
     sums = np.empty((len(layers), len(first[0]), len(first[1])), np.float32)
     for k, layer in enumerate(layers):

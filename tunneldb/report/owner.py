@@ -127,8 +127,8 @@ class _Given:
     path: Path
     values: dict[str, Any]
 
-    def refuse(self, key: str, said: str) -> NoReturn:
-        raise InputError(f"{self.path}: {key}: {said}")
+    def refuse(self, key: str, reason: str) -> NoReturn:
+        raise InputError(f"{self.path}: {key}: {reason}")
 
     def refuse_others(self, known: tuple[str, ...]) -> None:
         for key in self.values:
@@ -153,20 +153,20 @@ class _Given:
         value = self.values.get(key, {})
         if not isinstance(value, dict):
             self.refuse(key, f"must be a table of texts, not {value!r}")
-        for name, said in value.items():
-            if not isinstance(said, str):
-                self.refuse(f"{key}.{name}", f"must be a text, not {said!r}")
+        for name, text in value.items():
+            if not isinstance(text, str):
+                self.refuse(f"{key}.{name}", f"must be a text, not {text!r}")
         return value
 
     def texts(self, key: str) -> dict[str, str]:
         """Return a table of translations of English texts; each must have the same names in braces."""
         table, known = self.table(key), known_texts()
-        for english, said in table.items():
+        for english, translation in table.items():
             if english not in known:
                 self.refuse(f"{key}.{english!r}", "unknown heading; all are in languages/en.toml of the package")
-            stray = re.search(r"[{}]", _NAME.sub("", said))
-            if stray or set(_NAME.findall(said)) != set(_NAME.findall(english)):
-                self.refuse(f"{key}.{english!r}", f"{said!r} has other names in braces")
+            stray = re.search(r"[{}]", _NAME.sub("", translation))
+            if stray or set(_NAME.findall(translation)) != set(_NAME.findall(english)):
+                self.refuse(f"{key}.{english!r}", f"{translation!r} has other names in braces")
         return table
 
 

@@ -147,8 +147,8 @@ def _fetch(url: str, end: float) -> bytes:
         raise _NotHadError(f"could not be fetched: {error.code} {error.reason}") from error
     except Exception as error:  # of sockets, TLS, HTTP and odd addresses; whatever it is, the report is written
         cause = getattr(error, "reason", error)
-        said = str(getattr(cause, "strerror", None) or cause) or type(cause).__name__
-        raise _NotHadError(said if isinstance(error, _NotHadError) else f"could not be fetched: {said}") from error
+        reason = str(getattr(cause, "strerror", None) or cause) or type(cause).__name__
+        raise _NotHadError(reason if isinstance(error, _NotHadError) else f"could not be fetched: {reason}") from error
     return data.getvalue()
 
 

@@ -93,9 +93,9 @@ def css(value: str) -> str:
     return "".join(c if c.isalnum() or c in " .,:;·–-_+()/" else f"\\{ord(c):x} " for c in value)
 
 
-def counters(said: str) -> str:
+def counters(text: str) -> str:
     """Return text with {page} and {pages} as content of a style sheet: strings between page counters."""
-    parts = re.split(r"\{(pages?)\}", said)
+    parts = re.split(r"\{(pages?)\}", text)
     return " ".join(f"counter({part})" if n % 2 else f'"{css(part)}"' for n, part in enumerate(parts) if part)
 
 
@@ -120,17 +120,17 @@ def versions(runs: Sequence[Row]) -> list[dict[str, Any]]:
         by[", ".join(f"{name} {value}" for name, value in sorted(run["versions"].items()))].append(run)
     return [
         {
-            "versions": said,
+            "versions": names,
             "stages": ", ".join(dict.fromkeys(run["stage"] for run in theirs)),
             "kilometres": kilometres({km for run in theirs for km in run["kilometres"]}),
         }
-        for said, theirs in by.items()
+        for names, theirs in by.items()
     ]
 
 
-def crs(said: str) -> str:
+def crs(definition: str) -> str:
     """Return AUTHORITY:CODE unchanged; for a definition its name, the first quoted text."""
-    return said.split('"')[1] if '"' in said else said
+    return definition.split('"')[1] if '"' in definition else definition
 
 
 def script_json(value: Any) -> Markup:

@@ -35,8 +35,8 @@ class Words:
 
     def __call__(self, english: str, **values: Any) -> str:
         """Return a text in this language, values put in for the names in braces."""
-        said = self.texts.get(english, english)
-        return said.format(**values) if values else said
+        translation = self.texts.get(english, english)
+        return translation.format(**values) if values else translation
 
     def day(self, date: dt.date) -> str:
         """Return a day as it is written in this language."""

@@ -199,8 +199,8 @@ def _deviation(
             e[k, 8], e[k, 9] = chord, b
             if abs(b) > 1e-12:
                 radius = chord * (1.0 + b * b) / (4.0 * abs(b))
-                apart = chord * (1.0 - b * b) / (4.0 * b)
-                e[k, 10], e[k, 11] = (x0 + x1) / 2.0 - ay * apart, (y0 + y1) / 2.0 + ax * apart
+                centre_offset = chord * (1.0 - b * b) / (4.0 * b)
+                e[k, 10], e[k, 11] = (x0 + x1) / 2.0 - ay * centre_offset, (y0 + y1) / 2.0 + ax * centre_offset
                 e[k, 12] = radius
                 side = 1.0 if b > 0.0 else -1.0
                 e[k, 13], e[k, 14], e[k, 15] = side * ay, -side * ax, cosine

@@ -222,11 +222,11 @@ def _fitted(conn: psycopg.Connection[Any], survey: Survey, km: int, axis: Alignm
     return fit_track(points[np.isfinite(points[:, 0])], rough, low, high, gauge)
 
 
-def _share_seen(track: Track, begins: Float, held: Bool) -> float:
+def _share_seen(track: Track, begins: Float, measured: Bool) -> float:
     """Return the share of metres whose nearest station saw both rails; 0 without a track."""
-    if not held.any():
+    if not measured.any():
         return 0.0
-    k = np.abs(track.chainage[None, :] - begins[held][:, None] - STEP / 2.0).argmin(axis=1)
+    k = np.abs(track.chainage[None, :] - begins[measured][:, None] - STEP / 2.0).argmin(axis=1)
     return float(track.seen[k].sum() / len(begins))
 
 

@@ -338,8 +338,8 @@ def _information_share(own: Float, which: Int64, away: Float, sigma: Float, plac
     for _ in range(MIXTURE_ROUNDS):
         mine = rungs * echo / (rungs * echo + (1.0 - rungs) * even)
         rungs = float(mine.mean())
-    told = float((mine - mine * (1.0 - mine) * off).sum() / mine.sum())
-    share[inside] = np.maximum(mine * told, MIN_INFORMATION_SHARE)
+    information = float((mine - mine * (1.0 - mine) * off).sum() / mine.sum())
+    share[inside] = np.maximum(mine * information, MIN_INFORMATION_SHARE)
     return share
 
 

@@ -57,9 +57,9 @@ class SectionCells:
     group: Int64
     column: Int64
 
-    def part(self, held: Bool) -> SectionCells:
+    def part(self, mask: Bool) -> SectionCells:
         """Return some of the cells."""
-        return SectionCells(self.difference[held], self.variance[held], self.columns[held], self.group[held], self.column[held])
+        return SectionCells(self.difference[mask], self.variance[mask], self.columns[mask], self.group[mask], self.column[mask])
 
 
 @dataclass(frozen=True)

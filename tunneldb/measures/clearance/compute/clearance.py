@@ -160,21 +160,22 @@ def _groups(places: Float, classes: UInt8, margin: Float, grouping: Grouping) ->
 
 
 def _section(
-    begin: float, middle: Float, held: Int64, places: Float, classes: UInt8, margin: Float, real: Bool
+    begin: float, middle: Float, chosen: Int64, places: Float, classes: UInt8, margin: Float, real: Bool
 ) -> Section:  # fmt: skip
-    at = clock(places[held, 1:], middle)
+    at = clock(places[chosen, 1:], middle)
     cell = np.minimum((at / (360.0 / DIRECTIONS)).astype(np.int64), DIRECTIONS - 1)
-    seen = len(np.unique(cell[classes[held] != PointClass.NOISE])) / DIRECTIONS
-    within = margin[held] < 0.0
-    passing = np.isin(classes[held], TEMPORARY_CLASSES)
-    ground = np.isin(classes[held], TRACK_CLASSES)
-    counts = real[held] & ~passing
+    seen = len(np.unique(cell[classes[chosen] != PointClass.NOISE])) / DIRECTIONS
+    within = margin[chosen] < 0.0
+    passing = np.isin(classes[chosen], TEMPORARY_CLASSES)
+    ground = np.isin(classes[chosen], TRACK_CLASSES)
+    counts = real[chosen] & ~passing
     margins = np.full(DIRECTIONS, np.inf)
-    np.minimum.at(margins, cell[counts], margin[held][counts])
+    np.minimum.at(margins, cell[counts], margin[chosen][counts])
     margins[np.isinf(margins)] = np.nan
-    k = int(np.argmin(np.where(counts, margin[held], np.inf))) if counts.any() else -1
+    k = int(np.argmin(np.where(counts, margin[chosen], np.inf))) if counts.any() else -1
     return Section(
-        begin, float(margin[held[k]]) if k >= 0 else np.nan, int(held[k]) if k >= 0 else -1,
+        begin, float(margin[chosen[k]]) if k >= 0 else np.nan, int(chosen[k]) if k >= 0 else -1,
         float(at[k]) if k >= 0 else np.nan, margins, seen, int(counts.sum()), int((within & counts).sum()),
-        int((within & ~real[held] & ~ground).sum()), int((within & real[held] & passing).sum()), int((within & ground).sum()),
+        int((within & ~real[chosen] & ~ground).sum()), int((within & real[chosen] & passing).sum()),
+        int((within & ground).sum()),
     )  # fmt: skip
