@@ -1,11 +1,13 @@
 """CSV files: read small ones (axis, stations, control points) and write lists.
 
 Columns of a file that is read are separated by commas, semicolons, tabs or spaces, as its header shows. Where the separator
-is not a comma, a comma may be the decimal point.
+is not a comma, a comma may be the decimal point. Text is UTF-8, UTF-16 with a byte order mark, or Windows-1252. Lines before
+the header that are blank or begin with # or // are skipped; a header may begin with # itself.
 """
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import re
@@ -14,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,8 +29,24 @@ if TYPE_CHECKING:
 MAX_MEASUREMENT = 1e12
 """Greatest measured value that is accepted; seconds since 1970 and coordinates are smaller."""
 
+NO_NUMBER = re.compile(r"[+-]?(?:nan(?:\(\w*\))?|1\.#(?:[QS]NAN|IND)0*|null|none|n/?a)", re.IGNORECASE)
+"""Texts that programs write for a missing number, also those of C on Windows."""
+
+_ALIASES = {
+    "x": ("e", "east", "easting", "rechtswert", "ost", "est", "este"),
+    "y": ("n", "north", "northing", "hochwert", "nord", "norte"),
+    "z": ("h", "height", "elevation", "altitude", "höhe", "hoehe", "quota", "cota"),
+    "time": ("gpstime",),
+    "scanid": ("pointsourceid",),
+}
+"""Other names of columns, normalised."""
+
 _SEPARATORS = (";", "\t", ",", " ")
+_COMMENTS = ("#", "//")
+_UNIT = re.compile(r"[\[(](?:m|s|db)[\])]$")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d*(?:[eE][+-]?\d+)?")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:[ '’.,\u00a0\u202f]\d{3})+(?:[.,]\d+)?")
+_BINARY = re.compile("[\0-\x08\x0e-\x19\x1b-\x1f]")
 _FORMULA = re.compile(r"'*(?:[=@\t\r]|[+-](?![\d.+-]*$))")  # also with apostrophes, so that guarding can be undone
 _GUARD = "'"
 
@@ -103,18 +121,45 @@ def _bare(text: str) -> str:
 
 
 def read_header(path: Path) -> list[str]:
-    """Return the column names of a CSV file with any separator, as written in its first line.
+    """Return the column names of a CSV file with any separator, as written in its header.
 
     Raises
     ------
     InputError
         If the file cannot be read or is empty.
     """
-    with _opened(path) as file:
-        header = next(_rows(file)[0], None)
-    if header is None:
-        raise InputError(f"{path} is empty; write a header with its column names, for example x,y,z")
-    return [cell.strip() for cell in header]
+    with _opened(path) as sheet:
+        if not sheet.header:
+            raise InputError(f"{path} is empty; write a header with its column names, for example x,y,z")
+        return sheet.header
+
+
+def find_column(path: Path, header: Sequence[str], name: str) -> str | None:
+    """Return the column of a header with a name; None if there is none.
+
+    Capitals, blanks, underscores and a unit ``[m]``, ``[s]`` or ``[dB]`` are ignored; x, y, z, time and scan_id have other
+    usual names, for example easting. An exact name precedes.
+
+    Raises
+    ------
+    InputError
+        If several columns may be the one.
+    """
+    if name in header:
+        return name
+    wanted = _normalised(name)
+    meanings = {column: _normalised(column) for column in header}
+    found = [column for column, meaning in meanings.items() if meaning == wanted] or [
+        column for column, meaning in meanings.items() if meaning in _ALIASES.get(wanted, ())
+    ]
+    if len(found) > 1:
+        raise InputError(f"{path}: {' and '.join(found)} may both be {name}; rename one of them to {name}")
+    return found[0] if found else None
+
+
+def _normalised(name: str) -> str:
+    """Return a column name without capitals, blanks, underscores and a unit."""
+    return _UNIT.sub("", re.sub(r"[\s_]", "", name.casefold()))
 
 
 def read_texts(path: Path, name: str) -> list[str]:
@@ -125,18 +170,21 @@ def read_texts(path: Path, name: str) -> list[str]:
     InputError
         If the file cannot be read, has no such column, or a row is longer or shorter than the header; names file and line.
     """
-    with _opened(path) as file:
-        rows, _ = _rows(file)
-        header = [cell.strip() for cell in next(rows, [])]
-        index = _indices(path, header, [name], {}, {})[name]
+    with _opened(path) as sheet:
+        index = _indices(path, sheet.header, [name], {}, {})[name]
         texts = []
-        for row in rows:
-            if not any(cell.strip() for cell in row):
-                continue
-            if len(row) != len(header):
-                raise _uneven(path, rows.line_num, row, header)
-            texts.append(_bare(row[index].strip()))
+        for line, row in sheet.rows():
+            text = _bare(row[index].strip())
+            if sheet.foreign and not text.isascii():
+                raise InputError(f"{path}, line {line}: {text!r} is not written in UTF-8; save the table as CSV UTF-8")
+            texts.append(text)
         return texts
+
+
+def row_lines(path: Path) -> list[int]:
+    """Return the line number of each row, from 1; the rows are those of `read_csv`."""
+    with _opened(path) as sheet:
+        return [line for line, _ in sheet.rows()]
 
 
 def read_csv(
@@ -159,87 +207,187 @@ def read_csv(
         If the file cannot be read, a column is missing, or a value is not a finite number; names file, line and
         value.
     """
-    with _opened(path) as file:
-        rows, lines = _read_rows(path, *_rows(file), names, default or {}, hint or {})
+    with _opened(path) as sheet:
+        rows, lines = _read_rows(sheet, names, default or {}, hint or {})
     values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
     return CsvTable(path, tuple(names), values, np.array(lines, dtype=np.int64))
 
 
+@dataclass(frozen=True)
+class _Sheet:
+    """Opened CSV file.
+
+    Attributes
+    ----------
+    path : Path
+    header : list of str
+        Column names; empty if the file is.
+    body : reader
+        Rows below the header.
+    skipped : int
+        Lines above the first line of ``body``.
+    decimal_comma : bool
+        True if a comma may be the decimal point.
+    foreign : bool
+        True if the text is not Unicode, so that letters beyond ASCII may be wrong.
+    """
+
+    path: Path
+    header: list[str]
+    body: _csv.Reader
+    skipped: int
+    decimal_comma: bool
+    foreign: bool
+
+    def rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Yield line number and cells of each row that is not blank or a comment; it is as long as the header.
+
+        Raises
+        ------
+        InputError
+            If a row is longer or shorter.
+        """
+        for row in self.body:
+            while len(row) > len(self.header) and not row[-1].strip():
+                row.pop()
+            if not any(cell.strip(" \t\x1a") for cell in row):
+                continue
+            line = self.skipped + self.body.line_num
+            if len(row) == len(self.header):
+                yield line, row
+            elif not row[0].lstrip().startswith(_COMMENTS):
+                comma = "" if self.decimal_comma or len(row) < len(self.header) else "; write decimals with a point"
+                raise InputError(
+                    f"{self.path}, line {line}: {len(row)} values, but the header has {len(self.header)} columns{comma}"
+                )
+
+
 @contextmanager
-def _opened(path: Path) -> Iterator[TextIO]:
-    """Open a text file; raise an error of one line if it cannot be read as text."""
+def _opened(path: Path) -> Iterator[_Sheet]:
+    """Open a CSV file; raise an error of one line if it cannot be read."""
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            yield file
+        text, foreign = decoded(path)
+        yield _sheet(path, text, foreign)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not a text file in UTF-8 (byte {error.start}); save it as CSV") from None
     except csv.Error as error:
         raise InputError(f"{path} is not a CSV file: {error}") from None
 
 
-def _rows(file: Iterable[str]) -> tuple[_csv.Reader, bool]:
-    """Return the rows of a CSV file, and whether a comma may be the decimal point."""
-    lines = iter(file)
-    header = next(lines, "")
+def decoded(path: Path) -> tuple[str, bool]:
+    """Return the text of a file, and True if it is not Unicode but Windows-1252.
+
+    Raises
+    ------
+    InputError
+        If it is not text.
+    OSError
+    """
+    data, foreign = path.read_bytes(), False
+    try:
+        text = data.decode("utf-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig")
+    except UnicodeDecodeError:
+        text, foreign = data.decode("cp1252", "replace"), True
+    if _BINARY.search(text):
+        raise InputError(f"{path} is not a text file; save the table as CSV UTF-8")
+    return text, foreign
+
+
+def _sheet(path: Path, text: str, foreign: bool) -> _Sheet:
+    """Find the header and the separator of a table."""
+    lines = io.StringIO(text, newline="")
+    comment, header, skipped = "", "", 0
+    for line in lines:
+        bare = line.strip()
+        if bare.startswith(_COMMENTS):
+            comment = bare
+        elif bare and not bare.lower().startswith("sep="):
+            header = line
+            break
+        skipped += 1
     separator = next((one for one in _SEPARATORS if one in header.strip()), ",")
-    whole: Iterable[str] = chain([header] if header else [], lines)
+
+    def cells(content: str) -> list[str]:
+        return [cell.strip() for cell in next(_reader([content], separator), [])]
+
+    names, body = cells(header), chain([header] if header else [], lines)
+    if comment and any(map(_is_number, names)):  # the header begins with #
+        whole, without = cells(comment), cells(comment.lstrip("#/ "))
+        names = without if len(without) == len(names) else whole
+    else:
+        next(body, None)
+        skipped += 1
+    while names and not names[-1]:
+        names.pop()
+    return _Sheet(path, names, _reader(body, separator), skipped, separator != ",", foreign)
+
+
+def _reader(lines: Iterable[str], separator: str) -> _csv.Reader:
     if separator == " ":  # several spaces may align columns
-        whole = (" ".join(line.split()) for line in whole)
-    return csv.reader(whole, delimiter=separator), separator != ","
+        lines = (" ".join(line.split()) for line in lines)
+    return csv.reader(lines, delimiter=separator)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.replace(",", "."))
+    except ValueError:
+        return False
+    return True
 
 
 def _read_rows(
-    path: Path,
-    reader: _csv.Reader,
-    decimal_comma: bool,
-    names: Sequence[str],
-    default: Mapping[str, float],
-    hint: Mapping[str, str],
+    sheet: _Sheet, names: Sequence[str], default: Mapping[str, float], hint: Mapping[str, str]
 ) -> tuple[list[list[float]], list[int]]:
-    header = next(reader, None)
-    if header is None:
-        raise InputError(f"{path} is empty; write the header {','.join(names)}")
-    indices = _indices(path, [cell.strip() for cell in header], names, default, hint)
+    if not sheet.header:
+        raise InputError(f"{sheet.path} is empty; write the header {','.join(names)}")
+    indices = _indices(sheet.path, sheet.header, names, default, hint)
     rows: list[list[float]] = []
     lines: list[int] = []
-    for row in reader:
-        if not any(cell.strip() for cell in row):
-            continue
-        if len(row) != len(header):
-            raise _uneven(path, reader.line_num, row, header)
-        numbers = {name: _number(path, reader.line_num, name, row[index], decimal_comma) for name, index in indices.items()}
+    for line, row in sheet.rows():
+        numbers = {name: _number(sheet.path, line, name, row[index], sheet.decimal_comma) for name, index in indices.items()}
         rows.append([numbers[name] if name in numbers else default[name] for name in names])
-        lines.append(reader.line_num)
+        lines.append(line)
     return rows, lines
-
-
-def _uneven(path: Path, line: int, row: Sequence[str], header: Sequence[str]) -> InputError:
-    """Return an error about a row whose number of columns differs from the header's."""
-    return InputError(f"{path}, line {line}: {len(row)} values, but the header has {len(header)} columns")
 
 
 def _indices(
     path: Path, header: list[str], names: Sequence[str], default: Mapping[str, float], hint: Mapping[str, str]
 ) -> dict[str, int]:
-    missing = [name for name in names if name not in header and name not in default]
+    columns = {name: find_column(path, header, name) for name in names}
+    missing = [name for name, column in columns.items() if column is None and name not in default]
     if missing:
-        advice = ["separate columns by commas, semicolons, tabs or spaces"] if len(header) == 1 else []
-        advice += [hint[name] for name in missing if name in hint]
+        advice = [hint[name] for name in missing if name in hint] or [f"the first line must name the columns {','.join(names)}"]
+        if len(header) == 1 and len(names) > 1:
+            advice.insert(0, "separate columns by commas, semicolons, tabs or spaces")
         raise InputError("; ".join([f"{path} has no column {', '.join(missing)}: the header is {','.join(header)!r}", *advice]))
-    repeated = [name for name in names if header.count(name) > 1]
+    repeated = [column for column in columns.values() if column is not None and header.count(column) > 1]
     if repeated:
         raise InputError(f"{path} has the column {repeated[0]} twice")
-    return {name: header.index(name) for name in names if name in header}
+    return {name: header.index(column) for name, column in columns.items() if column is not None}
 
 
 def _number(path: Path, line: int, name: str, text: str, decimal_comma: bool) -> float:
-    comma = decimal_comma and _DECIMAL_COMMA.fullmatch(text.strip())
+    text = text.strip()
+    comma = decimal_comma and _DECIMAL_COMMA.fullmatch(text)
     try:
-        value = float(text.replace(",", ".") if comma else text)
+        value = float("nan" if NO_NUMBER.fullmatch(text) else text.replace(",", ".") if comma else text)
     except ValueError:
-        raise InputError(f"{path}, line {line}: {name} is {text.strip()!r}, not a number") from None
+        raise InputError(f"{path}, line {line}: {_not_a_number(name, text)}") from None
     if not abs(value) <= MAX_MEASUREMENT:  # also true for NaN
-        raise InputError(f"{path}, line {line}: {name} is {text.strip()}, not a plausible measurement; remove the line")
+        raise InputError(f"{path}, line {line}: {name} is {text}, not a plausible measurement; remove the line")
     return value
+
+
+def _not_a_number(name: str, text: str) -> str:
+    """Return what is wrong with a value, and how to write it."""
+    if not text:
+        return f"{name} is empty; fill it in, or remove the line"
+    return f"{name} is {text!r}, not a number{number_advice(text)}"
+
+
+def number_advice(text: str) -> str:
+    """Return how to write a number, as the end of a message; empty if unknown."""
+    if _DECIMAL_COMMA.fullmatch(text):
+        return "; write decimals with a point"
+    return "; write it without separators of thousands" if _THOUSANDS.fullmatch(text) else ""

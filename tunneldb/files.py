@@ -141,7 +141,8 @@ def vector_source(path: Path) -> str:
     Raises
     ------
     UserError
-        If it cannot be read, or is not a GeoPackage, GeoJSON, Shapefile or FlatGeobuf.
+        If it cannot be read, or is not a GeoPackage, GeoJSON, Shapefile or FlatGeobuf; or if a Shapefile is truncated or its
+        .shx is missing.
     """
     try:
         with path.open("rb") as file:
@@ -152,10 +153,37 @@ def vector_source(path: Path) -> str:
         return f"GeoJSON:{path}"
     if not head.startswith((b"SQLite format 3\0", b"fgb\x03", b"\0\0\x27\x0a")):
         raise UserError(f"{path} cannot be read: its content is not a GeoPackage, GeoJSON, Shapefile or FlatGeobuf")
+    if head.startswith(_SHAPEFILE):
+        _require_whole_shapefile(path, head)
     return str(path)
 
 
 _HEAD = 1024
+_SHAPEFILE = b"\0\0\x27\x0a"
+
+
+def _require_whole_shapefile(path: Path, head: bytes) -> None:
+    """Refuse a Shapefile that is shorter than its header states, or without its index."""
+    stated, size = 2 * int.from_bytes(head[24:28], "big"), path.stat().st_size
+    if size < stated:
+        raise UserError(f"{path} is truncated: its header states {stated} bytes, it has {size}; copy it again")
+    there = {file.suffix.lower() for file in path.parent.iterdir() if file.stem == path.stem}
+    if missing := {".shp", ".shx"} - there:
+        raise UserError(
+            f"{path} is one file of a Shapefile; copy the files that belong to it to the same folder: {', '.join(missing)},"
+            " also .dbf and .prj"
+        )
+
+
+def gdal_fault(error: Exception) -> str:
+    """Return the first line of an error of GDAL, without advice about options of GDAL, which only programs can set."""
+    line = str(error).strip().split("\n", 1)[0]
+    return _GDAL_ADVICE.sub("", line).rstrip(" .;,") or type(error).__name__
+
+
+_GDAL_ADVICE = re.compile(
+    r"(?:\bYou (?:can|may|might)\b|\bConsider\b|\bTry\b|\bSet\b|\bSetting\b|\bUse\b)[^.]*[A-Z]+_[A-Z_]+.*"
+)
 
 
 def by_kilometre(path: Path, kilometres: Sequence[int]) -> list[Path]:

@@ -49,7 +49,7 @@ def fields(**values: Any) -> dict[str, Any]:
 
 @contextmanager
 def logging_to(path: Path | None, verbosity: int = 0) -> Iterator[None]:
-    """Log inside a with block.
+    """Log inside a with block; libraries' log records and warnings go to the log only, never to standard error by themselves.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def logging_to(path: Path | None, verbosity: int = 0) -> Iterator[None]:
     InputError
         If the file cannot be opened.
     """
-    handlers: list[logging.Handler] = []
+    handlers: list[logging.Handler] = [logging.NullHandler()]  # without a handler, Python prints warnings of libraries
     if path is not None:
         try:
             file = logging.FileHandler(path, encoding="utf-8", errors="backslashreplace")
@@ -75,14 +75,16 @@ def logging_to(path: Path | None, verbosity: int = 0) -> Iterator[None]:
         handlers.append(_on_stderr(verbosity))
     root, ours = logging.getLogger(), logging.getLogger("tunneldb")
     level, inherited = ours.level, os.environ.get(VARIABLE)
-    ours.setLevel(logging.INFO if handlers else level)
+    ours.setLevel(logging.INFO if path is not None or verbosity else level)
     if path is not None:
         os.environ[VARIABLE] = str(path.absolute())
     for handler in handlers:
         root.addHandler(handler)
+    logging.captureWarnings(True)
     try:
         yield
     finally:
+        logging.captureWarnings(False)
         for handler in handlers:
             root.removeHandler(handler)
             handler.close()

@@ -203,7 +203,7 @@ BROKEN = [
     (('rot="ccw" radius="250', 'rot="left" radius="250'), r"rotation 'left'; it must be cw or ccw"),
     (("-5764.59435677 -16511.51399200 88.79745221</Start>", "-5764.5 -16511.5</Start>"), r"off by|ends 0\.\d+ m from"),
     (("<Start name=\"BP\">-5851", "<Start name=\"BP\">x-5851"), r"Start of a Line is 'x-5851.* not northing and easting"),
-    (('linearUnit="meter"', 'linearUnit="fathom"'), r"linearUnit 'fathom' is not one of"),
+    (('linearUnit="meter"', 'linearUnit="fathom"'), r"unknown unit, 'fathom'; give it by --axis-unit"),
     (('staStart="-90.00000000"', 'staStart="minus"'), r"staStart of a Alignment is 'minus', not a number"),
     (("<PVI>-90.00000000 90.90600001</PVI>", "<PVI>-90</PVI>"), r"a PVI of the profile is '-90', not station and height"),
     (("<PVI>-90.00000000 ", "<PVI>390.00000000 "), r"the profile reverses"),

@@ -2,59 +2,19 @@
 
 from __future__ import annotations
 
-import re
+import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-import ezdxf
 import numpy as np
-import pyogrio
 import pytest
 import shapely
+from support.axis_files import LINE, SRID, chain, dxf, edited, gis, pieces, written
 
-from tunneldb.alignment.given import GivenAxis, read_given
+from tunneldb.alignment.given import read_given
 from tunneldb.alignment.joining import join_pieces
-from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-
-SRID = 25830
-LINE = np.array(
-    [[500_000.0, 4_640_000.0, 100.0], [500_050, 4_640_000, 101], [500_099, 4_640_010, 102], [500_147, 4_640_024, 103]]
-)
-
-
-def gis(
-    path: Path, geometries: list[shapely.Geometry], srid: int | None = SRID, layer: str | None = None, **more: object
-) -> Path:
-    pyogrio.raw.write(
-        path,
-        np.array([shapely.to_wkb(g) for g in geometries], dtype=object),
-        [],
-        [],
-        layer=layer,
-        geometry_type=more.pop("geometry_type", geometries[0].geom_type + (" Z" if geometries[0].has_z else "")),
-        crs=f"EPSG:{srid}" if srid else None,
-        **more,
-    )
-    return path
-
-
-def pieces(xyz: Float = LINE) -> list[shapely.Geometry]:
-    """The line in pieces, out of order, the middle one drawn backwards."""
-    return [shapely.LineString(xyz[2:]), shapely.LineString(xyz[[2, 1]]), shapely.LineString(xyz[:2])]
-
-
-def dxf(path: Path, draw: Callable, insunits: int = 6) -> Path:  # type: ignore[type-arg]
-    document = ezdxf.new("R2018")
-    document.header["$INSUNITS"] = insunits
-    draw(document.modelspace())
-    document.saveas(path)
-    return path
-
-
-def chain(space: object) -> None:
-    for a, b in ((2, 3), (1, 0), (1, 2)):
-        space.add_line(LINE[a], LINE[b], dxfattribs={"layer": "AXIS"})  # type: ignore[attr-defined]
 
 
 def text(path: Path, separator: str, comma: bool) -> Path:
@@ -89,35 +49,46 @@ def test_each_format_holds_the_line(kind: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(read_given(path, srid=SRID, reverse=True, start=50.0).xyz, LINE[::-1], atol=1e-6)
 
 
-def test_arcs_and_bulges_keep_their_circle(tmp_path: Path) -> None:
-    """Straight, quarter of a circle of R 60 as a bulge of tan(90°/4), straight: in one polyline, and as LINE and ARC."""
-    bulge = np.tan(np.radians(90.0 / 4))
-    ends = [(0.0, 0.0, 0.0), (100.0, 0.0, bulge), (160.0, 60.0, 0.0), (160.0, 160.0, 0.0)]
-    one = dxf(
-        tmp_path / "one.dxf",
-        lambda space: space.add_lwpolyline([(x, y, b) for x, y, b in ends], format="xyb", dxfattribs={"elevation": 12.0}),
-    )
-
-    def apart(space: object) -> None:
-        space.add_line((0, 0, 12), (100, 0, 12))  # type: ignore[attr-defined]
-        space.add_arc((100, 60, 12), 60, 270, 360)  # type: ignore[attr-defined]
-        space.add_line((160, 160, 12), (160, 60, 12))  # type: ignore[attr-defined]
-
-    for path in (one, dxf(tmp_path / "apart.dxf", apart)):
-        xyz = read_given(path).xyz
-        xyz = xyz if xyz[0, 0] < 1 else xyz[::-1]
-        length = np.hypot(*np.diff(xyz[:, :2], axis=0).T)
-        assert length.sum() == pytest.approx(200.0 + 60.0 * np.pi / 2, abs=0.01)
-        assert length.max() < 2.0
-        on = xyz[(xyz[:, 0] > 100.1) & (xyz[:, 1] < 59.9)]
-        np.testing.assert_allclose(np.hypot(on[:, 0] - 100.0, on[:, 1] - 60.0), 60.0, atol=0.001)
-        assert set(xyz[:, 2].round(6)) == {12.0}
+def geojson(path: Path, *coordinates: list[list[float]] | None) -> Path:
+    """GeoJSON in the system of the tests, written by hand; None is a row without a geometry."""
+    shapes = [None if one is None else {"type": "LineString", "coordinates": one} for one in coordinates]
+    rows = [{"type": "Feature", "properties": {}, "geometry": shape} for shape in shapes]
+    system = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{SRID}"}}
+    return written(path, json.dumps({"type": "FeatureCollection", "crs": system, "features": rows}).encode())
 
 
-def test_a_spline_is_followed(tmp_path: Path) -> None:
-    path = dxf(tmp_path / "a.dxf", lambda space: space.add_spline([tuple(p) for p in LINE - LINE[0]]))
-    line = shapely.LineString(read_given(path).xyz)
-    assert max(line.distance(shapely.Point(p)) for p in LINE - LINE[0]) < 0.001
+@pytest.mark.parametrize("kind", ["gpkg", "shp", "fgb", "geojson"])
+def test_rows_without_geometry_are_left_out_and_counted(kind: str, tmp_path: Path) -> None:
+    line, empty = shapely.LineString(LINE), shapely.LineString()
+    if kind == "geojson":
+        path = geojson(tmp_path / "a.geojson", None, [], LINE.tolist())
+    else:
+        rows = {"gpkg": [None, empty, line], "shp": [None, line], "fgb": [None, line]}[kind]
+        path = gis(
+            tmp_path / f"a.{kind}", rows, geometry_type="LineString Z", **({"SPATIAL_INDEX": "NO"} if kind == "fgb" else {})
+        )
+    given = read_given(path, srid=SRID)
+    np.testing.assert_allclose(given.xyz, LINE, atol=1e-6)
+    count = "2 of 3" if kind in ("gpkg", "geojson") else "1 of 2"
+    assert given.notes == (f"rows without geometry in layer 'a': {count}; left out",)
+
+
+@pytest.mark.parametrize("missing", [0.0, -9999.0, None])
+def test_vertices_without_height_are_interpolated_and_counted(missing: float | None, tmp_path: Path) -> None:
+    """As QGIS writes a vertex without height: 0 among heights; and as a missing value, or number."""
+    rows = LINE.tolist()
+    rows[1][2:] = [] if missing is None else [missing]
+    given = read_given(geojson(tmp_path / "a.geojson", rows), srid=SRID)
+    plan = np.hypot(*np.diff(LINE[:, :2], axis=0).T)
+    np.testing.assert_allclose(given.xyz[1, 2], 100.0 + 2.0 * plan[0] / plan[:2].sum())
+    assert given.notes == ("vertices without height in layer 'a': 1; interpolated between their neighbours",)
+
+
+def test_a_line_at_sea_level_keeps_its_heights(tmp_path: Path) -> None:
+    rows = np.column_stack([LINE[:, :2], [2.0, 0.0, 0.0, -2.5]])
+    given = read_given(geojson(tmp_path / "a.geojson", rows.tolist()), srid=SRID)
+    np.testing.assert_allclose(given.xyz, rows)
+    assert given.notes == ()
 
 
 @pytest.mark.parametrize("kind", ["gpkg", "dxf", "zero", "csv"])
@@ -182,8 +153,15 @@ REFUSED: dict[str, tuple[Callable[[Path], Path], str]] = {
     "other crs": (lambda f: gis(f / "a.gpkg", pieces(), srid=3794), r"system is EPSG:3794 .*, the tunnel's is EPSG:25830"),
     "degrees": (lambda f: gis(f / "a.geojson", [shapely.LineString([(1, 41), (2, 42)])], 4326), r"EPSG:4326 .*25830"),
     "points": (lambda f: gis(f / "a.gpkg", [shapely.Point(1, 2)], layer="p"), "holds no lines; its layers: 'p'; draw the axis"),
-    "millimetres": (lambda f: dxf(f / "a.dxf", chain, 4), r"unit is mm \(\$INSUNITS 4\); .* --axis-unit"),
-    "no lines": (lambda f: dxf(f / "a.dxf", lambda space: space.add_circle((0, 0), 5)), "holds no lines; draw the axis"),
+    "no lines": (lambda f: dxf(f / "a.dxf", lambda space: space.add_circle((0, 0), 5)), "no lines, but 1 CIRCLE; draw"),
+    "sheet": (lambda f: dxf(f / "a.dxf", sheet), r"\(layout 'Layout1' has some\); draw the axis as a line in model space"),
+    "comma": (lambda f: edited(dxf(f / "a.dxf", chain), "500050.0", "500050,0"), "Export it again, with decimal points"),
+    "nan": (lambda f: edited(dxf(f / "a.dxf", chain), "500050.0", "nan"), "2 lines of layer 'AXIS' have invalid coordinates"),
+    "UTF-16": (lambda f: written(f / "a.dxf", "\ufeff0\nSECTION\n".encode("utf-16-le")), "text is UTF-16; save it as UTF-8"),
+    "kml": (lambda f: written(f / "a.kml", b'<kml xmlns="http://www.opengis.net/kml/2.2"/>'), "root is kml, .* as GeoPackage"),
+    "pdf": (lambda f: written(f / "a.pdf", b"%PDF-1.7"), "is a PDF; export its drawing as DXF"),
+    "dbf": (lambda f: gis(f / "a.shp", pieces()).with_suffix(".dbf"), r"is one file of a Shapefile; pass .*a\.shp"),
+    "only empty": (lambda f: gis(f / "a.gpkg", [None], geometry_type="LineString"), "no line with a length; draw the axis"),
     "turns back": (
         lambda f: gis(f / "a.gpkg", [shapely.LineString([(0, 0, 1), (20, 0, 1), (10, 1, 1)])]),
         "at 10.00,1.00 the axis reverses here",
@@ -199,9 +177,8 @@ REFUSED: dict[str, tuple[Callable[[Path], Path], str]] = {
 }  # fmt: skip
 
 
-def written(path: Path, content: bytes) -> Path:
-    path.write_bytes(content)
-    return path
+def sheet(space: object) -> None:
+    space.doc.layout("Layout1").add_polyline3d(LINE)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("kind", REFUSED)
@@ -212,6 +189,26 @@ def test_what_is_refused_is_said_in_one_line(kind: str, tmp_path: Path) -> None:
         read_given(path, srid=SRID)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
+
+
+def test_a_shapefile_is_whole_or_the_missing_files_are_named(tmp_path: Path) -> None:
+    whole = gis(tmp_path / "a.shp", pieces())
+    (tmp_path / "b").mkdir()
+    alone = Path(shutil.copy(whole, tmp_path / "b"))
+    with pytest.raises(UserError, match=r"copy the files that belong to it to the same folder: \.shx, also \.dbf and \.prj"):
+        read_given(alone, srid=SRID)
+    for suffix in (".shx", ".dbf", ".prj"):
+        shutil.copy(whole.with_suffix(suffix), alone.with_suffix(suffix.upper()))
+    given = read_given(alone.rename(alone.with_suffix(".SHP")), srid=SRID)
+    np.testing.assert_allclose(given.xyz, LINE, atol=1e-6)
+    assert given.notes == ()
+    content = whole.read_bytes()
+    whole.write_bytes(content[:-20])
+    with pytest.raises(UserError, match=f"is truncated: its header states {len(content)} bytes, it has {len(content) - 20}"):
+        read_given(whole, srid=SRID)
+    whole.write_bytes(content)
+    whole.with_suffix(".prj").write_text("no system")
+    assert "a coordinate system that cannot be read (a.prj); using the tunnel's" in read_given(whole, srid=SRID).notes[0]
 
 
 @pytest.mark.filterwarnings("ignore:'crs' was not provided")
@@ -244,32 +241,3 @@ def test_pieces_are_joined_as_far_as_there_is_one_way() -> None:
     above = np.array([[10.0, 0, 5], [20, 0, 5]])  # at the same place in plan, 5 m higher
     assert len(join_pieces([ring[:2], above])) == 2
     assert join_pieces([ring[:1], np.repeat(ring[:1], 3, axis=0)]) == []
-
-
-def test_a_landxml_says_its_unit_or_is_asked(tmp_path: Path) -> None:
-    path = tmp_path / "a.xml"
-    bare = (Path(__file__).parents[1] / "data" / "j-landxml.xml").read_text()
-    begin, end = bare.index("<Units"), bare.index("</Units>") + len("</Units>")
-    path.write_text(bare[:begin] + bare[end:])
-    with pytest.raises(UserError, match=r"states no unit of lengths .* --axis-unit"):
-        read_given(path)
-
-    def length(given: GivenAxis) -> float:
-        return float(np.hypot(*np.diff(given.xyz[:, :2], axis=0).T).sum())
-
-    assert read_given(path, unit="foot").design is not None
-    assert length(read_given(path, unit="foot")) == pytest.approx(0.3048 * length(read_given(path, unit="meter")), abs=0.001)
-    assert read_given(path, unit="meter").notes[0].endswith("1 unit is 1 m, as given; the file states none")
-    with pytest.raises(UserError, match="own direction"):
-        read_given(path, unit="meter", reverse=True)
-
-
-def test_a_landxml_whose_height_lacks_its_decimal_point_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "a.xml"
-    bare = (Path(__file__).parents[1] / "data" / "j-landxml.xml").read_text()
-    straight = re.sub(r" *<ParaCurve.*</ParaCurve>\n", "", bare)
-    path.write_text(straight)
-    assert read_given(path).xyz[:, 2].max() < 91.0
-    path.write_text(straight.replace("995.94618316 75.38160000", "995.94618316 75381.60000"))
-    with pytest.raises(UserError, match=r"a\.xml: at chainage .* its profile rises .* is a decimal point missing"):
-        read_given(path)

@@ -122,7 +122,7 @@ def test_a_survey_and_its_tunnel_are_removed_in_this_order(tunnel: Path, conn: p
         ("x,x,y,z\n1,1,2,3\n", ["column x twice"]),
         ("x,y,z\n0,0,0\n", ["at least 2 points", "has 1"]),
         ("x,y,z\n0,0,0\n10,abc,0\n", ["line 3", "y is 'abc'"]),
-        ("x,y,z\n0,0,0\n10,,0\n", ["line 3", "y is ''"]),
+        ("x,y,z\n0,0,0\n10,,0\n", ["line 3", "y is empty; fill it in, or remove the line"]),
         ("x,y,z\n0,0,0\n10,nan,0\n", ["line 3", "y is nan"]),
         ("x,y,z\n0,0,0\n10,0,-inf\n", ["line 3", "z is -inf"]),
         ("x,y,z\n0,0,0\n10,0\n", ["line 3", "2 values", "3 columns"]),
@@ -137,8 +137,8 @@ def test_a_wrong_axis_is_refused(conn: psycopg.Connection, files: Path, text: st
 
 
 def test_an_axis_that_is_no_text_or_no_file(dsn: str, files: Path) -> None:
-    (files / "axis.csv").write_bytes(b"x,y,z\n\xff\xfe\n")
-    refused(run("tunnel", "add", "t", "--srid", "25830", "--axis", "axis.csv"), "not a text file in UTF-8")
+    (files / "axis.csv").write_bytes(b"x,y,z\n\xff\0\n")
+    refused(run("tunnel", "add", "t", "--srid", "25830", "--axis", "axis.csv"), "not a text file; save the table as CSV UTF-8")
     refused(run("tunnel", "add", "t", "--srid", "25830", "--axis", "gone.csv"), "gone.csv: No such file")
     refused(run("tunnel", "add", "t", "--srid", "25830", "--axis", "."), "directory")
 

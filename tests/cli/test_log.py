@@ -7,6 +7,7 @@ import logging
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,21 @@ def test_a_command_is_logged_from_its_beginning_to_its_end(tmp_path: Path) -> No
     assert {"time", "level", "logger", "process", "message"} <= begun.keys()
     run("--log", str(log), *TRIED, "--json")  # appended
     assert [line["level"] for line in lines(log)] == ["INFO", "ERROR", "INFO"] * 2
+
+
+def test_libraries_write_to_the_log_and_not_to_the_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(logging.getLogger(), "handlers", [])  # without pytest's own
+    for log in (None, tmp_path / "log"):
+        with warnings.catch_warnings(), logging_to(log):
+            warnings.simplefilter("always")
+            logging.getLogger("ezdxf").warning("Found non-unique entity handle")
+            warnings.warn("more than one layer found", UserWarning, stacklevel=1)
+        assert capsys.readouterr().err == ""
+    handle, layers = lines(tmp_path / "log")
+    assert (handle["logger"], handle["message"]) == ("ezdxf", "Found non-unique entity handle")
+    assert "more than one layer found" in layers["message"]
 
 
 def test_a_wrong_command_line_and_a_bug_are_logged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

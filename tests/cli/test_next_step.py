@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -82,3 +83,30 @@ def test_a_misspelt_dimension_is_mended_by_what_is_said(refused: Callable[..., s
     said = refused("load", empty, tmp_path / "a.laz")
     assert "did you mean 'Reflectance'?" in said
     assert said.rstrip().endswith(": tunneldb survey set empty --intensity Reflectance")
+
+
+ADVICE: list[tuple[str, str, str]] = [
+    ("leaks demo", r"say which of its surveys: (\S+)", "leaks {0}"),
+    ("leaks demo-2023", r"Did you mean '(\S+)'\?", "leaks {0}"),
+    ("tunnel add demo --srid 25830 --axis no.csv", r"there is a tunnel 'demo' already: tunneldb (tunnel list)", "{0}"),
+    ("leaks demo-2024 --format gpkg", r"add -o (leaks\.gpkg)", "leaks demo-2024 --format gpkg -o {0}"),
+    ("leaks demo-2024 -o a.pdf", r"leaks are written as (\.csv), .* use one of these", "leaks demo-2024 -o a{0}"),
+    ("leaks demo-2024 --clock 10-10", r"is one position; give two, as (10-2)", "leaks demo-2024 --clock {0}"),
+    ("findings demo-2024 --count --from 0", r"leave out --from\b", "findings demo-2024 --count"),
+    ("survey set demo-2024", r"nothing to set: give (--date)", "survey set demo-2024 {0} 2024-05-05"),
+    ("status --watch", r"--watch is for one survey: tunneldb (status) SURVEY (--watch)", "status demo-2024"),
+    ("tunnel stationing demo", r"give either a FILE, or (--show)", "tunnel stationing demo {0}"),
+    ("leaks demo-2024 --from 900+000", r"has no such station: tunneldb (tunnel stationing demo --show)", "{0}"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("wrong", "advice", "right"), ADVICE, ids=[wrong for wrong, _, _ in ADVICE])
+def test_what_a_message_says_is_typed(
+    refused: Callable[..., str], dsn: str, wrong: str, advice: str, right: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = refused(*wrong.split())
+    found = re.search(advice, said)
+    assert found, said
+    result = CliRunner().invoke(main, ["--dsn", dsn, *right.format(*found.groups()).split()])
+    assert result.exit_code == 0, result.stderr

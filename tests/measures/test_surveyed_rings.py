@@ -78,7 +78,7 @@ def test_a_ring_lies_where_it_was_put(files: tuple[Path, Path]) -> None:
 @pytest.mark.parametrize(
     ("rows", "header", "said"),
     [
-        (lines(), "ring,point,x,y,h", "has no column z"),
+        (lines(), "ring,point,x,y,q", "has no column z"),
         ([], "ring,point,x,y,z", "has no point"),
         (lines(radius=3000.0), "ring,point,x,y,z", "in millimetres"),
         (lines(radius=6.0), "ring,point,x,y,z", "is 6 m the radius"),

@@ -1,4 +1,5 @@
 import contextlib
+import io
 from pathlib import Path
 
 import laspy
@@ -398,3 +399,38 @@ def test_the_box_of_a_file_is_read_even_when_the_rest_is_gone(tmp_path: Path) ->
     assert header_box(path) is None
     path.write_text("no scan " * 100)
     assert header_box(path) is None
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_laz_of_early_compressors(tmp_path: Path, version: int) -> None:
+    """As LASzip 1.x wrote it: one run of points (compressor 1) without a chunk table, with items of an early version."""
+    count = 5000
+    header = laspy.LasHeader(point_format=1, version="1.2")
+    header.scales, header.offsets = [0.001] * 3, [500_000, 4_500_000, 100]
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = np.random.default_rng(3).uniform(-50, 50, (3, count)) + np.array([[500_000], [4_500_000], [100]])
+    las.intensity = np.arange(count) % 999
+    path = tmp_path / "a.laz"
+    las.write(path)
+    content = bytearray(path.read_bytes())
+    points_at = int.from_bytes(content[96:100], "little")
+    record_at = content.index(b"laszip encoded") - 2 + 54
+    items = int.from_bytes(content[record_at + 32 : record_at + 34], "little")
+    for item in range(items):
+        content[record_at + 34 + 6 * item + 4] = version
+    packed = io.BytesIO()
+    compressor = lazrs.LasZipCompressor(packed, lazrs.LazVlr(bytes(content[record_at : record_at + 34 + 6 * items])))
+    compressor.compress_many(las.points.array.view(np.uint8))
+    compressor.done()
+    content[record_at] = 1
+    chunk_table_at = int.from_bytes(packed.getvalue()[:8], "little")
+    path.write_bytes(content[:points_at] + packed.getvalue()[8:chunk_table_at])
+
+    ranges = [(5, 7), (3000, 4200)]
+    chosen = np.r_[5:7, 3000:4200]
+    found = list(read_chunks(path, "intensity", 500, ranges))
+    np.testing.assert_allclose(np.concatenate([chunk.xyz for chunk in found]), las.xyz[chosen], atol=1e-9)
+    np.testing.assert_array_equal(np.concatenate([chunk.intensity for chunk in found]), las.intensity[chosen])
+    path.write_bytes(path.read_bytes()[:-500])
+    with pytest.raises(UserError, match="truncated"):
+        list(read_chunks(path, None))

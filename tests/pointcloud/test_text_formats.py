@@ -219,7 +219,21 @@ DAMAGED = {
     "comma.csv": ("x;y;z\n1,5;2,5;3,5\n", r"comma\.csv, line 2: '1,5' is not a number; write decimals with a point"),
     "count.pts": ("500\n" + GOOD, "truncated: line 1 states 500 points, but 300 follow"),
     "none.pts": ("", "holds no points"),
-    "head.csv": ("E,N,H\n1,2,3\n", r"no column x, y, z: its header names E, N, H"),
+    "head.csv": ("A,B,H\n1,2,3\n", r"no column x, y: its header names A, B, H"),
+    "tabs.txt": ("X\tY\tZ\n1,5\t2,5\t3,5\n", r"tabs\.txt, line 2: '1,5' is not a number; write decimals with a point"),
+    "blanks.xyz": ("1,5 2,5 3,5\n", r"blanks\.xyz, line 1: '1,5' is not a number; write decimals with a point"),
+    "commas.csv": ("x,y,z\n1,5,2,5,3,5\n", r"line 2: 6 values, but its header names 3 columns: x, y, z; write decimals with"),
+    "comma.pts": ("1\n1,5 2,5 3,5\n", r"line 2: '1,5' is not a number; write decimals with a point"),
+    "comma.ply": (
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\nproperty double z\n"
+        "end_header\n1,5 2 3\n",
+        r"line 8: '1,5' is not a number; write decimals with a point",
+    ),
+    "thousands.csv": ("x;y;z\n4'640'000.5;2;3\n", '000.5" is not a number; write it without separators of thousands'),
+    "mac.xyz": ("1 2 3\r" * 2, "its lines end with CR only; save it with line ends LF or CR LF"),
+    "utf16.xyz": ("\ufeff1 2 3\n", "its text is UTF-16; save it as UTF-8"),
+    "count.asc": ("//X Y Z\n3\n1 2 3\n1 2 4\n", "line 2 states 3 points, but 2 follow; if .* complete, remove that line"),
+    "names.txt": ("x y z\n1 2 3 4\n", r"names 3 columns: x, y, z; write 4 names, - for a column to leave out, to .*columns"),
     "twice.csv": ("x,y,z,X\n1,2,3,4\n", "names the column x twice"),
     "ids.csv": ("x,y,z,scan_id\n1,2,3,1.5\n", r"scan_id of point 1 is 1\.5, not a whole number"),
     "short.ptx": (ptx([(2, 5, np.eye(3), FAR, ["1 2 3 0.5"] * 9)]), "line 1 states 2 × 5 points, but 9 follow"),
@@ -241,11 +255,54 @@ DAMAGED = {
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damage_is_told_in_one_line(tmp_path: Path, name: str) -> None:
     content, message = DAMAGED[name]
-    (tmp_path / name).write_bytes(content.encode())
+    (tmp_path / name).write_bytes(content.encode("utf-16-le" if content.startswith("\ufeff") else "utf-8"))
     with pytest.raises(UserError, match=message) as error:
         read_header(tmp_path / name)
         read(tmp_path / name)
     assert "\n" not in str(error.value)
+
+
+SAME: dict[str, tuple[str | bytes, str]] = {
+    "mark.xyz": ("\ufeff1.5 2 3\r\n4 5 6\r\n", "marks of Windows"),
+    "mark.pts": ("\ufeff1.5 2 3\n4 5 6\n", "byte order mark, no count"),
+    "quotes.csv": ('"x","y","z"\n"1.5","2","3"\n"4","5","6"\n', "quotes"),
+    "end.csv": ("x,y,z,\n1.5,2,3,\n4,5,6,\n", "separators at the end"),
+    "end.xyz": ("1.5;2;3;\n4;5;6;\n", "separators at the end, no header"),
+    "remarks.txt": ("x y z\n1.5 2 3\n# second scan\n4 5 6\n// end\n", "comments between points"),
+    "cc.asc": ("//X Y Z\n2\n1.5 2 3\n4 5 6\n", "CloudCompare, with a line of the number of points"),
+    "east.txt": ("Northing;Easting;Elevation\n2;1.5;3\n5;4;6\n", "usual names"),
+    "letters.txt": ("x;y;z;Höhe\n1.5;2;3;0\n4;5;6;0\n".encode("cp1252"), "Windows-1252"),
+    "dos.xyz": (b"1.5 2 3\r\n4 5 6\r\n\x1a", "end mark of DOS"),
+    "spaces.xyz": ("1.5\u00a02\u00a03\n4\u00a05\u00a06\n", "no-break spaces"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_points_however_written_are_the_same(tmp_path: Path, name: str) -> None:
+    content, _ = SAME[name]
+    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    assert read_header(tmp_path / name).points == 2
+    assert read(tmp_path / name).xyz.tolist() == [[1.5, 2.0, 3.0], [4.0, 5.0, 6.0]]
+
+
+def test_names_written_by_windows_are_read(tmp_path: Path) -> None:
+    """``echo 'x y z i' > a.xyz.columns`` in PowerShell, in cmd.exe, and by Notepad."""
+    (tmp_path / "a.xyz").write_text("1 2 3 4\n")
+    for content in ("\ufeffx y z i\r\n".encode("utf-16-le"), b"'x y z i' \r\n", b"\xef\xbb\xbfx y z i"):
+        (tmp_path / "a.xyz.columns").write_bytes(content)
+        assert read_header(tmp_path / "a.xyz").dimensions == ("i",)
+
+
+def test_missing_numbers_are_not_refused(tmp_path: Path) -> None:
+    """As C on Windows, databases and spreadsheets write them: no intensity, and no point without a coordinate."""
+    path = tmp_path / "a.csv"
+    rows = ["1,2,3,-nan(ind)", "1,2,4,1.#QNAN", "1,2,5,NULL", "1,2,6,", "1,2,7,8", "-1.#IND,2,3,4", "nan(ind),2,3,4", ",2,3,4"]
+    path.write_text("x,y,z,i\n" + "\n".join([*rows, "1,inf,3,4"]) + "\n")
+    found = read(path, "i")
+    np.testing.assert_array_equal(found.xyz, [[1, 2, z] for z in (3, 4, 5, 6, 7)])
+    np.testing.assert_array_equal(found.intensity, [np.nan, np.nan, np.nan, np.nan, 8])
+    header = read_header(path)
+    assert (header.points, header.high.tolist()) == (9, [1.0, 2.0, 7.0])
 
 
 def test_a_point_that_is_none_is_left_out(tmp_path: Path) -> None:

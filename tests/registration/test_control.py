@@ -142,7 +142,7 @@ def test_control_files_with_other_separators(tmp_path: Path, text: str) -> None:
     ("text", "said"),
     [
         ("id,x,y,z\nA,1,2,3\nB,4,five,6\n", "line 3: y is 'five', not a number"),
-        ("id,x,y,z\nA,1,2,3\nB,4,,6\n", "line 3: y is '', not a number"),
+        ("id,x,y,z\nA,1,2,3\nB,4,,6\n", "line 3: y is empty; fill it in, or remove the line"),
         ("id,x,y,z\nA,1,2,nan\n", "line 2: z is nan"),
         ("id,x,y,z\nA,1,2\n", "line 2: 3 values, but the header has 4 columns"),
         ("id,x,y,z\nA,1,2,3\n,4,5,6\n", "line 3: id is empty"),

@@ -1,25 +1,27 @@
-"""Lines of drawings and maps: DXF by ezdxf; GeoPackage, Shapefile, GeoJSON and FlatGeobuf by GDAL."""
+"""Lines of maps: GeoPackage, Shapefile, GeoJSON and FlatGeobuf by GDAL; layers of drawings and maps."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from tunneldb.alignment.joining import join_pieces
-from tunneldb.arrays import Float
+from tunneldb.arrays import Bool, Float
 from tunneldb.errors import InputError
-from tunneldb.files import vector_source
-from tunneldb.geometry.crs import LOCAL, describe_crs, describe_srid, fits_srid, is_local
+from tunneldb.files import gdal_fault, vector_source
+from tunneldb.geometry.crs import LOCAL, describe_crs, describe_srid, fits_srid, is_local, srid_name
 
-CHORD_ERROR = 0.0005  # m, of arcs and splines
-MAX_STEP = 1.0  # m between vertices of a drawing with arcs, so that the spline through them keeps straights straight
+MAX_COORDINATE = 1e9
+"""Greatest coordinate of a line, m; greater ones are damage."""
+
 _MAX_LISTED = 8
-_ENTITIES = {"LINE", "ARC", "LWPOLYLINE", "POLYLINE", "SPLINE"}
+_LOWEST = -9000.0  # m; lower heights are numbers for no height, as -9999
+_MAX_DROP = 0.2  # greatest grade beside a vertex at height 0; a steeper one has no height
+_MIN_DROP = 5.0  # m
 
 
 @dataclass(frozen=True)
@@ -62,50 +64,6 @@ def describe_line(line: Float) -> str:
     return f"{length:.1f} m from {x1:.1f},{y1:.1f} to {x2:.1f},{y2:.1f}"
 
 
-def read_dxf(path: Path, layer: str | None, unit: float | None) -> Drawn:
-    """Read the lines of a DXF file's model space: LINE, ARC, LWPOLYLINE, POLYLINE and SPLINE.
-
-    Parameters
-    ----------
-    layer
-        Name of the layer; required if several contain lines.
-    unit
-        Metres per drawing unit; None for the file's own unit.
-
-    Raises
-    ------
-    InputError
-        If it can't be read, has no lines, has several layers to choose from, or its unit isn't the metre.
-    """
-    drawing = open_drawing(path)
-    entities = [entity for entity in drawing.modelspace() if entity.dxftype() in _ENTITIES and not _is_mesh(entity)]
-    names = sorted({entity.dxf.layer for entity in entities})
-    chosen = choose_layer(path, names, layer)
-    scale, note = _dxf_unit(path, drawing.header.get("$INSUNITS", 0), unit)
-    parts = [part for entity in entities if entity.dxf.layer == chosen for part in _simple(entity)]
-    curved = any(part.dxftype() != "LINE" for part in parts)
-    pieces = [scale * _vertices(part, CHORD_ERROR / scale) for part in parts]
-    lines = [_densified(line) if curved else line for line in join_pieces(pieces)]
-    return _drawn(path, lines, chosen, (note,) if note else ())
-
-
-def open_drawing(path: Path) -> Any:
-    """Open a DXF file.
-
-    Raises
-    ------
-    InputError
-        If it can't be read.
-    """
-    from ezdxf import filemanagement
-
-    try:
-        return filemanagement.readfile(str(path))
-    except Exception as error:  # for damaged files ezdxf raises StopIteration, OverflowError and others
-        message = str(error).strip().splitlines() or [f"it is damaged ({type(error).__name__})"]
-        raise InputError(f"{path} cannot be read as DXF: {message[0]}") from None
-
-
 def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
     """Read the lines of a GeoPackage, Shapefile, GeoJSON or FlatGeobuf.
 
@@ -130,22 +88,26 @@ def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
         linear = [name for name, kind in layers if not any(other in kind for other in ("Point", "Polygon", "Surface"))]
         chosen = choose_layer(path, linear, layer, [name for name, _ in layers])
         meta, _, wkb, _ = pyogrio.raw.read(source, layer=chosen, columns=[])
-    except (pyogrio.errors.DataSourceError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} cannot be read: {str(error).strip().splitlines()[0]}") from None
+    except (RuntimeError, ValueError) as error:  # those of pyogrio, and names that are not UTF-8
+        raise InputError(f"{path} cannot be read: {gdal_fault(error)}") from None
     notes = _check_crs(path, meta["crs"], srid)
     try:
-        geometries = shapely.get_parts(shapely.get_parts(shapely.from_wkb(wkb, on_invalid="ignore")))
+        rows = shapely.from_wkb(np.empty(0, object) if wkb is None else wkb, on_invalid="ignore")
     except shapely.errors.GEOSException as error:
         raise InputError(
             f"{path}: a geometry of layer {chosen!r} is damaged ({str(error).strip().splitlines()[0]}); fix it (in QGIS: Fix "
             "geometries)"
         ) from None
+    whole = rows[~shapely.is_missing(rows) & ~shapely.is_empty(rows)]
+    if len(whole) < len(rows):
+        notes += (f"rows without geometry in layer {chosen!r}: {len(rows) - len(whole)} of {len(rows)}; left out",)
+    geometries = shapely.get_parts(shapely.get_parts(whole))
     geometries = geometries[np.isin(shapely.get_type_id(geometries), (1, 2))]  # lines and rings
     pieces = [shapely.get_coordinates(line, include_z=True) for line in geometries]
-    broken = sum(not np.isfinite(piece[:, :2]).all() for piece in pieces)
+    broken = sum(not (np.abs(piece[:, :2]) <= MAX_COORDINATE).all() for piece in pieces)
     if broken:
         raise InputError(f"{path}: {broken} lines of layer {chosen!r} have invalid coordinates")
-    return _drawn(path, join_pieces(pieces), chosen, notes)
+    return drawn_lines(path, join_pieces(pieces), chosen, notes)
 
 
 def choose_layer(path: Path, names: list[str], wanted: str | None, others: list[str] | None = None) -> str:
@@ -166,20 +128,52 @@ def choose_layer(path: Path, names: list[str], wanted: str | None, others: list[
     return names[0]
 
 
-def _drawn(path: Path, lines: list[Float], layer: str, notes: tuple[str, ...]) -> Drawn:
+def drawn_lines(path: Path, lines: list[Float], layer: str, notes: tuple[str, ...]) -> Drawn:
+    """Return joined lines of a layer, with heights for all vertices or none.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
     if not lines:
-        raise InputError(f"{path}: layer {layer!r} holds no line with a length")
+        raise InputError(f"{path}: layer {layer!r} holds no line with a length; draw the axis as a line")
+    heightless = 0
     for line in lines:
-        if not np.isfinite(line[:, 2]).all() or not line[:, 2].any():
+        missing = _without_height(line)
+        if missing.all():
             line[:, 2] = np.nan
+        elif missing.any():
+            heightless += int(missing.sum())
+            along = np.append(0.0, np.hypot(*np.diff(line[:, :2], axis=0).T).cumsum())
+            line[missing, 2] = np.interp(along[missing], along[~missing], line[~missing, 2])
+    if heightless:
+        notes += (f"vertices without height in layer {layer!r}: {heightless}; interpolated between their neighbours",)
     return Drawn(lines, layer, notes)
+
+
+def _without_height(line: Float) -> Bool:
+    """Return True for the vertices (n,) of a line without height: not a number, below any land, or a sudden 0."""
+    z = line[:, 2]
+    missing = ~(z > _LOWEST)
+    if not z[~missing].any():
+        return np.ones(len(z), bool)
+    plan, rise = np.hypot(*np.diff(line[:, :2], axis=0).T), np.abs(np.diff(z))
+    steep = (rise > _MAX_DROP * plan + _MIN_DROP) & (np.minimum(np.abs(z[1:]), np.abs(z[:-1])) == 0.0)
+    zero = z == 0.0
+    # a run of zeros has no heights if a step at one of its ends is steep
+    run = np.cumsum(np.append(True, zero[1:] != zero[:-1]))
+    wrong = np.union1d(run[1:][steep & zero[1:]], run[:-1][steep & zero[:-1]])
+    return np.asarray(missing | (zero & np.isin(run, wrong)))
 
 
 def _check_crs(path: Path, stated: str | None, srid: int | None) -> tuple[str, ...]:
     if srid is None:
         return ()
     if stated is None:
-        return () if srid == LOCAL else (f"states no coordinate system; using the tunnel's, EPSG:{srid}",)
+        unread = path.with_suffix(".prj").is_file()
+        system = f"a coordinate system that cannot be read ({path.stem}.prj)" if unread else "no coordinate system"
+        return () if srid == LOCAL and not unread else (f"states {system}; using the tunnel's, {srid_name(srid)}",)
     try:
         own = CRS.from_user_input(stated)
         fits, tunnel_crs = fits_srid(own, srid), describe_srid(srid)
@@ -193,45 +187,3 @@ def _check_crs(path: Path, stated: str | None, srid: int | None) -> tuple[str, .
             f"QGIS: Export, Save Features As), or add the tunnel with {srid_option}"
         )
     return ()
-
-
-def _dxf_unit(path: Path, code: int, unit: float | None) -> tuple[float, str]:
-    """Return the metres per drawing unit, and a note about it."""
-    from ezdxf import units
-
-    if unit is not None:
-        stated = f"; the file states {units.decode(code)}" if code else ""
-        return unit, f"unit: {unit:.9g} m, as given{stated}"
-    if code == units.M:
-        return 1.0, ""
-    if code == 0:
-        return 1.0, "states no unit; using metres, the unit of the SRID"
-    raise InputError(
-        f"{path}: its unit is {units.decode(code)} ($INSUNITS {code}); give the unit of its lengths, for "
-        "example --axis-unit meter"
-    )
-
-
-def _simple(entity: Any) -> list[Any]:
-    """Return the lines and arcs of a polyline, else the entity itself."""
-    return list(entity.virtual_entities()) if entity.dxftype() in ("LWPOLYLINE", "POLYLINE") else [entity]
-
-
-def _vertices(entity: Any, chord_error: float) -> Float:
-    """Return vertices (n, 3) along a LINE, an ARC or a SPLINE, in its drawing's unit."""
-    line = entity.dxftype() == "LINE"
-    vertices = (entity.dxf.start, entity.dxf.end) if line else entity.flattening(chord_error)
-    return np.array([tuple(vertex) for vertex in vertices], dtype=np.float64).reshape(-1, 3)
-
-
-def _is_mesh(entity: Any) -> bool:
-    return entity.dxftype() == "POLYLINE" and (entity.is_poly_face_mesh or entity.is_polygon_mesh)
-
-
-def _densified(line: Float) -> Float:
-    """Return the same line with vertices at most 1 m apart."""
-    length = np.hypot(*np.diff(line[:, :2], axis=0).T)
-    parts = np.maximum(np.ceil(length / MAX_STEP), 1.0).astype(int)
-    within = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
-    at = np.append(np.repeat(np.arange(len(parts)), parts) + within / np.repeat(parts, parts), float(len(parts)))
-    return np.column_stack([np.interp(at, np.arange(len(line)), column) for column in line.T])

@@ -11,10 +11,11 @@ from typing import Literal
 import numpy as np
 
 from tunneldb.alignment.design import Design
-from tunneldb.alignment.drawing import read_dxf, read_vector
+from tunneldb.alignment.drawing import read_vector
+from tunneldb.alignment.dxf import read_dxf
 from tunneldb.alignment.units import UNITS
 from tunneldb.arrays import Float
-from tunneldb.csvfile import read_csv, read_header
+from tunneldb.csvfile import find_column, read_csv, read_header
 from tunneldb.errors import InputError, UserError
 
 XYZ = ("x", "y", "z")
@@ -28,16 +29,15 @@ MIN_TRAJECTORY_STEP = 5.0
 """Least distance between points of a trajectory that become vertices of the axis, m."""
 
 _SNIFFED = 1024  # bytes
-_HEADERS = {
-    "x": ("x", "e", "east", "easting"),
-    "y": ("y", "n", "north", "northing"),
-    "z": ("z", "h", "height", "elevation"),
-}
 _GIS = (b"SQLite format 3\0", b"\0\0\x27\x0a", b"fgb\x03fgb", b"{")  # GeoPackage, Shapefile, FlatGeobuf, GeoJSON
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _OTHER_FORMATS = {
     b"LASF": "is a scan, not an axis; --axis auto FILE... finds the axis in scans",
     b"ASTM-E57": "is a scan, not an axis; --axis auto FILE... finds the axis in scans",
     b"AC10": "is a DWG drawing; save it as DXF",
+    b"\x08\x09\xfe": "is a DGN drawing; save it as DXF",
+    b"\xd0\xcf\x11\xe0": "is an Excel workbook or a DGN drawing; save the table as CSV, the drawing as DXF",
+    b"%PDF": "is a PDF; export its drawing as DXF, or its table as CSV",
     b"PK\x03\x04": "is a ZIP archive or a spreadsheet; unpack it, or save the table as CSV",
 }
 
@@ -139,15 +139,24 @@ def _kind(path: Path) -> Kind:
     for magic, why in _OTHER_FORMATS.items():
         if head.startswith(magic):
             raise InputError(f"{path} {why}")
-    if head.startswith(b"AutoCAD Binary DXF") or re.match(rb"\s*(999\s|0\s+SECTION\s)", head.removeprefix(b"\xef\xbb\xbf")):
-        return "dxf"
-    if head.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n").startswith(_GIS):
-        return "gis"
+    if path.suffix.lower() in (".dbf", ".prj", ".cpg") and (whole := path.with_suffix(".shp")).is_file():
+        raise InputError(f"{path} is one file of a Shapefile; pass {whole}")
+    wide = head.startswith(_UTF16)
     # A null is every second byte of UTF-16.
-    head = head.replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
-    if head.startswith(b"ISO-10303-21"):
-        return "ifc"
-    return "landxml" if head.startswith(b"<") else "csv"
+    bare = head.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n")
+    letters = head.replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
+    if letters.startswith(b"<"):
+        return "landxml"
+    kind: Kind = "csv"
+    if head.startswith(b"AutoCAD Binary DXF") or re.match(rb"999\s|0\s+SECTION\s", letters if wide else bare):
+        kind = "dxf"
+    elif bare.startswith(_GIS) or (wide and letters.startswith(b"{")):
+        kind = "gis"
+    elif letters.startswith(b"ISO-10303-21"):
+        kind = "ifc"
+    if wide and kind != "csv":
+        raise InputError(f"{path}: its text is UTF-16; save it as UTF-8")
+    return kind
 
 
 def _refuse_options(path: Path, kind: Kind, given: dict[str, str | None]) -> None:
@@ -201,15 +210,15 @@ def _read_design(path: Path, kind: Kind, alignment: str | None, profile: str | N
 def _choose(path: Path, what: str, names: list[str], wanted: str | None) -> int:
     """Return the index of the wanted element, or of the only one."""
     if not names:
-        raise InputError(f"{path} holds no {what}")
+        raise InputError(f"{path} holds no {what}; export the design alignment, with plan and profile")
+    names = [f"{name or 'unnamed'} ({k})" if names.count(name) > 1 else name for k, name in enumerate(names, start=1)]
     listed = ", ".join(repr(name) for name in names)
     if wanted is None:
         if len(names) > 1:
             raise InputError(f"{path} holds {len(names)} {what}s: {listed}; choose one by --{what} NAME")
         return 0
-    if names.count(wanted) != 1:
-        problem = "several" if wanted in names else "no"
-        raise InputError(f"{path} holds {problem} {what} {wanted!r}; it has {listed}")
+    if wanted not in names:
+        raise InputError(f"{path} holds no {what} {wanted!r}; it has {listed}")
     return names.index(wanted)
 
 
@@ -234,12 +243,9 @@ def _read_points(path: Path) -> GivenAxis:
 
 def _column(path: Path, header: list[str], name: str) -> str | None:
     """Return the column of a coordinate, by its usual names; None if there is no height."""
-    found = [column for column in header if column.lower() in _HEADERS[name]]
-    exact = [column for column in found if column.lower() == name]
-    if len(found) > 1 and len(exact) != 1 and len(set(found)) > 1:
-        raise InputError(f"{path}: {' and '.join(found)} may both be {name}; rename one of them to {name}")
-    if found:
-        return exact[0] if exact else found[0]
+    found = find_column(path, header, name)
+    if found is not None:
+        return found
     if name == "z" and len(header) > 1:
         return None
     numbers = sum(re.fullmatch(r"[+-]?[\d.,]+", column) is not None for column in header)

@@ -24,7 +24,10 @@ PROFILE: dict[str, ProfileKind] = {"CONSTANTGRADIENT": "grade", "PARABOLICARC": 
 
 STATION_TOLERANCE = 0.001  # m; tolerance for a station that continues the previous piece
 SCHEMAS = ("IFC4X3", "IFC4X3_TC1", "IFC4X3_ADD1", "IFC4X3_ADD2")
-HEADER = 10_000  # characters at the start of a file that contain its schema
+_END = "END-ISO-10303-21"
+_END_WITHIN = 1000  # characters at the end of a file that contain it
+_STRING_OR_COMMENT = re.compile(r"('(?:[^']|'')*')|/\*.*?\*/", re.DOTALL)
+_STRING_OR_SCHEMA = re.compile(r"'(?:[^']|'')*'|FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'")
 ARM = 1e6  # m; length for computing directions on the map, long enough for coordinates of millions
 MAX_SCALE_ERROR = 1e-6  # greatest difference of a map scale from 1
 
@@ -220,21 +223,26 @@ def _open(path: Path) -> Any:
         raise InputError(f"{path} has the schema {schema}; alignments need IFC 4.3, so export it as IFC4X3_ADD2")
     try:
         # The releases of 4.3 do not differ in the entities read here, and ifcopenshell supports the last one.
-        return ifcopenshell.file.from_string(text.replace(f"'{schema}'", "'IFC4X3_ADD2'", 1))
+        return ifcopenshell.file.from_string(text)
     except (RuntimeError, ifcopenshell.Error) as error:
         raise InputError(f"{path} cannot be read as IFC: {str(error).strip().splitlines()[0]}") from None
 
 
 def _schema(path: Path) -> tuple[str, str]:
-    """Return the schema in the header of a STEP file, and its text."""
+    """Return the schema in the header of a STEP file, and its text with the schema that ifcopenshell is to use."""
     try:
-        text = path.read_text(encoding="latin-1")  # STEP escapes other letters
+        text = path.read_bytes().removeprefix(b"\xef\xbb\xbf").decode("latin-1")  # STEP escapes other letters
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
-    found = re.search(r"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'", text[:HEADER])
+    data = re.search(r"\bDATA\s*;", text)
+    end = len(text) if data is None else data.start()
+    header = _STRING_OR_COMMENT.sub(lambda found: found[1] or "", text[:end])
+    found = next((found for found in _STRING_OR_SCHEMA.finditer(header) if found[1] is not None), None)
     if found is None:
         raise InputError(f"{path} is not an IFC file: its header states no schema")
-    return found[1].upper(), text
+    if _END not in text[-_END_WITHIN:]:
+        raise InputError(f"{path} is truncated: it does not end with {_END}; copy or export it again")
+    return found[1].upper(), f"{header[: found.start(1)]}{SCHEMAS[-1]}{header[found.end(1) :]}{text[end:]}"
 
 
 def _nested(entity: Any, kind: str) -> list[Any]:

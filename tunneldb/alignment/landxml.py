@@ -14,13 +14,16 @@ from xml.etree.ElementTree import Element, ParseError, iterparse
 from tunneldb.alignment.design import Design, StationPiece
 from tunneldb.alignment.elements import PlanElement, clothoid_from_chord
 from tunneldb.alignment.profile import Pvi, profile_elements
-from tunneldb.alignment.units import UNITS
+from tunneldb.alignment.units import UNITS, unit_of
 from tunneldb.errors import InputError
 
 MISMATCH = 0.02  # m between a stated length and that of its points; files are rounded to millimetres or centimetres
 _PVIS = ("PVI", "ParaCurve", "UnsymParaCurve", "CircCurve")
 _READ_ELEMENTS = ("Alignments", "Units", "CoordinateSystem", "CgPoints")
 _SKIPPED_ELEMENTS = ("CrossSects", "CrossSect")  # inside Alignments; they are most of some files
+
+_SAVE_AS = "save it as GeoPackage in the coordinate system of the tunnel (in QGIS: Export, Save Features As)"
+_OTHER_ROOTS = {"kml": _SAVE_AS, "gpx": _SAVE_AS, "FeatureCollection": _SAVE_AS, "ifcXML": "export it as .ifc"}
 
 Point = tuple[float, float]
 
@@ -46,10 +49,13 @@ class LandXml:
     def __init__(self, path: Path, unit: str | None = None) -> None:
         self._path = path
         root = _read(path)
-        stated = self._linear_unit(root)
-        name = unit or stated
+        stated = _linear_unit(root)
+        name = unit or (None if stated is None else unit_of(stated))
         if name is None:
-            raise InputError(f"{path} states no unit of lengths (linearUnit of Units); give it by --axis-unit meter, foot, ...")
+            problem = (
+                "states no unit of lengths (linearUnit of Units)" if stated is None else f"has an unknown unit, {stated!r}"
+            )
+            raise InputError(f"{path} {problem}; give it by --axis-unit meter, foot, USSurveyFoot, ...")
         self._unit = UNITS[name]
         self._unit_note = "" if unit is None or unit == stated else f", as given; the file states {stated or 'none'}"
         self._points = {
@@ -85,16 +91,6 @@ class LandXml:
             self._stationing(alignment, start),
             tuple(notes),
         )
-
-    def _linear_unit(self, root: Element) -> str | None:
-        """Return the name of the unit stated by the file; None if it states none."""
-        for units in (element for element in root.iter() if _tag(element) == "Units"):
-            for system in units:
-                unit = system.get("linearUnit")
-                if unit is not None and unit not in UNITS:
-                    raise InputError(f"{self._path}: its linearUnit {unit!r} is not one of {', '.join(UNITS)}")
-                return unit
-        return None
 
     def _profiles(self, alignment: Element) -> list[Element]:
         return [
@@ -268,8 +264,16 @@ def _read(path: Path) -> Element:
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
     if _tag(element) != "LandXML":
-        raise InputError(f"{path} is XML, but its root is {_tag(element)}, not LandXML")
+        root = _tag(element)
+        advice = _OTHER_ROOTS.get(root, "export the alignment as LandXML 1.2")
+        raise InputError(f"{path} is XML, but its root is {root}, not LandXML; {advice}")
     return element
+
+
+def _linear_unit(root: Element) -> str | None:
+    """Return the unit of lengths that a file states; None if it states none."""
+    systems = (system for element in root.iter() if _tag(element) == "Units" for system in element)
+    return next((system.get("linearUnit") for system in systems), None)
 
 
 def _tag(element: Element) -> str:

@@ -19,7 +19,7 @@ from pyproj.exceptions import CRSError
 from shapely.geometry import MultiPolygon, Polygon
 
 from tunneldb.errors import InputError
-from tunneldb.files import vector_source
+from tunneldb.files import gdal_fault, vector_source
 from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.survey import Survey
 
@@ -110,7 +110,7 @@ def read_polygons(path: Path, survey: Survey, layer: str | None, noun: str) -> P
     try:
         meta, _, wkb, columns = pyogrio.raw.read(vector_source(path), layer=chosen)
     except (DataSourceError, DataLayerError, RuntimeError, UnicodeDecodeError) as error:
-        raise InputError(f"{where}: cannot be read: {_line(error)}") from None
+        raise InputError(f"{where}: cannot be read: {gdal_fault(error)}") from None
     if wkb is None or not len(wkb):
         raise InputError(f"{where} is empty; at least one {noun} is needed for a comparison")
     ids = _ids(meta, columns, len(wkb))

@@ -312,8 +312,8 @@ def load_radiometer(conn: psycopg.Connection[Any], survey: Survey, km: int, valu
     if needs_reference(kind) and reference is None:
         raise UserError(
             f"survey {survey.name} has no reference curve, which is required to correct intensity of kind {kind} for"
-            " distance: add the survey with --reference CSV (range_m,intensity_db), or with --reference auto to estimate it"
-            " from the lining, or use a reflectance dimension"
+            f" distance: tunneldb survey set {survey.name} --reference FILE (CSV with range_m,intensity_db), or --reference"
+            " auto to estimate it from the lining"
         )
     limits = (values[f"intensity.{name}"] for name in ("max_incidence", "max_range", "max_outside"))
     return Radiometer(kind, load_poses(conn, survey, km), reference, *limits)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import textwrap
 from collections import Counter
@@ -21,9 +20,9 @@ from pyogrio.errors import DataLayerError, DataSourceError
 from pyproj import CRS
 from shapely.geometry.base import BaseGeometry
 
-from tunneldb.csvfile import read_header, read_texts
+from tunneldb.csvfile import find_column, read_header, read_texts, row_lines
 from tunneldb.errors import UserError
-from tunneldb.files import vector_source
+from tunneldb.files import gdal_fault, vector_source
 from tunneldb.geometry.crs import fits_srid, is_local, srid_name
 from tunneldb.store.alignment import station_chainages
 from tunneldb.store.survey import Survey
@@ -167,7 +166,7 @@ def _read_csv(conn: psycopg.Connection[Any], survey: Survey, path: Path, columns
 
     def column(name: str) -> list[str] | None:
         theirs = columns.get(name, name)
-        if theirs not in header:
+        if find_column(path, header, theirs) is None:
             if name in columns:
                 raise UserError(f"{path} has no column {theirs}: its header is {','.join(header)!r}")
             return None
@@ -182,7 +181,7 @@ def _read_csv(conn: psycopg.Connection[Any], survey: Survey, path: Path, columns
             f"{path} has no place of the findings: it needs columns wkt or geometry; chainage_from, chainage_to,"
             f" arc_from and arc_to; chainage and arc; or x, y and z (--column OURS=THEIRS); its header is {','.join(header)!r}"
         )
-    lines = _line_numbers(path)
+    lines = row_lines(path)
     for k in range(len(texts["kind"])):
         values = {name: found[k] for name, found in texts.items() if found[k]}
         yield _row(conn, survey, lines[k], values, next((way for way in ways if all(name in values for name in way)), None))
@@ -193,14 +192,6 @@ _WAYS = (("wkt",), ("geometry",), ("chainage_from", "chainage_to", "arc_from", "
 together with the bounding box, which is less precise."""
 
 _PLACES = tuple(name for way in _WAYS for name in way)
-
-
-def _line_numbers(path: Path) -> list[int]:
-    """Return the line of each row that is not empty, as for read_texts."""
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        reader = csv.reader(file)
-        next(reader, None)
-        return [reader.line_num for row in reader if any(cell.strip() for cell in row)]
 
 
 def _row(
@@ -287,7 +278,7 @@ def _read_layer(path: Path, survey: Survey, columns: Mapping[str, str], layer: s
             layer = there[0]
         meta, _, shapes, found = pyogrio.raw.read(source, layer=layer)
     except (DataSourceError, DataLayerError, RuntimeError, ValueError) as error:
-        raise UserError(f"{path}: cannot be read: {str(error).strip().splitlines()[0]}") from None
+        raise UserError(f"{path}: cannot be read: {gdal_fault(error)}") from None
     view = _view(path, meta["crs"], survey)
     names = list(meta["fields"])
     wanted = {ours: columns.get(ours, ours) for ours in COLUMNS}

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tunneldb.alignment.drawing import open_drawing
+from tunneldb.alignment.dxf import open_drawing, unit_name
 from tunneldb.arrays import Float
 from tunneldb.errors import InputError
 
@@ -53,8 +53,8 @@ def read_drawing(path: Path, unit: str | None, layer: str | None) -> DrawnOutlin
         If it can't be read, states no unit and none is given, or another; has several layers of lines and none is chosen; has
         curves that are no arcs; or leaves a gap.
     """
-    drawing = open_drawing(path)
-    metres, notes = _unit(path, drawing.header.get("$INSUNITS", 0), unit)
+    drawing, repaired = open_drawing(path)
+    metres = _unit(path, drawing.header.get("$INSUNITS", 0), unit)
     entities: list[Any] = [one for one in drawing.modelspace() if one.dxftype() in (*_PLAIN, *_POLYLINES, *_CURVES)]
     chosen = _layer(path, sorted({one.dxf.layer for one in entities}), layer)
     elements, names = [], []
@@ -74,22 +74,24 @@ def read_drawing(path: Path, unit: str | None, layer: str | None) -> DrawnOutlin
         raise InputError(f"{path}: layer {chosen!r} has no line with a length")
     scaled = np.array(elements)
     scaled[:, :4] *= metres
-    return DrawnOutline(*_joined(path, scaled, names), metres, notes)
+    return DrawnOutline(*_joined(path, scaled, names), metres, (repaired,) if repaired else ())
 
 
-def _unit(path: Path, code: int, unit: str | None) -> tuple[float, tuple[str, ...]]:
-    """Return the unit of the drawing in metres, and a note; it is never guessed."""
+def _unit(path: Path, code: int, unit: str | None) -> float:
+    """Return the unit of the drawing in metres; it is never guessed."""
     from ezdxf import units
 
     stated = {units.M: "m", units.CM: "cm", units.MM: "mm", units.FT: "ft", units.IN: "in"}.get(code)
     if unit is None:
         if stated is None:
-            says = f"its unit is {units.decode(code)}" if code else "it states no unit"
+            says = f"its unit is {unit_name(code)}" if code else "it states no unit"
             raise InputError(f"{path}: {says} ($INSUNITS {code}); say what its lengths are by --unit {'|'.join(METRES)}")
-        return METRES[stated], ()
+        return METRES[stated]
     if stated is not None and stated != unit:
-        raise InputError(f"{path}: it states {stated} ($INSUNITS {code}), --unit says {unit}; leave one out")
-    return METRES[unit], ()
+        raise InputError(
+            f"{path}: it states {stated} ($INSUNITS {code}), --unit says {unit}; omit --unit, or set the drawing's unit"
+        )
+    return METRES[unit]
 
 
 def _layer(path: Path, names: list[str], wanted: str | None) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 import shapely
 
 from tunneldb.arrays import Float, Int64
-from tunneldb.csvfile import read_csv
+from tunneldb.csvfile import decoded, read_csv
 from tunneldb.errors import UserError
 from tunneldb.pipeline.profile_drawing import METRES, read_drawing
 from tunneldb.shape.outline import TOLERANCE, Outline
@@ -95,7 +96,7 @@ def _read_vertices(path: Path, origin: tuple[float, float]) -> ReadProfile:
         if radius[row] != 0.0 and 2.0 * abs(radius[row]) < chord[row] * (1.0 - 1e-6):
             raise table.error(
                 row, f"radius {radius[row]:g} is too small for an arc to the next vertex, {chord[row]:.4f} m away; "
-                f"it takes {chord[row] / 2.0:.4f} or more, and an arc of more than half a circle two lines"
+                f"it takes {np.ceil(5e3 * chord[row]) / 1e4:.4f} or more, and an arc of more than half a circle two lines"
             )  # fmt: skip
     if np.hypot(*(vertices[-1] - vertices[0])) >= TOLERANCE and radius[-1] != 0.0:
         raise table.error(len(table) - 1, f"radius {radius[-1]:g} leads nowhere: this is the last vertex; 0 there")
@@ -123,18 +124,19 @@ def _read_points(path: Path, origin: tuple[float, float], unit: str | None) -> R
     if unit is None:
         raise UserError(f"{path}: points state no unit; say it by --unit {'|'.join(METRES)}")
     try:
-        lines = path.read_bytes().decode("latin-1").splitlines()
+        lines = decoded(path)[0].splitlines()
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from None
     rows = []
     for number, line in enumerate(lines, start=1):
-        cells = line.replace(",", " ").split()
-        if not cells or cells[0].startswith("#"):
+        cells = re.split(r"\s*[;,\s]\s*", line.strip(" \t\x1a"))
+        if not cells[0] or cells[0].startswith("#"):
             continue
         try:
             right, up = (float(cell) for cell in cells)
         except ValueError:
-            raise UserError(f"{path}, line {number}: {line.strip()[:60]!r} is not two numbers, right and up") from None
+            comma = "; write decimals with a point" if line.count(",") > 1 else ""
+            raise UserError(f"{path}, line {number}: {line.strip()[:60]!r} is not two numbers, right and up{comma}") from None
         rows.append((right, up))
     if len(rows) < 8:
         raise UserError(f"{path}: {len(rows)} points make no outline; it takes 8")

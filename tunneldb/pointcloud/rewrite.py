@@ -20,7 +20,7 @@ from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.e57 import is_e57
 from tunneldb.pointcloud.formats.e57_records import E57Records
 from tunneldb.pointcloud.formats.faults import decoding
-from tunneldb.pointcloud.formats.las import KIND, read_las_header
+from tunneldb.pointcloud.formats.las import KIND, is_pointwise, read_las_header, seek
 from tunneldb.pointcloud.formats.las_header import Head, read_head
 from tunneldb.pointcloud.formats.las_records import FORMAT_OF, coordinates, fields, record_size, upgraded
 from tunneldb.pointcloud.formats.laz import writing
@@ -218,6 +218,7 @@ def _read(
     backends = (LazBackend.Lazrs,) if threads() == 1 else (LazBackend.LazrsParallel, LazBackend.Lazrs)
     with decoding(path, KIND):
         las = laspy.open(path, laz_backend=backends, read_evlrs=False, decompression_selection=selection)
+        pointwise = is_pointwise(las.header)
     with las:
         done = at = 0
         while done < count:
@@ -226,7 +227,7 @@ def _read(
                 continue
             with decoding(path, KIND):
                 if at != done:
-                    las.seek(done)
+                    seek(las, done, pointwise)
                 array = las.read_points(size).array
             if len(array) == 0:
                 raise InputError(f"{path}: truncated: {done} points read, but its header states {count}")

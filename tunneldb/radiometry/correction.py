@@ -112,8 +112,8 @@ def observe(
         reference = None
     elif reference is None:
         raise UserError(
-            f"intensity of kind {kind} needs a reference curve: add the survey with --reference CSV"
-            " (columns range_m,intensity_db)"
+            f"intensity of kind {kind} needs a reference curve: tunneldb survey set SURVEY --reference FILE (CSV with"
+            " range_m,intensity_db)"
         )
     x, y, z = (scanner - points).T
     nx, ny, nz = normal.T

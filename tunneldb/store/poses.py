@@ -140,4 +140,4 @@ def _xyz(rows: Any) -> Float:
 
 def _no_positions(survey: Survey) -> UserError:
     kind = "trajectory" if survey.platform == "mobile" else "stations"
-    return UserError(f"survey {survey.name} has no {kind}: add the survey again with --{kind}")
+    return UserError(f"survey {survey.name} has no {kind}: tunneldb survey set {survey.name} --{kind} FILE")

@@ -14,7 +14,7 @@ import shapely
 from tunneldb.arrays import Bool, Float
 from tunneldb.classification.classes import PointClass
 from tunneldb.classification.objects.spacing import Spacing
-from tunneldb.csvfile import read_csv, read_header
+from tunneldb.csvfile import find_column, read_csv, read_header
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
@@ -108,7 +108,7 @@ def read_track(path: Path, axis: Alignment) -> Tracks:
     UserError
         If it can't be read, doesn't grow along the axis, or has one row.
     """
-    columns = ("x", "y", "z") if "x" in read_header(path) else ("chainage", "right", "up")
+    columns = ("x", "y", "z") if find_column(path, read_header(path), "x") else ("chainage", "right", "up")
     table = read_csv(path, (*columns, "cant"), {"cant": 0.0}, {})
     places = table.columns(columns)
     if columns[0] == "x":

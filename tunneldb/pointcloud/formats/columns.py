@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from tunneldb.csvfile import decoded, find_column
 from tunneldb.errors import InputError
 
 COORDINATES = ("x", "y", "z")
@@ -53,6 +54,9 @@ def columns_of(path: Path, names: Sequence[str], source: str) -> tuple[str, ...]
         If one of x, y and z is missing, or a name is repeated.
     """
     columns = tuple(name if name == SKIPPED else meaning_of(name) for name in names)
+    if not set(COORDINATES) & set(columns):
+        other_names = {find_column(path, names, name): name for name in COORDINATES}
+        columns = tuple(other_names.get(name, meaning) for name, meaning in zip(names, columns, strict=True))
     missing = [name for name in COORDINATES if name not in columns]
     if missing:
         raise InputError(
@@ -90,10 +94,10 @@ def given_names(path: Path) -> tuple[list[str], str] | None:
     if file is None:
         return None
     try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: cannot be read as column names: {error}") from None
-    names = split_names(text)
+        text, _ = decoded(file)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read as column names: {error.strerror}") from None
+    names = split_names(text.strip().strip("'"))  # cmd.exe writes the quotes of echo
     if not names:
         raise InputError(f"{file}: contains no column names; write them on one line: x y z intensity")
     return names, str(file)

@@ -16,9 +16,9 @@ from pyproj.exceptions import CRSError
 from tunneldb.arrays import Float
 from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, line_of, require_dimension
-from tunneldb.pointcloud.formats.las_bounds import check_envelope
+from tunneldb.pointcloud.formats.las_bounds import POINTWISE, check_envelope
 from tunneldb.pointcloud.formats.laz_chunks import VariedChunks
-from tunneldb.pointcloud.points import Ranges, Raw, ScanHeader
+from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
 from tunneldb.threads import threads
 
 KIND = "a LAS or LAZ"
@@ -109,9 +109,10 @@ def read_las(
             _check_scales(path, header.scales, header.offsets)
             take = _Taker(path, header, dimension, colours)
             las.decompression_selection = take.selection()
+            pointwise = is_pointwise(header)
             varied = VariedChunks(source, header, take.selection()) if VariedChunks.has(header) else None
         for begin, end in check_ranges(path, ranges, int(header.point_count)):
-            records = varied.read(begin, end, size) if varied else _read(las, begin, end, size)
+            records = varied.read(begin, end, size) if varied else _read(las, begin, end, size, pointwise)
             done = begin
             while done < end:
                 with decoding(path, KIND):
@@ -122,11 +123,30 @@ def read_las(
                 yield raw
 
 
-def _read(las: laspy.LasReader, begin: int, end: int, size: int) -> Iterator[laspy.ScaleAwarePointRecord]:
-    if las.points_read != begin:
-        las.seek(begin)
+def _read(las: laspy.LasReader, begin: int, end: int, size: int, pointwise: bool) -> Iterator[laspy.ScaleAwarePointRecord]:
+    seek(las, begin, pointwise)
     for at in range(begin, end, size):
         yield las.read_points(min(size, end - at))
+
+
+def seek(las: laspy.LasReader, point: int, pointwise: bool) -> None:
+    """Go to a point of a file; where `is_pointwise`, the points before it are read and discarded."""
+    if las.points_read == point:
+        return
+    if not pointwise:
+        las.seek(point)
+        return
+    if las.points_read > point:
+        raise ValueError(f"point {point} is before point {las.points_read}, and the file has no chunk table")
+    while las.points_read < point:
+        las.read_points(min(CHUNK, point - las.points_read))
+
+
+def is_pointwise(header: laspy.LasHeader) -> bool:
+    """Return True for LAZ without a chunk table, as LASzip wrote it before version 2.0; only before points are read."""
+    if not header.are_points_compressed:
+        return False
+    return int.from_bytes(header.vlrs.get("LasZipVlr")[0].record_data[:2], "little") == POINTWISE
 
 
 class _Taker:

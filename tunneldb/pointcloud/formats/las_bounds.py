@@ -15,6 +15,9 @@ from pathlib import Path
 _VLR_BYTES = 54
 _LASZIP_ID = 22204
 _VARIABLE_CHUNKS = 0xFFFFFFFF
+POINTWISE = 1
+"""Compressor of LASzip before 2.0: one run of points, without a chunk table."""
+
 _STREAMED = -1  # the offset of the chunk table is in the file's last 8 bytes
 _MAX_CHUNK = 1 << 32  # bytes
 _BOX_AT = 179
@@ -72,6 +75,9 @@ def check_envelope(path: Path) -> None:
             if number == _LASZIP_ID:
                 file.seek(place)
                 body = file.read(length)
+                (compressor,) = struct.unpack_from("<H", body, 0)
+                if compressor == POINTWISE:
+                    return
                 (chunk,) = struct.unpack_from("<I", body, 12)
                 (items,) = struct.unpack_from("<H", body, 32)
                 if sum(struct.unpack_from("<HHH", body, 34 + 6 * item)[1] for item in range(items)) != record:

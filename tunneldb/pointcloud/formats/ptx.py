@@ -19,7 +19,7 @@ from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.faults import decoding
 from tunneldb.pointcloud.formats.scans import PosedScan, scan_number
 from tunneldb.pointcloud.formats.text import CloudBuilder, TextCloud, TextScan
-from tunneldb.pointcloud.formats.text_lines import TextLines
+from tunneldb.pointcloud.formats.text_lines import TextLines, decimal_comma
 from tunneldb.pointcloud.formats.xyz import LEICA
 
 KIND = "a PTX"
@@ -90,7 +90,8 @@ def _read_head(path: Path, lines: TextLines) -> tuple[int, int, int, Float] | No
             numbers = []
         if len(numbers) != count or not np.isfinite(numbers).all():
             what = "a number" if count == 1 else f"{count} numbers"
-            raise InputError(f"{path}, line {lines.line - 1}: {text[:60]!r}, but the header of a scan has {what} here")
+            comma = "; write decimals with a point" if decimal_comma(text.split()) else ""
+            raise InputError(f"{path}, line {lines.line - 1}: {text[:60]!r}, but the header of a scan has {what} here{comma}")
         values.append(numbers)
         if len(values) < len(_HEADER):
             text = lines.text()

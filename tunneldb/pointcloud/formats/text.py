@@ -84,7 +84,8 @@ class TextTable:
 
     def turned(self) -> Float:
         """Return coordinates rotated into the file's frame, without the scan's position (n, 3), m."""
-        return self.own() @ self.scan.rotation.T
+        with np.errstate(invalid="ignore"):  # infinite coordinates become NaN
+            return self.own() @ self.scan.rotation.T
 
 
 @dataclass(frozen=True)
@@ -157,8 +158,9 @@ class CloudBuilder:
             if not len(table):
                 continue
             turned = table.turned()
-            self.low = np.fmin(self.low, np.fmin.reduce(turned) + scan.position)
-            self.high = np.fmax(self.high, np.fmax.reduce(turned) + scan.position)
+            placed = turned[np.isfinite(turned).all(axis=1)] + scan.position
+            self.low = np.minimum(self.low, placed.min(axis=0, initial=np.inf))
+            self.high = np.maximum(self.high, placed.max(axis=0, initial=-np.inf))
             self.blocks.append(Block(self.points, len(table), offset, len(data), line, len(self.scans)))
             self.points += len(table)
         self.scans.append(scan)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import codecs
 import io
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
@@ -11,11 +13,26 @@ from typing import Self
 import numpy as np
 
 from tunneldb.arrays import Float
+from tunneldb.csvfile import NO_NUMBER, number_advice
 from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.columns import SKIPPED
 
 BLOCK_BYTES = 1 << 24
 MAX_LINE_BYTES = 1 << 16  # bytes of a line; text files do not have longer ones
+COMMENTS = ("#", "//")
+
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
+_TIDIED = (
+    (re.compile(rb"(?m)^[ \t]*(?:#|//)[^\n]*"), b""),
+    (re.compile(rb'["\x1a\r]'), b""),
+    (re.compile(rb"\xc2\xa0"), b" "),
+    (re.compile(rb"(?i)(?<![^\s;,])([+-]?)1\.#inf0*(?![^\s;,])"), rb"\1inf"),
+    (re.compile(rb"(?i)(?<![^\s;,])" + NO_NUMBER.pattern.encode() + rb"(?![^\s;,])"), b"nan"),
+)
+"""Replacements in lines that are not plain numbers: comments, quotes, Windows' end mark, no-break spaces, missing numbers."""
+
+_EMPTY = re.compile(rb"(?m)(?:^|(?<=[;,]))[ \t]*(?=[;,]|(?<=[;,])$)")
+"""Empty values between separators."""
 
 
 class TextLines:
@@ -64,9 +81,14 @@ class TextLines:
         data, count = self.take(1)
         if not count:
             return None
+        if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            raise InputError(f"{self.path}: its text is UTF-16; save it as UTF-8")
         if b"\0" in data:
             raise InputError(f"{self.path}, line {self.line - 1}: not a text file")
-        return data.decode("utf-8-sig", "replace").strip()
+        try:
+            return data.decode("utf-8-sig").strip()
+        except UnicodeDecodeError:
+            return data.decode("cp1252", "replace").strip()
 
     def skip(self, count: int) -> None:
         """Skip lines."""
@@ -90,29 +112,54 @@ class TextLines:
         self._ends = np.flatnonzero(np.frombuffer(self._buffer, np.uint8) == ord("\n")) + 1
         self._at = 0
         if self._buffer and (not len(self._ends) or self._ends[0] > MAX_LINE_BYTES):
+            if b"\r" in self._buffer and b"\0" not in self._buffer:
+                raise InputError(f"{self.path}: its lines end with CR only; save it with line ends LF or CR LF")
             raise InputError(f"{self.path}, line {self.line}: no line end within {MAX_LINE_BYTES} bytes: not a text file")
         return bool(len(self._ends))
 
 
 def divider_of(line: str) -> str | None:
-    """Return the separator of the values of a line: semicolon, comma, or None for blanks and tabs."""
-    return next((mark for mark in (";", ",") if mark in line), None)
+    """Return the separator of the values of a line: semicolon, comma, or None for blanks and tabs.
+
+    Commas inside numbers that are separated by blanks or tabs are decimal commas.
+    """
+    if ";" in line or "," not in line:
+        return ";" if ";" in line else None
+    values = line.split()
+    return None if len(values) > 1 and decimal_comma(values) else ","
+
+
+def decimal_comma(values: Sequence[str]) -> str | None:
+    """Return the first value with a decimal comma; None if there is none, or one is not a number."""
+    commas = [value for value in values if _DECIMAL_COMMA.fullmatch(value.strip())]
+    return commas[0] if commas and all(value in commas or _is_number(value) for value in values) else None
+
+
+def split_values(line: str) -> tuple[list[str], str | None]:
+    """Return the values of a line, stripped and without quotes, and their separator; without an empty one at the end."""
+    divider = divider_of(line)
+    values = [value.strip().strip('"') for value in line.split(divider)]
+    return values[:-1] if divider and len(values) > 1 and not values[-1] else values, divider
 
 
 def are_numbers(line: str, columns: Sequence[str] = ()) -> bool:
     """Return True if a line has values and all are numbers; values of skipped columns may be words."""
-    values = line.split(divider_of(line))
+    values, _ = split_values(line)
     if len(values) == len(columns):
         values = [value for value, name in zip(values, columns, strict=True) if name != SKIPPED]
+    return bool(values) and all(map(_is_number, values))
+
+
+def _is_number(text: str) -> bool:
     try:
-        list(map(float, values))
+        float(text)
     except ValueError:
-        return False
-    return bool(values)
+        return NO_NUMBER.fullmatch(text) is not None
+    return True
 
 
 def parse(path: Path, block: bytes, first: int, divider: str | None, width: int, used: tuple[int, ...]) -> Float:
-    """Parse the numbers of a block of lines; blank lines are ignored.
+    """Parse the numbers of a block of lines; blank lines and comments are ignored, and missing numbers are NaN.
 
     Parameters
     ----------
@@ -140,16 +187,34 @@ def parse(path: Path, block: bytes, first: int, divider: str | None, width: int,
     """
     if not block.strip():
         return np.empty((0, len(used)))
+    # If all columns are numbers, all are read, so that lines with more values are detected.
+    chosen = None if used == tuple(range(width)) else used
     try:
-        text = io.StringIO(block.decode("ascii"))
-        # If all columns are numbers, all are read, so that lines with more values are detected.
-        chosen = None if used == tuple(range(width)) else used
-        values = np.loadtxt(text, np.float64, comments=None, delimiter=divider, ndmin=2, usecols=chosen)
-    except (ValueError, UnicodeDecodeError) as error:
-        raise _fault(path, block, first, divider, width, used) or InputError(f"{path}: {error}") from None
+        values = _numbers(block, divider, chosen)
+    except (ValueError, UnicodeDecodeError):
+        block = _tidied(block, divider)
+        if not block.strip():
+            return np.empty((0, len(used)))
+        try:
+            values = _numbers(block, divider, chosen)
+        except (ValueError, UnicodeDecodeError) as error:
+            raise _fault(path, block, first, divider, width, used) or InputError(f"{path}: {error}") from None
     if chosen is None and values.shape[1] != width:
         raise _fault(path, block, first, divider, width, used) or InputError(f"{path}: lines have {values.shape[1]} values")
     return values
+
+
+def _numbers(block: bytes, divider: str | None, columns: tuple[int, ...] | None) -> Float:
+    text = io.StringIO(block.decode("ascii"))
+    return np.loadtxt(text, np.float64, comments=None, delimiter=divider, ndmin=2, usecols=columns)
+
+
+def _tidied(block: bytes, divider: str | None) -> bytes:
+    """Return lines without a byte order mark, comments and quotes, and with nan for missing numbers; as many lines."""
+    block = block.removeprefix(codecs.BOM_UTF8)
+    for pattern, replacement in _TIDIED:
+        block = pattern.sub(replacement, block)
+    return block if divider is None else _EMPTY.sub(b"nan", block)
 
 
 def _fault(path: Path, block: bytes, first: int, divider: str | None, width: int, used: tuple[int, ...]) -> InputError | None:
@@ -163,8 +228,8 @@ def _fault(path: Path, block: bytes, first: int, divider: str | None, width: int
             try:
                 float(values[place])
             except ValueError:
-                comma = "; write decimals with a point" if divider == ";" and "," in values[place] else ""
-                return InputError(f"{path}, line {number}: {_short(values[place])!r} is not a number{comma}")
+                advice = number_advice(values[place].strip())
+                return InputError(f"{path}, line {number}: {_short(values[place])!r} is not a number{advice}")
     return None
 
 

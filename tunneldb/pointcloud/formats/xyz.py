@@ -8,14 +8,23 @@ Source: Leica Geosystems, *Cyclone* (PTS: a line with the number of points, then
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 from tunneldb.errors import InputError
-from tunneldb.pointcloud.formats.columns import COORDINATES, columns_of, given_names, names_file, own_names, split_names
+from tunneldb.pointcloud.formats.columns import (
+    COORDINATES,
+    SKIPPED,
+    columns_of,
+    given_names,
+    names_file,
+    own_names,
+    split_names,
+)
 from tunneldb.pointcloud.formats.faults import decoding
 from tunneldb.pointcloud.formats.text import KIND, CloudBuilder, TextCloud, TextScan
-from tunneldb.pointcloud.formats.text_lines import TextLines, are_numbers, divider_of
+from tunneldb.pointcloud.formats.text_lines import COMMENTS, TextLines, are_numbers, decimal_comma, divider_of, split_values
 
 COLOURS = ("red", "green", "blue")
 LEICA = {
@@ -52,8 +61,22 @@ def _read_table(path: Path, version: tuple[int, int], named: tuple[Path, int] | 
         if path.suffix.lower() == ".pts":
             _read_pts(builder)
         else:
-            builder.add(_layout(path, lines), None)
+            scan, count = _layout(path, lines)
+            builder.add(scan, None)
+            if count is not None and builder.points != count.points:
+                raise InputError(
+                    f"{path}: line {count.line} states {count.points} points, but {builder.points} follow; if the file is "
+                    "complete, remove that line"
+                )
         return builder.cloud()
+
+
+@dataclass(frozen=True)
+class _Count:
+    """Number of points that a line states."""
+
+    line: int
+    points: int
 
 
 def _read_pts(builder: CloudBuilder) -> None:
@@ -77,16 +100,21 @@ def _read_pts(builder: CloudBuilder) -> None:
             raise InputError(f"{path}: truncated: line {at} states {count} points, but {found} follow")
 
 
-def _layout(path: Path, lines: TextLines) -> TextScan:
-    """Return the columns of a table, and consume the lines before its points."""
+def _layout(path: Path, lines: TextLines) -> tuple[TextScan, _Count | None]:
+    """Return the columns of a table and the number of points that it states, and consume the lines before its points."""
     given = given_names(path)
     remarks: list[str] = []
     header: str | None = None
+    count: _Count | None = None
     while (text := lines.text()) is not None:
         if not text:
             continue
-        if text.startswith(("#", "//")) and len(remarks) < _MAX_COMMENTS:
+        if text.startswith(COMMENTS) and len(remarks) < _MAX_COMMENTS:
             remarks.append(text)
+        elif text.isdecimal() and count is None:
+            count = _Count(lines.line - 1, int(text))
+        elif comma := decimal_comma(text.split(divider_of(text))):
+            raise InputError(f"{path}, line {lines.line - 1}: {comma!r} is not a number; write decimals with a point")
         elif header is None and not are_numbers(text, () if given is None else given[0]):
             header = text
         else:
@@ -94,9 +122,10 @@ def _layout(path: Path, lines: TextLines) -> TextScan:
     if text is None:
         raise InputError(f"{path}: the file holds no points")
     lines.back()
-    divider = divider_of(text)
-    width = len(text.split(divider))
-    return TextScan(_columns(path, lines.line, width, text, given, header, remarks), divider)
+    values, divider = split_values(text)
+    columns = _columns(path, lines.line, len(values), text, given, header, remarks)
+    empty_end = len(text.split(divider)) - len(values)
+    return TextScan((*columns, *[SKIPPED] * empty_end), divider), count
 
 
 def _columns(
@@ -124,5 +153,9 @@ def _columns(
             f"echo 'x y z …' > {own_names(path)}"
         )
     if len(names) != width:
-        raise InputError(f"{path}, line {line}: {width} values, but {source} names {len(names)} columns: {', '.join(names)}")
+        comma = "write decimals with a point; or " if divider_of(first) == "," and width > len(names) else ""
+        raise InputError(
+            f"{path}, line {line}: {width} values, but {source} names {len(names)} columns: {', '.join(names)}; {comma}"
+            f"write {width} names, - for a column to leave out, to {own_names(path)}"
+        )
     return columns_of(path, names, source)
