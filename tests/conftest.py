@@ -18,7 +18,7 @@ from psycopg.conninfo import make_conninfo
 from support import blas  # noqa: F401
 from support.databases import SETTINGS as DATABASES
 from support.databases import Copies, create_database
-from support.system import missing
+from support.system import memory_disk, missing
 
 from tunneldb.database import connect, install, open_connection
 from tunneldb.database.server import Server
@@ -28,7 +28,13 @@ pytest_plugins = ["support.example_survey"]
 
 TEMPLATE = "tunneldb_template"
 # Nothing of value is in it: no need to wait for the disk, and small enough for two workers on a small machine.
-TEST_SETTINGS = {"fsync": "off", "synchronous_commit": "off", "full_page_writes": "off", "shared_buffers": "128MB"} | DATABASES
+TEST_SETTINGS = {
+    "fsync": "off",
+    "synchronous_commit": "off",
+    "full_page_writes": "off",
+    "shared_buffers": "128MB",
+    "max_wal_size": "256MB",
+} | DATABASES
 
 # What a script runs in the background has Ctrl-C ignored, and so would all that tests start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -58,7 +64,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> Iterator[None]:
 @pytest.fixture(scope="session", autouse=True)
 def _own_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Keep every test away from the user's own embedded server and database."""
-    home = Path(tempfile.mkdtemp(prefix="tunneldb-tests-"))
+    home = Path(tempfile.mkdtemp(prefix="tunneldb-tests-", dir=memory_disk()))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TUNNELDB_HOME", str(home))
         patch.delenv("TUNNELDB_DSN", raising=False)

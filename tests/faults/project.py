@@ -18,6 +18,7 @@ from click.testing import CliRunner
 from faults.scene import NAME, SRID, THIN, Scene
 from psycopg import sql
 from psycopg.conninfo import make_conninfo
+from support.system import memory_disk
 
 from tunneldb.cli.main import main
 from tunneldb.database import connect
@@ -43,7 +44,7 @@ class Project:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.home = Path(tempfile.mkdtemp(prefix="tunneldb-faults-"))
+        self.home = Path(tempfile.mkdtemp(prefix="tunneldb-faults-", dir=memory_disk()))
         self.scratch = self.home / "scratch"
         self.scratch.mkdir()
         self._session: psycopg.Connection[Any] | None = None

@@ -20,6 +20,9 @@ SETTINGS = {"track_commit_timestamp": "on", "autovacuum": "off"}
 PATIENCE = 5.0
 """Longest wait for closed sessions to end, s: on a busy machine the server notices late that a client has gone."""
 
+BY_FILES = 150_000
+"""First version of the server that copies databases block by block, through its log, unless it is asked for files."""
+
 Sequences = dict[tuple[str, str], tuple[int, bool]]
 
 _numbers = itertools.count(1)
@@ -28,6 +31,8 @@ _numbers = itertools.count(1)
 def create_database(server_dsn: str, name: str, template: str | None = None) -> None:
     command = sql.SQL("CREATE DATABASE {} TEMPLATE {}").format(sql.Identifier(name), sql.Identifier(template or "template0"))
     with psycopg.connect(server_dsn, autocommit=True) as connection:
+        if connection.info.server_version >= BY_FILES:
+            command += sql.SQL(" STRATEGY file_copy")
         connection.execute(command)
 
 

@@ -30,6 +30,7 @@ from psycopg import sql
 from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
 import tunneldb
+from support.databases import create_database
 from support.fuzz.cases import Case, make_case, right_cases, verb_of
 from tunneldb.cli.main import main
 
@@ -92,17 +93,16 @@ class Fresh:
 
     def __exit__(self, *error: object) -> None:
         """Drop it."""
-        self._execute("DROP DATABASE IF EXISTS {name} WITH (FORCE)")
+        self._drop()
 
     def renew(self) -> None:
         """Drop the copy and make another."""
-        self._execute("DROP DATABASE IF EXISTS {name} WITH (FORCE)", "CREATE DATABASE {name} TEMPLATE {template}")
+        self._drop()
+        create_database(self._server, self._name, self._template)
 
-    def _execute(self, *commands: str) -> None:
+    def _drop(self) -> None:
         with psycopg.connect(self._server, autocommit=True) as conn:
-            for command in commands:
-                names = {"name": sql.Identifier(self._name), "template": sql.Identifier(self._template)}
-                conn.execute(sql.SQL(command).format(**{k: v for k, v in names.items() if f"{{{k}}}" in command}))
+            conn.execute(sql.SQL("DROP DATABASE IF EXISTS {} WITH (FORCE)").format(sql.Identifier(self._name)))
 
 
 def run_cases(seed: int, numbers: Iterable[int], seconds: float, seeds: Path, fresh: Fresh) -> list[Outcome]:
