@@ -7,24 +7,18 @@ the header that are blank or begin with # or // are skipped; a header may begin 
 
 from __future__ import annotations
 
-import codecs
 import csv
 import io
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tunneldb.arrays import Float, Int64
+from tunneldb.csvsheet import Sheet, opened
 from tunneldb.errors import InputError
-
-if TYPE_CHECKING:
-    import _csv
 
 MAX_MEASUREMENT = 1e12
 """Greatest measured value that is accepted; seconds since 1970 and coordinates are smaller."""
@@ -41,12 +35,9 @@ _ALIASES = {
 }
 """Other names of columns, normalised."""
 
-_SEPARATORS = (";", "\t", ",", " ")
-_COMMENTS = ("#", "//")
 _UNIT = re.compile(r"[\[(](?:m|s|db)[\])]$")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d*(?:[eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:[ '’.,\u00a0\u202f]\d{3})+(?:[.,]\d+)?")
-_BINARY = re.compile("[\0-\x08\x0e-\x19\x1b-\x1f]")
 _FORMULA = re.compile(r"'*(?:[=@\t\r]|[+-](?![\d.+-]*$))")  # also with apostrophes, so that guarding can be undone
 _GUARD = "'"
 
@@ -128,7 +119,7 @@ def read_header(path: Path) -> list[str]:
     InputError
         If the file cannot be read or is empty.
     """
-    with _opened(path) as sheet:
+    with opened(path) as sheet:
         if not sheet.header:
             raise InputError(f"{path} is empty; write a header with its column names, for example x,y,z")
         return sheet.header
@@ -170,21 +161,37 @@ def read_texts(path: Path, name: str) -> list[str]:
     InputError
         If the file cannot be read, has no such column, or a row is longer or shorter than the header; names file and line.
     """
-    with _opened(path) as sheet:
+    with opened(path) as sheet:
         index = _indices(path, sheet.header, [name], {}, {})[name]
         texts = []
         for line, row in sheet.rows():
             text = _bare(row[index].strip())
-            if sheet.foreign and not text.isascii():
-                raise InputError(f"{path}, line {line}: {text!r} is not written in UTF-8; save the table as CSV UTF-8")
+            sheet.require_unicode(line, text)
             texts.append(text)
         return texts
 
 
 def row_lines(path: Path) -> list[int]:
     """Return the line number of each row, from 1; the rows are those of `read_csv`."""
-    with _opened(path) as sheet:
+    with opened(path) as sheet:
         return [line for line, _ in sheet.rows()]
+
+
+def read_rows(path: Path) -> list[list[str]]:
+    """Return the cells of each row, as many as in the header; the rows are those of `read_csv`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read; names file and line.
+    """
+    with opened(path) as sheet:
+        rows = []
+        for line, row in sheet.rows():
+            for text in row:
+                sheet.require_unicode(line, text)
+            rows.append(row)
+        return rows
 
 
 def read_csv(
@@ -207,137 +214,14 @@ def read_csv(
         If the file cannot be read, a column is missing, or a value is not a finite number; names file, line and
         value.
     """
-    with _opened(path) as sheet:
+    with opened(path) as sheet:
         rows, lines = _read_rows(sheet, names, default or {}, hint or {})
     values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
     return CsvTable(path, tuple(names), values, np.array(lines, dtype=np.int64))
 
 
-@dataclass(frozen=True)
-class _Sheet:
-    """Opened CSV file.
-
-    Attributes
-    ----------
-    path : Path
-    header : list of str
-        Column names; empty if the file is.
-    body : reader
-        Rows below the header.
-    skipped : int
-        Lines above the first line of ``body``.
-    decimal_comma : bool
-        True if a comma may be the decimal point.
-    foreign : bool
-        True if the text is not Unicode, so that letters beyond ASCII may be wrong.
-    """
-
-    path: Path
-    header: list[str]
-    body: _csv.Reader
-    skipped: int
-    decimal_comma: bool
-    foreign: bool
-
-    def rows(self) -> Iterator[tuple[int, list[str]]]:
-        """Yield line number and cells of each row that is not blank or a comment; it is as long as the header.
-
-        Raises
-        ------
-        InputError
-            If a row is longer or shorter.
-        """
-        for row in self.body:
-            while len(row) > len(self.header) and not row[-1].strip():
-                row.pop()
-            if not any(cell.strip(" \t\x1a") for cell in row):
-                continue
-            line = self.skipped + self.body.line_num
-            if len(row) == len(self.header):
-                yield line, row
-            elif not row[0].lstrip().startswith(_COMMENTS):
-                comma = "" if self.decimal_comma or len(row) < len(self.header) else "; write decimals with a point"
-                raise InputError(
-                    f"{self.path}, line {line}: {len(row)} values, but the header has {len(self.header)} columns{comma}"
-                )
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[_Sheet]:
-    """Open a CSV file; raise an error of one line if it cannot be read."""
-    try:
-        text, foreign = decoded(path)
-        yield _sheet(path, text, foreign)
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from None
-    except csv.Error as error:
-        raise InputError(f"{path} is not a CSV file: {error}") from None
-
-
-def decoded(path: Path) -> tuple[str, bool]:
-    """Return the text of a file, and True if it is not Unicode but Windows-1252.
-
-    Raises
-    ------
-    InputError
-        If it is not text.
-    OSError
-    """
-    data, foreign = path.read_bytes(), False
-    try:
-        text = data.decode("utf-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig")
-    except UnicodeDecodeError:
-        text, foreign = data.decode("cp1252", "replace"), True
-    if _BINARY.search(text):
-        raise InputError(f"{path} is not a text file; save the table as CSV UTF-8")
-    return text, foreign
-
-
-def _sheet(path: Path, text: str, foreign: bool) -> _Sheet:
-    """Find the header and the separator of a table."""
-    lines = io.StringIO(text, newline="")
-    comment, header, skipped = "", "", 0
-    for line in lines:
-        bare = line.strip()
-        if bare.startswith(_COMMENTS):
-            comment = bare
-        elif bare and not bare.lower().startswith("sep="):
-            header = line
-            break
-        skipped += 1
-    separator = next((one for one in _SEPARATORS if one in header.strip()), ",")
-
-    def cells(content: str) -> list[str]:
-        return [cell.strip() for cell in next(_reader([content], separator), [])]
-
-    names, body = cells(header), chain([header] if header else [], lines)
-    if comment and any(map(_is_number, names)):  # the header begins with #
-        whole, without = cells(comment), cells(comment.lstrip("#/ "))
-        names = without if len(without) == len(names) else whole
-    else:
-        next(body, None)
-        skipped += 1
-    while names and not names[-1]:
-        names.pop()
-    return _Sheet(path, names, _reader(body, separator), skipped, separator != ",", foreign)
-
-
-def _reader(lines: Iterable[str], separator: str) -> _csv.Reader:
-    if separator == " ":  # several spaces may align columns
-        lines = (" ".join(line.split()) for line in lines)
-    return csv.reader(lines, delimiter=separator)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text.replace(",", "."))
-    except ValueError:
-        return False
-    return True
-
-
 def _read_rows(
-    sheet: _Sheet, names: Sequence[str], default: Mapping[str, float], hint: Mapping[str, str]
+    sheet: Sheet, names: Sequence[str], default: Mapping[str, float], hint: Mapping[str, str]
 ) -> tuple[list[list[float]], list[int]]:
     if not sheet.header:
         raise InputError(f"{sheet.path} is empty; write the header {','.join(names)}")

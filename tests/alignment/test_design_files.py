@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import ifcopenshell
 import numpy as np
 import pytest
 from support.axis_files import J_LANDXML, plan_length, written
@@ -95,3 +96,24 @@ def test_a_landxml_whose_height_lacks_its_decimal_point_is_refused(tmp_path: Pat
     path.write_text(straight.replace("995.94618316 75.38160000", "995.94618316 75381.60000"))
     with pytest.raises(UserError, match=r"a\.xml: at chainage .* its profile rises .* is a decimal point missing"):
         read_given(path)
+
+
+def test_an_ifc_in_millimetres_is_that_in_metres(tmp_path: Path) -> None:
+    source = IFC.with_name("aplitop-3.ifc")
+    file = ifcopenshell.open(str(source))
+    lengths = {
+        "IfcAlignmentHorizontalSegment": ("StartRadiusOfCurvature", "EndRadiusOfCurvature", "SegmentLength"),
+        "IfcAlignmentVerticalSegment": ("StartDistAlong", "HorizontalLength", "StartHeight", "RadiusOfCurvature"),
+    }
+    for kind, names in lengths.items():
+        for entity in file.by_type(kind):
+            for name in names:
+                value = getattr(entity, name)
+                setattr(entity, name, None if value is None else 1000.0 * value)
+    for point in file.by_type("IfcCartesianPoint"):
+        point.Coordinates = [1000.0 * value for value in point.Coordinates]
+    next(unit for unit in file.by_type("IfcSIUnit") if unit.UnitType == "LENGTHUNIT").Prefix = "MILLI"
+    file.write(str(tmp_path / "a.ifc"))
+    given = read_given(tmp_path / "a.ifc")
+    np.testing.assert_allclose(given.xyz, read_given(source).xyz, atol=1e-6)
+    assert given.notes == ("lengths are converted to metres: 1 unit is 0.001 m",)

@@ -302,10 +302,10 @@ def test_unroll_command(curve: tuple[psycopg.Connection, Survey, Path]) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("x,y\n1,2\n", "line 1: there is no column z"),
-        ("x,y,z\n1,2,three\n", "line 2: z must be a finite number, not 'three'"),
-        ("x,y,z\n1,2,nan\n", "line 2: z must be a finite number"),
-        ("x,y,z\n1,2\n", "line 2: 2 values, the header has 3 columns"),
+        ("x,y\n1,2\n", "has no column z: the header is 'x,y'"),
+        ("x,y,z\n1,2,three\n", "line 2: z is 'three', not a number"),
+        ("x,y,z\n1,2,nan\n", "line 2: z is nan, not a plausible measurement"),
+        ("x,y,z\n1,2\n", "line 2: 2 values, but the header has 3 columns"),
         ("", "is empty"),
         ("x,y,z,arc\n1,2,3,4\n", "already has the column arc"),
     ],

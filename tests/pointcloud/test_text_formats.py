@@ -134,7 +134,7 @@ def test_what_columns_are_is_said_and_not_guessed(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"'wall' is not|no column x, y, z"):
         read_header(path)
     path.write_text(rows(XYZ, VALUES))
-    with pytest.raises(UserError, match=r"a\.xyz: its 4 columns have no names .*echo 'x y z …' > .*a\.xyz\.columns"):
+    with pytest.raises(UserError, match=r"a\.xyz: its 4 columns have no names .*echo 'x y z column4' > .*a\.xyz\.columns"):
         read_header(path)
     (tmp_path / "xyz.columns").write_text("y x z intensity\n")
     np.testing.assert_array_equal(read(path).xyz, XYZ[:, [1, 0, 2]])

@@ -10,17 +10,20 @@ from pathlib import Path
 from typing import Any
 
 import ezdxf
+import laspy
 import numpy as np
 import pyogrio
 import pytest
 import shapely
-from support.axis_files import LINE, SRID, chain, dxf, gis, pieces
+from support.axis_files import J_LANDXML, LINE, SRID, chain, dxf, gis, pieces
 
 from tunneldb.alignment.given import read_given
 from tunneldb.csvfile import read_csv, read_texts
 from tunneldb.errors import UserError
 from tunneldb.pipeline.profile_file import read_profile
 from tunneldb.pointcloud.reader import read_chunks, read_header
+from tunneldb.pointcloud.rewrite import rewrite_with_numbers
+from tunneldb.pointcloud.stations import read_stations
 from tunneldb.simulate.checks import require_within
 from tunneldb.simulate.parameters import LIMITS, Parameters
 from tunneldb.store.scanner import read_reference
@@ -88,9 +91,9 @@ def test_points_in_text(kind: str, tmp_path: Path) -> None:
 def test_names_of_columns_are_written_by_the_command_of_the_message(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     path.write_text("1.5 2 3 0.5\n")
-    command = advised(lambda: read_header(path), "name them: (echo .*)$")[1]
-    subprocess.run(command.replace("…", "intensity"), shell=True, check=True)
-    assert read_header(path).dimensions == ("intensity",)
+    subprocess.run(advised(lambda: read_header(path), "name them: (echo .*)$")[1], shell=True, check=True)
+    assert read_header(path).dimensions == ("column4",)
+    assert points(path) == XYZ[:1]
 
 
 @pytest.mark.parametrize(
@@ -258,7 +261,26 @@ def a_drawing_with_decimal_commas(folder: Path) -> None:
     np.testing.assert_allclose(read_given(path).xyz, LINE)
 
 
+def a_landxml_in_an_asian_encoding(folder: Path) -> None:
+    text = J_LANDXML.read_text()
+    path = folder / "a.xml"
+    path.write_bytes(re.sub("encoding=.[^ ?]*", 'encoding="shift_jis"', text, count=1).encode("shift_jis", "replace"))
+    advised(lambda: read_given(path), "cannot be read as XML: .*; save it as UTF-8")
+    path.write_text(re.sub("encoding=.[^ ?]*", 'encoding="UTF-8"', text, count=1), "utf-8")
+    assert len(read_given(path).xyz) > 2
+
+
+def a_landxml_without_profile(folder: Path) -> None:
+    text = J_LANDXML.read_text()
+    path = folder / "a.xml"
+    path.write_text(re.sub("<Profile.*</Profile>", "", text, flags=re.DOTALL))
+    advised(lambda: read_given(path), "has no profile, .*; export both together")
+    path.write_text(text)
+    assert read_given(path).has_heights
+
+
 FILES = [
+    a_landxml_in_an_asian_encoding, a_landxml_without_profile,
     one_of_two_layers, one_of_two_lines, another_system, a_part_of_a_shapefile, a_shapefile_alone, an_option_of_another_format,
     a_drawing_of_other_things, blocks_that_multiply, a_drawing_with_decimal_commas,
 ]  # fmt: skip
@@ -267,6 +289,44 @@ FILES = [
 @pytest.mark.parametrize("case", FILES, ids=lambda case: case.__name__)
 def test_an_axis_in_a_file(case: Callable[[Path], None], tmp_path: Path) -> None:
     case(tmp_path)
+
+
+def test_coordinates_of_a_ply_are_exported_as_double(tmp_path: Path) -> None:
+    path = tmp_path / "a.ply"
+    header = "ply\nformat binary_little_endian 1.0\nelement vertex 1\n{}end_header\n"
+
+    def write(kind: str, dtype: str) -> None:
+        names = "".join(f"property {kind} {name}\n" for name in "xyz")
+        path.write_bytes(header.format(names).encode() + np.array(XYZ[1], dtype).tobytes())
+
+    write("float", "<f4")
+    advised(lambda: read_header(path), "export them as double")
+    write("double", "<f8")
+    assert points(path) == XYZ[1:]
+
+
+def test_members_are_numbered_in_the_original_scan(tmp_path: Path) -> None:
+    las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+    las.x = las.y = las.z = np.arange(3.0)
+    source, target = tmp_path / "a.laz", tmp_path / "b.laz"
+    las.write(source)
+
+    def number(path: Path) -> None:
+        rewrite_with_numbers(path, tmp_path / "c.laz", [[np.arange(3, dtype=np.uint32)]], {"member": "number"})
+
+    number(source)
+    (tmp_path / "c.laz").rename(target)
+    advised(lambda: number(target), "already has a dimension 'member', .*; use the original scan")
+    number(source)
+    assert laspy.read(tmp_path / "c.laz")["member"].tolist() == [0, 1, 2]
+
+
+def test_each_station_is_listed_once(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("scan_id,x,y,z\n1,1.5,2,3\n1,1.5,2,3\n")
+    line = int(advised(lambda: read_stations([path]), r"line (\d+): scan_id 1 is repeated; list each station once")[1])
+    path.write_text("\n".join(path.read_text().splitlines()[: line - 1]))
+    assert read_stations([path]).xyz.tolist() == XYZ[:1]
 
 
 def outline(path: Path, unit: int = 4, layers: tuple[str, ...] = ("0",)) -> Path:

@@ -395,6 +395,12 @@ def test_a_report_without_tables_of_leaks_lists_them_by_kind(drawn: str, tmp_pat
     assert "<h2>Zamakanje</h2>" in chapter
 
 
+def test_settings_written_by_windows_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "owner.toml"
+    path.write_text('client = "Straßen"\r\n', "utf-8-sig")
+    assert read_owner(path).client == "Straßen"
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -33,11 +33,14 @@ def unroll(settings: Settings, survey: str, points: Path, output: Path | None, i
     added are empty where a point lies off the tunnel. x,y,z are in the tunnel's SRID; all are metres: chainage in plan
     along the axis, arc from the crown, positive right looking up-chainage, offset from the surface, positive inwards.
     """
+    from tunneldb.csvfile import read_csv, read_header, read_rows
     from tunneldb.files import replacing
     from tunneldb.store.surface import load_surface
 
     given, added = (_PLANE, _SPACE) if inverse else (_SPACE, _PLANE)
-    header, rows, coordinates = _read(points, given, optional="offset" if inverse else None)
+    header = read_header(points)
+    coordinates = read_csv(points, given, {"offset": 0.0} if inverse else None).values
+    rows = read_rows(points)
     if clash := [name for name in added if name in header]:
         raise UserError(f"{points} already has the column {clash[0]}: rename or remove it")
     with connect(settings.dsn) as conn:
@@ -58,38 +61,3 @@ def unroll(settings: Settings, survey: str, points: Path, output: Path | None, i
     else:
         with replacing(output) as path, path.open("w", newline="", encoding="utf-8") as stream:
             csv.writer(stream, lineterminator="\n").writerows(table)
-
-
-def _read(path: Path, columns: tuple[str, ...], optional: str | None) -> tuple[list[str], list[list[str]], np.ndarray]:
-    """Header, rows as text, and the coordinates (n, 3) of a table."""
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            lines = [(reader.line_num, row) for reader in [csv.reader(stream)] for row in reader if row]
-    except OSError as error:
-        raise UserError(f"cannot read {path}: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise UserError(f"{path} is no text in UTF-8") from None
-    if not lines:
-        raise UserError(f"{path} is empty: it needs a header with {','.join(columns)}")
-    header = [name.strip() for name in lines[0][1]]
-    needed = [name for name in columns if name in header or name != optional]
-    if missing := [name for name in needed if name not in header]:
-        raise UserError(f"{path}, line 1: there is no column {missing[0]}; the header must have {','.join(columns)}")
-    coordinates = np.zeros((len(lines) - 1, 3))
-    for index, (number, row) in enumerate(lines[1:]):
-        if len(row) != len(header):
-            raise UserError(f"{path}, line {number}: {len(row)} values, the header has {len(header)} columns")
-        for column, name in enumerate(columns):
-            if name in header:
-                coordinates[index, column] = _number(path, number, name, row[header.index(name)])
-    return header, [row for _, row in lines[1:]], coordinates
-
-
-def _number(path: Path, line: int, name: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not np.isfinite(value):
-        raise UserError(f"{path}, line {line}: {name} must be a finite number, not {text!r}")
-    return value

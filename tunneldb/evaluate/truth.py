@@ -152,8 +152,8 @@ def _polygons(wkb: NDArray[np.object_], ids: list[str], where: str, noun: str) -
         except shapely.errors.GEOSException as error:
             raise InputError(f"{where}, {noun} {key} is not a valid polygon ({_line(error)}); fix it") from None
         if not isinstance(shape, Polygon | MultiPolygon) or shape.is_empty:
-            kind = "nothing" if shape is None or shape.is_empty else shape.geom_type
-            raise InputError(f"{where}, {noun} {key} is {kind}; each {noun} must be a polygon")
+            kind = "has no geometry; remove the row" if shape is None or shape.is_empty else f"is {shape.geom_type}"
+            raise InputError(f"{where}, {noun} {key} {kind}; each {noun} must be a polygon")
         if not np.isfinite(shapely.get_coordinates(shape)).all():
             raise InputError(f"{where}, {noun} {key} has an invalid coordinate; fix it")
         shapes.append(shape)
@@ -187,7 +187,7 @@ def _bare_geojson(path: Path) -> bool:
     if path.suffix.lower() not in (".geojson", ".json"):
         return False
     try:
-        content = json.loads(path.read_text("utf-8"))
+        content = json.loads(path.read_text("utf-8-sig"))
     except (ValueError, RecursionError):
         return False
     return isinstance(content, dict) and content.get("crs") is None

@@ -124,7 +124,7 @@ def import_findings(
 
 def _insert(conn: psycopg.Connection[Any], survey: Survey, row: Row, kind: str) -> int:
     if row.shape is None:
-        raise ValueError(row.wrong or "it has no place")
+        raise ValueError(row.wrong or "it has no geometry; draw it, or delete the row")
     query = sql.SQL(
         "INSERT INTO tunnel_api.{} (survey_id, kind, severity, width, review, remark, geom)"
         " VALUES (%s, %s, %s, %s, %s, %s, public.ST_GeomFromWKB(%s, %s)) RETURNING id"

@@ -103,7 +103,9 @@ def load_sonar(
 
 def _require_pose(path: Path, scan: StoredScan) -> None:
     if not path.is_file() or checksum(path) != scan.checksum:
-        raise UserError(f"{path}: the sonar scan was changed since it was registered: tunneldb register it again")
+        raise UserError(
+            f"{path}: the sonar scan is gone or was changed since it was registered; register it again: tunneldb register"
+        )
     if scan.state == "undetermined":
         named = ", ".join(scan.undetermined)
         raise UserError(

@@ -11,7 +11,8 @@ import numpy as np
 import shapely
 
 from tunneldb.arrays import Float, Int64
-from tunneldb.csvfile import decoded, read_csv
+from tunneldb.csvfile import read_csv
+from tunneldb.csvsheet import decoded
 from tunneldb.errors import UserError
 from tunneldb.pipeline.profile_drawing import METRES, read_drawing
 from tunneldb.shape.outline import TOLERANCE, Outline

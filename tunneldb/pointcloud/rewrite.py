@@ -127,7 +127,9 @@ def rewrite_with_numbers(
     try:
         head = what.head.with_numbers(names, record_size(what.head.point_format))
     except ValueError as error:
-        raise InputError(f"{source}: it already has a dimension {str(error)!r}; write it without that option") from None
+        raise InputError(
+            f"{source}: it already has a dimension {str(error)!r}, as files that tunneldb members writes; use the original scan"
+        ) from None
     values = _Pieces(numbers)
     with writing(target, head) as writer:
         for records in what.chunks:

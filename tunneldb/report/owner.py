@@ -107,7 +107,7 @@ _DEEP = re.compile(r"(?:[\[{]\s*){100}")
 
 def _load(path: Path) -> dict[str, Any]:
     try:
-        text = path.read_text("utf-8")
+        text = path.read_text("utf-8-sig")
         # Else the parser would use up the stack, and what is collected meanwhile would fail in its finalizer.
         if _DEEP.search(text):
             raise RecursionError

@@ -127,7 +127,8 @@ def _stretches(tunnel: str, layer: str, profiles: Sequence[Profile]) -> list[Str
         return stretches(profiles)
     except ValueError as error:
         raise UserError(
-            f"profiles of layer {layer} of tunnel {tunnel}: {error}; set their limits with --from and --to"
+            f"profiles of layer {layer} of tunnel {tunnel}: {error}; give another range by --from and --to, or remove one of"
+            f" them: tunneldb profile remove {tunnel} NAME --layer {layer}"
         ) from None
 
 

@@ -157,7 +157,7 @@ def _old_sums(conn: psycopg.Connection[Any], old: Survey, km: int, surface: Surf
     if ends is None:
         return None
     west, east, south, north, pixel = ends
-    if cell < MIN_SIDE * pixel * (1.0 - 1e-9):
+    if cell < MIN_SIDE * pixel * (1.0 - 1e-5):
         raise UserError(f"cells of {cell:g} m have too few pixels of {pixel:g} m: give --cell {MIN_SIDE * pixel:g} or more")
     row = np.floor(south / cell), np.ceil(north / cell)
     column = np.floor(west / cell + 1e-9), np.ceil(east / cell - 1e-9)

@@ -6,7 +6,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from tunneldb.csvfile import decoded, find_column
+from tunneldb.csvfile import find_column
+from tunneldb.csvsheet import decoded
 from tunneldb.errors import InputError
 
 COORDINATES = ("x", "y", "z")

@@ -148,9 +148,10 @@ def _columns(
     if not names and path.suffix.lower() == ".xyz" and width == len(COORDINATES):
         return COORDINATES
     if not names:
+        names = [*COORDINATES, *(f"column{number}" for number in range(len(COORDINATES) + 1, width + 1))]
         raise InputError(
             f"{path}: its {width} columns have no names (line {line}: {first[:60]}); name them: "
-            f"echo 'x y z …' > {own_names(path)}"
+            f"echo '{' '.join(names)}' > {own_names(path)}"
         )
     if len(names) != width:
         comma = "write decimals with a point; or " if divider_of(first) == "," and width > len(names) else ""
