@@ -305,6 +305,19 @@ def test_missing_numbers_are_not_refused(tmp_path: Path) -> None:
     assert (header.points, header.high.tolist()) == (9, [1.0, 2.0, 7.0])
 
 
+def test_points_without_coordinates_are_not_written_again(tmp_path: Path) -> None:
+    rows = ["nan,2,3,4,1", "1,2,3,NULL,1", "1,2,-nan(ind),5,1", "1,2,290,inf,2", "5,6,400,200,2"]
+    (tmp_path / "a.csv").write_text("x,y,z,intensity,scan_id\n" + "\n".join(rows))
+    classes = rewrite(tmp_path / "a.csv", tmp_path / "b.laz", below_or_above, {2: "ground"})
+    las = laspy.read(tmp_path / "b.laz")
+    np.testing.assert_allclose(las.xyz, [[1, 2, 3], [1, 2, 290], [5, 6, 400]], atol=1e-4)
+    np.testing.assert_array_equal(las.classification, [2, 2, 64])
+    np.testing.assert_array_equal(las.source_intensity, [np.nan, np.inf, 200.0])
+    np.testing.assert_array_equal(las.intensity, np.rint(np.array([0.0, 1.0, 200 / 255]) * 65535))
+    np.testing.assert_array_equal(las.point_source_id, [1, 2, 2])
+    assert classes.sum() == las.header.point_count == 3
+
+
 def test_a_point_that_is_none_is_left_out(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x,y,z,i\n1,2,3,4\n1,2,nan,5\n1,2,4,nan\n")
     found = read(tmp_path / "a.csv", "i")

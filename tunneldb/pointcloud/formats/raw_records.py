@@ -64,12 +64,12 @@ class RawRecords:
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
 
     def read(self, size: int) -> Iterator[UInt8]:
-        """Read the points once, in chunks of at most `size`.
+        """Read the points once, in chunks of at most `size`, without those that have no coordinates.
 
         Raises
         ------
         InputError
-            If they cannot be read, or a point has no coordinates.
+            If they cannot be read.
         """
         # One pass for each column: readers return one at a time, and tables have few.
         passes = [read_raw(self.path, name, size) for name in self.columns] or [read_raw(self.path, None, size)]
@@ -77,20 +77,24 @@ class RawRecords:
         for parts in zip(*passes, strict=True):
             raw = parts[0]
             xyz = np.column_stack([raw.x, raw.y, raw.z]) * raw.scales + raw.offsets
-            if not np.isfinite(xyz).all():
-                raise InputError(f"{self.path}: a coordinate is NaN or infinite; remove the point")
+            placed = np.flatnonzero(np.isfinite(xyz).all(axis=1))
+            if not len(placed):
+                continue
+            xyz = xyz[placed]
             stored = np.rint((xyz - self.offsets) / self.scale)
             if np.abs(stored).max() >= 2**31:
                 raise InputError(f"{self.path}: the file was changed while it was read")
-            out: UInt8 = np.zeros((len(raw), before + 8 * len(self.extras)), np.uint8)
+            out: UInt8 = np.zeros((len(xyz), before + 8 * len(self.extras)), np.uint8)
             point = fields(out, self.format)
             for column, axis in enumerate("XYZ"):
                 point[axis] = stored[:, column]
             point["bit_fields"] = 1 | 1 << 4  # the first of one return
-            point["point_source_id"] = self._numbers(raw.scan_id)
+            point["point_source_id"] = self._numbers(np.asarray(raw.scan_id)[placed])
             if raw.time is not None:
-                point["gps_time"] = raw.time
-            values = {name: np.asarray(part.intensity, np.float64) for name, part in zip(self.columns, parts, strict=False)}
+                point["gps_time"] = raw.time[placed]
+            values = {
+                name: np.asarray(part.intensity, np.float64)[placed] for name, part in zip(self.columns, parts, strict=False)
+            }
             if "intensity" in values:
                 point["intensity"] = spread(values["intensity"], *_limits(values["intensity"]))
             for name in _COLOURS if self.format == 7 else ():
@@ -126,7 +130,8 @@ def _extra_name(name: str) -> str:
 
 def _limits(values: Float) -> tuple[float, float]:
     """Return the range of 0–1, 8 bits or 16 bits that holds the values; 12 bits may be shifted below zero, as by Leica."""
-    maximum = float(np.nanmax(values, initial=0.0))
-    if float(np.nanmin(values, initial=0.0)) < 0.0:
+    values = values[np.isfinite(values)]
+    maximum = float(values.max(initial=0.0))
+    if float(values.min(initial=0.0)) < 0.0:
         return -2048.0, 2047.0
     return 0.0, next((float(end) for end in (1, 2**8 - 1, 2**16 - 1) if maximum <= end), maximum)
