@@ -356,6 +356,7 @@ CREATE TABLE tunnel.survey (
     reference TEXT DEFAULT 'none' NOT NULL,
     created_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
     positions_note TEXT,
+    time_offset DOUBLE PRECISION DEFAULT 0 NOT NULL,
     longest_interval DOUBLE PRECISION,
     trajectory_gaps DOUBLE PRECISION[],
     settings_at TIMESTAMP WITH TIME ZONE,
@@ -378,6 +379,7 @@ COMMENT ON COLUMN tunnel.survey.platform IS 'static (rows in station), mobile (r
 COMMENT ON COLUMN tunnel.survey.reference IS 'Range curve: none, measured on a target (rows in reference) or auto, from the lining of each kilometre';
 COMMENT ON COLUMN tunnel.survey.created_at IS 'Time when it was added';
 COMMENT ON COLUMN tunnel.survey.positions_note IS 'Notes on its scanner positions: poses left out, gaps';
+COMMENT ON COLUMN tunnel.survey.time_offset IS 'Seconds added to the times of its trajectory''s file';
 COMMENT ON COLUMN tunnel.survey.longest_interval IS 'Longest interval of its trajectory that is interpolated over, s; NULL without a trajectory';
 COMMENT ON COLUMN tunnel.survey.trajectory_gaps IS 'Longer intervals of its trajectory: times from and to, one after the other, s; NULL without a trajectory';
 COMMENT ON COLUMN tunnel.survey.settings_at IS 'Time of the last change of scanner positions, reference or intensity';
@@ -1375,6 +1377,7 @@ CREATE TABLE tunnel.scan_file (
     reach_before DOUBLE PRECISION DEFAULT '0' NOT NULL,
     reach_after DOUBLE PRECISION DEFAULT '0' NOT NULL,
     intensity_note TEXT,
+    pose_note TEXT,
     srid INTEGER,
     loaded_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
     CONSTRAINT scan_file_pkey PRIMARY KEY (id),
@@ -1403,6 +1406,7 @@ COMMENT ON COLUMN tunnel.scan_file.beyond_after IS 'Number of points outside tha
 COMMENT ON COLUMN tunnel.scan_file.reach_before IS 'Distance before the beginning of the given axis within which nearly all of these lie, m';
 COMMENT ON COLUMN tunnel.scan_file.reach_after IS 'Distance after the end of the given axis within which nearly all of these lie, m';
 COMMENT ON COLUMN tunnel.scan_file.intensity_note IS 'Doubts about its intensity: saturated, or another kind by its values';
+COMMENT ON COLUMN tunnel.scan_file.pose_note IS 'Doubts about the scanner positions of its points';
 COMMENT ON COLUMN tunnel.scan_file.srid IS 'Spatial reference that the file states, if it states one';
 COMMENT ON COLUMN tunnel.scan_file.loaded_at IS 'Time of loading';
 

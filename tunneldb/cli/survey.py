@@ -10,7 +10,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, notify, records, tell
-from tunneldb.cli.param_types import FilePath, file_path
+from tunneldb.cli.param_types import FINITE, FilePath, file_path
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.sizes import sizes
 from tunneldb.cli.survey_archive import export, import_
@@ -76,6 +76,12 @@ DAY = Day()
 )
 @click.option("--backwards", is_flag=True, help="The trajectory was driven down-chainage.")
 @click.option(
+    "--time-offset",
+    type=FINITE,
+    metavar="SECONDS",
+    help="Seconds to add to the times of the trajectory, such as 18 if they are in UTC and the files in GPS time.",
+)
+@click.option(
     "--reference",
     metavar="FILE|auto",
     help="Intensity of the scanner by range: CSV with range_m,intensity_db, measured on a target; or auto: "
@@ -103,6 +109,7 @@ def add(
     stations: tuple[Path, ...],
     no_poses: bool,
     backwards: bool,
+    time_offset: float | None,
     reference: str | None,
     intensity: str | None,
     intensity_kind: str,
@@ -114,6 +121,8 @@ def add(
         raise UserError("say where the scanner was: exactly one of --trajectory and --stations; or --no-poses, if nobody knows")
     if backwards and trajectory is None:
         raise UserError("--backwards is about a trajectory; stations have no direction")
+    if time_offset is not None and trajectory is None:
+        raise UserError("--time-offset is about a trajectory: give it with --trajectory")
     if intensity_kind == "none":
         intensity = None
     elif intensity is None:
@@ -129,6 +138,7 @@ def add(
             backwards=backwards,
             reference="auto" if reference == "auto" else None if reference is None else file_path(reference),
             intensity=Intensity(intensity_kind, intensity),
+            time_offset=time_offset or 0.0,
         )
     notes = [*positions.notes, *([UNPOSED] if no_poses and intensity is not None else [])]
     tell(survey=name, tunnel=tunnel, date=date.date(), poses=len(positions), notes=notes)
@@ -151,6 +161,9 @@ def add(
 @click.option("--trajectory", type=FILE, help="Replaces the scanner positions; as for survey add.")
 @click.option("--stations", type=FILE, multiple=True, help="Likewise for a static scanner; may be repeated.")
 @click.option("--backwards", is_flag=True, help="The trajectory was driven down-chainage.")
+@click.option(
+    "--time-offset", type=FINITE, metavar="SECONDS", help="Seconds to add to the times in the trajectory's file; 0 removes it."
+)
 @click.option("--reference", metavar="FILE|auto", help="Intensity of the scanner by range, as for survey add.")
 @click.option("--intensity", metavar="DIMENSION", help="Dimension with the intensity; the files must be loaded again.")
 @click.option("--intensity-kind", type=click.Choice(["amplitude", "reflectance", "linear", "none"]), help="What it is.")
@@ -162,6 +175,7 @@ def set_(
     trajectory: Path | None,
     stations: tuple[Path, ...],
     backwards: bool,
+    time_offset: float | None,
     reference: str | None,
     intensity: str | None,
     intensity_kind: str | None,
@@ -176,17 +190,22 @@ def set_(
         raise UserError("say where the scanner was by one of --trajectory and --stations")
     if backwards and trajectory is None:
         raise UserError("--backwards is about a trajectory: give it with --trajectory")
+    if time_offset is not None and stations:
+        raise UserError("--time-offset is about a trajectory; stations have no times")
     change = SurveyChange(
         None if date is None else date.date(),
         (trajectory,) if trajectory is not None else stations,
         trajectory is not None,
         backwards,
+        time_offset,
         "auto" if reference == "auto" else None if reference is None else file_path(reference),
         intensity_kind,
         intensity,
     )
     if change == SurveyChange():
-        raise UserError("nothing to set: give --date, --trajectory, --stations, --reference, --intensity or --intensity-kind")
+        raise UserError(
+            "nothing to set: give --date, --trajectory, --stations, --time-offset, --reference, --intensity or --intensity-kind"
+        )
     with connect(settings.dsn) as connection:
         notes, reload = set_survey(connection, name, change)
         stale = count_stale(connection, get_survey(connection, name, site=True).id)

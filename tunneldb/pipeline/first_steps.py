@@ -13,6 +13,7 @@ import numpy as np
 from tunneldb.errors import UserError
 from tunneldb.files import common_name
 from tunneldb.geometry.crs import outside_area
+from tunneldb.pipeline.inspected_poses import file_beside
 from tunneldb.pipeline.inspection import FileLook, IntensityLook
 from tunneldb.pointcloud.stations import read_stations
 from tunneldb.radiometry.intensity_kind import KindGuess
@@ -69,6 +70,7 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         for look in looks
         if look.misplaced or look.untimed
     ]
+    doubts += [f"{look.path.name}: {look.pose_doubt}" for look in looks if look.pose_doubt]
     doubts += [
         f"{look.path.name}: its profiles are {look.profile_spacing:.2f} m apart; the lining between them was not measured"
         for look in looks
@@ -174,13 +176,7 @@ def _srid(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> s
 
 def _beside(looks: Sequence[FileLook], ending: str) -> Path | None:
     """Return the file beside the scans with the same name but another extension; None if there is none, or several."""
-    found = set()
-    for look in looks:
-        stem = look.path.name.split(".", 1)[0]
-        for path in look.path.parent.glob(f"*.{ending}"):
-            if stem == path.name[: -len(ending) - 1] or stem.startswith(f"{path.name[: -len(ending) - 1]}-"):
-                found.add(path)
-    return found.pop() if len(found) == 1 else None
+    return file_beside([look.path for look in looks], ending)
 
 
 def _poses(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> str:
@@ -188,9 +184,14 @@ def _poses(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> 
     if posed and all(scan.position is not None for look in posed for scan in look.poses):
         _doubt_positions(posed, doubts)
         return " ".join(f"--stations {_quoted(look.path)}" for look in posed)
-    trajectory, stations = _beside(looks, "trajectory.csv"), _beside(looks, "stations.csv")
+    trajectory, stations = (
+        _beside(looks, "trajectory.csv"),
+        _beside(looks, "stations.csv"),
+    )
     if trajectory is not None:
-        return f"--trajectory {_quoted(trajectory)}"
+        offsets = {look.time_offset for look in looks}
+        offset = offsets.pop() if len(offsets) == 1 else None
+        return f"--trajectory {_quoted(trajectory)}" + ("" if offset is None else f" --time-offset {offset:.12g}")
     if stations is not None:
         return f"--stations {_quoted(stations)}"
     other = _stations_in_folder(looks)

@@ -13,6 +13,7 @@ from pyproj import CRS
 from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
 from tunneldb.geometry.crs import describe_crs, horizontal
+from tunneldb.pipeline.inspected_poses import doubt_poses
 from tunneldb.pointcloud.contents import Contents, read_contents, read_near, read_values
 from tunneldb.pointcloud.form import WINDOW, TunnelForm, profile_spacing, surface_density, tunnel_form
 from tunneldb.pointcloud.formats.las import read_las_facts
@@ -127,6 +128,10 @@ class FileLook:
     poses : list of PosedScan
         Scans that the file knows, with the positions that it gives them.
     intensities : list of IntensityLook
+    time_offset : float or None
+        Seconds to add to the times of the trajectory beside the file, so that it fits the points; None if it fits.
+    pose_doubt : str or None
+        Why the trajectory beside the file, or the positions of its scans, do not fit the points.
     only_noise : bool
         True if all points would be left out as noise, each too far from others; False if not all were examined.
     """
@@ -157,6 +162,8 @@ class FileLook:
     intensities: list[IntensityLook]
     foreign_unit: bool = False
     only_noise: bool = False
+    time_offset: float | None = None
+    pose_doubt: str | None = None
 
     @property
     def other_than_a_tunnel(self) -> str | None:
@@ -190,6 +197,8 @@ def inspect_file(path: Path, begin: StartProgress) -> FileLook:
     form = tunnel_form(contents.xyz)
     names = [name for name in header.dimensions if name.lower() not in _NO_INTENSITY]
     kind, time_kind = _described(path, contents)
+    poses = posed_scans(path)
+    time_offset, pose_doubt = doubt_poses(path, contents, form, poses)
     return FileLook(
         path,
         kind,
@@ -213,10 +222,12 @@ def inspect_file(path: Path, begin: StartProgress) -> FileLook:
         contents.untimed,
         _date(contents.times, time_kind),
         contents.scans,
-        posed_scans(path),
+        poses,
         [_look_at(path, name, contents.points) for name in names],
         header.crs is not None and _unit_of(header.crs) is not None,
         contents.share == 1.0 and bool(noise_filter(contents.xyz).all()),
+        time_offset,
+        pose_doubt,
     )
 
 

@@ -18,10 +18,11 @@ from tunneldb.errors import BusyError, UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import require_same_density
+from tunneldb.pipeline.pose_check import PoseCheck
 from tunneldb.pointcloud.formats.faults import require_dimension
 from tunneldb.pointcloud.pose_coverage import PoseCoverage
 from tunneldb.pointcloud.reader import ScanHeader, check_header, crs_note, read_header
-from tunneldb.pointcloud.selection import MEMORY, FilterCounts, FilterSettings, filter_file, voxel_reach
+from tunneldb.pointcloud.selection import MEMORY, CheckPoses, FilterCounts, FilterSettings, filter_file, voxel_reach
 from tunneldb.pointcloud.spool import Spool
 from tunneldb.progress import StartProgress, silent
 from tunneldb.radiometry.intensity_kind import contradiction, doubt
@@ -166,6 +167,7 @@ class Reading:
     settings: FilterSettings
     alignment: Alignment
     poses: PoseCoverage
+    pose_check: PoseCheck | None
     memory: int
     held: dict[int, Spool] | None = None
     share: int = 1
@@ -173,7 +175,8 @@ class Reading:
     @classmethod
     def of(cls, conn: psycopg.Connection[Any], survey: Survey, settings: FilterSettings, memory: int = MEMORY) -> Reading:
         """Read the axis of the survey, and its scanner positions."""
-        return cls(conn, survey, settings, load_alignment(conn, survey), load_pose_coverage(conn, survey), memory)
+        alignment, poses = load_alignment(conn, survey), load_pose_coverage(conn, survey)
+        return cls(conn, survey, settings, alignment, poses, PoseCheck.of(conn, survey, alignment), memory)
 
     def check(self, header: ScanHeader) -> None:
         """Check a file against its survey."""
@@ -280,10 +283,16 @@ class Reading:
             digest = pool.submit(checksum, header.path)
             dimension = self.survey.intensity_dimension
             counts = filter_file(
-                header.path, dimension, self.alignment, self.poses, self.settings, survivors, 0, progress, self.memory
-            )
+                header.path, dimension, self.alignment, self.poses, self.settings, survivors, 0, progress, self.memory,
+                check_poses=self._pose_checker(header.path),
+            )  # fmt: skip
             require_kind(self.survey, header.path, counts.intensity_sample)
             return counts, digest.result()
+
+    def _pose_checker(self, path: Path) -> CheckPoses | None:
+        """Return the function that compares a sample of a file's points with the scanner positions."""
+        check = self.pose_check
+        return None if check is None else lambda points: check.check(path, points, self.settings.max_left_out)
 
     def leave(self, former: Recorded) -> list[int]:
         """Drop the waiting points of a file's former content; return the kilometres that may have rows of it."""

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tunneldb.arrays import Float, Int64
+from tunneldb.arrays import Float, Int32, Int64
 from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.table import format_of
 from tunneldb.pointcloud.points import CHUNK, Raw, on_earth
+from tunneldb.pointcloud.pose_sample import SampledPoints
 
 SAMPLE = 400_000  # points; the sample has at most twice as many
 RUNS, RUN_POINTS = 20, 50_000  # runs of points whose values are examined, and points of a run (a chunk of LAZ)
@@ -31,7 +32,7 @@ class UniformSample:
     def __init__(self, max_points: int = SAMPLE) -> None:
         self.max_points, self.share = max_points, 1.0
         self._random = np.random.default_rng(1)
-        self._kept: list[tuple[Float, Float, Int64]] = []
+        self._kept: list[tuple[Float, Float, Int64, Float, Int32]] = []
         self._count = 0
 
     def add(self, raw: Raw, first: int) -> None:
@@ -40,7 +41,10 @@ class UniformSample:
         chosen = np.flatnonzero(chance < self.share)
         xyz = np.column_stack([np.asarray(stored)[chosen] for stored in (raw.x, raw.y, raw.z)]) * raw.scales + raw.offsets
         good = on_earth(xyz).all(axis=1)
-        self._kept.append((chance[chosen][good], xyz[good], chosen[good] + first))
+        numbers = chosen[good]
+        time = np.zeros(len(numbers)) if raw.time is None else np.asarray(raw.time, np.float64)[numbers]
+        scan_id = np.asarray(raw.scan_id)[numbers].astype(np.int32)
+        self._kept.append((chance[numbers], xyz[good], numbers + first, time, scan_id))
         self._count += int(good.sum())
         while self._count > 2 * self.max_points:
             self.share /= 2.0
@@ -56,6 +60,12 @@ class UniformSample:
     def numbers(self) -> Int64:
         """Indices (n,) of the sampled points in the file."""
         return np.concatenate([np.empty(0, np.int64), *(kept[2] for kept in self._kept)])
+
+    @property
+    def points(self) -> SampledPoints:
+        """The sample with its times, 0 if the file has none, and scan numbers."""
+        time = np.concatenate([np.empty(0), *(kept[3] for kept in self._kept)])
+        return SampledPoints(self.xyz, time, np.concatenate([np.empty(0, np.int32), *(kept[4] for kept in self._kept)]))
 
 
 @dataclass(frozen=True)
@@ -76,7 +86,7 @@ class Contents:
         Number of points whose time is NaN or infinite.
     scans : dict of int to int
         Number of points of each scan number.
-    xyz : (n, 3) float64 array
+    sample : SampledPoints
         Random sample of the points.
     numbers : (n,) int64 array
         Their indices in the file.
@@ -91,9 +101,14 @@ class Contents:
     times: tuple[float, float] | None
     untimed: int
     scans: dict[int, int]
-    xyz: Float
+    sample: SampledPoints
     numbers: Int64
     share: float
+
+    @property
+    def xyz(self) -> Float:
+        """Coordinates of the sample (n, 3)."""
+        return self.sample.xyz
 
 
 def read_contents(path: Path, progress: Callable[[int], None] = lambda count: None) -> Contents:
@@ -137,7 +152,7 @@ def read_contents(path: Path, progress: Callable[[int], None] = lambda count: No
     if points == misplaced:
         raise InputError(f"{path}: none of its {points} points has valid coordinates")
     times = (first, last) if timed and first < last else None
-    return Contents(points, misplaced, low, high, times, untimed, scans, sample.xyz, sample.numbers, sample.share)
+    return Contents(points, misplaced, low, high, times, untimed, scans, sample.points, sample.numbers, sample.share)
 
 
 def _finite_minimum(values: NDArray[Any]) -> float:

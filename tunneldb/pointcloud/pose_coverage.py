@@ -7,13 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int32, Int64
+from tunneldb.pointcloud.clock_offsets import guess_clocks
 from tunneldb.pointcloud.points import Points
 
 # Tolerance for times beyond the ends of the trajectory, s: times in a CSV are rounded.
 TIME_TOLERANCE = 0.001
-
-_WEEK = 604_800.0  # s
-_UNIX_TO_GPS = 315_964_800.0  # s from 1970 to the beginning of GPS time, without leap seconds
 
 
 @dataclass
@@ -78,7 +76,8 @@ class PoseFaults:
         ]
         lost = [f"gps_time of {self.outside} points is outside the trajectory, {' and '.join(where)}"] if self.outside else []
         lost += [f"{self.gap} points lie in gaps of the trajectory"] if self.gap else []
-        return f"{' and '.join(lost)}; {self.guess or 'give the whole trajectory, in the time system of the file'}"
+        whole = "give the whole trajectory, in the time system of the file"
+        return f"{' and '.join(lost)}; {self.guess + '; convert one of them' if self.guess else whole}"
 
 
 @dataclass(frozen=True)
@@ -117,7 +116,7 @@ class PoseCoverage:
             outside = points.time[~_covers(self.ends, points.time)]
             gap = int(np.count_nonzero(_in_gap(self.gaps, points.time)))
             before, after = (float(np.nanmax(off, initial=0.0)) for off in (self.ends[0] - outside, outside - self.ends[1]))
-            guess = _clocks(self.ends, outside) if len(outside) else ""
+            guess = guess_clocks(sum(self.ends) / 2.0, float(np.median(outside))) if len(outside) else ""
             return PoseFaults(len(outside), gap, before, after, guess=guess)
         scans, counts = _count_scans(points.scan_id)
         known = np.isin(scans, self.scan_id)
@@ -142,19 +141,6 @@ def _in_gap(gaps: Float, time: Float) -> Bool:
         return np.zeros(len(time), np.bool_)
     last = np.searchsorted(gaps[:, 0] + TIME_TOLERANCE, time) - 1  # last gap that begins before
     return np.asarray((last >= 0) & (time < gaps[last, 1] - TIME_TOLERANCE))
-
-
-def _clocks(ends: tuple[float, float], points: Float) -> str:
-    """Guess which time systems a trajectory with these ends and the points outside it have, if they differ."""
-    one, other = sum(ends) / 2.0, float(np.median(points))
-    in_week = [0.0 <= time <= _WEEK for time in (one, other)]
-    if in_week[0] != in_week[1]:
-        names = ("seconds of the GPS week", "time since an epoch")
-        return f"the trajectory seems to be in {names[in_week[1]]}, the file in {names[in_week[0]]}; convert one of them"
-    for seconds, names in ((1e9, ("adjusted GPS time", "GPS time")), (_UNIX_TO_GPS, ("GPS time", "Unix time"))):
-        if abs(abs(other - one) - seconds) < _WEEK:
-            return f"the trajectory seems to be in {names[one > other]}, the file in {names[other > one]}; convert one of them"
-    return ""
 
 
 def _count_scans(scan_id: Int32) -> tuple[Int64, Int64]:

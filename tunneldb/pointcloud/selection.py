@@ -29,6 +29,7 @@ from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.noise import DIAMETER, POINTS, is_noise, search_radii, typical_density
 from tunneldb.pointcloud.points import CHUNK, Points, on_earth
 from tunneldb.pointcloud.pose_coverage import PoseCoverage, PoseFaults
+from tunneldb.pointcloud.pose_sample import PoseSample, SampledPoints
 from tunneldb.pointcloud.prefetch import in_order, prefetch
 from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, PLACE, Rows, Spool, bin_of, rows_xyz, windows
 from tunneldb.pointcloud.thinning import first_of_voxels, pick, voxel_edge
@@ -36,6 +37,7 @@ from tunneldb.pointcloud.voxels import CellCounts
 from tunneldb.threads import threads
 
 Progress = Callable[[int], None]
+CheckPoses = Callable[[SampledPoints], str | None]
 
 MEMORY = 192 << 20  # bytes of rows that each spool keeps in memory before it uses the disk
 WINDOW = 500_000  # points whose neighbourhoods a thread examines at a time
@@ -99,6 +101,8 @@ class FilterCounts:
         Sample of raw intensities near the axis.
     ranges : dict of int to list of (int, int)
         Ranges of point indices, from 0, that contain the points of each kilometre and of MARGIN beyond it.
+    pose_note : str or None
+        Doubt about the scanner positions of the points.
     seconds : dict of int to list of (int, int)
         Half-open ranges of whole seconds that contain all finite times of the points in these ranges.
     density : float
@@ -119,6 +123,7 @@ class FilterCounts:
     beyond_reach: tuple[float, float] = (0.0, 0.0)
     intensities: list[Single] = field(default_factory=list)
     density: float = 0.0
+    pose_note: str | None = None
 
     @property
     def intensity_sample(self) -> Single:
@@ -163,6 +168,7 @@ def filter_file(
     progress: Progress = lambda points: None,
     memory: int = MEMORY,
     chunk: int = CHUNK,
+    check_poses: CheckPoses | None = None,
 ) -> FilterCounts:
     """Read a scan file at full density and store the points selected for the database.
 
@@ -187,6 +193,8 @@ def filter_file(
         Function of a number of points; the total is twice the number of points of the file.
     memory, chunk : int
         Bytes of rows in memory; points read at a time.
+    check_poses : callable or None
+        Function of a sample of the points near the axis; it returns a doubt about their scanner positions, or raises an error.
 
     Raises
     ------
@@ -195,7 +203,7 @@ def filter_file(
         points near the axis that are invalid or without scanner position exceeds ``max_left_out``.
     """
     with _Filter(path, dimension, alignment, poses, settings, memory) as work:
-        work.read(progress, chunk)
+        work.read(progress, chunk, check_poses)
         for rows in work.judge(progress):
             rows["tag"] = tag
             survivors.add(rows)
@@ -229,7 +237,7 @@ class _Filter:
         self.faults, self.invalid = PoseFaults(), ""
         self.places = ChainageLookup(alignment, settings.max_distance, self.cells.edge)
         self.beyond = BeyondEnds(alignment, settings.max_distance)
-        self.times = BlockTimes(BLOCK)
+        self.times, self.sample = BlockTimes(BLOCK), PoseSample()
         self.rows, self.cloud = Spool(memory // 2), Spool(memory // 2, PLACE)
 
     def __enter__(self) -> _Filter:
@@ -239,7 +247,7 @@ class _Filter:
         self.rows.close()
         self.cloud.close()
 
-    def read(self, progress: Progress, chunk: int) -> None:
+    def read(self, progress: Progress, chunk: int, check_poses: CheckPoses | None) -> None:
         """Read the file, and store the points that the noise filter has to examine."""
         counts, nearest, guess = self.counts, math.inf, None
         with closing(prefetch(map(Points.of, read_raw(self.path, self.dimension, chunk)))) as chunks:
@@ -262,6 +270,8 @@ class _Filter:
                 f"{self.path}: no points near the axis: the nearest is about {nearest:.0f} m from it, the limit is "
                 f"{self.settings.max_distance:g} m; {guess or check}"
             )
+        if check_poses is not None:
+            counts.pose_note = check_poses(self.sample.points)
         self._require_most()
 
     def _require_most(self) -> None:
@@ -294,6 +304,7 @@ class _Filter:
         if len(outside):
             self.beyond.add(points.xyz[outside])
             number, cell, points = self._drop(number, cell, points, outside)
+        self.sample.add(points.xyz, points.time, points.scan_id)
         faults = self.poses.faults(points)
         if faults:
             self.faults += faults

@@ -23,11 +23,14 @@ from tunneldb.store.scanner import (
     Positions,
     read_positions,
     read_reference,
+    replace_positions,
     require_no_range,
     require_range,
     save_positions,
     save_reference,
 )
+from tunneldb.store.survey import get_survey
+from tunneldb.store.time_offset import set_time_offset
 from tunneldb.store.unknown import unknown_survey, unknown_tunnel
 
 
@@ -151,6 +154,7 @@ def add_survey(
     backwards: bool,
     reference: Path | Literal["auto"] | None,
     intensity: Intensity,
+    time_offset: float = 0.0,
 ) -> Positions:
     """Add a survey with its scanner positions and reference curve; return the positions.
 
@@ -163,6 +167,8 @@ def add_survey(
         True if the trajectory runs towards decreasing chainage.
     reference
         CSV with range_m,intensity_db; or auto, to find the curve on the lining of each kilometre.
+    time_offset
+        Seconds to add to the times of the trajectory.
 
     Raises
     ------
@@ -171,7 +177,7 @@ def add_survey(
     """
     _require_name(name)
     tunnel_id, srid, alignment = _alignment(connection, tunnel)
-    positions = read_positions(poses, alignment, tunnel, mobile=mobile, backwards=backwards)
+    positions = read_positions(poses, alignment, tunnel, mobile=mobile, backwards=backwards, time_offset=time_offset)
     if poses is None:
         require_no_range(intensity.kind)
     if reference == "auto":
@@ -215,6 +221,8 @@ class SurveyChange:
         Files of the scanner's positions, see `add_survey`; empty leaves them.
     mobile, backwards : bool
         Kind of the positions.
+    time_offset : float or None
+        Seconds to add to the times of the trajectory as they are in its file.
     reference : Path, 'auto' or None
     kind, dimension : str or None
         Dimension and kind of the intensity.
@@ -224,6 +232,7 @@ class SurveyChange:
     poses: Sequence[Path] = ()
     mobile: bool = False
     backwards: bool = False
+    time_offset: float | None = None
     reference: Path | Literal["auto"] | None = None
     kind: str | None = None
     dimension: str | None = None
@@ -262,14 +271,18 @@ def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyCha
     notes: list[str] = []
     if change.poses:
         _, srid, alignment = _alignment(connection, tunnel)
-        positions = read_positions(change.poses, alignment, tunnel, mobile=change.mobile, backwards=change.backwards)
+        positions = read_positions(
+            change.poses, alignment, tunnel, mobile=change.mobile, backwards=change.backwards,
+            time_offset=change.time_offset or 0.0,
+        )  # fmt: skip
         notes += positions.notes
-        connection.execute("DELETE FROM tunnel.pose WHERE survey_id = %s", [key])
-        connection.execute("DELETE FROM tunnel.station WHERE survey_id = %s", [key])
-        save_positions(connection, key, positions, srid)
+        replace_positions(connection, key, positions, srid)
         connection.execute(
             "UPDATE tunnel.survey SET platform = %s WHERE id = %s", ["mobile" if change.mobile else "static", key]
         )
+    elif change.time_offset is not None:
+        notes += set_time_offset(connection, get_survey(connection, name, site=True), change.time_offset)
+    moved = bool(change.poses) or change.time_offset is not None
     if change.reference is not None:
         curve = read_reference(change.reference) if isinstance(change.reference, Path) else None
         connection.execute("DELETE FROM tunnel.reference WHERE survey_id = %s", [key])
@@ -286,14 +299,14 @@ def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyCha
             kind,
             dimension,
             reference,
-            bool(change.poses) or change.reference is not None or (kind, dimension) != (old_kind, old_dimension),
+            moved or change.reference is not None or (kind, dimension) != (old_kind, old_dimension),
             key,
         ],
     )
     # Known by no checksum, so that detection asks for them and loading does not take them for unchanged.
     reload = connection.execute(
         "UPDATE tunnel.scan_file SET checksum = '' WHERE survey_id = %s AND (%s OR %s AND unposed > 0)",
-        [key, dimension is not None and dimension != old_dimension, bool(change.poses)],
+        [key, dimension is not None and dimension != old_dimension, moved],
     ).rowcount
     return notes, reload
 

@@ -41,6 +41,15 @@ _ABOUT = sql.SQL(
     """
 )
 
+_FIRST_AFTER = sql.SQL(
+    """
+    FROM unnest(%(wanted)s::float8[]) AS s (wanted)
+    CROSS JOIN LATERAL (
+        SELECT p.time, p.geom FROM tunnel.pose p
+         WHERE p.survey_id = %(survey)s AND p.time >= s.wanted ORDER BY p.time LIMIT 1) q
+    """
+)
+
 
 def is_mobile(conn: psycopg.Connection[Any], survey: Survey) -> bool:
     """Return True if a survey's scanner positions come from a trajectory; raise an error if it has none of its kind.
@@ -103,6 +112,21 @@ def load_poses(conn: psycopg.Connection[Any], survey: Survey, km: int | None = N
     if len(rows) == 0:
         raise _no_positions(survey)
     return PoseModel.from_stations(rows["scan_id"].astype(np.int64), _xyz(rows))
+
+
+def load_coarse_trajectory(conn: psycopg.Connection[Any], survey: Survey, count: int = 5000) -> PoseModel:
+    """Read about ``count`` poses of a trajectory, evenly spread over the time outside its gaps, and those at the gaps."""
+    coverage = load_pose_coverage(conn, survey)
+    assert coverage.ends is not None
+    begins, ends = [coverage.ends[0], *coverage.gaps[:, 1]], [*coverage.gaps[:, 0], coverage.ends[1]]
+    step = max(sum(end - begin for begin, end in zip(begins, ends, strict=True)) / count, 1e-3)
+    wanted = np.concatenate([np.append(np.arange(begin, end, step), end) for begin, end in zip(begins, ends, strict=True)])
+    fields = (("time", "f8", sql.Identifier("time")), *_PLACE)
+    rows = fetch_array(conn, fields, _FIRST_AFTER, {"survey": survey.id, "wanted": wanted.tolist()})
+    time, first = np.unique(rows["time"], return_index=True)
+    row = conn.execute("SELECT longest_interval FROM tunnel.survey WHERE id = %s", [survey.id]).fetchone()
+    assert row is not None
+    return PoseModel.from_trajectory(time, _xyz(rows[first]), max(float(row[0]), 2.0 * step))
 
 
 def _trajectory(conn: psycopg.Connection[Any], survey: Survey, spans: list[tuple[float, float]]) -> PoseModel:

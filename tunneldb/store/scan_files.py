@@ -159,15 +159,15 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
     row = conn.execute(
         """
         INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, invalid, unposed,
-                                      thinned, kept, chainage_from, chainage_to, extent, srid, intensity_note,
+                                      thinned, kept, chainage_from, chainage_to, extent, srid, intensity_note, pose_note,
                                       beyond_before, beyond_after, reach_before, reach_after)
-        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s, %s, %s, %s, %s, %s)
+        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s)
         ON CONFLICT (survey_id, name) DO UPDATE
            SET path = excluded.path, checksum = excluded.checksum, bytes = excluded.bytes, points = excluded.points,
                noise = excluded.noise, outside = excluded.outside, invalid = excluded.invalid, unposed = excluded.unposed,
                thinned = excluded.thinned, kept = 0,
                chainage_from = excluded.chainage_from, chainage_to = excluded.chainage_to, extent = excluded.extent,
-               srid = excluded.srid, intensity_note = excluded.intensity_note,
+               srid = excluded.srid, intensity_note = excluded.intensity_note, pose_note = excluded.pose_note,
                beyond_before = excluded.beyond_before, beyond_after = excluded.beyond_after,
                reach_before = excluded.reach_before, reach_after = excluded.reach_after
         RETURNING id
@@ -188,6 +188,7 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
             counts.extent.tolist(),
             content.srid,
             content.intensity_note,
+            counts.pose_note,
             *counts.beyond,
             *counts.beyond_reach,
         ],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +19,16 @@ from tunneldb.database.copy import PointZ, copy_binary, pack
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.misplacement import explain_misplacement
+from tunneldb.pointcloud.clock_offsets import WEEK
+from tunneldb.pointcloud.formats.table import has_scans
 from tunneldb.pointcloud.pose_checks import MAX_AXIS_DISTANCE, MAX_END_DISTANCE, far_from_axis, jumps
-from tunneldb.pointcloud.poses import PoseModel
-from tunneldb.pointcloud.stations import read_stations
+from tunneldb.pointcloud.poses import PoseModel, longest_interval
+from tunneldb.pointcloud.station_fit import SAME_PLACE
+from tunneldb.pointcloud.stations import Stations, read_stations
+from tunneldb.pointcloud.week_end import continue_week, cover_week_end
 
 FARTHEST_SCANNER = 50.0  # m from the axis; a scanner that was never nearer stood in another tunnel
+MAX_NAMED = 10  # stations named in a message
 MAX_WILD_SHARE = 0.05  # share of a trajectory's poses that may be left out as they cannot be
 
 
@@ -40,20 +45,29 @@ class Positions:
     xyz : (n, 3) float64 array
         m, in the tunnel's SRID.
     notes : tuple of str
-        Remarks: poses that were left out, gaps.
+        Remarks: poses that were left out, gaps, changes of their times.
+    time_offset : float
+        Seconds added to the times of the trajectory.
     """
 
     mobile: bool
     keys: NDArray[Any]
     xyz: Float
     notes: tuple[str, ...] = ()
+    time_offset: float = 0.0
 
     def __len__(self) -> int:
         return len(self.keys)
 
 
 def read_positions(
-    paths: Sequence[Path] | None, alignment: Alignment | None, tunnel: str, *, mobile: bool, backwards: bool
+    paths: Sequence[Path] | None,
+    alignment: Alignment | None,
+    tunnel: str,
+    *,
+    mobile: bool,
+    backwards: bool,
+    time_offset: float = 0.0,
 ) -> Positions:
     """Read the scanner's positions, and leave out poses of a trajectory that cannot be.
 
@@ -66,6 +80,8 @@ def read_positions(
         Given axis, None for a site, whose positions are not checked; and the tunnel's name, for errors.
     backwards
         True if the trajectory runs towards decreasing chainage.
+    time_offset
+        Seconds to add to the times of the trajectory.
 
     Raises
     ------
@@ -77,8 +93,9 @@ def read_positions(
         return Positions(False, np.empty(0, np.int32), np.empty((0, 3)))
     if not mobile:
         stations = read_stations(paths)
+        together = _stations_together(paths, stations)
         if alignment is None:
-            return Positions(False, stations.scan_id, stations.xyz)
+            return Positions(False, stations.scan_id, stations.xyz, together)
         _require_near(paths, stations.xyz, alignment, tunnel)
         far = far_from_axis(stations.xyz, alignment)
         if far.any():
@@ -90,8 +107,8 @@ def read_positions(
                 f" {MAX_AXIS_DISTANCE:g} m beside it or {MAX_END_DISTANCE:g} m beyond its ends: fix the position, or remove"
                 " the row, and the points of that scan are left out"
             )
-        return Positions(False, stations.scan_id, stations.xyz)
-    table = _read_trajectory(paths[0])
+        return Positions(False, stations.scan_id, stations.xyz, together)
+    table, ended = _read_trajectory(paths[0])
     time, xyz = table["time"], table.columns(XYZ)
     if alignment is None:
         raise UserError(f"{tunnel!r} is a site; it takes the --stations of a static scanner")
@@ -105,7 +122,7 @@ def read_positions(
             f" {MAX_AXIS_DISTANCE:g} m beside the axis of {tunnel!r}, {MAX_END_DISTANCE:g} m beyond its ends, or jump;"
             " fix the trajectory",
         )
-    notes = []
+    notes = [ended] if ended else []
     if wild.any():
         first = int(np.argmax(wild))
         notes.append(
@@ -114,6 +131,13 @@ def read_positions(
         )
     time, xyz = time[~wild], xyz[~wild]
     _require_direction(table.path, xyz, alignment, backwards=backwards)
+    time = time + time_offset
+    return Positions(True, time, xyz, (*notes, *time_notes(time, xyz, time_offset)), time_offset)
+
+
+def time_notes(time: Float, xyz: Float, time_offset: float) -> list[str]:
+    """Return remarks on the times of a trajectory (m,), s, with positions (m, 3): their offset, and gaps."""
+    notes = [f"{time_offset:+.12g} s added to the times of the trajectory (--time-offset)"] if time_offset else []
     gaps = PoseModel.from_trajectory(time, xyz).gaps
     if len(gaps):
         longest = gaps[np.argmax(gaps[:, 1] - gaps[:, 0])]
@@ -121,25 +145,50 @@ def read_positions(
             f"the trajectory has {len(gaps)} gap{'s' if len(gaps) > 1 else ''}, the longest of {longest[1] - longest[0]:.1f} s"
             f" from time {longest[0]:.3f}: points measured in {'them' if len(gaps) > 1 else 'it'} are left out"
         )
-    return Positions(True, time, xyz, tuple(notes))
+    return notes
+
+
+def _stations_together(paths: Sequence[Path], stations: Stations) -> tuple[str, ...]:
+    """Return a remark if all stations are at one place; refuse poses of files that were lost on export."""
+    count = len(stations.xyz)
+    if count < 2 or float(np.ptp(stations.xyz, axis=0).max()) > SAME_PLACE:
+        return ()
+    numbers = ", ".join(map(str, stations.scan_id[:MAX_NAMED].tolist())) + (", …" if count > MAX_NAMED else "")
+    if np.abs(stations.xyz).max() < SAME_PLACE and all(path.is_dir() or has_scans(path) for path in paths):
+        raise UserError(
+            f"{', '.join(map(str, paths))}: all {count} scans have the position 0, 0, 0: their poses were lost on export;"
+            f" export them with poses, or give them in a CSV file with scan_id,x,y,z: --stations FILE, scan_id {numbers}"
+        )
+    place = ", ".join(f"{value:.3f}" for value in stations.xyz[0])
+    return (f"all {count} stations are at one place ({place}), of scan_id {numbers}: check that the scanner stayed there",)
 
 
 def save_positions(connection: psycopg.Connection[Any], survey: int, positions: Positions, srid: int) -> None:
     """Write the positions of a survey, by its key, that has none, and a note on them."""
     note = "; ".join(positions.notes) or None
     longest, gaps = None, None
+    keys, xyz = positions.keys, positions.xyz
     if positions.mobile:
-        trajectory = PoseModel.from_trajectory(positions.keys, positions.xyz)
-        longest, gaps = trajectory.longest, trajectory.gaps.ravel().tolist()
+        longest = longest_interval(np.asarray(keys, np.float64))
+        keys, xyz = cover_week_end(keys, xyz, longest)
+        gaps = PoseModel.from_trajectory(keys, xyz, longest).gaps.ravel().tolist()
     connection.execute(
-        "UPDATE tunnel.survey SET positions_note = %s, longest_interval = %s, trajectory_gaps = %s WHERE id = %s",
-        [note, longest, gaps, survey],
+        "UPDATE tunnel.survey SET positions_note = %s, longest_interval = %s, trajectory_gaps = %s, time_offset = %s"
+        " WHERE id = %s",
+        [note, longest, gaps, positions.time_offset, survey],
     )
     if not len(positions):
         return
     table, key = ("pose", "time") if positions.mobile else ("station", "scan_id")
-    columns = [np.full(len(positions), survey, dtype=np.int32), positions.keys, PointZ(positions.xyz, srid)]
+    columns = [np.full(len(keys), survey, dtype=np.int32), keys, PointZ(xyz, srid)]
     _insert(connection, table, ["survey_id", key, "geom"], columns)
+
+
+def replace_positions(connection: psycopg.Connection[Any], survey: int, positions: Positions, srid: int) -> None:
+    """Write the positions of a survey, by its key, in place of the former ones."""
+    connection.execute("DELETE FROM tunnel.pose WHERE survey_id = %s", [survey])
+    connection.execute("DELETE FROM tunnel.station WHERE survey_id = %s", [survey])
+    save_positions(connection, survey, positions, srid)
 
 
 def read_reference(path: Path) -> CsvTable:
@@ -180,12 +229,21 @@ def _insert(connection: psycopg.Connection[Any], table: str, names: list[str], c
     copy_binary(connection, sql.Identifier("tunnel", table), names, [pack(columns)])
 
 
-def _read_trajectory(path: Path) -> CsvTable:
+def _read_trajectory(path: Path) -> tuple[CsvTable, str]:
+    """Read a trajectory in ascending time, and return a remark if the GPS week ends during it."""
     table = read_csv(path, ("time", *XYZ))
     if len(table) < 2:
         raise UserError(f"{path}: a trajectory needs at least 2 rows, this one has {len(table)}")
-    table.require_growing("time")
-    return table
+    time = continue_week(table["time"], table.columns(XYZ))
+    if time is table["time"] or np.array_equal(time, table["time"]):
+        table.require_growing("time")
+        return table, ""
+    later = int(np.count_nonzero(time != table["time"]))
+    order = np.argsort(time, kind="stable")
+    values = np.column_stack([time, table.columns(XYZ)])[order]
+    kept = np.append(True, np.diff(values[:, 0]) > 0.0)  # the end of the week may be written as 604800 and as 0
+    said = f"the GPS week ends during the trajectory: {WEEK:.0f} s added to the times of its {later} later poses"
+    return replace(table, values=values[kept], lines=table.lines[order][kept]), said
 
 
 def _require_near(paths: Sequence[Path], xyz: Float, alignment: Alignment, tunnel: str) -> None:

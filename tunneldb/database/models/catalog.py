@@ -128,6 +128,9 @@ class Survey(Base):
     )
     created_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="Time when it was added")
     positions_note: Mapped[str | None] = mapped_column(comment="Notes on its scanner positions: poses left out, gaps")
+    time_offset: Mapped[float] = mapped_column(
+        server_default=text("0"), comment="Seconds added to the times of its trajectory's file"
+    )
     longest_interval: Mapped[float | None] = mapped_column(
         comment="Longest interval of its trajectory that is interpolated over, s; NULL without a trajectory"
     )

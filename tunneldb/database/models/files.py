@@ -60,6 +60,7 @@ class ScanFile(Base):
     intensity_note: Mapped[str | None] = mapped_column(
         comment="Doubts about its intensity: saturated, or another kind by its values"
     )
+    pose_note: Mapped[str | None] = mapped_column(comment="Doubts about the scanner positions of its points")
     srid: Mapped[int | None] = mapped_column(comment="Spatial reference that the file states, if it states one")
     loaded_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="Time of loading")
 
