@@ -259,7 +259,9 @@ def _number(path: Path, line: int, name: str, text: str, decimal_comma: bool) ->
     except ValueError:
         raise InputError(f"{path}, line {line}: {_not_a_number(name, text)}") from None
     if not abs(value) <= MAX_MEASUREMENT:  # also true for NaN
-        raise InputError(f"{path}, line {line}: {name} is {text}, not a plausible measurement; remove the line")
+        nanoseconds = name == "time" and abs(value) > MAX_MEASUREMENT
+        scaled = ", or divide the column by 1000000000 if it is in nanoseconds" if nanoseconds else ""
+        raise InputError(f"{path}, line {line}: {name} is {text}, not a plausible measurement; remove the line{scaled}")
     return value
 
 

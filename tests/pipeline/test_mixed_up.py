@@ -63,7 +63,7 @@ def scan(path: Path, time: float = 0.0, scan_id: int = 1) -> Path:
         (EPOCH, 200_000.0, "the trajectory seems to be in time since an epoch, the file in seconds of the GPS week"),
         (EPOCH, EPOCH - 1e9, "the trajectory seems to be in GPS time, the file in adjusted GPS time"),
         (EPOCH + 315_964_782, EPOCH, "the trajectory seems to be in Unix time, the file in GPS time"),
-        (EPOCH, EPOCH + 3600, "give the whole trajectory, in the time system of the file"),
+        (EPOCH, EPOCH + 3600, "whole hours: a time zone; with +3600 s on the trajectory's times they fit"),
     ],
 )
 def test_clocks(tunnel: Path, trajectory: float, file: float, says: str) -> None:

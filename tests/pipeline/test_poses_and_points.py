@@ -167,3 +167,12 @@ def test_exchanged_stations_are_named_and_the_right_ones_fit(folder: Path) -> No
     las.classification = np.full(len(las), 1)
     las.write(path)
     assert "scan 2 30 m after its station" in command("load", "s", path, code=2)
+
+
+def test_inspect_finds_the_time_offset_before(folder: Path) -> None:
+    trajectory(folder / "a.trajectory.csv", -18.0)
+    result = CliRunner().invoke(main, ["inspect", str(folder / "a.laz")])
+    assert result.exit_code == 0, result.output
+    doubts, _, commands = result.stdout.partition("Next:")
+    assert "the trajectory seems to be in UTC, the file in GPS time" in doubts
+    assert re.search(r"survey add .* --trajectory .*a\.trajectory\.csv --time-offset 18 ", commands)
