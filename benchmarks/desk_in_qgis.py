@@ -74,7 +74,7 @@ def day() -> Iterator[None]:
         yield
         for _, label, code, severity, corners in (row for row in DRAWN if row[0] == shape):
             yield from draw(
-                corners, {"kind": label, "severity": severity, "width": "0.0020" if code == "crack" else "", "remark": "seen"}
+                corners, {"kind": label, "severity": severity, "width_mm": "2.00" if code == "crack" else "", "remark": "seen"}
             )
             note("drawn", kind=code)
         press(iface.actionSaveActiveLayerEdits())

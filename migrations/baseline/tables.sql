@@ -1782,7 +1782,7 @@ CREATE TABLE tunnel.finding (
     origin TEXT DEFAULT 'detected' NOT NULL,
     manual BOOLEAN DEFAULT false NOT NULL,
     severity SMALLINT,
-    width DOUBLE PRECISION,
+    width_mm DOUBLE PRECISION,
     length DOUBLE PRECISION,
     shape geometry(GEOMETRY,-1),
     shape_map geometry(GEOMETRY,-1),
@@ -1805,7 +1805,7 @@ CREATE TABLE tunnel.finding (
     CONSTRAINT finding_pkey PRIMARY KEY (id),
     CONSTRAINT finding_review_check CHECK (review IN ('open', 'confirmed', 'rejected')),
     CONSTRAINT finding_origin_check CHECK (origin IN ('detected', 'drawn', 'redrawn', 'split', 'merged')),
-    CONSTRAINT finding_width_check CHECK (width > 0),
+    CONSTRAINT finding_width_mm_check CHECK (width_mm > 0),
     CONSTRAINT finding_other_check CHECK (merged_into <> id AND same_as <> id),
     CONSTRAINT finding_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE,
     CONSTRAINT finding_kind_fkey FOREIGN KEY(kind) REFERENCES tunnel.finding_kind (code),
@@ -1845,7 +1845,7 @@ COMMENT ON COLUMN tunnel.finding.model IS 'Version of the model of evidence that
 COMMENT ON COLUMN tunnel.finding.origin IS 'Origin of its outline: detected, drawn, redrawn, split or merged; detection changes detected outlines only';
 COMMENT ON COLUMN tunnel.finding.manual IS 'True if it was drawn, or split off from what was drawn: never detected';
 COMMENT ON COLUMN tunnel.finding.severity IS 'Severity, 1 to 4';
-COMMENT ON COLUMN tunnel.finding.width IS 'Width of a line, such as a crack, m';
+COMMENT ON COLUMN tunnel.finding.width_mm IS 'Width of a line, such as a crack, mm';
 COMMENT ON COLUMN tunnel.finding.length IS 'Length of a line on the surface, m';
 COMMENT ON COLUMN tunnel.finding.shape IS 'The line or point that it is, if it is no polygon, in the unrolled plane, m';
 COMMENT ON COLUMN tunnel.finding.shape_map IS 'The same on the map strip, tunnel''s SRID, m';

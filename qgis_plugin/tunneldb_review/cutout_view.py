@@ -9,9 +9,9 @@ from qgis.PyQt.QtCore import QPointF, QRectF, QSize, Qt, pyqtSignal
 from qgis.PyQt.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPolygonF, QResizeEvent
 from qgis.PyQt.QtWidgets import QSizePolicy, QWidget
 
-from .cutouts import BACKGROUND, Picture
+from .cutouts import BACKGROUND, REVIEW_COLOURS, Picture
 
-_COLOURS = {"open": QColor("#e67e22"), "confirmed": QColor("#1f6fd6"), "rejected": QColor("#666666")}
+_COLOURS = {review: QColor(colour) for review, colour in REVIEW_COLOURS.items()}
 _BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 _NEAR = 6.0  # pixels; smaller outlines get a ring
 

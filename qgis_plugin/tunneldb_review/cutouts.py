@@ -26,6 +26,9 @@ KEPT = 60
 """Number of pictures in memory."""
 
 BACKGROUND = QColor("#f7f7f7")
+REVIEW_COLOURS = {"open": "#e67e00", "confirmed": "#005caf", "rejected": "#6e6e6e"}
+"""Colours of leaks by their review, those of all outputs of tunneldb."""
+
 _SAMPLE = 250_000
 _LEAST_DARK, _LEAST_BRIGHT = 4.0, 1.6  # dB about the median, as in the images of tunneldb
 _OFFSET = 0.1  # m, where colours are full

@@ -7,10 +7,10 @@ from typing import Any, Dict, List, Tuple
 from qgis.PyQt.QtCore import Qt, pyqtSignal
 from qgis.PyQt.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLabel, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
+from .cutouts import REVIEW_COLOURS
+
 _LETTERS = {"joint": "J", "dark": "D"}
 """Kinds that detection finds besides leaks: always available, whatever their place in the list."""
-
-_BADGE = {"open": "#e67e22", "confirmed": "#1f6fd6", "rejected": "#757575"}
 
 
 class FactsPanel(QWidget):
@@ -54,7 +54,7 @@ class FactsPanel(QWidget):
             self.facts.setText("No finding is left in this selection.")
             self.remark.clear()
             return
-        badge = f"<span style='color:{_BADGE.get(facts['review'], '#000')}'>{facts['review']}</span>"
+        badge = f"<span style='color:{REVIEW_COLOURS.get(facts['review'], '#000')}'>{facts['review']}</span>"
         self.head.setText(f"<b>{facts['label'] or ''}</b> &nbsp; no. {facts['id']} &nbsp; <b>{badge}</b>")
         self.facts.setText("<br>".join(_lines(facts, probability)))
         self.kind.setCurrentIndex(self.kind.findData(facts["kind"]))

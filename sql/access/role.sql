@@ -104,7 +104,7 @@ BEGIN
     GRANT UPDATE (review, remark) ON tunnel_api.spot, tunnel_api.spot_face, tunnel_api.spot_map, tunnel_api.spot_3d, tunnel_api.spot_sheet
         TO tunnel_inspector;
     GRANT INSERT, DELETE, UPDATE (kind, geom, reason) ON tunnel_api.region TO tunnel_inspector;
-    GRANT INSERT, DELETE, UPDATE (kind, severity, width, review, remark, geom) ON
+    GRANT INSERT, DELETE, UPDATE (kind, severity, width_mm, review, remark, geom) ON
         tunnel_api.finding_unrolled, tunnel_api.finding_map, tunnel_api.finding_3d TO tunnel_inspector;
     GRANT INSERT, DELETE, UPDATE (path, caption) ON tunnel_api.finding_photo TO tunnel_inspector;
     GRANT EXECUTE ON FUNCTION tunnel_api.finding_split(bigint, geometry), tunnel_api.finding_merge(bigint[]),

@@ -5,7 +5,7 @@ CREATE OR REPLACE FUNCTION tunnel_internal.draw_finding() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     place CONSTANT text := TG_ARGV[0];
-    editable CONSTANT text[] := ARRAY['kind', 'severity', 'width', 'review', 'remark'];
+    editable CONSTANT text[] := ARRAY['kind', 'severity', 'width_mm', 'review', 'remark'];
     key text;
     its tunnel.survey;
     was tunnel.finding;
@@ -30,9 +30,9 @@ BEGIN
         END IF;
         drawn := tunnel_internal.drawn_in(its.id, place, NEW.geom);
         PERFORM tunnel_internal.check_kind(NEW.kind, drawn);
-        PERFORM tunnel_internal.check_finding(NEW.severity, NEW.width, coalesce(NEW.review, 'confirmed'));
+        PERFORM tunnel_internal.check_finding(NEW.kind, NEW.severity, NEW.width_mm, coalesce(NEW.review, 'confirmed'));
         PERFORM tunnel_internal.lock_findings(its.id);
-        NEW.id := tunnel_internal.add_finding(its.id, NEW.kind, drawn, NEW.width, NEW.severity, coalesce(NEW.review, 'confirmed'),
+        NEW.id := tunnel_internal.add_finding(its.id, NEW.kind, drawn, NEW.width_mm, NEW.severity, coalesce(NEW.review, 'confirmed'),
                                          NEW.remark, 'drawn', true, NULL);
     ELSE
         PERFORM tunnel_internal.lock_findings(OLD.survey_id);
@@ -68,7 +68,7 @@ BEGIN
             RAISE EXCEPTION 'of a finding only the kind, the severity, the width, the review, the remark and the geometry can be edited'
                 USING ERRCODE = 'feature_not_supported';
         END IF;
-        was_row := jsonb_build_object('kind', coalesce(was.kind_override, was.kind), 'severity', was.severity, 'width', was.width,
+        was_row := jsonb_build_object('kind', coalesce(was.kind_override, was.kind), 'severity', was.severity, 'width_mm', was.width_mm,
                                       'review', was.review, 'remark', was.remark);
         shape_before := CASE place WHEN 'unrolled' THEN coalesce(was.shape, was.unrolled) WHEN 'map' THEN coalesce(was.shape_map, was.map)
                                    ELSE coalesce(was.shape_surface, was.surface) END;
@@ -88,10 +88,10 @@ BEGIN
         END IF;
         NEW.kind := new_row ->> 'kind';
         NEW.severity := (new_row ->> 'severity')::smallint;
-        NEW.width := (new_row ->> 'width')::float8;
+        NEW.width_mm := (new_row ->> 'width_mm')::float8;
         NEW.review := new_row ->> 'review';
         NEW.remark := new_row ->> 'remark';
-        PERFORM tunnel_internal.check_finding(NEW.severity, NEW.width, NEW.review);
+        PERFORM tunnel_internal.check_finding(NEW.kind, NEW.severity, NEW.width_mm, NEW.review);
         IF redrawn THEN
             drawn := tunnel_internal.drawn_in(was.survey_id, place, NEW.geom);
         ELSE
@@ -102,9 +102,9 @@ BEGIN
            OR (redrawn AND EXISTS (SELECT FROM tunnel.finding_kind k WHERE k.code = NEW.kind AND k.active)) THEN
             PERFORM tunnel_internal.check_kind(NEW.kind, CASE WHEN was.manual OR redrawn THEN drawn END);
         END IF;
-        IF redrawn OR (was.shape IS NOT NULL AND new_row -> 'width' <> was_row -> 'width') THEN
+        IF redrawn OR (was.shape IS NOT NULL AND new_row -> 'width_mm' <> was_row -> 'width_mm') THEN
             kept := tunnel_internal.finding_measured(was.id);
-            PERFORM tunnel_internal.redraw(was.id, drawn, NEW.width, CASE was.origin WHEN 'detected' THEN 'redrawn' ELSE was.origin END);
+            PERFORM tunnel_internal.redraw(was.id, drawn, NEW.width_mm, CASE was.origin WHEN 'detected' THEN 'redrawn' ELSE was.origin END);
         END IF;
         IF new_row -> 'review' <> was_row -> 'review' OR new_row -> 'remark' <> was_row -> 'remark'
            OR new_row -> 'kind' <> was_row -> 'kind' THEN
@@ -115,7 +115,7 @@ BEGIN
             NEW.reviewed_at := was.reviewed_at;
         END IF;
         UPDATE tunnel.finding a
-           SET severity = NEW.severity, width = NEW.width, review = NEW.review, remark = NEW.remark,
+           SET severity = NEW.severity, width_mm = NEW.width_mm, review = NEW.review, remark = NEW.remark,
                reviewed_by = NEW.reviewed_by, reviewed_at = NEW.reviewed_at,
                kind = CASE WHEN a.manual THEN NEW.kind ELSE a.kind END,
                kind_override = CASE WHEN a.manual THEN NULL WHEN NEW.kind = coalesce(a.kind_override, a.kind) THEN a.kind_override

@@ -23,21 +23,24 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.check_kind(text, geometry) IS
     'Raise an error unless a kind of findings with this code can be drawn with this geometry, or with any if none is given';
 
-CREATE OR REPLACE FUNCTION tunnel_internal.check_finding(severity int, width float8, review text) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.check_finding(kind text, severity int, width_mm float8, review text) RETURNS void
 LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
+DECLARE
+    widest constant int := CASE kind WHEN 'crack' THEN 100 ELSE 10000 END;  -- mm
 BEGIN
     IF severity NOT BETWEEN 1 AND 4 THEN
         RAISE EXCEPTION 'the severity of a finding is 1 to 4, not %', severity USING ERRCODE = 'check_violation';
-    ELSIF NOT (width > 0 AND width <= 10) THEN
-        RAISE EXCEPTION 'the width of a line is above 0 and at most 10 m, not %', width USING ERRCODE = 'check_violation';
+    ELSIF NOT width_mm BETWEEN 0.01 AND widest THEN
+        RAISE EXCEPTION 'a % is 0.01 to % mm wide, not % mm: widths are in millimetres',
+            kind, widest, width_mm USING ERRCODE = 'check_violation';
     ELSIF review IS NULL OR review NOT IN ('open', 'confirmed', 'rejected') THEN
         RAISE EXCEPTION 'the review of a finding can be open, confirmed or rejected, not %', coalesce(review, 'empty')
             USING ERRCODE = 'check_violation';
     END IF;
 END
 $$;
-COMMENT ON FUNCTION tunnel_internal.check_finding(int, float8, text) IS
-    'Raise an error unless severity, width (m) and review are valid';
+COMMENT ON FUNCTION tunnel_internal.check_finding(text, int, float8, text) IS
+    'Raise an error unless severity, width (mm; of a crack at most 100) and review are valid';
 
 -- Shape drawn in a view, in the unrolled plane: drawn there (finding_unrolled), on the map strip (finding_map) or in space
 -- (finding_3d).
@@ -75,11 +78,11 @@ COMMENT ON FUNCTION tunnel_internal.drawn_in(int, text, geometry) IS
 
 -- New outline of a finding: compute all dependent values, and clear the measured ones until the next detection measures the new
 -- outline.
-CREATE OR REPLACE FUNCTION tunnel_internal.redraw(id bigint, drawn geometry, width float8, origin text) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.redraw(id bigint, drawn geometry, width_mm float8, origin text) RETURNS void
 LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
     UPDATE tunnel.finding a
        SET km = f.km, chainage_from = f.chainage_from, chainage_to = f.chainage_to, arc_from = f.arc_from, arc_to = f.arc_to,
-           clock = f.clock, area = f.area, length = f.length, width = $3, unrolled = f.unrolled, map = f.map, surface = f.surface,
+           clock = f.clock, area = f.area, length = f.length, width_mm = $3, unrolled = f.unrolled, map = f.map, surface = f.surface,
            shape = f.shape, shape_map = f.shape_map, shape_surface = f.shape_surface, origin = $4, drawn_by = session_user,
            drawn_at = clock_timestamp(), detected = true, darkening_mean = NULL, darkening_max = NULL, image_share = NULL, contrast = NULL,
            confidence = NULL, reasons = '{}', evidence = NULL, features = NULL, feature_list_id = NULL, model = NULL,
@@ -93,10 +96,10 @@ COMMENT ON FUNCTION tunnel_internal.redraw(bigint, geometry, float8, text) IS
 
 -- New finding, alone or as a part of another one. A finding that is restored keeps its id.
 CREATE OR REPLACE FUNCTION tunnel_internal.add_finding(
-    survey_id int, kind text, drawn geometry, width float8, severity int, review text, remark text, origin text, manual boolean,
+    survey_id int, kind text, drawn geometry, width_mm float8, severity int, review text, remark text, origin text, manual boolean,
     parent_id bigint, id bigint DEFAULT NULL) RETURNS bigint
 LANGUAGE sql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
-    INSERT INTO tunnel.finding (id, survey_id, kind, width, severity, review, reviewed_by, reviewed_at, remark, origin, manual,
+    INSERT INTO tunnel.finding (id, survey_id, kind, width_mm, severity, review, reviewed_by, reviewed_at, remark, origin, manual,
         parent_id, drawn_by, drawn_at, km, chainage_from, chainage_to, arc_from, arc_to, clock, area, length, unrolled, map,
         surface, shape, shape_map, shape_surface, created_at) OVERRIDING SYSTEM VALUE
     SELECT coalesce($11, nextval('tunnel.finding_id_seq')), $1, $2, $4, $5, $6, CASE WHEN $6 <> 'open' THEN session_user END,
@@ -124,7 +127,7 @@ BEGIN
             UPDATE tunnel.finding a
                SET clock = f.clock, area = f.area, length = f.length, map = f.map, surface = f.surface, shape_map = f.shape_map,
                    shape_surface = f.shape_surface
-              FROM tunnel_internal.drawn_figures(survey_key, coalesce(was.shape, was.unrolled), was.width) f
+              FROM tunnel_internal.drawn_figures(survey_key, coalesce(was.shape, was.unrolled), was.width_mm) f
              WHERE a.id = was.id AND NOT (f.surface OPERATOR(public.=) was.surface AND f.map OPERATOR(public.=) was.map);
         EXCEPTION WHEN invalid_parameter_value THEN
             NULL;

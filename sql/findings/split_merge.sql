@@ -40,10 +40,10 @@ BEGIN
     END IF;
     before := tunnel_internal.finding_state(finding);
     kept := tunnel_internal.finding_measured(finding);
-    PERFORM tunnel_internal.redraw(finding, parts[1], was.width, 'split');
+    PERFORM tunnel_internal.redraw(finding, parts[1], was.width_mm, 'split');
     ids := ARRAY[finding];
     FOREACH part IN ARRAY parts[2:] LOOP
-        ids := ids || tunnel_internal.add_finding(survey_key, coalesce(was.kind_override, was.kind), part, was.width, was.severity, was.review,
+        ids := ids || tunnel_internal.add_finding(survey_key, coalesce(was.kind_override, was.kind), part, was.width_mm, was.severity, was.review,
                                              was.remark, 'split', was.manual, finding);
     END LOOP;
     step := tunnel_internal.note_edit(name, 'finding', finding, before, tunnel_internal.finding_state(finding), kept => kept);
@@ -123,7 +123,7 @@ BEGIN
     END LOOP;
     before := tunnel_internal.finding_state(oldest.id);
     kept := tunnel_internal.finding_measured(oldest.id);
-    PERFORM tunnel_internal.redraw(oldest.id, whole, oldest.width, 'merged');
+    PERFORM tunnel_internal.redraw(oldest.id, whole, oldest.width_mm, 'merged');
     UPDATE tunnel.finding a SET severity = m.severity, remark = m.remark
       FROM (SELECT max(x.severity) AS severity, string_agg(DISTINCT x.remark, '; ') AS remark
               FROM tunnel.finding x WHERE x.id = ANY (wanted)) m

@@ -4,7 +4,7 @@
 CREATE OR REPLACE FUNCTION tunnel_internal.finding_state(id bigint) RETURNS jsonb
 LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
     SELECT jsonb_strip_nulls(jsonb_build_object(
-        'kind', coalesce(a.kind_override, a.kind), 'severity', a.severity, 'width', a.width, 'review', a.review, 'remark', a.remark,
+        'kind', coalesce(a.kind_override, a.kind), 'severity', a.severity, 'width_mm', a.width_mm, 'review', a.review, 'remark', a.remark,
         'origin', a.origin, 'parent_id', a.parent_id, 'merged_into', a.merged_into,
         'geom', public.ST_AsEWKT(coalesce(a.shape, a.unrolled))))
       FROM tunnel.finding a WHERE a.id = $1

@@ -88,13 +88,13 @@ DECLARE
     becomes jsonb := tunnel_internal.finding_state(finding_id) - ARRAY(SELECT jsonb_object_keys(changed)) || coalesce(step.before, '{}');
 BEGIN
     IF changed ?| ARRAY['geom', 'origin']
-       OR (changed ? 'width' AND EXISTS (SELECT FROM tunnel.finding a WHERE a.id = finding_id AND a.shape IS NOT NULL)) THEN
+       OR (changed ? 'width_mm' AND EXISTS (SELECT FROM tunnel.finding a WHERE a.id = finding_id AND a.shape IS NOT NULL)) THEN
         -- a detection since would count twice if the finding were detected again
         IF becomes ->> 'origin' = 'detected' AND EXISTS (
             SELECT FROM tunnel.finding x WHERE x.same_as = finding_id AND x.origin = 'detected' AND x.created_at > step.at) THEN
             becomes := becomes || '{"origin": "redrawn"}';
         END IF;
-        PERFORM tunnel_internal.redraw(finding_id, public.ST_GeomFromEWKT(becomes ->> 'geom'), (becomes ->> 'width')::float8, becomes ->> 'origin');
+        PERFORM tunnel_internal.redraw(finding_id, public.ST_GeomFromEWKT(becomes ->> 'geom'), (becomes ->> 'width_mm')::float8, becomes ->> 'origin');
         UPDATE tunnel.finding a
            SET darkening_mean = k.darkening_mean, darkening_max = k.darkening_max, image_share = k.image_share, contrast = k.contrast,
                confidence = k.confidence, reasons = k.reasons, evidence = k.evidence, features = k.features,
@@ -103,7 +103,7 @@ BEGIN
          WHERE a.id = finding_id AND step.kept IS NOT NULL;
     END IF;
     UPDATE tunnel.finding a
-       SET severity = (becomes ->> 'severity')::smallint, width = (becomes ->> 'width')::float8, review = becomes ->> 'review',
+       SET severity = (becomes ->> 'severity')::smallint, width_mm = (becomes ->> 'width_mm')::float8, review = becomes ->> 'review',
            remark = becomes ->> 'remark', merged_into = (becomes ->> 'merged_into')::bigint,
            kind = CASE WHEN a.manual THEN becomes ->> 'kind' ELSE a.kind END,
            kind_override = CASE WHEN NOT a.manual THEN nullif(becomes ->> 'kind', a.kind) END
@@ -121,7 +121,7 @@ DECLARE
     had constant jsonb := step.before;
 BEGIN
     PERFORM tunnel_internal.add_finding(
-        survey_id, had ->> 'kind', public.ST_GeomFromEWKT(had ->> 'geom'), (had ->> 'width')::float8, (had ->> 'severity')::int,
+        survey_id, had ->> 'kind', public.ST_GeomFromEWKT(had ->> 'geom'), (had ->> 'width_mm')::float8, (had ->> 'severity')::int,
         had ->> 'review', had ->> 'remark', had ->> 'origin', true,
         (SELECT a.id FROM tunnel.finding a WHERE a.id = (had ->> 'parent_id')::bigint), step.row_id);
     UPDATE tunnel.finding a SET darkening_mean = k.darkening_mean, darkening_max = k.darkening_max, image_share = k.image_share, contrast = k.contrast

@@ -111,7 +111,7 @@ COMMENT ON FUNCTION tunnel_internal.clock_at(int, float8, float8) IS
 -- found, drawn and exported as polygons. The area on the surface is the area in the unrolled plane times the mean stretch of
 -- the surface (slope, curve) at 16 places.
 CREATE OR REPLACE FUNCTION tunnel_internal.drawn_figures(
-    survey_id int, drawn geometry, width float8,
+    survey_id int, drawn geometry, width_mm float8,
     OUT km int, OUT chainage_from float8, OUT chainage_to float8, OUT arc_from float8, OUT arc_to float8, OUT clock float8,
     OUT area float8, OUT length float8, OUT unrolled geometry, OUT map geometry, OUT surface geometry,
     OUT shape geometry, OUT shape_map geometry, OUT shape_surface geometry)
@@ -138,7 +138,7 @@ BEGIN
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     unrolled := CASE kind WHEN 'POLYGON' THEN given
-                          WHEN 'LINESTRING' THEN public.ST_Buffer(given, greatest(width, 0.01) / 2, 'endcap=flat join=mitre')
+                          WHEN 'LINESTRING' THEN public.ST_Buffer(given, greatest(width_mm / 1000, 0.01) / 2, 'endcap=flat join=mitre')
                           ELSE public.ST_Buffer(given, 0.05, 'quad_segs=4') END;
     surface := tunnel_api.roll(survey_id, unrolled);
     IF surface IS NULL AND kind <> 'POLYGON' THEN  -- at the very edge of the lining
@@ -174,7 +174,7 @@ BEGIN
         shape_map := tunnel_api.map_strip(survey_id, given);
         shape_surface := tunnel_api.roll(survey_id, given);
         length := CASE kind WHEN 'LINESTRING' THEN public.ST_3DLength(shape_surface) END;
-        area := coalesce(length * width, 0);
+        area := coalesce(length * width_mm / 1000, 0);
     END IF;
     chainage_from := public.ST_XMin(unrolled);
     chainage_to := public.ST_XMax(unrolled);
@@ -185,4 +185,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_internal.drawn_figures(int, geometry, float8) IS
-'Values derived from a polygon, a line (with its width, m) or a point drawn in the unrolled plane (chainage, arc; m): kilometre and clock position of the middle, extent, area and length on the surface, outline and three geometries. Raises an error if the shape is invalid or extends beyond the lining';
+'Values derived from a polygon, a line (with its width, mm) or a point drawn in the unrolled plane (chainage, arc; m): kilometre and clock position of the middle, extent, area and length on the surface, outline and three geometries. Raises an error if the shape is invalid or extends beyond the lining';

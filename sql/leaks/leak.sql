@@ -36,12 +36,17 @@ AS $$
             (SELECT max(l.chainage_to - l.chainage_from) FROM tunnel.finding l WHERE l.survey_id = s.id) AS longest
         FROM tunnel.survey s CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e WHERE s.id = tunnel_api.survey_id($1)
     )
-    SELECT coalesce(sum(CASE WHEN l.chainage_from >= g.low AND l.chainage_to <= g.high THEN l.area
-        ELSE (SELECT tunnel_internal.area_between(a.unrolled, a.area, g.low, g.high) FROM tunnel.finding a WHERE a.id = l.id) END), 0)
-    FROM given g
-    JOIN tunnel.finding l ON l.survey_id = g.id AND l.detected AND l.review <> 'rejected' AND l.wet AND NOT l.superseded
-        AND l.chainage_from > g.low - 1e-6 - g.longest AND l.chainage_to > g.low AND l.chainage_from < g.high
-    WHERE g.low < g.high AND tunnel_internal.in_order($2, $3)
+    SELECT CASE WHEN w.area IS NOT NULL OR w.searched THEN coalesce(w.area, 0) END
+    FROM (
+        SELECT sum(CASE WHEN l.chainage_from >= g.low AND l.chainage_to <= g.high THEN l.area
+            ELSE (SELECT tunnel_internal.area_between(a.unrolled, a.area, g.low, g.high) FROM tunnel.finding a WHERE a.id = l.id) END)
+            AS area,
+            EXISTS (SELECT FROM given n JOIN tunnel.coverage c
+                        ON c.survey_id = n.id AND c.km * 1000 < n.high AND (c.km + 1) * 1000 > n.low) AS searched
+        FROM given g
+        JOIN tunnel.finding l ON l.survey_id = g.id AND l.detected AND l.review <> 'rejected' AND l.wet AND NOT l.superseded
+            AND l.chainage_from > g.low - 1e-6 - g.longest AND l.chainage_to > g.low AND l.chainage_from < g.high
+        WHERE g.low < g.high AND tunnel_internal.in_order($2, $3)) w
 $$;
 COMMENT ON FUNCTION tunnel_api.wet_area(text, float8, float8) IS
-'Wet area (m² on the lining) of a survey between two chainages (m). Rejected leaks and leaks that the last detection did not find are left out';
+'Wet area (m² on the lining) of a survey between two chainages (m). Rejected leaks and leaks that the last detection did not find are left out. NULL if no part was searched for leaks and no leak was drawn; coverage_gaps names stretches that were not searched';

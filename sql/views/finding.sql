@@ -38,7 +38,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, m.chainage) l) AS label,
        a.arc_from, a.arc_to, a.clock,
        coalesce(a.kind_override, a.kind) AS kind, k.label AS kind_label, CASE WHEN NOT a.manual THEN a.kind END AS kind_detected, a.wet,
-       a.origin, a.manual, a.severity, v.label AS severity_label, a.width, a.length, a.area,
+       a.origin, a.manual, a.severity, v.label AS severity_label, a.width_mm, a.length, a.area,
        a.image_share IS NOT NULL AS measured, a.darkening_mean, a.darkening_max, a.image_share, a.contrast, a.confidence, a.reasons,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.drawn_by, a.drawn_at,
        a.detected, a.created_at, CASE WHEN NOT a.manual THEN a.detected_at END AS detected_at,
@@ -95,7 +95,7 @@ BEGIN
         ('manual', 'True if it was drawn, never detected: only such findings can be deleted'),
         ('severity', 'Severity, 1 (lowest) to 4'),
         ('severity_label', 'Name of the severity'),
-        ('width', 'Width of a line, m'),
+        ('width_mm', 'Width of a line, such as a crack, mm'),
         ('length', 'Length of a line on the surface, m'),
         ('area', 'Area on the lining, m²; for a line, length × width; for a point, 0'),
         ('measured', 'True if it was measured on the image; the next detect measures drawn and redrawn findings'),
@@ -177,16 +177,18 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.area, a.darkening_mean, a.darkening_max, a.image_share,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.detected, a.created_at, a.detected_at,
        a.detected AND a.review <> 'rejected' AS counted,
-       tunnel_internal.evidence_text(a.evidence) AS evidence, a.model, a.wet, a.origin,
-       (public.st_xmin(a.surface) + public.st_xmax(a.surface)) / 2 AS easting,
-       (public.st_ymin(a.surface) + public.st_ymax(a.surface)) / 2 AS northing,
-       (public.st_zmin(a.surface) + public.st_zmax(a.surface)) / 2 AS height,
+       tunnel_internal.evidence_text(a.evidence) AS evidence, a.model, a.wet, a.origin, a.severity,
+       v.label AS severity_label,
+       (public.st_xmin(coalesce(a.shape_surface, a.surface)) + public.st_xmax(coalesce(a.shape_surface, a.surface))) / 2 AS easting,
+       (public.st_ymin(coalesce(a.shape_surface, a.surface)) + public.st_ymax(coalesce(a.shape_surface, a.surface))) / 2 AS northing,
+       (public.st_zmin(coalesce(a.shape_surface, a.surface)) + public.st_zmax(coalesce(a.shape_surface, a.surface))) / 2 AS height,
        a.unrolled::public.geometry(Polygon, 0) AS unrolled,
        a.map::public.geometry AS map,
        a.surface::public.geometry AS surface
   FROM tunnel.finding a
   JOIN tunnel.survey s ON s.id = a.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+  LEFT JOIN tunnel.severity v ON v.id = a.severity
  CROSS JOIN LATERAL (SELECT (a.chainage_from + a.chainage_to) / 2 AS chainage,
                             floor((a.chainage_from + a.chainage_to) / 2 / t.spacing)::integer AS near) m
  WHERE a.wet AND NOT a.superseded;
@@ -230,6 +232,8 @@ BEGIN
         ('origin', 'Origin of its outline: detected, drawn, redrawn, split or merged'),
         ('evidence', 'Evidence for a leak (+) and against it (-): logarithms of odds by reason, the strongest first'),
         ('model', 'Version of the model of evidence that classified it'),
+        ('severity', 'Severity, 1 (lowest) to 4; edited in the views of findings'),
+        ('severity_label', 'Name of the severity'),
         ('unrolled', 'Polygon in the unrolled plane (chainage, arc), m, SRID 0: measure and compare leaks here'),
         ('map', 'Polygon on the map strip beside the axis, tunnel''s SRID'),
         ('surface', 'Polygon on the lining in space (3D), tunnel''s SRID. ST_Area of it is 0 on a vertical wall: use area')) AS t (name, text)
@@ -329,11 +333,10 @@ COMMENT ON COLUMN tunnel_api.dry_region.geom IS 'Polygon in the unrolled plane (
 -- CS1 to CS4, findings without severity as CS2. The liner without findings is in CS1.
 CREATE OR REPLACE VIEW tunnel_api.snti_condition AS
 SELECT s.id::bigint * 10 + q.n AS id, s.id AS survey_id, s.name AS survey, q.element, q.unit,
-       q.cs1 + CASE WHEN q.n = 1 THEN greatest(coalesce((SELECT sum(c.lining_total) FROM tunnel.coverage c
-                                                          WHERE c.survey_id = s.id), 0) - q.cs1 - q.cs2 - q.cs3 - q.cs4, 0)
-                    ELSE 0 END AS cs1,
-       q.cs2, q.cs3, q.cs4
+       q.cs1 + CASE WHEN q.n = 1 THEN greatest(coalesce(i.seen, 0) - q.cs1 - q.cs2 - q.cs3 - q.cs4, 0) ELSE 0 END AS cs1,
+       q.cs2, q.cs3, q.cs4, i.seen_share
   FROM tunnel.survey s
+  LEFT JOIN LATERAL tunnel_api.coverage(s.name, '-infinity', 'infinity') i (lining, seen, seen_share) ON true
  CROSS JOIN LATERAL (
         SELECT e.n, e.element, e.unit, coalesce(sum(m.amount) FILTER (WHERE g.state = 1), 0) AS cs1,
                coalesce(sum(m.amount) FILTER (WHERE g.state = 2), 0) AS cs2,
@@ -356,10 +359,12 @@ SELECT s.id::bigint * 10 + q.n AS id, s.id AS survey_id, s.name AS survey, q.ele
                 SELECT CASE e.unit WHEN 'm²' THEN g.area WHEN 'each' THEN g.findings ELSE g.length END AS amount) m
          GROUP BY e.n, e.element, e.unit) q;
 COMMENT ON VIEW tunnel_api.snti_condition IS
-    'Example: quantities of elements in the condition states of FHWA''s SNTI, from the severity of counted findings (without severity: CS2). The rest of the scanned liner is in CS1. Owners can write their own view';
+    'Example: quantities of elements in the condition states of FHWA''s SNTI, from the severity of counted findings (without severity: CS2). The rest of the inspected liner is in CS1. Owners can write their own view';
 COMMENT ON COLUMN tunnel_api.snti_condition.element IS 'liner, cracks, joints, bolts or drips';
 COMMENT ON COLUMN tunnel_api.snti_condition.unit IS 'm², m or each';
 COMMENT ON COLUMN tunnel_api.snti_condition.cs1 IS 'Quantity in condition state 1, good';
 COMMENT ON COLUMN tunnel_api.snti_condition.cs2 IS 'Quantity in condition state 2, fair';
 COMMENT ON COLUMN tunnel_api.snti_condition.cs3 IS 'Quantity in condition state 3, poor';
 COMMENT ON COLUMN tunnel_api.snti_condition.cs4 IS 'Quantity in condition state 4, severe';
+COMMENT ON COLUMN tunnel_api.snti_condition.seen_share IS
+    'Inspected share of the liner of the whole survey; the quantities say nothing about the rest. NULL if leaks were not searched for';

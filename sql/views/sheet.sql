@@ -5,7 +5,7 @@
 -- table of leaks (sheet_leak); their severities are drawn, and drips as points.
 CREATE OR REPLACE VIEW tunnel_api.sheet_finding AS
 SELECT f.id, f.survey_id, f.survey, f.km, f.chainage_from, f.chainage_to, f.label, f.arc_from, f.arc_to, f.clock,
-       f.kind, f.kind_label, k.position, f.wet, f.origin, f.manual, f.severity, f.severity_label, f.width, f.length, f.area,
+       f.kind, f.kind_label, k.position, f.wet, f.origin, f.manual, f.severity, f.severity_label, f.width_mm, f.length, f.area,
        f.counted, f.state, f.remark, p.shown, p.shown AND NOT f.wet AS listed, f.geom
   FROM tunnel_api.finding_unrolled f
   LEFT JOIN tunnel.finding_kind k ON k.code = f.kind

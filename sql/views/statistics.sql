@@ -46,7 +46,10 @@ COMMENT ON COLUMN tunnel_api.radiometry.sigma_oren_nayar IS
 CREATE OR REPLACE VIEW tunnel_api.km_statistics AS
 SELECT g.id, g.survey_id, g.survey, g.km, g.chainage_from, g.chainage_to, g.lining_area, d.seen AS seen_area,
        d.seen / nullif(g.lining_area, 0) AS seen_share, g.wet_area, g.wet_area / nullif(d.seen, 0) AS wet_share,
-       c.wet / nullif(c.seen, 0) AS wet_pixel_share, g.patches AS leaks, l.leaks_open, l.leaks_confirmed, l.leaks_rejected,
+       c.wet / nullif(c.seen, 0) AS wet_pixel_share, g.patches AS leaks,
+       CASE WHEN g.patches IS NOT NULL THEN l.leaks_open END AS leaks_open,
+       CASE WHEN g.patches IS NOT NULL THEN l.leaks_confirmed END AS leaks_confirmed,
+       CASE WHEN g.patches IS NOT NULL THEN l.leaks_rejected ELSE nullif(l.leaks_rejected, 0) END AS leaks_rejected,
        g.largest_area, l.greatest_darkening
   FROM tunnel_api.km_waterproof g
   LEFT JOIN LATERAL (

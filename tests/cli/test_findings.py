@@ -42,8 +42,8 @@ def ids(result: Result) -> list[int]:
 
 
 DRAWN = (
-    "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width, geom) VALUES "
-    "('demo-2024', 'crack', 3, 0.002, 'LINESTRING(12350 1, 12353 1.5)'), "
+    "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width_mm, geom) VALUES "
+    "('demo-2024', 'crack', 3, 2, 'LINESTRING(12350 1, 12353 1.5)'), "
     "('demo-2024', 'missing_bolt', 1, NULL, 'POINT(12360 -2)'), "
     "('demo-2024', 'leak', NULL, NULL, 'POLYGON((12350 0, 12351 0, 12351 1, 12350 0))')"
 )
@@ -238,7 +238,7 @@ def test_what_was_exported_is_imported_as_it_was(conn: psycopg.Connection, tmp_p
     done = run("findings", "import", NAME, path)
     assert done.exit_code == 0, done.output
     rows = conn.execute(
-        "SELECT kind, severity, width, round(area::numeric, 3), round(length::numeric, 3) FROM tunnel_api.finding "
+        "SELECT kind, severity, width_mm, round(area::numeric, 3), round(length::numeric, 3) FROM tunnel_api.finding "
         "WHERE manual ORDER BY id"
     ).fetchall()
     assert sorted(rows[:3], key=str) == sorted(rows[3:], key=str)

@@ -19,7 +19,7 @@ EDITABLE = {
     "axis_vertex": {"geom"},
     "region": {"kind", "geom", "reason", "INSERT", "DELETE"},
     **{
-        "finding" + part: {"kind", "severity", "width", "review", "remark", "geom", "INSERT", "DELETE"}
+        "finding" + part: {"kind", "severity", "width_mm", "review", "remark", "geom", "INSERT", "DELETE"}
         for part in ("_unrolled", "_map", "_3d")
     },
     "finding_photo": {"path", "caption", "INSERT", "DELETE"},

@@ -364,7 +364,7 @@ def test_what_people_drew_is_measured_and_stays(detected: psycopg.Connection) ->
         [NAME, key],
     ).fetchone()
     (line,) = conn.execute(
-        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, width, geom) SELECT %s, 'crack', 0.002, "
+        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, width_mm, geom) SELECT %s, 'crack', 2, "
         "ST_MakeLine(ST_Point(chainage_from, arc_from), ST_Point(chainage_to, arc_to)) FROM tunnel_api.leak WHERE id = %s "
         "RETURNING id",
         [NAME, key],

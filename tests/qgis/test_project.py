@@ -396,8 +396,8 @@ def test_a_table_that_is_too_long_says_how_many_leaks_it_lacks(conn: psycopg.Con
 def draw(conn: psycopg.Connection, kind: str, shape: str, *, severity: int | None = None, review: str = "confirmed") -> int:
     """Draw a finding on the unrolled lining, with a remark; return its number."""
     row = conn.execute(
-        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width, review, remark, geom)"
-        " VALUES ('demo-2024', %s, %s, 0.002, %s, %s, ST_GeomFromText(%s)) RETURNING id",
+        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width_mm, review, remark, geom)"
+        " VALUES ('demo-2024', %s, %s, 2, %s, %s, ST_GeomFromText(%s)) RETURNING id",
         (kind, severity, review, f"a {kind}", shape),
     ).fetchone()
     assert row is not None
@@ -419,7 +419,7 @@ def test_a_sheet_lists_findings_by_kind_and_each_in_one_table(conn: psycopg.Conn
     # 1 m of arc is 0.25 of 4 m of radius: 29 minutes. The tunnel bends to the right by 1 / 300 m: there lengths are 0.3 % less
     # than unrolled, and areas 1.5 m from the crown 0.5 %.
     listed = [
-        f"{crack} Crack 12+382.000 12:29 3.99 m, 2.0 mm confirmed a crack",
+        f"{crack} Crack 12+382.000 12:29 3.99 m, 2.00 mm confirmed a crack",
         f"{spall} Spall 12+371.000 12:43 1.99 m2 Stufe 3 confirmed a spall",
         f"{bolt} Missing bolt 12+360.000 12:29 confirmed",
     ]
@@ -441,9 +441,9 @@ def test_a_table_that_is_too_long_says_how_many_findings_it_lacks(
     draw(conn, "crack", "LINESTRING(12351 3, 12351.1 3)")
     conn.execute(
         "INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, area,"
-        " length, width, unrolled, map, surface, shape, shape_map, shape_surface, origin, manual, review, remark)"
+        " length, width_mm, unrolled, map, surface, shape, shape_map, shape_surface, origin, manual, review, remark)"
         " SELECT survey_id, km, chainage_from + i * 0.1, chainage_to + i * 0.1, arc_from, arc_to, clock, kind, reasons, area,"
-        " length, width, ST_Translate(unrolled, i * 0.1, 0), map, surface, ST_Translate(shape, i * 0.1, 0), shape_map,"
+        " length, width_mm, ST_Translate(unrolled, i * 0.1, 0), map, surface, ST_Translate(shape, i * 0.1, 0), shape_map,"
         " shape_surface, origin, manual, review, 'No ' || i || ', wet in winter, dry in summer'"
         " FROM tunnel.finding, generate_series(1, 299) AS i WHERE manual"
     )

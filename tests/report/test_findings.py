@@ -41,10 +41,10 @@ from tunneldb.store.survey import get_survey
 NONE = np.empty(0, np.int64)
 
 DRAWN = """
-    INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width, review, remark, geom) VALUES
-    ('demo-2024', 'crack', 3, 0.002, 'confirmed', '<b>open</b>', 'LINESTRING(12350 1, 12353 1.5)'),
+    INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width_mm, review, remark, geom) VALUES
+    ('demo-2024', 'crack', 3, 2, 'confirmed', '<b>open</b>', 'LINESTRING(12350 1, 12353 1.5)'),
     ('demo-2024', 'crack', 1, NULL, 'rejected', 'a scratch', 'LINESTRING(12360 1, 12361 1.5)'),
-    ('demo-2024', 'crack', 2, 0.001, 'open', NULL, 'LINESTRING(12398 -1, 12402 -1)'),
+    ('demo-2024', 'crack', 2, 1, 'open', NULL, 'LINESTRING(12398 -1, 12402 -1)'),
     ('demo-2024', 'missing_bolt', 4, NULL, 'confirmed', NULL, 'POINT(12360 -2)'),
     ('demo-2024', 'drip', 2, NULL, 'confirmed', NULL, 'POINT(12370 0.5)'),
     ('demo-2024', 'delamination', NULL, NULL, 'open', 'hollow', 'POLYGON((12380 0, 12382 0, 12382 1, 12380 1, 12380 0))'),
@@ -280,9 +280,9 @@ def test_digest_tells_another_dry_region_and_another_width(example: str, conn: p
     survey = get_survey(conn, example)
     digests = []
     for change in (
-        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, width, geom)"
-        " VALUES ('demo-2024', 'crack', 0.001, 'LINESTRING(12350 1, 12353 1.5)')",
-        "UPDATE tunnel_api.finding_unrolled SET width = 0.002 WHERE kind = 'crack'",
+        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, width_mm, geom)"
+        " VALUES ('demo-2024', 'crack', 1, 'LINESTRING(12350 1, 12353 1.5)')",
+        "UPDATE tunnel_api.finding_unrolled SET width_mm = 0.3 WHERE kind = 'crack'",
         "INSERT INTO tunnel_api.region (survey_id, kind, reason, geom)"
         " SELECT id, 'dry', 'oil', ST_MakeEnvelope(12410, -4, 12426, 4, 0) FROM tunnel.survey",
         "UPDATE tunnel_api.region SET reason = 'soot' WHERE reason = 'oil'",

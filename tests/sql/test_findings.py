@@ -186,7 +186,9 @@ def test_only_what_was_drawn_is_deleted(person: psycopg.Connection) -> None:
         (FREE, {"review": "maybe"}, "can be open, confirmed or rejected, not maybe"),
         (FREE, {"survey": "nowhere"}, "there is none named nowhere"),
         (Polygon(), {}, "a finding needs a place"),
-        (LineString([(12350, 0), (12351, 0)]), {"kind": "crack", "width": -0.1}, "the width of a line is above 0"),
+        (LineString([(12350, 0), (12351, 0)]), {"kind": "crack", "width_mm": -0.1}, "a crack is 0.01 to 100 mm wide"),
+        (LineString([(12350, 0), (12351, 0)]), {"kind": "crack", "width_mm": 0.0003}, "not 0.0003 mm: widths are in mill"),
+        (LineString([(12350, 0), (12351, 0)]), {"kind": "crack", "width_mm": 300}, "a crack is 0.01 to 100 mm wide"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused_in_one_line(
@@ -200,10 +202,10 @@ def test_what_cannot_be_drawn_is_refused_in_one_line(
 @INSPECTOR
 def test_a_line_has_length_and_width_and_a_point_neither(person: psycopg.Connection) -> None:
     line = LineString([(12350.0, 1.0), (12353.0, 1.0)])
-    key = draw(person, line, "crack", width=0.002)
+    key = draw(person, line, "crack", width_mm=0.3)
     length, area, kind = row(person, key, "length, area, GeometryType(unrolled)")
-    assert (length, area, kind) == (pytest.approx(3.0, rel=0.05), pytest.approx(0.002 * length), "LINESTRING")
-    person.execute("UPDATE tunnel_api.finding_map SET width = 0.004 WHERE id = %s", [key])
+    assert (length, area, kind) == (pytest.approx(3.0, rel=0.05), pytest.approx(0.0003 * length), "LINESTRING")
+    person.execute("UPDATE tunnel_api.finding_map SET width_mm = 4 WHERE id = %s", [key])
     assert row(person, key, "area, origin")[:2] == (pytest.approx(0.004 * length), "drawn")
     point = draw(person, Point(12351.0, 2.0), "drip", severity=1)
     assert row(person, point, "area, length, wet, GeometryType(unrolled)") == (0.0, None, True, "POINT")
@@ -456,13 +458,13 @@ def test_each_step_is_taken_back_to_what_was_before(person: psycopg.Connection) 
     (found,) = person.execute("SELECT min(id) FROM tunnel_api.leak WHERE review = 'confirmed'").fetchone()
     drawn = draw(person, FREE, "spall", remark="new")
     person.execute("INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (%s, 'a.jpg')", [drawn])
-    crack = draw(person, LineString([(12360.0, 1.0), (12363.0, 1.5)]), "crack", width=0.002)
+    crack = draw(person, LineString([(12360.0, 1.0), (12363.0, 1.5)]), "crack", width_mm=2)
     steps = (
         (drawn, "redrawn", f"UPDATE tunnel_api.finding_map SET geom = ST_Buffer(geom, -0.1) WHERE id = {drawn}"),
         (drawn, "reviewed", f"UPDATE tunnel_api.finding_3d SET remark = NULL, severity = 4, kind = 'other' WHERE id = {drawn}"),
         (drawn, "deleted", f"DELETE FROM tunnel_api.finding_unrolled WHERE id = {drawn}"),
         (drawn, "split", f"SELECT tunnel_api.finding_split({drawn}, 'LINESTRING(12350.5 0, 12350.5 2)')"),
-        (crack, "reviewed", f"UPDATE tunnel_api.finding_unrolled SET width = 0.01 WHERE id = {crack}"),
+        (crack, "reviewed", f"UPDATE tunnel_api.finding_unrolled SET width_mm = 10 WHERE id = {crack}"),
         (crack, "split", f"SELECT tunnel_api.finding_split({crack}, 'LINESTRING(12361.7 0, 12361.7 2)')"),
         (found, "reviewed", f"UPDATE tunnel_api.leak SET review = 'rejected', remark = NULL, kind = 'dark' WHERE id = {found}"),
         (found, "redrawn", f"UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, 0.2) WHERE id = {found}"),

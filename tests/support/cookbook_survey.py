@@ -85,18 +85,18 @@ def _points(conn: psycopg.Connection, survey_id: int) -> None:
 def draw_findings(conn: psycopg.Connection, survey: str) -> dict[str, int]:
     """Draw findings, draw over one leak and put a dry region over another; their ids, and that of the region."""
 
-    def drawn(kind: str, shape: str, severity: int | None, width: float | None = None) -> int:
+    def drawn(kind: str, shape: str, severity: int | None, width_mm: float | None = None) -> int:
         row = conn.execute(
-            "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width, geom) "
+            "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width_mm, geom) "
             "VALUES (%s, %s, %s, %s, %s) RETURNING id",
-            (survey, kind, severity, width, shape),
+            (survey, kind, severity, width_mm, shape),
         ).fetchone()
         assert row is not None
         return int(row[0])
 
     made = {
-        "long crack": drawn("crack", "LINESTRING(12350 0, 12353 0)", 2, 0.002),
-        "longer crack": drawn("crack", "LINESTRING(12360 0, 12364 0)", 4, 0.001),
+        "long crack": drawn("crack", "LINESTRING(12350 0, 12353 0)", 2, 2.0),
+        "longer crack": drawn("crack", "LINESTRING(12360 0, 12364 0)", 4, 1.0),
         "short crack": drawn("crack", "LINESTRING(12354 0, 12354.5 0)", 4),
         "bolt": drawn("missing_bolt", "POINT(12370 -1)", 3),
         "spall": drawn("spall", "POLYGON((12380 0, 12381 0, 12381 1, 12380 1, 12380 0))", 3),

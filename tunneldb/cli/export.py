@@ -21,7 +21,6 @@ from tunneldb.errors import NotReadyError, UserError
 from tunneldb.files import exit_on_sigterm, made_folder, replacing
 from tunneldb.stages.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
-from tunneldb.store.listing import count_dry_findings
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
@@ -65,13 +64,11 @@ def export(
     ticks and the lining unrolled on the map. Layers of the unrolled plane (x is the chainage, y the arc, m) have an
     undefined Cartesian system, all others the tunnel's.
 
-    A DXF drawing (2010, metres) has axis, sections and leaks in true coordinates, with chainage ticks; below the map
+    A DXF drawing (2010, metres) has axis, sections and findings in true coordinates, with chainage ticks; below the map
     the unrolled lining and the profiles of the sections with their leaks. Rejected findings are not drawn.
 
-    In both, the layer of coverage gaps shows where leaks could be missed: lining not searched, outdated or hardly
-    inspected. The table or layer of remarks has notes and limitations of the results.
-
-    Neither has dry findings, such as cracks; their number is stated. tunneldb findings -o writes them.
+    Both have findings of all kinds. The layer of coverage gaps shows where leaks could be missed: lining not searched,
+    outdated or hardly inspected. The table or layer of remarks has notes and limitations of the results.
 
     With --classified the scan files are written as LAZ 1.4 with the class of each point, from stage ground, which
     must be up to date in every kilometre of a file: 2 ground, 64 lining, 65 niche, 66 fixture, 67 rail, 68 object, 69
@@ -107,19 +104,7 @@ def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, st
     tell(survey=survey.name, file=output, layers=counts)
     say_coverage(coverage, survey)
     say_remarks(read_remarks(conn, survey, stretch.low, stretch.high), survey)
-    _say_left_out(conn, survey, output, stretch)
     notify(f"{output}: " + ", ".join(f"{name} {count}" for name, count in counts.items() if count))
-
-
-def _say_left_out(conn: psycopg.Connection[Any], survey: Survey, output: Path, stretch: Stretch) -> None:
-    """Say how many findings that are no water the file doesn't hold: cracks, spalls, bolts."""
-    left_out = count_dry_findings(conn, survey, stretch.low, stretch.high)
-    tell(findings_left_out=left_out)
-    if left_out:
-        notify(
-            f"{output} does not hold {left_out} finding{'s' if left_out > 1 else ''} that {'are' if left_out > 1 else 'is'} no"
-            f" water, such as cracks: tunneldb findings {survey.name} -o FILE.gpkg"
-        )
 
 
 def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Path, km: str | None, copc: bool) -> None:

@@ -9,6 +9,7 @@ from typing import cast, get_args
 import click
 import psycopg
 
+from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, notify, printable, records, tell
@@ -17,17 +18,20 @@ from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.export.tables.finding_counts import count_findings
-from tunneldb.export.tables.findings import as_csv, as_geojson, write_gpkg
+from tunneldb.export.tables.finding_counts import count_findings, sum_groups
+from tunneldb.export.tables.findings import FindingList, as_csv, as_geojson, write_gpkg
 from tunneldb.export.tables.leaks import clock_label
 from tunneldb.export.tables.workbooks import write_findings
 from tunneldb.files import replacing
+from tunneldb.finding_kind import DETECTED
 from tunneldb.pipeline.findings import import_findings
+from tunneldb.store.coverage import read_coverage
 from tunneldb.store.drawn_findings import undo_finding
 from tunneldb.store.dry_regions import read_dry_regions
-from tunneldb.store.finding_kinds import read_kinds, read_severities
+from tunneldb.store.finding_kinds import read_kinds, read_severities, read_wet_kinds
 from tunneldb.store.findings import COUNTED, Chosen, Finding, Geometry, State, read_findings
 from tunneldb.store.listing import list_finding_counts, require_finding_kinds
+from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
 
@@ -58,6 +62,7 @@ def findings() -> None:
         "tunneldb findings list ringo-2024 -o findings.xlsx",
         "tunneldb findings list ringo-2024 --state all --count",
     ],
+    wrong="done, but not all that was asked for has been searched for leaks, or nothing of it was seen: what, is said first",
 )
 @click.argument("survey")
 @click.option("--kind", "kinds", multiple=True, metavar="KIND", help="Only this kind; may be repeated.")
@@ -87,9 +92,9 @@ def findings() -> None:
 )
 @click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write.")
 @click.option("--count", is_flag=True, help="Number of each kind and origin instead, by state.")
-@click.pass_obj
+@click.pass_context
 def list_findings(
-    settings: Settings,
+    context: click.Context,
     survey: str,
     kinds: tuple[str, ...],
     origins: tuple[str, ...],
@@ -108,6 +113,8 @@ def list_findings(
 
     Listed are findings that count: open and confirmed. --state selects others: rejected; gone (not found again by the
     last detection); dry (in a dry region); same (represented by another finding); merged into another.
+
+    As for leaks, stretches where leaks could be missed, notes and limitations come first, in every file too.
 
     An Excel workbook has sheets of the listed findings, of counts, of findings that fit except for their state, and
     of dry regions. --json has the counts too, of any state.
@@ -128,45 +135,60 @@ def list_findings(
                 "-o": output is not None,
             }
         )
+    settings: Settings = context.obj
     form = table_format(form, output, "findings", ("csv", "geojson", "gpkg", "xlsx"))
     hours = parse_clock(clock) if clock else None
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
         require_finding_kinds(conn, kinds)
-        if count:
-            _print_counts(conn, found, kinds, origins)
-            return
         stretch = parse_stretch(conn, found, start, end)
+        coverage = read_coverage(conn, found, stretch.low, stretch.high)
+        remarks = read_remarks(conn, found, stretch.low, stretch.high)
+        say_remarks(remarks, found)
+        searched = coverage.complete or not _is_detected(kinds, origins)
+        if count:
+            say_coverage(coverage, found, on_stdout=True)
+            _print_counts(conn, found, kinds, origins)
+            context.exit(0 if searched else 1)
         wanted = () if "all" in states else states or COUNTED
         chosen = Chosen(kinds, origins, (), stretch.low, stretch.high, hours, min_area, min_severity or 0)
         fitting = read_findings(conn, found, cast(Geometry, geometry), chosen)
         severities, regions = read_severities(conn), read_dry_regions(conn, found, stretch.low, stretch.high)
-        counts = count_findings(fitting, read_kinds(conn))
+        counts, wet = count_findings(fitting, read_kinds(conn)), read_wet_kinds(conn)
     rows = [row for row in fitting if not wanted or row.state in wanted]
     tell(survey=survey, listed=len(rows), geometry=geometry, findings=rows, kinds=counts, dry_regions=regions)
+    listed = FindingList(rows, coverage, remarks)
+    say_coverage(coverage, found, on_stdout=output is None and form == "table")
     if output is None:
-        _print(rows, form, cast(Geometry, geometry), found)
-        return
-    with replacing(output) as temporary:
-        if form == "gpkg":
-            write_gpkg(temporary, rows, cast(Geometry, geometry), found.srid)
-        elif form == "xlsx":
-            others = [row for row in fitting if wanted and row.state not in wanted]
-            write_findings(temporary, found.name, rows, others, counts, severities, regions)
-        elif form == "geojson":
-            temporary.write_text(as_geojson(rows, cast(Geometry, geometry), found.srid), encoding="utf-8")
-        else:
-            temporary.write_text(as_csv(rows), encoding="utf-8")
-    tell(file=output)
-    notify(f"{len(rows)} findings to {output}")
-
-
-def _print(rows: list[Finding], form: str, geometry: Geometry, survey: Survey) -> None:
-    if form == "csv":
-        click.echo(as_csv(rows), nl=False)
-    elif form == "geojson":
-        click.echo(as_geojson(rows, geometry, survey.srid), nl=False)
+        _print(listed, form, cast(Geometry, geometry), found)
     else:
+        with replacing(output) as temporary:
+            if form == "gpkg":
+                write_gpkg(temporary, listed, cast(Geometry, geometry), found.srid)
+            elif form == "xlsx":
+                others = [row for row in fitting if wanted and row.state not in wanted]
+                write_findings(temporary, found.name, listed, others, sum_groups(counts, wet), severities, regions)
+            elif form == "geojson":
+                temporary.write_text(as_geojson(listed, cast(Geometry, geometry), found.srid), encoding="utf-8")
+            else:
+                temporary.write_text(as_csv(listed), encoding="utf-8")
+        tell(file=output)
+        notify(f"{len(rows)} findings to {output}")
+    if not searched:
+        context.exit(1)
+
+
+def _is_detected(kinds: Sequence[str], origins: Sequence[str]) -> bool:
+    """Return True if detection finds some of the kinds and origins; others are drawn by people alone."""
+    return (not kinds or not set(kinds).isdisjoint(DETECTED)) and tuple(set(origins)) != ("drawn",)
+
+
+def _print(listed: FindingList, form: str, geometry: Geometry, survey: Survey) -> None:
+    if form == "csv":
+        click.echo(as_csv(listed), nl=False)
+    elif form == "geojson":
+        click.echo(as_geojson(listed, geometry, survey.srid), nl=False)
+    elif listed.rows or listed.coverage.seen_area:
         header = [
             "id",
             "chainage",
@@ -177,6 +199,7 @@ def _print(rows: list[Finding], form: str, geometry: Geometry, survey: Survey) -
             "severity",
             "area m²",
             "length m",
+            "width mm",
             "state",
             "by",
             "remark",
@@ -185,11 +208,13 @@ def _print(rows: list[Finding], form: str, geometry: Geometry, survey: Survey) -
             [
                 row.id, row.label, f"{row.arc_from:+.2f} to {row.arc_to:+.2f}", clock_label(row.clock), row.kind,
                 row.origin + (", also detected" if row.also_detected else ""), row.severity, f"{row.area:.3f}",
-                None if row.length is None else f"{row.length:.2f}", _state(row), row.drawn_by or row.reviewed_by, row.remark,
+                None if row.length is None else f"{row.length:.2f}",
+                None if row.width_mm is None else f"{row.width_mm:g}", _state(row), row.drawn_by or row.reviewed_by,
+                row.remark and " ".join(row.remark.split()),
             ]
-            for row in rows
+            for row in listed.rows
         ]  # fmt: skip
-        print_table(header, cells, right=(0, 1, 2, 3, 6, 7, 8))
+        print_table(header, cells, right=(0, 1, 2, 3, 6, 7, 8, 9))
 
 
 def _state(row: Finding) -> str:
@@ -248,11 +273,11 @@ def import_(
 ) -> None:
     """Import findings of another system from FILE into SURVEY, all or none.
 
-    FILE is CSV, GeoPackage or GeoJSON with a kind for each finding, and optionally severity (1 to 4), width (m),
-    review, remark and photo (path or URL). Geometries of a layer without a coordinate system are in chainage and arc,
-    m; in the tunnel's they must be 3D, on the lining. A CSV has places by wkt or geometry (WKT: chainage and arc, or
-    3D), by chainage_from, chainage_to, arc_from and arc_to, by chainage and arc, or by x, y and z; a chainage may be
-    a station, as 12+345.678. Each wrong row is listed; then nothing is imported.
+    FILE is CSV, GeoPackage or GeoJSON with a kind for each finding, and optionally severity (1 to 4), width_mm
+    (millimetres), review, remark and photo (path or URL). Geometries of a layer without a coordinate system are in
+    chainage and arc, m; in the tunnel's they must be 3D, on the lining. A CSV has places by wkt or geometry (WKT:
+    chainage and arc, or 3D), by chainage_from, chainage_to, arc_from and arc_to, by chainage and arc, or by x, y and
+    z; a chainage may be a station, as 12+345.678. Each wrong row is listed; then nothing is imported.
     """
     theirs, ours = _pairs(kinds, "--map"), _pairs(columns, "--column")
     with connect(settings.dsn) as conn:

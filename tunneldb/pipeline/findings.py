@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,9 +25,11 @@ from tunneldb.errors import UserError
 from tunneldb.files import gdal_fault, vector_source
 from tunneldb.geometry.crs import fits_srid, is_local, srid_name
 from tunneldb.store.alignment import station_chainages
+from tunneldb.store.coverage import GAP_STATES
+from tunneldb.store.remarks import REMARK
 from tunneldb.store.survey import Survey
 
-COLUMNS = ("kind", "severity", "width", "review", "remark", "photo")
+COLUMNS = ("kind", "severity", "width_mm", "review", "remark", "photo")
 """Columns read from each row besides its place; all except the kind are optional."""
 
 
@@ -106,6 +108,8 @@ def import_findings(
     made: Counter[str] = Counter()
     for row in rows:
         theirs = row.values.get("kind", "")
+        if row.shape is None and theirs in (*GAP_STATES, REMARK):  # a list of findings begins with such rows
+            continue
         kind = kinds.get(theirs, theirs)
         try:
             with conn.transaction():
@@ -126,7 +130,7 @@ def _insert(conn: psycopg.Connection[Any], survey: Survey, row: Row, kind: str) 
     if row.shape is None:
         raise ValueError(row.wrong or "it has no geometry; draw it, or delete the row")
     query = sql.SQL(
-        "INSERT INTO tunnel_api.{} (survey_id, kind, severity, width, review, remark, geom)"
+        "INSERT INTO tunnel_api.{} (survey_id, kind, severity, width_mm, review, remark, geom)"
         " VALUES (%s, %s, %s, %s, %s, %s, public.ST_GeomFromWKB(%s, %s)) RETURNING id"
     ).format(sql.Identifier(f"finding_{row.view}"))
     found = conn.execute(
@@ -135,7 +139,7 @@ def _insert(conn: psycopg.Connection[Any], survey: Survey, row: Row, kind: str) 
             survey.id,
             kind or None,
             _number(row, "severity", int),
-            _number(row, "width", float),
+            _number(row, "width_mm", float),
             row.values.get("review"),
             row.values.get("remark"),
             shapely.to_wkb(row.shape),
@@ -172,6 +176,7 @@ def _read_csv(conn: psycopg.Connection[Any], survey: Survey, path: Path, columns
             return None
         return read_texts(path, theirs)
 
+    _require_unit(path, header, columns)
     texts = {name: found for name in (*COLUMNS, *_PLACES) if (found := column(name)) is not None}
     if "kind" not in texts:
         raise UserError(f"{path} has no column kind: say which by --column kind=THEIRS; its header is {','.join(header)!r}")
@@ -286,10 +291,17 @@ def _read_layer(path: Path, survey: Survey, columns: Mapping[str, str], layer: s
         raise UserError(
             f"{path} has no column {', '.join(missing)}: it has {', '.join(names)}; say which by --column OURS=THEIRS"
         )
+    _require_unit(path, names, columns)
     held = {ours: found[names.index(theirs)] for ours, theirs in wanted.items() if theirs in names}
     for k, data in enumerate([] if shapes is None else shapes):
         values = {ours: str(column[k]) for ours, column in held.items() if not _empty(column[k])}
         yield Row(k + 1, values, None if data is None else shapely.from_wkb(data, on_invalid="ignore"), view)
+
+
+def _require_unit(path: Path, names: Sequence[str], columns: Mapping[str, str]) -> None:
+    """Raise UserError if a file has a width without a unit, and none is named for ``width_mm``."""
+    if "width" in names and "width_mm" not in names and "width_mm" not in columns:
+        raise UserError(f"{path} has a column width without a unit: if it is in millimetres, add --column width_mm=width")
 
 
 def _empty(value: Any) -> bool:

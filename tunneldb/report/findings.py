@@ -16,7 +16,7 @@ import psycopg
 import shapely
 
 from tunneldb.arrays import Int64
-from tunneldb.export.tables.finding_counts import STATES, UNCOUNTED, KindCount, KindTally, in_order
+from tunneldb.export.tables.finding_counts import DARK, OTHERS, STATES, UNCOUNTED, KindCount, KindTally, in_order, sum_groups
 from tunneldb.report.drawing import line_path, outline_path
 from tunneldb.report.photos import Thumbnail, make_thumbnails, read_photos
 from tunneldb.store.dry_regions import DryRegion
@@ -112,6 +112,21 @@ class FindingsChapter:
     def wet_states(self) -> dict[str, int]:
         """Number of leaks (wet kinds) in each state."""
         return _states([kind for kind in self.kinds if kind.count.kind in self.wet])
+
+    @property
+    def groups(self) -> list[KindCount]:
+        """Sums of leaks, of other findings, and of joints and dry dark areas."""
+        return [total for total, _ in sum_groups([kind.count for kind in self.kinds], self.wet)]
+
+    @property
+    def others(self) -> KindCount | None:
+        """Sum of the findings that are neither wet nor joints and dry dark areas."""
+        return next((total for total in self.groups if total.label == OTHERS), None)
+
+    @property
+    def open(self) -> int:
+        """Number of open findings, without joints and dry dark areas."""
+        return sum(total.states["open"] for total in self.groups if total.label != DARK)
 
     @property
     def counted(self) -> int:
@@ -316,7 +331,7 @@ def _stated(finding: Finding, photos: Sequence[Thumbnail]) -> tuple[Any, ...]:
     """Return the report entry of a noted finding."""
     return (
         finding.id, finding.kind, finding.origin, finding.state, finding.severity, finding.drawn_by, finding.reviewed_by,
-        finding.remark, f"{finding.area:.4f}", f"{finding.length or 0:.4f}", finding.width, finding.geometry.wkb_hex,
+        finding.remark, f"{finding.area:.4f}", f"{finding.length or 0:.4f}", finding.width_mm, finding.geometry.wkb_hex,
         [(photo.photo.path, photo.photo.caption) for photo in photos],
     )  # fmt: skip
 

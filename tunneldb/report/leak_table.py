@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from markupsafe import Markup
 
 from tunneldb.export.tables.leaks import clock_label
@@ -29,6 +31,7 @@ TABLE = [
         "confidence",
     ),
     *("imageShare", "review", "by", "at", "remark", "detected", "strip", "kind", "origin", "severity", "severityLabel"),
+    *("easting", "northing", "height"),
 ]
 """Columns of the table, as in the page's script."""
 
@@ -60,8 +63,9 @@ def leak_table(facts: Facts) -> Markup:
     )
 
 
-def _as_finding(facts: Facts, key: int) -> tuple[str, str, int | None, str]:
-    """Return name of the kind, origin, severity and its name of a leak."""
+def _as_finding(facts: Facts, key: int) -> tuple[Any, ...]:
+    """Return name of the kind, origin, severity and its name, and the coordinates (m) of a leak."""
     assert facts.findings is not None  # leaks are findings
     finding = facts.findings.by_id[key]
-    return finding.kind_label, finding.origin, finding.severity, finding.severity_label or ""
+    place = (round(value, 3) for value in (finding.easting, finding.northing, finding.height))
+    return finding.kind_label, finding.origin, finding.severity, finding.severity_label or "", *place

@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 from PIL import Image
 
 from tunneldb.errors import InputError
+from tunneldb.finding_kind import SEVERITY_COLOURS
 from tunneldb.report.words import ENGLISH, Words, known_texts, languages, read_language
 
 CHAPTERS = {
@@ -36,9 +37,6 @@ CHAPTERS = {
     "signatures": "Signatures",
 }
 """Chapters in their default order: names, and titles in the navigation."""
-
-COLOURS = {1: "#3a8f5c", 2: "#c9a100", 3: "#e0660b", 4: "#b8171d"}
-"""Default colours of severities."""
 
 LOGO = 640
 """Maximum width and height of a logo, pixels."""
@@ -73,7 +71,7 @@ class Owner:
     standard: str | None = None
     logo: str | None = None
     chapters: tuple[str, ...] = tuple(CHAPTERS)
-    colours: Mapping[int, str] = field(default_factory=lambda: COLOURS)
+    colours: Mapping[int, str] = field(default_factory=lambda: SEVERITY_COLOURS)
 
 
 _KEYS = ("logo", "client", "project", "standard", "language", "chapters", "headings", "severity_colours")
@@ -204,7 +202,7 @@ def _colours(given: _Given) -> dict[int, str]:
             given.refuse(f"severity_colours.{name}", "severities are 1 to 4")
         if not _COLOUR.fullmatch(colour):
             given.refuse(f"severity_colours.{name}", f"must be a colour such as #b8371d, not {colour!r}")
-    return COLOURS | {int(name): colour for name, colour in colours.items()}
+    return SEVERITY_COLOURS | {int(name): colour for name, colour in colours.items()}
 
 
 def _logo(given: _Given, path: Path) -> str:

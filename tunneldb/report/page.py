@@ -17,6 +17,7 @@ from tunneldb.database import snapshot
 from tunneldb.errors import NotReadyError
 from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, STATES, UNCOUNTED
 from tunneldb.export.tables.leaks import clock_label
+from tunneldb.finding_kind import REVIEW_COLOURS
 from tunneldb.report import data, text
 from tunneldb.report.chapters import ALL
 from tunneldb.report.facts import Facts, Request, digest_spots
@@ -149,6 +150,7 @@ def _template(name: str, owner: Owner) -> jinja2.Template:
     }  # fmt: skip
     environment.globals |= {"_": owner.words, "owner": owner}
     environment.globals |= {"origins": ORIGINS, "severities": SEVERITIES, "uncounted": UNCOUNTED, "said": STATE_WORDS}
+    environment.globals |= {"review_colours": REVIEW_COLOURS}
     return environment.get_template(name)
 
 

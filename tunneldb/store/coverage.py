@@ -12,6 +12,9 @@ from psycopg.rows import class_row
 
 from tunneldb.store.survey import Survey
 
+GAP_STATES = ("not scanned", "not loaded", "not searched", "failed", "interrupted", "stale", "unseen", "no intensity")
+"""States of a gap, by ``tunnel_api.coverage_gaps``."""
+
 
 @dataclass(frozen=True)
 class CoverageGap:

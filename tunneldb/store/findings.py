@@ -55,7 +55,7 @@ class Finding:
     severity_label: str | None
     area: float
     length: float | None
-    width: float | None
+    width_mm: float | None
     darkening_mean: float | None
     darkening_max: float | None
     contrast: float | None
@@ -76,6 +76,9 @@ class Finding:
     reviewed_at: dt.datetime | None
     remark: str | None
     photos: int
+    easting: float
+    northing: float
+    height: float
     share: float
     geometry: BaseGeometry
 

@@ -19,7 +19,8 @@ from tunneldb.store.survey import Survey
 Kind = Literal["leak", "joint", "dark", "all"]
 """Kinds to list: leaks, joints, dry dark areas, or all."""
 
-_PLURAL = {"leak": "leaks", "joint": "joints", "dark": "dark spots", "all": "anomalies"}
+_NAMES = {"leak": ("leak", "leaks"), "joint": ("joint", "joints"), "dark": ("dry dark area", "dry dark areas")}
+"""Name of one, and of several."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +59,8 @@ class LeakList:
         Kind.
     rows : list of Finding
         In order of chainage: those that the last detection found, and those that an inspector confirmed although it did not.
-    count : int
-        Number included in totals: found last, and not rejected.
-    area : float
-        Area of these within the stretch, m².
+    sums : dict of str to (int, float)
+        Number and area (m², within the stretch) included in totals, by leak (all wet kinds), joint and dark.
     coverage : Coverage
         Statement on the stretch.
     remarks : list of Remark
@@ -70,22 +69,35 @@ class LeakList:
 
     kind: Kind
     rows: list[Finding]
-    count: int
-    area: float
+    sums: dict[str, tuple[int, float]]
     coverage: Coverage
     remarks: list[Remark]
+
+    @property
+    def count(self) -> int:
+        """Number included in totals: found last, and not rejected."""
+        return sum(count for count, _ in self.sums.values())
+
+    @property
+    def area(self) -> float:
+        """Area of these within the stretch, m²."""
+        return sum(area for _, area in self.sums.values())
 
     @property
     def total(self) -> str:
         """Return number and total area, and other listed items; also if nothing was searched."""
         if not self.rows and not self.coverage.seen_area:
-            return f"{_PLURAL[self.kind]} were not searched for"
+            return f"{_NAMES['leak' if self.kind == 'all' else self.kind][1]} were not searched for"
         others = {
             "rejected": sum(row.review == "rejected" for row in self.rows),
             "not found again": sum(row.review != "rejected" and not row.detected for row in self.rows),
         }
         besides = " and ".join(f"{count} {name}" for name, count in others.items() if count)
-        return f"{self.count} {_PLURAL[self.kind]}, {self.area:.2f} m²" + (f"; also listed: {besides}" if besides else "")
+        sums = self.sums or {"leak" if self.kind == "all" else self.kind: (0, 0.0)}
+        said = "; ".join(
+            f"{count} {_NAMES.get(kind, (kind, kind))[count != 1]}, {area:.2f} m²" for kind, (count, area) in sums.items()
+        )
+        return said + (f"; also listed: {besides}" if besides else "")
 
 
 _CHOSEN = sql.SQL(
@@ -130,15 +142,15 @@ def read_leaks(
     )
     rows = conn.execute(query, asked).fetchall()
     sums = sql.SQL(
-        "SELECT count(*), coalesce(sum(tunnel_internal.area_between(p.unrolled, area, %(low)s, %(high)s)), 0) {} AND counted"
+        "SELECT CASE WHEN wet THEN 'leak' ELSE kind END, count(*),"
+        " coalesce(sum(tunnel_internal.area_between(p.unrolled, area, %(low)s, %(high)s)), 0) {} AND counted"
+        " GROUP BY 1 ORDER BY array_position('{{leak,joint,dark}}', CASE WHEN wet THEN 'leak' ELSE kind END), 1"
     )
-    summed = conn.execute(sums.format(_CHOSEN), asked).fetchone()
-    assert summed is not None
+    summed = conn.execute(sums.format(_CHOSEN), asked).fetchall()
     return LeakList(
         chosen.kind,
         [finding_of(row) for row in rows],
-        count=summed[0],
-        area=summed[1],
+        sums={kind: (count, area) for kind, count, area in summed},
         coverage=read_coverage(conn, survey, chosen.low, chosen.high),
         remarks=read_remarks(conn, survey, chosen.low, chosen.high),
     )

@@ -9,7 +9,6 @@ import psycopg
 from psycopg import sql
 
 from tunneldb.errors import InputError
-from tunneldb.finding_kind import DETECTED
 from tunneldb.store.survey import Survey
 
 Rows = list[tuple[Any, ...]]
@@ -186,14 +185,3 @@ def require_finding_kinds(conn: psycopg.Connection[Any], kinds: Sequence[str]) -
     if unknown := set(kinds) - {code for (code,) in conn.execute("SELECT code FROM tunnel_api.finding_kind")}:
         names = ", ".join(map(repr, sorted(unknown)))
         raise InputError(f"there is no kind {names} of findings: SELECT code FROM tunnel_api.finding_kind")
-
-
-def count_dry_findings(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> int:
-    """Return the number of counted findings of a stretch that are not water, such as cracks."""
-    row = conn.execute(
-        "SELECT count(*) FROM tunnel_api.finding f WHERE survey_id = %s AND counted AND chainage_to >= %s"
-        " AND chainage_from <= %s AND NOT (wet OR coalesce(kind_detected, kind) = ANY (%s))",
-        [survey.id, low, high, list(map(str, DETECTED))],
-    ).fetchone()
-    assert row is not None
-    return int(row[0])

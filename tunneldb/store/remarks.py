@@ -11,6 +11,9 @@ from psycopg.rows import class_row
 
 from tunneldb.store.survey import Survey
 
+REMARK = "remark"
+"""Kind of the rows of a list of findings that are notes."""
+
 
 @dataclass(frozen=True)
 class Remark:

@@ -100,7 +100,7 @@ class Finding(Review, Base):
     __table_args__ = (
         one_of("review", "open", "confirmed", "rejected"),
         one_of("origin", "detected", "drawn", "redrawn", "split", "merged"),
-        CheckConstraint("width > 0", name="width"),
+        CheckConstraint("width_mm > 0", name="width_mm"),
         CheckConstraint("merged_into <> id AND same_as <> id", name="other"),
         Index(None, "survey_id", "km", postgresql_include=[*_SUMMED, "darkening_max"]),
         Index(None, "survey_id", "chainage_from", "chainage_to", postgresql_include=["id", *_SUMMED]),
@@ -195,7 +195,7 @@ class Finding(Review, Base):
         server_default=text("false"), comment="True if it was drawn, or split off from what was drawn: never detected"
     )
     severity: Mapped[int | None] = mapped_column(SmallInteger, ForeignKey(Severity.id), comment="Severity, 1 to 4")
-    width: Mapped[float | None] = mapped_column(comment="Width of a line, such as a crack, m")
+    width_mm: Mapped[float | None] = mapped_column(comment="Width of a line, such as a crack, mm")
     length: Mapped[float | None] = mapped_column(comment="Length of a line on the surface, m")
     shape: Mapped[WKBElement | None] = mapped_column(
         geometry("GEOMETRY"),

@@ -13,7 +13,7 @@ import shapely
 from ezdxf import filemanagement
 from ezdxf.enums import TextEntityAlignment as Align
 from ezdxf.units import M
-from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from tunneldb import __version__
 from tunneldb.export.exchange.entity import APPLICATION, Spot, draw_spot, write
@@ -30,7 +30,8 @@ from tunneldb.export.exchange.lines import (
 )  # fmt: skip
 from tunneldb.export.exchange.sheet import Box, draw_profiles, draw_unrolled
 from tunneldb.export.exchange.table import Table, read_table
-from tunneldb.export.qgis.layer import DRY_DARK
+from tunneldb.export.qgis.catalogue import looks_of
+from tunneldb.finding_kind import REVIEW_COLOURS
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.alignment import labels
 from tunneldb.store.catalog import crs_text
@@ -76,6 +77,7 @@ LAYERS = {
         for place, where in _PLACES.items()
     },
     "LEAK_TEXT": (_BLUE, "Number and area of leaks"),
+    "FINDING_TEXT": (_CYAN, "Number, kind and size of other findings"),
     "LEAK_PROFILE": (_BLUE, "Leaks on the profiles"),
     "COVERAGE_GAP": (_MAGENTA, "Unrolled lining: where leaks could be missed, and why"),
     "REMARK": (_MAGENTA, "Above the map: notes and limitations of the results"),
@@ -181,32 +183,63 @@ def _write_remarks(space: Any, corner: tuple[float, float], said: Sequence[str |
     return *corner, corner[0] + TEXT * max(map(len, lines)), corner[1] + len(lines) * LINE * TEXT
 
 
-_DRAWN = "review <> 'rejected' AND (detected OR review = 'confirmed')"
+_DRAWN = "NOT superseded AND review <> 'rejected' AND (detected OR review = 'confirmed')"
 
 
 def read_spots(conn: psycopg.Connection[Any], survey: Survey, geometry: str, low: float, high: float) -> list[Spot]:
-    """Read leaks, joints and dry dark areas that were found or confirmed and not rejected, in one of their geometries."""
-    spots = []
-    for view, where in ((f"leak_{geometry}", _DRAWN), (f"finding_{geometry}", f"{_DRAWN} AND {DRY_DARK}")):
-        table = read_table(conn, survey, view, low, high, where)
-        shapes = shapely.from_wkb(table.geometry)
-        spots += [_spot(row, shape) for row, shape in zip(_rows(table), shapes, strict=True)]
-    return sorted(spots, key=lambda spot: spot.id)
+    """Read findings of all kinds that were found, drawn or confirmed and not rejected, in one of their geometries."""
+    table = read_table(conn, survey, f"finding_{geometry}", low, high, _DRAWN)
+    colours = {kind: f"#{bytes(map(int, look.colour.split(','))).hex()}" for kind, look in looks_of(conn).items()}
+    shapes = shapely.from_wkb(table.geometry)
+    return [_spot(row, shape, colours[row["kind"]]) for row, shape in zip(_rows(table), shapes, strict=True)]
 
 
 def _rows(table: Table) -> Iterator[dict[str, Any]]:
+    """Yield the rows of a table, None for a missing value."""
     names = [column.name for column in table.columns]
-    for values in zip(*(column.values for column in table.columns), strict=True):
+    columns = [
+        [None if missing else value for value, missing in zip(column.values, column.missing, strict=True)]
+        for column in table.columns
+    ]
+    for values in zip(*columns, strict=True):
         yield dict(zip(names, values, strict=True))
 
 
-def _spot(row: dict[str, Any], shape: Polygon) -> Spot:
-    facts = [
-        f"id={row['id']}", f"kind={row['kind']}", f"station={row['label']}", f"chainage_from={row['chainage_from']:.3f}",
-        f"chainage_to={row['chainage_to']:.3f}", f"area_m2={row['area']:.3f}", f"confidence={row['confidence']:.2f}",
-        f"review={row['review']}", f"reviewed_by={row['reviewed_by'] or ''}", f"counted={'yes' if row['counted'] else 'no'}",
-    ]  # fmt: skip
-    return Spot(int(row["id"]), row["kind"], row["review"], f"{row['id']}: {row['area']:.2f} m²", facts, shape)
+_FACTS = {
+    "id": ("id", "{}"), "kind": ("kind", "{}"), "station": ("label", "{}"), "chainage_from": ("chainage_from", "{:.3f}"),
+    "chainage_to": ("chainage_to", "{:.3f}"), "area_m2": ("area", "{:.3f}"), "confidence": ("confidence", "{:.2f}"),
+    "review": ("review", "{}"), "reviewed_by": ("reviewed_by", "{}"), "severity": ("severity", "{}"),
+    "severity_label": ("severity_label", "{}"), "length_m": ("length", "{:.3f}"), "width_mm": ("width_mm", "{:.2f}"),
+    "easting": ("easting", "{:.3f}"), "northing": ("northing", "{:.3f}"), "height": ("height", "{:.3f}"),
+    "remark": ("remark", "{}"),
+}  # fmt: skip
+"""Extended data of a finding: name, column and format."""
+
+MAX_FACT = 250
+"""Maximum number of bytes of a fact: a string of extended data has at most 255."""
+
+
+def _spot(row: dict[str, Any], shape: BaseGeometry, colour: str) -> Spot:
+    texts = {
+        name: " ".join(form.format(row[column]).split())  # a string is a line of the file
+        for name, (column, form) in _FACTS.items()
+        if row[column] is not None
+    }
+    facts = [_shortened(f"{name}={text}") for name, text in texts.items()]
+    facts.append(f"counted={'yes' if row['counted'] else 'no'}")
+    size = f"{row['area']:.2f} m²" if row["length"] is None else f"{row['length']:.2f} m"
+    width = "" if row["width_mm"] is None else f", {row['width_mm']:.2f} mm"
+    named = "" if row["kind"] == "leak" else row["kind_label"]
+    text = " ".join(f"{row['id']}: {named} {size if row['area'] or row['length'] else ''}{width}".split())
+    if row["wet"]:
+        colour = REVIEW_COLOURS[row["review"]]
+    return Spot(int(row["id"]), row["kind"], bool(row["wet"]), colour, text, facts, shape)
+
+
+def _shortened(fact: str) -> str:
+    """Return a text of at most MAX_FACT bytes."""
+    data = fact.encode()
+    return fact if len(data) <= MAX_FACT else data[: MAX_FACT - 3].decode(errors="ignore") + "…"
 
 
 def _document(conn: psycopg.Connection[Any], survey: Survey, coverage: Coverage, remarks: list[Remark]) -> Any:

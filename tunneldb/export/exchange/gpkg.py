@@ -16,9 +16,12 @@ import shapely
 from tunneldb import __version__
 from tunneldb.export.exchange.lines import edges, is_hundred, on_map, outline, stretches, tick_chainages, ticks
 from tunneldb.export.exchange.table import Column, Table, read_table
-from tunneldb.export.qgis.layer import LAYERS, VectorLayer
+from tunneldb.export.qgis.catalogue import read_catalogue
+from tunneldb.export.qgis.finding_style import finding_style_text
+from tunneldb.export.qgis.layer import LAYERS, SPACE, VectorLayer, only
 from tunneldb.export.qgis.styles import STYLE_NAME, style_text
 from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN, write_remarks
+from tunneldb.finding_kind import DRY
 from tunneldb.geometry.crs import LOCAL
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.alignment import labels
@@ -49,11 +52,19 @@ def layers() -> list[VectorLayer]:
     """Return the layers of the QGIS project that have rows of their own; only the first of those on the same view."""
     seen: dict[str, VectorLayer] = {}
     for layer in LAYERS:
-        # Findings are of three kinds of geometry, "findings -o" writes them; leaks are there, and on sheets once more.
-        if layer.shows_findings or layer.view == "sheet_leak":
+        if layer.on_sheet:  # findings and leaks once more
             continue
-        seen.setdefault(layer.view, layer)
+        if layer.shows_findings:
+            layer = replace(layer, where=f"{_DRY} AND NOT ({_DARK}) AND {only(layer.wkb.removesuffix('Z'))}")
+        elif layer.style == "dark":
+            layer = replace(layer, where=f"{_DRY} AND {_DARK}")
+        seen.setdefault(layer.id if layer.view.startswith("finding_") else layer.view, layer)
     return list(seen.values())
+
+
+_DRY = 'NOT "wet" AND NOT "superseded"'
+_DARK = f'"kind" IN ({", ".join(map(repr, map(str, DRY)))}) AND {only("Polygon")}'
+"""Conditions by which findings are divided, each in one layer: leaks have their own, and joints and dry dark areas."""
 
 
 def parts() -> int:
@@ -98,24 +109,29 @@ def write_survey_gpkg(
     crs = None if survey.srid == LOCAL else crs_text(conn, survey.srid)
     ends = survey_ends(conn, survey) or (low, high)
     inside = max(low, ends[0]), min(high, ends[1])
+    coverage = read_coverage(conn, survey, low, high)
+    catalogue = read_catalogue(conn, survey)
     counts: dict[str, int] = {}
     styled: list[tuple[str, str, str]] = []
     for layer in layers():
         spots = layer.view.startswith(("leak", "finding"))
         table = read_table(conn, survey, layer.view, *(inside if spots else (low, high)), layer.where)
         if layer.view == "coverage_gap":
-            table = replace(table, description=read_coverage(conn, survey, low, high).statement or table.description)
+            table = replace(table, description=coverage.statement or table.description)
+        if spots and coverage.statement is not None:
+            table = replace(table, description=f"{coverage.statement}. {table.description}")
         if layer.view == "axis":
             table = _cut_axis(conn, survey, table, low, high)
         _write(path, layer.id, table, layer.wkb, crs if layer.on_map else None)
         counts[layer.id] = len(table.geometry)
-        styled.append((layer.id, layer.style, layer.title))
+        own = finding_style_text(catalogue, layer.geometry, in_space=layer.group == SPACE) if layer.shows_findings else None
+        styled.append((layer.id, own or style_text(layer.style), layer.title))
         progress(1)
     made = _drawn(conn, survey, surface, low, high)
     for (name, wkb, style, with_crs, text), table in zip(_DRAWN, made, strict=True):
         _write(path, name, replace(table, description=text), wkb, crs if with_crs else None)
         counts[name] = len(table.geometry)
-        styled.append((name, style, text))
+        styled.append((name, style_text(style), text))
         progress(1)
     remarks = read_remarks(conn, survey, low, high)
     write_remarks(path, remarks, **VERSION)
@@ -151,7 +167,7 @@ def _write_styles(path: Path, styled: list[tuple[str, str, str]]) -> None:
         "f_table_name": [name for name, _, _ in styled],
         "f_geometry_column": ["geom"] * count,
         "styleName": [STYLE_NAME] * count,
-        "styleQML": [style_text(style) for _, style, _ in styled],
+        "styleQML": [style for _, style, _ in styled],
         "styleSLD": [""] * count,
         "useAsDefault": [True] * count,
         "description": [title for _, _, title in styled],

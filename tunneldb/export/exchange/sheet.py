@@ -12,6 +12,7 @@ from ezdxf.enums import TextEntityAlignment as Align
 from tunneldb.arrays import Float
 from tunneldb.export.exchange.entity import Spot, draw_spot, write
 from tunneldb.export.exchange.lines import Profile, wet_parts
+from tunneldb.finding_kind import DRY
 from tunneldb.geometry.surface import Surface
 
 Box = tuple[float, float, float, float]
@@ -74,9 +75,10 @@ def draw_unrolled(
             write(space, why, corners[0] + TEXT_HEIGHT, 2 * TEXT_HEIGHT, "COVERAGE_GAP")
     for spot in spots:
         draw_spot(space, spot, "UNROLLED", shift)
-        if spot.kind == "leak":
+        if spot.kind not in DRY:
             east, north = spot.shape.bounds[2:]
-            write(space, spot.text, np.array([east, north]) + shift, TEXT_HEIGHT, "LEAK_TEXT", Align.BOTTOM_LEFT)
+            layer = "LEAK_TEXT" if spot.wet else "FINDING_TEXT"
+            write(space, spot.text, np.array([east, north]) + shift, TEXT_HEIGHT, layer, Align.BOTTOM_LEFT)
     return corner[0], float(shift[1] + low[1]), float(shift[0] + high[0]), corner[1]
 
 
@@ -91,7 +93,7 @@ def draw_profiles(
     east, north = bounds[:, 2:].max(axis=0)
     width, height = east - west + GAP, north - south + GAP + 8 * TEXT_HEIGHT
     columns = max(1, min(len(named), round(math.sqrt(SHEET_ASPECT * len(named) * height / width))))
-    leaks = [spot for spot in spots if spot.kind == "leak"]
+    leaks = [spot for spot in spots if spot.wet]
     ends = np.array([spot.shape.bounds for spot in leaks]).reshape(-1, 4)
     for k, (profile, label) in enumerate(named):
         row, column = divmod(k, columns)

@@ -202,11 +202,11 @@ def preview_factor(pixel: float) -> int:
     return factor
 
 
-def _leaks(conn: psycopg.Connection, survey: Survey, km: int) -> list[Polygon]:
+def _leaks(conn: psycopg.Connection, survey: Survey, km: int) -> list[tuple[Polygon, str]]:
     rows = conn.execute(
-        "SELECT public.ST_AsBinary(unrolled) FROM tunnel.finding"
+        "SELECT public.ST_AsBinary(unrolled), review FROM tunnel.finding"
         " WHERE survey_id = %s AND chainage_to > %s AND chainage_from < %s AND detected AND review <> 'rejected'"
         " AND wet AND NOT superseded ORDER BY id",
         (survey.id, km * KILOMETRE, (km + 1) * KILOMETRE),
     )
-    return [shapely.from_wkb(bytes(wkb)) for (wkb,) in rows]
+    return [(shapely.from_wkb(bytes(wkb)), review) for wkb, review in rows]

@@ -16,6 +16,7 @@ from shapely.geometry import Polygon
 from tunneldb.arrays import Single, UInt8
 from tunneldb.classification.classes import PointClass
 from tunneldb.export.images.palette import PALETTES
+from tunneldb.finding_kind import REVIEW_COLOURS, rgb
 from tunneldb.geometry.stationing import Stationing
 from tunneldb.raster.gap_fill import MAX_FILL_DISTANCE, fill_gaps
 from tunneldb.raster.geotiff import DEVIATION_KINDS
@@ -34,7 +35,7 @@ _SIGNED = ("offset", *DEVIATION_KINDS.values())
 
 _MARGIN, _HEAD, _GAP = 84, 40, 26
 _TICK = 10  # of chainage, m
-_BACK, _INK, _GRID, _EMPTY, _LEAK = (255, 255, 255), (40, 40, 40), (150, 170, 200), (226, 229, 233), (0, 200, 255)
+_BACK, _INK, _GRID, _EMPTY = (255, 255, 255), (40, 40, 40), (150, 170, 200), (226, 229, 233)
 _BLUE, _WHITE, _RED = np.array([33, 102, 172.0]), np.array([247, 247, 247.0]), np.array([178, 24, 43.0])
 
 
@@ -99,7 +100,7 @@ def draw(
     stationing: Stationing,
     top: float,
     pixel: float,
-    leaks: Sequence[Polygon] = (),
+    leaks: Sequence[tuple[Polygon, str]] = (),
 ) -> None:
     """Draw strips below one another and write them as PNG.
 
@@ -121,8 +122,8 @@ def draw(
         Arc of the upper edge, m.
     pixel : float
         Side of a pixel, m.
-    leaks : sequence of Polygon
-        Outlines to draw, (chainage, arc), m.
+    leaks : sequence of (Polygon, str)
+        Outlines to draw, (chainage, arc), m, in the colour of their review with a white rim.
     """
     strips = _held(strips, pixel)
     height, width = (max(s.values.shape[side] for s in strips) for side in (0, 1))
@@ -137,11 +138,12 @@ def draw(
         colours = _colours(kind, _filled(kind, strip.values, MAX_FILL_DISTANCE / pixel), low, high)
         sheet.paste(Image.fromarray(colours), (_MARGIN, y))
         _ticks(pen, strip, stationing, (_MARGIN, y), (width, height), top, pixel, small)
-        for leak in leaks:
+        for leak, review in leaks:
             if leak.bounds[0] < strip.start + width * pixel and leak.bounds[2] > strip.start:
                 for ring in (leak.exterior, *leak.interiors):
                     line = [(_MARGIN + (c - strip.start) / pixel, y + (top - a) / pixel) for c, a in ring.coords]
-                    pen.line(_clip(line, _MARGIN, _MARGIN + width), _LEAK, 2)
+                    for colour, wide in ((_BACK, 4), (rgb(REVIEW_COLOURS[review]), 2)):
+                        pen.line(_clip(line, _MARGIN, _MARGIN + width), colour, wide)
     sheet.save(path, "PNG")
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import psycopg
 
+from tunneldb.finding_kind import SEVERITY_COLOURS, rgb
 from tunneldb.store.survey import Survey
 
 SHAPES = {"Polygon": "polygon", "Line": "line", "Point": "point"}
@@ -53,7 +54,7 @@ LOOKS = {
 OWN = (Look("27,158,119"), Look("79,109,0", "f_diagonal", "dash"), Look("140,45,140", "b_diagonal", "dot", "square"))
 """Symbols of an owner's own kinds, in turn."""
 
-HALOS = {4: "227,26,28", 3: "255,159,28"}
+HALOS = {severity: ",".join(map(str, rgb(SEVERITY_COLOURS[severity]))) for severity in (4, 3)}
 """Halo colour of severe findings, by severity."""
 
 
@@ -65,6 +66,7 @@ class Kind:
     label: str
     shapes: tuple[str, ...]
     look: Look
+    wet: bool
 
 
 @dataclass(frozen=True)
@@ -90,16 +92,24 @@ class Catalogue:
         return [kind for kind in self.kinds if shape in kind.shapes]
 
 
+def looks_of(conn: psycopg.Connection) -> dict[str, Look]:
+    """Return the symbol of each kind by its code, also of inactive ones."""
+    codes = conn.execute("SELECT code FROM tunnel_api.finding_kind ORDER BY position, code").fetchall()
+    own = [code for (code,) in codes if code not in LOOKS]
+    return LOOKS | {code: OWN[n % len(OWN)] for n, code in enumerate(own)}
+
+
 def read_catalogue(conn: psycopg.Connection, survey: Survey) -> Catalogue:
     """Read the kinds that are offered, the severities and the limit of a survey's tunnel."""
     rows = conn.execute(
-        "SELECT code, label, geometries FROM tunnel_api.finding_kind WHERE active ORDER BY position, code"
+        "SELECT code, label, geometries, wet FROM tunnel_api.finding_kind WHERE active ORDER BY position, code"
     ).fetchall()
-    own = [code for code, *_ in rows if code not in LOOKS]
-    looks = LOOKS | {code: OWN[n % len(OWN)] for n, code in enumerate(own)}
+    looks = looks_of(conn)
     severities = conn.execute("SELECT id, label FROM tunnel_api.severity ORDER BY id").fetchall()
     limit = conn.execute("SELECT dry_region_limit FROM tunnel_api.tunnel WHERE name = %s", [survey.tunnel]).fetchone()
     assert limit is not None
     return Catalogue(
-        tuple(Kind(code, label, tuple(shapes), looks[code]) for code, label, shapes in rows), dict(severities), limit[0]
+        tuple(Kind(code, label, tuple(shapes), looks[code], wet) for code, label, shapes, wet in rows),
+        dict(severities),
+        limit[0],
     )

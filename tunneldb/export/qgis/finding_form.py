@@ -21,7 +21,7 @@ _ALIASES = {
     "arc_to": "Arc to (m)", "clock": "Clock position (h)", "kind": "Kind", "kind_label": "Kind (name)",
     "kind_detected": "Found as",
     "wet": "Wet", "origin": "Origin of the outline", "manual": "Drawn by hand", "severity": "Severity",
-    "severity_label": "Severity (name)", "width": "Width of the line (m)", "length": "Length (m)", "area": "Area (m²)",
+    "severity_label": "Severity (name)", "width_mm": "Width of the line (mm)", "length": "Length (m)", "area": "Area (m²)",
     "measured": "Measured on the image", "darkening_mean": "Mean darkening (dB)", "darkening_max": "Greatest darkening (dB)",
     "image_share": "Share measured", "contrast": "Contrast (sigma)", "confidence": "Confidence (0-1)", "reasons": "Reasons",
     "review": "Review", "reviewed_by": "Reviewed by", "reviewed_at": "Reviewed at", "remark": "Remark", "drawn_by": "Drawn by",
@@ -51,7 +51,8 @@ _FACTS = (
     "darkening_mean", "darkening_max", "image_share", "kind_detected", "confidence", "reasons", "also_detected", "merged",
     "merged_into",
     "same_as",
-    "parent_id", "dry_region_id", "segment", "chainage_from", "chainage_to", "arc_from", "arc_to", "survey",
+    "parent_id", "dry_region_id", "segment", "chainage_from", "chainage_to", "arc_from", "arc_to", "easting", "northing",
+    "height", "survey",
 )  # fmt: skip
 
 
@@ -86,15 +87,15 @@ def finding_form(catalogue: Catalogue, geometry: str, layer: str, tables: Mappin
         Name of the survey that new findings belong to.
     """
     shape = SHAPES[geometry]
-    asked = ("kind", "severity", *(["width"] if shape == "line" else []), "review", "remark")
+    asked = ("kind", "severity", *(["width_mm"] if shape == "line" else []), "review", "remark")
     # Of what is not offered any more, the kind that a finding has. By current_value the list would be made anew while it is
     # being chosen from, at which QGIS 3.22 crashes.
     fits = f'"active" AND array_contains("geometries", \'{shape}\') OR "code" = attribute(@current_feature, \'kind\')'
     widgets: dict[str, tuple[str, dict[str, object]]] = {
         "kind": _listed(tables[KIND_LIST], "code", fits, nothing=False),
         "severity": _listed(tables[SEVERITIES], "id", "", nothing=True),
-        "width": ("Range", {
-            "AllowNull": True, "Min": 0.0001, "Max": 10.0, "Step": 0.001, "Precision": 4, "Style": "SpinBox", "Suffix": " m",
+        "width_mm": ("Range", {
+            "AllowNull": True, "Min": 0.01, "Max": 10000.0, "Step": 0.05, "Precision": 2, "Style": "SpinBox", "Suffix": " mm",
         }),
         "review": ("ValueMap", {"map": [{word: code} for word, code in _REVIEWS.items()]}),
     }  # fmt: skip

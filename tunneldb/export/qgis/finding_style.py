@@ -5,15 +5,20 @@ from __future__ import annotations
 import uuid
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
+from dataclasses import replace
 
 from tunneldb.export.qgis.catalogue import HALOS, SHAPES, Catalogue, Look
 from tunneldb.finding_kind import DRY as DRY_KINDS
+from tunneldb.finding_kind import REVIEW_COLOURS, rgb
 
 COUNTS = 'coalesce("counted", true)'
 """Condition for findings to show: also new ones that are not saved yet."""
 
 DRY = 'NOT "wet"'
 """Condition for findings without an outline or a number as a leak."""
+
+_REVIEW = {review: ",".join(map(str, rgb(colour))) for review, colour in REVIEW_COLOURS.items()}
+"""Colours of leaks by their review, as QGIS writes them."""
 
 _WHITE, _GREY = "255,255,255,200", "110,110,110,255"
 _UNKNOWN = Look("230,106,177")
@@ -30,6 +35,13 @@ def finding_style(catalogue: Catalogue, geometry: str, *, in_space: bool, on_she
         return [_renderer(catalogue, geometry, on_sheet=True), _labeling(geometry, DRY)]
     drawn = [_renderer(catalogue, geometry), _labeling(geometry)]
     return [*drawn, _renderer_3d(catalogue, geometry)] if in_space else drawn
+
+
+def finding_style_text(catalogue: Catalogue, geometry: str, *, in_space: bool) -> str:
+    """Return the style of a layer of findings as the text of a style file."""
+    root = ET.Element("qgis", styleCategories="Symbology|Labeling|Symbology3D", version="3.22.0")
+    root.extend(finding_style(catalogue, geometry, in_space=in_space))
+    return ET.tostring(root, encoding="unicode")
 
 
 def _renderer(catalogue: Catalogue, geometry: str, *, on_sheet: bool = False) -> ET.Element:
@@ -66,6 +78,11 @@ def _renderer(catalogue: Catalogue, geometry: str, *, on_sheet: bool = False) ->
     for kind in catalogue.drawn_as(SHAPES[geometry]):
         quoted = kind.code.replace("'", "''")
         condition, layers = f"\"kind\" = '{quoted}'", _layers(geometry, kind.look)
+        if kind.wet:
+            for review in ("open", "confirmed"):
+                look = replace(kind.look, colour=_REVIEW[review])
+                rule(kinds, f"{kind.label}, {review}", f"{condition} AND \"review\" = '{review}'", _layers(geometry, look))
+            continue
         if kind.code in DRY_KINDS and not on_sheet:
             rule(kinds, f"{kind.label}, as detected", f'{condition} AND NOT "manual"', layers, shown=False)
         else:
@@ -113,11 +130,13 @@ def _renderer_3d(catalogue: Catalogue, geometry: str) -> ET.Element:
     rules = ET.SubElement(root, "rules", key=_key("3d", geometry))
     for kind in catalogue.drawn_as(SHAPES[geometry]):
         quoted = kind.code.replace("'", "''")
-        rule = ET.SubElement(
-            rules, "rule", key=_key("3d" + kind.code, geometry), description=kind.label,
-            filter=f"\"counted\" AND \"kind\" = '{quoted}'",
-        )  # fmt: skip
-        rule.append(_solid(geometry, f"{kind.look.colour},255"))
+        looks = {f" AND \"review\" = '{review}'": _REVIEW[review] for review in ("open", "confirmed")}
+        for condition, colour in (looks if kind.wet else {"": kind.look.colour}).items():
+            rule = ET.SubElement(
+                rules, "rule", key=_key("3d" + kind.code + condition, geometry), description=kind.label,
+                filter=f"\"counted\" AND \"kind\" = '{quoted}'{condition}",
+            )  # fmt: skip
+            rule.append(_solid(geometry, f"{colour},255"))
     return root
 
 

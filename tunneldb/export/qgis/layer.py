@@ -118,7 +118,7 @@ DRY_DARK = (
 """Condition that a finding is dark on the image and dry: a joint, or what else was found dark and is no leak."""
 
 
-def _only(wkb: str) -> str:
+def only(wkb: str) -> str:
     """Return the condition for rows of a geometry type: QGIS adds it only if it finds others on opening the layer."""
     return f"public.geometrytype(\"geom\") = '{wkb.upper()}'"
 
@@ -130,7 +130,7 @@ def _findings(suffix: str, group: str, theme: str, z: str = "", where: str = "")
         VectorLayer(
             f"finding_{shape}_{suffix}", f"Findings: {title}{' (sheets)' if on_sheet else ''}",
             SHEET_FINDING if on_sheet else f"finding_{suffix}", wkb + z, "finding", group, (theme,),
-            edited=not (z or on_sheet), where=" AND ".join(filter(None, [where, _only(wkb)])),
+            edited=not (z or on_sheet), where=" AND ".join(filter(None, [where, only(wkb)])),
             part=SHEETS if on_sheet else FINDINGS,
         )
         for shape, title, wkb in (("point", "points", "Point"), ("line", "lines", "LineString"), ("area", "areas", "Polygon"))

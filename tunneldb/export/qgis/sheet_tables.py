@@ -30,7 +30,7 @@ ON_PAGE = "attribute(@atlas_feature, '{}')"
 
 # As the sheet's sums count them: one that only touches its edge is not on it.
 _ON_SHEET = f'"chainage_to" > {ON_PAGE.format("chainage_from")} and "chainage_from" < {ON_PAGE.format("chainage_to")}'
-_LONG = "format_number(\"length\", 2) || ' m' || coalesce(', ' || format_number(1000 * \"width\", 1) || ' mm', '')"  # a line
+_LONG = "format_number(\"length\", 2) || ' m' || coalesce(', ' || format_number(\"width_mm\", 2) || ' mm', '')"  # a line
 _SIZE = f'if("length" IS NOT NULL, {_LONG}, if("area" > 0, format_number("area", 2) || \' m²\', \'\'))'
 
 

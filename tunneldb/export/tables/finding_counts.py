@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import get_args
+from typing import Any, get_args
 
+from tunneldb.finding_kind import DRY
 from tunneldb.store.findings import COUNTED, Finding, State
 
 ORIGINS = ("detected", "drawn", "redrawn", "split", "merged")
@@ -15,6 +16,9 @@ STATES: tuple[State, ...] = get_args(State)
 
 UNCOUNTED: tuple[State, ...] = tuple(state for state in STATES if state not in COUNTED)
 """States that are not included in totals."""
+
+LEAKS, OTHERS, DARK = "All leaks", "All other findings", "All joints and dry dark areas"
+"""Groups of kinds whose numbers are added up."""
 
 SEVERITIES = (1, 2, 3, 4, 0)
 """Severities from the least; 0 for findings without one."""
@@ -48,6 +52,11 @@ class KindCount:
     counted: int
     area: float
     length: float
+
+    @property
+    def uncounted(self) -> int:
+        """Number not included in totals."""
+        return sum(self.states[state] for state in UNCOUNTED)
 
 
 @dataclass
@@ -101,6 +110,37 @@ def count_findings(findings: Iterable[Finding], order: Sequence[str] = ()) -> li
     for finding in findings:
         kinds[finding.kind].add(finding)
     return [kinds[kind].count(kind) for kind in in_order(kinds, order)]
+
+
+def group_of(kind: str, wet: Container[str]) -> str:
+    """Return the group of a kind: wet kinds, other kinds, and joints and dry dark areas, which are no defects."""
+    return LEAKS if kind in wet else DARK if kind in DRY else OTHERS
+
+
+def sum_groups(counts: Sequence[KindCount], wet: Container[str]) -> list[tuple[KindCount, list[KindCount]]]:
+    """Return the sum of each group of kinds that occurs, with the counts of its kinds: no sum adds dry lining to leaks.
+
+    Parameters
+    ----------
+    counts : sequence of KindCount
+        Counts by kind.
+    wet : container of str
+        Codes of the kinds that count as wet.
+    """
+    groups = {label: [count for count in counts if group_of(count.kind, wet) == label] for label in (LEAKS, OTHERS, DARK)}
+    return [(_sum(label, members), members) for label, members in groups.items() if members]
+
+
+def _sum(label: str, counts: Sequence[KindCount]) -> KindCount:
+    """Return the sum over several kinds, whose code is empty."""
+
+    def total(name: str) -> dict[Any, int]:
+        return {key: sum(getattr(count, name)[key] for count in counts) for key in getattr(counts[0], name)}
+
+    return KindCount(
+        "", label, total("states"), total("origins"), total("severities"), sum(count.counted for count in counts),
+        sum(count.area for count in counts), sum(count.length for count in counts),
+    )  # fmt: skip
 
 
 def in_order(kinds: Iterable[str], order: Sequence[str]) -> list[str]:

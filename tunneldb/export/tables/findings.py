@@ -2,49 +2,75 @@
 
 from __future__ import annotations
 
-import datetime as dt
 import json
-import warnings
-from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pyogrio.raw
 import shapely
 from shapely.geometry import mapping
 
 from tunneldb.csvfile import write_csv
 from tunneldb.export.tables.cell import DECIMALS, plain
-from tunneldb.export.tables.geopackage import UNDEFINED_CARTESIAN
+from tunneldb.export.tables.geopackage import write_gaps, write_layer, write_remarks
+from tunneldb.export.tables.notes import note_rows
 from tunneldb.geometry.crs import LOCAL
+from tunneldb.store.coverage import Coverage
 from tunneldb.store.findings import Finding, Geometry
+from tunneldb.store.remarks import Remark
 
 COLUMNS = (
     "id", "km", "label", "chainage_from", "chainage_to", "arc_from", "arc_to", "clock", "kind", "kind_label", "origin",
-    "severity", "severity_label", "area", "length", "width", "darkening_mean", "confidence", "review", "state", "counted",
+    "severity", "severity_label", "area", "length", "width_mm", "darkening_mean", "confidence", "review", "state", "counted",
     "also_detected", "merged_into", "same_as", "parent_id", "dry_region_id", "drawn_by", "drawn_at", "reviewed_by",
-    "reviewed_at", "remark", "photos",
+    "reviewed_at", "remark", "photos", "easting", "northing", "height",
 )  # fmt: skip
 """Columns of the files: attributes of a finding."""
 
 
-def as_csv(findings: Sequence[Finding]) -> str:
-    """Write findings as CSV with a header; the last column, ``geometry``, is WKT."""
-    return write_csv(
-        [*COLUMNS, "geometry"],
-        (
-            [*(plain(getattr(one, name)) for name in COLUMNS), shapely.to_wkt(one.geometry, rounding_precision=DECIMALS)]
-            for one in findings
-        ),
-    )
+@dataclass(frozen=True)
+class FindingList:
+    """Findings of a stretch, with the statements on it.
+
+    Attributes
+    ----------
+    rows : list of Finding
+        In order of chainage.
+    coverage : Coverage
+        Statement on the search.
+    remarks : list of Remark
+        Notes and limitations.
+    """
+
+    rows: list[Finding]
+    coverage: Coverage
+    remarks: list[Remark]
 
 
-def as_geojson(findings: Sequence[Finding], geometry: Geometry, srid: int) -> str:
-    """Write findings as a GeoJSON FeatureCollection; on the map and in space it names the tunnel's coordinate system."""
+def as_csv(findings: FindingList) -> str:
+    """Write findings as CSV with a header; the last column, ``geometry``, is WKT.
+
+    First come the gaps in the search and the notes, as in the CSV of leaks, with their texts in ``remark``.
+    """
+    notes = [[plain(row.get(name)) for name in COLUMNS] for row in note_rows(findings.coverage, findings.remarks, "remark")]
+    rows = [
+        [*(plain(getattr(one, name)) for name in COLUMNS), shapely.to_wkt(one.geometry, rounding_precision=DECIMALS)]
+        for one in findings.rows
+    ]
+    return write_csv([*COLUMNS, "geometry"], [*([*note, None] for note in notes), *rows])
+
+
+def as_geojson(findings: FindingList, geometry: Geometry, srid: int) -> str:
+    """Write findings as a GeoJSON FeatureCollection; on the map and in space it names the tunnel's coordinate system.
+
+    Members ``statement``, ``gaps`` and ``remarks`` are those of leaks.
+    """
     collection: dict[str, Any] = {"type": "FeatureCollection", "name": f"finding_{geometry}"}
     if geometry != "unrolled" and srid != LOCAL:
         collection["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{srid}"}}
+    collection["statement"] = findings.coverage.statement
+    collection["gaps"] = [asdict(gap) for gap in findings.coverage.gaps]
+    collection["remarks"] = [asdict(remark) for remark in findings.remarks]
     collection["features"] = [
         {
             "type": "Feature",
@@ -52,59 +78,20 @@ def as_geojson(findings: Sequence[Finding], geometry: Geometry, srid: int) -> st
             "geometry": mapping(shapely.set_precision(finding.geometry, 10.0**-DECIMALS, mode="pointwise")),
             "properties": {name: plain(getattr(finding, name)) for name in COLUMNS},
         }
-        for finding in findings
+        for finding in findings.rows
     ]
     return json.dumps(collection, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def write_gpkg(path: Path, findings: Sequence[Finding], geometry: Geometry, srid: int) -> None:
-    """Write findings as a GeoPackage with one layer of polygons, lines and points; numbers that are not known are empty."""
-    bare = geometry == "unrolled" or srid == LOCAL
-    columns, masks = [], []
-    for name in COLUMNS:
-        values = [getattr(finding, name) for finding in findings]
-        unknown = np.array([value is None for value in values], np.bool_)
-        kind = _TYPE.get(name, object)
-        if kind == "datetime64[ms]":
-            values = [np.datetime64("NaT") if v is None else v.astimezone(dt.UTC).replace(tzinfo=None) for v in values]
-        elif kind is not object:
-            values = [kind(0) if value is None else value for value in values]
-        columns.append(np.array(values, dtype=kind))
-        masks.append(unknown if unknown.any() and kind not in (object, "datetime64[ms]") else None)
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "'crs' was not provided")
-        pyogrio.raw.write(
-            str(path),
-            shapely.to_wkb(np.array([finding.geometry for finding in findings], dtype=object)),
-            columns,
-            np.array(COLUMNS),
-            field_mask=masks,
-            geometry_type="Unknown",
-            crs=None if bare else f"EPSG:{srid}",
-            driver="GPKG",
-            layer=f"finding_{geometry}",
-            **(UNDEFINED_CARTESIAN if bare else {}),
-        )
-
-
-_TYPE: dict[str, Any] = {
-    **dict.fromkeys(("id", "merged_into", "same_as", "parent_id", "dry_region_id"), np.int64),
-    **dict.fromkeys(("km", "severity", "photos"), np.int32),
-    **dict.fromkeys(("counted", "also_detected"), np.bool_),
-    **dict.fromkeys(("drawn_at", "reviewed_at"), "datetime64[ms]"),
-    **dict.fromkeys(
-        (
-            "chainage_from",
-            "chainage_to",
-            "arc_from",
-            "arc_to",
-            "clock",
-            "area",
-            "length",
-            "width",
-            "darkening_mean",
-            "confidence",
-        ),
-        np.float64,
-    ),
-}
+def write_gpkg(path: Path, findings: FindingList, geometry: Geometry, srid: int) -> None:
+    """Write findings as a GeoPackage with one layer of polygons, lines and points, and tables of gaps and notes."""
+    said = ". ".join(filter(None, (findings.coverage.statement, *(remark.said for remark in findings.remarks))))
+    write_layer(
+        path, f"finding_{geometry}", [finding.geometry for finding in findings.rows],
+        {name: [getattr(finding, name) for finding in findings.rows] for name in COLUMNS},
+        geometry_type="Unknown", srid=LOCAL if geometry == "unrolled" else srid, description=said,
+    )  # fmt: skip
+    if findings.coverage.gaps:
+        write_gaps(path, findings.coverage)
+    if findings.remarks:
+        write_remarks(path, findings.remarks)

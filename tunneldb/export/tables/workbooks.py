@@ -7,27 +7,37 @@ from pathlib import Path
 from typing import Any
 
 from tunneldb.export.tables.finding_counts import ORIGINS, SEVERITIES, UNCOUNTED, KindCount
+from tunneldb.export.tables.findings import FindingList
 from tunneldb.export.tables.leaks import clock_label
+from tunneldb.export.tables.notes import note_rows
 from tunneldb.export.tables.workbook import Column, Sheet, write_workbook
+from tunneldb.finding_kind import DRY
+from tunneldb.store.coverage import Coverage
 from tunneldb.store.dry_regions import DryRegion
 from tunneldb.store.findings import Finding
 from tunneldb.store.leaks import LeakList
+from tunneldb.store.remarks import REMARK, Remark
 
 _METRES, _WHOLE = "0.000", "0"
 
+_PLACE = (
+    (Column("Easting, m", _METRES), "easting"), (Column("Northing, m", _METRES), "northing"),
+    (Column("Height, m", _METRES), "height"),
+)  # fmt: skip
 _FINDING = (
     (Column("No.", _WHOLE), "id"), (Column("Chainage"), "label"), (Column("Chainage from, m", _METRES), "chainage_from"),
     (Column("Chainage to, m", _METRES), "chainage_to"), (Column("Arc from, m", _METRES), "arc_from"),
     (Column("Arc to, m", _METRES), "arc_to"), (Column("Clock"), "clock"), (Column("Kind"), "kind_label"),
     (Column("Code of kind"), "kind"), (Column("Origin"), "origin"), (Column("Severity", _WHOLE), "severity"),
     (Column("Severity in words"), "severity_label"), (Column("Area, m²", "0.0000"), "area"),
-    (Column("Length, m", _METRES), "length"), (Column("Width, m", "0.0000"), "width"), (Column("State"), "state"),
+    (Column("Length, m", _METRES), "length"), (Column("Width, mm", "0.00"), "width_mm"), (Column("State"), "state"),
     (Column("Counted"), "counted"), (Column("Also detected"), "also_detected"),
     (Column("Merged into", _WHOLE), "merged_into"), (Column("Same as", _WHOLE), "same_as"),
     (Column("Split off", _WHOLE), "parent_id"), (Column("Dry region", _WHOLE), "dry_region_id"),
     (Column("Drawn by"), "drawn_by"), (Column("Drawn, UTC"), "drawn_at"), (Column("Reviewed by"), "reviewed_by"),
     (Column("Reviewed, UTC"), "reviewed_at"), (Column("Mean drop, dB", "0.0"), "darkening_mean"),
     (Column("Confidence", "0.00"), "confidence"), (Column("Photos", _WHOLE), "photos"), (Column("Remark"), "remark"),
+    *_PLACE,
 )  # fmt: skip
 _LEAK = (
     (Column("No.", _WHOLE), "id"), (Column("Chainage"), "label"), (Column("Chainage from, m", _METRES), "chainage_from"),
@@ -38,6 +48,8 @@ _LEAK = (
     (Column("Confidence", "0.00"), "confidence_in_kind"), (Column("Share measured", "0.00"), "image_share"),
     (Column("Review"), "review"), (Column("Found again"), "detected"), (Column("Counted"), "counted"),
     (Column("Reviewed by"), "reviewed_by"), (Column("Reviewed, UTC"), "reviewed_at"), (Column("Reasons"), "reasons"),
+    (Column("Severity", _WHOLE), "severity"), (Column("Severity in words"), "severity_label"), (Column("Remark"), "remark"),
+    *_PLACE,
 )  # fmt: skip
 
 _NAMES = {"leak": "Leaks", "joint": "Joints", "dark": "Dry dark areas", "all": "Leaks, joints, dry dark areas"}
@@ -46,9 +58,9 @@ _NAMES = {"leak": "Leaks", "joint": "Joints", "dark": "Dry dark areas", "all": "
 def write_findings(
     path: Path,
     title: str,
-    findings: Sequence[Finding],
+    findings: FindingList,
     others: Sequence[Finding],
-    counts: Sequence[KindCount],
+    counts: Sequence[tuple[KindCount, Sequence[KindCount]]],
     severities: dict[int, str],
     regions: Sequence[DryRegion],
 ) -> None:
@@ -58,10 +70,12 @@ def write_findings(
     ----------
     path, title
         Target, and its title.
-    findings, others : sequence of Finding
-        Requested findings, and those excluded only by their state: rejected, gone, merged, …
-    counts : sequence of KindCount
-        Counts of both together.
+    findings : FindingList
+        Requested findings, with the statements on the stretch, which come first.
+    others : sequence of Finding
+        Findings excluded only by their state: rejected, gone, merged, …
+    counts : sequence of (KindCount, sequence of KindCount)
+        Sum and kinds of each group, of both together.
     severities : dict of int to str
         The owner's words.
     regions : sequence of DryRegion
@@ -71,8 +85,16 @@ def write_findings(
     write_workbook(
         path,
         [
-            Sheet("Findings", columns, [_cells(row, _FINDING) for row in findings]),
+            Sheet(
+                "Findings",
+                columns,
+                [
+                    *_notes(_FINDING, findings.coverage, findings.remarks, "remark"),
+                    *(_cells(row, _FINDING) for row in findings.rows),
+                ],
+            ),
             _counts(counts, severities),
+            _missed(findings.coverage, findings.remarks),
             Sheet("Left out", columns, [_cells(row, _FINDING) for row in others]),
             _regions(regions),
         ],
@@ -82,38 +104,64 @@ def write_findings(
 
 def write_leaks(path: Path, title: str, leaks: LeakList, regions: Sequence[DryRegion]) -> None:
     """Write leaks, or other anomalies, as a workbook, with a sheet of gaps in the inspection and notes."""
-    kinds = sorted({row.kind for row in leaks.rows})
-    reviews = ("open", "confirmed", "rejected")
-    of_kind = {kind: [row for row in leaks.rows if row.kind == kind] for kind in kinds}
-    counted = [
-        [
-            kind, sum(row.counted for row in rows), *(sum(row.review == review for row in rows) for review in reviews),
-            sum(not row.detected for row in rows), None,
-        ]
-        for kind, rows in of_kind.items()
-    ]  # fmt: skip
-    total = ["all", leaks.count, *(sum(row.review == review for row in leaks.rows) for review in reviews)]
-    known = [[gap.label_from, gap.label_to, gap.state, gap.reason, gap.seen_share] for gap in leaks.coverage.gaps]
-    known += [[None, None, "remark", remark.said, None] for remark in leaks.remarks]
     heads = ("Kind", "Counted", "Open", "Confirmed", "Rejected", "Not found again")
     write_workbook(
         path,
         [
-            Sheet(_NAMES[leaks.kind], [column for column, _ in _LEAK], [_cells(row, _LEAK) for row in leaks.rows]),
+            Sheet(
+                _NAMES[leaks.kind],
+                [column for column, _ in _LEAK],
+                [
+                    *_notes(_LEAK, leaks.coverage, leaks.remarks, "reasons"),
+                    *(_cells(row, _LEAK) for row in leaks.rows),
+                ],
+            ),
             Sheet(
                 "Counts",
                 [*(Column(head, _WHOLE) for head in heads), Column("Area in the stretch, m²", "0.0000")],
-                [*counted, [*total, sum(not row.detected for row in leaks.rows), leaks.area]],
+                _leak_counts(leaks),
             ),
-            Sheet(
-                "Could be missed",
-                [Column("From"), Column("To"), Column("State"), Column("Why"), Column("Lining seen", "0.0 %")],
-                known,
-            ),
+            _missed(leaks.coverage, leaks.remarks),
             _regions(regions),
         ],
         title,
     )
+
+
+def _leak_counts(leaks: LeakList) -> list[list[Any]]:
+    """Make a row of counts for each kind, and one of all; where dry kinds are listed too, of all leaks."""
+    if not leaks.rows and not leaks.coverage.seen_area:
+        return [[leaks.total, *[None] * 6]]
+    kinds = sorted({row.kind for row in leaks.rows})
+    counts = [_reviews(kind, [row for row in leaks.rows if row.kind == kind], leaks.sums.get(kind)) for kind in kinds]
+    if leaks.kind == "all":
+        wet = [row for row in leaks.rows if row.kind not in DRY]
+        return [*counts, _reviews("all leaks", wet, leaks.sums.get("leak", (0, 0.0)))]
+    return [*counts, _reviews("all", leaks.rows, (leaks.count, leaks.area))]
+
+
+def _reviews(name: str, rows: Sequence[Finding], total: tuple[int, float] | None) -> list[Any]:
+    """Make a row of counts: included, by review, not found again; and the area within the stretch, if it is known."""
+    reviews = [sum(row.review == review for row in rows) for review in ("open", "confirmed", "rejected")]
+    return [name, sum(row.counted for row in rows), *reviews, sum(not row.detected for row in rows), total and total[1]]
+
+
+def _missed(coverage: Coverage, remarks: Sequence[Remark]) -> Sheet:
+    """Make the sheet of stretches where leaks could be missed, and of notes."""
+    known = [[gap.label_from, gap.label_to, gap.state, gap.reason, gap.seen_share] for gap in coverage.gaps]
+    return Sheet(
+        "Could be missed",
+        [Column("From"), Column("To"), Column("State"), Column("Why"), Column("Lining seen", "0.0 %")],
+        [*known, *([None, None, REMARK, remark.said, None] for remark in remarks)],
+    )
+
+
+def _notes(columns: Sequence[tuple[Column, str]], coverage: Coverage, remarks: Sequence[Remark], text: str) -> list[list[Any]]:
+    """Make the rows before a list that state gaps and notes; the state is in the first column with the kind."""
+    names = [name for _, name in columns]
+    if "kind_label" in names:
+        names = ["kind" if name == "kind_label" else "" if name == "kind" else name for name in names]
+    return [[row.get(name) for name in names] for row in note_rows(coverage, remarks, text)]
 
 
 def _cells(row: Any, columns: Sequence[tuple[Column, str]]) -> list[Any]:
@@ -126,8 +174,9 @@ def _cell(name: str, value: Any) -> Any:
     return ", ".join(map(str, value)) if isinstance(value, list) else value
 
 
-def _counts(counts: Sequence[KindCount], severities: dict[int, str]) -> Sheet:
-    """Make rows by kind: number counted, by origin and by severity; then uncounted ones; then the total of each column."""
+def _counts(groups: Sequence[tuple[KindCount, Sequence[KindCount]]], severities: dict[int, str]) -> Sheet:
+    """Make rows by kind, and the sum of each group: number counted, by origin and by severity; then uncounted ones."""
+    counts = [count for total, kinds in groups for count in (*kinds, total)]
     degrees = [f"Severity {n} {severities.get(n, '')}".rstrip() if n else "No severity" for n in SEVERITIES]
     heads = [
         "Counted",
@@ -144,15 +193,13 @@ def _counts(counts: Sequence[KindCount], severities: dict[int, str]) -> Sheet:
         ]
         for count in counts
     ]  # fmt: skip
-    sums = [sum(column) for column in zip(*rows, strict=True)] if rows else []
-    named = [[count.label, count.kind, *row] for count, row in zip(counts, rows, strict=True)]
     return Sheet(
         "Counts",
         [
             Column("Kind"), Column("Code of kind"), *(Column(head, _WHOLE) for head in heads), Column("Area, m²", "0.0000"),
             Column("Length, m", _METRES),
         ],
-        [*named, *([["All", None, *sums]] if rows else [])],
+        [[count.label, count.kind, *row] for count, row in zip(counts, rows, strict=True)],
     )  # fmt: skip
 
 

@@ -28,6 +28,8 @@
   const arc = (leak) => _("{low} to {high}", { low: signed(leak.arcFrom), high: signed(leak.arcTo) });
   const review = (leak) => make("span", { class: `review ${leak.review}` }, _(leak.review) + (leak.detected ? "" : _(", not found again")));
 
+  const coordinates = (leak) => [leak.easting, leak.northing, leak.height].map((value) => value.toFixed(2)).join(" ");
+
   // Columns of the table: heading, key, cell, class; minor ones are left out on a phone.
   const several = new Set(leaks.map((leak) => leak.kind)).size > 1 || leaks.some((leak) => leak.origin !== "detected");
   const kind = (leak) => _(leak.kind) + (leak.origin === "detected" ? "" : `, ${_(leak.origin)}`);
@@ -36,6 +38,7 @@
     [data.place, "chainage", (l) => l.label, ""],
     ...(several ? [["Kind", "kind", kind, "kinds"]] : []),
     ["Clock", "clock", (l) => l.clockLabel, "n"],
+    ["E, N, H m", "easting", coordinates, "n minor"],
     ["Arc m", "arcFrom", arc, "n minor"],
     ["Length m", "length", (l) => fixed(l.length, 2), "n minor"],
     ["Area m²", "area", (l) => fixed(l.area, 2), "n"],
@@ -180,6 +183,7 @@
       [_("Darkening, mean and greatest"), `${fixed(leak.drop, 1)}, ${fixed(leak.dropMax, 1)} dB`], [_("Contrast"), `${fixed(leak.contrast, 1)} σ`],
       [_("Confidence"), fixed(leak.confidence, 2)], [_("Measured"), leak.imageShare === null ? _("not yet") : _("{share} % of it", { share: Math.round(100 * leak.imageShare) })],
     ];
+    facts.push([_("E, N, H m"), coordinates(leak)]);
     const list = make("dl", {}, ...facts.map(([term, value]) => make("div", {}, make("dt", {}, term), make("dd", {}, value))));
     if (leak.by) list.append(make("div", { class: "long" }, make("dt", {}, _("Reviewed")), make("dd", {}, _("{state} by {who}, {when}", { state: _(leak.review), who: leak.by, when: leak.at }))));
     if (leak.severity) list.append(make("div", {}, make("dt", {}, _("Severity")), make("dd", {}, _(leak.severityLabel))));

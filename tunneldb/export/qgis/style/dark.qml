@@ -10,9 +10,9 @@
       <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="0,150,136,40"/>
+            <Option type="QString" name="color" value="63,174,63,40"/>
             <Option type="QString" name="style" value="solid"/>
-            <Option type="QString" name="outline_color" value="0,150,136,255"/>
+            <Option type="QString" name="outline_color" value="63,174,63,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
             <Option type="QString" name="outline_width" value="0.4"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
@@ -23,9 +23,9 @@
       <symbol name="1" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
         <layer class="SimpleFill" enabled="1" locked="0" pass="0">
           <Option type="Map">
-            <Option type="QString" name="color" value="156,39,176,40"/>
+            <Option type="QString" name="color" value="107,107,107,40"/>
             <Option type="QString" name="style" value="solid"/>
-            <Option type="QString" name="outline_color" value="156,39,176,255"/>
+            <Option type="QString" name="outline_color" value="107,107,107,255"/>
             <Option type="QString" name="outline_style" value="dash"/>
             <Option type="QString" name="outline_width" value="0.4"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
@@ -579,7 +579,7 @@
     <alias index="16" field="manual" name="Drawn by hand"/>
     <alias index="17" field="severity" name="Severity"/>
     <alias index="18" field="severity_label" name="Severity (name)"/>
-    <alias index="19" field="width" name="Width of the line (m)"/>
+    <alias index="19" field="width_mm" name="Width of the line (mm)"/>
     <alias index="20" field="length" name="Length (m)"/>
     <alias index="21" field="area" name="Area (m²)"/>
     <alias index="22" field="measured" name="Measured on the image"/>
@@ -709,6 +709,6 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "found" %]&lt;br&gt;darkening [% format_number("darkening_mean", 1) %] dB, [% "review" %]</mapTip>
+  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "kind_detected" %]&lt;br&gt;darkening [% format_number("darkening_mean", 1) %] dB, [% "review" %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -414,6 +414,20 @@
         </config>
       </editWidget>
     </field>
+    <field name="severity" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
+    <field name="severity_label" configurationFlags="None">
+      <editWidget type="TextEdit">
+        <config>
+          <Option/>
+        </config>
+      </editWidget>
+    </field>
     <field name="easting" configurationFlags="None">
       <editWidget type="Range">
         <config>
@@ -488,6 +502,8 @@
     <alias index="33" field="easting" name="Easting (m)"/>
     <alias index="34" field="northing" name="Northing (m)"/>
     <alias index="35" field="height" name="Height (m)"/>
+    <alias index="36" field="severity" name="Severity"/>
+    <alias index="37" field="severity_label" name="Severity (name)"/>
   </aliases>
   <editable>
     <field name="id" editable="0"/>
@@ -522,6 +538,8 @@
     <field name="model" editable="0"/>
     <field name="wet" editable="0"/>
     <field name="origin" editable="0"/>
+    <field name="severity" editable="0"/>
+    <field name="severity_label" editable="0"/>
     <field name="easting" editable="0"/>
     <field name="northing" editable="0"/>
     <field name="height" editable="0"/>
@@ -542,6 +560,7 @@
       <attributeEditorField name="clock_text" index="32" showLabel="1"/>
       <attributeEditorField name="area" index="16" showLabel="1"/>
       <attributeEditorField name="image_share" index="19" showLabel="1"/>
+      <attributeEditorField name="severity_label" index="37" showLabel="1"/>
       <attributeEditorField name="kind_detected" index="12" showLabel="1"/>
       <attributeEditorField name="confidence" index="14" showLabel="1"/>
       <attributeEditorField name="reasons" index="13" showLabel="1"/>
@@ -553,6 +572,9 @@
       <attributeEditorField name="chainage_to" index="6" showLabel="1"/>
       <attributeEditorField name="arc_from" index="8" showLabel="1"/>
       <attributeEditorField name="arc_to" index="9" showLabel="1"/>
+      <attributeEditorField name="easting" index="33" showLabel="1"/>
+      <attributeEditorField name="northing" index="34" showLabel="1"/>
+      <attributeEditorField name="height" index="35" showLabel="1"/>
       <attributeEditorField name="detected" index="24" showLabel="1"/>
       <attributeEditorField name="created_at" index="25" showLabel="1"/>
       <attributeEditorField name="detected_at" index="26" showLabel="1"/>
@@ -563,6 +585,6 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "found" %]&lt;br&gt;darkening [% format_number("darkening_mean", 1) %] dB, [% "review" %]</mapTip>
+  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "kind_detected" %]&lt;br&gt;darkening [% format_number("darkening_mean", 1) %] dB, [% "review" %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

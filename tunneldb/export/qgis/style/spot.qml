@@ -25,7 +25,7 @@
           <Option type="Map">
             <Option type="QString" name="color" value="60,30,20,150"/>
             <Option type="QString" name="style" value="solid"/>
-            <Option type="QString" name="outline_color" value="200,80,0,255"/>
+            <Option type="QString" name="outline_color" value="230,126,0,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
             <Option type="QString" name="outline_width" value="0.5"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
@@ -94,7 +94,7 @@
           <Option type="Map">
             <Option type="QString" name="color" value="255,214,40,150"/>
             <Option type="QString" name="style" value="solid"/>
-            <Option type="QString" name="outline_color" value="200,80,0,255"/>
+            <Option type="QString" name="outline_color" value="230,126,0,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
             <Option type="QString" name="outline_width" value="0.5"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>

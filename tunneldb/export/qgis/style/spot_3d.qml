@@ -25,7 +25,7 @@
           <Option type="Map">
             <Option type="QString" name="color" value="60,30,20,150"/>
             <Option type="QString" name="style" value="solid"/>
-            <Option type="QString" name="outline_color" value="200,80,0,255"/>
+            <Option type="QString" name="outline_color" value="230,126,0,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
             <Option type="QString" name="outline_width" value="0.5"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
@@ -94,7 +94,7 @@
           <Option type="Map">
             <Option type="QString" name="color" value="255,214,40,150"/>
             <Option type="QString" name="style" value="solid"/>
-            <Option type="QString" name="outline_color" value="200,80,0,255"/>
+            <Option type="QString" name="outline_color" value="230,126,0,255"/>
             <Option type="QString" name="outline_style" value="solid"/>
             <Option type="QString" name="outline_width" value="0.5"/>
             <Option type="QString" name="outline_width_unit" value="MM"/>
@@ -479,7 +479,7 @@
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
           <material ambient="119,87,72,255" diffuse="76,56,46,255" specular="0,0,0,255" shininess="0"/>
-          <edges enabled="1" width="3" color="200,80,0,255"/>
+          <edges enabled="1" width="3" color="230,126,0,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-1}" filter="&quot;kind&quot; = 'dark' and &quot;review&quot; = 'confirmed'" description="Dark, confirmed">
@@ -500,7 +500,7 @@
         <symbol type="polygon" material_type="phong">
           <data alt-clamping="absolute" alt-binding="vertex" height="0" extrusion-height="0" culling-mode="no-culling" invert-normals="0" add-back-faces="1" rendered-facade="3"/>
           <material ambient="230,213,99,255" diffuse="148,136,64,255" specular="0,0,0,255" shininess="0"/>
-          <edges enabled="1" width="3" color="200,80,0,255"/>
+          <edges enabled="1" width="3" color="230,126,0,255"/>
         </symbol>
       </rule>
       <rule key="{tunneldb-3d-4}" filter="&quot;kind&quot; = 'bright' and &quot;review&quot; = 'confirmed'" description="Bright, confirmed">
