@@ -159,16 +159,21 @@ def test_report_workbook_json_and_view_count_alike(drawn: str, report: Path, tmp
         ).fetchone()
     text = report.read_text("utf-8")
     overview = section(text, "findings")
-    *kinds, everything = table(overview.partition("By state")[2].partition("</table>")[0])
+    rows = table(overview.partition("By state")[2].partition("</table>")[0])
+    sums = {row[0]: row for row in rows if row[0].startswith("All ")}
+    kinds = [row for row in rows if row[0] not in sums]
     numbers = [[float(cell.replace("–", "0")) for cell in row[1:]] for row in kinds]
     assert [row[0] for row in kinds] == [row[0] for row in view]
     assert numbers == [[pytest.approx(value, abs=0.006) for value in row[1:]] for row in view]
-    assert float(everything[3]) == sum(row[3] for row in view)
-    assert sum(row[3] for row in view[:2]) == patches, "leaks and drips are the leaks of the statistics"
+    assert sum(row[3] for row in view[:2]) == patches == float(sums["All leaks"][3]), "leaks and drips, as in the statistics"
     assert sum(row[4] for row in view[:2]) == pytest.approx(wet)
+    assert float(sums["All leaks"][4]) == pytest.approx(wet, abs=0.0006)
+    assert float(sums["All other findings"][3]) == sum(row[3] for row in view[2:-2])
+    assert float(sums["All joints and dry dark areas"][3]) == sum(row[3] for row in view[-2:])
     told = json.loads(run(drawn, "findings", NAME, "-o", tmp_path / "f.xlsx", "--json").stdout)
     assert [kind["kind"] for kind in told["kinds"]] == KINDS
-    head, *rows, _ = openpyxl.load_workbook(tmp_path / "f.xlsx")["Counts"].iter_rows(values_only=True)
+    head, *rows = openpyxl.load_workbook(tmp_path / "f.xlsx")["Counts"].iter_rows(values_only=True)
+    rows = [row for row in rows if row[1]]
     for row, kind, stated in zip(rows, told["kinds"], view, strict=True):
         of = dict(zip(head, row, strict=True))
         assert (kind["counted"], kind["area"], kind["length"]) == (stated[3], *map(pytest.approx, stated[4:6]))
@@ -196,7 +201,7 @@ def test_each_finding_has_a_row_or_is_in_a_line_that_says_so(drawn: str, report:
             assert sum(int(count) for _, count in order) == len(listed)
             for key, _, label, severity in rows:
                 if key in listed:
-                    assert (listed[key][0], listed[key][1], listed[key][6]) == (str(key), label, severity)
+                    assert (listed[key][0], listed[key][1], listed[key][7]) == (str(key), label, severity)
         (merged,) = conn.execute("SELECT id FROM tunnel_api.finding WHERE origin = 'merged'").fetchone()
         region, ids = conn.execute("SELECT id, leak_ids FROM tunnel_api.dry_region WHERE reason = 'oil'").fetchone()
     assert f"; merged into {merged}" in section(text, "kind-leak")

@@ -557,13 +557,13 @@ def test_two_inspectors_at_once_on_one_finding(people: None, dsn: str, example: 
 
 @INSPECTOR
 def test_conditions_by_fhwa_are_sums_of_what_is_counted(person: psycopg.Connection) -> None:
-    draw(person, LineString([(12350.0, 1.0), (12353.0, 1.0)]), "crack", width=0.002, severity=4)
+    draw(person, LineString([(12350.0, 1.0), (12353.0, 1.0)]), "crack", width_mm=2, severity=4)
     draw(person, Point(12360.0, 1.0), "missing_bolt")
     states = {r[0]: r[1:] for r in person.execute("SELECT element, unit, cs1, cs2, cs3, cs4 FROM tunnel_api.snti_condition")}
     assert states["cracks"] == ("m", 0, 0, 0, pytest.approx(3.0, rel=0.05))
     assert states["bolts"] == ("each", 0, 1, 0, 0)
-    lining = person.execute("SELECT sum(lining_area) FROM tunnel_api.km_statistics").fetchone()[0]
-    assert sum(states["liner"][1:]) == pytest.approx(lining)
+    inspected = person.execute("SELECT sum(seen_area) FROM tunnel_api.km_statistics").fetchone()[0]
+    assert sum(states["liner"][1:]) == pytest.approx(inspected), "nothing is said about the rest"
 
 
 def test_the_program_knows_the_kinds_of_the_catalogue(conn: psycopg.Connection) -> None:

@@ -14,6 +14,7 @@ from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, notify, printable, records, tell
 from tunneldb.cli.param_types import FilePath, FiniteRange
+from tunneldb.cli.stage_sentence import number
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
@@ -173,7 +174,8 @@ def list_findings(
             else:
                 temporary.write_text(as_csv(listed), encoding="utf-8")
         tell(file=output)
-        notify(f"{len(rows)} findings to {output}")
+        unknown = not rows and not coverage.seen_area
+        notify(f"{'findings were not searched for' if unknown else number(len(rows), 'finding')}: {output}")
     if not searched:
         context.exit(1)
 
@@ -286,9 +288,9 @@ def import_(
         notify(printable(line))
     tell(survey=survey, imported=len(done.ids), kinds=dict(done.kinds), ids=done.ids, wrong=done.wrong)
     if done.wrong:
-        raise UserError(f"{file}: {len(done.wrong)} rows are wrong, so nothing was imported")
+        raise UserError(f"{file}: {number(len(done.wrong), 'wrong row')}, so nothing was imported")
     said = ", ".join(f"{number} {kind}" for kind, number in sorted(done.kinds.items()))
-    click.echo(f"{survey}: {len(done.ids)} findings imported" + (f": {said}" if said else ""))
+    click.echo(f"{survey}: {number(len(done.ids), 'finding')} imported" + (f": {said}" if said else ""))
 
 
 @findings.command("undo", examples=["tunneldb findings undo 12"])

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.progress import bar, say
 from tunneldb.cli.stage_sentence import number, stage_sentence
 from tunneldb.database import connect
 from tunneldb.errors import NotReadyError
 from tunneldb.stages.ledger import Run
 from tunneldb.stages.parameters import PARAMETERS, settings
-from tunneldb.store.coverage import sum_leaks
+from tunneldb.store.coverage import read_coverage, sum_leaks
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
@@ -127,5 +127,7 @@ def _say_result(conn: psycopg.Connection[Any], survey: Survey) -> None:
         return
     leaks, area = sum_leaks(conn, survey)
     tell(leaks=leaks, wet_area=area)
+    if (statement := read_coverage(conn, survey).statement) is not None:
+        notify(statement)
     click.echo(f"{survey.name}: {number(leaks, 'leak')}, {area:.2f} m²: tunneldb leaks {survey.name}")
     click.echo(f"to look at it: tunneldb qgis {survey.name} -o FILE.qgz; a report: tunneldb report {survey.name} -o FILE.html")

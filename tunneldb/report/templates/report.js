@@ -38,7 +38,6 @@
     [data.place, "chainage", (l) => l.label, ""],
     ...(several ? [["Kind", "kind", kind, "kinds"]] : []),
     ["Clock", "clock", (l) => l.clockLabel, "n"],
-    ["E, N, H m", "easting", coordinates, "n minor"],
     ["Arc m", "arcFrom", arc, "n minor"],
     ["Length m", "length", (l) => fixed(l.length, 2), "n minor"],
     ["Area m²", "area", (l) => fixed(l.area, 2), "n"],
@@ -49,6 +48,7 @@
     ["Review", "review", review, ""],
     ["By", "by", (l) => l.by, "minor"],
     ["Remark", "remark", (l) => l.remark, "minor remark"],
+    ["E, N, H m", "easting", coordinates, "n minor screen"],
   ];
 
   function wanted(leak, filters) {
