@@ -31,7 +31,7 @@ from tunneldb.export.exchange.lines import (
 from tunneldb.export.exchange.sheet import Box, draw_profiles, draw_unrolled
 from tunneldb.export.exchange.table import Table, read_table
 from tunneldb.export.qgis.catalogue import looks_of
-from tunneldb.finding_kind import REVIEW_COLOURS
+from tunneldb.finding_kind import DRY, REVIEW_COLOURS
 from tunneldb.geometry.surface import Surface
 from tunneldb.store.alignment import labels
 from tunneldb.store.catalog import crs_text
@@ -77,7 +77,6 @@ LAYERS = {
         for place, where in _PLACES.items()
     },
     "LEAK_TEXT": (_BLUE, "Number and area of leaks"),
-    "FINDING_TEXT": (_CYAN, "Number, kind and size of other findings"),
     "LEAK_PROFILE": (_BLUE, "Leaks on the profiles"),
     "COVERAGE_GAP": (_MAGENTA, "Unrolled lining: where leaks could be missed, and why"),
     "REMARK": (_MAGENTA, "Above the map: notes and limitations of the results"),
@@ -262,6 +261,8 @@ def _document(conn: psycopg.Connection[Any], survey: Survey, coverage: Coverage,
 def _add_kinds(conn: psycopg.Connection[Any], document: Any, spots: Sequence[Spot]) -> None:
     """Make layers for kinds of findings that occur and have none yet: the catalogue is the owner's, and grows."""
     named = dict(conn.execute("SELECT code, label FROM tunnel_api.finding_kind").fetchall())
+    if any(not spot.wet and spot.kind not in DRY for spot in spots) and not document.layers.has_entry("FINDING_TEXT"):
+        document.layers.add("FINDING_TEXT", color=_OTHER_KIND).description = "Number, kind and size of other findings"
     for kind in sorted({spot.kind for spot in spots}):
         for place, where in _PLACES.items():
             name = f"{kind.upper()}_{place}"
