@@ -29,7 +29,7 @@ from support.example_survey import NAME
 from tunneldb.cli.main import main
 from tunneldb.database import connect
 from tunneldb.errors import UserError
-from tunneldb.export.tables.finding_counts import UNCOUNTED
+from tunneldb.export.tables.finding_counts import DARK, LEAKS, OTHERS, UNCOUNTED
 from tunneldb.report import findings
 from tunneldb.report.change import CHANGE_WORDS
 from tunneldb.report.owner import CHAPTERS, Owner, read_owner
@@ -477,6 +477,7 @@ def example_catalogue() -> frozenset[str]:
     """Texts of templates and scripts, and those that are put together: states, origins, kinds, …"""
     package = Path(findings.__file__).parent
     texts = set(CHAPTERS.values()) | set(findings.STATE_WORDS.values()) | {"detected", "redrawn", "split", "merged"}
+    texts |= {LEAKS, OTHERS, DARK}
     texts |= set(CHANGE_WORDS.values()) | {"Chainage", "Station", "o’clock", "m²", "Client", "Project", "Standard"}
     texts |= {"Prepared by", "Checked by", "Accepted by", "Name", "Position", "Date", "Signature"}
     source = (package / "photos.py").read_text("utf-8")
