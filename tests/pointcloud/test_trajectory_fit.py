@@ -87,11 +87,28 @@ def test_times_in_another_unit(scale: float, unit: str) -> None:
     assert fit.offset == 0.0
 
 
-def test_a_parallel_tube_is_outside_the_section() -> None:
-    fit = fit_trajectory(*measure(STOPS), moved(STOPS, aside=14.0))
+@pytest.mark.parametrize("aside", [14.0, -6.0])
+def test_a_parallel_tube_is_outside_the_section(aside: float) -> None:
+    fit = fit_trajectory(*measure(STOPS), moved(STOPS, aside=aside))
     assert fit is not None
     assert fit.refused
-    assert fit.outside == pytest.approx(14.0 - RADIUS, abs=0.1)
+    assert fit.outside == pytest.approx(abs(aside) - RADIUS, abs=0.1)
+
+
+def test_a_scanner_below_the_crown_that_it_measures_is_possible() -> None:
+    time, place = measure(STOPS)
+    place[:, 2] = np.abs(place[:, 2]) + 3.0
+    fit = fit_trajectory(time, place, STOPS)
+    assert fit is not None
+    assert not fit.refused
+
+
+def test_a_shift_along_the_tunnel_is_no_time_offset() -> None:
+    fit = fit_trajectory(*measure(STOPS, ahead=10.0), STOPS)
+    assert fit is not None
+    assert fit.refused
+    assert fit.shift == pytest.approx(10.0, abs=0.01)
+    assert fit.offset is None
 
 
 def test_another_trajectory_is_explained_by_no_offset() -> None:

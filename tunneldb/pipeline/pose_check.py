@@ -16,7 +16,7 @@ from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.pointcloud.pose_faults_text import stations_fault, trajectory_fault
 from tunneldb.pointcloud.pose_sample import SampledPoints
 from tunneldb.pointcloud.station_fit import find_misfits
-from tunneldb.pointcloud.trajectory_fit import OUTSIDE, Track, fit_trajectory, outside_section
+from tunneldb.pointcloud.trajectory_fit import Track, fit_trajectory, outside_section
 from tunneldb.store.poses import load_coarse_trajectory, load_poses
 from tunneldb.store.survey import Survey
 
@@ -104,7 +104,7 @@ class PoseCheck:
         near = np.abs(scanner[:, 0] - place[:, 0]) < _NEAR
         scanner[~near] = np.nan
         outside = outside_section(place, scanner)
-        if outside > OUTSIDE:
+        if outside > 0.0:
             raise UserError(
                 f"{path}: the stations lie {outside:.0f} m outside the tunnel's section, which its points show: they are of"
                 f" another tunnel, or in another system; {self._again}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tunneldb.pointcloud.station_fit import Misfit
-from tunneldb.pointcloud.trajectory_fit import OUTSIDE, WRONG, TrajectoryFit
+from tunneldb.pointcloud.trajectory_fit import WRONG, TrajectoryFit
 
 _NAMED = 5  # scans
 
@@ -22,7 +22,7 @@ def trajectory_fault(fit: TrajectoryFit, added: float, option: str) -> str:
     option : str
         Command up to the value of ``--time-offset``.
     """
-    if fit.outside > OUTSIDE:
+    if fit.outside > 0.0:
         return (
             f"the scanner's positions lie {fit.outside:.0f} m outside the section that the points show: the trajectory is of"
             " another tunnel, or in another coordinate system; give the trajectory of this scan"
@@ -46,9 +46,12 @@ def trajectory_fault(fit: TrajectoryFit, added: float, option: str) -> str:
 def _cause(fit: TrajectoryFit, added: float, option: str) -> str:
     if fit.scale:
         return f"the trajectory's times seem to be in {fit.scale}"
+    shift = f"a shift of {abs(fit.shift):.1f} m along the tunnel between positions and points" if fit.shift else ""
+    if fit.offset is None and shift:
+        return f"the cause is {shift}; give the trajectory of this scan, in its coordinate system"
     if fit.offset is None:
         return "no time offset makes them fit; the trajectory is of another scan, or its clock changed during the scan"
-    cause = fit.cause or fit.clocks or "it is no usual difference of clocks"
+    cause = fit.cause or fit.clocks or "it is no usual difference of clocks" + (f", and may be {shift}" if shift else "")
     return (
         f"{cause}; with {fit.offset:+.12g} s on the trajectory's times they fit to {max(fit.remaining, 0.1):.1f} m:"
         f" {option} {added + fit.offset:.12g}"

@@ -27,13 +27,12 @@ MAX_WRONG_SHARE = 0.2
 MIN_WRONG_SHARE = 0.01
 """Share of profiles with a wrong pose from which it is reported."""
 
-OUTSIDE = 6.0
-"""Distance from the section that points span up to which the scanner may have been outside it, m; a scanner
-that measures the crown or one wall only is outside."""
-
 _GROUP = 60  # least number of points that are compared together
 _GROUPS = 3000
 _SECONDS = 2.0  # in which a mirror turns at least once
+_SECTORS = 12  # of a section that points close
+_CLOSED_LIMIT = 1.5  # m outside a closed section from which a scanner cannot have measured it
+_OPEN_LIMIT = 6.0  # m, the same for a part of a section: a scanner that measures the crown or one wall only is outside it
 _LENGTH = 5.0  # m of tunnel whose points span a section
 _SPREAD = (5.0, 95.0)  # percentiles of the points along the tunnel between which the scanner may be
 _CAP = 20.0  # m; greater distances count as this one
@@ -41,6 +40,7 @@ _SEARCH_POINTS, _FINE_POINTS = 160, 2000
 _SEARCH_STEPS = 8000
 _SEARCH_STEP = 2.0  # m that the scanner moves at its typical speed
 _MIN_REDUCTION = 0.4  # of the mean distance, for a time offset to be the cause
+_SAME = 0.1  # m by which two explanations differ that explain the points equally well
 _MIN_SPEED = 0.002  # m/s, standing included; slower ones are of times in another unit
 _SCALES = ((1e-3, "milliseconds", "divide them by 1000"), (1e-6, "microseconds", "divide them by 1000000"),
            (1e-9, "nanoseconds", "divide them by 1000000000"))  # fmt: skip
@@ -86,7 +86,7 @@ class TrajectoryFit:
     known : float
         Share of points with a pose.
     outside : float
-        Median distance of the scanner outside the section that the points near it span, m.
+        Median distance of the scanner outside the section that the points near it span, m; 0 if it is possible.
     offset : float or None
         Seconds to add to the trajectory's times, so that it fits; None if there is none, or it fits.
     cause : str
@@ -97,6 +97,8 @@ class TrajectoryFit:
         Unit of the trajectory's times, if it is not the second, and the conversion.
     remaining : float
         Mean distance with this offset, m.
+    shift : float
+        Distance along the tunnel from the trajectory to the points, m, if it explains them as well; else 0.
     """
 
     distance: float
@@ -109,11 +111,12 @@ class TrajectoryFit:
     clocks: str = ""
     scale: str = ""
     remaining: float = 0.0
+    shift: float = 0.0
 
     @property
     def refused(self) -> bool:
         """True if results from this trajectory would be wrong."""
-        return self.wrong > MAX_WRONG_SHARE or self.outside > OUTSIDE or (bool(self.cause) and self.distance > WRONG / 2.0)
+        return self.wrong > MAX_WRONG_SHARE or self.outside > 0.0 or (bool(self.cause) and self.distance > WRONG / 2.0)
 
     @property
     def doubtful(self) -> bool:
@@ -173,7 +176,7 @@ def _distances(time: Float, along: Float, at: Float) -> Float:
 
 
 def outside_section(place: Float, scanner: Float) -> float:
-    """Return the median distance of scanner positions from the section that the points near them span, m; 0 within it.
+    """Return the median distance of scanner positions from the section that the points near them span, m; 0 if possible.
 
     Parameters
     ----------
@@ -191,8 +194,16 @@ def outside_section(place: Float, scanner: Float) -> float:
         least, most = np.percentile(place[chosen, 1:], [2.0, 98.0], axis=0)
         where = np.median(scanner[chosen, 1:], axis=0)
         beyond = float(np.linalg.norm(np.maximum(np.maximum(least - where, where - most), 0.0)))
-        found.append(beyond if beyond > np.linalg.norm(most - least) else 0.0)
+        closed = _closed(place[chosen, 1:] - (least + most) / 2.0)
+        limit = _CLOSED_LIMIT if closed else max(_OPEN_LIMIT, float(np.linalg.norm(most - least)))
+        found.append(beyond if beyond > limit else 0.0)
     return float(np.median(found)) if found else 0.0
+
+
+def _closed(away: Float) -> bool:
+    """Return True if points (n, 2), relative to the middle of their section, lie all round it."""
+    sector = np.floor(np.arctan2(away[:, 1], away[:, 0]) / np.pi * _SECTORS / 2.0).astype(np.int64) % _SECTORS
+    return bool(np.count_nonzero(np.bincount(sector, minlength=_SECTORS)) == _SECTORS)
 
 
 def _explained(time: Float, along: Float, track: Track, fit: TrajectoryFit) -> TrajectoryFit:
@@ -204,6 +215,7 @@ def _explained(time: Float, along: Float, track: Track, fit: TrajectoryFit) -> T
     fine = np.sort(random.choice(len(time), min(len(time), _FINE_POINTS), replace=False))
     moments, places = time[fine], along[fine]
     here = _mean_distance(moments, places, track, 0.0)
+    shift, shifted = _shift(moments, places, track)
     for scale, unit, advice in ((1.0, "", ""), *_SCALES):
         scaled = _without_repeat(Track(track.time * scale, track.place, track.longest * scale))
         duration = scaled.time[-1] - scaled.time[0]
@@ -219,7 +231,11 @@ def _explained(time: Float, along: Float, track: Track, fit: TrajectoryFit) -> T
             if _mean_distance(moments, places, scaled, exact) <= remaining + DOUBTFUL:
                 return replace(fit, offset=exact, cause=cause, scale=said, remaining=remaining)
         clocks = guess_clocks(float(np.mean(scaled.time[[0, -1]])), float(np.median(moments)))
-        return replace(fit, offset=round(offset, 1), clocks=clocks, scale=said, remaining=remaining)
+        fit = replace(fit, offset=round(offset, 1), clocks=clocks, scale=said, remaining=remaining)
+        break
+    if shifted <= _MIN_REDUCTION * here and (fit.offset is None or shifted <= fit.remaining + _SAME) and not fit.scale:
+        better = fit.offset is not None and fit.remaining > shifted + _SAME
+        return replace(fit, shift=shift, offset=None if better else fit.offset)
     return fit
 
 
@@ -227,6 +243,15 @@ def _without_repeat(track: Track) -> Track:
     """Return a trajectory without the poses that are repeated for the beginning of the week."""
     repeats = count_repeats(track.time)
     return Track(track.time[repeats:], track.place[repeats:], track.longest)
+
+
+def _shift(time: Float, along: Float, track: Track) -> tuple[float, float]:
+    """Return the median distance from a trajectory to its points along the tunnel, and the mean distance that remains, m."""
+    away = along - track.at(time, 1)[:, 0]
+    if not np.isfinite(away).any():
+        return 0.0, _CAP
+    shift = float(np.nanmedian(away))
+    return shift, float(np.minimum(np.nan_to_num(np.abs(away - shift), nan=_CAP), _CAP).mean())
 
 
 def _speed(track: Track) -> float:
