@@ -155,7 +155,7 @@ def test_exchanged_stations_are_named_and_the_right_ones_fit(folder: Path) -> No
     exchanged[:, 0] = [2, 1]
     add("--stations", table(folder / "s.csv", "scan_id,x,y,z", exchanged))
     said = command("load", "s", path, code=2)
-    assert "scan 1 30 m before its station, at that of scan 2; scan 2 30 m after its station, at that of scan 1" in said
+    assert "scan 1: 30 m before its station, at that of scan 2; scan 2: 30 m after its station, at that of scan 1" in said
     assert said.endswith("then: tunneldb survey set s --stations FILE\n")
     command("survey", "set", "s", "--stations", table(folder / "s.csv", "scan_id,x,y,z", places))
     command("load", "s", path)
@@ -166,7 +166,7 @@ def test_exchanged_stations_are_named_and_the_right_ones_fit(folder: Path) -> No
     )
     las.classification = np.full(len(las), 1)
     las.write(path)
-    assert "scan 2 30 m after its station" in command("load", "s", path, code=2)
+    assert "scan 2: 30 m after its station" in command("load", "s", path, code=2)
 
 
 def test_inspect_finds_the_time_offset_before(folder: Path) -> None:

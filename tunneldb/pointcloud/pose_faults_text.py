@@ -61,7 +61,7 @@ def _cause(fit: TrajectoryFit, added: float, option: str) -> str:
 def stations_fault(misfits: Sequence[Misfit]) -> str:
     """Return the message about stations that do not fit the points of their scans."""
     named = [
-        f"scan {one.scan_id} {abs(one.shift):.0f} m {'after' if one.shift > 0.0 else 'before'} its station"
+        f"scan {one.scan_id}: {abs(one.shift):.0f} m {'after' if one.shift > 0.0 else 'before'} its station"
         + (f", at that of scan {one.station}" if one.station is not None else "")
         for one in misfits[:_NAMED]
     ]

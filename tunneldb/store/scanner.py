@@ -159,7 +159,7 @@ def _stations_together(paths: Sequence[Path], stations: Stations) -> tuple[str, 
             f"{', '.join(map(str, paths))}: all {count} scans have the position 0, 0, 0: their poses were lost on export;"
             f" export them with poses, or give them in a CSV file with scan_id,x,y,z: --stations FILE, scan_id {numbers}"
         )
-    place = ", ".join(f"{value:.3f}" for value in stations.xyz[0])
+    place = ", ".join(f"{value + 0.0:.3f}" for value in stations.xyz[0])
     return (f"all {count} stations are at one place ({place}), of scan_id {numbers}: check that the scanner stayed there",)
 
 
