@@ -200,10 +200,11 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 10 SECURITY DEFINER SET search_pat
      CROSS JOIN LATERAL (SELECT q.* FROM tunnel.ring q WHERE q.survey_id = s.id AND q.chainage_from <= $2
                           ORDER BY q.chainage_from DESC LIMIT 1) r
      WHERE t.id = tunnel_api.tunnel_id($1) AND r.chainage_to > $2
+       AND s.id NOT IN (SELECT c.survey_id FROM tunnel_internal.survey_copy c)
      ORDER BY s.date, s.name
 $$;
 COMMENT ON FUNCTION tunnel_api.ring_series(text, float8) IS
-'Shape of the ring at a chainage (m) in each survey of a tunnel with rings, by date: inspected share, mean radius (m), ovality as a share of the design diameter, clock position of the largest diameter (degrees), with standard errors; NULL if not measured. Ring numbers can differ between surveys';
+'Shape of the ring at a chainage (m) in each survey of a tunnel with rings, without copies from archives, by date: inspected share, mean radius (m), ovality as a share of the design diameter, clock position of the largest diameter (degrees), with standard errors; NULL if not measured. Ring numbers can differ between surveys';
 
 CREATE OR REPLACE FUNCTION tunnel_api.leak_area_series(tunnel text, step float8 DEFAULT 100)
 RETURNS TABLE (chainage_from float8, chainage_to float8, label text, survey text, date date, leaks bigint, area float8)
@@ -215,8 +216,9 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 1000 SECURITY DEFINER SET search_p
               JOIN tunnel.survey s ON s.tunnel_id = t.id
               JOIN tunnel.finding a ON a.survey_id = s.id AND a.detected AND a.review <> 'rejected' AND a.wet AND NOT a.superseded
              WHERE t.id = tunnel_api.tunnel_id($1) AND $2 > 0
+               AND s.id NOT IN (SELECT c.survey_id FROM tunnel_internal.survey_copy c)
              GROUP BY s.tunnel_id, s.id, s.name, s.date, 4) q
      ORDER BY q.k, q.date, q.name
 $$;
 COMMENT ON FUNCTION tunnel_api.leak_area_series(text, float8) IS
-'Wet area (m²) of each survey of a tunnel in stretches of step metres, by date: counted leaks, at their middle. A stretch without a row has no leak or was not inspected (tunnel_api.coverage_gaps)';
+'Wet area (m²) of each survey of a tunnel, without copies from archives, in stretches of step metres, by date: counted leaks, at their middle. A stretch without a row has no leak or was not inspected (tunnel_api.coverage_gaps)';

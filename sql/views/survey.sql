@@ -36,6 +36,23 @@ COMMENT ON COLUMN tunnel_api.survey.intensity_kind IS 'amplitude (dB), reflectan
 COMMENT ON COLUMN tunnel_api.survey.reference IS
     'Range curve of the intensity: none, measured (on a target) or auto (from the lining of each kilometre, tunnel_api.range_curve)';
 
+-- An archive that is imported while the survey is there, or twice, makes a second survey of one scan. Its first import names the
+-- survey that it was. The one with that name is the original; if it was removed, the one that was imported first.
+CREATE OR REPLACE VIEW tunnel_internal.survey_copy AS
+WITH origin AS (
+    SELECT s.id, s.tunnel_id, s.date, s.name, coalesce(i.name, s.name) AS first_name
+      FROM tunnel.survey s
+      LEFT JOIN LATERAL (SELECT r.parameters ->> 'survey' AS name FROM tunnel.run r
+                          WHERE r.survey_id = s.id AND r.stage = 'import' AND r.outcome = 'done' ORDER BY r.id LIMIT 1) i ON true
+), ranked AS (
+    SELECT o.id, first_value(o.id) OVER (PARTITION BY o.tunnel_id, o.date, o.first_name
+                                         ORDER BY o.name = o.first_name DESC, o.id) AS of_id
+      FROM origin o
+)
+SELECT r.id AS survey_id, r.of_id FROM ranked r WHERE r.id <> r.of_id;
+COMMENT ON VIEW tunnel_internal.survey_copy IS
+    'Surveys that are copies of another survey (of_id) of the same tunnel, from an archive of it (survey import): not another scan, so not listed in series by date';
+
 CREATE OR REPLACE VIEW tunnel_api.file AS
 SELECT f.id, f.survey_id, s.name AS survey, f.name, tunnel_internal.for_operators(f.path) AS path, f.checksum, f.bytes, f.points, f.noise, f.outside, f.thinned,
        f.kept, f.chainage_from, f.chainage_to, f.extent, f.srid, f.loaded_at, f.invalid, f.unposed

@@ -20,6 +20,7 @@ from tunneldb.export.archive import load
 from tunneldb.export.archive.load import load_survey
 from tunneldb.export.archive.save import save_survey
 from tunneldb.stages.ledger import lock
+from tunneldb.stages.on_demand import refuse_wrong_pair
 from tunneldb.stages.registry import REGISTRY
 from tunneldb.store.archive.tables import EXCLUDED, archive_tables, stored_tables
 from tunneldb.store.catalog import remove_survey
@@ -190,6 +191,13 @@ def test_under_another_name_it_is_the_same_up_to_numbers_and_steps_can_be_taken_
     ).fetchone()
     assert strays == (0,)
     assert untouched == (1,)
+    listed = "SELECT DISTINCT survey FROM tunnel_api.leak_area_series((SELECT tunnel FROM tunnel_api.survey LIMIT 1))"
+    assert conn.execute(listed).fetchall() == [(NAME,)]  # one scan, one date
+    with pytest.raises(UserError, match="are the same scan"):
+        refuse_wrong_pair(conn, get_survey(conn, NAME), get_survey(conn, "other"), "compare")
+    conn.rollback()
+    remove_survey(conn, NAME)
+    assert conn.execute(listed).fetchall() == [("other",)]
 
 
 def test_in_a_database_of_others_its_tunnel_is_added(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sqlite3
 from pathlib import Path
 
@@ -67,7 +68,10 @@ def run(*words: object) -> dict[str, object]:
 
 
 def test_change_leaks_files_and_when_they_are_stale(surveys: tuple[str, str], conn: psycopg.Connection, tmp_path: Path) -> None:
-    told = run("compare", *surveys)
+    reversed_ = CliRunner().invoke(main, ["compare", *surveys[::-1]])
+    assert reversed_.exit_code == 2
+    (advice,) = re.findall(r"tunneldb (compare \w+ \w+)", reversed_.output)
+    told = run(*advice.split())
     assert told["made"] == [0, 1]
     (region,) = told["regions"]
     west, east, south, north = PATCH

@@ -91,6 +91,32 @@ def test_reviews_of_anomalies_without_features_are_one_line(conn: psycopg.Connec
     assert as_json("learn", SURVEY, "--list")["learned"] == []
 
 
+def test_outlines_drawn_by_hand_are_counted_apart_and_need_no_new_detection(reviewed: psycopg.Connection) -> None:
+    """Detection never measures them, unless it finds them, too."""
+    reviewed.execute("UPDATE tunnel.finding SET origin = 'drawn' WHERE review <> 'open' AND features IS NULL")
+    reviewed.commit()
+    learned = command("learn", SURVEY, "--json")
+    told = json.loads(learned.stdout)
+    assert told["unused"][SURVEY] == {"detected": 0, "gone": 0, "drawn": 3}
+    assert told["without_features"] == {SURVEY: 0}
+    assert f"{SURVEY}: 3 reviewed findings have an outline drawn by hand" in learned.stderr
+    assert "run detect again" not in learned.stderr
+    (original,) = reviewed.execute("SELECT min(id) FROM tunnel.finding WHERE features IS NOT NULL").fetchone()
+    reviewed.execute(
+        "UPDATE tunnel.finding SET same_as = (SELECT min(id) FROM tunnel.finding WHERE origin = 'drawn') WHERE id = %s",
+        [original],
+    )
+    reviewed.execute("UPDATE tunnel.finding SET detected = false WHERE origin = 'detected' AND features IS NULL")
+    reviewed.commit()
+    assert as_json("learn", SURVEY)["unused"][SURVEY]["drawn"] == 2
+    reviewed.execute("UPDATE tunnel.finding SET review = 'open' WHERE origin = 'detected'")
+    reviewed.execute("UPDATE tunnel.finding SET same_as = NULL")
+    reviewed.commit()
+    refused = command("learn", SURVEY, code=2).stderr
+    assert refused.startswith(f"tunneldb: {SURVEY}: 3 reviewed findings have an outline drawn by hand")
+    assert refused.count("\n") == 1
+
+
 def test_features_of_a_version_that_measured_less_are_none(reviewed: psycopg.Connection) -> None:
     conn = reviewed
     conn.execute("UPDATE tunnel.feature_list SET names = names[2:]")

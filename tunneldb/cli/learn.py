@@ -44,7 +44,8 @@ def learn(settings: Settings, surveys: tuple[str, ...], apply_: bool, undo: bool
     significantly better. Fewer false leaks can mean more missed ones: both are stated.
 
     An applied model is used for all surveys of these tunnels: their stage detect becomes stale until tunneldb run
-    SURVEY --stale. Reviews are kept. Findings without stored features are ignored until stage detect has run again.
+    SURVEY --stale. Reviews are kept. Outlines drawn by hand have no features and are not used; detected findings without stored
+    features are not used until stage detect has run again.
     """
     from tunneldb.pipeline.learn import apply_plan, get_surveys, plan_learning, undo_learning
     from tunneldb.store.learned import list_learned
@@ -80,11 +81,12 @@ def _print_plan(plan: Plan) -> None:
     lesson = plan.lesson
     adjustment = lesson.adjustment
     tell(
-        surveys=plan.surveys, tunnels=list(plan.tunnels.values()), reviews=plan.reviews, without_features=plan.without,
+        surveys=plan.surveys, tunnels=list(plan.tunnels.values()), reviews=plan.reviews,
+        without_features={survey: one.detected for survey, one in plan.unused.items()}, unused=plan.unused,
         held_out=lesson.held_out, chosen=adjustment.way, parameters=adjustment.to_json(), changes=plan.changes,
         largest=plan.largest,
     )  # fmt: skip
-    for line in no_features(plan.without):
+    for line in no_features(plan.unused):
         notify(line)
     sorts = ", ".join(f"{count} {sort}" for sort, count in plan.reviews.items())
     click.echo(f"{lesson.reviews} reviews: {sorts}")

@@ -74,6 +74,25 @@ class Changes:
 
 
 @dataclass(frozen=True)
+class Unused:
+    """Numbers of reviewed findings of a survey that nothing can be learned from, because they have no features.
+
+    Attributes
+    ----------
+    detected : int
+        Found by a version that did not store the features: detection stores them when it runs again.
+    gone : int
+        The same, but the last detection did not find them any more.
+    drawn : int
+        Drawn, redrawn, split or merged by people: detection does not measure them, unless it finds them, too.
+    """
+
+    detected: int
+    gone: int
+    drawn: int
+
+
+@dataclass(frozen=True)
 class Plan:
     """Result of learning, and its effects.
 
@@ -86,8 +105,8 @@ class Plan:
     lesson : Lesson
     reviews : mapping
         Number of used reviews of each sort.
-    without : mapping
-        Number of reviewed findings without features, by survey.
+    unused : mapping
+        Reviewed findings without features, by survey.
     changes : sequence of Changes
         Changes in all surveys of the tunnels, compared with the current model.
     largest : sequence of Change
@@ -98,7 +117,7 @@ class Plan:
     surveys: Sequence[str]
     lesson: Lesson
     reviews: Mapping[str, int]
-    without: Mapping[str, int]
+    unused: Mapping[str, Unused]
     changes: Sequence[Changes]
     largest: Sequence[Change]
 
@@ -126,7 +145,7 @@ def plan_learning(conn: psycopg.Connection[Any], surveys: Sequence[Survey]) -> P
     names = [survey.name for survey in surveys]
     measured = load_measured(conn, tunnels)
     reviewed = (measured.said != "") & np.isin(measured.survey, [survey.id for survey in surveys])
-    without = {survey.name: int((reviewed & ~measured.known & (measured.survey == survey.id)).sum()) for survey in surveys}
+    unused = {survey.name: _unused(measured, reviewed & (measured.survey == survey.id)) for survey in surveys}
     if not reviewed.any():
         raise NotReadyError(
             f"no finding of {' or '.join(names)} was reviewed yet: confirm, reject or rename some, in QGIS or through the view"
@@ -134,21 +153,38 @@ def plan_learning(conn: psycopg.Connection[Any], surveys: Sequence[Survey]) -> P
         )
     used = reviewed & measured.known
     if not used.any():
-        raise UserError("; ".join(no_features(without)))
+        raise UserError("; ".join(no_features(unused)))
     lesson = learn(standard_model(), _reviewed(measured, used))
     sorts = Counter(measured.said[used].tolist())
     changes, largest = _changes(conn, measured, lesson, tunnels)
-    return Plan(tunnels, names, lesson, dict(sorted(sorts.items())), without, changes, largest)
+    return Plan(tunnels, names, lesson, dict(sorted(sorts.items())), unused, changes, largest)
 
 
-def no_features(without: Mapping[str, int]) -> list[str]:
-    """Return which surveys have reviewed findings without features, a line for each."""
-    return [
-        f"{survey}: {count} reviewed {'finding has' if count == 1 else 'findings have'} no features: run detect again:"
-        f" tunneldb run {survey} --from detect"
-        for survey, count in without.items()
-        if count
-    ]
+def no_features(unused: Mapping[str, Unused]) -> list[str]:
+    """Return which surveys have reviewed findings without features, and what to do, a line for each survey and reason."""
+    lines = []
+    for survey, one in unused.items():
+        if one.detected:
+            lines.append(f"{_counted(survey, one.detected)} no features: run detect again: tunneldb run {survey} --from detect")
+        if one.gone:
+            lines.append(f"{_counted(survey, one.gone)} no features and were not found again by the last detection: not used")
+        if one.drawn:
+            lines.append(
+                f"{_counted(survey, one.drawn)} an outline drawn by hand, which has no features: not used; detection learns"
+                " from detected findings that you confirm, reject or rename"
+            )
+    return lines
+
+
+def _counted(survey: str, count: int) -> str:
+    return f"{survey}: {count} reviewed {'finding has' if count == 1 else 'findings have'}"
+
+
+def _unused(measured: Measured, reviewed: Bool) -> Unused:
+    without = reviewed & ~measured.known
+    drawn = without & measured.drawn
+    again = without & ~measured.drawn & measured.detected
+    return Unused(int(again.sum()), int((without & ~drawn & ~again).sum()), int((drawn & ~measured.covered).sum()))
 
 
 def apply_plan(conn: psycopg.Connection[Any], plan: Plan, note: str | None) -> dict[str, int]:

@@ -118,7 +118,9 @@ def _path(sections: list[Row], name: str, low: float, scale: float, most: float)
 def _series(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
     with conn.cursor(row_factory=dict_row) as cursor:
         return cursor.execute(
-            "SELECT name AS survey, date, tunnel_api.wet_area(name, %s, %s) AS area FROM tunnel.survey"
-            " WHERE tunnel_id = %s AND intensity_kind <> 'none' ORDER BY date, name",
-            [low, high, survey.tunnel_id],
+            "SELECT name AS survey, date, tunnel_api.wet_area(name, %(low)s, %(high)s) AS area FROM tunnel.survey"
+            " WHERE tunnel_id = %(tunnel)s AND intensity_kind <> 'none' AND (id = %(own)s OR id NOT IN"
+            " (SELECT survey_id FROM tunnel_internal.survey_copy UNION SELECT of_id FROM tunnel_internal.survey_copy"
+            " WHERE survey_id = %(own)s)) ORDER BY date, name",
+            {"low": low, "high": high, "tunnel": survey.tunnel_id, "own": survey.id},
         ).fetchall()

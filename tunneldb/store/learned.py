@@ -42,6 +42,10 @@ class Measured:
         Inspectors' answers as sorts of review: "confirmed leak", "renamed to joint" …; empty without one.
     leak : (n,) bool array
         True if the inspector called it a leak.
+    drawn : (n,) bool array
+        True for outlines by people (drawn, redrawn, split, merged), which detection does not measure.
+    covered : (n,) bool array
+        True for those of them whose review applies to a detected finding, too.
     known : (n,) bool array
         True if all features of the model are stored.
     features : (n, len(FEATURES)) float array
@@ -57,6 +61,8 @@ class Measured:
     crossed: Bool
     said: np.ndarray[Any, np.dtype[np.object_]]
     leak: Bool
+    drawn: Bool
+    covered: Bool
     known: Bool
     features: Float
     outline: Float
@@ -122,7 +128,8 @@ def load_measured(conn: psycopg.Connection[Any], tunnels: Iterable[int]) -> Meas
                CASE WHEN r.review = 'rejected' THEN 'rejected'
                     WHEN a.kind_override <> a.kind THEN 'renamed to ' || a.kind_override
                     WHEN r.review = 'confirmed' OR a.kind_override = a.kind THEN 'confirmed ' || a.kind ELSE '' END,
-               r.review <> 'rejected' AND a.wet, a.feature_list_id, a.features
+               r.review <> 'rejected' AND a.wet, a.feature_list_id, a.features, a.origin <> 'detected',
+               EXISTS (SELECT FROM tunnel.finding d WHERE a.id IN (d.merged_into, d.same_as) AND d.origin = 'detected')
           FROM tunnel.finding a
           JOIN tunnel.survey s ON s.id = a.survey_id
           LEFT JOIN tunnel.finding h ON h.id = coalesce(a.merged_into, a.same_as) AND h.origin <> 'detected'
@@ -145,7 +152,8 @@ def load_measured(conn: psycopg.Connection[Any], tunnels: Iterable[int]) -> Meas
 
     return Measured(
         column(0, np.int64), column(1, np.int64), column(2, np.int64), column(3, np.float64), column(4, np.bool_),
-        column(5, np.bool_), column(6, np.object_), column(7, np.bool_), known, values[:, :-1], values[:, -1],
+        column(5, np.bool_), column(6, np.object_), column(7, np.bool_), column(10, np.bool_), column(11, np.bool_), known,
+        values[:, :-1], values[:, -1],
     )  # fmt: skip
 
 

@@ -44,7 +44,7 @@ from tunneldb.measures.deviation.measure import lining_by_class
 from tunneldb.progress import StartProgress
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.pixel_state import PixelState, shows_lining
-from tunneldb.stages.on_demand import measure_kilometres, refuse_beyond, refuse_different_tunnels
+from tunneldb.stages.on_demand import measure_kilometres, refuse_beyond, refuse_wrong_pair
 from tunneldb.stages.stale import Result, refuse_blocked, result_states
 from tunneldb.store.images import image_blocks, load_block
 from tunneldb.store.surface import load_surface
@@ -88,9 +88,10 @@ def compare(
     Raises
     ------
     UserError
-        If they are of two tunnels or one and the same, if they have no kilometre in common, or one is out of date.
+        If they are of two tunnels or one and the same, the older one comes last, they have no kilometre in common, or one is
+        out of date.
     """
-    refuse_different_tunnels(old, new, "compare")
+    refuse_wrong_pair(conn, old, new, "compare")
     for survey in (old, new):
         refuse_beyond(conn, survey, low, high)
     result = change_between(old, new)

@@ -14,7 +14,7 @@ from tunneldb.measures.thickness.rows import (
     save_thickness,
 )
 from tunneldb.progress import StartProgress
-from tunneldb.stages.on_demand import measure_kilometres, refuse_beyond, refuse_different_tunnels
+from tunneldb.stages.on_demand import measure_kilometres, refuse_beyond, refuse_wrong_pair
 from tunneldb.stages.stale import Result, result_states
 from tunneldb.store.design import load_design
 from tunneldb.store.survey import Survey
@@ -47,9 +47,9 @@ def measure_thickness(
     Raises
     ------
     UserError
-        If they are of two tunnels, or one, or have no kilometre in common there.
+        If they are of two tunnels, or one, or the older one comes last, or have no kilometre in common there.
     """
-    refuse_different_tunnels(before, after, "thickness")
+    refuse_wrong_pair(conn, before, after, "thickness")
     for survey in (before, after):  # both, before anything is measured
         refuse_beyond(conn, survey, low, high)
         measurable_kilometres(conn, survey, layer, low, high)
