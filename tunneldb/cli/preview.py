@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
 from tunneldb.cli.overview import FittedTable, duration, number, spans
 from tunneldb.queue.batch import Incoming
-from tunneldb.queue.preview import Preview, kilometres_of
+from tunneldb.queue.preview import Preview, Span, kilometres_of
 
 
 def show(seen: Preview) -> None:
@@ -39,10 +39,10 @@ def _files(seen: Preview) -> list[RenderableType]:
     return [FittedTable(("file", "points", "size", "km", ""), rows, elastic=0, right=(1, 2))] if rows else []
 
 
-def _kilometres_of(file: Incoming, seen: Preview) -> range:
+def _kilometres_of(file: Incoming, seen: Preview) -> Sequence[int]:
     if file.name in seen.stretches:
         return kilometres_of(seen.stretches[file.name])
-    return range(0) if file.km_from is None or file.km_to is None else range(file.km_from, file.km_to + 1)
+    return file.touched
 
 
 def _kilometres(seen: Preview) -> list[RenderableType]:
@@ -59,23 +59,37 @@ def _kilometres(seen: Preview) -> list[RenderableType]:
 def _points(seen: Preview) -> list[RenderableType]:
     if not seen.points:
         return []
-    if seen.kept is not None:
-        rows = f"about {number(seen.rows)} rows, as of the files before {seen.kept:.1%} were kept"
-    else:
-        rows = f"at most {number(seen.rows)} rows"
-    return [Text(f"points to be read: {number(seen.points)}, {rows}")]
+    rows = f"about {_rounded(seen.rows.likely)} rows ({_rounded(seen.rows.low)} to {_rounded(seen.rows.high)})"
+    return [Text(f"points to be read: {number(seen.points)}, of these {rows}, estimated from a sample")]
+
+
+def _rounded(value: float) -> str:
+    """Return a number to two digits: an estimate has no more."""
+    return number(float(f"{value:.1e}"))
 
 
 def _disk(seen: Preview) -> list[RenderableType]:
     disk = seen.disk
     need = (
-        f"disk needed: {size(disk.total)} (points {size(disk.points)}, in passing {size(disk.passing)}, "
-        f"images {size(disk.images)}, others {size(disk.others)}, write-ahead log {size(disk.wal)})"
+        f"disk needed: about {size(disk.total)} ({size(seen.need.low)} to {size(seen.need.high)}; points {size(disk.points)},"
+        f" in passing {size(disk.passing)}, images {size(disk.images)}, others {size(disk.others)}, write-ahead log up to"
+        f" {size(disk.wal)})"
     )
+    low, high = seen.temporary.low, seen.temporary.high
+    temporary = f"temporary folder of the workers (TMPDIR): {size(low)} to {size(high)}"
+    lines = [Text(need)]
     if seen.free is None:
-        return [Text(need), Text("disk free: can't be seen from here; ask who runs the server")]
-    free = f"disk free: {size(seen.free)} in {seen.folder}"
-    return [Text(need), Text(free, "green") if seen.fits else Text(f"{free}: TOO LITTLE", "bold red")]
+        lines.append(Text("disk free: can't be seen from here; ask who runs the server"))
+    else:
+        lines.append(_free(seen.free, str(seen.folder), seen.need))
+    return [*lines, Text(temporary), _free(seen.temporary_free, str(seen.temporary_folder), seen.temporary)]
+
+
+def _free(free: int, folder: str, need: Span) -> Text:
+    text = f"disk free: {size(free)} in {folder}"
+    if need.high <= free:
+        return Text(text, "green")
+    return Text(f"{text}: {'TOO LITTLE' if need.likely > free else 'perhaps TOO LITTLE'}", "bold red")
 
 
 def _time(seen: Preview) -> list[RenderableType]:
@@ -104,8 +118,10 @@ def _said(seen: Preview) -> Iterator[str]:
     for file in seen.plan.files:
         if file.error:
             yield file.error
+    if seen.plan.skipped:
+        yield f"not read, outside the kilometres of --km by header and sample: {', '.join(seen.plan.skipped)}"
     if not seen.fits:
-        yield "the disk is too small: free some, take fewer kilometres at a time (--km), or a lower --density"
+        yield "a disk is too small: free some, take fewer kilometres at a time (--km), or a lower --density; or set TMPDIR"
 
 
 def size(count: float) -> str:

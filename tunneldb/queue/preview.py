@@ -5,20 +5,26 @@ The constants are measured; docs/howto-operate.md (Before it starts) states how.
 
 from __future__ import annotations
 
-import math
 import shutil
+import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import psycopg
 
 from tunneldb.database.server import Server
+from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.pointcloud.reader import read_header
-from tunneldb.queue.batch import Plan, extent
+from tunneldb.pipeline.load_settings import settings_of
+from tunneldb.pointcloud.file_sample import BLOCK, read_runs
+from tunneldb.pointcloud.row_estimate import FileSample, RowEstimate, estimate_rows
+from tunneldb.pointcloud.selection import MEMORY
+from tunneldb.queue.batch import Incoming, Plan
+from tunneldb.queue.expected import RUN_POINTS, RUNS
 from tunneldb.stages.parameters import PARAMETERS
 from tunneldb.stages.registry import STAGE_NAMES
 from tunneldb.store.surface import load_alignment
@@ -40,7 +46,22 @@ GIRTH = 25.0
 """Assumed length around a cross-section of an unknown tunnel, m: 8 m in diameter."""
 
 MIN_GAP = 100.0
-"""Least length of a reported stretch without a file, m: the box of a file gives its ends to about 30 m."""
+"""Least length of a reported stretch without a file, m: a sample gives the ends of a file to about 30 m."""
+
+EDGE = 35.0
+"""Length at the ends of a file's stretch that does not count as covering a kilometre, m."""
+
+TAIL = 0.01
+"""Share of a file's points beyond each end of its stretch: a scan thins out."""
+
+SAMPLED_FILES, SAMPLED_RUNS = 40, 80
+"""Number of files and of runs of points from which rows are estimated."""
+
+PLACE_BYTES = 24.0
+"""Bytes in the temporary folder per point of a file that is being read."""
+
+CANDIDATE_BYTES = 110.0
+"""Bytes there per point that may get a row: while it is examined, and after."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +75,7 @@ class Disk:
     passing : float
         Temporary data: points that were read but not yet loaded, and kilometres that are being rewritten.
     wal : float
-        Greatest size of the write-ahead log.
+        Greatest size of the write-ahead log: ``max_wal_size``, which a batch fills and which stays in use.
     """
 
     points: float
@@ -67,6 +88,15 @@ class Disk:
     def total(self) -> float:
         """Total at the worst moment."""
         return self.points + self.passing + self.images + self.others + self.wal
+
+
+@dataclass(frozen=True)
+class Span:
+    """Low, likely and high value of an estimate."""
+
+    low: float
+    likely: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -95,15 +125,21 @@ class Preview:
         Stretches of covered kilometres without a file, chainages, m.
     points : int
         Number of points of the files to read.
-    rows : float
-        Expected rows in the database; an upper limit if ``kept`` is None.
-    kept : float or None
-        Share of points that this survey, or another of the same density, has kept so far; None if unknown.
+    rows : Span
+        Estimated rows in the database, from a sample of the files.
     disk : Disk
+        Likely disk space for the database.
+    need : Span
+        Total disk space for the database, bytes.
+    temporary : Span
+        Disk space for the temporary folder of the workers, bytes.
     free : int or None
         Free bytes on the database's disk; None if unknown.
     folder : Path or None
         Folder of the database.
+    temporary_free : int
+        Free bytes in the temporary folder of this machine.
+    temporary_folder : Path
     speeds : tuple of Speed
         Speeds of the stages measured in this database.
     seconds : float or None
@@ -117,19 +153,22 @@ class Preview:
     missing: tuple[int, ...]
     gaps: tuple[tuple[float, float], ...]
     points: int
-    rows: float
-    kept: float | None
+    rows: Span
     disk: Disk
+    need: Span
+    temporary: Span
     free: int | None
     folder: Path | None
+    temporary_free: int
+    temporary_folder: Path
     speeds: tuple[Speed, ...]
     seconds: float | None
     workers: int
 
     @property
     def fits(self) -> bool:
-        """True if there is enough space, as far as known."""
-        return self.free is None or self.disk.total <= self.free
+        """True if there is enough space, as far as known, for the high estimates."""
+        return (self.free is None or self.need.high <= self.free) and self.temporary.high <= self.temporary_free
 
 
 def preview(
@@ -148,7 +187,8 @@ def preview(
     workers : int
         Number of workers to start.
     """
-    of_files = _stretches(conn, survey, plan)
+    alignment = load_alignment(conn, survey)
+    of_files = {file.name: found for file in plan.files if file.error is None and (found := _stretch(file, plan, alignment))}
     stretches = sorted(of_files.values())
     covered = sorted({km for stretch in stretches for km in kilometres_of(stretch)})
     requested: Sequence[int] = kilometres or (range(covered[0], covered[-1] + 1) if covered else ())
@@ -156,10 +196,17 @@ def preview(
     new = [file for file in plan.files if not file.already_read and file.error is None]
     points = sum(file.points for file in new)
     length = sum(high - low for low, high in _union(sorted(of_files[file.name] for file in new if file.name in of_files)))
-    kept = _kept(conn, survey, plan)
-    rows = _rows(points, length, kept, plan)
-    disk = _disk(conn, plan, rows, length or KILOMETRE * len(plan.kilometres), workers)
+    estimate = estimate_rows(_samples(new), alignment, settings_of(plan.reading))
+    rows = Span(estimate.low, estimate.likely, estimate.high)
+    area = estimate.area or GIRTH * (length or KILOMETRE * len(plan.kilometres))
+    wal = conn.execute("SELECT pg_size_bytes(current_setting('max_wal_size'))").fetchone()
+    assert wal is not None
+    low, disk, high = (
+        _disk(plan, count, area, length or KILOMETRE * len(plan.kilometres), workers, float(wal[0]))
+        for count in (rows.low, rows.likely, rows.high)
+    )
     folder = Server().home().cluster if embedded else None
+    temporary_folder = Path(tempfile.gettempdir())
     speeds = _speeds(conn)
     return Preview(
         plan,
@@ -169,10 +216,13 @@ def preview(
         tuple(gap for gap in _gaps(stretches) if not _whole(gap, missing)),
         points,
         rows,
-        kept,
         disk,
+        Span(low.total, disk.total, high.total),
+        _temporary(new, estimate, points, workers),
         shutil.disk_usage(folder).free if folder is not None else None,
         folder,
+        shutil.disk_usage(temporary_folder).free,
+        temporary_folder,
         speeds,
         _time(speeds, plan, points, workers),
         workers,
@@ -180,15 +230,40 @@ def preview(
 
 
 def kilometres_of(stretch: tuple[float, float]) -> range:
-    """Return the kilometres of a stretch from one chainage to another, m."""
-    return range(int(stretch[0] // KILOMETRE), math.ceil(stretch[1] / KILOMETRE))
+    """Return the kilometres of a stretch from one chainage to another, m, less EDGE at its ends."""
+    edge = min(EDGE, 0.5 * (stretch[1] - stretch[0]))
+    return range(int((stretch[0] + edge) // KILOMETRE), int((stretch[1] - edge) // KILOMETRE) + 1)
 
 
-def _stretches(conn: psycopg.Connection[Any], survey: Survey, plan: Plan) -> dict[str, tuple[float, float]]:
-    alignment = load_alignment(conn, survey)
-    reach = float(plan.reading["load.max_distance"])
-    found = {file.name: extent(read_header(file.path), alignment, reach) for file in plan.files if file.error is None}
-    return {name: stretch for name, stretch in found.items() if stretch is not None}
+def _stretch(file: Incoming, plan: Plan, alignment: Alignment) -> tuple[float, float] | None:
+    """Return the first and last chainage of a file, m, by a sample of its points; None if none is near the axis."""
+    xyz = np.concatenate(list(read_runs(file.path, file.points, RUNS, RUN_POINTS)))
+    chainage, distance = alignment.locate(xyz)
+    near = chainage[distance <= float(plan.reading["load.max_distance"])]
+    return (float(np.quantile(near, TAIL)), float(np.quantile(near, 1.0 - TAIL))) if len(near) else None
+
+
+def _samples(files: Sequence[Incoming]) -> list[FileSample]:
+    """Read runs of points of some files, spread evenly; together they stand for all."""
+    if not files:
+        return []
+    chosen = [files[k] for k in np.unique(np.linspace(0, len(files) - 1, min(SAMPLED_FILES, len(files))).astype(int))]
+    points, share = sum(file.points for file in chosen), sum(file.points for file in files)
+    samples = []
+    for file in chosen:
+        runs = max(round(SAMPLED_RUNS * file.points / points), 1)
+        stands_for = round(file.points * share / points)
+        samples.append(FileSample(stands_for, list(read_runs(file.path, file.points, runs, BLOCK))))
+    return samples
+
+
+def _temporary(files: Sequence[Incoming], estimate: RowEstimate, points: int, workers: int) -> Span:
+    """Return the space in temporary folders for the largest files, one a worker; little of it is used for dense scans."""
+    largest = sum(sorted((file.points for file in files), reverse=True)[:workers])
+    share = largest / points if points else 0.0
+    places = PLACE_BYTES * estimate.near * share
+    low, likely, high = (places + CANDIDATE_BYTES * count * share for count in (estimate.low, estimate.likely, estimate.near))
+    return Span(max(low - workers * MEMORY, 0.0), likely, high)
 
 
 def _union(stretches: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -212,44 +287,15 @@ def _whole(gap: tuple[float, float], missing: Sequence[int]) -> bool:
     return bool(inside) and gap[1] - gap[0] <= 1000 * len(inside) + 2 * MIN_GAP
 
 
-def _kept(conn: psycopg.Connection[Any], survey: Survey, plan: Plan) -> float | None:
-    """Return the share of points kept of files loaded at this density: of this survey, else of all."""
-    row = conn.execute(
-        """
-        WITH file AS (
-            SELECT f.survey_id, f.kept, f.points
-              FROM tunnel.scan_file f
-             WHERE f.kept > 0 AND (SELECT r.parameters -> 'load.density' FROM tunnel.run r
-                                    WHERE r.survey_id = f.survey_id AND r.outcome = 'done' AND r.stage IN ('read', 'load')
-                                      AND r.parameters ? 'load.density' ORDER BY r.id DESC LIMIT 1) = to_jsonb(%(density)s)
-        )
-        SELECT coalesce(sum(kept) FILTER (WHERE survey_id = %(survey)s) / sum(points) FILTER (WHERE survey_id = %(survey)s),
-                        sum(kept) / sum(points))::float8
-          FROM file
-        """,
-        {"survey": survey.id, "density": plan.reading["load.density"]},
-    ).fetchone()
-    return None if row is None else row[0]
-
-
-def _rows(points: int, length: float, kept: float | None, plan: Plan) -> float:
-    if kept is not None:
-        return kept * points
-    density = plan.reading["load.density"]
-    return float(points) if density == "all" else min(float(points), float(density) * GIRTH * length)
-
-
-def _disk(conn: psycopg.Connection[Any], plan: Plan, rows: float, length: float, workers: int) -> Disk:
-    row = conn.execute("SELECT pg_size_bytes(current_setting('max_wal_size'))").fetchone()
-    assert row is not None
+def _disk(plan: Plan, rows: float, area: float, length: float, workers: int, wal: float) -> Disk:
     pixel = float(plan.parameters.get("image.pixel", PARAMETERS["image.pixel"].default))
     detects = plan.stage in (None, STAGE_NAMES[-1])
     return Disk(
         ROW_BYTES * rows,
         FRAGMENT_BYTES * rows + ROW_BYTES * rows * min(workers / max(len(plan.kilometres), 1), 1.0),
-        PIXEL_BYTES * GIRTH * length / pixel**2 if detects else 0.0,
+        PIXEL_BYTES * area / pixel**2 if detects else 0.0,
         KILOMETRE_BYTES * length / KILOMETRE,
-        float(row[0]),
+        wal,
     )
 
 
