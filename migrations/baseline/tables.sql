@@ -959,6 +959,9 @@ CREATE TABLE tunnel.incoming (
     km_from INTEGER,
     km_to INTEGER,
     parameters JSONB DEFAULT '{}' NOT NULL,
+    stage TEXT,
+    stage_parameters JSONB DEFAULT '{}' NOT NULL,
+    kilometres INT4RANGE,
     requested_at TIMESTAMP WITH TIME ZONE DEFAULT clock_timestamp() NOT NULL,
     failed_at TIMESTAMP WITH TIME ZONE,
     message TEXT,
@@ -971,9 +974,12 @@ COMMENT ON COLUMN tunnel.incoming.name IS 'File name without its folder';
 COMMENT ON COLUMN tunnel.incoming.path IS 'Path of the file';
 COMMENT ON COLUMN tunnel.incoming.bytes IS 'Size of the file, bytes';
 COMMENT ON COLUMN tunnel.incoming.points IS 'Points that its header announces; 0 if it is unreadable';
-COMMENT ON COLUMN tunnel.incoming.km_from IS 'First kilometre that it may touch, by its header''s box';
-COMMENT ON COLUMN tunnel.incoming.km_to IS 'Last kilometre that it may touch, by its header''s box';
+COMMENT ON COLUMN tunnel.incoming.km_from IS 'First kilometre that it probably touches, by header or sample; NULL if unknown. The points decide';
+COMMENT ON COLUMN tunnel.incoming.km_to IS 'Last kilometre that it probably touches, by header or sample; NULL if unknown. The points decide';
 COMMENT ON COLUMN tunnel.incoming.parameters IS 'Parameters of reading';
+COMMENT ON COLUMN tunnel.incoming.stage IS 'Last stage to run in the kilometres that get points of it; NULL for load';
+COMMENT ON COLUMN tunnel.incoming.stage_parameters IS 'Parameters of the stages in these kilometres';
+COMMENT ON COLUMN tunnel.incoming.kilometres IS 'Kilometres that are run up to this stage, others are only loaded; NULL for all';
 COMMENT ON COLUMN tunnel.incoming.requested_at IS 'Time of the request';
 COMMENT ON COLUMN tunnel.incoming.failed_at IS 'Time of the failure';
 COMMENT ON COLUMN tunnel.incoming.message IS 'Why it failed';
@@ -1378,6 +1384,7 @@ CREATE TABLE tunnel.scan_file (
     reach_after DOUBLE PRECISION DEFAULT '0' NOT NULL,
     intensity_note TEXT,
     pose_note TEXT,
+    header_note TEXT,
     srid INTEGER,
     loaded_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
     CONSTRAINT scan_file_pkey PRIMARY KEY (id),
@@ -1407,6 +1414,7 @@ COMMENT ON COLUMN tunnel.scan_file.reach_before IS 'Distance before the beginnin
 COMMENT ON COLUMN tunnel.scan_file.reach_after IS 'Distance after the end of the given axis within which nearly all of these lie, m';
 COMMENT ON COLUMN tunnel.scan_file.intensity_note IS 'Doubts about its intensity: saturated, or another kind by its values';
 COMMENT ON COLUMN tunnel.scan_file.pose_note IS 'Doubts about the scanner positions of its points';
+COMMENT ON COLUMN tunnel.scan_file.header_note IS 'Difference between the header and the points, with both values';
 COMMENT ON COLUMN tunnel.scan_file.srid IS 'Spatial reference that the file states, if it states one';
 COMMENT ON COLUMN tunnel.scan_file.loaded_at IS 'Time of loading';
 

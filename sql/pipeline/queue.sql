@@ -146,7 +146,8 @@ BEGIN
     WITH job AS (
         SELECT j.queueing_lock FROM tunnel_queue.procrastinate_jobs j WHERE j.status IN ('todo', 'doing')
     ), ready AS (
-        SELECT 'read' AS task, -10 * i.km_from AS priority, format('s%s.f%s', queue_plan.survey_id, i.name) AS lock,
+        SELECT 'read' AS task, coalesce(-10 * i.km_from, 10000000) AS priority,  -- kilometres unknown: first
+               format('s%s.f%s', queue_plan.survey_id, i.name) AS lock,
                jsonb_build_object('survey_id', queue_plan.survey_id, 'file', i.name, 'stage', 'read') AS args
           FROM tunnel.incoming i
          WHERE i.survey_id = queue_plan.survey_id AND i.failed_at IS NULL
@@ -180,8 +181,44 @@ AS $$
 $$;
 COMMENT ON FUNCTION tunnel_internal.queue_hold(bigint, bigint) IS 'Lock a job, and return true if the worker still runs it';
 
+-- Request the kilometres that got points of a file that was read: they are processed to the stage that the batch requested for
+-- the file's points, whatever its header states; kilometres beyond those of the batch, and those of files that had to be read
+-- again, are only loaded. A later stage that was requested before stays.
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_request(survey_id integer, file text) RETURNS void
+LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
+AS $$
+    WITH touched AS (
+        SELECT i.survey_id, k.km, i.stage, i.parameters, i.stage_parameters,
+               i.stage IS NOT NULL AND bool_or(f.name = i.name) AND coalesce(i.kilometres @> k.km, true) AS runs
+          FROM tunnel.incoming i
+          JOIN tunnel.scan_file f ON f.survey_id = i.survey_id
+          JOIN tunnel.file_km k ON k.file_id = f.id AND k.loaded_at IS NULL
+         WHERE i.survey_id = $1 AND i.name = $2
+         GROUP BY i.survey_id, i.name, k.km
+    )
+    INSERT INTO tunnel.goal AS g (survey_id, km, stage, parameters)
+    SELECT t.survey_id, t.km, CASE WHEN t.runs THEN t.stage ELSE 'load' END, t.parameters || t.stage_parameters FROM touched t
+        ON CONFLICT (survey_id, km) DO UPDATE
+       SET stage = (SELECT s.name FROM tunnel.stage s WHERE s.name IN (g.stage, excluded.stage) ORDER BY s.step DESC LIMIT 1),
+           parameters = g.parameters || coalesce((SELECT t.stage_parameters FROM touched t WHERE t.km = g.km AND t.runs), '{}')
+$$;
+COMMENT ON FUNCTION tunnel_internal.queue_request(integer, text) IS
+    'Request the kilometres that got points of a file, up to the stage of its batch';
+
+-- Withdraw the request of kilometres between two that a file was expected to touch and did not: those without points that await
+-- no other file.
+CREATE OR REPLACE FUNCTION tunnel_internal.queue_withdraw(survey_id integer, km_from integer, km_to integer) RETURNS void
+LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
+AS $$
+    DELETE FROM tunnel.goal g
+     WHERE g.survey_id = $1 AND g.km BETWEEN $2 AND $3
+       AND g.km IN (SELECT s.km FROM tunnel_internal.queue_state($1, $2, $3) s WHERE s.state = 'empty')
+$$;
+COMMENT ON FUNCTION tunnel_internal.queue_withdraw(integer, integer, integer) IS
+    'Withdraw the request of kilometres that have no points and await no file';
+
 -- Finish a job that succeeded, and queue what is ready now. A file that was read is removed from the list, unless it was
--- requested again after the job began. Kilometres with new points are loaded, also without a goal.
+-- requested again after the job began. The kilometres that have its points are requested, and no others.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_done(job_id bigint, started_at timestamptz) RETURNS void
 LANGUAGE plpgsql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
@@ -192,19 +229,15 @@ DECLARE
     reach constant integer := tunnel_internal.queue_reach();
     first integer;
     last integer;
+    expected_from integer;
+    expected_to integer;
 BEGIN
     PERFORM tunnel_queue.procrastinate_finish_job_v1(job_id, 'succeeded', false);
     IF km IS NOT NULL THEN
         PERFORM tunnel_internal.queue_plan(survey, km - reach, km + reach);
         RETURN;
     END IF;
-    INSERT INTO tunnel.goal (survey_id, km, stage, parameters)
-    SELECT DISTINCT i.survey_id, k.km, 'load', i.parameters
-      FROM tunnel.incoming i
-      JOIN tunnel.scan_file f ON f.survey_id = i.survey_id
-      JOIN tunnel.file_km k ON k.file_id = f.id AND k.loaded_at IS NULL
-     WHERE i.survey_id = survey AND i.name = args ->> 'file'
-        ON CONFLICT DO NOTHING;
+    PERFORM tunnel_internal.queue_request(survey, args ->> 'file');
     -- those that the file may touch, and those that were read anew
     SELECT least(min(i.km_from), min(k.km)) - reach, greatest(max(i.km_to), max(k.km)) + reach
       INTO first, last
@@ -213,7 +246,9 @@ BEGIN
       LEFT JOIN tunnel.file_km k ON k.file_id = f.id AND k.read_at >= queue_done.started_at
      WHERE i.survey_id = survey AND i.name = args ->> 'file';
     DELETE FROM tunnel.incoming i
-     WHERE i.survey_id = survey AND i.name = args ->> 'file' AND i.requested_at < queue_done.started_at;
+     WHERE i.survey_id = survey AND i.name = args ->> 'file' AND i.requested_at < queue_done.started_at
+    RETURNING i.km_from, i.km_to INTO expected_from, expected_to;
+    PERFORM tunnel_internal.queue_withdraw(survey, expected_from, expected_to);
     PERFORM tunnel_internal.queue_plan(survey, coalesce(first, -1000000), coalesce(last, 1000000));
 END
 $$;

@@ -21,7 +21,8 @@ COMMENT ON VIEW tunnel_api.incoming IS
 COMMENT ON COLUMN tunnel_api.incoming.id IS 'Key, derived from survey and name';
 COMMENT ON COLUMN tunnel_api.incoming.path IS 'Path of the file; visible to operators only';
 COMMENT ON COLUMN tunnel_api.incoming.points IS 'Number of points by its header; 0 if unreadable';
-COMMENT ON COLUMN tunnel_api.incoming.km_from IS 'First kilometre that it can touch, by its header; NULL if unreadable';
+COMMENT ON COLUMN tunnel_api.incoming.km_from IS
+    'First kilometre that it probably touches, by header or sample; NULL if unknown. After reading, its points decide';
 COMMENT ON COLUMN tunnel_api.incoming.state IS 'waiting, or failed';
 COMMENT ON COLUMN tunnel_api.incoming.message IS 'Reason of the failure, and what to do';
 

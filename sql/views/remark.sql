@@ -52,11 +52,16 @@ SELECT 16 * f.id::bigint + 9, f.survey_id, s.name, NULL, 'load', f.name, f.pose_
   JOIN tunnel.survey s ON s.id = f.survey_id
  WHERE f.pose_note IS NOT NULL
  UNION ALL
+SELECT 16 * f.id::bigint + 10, f.survey_id, s.name, NULL, 'load', f.name, f.header_note
+  FROM tunnel.scan_file f
+  JOIN tunnel.survey s ON s.id = f.survey_id
+ WHERE f.header_note IS NOT NULL
+ UNION ALL
 SELECT 16 * s.id::bigint + 6, s.id, s.name, NULL, 'survey', NULL, s.positions_note
   FROM tunnel.survey s
  WHERE s.positions_note IS NOT NULL;
 COMMENT ON VIEW tunnel_api.remark IS
-    'Notes on the results of surveys: notes of stages by kilometre, points of files that were left out, doubtful intensity and scanner positions of files, and notes on scanner positions';
+    'Notes on the results of surveys: notes of stages by kilometre, points of files that were left out, doubtful intensity and scanner positions of files, differences between header and points, and notes on scanner positions';
 COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file or for the survey as a whole';
 COMMENT ON COLUMN tunnel_api.remark.stage IS
     'Stage that wrote the note; survey for notes written when the survey was added or set';

@@ -14,18 +14,23 @@ from rich.console import Console
 
 from tunneldb.cli.load import density_of, say_notes
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb, wants_json
+from tunneldb.cli.output import notify, tell, verb, wants_json
 from tunneldb.cli.param_types import FilePath
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.queue.watching import is_busy, server_time
 from tunneldb.stages.parameters import PARAMETERS, settings
+from tunneldb.stages.registry import STAGE_NAMES
 from tunneldb.store.survey import Survey, get_survey
 
 if TYPE_CHECKING:
     import psycopg
 
     from tunneldb.cli.watch import Watch
+    from tunneldb.queue.batch import Plan
+
+
+OUTSIDE = "outside the kilometres of --km, by its header and a sample of its points: not read"
 
 
 @verb(
@@ -73,7 +78,6 @@ def batch(
     Ctrl-C finishes the current stages and stops; a second one stops at once.
     """
     from tunneldb.queue.batch import plan, register
-    from tunneldb.stages.registry import STAGE_NAMES
     from tunneldb.stages.run import km_range
 
     if last is not None and last not in STAGE_NAMES:
@@ -102,7 +106,7 @@ def batch(
     began = time.monotonic()
     watch = _work(found, settings_.dsn, count if busy else 0)
     with connect(settings_.dsn) as conn:  # the server may have been restarted meanwhile
-        raise SystemExit(_summary(conn, found, watch, time.monotonic() - began, since))
+        raise SystemExit(_summary(conn, found, asked, watch, time.monotonic() - began, since))
 
 
 def _work(survey: Survey, dsn: str | None, count: int) -> Watch:
@@ -129,10 +133,12 @@ def _busy(conn: psycopg.Connection[Any], survey: Survey) -> tuple[bool, dt.datet
     return is_busy(conn, survey.id), server_time(conn)
 
 
-def _summary(conn: psycopg.Connection[Any], survey: Survey, watch: Watch, seconds: float, since: dt.datetime) -> int:
+def _summary(
+    conn: psycopg.Connection[Any], survey: Survey, asked: Plan, watch: Watch, seconds: float, since: dt.datetime
+) -> int:
     """Print a summary, and return the exit code."""
-    from tunneldb.cli.overview import advise, duration, number
-    from tunneldb.queue.batch import failed_files, notes_of_files, results
+    from tunneldb.cli.overview import advise, duration, number, spans
+    from tunneldb.queue.batch import failed_files, notes_of_files, only_loaded, results
 
     found = results(conn, survey)
     files = failed_files(conn, survey)
@@ -145,8 +151,16 @@ def _summary(conn: psycopg.Connection[Any], survey: Survey, watch: Watch, second
         failed_files=[{"name": name, "message": why} for name, why in files],
         points=points,
         notes=[{"name": name, "note": note} for name, note in notes],
+        skipped=asked.skipped,
+        only_loaded=(loaded := only_loaded(conn, survey, asked, since)),
     )
-    say_notes(notes)
+    say_notes([*notes, *((name, OUTSIDE) for name in asked.skipped)])
+    if loaded:
+        last = asked.stage or STAGE_NAMES[-1]
+        notify(
+            f"km {spans(loaded)}: loaded and not run, because these files have points there, but --km excludes it: "
+            f"tunneldb batch {survey.name} --km {loaded[0]}{f'-{loaded[-1]}' * (len(loaded) > 1)} --to {last}"
+        )
     speed = f", {number(points / seconds)} points/s" if points else ""
     click.echo(f"{done} of {len(found)} kilometres done; {duration(seconds)}{speed}")
     if watch.live is None and watch.seen is not None:  # on a terminal it stands there already

@@ -169,9 +169,10 @@ def _summary(connection: psycopg.Connection[Any], survey: Survey, done: list[Loa
     if survey.site:
         notify(f"looked through; the points stay in the files: tunneldb members {survey.name}")
     loaded = {file.name for file in done}
-    for remark in read_remarks(connection, survey):
-        if remark.file in loaded:
-            notify(remark.said)
+    remarks = [remark for remark in read_remarks(connection, survey) if remark.file in loaded]
+    tell(remarks=remarks)
+    for remark in remarks:
+        notify(remark.said)
     connection.rollback()
     say_notes((file.name, file.note) for file in done if file.note)
 

@@ -65,6 +65,7 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
     missing: list[str] = []
     doubts = [f"{look.path.name}: is it a tunnel? {said}" for look in looks if (said := look.other_than_a_tunnel)]
     doubts += [f"{look.path.name}: {look.unit}" for look in looks if look.unit]
+    doubts += [f"{look.path.name}: {look.header_note}" for look in looks if look.header_note]
     doubts += [
         f"{look.path.name}: {look.misplaced} points have no coordinates, {look.untimed} no time"
         for look in looks

@@ -19,6 +19,7 @@ from tunneldb.pointcloud.form import WINDOW, TunnelForm, profile_spacing, surfac
 from tunneldb.pointcloud.formats.las import read_las_facts
 from tunneldb.pointcloud.formats.scans import PosedScan
 from tunneldb.pointcloud.formats.table import format_of, posed_scans
+from tunneldb.pointcloud.header_box import describe_box_difference
 from tunneldb.pointcloud.noise import noise_filter
 from tunneldb.pointcloud.reader import ScanHeader, read_header
 from tunneldb.progress import StartProgress
@@ -132,6 +133,8 @@ class FileLook:
         Seconds to add to the times of the trajectory beside the file, so that it fits the points; None if it fits.
     pose_doubt : str or None
         Why the trajectory beside the file, or the positions of its scans, do not fit the points.
+    header_note : str or None
+        Difference between its header and its points.
     only_noise : bool
         True if all points would be left out as noise, each too far from others; False if not all were examined.
     """
@@ -161,6 +164,7 @@ class FileLook:
     poses: list[PosedScan]
     intensities: list[IntensityLook]
     foreign_unit: bool = False
+    header_note: str | None = None
     only_noise: bool = False
     time_offset: float | None = None
     pose_doubt: str | None = None
@@ -225,6 +229,7 @@ def inspect_file(path: Path, begin: StartProgress) -> FileLook:
         poses,
         [_look_at(path, name, contents.points) for name in names],
         header.crs is not None and _unit_of(header.crs) is not None,
+        describe_box_difference(header, np.concatenate([contents.low, contents.high])),
         contents.share == 1.0 and bool(noise_filter(contents.xyz).all()),
         time_offset,
         pose_doubt,

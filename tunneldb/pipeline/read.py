@@ -20,6 +20,7 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load_settings import require_same_density
 from tunneldb.pipeline.pose_check import PoseCheck
 from tunneldb.pointcloud.formats.faults import require_dimension
+from tunneldb.pointcloud.header_box import describe_box_difference
 from tunneldb.pointcloud.pose_coverage import PoseCoverage
 from tunneldb.pointcloud.reader import ScanHeader, check_header, crs_note, read_header
 from tunneldb.pointcloud.selection import MEMORY, CheckPoses, FilterCounts, FilterSettings, filter_file, voxel_reach
@@ -79,13 +80,13 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
         read = reading.read([header], [])
         files, state = [file.id for file in read], read[0].state
     row = conn.execute(
-        "SELECT points, noise, outside, invalid, unposed, ARRAY(SELECT DISTINCT km FROM tunnel.file_km"
+        "SELECT points, noise, outside, invalid, unposed, header_note, ARRAY(SELECT DISTINCT km FROM tunnel.file_km"
         " WHERE file_id = ANY (%s) AND loaded_at IS NULL ORDER BY km) FROM tunnel.scan_file WHERE id = %s",
         [files, files[0]],
     ).fetchone()
     assert row is not None
     sparse = None if known is not None else read[0].note
-    note = "; ".join(filter(None, (crs_note(header, survey.srid), sparse)))
+    note = "; ".join(filter(None, (crs_note(header, survey.srid), row[5], sparse)))
     left_out = {name: count for name, count in (("invalid", row[3]), ("unposed", row[4])) if count}
     return {
         "file": path.name,
@@ -94,7 +95,7 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
         "noise": row[1],
         "outside": row[2],
         **left_out,
-        "kilometres": row[5],
+        "kilometres": row[6],
         **({"note": note} if note else {}),
     }
 
@@ -255,7 +256,8 @@ class Reading:
             doubtful = doubt(self.survey.intensity_kind, counts.intensity_sample)
             stated = None if header.crs is None else self.survey.srid
             left = [] if former is None else self.leave(former)
-            content = Content(path, digest, path.stat().st_size, stated, doubtful, counts)
+            differs = describe_box_difference(header, counts.box)
+            content = Content(path, digest, path.stat().st_size, stated, differs, doubtful, counts)
             file_id = record_file(self.conn, self.survey, content)
             record_kilometres(self.conn, file_id, survivors.kilometres(), counts, left)
             if self.held is None:

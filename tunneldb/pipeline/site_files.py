@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 import psycopg
 
+from tunneldb.arrays import Float
 from tunneldb.errors import UserError
 from tunneldb.geometry.crs import outside_area
 from tunneldb.pipeline.read import read_headers, require_kind
 from tunneldb.pointcloud.formats.raw import read_raw
+from tunneldb.pointcloud.header_box import describe_box_difference
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.pose_coverage import PoseCoverage, PoseFaults
 from tunneldb.pointcloud.reader import CHUNK, ScanHeader, check_header, crs_note
@@ -82,14 +84,22 @@ def register_files(
     yield from copies.values()
     headers = [header for header in headers if header.path not in copies]
     for header in headers:
-        corners = np.array([header.low[:2], header.high[:2]])
         recorded = recorded_files(conn, survey).get(header.path.name)
         there = unchanged(conn, header.path, recorded)
         conn.commit()
         if there is None:
             there = _register(conn, survey, header, poses, max_left_out, begin, replaces=recorded is not None)
-        notes = (crs_note(header, survey.srid), outside_area(survey.srid, corners), there.note)
+        place = outside_area(survey.srid, _corners(conn, survey, header.path.name))
+        notes = (crs_note(header, survey.srid), place, there.note)
         yield replace(there, note="; ".join(filter(None, notes)) or None)
+
+
+def _corners(conn: psycopg.Connection[Any], survey: Survey, name: str) -> Float:
+    """Return two corners of the box of a file's points in plan (2, 2), m."""
+    row = conn.execute("SELECT extent FROM tunnel.scan_file WHERE survey_id = %s AND name = %s", [survey.id, name]).fetchone()
+    conn.rollback()
+    assert row is not None
+    return np.array(row[0]).reshape(2, 3)[:, :2]
 
 
 def remove_site_files(conn: psycopg.Connection[Any], survey: Survey, names: Sequence[str]) -> None:
@@ -115,7 +125,8 @@ def _register(
             counts = _look_through(survey, header, poses, max_left_out, begin)
             doubtful = doubt(survey.intensity_kind, counts.intensity_sample)
             stated = survey.srid if header.crs else None
-            content = Content(path, digest.result(), path.stat().st_size, stated, doubtful, counts)
+            differs = describe_box_difference(header, counts.box)
+            content = Content(path, digest.result(), path.stat().st_size, stated, differs, doubtful, counts)
         file_id = record_file(conn, survey, content)
         loaded = outcome(conn, file_id, "replaced" if replaces else "loaded", time.monotonic() - started)
         loaded = replace(loaded, note=doubtful)
@@ -132,6 +143,7 @@ def _look_through(
     progress = begin(header.path.name, header.points)
     for points in map(Points.of, read_raw(header.path, survey.intensity_dimension, CHUNK)):
         counts.points += len(points)
+        counts.enclose(points.xyz)
         progress(len(points))
         finite = points.finite(time=poses.mobile, intensity=survey.intensity_dimension is not None)
         if finite is not None:

@@ -173,9 +173,11 @@ class ScanHeader:
     crs : CRS or None
         Coordinate reference system, None if the file states none.
     low, high : (3,) float64 array
-        Bounding box of the coordinates by the header, m; not checked.
+        Bounding box of the coordinates by the header, m; not checked, so it must not decide what is done with the points.
     unread_crs : str
         Text of a coordinate system that cannot be read, and the reason; empty if there is none.
+    tight : bool
+        False if the box may be larger than that of the points because it encloses rotated boxes of scans.
     """
 
     path: Path
@@ -185,3 +187,4 @@ class ScanHeader:
     low: Float
     high: Float
     unread_crs: str = ""
+    tight: bool = True

@@ -93,6 +93,8 @@ class FilterCounts:
         Least and greatest chainage of the points kept, m; infinite if there is none.
     extent : (6,) float64 array
         Least and greatest x, y, z of the points kept: x0, y0, z0, x1, y1, z1, m.
+    box : (6,) float64 array
+        The same of all points with a finite coordinate.
     beyond : (int, int)
         Points outside before the start of the axis, and after its end, where the tunnel may continue.
     beyond_reach : (float, float)
@@ -117,6 +119,7 @@ class FilterCounts:
     kept: int = 0
     chainage: tuple[float, float] = (math.inf, -math.inf)
     extent: Float = field(default_factory=lambda: np.array([np.inf] * 3 + [-np.inf] * 3))
+    box: Float = field(default_factory=lambda: np.array([np.inf] * 3 + [-np.inf] * 3))
     ranges: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
     seconds: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
     beyond: tuple[int, int] = (0, 0)
@@ -134,6 +137,15 @@ class FilterCounts:
     def thinned(self) -> int:
         """Number of points removed by thinning."""
         return self.points - self.invalid - self.outside - self.unposed - self.noise - self.kept
+
+    def enclose(self, xyz: Float) -> None:
+        """Extend the box of all points by a chunk (n, 3)."""
+        low, high = xyz.min(axis=0, initial=np.inf), xyz.max(axis=0, initial=-np.inf)
+        if not on_earth(np.concatenate([low, high])).all():  # also NaN
+            valid = xyz[on_earth(xyz).all(axis=1)]
+            low, high = valid.min(axis=0, initial=np.inf), valid.max(axis=0, initial=-np.inf)
+        np.minimum(self.box[:3], low, out=self.box[:3])
+        np.maximum(self.box[3:], high, out=self.box[3:])
 
     def locate(self, blocks: Int64, low: Float, high: Float) -> None:
         """Record the places of kilometres in the file: blocks of BLOCK points, with start and end chainage of each, m."""
@@ -291,6 +303,7 @@ class _Filter:
         self.times.add(self.counts.points, points.time)
         number = np.arange(self.counts.points, self.counts.points + len(points))
         self.counts.points += len(points)
+        self.counts.enclose(points.xyz)
         finite = points.finite(time=self.poses.mobile, intensity=self.dimension is not None)
         if finite is not None:
             self._note_invalid(points, number, finite)

@@ -8,18 +8,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import psycopg
 from psycopg.rows import class_row
 from psycopg.types.json import Jsonb
+from psycopg.types.range import Range
 
 from tunneldb.errors import UserError
-from tunneldb.geometry.alignment import Alignment
-from tunneldb.geometry.stationing import KILOMETRE
-from tunneldb.pipeline.load import chainages_near, header_kilometres, parameters_of, settings_of
-from tunneldb.pointcloud.formats.las_bounds import header_box
-from tunneldb.pointcloud.formats.table import format_of
-from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
+from tunneldb.pipeline.load import parameters_of, settings_of
+from tunneldb.pointcloud.reader import check_header, read_header
+from tunneldb.queue.expected import damaged_kilometres, expected_kilometres, kilometres_near_damaged
 from tunneldb.stages.registry import STAGE_NAMES
 from tunneldb.stages.run import loaded_kilometres
 from tunneldb.store.poses import is_mobile
@@ -39,8 +36,10 @@ class Incoming:
         Absolute path.
     bytes, points : int
         Size, and number of points by the header; 0 points if it is unreadable.
-    km_from, km_to : int or None
-        First and last kilometre that it may touch; None if its box is unreadable, or it touches none.
+    touched : tuple of int
+        Kilometres to request: expected ones, or those with its points if it was already read. Empty if unknown.
+    awaited : tuple of int
+        Kilometres that wait for it, or fail with it if it is unreadable.
     error : str or None
         Reason why it can't be read.
     already_read : bool
@@ -51,8 +50,8 @@ class Incoming:
     path: Path
     bytes: int
     points: int
-    km_from: int | None = None
-    km_to: int | None = None
+    touched: tuple[int, ...] = ()
+    awaited: tuple[int, ...] = ()
     error: str | None = None
     already_read: bool = False
 
@@ -73,6 +72,10 @@ class Plan:
         Parameters that differ from the defaults, by name, including those of reading and loading.
     reading : dict
         All parameters of reading and loading.
+    only : range or None
+        Kilometres to which it is restricted; None for all.
+    skipped : tuple of str
+        Files that it names and that lie outside these kilometres, by their headers and a sample of their points.
     """
 
     files: tuple[Incoming, ...]
@@ -80,6 +83,8 @@ class Plan:
     stage: str | None
     parameters: dict[str, Any] = field(default_factory=dict)
     reading: dict[str, Any] = field(default_factory=dict)
+    only: range | None = None
+    skipped: tuple[str, ...] = ()
 
 
 def plan(
@@ -122,20 +127,19 @@ def plan(
     _require_files(named)
     again = _failed_paths(conn, survey, {path.name for path in named}) if retry else []
     how = parameters_of(settings_of({**_present_density(conn, survey), **(reading or {})}))
-    files = _headers(conn, survey, [*named, *again], float(how["load.max_distance"]))
-    if kilometres is not None:
-        files = [file for file in files if file.error or _touches(file, kilometres)]
-    requested = {km for file in files for km in _kilometres(file)}
-    requested |= _near_damaged(conn, survey, files, float(how["load.max_distance"]))
+    found = _headers(conn, survey, [*named, *again], float(how["load.max_distance"]), kilometres)
+    files = [file for file in found if kilometres is None or file.error or _touches(file, kilometres)]
+    requested = {km for file in files for km in file.touched}
     if not named:
         goals = _goals(conn, survey)
         options = kilometres is not None or stage is not None or parameters
         requested |= goals if goals and not options else goals | set(loaded_kilometres(conn, survey))
     chosen = {km for km in requested if kilometres is None or km in kilometres}
-    if not chosen and not any(file.error for file in files) and not _awaits(conn, survey):
+    if not chosen and all(file.already_read for file in files) and not _awaits(conn, survey):
         where = "" if kilometres is None else f" in kilometres {kilometres[0]}-{kilometres[-1]}"
         raise UserError(f"survey {survey.name} has nothing to do{where}; type tunneldb batch {survey.name} FILES")
-    return Plan(tuple(files), tuple(sorted(chosen)), stage, dict(parameters or {}), how)
+    skipped = tuple(file.name for file in found if file not in files)
+    return Plan(tuple(files), tuple(sorted(chosen)), stage, dict(parameters or {}), how, kilometres, skipped)
 
 
 def _require_files(paths: Sequence[Path]) -> None:
@@ -166,14 +170,18 @@ def _present_density(conn: psycopg.Connection[Any], survey: Survey) -> dict[str,
     return {} if row is None else {"load.density": row[0]}
 
 
-def _headers(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path], reach: float) -> list[Incoming]:
+def _headers(
+    conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path], reach: float, wanted: range | None
+) -> list[Incoming]:
     if not paths:
         return []
     alignment, mobile = load_alignment(conn, survey), is_mobile(conn, survey)
     read = {
         row[0]: row[1:]
         for row in conn.execute(
-            "SELECT name, path, bytes, loaded_at FROM tunnel.scan_file WHERE survey_id = %s", [survey.id]
+            "SELECT f.name, f.path, f.bytes, f.loaded_at, ARRAY(SELECT k.km FROM tunnel.file_km k"
+            " WHERE k.file_id = f.id AND k.rows > 0 ORDER BY k.km) FROM tunnel.scan_file f WHERE f.survey_id = %s",
+            [survey.id],
         ).fetchall()
     }
     files = []
@@ -184,72 +192,17 @@ def _headers(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path
             header = read_header(path)
             points = header.points
             check_header(header, survey.intensity_dimension, survey.srid, needs_time=mobile)
+            if path.name in read and _untouched(path, size, *read[path.name][:3]):
+                files.append(Incoming(path.name, path, size, points, tuple(read[path.name][3]), already_read=True))
+                continue
+            expected = expected_kilometres(header, alignment, reach, wanted)
         except UserError as error:
-            touched = _damaged_kilometres(path, alignment, reach)
-            first, last = (touched[0], touched[-1]) if touched else (None, None)
-            files.append(Incoming(path.name, path, size, points, first, last, str(error)))
+            near = tuple(kilometres_near_damaged(path, alignment, reach))
+            failing = tuple(damaged_kilometres(path, alignment, reach))
+            files.append(Incoming(path.name, path, size, points, near, failing, str(error)))
             continue
-        touched = header_kilometres(header, alignment, reach)
-        if not touched:
-            off = f"{path}: its points lie off the given axis of tunnel {survey.tunnel}; does the file belong to this tunnel?"
-            files.append(Incoming(path.name, path, size, points, error=off))
-            continue
-        already_read = path.name in read and _untouched(path, size, *read[path.name])
-        files.append(Incoming(path.name, path, size, points, touched[0], touched[-1], None, already_read))
+        files.append(Incoming(path.name, path, size, points, tuple(expected or ()), tuple(expected or ())))
     return files
-
-
-def _near_damaged(conn: psycopg.Connection[Any], survey: Survey, files: Sequence[Incoming], reach: float) -> set[int]:
-    """Return the kilometres that unreadable files may touch; they are requested like those of readable files."""
-    damaged = [header for file in files if file.error and (header := _damaged_header(file.path)) is not None]
-    if not damaged:
-        return set()
-    alignment = load_alignment(conn, survey)
-    return {km for header in damaged for km in header_kilometres(header, alignment, reach)}
-
-
-def _damaged_header(path: Path) -> ScanHeader | None:
-    """Return the header of an unreadable file with its box, if that is readable."""
-    box = header_box(path) if format_of(path).is_las else None
-    return None if box is None else ScanHeader(path, 0, (), None, np.array(box[0]), np.array(box[1]))
-
-
-def _damaged_kilometres(path: Path, alignment: Alignment, reach: float) -> range:
-    """Return the kilometres that fail with an unreadable file: those of its box, if that is readable."""
-    header = _damaged_header(path)
-    return range(0) if header is None else _inner_kilometres(header, alignment, reach)
-
-
-def _inner_kilometres(header: ScanHeader, alignment: Alignment, reach: float) -> range:
-    """Return the kilometres in which the axis crosses the box of a file, not just near its ends; empty if none."""
-    ends = extent(header, alignment, reach)
-    return range(0) if ends is None else range(int(ends[0] // KILOMETRE), int(ends[1] // KILOMETRE) + 1)
-
-
-def extent(header: ScanHeader, alignment: Alignment, reach: float) -> tuple[float, float] | None:
-    """Return the first and last chainage of a file, by its box; rather too short than too long.
-
-    The part of the axis within the reach of the box is shortened at both ends by 1.5 times the reach, since the box may be
-    oblique to the axis, and by one step of the axis.
-
-    Parameters
-    ----------
-    header : ScanHeader
-    alignment : Alignment
-        Given axis.
-    reach : float
-        Greatest distance of the tunnel from the axis, m.
-
-    Returns
-    -------
-    tuple or None
-        Two chainages, m; None if the file is not near the axis.
-    """
-    chainage = chainages_near(header, alignment, reach)
-    if not len(chainage):
-        return None
-    margin = min(1.5 * reach + alignment.spacing, float(np.ptp(chainage)) / 2.0)
-    return float(chainage.min()) + margin, float(chainage.max()) - margin
 
 
 def restrict_failed_file(conn: psycopg.Connection[Any], survey: Survey, name: str) -> None:
@@ -266,7 +219,7 @@ def restrict_failed_file(conn: psycopg.Connection[Any], survey: Survey, name: st
         if row is None or not Path(row[0]).is_file():
             return
         reach = settings_of(row[1]).max_distance
-        damaged = _damaged_kilometres(Path(row[0]), load_alignment(conn, survey), reach)
+        damaged = damaged_kilometres(Path(row[0]), load_alignment(conn, survey), reach)
         if damaged:
             conn.execute(
                 "UPDATE tunnel.incoming SET km_from = %s, km_to = %s WHERE survey_id = %s AND name = %s",
@@ -281,12 +234,9 @@ def _untouched(path: Path, size: int, known_path: str, known_size: int, read_at:
     return str(path) == known_path and size == known_size and max(stat.st_mtime, stat.st_ctime) < read_at.timestamp()
 
 
-def _kilometres(file: Incoming) -> range:
-    return range(0) if file.km_from is None or file.km_to is None else range(file.km_from, file.km_to + 1)
-
-
 def _touches(file: Incoming, kilometres: range) -> bool:
-    return any(km in kilometres for km in _kilometres(file))
+    """Return True if a file may have points in some kilometres; a file of unknown place may."""
+    return not file.touched or any(km in kilometres for km in file.touched)
 
 
 def _goals(conn: psycopg.Connection[Any], survey: Survey) -> set[int]:
@@ -301,8 +251,7 @@ def register(conn: psycopg.Connection[Any], survey: Survey, asked: Plan, *, retr
     """Record the request of a batch, and defer the jobs that are ready, in one transaction; return their number.
 
     Earlier requests stay: a kilometre is processed to the later one of two stages, and parameters that are not set keep their
-    values.
-    set keep their values.
+    values. The files keep the request, too: it is for the kilometres that their points turn out to lie in.
 
     Parameters
     ----------
@@ -314,6 +263,7 @@ def register(conn: psycopg.Connection[Any], survey: Survey, asked: Plan, *, retr
         with conn.cursor() as cursor:
             cursor.executemany(_INCOMING, [_row(survey, file, asked) for file in asked.files if not file.already_read])
             cursor.executemany(_GOAL, [_goal(survey, km, asked) for km in asked.kilometres])
+        conn.execute(_REQUEST, _request(survey, asked))
         if retry:
             conn.execute("UPDATE tunnel.goal SET retry_after = clock_timestamp() WHERE survey_id = %s", [survey.id])
         row = conn.execute("SELECT tunnel_internal.queue_plan(%s)", [survey.id]).fetchone()
@@ -322,8 +272,9 @@ def register(conn: psycopg.Connection[Any], survey: Survey, asked: Plan, *, retr
 
 
 _INCOMING = """
-INSERT INTO tunnel.incoming AS i (survey_id, name, path, bytes, points, km_from, km_to, parameters, failed_at, message)
-VALUES (%(survey)s, %(name)s, %(path)s, %(bytes)s, %(points)s, %(km_from)s, %(km_to)s, %(parameters)s,
+INSERT INTO tunnel.incoming AS i (survey_id, name, path, bytes, points, km_from, km_to, parameters, kilometres,
+                                  failed_at, message)
+VALUES (%(survey)s, %(name)s, %(path)s, %(bytes)s, %(points)s, %(km_from)s, %(km_to)s, %(parameters)s, 'empty',
         CASE WHEN %(error)s::text IS NOT NULL THEN clock_timestamp() END, %(error)s)
 ON CONFLICT (survey_id, name) DO UPDATE
    SET path = excluded.path, bytes = excluded.bytes, points = excluded.points, km_from = excluded.km_from,
@@ -332,6 +283,15 @@ ON CONFLICT (survey_id, name) DO UPDATE
  WHERE i.failed_at IS NOT NULL OR excluded.failed_at IS NOT NULL
     OR (i.path, i.bytes, i.parameters) IS DISTINCT FROM (excluded.path, excluded.bytes, excluded.parameters)
 """
+
+_REQUEST = """
+UPDATE tunnel.incoming i
+   SET stage = (SELECT s.name FROM tunnel.stage s WHERE s.name IN (i.stage, %(stage)s) ORDER BY s.step DESC LIMIT 1),
+       stage_parameters = i.stage_parameters || %(parameters)s,
+       kilometres = range_merge(i.kilometres, %(kilometres)s::int4range)
+ WHERE i.survey_id = %(survey)s AND (%(names)s::text[] IS NULL OR i.name = ANY (%(names)s))
+"""
+"""The files of a request, or all that wait if it names none; a restriction that one of two requests lacks is dropped."""
 
 _GOAL = """
 INSERT INTO tunnel.goal AS g (survey_id, km, stage, parameters)
@@ -352,10 +312,21 @@ def _row(survey: Survey, file: Incoming, asked: Plan) -> dict[str, Any]:
         "path": str(file.path),
         "bytes": file.bytes,
         "points": file.points,
-        "km_from": file.km_from,
-        "km_to": file.km_to,
+        "km_from": min(file.awaited, default=None),
+        "km_to": max(file.awaited, default=None),
         "parameters": Jsonb(asked.reading),
         "error": file.error,
+    }
+
+
+def _request(survey: Survey, asked: Plan) -> dict[str, Any]:
+    named = bool(asked.files or asked.skipped)
+    return {
+        "survey": survey.id,
+        "stage": asked.stage or (STAGE_NAMES[-1] if named else None),
+        "parameters": Jsonb(asked.parameters),
+        "kilometres": None if asked.only is None else Range(asked.only[0], asked.only[-1] + 1),
+        "names": [file.name for file in asked.files] if named else None,
     }
 
 
@@ -400,6 +371,22 @@ def failed_files(conn: psycopg.Connection[Any], survey: Survey) -> list[tuple[st
         "SELECT name, message FROM tunnel.incoming WHERE survey_id = %s AND failed_at IS NOT NULL ORDER BY km_from, name",
         [survey.id],
     ).fetchall()
+
+
+def only_loaded(conn: psycopg.Connection[Any], survey: Survey, asked: Plan, since: dt.datetime) -> list[int]:
+    """Return the kilometres that got points of files since a moment, and are not run because the batch is restricted."""
+    if asked.only is None or asked.stage == "load":
+        return []
+    rows = conn.execute(
+        """
+        SELECT DISTINCT k.km FROM tunnel.file_km k
+          JOIN tunnel.scan_file f ON f.id = k.file_id
+          JOIN tunnel.goal g ON g.survey_id = f.survey_id AND g.km = k.km AND g.stage = 'load'
+         WHERE f.survey_id = %s AND k.rows > 0 AND k.loaded_at >= %s AND k.km <> ALL (%s) ORDER BY k.km
+        """,
+        [survey.id, since, list(asked.only)],
+    ).fetchall()
+    return [row[0] for row in rows]
 
 
 def notes_of_files(conn: psycopg.Connection[Any], survey: Survey, since: dt.datetime) -> list[tuple[str, str]]:

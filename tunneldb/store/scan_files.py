@@ -70,13 +70,14 @@ class Recorded:
 class Content:
     """A file that was read, as it is to be recorded; srid is that of the tunnel, if the file states one.
 
-    intensity_note is a doubt about its intensity.
+    header_note states a difference between its header and its points, intensity_note a doubt about its intensity.
     """
 
     path: Path
     checksum: str
     bytes: int
     srid: int | None
+    header_note: str | None
     intensity_note: str | None
     counts: FilterCounts
 
@@ -159,15 +160,17 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
     row = conn.execute(
         """
         INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, invalid, unposed,
-                                      thinned, kept, chainage_from, chainage_to, extent, srid, intensity_note, pose_note,
+                                      thinned, kept, chainage_from, chainage_to, extent, srid, header_note,
+                                      intensity_note, pose_note,
                                       beyond_before, beyond_after, reach_before, reach_after)
-        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s)
+        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s)
         ON CONFLICT (survey_id, name) DO UPDATE
            SET path = excluded.path, checksum = excluded.checksum, bytes = excluded.bytes, points = excluded.points,
                noise = excluded.noise, outside = excluded.outside, invalid = excluded.invalid, unposed = excluded.unposed,
                thinned = excluded.thinned, kept = 0,
                chainage_from = excluded.chainage_from, chainage_to = excluded.chainage_to, extent = excluded.extent,
-               srid = excluded.srid, intensity_note = excluded.intensity_note, pose_note = excluded.pose_note,
+               srid = excluded.srid, header_note = excluded.header_note, intensity_note = excluded.intensity_note,
+               pose_note = excluded.pose_note,
                beyond_before = excluded.beyond_before, beyond_after = excluded.beyond_after,
                reach_before = excluded.reach_before, reach_after = excluded.reach_after
         RETURNING id
@@ -187,6 +190,7 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
             *chainage,
             counts.extent.tolist(),
             content.srid,
+            content.header_note,
             content.intensity_note,
             counts.pose_note,
             *counts.beyond,

@@ -6,7 +6,7 @@ import datetime as dt
 from typing import Any
 
 from sqlalchemy import REAL, BigInteger, Column, Double, Identity, Index, Integer, SmallInteger, Table, UniqueConstraint, text
-from sqlalchemy.dialects.postgresql import INT8MULTIRANGE
+from sqlalchemy.dialects.postgresql import INT4RANGE, INT8MULTIRANGE
 from sqlalchemy.orm import Mapped, mapped_column
 
 from tunneldb.database.models.base import CLOCK, KM, NOW, SURVEY, Base, geometry, parent
@@ -61,6 +61,7 @@ class ScanFile(Base):
         comment="Doubts about its intensity: saturated, or another kind by its values"
     )
     pose_note: Mapped[str | None] = mapped_column(comment="Doubts about the scanner positions of its points")
+    header_note: Mapped[str | None] = mapped_column(comment="Difference between the header and the points, with both values")
     srid: Mapped[int | None] = mapped_column(comment="Spatial reference that the file states, if it states one")
     loaded_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="Time of loading")
 
@@ -99,9 +100,22 @@ class Incoming(Base):
     path: Mapped[str] = mapped_column(comment="Path of the file")
     bytes: Mapped[int] = mapped_column(BigInteger, comment="Size of the file, bytes")
     points: Mapped[int] = mapped_column(BigInteger, comment="Points that its header announces; 0 if it is unreadable")
-    km_from: Mapped[int | None] = mapped_column(comment="First kilometre that it may touch, by its header's box")
-    km_to: Mapped[int | None] = mapped_column(comment="Last kilometre that it may touch, by its header's box")
+    km_from: Mapped[int | None] = mapped_column(
+        comment="First kilometre that it probably touches, by header or sample; NULL if unknown. The points decide"
+    )
+    km_to: Mapped[int | None] = mapped_column(
+        comment="Last kilometre that it probably touches, by header or sample; NULL if unknown. The points decide"
+    )
     parameters: Mapped[dict[str, Any]] = mapped_column(server_default=text("'{}'"), comment="Parameters of reading")
+    stage: Mapped[str | None] = mapped_column(
+        comment="Last stage to run in the kilometres that get points of it; NULL for load"
+    )
+    stage_parameters: Mapped[dict[str, Any]] = mapped_column(
+        server_default=text("'{}'"), comment="Parameters of the stages in these kilometres"
+    )
+    kilometres: Mapped[Any | None] = mapped_column(
+        INT4RANGE, comment="Kilometres that are run up to this stage, others are only loaded; NULL for all"
+    )
     requested_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time of the request")
     failed_at: Mapped[dt.datetime | None] = mapped_column(comment="Time of the failure")
     message: Mapped[str | None] = mapped_column(comment="Why it failed")

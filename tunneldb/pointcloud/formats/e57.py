@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from itertools import product
+from itertools import islice, product
 from pathlib import Path
 from typing import Any
 
@@ -134,6 +134,7 @@ def read_e57_header(path: Path) -> ScanHeader:
         np.min([low for low, _ in boxes], axis=0),
         np.max([high for _, high in boxes], axis=0),
         unread,
+        tight=False,
     )
 
 
@@ -166,6 +167,20 @@ def read_e57(
             return
         for begin, end in requested:
             yield from cursor.read(begin, end)
+
+
+def read_e57_beginnings(path: Path, scans: int, size: int) -> Iterator[Raw]:
+    """Read the first `size` points of at most `scans` scans, spread evenly over an E57 file; less the invalid ones.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    with open_e57(path) as image, decoding(path, KIND):
+        every = scans_of(path, image)
+        for index in np.unique(np.linspace(0, len(every) - 1, min(scans, len(every))).astype(int)).tolist():
+            yield from islice(_read_scan(image, every[index], None, size), 1)
 
 
 class _Cursor:

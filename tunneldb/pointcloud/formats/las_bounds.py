@@ -18,6 +18,7 @@ _VARIABLE_CHUNKS = 0xFFFFFFFF
 POINTWISE = 1
 """Compressor of LASzip before 2.0: one run of points, without a chunk table."""
 
+_INTERNAL_WAVEFORMS = 1 << 1  # of the header's flags
 _STREAMED = -1  # the offset of the chunk table is in the file's last 8 bytes
 _MAX_CHUNK = 1 << 32  # bytes
 _BOX_AT = 179
@@ -60,14 +61,15 @@ def check_envelope(path: Path) -> None:
         (header_size,) = struct.unpack_from("<H", head, 94)
         points_at, vlrs, point_format, record, count = struct.unpack_from("<IIBHI", head, 96)
         if head[25] >= 4:  # minor version
-            (count,) = struct.unpack_from("<Q", head, 247)
+            count = struct.unpack_from("<Q", head, 247)[0] or count  # some writers fill the field of older versions alone
         if not header_size + vlrs * _VLR_BYTES <= points_at <= size:
             raise ValueError(f"its header states {vlrs} records before byte {points_at}, but the file has {size} bytes")
         if point_format < 128:  # not compressed
             if points_at + count * record > size:
                 raise ValueError(f"its header states {count} points, but the file has space for {(size - points_at) // record}")
+            _require_all_stated(count, _end_of_points(head, size) - points_at, record)
             return
-        place = header_size
+        place, fixed = header_size, None
         for _ in range(vlrs):
             file.seek(place)
             number, length = struct.unpack_from("<HH", file.read(_VLR_BYTES), 18)
@@ -84,6 +86,7 @@ def check_envelope(path: Path) -> None:
                     raise ValueError(f"the items of its points do not make up {record} bytes")
                 if chunk != _VARIABLE_CHUNKS and chunk * record > _MAX_CHUNK:
                     raise ValueError(f"its chunks would have {chunk} points")
+                fixed = chunk if 0 < chunk < _VARIABLE_CHUNKS else None
             place += length
         file.seek(points_at)
         (table_at,) = struct.unpack("<q", file.read(8))
@@ -96,3 +99,27 @@ def check_envelope(path: Path) -> None:
         version, chunks = struct.unpack("<II", file.read(8))
         if version != 0 or chunks > max(count, 1):
             raise ValueError(f"its chunk table is damaged: version {version}, {chunks} chunks for {count} points")
+        if fixed is not None and chunks > max(-(-count // fixed), 1):
+            raise ValueError(f"its header states {count} points, but it has {chunks} chunks of {fixed} points; export it again")
+
+
+def _end_of_points(head: bytes, size: int) -> int:
+    """Return the offset at which uncompressed points end at the latest: before extended records or waveforms."""
+    ends = [size]
+    (points_at,) = struct.unpack_from("<I", head, 96)
+    if head[25] >= 3 and struct.unpack_from("<H", head, 6)[0] & _INTERNAL_WAVEFORMS:
+        ends += struct.unpack_from("<Q", head, 227)
+    if head[25] >= 4:
+        place, number = struct.unpack_from("<QI", head, 235)
+        ends += [place] if number else []
+    return min(end for end in ends if end >= points_at)
+
+
+def _require_all_stated(count: int, room: int, record: int) -> None:
+    """Refuse a file with more points than its header states: its writer was interrupted before it wrote the number.
+
+    Other bytes may follow the points; only a whole number of points is taken for points, or anything if none is stated.
+    """
+    there = room // max(record, 1)
+    if there > count and (count == 0 or room % record == 0):
+        raise ValueError(f"its header states {count} points, but it contains {there}; export it again")
