@@ -97,7 +97,8 @@ def test_space_is_computed_from_rows_surface_and_kilometres(conn: psycopg.Connec
     seen = preview(conn, survey, asked, None, embedded=True, workers=1)
     low, high = seen.stretches["from-2000.laz"]
     assert high - low == pytest.approx(980, abs=10)  # without the tails
-    assert seen.rows.low < seen.rows.likely < seen.rows.high == COUNT  # so few points are noise, perhaps
+    assert seen.rows.low < seen.rows.likely < seen.rows.high  # so few points are noise, perhaps
+    assert seen.rows.high == pytest.approx(COUNT, rel=0.01)
     rows, share = seen.rows.likely, 1 / len(asked.kilometres)
     assert seen.disk.points == ROW_BYTES * rows
     assert seen.disk.passing == pytest.approx((FRAGMENT_BYTES + ROW_BYTES * share) * rows)

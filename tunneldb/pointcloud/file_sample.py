@@ -10,7 +10,7 @@ import numpy as np
 from tunneldb.arrays import Float
 from tunneldb.pointcloud.formats.e57 import read_e57_beginnings
 from tunneldb.pointcloud.formats.table import format_of
-from tunneldb.pointcloud.points import CHUNK, Points, on_earth
+from tunneldb.pointcloud.points import CHUNK, Points
 
 BLOCK = 50_000
 """Points of a chunk of LAZ: a run that begins with a chunk is decoded without the points before it."""
@@ -40,7 +40,7 @@ def read_runs(path: Path, points: int, runs: int, length: int) -> Iterator[Float
     form = format_of(path)
     if form.name == "E57":
         for raw in read_e57_beginnings(path, runs, length):
-            yield _valid(Points.of(raw).xyz)
+            yield Points.of(raw).located().xyz
         return
     blocks = max(-(-points // BLOCK), 1)
     begins = np.unique(np.linspace(0, blocks - 1, min(runs, blocks)).astype(int)) * BLOCK
@@ -48,12 +48,8 @@ def read_runs(path: Path, points: int, runs: int, length: int) -> Iterator[Float
     parts, missing = [np.empty((0, 3))], iter([end - begin for begin, end in ranges])
     left = next(missing)
     for raw in form.read(path, None, CHUNK, ranges):  # a range may come in parts
-        parts.append(Points.of(raw).xyz)
+        parts.append(Points.of(raw).located().xyz)
         left -= len(raw)
         if left <= 0:
-            yield _valid(np.concatenate(parts))
+            yield np.concatenate(parts)
             parts, left = [np.empty((0, 3))], next(missing, 0)
-
-
-def _valid(xyz: Float) -> Float:
-    return np.asarray(xyz[on_earth(xyz).all(axis=1)])

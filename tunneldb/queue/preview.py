@@ -54,7 +54,7 @@ EDGE = 35.0
 TAIL = 0.01
 """Share of a file's points beyond each end of its stretch: a scan thins out."""
 
-SAMPLED_FILES, SAMPLED_RUNS = 40, 80
+SAMPLED_FILES, SAMPLED_RUNS = 40, 40
 """Number of files and of runs of points from which rows are estimated."""
 
 PLACE_BYTES = 24.0

@@ -17,7 +17,7 @@ from tunneldb.arrays import Float
 from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, line_of, require_dimension
 from tunneldb.pointcloud.formats.las_bounds import POINTWISE, check_envelope
-from tunneldb.pointcloud.formats.laz_chunks import VariedChunks
+from tunneldb.pointcloud.formats.laz_chunks import VariedChunks, count_points
 from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
 from tunneldb.threads import threads
 
@@ -61,10 +61,13 @@ def read_las_header(path: Path) -> ScanHeader:
     with decoding(path, KIND):
         check_envelope(path)
         las = laspy.open(path)
-    with decoding(path, KIND), las:
+    with decoding(path, KIND), las, path.open("rb") as source:
         header = las.header
         dimensions = _dimensions(header)
         scales, offsets, count = header.scales, header.offsets, int(header.point_count)
+        stored = count_points(source, header)
+        if stored is not None and stored != count:
+            raise ValueError(f"its header states {count} points, but it contains {stored}; export it again")
         crs, unread = None, ""
         try:
             crs = header.parse_crs()

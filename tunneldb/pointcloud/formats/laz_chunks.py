@@ -16,6 +16,26 @@ from laspy import DecompressionSelection
 from numpy.typing import NDArray
 
 
+LAYERED = 6
+"""First point format whose chunks state their number of points."""
+
+
+def count_points(source: BinaryIO, header: laspy.LasHeader) -> int | None:
+    """Return the number of points in the chunks of a LAZ file, whatever its header states; None if they do not state it.
+
+    Source: LASzip, chunks of layered points: the first point as it is, then the number of points, 32 bits.
+    """
+    if not header.are_points_compressed or header.point_format.id < LAYERED or VariedChunks.has(header):
+        return None
+    vlr = lazrs.LazVlr(header.vlrs.get("LasZipVlr")[0].record_data)
+    source.seek(header.offset_to_point_data)
+    sizes = [size for _, size in lazrs.read_chunk_table(source, vlr)]
+    if not sizes:
+        return 0
+    source.seek(header.offset_to_point_data + 8 + sum(sizes[:-1]) + header.point_format.size)
+    return (len(sizes) - 1) * int(vlr.chunk_size()) + int.from_bytes(source.read(4), "little")
+
+
 class VariedChunks:
     """Chunks of a LAZ file.
 
