@@ -178,7 +178,10 @@ def test_boxes_are_compared_up_to_a_metre(low: tuple, high: tuple, tight: bool, 
     assert note is None or f"states the box {differs}, but" in note
 
 
-@pytest.mark.parametrize(("name", "count", "stated"), [("a.las", 0, 0), ("a.las", 3000, 3000), ("a.laz", 30_000, 30_000), ("a.laz", 113_000, 113_000)])
+@pytest.mark.parametrize(
+    ("name", "count", "stated"),
+    [("a.las", 0, 0), ("a.las", 3000, 3000), ("a.laz", 30_000, 30_000), ("a.laz", 113_000, 113_000)],
+)
 def test_a_file_with_more_points_than_its_header_states_is_refused(tmp_path: Path, name: str, count: int, stated: int) -> None:
     path = write(tmp_path / name, tube(*BOTH, 150.0, 1))
     there = read_header(path).points
@@ -188,3 +191,13 @@ def test_a_file_with_more_points_than_its_header_states_is_refused(tmp_path: Pat
     with pytest.raises(UserError, match=f"its header states {stated} points, but it") as refused:
         read_header(path)
     assert name.endswith("z") or f"contains {there}" in str(refused.value)
+
+
+def test_a_ply_with_more_vertices_than_its_header_states_is_refused(tmp_path: Path) -> None:
+    path, head = tmp_path / "a.ply", "ply\nformat binary_little_endian 1.0\nelement vertex 2\n"
+    head += "".join(f"property double {name}\n" for name in "xyz") + "end_header\n"
+    path.write_bytes(head.encode() + np.zeros((3, 3)).tobytes())
+    with pytest.raises(UserError, match="its header states 2 vertices, but it contains 3"):
+        read_header(path)
+    path.write_bytes(head.encode() + np.zeros((2, 3)).tobytes())
+    assert read_header(path).points == 2

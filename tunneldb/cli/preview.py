@@ -72,7 +72,7 @@ def _disk(seen: Preview) -> list[RenderableType]:
     disk = seen.disk
     need = (
         f"disk needed: about {size(disk.total)} ({size(seen.need.low)} to {size(seen.need.high)}; points {size(disk.points)},"
-        f" in passing {size(disk.passing)}, images {size(disk.images)}, others {size(disk.others)}, write-ahead log up to"
+        f" in passing {size(disk.passing)}, images {size(disk.images)}, others {size(disk.others)}, write-ahead log"
         f" {size(disk.wal)})"
     )
     low, high = seen.temporary.low, seen.temporary.high

@@ -10,6 +10,7 @@ import numpy as np
 
 from tunneldb.errors import InputError
 from tunneldb.geometry.crs import LOCAL, describe_crs, describe_srid, fits_srid, horizontal, is_local, srid_name
+from tunneldb.pointcloud.file_sample import read_runs
 from tunneldb.pointcloud.formats.faults import require_dimension
 from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.formats.table import format_of, require_known
@@ -18,6 +19,7 @@ from tunneldb.pointcloud.points import CHUNK, Points, Ranges, ScanHeader
 __all__ = ["CHUNK", "Points", "ScanHeader", "check_header", "read_chunks", "read_header"]
 
 _DEGREES = 360.0  # of longitude; greater coordinates are lengths
+_RUNS, _RUN_POINTS = 5, 100  # of a sample that shows whether coordinates are degrees
 
 
 def read_header(path: Path) -> ScanHeader:
@@ -36,10 +38,10 @@ def _without_wrong_crs(header: ScanHeader) -> ScanHeader:
     """Remove a coordinate system in degrees if the coordinates can't be degrees: exporters write a default system."""
     if header.crs is None or not horizontal(header.crs).is_geographic:
         return header
-    corners = np.array([header.low[:2], header.high[:2]])
-    if not np.isfinite(corners).all() or np.abs(corners).max() <= _DEGREES:
+    plan = np.concatenate(list(read_runs(header.path, header.points, _RUNS, _RUN_POINTS)))[:, :2]  # its box may be wrong
+    if not len(plan) or np.abs(plan).max() <= _DEGREES:
         return header
-    x, y = header.low[:2]
+    x, y = plan[0]
     reason = f"{describe_crs(header.crs)} is in degrees, but x = {x:.0f}, y = {y:.0f} are not"
     return replace(header, crs=None, unread_crs=reason)
 

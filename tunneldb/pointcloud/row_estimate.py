@@ -32,6 +32,9 @@ RUNS_PER_BIN = 4
 SATURATED = 5.0
 """Points for each voxel from which more points occupy no more voxels."""
 
+MIN_FILLED = 0.3
+"""Occupied voxels of a dense place, as a share of the density, at least for its number of points."""
+
 FILLED_QUANTILE = 0.6
 """Quantile of the occupied voxels of sampled places: some of them are covered in part only."""
 
@@ -185,21 +188,30 @@ def _outline(across: Float) -> tuple[Int64, Float]:
 def _filled_share(placed: Float, xyz: Float, number: Int64, bins: _Bins, density: float) -> float:
     """Return the voxels for each m² that a dense scan occupies, as a share of the density; 1 if the sample is not dense.
 
-    Metres of tunnel in a sector that a run covers with many points for each voxel are counted.
+    Places are metres of tunnel in a sector, or less where a run is shorter, that a run covers with many points for each voxel.
     """
-    metre = np.floor(placed[:, 0]).astype(np.int64)
-    place = _keys(np.column_stack([number, metre, bins.cell]))
-    _, place_of, counts = np.unique(place, return_inverse=True, return_counts=True)
-    voxel = np.floor(xyz / voxel_edge(density)).astype(np.int64)
+    edge = voxel_edge(density)
+    along = placed[:, 0] - _least(placed[:, 0], number)[number]  # from the beginning of its run
+    _, place, counts = np.unique(
+        _keys(np.column_stack([number, along.astype(np.int64), bins.cell])), return_inverse=True, return_counts=True
+    )
+    voxel = np.floor(xyz / edge).astype(np.int64)
     first = np.unique(_keys(np.column_stack([number, voxel])), return_index=True)[1]  # one across places counts once
-    occupied = np.bincount(place_of[first], minlength=len(counts))
-    width = np.zeros(len(counts))
-    width[place_of] = bins.width[bins.cell]
-    dense: Bool = counts >= SATURATED * np.maximum(occupied, 0.3 * density * width)
-    dense &= width > 0.0
+    occupied = np.bincount(place[first], minlength=len(counts))
+    left = -_least(-along, number)[number] - np.floor(along) + edge  # to the end of its run
+    area = np.zeros(len(counts))
+    area[place] = bins.width[bins.cell] * np.minimum(left, 1.0)
+    dense: Bool = (counts >= SATURATED * np.maximum(occupied, MIN_FILLED * density * area)) & (area > 0.0)
     if np.count_nonzero(dense) < SECTORS:
         return 1.0
-    return float(np.quantile(occupied[dense] / (density * width[dense]), FILLED_QUANTILE))
+    return float(np.quantile(occupied[dense] / (density * area[dense]), FILLED_QUANTILE))
+
+
+def _least(values: Float, group: Int64) -> Float:
+    """Return the least value of each group, numbered from 0."""
+    least = np.full(int(group.max()) + 1, np.inf)
+    np.minimum.at(least, group, values)
+    return least
 
 
 def _keys(columns: Int64) -> UInt64:

@@ -57,6 +57,9 @@ TAIL = 0.01
 SAMPLED_FILES, SAMPLED_RUNS = 40, 40
 """Number of files and of runs of points from which rows are estimated."""
 
+WAL_BYTES = (300.0, 600.0, 1000.0)
+"""Low, likely and high bytes of write-ahead log per row."""
+
 PLACE_BYTES = 24.0
 """Bytes in the temporary folder per point of a file that is being read."""
 
@@ -75,7 +78,7 @@ class Disk:
     passing : float
         Temporary data: points that were read but not yet loaded, and kilometres that are being rewritten.
     wal : float
-        Greatest size of the write-ahead log: ``max_wal_size``, which a batch fills and which stays in use.
+        Size of the write-ahead log, at most ``max_wal_size``: it stays in use.
     """
 
     points: float
@@ -202,8 +205,8 @@ def preview(
     wal = conn.execute("SELECT pg_size_bytes(current_setting('max_wal_size'))").fetchone()
     assert wal is not None
     low, disk, high = (
-        _disk(plan, count, area, length or KILOMETRE * len(plan.kilometres), workers, float(wal[0]))
-        for count in (rows.low, rows.likely, rows.high)
+        _disk(plan, count, area, length or KILOMETRE * len(plan.kilometres), workers, min(log * count, float(wal[0])))
+        for count, log in zip((rows.low, rows.likely, rows.high), WAL_BYTES, strict=True)
     )
     folder = Server().home().cluster if embedded else None
     temporary_folder = Path(tempfile.gettempdir())

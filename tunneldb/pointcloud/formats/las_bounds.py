@@ -118,7 +118,7 @@ def _end_of_points(head: bytes, size: int) -> int:
 def _require_all_stated(count: int, room: int, record: int) -> None:
     """Refuse a file with more points than its header states: its writer was interrupted before it wrote the number.
 
-    Other bytes may follow the points; only a whole number of points is taken for points, or anything if none is stated.
+    Other bytes may follow the points; they count as points if they make up whole ones, or if the header states none.
     """
     there = room // max(record, 1)
     if there > count and (count == 0 or room % record == 0):

@@ -15,7 +15,6 @@ import numpy as np
 from laspy import DecompressionSelection
 from numpy.typing import NDArray
 
-
 LAYERED = 6
 """First point format whose chunks state their number of points."""
 

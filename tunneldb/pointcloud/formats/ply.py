@@ -48,6 +48,8 @@ class Vertices:
     count : int
     offset : int
         Start of the vertices in a binary file, bytes.
+    last : bool
+        True if no other element follows the vertices.
     """
 
     order: str
@@ -55,6 +57,7 @@ class Vertices:
     types: tuple[str, ...]
     count: int
     offset: int
+    last: bool
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -119,6 +122,11 @@ def _look_through(path: Path, version: tuple[int, int]) -> tuple[Vertices, TextC
             raise InputError(
                 f"{path}: truncated: its header states {found.count} vertices, but the file has space for "
                 f"{(size - found.offset) // found.dtype.itemsize}"
+            )
+        beyond, rest = divmod(size - found.offset - found.count * found.dtype.itemsize, found.dtype.itemsize)
+        if found.last and beyond and not rest:
+            raise InputError(
+                f"{path}: its header states {found.count} vertices, but it contains {found.count + beyond}; export it again"
             )
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for at in range(0, found.count, CHUNK):
@@ -199,4 +207,4 @@ def _vertices(path: Path, order: str, elements: list[tuple[str, int, list[tuple[
     if missing or len(set(names)) < len(names):
         wrong = f"no property {', '.join(missing)}" if missing else "a property twice"
         raise InputError(f"{path}: its vertices have {wrong}: {', '.join(name for name, _ in properties)}")
-    return Vertices(order, names, tuple(kind for _, kind in properties), count, offset)
+    return Vertices(order, names, tuple(kind for _, kind in properties), count, offset, elements[-1][0] == "vertex")
