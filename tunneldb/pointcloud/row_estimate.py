@@ -35,6 +35,9 @@ SATURATED = 5.0
 MIN_FILLED = 0.3
 """Occupied voxels of a dense place, as a share of the density, at least for its number of points."""
 
+MIN_AROUND = 0.5
+"""Share of the sectors in which the metres of a run have points, from which its scanner measures profiles."""
+
 FILLED_QUANTILE = 0.6
 """Quantile of the occupied voxels of sampled places: some of them are covered in part only."""
 
@@ -189,6 +192,7 @@ def _filled_share(placed: Float, xyz: Float, number: Int64, bins: _Bins, density
     """Return the voxels for each m² that a dense scan occupies, as a share of the density; 1 if the sample is not dense.
 
     Places are metres of tunnel in a sector, or less where a run is shorter, that a run covers with many points for each voxel.
+    A static scanner turns: its runs cover no cross-section, so places are covered in part; but it leaves no gaps either.
     """
     edge = voxel_edge(density)
     along = placed[:, 0] - _least(placed[:, 0], number)[number]  # from the beginning of its run
@@ -202,7 +206,8 @@ def _filled_share(placed: Float, xyz: Float, number: Int64, bins: _Bins, density
     area = np.zeros(len(counts))
     area[place] = bins.width[bins.cell] * np.minimum(left, 1.0)
     dense: Bool = (counts >= SATURATED * np.maximum(occupied, MIN_FILLED * density * area)) & (area > 0.0)
-    if np.count_nonzero(dense) < SECTORS:
+    metres = len(np.unique(_keys(np.column_stack([number, along.astype(np.int64)]))))
+    if np.count_nonzero(dense) < SECTORS or len(counts) < MIN_AROUND * SECTORS * metres:
         return 1.0
     return float(np.quantile(occupied[dense] / (density * area[dense]), FILLED_QUANTILE))
 
