@@ -80,6 +80,10 @@ def test_two_scans_from_one_tripod_fit() -> None:
     assert find_misfits(*joined([PARTS[0], PARTS[0]]), SCANS[:2], STATIONS[[0, 0]]) == []
 
 
+def test_stations_in_feet_are_found() -> None:
+    assert [one.scan_id for one in find_misfits(*joined(PARTS), SCANS, STATIONS / 0.3048)] == [1, 2, 3]
+
+
 def test_directions_are_even_from_the_station_only() -> None:
     whole, filled = evenness(PARTS[0], STATIONS[0])
     assert filled > 0.9

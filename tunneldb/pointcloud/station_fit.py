@@ -18,9 +18,10 @@ SAME_PLACE = 0.001
 """Greatest distance of stations at one place, m."""
 
 _AZIMUTHS, _ELEVATIONS = 36, 16  # cells of 10 by 11 degrees
-_DIRECTIONS = 3000  # points whose directions are counted
+_DIRECTIONS = 2000  # points whose directions are counted
 _STEP = 1.0  # m between places that are tried
-_MAX_PLACES = 200
+_MAX_PLACES = 100
+_MOVE, _MOVES = 0.4, 8  # m, and number of moves to the most even place near the best that was tried
 _MIN_EVENNESS, _MIN_FILLING = 0.5, 0.85  # of directions as a scanner measures them
 _GAIN, _FACTOR = 0.12, 1.5  # by which another place is more even than the station
 
@@ -108,16 +109,27 @@ def _look(place: Float, part: Intp, station: Float) -> _Look:
     few = place[part[np.linspace(0, len(part) - 1, min(len(part), _DIRECTIONS)).astype(int)]]
     low, first, middle, third, high = np.percentile(few[:, 0], [1.0, 25.0, 50.0, 75.0, 99.0])
     step = max(_STEP, (high - low) / _MAX_PLACES)
-    tried = np.arange(low, high + step, step)
-    even = [evenness(few, np.array([along, *station[1:]])) for along in tried.tolist()]
-    best = int(np.argmax([one[0] for one in even]))
+    centre = np.percentile(few[:, 1:], [5.0, 95.0], axis=0).mean(axis=0)
+    tried = [np.array([along, *across]) for along in np.arange(low, high + step, step) for across in (station[1:], centre)]
+    best = _most_even(few, max(tried, key=lambda one: evenness(few, one)[0]))
+    there, filled = evenness(few, best)
     here = evenness(few, station)[0]
-    certain = even[best][0] >= _MIN_EVENNESS and even[best][1] >= _MIN_FILLING
-    if certain:
-        worse = even[best][0] > here + _GAIN and even[best][0] > _FACTOR * here
-        return _Look(float(tried[best]), 2.0, True, worse)
+    if there >= _MIN_EVENNESS and filled >= _MIN_FILLING:
+        return _Look(float(best[0]), 2.0, True, there > here + _GAIN and there > _FACTOR * here)
     outside = not low - MIN_SHIFT <= station[0] <= high + MIN_SHIFT
     return _Look(float(middle), float(third - first) / 2.0, False, outside)
+
+
+def _most_even(few: Float, place: Float) -> Float:
+    """Return the place near a place from which directions to points are most even."""
+    moves = _MOVE * np.concatenate([np.eye(3), -np.eye(3)])
+    best, most = place, evenness(few, place)[0]
+    for _ in range(_MOVES):
+        found = max((evenness(few, best + move)[0], k) for k, move in enumerate(moves))
+        if found[0] <= most:
+            break
+        best, most = best + moves[found[1]], found[0]
+    return best
 
 
 def _station_at(look: _Look, scan: int, where: dict[int, Float]) -> int | None:
