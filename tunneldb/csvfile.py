@@ -252,16 +252,19 @@ def _indices(
 
 
 def _number(path: Path, line: int, name: str, text: str, decimal_comma: bool) -> float:
-    text = text.strip()
-    comma = decimal_comma and _DECIMAL_COMMA.fullmatch(text)
     try:
-        value = float("nan" if NO_NUMBER.fullmatch(text) else text.replace(",", ".") if comma else text)
+        value = float(text)
     except ValueError:
-        raise InputError(f"{path}, line {line}: {_not_a_number(name, text)}") from None
+        text = text.strip()
+        if decimal_comma and _DECIMAL_COMMA.fullmatch(text):
+            return _number(path, line, name, text.replace(",", "."), False)
+        if not NO_NUMBER.fullmatch(text):
+            raise InputError(f"{path}, line {line}: {_not_a_number(name, text)}") from None
+        value = float("nan")
     if not abs(value) <= MAX_MEASUREMENT:  # also true for NaN
         nanoseconds = name == "time" and abs(value) > MAX_MEASUREMENT
         scaled = ", or divide the column by 1000000000 if it is in nanoseconds" if nanoseconds else ""
-        raise InputError(f"{path}, line {line}: {name} is {text}, not a plausible measurement; remove the line{scaled}")
+        raise InputError(f"{path}, line {line}: {name} is {text.strip()}, not a plausible measurement; remove the line{scaled}")
     return value
 
 

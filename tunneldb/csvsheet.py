@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import codecs
 import csv
-import io
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -20,6 +19,8 @@ if TYPE_CHECKING:
 
 _SEPARATORS = (";", "\t", ",", " ")
 _COMMENTS = ("#", "//")
+_FOREIGN = "cp1252"
+_BLOCK = 1 << 20  # bytes
 _BINARY = re.compile("[\0-\x08\x0e-\x19\x1b-\x1f]")
 
 
@@ -57,13 +58,14 @@ class Sheet:
         InputError
             If a row is longer or shorter.
         """
+        width = len(self.header)
         for row in self.body:
-            while len(row) > len(self.header) and not row[-1].strip():
+            while len(row) > width and not row[-1].strip():
                 row.pop()
             if not any(cell.strip(" \t\x1a") for cell in row):
                 continue
             line = self.skipped + self.body.line_num
-            if len(row) == len(self.header):
+            if len(row) == width:
                 yield line, row
             elif not row[0].lstrip().startswith(_COMMENTS):
                 comma = "" if self.decimal_comma or len(row) < len(self.header) else "; write decimals with a point"
@@ -81,16 +83,17 @@ class Sheet:
 def opened(path: Path) -> Iterator[Sheet]:
     """Open a CSV file; raise an error of one line if it cannot be read."""
     try:
-        text, foreign = decoded(path)
-        yield _sheet(path, text, foreign)
+        encoding = _encoding(path)
+        with path.open(encoding=encoding, errors="replace", newline="") as file:
+            yield _sheet(path, file, encoding == _FOREIGN)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
     except csv.Error as error:
         raise InputError(f"{path} is not a CSV file: {error}") from None
 
 
-def decoded(path: Path) -> tuple[str, bool]:
-    """Return the text of a file, and True if it is not Unicode but Windows-1252.
+def read_text(path: Path) -> str:
+    """Return the text of a small file in UTF-8, UTF-16 with a byte order mark, or else Windows-1252.
 
     Raises
     ------
@@ -98,19 +101,29 @@ def decoded(path: Path) -> tuple[str, bool]:
         If it is not text.
     OSError
     """
-    data, foreign = path.read_bytes(), False
-    try:
-        text = data.decode("utf-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig")
-    except UnicodeDecodeError:
-        text, foreign = data.decode("cp1252", "replace"), True
-    if _BINARY.search(text):
-        raise InputError(f"{path} is not a text file; save the table as CSV UTF-8")
-    return text, foreign
+    return path.read_text(_encoding(path), errors="replace")
 
 
-def _sheet(path: Path, text: str, foreign: bool) -> Sheet:
+def _encoding(path: Path) -> str:
+    """Return the encoding of a text file, which is read once, in blocks."""
+    with path.open("rb") as file:
+        wide = file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+        for encoding in ("utf-16" if wide else "utf-8-sig", _FOREIGN):
+            file.seek(0)
+            decoder = codecs.getincrementaldecoder(encoding)("replace" if encoding == _FOREIGN else "strict")
+            try:
+                while block := file.read(_BLOCK):
+                    if _BINARY.search(decoder.decode(block)):
+                        raise InputError(f"{path} is not a text file; save the table as CSV UTF-8")
+                decoder.decode(b"", final=True)
+            except UnicodeDecodeError:
+                continue
+            break
+    return encoding
+
+
+def _sheet(path: Path, lines: Iterator[str], foreign: bool) -> Sheet:
     """Find the header and the separator of a table."""
-    lines = io.StringIO(text, newline="")
     comment, header, skipped = "", "", 0
     for line in lines:
         bare = line.strip()

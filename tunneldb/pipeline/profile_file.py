@@ -12,7 +12,7 @@ import shapely
 
 from tunneldb.arrays import Float, Int64
 from tunneldb.csvfile import read_csv
-from tunneldb.csvsheet import decoded
+from tunneldb.csvsheet import read_text
 from tunneldb.errors import UserError
 from tunneldb.pipeline.profile_drawing import METRES, read_drawing
 from tunneldb.shape.outline import TOLERANCE, Outline
@@ -125,7 +125,7 @@ def _read_points(path: Path, origin: tuple[float, float], unit: str | None) -> R
     if unit is None:
         raise UserError(f"{path}: points state no unit; say it by --unit {'|'.join(METRES)}")
     try:
-        lines = decoded(path)[0].splitlines()
+        lines = read_text(path).splitlines()
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from None
     rows = []

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tunneldb.csvfile import find_column
-from tunneldb.csvsheet import decoded
+from tunneldb.csvsheet import read_text
 from tunneldb.errors import InputError
 
 COORDINATES = ("x", "y", "z")
@@ -95,7 +95,7 @@ def given_names(path: Path) -> tuple[list[str], str] | None:
     if file is None:
         return None
     try:
-        text, _ = decoded(file)
+        text = read_text(file)
     except OSError as error:
         raise InputError(f"{file}: cannot be read as column names: {error.strerror}") from None
     names = split_names(text.strip().strip("'"))  # cmd.exe writes the quotes of echo
