@@ -120,7 +120,7 @@ def estimate_rows(samples: Sequence[FileSample], alignment: Alignment, settings:
     if settings.edge is None or settings.density is None:
         return RowEstimate(total * (1.0 - noise) / SAMPLING, total * (1.0 - 0.5 * noise), total, total, area)
     filled = _filled_share(placed, xyz, number, bins, settings.density)
-    points = np.bincount(bins.cell, weight, len(bins.area))
+    points: Float = np.bincount(bins.cell, weight, len(bins.area)).astype(np.float64)
     low, likely, high = (
         float(_occupied(points, settings.density * filled * factor * bins.area).sum()) for factor in (SPREAD[0], 1.0, SPREAD[1])
     )
@@ -162,16 +162,16 @@ class _Bins:
         row = np.floor((chainage - first) / step).astype(np.int64)
         rows = int(row.max()) + 1
         self.cell = np.empty(len(placed), np.int64)
-        self.width = np.zeros((rows, SECTORS))
+        width = np.zeros((rows, SECTORS))
         length = np.zeros(rows)
         order = np.argsort(row, kind="stable")
         for part in np.split(order, np.flatnonzero(np.diff(row[order])) + 1):
             stretch = int(row[part[0]])
-            sector, self.width[stretch] = _outline(placed[part, 1:])
+            sector, width[stretch] = _outline(placed[part, 1:])
             self.cell[part] = SECTORS * stretch + sector
             length[stretch] = min(step, last - first - stretch * step)
-        self.area = (self.width * length[:, None]).ravel()
-        self.width = self.width.ravel()
+        self.area = (width * length[:, None]).ravel()
+        self.width = width.ravel()
 
 
 def _outline(across: Float) -> tuple[Int64, Float]:
