@@ -1385,6 +1385,9 @@ CREATE TABLE tunnel.scan_file (
     intensity_note TEXT,
     pose_note TEXT,
     header_note TEXT,
+    coordinate_note TEXT,
+    unit TEXT DEFAULT 'm' NOT NULL,
+    height_unit TEXT DEFAULT 'm' NOT NULL,
     srid INTEGER,
     loaded_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
     CONSTRAINT scan_file_pkey PRIMARY KEY (id),
@@ -1415,6 +1418,9 @@ COMMENT ON COLUMN tunnel.scan_file.reach_after IS 'Distance after the end of the
 COMMENT ON COLUMN tunnel.scan_file.intensity_note IS 'Doubts about its intensity: saturated, or another kind by its values';
 COMMENT ON COLUMN tunnel.scan_file.pose_note IS 'Doubts about the scanner positions of its points';
 COMMENT ON COLUMN tunnel.scan_file.header_note IS 'Difference between the header and the points, with both values';
+COMMENT ON COLUMN tunnel.scan_file.coordinate_note IS 'Conversion of its coordinates to metres, and contradictions in what it states of them';
+COMMENT ON COLUMN tunnel.scan_file.unit IS 'Unit of its x and y: m, cm, mm, ft, us-ft or in';
+COMMENT ON COLUMN tunnel.scan_file.height_unit IS 'Unit of its z: m, cm, mm, ft, us-ft or in';
 COMMENT ON COLUMN tunnel.scan_file.srid IS 'Spatial reference that the file states, if it states one';
 COMMENT ON COLUMN tunnel.scan_file.loaded_at IS 'Time of loading';
 

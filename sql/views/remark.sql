@@ -1,7 +1,7 @@
 -- Notes on the results of surveys, as every document states them.
 
 -- Notes of the stages whose results are in the database, points that were left out of files, and doubts about their
--- intensity. More than 20 % noise means that the filter does not suit the scan: it is made for isolated returns (dust, edges,
+-- intensity and coordinates. More than 20 % noise means that the filter does not suit the scan: it is made for isolated returns (dust, edges,
 -- people), which are a few percent. Points beyond the ends of the given axis are reported from 1 % on: a scan contains some
 -- points before a portal, but a tunnel that continues needs attention.
 CREATE OR REPLACE VIEW tunnel_api.remark AS
@@ -57,11 +57,16 @@ SELECT 16 * f.id::bigint + 10, f.survey_id, s.name, NULL, 'load', f.name, f.head
   JOIN tunnel.survey s ON s.id = f.survey_id
  WHERE f.header_note IS NOT NULL
  UNION ALL
+SELECT 16 * f.id::bigint + 11, f.survey_id, s.name, NULL, 'load', f.name, f.coordinate_note
+  FROM tunnel.scan_file f
+  JOIN tunnel.survey s ON s.id = f.survey_id
+ WHERE f.coordinate_note IS NOT NULL
+ UNION ALL
 SELECT 16 * s.id::bigint + 6, s.id, s.name, NULL, 'survey', NULL, s.positions_note
   FROM tunnel.survey s
  WHERE s.positions_note IS NOT NULL;
 COMMENT ON VIEW tunnel_api.remark IS
-    'Notes on the results of surveys: notes of stages by kilometre, points of files that were left out, doubtful intensity and scanner positions of files, differences between header and points, and notes on scanner positions';
+    'Notes on the results of surveys: notes of stages by kilometre, points of files that were left out, doubtful intensity, scanner positions and coordinates of files, differences between header and points, and notes on scanner positions';
 COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file or for the survey as a whole';
 COMMENT ON COLUMN tunnel_api.remark.stage IS
     'Stage that wrote the note; survey for notes written when the survey was added or set';

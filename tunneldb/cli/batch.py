@@ -16,6 +16,7 @@ from tunneldb.cli.load import density_of, say_notes
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import notify, tell, verb, wants_json
 from tunneldb.cli.param_types import FilePath
+from tunneldb.cli.units import unit_options
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.queue.watching import is_busy, server_time
@@ -50,6 +51,7 @@ OUTSIDE = "outside the kilometres of --km, by its header and a sample of its poi
 @click.option("--km", metavar="A[-B]", help="Only these kilometres, 511 or 511-512.")
 @click.option("--to", "last", metavar="STAGE", help="Last stage: load, axis, segments, sections, ground or detect (default).")
 @click.option("--density", help="Points per m² of surface to keep, 1 or more, or 'all'; 100, or what the survey has.")
+@unit_options("FILES")
 @click.option("--set", "assignments", multiple=True, metavar="NAME=VALUE", help="Set a parameter, as for tunneldb run.")
 @click.option("--retry-failed", is_flag=True, help="Retry failed jobs.")
 @click.option(
@@ -66,6 +68,8 @@ def batch(
     km: str | None,
     last: str | None,
     density: str | None,
+    unit: str | None,
+    height_unit: str | None,
     assignments: tuple[str, ...],
     retry_failed: bool,
     preview: bool,
@@ -85,7 +89,8 @@ def batch(
     values = settings(assignments)
     kilometres = None if km is None else km_range(km)
     chosen = {name: values[name] for name in (text.partition("=")[0] for text in assignments) if name in PARAMETERS}
-    reading = {} if density is None else {"load.density": "all" if density == "all" else density_of(density)}
+    reading: dict[str, Any] = {} if density is None else {"load.density": "all" if density == "all" else density_of(density)}
+    reading |= {"load.unit": unit, "load.height_unit": height_unit}
     with connect(settings_.dsn) as conn:
         conn.autocommit = True
         found = get_survey(conn, survey)

@@ -12,6 +12,7 @@ from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
+from tunneldb.cli.units import unit_options
 from tunneldb.errors import UserError
 
 if TYPE_CHECKING:
@@ -26,7 +27,8 @@ _MOST_SCANS = 8
     wrong="a file can't be read; the others were looked at",
 )
 @click.argument("files", nargs=-1, required=True, type=FilePath(), metavar="FILES...")
-def inspect(files: tuple[Path, ...]) -> None:
+@unit_options("FILES")
+def inspect(files: tuple[Path, ...], unit: str | None, height_unit: str | None) -> None:
     """Show the contents of scan FILES, missing inputs, and the next commands; needs no database.
 
     Files are read once in chunks, and up to 50 million points a second time, to test if an axis can be found.
@@ -35,16 +37,18 @@ def inspect(files: tuple[Path, ...]) -> None:
     """
     from tunneldb.pipeline.first_steps import first_steps, needs_axis
     from tunneldb.pipeline.inspection import find_axis_fault, inspect_file
+    from tunneldb.pointcloud.units import GivenUnits
 
+    given = GivenUnits(unit, height_unit)
     looks: list[FileLook] = []
     faults: list[UserError] = []
     with bar("points") as progress:
         for path in files:
             try:
-                looks.append(inspect_file(path, step(progress)))
+                looks.append(inspect_file(path, step(progress), given))
             except UserError as error:  # what is wrong with one file is no reason not to look at the others
                 faults.append(error)
-        axis_fault = find_axis_fault(looks, step(progress)) if looks and needs_axis(looks) else None
+        axis_fault = find_axis_fault(looks, step(progress), given) if looks and needs_axis(looks) else None
     if not looks:
         raise faults[0]
     for look in looks:
@@ -86,6 +90,7 @@ def _rows(look: FileLook) -> list[tuple[str, str]]:
         ("format", look.format),
         ("points", _number(look.points) + invalid),
         ("coordinate system", look.crs or (f"can't be read: {look.unread_crs}" if look.unread_crs else "not stated")),
+        ("heights", look.heights or "not stated"),
         ("x, y, z from", "  ".join(f"{value:.3f}" for value in low)),
         ("to", "  ".join(f"{value:.3f}" for value in high)),
     ]

@@ -14,6 +14,7 @@ from tunneldb.cli.output import notify, printable, tell, verb
 from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
+from tunneldb.cli.units import unit_options
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.store.remarks import read_remarks
@@ -74,6 +75,7 @@ MOST_NAMED = 5  # files of which the same is said
     help="Share of points of unknown scanner position, or with NaN time or intensity, that are left out; a "
     "file with more is refused.",
 )
+@unit_options("FILES")
 @click.option(
     "--medium",
     type=click.Choice(["air", "water"]),
@@ -92,6 +94,8 @@ def load(
     noise_diameter: float,
     max_distance: float,
     max_left_out: float,
+    unit: str | None,
+    height_unit: str | None,
     medium: str,
     water_level: float | None,
 ) -> None:
@@ -109,11 +113,13 @@ def load(
     from tunneldb.pipeline.load import load_files
     from tunneldb.pipeline.site_files import register_files
     from tunneldb.pointcloud.selection import FilterSettings
+    from tunneldb.pointcloud.units import NOT_GIVEN, GivenUnits
     from tunneldb.store.scan_files import sonar_among
 
     if (medium == "water") != (water_level is not None):
         raise UserError("--medium water and --water-level M belong together: give both or none")
-    chosen = FilterSettings(density_of(density), noise_points, noise_diameter, max_distance, max_left_out / 100.0)
+    units = GivenUnits(unit, height_unit)
+    chosen = FilterSettings(density_of(density), noise_points, noise_diameter, max_distance, max_left_out / 100.0, units)
     done: list[Loaded] = []
     tell(survey=survey, files=done)
     with connect(settings.dsn) as connection:
@@ -128,12 +134,14 @@ def load(
 
                     record_soundings(connection, found, files, water_level)
                 if found.site:
-                    loaded = register_files(connection, found, files, chosen.max_left_out, step(progress))
+                    loaded = register_files(connection, found, files, chosen, step(progress))
                 else:
                     sonar = sonar_among(connection, found, files)
                     laser = [path for path in files if path not in sonar]
                     loaded = load_files(connection, found, laser, chosen, step(progress)) if laser else iter(())
                     if sonar:
+                        if units != NOT_GIVEN:
+                            raise UserError("--unit and --height-unit are of laser scans; not registered sonar scans")
                         from tunneldb.pipeline.load_sonar import load_sonar
 
                         loaded = chain(loaded, load_sonar(connection, found, sonar, step(progress)))

@@ -15,8 +15,10 @@ from tunneldb.cli.progress import bar, step
 from tunneldb.cli.sizes import sizes
 from tunneldb.cli.survey_archive import export, import_
 from tunneldb.cli.tables import print_table
+from tunneldb.cli.units import unit_options
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.geometry.units import Units
 from tunneldb.store.listing import count_holdings, count_stale, list_surveys
 from tunneldb.store.survey import UNPOSED, get_survey
 
@@ -75,6 +77,7 @@ DAY = Day()
     "uncorrected, and every result states it.",
 )
 @click.option("--backwards", is_flag=True, help="The trajectory was driven down-chainage.")
+@unit_options("the files of --trajectory and --stations")
 @click.option(
     "--time-offset",
     type=FINITE,
@@ -110,6 +113,8 @@ def add(
     no_poses: bool,
     backwards: bool,
     time_offset: float | None,
+    unit: str | None,
+    height_unit: str | None,
     reference: str | None,
     intensity: str | None,
     intensity_kind: str,
@@ -139,6 +144,7 @@ def add(
             reference="auto" if reference == "auto" else None if reference is None else file_path(reference),
             intensity=Intensity(intensity_kind, intensity),
             time_offset=time_offset or 0.0,
+            units=_units(unit, height_unit, no_poses),
         )
     notes = [*positions.notes, *([UNPOSED] if no_poses and intensity is not None else [])]
     tell(survey=name, tunnel=tunnel, date=date.date(), poses=len(positions), notes=notes)
@@ -164,6 +170,7 @@ def add(
 @click.option(
     "--time-offset", type=FINITE, metavar="SECONDS", help="Seconds to add to the times in the trajectory's file; 0 removes it."
 )
+@unit_options("the files of --trajectory and --stations")
 @click.option("--reference", metavar="FILE|auto", help="Intensity of the scanner by range, as for survey add.")
 @click.option("--intensity", metavar="DIMENSION", help="Dimension with the intensity; the files must be loaded again.")
 @click.option("--intensity-kind", type=click.Choice(["amplitude", "reflectance", "linear", "none"]), help="What it is.")
@@ -176,6 +183,8 @@ def set_(
     stations: tuple[Path, ...],
     backwards: bool,
     time_offset: float | None,
+    unit: str | None,
+    height_unit: str | None,
     reference: str | None,
     intensity: str | None,
     intensity_kind: str | None,
@@ -201,6 +210,7 @@ def set_(
         "auto" if reference == "auto" else None if reference is None else file_path(reference),
         intensity_kind,
         intensity,
+        _units(unit, height_unit, trajectory is None and not stations),
     )
     if change == SurveyChange():
         raise UserError(
@@ -217,6 +227,13 @@ def set_(
     notify(f"{name}: set")
     for note in notes:
         notify(f"{name}: {note}")
+
+
+def _units(unit: str | None, height_unit: str | None, without_files: bool) -> Units:
+    """Units of the scanner positions in files."""
+    if without_files and (unit or height_unit):
+        raise UserError("--unit and --height-unit are of positions: give --trajectory or --stations")
+    return Units(unit or "m", height_unit or unit or "m")
 
 
 @survey.command(

@@ -13,6 +13,7 @@ from tunneldb.cli.output import VerbGroup, notify, records, tell
 from tunneldb.cli.param_types import FINITE, FilePath, file_path
 from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.cli.tables import print_table
+from tunneldb.cli.units import unit_options
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import exit_on_sigterm
@@ -84,6 +85,7 @@ def tunnel() -> None:
     help="Unit of the lengths of a LandXML or DXF without a unit, or with a wrong one: millimeter, "
     "centimeter, meter, kilometer, inch, foot, USSurveyFoot, mile. ",
 )
+@unit_options("SCAN files")
 @click.option(
     "--alignment",
     metavar="NAME",
@@ -123,6 +125,8 @@ def add(
     site: bool,
     axis_layer: str | None,
     axis_unit: str | None,
+    unit: str | None,
+    height_unit: str | None,
     alignment: str | None,
     profile: str | None,
     reverse: bool,
@@ -143,15 +147,19 @@ def add(
     from tunneldb.alignment.given import read_given
     from tunneldb.geometry.crs import outside_area
     from tunneldb.pipeline.axis_search import complete, found_given
+    from tunneldb.pointcloud.units import NOT_GIVEN, GivenUnits
     from tunneldb.store.alignment import read_equations, save_equations
     from tunneldb.store.catalog import add_tunnel, get_tunnel, require_new_tunnel
 
     if (axis is None) != site:
         raise UserError("give a tunnel its --axis; or say --site, if it has none")
     if axis is None:
-        about_axis = {axis_layer, axis_unit, alignment, profile, start_chainage, equations, axis_out, *scans}
+        about_axis = {axis_layer, axis_unit, unit, height_unit, alignment, profile, start_chainage, equations, axis_out, *scans}
         _add_site(settings, name, srid, about_axis)
         return
+    units = GivenUnits(unit, height_unit)
+    if units != NOT_GIVEN and not scans:
+        raise UserError("--unit and --height-unit are of SCAN files; --axis-unit is that of a LandXML or DXF")
     own = read_equations(equations) if equations else None
     found = None
     with connect(settings.dsn) as connection:
@@ -160,7 +168,7 @@ def add(
         if {axis_layer, axis_unit, alignment, profile} != {None}:
             raise UserError("--axis auto reads SCAN files; --axis-layer, --axis-unit, --alignment and --profile are for others")
         with exit_on_sigterm(), bar("points") as progress:
-            given, found = found_given(scans, srid, step(progress), start_chainage, reverse)
+            given, found = found_given(scans, srid, step(progress), start_chainage, reverse, units)
     else:
         given = read_given(
             file_path(axis), start_chainage, alignment, profile, layer=axis_layer, unit=axis_unit, srid=srid, reverse=reverse
@@ -174,7 +182,7 @@ def add(
                     f"tunneldb tunnel add {name} --srid {srid or 'local'} --axis {axis} SCAN..."
                 )
             with exit_on_sigterm(), bar("points") as progress:
-                given, found = complete(given, scans, srid, step(progress))
+                given, found = complete(given, scans, srid, step(progress), units)
     if found is None and axis_out is not None:
         raise UserError("--axis-out is for an axis that is found in SCAN files")
     with connect(settings.dsn) as connection:

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import re
+from typing import TYPE_CHECKING, NamedTuple
+
 import numpy as np
 from pyproj import CRS, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
 from tunneldb.arrays import Float
+from tunneldb.geometry.crs_equality import epsg_code, horizontal, same_horizontally, vertical
+from tunneldb.geometry.units import METRES, unit_name, unit_option
+
+if TYPE_CHECKING:
+    from pyproj._crs import Axis
 
 LOCAL = 0
 """SRID of a tunnel in local coordinates, metres without a place on Earth; PostGIS's number for no reference system."""
@@ -17,29 +25,94 @@ MARGIN = 0.5
 """Greatest distance beyond the bounds of a system's area of use, degrees: surveys may cross the border of a zone or a
 country."""
 
-
-def same_horizontally(one: CRS, other: CRS) -> bool:
-    """Return True if two coordinate systems agree in the plane, whatever their height systems."""
-    a, b = horizontal(one), horizontal(other)
-    if a.equals(b, ignore_axis_order=True):
-        return True
-    code = a.to_epsg()
-    return code is not None and code == b.to_epsg()
+_NAMELESS = re.compile("^(unknown|unnamed|)$", re.IGNORECASE)
 
 
-def horizontal(crs: CRS) -> CRS:
-    """Return the horizontal part of a coordinate system that may be compound, bound or three-dimensional."""
-    if crs.is_bound and crs.source_crs is not None:
-        crs = crs.source_crs
-    if crs.is_compound:
-        crs = crs.sub_crs_list[0]
-    return crs.to_2d()
+class StatedUnit(NamedTuple):
+    """Unit of coordinates that a file states.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    metres : float or None
+        Its length, m; None for an angle.
+    """
+
+    name: str
+    metres: float | None
+
+
+def plan_unit(crs: CRS) -> StatedUnit | None:
+    """Return the unit of a coordinate system in plan; None if it has no axes there."""
+    axes = horizontal(crs).axis_info
+    if not axes:
+        return None
+    return _unit(axes[0], is_angle=horizontal(crs).is_geographic)
+
+
+def height_unit(crs: CRS | None, heights: CRS | None) -> StatedUnit | None:
+    """Return the unit of a system of heights, else of the ellipsoidal heights of another; None if unknown."""
+    if heights is not None:
+        return _unit(heights.axis_info[0]) if heights.axis_info else None
+    if crs is not None and len(crs.axis_info) == 3 and not crs.is_geocentric:
+        return _unit(crs.axis_info[2])
+    return None
+
+
+def _unit(axis: Axis, *, is_angle: bool = False) -> StatedUnit:
+    if is_angle:
+        return StatedUnit(axis.unit_name, None)
+    metres = float(axis.unit_conversion_factor)
+    named = unit_option(metres)
+    return StatedUnit(axis.unit_name, metres) if named is None else StatedUnit(unit_name(named), METRES[named])
+
+
+def in_metres(crs: CRS) -> CRS:
+    """Return a projected system in plan with the same projection and its axes in metres; others as they are."""
+    plan = horizontal(crs)
+    unit = plan_unit(plan)
+    if not plan.is_projected or unit is None or unit.metres == 1.0:
+        return plan
+    text = plan.to_json_dict()
+    for axis in text["coordinate_system"]["axis"]:
+        axis["unit"] = "metre"
+    text.pop("id", None)
+    return CRS.from_json_dict(text)
 
 
 def describe_crs(crs: CRS) -> str:
     """Return the name of a coordinate system, with its EPSG code if it has one."""
-    code = horizontal(crs).to_epsg()
+    code = epsg_code(crs)
     return f"EPSG:{code} ({crs.name})" if code is not None else crs.name
+
+
+def describe_heights(crs: CRS | None, heights: CRS | None) -> str | None:
+    """Return the system of the heights with its unit; None if none is stated."""
+    unit = height_unit(crs, heights)
+    if heights is None:
+        return None if unit is None else f"ellipsoidal, {unit.name}"
+    name = "not named" if _NAMELESS.match(heights.name) else heights.name
+    return ", ".join(filter(None, (name, unit and unit.name, "depths" if _is_depth(heights) else "")))
+
+
+def heights_differ(heights: CRS | None, srid: int) -> str | None:
+    """Return a note if heights are of another system than those of a tunnel's SRID; None if either is unknown."""
+    if heights is None or srid == LOCAL or _NAMELESS.match(heights.name):
+        return None
+    own = vertical(CRS.from_epsg(srid))
+    if own is None or _same_heights(own, heights):
+        return None
+    return f"its heights are {heights.name}, the tunnel's are {own.name}"
+
+
+def _same_heights(one: CRS, other: CRS) -> bool:
+    """Return True if two height systems have the same datum, whatever their units."""
+    return one.equals(other) or (one.datum is not None and other.datum is not None and one.datum.name == other.datum.name)
+
+
+def _is_depth(heights: CRS) -> bool:
+    return bool(heights.axis_info) and heights.axis_info[0].direction == "down"
 
 
 def is_local(crs: CRS) -> bool:
@@ -53,7 +126,7 @@ def srid_name(srid: int) -> str:
 
 
 def fits_srid(crs: CRS, srid: int) -> bool:
-    """Return True if a coordinate system agrees with an SRID (EPSG code or LOCAL) in the plane."""
+    """Return True if a coordinate system agrees with an SRID (EPSG code or LOCAL) in the plane, in its unit too."""
     return is_local(crs) if srid == LOCAL else same_horizontally(crs, CRS.from_epsg(srid))
 
 

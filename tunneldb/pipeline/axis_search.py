@@ -14,13 +14,15 @@ from tunneldb.alignment.found import FoundAxis, find_axis, follow_line, without_
 from tunneldb.alignment.given import GivenAxis
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
-from tunneldb.geometry.crs import describe_crs, horizontal, same_horizontally
+from tunneldb.geometry.crs import describe_crs, in_metres, plan_unit
+from tunneldb.geometry.crs_equality import same_horizontally
 from tunneldb.geometry.stationing import chainage_label
 from tunneldb.pointcloud.contents import UniformSample
 from tunneldb.pointcloud.form import tunnel_form
 from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.reader import ScanHeader, check_header, read_header
+from tunneldb.pointcloud.units import NOT_GIVEN, GivenUnits, in_units, require_metres
 from tunneldb.pointcloud.voxels import Voxels
 from tunneldb.progress import StartProgress
 
@@ -40,7 +42,13 @@ TRUSTED_ASIDE = 0.03
 """Share of roofed area off the line from which it is reported."""
 
 
-def search_axis(files: Sequence[Path], srid: int | None, begin: StartProgress, along: Float | None = None) -> FoundAxis:
+def search_axis(
+    files: Sequence[Path],
+    srid: int | None,
+    begin: StartProgress,
+    along: Float | None = None,
+    given: GivenUnits = NOT_GIVEN,
+) -> FoundAxis:
     """Find the axis of the tunnel in scan files.
 
     Parameters
@@ -53,13 +61,15 @@ def search_axis(files: Sequence[Path], srid: int | None, begin: StartProgress, a
         Called with a text and the number of points; returns a function that takes the points done.
     along : (k, 2) float array or None
         A line drawn in plan, which the axis follows, m.
+    given
+        Units of the files' coordinates as given by the user.
 
     Raises
     ------
     UserError
         If a file can't be read or is in another coordinate system, or no tunnel is found.
     """
-    headers = [read_header(path) for path in files]
+    headers = [in_units(read_header(path), given) for path in files]
     for header in headers:
         if srid is not None:
             check_header(header, None, srid, needs_time=False)
@@ -74,13 +84,18 @@ def search_axis(files: Sequence[Path], srid: int | None, begin: StartProgress, a
 
 
 def found_given(
-    files: Sequence[Path], srid: int | None, begin: StartProgress, start: float | None, reverse: bool
+    files: Sequence[Path],
+    srid: int | None,
+    begin: StartProgress,
+    start: float | None,
+    reverse: bool,
+    given: GivenUnits = NOT_GIVEN,
 ) -> tuple[GivenAxis, FoundAxis]:
     """Return the axis found in scan files, in the form of a given axis.
 
     Parameters
     ----------
-    files, srid, begin
+    files, srid, begin, given
         As for `search_axis`.
     start
         Chainage of its beginning, m; None: 0.
@@ -89,14 +104,16 @@ def found_given(
     """
     if not files:
         raise UserError("--axis auto finds the axis in scan files; name them after the tunnel: --axis auto SCAN...")
-    found = search_axis(files, srid, begin)
+    found = search_axis(files, srid, begin, given=given)
     found = found.reversed() if reverse else found
     return GivenAxis(found.xyz, start or 0.0, source=f"the axis found in {_names(files)}"), found
 
 
-def complete(given: GivenAxis, files: Sequence[Path], srid: int, begin: StartProgress) -> tuple[GivenAxis, FoundAxis]:
+def complete(
+    given: GivenAxis, files: Sequence[Path], srid: int, begin: StartProgress, units: GivenUnits = NOT_GIVEN
+) -> tuple[GivenAxis, FoundAxis]:
     """Set the middle and heights of a line drawn in plan from scan files; ends and direction stay."""
-    found = search_axis(files, srid, begin, given.xyz[:, :2])
+    found = search_axis(files, srid, begin, given.xyz[:, :2], units)
     note = f"its middle and heights are from {_names(files)}"
     return GivenAxis(found.xyz, given.start, None, given.source, (*given.notes, note)), found
 
@@ -137,7 +154,7 @@ def _voxels(headers: Sequence[ScanHeader], begin: StartProgress) -> tuple[Float,
     voxels, sample, read = Voxels(EDGE), UniformSample(), 0
     middle: Float | None = None
     for header in headers:
-        for raw in read_raw(header.path, None):
+        for raw in read_raw(header.path, None, units=header.units):
             sample.add(raw, read)
             read += len(raw)
             chunk = Points.of(raw).located()
@@ -152,11 +169,12 @@ def _voxels(headers: Sequence[ScanHeader], begin: StartProgress) -> tuple[Float,
 def _require_one_system(headers: Sequence[ScanHeader]) -> None:
     known = [(header, header.crs) for header in headers if header.crs is not None]
     for header, crs in known:
-        units = {axis.unit_name for axis in horizontal(crs).axis_info}
-        if units != {"metre"}:
-            raise UserError(f"{header.path}: its coordinates are in {', '.join(sorted(units))}, not metres; transform it")
+        require_metres(header)
+        unit = plan_unit(crs)
+        if unit is not None and unit.metres is None:
+            raise UserError(f"{header.path}: its coordinates are in {unit.name}, not metres; transform it")
         first: CRS = known[0][1]
-        if not same_horizontally(crs, first):
+        if not same_horizontally(in_metres(crs), in_metres(first)):
             raise UserError(
                 f"{header.path} is in {describe_crs(crs)}, {known[0][0].path} in {describe_crs(first)}; give files of one"
             )

@@ -66,6 +66,7 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
     doubts = [f"{look.path.name}: is it a tunnel? {said}" for look in looks if (said := look.other_than_a_tunnel)]
     doubts += [f"{look.path.name}: {look.unit}" for look in looks if look.unit]
     doubts += [f"{look.path.name}: {look.header_note}" for look in looks if look.header_note]
+    doubts += [f"{look.path.name}: {note}" for look in looks for note in look.notes]
     doubts += [
         f"{look.path.name}: {look.misplaced} points have no coordinates, {look.untimed} no time"
         for look in looks
@@ -85,19 +86,16 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         return FirstSteps(missing, doubts, [])
     if axis_fault is not None:
         doubts.append(f"no axis can be found in the points (--axis auto is refused): {axis_fault}")
-    if foreign := [look.path for look in looks if look.foreign_unit]:
-        missing.append(
-            f"{', '.join(path.name for path in foreign)} in a projected coordinate system in metres: transform first"
-        )
-        metric = [_quoted(path.with_name(f"TRANSFORMED-{path.name}")) for path in foreign]
-        return FirstSteps(missing, doubts, [f"tunneldb inspect {' '.join(metric)}"])
+    if foreign := [look for look in looks if look.foreign_unit]:
+        return FirstSteps(missing, doubts, [_in_metres(foreign, missing)])
     name, files = common_name([look.path for look in looks]), _files(looks)
+    units = looks[0].unit_options
     srid = _srid(looks, missing, doubts)
     axis = _beside(looks, "axis.csv")
     if axis is not None:
         given = _quoted(axis)
     elif axis_fault is None:
-        given = f"auto {files}"
+        given = f"auto {files}{units}"
         missing.append("the given axis, which no scan contains: give your own with --axis, or have it found (auto)")
     else:
         given = "AXIS.csv"
@@ -124,10 +122,23 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
             "tunneldb init",
             tunnel,
             f"tunneldb survey add {survey} --tunnel {name} --date {date} {poses} {intensity}",
-            f"tunneldb load {survey} {files}",
+            f"tunneldb load {survey} {files}{units}",
             f"tunneldb run {survey}",
         ],
     )
+
+
+def _in_metres(foreign: Sequence[FileLook], missing: list[str]) -> str:
+    """Return the command for files that are not in metres: with their units, or after a transformation."""
+    names = ", ".join(look.path.name for look in foreign)
+    options = {look.suggested_units for look in foreign}
+    if len(options) == 1 and (units := options.pop()):
+        if "UNIT" in units.split():
+            missing.append(f"the unit of {names}, in place of UNIT: the file contradicts itself, see above")
+        return f"tunneldb inspect {' '.join(_quoted(look.path) for look in foreign)}{units}"
+    missing.append(f"{names} in a projected coordinate system in metres: transform first")
+    metric = [_quoted(look.path.with_name(f"TRANSFORMED-{look.path.name}")) for look in foreign]
+    return f"tunneldb inspect {' '.join(metric)}"
 
 
 def _quoted(path: Path) -> str:
@@ -182,9 +193,11 @@ def _beside(looks: Sequence[FileLook], ending: str) -> Path | None:
 
 def _poses(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> str:
     posed = [look for look in looks if look.poses]
-    if posed and all(scan.position is not None for look in posed for scan in look.poses):
+    lost = [look for look in looks if look.lost_positions]
+    doubts += [f"{look.path.name}: {look.lost_positions}" for look in lost]
+    if posed and not lost and all(scan.position is not None for look in posed for scan in look.poses):
         _doubt_positions(posed, doubts)
-        return " ".join(f"--stations {_quoted(look.path)}" for look in posed)
+        return " ".join(f"--stations {_quoted(look.path)}" for look in posed) + looks[0].unit_options
     trajectory, stations = (
         _beside(looks, "trajectory.csv"),
         _beside(looks, "stations.csv"),

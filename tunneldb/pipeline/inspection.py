@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +12,20 @@ from pyproj import CRS
 
 from tunneldb.arrays import Bool, Float
 from tunneldb.errors import UserError
-from tunneldb.geometry.crs import describe_crs, horizontal
+from tunneldb.geometry.crs import describe_crs, describe_heights, in_metres
+from tunneldb.geometry.crs_equality import epsg_code, horizontal
+from tunneldb.geometry.units import Units
 from tunneldb.pipeline.inspected_poses import doubt_poses
 from tunneldb.pointcloud.contents import Contents, read_contents, read_near, read_values
 from tunneldb.pointcloud.form import WINDOW, TunnelForm, profile_spacing, surface_density, tunnel_form
 from tunneldb.pointcloud.formats.las import read_las_facts
+from tunneldb.pointcloud.formats.pose_contradictions import lost_positions, position_notes
 from tunneldb.pointcloud.formats.scans import PosedScan
 from tunneldb.pointcloud.formats.table import format_of, posed_scans
 from tunneldb.pointcloud.header_box import describe_box_difference
 from tunneldb.pointcloud.noise import noise_filter
 from tunneldb.pointcloud.reader import ScanHeader, read_header
+from tunneldb.pointcloud.units import NOT_GIVEN, GivenUnits, conversion_note, in_units, suggested_options, unit_faults
 from tunneldb.progress import StartProgress
 from tunneldb.radiometry.intensity_kind import KindGuess, ValueRange, contradiction, guess_kind, value_range
 
@@ -101,9 +105,9 @@ class FileLook:
     crs, unread_crs : str or None
         Name of its coordinate system; or the reason why there is none.
     srid : int or None
-        EPSG code of the coordinate system in plan.
+        EPSG code of the coordinate system in plan, in metres.
     low, high : (3,) float64 array
-        Box, in the file's unit.
+        Box, in the file's unit, or converted from given units to metres.
     length, width, height : float or None
         Form of the tunnel, from `tunnel_form`.
     density : tuple of three floats
@@ -111,7 +115,15 @@ class FileLook:
     sampled : int
         Points that these were found on.
     foreign_unit : bool
-        True if its coordinate system has another unit than metres, which is not possible for a tunnel.
+        True if it states another unit than metres, or two different ones, and none was given.
+    unit_options, suggested_units : str
+        Given units, as options of the next commands, and those that would convert what it states; empty for none.
+    heights : str or None
+        System of its heights, and their unit; None if not stated.
+    notes : list of str
+        Contradictions in its header, and conversions.
+    lost_positions : str
+        Why the positions of its scans cannot be used; empty if they can.
     profile_spacing : float or None
         Distance of the profiles along the tunnel; None if unknown.
     unit : str or None
@@ -165,6 +177,11 @@ class FileLook:
     intensities: list[IntensityLook]
     foreign_unit: bool = False
     header_note: str | None = None
+    unit_options: str = ""
+    suggested_units: str = ""
+    heights: str | None = None
+    notes: list[str] = field(default_factory=list)
+    lost_positions: str = ""
     only_noise: bool = False
     time_offset: float | None = None
     pose_doubt: str | None = None
@@ -182,7 +199,7 @@ class FileLook:
         return None
 
 
-def inspect_file(path: Path, begin: StartProgress) -> FileLook:
+def inspect_file(path: Path, begin: StartProgress, given: GivenUnits = NOT_GIVEN) -> FileLook:
     """Inspect a scan file, read in chunks with constant memory.
 
     Parameters
@@ -190,18 +207,21 @@ def inspect_file(path: Path, begin: StartProgress) -> FileLook:
     path : Path
     begin : callable
         Called with a text and a number of points before each step; returns a function that takes the points done.
+    given : GivenUnits
+        Units of its coordinates as given by the user.
 
     Raises
     ------
     UserError
         If it cannot be read.
     """
-    header = read_header(path)
-    contents = read_contents(path, begin(path.name, header.points))
+    header = in_units(read_header(path), given)
+    contents = read_contents(path, begin(path.name, header.points), header.units)
     form = tunnel_form(contents.xyz)
     names = [name for name in header.dimensions if name.lower() not in _NO_INTENSITY]
     kind, time_kind = _described(path, contents)
-    poses = posed_scans(path)
+    scans = posed_scans(path)
+    poses = [_converted(scan, header.units) for scan in scans]
     time_offset, pose_doubt = doubt_poses(path, contents, form, poses)
     return FileLook(
         path,
@@ -211,7 +231,7 @@ def inspect_file(path: Path, begin: StartProgress) -> FileLook:
         contents.misplaced,
         None if header.crs is None else describe_crs(header.crs),
         header.unread_crs or None,
-        None if header.crs is None else horizontal(header.crs).to_epsg(),
+        None if header.crs is None else epsg_code(in_metres(header.crs) if header.unit_given else header.crs),
         contents.low,
         contents.high,
         None if form is None else form.length,
@@ -219,7 +239,7 @@ def inspect_file(path: Path, begin: StartProgress) -> FileLook:
         None if form is None else form.height,
         surface_density(contents.xyz, contents.share),
         len(contents.xyz),
-        None if form is None else _spacing(path, contents, form),
+        None if form is None else _spacing(path, contents, form, header.units),
         _unit(header, contents, form),
         contents.times,
         time_kind,
@@ -228,22 +248,31 @@ def inspect_file(path: Path, begin: StartProgress) -> FileLook:
         contents.scans,
         poses,
         [_look_at(path, name, contents.points) for name in names],
-        header.crs is not None and _unit_of(header.crs) is not None,
+        bool(unit_faults(header)) or (header.crs is not None and _is_angular(header.crs)),
         describe_box_difference(header, np.concatenate([contents.low, contents.high])),
+        "".join(f" {option} {unit}" for option, unit in (("--unit", given.plan), ("--height-unit", given.height)) if unit),
+        suggested_options(header),
+        describe_heights(header.crs, header.stated.heights),
+        [*header.stated.notes, *header.notes, *filter(None, [conversion_note(header)]), *position_notes(scans)],
+        lost_positions(scans),
         contents.share == 1.0 and bool(noise_filter(contents.xyz).all()),
         time_offset,
         pose_doubt,
     )
 
 
-def find_axis_fault(looks: Sequence[FileLook], begin: StartProgress) -> str | None:
+def _converted(scan: PosedScan, units: Units) -> PosedScan:
+    return scan if scan.position is None else replace(scan, position=scan.position * units.scales)
+
+
+def find_axis_fault(looks: Sequence[FileLook], begin: StartProgress, given: GivenUnits = NOT_GIVEN) -> str | None:
     """Return why ``--axis auto`` would be refused for files; None if not, or if they have more than SEARCHED points."""
     from tunneldb.pipeline.axis_search import search_axis
 
     if sum(look.points for look in looks) > SEARCHED:
         return None
     try:
-        search_axis([look.path for look in looks], None, begin)
+        search_axis([look.path for look in looks], None, begin, given=given)
     except UserError as error:
         return str(error)
     return None
@@ -278,7 +307,7 @@ def _look_at(path: Path, name: str, points: int) -> IntensityLook:
     return IntensityLook(name, str(values.dtype.newbyteorder("=")), found, guess_kind(found, name))
 
 
-def _spacing(path: Path, contents: Contents, form: TunnelForm) -> float | None:
+def _spacing(path: Path, contents: Contents, form: TunnelForm, units: Units) -> float | None:
     """Return the median of three short windows of the tunnel."""
     along, _ = form.line.place(contents.xyz)
     first = float(np.percentile(along, 0.1))
@@ -288,7 +317,7 @@ def _spacing(path: Path, contents: Contents, form: TunnelForm) -> float | None:
         near: Bool = np.abs(along - middle) < WINDOW / 2.0
         if not near.any():
             continue
-        xyz = read_near(path, contents, near)
+        xyz = read_near(path, contents, near, units)
         at, across = form.line.place(xyz)
         inside = np.abs(at - middle) < WINDOW / 2.0
         spacing = profile_spacing(at[inside], across[inside], xyz[inside, 2])
@@ -298,9 +327,13 @@ def _spacing(path: Path, contents: Contents, form: TunnelForm) -> float | None:
 
 
 def _unit(header: ScanHeader, contents: Contents, form: TunnelForm | None) -> str | None:
-    if header.crs is not None:
-        named = _unit_of(header.crs)
-        return None if named is None else f"{named}, by its coordinate system: transform it to one in metres"
+    faults = unit_faults(header)
+    if faults:
+        return "; ".join(faults)
+    if header.crs is not None and _is_angular(header.crs):
+        return "not metres in plan, by its coordinate system: transform it to a projected system in metres"
+    if header.crs is not None or header.unit_given:
+        return None
     low, high = contents.low, contents.high
     inside = bool(np.all(np.abs([low[0], high[0]]) <= 180.0) and np.all(np.abs([low[1], high[1]]) <= 90.0))
     if inside and float(np.max(high[:2] - low[:2])) < 0.1 < float(high[2] - low[2]):
@@ -315,7 +348,6 @@ def _unit(header: ScanHeader, contents: Contents, form: TunnelForm | None) -> st
     return None
 
 
-def _unit_of(crs: CRS) -> str | None:
-    """Return the unit of a coordinate system in plan; None if it is the metre."""
-    units = {axis.unit_name for axis in horizontal(crs).axis_info}
-    return None if units <= {"metre", "meter", "m"} else ", ".join(sorted(units))
+def _is_angular(crs: CRS) -> bool:
+    """Return True for longitude and latitude, and for geocentric coordinates; neither is possible for a tunnel."""
+    return bool(horizontal(crs).is_geographic or horizontal(crs).is_geocentric)

@@ -228,7 +228,7 @@ def load_files(
     require_same_density(conn, survey, settings)
     reading = Reading.of(conn, survey, settings, memory)
     conn.rollback()
-    headers = read_headers(paths)
+    headers = read_headers(paths, settings.units)
     for header in headers:
         reading.check(header)
     copies = copies_of(conn, survey, [header.path for header in headers])
@@ -239,7 +239,7 @@ def load_files(
     notes = {header.path.name: "; ".join(filter(None, (crs_note(header, survey.srid), place))) for header in headers}
     for batch in _batches(headers, reading.alignment, settings.max_distance):
         recorded = recorded_files(conn, survey)
-        there = {header.path: unchanged(conn, header.path, recorded.get(header.path.name)) for header in batch}
+        there = {header.path: unchanged(conn, header.path, recorded.get(header.path.name), header.units) for header in batch}
         _withdraw(conn, survey, [path.name for path, loaded in there.items() if loaded is not None])
         conn.commit()
         yield from (replace(loaded, note=notes[loaded.name] or None) for loaded in there.values() if loaded is not None)

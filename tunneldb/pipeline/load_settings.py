@@ -9,6 +9,7 @@ import psycopg
 
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.selection import FilterSettings
+from tunneldb.pointcloud.units import GivenUnits
 from tunneldb.store.survey import Survey
 
 
@@ -22,6 +23,7 @@ def settings_of(parameters: Mapping[str, Any]) -> FilterSettings:
         float(value["load.noise_diameter"]),
         float(value["load.max_distance"]),
         float(value["load.max_left_out"]),
+        GivenUnits(value["load.unit"], value["load.height_unit"]),
     )
 
 
@@ -33,6 +35,8 @@ def parameters_of(settings: FilterSettings) -> dict[str, Any]:
         "load.noise_diameter": settings.noise_diameter,
         "load.max_distance": settings.max_distance,
         "load.max_left_out": settings.max_left_out,
+        "load.unit": settings.units.plan,
+        "load.height_unit": settings.units.height,
     }
 
 

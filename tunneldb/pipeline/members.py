@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, repeat
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from tunneldb.arrays import Float, Int32, Int64, Single, UInt32
 from tunneldb.errors import UserError
 from tunneldb.geometry.crs import describe_crs
+from tunneldb.geometry.units import IN_METRES, Units
 from tunneldb.pointcloud.formats.faults import require_dimension
 from tunneldb.pointcloud.formats.table import has_scans
 from tunneldb.pointcloud.points import Points, ScanHeader
@@ -20,6 +21,7 @@ from tunneldb.pointcloud.poses import PoseModel
 from tunneldb.pointcloud.prefetch import prefetch
 from tunneldb.pointcloud.reader import read_chunks, read_header
 from tunneldb.pointcloud.stations import read_stations
+from tunneldb.pointcloud.units import NOT_GIVEN, GivenUnits, in_units, unit_faults
 from tunneldb.progress import StartProgress
 from tunneldb.radiometry.cells import IntensitySamples
 from tunneldb.radiometry.correction import Kind, needs_reference, to_decibel
@@ -66,6 +68,8 @@ class Inputs:
         Stations.
     reference : ReferenceCurve or 'auto' or None
         Curve for correcting levels for range.
+    units : tuple of Units
+        Units of each file's coordinates; empty: all are in metres.
     """
 
     paths: tuple[Path, ...]
@@ -73,6 +77,7 @@ class Inputs:
     kind: Kind
     poses: PoseModel
     reference: ReferenceCurve | str | None
+    units: tuple[Units, ...] = ()
 
     @property
     def name(self) -> str:
@@ -121,7 +126,8 @@ def find_members(inputs: Inputs, begin: StartProgress) -> FileMembers:
     UserError
         If the file cannot be read, is in degrees, has no usable intensity, or scans without a position.
     """
-    headers = [_usable(path, inputs.dimension) for path in inputs.paths]
+    of_files = zip(inputs.paths, inputs.units or repeat(None), strict=False)
+    headers = [_usable(path, inputs.dimension, units) for path, units in of_files]
     total = sum(header.points for header in headers)
     values = _Values(inputs)
     moments = VoxelMoments(_middle(inputs.poses.station, headers))
@@ -152,13 +158,19 @@ def find_members(inputs: Inputs, begin: StartProgress) -> FileMembers:
     return FileMembers(found, segmentation, values.count, far, values.unknown, values.untold, values.saturated, notes)
 
 
-def _usable(path: Path, dimension: str) -> ScanHeader:
-    """Read the header of a file, and check that the file is usable."""
-    header = read_header(path)
+def _usable(path: Path, dimension: str, units: Units | None) -> ScanHeader:
+    """Read the header of a file, and check that the file is usable; its units are known if it was loaded."""
+    given = NOT_GIVEN if units is None else GivenUnits(units.plan, units.height)
+    header = in_units(read_header(path), given)
     if header.crs is not None and header.crs.is_geographic:
         raise UserError(
             f"{path}: its coordinates are degrees, {describe_crs(header.crs)}, but structures are measured in metres;"
             " transform the file into a projected system"
+        )
+    if unit_faults(header):
+        raise UserError(
+            f"{path}: its coordinates are not in metres (tunneldb inspect {path}); transform the file, or load it with its"
+            " --unit into a survey of a site: tunneldb members SURVEY"
         )
     require_dimension(path, dimension, header.dimensions, "--intensity")
     return header
@@ -264,7 +276,10 @@ def read_all(
 ) -> Iterator[tuple[Points, Int32, Int64]]:
     """Return all points, the index of their scan among the stations, and which of them have one."""
     ids = inputs.poses.scan_id
-    files = chain.from_iterable(read_chunks(path, inputs.dimension, AT_ONCE, colours=colours) for path in inputs.paths)
+    of_files = zip(inputs.paths, inputs.units or repeat(IN_METRES), strict=False)
+    files = chain.from_iterable(
+        read_chunks(path, inputs.dimension, AT_ONCE, units=units, colours=colours) for path, units in of_files
+    )
     with closing(prefetch(files)) as chunks:
         for points in chunks:
             scan = np.minimum(np.searchsorted(ids, points.scan_id), len(ids) - 1).astype(np.int32)

@@ -22,9 +22,10 @@ from tunneldb.pipeline.pose_check import PoseCheck
 from tunneldb.pointcloud.formats.faults import require_dimension
 from tunneldb.pointcloud.header_box import describe_box_difference
 from tunneldb.pointcloud.pose_coverage import PoseCoverage
-from tunneldb.pointcloud.reader import ScanHeader, check_header, crs_note, read_header
+from tunneldb.pointcloud.reader import ScanHeader, check_header, coordinate_note, crs_note, read_header
 from tunneldb.pointcloud.selection import MEMORY, CheckPoses, FilterCounts, FilterSettings, filter_file, voxel_reach
 from tunneldb.pointcloud.spool import Spool
+from tunneldb.pointcloud.units import GivenUnits, in_units
 from tunneldb.progress import StartProgress, silent
 from tunneldb.radiometry.intensity_kind import contradiction, doubt
 from tunneldb.stages.parameters import PARAMETERS
@@ -69,11 +70,11 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
         again is gone.
     """
     require_same_density(conn, survey, settings)
-    header = read_header(path)
+    header = in_units(read_header(path), settings.units)
     reading = Reading.of(conn, survey, settings)
     reading.check(header)
     recorded = recorded_files(conn, survey).get(path.name)
-    known = unchanged(conn, path, recorded)
+    known = unchanged(conn, path, recorded, header.units)
     if recorded is not None and known is not None:
         files, state = [recorded.id], known.state
     else:
@@ -100,8 +101,8 @@ def read_file(conn: psycopg.Connection[Any], survey: Survey, path: Path, setting
     }
 
 
-def read_headers(paths: Sequence[Path]) -> list[ScanHeader]:
-    """Read the headers of scan files, which must have different names.
+def read_headers(paths: Sequence[Path], given: GivenUnits) -> list[ScanHeader]:
+    """Read the headers of scan files, which must have different names and coordinates in the given units.
 
     Raises
     ------
@@ -113,7 +114,7 @@ def read_headers(paths: Sequence[Path]) -> list[ScanHeader]:
         if path.name in names:
             raise UserError(f"{path} and {names[path.name]} have the same name: a survey's files are known by their names")
         names[path.name] = path
-    return [read_header(path) for path in paths]
+    return [in_units(read_header(path), given) for path in paths]
 
 
 def require_kind(survey: Survey, path: Path, sample: Single) -> None:
@@ -240,7 +241,7 @@ class Reading:
         path = next((path for path in given if path.name == file.name), Path(file.path))
         if not path.is_file() or checksum(path) != file.checksum:
             raise UserError(f"{why} {file.name}, which has to be read again and is not at {path} as it was loaded: {mend}")
-        header = read_header(path)
+        header = in_units(read_header(path), GivenUnits(file.units.plan, file.units.height))
         self.check(header)
         return header
 
@@ -257,7 +258,8 @@ class Reading:
             stated = None if header.crs is None else self.survey.srid
             left = [] if former is None else self.leave(former)
             differs = describe_box_difference(header, counts.box)
-            content = Content(path, digest, path.stat().st_size, stated, differs, doubtful, counts)
+            noted = coordinate_note(header, self.survey.srid)
+            content = Content(path, digest, path.stat().st_size, stated, differs, doubtful, counts, header.units, noted)
             file_id = record_file(self.conn, self.survey, content)
             record_kilometres(self.conn, file_id, survivors.kilometres(), counts, left)
             if self.held is None:
@@ -286,7 +288,7 @@ class Reading:
             dimension = self.survey.intensity_dimension
             counts = filter_file(
                 header.path, dimension, self.alignment, self.poses, self.settings, survivors, 0, progress, self.memory,
-                check_poses=self._pose_checker(header.path),
+                units=header.units, check_poses=self._pose_checker(header.path),
             )  # fmt: skip
             require_kind(self.survey, header.path, counts.intensity_sample)
             return counts, digest.result()

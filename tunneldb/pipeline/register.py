@@ -11,6 +11,7 @@ import psycopg
 
 from tunneldb.arrays import Float
 from tunneldb.errors import UserError
+from tunneldb.geometry.units import Units
 from tunneldb.pipeline.ladder_file import read_ladders, read_start
 from tunneldb.pointcloud.reader import read_chunks, read_header
 from tunneldb.pointcloud.sonar import read_sonar
@@ -114,17 +115,19 @@ def _of_file(scan: SonarPose, factor: float) -> SonarPose:
 def _laser_points(conn: psycopg.Connection[Any], survey: Survey, water_level: float, begin: StartProgress) -> Float:
     """Return points (n, 3) of the survey's scan files near the water level, one per small voxel."""
     rows = conn.execute(
-        "SELECT path, bytes, checksum FROM tunnel.scan_file WHERE survey_id = %s AND bytes > 0 ORDER BY name", [survey.id]
+        "SELECT path, bytes, checksum, unit, height_unit FROM tunnel.scan_file WHERE survey_id = %s AND bytes > 0"
+        " ORDER BY name",
+        [survey.id],
     ).fetchall()
     conn.rollback()
     if not rows:
         raise UserError(f"survey {survey.name} has no laser scan: tunneldb load {survey.name} FILE")
     voxels = Voxels(VOXEL)
     lowest, highest = np.inf, -np.inf
-    for name, size, checksum in rows:
+    for name, size, checksum, unit, height_unit in rows:
         path = unchanged_file(name, size, checksum)
         step = begin(path.name, read_header(path).points)
-        for chunk in read_chunks(path, None):
+        for chunk in read_chunks(path, None, units=Units(unit, height_unit)):
             height = chunk.xyz[:, 2]
             lowest, highest = min(lowest, float(height.min(initial=np.inf))), max(highest, float(height.max(initial=-np.inf)))
             voxels.add(chunk.xyz[(height > water_level - BELOW) & (height < water_level + ABOVE)])

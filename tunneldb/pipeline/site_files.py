@@ -20,8 +20,8 @@ from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.header_box import describe_box_difference
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.pose_coverage import PoseCoverage, PoseFaults
-from tunneldb.pointcloud.reader import CHUNK, ScanHeader, check_header, crs_note
-from tunneldb.pointcloud.selection import SAMPLE_STEP, FilterCounts
+from tunneldb.pointcloud.reader import CHUNK, ScanHeader, check_header, coordinate_note, crs_note
+from tunneldb.pointcloud.selection import SAMPLE_STEP, FilterCounts, FilterSettings
 from tunneldb.progress import StartProgress, silent
 from tunneldb.radiometry.intensity_kind import doubt
 from tunneldb.stages.ledger import stage_run
@@ -44,7 +44,7 @@ def register_files(
     conn: psycopg.Connection[Any],
     survey: Survey,
     paths: Sequence[Path],
-    max_left_out: float,
+    settings: FilterSettings,
     begin: StartProgress = silent,
 ) -> Iterator[Loaded]:
     """Record scan files of a site, each in a transaction of its own.
@@ -60,8 +60,8 @@ def register_files(
         Survey of a site.
     paths : sequence of Path
         Known by their names, as with `tunneldb.pipeline.load.load_files`.
-    max_left_out : float
-        Share of a file's points that may be invalid or without a scanner position.
+    settings : FilterSettings
+        Of which the share of a file's points that may be invalid or without a scanner position, and the units are used.
     begin : callable
         Called with each file that begins; returns a function that takes its progress.
 
@@ -76,7 +76,7 @@ def register_files(
         If a file is unreadable or does not fit the survey. The headers of all are checked before the first is read.
     """
     poses = load_pose_coverage(conn, survey)
-    headers = read_headers(paths)
+    headers = read_headers(paths, settings.units)
     for header in headers:
         check_header(header, survey.intensity_dimension, survey.srid, needs_time=poses.mobile)
     copies = copies_of(conn, survey, [header.path for header in headers])
@@ -85,10 +85,10 @@ def register_files(
     headers = [header for header in headers if header.path not in copies]
     for header in headers:
         recorded = recorded_files(conn, survey).get(header.path.name)
-        there = unchanged(conn, header.path, recorded)
+        there = unchanged(conn, header.path, recorded, header.units)
         conn.commit()
         if there is None:
-            there = _register(conn, survey, header, poses, max_left_out, begin, replaces=recorded is not None)
+            there = _register(conn, survey, header, poses, settings.max_left_out, begin, replaces=recorded is not None)
         place = outside_area(survey.srid, _corners(conn, survey, header.path.name))
         notes = (crs_note(header, survey.srid), place, there.note)
         yield replace(there, note="; ".join(filter(None, notes)) or None)
@@ -126,7 +126,10 @@ def _register(
             doubtful = doubt(survey.intensity_kind, counts.intensity_sample)
             stated = survey.srid if header.crs else None
             differs = describe_box_difference(header, counts.box)
-            content = Content(path, digest.result(), path.stat().st_size, stated, differs, doubtful, counts)
+            noted = coordinate_note(header, survey.srid)
+            content = Content(
+                path, digest.result(), path.stat().st_size, stated, differs, doubtful, counts, header.units, noted
+            )
         file_id = record_file(conn, survey, content)
         loaded = outcome(conn, file_id, "replaced" if replaces else "loaded", time.monotonic() - started)
         loaded = replace(loaded, note=doubtful)
@@ -141,7 +144,7 @@ def _look_through(
     counts, faults = FilterCounts(), PoseFaults()
     low, high = counts.extent[:3], counts.extent[3:]
     progress = begin(header.path.name, header.points)
-    for points in map(Points.of, read_raw(header.path, survey.intensity_dimension, CHUNK)):
+    for points in map(Points.of, read_raw(header.path, survey.intensity_dimension, CHUNK, units=header.units)):
         counts.points += len(points)
         counts.enclose(points.xyz)
         progress(len(points))

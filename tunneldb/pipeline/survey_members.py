@@ -9,6 +9,7 @@ import psycopg
 
 from tunneldb.database import snapshot
 from tunneldb.errors import NotReadyError, UserError
+from tunneldb.geometry.units import Units
 from tunneldb.pipeline.members import AUTO, FileMembers, Inputs
 from tunneldb.pipeline.replace_structures import replace_structures
 from tunneldb.pipeline.spot_colours import find_coloured_members
@@ -87,14 +88,15 @@ def _inputs(conn: psycopg.Connection[Any], survey: Survey) -> Inputs:
     if survey.platform != "static":
         raise UserError(f"survey {survey.name} is {survey.platform}; members are found only in scans of a static scanner")
     rows = conn.execute(
-        "SELECT path, bytes, checksum FROM tunnel.scan_file WHERE survey_id = %s ORDER BY name", [survey.id]
+        "SELECT path, bytes, checksum, unit, height_unit FROM tunnel.scan_file WHERE survey_id = %s ORDER BY name", [survey.id]
     ).fetchall()
     if not rows:
         raise NotReadyError(f"survey {survey.name} has no files yet: tunneldb load {survey.name} FILE...")
     return Inputs(
-        tuple(unchanged_file(*row) for row in rows),
+        tuple(unchanged_file(*row[:3]) for row in rows),
         survey.intensity_dimension,
         cast(Kind, survey.intensity_kind),
         load_poses(conn, survey),
         AUTO if survey.reference == AUTO else load_reference(conn, survey),
+        tuple(Units(*row[3:]) for row in rows),
     )

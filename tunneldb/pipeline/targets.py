@@ -234,7 +234,7 @@ class _Kilometre:
 
     def _chunks(self) -> Iterator[Points]:
         for file in self.files:
-            yield from read_chunks(file.path, None, CHUNK, file.ranges)
+            yield from read_chunks(file.path, None, CHUNK, file.ranges, units=file.units)
 
     def _kept(self, points: Points, curved: CurvedCells) -> NDArray[Any]:
         points = points.some(curved.holds(points.xyz))

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from tunneldb.arrays import Float, Int32, Int64
 from tunneldb.errors import InputError
-from tunneldb.pointcloud.formats.table import format_of
-from tunneldb.pointcloud.points import CHUNK, Raw, on_earth
+from tunneldb.geometry.units import IN_METRES, Units
+from tunneldb.pointcloud.formats.raw import read_raw
+from tunneldb.pointcloud.points import Raw, on_earth
 from tunneldb.pointcloud.pose_sample import SampledPoints
 
 SAMPLE = 400_000  # points; the sample has at most twice as many
@@ -79,7 +80,7 @@ class Contents:
     misplaced : int
         Number of valid points with a coordinate that is NaN or infinite.
     low, high : (3,) float64 array
-        Bounding box of the other points, in the file's unit.
+        Bounding box of the other points, m.
     times : (float, float) or None
         First and last ``gps_time``; None if the file has none, or all are equal.
     untimed : int
@@ -111,7 +112,7 @@ class Contents:
         return self.sample.xyz
 
 
-def read_contents(path: Path, progress: Callable[[int], None] = lambda count: None) -> Contents:
+def read_contents(path: Path, progress: Callable[[int], None] = lambda count: None, units: Units = IN_METRES) -> Contents:
     """Read a scan file once, in chunks of constant memory.
 
     Parameters
@@ -119,6 +120,8 @@ def read_contents(path: Path, progress: Callable[[int], None] = lambda count: No
     path : Path
     progress : callable
         Function of the number of points of each chunk.
+    units : Units
+        Units of the file's coordinates.
 
     Raises
     ------
@@ -129,7 +132,7 @@ def read_contents(path: Path, progress: Callable[[int], None] = lambda count: No
     points = misplaced = untimed = 0
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     first, last, timed = np.inf, -np.inf, False
-    for raw in format_of(path).read(path, None, CHUNK, None):
+    for raw in read_raw(path, None, units=units):
         sample.add(raw, points)
         points += len(raw)
         placed = [
@@ -179,24 +182,26 @@ def read_values(path: Path, dimension: str, points: int) -> NDArray[Any]:
     runs = -(-points // RUN_POINTS)
     chosen = np.unique(np.linspace(0, runs - 1, min(runs, RUNS)).astype(int)) * RUN_POINTS
     ranges = [(int(begin), min(int(begin) + RUN_POINTS, points)) for begin in chosen]
-    parts = [np.array(raw.intensity) for raw in format_of(path).read(path, dimension, CHUNK, ranges)]
+    parts = [np.array(raw.intensity) for raw in read_raw(path, dimension, ranges=ranges)]
     return np.concatenate(parts)
 
 
-def read_near(path: Path, contents: Contents, near: NDArray[np.bool_]) -> Float:
+def read_near(path: Path, contents: Contents, near: NDArray[np.bool_], units: Units = IN_METRES) -> Float:
     """Read coordinates (n, 3), m, at full density in the runs of points that hold most of some points of the sample.
 
     Parameters
     ----------
     near : (n,) bool array
         True for these points of the sample.
+    units : Units
+        Units of the file's coordinates.
     """
     runs, counts = np.unique(contents.numbers[near] // RUN_POINTS, return_counts=True)
     chosen = np.sort(runs[np.argsort(-counts, kind="stable")[:RUNS]]) * RUN_POINTS
     ranges = [(int(begin), min(int(begin) + RUN_POINTS, contents.points)) for begin in chosen]
     parts = [
         np.column_stack([np.asarray(stored) for stored in (raw.x, raw.y, raw.z)]) * raw.scales + raw.offsets
-        for raw in format_of(path).read(path, None, CHUNK, ranges)
+        for raw in read_raw(path, None, ranges=ranges, units=units)
     ]
     xyz = np.concatenate([np.empty((0, 3)), *parts])
     return np.asarray(xyz[on_earth(xyz).all(axis=1)])

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from pyproj import CRS
 
 from tunneldb.arrays import Bool, Float, Int32, Single, UInt8, UInt16
+from tunneldb.geometry.units import IN_METRES, Units
+from tunneldb.pointcloud.stated_crs import StatedCrs
 
 CHUNK = 500_000
 
@@ -66,6 +68,10 @@ class Raw:
 
     def __len__(self) -> int:
         return len(self.x)
+
+    def in_metres(self, units: Units) -> Raw:
+        """Return the chunk with the units of its coordinates in scales and offsets."""
+        return replace(self, scales=self.scales * units.scales, offsets=self.offsets * units.scales)
 
     def part(self, begin: int, end: int) -> Raw:
         """Return points begin to end, half-open, of the chunk."""
@@ -170,12 +176,16 @@ class ScanHeader:
         Number of points by the header; an E57 file may mark some of them as invalid, which are not read.
     dimensions : tuple of str
         Names of the dimensions of a point.
-    crs : CRS or None
-        Coordinate reference system, None if the file states none.
+    stated : StatedCrs
+        Coordinate system that it states.
     low, high : (3,) float64 array
         Bounding box of the coordinates by the header, m; not checked, so it must not decide what is done with the points.
-    unread_crs : str
-        Text of a coordinate system that cannot be read, and the reason; empty if there is none.
+    units : Units
+        Units of its coordinates; `low` and `high` are converted, and so are points that are read with them.
+    unit_given, height_unit_given : bool
+        True if the user gave the unit of x and y, or of z; then what the file states of it does not matter.
+    notes : tuple of str
+        Contradictions within the header, other than those of the coordinate system.
     tight : bool
         False if the box may be larger than that of the points because it encloses rotated boxes of scans.
     """
@@ -183,8 +193,21 @@ class ScanHeader:
     path: Path
     points: int
     dimensions: tuple[str, ...]
-    crs: CRS | None
+    stated: StatedCrs
     low: Float
     high: Float
-    unread_crs: str = ""
+    units: Units = IN_METRES
+    unit_given: bool = False
+    height_unit_given: bool = False
+    notes: tuple[str, ...] = ()
     tight: bool = True
+
+    @property
+    def crs(self) -> CRS | None:
+        """Coordinate system in plan, perhaps with heights; None if the file states none or it cannot be read."""
+        return self.stated.crs
+
+    @property
+    def unread_crs(self) -> str:
+        """Text of a coordinate system that cannot be read, and the reason; empty if there is none."""
+        return self.stated.unread

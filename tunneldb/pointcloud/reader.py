@@ -9,12 +9,24 @@ from pathlib import Path
 import numpy as np
 
 from tunneldb.errors import InputError
-from tunneldb.geometry.crs import LOCAL, describe_crs, describe_srid, fits_srid, horizontal, is_local, srid_name
+from tunneldb.geometry.crs import (
+    LOCAL,
+    describe_crs,
+    describe_srid,
+    fits_srid,
+    heights_differ,
+    in_metres,
+    is_local,
+    srid_name,
+)
+from tunneldb.geometry.crs_equality import horizontal, lacks_datum
+from tunneldb.geometry.units import IN_METRES, Units
 from tunneldb.pointcloud.file_sample import read_runs
 from tunneldb.pointcloud.formats.faults import require_dimension
 from tunneldb.pointcloud.formats.raw import read_raw
 from tunneldb.pointcloud.formats.table import format_of, require_known
 from tunneldb.pointcloud.points import CHUNK, Points, Ranges, ScanHeader
+from tunneldb.pointcloud.units import conversion_note, require_metres
 
 __all__ = ["CHUNK", "Points", "ScanHeader", "check_header", "read_chunks", "read_header"]
 
@@ -43,7 +55,7 @@ def _without_wrong_crs(header: ScanHeader) -> ScanHeader:
         return header
     x, y = plan[0]
     reason = f"{describe_crs(header.crs)} is in degrees, but x = {x:.0f}, y = {y:.0f} are not"
-    return replace(header, crs=None, unread_crs=reason)
+    return replace(header, stated=replace(header.stated, crs=None, unread=reason))
 
 
 def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_time: bool) -> None:
@@ -63,31 +75,50 @@ def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_tim
     Raises
     ------
     InputError
-        If the dimension or ``gps_time`` is missing, or the horizontal coordinate system differs.
+        If the dimension or ``gps_time`` is missing, the horizontal coordinate system differs, or coordinates are not in metres.
     """
     require_dimension(header.path, dimension, header.dimensions, "the survey's intensity")
     require_dimension(header.path, "gps_time" if needs_time else None, header.dimensions, "the trajectory")
-    if header.crs is not None and not fits_srid(header.crs, srid):
+    if header.crs is not None and not fits_srid(in_metres(header.crs), srid):
         option = "with --srid local" if is_local(header.crs) else "with the file's SRID"
         raise InputError(
             f"{header.path}: its coordinate system is {describe_crs(header.crs)}, the tunnel's is {describe_srid(srid)}; "
             f"transform the file or add the tunnel {option}"
         )
+    require_metres(header)
 
 
 def crs_note(header: ScanHeader, srid: int) -> str | None:
-    """Return a note that a file is assumed to be in the tunnel's system (EPSG code, LOCAL); None if it states it.
+    """Return assumptions about a file's coordinates in a tunnel of a system (EPSG code, LOCAL); None if there are none.
 
     Local coordinates need no note if the file states no system.
     """
-    if header.crs is not None or (srid == LOCAL and not header.unread_crs):
-        return None
-    stated = f"a coordinate system that cannot be read ({header.unread_crs})" if header.unread_crs else "no coordinate system"
-    return f"states {stated}; using the tunnel's, {srid_name(srid)}"
+    unstated = header.crs is None and not header.unread_crs and srid != LOCAL
+    nothing = f"states no coordinate system; using the tunnel's, {srid_name(srid)}" if unstated else None
+    return "; ".join(filter(None, (nothing, coordinate_note(header, srid)))) or None
+
+
+def coordinate_note(header: ScanHeader, srid: int) -> str | None:
+    """Return what results should say of a file's coordinates: unreadable or contradictory statements, conversions."""
+    notes = list(header.stated.notes)
+    if header.unread_crs:
+        notes.append(
+            f"states a coordinate system that cannot be read ({header.unread_crs}); using the tunnel's, {srid_name(srid)}"
+        )
+    if header.crs is not None and lacks_datum(header.crs):
+        notes.append(f"states no geodetic datum ({header.crs.name}); using the tunnel's, {srid_name(srid)}")
+    notes += filter(None, (heights_differ(header.stated.heights, srid), conversion_note(header), *header.notes))
+    return "; ".join(notes) or None
 
 
 def read_chunks(
-    path: Path, dimension: str | None, size: int = CHUNK, ranges: Ranges | None = None, *, colours: bool = False
+    path: Path,
+    dimension: str | None,
+    size: int = CHUNK,
+    ranges: Ranges | None = None,
+    *,
+    units: Units = IN_METRES,
+    colours: bool = False,
 ) -> Iterator[Points]:
     """Read a scan file chunk by chunk.
 
@@ -98,7 +129,7 @@ def read_chunks(
     Points
         In file order within a range; points without finite coordinates are skipped.
     """
-    for raw in read_raw(path, dimension, size, ranges, colours=colours):
+    for raw in read_raw(path, dimension, size, ranges, units=units, colours=colours):
         yield Points.of(raw).located()
 
 
@@ -114,11 +145,14 @@ class ScanSource:
         Half-open ranges of point indices, from 0, that contain all points of the kilometre and 10 m on both sides.
     dimension : str or None
         The survey's intensity dimension.
+    units : Units
+        Units of the file's coordinates.
     """
 
     path: Path
     ranges: list[tuple[int, int]]
     dimension: str | None
+    units: Units = IN_METRES
 
     @property
     def points(self) -> int:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass
 from pathlib import Path
 
-import laspy
 import numpy as np
 from laspy import DecompressionSelection, LazBackend
 
@@ -20,7 +19,7 @@ from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.e57 import is_e57
 from tunneldb.pointcloud.formats.e57_records import E57Records
 from tunneldb.pointcloud.formats.faults import decoding
-from tunneldb.pointcloud.formats.las import KIND, is_pointwise, read_las_header, seek
+from tunneldb.pointcloud.formats.las import KIND, is_pointwise, open_las, read_las_header, seek
 from tunneldb.pointcloud.formats.las_header import Head, read_head
 from tunneldb.pointcloud.formats.las_records import FORMAT_OF, coordinates, fields, record_size, upgraded
 from tunneldb.pointcloud.formats.laz import writing
@@ -219,7 +218,7 @@ def _read(
 ) -> Iterator[UInt8]:
     backends = (LazBackend.Lazrs,) if threads() == 1 else (LazBackend.LazrsParallel, LazBackend.Lazrs)
     with decoding(path, KIND):
-        las = laspy.open(path, laz_backend=backends, read_evlrs=False, decompression_selection=selection)
+        las = open_las(path, laz_backend=backends, read_evlrs=False, decompression_selection=selection)
         pointwise = is_pointwise(las.header)
     with las:
         done = at = 0

@@ -22,6 +22,7 @@ from tunneldb.errors import InputError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.misplacement import explain_misplacement
 from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.geometry.units import IN_METRES, Units
 from tunneldb.pointcloud.beyond_ends import BeyondEnds
 from tunneldb.pointcloud.block_times import BlockTimes
 from tunneldb.pointcloud.chainage_lookup import STRETCHING, ChainageLookup
@@ -33,6 +34,7 @@ from tunneldb.pointcloud.pose_sample import PoseSample, SampledPoints
 from tunneldb.pointcloud.prefetch import in_order, prefetch
 from tunneldb.pointcloud.spool import BINS_PER_KM, BINS_PER_METRE, PLACE, Rows, Spool, bin_of, rows_xyz, windows
 from tunneldb.pointcloud.thinning import first_of_voxels, pick, voxel_edge
+from tunneldb.pointcloud.units import NOT_GIVEN, GivenUnits
 from tunneldb.pointcloud.voxels import CellCounts
 from tunneldb.threads import threads
 
@@ -66,6 +68,8 @@ class FilterSettings:
         Distance from the given axis beyond which points are outside, m.
     max_left_out : float
         Greatest share of the points near the axis that may be invalid or without a scanner position.
+    units : GivenUnits
+        Units of the files' coordinates as given by the user.
     """
 
     density: float | None = 100.0
@@ -73,6 +77,7 @@ class FilterSettings:
     noise_diameter: float = DIAMETER
     max_distance: float = 25.0
     max_left_out: float = 0.05
+    units: GivenUnits = NOT_GIVEN
 
     @property
     def edge(self) -> float | None:
@@ -181,6 +186,7 @@ def filter_file(
     memory: int = MEMORY,
     chunk: int = CHUNK,
     check_poses: CheckPoses | None = None,
+    units: Units = IN_METRES,
 ) -> FilterCounts:
     """Read a scan file at full density and store the points selected for the database.
 
@@ -207,6 +213,8 @@ def filter_file(
         Bytes of rows in memory; points read at a time.
     check_poses : callable or None
         Function of a sample of the points near the axis; it returns a doubt about their scanner positions, or raises an error.
+    units : Units
+        Units of the file's coordinates.
 
     Raises
     ------
@@ -214,7 +222,7 @@ def filter_file(
         If the file cannot be read, no point is near the axis (states their distance), all near it are noise, or the share of
         points near the axis that are invalid or without scanner position exceeds ``max_left_out``.
     """
-    with _Filter(path, dimension, alignment, poses, settings, memory) as work:
+    with _Filter(path, dimension, alignment, poses, settings, memory, units) as work:
         work.read(progress, chunk, check_poses)
         for rows in work.judge(progress):
             rows["tag"] = tag
@@ -242,8 +250,9 @@ class _Filter:
         poses: PoseCoverage,
         settings: FilterSettings,
         memory: int,
+        units: Units,
     ) -> None:
-        self.path, self.dimension = path, dimension
+        self.path, self.dimension, self.units = path, dimension, units
         self.poses, self.settings = poses, settings
         self.counts, self.cells = FilterCounts(), CellCounts()
         self.faults, self.invalid = PoseFaults(), ""
@@ -262,7 +271,7 @@ class _Filter:
     def read(self, progress: Progress, chunk: int, check_poses: CheckPoses | None) -> None:
         """Read the file, and store the points that the noise filter has to examine."""
         counts, nearest, guess = self.counts, math.inf, None
-        with closing(prefetch(map(Points.of, read_raw(self.path, self.dimension, chunk)))) as chunks:
+        with closing(prefetch(map(Points.of, read_raw(self.path, self.dimension, chunk, units=self.units)))) as chunks:
             for points in chunks:
                 self._set_aside(points)
                 if counts.outside and counts.outside + counts.invalid == counts.points:

@@ -11,6 +11,7 @@ import numpy as np
 from tunneldb.arrays import Float, Int32
 from tunneldb.csvfile import read_csv
 from tunneldb.errors import InputError
+from tunneldb.pointcloud.formats.pose_contradictions import lost_positions, position_notes
 from tunneldb.pointcloud.formats.table import has_scans, posed_scans
 
 SCAN_ID_LIMIT = 1 << 31  # point_source_id of LAS has 16 bits, the numbers of E57 scans have 31
@@ -28,10 +29,13 @@ class Stations:
         Number of the scan, without repeats.
     xyz : (n, 3) float64 array
         Position, m.
+    notes : tuple of str
+        Positions for which a header has two that contradict each other.
     """
 
     scan_id: Int32
     xyz: Float
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -53,12 +57,14 @@ def read_stations(paths: Sequence[Path]) -> Stations:
     Raises
     ------
     InputError
-        If a file cannot be read or holds no station, a number is invalid, a scan has no position, or a scan has two.
+        If a file cannot be read or holds no station, a number is invalid, a scan has no position, or a scan has two, or the two
+        places of its headers contradict each other so that the positions are lost.
     """
     known: dict[int, _Station] = {}
     placeless = []
+    notes: list[str] = []
     for path in _files(paths):
-        for station in _of_scans(path) if has_scans(path) else _of_csv(path):
+        for station in _of_scans(path, notes) if has_scans(path) else _of_csv(path):
             if station.place is None:
                 placeless.append(station)
                 continue
@@ -71,7 +77,8 @@ def read_stations(paths: Sequence[Path]) -> Stations:
                 f"{station.origin} has no pose, so the scanner position is unknown; "
                 f"give it in a CSV file: --stations FILE, scan_id {station.scan_id}"
             )
-    return Stations(np.array(list(known), np.int32), np.array([station.place for station in known.values()], np.float64))
+    xyz = np.array([station.place for station in known.values()], np.float64)
+    return Stations(np.array(list(known), np.int32), xyz, tuple(notes))
 
 
 def _files(paths: Sequence[Path]) -> Iterator[Path]:
@@ -85,8 +92,13 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
         yield from found
 
 
-def _of_scans(path: Path) -> Iterator[_Station]:
-    for scan in posed_scans(path):
+def _of_scans(path: Path, notes: list[str]) -> Iterator[_Station]:
+    scans = posed_scans(path)
+    lost = lost_positions(scans)
+    if lost:
+        raise InputError(f"{path}: {lost}: --stations STATIONS.csv")
+    notes += [f"{path.name}: {note}" for note in position_notes(scans)]
+    for scan in scans:
         yield _Station(scan.number, scan.position, f"{path}, scan {scan.index + 1} ({scan.name})")
 
 

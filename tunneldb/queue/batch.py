@@ -16,6 +16,8 @@ from psycopg.types.range import Range
 from tunneldb.errors import UserError
 from tunneldb.pipeline.load import parameters_of, settings_of
 from tunneldb.pointcloud.reader import check_header, read_header
+from tunneldb.pointcloud.selection import FilterSettings
+from tunneldb.pointcloud.units import in_units
 from tunneldb.queue.expected import damaged_kilometres, expected_kilometres, kilometres_near_damaged
 from tunneldb.stages.registry import STAGE_NAMES
 from tunneldb.stages.run import loaded_kilometres
@@ -127,7 +129,7 @@ def plan(
     _require_files(named)
     again = _failed_paths(conn, survey, {path.name for path in named}) if retry else []
     how = parameters_of(settings_of({**_present_density(conn, survey), **(reading or {})}))
-    found = _headers(conn, survey, [*named, *again], float(how["load.max_distance"]), kilometres)
+    found = _headers(conn, survey, [*named, *again], settings_of(how), kilometres)
     files = [file for file in found if kilometres is None or file.error or _touches(file, kilometres)]
     requested = {km for file in files for km in file.touched}
     if not named:
@@ -171,11 +173,11 @@ def _present_density(conn: psycopg.Connection[Any], survey: Survey) -> dict[str,
 
 
 def _headers(
-    conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path], reach: float, wanted: range | None
+    conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path], settings: FilterSettings, wanted: range | None
 ) -> list[Incoming]:
     if not paths:
         return []
-    alignment, mobile = load_alignment(conn, survey), is_mobile(conn, survey)
+    alignment, mobile, reach = load_alignment(conn, survey), is_mobile(conn, survey), settings.max_distance
     read = {
         row[0]: row[1:]
         for row in conn.execute(
@@ -189,7 +191,7 @@ def _headers(
         size = path.stat().st_size
         points = 0
         try:
-            header = read_header(path)
+            header = in_units(read_header(path), settings.units)
             points = header.points
             check_header(header, survey.intensity_dimension, survey.srid, needs_time=mobile)
             if path.name in read and _untouched(path, size, *read[path.name][:3]):

@@ -20,6 +20,7 @@ from tunneldb.pointcloud.formats.las_bounds import header_box
 from tunneldb.pointcloud.formats.table import format_of
 from tunneldb.pointcloud.header_box import has_box, in_box
 from tunneldb.pointcloud.reader import ScanHeader
+from tunneldb.pointcloud.stated_crs import StatedCrs
 
 RUNS, RUN_POINTS = 50, 100
 """Number of runs of points that are sampled, and points of a run."""
@@ -53,7 +54,7 @@ def expected_kilometres(header: ScanHeader, alignment: Alignment, reach: float, 
     boxed = header_kilometres(header, alignment, reach) if has_box(header) else range(0)
     if boxed and (wanted is None or set(boxed) & set(wanted)):
         return boxed
-    xyz = np.concatenate(list(read_runs(header.path, header.points, RUNS, RUN_POINTS)))
+    xyz = np.concatenate(list(read_runs(header.path, header.points, RUNS, RUN_POINTS, header.units)))
     sampled = _kilometres(xyz, alignment, reach)
     if boxed or sampled:
         return range(min([*boxed, *sampled]), max([*boxed, *sampled]) + 1)
@@ -88,7 +89,7 @@ def kilometres_near_damaged(path: Path, alignment: Alignment, reach: float) -> r
 def _damaged_header(path: Path) -> ScanHeader | None:
     """Return the header of an unreadable file with its box, if that is readable."""
     box = header_box(path) if format_of(path).is_las else None
-    return None if box is None else ScanHeader(path, 0, (), None, np.array(box[0]), np.array(box[1]))
+    return None if box is None else ScanHeader(path, 0, (), StatedCrs(), np.array(box[0]), np.array(box[1]))
 
 
 def extent(header: ScanHeader, alignment: Alignment, reach: float) -> tuple[float, float] | None:

@@ -19,10 +19,13 @@ import psycopg
 from tunneldb.database.server import Server
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.geometry.units import IN_METRES, Units
 from tunneldb.pipeline.load_settings import settings_of
 from tunneldb.pointcloud.file_sample import BLOCK, read_runs
+from tunneldb.pointcloud.reader import read_header
 from tunneldb.pointcloud.row_estimate import FileSample, RowEstimate, estimate_rows
 from tunneldb.pointcloud.selection import MEMORY
+from tunneldb.pointcloud.units import NOT_GIVEN, in_units
 from tunneldb.queue.batch import Incoming, Plan
 from tunneldb.queue.expected import RUN_POINTS, RUNS
 from tunneldb.stages.parameters import PARAMETERS
@@ -199,7 +202,7 @@ def preview(
     new = [file for file in plan.files if not file.already_read and file.error is None]
     points = sum(file.points for file in new)
     length = sum(high - low for low, high in _union(sorted(of_files[file.name] for file in new if file.name in of_files)))
-    estimate = estimate_rows(_samples(new), alignment, settings_of(plan.reading))
+    estimate = estimate_rows(_samples(new, plan), alignment, settings_of(plan.reading))
     rows = Span(estimate.low, estimate.likely, estimate.high)
     area = estimate.area or GIRTH * (length or KILOMETRE * len(plan.kilometres))
     wal = conn.execute("SELECT pg_size_bytes(current_setting('max_wal_size'))").fetchone()
@@ -240,13 +243,18 @@ def kilometres_of(stretch: tuple[float, float]) -> range:
 
 def _stretch(file: Incoming, plan: Plan, alignment: Alignment) -> tuple[float, float] | None:
     """Return the first and last chainage of a file, m, by a sample of its points; None if none is near the axis."""
-    xyz = np.concatenate(list(read_runs(file.path, file.points, RUNS, RUN_POINTS)))
+    xyz = np.concatenate(list(read_runs(file.path, file.points, RUNS, RUN_POINTS, _units(file, plan))))
     chainage, distance = alignment.locate(xyz)
     near = chainage[distance <= float(plan.reading["load.max_distance"])]
     return (float(np.quantile(near, TAIL)), float(np.quantile(near, 1.0 - TAIL))) if len(near) else None
 
 
-def _samples(files: Sequence[Incoming]) -> list[FileSample]:
+def _units(file: Incoming, plan: Plan) -> Units:
+    given = settings_of(plan.reading).units
+    return IN_METRES if given == NOT_GIVEN else in_units(read_header(file.path), given).units
+
+
+def _samples(files: Sequence[Incoming], plan: Plan) -> list[FileSample]:
     """Read runs of points of some files, spread evenly; together they stand for all."""
     if not files:
         return []
@@ -256,7 +264,7 @@ def _samples(files: Sequence[Incoming]) -> list[FileSample]:
     for file in chosen:
         runs = max(round(SAMPLED_RUNS * file.points / points), 1)
         stands_for = round(file.points * share / points)
-        samples.append(FileSample(stands_for, list(read_runs(file.path, file.points, runs, BLOCK))))
+        samples.append(FileSample(stands_for, list(read_runs(file.path, file.points, runs, BLOCK, _units(file, plan)))))
     return samples
 
 

@@ -86,7 +86,7 @@ def rasterize(
 def _chunks(files: list[ScanSource]) -> Iterator[Points]:
     size = CHUNK if threads() == 1 else 4 * CHUNK * threads()  # so that each thread has chunks to decode
     for file in files:
-        yield from read_chunks(file.path, file.dimension, size, file.ranges)
+        yield from read_chunks(file.path, file.dimension, size, file.ranges, units=file.units)
 
 
 @dataclass

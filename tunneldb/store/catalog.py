@@ -18,6 +18,7 @@ from tunneldb.alignment.given import GivenAxis
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.crs import LOCAL, LOCAL_NAME
+from tunneldb.geometry.units import IN_METRES, Units
 from tunneldb.store.alignment import save_design
 from tunneldb.store.scanner import (
     Positions,
@@ -155,6 +156,7 @@ def add_survey(
     reference: Path | Literal["auto"] | None,
     intensity: Intensity,
     time_offset: float = 0.0,
+    units: Units = IN_METRES,
 ) -> Positions:
     """Add a survey with its scanner positions and reference curve; return the positions.
 
@@ -169,6 +171,8 @@ def add_survey(
         CSV with range_m,intensity_db; or auto, to find the curve on the lining of each kilometre.
     time_offset
         Seconds to add to the times of the trajectory.
+    units
+        Units of the coordinates in the files of `poses`.
 
     Raises
     ------
@@ -177,7 +181,9 @@ def add_survey(
     """
     _require_name(name)
     tunnel_id, srid, alignment = _alignment(connection, tunnel)
-    positions = read_positions(poses, alignment, tunnel, mobile=mobile, backwards=backwards, time_offset=time_offset)
+    positions = read_positions(
+        poses, alignment, tunnel, mobile=mobile, backwards=backwards, time_offset=time_offset, units=units
+    )
     if poses is None:
         require_no_range(intensity.kind)
     if reference == "auto":
@@ -226,6 +232,8 @@ class SurveyChange:
     reference : Path, 'auto' or None
     kind, dimension : str or None
         Dimension and kind of the intensity.
+    units : Units
+        Units of the coordinates in the files of `poses`.
     """
 
     date: dt.date | None = None
@@ -236,6 +244,7 @@ class SurveyChange:
     reference: Path | Literal["auto"] | None = None
     kind: str | None = None
     dimension: str | None = None
+    units: Units = IN_METRES
 
 
 def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyChange) -> tuple[list[str], int]:
@@ -273,7 +282,7 @@ def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyCha
         _, srid, alignment = _alignment(connection, tunnel)
         positions = read_positions(
             change.poses, alignment, tunnel, mobile=change.mobile, backwards=change.backwards,
-            time_offset=change.time_offset or 0.0,
+            time_offset=change.time_offset or 0.0, units=change.units,
         )  # fmt: skip
         notes += positions.notes
         replace_positions(connection, key, positions, srid)

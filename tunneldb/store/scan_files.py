@@ -14,6 +14,7 @@ from psycopg.types.multirange import Multirange
 from psycopg.types.range import Range
 
 from tunneldb.errors import UserError
+from tunneldb.geometry.units import Units
 from tunneldb.pointcloud.formats.columns import names_file
 from tunneldb.pointcloud.selection import FilterCounts
 from tunneldb.store.survey import Survey
@@ -55,7 +56,7 @@ class Loaded:
 
 @dataclass(frozen=True)
 class Recorded:
-    """A row of tunnel.scan_file; low and high are the ends of its chainage, m."""
+    """A row of tunnel.scan_file; low and high are the ends of its chainage, m, units those of the file's coordinates."""
 
     id: int
     name: str
@@ -64,13 +65,16 @@ class Recorded:
     bytes: int
     low: float
     high: float
+    units: Units
 
 
 @dataclass(frozen=True)
 class Content:
     """A file that was read, as it is to be recorded; srid is that of the tunnel, if the file states one.
 
-    header_note states a difference between its header and its points, intensity_note a doubt about its intensity.
+    header_note states a difference between its header and its points, intensity_note a doubt about its intensity,
+    coordinate_note conversions of its coordinates and contradictions in what the file states of them; units are those of the
+    file's coordinates.
     """
 
     path: Path
@@ -80,6 +84,8 @@ class Content:
     header_note: str | None
     intensity_note: str | None
     counts: FilterCounts
+    units: Units
+    coordinate_note: str | None
 
 
 def checksum(path: Path) -> str:
@@ -98,10 +104,11 @@ def checksum(path: Path) -> str:
 def recorded_files(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, Recorded]:
     """Return the files of a survey, by name."""
     rows = conn.execute(
-        "SELECT id, name, path, checksum, bytes, chainage_from, chainage_to FROM tunnel.scan_file WHERE survey_id = %s",
+        "SELECT id, name, path, checksum, bytes, chainage_from, chainage_to, unit, height_unit FROM tunnel.scan_file"
+        " WHERE survey_id = %s",
         [survey.id],
     ).fetchall()
-    return {row[1]: Recorded(*row) for row in rows}
+    return {row[1]: Recorded(*row[:7], units=Units(row[7], row[8])) for row in rows}
 
 
 def sonar_among(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path]) -> list[Path]:
@@ -110,9 +117,14 @@ def sonar_among(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[P
     return [path for path in paths if (path.name,) in known]
 
 
-def unchanged(conn: psycopg.Connection[Any], path: Path, recorded: Recorded | None) -> Loaded | None:
-    """Keep a file with unchanged content, but record its current path, for reading it at full density."""
-    if recorded is None or path.stat().st_size != recorded.bytes or checksum(path) != recorded.checksum:
+def unchanged(conn: psycopg.Connection[Any], path: Path, recorded: Recorded | None, units: Units) -> Loaded | None:
+    """Keep a file with unchanged content and units, but record its current path, for reading it at full density."""
+    if (
+        recorded is None
+        or recorded.units != units
+        or path.stat().st_size != recorded.bytes
+        or checksum(path) != recorded.checksum
+    ):
         return None
     place = str(path.resolve())
     state = "unchanged" if recorded.path == place else "moved"
@@ -161,9 +173,9 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
         """
         INSERT INTO tunnel.scan_file (survey_id, name, path, checksum, bytes, points, noise, outside, invalid, unposed,
                                       thinned, kept, chainage_from, chainage_to, extent, srid, header_note,
-                                      intensity_note, pose_note,
-                                      beyond_before, beyond_after, reach_before, reach_after)
-        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s)
+                                      intensity_note, pose_note, beyond_before, beyond_after, reach_before, reach_after,
+                                      unit, height_unit, coordinate_note)
+        VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, 0, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s)
         ON CONFLICT (survey_id, name) DO UPDATE
            SET path = excluded.path, checksum = excluded.checksum, bytes = excluded.bytes, points = excluded.points,
                noise = excluded.noise, outside = excluded.outside, invalid = excluded.invalid, unposed = excluded.unposed,
@@ -172,7 +184,8 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
                srid = excluded.srid, header_note = excluded.header_note, intensity_note = excluded.intensity_note,
                pose_note = excluded.pose_note,
                beyond_before = excluded.beyond_before, beyond_after = excluded.beyond_after,
-               reach_before = excluded.reach_before, reach_after = excluded.reach_after
+               reach_before = excluded.reach_before, reach_after = excluded.reach_after,
+               unit = excluded.unit, height_unit = excluded.height_unit, coordinate_note = excluded.coordinate_note
         RETURNING id
         """,
         [
@@ -195,6 +208,9 @@ def record_file(conn: psycopg.Connection[Any], survey: Survey, content: Content)
             counts.pose_note,
             *counts.beyond,
             *counts.beyond_reach,
+            content.units.plan,
+            content.units.height,
+            content.coordinate_note,
         ],
     ).fetchone()
     assert row is not None

@@ -19,6 +19,7 @@ from tunneldb.database.copy import PointZ, copy_binary, pack
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.misplacement import explain_misplacement
+from tunneldb.geometry.units import IN_METRES, Units, unit_name
 from tunneldb.pointcloud.clock_offsets import WEEK
 from tunneldb.pointcloud.formats.table import has_scans
 from tunneldb.pointcloud.pose_checks import MAX_AXIS_DISTANCE, MAX_END_DISTANCE, far_from_axis, jumps
@@ -68,6 +69,7 @@ def read_positions(
     mobile: bool,
     backwards: bool,
     time_offset: float = 0.0,
+    units: Units = IN_METRES,
 ) -> Positions:
     """Read the scanner's positions, and leave out poses of a trajectory that cannot be.
 
@@ -82,6 +84,8 @@ def read_positions(
         True if the trajectory runs towards decreasing chainage.
     time_offset
         Seconds to add to the times of the trajectory.
+    units
+        Units of the coordinates in the files.
 
     Raises
     ------
@@ -93,11 +97,12 @@ def read_positions(
         return Positions(False, np.empty(0, np.int32), np.empty((0, 3)))
     if not mobile:
         stations = read_stations(paths)
-        together = _stations_together(paths, stations)
+        places = stations.xyz * units.scales
+        said = (*_stations_together(paths, stations), *stations.notes, *_conversion(units))
         if alignment is None:
-            return Positions(False, stations.scan_id, stations.xyz, together)
-        _require_near(paths, stations.xyz, alignment, tunnel)
-        far = far_from_axis(stations.xyz, alignment)
+            return Positions(False, stations.scan_id, places, said)
+        _require_near(paths, places, alignment, tunnel)
+        far = far_from_axis(places, alignment)
         if far.any():
             worst, more = int(np.argmax(far)), np.count_nonzero(far) - 1
             others = f", and {more} more as far" if more else ""
@@ -107,9 +112,9 @@ def read_positions(
                 f" {MAX_AXIS_DISTANCE:g} m beside it or {MAX_END_DISTANCE:g} m beyond its ends: fix the position, or remove"
                 " the row, and the points of that scan are left out"
             )
-        return Positions(False, stations.scan_id, stations.xyz, together)
+        return Positions(False, stations.scan_id, places, said)
     table, ended = _read_trajectory(paths[0])
-    time, xyz = table["time"], table.columns(XYZ)
+    time, xyz = table["time"], table.columns(XYZ) * units.scales
     if alignment is None:
         raise UserError(f"{tunnel!r} is a site; it takes the --stations of a static scanner")
     _require_near(paths, xyz, alignment, tunnel)
@@ -122,7 +127,7 @@ def read_positions(
             f" {MAX_AXIS_DISTANCE:g} m beside the axis of {tunnel!r}, {MAX_END_DISTANCE:g} m beyond its ends, or jump;"
             " fix the trajectory",
         )
-    notes = [ended] if ended else []
+    notes = [*([ended] if ended else []), *_conversion(units)]
     if wild.any():
         first = int(np.argmax(wild))
         notes.append(
@@ -161,6 +166,14 @@ def _stations_together(paths: Sequence[Path], stations: Stations) -> tuple[str, 
         )
     place = ", ".join(f"{value + 0.0:.3f}" for value in stations.xyz[0])
     return (f"all {count} stations are at one place ({place}), of scan_id {numbers}: check that the scanner stayed there",)
+
+
+def _conversion(units: Units) -> tuple[str, ...]:
+    """Return a note on the conversion of positions to metres; none if they are metres."""
+    if units.metric:
+        return ()
+    heights = "" if units.plan == units.height else f", heights from {unit_name(units.height)}"
+    return (f"positions are converted from {unit_name(units.plan)}{heights} to metres, as given",)
 
 
 def save_positions(connection: psycopg.Connection[Any], survey: int, positions: Positions, srid: int) -> None:

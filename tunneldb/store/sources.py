@@ -13,6 +13,7 @@ from psycopg import sql
 from tunneldb.arrays import Float
 from tunneldb.database.fetch import fetch_array
 from tunneldb.errors import UserError
+from tunneldb.geometry.units import Units
 from tunneldb.pointcloud.reader import Points, ScanSource
 from tunneldb.store.partition import partition, partition_exists, rows_in
 from tunneldb.store.scan_files import checksum
@@ -42,7 +43,8 @@ def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Scan
         If there is none, or one is gone or has other content than at loading.
     """
     rows = conn.execute(
-        "SELECT f.path, f.bytes, f.checksum, k.points FROM tunnel.scan_file f JOIN tunnel.file_km k ON k.file_id = f.id"
+        "SELECT f.path, f.bytes, f.checksum, k.points, f.unit, f.height_unit FROM tunnel.scan_file f"
+        " JOIN tunnel.file_km k ON k.file_id = f.id"
         " WHERE f.survey_id = %s AND k.km = %s AND k.loaded_at IS NOT NULL AND NOT isempty(k.points)"
         " ORDER BY f.chainage_from, f.name",
         (survey.id, km),
@@ -50,9 +52,10 @@ def sources(conn: psycopg.Connection[Any], survey: Survey, km: int) -> list[Scan
     if not rows:
         raise UserError(f"survey {survey.name} has no scan file in kilometre {km}: tunneldb load {survey.name} FILE")
     found = []
-    for name, size, known, ranges in rows:
+    for name, size, known, ranges, unit, height_unit in rows:
         path = unchanged_file(name, size, known)
-        found.append(ScanSource(path, [(part.lower, part.upper) for part in ranges], survey.intensity_dimension))
+        parts = [(part.lower, part.upper) for part in ranges]
+        found.append(ScanSource(path, parts, survey.intensity_dimension, Units(unit, height_unit)))
     return found
 
 

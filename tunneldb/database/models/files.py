@@ -62,6 +62,11 @@ class ScanFile(Base):
     )
     pose_note: Mapped[str | None] = mapped_column(comment="Doubts about the scanner positions of its points")
     header_note: Mapped[str | None] = mapped_column(comment="Difference between the header and the points, with both values")
+    coordinate_note: Mapped[str | None] = mapped_column(
+        comment="Conversion of its coordinates to metres, and contradictions in what it states of them"
+    )
+    unit: Mapped[str] = mapped_column(server_default="m", comment="Unit of its x and y: m, cm, mm, ft, us-ft or in")
+    height_unit: Mapped[str] = mapped_column(server_default="m", comment="Unit of its z: m, cm, mm, ft, us-ft or in")
     srid: Mapped[int | None] = mapped_column(comment="Spatial reference that the file states, if it states one")
     loaded_at: Mapped[dt.datetime] = mapped_column(server_default=NOW, comment="Time of loading")
 

@@ -17,8 +17,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pyproj import CRS
-from pyproj.exceptions import CRSError
 
 from tunneldb.arrays import Bool, Float, UInt16
 from tunneldb.errors import InputError, UserError
@@ -26,6 +24,7 @@ from tunneldb.pointcloud.formats.e57_xml import require_bounded_xml
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_dimension
 from tunneldb.pointcloud.formats.scans import scan_number
 from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
+from tunneldb.pointcloud.stated_crs import StatedCrs, stated_in_text
 
 KIND = "an E57"
 CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
@@ -125,15 +124,14 @@ def read_e57_header(path: Path) -> ScanHeader:
     with open_e57(path) as image, decoding(path, KIND):
         scans = scans_of(path, image)
         boxes = [_box(image, scan) for scan in scans]
-        crs, unread = _crs(image)
+        stated = _stated_crs(image)
     return ScanHeader(
         path,
         sum(scan.records for scan in scans),
         tuple(_dimensions(scans)),
-        crs,
+        stated,
         np.min([low for low, _ in boxes], axis=0),
         np.max([high for _, high in boxes], axis=0),
-        unread,
         tight=False,
     )
 
@@ -441,13 +439,8 @@ def _xyz(raw: Raw) -> Float:
     return np.column_stack([raw.x, raw.y, raw.z]) * raw.scales + raw.offsets
 
 
-def _crs(image: Any) -> tuple[CRS | None, str]:
-    """Return the coordinate system that the file states, or else its text; exporters write various texts there."""
+def _stated_crs(image: Any) -> StatedCrs:
+    """Return the coordinate system that the file states; exporters write various texts there."""
     root = image.root()
-    text = root["coordinateMetadata"].value().strip() if root.isDefined("coordinateMetadata") else ""
-    if not text:
-        return None, ""
-    try:
-        return CRS.from_user_input(text), ""
-    except CRSError:
-        return None, repr(text.split("\n", 1)[0][:60])
+    text = root["coordinateMetadata"].value() if root.isDefined("coordinateMetadata") else ""
+    return stated_in_text(text, "coordinateMetadata")

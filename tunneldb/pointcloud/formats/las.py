@@ -11,17 +11,20 @@ import laspy
 import numpy as np
 from laspy import DecompressionSelection, LazBackend
 from numpy.typing import NDArray
-from pyproj.exceptions import CRSError
 
 from tunneldb.arrays import Float
 from tunneldb.errors import InputError
-from tunneldb.pointcloud.formats.faults import check_ranges, decoding, line_of, require_dimension
-from tunneldb.pointcloud.formats.las_bounds import POINTWISE, check_envelope
+from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_dimension
+from tunneldb.pointcloud.formats.las_bounds import POINTWISE, check_envelope, count_contradiction, point_counts
+from tunneldb.pointcloud.formats.las_header import HEADER_SIZE
 from tunneldb.pointcloud.formats.laz_chunks import VariedChunks, count_points
 from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
+from tunneldb.pointcloud.stated_crs import StatedCrs, stated_in_las
 from tunneldb.threads import threads
 
 KIND = "a LAS or LAZ"
+FIRST_OF_WKT = 6
+"""Point format from which a coordinate system is stated by WKT only."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ def read_las_header(path: Path) -> ScanHeader:
     """Read the header of a LAS or LAZ file; see `tunneldb.pointcloud.reader.read_header`."""
     with decoding(path, KIND):
         check_envelope(path)
-        las = laspy.open(path)
+        las = open_las(path)
     with decoding(path, KIND), las, path.open("rb") as source:
         header = las.header
         dimensions = _dimensions(header)
@@ -68,22 +71,36 @@ def read_las_header(path: Path) -> ScanHeader:
         stored = count_points(source, header)
         if stored is not None and stored != count:
             raise ValueError(f"its header states {count} points, but it contains {stored}; export it again")
-        crs, unread = None, ""
-        try:
-            crs = header.parse_crs()
-        except CRSError as error:
-            unread = line_of(error)
+        stated = _stated_crs(header)
+        notes = tuple(filter(None, [count_contradiction(path)]))
     if count == 0:
         raise InputError(f"{path}: the file holds no points")
     _check_scales(path, scales, offsets)
-    return ScanHeader(path, count, dimensions, crs, np.array(header.mins), np.array(header.maxs), unread)
+    return ScanHeader(path, count, dimensions, stated, np.array(header.mins), np.array(header.maxs), notes=notes)
+
+
+def open_las(path: Path, **options: Any) -> laspy.LasReader:
+    """Open a LAS or LAZ file whose header was checked, with its number of points from the field that has it."""
+    las = laspy.open(path, **options)
+    with path.open("rb") as file:
+        las.header.point_count = point_counts(file.read(HEADER_SIZE))[0]
+    return las
+
+
+def _stated_crs(header: laspy.LasHeader) -> StatedCrs:
+    records: dict[int, bytes] = {}
+    for record in [*header.vlrs, *(header.evlrs or ())]:
+        if record.user_id.strip("\0 ") == "LASF_Projection":
+            records.setdefault(record.record_id, record.record_data_bytes())
+    wkt_counts = bool(header.global_encoding.wkt) or header.point_format.id >= FIRST_OF_WKT
+    return stated_in_las(records, wkt_counts=wkt_counts)
 
 
 def read_las_facts(path: Path) -> tuple[str, str | None]:
     """Return version and point format of a LAS or LAZ file, and the kind of its times by the header; None if it has none."""
     with decoding(path, KIND):
         check_envelope(path)
-        las = laspy.open(path)
+        las = open_las(path)
     with decoding(path, KIND), las:
         header = las.header
         kind = "LAZ" if header.are_points_compressed else "LAS"
@@ -104,7 +121,7 @@ def read_las(
     """
     with decoding(path, KIND):
         check_envelope(path)
-        las = laspy.open(path, laz_backend=_backends())
+        las = open_las(path, laz_backend=_backends())
     with las, path.open("rb") as source:
         with decoding(path, KIND):
             header = las.header

@@ -21,6 +21,8 @@ POINTWISE = 1
 _INTERNAL_WAVEFORMS = 1 << 1  # of the header's flags
 _STREAMED = -1  # the offset of the chunk table is in the file's last 8 bytes
 _MAX_CHUNK = 1 << 32  # bytes
+_FULL_HEADER = 375  # bytes, of version 1.4
+_LEGACY_COUNT_AT, _COUNT_AT = 107, 247
 _BOX_AT = 179
 _BOX = struct.Struct("<6d")  # max x, min x, max y, min y, max z, min z
 
@@ -43,6 +45,27 @@ def header_box(path: Path) -> tuple[tuple[float, float, float], tuple[float, flo
     return (low_x, low_y, low_z), (high_x, high_y, high_z)
 
 
+def point_counts(head: bytes) -> tuple[int, int]:
+    """Return the number of points by a header, and that of its legacy field of 32 bits; 375 bytes.
+
+    Version 1.4 has a field of 64 bits, which counts; if it is 0, the legacy field does, which some writers fill alone.
+    """
+    (legacy,) = struct.unpack_from("<I", head, _LEGACY_COUNT_AT)
+    if head[25] < 4:  # minor version
+        return legacy, legacy
+    (count,) = struct.unpack_from("<Q", head, _COUNT_AT)
+    return count or legacy, legacy
+
+
+def count_contradiction(path: Path) -> str:
+    """Return a statement of both numbers of points if the header of a LAS file has two; empty if not."""
+    with path.open("rb") as file:
+        count, legacy = point_counts(file.read(_FULL_HEADER))
+    if legacy in (0, count):
+        return ""
+    return f"its header states {count} points in its field of 64 bits, which counts, but {legacy} in that of 32 bits"
+
+
 def check_envelope(path: Path) -> None:
     """Compare counts and offsets with the size of the file.
 
@@ -55,13 +78,12 @@ def check_envelope(path: Path) -> None:
     """
     size = path.stat().st_size
     with path.open("rb") as file:
-        head = file.read(375)
+        head = file.read(_FULL_HEADER)
         if head[:4] != b"LASF":
             raise ValueError("it does not begin with LASF")
         (header_size,) = struct.unpack_from("<H", head, 94)
-        points_at, vlrs, point_format, record, count = struct.unpack_from("<IIBHI", head, 96)
-        if head[25] >= 4:  # minor version
-            count = struct.unpack_from("<Q", head, 247)[0] or count  # some writers fill the field of older versions alone
+        points_at, vlrs, point_format, record = struct.unpack_from("<IIBH", head, 96)
+        count, _ = point_counts(head)
         if not header_size + vlrs * _VLR_BYTES <= points_at <= size:
             raise ValueError(f"its header states {vlrs} records before byte {points_at}, but the file has {size} bytes")
         if point_format < 128:  # not compressed

@@ -258,6 +258,8 @@ def _of_version_4(header: bytes) -> bytes:
         struct.pack_into("<QI", out, 235, 0, 0)
         struct.pack_into("<Q5Q", out, 247, count, *returns)
         struct.pack_into("<H", out, 94, len(out))
+    elif struct.unpack_from("<Q", header, 247)[0] == 0:  # the legacy fields may be filled alone
+        struct.pack_into("<Q5Q", out, 247, *struct.unpack_from("<I5I", header, 107))
     out[107:131] = bytes(24)  # counts of 32 bits: none in formats 6 and later
     return bytes(out)
 

@@ -6,7 +6,7 @@ Source: G. Turk, *The PLY Polygon File Format*, 1994.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_d
 from tunneldb.pointcloud.formats.text import CloudBuilder, TextCloud, TextScan, read_cloud
 from tunneldb.pointcloud.formats.text_lines import TextLines
 from tunneldb.pointcloud.points import CHUNK, Ranges, Raw, ScanHeader
+from tunneldb.pointcloud.stated_crs import stated_in_comments
 
 KIND = "a PLY"
 MAX_ROUNDING = 0.01
@@ -50,6 +51,8 @@ class Vertices:
         Start of the vertices in a binary file, bytes.
     last : bool
         True if no other element follows the vertices.
+    comments : tuple of str
+        Comments of the header.
     """
 
     order: str
@@ -58,6 +61,7 @@ class Vertices:
     count: int
     offset: int
     last: bool
+    comments: tuple[str, ...] = ()
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -81,7 +85,7 @@ def read_ply_header(path: Path) -> ScanHeader:
             f"{path}: its coordinates are 32-bit numbers, whose resolution is only {step:.3g} m so far from the origin; "
             "export them as double, or closer to the origin"
         )
-    return ScanHeader(path, found.count, found.dimensions, None, low, high)
+    return ScanHeader(path, found.count, found.dimensions, stated_in_comments(found.comments), low, high)
 
 
 def read_ply(path: Path, dimension: str | None, size: int, ranges: Ranges | None = None) -> Iterator[Raw]:
@@ -165,14 +169,15 @@ def _read_header(path: Path, lines: TextLines) -> Vertices:
     if lines.text() != "ply":
         raise InputError(f"{path}: it does not begin with ply, so it is not a PLY file")
     order: str | None = None
+    comments: list[str] = []
     elements: list[tuple[str, int, list[tuple[str, str]]]] = []
     for _ in range(_MAX_HEADER_LINES):
         words = (lines.text() or "").split()
         match words:
             case ["format", name, _] if name in _ORDERS:
                 order = _ORDERS[name]
-            case ["comment" | "obj_info", *_]:
-                pass
+            case ["comment" | "obj_info", *comment]:
+                comments.append(" ".join(comment))
             case ["element", name, count] if count.isdigit():
                 elements.append((name, int(count), []))
             case ["property", "list", _, _, name] if elements:
@@ -185,7 +190,7 @@ def _read_header(path: Path, lines: TextLines) -> Vertices:
                 raise InputError(f"{path}, line {lines.line - 1}: {' '.join(words)[:60]!r} is not a line of a PLY header")
     if order is None:
         raise InputError(f"{path}: its header states no format; expected ascii, binary_little_endian or binary_big_endian")
-    return _vertices(path, order, elements, lines)
+    return replace(_vertices(path, order, elements, lines), comments=tuple(comments))
 
 
 def _vertices(path: Path, order: str, elements: list[tuple[str, int, list[tuple[str, str]]]], lines: TextLines) -> Vertices:

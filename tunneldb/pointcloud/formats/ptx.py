@@ -2,7 +2,7 @@
 
 A scan has ten header lines, then one line per ray. The header has the numbers of columns and rows, position and axes of the
 scanner, and the matrix that transforms the points (as row vectors). Rays without an echo are 0, 0, 0. The scanner position
-is the image of 0, 0, 0 under the matrix.
+is the image of 0, 0, 0 under the matrix; line 3 of the header should repeat it.
 
 Source: Leica Geosystems, *Cyclone PTX export format*; P. Bourke, *ptx plain text data format*, 2015.
 """
@@ -52,7 +52,7 @@ def _read_ptx(path: Path, version: tuple[int, int]) -> TextCloud:
         builder = CloudBuilder(path, lines)
         seen: dict[bytes, int] = {}
         while (head := _read_head(path, lines)) is not None:
-            line, columns, rows, matrix = head
+            line, columns, rows, place, matrix = head
             first = lines.text()
             if first is None:
                 raise InputError(f"{path}: truncated: no point follows the scan that begins in line {line}")
@@ -64,7 +64,7 @@ def _read_ptx(path: Path, version: tuple[int, int]) -> TextCloud:
             seen[key] = seen.get(key, 0) + 1
             index = len(builder.scans)
             number = scan_number(f"{key.hex()} {seen[key]}", matrix[3, :3])
-            pose = PosedScan(index, f"line {line}", number, matrix[3, :3])
+            pose = PosedScan(index, f"line {line}", number, matrix[3, :3], place)
             scan = TextScan(LEICA[width], None, pose, matrix[:3, :3].T, True)
             found = builder.add(scan, columns * rows)
             if found < columns * rows:
@@ -72,8 +72,8 @@ def _read_ptx(path: Path, version: tuple[int, int]) -> TextCloud:
         return builder.cloud()
 
 
-def _read_head(path: Path, lines: TextLines) -> tuple[int, int, int, Float] | None:
-    """Return line, columns, rows and matrix (4, 4) of the next scan; None at the end of the file."""
+def _read_head(path: Path, lines: TextLines) -> tuple[int, int, int, Float, Float] | None:
+    """Return line, columns, rows, position (3,) and matrix (4, 4) of the next scan; None at the end of the file."""
     text = lines.text()
     while text == "":
         text = lines.text()
@@ -103,4 +103,4 @@ def _read_head(path: Path, lines: TextLines) -> tuple[int, int, int, Float] | No
         raise InputError(
             f"{path}, line {begin + 6}: the scan's matrix is not a rotation (is it scaled?); export it with its pose, in metres"
         )
-    return begin, int(columns), int(rows), matrix
+    return begin, int(columns), int(rows), np.array(values[2]), matrix

@@ -5,12 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from tunneldb.geometry.units import IN_METRES, Units
 from tunneldb.pointcloud.formats.table import format_of
 from tunneldb.pointcloud.points import CHUNK, Ranges, Raw
 
 
 def read_raw(
-    path: Path, dimension: str | None, size: int = CHUNK, ranges: Ranges | None = None, *, colours: bool = False
+    path: Path,
+    dimension: str | None,
+    size: int = CHUNK,
+    ranges: Ranges | None = None,
+    *,
+    units: Units = IN_METRES,
+    colours: bool = False,
 ) -> Iterator[Raw]:
     """Read a scan file chunk by chunk, without converting its numbers.
 
@@ -26,6 +33,8 @@ def read_raw(
         Half-open ranges of point numbers, from 0, to read in this order; None for the whole file. Points are numbered as in
         the whole file. Points between ranges are skipped without decoding, up to the bounds of the file's own chunks (LAZ:
         50 000 points by default; E57: scans; text: blocks of lines).
+    units : Units
+        Units of the coordinates, which become part of scales and offsets.
     colours : bool
         True to read colours, from the formats that have them (LAS, LAZ, E57).
 
@@ -42,5 +51,7 @@ def read_raw(
     """
     form = format_of(path)
     if colours and form.has_colours is not None:
-        return form.read(path, dimension, size, ranges, True)
-    return form.read(path, dimension, size, ranges)
+        chunks = form.read(path, dimension, size, ranges, True)
+    else:
+        chunks = form.read(path, dimension, size, ranges)
+    return chunks if units.metric else (raw.in_metres(units) for raw in chunks)

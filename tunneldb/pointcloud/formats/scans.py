@@ -25,12 +25,15 @@ class PosedScan:
         Result of `scan_number`.
     position : (3,) float64 array or None
         Scanner position in the file's frame, m; None if the scan has no pose.
+    stated : (3,) float64 array or None
+        Scanner position in a second place of the header, which `position` should repeat; None if there is none.
     """
 
     index: int
     name: str
     number: int
     position: Float | None
+    stated: Float | None = None
 
 
 def scan_number(guid: str, position: Float | None) -> int:

@@ -15,6 +15,7 @@ from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_d
 from tunneldb.pointcloud.formats.scans import PosedScan
 from tunneldb.pointcloud.formats.text_lines import TextLines, parse
 from tunneldb.pointcloud.points import Ranges, Raw, ScanHeader
+from tunneldb.pointcloud.stated_crs import StatedCrs
 
 KIND = "a text"
 BLOCK_LINES = 1 << 18
@@ -132,7 +133,7 @@ class TextCloud:
 
     def header(self) -> ScanHeader:
         """Return the scan header of the file."""
-        return ScanHeader(self.path, self.points, self.dimensions, None, self.low, self.high)
+        return ScanHeader(self.path, self.points, self.dimensions, StatedCrs(), self.low, self.high)
 
 
 class CloudBuilder:
