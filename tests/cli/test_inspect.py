@@ -122,7 +122,7 @@ def test_feet_are_noticed(tls: Path, tmp_path: Path) -> None:
     assert "looks like feet" in look["unit"]
     assert inspected(changed(tls, tmp_path / "b.las"))["files"][0]["unit"] is None
     (named,) = inspected(changed(tls, tmp_path / "c.las", 1.0, crs=2263))["files"]
-    assert named["unit"] == "US survey foot, by its coordinate system: transform it to one in metres"
+    assert named["unit"].endswith("(NAD83 / New York Long Island (ftUS)), not metres; convert them by --unit us-ft")
 
 
 def test_a_ptx_brings_its_stations(tmp_path: Path) -> None:
@@ -152,8 +152,18 @@ def test_lengths_that_are_said_to_be_degrees_are_not_believed(tls: Path, tmp_pat
     assert "cannot be read (EPSG:4326 (WGS 84) is in degrees" in str(crs_note(header, 25830))
 
 
-def test_what_is_not_in_metres_is_to_be_transformed_first(tls: Path, tmp_path: Path) -> None:
-    said = inspected(changed(tls, tmp_path / "a.las", crs=2263))
+def test_what_is_in_feet_is_inspected_in_metres_next(tls: Path, tmp_path: Path) -> None:
+    """The advice is followed, and its next commands have the metric code of the projection and the unit."""
+    said = inspected(changed(tls, tmp_path / "a.las", 3937.0 / 1200.0, crs=2263))
+    assert said["commands"] == [f"tunneldb inspect {tmp_path}/a.las --unit us-ft"]
+    (look,) = (converted := inspected(*shlex.split(said["commands"][0])[2:]))["files"]
+    assert (look["srid"], look["width"]) == (32118, pytest.approx(8.0, abs=0.3))
+    assert "--srid 32118 --axis auto" in converted["commands"][1]
+    assert converted["commands"][3].endswith("a.las --unit us-ft")
+
+
+def test_degrees_are_to_be_transformed_first(tls: Path, tmp_path: Path) -> None:
+    said = inspected(changed(tls, tmp_path / "a.las", 1e-5, crs=4326))
     assert said["commands"] == [f"tunneldb inspect {tmp_path}/TRANSFORMED-a.las"]
     assert any("projected coordinate system in metres" in line for line in said["missing"])
 

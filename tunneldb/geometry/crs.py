@@ -77,7 +77,16 @@ def in_metres(crs: CRS) -> CRS:
     text = plan.to_json_dict()
     for axis in text["coordinate_system"]["axis"]:
         axis["unit"] = "metre"
-    text.pop("id", None)
+    conversion = text["conversion"]
+    for parameter in conversion["parameters"]:
+        length = parameter.get("unit")
+        if isinstance(length, dict) and length["type"] == "LinearUnit":
+            parameter["value"] = round(parameter["value"] * length["conversion_factor"], 6)
+            parameter["unit"] = "metre"
+    # Without names, by which PROJ would look for the system in its own unit only.
+    text["name"] = conversion["name"] = "unknown"
+    for named in (text, conversion):
+        named.pop("id", None)
     return CRS.from_json_dict(text)
 
 
