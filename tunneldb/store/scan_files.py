@@ -108,7 +108,10 @@ def recorded_files(conn: psycopg.Connection[Any], survey: Survey) -> dict[str, R
         " WHERE survey_id = %s",
         [survey.id],
     ).fetchall()
-    return {row[1]: Recorded(*row[:7], units=Units(row[7], row[8])) for row in rows}
+    return {
+        name: Recorded(key, name, path, digest, size, low, high, Units(unit, height_unit))
+        for key, name, path, digest, size, low, high, unit, height_unit in rows
+    }
 
 
 def sonar_among(conn: psycopg.Connection[Any], survey: Survey, paths: Sequence[Path]) -> list[Path]:
