@@ -206,8 +206,8 @@ def test_coordinate_system_where_it_is_readable(tmp_path: Path, metadata: str, c
     assert header.crs == crs
     assert crs_note(header, 25830) == {
         "": "states no coordinate system; using the tunnel's, EPSG:25830",
-        "site grid, see plan": "states a coordinate system that cannot be read ('site grid, see plan'); "
-        "using the tunnel's, EPSG:25830",
+        "site grid, see plan": "states a coordinate system that cannot be read (coordinateMetadata: 'site grid, see plan' "
+        "(proj_create: unrecognized format / unknown name)); using the tunnel's, EPSG:25830",
     }.get(metadata)
 
 
