@@ -22,8 +22,11 @@ from pathlib import Path
 from benchmarks.any_scan.judge import judge
 from benchmarks.any_scan.page import page
 from benchmarks.any_scan.program import Program
-from benchmarks.any_scan.scenes import SCENES
+from benchmarks.any_scan.scenes import SCENES as FIRST
+from benchmarks.any_scan.stated import STATED
 from benchmarks.common import RESULTS, print_table, progress
+
+SCENES = (*FIRST, *STATED)
 
 
 def main() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +21,31 @@ SRID = 25832
 
 
 def las(
-    path: Path, cloud: Cloud, *, version: str = "1.4", srid: int | None = SRID, scans: bool = True, times: bool = True
+    path: Path,
+    cloud: Cloud,
+    *,
+    version: str = "1.4",
+    point_format: int | None = None,
+    srid: int | None = SRID,
+    stated: str | dict[int, int] | None = None,
+    scans: bool = True,
+    times: bool = True,
 ) -> Path:
-    """Write LAS or LAZ: ``Amplitude`` in dB, what `cloud.extra` holds, and counts as ``intensity``."""
-    header = laspy.LasHeader(version=version, point_format=6 if version == "1.4" else 1)
+    """Write LAS or LAZ: ``Amplitude`` in dB, what `cloud.extra` holds, and counts as ``intensity``.
+
+    Its coordinate system is that of `srid`, or as `stated`: WKT, or numbers of GeoTIFF keys.
+    """
+    header = laspy.LasHeader(version=version, point_format=point_format or (6 if version == "1.4" else 1))
     header.offsets = np.floor(cloud.xyz.min(axis=0)) if len(cloud) else [0, 0, 0]
     header.scales = [0.0005] * 3
     dimensions = {"Amplitude": cloud.db} | cloud.extra
     for name in dimensions:
         if name != "intensity":
             header.add_extra_dim(laspy.ExtraBytesParams(name, "f4"))
-    if srid is not None:
+    if stated is not None:
+        header.vlrs.append(_projection(stated))
+        header.global_encoding.wkt = isinstance(stated, str)
+    elif srid is not None:
         header.add_crs(CRS.from_epsg(srid))
     data = laspy.LasData(header)
     data.x, data.y, data.z = cloud.xyz.T
@@ -42,6 +57,21 @@ def las(
     if scans:
         data.point_source_id = cloud.scan
     data.write(path)
+    return path
+
+
+def _projection(stated: str | dict[int, int]) -> laspy.VLR:
+    if isinstance(stated, str):
+        return laspy.VLR("LASF_Projection", 2112, "", stated.encode() + b"\0")
+    keys = [value for key, number in sorted(stated.items()) for value in (key, 0, 1, number)]
+    return laspy.VLR("LASF_Projection", 34735, "", struct.pack(f"<{4 + len(keys)}H", 1, 1, 0, len(stated), *keys))
+
+
+def patch(path: Path, at: int, form: str, *values: float) -> Path:
+    """Write numbers over the bytes of a file, from `at` on."""
+    data = bytearray(path.read_bytes())
+    struct.pack_into("<" + form, data, at, *values)
+    path.write_bytes(data)
     return path
 
 

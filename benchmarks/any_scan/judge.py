@@ -37,6 +37,8 @@ class Plan:
     run: list[Any] = field(default_factory=list)
     between: Callable[[Path], None] | None = None
     """Done to the files between ``load`` and ``run``."""
+    batch: bool = False
+    """Load and run by ``batch``."""
     inspect: bool = False
     unit: float = 1.0
     """m; of the coordinates in the files."""
@@ -122,7 +124,7 @@ def _run(scene: Scene, plan: Plan, folder: Path, program: Program) -> list[Call]
     steps: list[tuple[Any, ...]] = [
         ("tunnel", "add", name, *plan.tunnel),
         ("survey", "add", name, "--tunnel", name, "--date", "2024-05-04", *plan.survey),
-        ("load", name, *plan.files, *plan.load),
+        ("batch" if plan.batch else "load", name, *plan.files, *plan.load),
     ]
     for step in steps:
         calls.append(program(folder, *step))
@@ -130,7 +132,8 @@ def _run(scene: Scene, plan: Plan, folder: Path, program: Program) -> list[Call]
             return calls
     if plan.between:
         plan.between(folder)
-    calls.append(program(folder, "run", name, *plan.run))
+    if not plan.batch:
+        calls.append(program(folder, "run", name, *plan.run))
     # After a failed stage a user looks at the leaks all the same.
     calls.append(program(folder, "leaks", name, "--json", "--geometry", "3d"))
     calls.append(program(folder, "report", name, "-o", "report.html", "--json"))

@@ -262,7 +262,8 @@ COMMENT ON FUNCTION tunnel_internal.axis_residual(int[], float8[], float8[], flo
 -- starts from the given axis (or from vertices edited by hand, which stay). Vertices up to two spacings beyond the kilometre
 -- are computed as well, so that the result does not depend on the order of kilometres. A vertex without points gets the shift
 -- of its neighbours and is marked interpolated. So is one that does not converge in max_iterations passes or deviates from
--- its neighbours by more than max_deviation (axis_residual); among adjacent ones the worst first, then the others are checked
+-- its neighbours by more than max_deviation (axis_residual; four times that if fewer than four vertices are measured, which
+-- determine no curve); among adjacent ones the worst first, then the others are checked
 -- again. axis_vertex.remark states the reason. Ends when all others converged, or when more than max_rejected (and more than
 -- one) were rejected.
 CREATE OR REPLACE FUNCTION tunnel_internal.axis_refine(
@@ -367,11 +368,13 @@ BEGIN
                       array_agg(v.gy ORDER BY v.n) AS gy, array_agg(v.gz ORDER BY v.n) AS gz
                   FROM measured_vertex v) a
             CROSS JOIN LATERAL tunnel_internal.axis_residual(a.n, a.x, a.y, a.z, a.gx, a.gy, a.gz) d
+        ), bound AS (  -- up to three vertices determine no curve: a bend of 60 m radius is 1.7 m off a chord of 30 m
+            SELECT axis_refine.max_deviation * CASE WHEN count(*) < 4 THEN 4 ELSE 1 END AS most FROM measured_vertex
         ), fault AS (  -- how many times the limit
-            SELECT v.n, v.moved, d.deviation, d.deviation > axis_refine.max_deviation AS off,
-                greatest(v.moved / axis_refine.tolerance, d.deviation / axis_refine.max_deviation) AS times
-            FROM measured_vertex v LEFT JOIN deviating d ON d.n = v.n
-            WHERE NOT v.fixed AND (v.moved >= axis_refine.tolerance OR d.deviation > axis_refine.max_deviation)
+            SELECT v.n, v.moved, d.deviation, d.deviation > b.most AS off,
+                greatest(v.moved / axis_refine.tolerance, d.deviation / b.most) AS times
+            FROM bound b CROSS JOIN measured_vertex v LEFT JOIN deviating d ON d.n = v.n
+            WHERE NOT v.fixed AND (v.moved >= axis_refine.tolerance OR d.deviation > b.most)
         ), worst AS (
             SELECT f.n, CASE WHEN f.off THEN format('lies %s m off where its neighbours lead', round(f.deviation::numeric, 2))
                 ELSE format('still moves by %s m after %s passes', round(f.moved::numeric, 4), pass - since) END AS why

@@ -135,7 +135,7 @@ def read_positions(
             f" {table.lines[first]}, {f'{far[first]:.0f} m from the axis' if far[first] else 'a jump there and back'}"
         )
     time, xyz = time[~wild], xyz[~wild]
-    _require_direction(table.path, xyz, alignment, backwards=backwards)
+    notes += _direction(table.path, xyz, alignment, backwards=backwards)
     time = time + time_offset
     return Positions(True, time, xyz, (*notes, *time_notes(time, xyz, time_offset)), time_offset)
 
@@ -274,17 +274,18 @@ def _require_near(paths: Sequence[Path], xyz: Float, alignment: Alignment, tunne
         )
 
 
-def _require_direction(path: Path, xyz: Float, alignment: Alignment, *, backwards: bool) -> None:
-    """Require that the trajectory runs up the axis, or down it if stated."""
+def _direction(path: Path, xyz: Float, alignment: Alignment, *, backwards: bool) -> list[str]:
+    """Return a note on a trajectory that runs down the axis without a statement; refuse one that is stated to, but does not."""
     chainage = alignment.chainage(xyz)
     within = chainage[np.isfinite(chainage)]
     if not len(within):
         raise UserError(f"{path}: no pose is between the ends of the axis; check that it belongs to this tunnel")
     run = within[-1] - within[0]
-    if run < 0 and not backwards:
-        raise UserError(
-            f"{path}: the trajectory runs {-run:.0f} m down the axis; reverse the axis's points, or use --backwards "
-            "if the scanner moved towards decreasing chainage"
-        )
     if run > 0 and backwards:
         raise UserError(f"{path}: the trajectory runs {run:.0f} m up the axis, so --backwards is wrong")
+    if run < 0 and not backwards:
+        return [
+            f"the trajectory runs {-run:.0f} m down the axis (--backwards confirms that): if chainage should increase along"
+            " the drive, add the tunnel with --reverse"
+        ]
+    return []
