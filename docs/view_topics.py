@@ -11,7 +11,7 @@ import psycopg
 from tunneldb.database.schema import sql_files
 
 TOPICS = {
-    "Axis and sections": ("stationing", "survey", "survey_ends", "outline", "alignment"),
+    "Axis and sections": ("stationing", "survey", "survey_ends", "outline", "alignment", "section_dimension"),
     "The scanner": ("scanner",),
     "Leaks and findings": ("finding", "learned"),
     "How wet, and what was seen": ("coverage", "statistics", "waterproof", "coverage_gap"),

@@ -198,7 +198,7 @@ BEGIN
             FROM pair p JOIN usual u ON u.angle = p.angle CROSS JOIN low l
             GROUP BY p.n, l.is_low
             HAVING count(*) >= 3
-        ), roofed AS (  -- as section_roofed says it
+        ), roofed AS (  -- as section_roofed, by all filled classes
             SELECT c.n, count(*) FILTER (WHERE abs(c.angle) < 45) * 3 * $2 >= 90 AS has_roof,
                 count(*) FILTER (WHERE abs(c.angle) > 135) * 3 * $2 >= 90 AS has_floor
             FROM class c

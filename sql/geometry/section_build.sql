@@ -99,18 +99,19 @@ COMMENT ON FUNCTION tunnel_internal.section_gather(int, int, float8, float8, flo
 'Angular classes of each section of a kilometre as arrays. The slab (width: half its length, m) is widened until 90 % of the classes hold four times min_points points, or min_points points from four times half_width on. Classes with that many points are used';
 
 
--- True if a section has a roof: at least a third of the classes within 45° of upwards are filled (radius: of the classes,
--- NULL for an empty one). Portals and open cuts have no roof and no lining.
-CREATE OR REPLACE FUNCTION tunnel_internal.section_roofed(angle_step float8, radius float8[])
+-- True if a section has a roof: at least a third of the classes within 45° of upwards show a surface (sigma: of the classes,
+-- NULL for an empty one). Points that scatter by more than 0.25 m along their class are not on a surface across it: a portal's
+-- face fills classes from the lining outwards. Portals and open cuts have no roof and no lining.
+CREATE OR REPLACE FUNCTION tunnel_internal.section_roofed(angle_step float8, sigma float8[])
 RETURNS boolean
 LANGUAGE sql IMMUTABLE PARALLEL SAFE STRICT
 AS $$
-    SELECT count(k.radius) * 3 >= count(*)
-    FROM unnest($2) WITH ORDINALITY AS k (radius, class)
+    SELECT count(*) FILTER (WHERE k.sigma <= 0.25) * 3 >= count(*)
+    FROM unnest($2) WITH ORDINALITY AS k (sigma, class)
     WHERE abs((k.class - 0.5) * $1 - 180) < 45
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_roofed(float8, float8[]) IS
-'True if at least a third of the angular classes within 45° of upwards are filled; without a roof there is no lining. radius: of the classes from -180°, NULL for an empty class';
+'True if at least a third of the angular classes within 45° of upwards show a surface; without a roof there is no lining. sigma: standard deviation of the points of the classes from -180°, m, at most 0.25 on a surface; NULL for an empty class';
 
 
 -- Parts of a kilometre with a floor and no roof, and therefore without sections: chainage that each such plane represents, m.
@@ -121,7 +122,7 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT
 ROWS 10
 AS $$
     WITH class AS MATERIALIZED (
-        SELECT c.segment, c.half, c.class, c.radius
+        SELECT c.segment, c.half, c.class, c.radius, c.sigma
         FROM (SELECT coalesce(array_agg(p.segment * 100 + p.half), '{}') AS missing
               FROM tunnel_internal.section_plane($1, $2) p
               WHERE NOT EXISTS (SELECT FROM tunnel.section s
@@ -129,7 +130,7 @@ AS $$
         CROSS JOIN LATERAL tunnel_internal.section_classes($1, $2, $4, $3, m.missing) c
         WHERE c.points >= $5
     ), seen AS (
-        SELECT d.segment, d.half, array_agg(c.radius ORDER BY i) AS radius,
+        SELECT d.segment, d.half, array_agg(c.sigma ORDER BY i) AS sigma,
             count(c.radius) FILTER (WHERE abs((i + 0.5) * $3 - 180) > 135) * 3
                 >= count(*) FILTER (WHERE abs((i + 0.5) * $3 - 180) > 135) AS floored
         FROM (SELECT DISTINCT c.segment, c.half FROM class c) d
@@ -140,7 +141,7 @@ AS $$
     SELECT s.chainage_from + (q.half - 25) / 100.0 * (s.chainage_to - s.chainage_from),
         s.chainage_from + (q.half + 25) / 100.0 * (s.chainage_to - s.chainage_from)
     FROM seen q JOIN tunnel.segment s ON s.survey_id = $1 AND s.km = $2 AND s.n = q.segment
-    WHERE q.floored AND NOT tunnel_internal.section_roofed($3, q.radius)
+    WHERE q.floored AND NOT tunnel_internal.section_roofed($3, q.sigma)
     ORDER BY 1
 $$;
 COMMENT ON FUNCTION tunnel_internal.section_open(int, int, float8, float8, int) IS
@@ -166,7 +167,7 @@ AS $$
         SELECT row_number() OVER (ORDER BY g.segment, g.half) AS i, g.*
         FROM tunnel_internal.section_gather(section_curves.survey_id, section_curves.km, section_curves.angle_step,
             section_curves.half_width, section_curves.max_half_width, section_curves.min_points) g
-        WHERE tunnel_internal.section_roofed(section_curves.angle_step, g.radius)
+        WHERE tunnel_internal.section_roofed(section_curves.angle_step, g.sigma)
     ), alone AS MATERIALIZED (
         SELECT g.i, q.*
         FROM gathered g

@@ -34,7 +34,7 @@ from tunneldb.report import findings
 from tunneldb.report.change import CHANGE_WORDS
 from tunneldb.report.owner import CHAPTERS, Owner, read_owner
 from tunneldb.report.photos import Photo, make_thumbnails
-from tunneldb.report.words import languages, read_language
+from tunneldb.report.words import english_texts, languages, plural_forms, read_language
 from tunneldb.store.dry_regions import read_dry_regions
 from tunneldb.store.survey import get_survey
 
@@ -336,7 +336,6 @@ TEMPLATE = """
 language = "de"
 client = "Bahn & Söhne"
 project = "Prüfung"
-standard = "Ril 853"
 logo = "logo.png"
 chapters = ["findings", "leaks", "dry", "signatures"]
 [severity_colours]
@@ -357,7 +356,7 @@ def test_an_owners_template(drawn: str, folder: Path, tmp_path: Path) -> None:
     assert re.findall(r'<section id="(\w+)"(?! class="kind)', text) == ["findings", "leaks", "sheets", "dry", "signatures"]
     left_out = re.findall(r"in diesem Bericht nicht enthalten:(.*)</p>", text)[0]
     assert [name.strip() for name in left_out.split(",")] == [
-        "Zusammenfassung", "Erfasste Auskleidung", "Dichtheit", "Auskleidung", "Statistik", "Lichtraum", "Ringe",
+        "Zusammenfassung", "Erfasste Auskleidung", "Auskleidung", "Querschnitte", "Statistik", "Lichtraum", "Ringe",
         "Verfahren", "Prüfungen",
     ]  # fmt: skip
     for said in ("<h2>Spalt</h2>", "<dd>Bahn &amp; Söhne</dd>", "<h2>Unterschriften</h2>", "--severity: #123456", 'lang="de"'):
@@ -416,8 +415,14 @@ def test_settings_written_by_windows_are_read(tmp_path: Path) -> None:
         ("chapters = [[1]]", "unknown chapter [1]"),
         ('chapters = ["leaks", "leaks"]', "'leaks' occurs 2 times"), ("headings = 1", "headings: must be a table"),
         ('[headings]\n"Leeks" = "x"', "headings.'Leeks': unknown heading"),
-        ('[headings]\n"Leaks" = 1', "headings.Leaks: must be a text, not 1"),
-        ('[headings]\n"{count} leaks" = "{number}"', "has other names in braces"),
+        ('[headings]\n"Leaks" = 1', "headings.'Leaks': must be a text, not 1"),
+        ('[headings]\n"{count} leaks" = ["1", "{number}"]', "has other names in braces"),
+        ('[headings]\n"{count} leaks" = "{count}"', "must be a list of 2 texts, the plural forms by 'n != 1', not '{count}'"),
+        ('language = "sl"\n[headings]\n"{count} leaks" = ["a", "b"]', "must be a list of 4 texts, the plural forms by"),
+        ('[headings]\n"{count} leaks" = ["{count}", 2]', "must be a text, not 2"),
+        ('scheme = "RVS 13.03"', "scheme: tunneldb does not rate by 'RVS 13.03'; leave it out, or choose GB 50108-2008"),
+        ('standard = "Ril 853"', "standard: unknown key"),
+        ('chapters = ["classes"]', "chapters: 'classes' needs a rating scheme: scheme = \"GB 50108-2008\""),
         ('[headings]\n"Leaks" = "{"', "has other names in braces"),
         ('[severity_colours]\n5 = "#123456"', "severity_colours.5: severities are 1 to 4"),
         ('[severity_colours]\n1 = "red"', "severity_colours.1: must be a colour such as #b8371d, not 'red'"),
@@ -464,12 +469,45 @@ def test_a_day_that_cannot_be_written_is_one_line(tmp_path: Path, date: str) -> 
 def test_catalogues_have_each_text_that_a_report_says(example_catalogue: frozenset[str]) -> None:
     """And no other; with the same names in braces."""
     for code in languages():
-        texts = read_language(code)["texts"]
+        catalogue = read_language(code)
+        texts, forms = catalogue["texts"], plural_forms(catalogue["plural"])
         assert set(texts) == example_catalogue, code
         for english, said in texts.items():
-            assert sorted(re.findall(r"{\w+}", said)) == sorted(re.findall(r"{\w+}", english)), (code, english)
-    english = read_language("en")["texts"]
-    assert list(english) == list(english.values())
+            assert isinstance(said, list) == isinstance(english_texts()[english], list), (code, english)
+            assert isinstance(said, str) or len(said) == forms, (code, english)
+            for form in said if isinstance(said, list) else [said]:
+                names = set(re.findall(r"{\w+}", english)), set(re.findall(r"{\w+}", form))
+                assert names[0] - names[1] <= {"{count}"} if isinstance(said, list) else names[0] == names[1], (code, english)
+                assert names[1] <= names[0], (code, english)
+    assert all(isinstance(said, list) or english == said for english, said in english_texts().items())
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        ("en", ["0 leaks", "1 leak", "2 leaks", "5 leaks", "11 leaks", "101 leaks", "1\u202f102 leaks"]),
+        ("de", [f"{n} Feuchtstelle{'n' * (n != '1')}" for n in ("0", "1", "2", "5", "11", "101", "1\u202f102")]),
+        # CLDR: one 1, two 2, few 3 and 4, each of the last two digits
+        ("sl", ["0 zamakanj", "1 zamakanje", "2 zamakanji", "5 zamakanj", "11 zamakanj", "101 zamakanje"]),
+    ],
+)
+def test_counts_have_the_plural_forms_of_the_language(tmp_path: Path, code: str, said: list[str]) -> None:
+    (tmp_path / "owner.toml").write_text(f'language = "{code}"', "utf-8")
+    words = read_owner(tmp_path / "owner.toml").words
+    assert [words.count("{count} leaks", count) for count in (0, 1, 2, 5, 11, 101, 1102)][: len(said)] == said
+
+
+def test_a_language_of_ones_own_has_its_own_plural(tmp_path: Path) -> None:
+    texts = '[texts]\n"{count} leaks" = ["{count} venue", "{count} venues"]'
+    (tmp_path / "fr.toml").write_text(f'plural = "n > 1"\n{texts}', "utf-8")
+    (tmp_path / "owner.toml").write_text('language = "fr.toml"', "utf-8")
+    words = read_owner(tmp_path / "owner.toml").words
+    assert [words.count("{count} leaks", count) for count in (0, 1, 2)] == ["0 venue", "1 venue", "2 venues"]
+    assert [words.count("{count} edits", count) for count in (0, 1)] == ["0 edits", "1 edit"], "what it omits stays English"
+    for plural in ("n; alert(1)", "n/0", "n > 1 ? 2 : 0"):
+        (tmp_path / "fr.toml").write_text(f'plural = "{plural}"', "utf-8")
+        with pytest.raises(UserError, match="is not a plural expression of gettext"):
+            read_owner(tmp_path / "owner.toml")
 
 
 @pytest.fixture
@@ -478,7 +516,7 @@ def example_catalogue() -> frozenset[str]:
     package = Path(findings.__file__).parent
     texts = set(CHAPTERS.values()) | set(findings.STATE_WORDS.values()) | {"detected", "redrawn", "split", "merged"}
     texts |= {LEAKS, OTHERS, DARK}
-    texts |= set(CHANGE_WORDS.values()) | {"Chainage", "Station", "o’clock", "m²", "Client", "Project", "Standard"}
+    texts |= set(CHANGE_WORDS.values()) | {"Chainage", "Station", "o’clock", "m²", "Client", "Project"}
     texts |= {"Prepared by", "Checked by", "Accepted by", "Name", "Position", "Date", "Signature"}
     source = (package / "photos.py").read_text("utf-8")
     texts |= {said for said in re.findall(r'_NotHadError\("([^"]+)"\)', source) if "fetched" not in said}
@@ -487,7 +525,7 @@ def example_catalogue() -> frozenset[str]:
     texts |= set(re.findall(r"^    \(\d, '(\w+)',", baseline, re.MULTILINE))
     for path in [*(package / "templates").rglob("*.*"), package / "strip.py"]:
         text = path.read_text("utf-8")
-        texts |= set(re.findall(r'(?<![\w.])(?:_|self\.words|words)\(\s*"([^"]+)"', text))
+        texts |= set(re.findall(r'(?<![\w.])(?:_|self\.words|words)(?:\.count)?\(\s*"([^"]+)"', text))
         if path.suffix == ".js":
             texts |= set(re.findall(r'\["([^"]+)", "\w+", (?:\(|kind|arc|review)', text))
     return frozenset(texts)

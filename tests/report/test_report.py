@@ -172,15 +172,38 @@ def test_details_show_picture_outline_and_section(reading: Reading, leaks: list[
         assert abs(detail["at"]) <= 2.5 + 0.1
 
 
-def test_verdict_is_the_databases(shared: str, reading: Reading) -> None:
+STANDARD = re.compile(r"GB 50108|standard|[Cc]lass(es)? (\d|of waterproofing)|>Waterproofing<")
+"""Words of a rating scheme."""
+
+
+def test_without_a_scheme_facts_are_the_headline(reading: Reading, leaks: list[dict[str, Any]]) -> None:
+    wet = [leak["area"] for leak in leaks if leak["review"] != "rejected"]
+    lead = re.findall(r'<p class="lead">\s*(.*?)\s*</p>', reading.text, re.DOTALL)
+    assert lead == [f"{len(wet)} leaks on the inspected lining, wet area {sum(wet):.2f} m²."]
+    body = reading.text[reading.text.index("<body>") : reading.text.index('<script type="application/json" id="data">')]
+    assert STANDARD.findall(body) == []
+    assert 'class="grade"' not in body
+    assert 'id="classes"' not in body
+
+
+@pytest.mark.parametrize("language", ["en", "de", "sl"])
+def test_class_is_the_databases_where_the_template_asks_for_it(shared: str, tmp_path: Path, language: str) -> None:
+    template = tmp_path / "owner.toml"
+    template.write_text(f'language = "{language}"\nscheme = "GB 50108-2008"\nchapters = ["summary", "classes"]', "utf-8")
+    run("--dsn", shared, "report", SURVEY, "-o", tmp_path / "r.html", "--template", template)
+    text = (tmp_path / "r.html").read_text("utf-8")
     with connect(shared) as conn:
         query = "SELECT class, holds, breaks FROM tunnel_api.waterproof_class(%s, 12300, 12500)"
         rows = conn.execute(query, [SURVEY]).fetchall()
     best = min(klass for klass, holds, _ in rows if holds)
-    assert f'<p class="grade">{best}</p>' in reading.text
+    assert f'<p class="grade">{best}</p>' in text
+    (lead,) = re.findall(r'<p class="lead">(.*?)</p>', text)
+    assert f"{best}" in lead
+    assert "GB 50108-2008" in lead
+    assert ">None" not in text
     for _, _, breaks in rows:
         for said in breaks:
-            assert said.replace(">", "&gt;") in reading.text
+            assert said.replace(">", "&gt;") in text
 
 
 def test_stretch(shared: str, leaks: list[dict[str, Any]], tmp_path: Path) -> None:
@@ -224,7 +247,7 @@ def test_what_was_rejected_and_not_found_again_counts_alike_everywhere(
     run("report", example, "-o", tmp_path / "r.html")
     text = (tmp_path / "r.html").read_text("utf-8")
     stated = re.findall(r"<dt>Review</dt><dd>(\d+) confirmed, (\d+) rejected, (\d+) open</dd>", text)
-    said = re.findall(r"inspectors confirmed (\d+) and rejected (\d+); (\d+) are not reviewed", text)
+    said = re.findall(r"confirmed by inspectors: (\d+); rejected: (\d+); not reviewed yet, [a-z ]+: (\d+)", text)
     row = re.findall(r'<tr><td><a href="#kind-leak">.*?</tr>', text)[0]
     cells = re.findall(r'<td class="n(?: apart)?">(?:<b>)?([^<]*)', row)
     assert stated == said == [(cells[0], cells[5], cells[1])]
@@ -250,7 +273,7 @@ def test_state_that_does_not_hold_is_warned_of(example: str, conn: psycopg.Conne
     assert "Why: axis edited since (12)." in text
     assert "moved by 0.050 m" in text
     assert "1 confirmed leak that the last detection did not find again" in text
-    assert "No class: " in text
+    assert "The lining was not searched for leaks." in text
     assert "Leaks were not searched for in 200.0 m of the stretch" in text
 
 
@@ -394,7 +417,7 @@ def test_table_sorts_and_filters(page: Page, leaks: list[dict[str, Any]]) -> Non
     large = [leak for leak in leaks if leak["area"] >= 1.5]
     assert 0 < len(large) < len(leaks)
     assert set(column(page, 1)) == {str(leak["id"]) for leak in large}
-    assert page.locator("#found").inner_text() == f"{len(large)} of 7 leaks, {sum(leak['area'] for leak in large):.2f} m²"
+    assert page.locator("#found").inner_text() == f"Leaks: {len(large)} of 7, {sum(leak['area'] for leak in large):.2f} m²"
     page.get_by_label("Area from").fill("")
     page.get_by_label("Search").fill("AFTER</b> rain")
     assert column(page, 1) == ["1"]
@@ -480,8 +503,9 @@ def test_of_too_many_leaks_the_largest_are_listed_and_all_counted(
     whole, few = Reading(tmp_path / "all.html"), Reading(tmp_path / "few.html")
     largest = sorted(leaks, key=lambda leak: (leak["review"] == "rejected", -leak["area"]))[:2]
     assert {row["id"] for row in few.rows} == {leak["id"] for leak in largest}
-    assert f"The 2 largest leaks are listed and drawn, rejected ones last. {len(leaks) - 2} more are not listed" in few.text
-    assert (len(whole.rows), "largest leaks are listed" in whole.text) == (len(leaks), False)
+    assert "Largest leaks, listed and drawn, rejected ones last: 2. " in few.text
+    assert f"Not listed, but included in all totals: {len(leaks) - 2};" in few.text
+    assert (len(whole.rows), "Largest leaks, listed" in whole.text) == (len(leaks), False)
     digests = [re.findall(r"digest ([0-9a-f]{16})", reading.text) for reading in (whole, few)]
     assert digests[0] == digests[1] != [], "it is of all leaks"
 

@@ -67,6 +67,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "Measure": {
         "axis": ("tunneldb.cli.axis:axis", "Compare the measured axis with the design axis."),
+        "sections": ("tunneldb.cli.sections:sections", "List width, height and area of cross-sections at a step."),
         **{stage.name: (stage.command, stage.summary) for stage in MEASURES},
         "spheres": ("tunneldb.cli.spheres:spheres", "Find target spheres, and compare them with control points."),
         "unroll": ("tunneldb.cli.unroll:unroll", "Convert x,y,z to chainage,arc,offset, or back."),

@@ -80,7 +80,7 @@ def report(
     """Write the inspection report of SURVEY for signature.
 
     It first states where leaks could be missed: lining not searched, outdated or hardly inspected. It contains the
-    scanned and inspected lining, class of waterproofing, the unrolled lining with its leaks, each leak with picture
+    scanned and inspected lining, the unrolled lining with its leaks, each leak with picture
     and cross-section, statistics, findings of all kinds with photos, dry regions, parameters and versions, and
     reviews by person. If members of structures were found, a chapter has the part that could be judged, their spots,
     and each member's unrolled faces; for a site that is the report.

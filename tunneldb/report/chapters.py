@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from tunneldb.export.tables.section_dimensions import dimension_rows
 from tunneldb.raster.gap_fill import FILL_NOTE
 from tunneldb.report import data, text
 from tunneldb.report.change import CHANGE_WORDS, read_change
@@ -14,12 +15,16 @@ from tunneldb.report.clearance import read_clearance
 from tunneldb.report.deviation import read_deviation
 from tunneldb.report.drawing import share_path, step_for, ticks, without_detection
 from tunneldb.report.facts import Facts
+from tunneldb.report.location import LocationMap, draw_location
 from tunneldb.report.owner import CHAPTERS
 from tunneldb.report.rings import read_rings
 from tunneldb.report.strip import LETTERS
 from tunneldb.report.underwater import read_underwater
 from tunneldb.store.catalog import crs_text
 from tunneldb.store.remarks import read_remarks
+
+LISTED_SECTIONS = 20
+"""Maximum number of sections in the table of cross-sections."""
 
 
 class Chapter:
@@ -78,7 +83,7 @@ class _Found(Chapter):
 
 
 class Summary(Chapter):
-    """Class of waterproofing, main figures, and facts of the survey."""
+    """Main figures, facts of the survey, and the class of waterproofing if the owner's template asks for it."""
 
     name = "summary"
 
@@ -88,13 +93,23 @@ class Summary(Chapter):
         return text.crs(crs_text(self.facts.conn, self.facts.survey.srid))
 
     @cached_property
+    def location(self) -> LocationMap | None:
+        """Map of the axis of the stretch; None without an axis."""
+        facts = self.facts
+        axis = data.read_axis(facts.conn, facts.survey, facts.low, facts.high)
+        if len(axis) < 2:
+            return None
+        first, last = (text.short(label) for label in facts.labels([facts.low, facts.high]))
+        return draw_location(axis, (first, last))
+
+    @cached_property
     def remarks(self) -> Any:
         """Notes and limitations."""
         return read_remarks(*self._of)
 
     @cached_property
     def glance(self) -> dict[str, Any]:
-        """Drawing of the whole stretch, 1000 wide: inspected share, wet area in bins, ticks."""
+        """Drawing of the whole stretch, 1000 wide: inspected share, wet area in bins, class of each kilometre, ticks."""
         facts = self.facts
         low, high = facts.low, facts.high
         length = high - low
@@ -111,7 +126,11 @@ class Summary(Chapter):
             "bin": facts.bin_length,
             "most": most,
             "bars": bars,
-            "seen": share_path(merged, low, high, 60.0, 50.0, scale),
+            "rows": [
+                ((row["chainage_from"] - low) * scale, (row["chainage_to"] - row["chainage_from"]) * scale - 0.6, row["class"])
+                for row in facts.kilometres
+            ],
+            "seen": share_path(merged, low, high, 50.0, 50.0, scale),
             "blank": [((a - low) * scale, (b - a) * scale) for a, b in without_detection(merged, low, high)],
             "ticks": [((x - low) * scale, text.short(label)) for x, label in zip(places, facts.labels(places), strict=True)],
             "leaks": [((leak.middle - low) * scale, leak) for leak in facts.leaks if leak.counts],
@@ -136,9 +155,14 @@ class Seen(_OfLeaks):
 
 
 class Classes(_OfLeaks):
-    """Classes of waterproofing."""
+    """Classes of waterproofing, by the scheme that the owner's template asks for."""
 
     name = "classes"
+
+    @property
+    def has_content(self) -> bool:
+        """True if leaks can be searched for, and a scheme is asked for."""
+        return super().has_content and self.facts.request.owner.scheme is not None
 
     @cached_property
     def rows(self) -> Any:
@@ -161,6 +185,22 @@ class Lining(Chapter):
     def letter(self) -> float:
         """Height of letters, m."""
         return self.facts.strips.length / LETTERS
+
+
+class Sections(_Found):
+    """Width, height and area of cross-sections."""
+
+    name = "sections"
+
+    @property
+    def step(self) -> float:
+        """Distance between listed sections, m."""
+        return step_for(self.facts.high - self.facts.low, LISTED_SECTIONS)
+
+    @cached_property
+    def found(self) -> Any:
+        """Sections at the step."""
+        return dimension_rows(self.facts.conn, self.facts.survey, self.facts.low, self.facts.high, self.step)
 
 
 class Leaks(_OfLeaks):
@@ -332,8 +372,8 @@ class Signatures(Chapter):
 ALL: dict[str, type[Chapter]] = {
     chapter.name: chapter
     for chapter in (
-        Summary, Seen, Classes, Lining, Leaks, Statistics, Findings, Dry, Structures, Underwater, Clearance, Rings, Change,
-        Deviation, Methods, Reviews, Signatures,
+        Summary, Seen, Classes, Lining, Sections, Leaks, Statistics, Findings, Dry, Structures, Underwater, Clearance, Rings,
+        Change, Deviation, Methods, Reviews, Signatures,
     )
 }  # fmt: skip
 """All chapters by name, in their default order."""

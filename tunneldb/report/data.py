@@ -196,6 +196,16 @@ def read_statistics(conn: psycopg.Connection[Any], survey: Survey, starts: Seque
     )
 
 
+def read_axis(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> Float:
+    """Read the vertices of the measured axis in a stretch and the next beyond its ends: easting and northing (n, 2), m."""
+    rows = conn.execute(
+        "SELECT ST_X(geom), ST_Y(geom) FROM tunnel.axis_vertex"
+        " WHERE survey_id = %s AND n BETWEEN floor(%s / %s) AND ceil(%s / %s) ORDER BY n",
+        [survey.id, low, survey.spacing, high, survey.spacing],
+    ).fetchall()
+    return np.array(rows, float).reshape(-1, 2)
+
+
 def read_classes(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[Row]:
     """Read which classes of GB 50108-2008 a stretch meets, and which limits it exceeds."""
     return _rows(

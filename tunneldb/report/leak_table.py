@@ -58,7 +58,7 @@ def leak_table(facts: Facts) -> Markup:
             "strip": facts.strips.length,
             "place": facts.place,
             "searched": facts.request.search.searched_share > 0,
-            "words": facts.request.owner.words.texts,
+            "words": facts.request.owner.words.other_than_english(),
         }
     )
 

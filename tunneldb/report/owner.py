@@ -1,4 +1,4 @@
-"""An owner's template of the report: a small TOML file with logo, client, language, standard, chapters and colours."""
+"""An owner's template of the report: a small TOML file with logo, client, language, rating scheme, chapters and colours."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from PIL import Image
 
 from tunneldb.errors import InputError
 from tunneldb.finding_kind import SEVERITY_COLOURS
-from tunneldb.report.words import ENGLISH, Words, known_texts, languages, read_language
+from tunneldb.report.words import ENGLISH, ENGLISH_PLURAL, Words, english_texts, languages, plural_forms, read_language
 
 CHAPTERS = {
     "summary": "Summary",
     "seen": "Inspected lining",
     "classes": "Waterproofing",
     "lining": "Lining",
+    "sections": "Cross-sections",
     "leaks": "Leaks",
     "statistics": "Statistics",
     "findings": "Findings",
@@ -37,6 +38,9 @@ CHAPTERS = {
     "signatures": "Signatures",
 }
 """Chapters in their default order: names, and titles in the navigation."""
+
+SCHEMES = ("GB 50108-2008",)
+"""Rating schemes whose rules the program applies: the only standards that a report names."""
 
 LOGO = 640
 """Maximum width and height of a logo, pixels."""
@@ -55,8 +59,10 @@ class Owner:
     ----------
     words : Words
         The language of its headings.
-    client, project, standard : str or None
-        Client, project, and standard of the inspection.
+    client, project : str or None
+        Client and project.
+    scheme : str or None
+        Rating scheme of SCHEMES, whose class is the headline of the report; None for a report without a class.
     logo : str or None
         The owner's, as a data URL.
     chapters : tuple of str
@@ -68,13 +74,13 @@ class Owner:
     words: Words = field(default_factory=Words)
     client: str | None = None
     project: str | None = None
-    standard: str | None = None
+    scheme: str | None = None
     logo: str | None = None
     chapters: tuple[str, ...] = tuple(CHAPTERS)
     colours: Mapping[int, str] = field(default_factory=lambda: SEVERITY_COLOURS)
 
 
-_KEYS = ("logo", "client", "project", "standard", "language", "chapters", "headings", "severity_colours")
+_KEYS = ("logo", "client", "project", "scheme", "language", "chapters", "headings", "severity_colours")
 
 
 def read_owner(path: Path) -> Owner:
@@ -87,14 +93,14 @@ def read_owner(path: Path) -> Owner:
     """
     given = _Given(path, _load(path))
     given.refuse_others(_KEYS)
-    logo = given.text("logo")
+    logo, scheme = given.text("logo"), _scheme(given)
     return Owner(
         words=_words(given),
         client=given.text("client"),
         project=given.text("project"),
-        standard=given.text("standard"),
+        scheme=scheme,
         logo=None if logo is None else _logo(given, path.parent / logo),
-        chapters=_chapters(given),
+        chapters=_chapters(given, scheme),
         colours=_colours(given),
     )
 
@@ -147,25 +153,45 @@ class _Given:
             self.refuse(key, f"{stray.group()!r} in {value!r} is no part of a day as strftime has it, such as %d, %m, %B, %Y")
         return value
 
-    def table(self, key: str) -> dict[str, str]:
+    def table(self, key: str) -> dict[str, Any]:
         value = self.values.get(key, {})
         if not isinstance(value, dict):
             self.refuse(key, f"must be a table of texts, not {value!r}")
-        for name, text in value.items():
-            if not isinstance(text, str):
-                self.refuse(f"{key}.{name}", f"must be a text, not {text!r}")
         return value
 
-    def texts(self, key: str) -> dict[str, str]:
-        """Return a table of translations of English texts; each must have the same names in braces."""
-        table, known = self.table(key), known_texts()
+    def plural(self, key: str) -> str:
+        """Return the expression of plural forms; English's if there is none."""
+        value = self.text(key) or ENGLISH_PLURAL
+        try:
+            plural_forms(value)
+        except ValueError as error:
+            self.refuse(key, f'{value!r} is not a plural expression of gettext, such as "{ENGLISH_PLURAL}": {error}')
+        return value
+
+    def texts(self, key: str, plural: str) -> dict[str, str | list[str]]:
+        """Return a table of translations; each must have the names in braces of the English text, and all plural forms."""
+        table, known, forms = self.table(key), english_texts(), plural_forms(plural)
         for english, translation in table.items():
+            place = f"{key}.{english!r}"
             if english not in known:
-                self.refuse(f"{key}.{english!r}", "unknown heading; all are in languages/en.toml of the package")
-            stray = re.search(r"[{}]", _NAME.sub("", translation))
-            if stray or set(_NAME.findall(translation)) != set(_NAME.findall(english)):
-                self.refuse(f"{key}.{english!r}", f"{translation!r} has other names in braces")
+                self.refuse(place, "unknown heading; all are in languages/en.toml of the package")
+            if isinstance(known[english], str):
+                self.refuse_text(place, translation, english)
+                continue
+            if not isinstance(translation, list) or len(translation) != forms:
+                self.refuse(place, f"must be a list of {forms} texts, the plural forms by {plural!r}, not {translation!r}")
+            for form in translation:
+                self.refuse_text(place, form, english)
         return table
+
+    def refuse_text(self, place: str, translation: Any, english: str) -> None:
+        """Refuse a translation that is no text or has other names in braces; a plural form may omit the count."""
+        if not isinstance(translation, str):
+            self.refuse(place, f"must be a text, not {translation!r}")
+        stray = re.search(r"[{}]", _NAME.sub("", translation))
+        names, wanted = set(_NAME.findall(translation)), set(_NAME.findall(english))
+        if stray or names - wanted or wanted - names - ({"{count}"} if isinstance(english_texts()[english], list) else set()):
+            self.refuse(place, f"{translation!r} has other names in braces")
 
 
 def _words(given: _Given) -> Words:
@@ -173,17 +199,25 @@ def _words(given: _Given) -> Words:
     if name.endswith(".toml"):
         path = given.path.parent / name
         own = _Given(path, _load(path))
-        own.refuse_others(("date", "texts"))
-        code, date, texts = path.stem, own.day_format("date"), own.texts("texts")
+        own.refuse_others(("date", "plural", "texts"))
+        code, date, plural = path.stem, own.day_format("date"), own.plural("plural")
+        texts = own.texts("texts", plural)
     elif name in languages():
         catalogue = read_language(name)
-        code, date, texts = name, catalogue.get("date"), catalogue["texts"] if name != ENGLISH else {}
+        code, date, plural, texts = name, catalogue.get("date"), catalogue["plural"], catalogue["texts"]
     else:
         given.refuse("language", f"{name!r} is none of {', '.join(languages())}, nor a .toml file of texts")
-    return Words(code, texts | given.texts("headings"), date)
+    return Words(code, texts | given.texts("headings", plural), date, plural)
 
 
-def _chapters(given: _Given) -> tuple[str, ...]:
+def _scheme(given: _Given) -> str | None:
+    scheme = given.text("scheme")
+    if scheme is not None and scheme not in SCHEMES:
+        given.refuse("scheme", f"tunneldb does not rate by {scheme!r}; leave it out, or choose {' or '.join(SCHEMES)}")
+    return scheme
+
+
+def _chapters(given: _Given, scheme: str | None) -> tuple[str, ...]:
     chapters = given.values.get("chapters", list(CHAPTERS))
     if not isinstance(chapters, list) or not chapters:
         given.refuse("chapters", f"must be a list of names, not {chapters!r}")
@@ -192,12 +226,16 @@ def _chapters(given: _Given) -> tuple[str, ...]:
             given.refuse("chapters", f"unknown chapter {name!r}; known are {', '.join(CHAPTERS)}")
         if chapters.count(name) > 1:
             given.refuse("chapters", f"{name!r} occurs {chapters.count(name)} times")
+    if scheme is None and "classes" in given.values.get("chapters", []):
+        given.refuse("chapters", f"'classes' needs a rating scheme: scheme = \"{SCHEMES[0]}\"")
     return tuple(chapters)
 
 
 def _colours(given: _Given) -> dict[int, str]:
     colours = given.table("severity_colours")
     for name, colour in colours.items():
+        if not isinstance(colour, str):
+            given.refuse(f"severity_colours.{name}", f"must be a text, not {colour!r}")
         if name not in ("1", "2", "3", "4"):
             given.refuse(f"severity_colours.{name}", "severities are 1 to 4")
         if not _COLOUR.fullmatch(colour):

@@ -250,7 +250,7 @@ def _summary(stated: Row, numbered: int, words: Words) -> str:
     if stated["patches"] is None:
         return words("leaks were not searched for")
     count = stated["patches"]
-    leaks = words("1 leak") if count == 1 else words("{count} leaks", count=count)
+    leaks = words.count("{count} leaks", count)
     unnumbered = max(count - numbered, 0)
-    without = words(", the {count} smallest without a number here", count=unnumbered) if unnumbered else ""
+    without = words.count(", the {count} smallest without a number here", unnumbered) if unnumbered else ""
     return leaks + without + words(", {share} of the lining inspected", share=text.percent(stated["seen_share"]))

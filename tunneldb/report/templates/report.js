@@ -100,8 +100,8 @@
     $("#found").textContent = !data.searched && !leaks.length
       ? _("Leaks were not searched for")
       : state.all
-        ? _("{count} leaks, including rejected ones, by chainage", { count: listed.length })
-        : _("{count} of {all} leaks, {area} m²", { count: listed.length, all: leaks.length, area: area.toFixed(2) });
+        ? _("Leaks by chainage, including rejected ones: {count}", { count: listed.length })
+        : _("Leaks: {count} of {all}, {area} m²", { count: listed.length, all: leaks.length, area: area.toFixed(2) });
     $("#table thead").replaceChildren(
       make("tr", {}, ...columns.map(([heading, key, , kind]) => {
         const sorted = state.sort === key ? { "aria-sort": state.up ? "ascending" : "descending" } : {};
@@ -247,8 +247,8 @@
     const largest = [...leaks].sort((a, b) => (a.review === "rejected") - (b.review === "rejected") || b.area - a.area).slice(0, data.cards);
     const order = largest.sort((a, b) => a.chainage - b.chainage || a.id - b.id);
     $("#sheets-note").textContent = order.length < leaks.length
-      ? _("The {count} largest of {all} leaks, by chainage; the HTML version of this report shows all.", { count: order.length, all: leaks.length })
-      : order.length ? _("All {count} leaks, by chainage.", { count: order.length }) : "";
+      ? _("Largest leaks, by chainage: {count} of {all}; the HTML version of this report shows all.", { count: order.length, all: leaks.length })
+      : order.length ? _("All leaks, by chainage: {count}.", { count: order.length }) : "";
     $("#sheets .cards").replaceChildren(...order.map(card));
   }
   function toScreen() {
