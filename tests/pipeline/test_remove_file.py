@@ -135,8 +135,8 @@ def test_reviewed_leaks_do_not_go_without_a_word(survey: psycopg.Connection, sca
     before = rows(survey)
     asked = CliRunner().invoke(main, ["survey", "remove-file", SURVEY, "b.laz"], input="n\n")
     assert asked.exit_code == 1
-    assert "1 leaks and dry dark areas are removed, 1 of them reviewed" in asked.output
-    assert "2 findings drawn by hand are kept" in asked.output
+    assert "Removed: 1 leak or dry dark area, 1 of them reviewed, and " in asked.output
+    assert "Kept: 2 findings drawn by hand." in asked.output
     assert rows(survey) == before
     said = command("survey", "remove-file", SURVEY, scans[1], "--yes").stderr
     assert "read again: a.laz" in said
@@ -153,7 +153,7 @@ def test_reviewed_leaks_do_not_go_without_a_word(survey: psycopg.Connection, sca
     assert survey.execute("SELECT DISTINCT km FROM tunnel_api.stage_status").fetchall() == [(0,)]
     (remark,) = survey.execute("SELECT remark FROM tunnel_api.remark WHERE km = 1").fetchone()  # type: ignore[misc]
     assert remark.startswith(
-        "no points since b.laz was removed; 2 findings drawn by hand are kept; 1 leaks and dry dark areas, 1 of them"
+        "no points since b.laz was removed; 2 findings drawn by hand are kept; 1 leak or dry dark area, 1 of them"
     )
     survey.rollback()
     shown = command("status", SURVEY).output

@@ -17,6 +17,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import notify, tell, verb, wants_json
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.units import unit_options
+from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.queue.watching import is_busy, server_time
@@ -167,7 +168,7 @@ def _summary(
             f"tunneldb batch {survey.name} --km {loaded[0]}{f'-{loaded[-1]}' * (len(loaded) > 1)} --to {last}"
         )
     speed = f", {number(points / seconds)} points/s" if points else ""
-    click.echo(f"{done} of {len(found)} kilometres done; {duration(seconds)}{speed}")
+    click.echo(f"{done} of {counted(len(found), 'kilometre')} done; {duration(seconds)}{speed}")
     if watch.live is None and watch.seen is not None:  # on a terminal it stands there already
         for advice in advise(watch.seen):
             click.echo(advice.line())

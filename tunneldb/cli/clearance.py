@@ -22,6 +22,7 @@ from tunneldb.cli.output import tell, verb
 from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
 from tunneldb.cli.stretch import stretch_options
 from tunneldb.cli.tables import print_table
+from tunneldb.counted import counted
 from tunneldb.errors import UserError
 from tunneldb.files import replacing
 
@@ -198,6 +199,6 @@ def _print(kilometres: list[Row], rows: list[Row], inside: list[Row], track: str
     )  # fmt: skip
     count = sum(row["counts"] for row in inside)
     click.echo(
-        f"{gauge} about track {track}: {count} infringements, and {len(inside) - count} by objects, which may be gone; stray,"
-        " passing, ground: points inside that do not count; what was not seen is not clear"
+        f"{gauge} about track {track}: {counted(count, 'infringement')}, and {len(inside) - count} by objects, which may be"
+        " gone; stray, passing, ground: points inside that do not count; what was not seen is not clear"
     )

@@ -8,6 +8,7 @@ import click
 from rich.console import Console
 
 from tunneldb.cli.output import notify, printable, tell
+from tunneldb.counted import counted
 from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.coverage import Coverage
 from tunneldb.store.remarks import Remark
@@ -23,7 +24,7 @@ def say_remarks(remarks: Sequence[Remark], survey: Survey) -> None:
     for remark in remarks[:MOST_REMARKS]:
         notify(printable(remark.said))
     if len(remarks) > MOST_REMARKS:
-        notify(f"and {len(remarks) - MOST_REMARKS} remarks more: tunneldb status {survey.name}")
+        notify(f"and {counted(len(remarks) - MOST_REMARKS, 'more remark')}: tunneldb status {survey.name}")
 
 
 def say_coverage(coverage: Coverage, survey: Survey, *, on_stdout: bool = False) -> None:

@@ -16,6 +16,7 @@ from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.cli.tables import print_classes
+from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import NotReadyError, UserError
 from tunneldb.files import exit_on_sigterm, made_folder, replacing
@@ -125,7 +126,7 @@ def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Pat
         for file in (export_copc if copc else export_classified)(conn, survey, output, wanted, step(progress)):
             points = int(file.counts.sum())
             rate = points / file.seconds / 1e6
-            say(f"{file.path}: {points} points, {rate:.1f} million/s", err=True)
+            say(f"{file.path}: {counted(points, 'point')}, {rate:.1f} million/s", err=True)
             files.append({"file": file.path, "points": points, "seconds": file.seconds})
             total += file.counts
     print_classes(total)

@@ -14,9 +14,9 @@ from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import VerbGroup, notify, printable, records, tell
 from tunneldb.cli.param_types import FilePath, FiniteRange
-from tunneldb.cli.stage_sentence import number
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
+from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.export.tables.finding_counts import count_findings, sum_groups
@@ -175,7 +175,7 @@ def list_findings(
                 temporary.write_text(as_csv(listed), encoding="utf-8")
         tell(file=output)
         unknown = not rows and not coverage.seen_area
-        notify(f"{'findings were not searched for' if unknown else number(len(rows), 'finding')}: {output}")
+        notify(f"{'findings were not searched for' if unknown else counted(len(rows), 'finding')}: {output}")
     if not searched:
         context.exit(1)
 
@@ -288,9 +288,9 @@ def import_(
         notify(printable(line))
     tell(survey=survey, imported=len(done.ids), kinds=dict(done.kinds), ids=done.ids, wrong=done.wrong)
     if done.wrong:
-        raise UserError(f"{file}: {number(len(done.wrong), 'wrong row')}, so nothing was imported")
+        raise UserError(f"{file}: {counted(len(done.wrong), 'wrong row')}, so nothing was imported")
     said = ", ".join(f"{number} {kind}" for kind, number in sorted(done.kinds.items()))
-    click.echo(f"{survey}: {number(len(done.ids), 'finding')} imported" + (f": {said}" if said else ""))
+    click.echo(f"{survey}: {counted(len(done.ids), 'finding')} imported" + (f": {said}" if said else ""))
 
 
 @findings.command("undo", examples=["tunneldb findings undo 12"])

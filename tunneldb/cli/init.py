@@ -7,6 +7,7 @@ import click
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.progress import bar, step, tell_warnings
+from tunneldb.counted import counted
 from tunneldb.database import open_connection
 from tunneldb.database.foreign import catalogue_alone
 from tunneldb.database.schema import install, schema_revision
@@ -39,4 +40,4 @@ def init(settings: Settings) -> None:
             kept = keep_missing(connection, step(shown))
     tell(before=before, revision=after, waterproofing=kept)
     if kept:
-        notify(f"waterproofing of {kept} kilometres worked out")
+        notify(f"waterproofing of {counted(kept, 'kilometre')} computed")

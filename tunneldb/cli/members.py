@@ -12,6 +12,7 @@ from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath, file_path
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
+from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import exit_on_sigterm
@@ -171,8 +172,9 @@ def _print(found: FileMembers) -> None:
     area = sum(face.area for face in structures.faces)
     seen = sum(face.area * face.seen_share for face in structures.faces)
     click.echo(
-        f"{len(structures.members)} members of {len(structures.faces)} faces, {area:.1f} m², {seen:.1f} m² judged;"
-        f" {len(structures.spots)} spots"
+        f"{counted(len(structures.members), 'member')} of {counted(len(structures.faces), 'face')},"
+        f" {area:.1f} m², {seen:.1f} m² judged;"
+        f" {counted(len(structures.spots), 'spot')}"
     )
     rows = [
         [

@@ -14,6 +14,7 @@ from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.survey import DAY
 from tunneldb.cli.tables import print_table
+from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import BusyError, UserError
 from tunneldb.store.prune import Superseded, busy, superseded
@@ -71,7 +72,7 @@ def prune(settings: Settings, name: str | None, before: dt.datetime | None, yes:
     if not found:
         notify("nothing to prune")
     elif yes:
-        notify(f"deleted: {runs} runs and {jobs} jobs; for the room: tunneldb vacuum --yes")
+        notify(f"deleted: {counted(runs, 'run')} and {counted(jobs, 'job')}; for the room: tunneldb vacuum --yes")
     else:
         again = " ".join(
             ["tunneldb prune", *([name] if name else []), *([f"--before {before:%Y-%m-%d}"] if before else []), "--yes"]

@@ -13,6 +13,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
+from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.export.images.change import export_change
@@ -88,7 +89,7 @@ def qgis(
     if spots.statement and (found.site or spots.face_area):
         notify(f"survey {survey}: {spots.statement}")
     say_remarks(remarks, found)
-    notify(f"{', '.join(written)}: {len(images)} images, {styles}")
+    notify(f"{', '.join(written)}: {counted(len(images), 'image')}, {styles}")
     if settings.dsn is None and service is None:
         notify("the project works while the database runs; after a restart of the machine: tunneldb server start")
     if name is not None and socket:
@@ -114,6 +115,6 @@ def _store_styles(conn: psycopg.Connection) -> str:
     """Store the styles, or say that this user may not: the project holds them anyway."""
     try:
         with conn.transaction():
-            return f"{store_styles(conn)} styles in public.layer_styles"
+            return f"{counted(store_styles(conn), 'style')} in public.layer_styles"
     except psycopg.errors.InsufficientPrivilege:
         return "styles not stored in public.layer_styles: tunnel_operator may"

@@ -15,6 +15,7 @@ from tunneldb.cli.output import notify, printable, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
+from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import exit_on_sigterm, replacing
@@ -121,7 +122,7 @@ def report(
     for photo in written.missing:
         notify(printable(f"finding {photo.photo.finding_id}: photo {photo.photo.path}: {photo.trouble}"))
     sought = leaks or coverage.searched_share
-    notify(f"{output}: {leaks} leaks" if sought else f"{output}: leaks were not searched for")
+    notify(f"{output}: {counted(leaks, 'leak')}" if sought else f"{output}: leaks were not searched for")
 
 
 def _write_site(
@@ -142,7 +143,7 @@ def _write_site(
                 conn.close()
                 _print(browser, page, temporary, shown)
     tell(survey=survey.name, file=output, spots=spots, bytes=output.stat().st_size)
-    notify(f"{output}: {spots} spots")
+    notify(f"{output}: {counted(spots, 'spot')}")
 
 
 def _write(

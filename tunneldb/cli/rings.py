@@ -13,6 +13,7 @@ from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
 from tunneldb.cli.stretch import stretch_options
 from tunneldb.cli.tables import print_table
+from tunneldb.counted import counted
 from tunneldb.errors import UserError
 
 if TYPE_CHECKING:
@@ -223,4 +224,4 @@ def _said(found: SurveyedRings) -> str:
     remarks = sum(bool(row.remarks) for row in found.rows)
     whence = "as given" if found.sigma_given else "as all rings together say"
     good = "" if found.sigma is None else f"; a point is good for {1e3 * found.sigma:.1f} mm, {whence}"
-    return f"{measured} of {len(found.rows)} rings measured, {remarks} with a remark{good}"
+    return f"{measured} of {counted(len(found.rows), 'ring')} measured, {remarks} with a remark{good}"

@@ -11,7 +11,8 @@ import click
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.progress import bar, say
-from tunneldb.cli.stage_sentence import number, stage_sentence
+from tunneldb.cli.stage_sentence import stage_sentence
+from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import NotReadyError
 from tunneldb.stages.ledger import Run
@@ -129,5 +130,5 @@ def _say_result(conn: psycopg.Connection[Any], survey: Survey) -> None:
     tell(leaks=leaks, wet_area=area)
     if (statement := read_coverage(conn, survey).statement) is not None:
         notify(statement)
-    click.echo(f"{survey.name}: {number(leaks, 'leak')}, {area:.2f} m²: tunneldb leaks {survey.name}")
+    click.echo(f"{survey.name}: {counted(leaks, 'leak')}, {area:.2f} m²: tunneldb leaks {survey.name}")
     click.echo(f"to look at it: tunneldb qgis {survey.name} -o FILE.qgz; a report: tunneldb report {survey.name} -o FILE.html")

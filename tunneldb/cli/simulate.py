@@ -12,6 +12,7 @@ from tunneldb.cli.output import Verb, tell, verb
 from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.cli.simulate_options import NAME, SEED_NUMBER, SRID, parameter_option
+from tunneldb.counted import counted
 from tunneldb.simulate import PRESETS, Parameters, Simulation, write
 from tunneldb.simulate.parameters import CHOICES
 
@@ -303,5 +304,6 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
     area = sum(leak.area for leak in simulation.leaks)
     tell(points=files.points, leaks=len(simulation.leaks), leak_area=area, files=files)
     click.echo(
-        f"{files.points:,} points, {len(simulation.leaks)} leaks of {area:.2f} m²: " + ", ".join(str(p) for p in files.clouds)
+        f"{files.points:,} points, {counted(len(simulation.leaks), 'leak')} of {area:.2f} m²: "
+        + ", ".join(str(p) for p in files.clouds)
     )

@@ -12,6 +12,7 @@ from tunneldb.cli.output import tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import say
 from tunneldb.cli.simulate_options import NAME, SEED_NUMBER, SRID, parameter_option
+from tunneldb.counted import counted
 from tunneldb.files import exit_on_sigterm, made_folder
 from tunneldb.simulate.canal import CanalParameters, simulate, write
 
@@ -76,4 +77,6 @@ def simulate_canal(out: Path, **given: Any) -> None:
         files = write(scene, out)
     below = sum(len(scan.points) for scan in scene.sonar)
     tell(points=len(scene.laser), sonar_points=below, files=files)
-    click.echo(f"{len(scene.laser):,} points above the water, {below:,} below it in {len(scene.sonar)} scans: {files.laser}")
+    click.echo(
+        f"{len(scene.laser):,} points above the water, {below:,} below it in {counted(len(scene.sonar), 'scan')}: {files.laser}"
+    )

@@ -12,6 +12,7 @@ from tunneldb.cli.output import tell, verb
 from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.cli.simulate_options import NAME, SEED_NUMBER, SRID, parameter_option
+from tunneldb.counted import counted
 from tunneldb.simulate.structure import StructureParameters, StructureScan, write_structure
 
 _option = partial(parameter_option, StructureParameters)
@@ -67,4 +68,7 @@ def simulate_structure(out: Path, **given: Any) -> None:
         files = write_structure(scan, out, lambda points: progress.update(task, completed=points))
     counts = {"points": files.points, "faces": len(scan.structure.faces), "anomalies": len(scan.anomalies)}
     tell(**counts, files=files)
-    click.echo(f"{files.points:,} points, {counts['faces']} faces, {counts['anomalies']} anomalies: {files.cloud}")
+    click.echo(
+        f"{files.points:,} points, {counted(counts['faces'], 'face')},"
+        f" {counted(counts['anomalies'], 'anomaly', 'anomalies')}: {files.cloud}"
+    )

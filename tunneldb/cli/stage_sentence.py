@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from tunneldb.counted import counted, grouped
+
 Counts = Mapping[str, Any]
 
 
@@ -23,30 +25,21 @@ def stage_sentence(stage: str, counts: Counts) -> str:
     return ", ".join(f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}" for name, value in counts.items())
 
 
-def number(count: int, one: str, many: str = "") -> str:
-    """Return a count in groups of three digits, with what it counts."""
-    return f"{_grouped(count)} {one if count == 1 else many or f'{one}s'}"
-
-
-def _grouped(count: int) -> str:
-    return f"{count:,}".replace(",", " ")
-
-
 def _axis(counts: Counts) -> str:
     of = {"measured": "measured", "interpolated": "interpolated between its neighbours", "edited": "moved by hand"}
-    vertices = [f"{_grouped(counts[source])} {said}" for source, said in of.items() if counts.get(source)]
-    last = number(counts["iterations"], "pass", "passes")
+    vertices = [f"{grouped(counts[source])} {said}" for source, said in of.items() if counts.get(source)]
+    last = counted(counts["iterations"], "pass", "passes")
     return f"vertices: {', '.join(vertices)}; moved by at most {1000 * counts['moved']:.2g} mm in the last of {last}"
 
 
 def _segments(counts: Counts) -> str:
-    return f"{number(counts['segments'], 'segment')} with {number(counts['points'], 'point')}"
+    return f"{counted(counts['segments'], 'segment')} with {counted(counts['points'], 'point')}"
 
 
 def _sections(counts: Counts) -> str:
     radii = {state: counts.get(f"classes_{state}", 0) for state in ("measured", "interpolated", "rejected")}
     whole = sum(radii.values())
-    said = number(counts["sections"], "cross-section")
+    said = counted(counts["sections"], "cross-section")
     if whole:
         said += f", {100 * radii['measured'] / whole:.0f} % of their radii measured"
     return f"{said}; no roof over {counts['open']:g} m" if counts.get("open") else said
@@ -56,8 +49,8 @@ def _ground(counts: Counts) -> str:
     points = sum(counts[name] for name in _CLASSES)
     lining = 100 * counts["lining"] / points if points else 0.0
     return (
-        f"the ground over {counts['metres']} m, {number(counts['clusters'], 'object')} in the tunnel or on its lining;"
-        f" {lining:.0f} % of {number(points, 'point')} are lining"
+        f"the ground over {counts['metres']} m, {counted(counts['clusters'], 'object')} in the tunnel or on its lining;"
+        f" {lining:.0f} % of {counted(points, 'point')} are lining"
     )
 
 
@@ -66,16 +59,16 @@ _CLASSES = ("unassigned", "ground", "lining", "niche", "appendage", "rail", "obj
 
 def _detect(counts: Counts) -> str:
     if "seen" not in counts:
-        return f"offset image of {number(counts['pixels'], 'pixel')}"
-    said = f"{number(counts['leaks'], 'leak')}, {100 * counts['seen']:.1f} % of the lining inspected"
-    dry = [number(counts["joints"], "joint"), number(counts["dark"], "other area")]
+        return f"offset image of {counted(counts['pixels'], 'pixel')}"
+    said = f"{counted(counts['leaks'], 'leak')}, {100 * counts['seen']:.1f} % of the lining inspected"
+    dry = [counted(counts["joints"], "joint"), counted(counts["dark"], "other area")]
     said += f"; dry dark areas: {' and '.join(dry)}"
     changes = {
         "leaks_over_ends": "across the kilometre boundary",
         "leaks_gone": "not found again",
         "leaks_kept_for_review": "kept because they were reviewed",
     }
-    return "; ".join([said, *(f"{_grouped(counts[name])} {words}" for name, words in changes.items() if counts.get(name))])
+    return "; ".join([said, *(f"{grouped(counts[name])} {words}" for name, words in changes.items() if counts.get(name))])
 
 
 _SENTENCES: dict[str, Callable[[Counts], str]] = {

@@ -16,6 +16,7 @@ from tunneldb.cli.sizes import sizes
 from tunneldb.cli.survey_archive import export, import_
 from tunneldb.cli.tables import print_table
 from tunneldb.cli.units import unit_options
+from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.geometry.units import Units
@@ -271,9 +272,9 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
         if (work.reviewed or work.edited) and not yes:
             kms = ", ".join(map(str, emptied))
             question = (
-                f"Kilometre {kms} will have no points: {work.anomalies} leaks and dry dark areas are removed, {work.reviewed}"
-                f" of them reviewed, and {work.edited} axis vertices moved by hand; {work.drawn} findings drawn by hand are"
-                f" kept. Remove {', '.join(names)}?"
+                f"Kilometre {kms} will have no points. Removed: {_areas(work.anomalies)}, {work.reviewed} of them reviewed, and"
+                f" {counted(work.edited, 'axis vertex', 'axis vertices')} moved by hand. Kept:"
+                f" {counted(work.drawn, 'finding')} drawn by hand. Remove {', '.join(names)}?"
             )
             if not click.confirm(question, err=True):
                 raise click.Abort
@@ -298,11 +299,11 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
         lost = removed.lost
         notify(
             f"{name}: no points are left in kilometre {', '.join(map(str, removed.emptied))}, and all that was made of them is"
-            f" gone: {lost.anomalies} leaks and dry dark areas, {lost.reviewed} of them reviewed; {lost.drawn} findings"
-            " drawn by hand are kept"
+            f" gone: {_areas(lost.anomalies)}, {lost.reviewed} of them reviewed;"
+            f" {counted(lost.drawn, 'finding drawn by hand is', 'findings drawn by hand are')} kept"
         )
     if stale:
-        notify(f"{name}: {stale} stages are stale: tunneldb run {name} --stale")
+        notify(f"{name}: {counted(stale, 'stage is', 'stages are')} stale: tunneldb run {name} --stale")
 
 
 @survey.command("list", examples=["tunneldb survey list"])
@@ -332,10 +333,14 @@ def remove(settings: Settings, name: str, yes: bool) -> None:
         held = count_holdings(connection, found.id)
         connection.rollback()
         question = (
-            f"Remove {name} with {held.points} points and {held.findings} leaks and dry dark areas, {held.reviewed} of them"
-            " reviewed?"
+            f"Remove {name} with {counted(held.points, 'point')} and {_areas(held.findings)}, {held.reviewed} of them reviewed?"
         )
         if not yes and not click.confirm(question, err=True):
             raise click.Abort
         remove_survey(connection, name)
     tell(survey=name, points=held.points, anomalies=held.findings, reviewed=held.reviewed)
+
+
+def _areas(count: int) -> str:
+    """Return a number of detected areas in words."""
+    return counted(count, "leak or dry dark area", "leaks and dry dark areas")

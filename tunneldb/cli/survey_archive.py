@@ -10,6 +10,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import notify, tell, verb
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step, tell_warnings
+from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.files import exit_on_sigterm
 from tunneldb.store.survey import get_survey
@@ -33,7 +34,7 @@ def export(settings: Settings, name: str, output: Path) -> None:
     tell(survey=name, file=output, bytes=saved.bytes, kilometres=saved.kilometres, rows=saved.rows)
     notify(
         f"{name}: {sum(saved.rows.values())} rows of {sum(map(bool, saved.rows.values()))} tables, {saved.rows.get('point', 0)}"
-        f" of them points in {len(saved.kilometres)} kilometres: {output}, {saved.bytes / 1e6:.1f} MB"
+        f" of them points in {counted(len(saved.kilometres), 'kilometre')}: {output}, {saved.bytes / 1e6:.1f} MB"
     )
     notify(f"{name}: to free its room in the database: tunneldb survey remove {name}")
 
@@ -76,7 +77,7 @@ def import_(settings: Settings, file: Path, name: str | None) -> None:
     numbers = "the numbers that they had" if loaded.kept else "new numbers"
     notify(
         f"{loaded.survey}: {sum(loaded.rows.values())} rows, {loaded.rows.get('point', 0)} of them points in"
-        f" {len(loaded.kilometres)} kilometres of {loaded.tunnel}; rows have {numbers}"
+        f" {counted(len(loaded.kilometres), 'kilometre')} of {loaded.tunnel}; rows have {numbers}"
     )
     for note in notes:
         notify(f"{loaded.survey}: {note}")

@@ -14,6 +14,7 @@ from tunneldb.cli.measure import number, surveys_in, with_progress
 from tunneldb.cli.output import notify, tell
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
+from tunneldb.counted import counted
 from tunneldb.errors import UserError
 from tunneldb.files import exit_on_sigterm, replacing
 from tunneldb.store.survey import Survey
@@ -94,7 +95,7 @@ def _define(conn: psycopg.Connection[Any], survey: Survey, definition: Definitio
         tell(pitch=joints.pitch, pitch_se=joints.pitch_se, joints=len(joints.seen), joints_missing=missing)
         notify(
             f"rings of {joints.pitch:.4f} m (± {1e3 * joints.pitch_se:.1f} mm);"
-            f" {len(joints.seen)} joints, {missing} of them not seen"
+            f" {counted(len(joints.seen), 'joint')}, {missing} of them not seen"
         )
     elif definition.length is not None:
         rings = rings_by_length(conn, survey, definition.length, definition.start)
@@ -127,7 +128,7 @@ def _print(rows: list[Row], output: Path | None) -> None:
     header += ["circle x", "circle y", "circle z", "circle radius m"]
     print_table(header, table, right=(*range(2, 10), *range(11, 15)))
     steps = [abs(row["step_greatest"]) for row in rows if row["step_greatest"] is not None]
-    said = f"{len(rows)} rings, {len(told)} with an ellipse"
+    said = f"{counted(len(rows), 'ring')}, {len(told)} with an ellipse"
     if len(rows) > len(shown):
         said += f", the {len(shown)} of most ovality shown"
     if steps:

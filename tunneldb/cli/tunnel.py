@@ -14,6 +14,7 @@ from tunneldb.cli.param_types import FINITE, FilePath, file_path
 from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.cli.tables import print_table
 from tunneldb.cli.units import unit_options
+from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import exit_on_sigterm
@@ -210,7 +211,7 @@ def add(
     if given.design is not None:
         plan, profiles = len(given.design.plan), len(given.design.profile)
         tell(plan_elements=plan, profile_elements=profiles)
-        notify(f"{given.source}: {plan} elements in plan, {profiles} in profile")
+        notify(f"{given.source}: {counted(plan, 'element')} in plan, {profiles} in profile")
     for note in notes:
         notify(f"{axis}: {note}")
 

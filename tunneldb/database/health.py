@@ -11,6 +11,7 @@ from typing import Any, Literal, LiteralString
 
 import psycopg
 
+from tunneldb.counted import counted
 from tunneldb.database.connection import MINIMUM_POSTGIS, open_connection
 from tunneldb.database.foreign import SUBJECTS, catalogue_alone, foreign_objects, silent_triggers
 from tunneldb.database.schema import (
@@ -289,7 +290,9 @@ def _queue(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
     assert row is not None
     queued, workers = row
     if queued and not workers:
-        yield CheckResult("note", "queue", f"{queued} jobs are queued, but no worker is running", "tunneldb worker")
+        yield CheckResult(
+            "note", "queue", f"{counted(queued, 'job is', 'jobs are')} queued, but no worker is running", "tunneldb worker"
+        )
 
 
 def _remarks(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
@@ -305,7 +308,8 @@ def _stale(state: Sequence[tuple[Any, ...]]) -> Iterator[CheckResult]:
     """Report results that are out of date, one line per survey."""
     for survey, rows in groupby((row for row in state if row[5]), key=itemgetter(0)):
         kilometres = [row[1] for row in rows]
-        text = f"{survey}: {len(kilometres)} stages of {len(set(kilometres))} kilometres are out of date"
+        stages = counted(len(kilometres), "stage")
+        text = f"{survey}: out of date: {stages} of {counted(len(set(kilometres)), 'kilometre')}"
         yield CheckResult("note", "work", text, f"tunneldb run {survey} --stale")
 
 

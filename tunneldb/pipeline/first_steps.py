@@ -68,7 +68,7 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
     doubts += [f"{look.path.name}: {look.header_note}" for look in looks if look.header_note]
     doubts += [f"{look.path.name}: {note}" for look in looks for note in look.notes]
     doubts += [
-        f"{look.path.name}: {look.misplaced} points have no coordinates, {look.untimed} no time"
+        f"{look.path.name}: points without coordinates: {look.misplaced}; without time: {look.untimed}"
         for look in looks
         if look.misplaced or look.untimed
     ]

@@ -7,6 +7,7 @@ from typing import Any, LiteralString
 
 import psycopg
 
+from tunneldb.counted import counted
 from tunneldb.errors import NotReadyError, UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.stages.stage import Counts, Progress
@@ -159,7 +160,7 @@ def _without_roof(conn: psycopg.Connection[Any], survey: Survey, km: int, values
             [[round(end, 1) for end in stretch], survey.id],
         ).fetchall()
         named.append(" and ".join(label for (label,) in labels))
-    more = f" and {len(stretches) - MAX_NAMED} stretches more" if len(stretches) > MAX_NAMED else ""
+    more = f" and {counted(len(stretches) - MAX_NAMED, 'more stretch', 'more stretches')}" if len(stretches) > MAX_NAMED else ""
     note = f"no roof between {', between '.join(named)}{more}: an open cut or a portal, without sections and lining"
     return sum(high - low for low, high in stretches), note if stretches else ""
 

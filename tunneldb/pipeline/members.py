@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from tunneldb.arrays import Float, Int32, Int64, Single, UInt32
+from tunneldb.counted import counted
 from tunneldb.errors import UserError
 from tunneldb.geometry.crs import describe_crs
 from tunneldb.geometry.units import IN_METRES, Units
@@ -82,7 +83,9 @@ class Inputs:
     @property
     def name(self) -> str:
         """Return the name of all files for errors."""
-        return str(self.paths[0]) if len(self.paths) == 1 else f"{self.paths[0]} and {len(self.paths) - 1} more files"
+        return (
+            str(self.paths[0]) if len(self.paths) == 1 else f"{self.paths[0]} and {counted(len(self.paths) - 1, 'more file')}"
+        )
 
 
 @dataclass(frozen=True)

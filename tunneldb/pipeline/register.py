@@ -10,6 +10,7 @@ import numpy as np
 import psycopg
 
 from tunneldb.arrays import Float
+from tunneldb.counted import counted
 from tunneldb.errors import UserError
 from tunneldb.geometry.units import Units
 from tunneldb.pipeline.ladder_file import read_ladders, read_start
@@ -94,7 +95,7 @@ def register_survey(conn: psycopg.Connection[Any], survey: Survey, given: SonarI
         points, invalid = read_sonar(path)
         clouds.append(SonarCloud(path, points * given.factor, given.up, places.get(path.name)))
         if invalid:
-            notes.append(f"{path.name}: {invalid} points without coordinates are left out")
+            notes.append(f"{path.name}: {counted(invalid, 'point')} without coordinates left out")
     laser = _laser_points(conn, survey, given.water_level, begin)
     begin("registration", len(clouds))
     found = register(laser, clouds, ladders, given.water_level)

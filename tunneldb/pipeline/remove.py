@@ -9,6 +9,7 @@ from typing import Any
 
 import psycopg
 
+from tunneldb.counted import counted
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load import load_kilometre
@@ -209,9 +210,10 @@ def _farewell(names: Sequence[str], lost: Work) -> str:
     """Return a note on a kilometre that was removed with its files."""
     said = f"no points since {', '.join(names)} was removed"
     if lost.drawn:
-        said += f"; {lost.drawn} findings drawn by hand are kept"
+        said += f"; {counted(lost.drawn, 'finding drawn by hand is', 'findings drawn by hand are')} kept"
     if not (lost.anomalies or lost.edited):
         return said
     gone = f", {lost.reviewed} of them reviewed" if lost.reviewed else ""
-    edited = f", and {lost.edited} axis vertices moved by hand" if lost.edited else ""
-    return f"{said}; {lost.anomalies} leaks and dry dark areas{gone}{edited} were removed with them"
+    edited = f", and {counted(lost.edited, 'axis vertex', 'axis vertices')} moved by hand" if lost.edited else ""
+    areas = counted(lost.anomalies, "leak or dry dark area", "leaks and dry dark areas")
+    return f"{said}; {areas}{gone}{edited} removed with them"

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from tunneldb.arrays import Bool, Float
+from tunneldb.counted import counted
 from tunneldb.shape.adjustment import MAX_ERROR_INFLATION, Adjustment, adjust, begin
 from tunneldb.shape.departures import Departure, clock_of, departures
 from tunneldb.shape.ellipse import CIRCLE, ELLIPSE, solve
@@ -122,7 +123,7 @@ def fit_ring(
         If there are fewer than 5 points, or they determine no circle.
     """
     if len(points) < MIN_POINTS:
-        raise RingRefusedError(f"only {len(points)} points; a ring needs {MIN_POINTS}")
+        raise RingRefusedError(f"only {counted(len(points), 'point')}; a ring needs {MIN_POINTS}")
     plane = _plane(points, ahead, across)
     xy = points if points.shape[1] == 2 else plane.project(points)
     start = begin(xy)

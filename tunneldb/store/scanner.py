@@ -14,6 +14,7 @@ from psycopg import sql
 
 from tunneldb.alignment.given import XYZ
 from tunneldb.arrays import Float
+from tunneldb.counted import counted
 from tunneldb.csvfile import CsvTable, read_csv
 from tunneldb.database.copy import PointZ, copy_binary, pack
 from tunneldb.errors import UserError
@@ -147,7 +148,7 @@ def time_notes(time: Float, xyz: Float, time_offset: float) -> list[str]:
     if len(gaps):
         longest = gaps[np.argmax(gaps[:, 1] - gaps[:, 0])]
         notes.append(
-            f"the trajectory has {len(gaps)} gap{'s' if len(gaps) > 1 else ''}, the longest of {longest[1] - longest[0]:.1f} s"
+            f"the trajectory has {counted(len(gaps), 'gap')}, the longest of {longest[1] - longest[0]:.1f} s"
             f" from time {longest[0]:.3f}: points measured in {'them' if len(gaps) > 1 else 'it'} are left out"
         )
     return notes

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from tunneldb.counted import counted
 from tunneldb.geometry.crs import srid_name
 from tunneldb.geometry.stationing import Stationing
 from tunneldb.pipeline.target_control import Comparison, mean_centres
@@ -60,7 +61,8 @@ def report(
     parts = [
         f"# Target spheres of {survey.name}",
         f"Tunnel {survey.tunnel}, scanned {survey.date}, {srid_name(survey.srid)}. Spheres of {1e3 * radius:g} mm radius"
-        f" ± {1e3 * tolerance:g} mm; {found.points} points read. {spheres} spheres, seen {len(found.spheres)} times.",
+        f" ± {1e3 * tolerance:g} mm; {counted(found.points, 'point')} read."
+        f" {counted(spheres, 'sphere')}, seen {counted(len(found.spheres), 'time')}.",
         "Centres are from a fit with the nominal radius; radius is that of the best sphere of any radius, as a check."
         " sigma is the standard deviation of the centre in space.",
     ]

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tunneldb.arrays import Float
+from tunneldb.counted import counted
 from tunneldb.errors import UserError
 from tunneldb.measures.rings.surveyed_points import SurveyedRing, read_axis, read_points, require_near, require_size
 from tunneldb.shape.axis import DesignAxis
@@ -148,7 +149,7 @@ def _refusal(ring: SurveyedRing, away: float, diameter: float) -> str | None:
     if ring.refused is not None:
         return ring.refused
     if len(ring.xyz) < MIN_POINTS:
-        return f"only {len(ring.xyz)} points; a ring needs {MIN_POINTS}"
+        return f"only {counted(len(ring.xyz), 'point')}; a ring needs {MIN_POINTS}"
     return f"the points are {away:.1f} m from the axis" if away > diameter else None
 
 

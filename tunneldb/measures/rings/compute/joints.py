@@ -15,6 +15,7 @@ from scipy.ndimage import median_filter
 from scipy.stats import gamma
 
 from tunneldb.arrays import Bool, Float, Int64, Single
+from tunneldb.counted import counted
 from tunneldb.robust import MAD_TO_SIGMA
 
 LINE_SIDE = 0.06
@@ -180,7 +181,7 @@ def ring_length(places: Float, weight: Float) -> float:
         If they repeat no better than random places.
     """
     if len(places) < 5:
-        raise NoRingsError(f"only {len(places)} places look like joints all around")
+        raise NoRingsError(f"only {counted(len(places), 'place looks like a joint', 'places look like joints')} all around")
     per_metre = np.arange(1.0 / MAX_RING_LENGTH, 1.0 / MIN_RING_LENGTH, 0.1 / STRETCH)
     power, parts = np.zeros(len(per_metre)), 0
     weight = np.minimum(weight, 4.0 * np.median(weight))
