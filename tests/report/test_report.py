@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import itertools
 import json
 import math
 import re
@@ -172,7 +173,7 @@ def test_details_show_picture_outline_and_section(reading: Reading, leaks: list[
         assert abs(detail["at"]) <= 2.5 + 0.1
 
 
-STANDARD = re.compile(r"GB 50108|standard|[Cc]lass(es)? (\d|of waterproofing)|>Waterproofing<")
+STANDARD = re.compile(r"GB 50108|standard’s|[Cc]lass(?:es)? (?:\d|of waterproofing)|>Waterproofing<")
 """Words of a rating scheme."""
 
 
@@ -460,6 +461,14 @@ def test_fits_a_small_screen(browser: Browser, report: Path, width: int) -> None
     for address in (report.as_uri(), f"{report.as_uri()}#leak-2"):
         page.goto(address)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+    chart = page.locator("svg.glance").bounding_box()
+    assert chart is not None
+    assert 0 <= chart["x"] <= chart["x"] + chart["width"] <= width, "it is not cut"
+    boxes = "[...document.querySelectorAll('.glance .tick text')].map(label => label.getBoundingClientRect())"
+    labels = page.evaluate(f"{boxes}.filter(box => box.width > 0).map(box => [box.left, box.right])")
+    assert len(labels) >= 3
+    assert all(0 <= left < right <= width for left, right in labels)
+    assert all(one[1] < following[0] for one, following in itertools.pairwise(labels))
     card = page.get_by_role("dialog").bounding_box()
     assert card is not None
     assert card["width"] <= width
@@ -475,6 +484,18 @@ def test_on_paper_all_leaks_are_there(page: Page, leaks: list[dict[str, Any]]) -
     assert column(page, 1) == ["1"], "and the screen is as it was"
 
 
+def lowest_text(sheet: pypdf.PageObject) -> float:
+    """Height of the lowest text of a page above its foot, points; without the footer."""
+    heights: list[float] = []
+
+    def note(text: str, page: list[float], place: list[float], *_: Any) -> None:
+        if text.strip():
+            heights.append(place[4] * page[1] + place[5] * page[3] + page[5])
+
+    sheet.extract_text(visitor_text=note)
+    return min(height for height in heights if height > 45)
+
+
 def test_pdf(shared: str, leaks: list[dict[str, Any]], tmp_path: Path, chromium: Path) -> None:
     path = tmp_path / "report.pdf"
     run("--dsn", shared, "report", SURVEY, "-o", path)
@@ -482,6 +503,7 @@ def test_pdf(shared: str, leaks: list[dict[str, Any]], tmp_path: Path, chromium:
     reader = pypdf.PdfReader(path)
     sheets = [" ".join(sheet.extract_text().split()) for sheet in reader.pages]
     for number, sheet in enumerate(reader.pages, start=1):
+        assert number == len(reader.pages) or lowest_text(sheet) < 300, f"page {number} is half empty"
         assert (float(sheet.mediabox.width), float(sheet.mediabox.height)) == pytest.approx((595, 842), abs=1.5), "A4"
         assert f"Page {number} of {len(sheets)}" in sheets[number - 1]
         assert f"{SURVEY} · digest" in sheets[number - 1]
