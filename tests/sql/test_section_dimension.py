@@ -42,9 +42,9 @@ def test_area_of_an_outline_with_arcs(conn: psycopg.Connection, outline: list[fl
     vertices = np.array(outline, float).reshape(-1, 3)
     edges = itertools.pairwise(vertices)
     points = np.concatenate([arc_points(*a[:2], *b[:2], a[2]) for a, b in edges])
-    ((area,),) = conn.execute("SELECT tunnel_internal.outline_area(%s::float8[])", [outline]).fetchall()
+    ((area,),) = conn.execute("SELECT tunnel_internal.outline_area(%s::float8[])", [vertices.ravel().tolist()]).fetchall()
     assert area == pytest.approx(shapely.Polygon(points).area, rel=1e-5)
-    ((none,),) = conn.execute("SELECT tunnel_internal.outline_area(%s::float8[])", [outline[:-3]]).fetchall()
+    ((none,),) = conn.execute("SELECT tunnel_internal.outline_area(%s::float8[])", [vertices[:-1].ravel().tolist()]).fetchall()
     assert none is None, "an open profile has no area"
 
 
@@ -56,6 +56,7 @@ def test_sections_have_the_size_of_their_polygon(example: str, conn: psycopg.Con
         radius = rng.uniform(2.0, 5.0, 360)
         radii[chainage] = radius
         conn.execute("UPDATE tunnel.section SET radius = %s WHERE id = %s", [[*radius, radius[0]], key])
+    conn.execute("DELETE FROM tunnel.design_profile")
     outline = [-4.0, 0.0, -1.0, 4.0, 0.0, -1.0, -4.0, 0.0, 0.0]
     conn.execute(
         "INSERT INTO tunnel.design_profile (tunnel_id, name, layer, chainage_from, chainage_to, outline, source)"
