@@ -9,10 +9,13 @@ from pathlib import Path
 import laspy
 import numpy as np
 import psycopg
+import pytest
 from click.testing import CliRunner
 from support.loaded_survey import ORIGIN, SURVEY, add_survey, files, rows, tube
 
 from tunneldb.cli.main import main
+from tunneldb.errors import UserError
+from tunneldb.export.pointcloud.survey import survey_files
 from tunneldb.geometry.units import METRES
 from tunneldb.pointcloud.reader import read_chunks
 from tunneldb.store.remarks import read_remarks
@@ -63,3 +66,6 @@ def test_the_advice_for_feet_loads_metres(conn: psycopg.Connection, dsn: str, tm
     conn.rollback()
     repeated = CliRunner().invoke(main, [*command, *options])
     assert "unchanged" in repeated.output
+    conn.rollback()
+    with pytest.raises(UserError, match=r"converted from us-ft .*copies would not be"):
+        survey_files(conn, survey)

@@ -107,7 +107,14 @@ def export_classified(
 
 
 def survey_files(conn: psycopg.Connection[Any], survey: Survey) -> list[ScanFile]:
-    """Return the files of a survey in the order of chainage."""
+    """Return the files of a survey in the order of chainage.
+
+    Raises
+    ------
+    UserError
+        If one is not in metres: copies have the coordinates of the file, but classes are found in metres.
+    """
+    _require_metres(conn, survey)
     there = set(loaded_kilometres(conn, survey))
     rows = conn.execute(
         "SELECT f.name, f.path, f.checksum, f.bytes, f.points,"
@@ -120,6 +127,19 @@ def survey_files(conn: psycopg.Connection[Any], survey: Survey) -> list[ScanFile
         ScanFile(name, path, checksum, size, points, tuple(km for km in near if km in there), tuple(touched))
         for name, path, checksum, size, points, near, touched in rows
     ]
+
+
+def _require_metres(conn: psycopg.Connection[Any], survey: Survey) -> None:
+    row = conn.execute(
+        "SELECT path, unit, height_unit FROM tunnel.scan_file WHERE survey_id = %s AND (unit <> 'm' OR height_unit <> 'm')"
+        " ORDER BY name LIMIT 1",
+        [survey.id],
+    ).fetchone()
+    if row is not None:
+        raise UserError(
+            f"{row[0]}: its coordinates were converted from {row[1]} (heights: {row[2]}) when it was loaded, and copies would"
+            " not be; transform the file to metres and load it again"
+        )
 
 
 def _targets(conn: psycopg.Connection[Any], files: Sequence[ScanFile], every: Sequence[ScanFile], folder: Path) -> list[Path]:
