@@ -15,6 +15,7 @@ import shapely
 from benchmarks.any_scan.program import Call, Program
 from benchmarks.any_scan.scan import Leak
 from benchmarks.any_scan.tube import Tube
+from benchmarks.any_scan.ways import WAYS, first_word
 
 NEAR = 0.10
 """m; so far from a true leak what was found may lie and still be of it."""
@@ -77,12 +78,15 @@ class Verdict:
     said: str
     seconds: float
     typed: str
+    learned: tuple[str, str] = ("", "")
+    """Of a way of doing it wrong: command and line that first name it."""
 
 
 def judge(scene: Scene, folder: Path, program: Program) -> tuple[Verdict, list[Call]]:
     """Build the scene in `folder`, run it, and judge."""
     folder.mkdir(parents=True, exist_ok=True)
     plan = scene.build(folder)
+    plan.inspect = scene.name in WAYS.values()
     calls = _run(scene, plan, folder, program)
     faults = [f"traceback: {call.line}" for call in calls if "Traceback" in call.text or call.code not in (0, 1, 2)]
     spoken = _spoken(scene, calls)
@@ -107,6 +111,7 @@ def judge(scene: Scene, folder: Path, program: Program) -> tuple[Verdict, list[C
     verdict = Verdict(
         scene.name, scene.special, scene.expect, seen, not faults, faults, found, true, false, said[:300],
         round(sum(call.seconds for call in calls), 1), (refused or calls[-1]).line,
+        first_word(scene.word, calls) if plan.inspect else ("", ""),
     )  # fmt: skip
     return verdict, calls
 

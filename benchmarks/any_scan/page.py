@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from benchmarks.any_scan.ways import WAYS
+
 HEAD = """# Typical real scans
 
 <!-- Written by python -m benchmarks.any_scan --table; edit benchmarks/any_scan/page.py, not this page. -->
@@ -34,6 +36,25 @@ least 30 % of it is covered. If several outcomes are listed, any of them is righ
 """
 
 
+WAYS_HEAD = """## Ways of doing it wrong
+
+The step at which the user first learns of a mistake, of `inspect` (with the scan files only), `tunnel add`, `survey add`,
+`load`, `run`, `leaks` and `report`.
+
+| mistake | scene | step | message |
+|---|---|---|---|
+"""
+
+
+def _ways(verdicts: dict[str, Any]) -> str:
+    rows = []
+    for way, name in WAYS.items():
+        step, line = verdicts[name]["learned"] if name in verdicts else ("not run yet", "")
+        said = line.removeprefix("tunneldb: ").replace("|", "\\|").replace("<", "&lt;")
+        rows.append(f"| {way} | {name} | {f'`{step}`' if step else '**none**'} | {said} |")
+    return WAYS_HEAD + "\n".join(rows) + "\n"
+
+
 def page(verdicts: dict[str, Any], names: list[str]) -> str:
     """Return the page as Markdown, in the order of the scenes' `names`."""
     missing = [name for name in names if name not in verdicts]
@@ -47,6 +68,7 @@ def page(verdicts: dict[str, Any], names: list[str]) -> str:
         rows.append("| " + " | ".join(map(str, [*cells, "yes" if v["right"] else "**no**"])) + " |")
     minutes = round(sum(v["seconds"] for v in verdicts.values()) / 60)
     text = HEAD.format(count=len(verdicts), right=sum(v["right"] for v in verdicts.values()), minutes=minutes)
+    text += "\n" + _ways(verdicts)
     wrong = [v for v in verdicts.values() if not v["right"]]
     text += "\n".join(rows) + "\n"
     if missing:

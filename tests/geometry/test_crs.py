@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from pyproj import CRS
 
+from tunneldb.arrays import Float
 from tunneldb.geometry.crs import LOCAL, fits_srid, outside_area
 
 PLACES = [  # published coordinates of places, m
@@ -28,6 +31,19 @@ def test_places_outside_of_the_area_are_told(srid: int, x: float, y: float, insi
     if said is not None:
         assert f"EPSG:{srid}" in said
         assert "--srid local" in said
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        (lambda xy: xy[:, ::-1], "inside with east and north swapped"),
+        (lambda xy: xy * 1000.0, "inside if they are millimetres"),
+        (lambda xy: xy / 0.3048, "inside if they are feet"),
+    ],
+)
+def test_the_likely_cause_is_named(change: Callable[[Float], Float], cause: str) -> None:
+    munich = np.array([[691600.0, 5334800.0]])
+    assert cause in str(outside_area(25832, change(munich)))
 
 
 def test_what_lies_over_a_border_is_taken_for_meant() -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from pyproj import CRS, Transformer
+from pyproj.aoi import AreaOfUse
 from pyproj.exceptions import CRSError, ProjError
 
 from tunneldb.arrays import Float
@@ -166,17 +168,31 @@ def outside_area(srid: int | None, xy: Float) -> str | None:
         if crs.geodetic_crs is None or crs.area_of_use is None:
             return None
         degrees = Transformer.from_crs(crs, crs.geodetic_crs, always_xy=True)
-        east, north = degrees.transform(xy[:, 0], xy[:, 1])
+        if _inside(crs.area_of_use, degrees, xy):
+            return None
+        likely = [cause for cause, change in _CAUSES.items() if _inside(crs.area_of_use, degrees, change(xy))]
     except (CRSError, ProjError):
         return None
-    area = crs.area_of_use
+    why = f"; they would be inside {' or '.join(likely)}" if likely else ""
+    return (
+        f"the coordinates are outside the area of use of EPSG:{srid} ({crs.name}), {crs.area_of_use.name.rstrip('.')}, and"
+        f" would be shown in a wrong place on the map{why}; check the SRID, or use local coordinates (tunnel add --srid local)"
+    )
+
+
+_CAUSES: dict[str, Callable[[Float], Float]] = {
+    "with east and north swapped": lambda xy: xy[:, ::-1],
+    "if they are millimetres": lambda xy: xy / 1000.0,
+    "if they are feet": lambda xy: xy * 0.3048,
+}
+"""Likely causes of coordinates outside the area of use, and what undoes them."""
+
+
+def _inside(area: AreaOfUse, degrees: Transformer, xy: Float) -> bool:
+    """Return True if any point is inside an area of use, within MARGIN."""
+    east, north = degrees.transform(xy[:, 0], xy[:, 1])
     # Longitudes are relative to the western bound, since the area may cross 180°.
     width = (area.east - area.west) % 360.0 or 360.0
-    along = (np.asarray(east) - area.west + MARGIN) % 360.0
-    inside = (along <= width + 2.0 * MARGIN) & (area.south - MARGIN <= north) & (north <= area.north + MARGIN)
-    if inside.any():
-        return None
-    return (
-        f"the coordinates are outside the area of use of EPSG:{srid} ({crs.name}), {area.name.rstrip('.')}, and would be shown"
-        " in a wrong place on the map; check the SRID, or use local coordinates (tunnel add --srid local)"
-    )
+    with np.errstate(invalid="ignore"):  # no place on Earth
+        along = (np.asarray(east) - area.west + MARGIN) % 360.0
+    return bool(((along <= width + 2.0 * MARGIN) & (area.south - MARGIN <= north) & (north <= area.north + MARGIN)).any())
