@@ -78,9 +78,11 @@ def test_clocks(tunnel: Path, trajectory: float, file: float, says: str) -> None
         (np.eye(3)[[1, 0, 2]], "they would fit with x and y swapped"),
         (np.eye(3) * 1000.0, "they would fit as millimetres"),
         (np.eye(3) / 0.3048, "they would fit as feet"),
+        (np.eye(3) / 1000.0, "they would fit if the axis is in millimetres"),
+        (np.eye(3) * 0.3048, "they would fit if the axis is in feet"),
         (np.eye(3) * 0.9, "check that it belongs to this tunnel and SRID"),
     ],
-    ids=["swapped", "millimetres", "feet", "elsewhere"],
+    ids=["swapped", "millimetres", "feet", "axis in millimetres", "axis in feet", "elsewhere"],
 )
 def test_positions(tunnel: Path, kind: str, matrix: np.ndarray, says: str) -> None:
     rows = (POSES if kind == "--trajectory" else STATIONS).copy()

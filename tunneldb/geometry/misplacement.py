@@ -33,4 +33,7 @@ def explain_misplacement(xyz: Float, vertices: Float, reach: float) -> str | Non
     for plan, how in tried:
         if np.median(tree.query(plan)[0]) <= reach:
             return f"they would fit {how}"
+    for factor, unit in ((0.001, "millimetres"), (_FOOT, "feet")):
+        if np.median(scipy.spatial.cKDTree(factor * vertices[:, :2]).query(xyz[:, :2])[0]) <= reach:
+            return f"they would fit if the axis is in {unit}"
     return None
