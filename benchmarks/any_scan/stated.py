@@ -391,7 +391,7 @@ STATED: tuple[Scene, ...] = (
         r"swapped|axis|outside",
     ),
     Scene(
-        "scan-millimetres",
+        "scan-thousandfold",
         "scan, stations and axis in millimetres, no coordinate system",
         "warning|refusal",
         all_millimetres,

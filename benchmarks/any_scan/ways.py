@@ -13,7 +13,7 @@ WAYS = {
     "feet": "feet",
     "swapped axes": "scan-swapped",
     "mirrored stations": "mirrored",
-    "millimetres": "scan-millimetres",
+    "millimetres": "scan-thousandfold",
     "clipped export": "clipped-las",
     "merged scans": "numbered-anew",
     "wrong intensity field, reflectance for amplitude": "reflectance-as-amplitude",

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from pyproj import CRS, Transformer
-from pyproj.aoi import AreaOfUse
 from pyproj.exceptions import CRSError, ProjError
 
 from tunneldb.arrays import Float
@@ -168,9 +167,9 @@ def outside_area(srid: int | None, xy: Float) -> str | None:
         if crs.geodetic_crs is None or crs.area_of_use is None:
             return None
         degrees = Transformer.from_crs(crs, crs.geodetic_crs, always_xy=True)
-        if _inside(crs.area_of_use, degrees, xy):
+        if _inside(crs.area_of_use.bounds, degrees, xy):
             return None
-        likely = [cause for cause, change in _CAUSES.items() if _inside(crs.area_of_use, degrees, change(xy))]
+        likely = [cause for cause, change in _CAUSES.items() if _inside(crs.area_of_use.bounds, degrees, change(xy))]
     except (CRSError, ProjError):
         return None
     why = f"; they would be inside {' or '.join(likely)}" if likely else ""
@@ -188,11 +187,12 @@ _CAUSES: dict[str, Callable[[Float], Float]] = {
 """Likely causes of coordinates outside the area of use, and what undoes them."""
 
 
-def _inside(area: AreaOfUse, degrees: Transformer, xy: Float) -> bool:
-    """Return True if any point is inside an area of use, within MARGIN."""
+def _inside(area: tuple[float, float, float, float], degrees: Transformer, xy: Float) -> bool:
+    """Return True if any point is inside an area of use (west, south, east, north, degrees), within MARGIN."""
+    west, south, area_east, area_north = area
     east, north = degrees.transform(xy[:, 0], xy[:, 1])
     # Longitudes are relative to the western bound, since the area may cross 180°.
-    width = (area.east - area.west) % 360.0 or 360.0
+    width = (area_east - west) % 360.0 or 360.0
     with np.errstate(invalid="ignore"):  # no place on Earth
-        along = (np.asarray(east) - area.west + MARGIN) % 360.0
-    return bool(((along <= width + 2.0 * MARGIN) & (area.south - MARGIN <= north) & (north <= area.north + MARGIN)).any())
+        along = (np.asarray(east) - west + MARGIN) % 360.0
+    return bool(((along <= width + 2.0 * MARGIN) & (south - MARGIN <= north) & (north <= area_north + MARGIN)).any())
