@@ -125,12 +125,6 @@ def test_feet_are_noticed(tls: Path, tmp_path: Path) -> None:
     assert named["unit"].endswith("(NAD83 / New York Long Island (ftUS)), not metres; convert them by --unit us-ft")
 
 
-def test_millimetres_are_noticed(tls: Path, tmp_path: Path) -> None:
-    said = inspected(changed(tls, tmp_path / "a.las", 1000.0))
-    assert any("a.las: looks like millimetres: the tunnel is then" in doubt for doubt in said["doubts"])
-    assert not any("is it a tunnel?" in doubt or "noise" in doubt for doubt in said["doubts"])
-
-
 def test_a_ptx_brings_its_stations(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     lines = []

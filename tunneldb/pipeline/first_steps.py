@@ -14,7 +14,7 @@ from tunneldb.errors import UserError
 from tunneldb.files import common_name
 from tunneldb.geometry.crs import outside_area
 from tunneldb.pipeline.inspected_poses import file_beside
-from tunneldb.pipeline.inspection import NARROWEST, FileLook, IntensityLook
+from tunneldb.pipeline.inspection import FileLook, IntensityLook
 from tunneldb.pointcloud.stations import read_stations
 from tunneldb.radiometry.intensity_kind import KindGuess
 from tunneldb.store.scanner import FARTHEST_SCANNER
@@ -49,9 +49,8 @@ class FirstSteps:
 
 
 def needs_axis(looks: Sequence[FileLook]) -> bool:
-    """Return True if no axis file is beside the scans, so that it must be found in them, and they are in metres."""
-    other = any(look.foreign_unit or (look.unit and (look.width or np.inf) > 1000.0 * NARROWEST) for look in looks)
-    return _beside(looks, "axis.csv") is None and not other and not all(look.only_noise for look in looks)
+    """Return True if no axis file is beside the scans, so that it must be found in them."""
+    return _beside(looks, "axis.csv") is None and not any(look.foreign_unit for look in looks)
 
 
 def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> FirstSteps:
@@ -80,8 +79,6 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         if look.profile_spacing is not None and look.profile_spacing > FAR_APART
     ]
     if all(look.only_noise for look in looks):
-        if any(look.unit for look in looks):
-            return FirstSteps([f"{', '.join(look.path.name for look in looks)} in metres: transform first"], doubts, [])
         doubts.append(
             "nothing to load: all points would be left out as noise, because none has others near enough on one surface;"
             " single points measured in profiles are not a scan"

@@ -188,9 +188,9 @@ class FileLook:
 
     @property
     def other_than_a_tunnel(self) -> str | None:
-        """Return its probable nature by size; None if it can be a tunnel, perhaps in another unit."""
+        """Return its probable nature by size; None if it can be a tunnel."""
         if self.length is None or self.width is None or self.height is None:
-            return None if self.unit else "no axis through it as through a tunnel"
+            return "no axis through it as through a tunnel"
         size = f"{self.length:.1f} long, {self.width:.1f} wide and {self.height:.1f} high"
         if self.height < LOWEST * self.width:
             return f"{size}: open country or a street rather than a tunnel"
@@ -339,10 +339,7 @@ def _unit(header: ScanHeader, contents: Contents, form: TunnelForm | None) -> st
     if inside and float(np.max(high[:2] - low[:2])) < 0.1 < float(high[2] - low[2]):
         return "looks like degrees (longitude and latitude): transform it to a projected system in metres"
     if form is None:
-        smaller = tunnel_form(contents.xyz / 1000.0) if float(np.max(high - low)) > 1000.0 * NARROWEST else None
-        if smaller is None or not NARROWEST < smaller.width < MAX_WIDTH or smaller.height < LOWEST * smaller.width:
-            return None
-        return f"looks like millimetres: the tunnel is then {smaller.width:.1f} m wide and {smaller.height:.1f} m high"
+        return None
     size = f"the tunnel is {form.width:.4g} wide and {form.height:.4g} high"
     if form.width > 1000.0 * NARROWEST:
         return f"looks like millimetres: {size}"
