@@ -111,7 +111,7 @@ def judge(scene: Scene, folder: Path, program: Program) -> tuple[Verdict, list[C
     verdict = Verdict(
         scene.name, scene.special, scene.expect, seen, not faults, faults, found, true, false, said[:300],
         round(sum(call.seconds for call in calls), 1), (refused or calls[-1]).line,
-        first_word(scene.word, calls) if plan.inspect else ("", ""),
+        first_word(scene.name, scene.word, calls) if plan.inspect else ("", ""),
     )  # fmt: skip
     return verdict, calls
 

@@ -22,15 +22,15 @@ WAYS = {
 }
 """Scene of each."""
 
-_COUNTS = re.compile(r"(file +points|.*┃|\S+: [\d ]+ (stations|poses) of )")
+_COUNTS = re.compile(r"file +points|.*┃|\S+: [\d ]+ (stations|poses) of |.* m of axis, chainage |chainage grows over ")
 
 
-def first_word(word: str, calls: Sequence[Call]) -> tuple[str, str]:
-    """Return the command and the line that first name the matter `word`, a regular expression; empty if none does."""
+def first_word(name: str, word: str, calls: Sequence[Call]) -> tuple[str, str]:
+    """Return command and line that first name the matter `word`, a regular expression, of the scene `name`; empty if none does."""
     for call in calls:
         verb = " ".join(call.words[:2]) if call.words[0] in ("tunnel", "survey") else call.words[0]
         lines = list(_doubts(call) if verb == "inspect" else _said(call))
-        named = [line for line in lines if re.search(word, line.lower())]
+        named = [line for line in lines if re.search(word, line.replace(name, "").lower())]
         if named or call.code == 2:
             return verb, (named or lines)[-1]
     return "", ""
