@@ -26,7 +26,7 @@ _COUNTS = re.compile(r"file +points|.*┃|\S+: [\d ]+ (stations|poses) of |.* m 
 
 
 def first_word(name: str, word: str, calls: Sequence[Call]) -> tuple[str, str]:
-    """Return command and line that first name the matter `word`, a regular expression, of the scene `name`; empty if none does."""
+    """Return command and line that first name the matter `word` (regular expression) of the scene `name`; else empty."""
     for call in calls:
         verb = " ".join(call.words[:2]) if call.words[0] in ("tunnel", "survey") else call.words[0]
         lines = list(_doubts(call) if verb == "inspect" else _said(call))
