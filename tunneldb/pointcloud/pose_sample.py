@@ -8,7 +8,7 @@ import numpy as np
 
 from tunneldb.arrays import Float, Int32
 
-MAX_POINTS = 200_000
+MAX_POINTS = 60_000
 
 
 @dataclass(frozen=True)
@@ -46,12 +46,17 @@ class PoseSample:
         count = len(xyz)
         if not count:
             return
+        while count * self.share > self.max_points:
+            self._halve()
         wanted = int(count * self.share + self._random.random())
         chosen = np.arange(count) if wanted >= count else self._random.integers(0, count, wanted)
         self._parts.append(SampledPoints(xyz[chosen], time[chosen], scan_id[chosen]))
         while sum(map(len, self._parts)) > self.max_points:
-            self.share /= 2.0
-            self._parts = [self._half(part) for part in self._parts]
+            self._halve()
+
+    def _halve(self) -> None:
+        self.share /= 2.0
+        self._parts = [self._half(part) for part in self._parts]
 
     def _half(self, part: SampledPoints) -> SampledPoints:
         kept = self._random.random(len(part)) < 0.5
