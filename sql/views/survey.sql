@@ -52,6 +52,7 @@ WITH origin AS (
 SELECT r.id AS survey_id, r.of_id FROM ranked r WHERE r.id <> r.of_id;
 COMMENT ON VIEW tunnel_internal.survey_copy IS
     'Surveys that are copies of another survey (of_id) of the same tunnel, from an archive of it (survey import): not another scan, so not listed in series by date';
+COMMENT ON COLUMN tunnel_internal.survey_copy.of_id IS 'Key of the survey that it is a copy of';
 
 CREATE OR REPLACE VIEW tunnel_api.file AS
 SELECT f.id, f.survey_id, s.name AS survey, f.name, tunnel_internal.for_operators(f.path) AS path, f.checksum, f.bytes, f.points, f.noise, f.outside, f.thinned,
