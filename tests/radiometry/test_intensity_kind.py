@@ -89,3 +89,10 @@ def test_values_that_are_none_are_counted_and_left_out() -> None:
     assert (found.count, found.missing, found.least, found.median, found.most, found.whole) == (5, 2, 1.0, 2.0, 3.0, True)
     assert guess_kind(np.full(3, np.nan))[0].kind == "none"
     assert contradiction("linear", np.full(3, np.nan)) == "no value is a number"
+
+
+def test_amplitudes_below_zero_are_doubted() -> None:
+    below = np.random.default_rng(1).normal(-8.0, 1.5, 5000)
+    assert "--intensity-kind reflectance" in str(doubt("amplitude", below))
+    assert doubt("amplitude", below + 50.0) is None
+    assert doubt("reflectance", below) is None

@@ -195,6 +195,11 @@ def doubt(kind: str, values: NDArray[Any]) -> str | None:
             f"the intensities, declared reflectance, range from {found.low:.4g} to {found.high:.4g} dB (1 to 99 %), but"
             " lining is below 0 dB, the level of a white target; check whether --intensity-kind amplitude is right"
         )
+    if kind == "amplitude" and found.high < 0.0:
+        said.append(
+            f"the intensities, declared amplitude, range from {found.low:.4g} to {found.high:.4g} dB (1 to 99 %), but an"
+            " amplitude is above 0 dB, the detection limit; check whether --intensity-kind reflectance is right"
+        )
     return "; ".join(said) or None
 
 
