@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from benchmarks.blind.run import Outcome
 from tunneldb.anomalies.background.contrast import contrast_image
 from tunneldb.anomalies.background.level_map import map_background
-from tunneldb.anomalies.detect import find_dark, find_dark_regions, may_count
+from tunneldb.anomalies.detect import find_dark, find_dark_regions, is_large_enough
 from tunneldb.anomalies.features import measure_regions
 from tunneldb.raster.image import LiningImage
 
@@ -51,7 +51,7 @@ def candidates(family: str, picture: LiningImage, truth: Outcome) -> Candidates:
     wet = shapely.union_all(truth.true)
     dim = shapely.union_all([shape for shape, limit in zip(truth.true, truth.limits, strict=True) if limit])
     features, leak = [], []
-    regions = [region for region in find_dark_regions(dark, contrast, LEAST) if may_count(region, LEAST)]
+    regions = [region for region in find_dark_regions(dark, contrast, LEAST) if is_large_enough(region, LEAST)]
     for region, measures in zip(regions, measure_regions(regions), strict=True):
         outline = region.outline
         if outline.intersection(dim).area >= MOSTLY * outline.area:

@@ -12,7 +12,7 @@ from tunneldb.anomalies import verdict
 from tunneldb.anomalies.background.contrast import contrast_image
 from tunneldb.anomalies.background.level_map import map_background
 from tunneldb.anomalies.coverage import Coverage, measure_coverage
-from tunneldb.anomalies.detect import Detection, find_anomalies, judge_region
+from tunneldb.anomalies.detect import Detection, classify_region, find_anomalies
 from tunneldb.anomalies.evidence import EvidenceModel
 from tunneldb.anomalies.records import Anomaly
 from tunneldb.raster.image import LiningImage
@@ -60,5 +60,5 @@ def detect(picture: LiningImage, truth: Outcome) -> tuple[Outcome, dict[int, Cov
 
 def _whole(found: Detection) -> list[Anomaly]:
     """Return all detected regions, including those at an end of the only kilometre."""
-    cut = [judge_region(region, LEAST) for region in found.cut]
+    cut = [classify_region(region, LEAST) for region in found.cut]
     return [*found.anomalies, *(anomaly for anomaly in cut if anomaly is not None)]

@@ -18,7 +18,7 @@ from shapely.geometry import Polygon, box
 
 from benchmarks.evidence.candidates import LEAST, MOSTLY, Candidates
 from tunneldb.anomalies.background.contrast import ContrastImage
-from tunneldb.anomalies.detect import find_dark, find_dark_regions, may_count
+from tunneldb.anomalies.detect import find_dark, find_dark_regions, is_large_enough
 from tunneldb.anomalies.features import measure_regions
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import FaceGrid
@@ -72,7 +72,7 @@ class Painting:
         sigma = np.full((self.grid.rows // TILE, self.grid.columns // TILE), self.sigma, np.float32)
         contrast = ContrastImage(self.grid, state, drop, TILE, sigma)
         dark, _ = find_dark(contrast)
-        regions = [region for region in find_dark_regions(dark, contrast, LEAST) if may_count(region, LEAST)]
+        regions = [region for region in find_dark_regions(dark, contrast, LEAST) if is_large_enough(region, LEAST)]
         for region, features in zip(regions, measure_regions(regions), strict=True):
             rows, columns = region.mask.shape
             top = self.grid.bottom + self.grid.rows - region.row - rows

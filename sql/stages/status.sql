@@ -137,7 +137,7 @@ BEGIN
                        END
                    WHEN s.of_survey AND v.settings_at > c.started_at THEN 'positions, reference or intensity set since'
                    WHEN s.of_sonar AND w.changed_at > c.started_at THEN 'sonar scans loaded or registered since'
-                   WHEN s.of_learned AND c.learned IS DISTINCT FROM v.learned THEN 'what is learned from reviews is another since'
+                   WHEN s.of_learned AND c.learned IS DISTINCT FROM v.learned THEN 'adapted model changed since'
                    WHEN s.of_segments AND m.km IS NOT NULL THEN 'axis edited since'
                END AS reason
           FROM cell c

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from tunneldb.anomalies.background.contrast import ContrastImage
-from tunneldb.anomalies.detect import judge_region
+from tunneldb.anomalies.detect import classify_region
 from tunneldb.anomalies.features import FEATURES
 from tunneldb.anomalies.records import Anomaly
 from tunneldb.anomalies.regions import Region, RegionProperties, find_regions, merge_regions, touching_groups
@@ -43,7 +43,7 @@ def cut_by_kilometre(mask: np.ndarray, level: np.ndarray, first: int, bottom: in
 
 def leaks(parts: list[Region], min_area: float) -> list[Anomaly]:
     united = [merge_regions([parts[k] for k in group]) for group in touching_groups(parts)]
-    return [leak for region in united if (leak := judge_region(region, min_area)) is not None]
+    return [leak for region in united if (leak := classify_region(region, min_area)) is not None]
 
 
 def assert_same(one: list[Anomaly], other: list[Anomaly]) -> None:

@@ -19,7 +19,7 @@ from tunneldb.store.learned import STORED, apply_learned, feature_list, load_mea
 
 SURVEY = "demo-2024"
 STALE = "SELECT stage, reason FROM tunnel_api.stage_status WHERE stale"
-REASON = "what is learned from reviews is another since"
+REASON = "adapted model changed since"
 MANY = 120
 
 

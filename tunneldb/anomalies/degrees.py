@@ -1,4 +1,8 @@
-"""Degrees of likeness of a dark region to dry dark areas, from its shape and its sums."""
+"""Degrees of likeness of a dark region to dry dark areas, from its shape and its sums.
+
+They are features of the model that classifies regions (:mod:`tunneldb.anomalies.evidence`), and name its reasons; none of them
+decides by itself.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +30,8 @@ MAX_POCKET_SIZE = 0.3
 """Maximum size of bolt pockets, m."""
 
 FEW_PROFILES, MANY_PROFILES = 3.0, 6.0
-"""On so few profiles that lie apart anything looks straight along the tunnel; so many tell whether it is."""
+"""Number of profiles across a region up to which anything looks straight along the tunnel, and from which its straightness is
+known."""
 
 MIN_STEP_LENGTH = 0.2
 """Minimum length of a region's boundary with a known step for the boundary to be called soft, m."""

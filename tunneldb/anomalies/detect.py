@@ -91,10 +91,10 @@ def find_anomalies(
     anomalies, cut, leaks = [], [], []
     ends = (grid.first_column + grid.inner.start, grid.first_column + grid.inner.stop)
     regions = find_dark_regions(dark, contrast, min_area)
-    verdicts = _classified(regions, min_area, model)
+    classified = _classified(regions, min_area, model)
     if contrast.spacing:
-        verdicts = _without_joints(regions, verdicts, contrast.spacing)
-    for region, anomaly in zip(regions, verdicts, strict=True):
+        classified = _without_joints(regions, classified, contrast.spacing)
+    for region, anomaly in zip(regions, classified, strict=True):
         if region.column == ends[0] or region.stop == ends[1]:
             cut.append(region)
         elif anomaly is not None:
@@ -106,20 +106,20 @@ def find_anomalies(
     return Detection(anomalies, cut, dark, wet, size, pixels, sum(region.filled for region in leaks))
 
 
-def may_count(region: Region, min_area: float) -> bool:
+def is_large_enough(region: Region, min_area: float) -> bool:
     """Return True if a region has points, and is large enough for a leak, m², or long enough for a joint."""
     large = region.area >= min_area * (1 - 1e-12) or max(region.mask.shape) * region.pixel >= MIN_JOINT_LENGTH
     return bool(region.filled) and large
 
 
-def judge_region(
+def classify_region(
     region: Region, min_area: float, features: Float | None = None, model: EvidenceModel | None = None
 ) -> Anomaly | None:
-    """Classify a region by its features and a model; None if it holds no point or is too small.
+    """Classify a region by its features and a model; None if it has no points or is too small.
 
     Leaks and dry dark areas must not be smaller than ``min_area``, m², joints no shorter than MIN_JOINT_LENGTH.
     """
-    if not may_count(region, min_area):
+    if not is_large_enough(region, min_area):
         return None
     verdict = classify(region, features, model)
     if verdict.kind == FindingKind.JOINT:
@@ -133,11 +133,11 @@ def judge_region(
 
 def _classified(regions: Sequence[Region], min_area: float, model: EvidenceModel | None) -> list[Anomaly | None]:
     """Classify the regions of a kilometre, each compared with those around it; None for those that are too small."""
-    verdicts: list[Anomaly | None] = [None] * len(regions)
-    counted = [k for k, region in enumerate(regions) if may_count(region, min_area)]
-    for k, features in zip(counted, measure_regions([regions[k] for k in counted]), strict=True):
-        verdicts[k] = judge_region(regions[k], min_area, features, model)
-    return verdicts
+    found: list[Anomaly | None] = [None] * len(regions)
+    large_enough = [k for k, region in enumerate(regions) if is_large_enough(region, min_area)]
+    for k, features in zip(large_enough, measure_regions([regions[k] for k in large_enough]), strict=True):
+        found[k] = classify_region(regions[k], min_area, features, model)
+    return found
 
 
 def find_dark(contrast: ContrastImage) -> tuple[Bool, int]:

@@ -39,7 +39,7 @@ def behind_strips(dark: Bool, state: UInt8, first: int, stop: int, pixel: float)
 
 @kernel
 def _fill_down(dark: Bool, state: UInt8, max_run: int, found: Bool) -> None:  # pragma: no cover - compiled
-    """Mark runs of up to ``most`` hidden pixels down the columns with a dark pixel at both ends.
+    """Mark runs of up to ``max_run`` hidden pixels down the columns with a dark pixel at both ends.
 
     At least one pixel of a run shows the hiding object; the others may be empty.
     """

@@ -1,4 +1,8 @@
-"""Classification of a dark region: a leak, a joint, or a dry dark area, with probability and evidence."""
+"""Classification of a dark region: a leak, a joint, or a dry dark area, with probability and evidence.
+
+The model of :mod:`tunneldb.anomalies.evidence` gives the probability from the features of
+:mod:`tunneldb.anomalies.features`; :func:`kind_of` decides.
+"""
 
 from __future__ import annotations
 

@@ -119,4 +119,4 @@ def _print(rows: list[Row], whole: Row, layer: str, axis_sigma: float | None) ->
         [*table, ("all", *cells(whole))],
         right=(1, 2, 3, 4, 5, 6),
     )
-    click.echo(f"against {layer}; of the lining seen; ± is one standard deviation, the axis {axis_quality(axis_sigma)}")
+    click.echo(f"compared with {layer}; inspected lining only; ± is one standard deviation; axis: {axis_quality(axis_sigma)}")

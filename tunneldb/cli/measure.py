@@ -103,7 +103,7 @@ def number(value: float | None, decimals: int, factor: float = 1.0) -> str:
 
 
 def axis_quality(axis_sigma: float | None) -> str:
-    """Return in words how well an axis is known."""
+    """Return the accuracy of an axis, or of a registration, as text."""
     if axis_sigma is None:
-        return "taken to be right: --axis-sigma says what it is good for"
-    return f"good for {1e3 * axis_sigma:g} mm"
+        return "assumed exact, else give --axis-sigma"
+    return f"standard deviation {1e3 * axis_sigma:g} mm"

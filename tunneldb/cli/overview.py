@@ -29,7 +29,7 @@ STYLES = {
     "empty": "dim",
 }
 
-_VERDICTS = {"failed": "failed", "interrupted": "was cut off", "stale": "out of date", "never": "not yet run"}
+_STATE_TEXTS = {"failed": "failed", "interrupted": "was cut off", "stale": "out of date", "never": "not yet run"}
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ def advise(seen: Overview) -> list[Advice]:
         if entry is None or (entry[1].state == "failed" and entry[1].reason in read):
             continue
         stage, cell = entry
-        what = f"{stage}: {_VERDICTS[cell.state]}" + (f": {_line(cell, seen.files)}" if cell.reason else "")
+        what = f"{stage}: {_STATE_TEXTS[cell.state]}" + (f": {_line(cell, seen.files)}" if cell.reason else "")
         first = cause_of(cell.reason, [file.path for file in seen.files]).first if cell.state == "failed" else ""
         found.setdefault((what, _command(seen.survey, cell), first), []).append(km)
     advices = [Advice(tuple(kms), what, command, first) for (what, command, first), kms in found.items()]

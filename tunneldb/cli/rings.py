@@ -222,6 +222,6 @@ def _tell(found: SurveyedRings, output: Path | None) -> None:
 def _said(found: SurveyedRings) -> str:
     measured = sum(row.ring is not None for row in found.rows)
     remarks = sum(bool(row.remarks) for row in found.rows)
-    whence = "as given" if found.sigma_given else "as all rings together say"
-    good = "" if found.sigma is None else f"; a point is good for {1e3 * found.sigma:.1f} mm, {whence}"
-    return f"{measured} of {counted(len(found.rows), 'ring')} measured, {remarks} with a remark{good}"
+    source = "given" if found.sigma_given else "estimated from all rings"
+    accuracy = "" if found.sigma is None else f"; standard deviation of a point {1e3 * found.sigma:.1f} mm, {source}"
+    return f"{measured} of {counted(len(found.rows), 'ring')} measured, {remarks} with a remark{accuracy}"

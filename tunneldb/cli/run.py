@@ -122,7 +122,7 @@ class _Shown:
 
 
 def _say_result(conn: psycopg.Connection[Any], survey: Survey) -> None:
-    """Say how much leaks, and what to type to see it."""
+    """Print number and area of the leaks, and the commands that show them."""
     if survey.intensity_kind == "none":
         click.echo(f"no leaks were sought; the lining: tunneldb image {survey.name}, tunneldb qgis {survey.name} -o FILE.qgz")
         return

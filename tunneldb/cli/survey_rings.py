@@ -1,4 +1,4 @@
-"""Rings of a survey, as the command ``rings`` does them."""
+"""Rings of a survey for the command ``rings``: define, measure, list. Rings of total-station points are in ``cli/rings.py``."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def survey_rings(
     chords: tuple[tuple[float, float], ...],
     output: Path | None,
 ) -> None:
-    """Define the rings of a survey if that was said, measure what is out of date, and list them."""
+    """Define the rings of a survey if a definition is given, measure those out of date, and list them."""
     from tunneldb.export.tables.survey_rings import write_rings
     from tunneldb.measures.rings.measure import RingOptions, measure_survey_rings
     from tunneldb.measures.rings.tables import ring_rows

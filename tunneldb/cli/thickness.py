@@ -86,6 +86,6 @@ def thickness(
         ],
         right=(1, 2, 3, 4, 5, 6, 7),
     )  # fmt: skip
-    lying = axis_quality(axis_sigma)
-    click.echo(f"along layer {layer}; of what both saw; ± is one standard deviation, how the scans lie to each other {lying}")
+    quality = axis_quality(axis_sigma)
+    click.echo(f"along layer {layer}; inspected in both; ± is one standard deviation; relative registration: {quality}")
     say_written(files)

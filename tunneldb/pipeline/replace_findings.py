@@ -9,7 +9,7 @@ from typing import Any
 
 import psycopg
 
-from tunneldb.anomalies.detect import judge_region
+from tunneldb.anomalies.detect import classify_region
 from tunneldb.anomalies.evidence import EvidenceModel
 from tunneldb.anomalies.geometries import anomaly_geometries
 from tunneldb.anomalies.reconcile import Summary, gather_boundary, reconcile
@@ -66,7 +66,7 @@ def replace_findings(
     inside = [PlacedAnomaly(anomaly, anomaly_geometries(anomaly.outline, surface)) for anomaly in found]
     replaced = replace_boundary_regions(conn, survey, km, cut)
     boundary = gather_boundary(km, partial(load_boundary_regions, conn, survey), replaced)
-    across = [judge_region(cluster.region, min_area, model=model) for cluster in boundary.clusters]
+    across = [classify_region(cluster.region, min_area, model=model) for cluster in boundary.clusters]
     earlier = load_earlier_findings(conn, survey, km, (boundary.first, boundary.last), boundary.findings)
     changes = reconcile(found, across, boundary, earlier)
     replaces = map(changes.update.get, count())

@@ -23,28 +23,28 @@ SECTIONS = 12
 
 @dataclass(frozen=True)
 class Profile:
-    """The bed along the tunnel, drawn.
+    """The bed along the tunnel, drawn below the water surface at height 0.
 
     Attributes
     ----------
     range, mean : str
         Paths: from the least to the greatest height of each metre, and the mean height.
-    water : float
-        Height of the water in the picture.
     depths, places : list of (float, str)
         Positions of lines of equal depth and ticks of chainage, and their labels.
     """
 
     range: str
     mean: str
-    water: float
     depths: list[tuple[float, str]]
     places: list[tuple[float, str]]
 
 
 @dataclass(frozen=True)
 class ClosedSection:
-    """A closed section: its figures (columns of view ``closed_section``) and the paths of its parts, m, y downwards."""
+    """A closed section: its figures (columns of view ``closed_section``) and the paths of its parts, m, y downwards.
+
+    The parts above and below the water are those of the view ``section_piece``; the water surface itself is not drawn.
+    """
 
     row: dict[str, Any]
     parts: list[tuple[str, str]]
@@ -160,7 +160,6 @@ def _draw_profile(metres: Float) -> Profile:
     return Profile(
         band,
         "".join(line_path(steps(p, 2)) for p in pieces),
-        0.0,
         [(depth * down, f"{depth:g} m") for depth in ticks(0.0, deep, step_for(deep * 10.0, 25) / 10.0)[1:]],
         [((x - start) * across, f"{x:.0f}") for x in ticks(start, end, step)],
     )

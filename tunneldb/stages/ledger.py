@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 _LIBRARIES = ("numpy", "scipy", "numba", "laspy", "lazrs", "shapely", "rasterio", "psycopg")
 
 
-_PASSING = (
+_TRANSIENT = (
     psycopg.errors.DeadlockDetected,
     psycopg.errors.SerializationFailure,
     psycopg.errors.LockNotAvailable,
@@ -67,15 +67,15 @@ def stage_run(
     parameters: Mapping[str, Any],
     job: Job | None = None,
 ) -> Iterator[Run]:
-    """Record a stage, and do it in one transaction.
+    """Run a stage in one transaction, and record it in the ledger.
 
-    That it runs is committed first. What is done inside is committed together with its end, or rolled back, and then
-    the failure is recorded; nothing is of one that found another at work there, and is no job. A run that is killed stays
-    "running" with the backend that it ran in, which is gone.
-    An advisory lock keeps two runs of the same survey and kilometre apart; files of a survey may be read side by side.
+    First the start of the run is committed. The results are then committed together with the end of the run. After an error
+    they are rolled back, and the failure is recorded; without a job, a run that finds the kilometre locked is removed from the
+    ledger. A killed run stays "running", with a database session that has ended.
+    An advisory lock excludes a second run of the same survey and kilometre; files of a survey may be read at the same time.
 
-    The job that it is, if it is one, ends in the same transaction, and the jobs that follow from it come to be there. When
-    it fails, it is put back to be tried again if the error may pass by itself, and ends as failed if not.
+    The job of the run, if any, ends in the same transaction, and its follow-up jobs are queued there. After an error it
+    returns to the queue if the error can be transient; otherwise it ends as failed.
 
     Parameters
     ----------
@@ -86,15 +86,15 @@ def stage_run(
         The kilometre; None for a stage of the whole survey.
     stage : str
     parameters : mapping
-        What the stage depends on, as it will be recorded.
+        Values that the result depends on, for the ledger.
     job : Job or None
 
     Raises
     ------
     BusyError
-        When another process is at work on the same survey and kilometre.
+        If another process is at work on the same survey and kilometre.
     LostError
-        When another worker has the job now.
+        If another worker has taken over the job.
     """
     run = _begin(conn, survey_id, km, stage, parameters, job)
     began, what = time.monotonic(), {"run": run.id, "survey_id": survey_id, "km": km, "stage": stage}
@@ -154,12 +154,12 @@ def lock(conn: psycopg.Connection[Any], survey_id: int, km: int | None, *, share
     Parameters
     ----------
     shared : bool
-        Whether others that share the whole of the survey, too, may go on beside this one; a kilometre is never shared.
+        True if other shared locks of the whole survey are allowed at the same time; a kilometre is never shared.
 
     Raises
     ------
     BusyError
-        When another process is at work on it.
+        If another process is at work on it.
     """
     if km is None and shared:
         query: LiteralString = "SELECT pg_try_advisory_xact_lock_shared(%s, %s)"
@@ -228,7 +228,7 @@ def _end_job(conn: psycopg.Connection[Any], job: Job, error: BaseException) -> N
 
 def retry_at(error: BaseException, attempts: int) -> dt.timedelta | None:
     """Return the time to wait before another attempt, about 1, 2, 4 s and so on; None if it would fail again."""
-    if attempts + 1 >= _ATTEMPTS or not isinstance(error, (BusyError, *_PASSING)):
+    if attempts + 1 >= _ATTEMPTS or not isinstance(error, (BusyError, *_TRANSIENT)):
         return None
     return dt.timedelta(seconds=2.0**attempts * random.uniform(0.7, 1.3))
 

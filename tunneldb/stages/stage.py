@@ -61,14 +61,14 @@ class Stage:
     ----------
     name : str
     function : str
-        ``module:function`` that does one kilometre; connection, survey, km, values of the parameters and progress go in, counts
-        come out. Empty for ``load``, which works on files (`tunneldb.pipeline.load`), and for measures.
+        ``module:function`` that processes one kilometre: takes connection, survey, km, values of the parameters and progress,
+        returns counts. Empty for ``load``, which works on files (`tunneldb.pipeline.load`), and for measures.
     reads : tuple of str
-        Stages whose results in the kilometre itself it rests on, directly or through another; ``survey`` where it rests on the
-        scanner's positions, the reference curve or the kind of intensity, ``sonar`` on what sonar scans saw below the water,
-        ``learned`` on what the model of evidence learned from reviews. Of a measure only those that it reads directly.
+        Stages whose results in the same kilometre it depends on, directly or indirectly. Also ``survey``: the scanner's
+        positions, the reference curve or the kind of intensity; ``sonar``: points of sonar scans below the water;
+        ``learned``: the evidence model adapted to reviews. Of a measure only those that it reads directly.
     reads_beside : tuple of str
-        Stages whose results in the kilometres before and after it rests on.
+        Stages whose results in the kilometres before and after it depends on.
     parameters : tuple of str
         Prefixes of the parameters that it depends on. Those of ``load`` are kept with the files.
     tables : tuple of str

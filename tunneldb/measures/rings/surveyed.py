@@ -1,4 +1,4 @@
-"""Rings from surveyed points: read, fit, compare with the design axis."""
+"""Rings from points of a total station (``rings --points``): read, fit, compare with the design axis. No database."""
 
 from __future__ import annotations
 
