@@ -124,6 +124,7 @@ class CutoutMaker(QObject):
         """Forget all, and wait until nothing is being drawn."""
         self.clear()
         for job in self._leaving:
+            job.finished.disconnect()  # a late signal would reach objects that Python is deleting
             job.waitForFinished()
         self._leaving.clear()
 

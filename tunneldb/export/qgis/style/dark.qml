@@ -239,7 +239,7 @@
         </config>
       </editWidget>
     </field>
-    <field name="width" configurationFlags="None">
+    <field name="width_mm" configurationFlags="None">
       <editWidget type="TextEdit">
         <config>
           <Option/>
@@ -636,7 +636,7 @@
     <field name="manual" editable="0"/>
     <field name="severity" editable="0"/>
     <field name="severity_label" editable="0"/>
-    <field name="width" editable="0"/>
+    <field name="width_mm" editable="0"/>
     <field name="length" editable="0"/>
     <field name="area" editable="0"/>
     <field name="measured" editable="0"/>
