@@ -144,7 +144,8 @@ def test_files_of_two_systems_and_stray_points(
         las.x, las.y, las.z = np.arange(3.0), np.arange(3.0), np.arange(3.0)
         las.write(tmp_path / f"{name}.las")
     out = tmp_path / "a.csv"
-    refused(run("tunnel", "find-axis", tmp_path / "feet.las", "-o", out), "US survey foot, not metres; transform it")
+    refused(run("tunnel", "find-axis", tmp_path / "feet.las", "-o", out), "not metres; convert them by --unit us-ft")
+    refused(run("tunnel", "find-axis", tmp_path / "feet.las", "--unit", "us-ft", "-o", out), "feet.las: no tunnel: ")
     refused(run("tunnel", "find-axis", scan, tmp_path / "other.las", "-o", out), "EPSG:3794", "EPSG:25830", "give files of one")
     refused(run("tunnel", "find-axis", tmp_path / "other.las", "-o", out), "other.las: no tunnel: ")
     assert not out.exists()

@@ -247,7 +247,15 @@ def _add_site(settings: Settings, name: str, srid: int, given: set[Any]) -> None
     help="Picture to write, .png. [default: beside the axis, with its name]",
 )
 @click.option("--reverse", is_flag=True, help="Reverse the direction of chainage.")
-def find_axis(scans: tuple[Path, ...], output: Path | None, picture: Path | None, reverse: bool) -> None:
+@unit_options("SCAN files")
+def find_axis(
+    scans: tuple[Path, ...],
+    output: Path | None,
+    picture: Path | None,
+    reverse: bool,
+    unit: str | None,
+    height_unit: str | None,
+) -> None:
     """Find the axis of the tunnel in SCAN files; needs no database.
 
     It needs a roof, two walls and a floor along most of one tunnel. The tunnel may be straight or curved, level or
@@ -257,10 +265,11 @@ def find_axis(scans: tuple[Path, ...], output: Path | None, picture: Path | None
     from tunneldb.alignment.drawing import describe_line
     from tunneldb.files import common_name
     from tunneldb.pipeline.axis_search import found_given
+    from tunneldb.pointcloud.units import GivenUnits
 
     name = common_name(scans)
     with exit_on_sigterm(), bar("points") as progress:
-        _, found = found_given(scans, None, step(progress), None, reverse)
+        _, found = found_given(scans, None, step(progress), None, reverse, GivenUnits(unit, height_unit))
     _keep(found, output or Path(f"{name}.found-axis.csv"), picture, 0.0, name)
     notify(f"chainage grows over {describe_line(found.xyz)}; --reverse turns it round")
 
