@@ -253,7 +253,7 @@ def test_a_rerun_gives_the_same_however_long_the_trajectory_and_reviews_survive(
     conn.commit()
     refused = CliRunner().invoke(main, ["learn", NAME])
     assert refused.exit_code == 2
-    (advice,) = re.findall(r"2 reviewed findings have no features: run detect again: tunneldb ([^;]+)", refused.output)
+    (advice,) = re.findall(r"3 reviewed findings have no features: run detect again: tunneldb ([^;]+)", refused.output)
     command(*advice.split())
     assert "2 reviews: 1 confirmed leak, 1 rejected" in command("learn", NAME).stdout
     after = outlines(conn)
