@@ -79,6 +79,7 @@ OF_WORDS: tuple[str, ...] = (
     "spots demo-2024",
     "members demo-2024", "spheres scan-2024 --radius 0.07", "axis demo-2024 -o {out}.csv",
     "rings --points {seeds}/rings-points.csv --axis {seeds}/rings-axis.csv --diameter 5.8 -o {out}.csv", "rings demo-2024",
+    "sections demo-2024 --from 12+300 --to 12+310 --every 5 -o {out}.csv",
     "profile add demo {new} {seeds}/profile.csv {stretch}", "profile list demo", "profile remove demo {new}",
     "deviation demo-2024 -o {out}.csv", "thickness demo-2024 scan-2024", "evenness demo-2024", "compare demo-2024 scan-2024",
     "clearance demo-2024 --gauge {seeds}/profile.csv --track single", "unroll demo-2024 {seeds}/points.csv",
