@@ -120,5 +120,5 @@ def test_operators_vacuum_their_tables_and_prune_and_others_are_told_in_a_line(
     assert "left out, for others are at work on them: tunnel.axis_vertex" in done.stderr
     assert "not yours to vacuum, as tunnel_queue." in done.stderr
     pruned = run("--dsn", make_conninfo(dsn, user="otto"), "prune", "--yes")
-    assert (pruned.exit_code, "deleted: 0 runs and 1 jobs" in pruned.stderr) == (0, True), pruned.stderr
+    assert (pruned.exit_code, "deleted: 0 runs and 1 job;" in pruned.stderr) == (0, True), pruned.stderr
     assert conn.execute(DEAD).fetchone() == (0,)

@@ -383,7 +383,18 @@ def test_real_scans() -> None:
     assert sum(map(len, read_chunks(real_scan("extra-bytes.laz"), "Deviation"))) == header.points
     header = read_header(real_scan("lone-star.laz"))
     check_header(header, "intensity", 25830, needs_time=False)
-    assert "EPSG:4326 (WGS 84) is in degrees, but x = 5153" in str(crs_note(header, 25830))
+    assert "is geocentric, but x = 5153" in str(crs_note(header, 25830))
+
+
+@pytest.mark.parametrize(("x", "stated"), [(4_307_000.0, True), (515_396.0, False)])
+def test_a_geocentric_system_is_kept_if_the_points_lie_on_the_earth(tmp_path: Path, x: float, stated: bool) -> None:
+    """Exporters write a geocentric system over coordinates of a map; 4307 km, 1074 km and 4566 km are in Slovenia."""
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.add_crs(CRS.from_epsg(4978))
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = [x], [1_074_000.0], [4_566_000.0]
+    las.write(tmp_path / "a.las")
+    assert (read_header(tmp_path / "a.las").crs is not None) == stated
 
 
 def test_the_box_of_a_file_is_read_even_when_the_rest_is_gone(tmp_path: Path) -> None:

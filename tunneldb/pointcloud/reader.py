@@ -31,6 +31,7 @@ from tunneldb.pointcloud.units import conversion_note, require_metres
 __all__ = ["CHUNK", "Points", "ScanHeader", "check_header", "read_chunks", "read_header"]
 
 _DEGREES = 360.0  # of longitude; greater coordinates are lengths
+_FROM_CENTRE = (6.33e6, 6.40e6)  # m from the Earth's centre to places on land or below it
 _RUNS, _RUN_POINTS = 5, 100  # of a sample that shows whether coordinates are degrees
 
 
@@ -47,15 +48,24 @@ def read_header(path: Path) -> ScanHeader:
 
 
 def _without_wrong_crs(header: ScanHeader) -> ScanHeader:
-    """Remove a coordinate system in degrees if the coordinates can't be degrees: exporters write a default system."""
-    if header.crs is None or not horizontal(header.crs).is_geographic:
+    """Remove a geographic or geocentric system that the coordinates cannot have: exporters write a default system."""
+    if header.crs is None or not (header.crs.is_geocentric or horizontal(header.crs).is_geographic):
         return header
-    plan = np.concatenate(list(read_runs(header.path, header.points, _RUNS, _RUN_POINTS)))[:, :2]  # its box may be wrong
-    if not len(plan) or np.abs(plan).max() <= _DEGREES:
+    xyz = np.concatenate(list(read_runs(header.path, header.points, _RUNS, _RUN_POINTS)))[:, :3]  # its box may be wrong
+    if not len(xyz):
         return header
-    x, y = plan[0]
-    reason = f"{describe_crs(header.crs)} is in degrees, but x = {x:.0f}, y = {y:.0f} are not"
-    return replace(header, stated=replace(header.stated, crs=None, unread=reason))
+    x, y, _ = xyz[0]
+    if header.crs.is_geocentric:
+        low, high = _FROM_CENTRE
+        distance = np.linalg.norm(xyz, axis=1)
+        possible = bool(((low < distance) & (distance < high)).all())
+        reason = f"is geocentric, but x = {x:.0f}, y = {y:.0f} are not on the Earth's surface"
+    else:
+        possible = bool(np.abs(xyz[:, :2]).max() <= _DEGREES)
+        reason = f"is in degrees, but x = {x:.0f}, y = {y:.0f} are not"
+    if possible:
+        return header
+    return replace(header, stated=replace(header.stated, crs=None, unread=f"{describe_crs(header.crs)} {reason}"))
 
 
 def check_header(header: ScanHeader, dimension: str | None, srid: int, needs_time: bool) -> None:
