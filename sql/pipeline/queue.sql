@@ -211,7 +211,7 @@ CREATE OR REPLACE FUNCTION tunnel_internal.queue_withdraw(survey_id integer, km_
 LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
 AS $$
     DELETE FROM tunnel.goal g
-     WHERE g.survey_id = $1 AND g.km BETWEEN $2 AND $3
+     WHERE g.survey_id = $1 AND g.km BETWEEN $2 AND $3 AND tunnel_internal.in_order($2, $3, 'km')
        AND g.km IN (SELECT s.km FROM tunnel_internal.queue_state($1, $2, $3) s WHERE s.state = 'empty')
 $$;
 COMMENT ON FUNCTION tunnel_internal.queue_withdraw(integer, integer, integer) IS

@@ -52,16 +52,24 @@ COMMENT ON COLUMN tunnel_api.section_dimension.area_difference IS
 CREATE OR REPLACE FUNCTION tunnel_api.section_dimensions(
     survey text, step float8 DEFAULT 10, chainage_from float8 DEFAULT '-infinity', chainage_to float8 DEFAULT 'infinity')
 RETURNS SETOF tunnel_api.section_dimension
-LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 100
+LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT ROWS 100
+SET search_path = pg_catalog, pg_temp
 AS $$
+BEGIN
+    PERFORM tunnel_internal.in_order(chainage_from, chainage_to);
+    IF NOT (step > 0 AND step < 'NaN') THEN
+        RAISE EXCEPTION 'the step is % m: give one greater than 0', step USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    RETURN QUERY
     SELECT d.*
       FROM tunnel_api.section_dimension d
-     WHERE $2 > 0 AND d.id IN (
-            SELECT DISTINCT ON (round(c.chainage / $2)) c.id
+     WHERE d.id IN (
+            SELECT DISTINCT ON (round(c.chainage / step)) c.id
               FROM tunnel_api.section c
              WHERE c.survey_id = tunnel_api.survey_id($1) AND c.chainage BETWEEN $3 AND $4
-             ORDER BY round(c.chainage / $2), abs(c.chainage - round(c.chainage / $2) * $2))
-     ORDER BY d.chainage
+             ORDER BY round(c.chainage / step), abs(c.chainage - round(c.chainage / step) * step))
+     ORDER BY d.chainage;
+END
 $$;
 COMMENT ON FUNCTION tunnel_api.section_dimensions(text, float8, float8, float8) IS
     'Rows of section_dimension of a survey between two chainages, m: for each multiple of step (m) the nearest section, if it is within half a step';

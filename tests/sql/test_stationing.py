@@ -345,7 +345,7 @@ def test_what_is_no_part_of_the_clock_is_refused(example: str) -> None:
         ("chainage,station\n0,1\n10,2\n5,3\n", ["line 4", "chainage 5 is less than"]),
         ("chainage,station\n0,1\n0,2\n", ["line 3", "chainage 0 repeats"]),
         ("chainage,station,direction\n0,1,1\n5,2,0\n", ["line 3", "direction 0 is neither 1"]),
-        ("chainage,station,direction\n0,1,\n", ["line 2", "direction is ''"]),
+        ("chainage,station,direction\n0,1,\n", ["line 2", "direction is empty"]),
         ("chainage,station,direction,direction\n0,1,1,1\n", ["column direction twice"]),
         (
             "chainage,station\n0,12000\n12500,13000\n",
