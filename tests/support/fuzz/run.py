@@ -44,8 +44,8 @@ BEFORE = (
 """Commands that are run before all cases, in this process: each case begins with the compiled loops that they load, and need
 not load them itself. None reads LAZ, whose decoder keeps threads that a child would wait for in vain."""
 
-PATIENCE = 30
-"""Seconds of computing that a case may take: small files are read in one or two."""
+PATIENCE = 90
+"""Seconds of computing that a case may take: small files are read in one or two; the first case of a loop also compiles it."""
 
 WAITING = 300
 """Seconds that it may take on a machine that others are busy on, or waiting for what never comes."""
