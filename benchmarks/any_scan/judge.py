@@ -79,7 +79,7 @@ class Verdict:
     seconds: float
     typed: str
     learned: tuple[str, str] = ("", "")
-    """Of a way of doing it wrong: command and line that first name it."""
+    """First message that names a mistake: the command and the line that it printed."""
 
 
 def judge(scene: Scene, folder: Path, program: Program) -> tuple[Verdict, list[Call]]:

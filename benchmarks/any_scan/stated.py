@@ -103,7 +103,7 @@ def counted(change: Callable[[int], int]) -> Build:
 
 
 def cut(folder: Path) -> Plan:
-    """LAS without compression, of which the last 40 % were never copied."""
+    """Write an uncompressed LAS file without its last 40 %, as after an interrupted copy."""
     cloud = static(TUBE, density=300)
     path = files.las(folder / "scan.las", cloud)
     data = path.read_bytes()

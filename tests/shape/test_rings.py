@@ -66,7 +66,7 @@ def test_the_best_circle_of_an_even_oval_has_its_centre_and_the_mean_distance_of
 
 @pytest.mark.parametrize("clock", [EIGHT, np.linspace(-80.0, 80.0, 12), np.linspace(-135.0, 135.0, 500)])
 def test_the_best_circle_satisfies_the_normal_equations_of_all_points(clock: Float) -> None:
-    """Of least squares of distances: the mean of residuals, and of residuals times direction, is zero; gross errors count."""
+    """Residuals, and residuals times direction, have a mean of zero; points with gross errors are included."""
     points = ring(clock) + np.random.default_rng(3).normal(0.0, 0.004, (len(clock), 2))
     points[len(points) // 3] *= 1.05
     found = fit_ring(points, sigma=0.004)

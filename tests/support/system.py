@@ -1,4 +1,4 @@
-"""What tests need of the system: programs, and a disk in memory for their servers."""
+"""Resources of the system for tests: programs, and a disk in memory for their servers."""
 
 from __future__ import annotations
 

@@ -61,7 +61,8 @@ def register_files(
     paths : sequence of Path
         Known by their names, as with `tunneldb.pipeline.load.load_files`.
     settings : FilterSettings
-        Of which the share of a file's points that may be invalid or without a scanner position, and the units are used.
+        Settings of loading. Two are used: the units, and the greatest share of points that may be invalid or without a scanner
+        position.
     begin : callable
         Called with each file that begins; returns a function that takes its progress.
 
