@@ -1,9 +1,9 @@
 -- Notes on the results of surveys, as every document states them.
 
 -- Notes of the stages whose results are in the database, points that were left out of files, and doubts about their
--- intensity and coordinates. More than 20 % noise means that the filter does not suit the scan: it is made for isolated returns (dust, edges,
--- people), which are a few percent. Points beyond the ends of the given axis are reported from 1 % on: a scan contains some
--- points before a portal, but a tunnel that continues needs attention.
+-- intensity and coordinates. More than 20 % noise means that the filter does not suit the scan: it is made for isolated
+-- returns (dust, edges, people), which are a few percent. Points beyond the ends of the given axis are reported from 1 % on:
+-- a scan contains some points before a portal, but a tunnel that continues needs attention.
 CREATE OR REPLACE VIEW tunnel_api.remark AS
 SELECT 16 * r.id AS id, s.id AS survey_id, s.name AS survey, r.km, r.stage, NULL::text AS file,
        concat_ws('; ', r.counts ->> 'note', r.counts ->> 'place') AS remark
@@ -42,25 +42,11 @@ SELECT 16 * f.id::bigint + 7, f.survey_id, s.name, NULL, 'load', f.name,
                       WHERE e.survey_id = f.survey_id AND e.checksum = f.checksum AND e.id < f.id AND e.checksum <> '') o
  WHERE o.name IS NOT NULL
  UNION ALL
-SELECT 16 * f.id::bigint + 8, f.survey_id, s.name, NULL, 'load', f.name, f.intensity_note
+SELECT 16 * f.id::bigint + n.k, f.survey_id, s.name, NULL, 'load', f.name, n.note
   FROM tunnel.scan_file f
   JOIN tunnel.survey s ON s.id = f.survey_id
- WHERE f.intensity_note IS NOT NULL
- UNION ALL
-SELECT 16 * f.id::bigint + 9, f.survey_id, s.name, NULL, 'load', f.name, f.pose_note
-  FROM tunnel.scan_file f
-  JOIN tunnel.survey s ON s.id = f.survey_id
- WHERE f.pose_note IS NOT NULL
- UNION ALL
-SELECT 16 * f.id::bigint + 10, f.survey_id, s.name, NULL, 'load', f.name, f.header_note
-  FROM tunnel.scan_file f
-  JOIN tunnel.survey s ON s.id = f.survey_id
- WHERE f.header_note IS NOT NULL
- UNION ALL
-SELECT 16 * f.id::bigint + 11, f.survey_id, s.name, NULL, 'load', f.name, f.coordinate_note
-  FROM tunnel.scan_file f
-  JOIN tunnel.survey s ON s.id = f.survey_id
- WHERE f.coordinate_note IS NOT NULL
+ CROSS JOIN LATERAL (VALUES (8, f.intensity_note), (9, f.pose_note), (10, f.header_note), (11, f.coordinate_note)) AS n (k, note)
+ WHERE n.note IS NOT NULL
  UNION ALL
 SELECT 16 * s.id::bigint + 6, s.id, s.name, NULL, 'survey', NULL, s.positions_note
   FROM tunnel.survey s

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from tunneldb.alignment.given import XYZ
-from tunneldb.csvfile import read_csv
 from tunneldb.errors import UserError
 from tunneldb.pipeline.pose_check import places
 from tunneldb.pointcloud.contents import Contents
@@ -17,8 +16,9 @@ from tunneldb.pointcloud.formats.scans import PosedScan
 from tunneldb.pointcloud.pose_faults_text import stations_fault, trajectory_fault
 from tunneldb.pointcloud.poses import longest_interval
 from tunneldb.pointcloud.station_fit import find_misfits
+from tunneldb.pointcloud.trajectory_file import read_trajectory
 from tunneldb.pointcloud.trajectory_fit import Track, fit_trajectory
-from tunneldb.pointcloud.week_end import continue_week, cover_week_end
+from tunneldb.pointcloud.week_end import cover_week_end
 
 _MAX_POINTS = 200_000
 
@@ -64,12 +64,10 @@ def doubt_poses(
 
 
 def _track(path: Path, form: TunnelForm) -> Track | None:
-    table = read_csv(path, ("time", *XYZ))
-    xyz = table.columns(XYZ)
-    time = continue_week(table["time"], xyz)
-    order = np.argsort(time, kind="stable")
-    time, xyz = time[order], xyz[order]
-    if len(time) < 2 or np.any(np.diff(time) <= 0.0):
+    table, _ = read_trajectory(path)
+    order = np.argsort(table["time"], kind="stable")
+    time, xyz = table["time"][order], table.columns(XYZ)[order]
+    if np.any(np.diff(time) <= 0.0):
         return None
     longest = longest_interval(time)
     time, xyz = cover_week_end(time, xyz, longest)

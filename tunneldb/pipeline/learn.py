@@ -15,6 +15,7 @@ from tunneldb.anomalies.features import NAMES
 from tunneldb.anomalies.learning import Lesson, Reviewed, learn
 from tunneldb.anomalies.verdict import kind_of, weigh
 from tunneldb.arrays import Bool, Float
+from tunneldb.counted import counted
 from tunneldb.errors import NotReadyError, UserError
 from tunneldb.store.learned import (
     Measured,
@@ -177,7 +178,7 @@ def no_features(unused: Mapping[str, Unused]) -> list[str]:
 
 
 def _counted(survey: str, count: int) -> str:
-    return f"{survey}: {count} reviewed {'finding has' if count == 1 else 'findings have'}"
+    return f"{survey}: {counted(count, 'reviewed finding has', 'reviewed findings have')}"
 
 
 def _unused(measured: Measured, reviewed: Bool) -> Unused:

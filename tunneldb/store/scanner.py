@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +21,13 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.misplacement import explain_misplacement
 from tunneldb.geometry.units import IN_METRES, Units, unit_name
-from tunneldb.pointcloud.clock_offsets import WEEK
 from tunneldb.pointcloud.formats.table import has_scans
 from tunneldb.pointcloud.pose_checks import MAX_AXIS_DISTANCE, MAX_END_DISTANCE, far_from_axis, jumps
 from tunneldb.pointcloud.poses import PoseModel, longest_interval
 from tunneldb.pointcloud.station_fit import SAME_PLACE
 from tunneldb.pointcloud.stations import Stations, read_stations
-from tunneldb.pointcloud.week_end import continue_week, cover_week_end
+from tunneldb.pointcloud.trajectory_file import read_trajectory
+from tunneldb.pointcloud.week_end import cover_week_end
 
 FARTHEST_SCANNER = 50.0  # m from the axis; a scanner that was never nearer stood in another tunnel
 MAX_NAMED = 10  # stations named in a message
@@ -114,7 +114,8 @@ def read_positions(
                 " the row, and the points of that scan are left out"
             )
         return Positions(False, stations.scan_id, places, said)
-    table, ended = _read_trajectory(paths[0])
+    table, ended = read_trajectory(paths[0])
+    table.require_growing("time")
     time, xyz = table["time"], table.columns(XYZ) * units.scales
     if alignment is None:
         raise UserError(f"{tunnel!r} is a site; it takes the --stations of a static scanner")
@@ -241,23 +242,6 @@ def require_no_range(kind: str) -> None:
 
 def _insert(connection: psycopg.Connection[Any], table: str, names: list[str], columns: list[Any]) -> None:
     copy_binary(connection, sql.Identifier("tunnel", table), names, [pack(columns)])
-
-
-def _read_trajectory(path: Path) -> tuple[CsvTable, str]:
-    """Read a trajectory in ascending time, and return a remark if the GPS week ends during it."""
-    table = read_csv(path, ("time", *XYZ))
-    if len(table) < 2:
-        raise UserError(f"{path}: a trajectory needs at least 2 rows, this one has {len(table)}")
-    time = continue_week(table["time"], table.columns(XYZ))
-    if time is table["time"] or np.array_equal(time, table["time"]):
-        table.require_growing("time")
-        return table, ""
-    later = int(np.count_nonzero(time != table["time"]))
-    order = np.argsort(time, kind="stable")
-    values = np.column_stack([time, table.columns(XYZ)])[order]
-    kept = np.append(True, np.diff(values[:, 0]) > 0.0)  # the end of the week may be written as 604800 and as 0
-    said = f"the GPS week ends during the trajectory: {WEEK:.0f} s added to the times of its {later} later poses"
-    return replace(table, values=values[kept], lines=table.lines[order][kept]), said
 
 
 def _require_near(paths: Sequence[Path], xyz: Float, alignment: Alignment, tunnel: str) -> None:
