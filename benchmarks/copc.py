@@ -29,7 +29,7 @@ ORDER = ["gps_time", "X", "Y", "Z"]
 
 
 def measured(survey: str, folder: Path) -> tuple[dict[str, float], dict[str, float]]:
-    """Export a survey as LAZ and as COPC, by each verb's own process."""
+    """Export a survey as LAZ and as COPC, by each command's own process."""
     export = ["export", survey, "--classified", "-o"]
     return watched([*export, folder / "laz"]), watched([*export, folder / "copc", "--copc"])
 

@@ -102,7 +102,7 @@ def watched(arguments: Sequence[object], dsn: str | None = None) -> dict[str, fl
 
 
 def speed(folder: Path, repeats: int, server: str | None) -> dict[str, Any]:
-    """Both verbs and the bare rewriting, on one file; each verb once before, for what Numba compiles."""
+    """Both commands and the bare rewriting, on one file; each command once before, for what Numba compiles."""
     progress(f"simulating {repeats} × {LENGTH:g} m")
     scene = simulate(folder, repeats)
     (source,) = scene.scans
@@ -128,7 +128,7 @@ def speed(folder: Path, repeats: int, server: str | None) -> dict[str, Any]:
 
 
 def memory(folder: Path, points: int) -> dict[str, Any]:
-    """Peak memory of the bare verb on a file of about that many points, and its speed."""
+    """Peak memory of the bare command on a file of about that many points, and its speed."""
     progress(f"{points:,} points")
     scene = simulate(folder, max(1, round(points / (100_000 * LENGTH))), "large")
     (source,) = scene.scans

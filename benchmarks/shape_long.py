@@ -1,4 +1,4 @@
-"""Each verb of shape on a long tunnel scanned twice: its time, its processor time and its memory, from files on.
+"""Each command of shape on a long tunnel scanned twice: its time, its processor time and its memory, from files on.
 
     python -m benchmarks.shape_long                     # 25 km, two surveys at survey density; two hours
     python -m benchmarks.shape_long --km 2
@@ -72,7 +72,7 @@ def main() -> None:
     parser.add_argument("--km", type=int, default=25)
     parser.add_argument("--density", type=int, default=100, help="points per m²")
     parser.add_argument("--filled", action="store_true", help="the database of --dsn holds both surveys already")
-    parser.add_argument("--only", action="append", default=[], metavar="WORD", help="verbs whose line begins so")
+    parser.add_argument("--only", action="append", default=[], metavar="WORD", help="commands whose line begins so")
     arguments = parser.parse_args()
     load = os.getloadavg()[0]
     with (
@@ -91,7 +91,7 @@ def main() -> None:
                 progress(f"{title}: {found[title]}")
     print_table(
         f"{arguments.km} km",
-        ("verb", "seconds", "processor s", "s per km", "peak, MB"),
+        ("command", "seconds", "processor s", "s per km", "peak, MB"),
         [(title, f["seconds"], f["cpu"], f["seconds"] / arguments.km, f["peak"] / 1e6) for title, f in found.items()],
     )
     settings = {"km": arguments.km, "density": arguments.density, "load_average_before": load, "command": sys.argv[1:]}

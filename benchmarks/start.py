@@ -7,9 +7,9 @@
 
 cold    into an empty folder for compiled code; the user's own is not touched
 warm    into the same folder, with another survey of the same kind
-loops   how many functions the verb compiled, one for each kind of arguments; below the table, how many the package has
+loops   how many functions the command compiled, one for each kind of arguments; below the table, how many the package has
 
-Times are those of the processor, of user and system, summed over all cores and processes of a verb, its start-up included,
+Times are those of the processor, of user and system, summed over all cores and processes of a command, its start-up included,
 but for the server's. Beside other work they may double: on a machine that is busy compare instructions, which don't.
 """
 
@@ -128,7 +128,7 @@ def installation(command: Sequence[str], perf: bool) -> Iterator[Installation]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tunneldb", type=Path, metavar="PATH", help="the program to measure; default: the one at hand")
-    parser.add_argument("--demo", action="store_true", help="all verbs of the demo, at its size")
+    parser.add_argument("--demo", action="store_true", help="all commands of the demo, at its size")
     parser.add_argument("--perf", action="store_true", help="also count instructions, by Linux's perf")
     arguments = parser.parse_args()
     command = [str(arguments.tunneldb.absolute())] if arguments.tunneldb else COMMAND
@@ -145,7 +145,7 @@ def main() -> None:
 
 
 def measure(measured: Installation, name: str, demo: bool) -> dict[str, dict[str, float]]:
-    """Take a tunnel of that name through the verbs; what each of them took."""
+    """Take a tunnel of that name through the commands; what each of them took."""
     found = {}
     for verb, words in steps(measured.folder, name, demo):
         progress(f"{name}: {verb}")
@@ -185,7 +185,7 @@ def steps(folder: Path, name: str, demo: bool) -> Iterator[tuple[str, list[str]]
 
 
 def report(figures: dict[str, Any]) -> None:
-    """Print the verbs one below the other, and their sums."""
+    """Print the commands one below the other, and their sums."""
     cold, warm = figures["cold"], figures["warm"]
     units = {"processor": "Processor time, s"}
     if "instructions" in cold["run"]:
@@ -197,7 +197,7 @@ def report(figures: dict[str, Any]) -> None:
             first, later = (sum(side[verb][unit] for verb in verbs) for side in (cold, warm))
             loops = [int(sum(side[verb]["compiled"] for verb in verbs)) for side in (cold, warm)]
             rows.append((name, f"{first:.1f}", f"{later:.1f}", f"{first - later:.1f}", *loops))
-        print_table(f"{title}: a first and a second use", ("verb", "cold", "warm", "difference", "loops", "again"), rows)
+        print_table(f"{title}: a first and a second use", ("command", "cold", "warm", "difference", "loops", "again"), rows)
     by_clock = [sum(verb["clock"] for verb in side.values()) for side in (cold, warm)]
     print(f"by the clock: {by_clock[0]:.0f} and {by_clock[1]:.0f} s, load average {figures['load_average']:.1f} at the end")
     package = figures["loops"]

@@ -18,7 +18,7 @@ from pathlib import Path
 import psycopg
 
 from benchmarks.common import print_table, progress, save, scratch_database, tunneldb
-from benchmarks.growth.verbs import cpu_times, postmaster_of
+from benchmarks.growth.commands import cpu_times, postmaster_of
 from benchmarks.scene import Scene
 
 NAME = "long"

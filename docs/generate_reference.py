@@ -22,7 +22,7 @@ from site_hooks import REFERENCE
 from view_topics import base_views, views_by_topic
 
 from tunneldb.cli.main import COMMANDS, main
-from tunneldb.cli.output import JSON, Verb
+from tunneldb.cli.output import JSON, Command
 from tunneldb.database import install, open_connection
 from tunneldb.database.schema import sql_files
 from tunneldb.database.server import Server
@@ -56,7 +56,7 @@ def _command(command: click.Command, name: str) -> Iterator[str]:
     yield _help(command)
     if options := _options(command):
         yield options
-    if isinstance(command, Verb):
+    if isinstance(command, Command):
         if command.wrong:
             yield f"Exit code 1: {command.wrong}."
         yield "\n".join(["```sh", *command.examples, "```"])

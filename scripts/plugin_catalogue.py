@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from tunneldb.cli.main import COMMANDS, main
-from tunneldb.cli.output import JSON, Verb
+from tunneldb.cli.output import JSON, Command
 
 GROUPS = {
     "1 Begin": ("init", "check", "inspect", "tunnel add", "survey add"),
@@ -70,9 +70,9 @@ def _command(name: str, group: str) -> str:
         "name": re.sub(r"\W+", "_", name),
         "title": f"{title} ({words[-1].strip('-')})" if words[-1].startswith("-") else title,
         "group": group,
-        "verb": tuple(words),
+        "words": tuple(words),
         "help": "</p><p>".join(paragraphs),
-        "wrong": command.wrong or "" if isinstance(command, Verb) else "",
+        "wrong": command.wrong or "" if isinstance(command, Command) else "",
         "loads": any(ending in item.get("filter", "") for item in parameters for ending in ("gpkg", "geojson", "dxf")),
         "database": name not in WITHOUT_DATABASE,
     }

@@ -1,4 +1,4 @@
-"""A process that has the program's libraries loaded, and forks one of its own for each verb.
+"""A process that has the program's libraries loaded, and forks one of its own for each command.
 
 Asked by lines of JSON: ``{"folder": …, "words": […]}``; answers ``{"code": …, "out": …, "err": …}``.
 """
@@ -15,7 +15,7 @@ import traceback
 from pathlib import Path
 
 LIMIT = 300
-"""s; a verb that isn't over by then is ended by a signal."""
+"""s; a command that isn't over by then is ended by a signal."""
 LIBRARIES = (
     "laspy",
     "matplotlib.figure",

@@ -1,4 +1,4 @@
-"""The program as its user runs it: verbs on the command line, one server for all scenes.
+"""The program as its user runs it: commands on the command line, one server for all scenes.
 
 Each verb is the program's own ``main`` in a process of its own, forked from one that has the libraries loaded already: with a
 hundred scenes of seven verbs loading them would take longer than all else.
@@ -18,7 +18,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Call:
-    """One verb: what was typed and what came of it."""
+    """One command: what was typed and what came of it."""
 
     words: tuple[str, ...]
     code: int
@@ -40,7 +40,7 @@ class Call:
 
 
 class Program:
-    """Run verbs on the server of `home`."""
+    """Run commands on the server of `home`."""
 
     def __init__(self, home: Path) -> None:
         environment = dict(os.environ) | {"TUNNELDB_HOME": str(home), "COLUMNS": "200"}

@@ -1,4 +1,4 @@
-"""A survey by itself, and the same among a thousand: CPU time of each view, and of verbs, and how many times more it is.
+"""A survey by itself, and the same among a thousand: CPU time of each view, and of commands, and how many times more it is.
 
     python -m benchmarks.growth                                # makes a database of 1000 surveys and 25 000 km: 5 GB
     python -m benchmarks.growth --surveys 100 --only status    # less of it, and only what has that in its name
@@ -19,8 +19,8 @@ from pathlib import Path
 import psycopg
 
 from benchmarks.common import print_table, progress, save, scratch_database
+from benchmarks.growth.commands import Run, ask_commands
 from benchmarks.growth.database import note_shape, surround
-from benchmarks.growth.verbs import Run, ask_verbs
 from benchmarks.growth.views import LEAST_MS, Asked, ask_all
 from benchmarks.synthetic import Size, make
 
@@ -29,14 +29,16 @@ SIZE = Size(leaks=2000, points=25_000, dry=1000, drawn=2000)
 """What the sample holds: little, so that what others cost shows."""
 
 Side = tuple[list[Asked], list[Run]]
-"""What one of the two databases took: views, and verbs."""
+"""What one of the two databases took: views, and commands."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--dsn", help="server on which a database is made and dropped; default: the embedded one")
     parser.add_argument("--surveys", type=int, default=1000)
-    parser.add_argument("--only", default="", help="views and verbs with one of these words in their names, parted by commas")
+    parser.add_argument(
+        "--only", default="", help="views and commands with one of these words in their names, parted by commas"
+    )
     parser.add_argument("--alone", help="database that holds the sample alone")
     parser.add_argument("--among", help="the same with the other surveys")
     asked = parser.parse_args()
@@ -60,7 +62,7 @@ def _tell(alone: Side, among: Side) -> None:
     """Print the tables and save them."""
     (views, verbs), (views_among, verbs_among) = alone, among
     _print_views(views, views_among)
-    _print_verbs(verbs, verbs_among)
+    _print_commands(verbs, verbs_among)
     figures = {
         "views": [[asdict(one), asdict(other)] for one, other in zip(views, views_among, strict=True)],
         "verbs": [[asdict(one), asdict(other)] for one, other in zip(verbs, verbs_among, strict=True)],
@@ -72,7 +74,7 @@ def _measure(dsn: str, only: str, folder: Path) -> Side:
     progress(f"views of {SURVEY}")
     views = ask_all(dsn, SURVEY, only)
     progress(f"verbs on {SURVEY}")
-    return views, ask_verbs(dsn, SURVEY, folder, only)
+    return views, ask_commands(dsn, SURVEY, folder, only)
 
 
 def _print_views(alone: Sequence[Asked], among: Sequence[Asked]) -> None:
@@ -86,13 +88,13 @@ def _print_views(alone: Sequence[Asked], among: Sequence[Asked]) -> None:
     print_table("CPU time of the backend, for one survey", header, rows)
 
 
-def _print_verbs(alone: Sequence[Run], among: Sequence[Run]) -> None:
+def _print_commands(alone: Sequence[Run], among: Sequence[Run]) -> None:
     rows = [
         [one.name, one.program, other.program, one.backends, other.backends, other.total / one.total]
         for one, other in zip(alone, among, strict=True)
     ]
-    header = ["verb", "program alone, s", "among", "server alone, s", "among", "ratio of both"]
-    print_table("CPU time of verbs", header, rows)
+    header = ["command", "program alone, s", "among", "server alone, s", "among", "ratio of both"]
+    print_table("CPU time of commands", header, rows)
 
 
 if __name__ == "__main__":

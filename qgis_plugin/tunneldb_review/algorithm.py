@@ -1,4 +1,4 @@
-"""A verb of ``tunneldb`` as an algorithm of Processing, made of its description in :mod:`.commands`."""
+"""A command of ``tunneldb`` as an algorithm of Processing, made of its description in :mod:`.commands`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ EXIT_CODE, LOAD = "EXIT_CODE", "LOAD"
 
 
 class CommandAlgorithm(QgsProcessingAlgorithm):
-    """Calls a verb of the command line.
+    """Calls a command of the command line.
 
     Parameters
     ----------

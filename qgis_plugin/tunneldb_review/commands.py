@@ -51,7 +51,7 @@ def arguments_of(command: Command, values: Mapping[str, Any]) -> List[str]:
         else:
             options += [word for value in words for word in (parameter.option, value)]
     # after -- a name that begins with a hyphen is none of an option
-    return [*command.verb, *options, *(["--", *positional] if positional else [])]
+    return [*command.words, *options, *(["--", *positional] if positional else [])]
 
 
 def progress_of(line: str) -> Optional[float]:
@@ -77,7 +77,7 @@ def error_of(text: str) -> str:
 
 def help_of(command: Command) -> str:
     """Return the help of an algorithm: its purpose, and the command that it calls."""
-    said = f"<p>{command.help}</p><p>Calls <code>tunneldb {' '.join(command.verb)}</code>.</p>"
+    said = f"<p>{command.help}</p><p>Calls <code>tunneldb {' '.join(command.words)}</code>.</p>"
     if command.wrong:
         said += f"<p>Exit code 1: {command.wrong}.</p>"
     return said

@@ -56,7 +56,7 @@ class Command:
     ----------
     name, title, group : str
         Its id, its name and where it stands in the toolbox.
-    verb : tuple of str
+    words : tuple of str
         Words that the command line begins with.
     help : str
         What it does.
@@ -72,7 +72,7 @@ class Command:
     name: str
     title: str
     group: str
-    verb: Tuple[str, ...]
+    words: Tuple[str, ...]
     help: str
     parameters: Tuple[Parameter, ...]
     wrong: str = ""

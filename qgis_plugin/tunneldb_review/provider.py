@@ -1,4 +1,4 @@
-"""The Processing provider: an algorithm for each verb that :mod:`.commands` describes."""
+"""The Processing provider: an algorithm for each command that :mod:`.commands` describes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The verbs findings and findings import: lists, files that other programs read, and imports that are whole or not at all."""
+"""`findings` and `findings import`: lists, files that other programs read, and imports that are whole or not at all."""
 
 from __future__ import annotations
 

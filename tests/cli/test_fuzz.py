@@ -31,18 +31,18 @@ def template(example_template: str) -> str:
 
 
 def test_each_verb_and_each_file_is_tried() -> None:
-    """A verb, or an option that takes a file, which is new has to be put into the tables of cases."""
+    """A command, or an option that takes a file, which is new has to be put into the tables of cases."""
     named = {"new": "n", "stretch": "", "out": "o", "seeds": "s", "file": "FILE"}
     of_files = [command.format(**named).split() for _, command in OF_FILES]
     of_words = {verb_of(command.format(**named).split()) for command in OF_WORDS}
     assert not of_words & set(UNTRIED)
-    assert of_words | set(UNTRIED) == set(_verbs())
+    assert of_words | set(UNTRIED) == set(_commands())
     # the file stands after an option, or as an argument
     read = {(verb_of(words), _option(words)) for words in of_files}
-    assert read == {(verb, name) for verb, command in _verbs().items() for name in _files_of(verb, command)}
+    assert read == {(verb, name) for verb, command in _commands().items() for name in _files_of(verb, command)}
 
 
-def _verbs() -> dict[str, click.Command]:
+def _commands() -> dict[str, click.Command]:
     verbs = {}
     for name in COMMANDS:
         command = main.get_command(click.Context(main), name)
@@ -94,7 +94,7 @@ def test_what_is_wrong_is_said_in_one_line(conn: psycopg.Connection, dsn: str, t
     allowed = {"right": (0, 1), "refused": (2,)}
     wrong = [f"{one.command}: {one.said}{one.fault}" for one in outcomes if one.code not in allowed.get(one.kind, (one.code,))]
     assert not wrong, "\n".join(wrong)
-    print(table(outcomes, "kind"), table(outcomes, "verb"), sep="\n\n")
+    print(table(outcomes, "kind"), table(outcomes, "command"), sep="\n\n")
     assert {one.code for one in outcomes} >= {0, 2}
     faults = [f"{one.number}: {one.command} ({one.wrong}): {one.fault}" for one in outcomes if one.fault]
     assert not faults, "\n".join(faults)

@@ -1,4 +1,4 @@
-"""The verb intensity on scan files by themselves, and surveys whose range curve is found on the lining."""
+"""The command intensity on scan files by themselves, and surveys whose range curve is found on the lining."""
 
 from contextlib import nullcontext
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""``--json`` of every verb: one object on standard output, which says what the database and the files say."""
+"""``--json`` of every command: one object on standard output, which says what the database and the files say."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ TUNNELDB = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
 
 
 def told(code: int, *words: object) -> dict[str, Any]:
-    """Run a verb in this process; returns its object, which must be all of standard output, and without NaN."""
+    """Run a command in this process; returns its object, which must be all of standard output, and without NaN."""
     result = CliRunner().invoke(main, [*map(str, words), "--json"])
     assert result.exit_code == code, result.output
     said = json.loads(result.stdout, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
     assert isinstance(said, dict)
     assert (said["ok"], said["exit_code"]) == (code == 0, code)
-    assert " ".join(map(str, words)).startswith(said["verb"])
+    assert " ".join(map(str, words)).startswith(said["command"])
     assert 0 <= said["seconds"] < 600
     assert ("error" in said) is (code == 2)
     return said

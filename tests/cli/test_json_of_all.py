@@ -1,4 +1,4 @@
-"""``--json`` of every verb in the tree of commands: one document on standard output, messages on standard error."""
+"""``--json`` of every command in the tree of commands: one document on standard output, messages on standard error."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from tunneldb.cli.main import main
 NOISY = """
 import os, subprocess, sys, click
 from tunneldb.cli.main import main
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli import check
 
-@verb()
+@command()
 def noisy():
     print("printed")
     click.echo("said")
     os.write(1, b"written\\n")
     subprocess.run(["echo", "from a program"], check=True)
     click.echo("a message", err=True)
-    tell(rows=[{"km": 12, "share": float("nan")}])
+    add_to_json(rows=[{"km": 12, "share": float("nan")}])
 
 check.check = noisy
 main()
@@ -70,7 +70,7 @@ def test_every_verb_takes_it() -> None:
 def test_a_line_that_is_wrong_is_answered_by_a_document() -> None:
     for words in verbs():
         said, errors = document([*words, "--no-such-option", "--json"])
-        assert (said["verb"], said["exit_code"]) == (" ".join(words), 2)
+        assert (said["command"], said["exit_code"]) == (" ".join(words), 2)
         assert "--no-such-option" in said["error"]
         assert said["error"] in errors
     for line in (
@@ -111,7 +111,7 @@ def test_every_verb_answers_with_a_document_on_an_empty_database(
             elif parameter.required:
                 line += [parameter.opts[0], given(parameter, nowhere)]
         said, errors = document([*line, "--json"])
-        assert " ".join(words).startswith(said["verb"])  # of a group that is refused as a whole, the group
+        assert " ".join(words).startswith(said["command"])  # of a group that is refused as a whole, the group
         assert ("error" in said) is (said["exit_code"] == 2), said
         assert said.get("error", "") in errors
         good |= {words} if said["ok"] else set()

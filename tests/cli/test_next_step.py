@@ -27,7 +27,7 @@ def template(example_template: str) -> str:
 
 @pytest.fixture
 def refused(dsn: str, example: str) -> Callable[..., str]:
-    """Return a function that runs a verb, which is refused, and returns what it says."""
+    """Return a function that runs a command, which is refused, and returns what it says."""
 
     def run(*words: object) -> str:
         result = CliRunner().invoke(main, ["--dsn", dsn, *map(str, words)])

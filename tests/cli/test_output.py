@@ -18,14 +18,14 @@ from click.testing import CliRunner
 from shapely.geometry import Point
 
 from tunneldb.cli.main import COMMANDS, EXAMPLES, main
-from tunneldb.cli.output import Verb, plain
+from tunneldb.cli.output import Command, plain
 from tunneldb.cli.progress import rate
 from tunneldb.errors import UserError
 from tunneldb.stages.parameters import check_together, settings
 
 
 def verbs() -> Iterator[tuple[str, click.Command]]:
-    """All verbs, those of groups by two words; psql's command line is its own."""
+    """All commands, those of groups by two words; psql's command line is its own."""
     context = click.Context(main)
     for name in COMMANDS:
         command = main.get_command(context, name)
@@ -38,7 +38,7 @@ def verbs() -> Iterator[tuple[str, click.Command]]:
 
 @pytest.mark.parametrize(("name", "command"), [pytest.param(*verb, id=verb[0]) for verb in verbs()])
 def test_each_verb_has_examples_that_are_right(name: str, command: click.Command) -> None:
-    assert isinstance(command, Verb)
+    assert isinstance(command, Command)
     lines = [line for line in "\n".join(command.examples).replace("\\\n", " ").split("\n") if line.startswith("tunneldb ")]
     assert lines or name == "server start"
     for line in lines:
@@ -117,13 +117,13 @@ def test_a_wrong_command_line_is_told_in_json_too() -> None:
     ):
         result = CliRunner().invoke(main, words)
         said = json.loads(result.stdout)
-        assert (result.exit_code, said["ok"], said["exit_code"], said["verb"]) == (2, False, 2, verb)
+        assert (result.exit_code, said["ok"], said["exit_code"], said["command"]) == (2, False, 2, verb)
         assert said["error"] in result.stderr
 
 
 def test_a_survey_may_have_the_name_of_a_verb() -> None:
     result = CliRunner().invoke(main, ["--dsn", "host=/nowhere", "report", "psql", "-o", "psql.doc", "--json"])
-    assert (result.exit_code, json.loads(result.stdout)["verb"]) == (2, "report")
+    assert (result.exit_code, json.loads(result.stdout)["command"]) == (2, "report")
 
 
 def test_parameters_are_checked_together() -> None:

@@ -25,7 +25,7 @@ TUNNELDB = [sys.executable, "-c", "from tunneldb.cli.main import main; main()"]
 
 
 def on_a_terminal(*words: object, program: Sequence[str] = TUNNELDB, output_too: bool = False) -> tuple[str, str]:
-    """Run a verb whose standard error is a terminal of 100 columns, and standard output a pipe unless it is there, too."""
+    """Run a command whose standard error is a terminal of 100 columns, and standard output a pipe unless it is there, too."""
     ours, theirs = pty.openpty()
     environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": "100"}
     with subprocess.Popen(

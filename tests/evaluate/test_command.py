@@ -1,4 +1,4 @@
-"""The verb evaluate, on a survey made by hand whose leaks are known."""
+"""The command evaluate, on a survey made by hand whose leaks are known."""
 
 from __future__ import annotations
 

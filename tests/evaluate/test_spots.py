@@ -1,4 +1,4 @@
-"""Spots of structures against a truth: laid on faces, and the verb on structures made by hand."""
+"""Spots of structures against a truth: laid on faces, and the command on structures made by hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The verb ground: scan files by themselves, of all sorts."""
+"""The command ground: scan files by themselves, of all sorts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The verb ``compare`` on two surveys whose linings and leaks are known."""
+"""The command ``compare`` on two surveys whose linings and leaks are known."""
 
 from __future__ import annotations
 

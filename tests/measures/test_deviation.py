@@ -1,4 +1,4 @@
-"""The verb ``deviation`` on a survey whose lining is known, against areas by shapely."""
+"""The command ``deviation`` on a survey whose lining is known, against areas by shapely."""
 
 from __future__ import annotations
 

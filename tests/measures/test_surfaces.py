@@ -1,4 +1,4 @@
-"""The verbs ``thickness`` and ``evenness`` on surveys whose lining is known, and what makes them stale."""
+"""The commands ``thickness`` and ``evenness`` on surveys whose lining is known, and what makes them stale."""
 
 from __future__ import annotations
 

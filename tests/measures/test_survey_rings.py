@@ -1,4 +1,4 @@
-"""The verb ``rings`` on a survey whose lining is known, over the end of a kilometre."""
+"""The command ``rings`` on a survey whose lining is known, over the end of a kilometre."""
 
 from __future__ import annotations
 

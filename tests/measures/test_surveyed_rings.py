@@ -1,4 +1,4 @@
-"""The verb ``rings``: real rings against their published results, and what is wrong of the files."""
+"""The command ``rings``: real rings against their published results, and what is wrong of the files."""
 
 from __future__ import annotations
 

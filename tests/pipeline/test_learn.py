@@ -1,4 +1,4 @@
-"""The verb `learn`: reviews in the database to what is in force, and back; who may; what is stale then."""
+"""The command `learn`: reviews in the database to what is in force, and back; who may; what is stale then."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def mistake(words: list[str]) -> str | None:
         elif isinstance(command, click.Group):
             found = command.get_command(click.Context(command), word)
             if found is None:
-                return f"there is no verb {word}"
+                return f"there is no command {word}"
             if found.name == "psql":
                 return None  # the rest is psql's own
             command = found
@@ -93,7 +93,7 @@ def mistake(words: list[str]) -> str | None:
 def test_mistakes_are_found() -> None:
     assert mistake(["leaks", "x", "--format", "csv", "-o", "y"]) is None
     assert mistake(["survey", "add", "--reference", "r.csv"]) is None
-    assert mistake(["leek"]) == "there is no verb leek"
+    assert mistake(["leek"]) == "there is no command leek"
     assert mistake(["tunnel", "add", "--reference"]) == "add has no option --reference"
     assert mistake(["run", "x", "--set", "section.step=5"]) == "there is no parameter section.step=5"
 

@@ -1,4 +1,4 @@
-"""The plugin in real QGIS when the server goes away, when another reviews the same, and when a verb is cancelled.
+"""The plugin in real QGIS when the server goes away, when another reviews the same, and when a command is cancelled.
 
 Runs under the Python that has PyQGIS, says what it saw as JSON. PGSERVICEFILE has *review* and *owner*.
 
@@ -167,7 +167,7 @@ def typed_in_lists(dock: Any) -> dict[str, Any]:
 
 
 def cancel() -> dict[str, Any]:
-    """A verb is cancelled in the midst of its transaction, in which it waits for a lock: init, which makes tunnel_api anew."""
+    """Cancel init in the midst of its transaction, while it waits for a lock."""
     algorithm = QgsApplication.processingRegistry().createAlgorithmById("tunneldb:init")
     context, feedback = QgsProcessingContext(), QgsProcessingFeedback(False)
     seen: dict[str, Any] = {"before": ask(STATE)}

@@ -94,14 +94,14 @@ def test_options_of_algorithms_are_those_of_the_command_line(unpacked: Path, mon
     assert len({command.name for command in COMMANDS}) == len(COMMANDS)
     for command in COMMANDS:
         context, found = click.Context(main), main
-        for word in (word for word in command.verb if not word.startswith("-")):
+        for word in (word for word in command.words if not word.startswith("-")):
             assert isinstance(found, click.Group)
             found = found.get_command(context, word)  # type: ignore[assignment]
-        assert found.name == [word for word in command.verb if not word.startswith("-")][-1]
+        assert found.name == [word for word in command.words if not word.startswith("-")][-1]
         known = {option: p for p in found.params if isinstance(p, click.Option) for option in (*p.opts, *p.secondary_opts)}
         given = {parameter.option.split()[0]: parameter for parameter in command.parameters if parameter.option}
         assert set(given) <= set(known), command.name
-        words = {word for word in command.verb if word.startswith("-")}
+        words = {word for word in command.words if word.startswith("-")}
         needed = {p.opts[0] for p in known.values() if p.required}
         assert needed <= {option for name in {*given, *words} for option in known[name].opts}, command.name
         for name, parameter in given.items():
@@ -204,7 +204,7 @@ def test_a_viewer_is_told_that_she_may_not(
 def test_what_comes_between_loses_nothing_and_overwrites_nothing(
     unpacked: Path, tmp_path: Path, conn: psycopg.Connection, dsn: str, example: str, people: None
 ) -> None:
-    """The server goes away, another reviews the same, letters are typed in lists, a verb is cancelled in a stage."""
+    """The server goes away, another reviews the same, letters are typed in lists, a command is cancelled in a stage."""
     conn.close()  # the database is closed to all for a while
     seen = in_qgis(unpacked, tmp_path, dsn, "ines", "interrupted_in_qgis.py")
     assert seen["lists"] == {"reviewed": 0, "order": "By chainage", "keys": True}

@@ -1,4 +1,4 @@
-"""The verb `members` on files."""
+"""The command `members` on files."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
@@ -15,7 +15,7 @@ from tunneldb.database import connect
 from tunneldb.store.survey import get_survey
 
 
-@verb(examples=["tunneldb axis ringo-2024", "tunneldb axis ringo-2024 --from 511+700 -o axis.svg"])
+@command(examples=["tunneldb axis ringo-2024", "tunneldb axis ringo-2024 --from 511+700 -o axis.svg"])
 @click.argument("survey")
 @stretch_options
 @click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write: .png, .pdf, .svg, or .csv.")
@@ -37,7 +37,7 @@ def axis(settings: Settings, survey: str, start: str | None, end: str | None, ou
         found = get_survey(conn, survey)
         stretch = parse_stretch(conn, found, start, end)
         deviation = load_deviation(conn, found, stretch.low, stretch.high)
-    tell(survey=survey, elements=deviation.summaries(), file=output)
+    add_to_json(survey=survey, elements=deviation.summaries(), file=output)
     header = ["from", "to", "what", "vertices", "right mm", "at most", "up mm", "at most"]
     rows = [
         (s.label_from, s.label_to, s.title, s.vertices, *map(_millimetres, (s.right_mean, s.right_most, s.up_mean, s.up_most)))

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from tunneldb.cli.load import density_of, say_notes
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb, wants_json
+from tunneldb.cli.output import add_to_json, command, notify, wants_json
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.units import unit_options
 from tunneldb.counted import counted
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 OUTSIDE = "outside the kilometres of --km, by its header and a sample of its points: not read"
 
 
-@verb(
+@command(
     examples=[
         "tunneldb batch pajares-2026 /data/pajares/*.laz --preview",
         "tunneldb batch pajares-2026 /data/pajares/*.laz",
@@ -105,7 +105,7 @@ def batch(
 
             seen = look_ahead(conn, found, asked, kilometres, settings_.dsn is None, count)
             show(seen)
-            tell(survey=survey, preview=seen, fits=seen.fits)
+            add_to_json(survey=survey, preview=seen, fits=seen.fits)
             raise SystemExit(0 if seen.fits else 1)
         register(conn, found, asked, retry=retry_failed)
         busy, since = _busy(conn, found)
@@ -151,7 +151,7 @@ def _summary(
     notes = notes_of_files(conn, survey, since)
     done = sum(result.state == "done" for result in found)
     points = watch.ledger.points if watch.ledger is not None else 0
-    tell(
+    add_to_json(
         survey=survey.name,
         kilometres=found,
         failed_files=[{"name": name, "message": why} for name, why in files],

@@ -7,10 +7,10 @@ import sys
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 
 
-@verb(examples=["tunneldb check", "tunneldb check --json"], wrong="a check failed; the list has the fix")
+@command(examples=["tunneldb check", "tunneldb check --json"], wrong="a check failed; the list has the fix")
 @click.pass_obj
 def check(settings: Settings) -> None:
     """Check the server and the database, and show how to fix faults.
@@ -20,7 +20,7 @@ def check(settings: Settings) -> None:
     from tunneldb.database.health import CheckResult, examine
 
     findings: list[CheckResult] = []
-    tell(findings=findings)
+    add_to_json(findings=findings)
     for finding in examine(settings.dsn):
         findings.append(finding)
         mark = {"ok": "✓", "note": "•", "wrong": "✗"}[finding.level]

@@ -18,7 +18,7 @@ from tunneldb.cli.measure import (
     with_progress,
     write_text,
 )
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
 from tunneldb.cli.stretch import stretch_options
 from tunneldb.cli.tables import print_table
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _LENGTH = FiniteRange(0.0)
 
 
-@verb(
+@command(
     examples=[
         "tunneldb clearance ringo-2024 --gauge freight.csv --track left",
         "tunneldb clearance ringo-2024 --gauge freight.csv --track right --bogie-distance 14 --overhang 4 -o margins.csv",
@@ -128,9 +128,9 @@ def clearance(settings: Settings, /, survey: str, outline: Path, name: str | Non
             raise UserError(f"survey {survey}: track {track} was not seen there; nothing was measured, and nothing is clear")
         inside = infringement_rows(conn, found, gauge, track, part.low, part.high)
         rows = section_rows(conn, found, gauge, track, part.low, part.high)
-        tell(survey=survey, gauge=gauge, track=track, made=made, kilometres=kilometres, infringements=inside)
+        add_to_json(survey=survey, gauge=gauge, track=track, made=made, kilometres=kilometres, infringements=inside)
         if output is None:
-            tell(sections=[row | {"margins": [None if m != m else m for m in row["margins"]]} for row in rows])
+            add_to_json(sections=[row | {"margins": [None if m != m else m for m in row["margins"]]} for row in rows])
         elif output.suffix.lower() == ".csv":
             write_text(output, sections_csv(rows))
         elif output.suffix.lower() == ".gpkg":

@@ -10,7 +10,7 @@ import psycopg
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.measure import output_option, require_ending, say_written, surveys_in, with_progress, write_text
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli.param_types import FiniteRange
 from tunneldb.cli.stretch import Stretch, stretch_options
 from tunneldb.cli.tables import print_table
@@ -26,7 +26,7 @@ _WORDS = {
 }  # fmt: skip
 
 
-@verb(
+@command(
     examples=[
         "tunneldb compare demo-2024 demo-2026",
         "tunneldb compare demo-2024 demo-2026 --from 12+300 --to 12+400 -o leaks.csv",
@@ -78,7 +78,7 @@ def compare(
         }
         whole = summary(rows["change_section"], rows["change_region"], rows["leak_change"])
         files = [] if output is None else _write(conn, first, second, part, rows, output)
-    tell(
+    add_to_json(
         old=old, new=new, made=made, summary=whole, sections=rows["change_section"], regions=rows["change_region"],
         leaks=rows["leak_change"],
     )  # fmt: skip

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import click
 from rich.console import Console
 
-from tunneldb.cli.output import notify, printable, tell
+from tunneldb.cli.output import add_to_json, notify, printable
 from tunneldb.counted import counted
 from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.coverage import Coverage
@@ -20,7 +20,7 @@ MOST_REMARKS = 6
 
 def say_remarks(remarks: Sequence[Remark], survey: Survey) -> None:
     """Print notes and limitations of the results on stderr, and add them to ``--json``."""
-    tell(remarks=remarks)
+    add_to_json(remarks=remarks)
     for remark in remarks[:MOST_REMARKS]:
         notify(printable(remark.said))
     if len(remarks) > MOST_REMARKS:
@@ -29,7 +29,7 @@ def say_remarks(remarks: Sequence[Remark], survey: Survey) -> None:
 
 def say_coverage(coverage: Coverage, survey: Survey, *, on_stdout: bool = False) -> None:
     """Say where leaks can't be vouched for, on stderr or before what stdout holds for people, and tell it to ``--json``."""
-    tell(
+    add_to_json(
         statement=coverage.statement,
         gaps=coverage.gaps,
         seen_area=coverage.seen_area,

@@ -21,7 +21,7 @@ from tunneldb.cli.measure import (
     with_progress,
     write_rows,
 )
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli.stretch import Stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.errors import UserError
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from tunneldb.measures.deviation.tables import Row
 
 
-@verb(
+@command(
     examples=[
         "tunneldb deviation ringo-2024",
         "tunneldb deviation ringo-2024 --layer excavation --from 511+200 --to 511+400 --axis-sigma 0.01",
@@ -76,10 +76,10 @@ def deviation(
         if whole is None:
             raise UserError(f"survey {survey} has no lining or profile of layer {layer} there")
         rows = stretch_rows(conn, found, layer, part.low, part.high, every, axis_sigma or 0.0)
-        tell(survey=survey, layer=layer, made=made, axis_sigma=axis_sigma, volume=whole, stretches=rows)
+        add_to_json(survey=survey, layer=layer, made=made, axis_sigma=axis_sigma, volume=whole, stretches=rows)
         files: list[Path] = []
         if output is None:
-            tell(sections=section_rows(conn, found, layer, part.low, part.high))
+            add_to_json(sections=section_rows(conn, found, layer, part.low, part.high))
         elif output.suffix.lower() == ".csv":
             files = write_rows(output, COLUMNS, section_rows(conn, found, layer, part.low, part.high))
         else:

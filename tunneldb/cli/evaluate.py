@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 MIN_LEAK, MIN_SPOT = 0.1, 0.01  # m²
 
 
-@verb(
+@command(
     examples=[
         "tunneldb evaluate demo-2024 demo/demo.truth.gpkg",
         "tunneldb evaluate demo-2024 truth.geojson --km 12 -o figures.json",
@@ -90,7 +90,7 @@ def evaluate(
             smallest = MIN_LEAK if min_area is None else min_area
             report, about, said = _of_leaks(conn, found, truth, layer, km, smallest, begin)
     about = {"survey": survey, "truth": str(truth), **about, "min_area_m2": smallest}
-    tell(**reports.as_values(report, about), file=output)
+    add_to_json(**reports.as_values(report, about), file=output)
     if output:
         with replacing(output) as temporary:
             text = reports.as_json(report, about) if form == ".json" else reports.as_csv(report)
@@ -138,7 +138,7 @@ def _of_leaks(
         scanner_distance(conn, survey, list(comparison.found_shape)),
     )
     report = make_report(comparison, true.ids, [str(k) for k in findings.ids], distances, min_area, findings.seen)
-    tell(outside=outside)
+    add_to_json(outside=outside)
     said = [f"{outside} true leaks lie where leaks were not searched for, and are left out"] if outside else []
     return report, {"kilometres": findings.kilometres}, said
 

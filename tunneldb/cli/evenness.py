@@ -18,14 +18,14 @@ from tunneldb.cli.measure import (
     with_progress,
     write_rows,
 )
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli.param_types import FiniteRange
 from tunneldb.cli.stretch import stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.errors import UserError
 
 
-@verb(
+@command(
     examples=[
         "tunneldb evenness ringo-2024 --length 2 --limit 0.02",
         "tunneldb evenness ringo-2024 --layer shotcrete --length 4 --limit 0.1 -o evenness.csv",
@@ -71,9 +71,9 @@ def evenness(
         if not rows:
             raise UserError(f"survey {survey} has no lining there that was compared with layer {layer}")
         sections = section_rows(conn, found, layer, part.low, part.high)
-    tell(survey=survey, layer=layer, made=made, length=length, limit=limit, stretches=rows)
+    add_to_json(survey=survey, layer=layer, made=made, length=length, limit=limit, stretches=rows)
     if output is None:
-        tell(sections=sections)
+        add_to_json(sections=sections)
     files = [] if output is None else write_rows(output, COLUMNS, sections)
     print_table(
         ["from", "seen m²", "not measured m²", "over limit m²", "gap along mm", "gap around mm", "waviness %"],

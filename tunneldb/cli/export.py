@@ -11,7 +11,7 @@ import psycopg
 
 from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
@@ -28,7 +28,7 @@ from tunneldb.store.survey import Survey, get_survey
 _PLAIN = (".gpkg", ".dxf")
 
 
-@verb(
+@command(
     examples=[
         "tunneldb export ringo-2024 -o ringo.gpkg",
         "tunneldb export ringo-2024 -o ringo.dxf --from 511+700 --to 511+800",
@@ -102,7 +102,7 @@ def _write_plain(conn: psycopg.Connection[Any], survey: Survey, output: Path, st
     coverage = read_coverage(conn, survey, stretch.low, stretch.high)
     with exit_on_sigterm(), replacing(output) as temporary, bar("parts") as progress:
         counts = write_survey(conn, survey, stretch.low, stretch.high, temporary, step(progress))
-    tell(survey=survey.name, file=output, layers=counts)
+    add_to_json(survey=survey.name, file=output, layers=counts)
     say_coverage(coverage, survey)
     say_remarks(read_remarks(conn, survey, stretch.low, stretch.high), survey)
     notify(f"{output}: " + ", ".join(f"{name} {count}" for name, count in counts.items() if count))
@@ -121,7 +121,7 @@ def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Pat
     wanted = parse_km(km, there)
     conn.rollback()
     files: list[dict[str, Any]] = []
-    tell(survey=survey.name, files=files)
+    add_to_json(survey=survey.name, files=files)
     with exit_on_sigterm(), made_folder(output), bar("points") as progress:
         for file in (export_copc if copc else export_classified)(conn, survey, output, wanted, step(progress)):
             points = int(file.counts.sum())

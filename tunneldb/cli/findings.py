@@ -12,7 +12,7 @@ import psycopg
 from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import VerbGroup, notify, printable, records, tell
+from tunneldb.cli.output import CommandGroup, add_to_json, notify, printable, records
 from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
@@ -36,7 +36,7 @@ from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
 
-class _FindingsGroup(VerbGroup):
+class _FindingsGroup(CommandGroup):
     """Its command is ``list`` where none is named: ``tunneldb findings SURVEY``."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -157,7 +157,7 @@ def list_findings(
         severities, regions = read_severities(conn), read_dry_regions(conn, found, stretch.low, stretch.high)
         counts, wet = count_findings(fitting, read_kinds(conn)), read_wet_kinds(conn)
     rows = [row for row in fitting if not wanted or row.state in wanted]
-    tell(survey=survey, listed=len(rows), geometry=geometry, findings=rows, kinds=counts, dry_regions=regions)
+    add_to_json(survey=survey, listed=len(rows), geometry=geometry, findings=rows, kinds=counts, dry_regions=regions)
     listed = FindingList(rows, coverage, remarks)
     say_coverage(coverage, found, on_stdout=output is None and form == "table")
     if output is None:
@@ -173,7 +173,7 @@ def list_findings(
                 temporary.write_text(as_geojson(listed, cast(Geometry, geometry), found.srid), encoding="utf-8")
             else:
                 temporary.write_text(as_csv(listed), encoding="utf-8")
-        tell(file=output)
+        add_to_json(file=output)
         unknown = not rows and not coverage.seen_area
         notify(f"{'findings were not searched for' if unknown else counted(len(rows), 'finding')}: {output}")
     if not searched:
@@ -249,7 +249,7 @@ def _print_counts(conn: psycopg.Connection, survey: Survey, kinds: Sequence[str]
         "area",
     ]
     rows = list_finding_counts(conn, survey, kinds, origins)
-    tell(survey=survey.name, counts=records(names, rows))
+    add_to_json(survey=survey.name, counts=records(names, rows))
     print_table([*names[:-2], "to measure", "area m²"], [[*row[:-1], f"{row[-1]:.3f}"] for row in rows], right=range(2, 12))
 
 
@@ -286,7 +286,7 @@ def import_(
         done = import_findings(conn, get_survey(conn, survey), file, theirs, ours, layer)
     for line in done.wrong:
         notify(printable(line))
-    tell(survey=survey, imported=len(done.ids), kinds=dict(done.kinds), ids=done.ids, wrong=done.wrong)
+    add_to_json(survey=survey, imported=len(done.ids), kinds=dict(done.kinds), ids=done.ids, wrong=done.wrong)
     if done.wrong:
         raise UserError(f"{file}: {counted(len(done.wrong), 'wrong row')}, so nothing was imported")
     said = ", ".join(f"{number} {kind}" for kind, number in sorted(done.kinds.items()))
@@ -304,7 +304,7 @@ def undo(settings: Settings, number: int) -> None:
     """
     with connect(settings.dsn) as conn:
         undone = undo_finding(conn, number)
-    tell(finding=number, undone=undone)
+    add_to_json(finding=number, undone=undone)
     click.echo(f"finding {number}: change undone: {undone}")
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.run import parameter_table
@@ -19,7 +19,7 @@ _PREFIXES = ("ground.", "cluster.")
 _NAMES = [name for name in PARAMETERS if name.startswith(_PREFIXES)]
 
 
-@verb(
+@command(
     epilog="\b\nParameters for --set, with their defaults:\n" + parameter_table(_NAMES),
     examples=["tunneldb ground scan.laz -o classed.laz"],
 )
@@ -43,7 +43,7 @@ def ground(file: Path, output: Path, assignments: tuple[str, ...]) -> None:
 
     with exit_on_sigterm(), bar("points") as progress:
         found = classify_file(file, output, values, step(progress))
-    tell(file=output, ground=found.ground, lining=found.lining)
+    add_to_json(file=output, ground=found.ground, lining=found.lining)
     print_classes(found.counts)
     if not found.ground:
         click.echo("no ground: nothing in the file is a floor")

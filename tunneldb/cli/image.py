@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, say, step
 from tunneldb.database import connect
@@ -17,7 +17,7 @@ from tunneldb.stages.run import nothing_yet, parse_km
 from tunneldb.store.survey import get_survey
 
 
-@verb(examples=["tunneldb image ringo-2024 -o images --km 511-512"])
+@command(examples=["tunneldb image ringo-2024 -o images --km 511-512"])
 @click.argument("survey")
 @click.option(
     "-o",
@@ -44,7 +44,7 @@ def image(settings: Settings, survey: str, output: Path, km: str | None) -> None
         wanted = parse_km(km, there)
         conn.rollback()
         files: list[Path] = []
-        tell(survey=survey, files=files)
+        add_to_json(survey=survey, files=files)
         with exit_on_sigterm(), made_folder(output), bar("km") as progress:
             advance = step(progress)("images", len(wanted))
             for number, kilometre in enumerate(wanted, start=1):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.counted import counted
 from tunneldb.database import open_connection
@@ -15,7 +15,7 @@ from tunneldb.stages.registry import REGISTRY
 from tunneldb.store.waterproof import keep_missing
 
 
-@verb(examples=["tunneldb init", 'tunneldb --dsn "host=gis.example.org dbname=tunnels user=anna" init'])
+@command(examples=["tunneldb init", 'tunneldb --dsn "host=gis.example.org dbname=tunnels user=anna" init'])
 @click.pass_obj
 def init(settings: Settings) -> None:
     """Create or upgrade the schema, the functions and the roles.
@@ -38,6 +38,6 @@ def init(settings: Settings) -> None:
         notify(f"{where}: schema tunnel {change} ({after}), tunnel_api installed")
         with bar("km") as shown:
             kept = keep_missing(connection, step(shown))
-    tell(before=before, revision=after, waterproofing=kept)
+    add_to_json(before=before, revision=after, waterproofing=kept)
     if kept:
         notify(f"waterproofing of {counted(kept, 'kilometre')} computed")

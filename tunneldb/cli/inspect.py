@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _MOST_SCANS = 8
 
 
-@verb(
+@command(
     examples=["tunneldb inspect scan.laz", "tunneldb inspect scans/*.e57"],
     wrong="a file can't be read; the others were looked at",
 )
@@ -54,7 +54,7 @@ def inspect(files: tuple[Path, ...], unit: str | None, height_unit: str | None) 
     for look in looks:
         _print_file(look)
     found = first_steps(looks, axis_fault)
-    tell(files=looks, unreadable=list(map(str, faults)), **dataclasses.asdict(found))
+    add_to_json(files=looks, unreadable=list(map(str, faults)), **dataclasses.asdict(found))
     for fault in faults:
         notify(str(fault))
     _print_steps(found)

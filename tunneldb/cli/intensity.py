@@ -8,7 +8,7 @@ from typing import cast, get_args
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.param_types import FINITE, FilePath, file_path
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -22,7 +22,7 @@ from tunneldb.store.survey import get_survey
 _FILES = (".las", ".laz", ".e57")
 
 
-@verb(
+@command(
     examples=[
         "tunneldb intensity ringo-2024 --km 511 -o intensity.png",
         "tunneldb intensity scan.laz --intensity Amplitude --intensity-kind amplitude --scanner 0 0 1.8",
@@ -67,7 +67,7 @@ def intensity(
         if intensity is not None or intensity_kind is not None or scanner is not None:
             raise UserError(f"--intensity, --intensity-kind and --scanner are for a file; the survey {survey} has its own")
         look = _diagnose_survey(settings, survey, km)
-    tell(title=look.title, dependence=look.dependence, verdict=look.dependence.verdict(), notes=look.notes, file=output)
+    add_to_json(title=look.title, dependence=look.dependence, verdict=look.dependence.verdict(), notes=look.notes, file=output)
     _print(look)
     if output is not None:
         write_figure(look, output)

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from tunneldb.cli.coverage import say_coverage, say_no_crs, say_remarks
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, records, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify, records
 from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
@@ -39,7 +39,7 @@ _HOUR = r"(1[0-2]|[1-9])(?::([0-5]\d))?"
 _CLOCK = re.compile(rf"{_HOUR}-{_HOUR}")
 
 
-@verb(
+@command(
     examples=[
         "tunneldb leaks ringo-2024",
         "tunneldb leaks ringo-2024 --from 511+700 --to 511+800 --clock 10-2 --min-area 0.1",
@@ -130,7 +130,7 @@ def leaks(
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey)
         if found.note:
-            tell(note=found.note)
+            add_to_json(note=found.note)
         kilometres = parse_km(km, loaded_kilometres(conn, found)) if km else None
         stretch = parse_stretch(conn, found, start, end)
         low, high = stretch.low, stretch.high
@@ -157,7 +157,7 @@ def leaks(
                 notify(f"{listed.total} to {output}")
             if form == "geojson" and chosen != "unrolled":
                 say_no_crs(found.srid)
-            tell(survey=survey, kind=listed.kind, count=listed.count, area=listed.area, listed=len(listed.rows))
+            add_to_json(survey=survey, kind=listed.kind, count=listed.count, area=listed.area, listed=len(listed.rows))
     if not coverage.complete:
         context.exit(1)
 
@@ -172,7 +172,7 @@ def _write_file(
             write_leaks(temporary, survey.name, listed, regions)
         else:
             temporary.write_text(_text(listed, form, geometry, survey), encoding="utf-8")
-    tell(file=output)
+    add_to_json(file=output)
 
 
 def parse_clock(text: str) -> tuple[float, float]:
@@ -209,7 +209,7 @@ def _print_classes(conn: psycopg.Connection, survey: Survey, low: float, high: f
     rows, total = list_leak_statistics(conn, survey, low, high, [name for name, _, _ in _BY_KM])
     names = ["km", *(name for name, _, _ in _BY_KM)]
     kilometres = [{**row, "km": int(row["km"])} for row in records(names, rows)]
-    tell(survey=survey.name, kilometres=kilometres, total=records(names, total)[0] if total else None)
+    add_to_json(survey=survey.name, kilometres=kilometres, total=records(names, total)[0] if total else None)
     formats = [form for _, _, form in _BY_KM]
     lines = [
         [km, *("-" if v is None else format(v, form).removesuffix("%") for v, form in zip(values, formats, strict=True))]
@@ -220,7 +220,7 @@ def _print_classes(conn: psycopg.Connection, survey: Survey, low: float, high: f
 
 
 def _print(listed: LeakList, form: str, geometry: Geometry, survey: Survey) -> None:
-    tell(geometry=geometry, leaks=[as_record(leak) for leak in listed.rows])
+    add_to_json(geometry=geometry, leaks=[as_record(leak) for leak in listed.rows])
     if form != "table":
         click.echo(_text(listed, form, geometry, survey), nl=False)
     elif listed.rows or listed.coverage.seen_area:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
@@ -21,7 +21,7 @@ STRONGEST = 8
 """So many terms of features are printed; ``--json`` has all."""
 
 
-@verb(
+@command(
     examples=[
         "tunneldb learn ringo-2024",
         "tunneldb learn ringo-2024 ringo-2025 --apply --note 'soot at the portals'",
@@ -61,7 +61,7 @@ def learn(settings: Settings, surveys: tuple[str, ...], apply_: bool, undo: bool
         elif undo:
             undone = undo_learning(conn, found)
             conn.commit()
-            tell(undone=undone)
+            add_to_json(undone=undone)
             for tunnel, number in undone.items():
                 click.echo(
                     f"tunnel {tunnel}: learned {number} is undone; detection is stale where it was used: {_rerun(surveys)}"
@@ -71,7 +71,7 @@ def learn(settings: Settings, surveys: tuple[str, ...], apply_: bool, undo: bool
             numbers = apply_plan(conn, plan, note) if apply_ else {}
             conn.commit()
             _print_plan(plan)
-            tell(applied=numbers)
+            add_to_json(applied=numbers)
             _print_end(plan, numbers, surveys, apply_=apply_)
 
 
@@ -80,7 +80,7 @@ def _print_plan(plan: Plan) -> None:
 
     lesson = plan.lesson
     adjustment = lesson.adjustment
-    tell(
+    add_to_json(
         surveys=plan.surveys, tunnels=list(plan.tunnels.values()), reviews=plan.reviews,
         without_features={survey: one.detected for survey, one in plan.unused.items()}, unused=plan.unused,
         held_out=lesson.held_out, chosen=adjustment.way, parameters=adjustment.to_json(), changes=plan.changes,
@@ -128,7 +128,7 @@ def _rerun(surveys: tuple[str, ...]) -> str:
 
 
 def _print_list(listed: list[Learned]) -> None:
-    tell(learned=[dataclasses.asdict(one) for one in listed])
+    add_to_json(learned=[dataclasses.asdict(one) for one in listed])
     rows = [
         (
             one.id, one.tunnel, "in force" if one.in_force else "undone" if one.undone_at else "before", one.way,

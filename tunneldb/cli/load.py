@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, printable, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify, printable
 from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 MOST_NAMED = 5  # files of which the same is said
 
 
-@verb(
+@command(
     examples=[
         "tunneldb load ringo-2024 scans/km-511.laz scans/km-512.laz",
         "tunneldb load ringo-2024 scans/*.e57 --density all",
@@ -121,7 +121,7 @@ def load(
     units = GivenUnits(unit, height_unit)
     chosen = FilterSettings(density_of(density), noise_points, noise_diameter, max_distance, max_left_out / 100.0, units)
     done: list[Loaded] = []
-    tell(survey=survey, files=done)
+    add_to_json(survey=survey, files=done)
     with connect(settings.dsn) as connection:
         found = get_survey(connection, survey, site=True)
         connection.rollback()
@@ -178,7 +178,7 @@ def _summary(connection: psycopg.Connection[Any], survey: Survey, done: list[Loa
         notify(f"looked through; the points stay in the files: tunneldb members {survey.name}")
     loaded = {file.name for file in done}
     remarks = [remark for remark in read_remarks(connection, survey) if remark.file in loaded]
-    tell(remarks=remarks)
+    add_to_json(remarks=remarks)
     for remark in remarks:
         notify(remark.said)
     connection.rollback()

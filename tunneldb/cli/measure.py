@@ -11,7 +11,7 @@ import click
 import psycopg
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell
+from tunneldb.cli.output import add_to_json, notify
 from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.stretch import Stretch, parse_stretch
@@ -92,7 +92,7 @@ def write_rows(output: Path, columns: Sequence[str], rows: Sequence[Mapping[str,
 
 def say_written(files: Sequence[Path]) -> None:
     """Tell which files were written, and print a line for each."""
-    tell(files=list(files))
+    add_to_json(files=list(files))
     for file in files:
         notify(f"written to {file}")
 

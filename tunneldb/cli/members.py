@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast, get_args
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.param_types import FilePath, file_path
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _MOST = 20  # rows of a table that are printed
 
 
-@verb(
+@command(
     examples=[
         "tunneldb members plant.laz --stations stations.csv --intensity Amplitude --intensity-kind amplitude -o out.laz",
         "tunneldb members plant.laz --stations stations.csv --intensity Reflectance --intensity-kind reflectance -o out.gpkg",
@@ -94,7 +94,7 @@ def _of_survey(settings: Settings, name: str) -> None:
         with bar("points") as progress:
             done = find_survey_members(conn, survey, step(progress))
     _tell(done.members, None)
-    tell(survey=name, new=done.spots.new, again=done.spots.again, kept=done.spots.kept, gone=done.spots.gone)
+    add_to_json(survey=name, new=done.spots.new, again=done.spots.again, kept=done.spots.kept, gone=done.spots.gone)
     _print(done.members)
     if done.spots.again or done.spots.kept or done.spots.gone:
         click.echo(
@@ -150,7 +150,7 @@ def _tell(found: FileMembers, output: Path | None) -> None:
     from tunneldb.export.exchange.members import face_row, member_row, spot_row
 
     structures = found.found.structures
-    tell(
+    add_to_json(
         points=found.points,
         points_far=found.far,
         points_without_position=found.unknown,

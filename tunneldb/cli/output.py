@@ -1,8 +1,8 @@
 """Shared parts of all commands: help as a manual page, and ``--json``.
 
 Under ``--json`` standard output holds exactly one JSON object, also when the command fails; what the command would print there
-for people is left out. Keys that every object has: ``verb``, ``ok``, ``exit_code``, ``seconds``; ``error`` where there is
-one. The others are what the command told.
+for people is left out. Keys that every object has: ``command``, ``ok``, ``exit_code``, ``seconds``; ``error`` where there is
+one. The others are the results of the command.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ log = logging.getLogger(MESSAGES)
 _STDOUT = 1
 """Descriptor of standard output, which programs that are started inherit."""
 
-_TOLD = "tunneldb.told"
-_VERB = "tunneldb.verb"
+_RESULT = "tunneldb.result"
+_COMMAND = "tunneldb.command"
 
 
 def printable(text: str) -> str:
@@ -69,7 +69,7 @@ def _is_shown(character: str) -> bool:
     return character.isprintable() or unicodedata.category(character) == "Zs"  # such as the narrow space between thousands
 
 
-def tell(**values: Any) -> None:
+def add_to_json(**values: Any) -> None:
     """Add to what ``--json`` prints; a later value takes the place of an earlier one.
 
     Parameters
@@ -79,7 +79,7 @@ def tell(**values: Any) -> None:
     """
     context = click.get_current_context(silent=True)
     if context is not None:
-        context.meta.setdefault(_TOLD, {}).update(values)
+        context.meta.setdefault(_RESULT, {}).update(values)
 
 
 def records(names: Sequence[str], rows: Iterable[Sequence[Any]]) -> list[dict[str, Any]]:
@@ -93,7 +93,7 @@ def wants_json() -> bool:
     return context is not None and bool(context.meta.get(AS_JSON))
 
 
-class Verb(click.Command):
+class Command(click.Command):
     """A command with ``--json``, and with examples and exit codes in its help.
 
     Parameters
@@ -115,7 +115,7 @@ class Verb(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Note which command it is, before what stands after it can be wrong."""
-        ctx.meta[_VERB] = ctx.command_path.partition(" ")[2]
+        ctx.meta[_COMMAND] = ctx.command_path.partition(" ")[2]
         return super().parse_args(ctx, args)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -127,14 +127,14 @@ class Verb(click.Command):
             formatter.write_dl([(code, text) for code, text in codes.items() if text])
 
 
-class VerbGroup(click.Group):
+class CommandGroup(click.Group):
     """A group whose commands are commands."""
 
-    command_class = Verb
+    command_class = Command
 
 
-def verb(name: str | None = None, cls: type[Verb] = Verb, **options: Any) -> Callable[[Callable[..., Any]], Verb]:
-    """Return the decorator that makes a command of a function; options are those of `Verb`."""
+def command(name: str | None = None, cls: type[Command] = Command, **options: Any) -> Callable[[Callable[..., Any]], Command]:
+    """Return the decorator that makes a command of a function; options are those of `Command`."""
     return click.command(name, cls=cls, **options)
 
 
@@ -176,10 +176,10 @@ def run_as_json(ctx: click.Context, run: Callable[[], Any], describe: Callable[[
         click.echo(error_line(error), err=True)
         code = 2
     said = {"error": error} if error is not None else {}
-    told = ctx.meta.get(_TOLD, {})
-    name = ctx.meta.get(_VERB, ctx.invoked_subcommand)
+    told = ctx.meta.get(_RESULT, {})
+    name = ctx.meta.get(_COMMAND, ctx.invoked_subcommand)
     seconds = round(time.monotonic() - began, 3)
-    result = {"verb": name, "ok": code == 0, "exit_code": code, "seconds": seconds} | said | told
+    result = {"command": name, "ok": code == 0, "exit_code": code, "seconds": seconds} | said | told
     click.echo(json.dumps(plain(result), ensure_ascii=False, indent=1, allow_nan=False))
     return code
 

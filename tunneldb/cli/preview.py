@@ -110,11 +110,11 @@ def _time(seen: Preview) -> list[RenderableType]:
 
 
 def _problems(seen: Preview) -> list[RenderableType]:
-    lines: list[RenderableType] = [Text(text) for text in _said(seen)]
+    lines: list[RenderableType] = [Text(text) for text in _lines(seen)]
     return [Text("problems", "bold"), *lines] if lines else []
 
 
-def _said(seen: Preview) -> Iterator[str]:
+def _lines(seen: Preview) -> Iterator[str]:
     for file in seen.plan.files:
         if file.error:
             yield file.error

@@ -6,7 +6,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.measure import LAYERS, layer_option
-from tunneldb.cli.output import VerbGroup, notify, records, tell
+from tunneldb.cli.output import CommandGroup, add_to_json, notify, records
 from tunneldb.cli.param_types import file_path
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
@@ -14,7 +14,7 @@ from tunneldb.database import connect
 from tunneldb.errors import UserError
 
 
-@click.group(cls=VerbGroup)
+@click.group(cls=CommandGroup)
 def profile() -> None:
     """Add, list or remove the design profiles of a tunnel: lines and arcs around its axis, by chainage and layer."""
 
@@ -68,7 +68,7 @@ def add(
             raise UserError(f"tunnel {tunnel} has nothing there: it lies between {place.start:.3f} and {place.end:.3f} m")
         save_profile(conn, place, Profile(name, low, high, read.outline), layer, file.name)
     outline = read.outline
-    tell(
+    add_to_json(
         tunnel=tunnel, name=name, layer=layer, chainage_from=low, chainage_to=high, closed=outline.closed,
         elements=len(outline.elements), length=outline.length, area=outline.area, notes=read.notes,
     )  # fmt: skip
@@ -100,7 +100,7 @@ def list_(settings: Settings, tunnel: str) -> None:
                 sizes = sorted((part.first.area, part.second.area))
                 rows.append((layer, part.name, kind, part.low, part.high, *sizes, part.first.closed))
     columns = ("layer", "name", "kind", "chainage_from", "chainage_to", "area_least", "area_most", "closed")
-    tell(tunnel=tunnel, profiles=records(columns, rows))
+    add_to_json(tunnel=tunnel, profiles=records(columns, rows))
     print_table(
         ["layer", "profile", "", "from", "to", "area m²"],
         [
@@ -123,7 +123,7 @@ def remove(settings: Settings, tunnel: str, name: str, layer: str) -> None:
 
     with connect(settings.dsn) as conn:
         remove_profile(conn, get_tunnel(conn, tunnel), tunnel, name, layer)
-    tell(tunnel=tunnel, name=name, layer=layer)
+    add_to_json(tunnel=tunnel, name=name, layer=layer)
 
 
 def _origin(text: str) -> tuple[float, float]:

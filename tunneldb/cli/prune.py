@@ -10,7 +10,7 @@ import psycopg
 from rich.filesize import decimal
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.survey import DAY
 from tunneldb.cli.tables import print_table
@@ -22,7 +22,7 @@ from tunneldb.store.prune import prune as delete
 from tunneldb.store.survey import get_survey
 
 
-@verb(
+@command(
     examples=[
         "tunneldb prune",
         "tunneldb prune ringo-2024 --before 2024-01-01",
@@ -60,7 +60,7 @@ def prune(settings: Settings, name: str | None, before: dt.datetime | None, yes:
             left_out += began
             found = [row for row in found if row.survey not in began]
     freed = sum(row.bytes for row in found)
-    tell(
+    add_to_json(
         superseded=found,
         rows=sum(row.rows for row in found),
         bytes=freed,

@@ -10,7 +10,7 @@ import psycopg
 
 from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.counted import counted
@@ -26,7 +26,7 @@ from tunneldb.store.spots import read_spots
 from tunneldb.store.survey import Survey, get_survey
 
 
-@verb(
+@command(
     examples=[
         "tunneldb qgis demo-2024 -o demo.qgz",
         "tunneldb qgis demo-2024 --database --images /srv/tunnels/demo-2024",
@@ -83,7 +83,7 @@ def qgis(
             written.append(f"project {name or found.name} in public.qgis_projects")
         styles = _store_styles(conn)
         socket = conn.info.host.startswith("/")
-    tell(survey=survey, written=written, images=images, styles=styles)
+    add_to_json(survey=survey, written=written, images=images, styles=styles)
     if coverage is not None:
         say_coverage(coverage, found)
     if spots.statement and (found.site or spots.face_area):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 UP = {"+z": 1, "-z": -1}
 
 
-@verb(
+@command(
     examples=[
         "tunneldb register canal-26 mss-1.xyz mss-2.xyz --ladders ladders.csv --up +z --water-level 265.0",
         "tunneldb register canal-26 mss-*.xyz --ladders ladders.csv --up -z --water-level 265.0 --report registration.md",
@@ -113,7 +113,7 @@ def _speeds(text: str | None) -> tuple[float, float] | None:
 
 
 def _tell(survey: str, found: Registration) -> None:
-    tell(
+    add_to_json(
         survey=survey,
         scans=[_scan(scan) for scan in found.scans],
         ladders=found.ladders,

@@ -11,7 +11,7 @@ import psycopg
 
 from tunneldb.cli.coverage import say_coverage
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, printable, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify, printable
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
@@ -33,7 +33,7 @@ _START = 3.0  # time in which a browser starts, s
 _PRINTING = 1.2  # time in which it prints a page as a multiple of that in which the page was written, as seen on 0.2 and 25 km
 
 
-@verb(
+@command(
     examples=[
         "tunneldb report demo-2024 -o report.html",
         "tunneldb report demo-2024 -o part.pdf --from 12+300 --to 12+350",
@@ -116,8 +116,8 @@ def report(
                     conn.close()  # a browser may take minutes
                     _print(browser, page, temporary, shown)
     leaks, missing = written.leaks, [photo.photo.path for photo in written.missing]
-    tell(survey=survey, file=output, leaks=leaks, findings=written.findings, bytes=output.stat().st_size)
-    tell(missing_photos=missing)
+    add_to_json(survey=survey, file=output, leaks=leaks, findings=written.findings, bytes=output.stat().st_size)
+    add_to_json(missing_photos=missing)
     say_coverage(coverage, found)
     for photo in written.missing:
         notify(printable(f"finding {photo.photo.finding_id}: photo {photo.photo.path}: {photo.trouble}"))
@@ -142,7 +142,7 @@ def _write_site(
                 shown.update(task, completed=1)
                 conn.close()
                 _print(browser, page, temporary, shown)
-    tell(survey=survey.name, file=output, spots=spots, bytes=output.stat().st_size)
+    add_to_json(survey=survey.name, file=output, spots=spots, bytes=output.stat().st_size)
     notify(f"{output}: {counted(spots, 'spot')}")
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
 from tunneldb.cli.stretch import stretch_options
 from tunneldb.cli.tables import print_table
@@ -24,7 +24,7 @@ _END = r"(\d{1,3}(?:\.\d+)?|\d{1,2}:\d\d)"
 _CHORD = re.compile(f"{_END}-{_END}")
 
 
-@verb(
+@command(
     examples=[
         "tunneldb rings demo-2024 --find",
         "tunneldb rings demo-2024 --length 1.5 --diameter 8 --chord 9:00-3:00 -o rings.csv",
@@ -139,13 +139,13 @@ def rings(
     _tell(found, output)
     text = rings_csv(found, harmonics, lines)
     if output is None:
-        tell(rows=ring_records(found, harmonics, lines))
+        add_to_json(rows=ring_records(found, harmonics, lines))
         click.echo(text, nl=False)
     else:
         with replacing(output) as temporary:
             temporary.write_text(text, encoding="utf-8")
         print_table(("", *SUMMARY), summary(found), right=(1, 2, 3, 4, 5))
-        click.echo(_said(found))
+        click.echo(_summary(found))
     for note in found.notes:
         notify(note)
 
@@ -208,7 +208,7 @@ def _degrees(end: str, text: str) -> float:
 
 
 def _tell(found: SurveyedRings, output: Path | None) -> None:
-    tell(
+    add_to_json(
         rings=len(found.rows),
         measured=sum(row.ring is not None for row in found.rows),
         remarks={row.name: "; ".join(row.remarks) for row in found.rows if row.remarks},
@@ -219,7 +219,7 @@ def _tell(found: SurveyedRings, output: Path | None) -> None:
     )
 
 
-def _said(found: SurveyedRings) -> str:
+def _summary(found: SurveyedRings) -> str:
     measured = sum(row.ring is not None for row in found.rows)
     remarks = sum(bool(row.remarks) for row in found.rows)
     source = "given" if found.sigma_given else "estimated from all rings"

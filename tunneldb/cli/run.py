@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.progress import bar, say
 from tunneldb.cli.stage_sentence import stage_sentence
 from tunneldb.counted import counted
@@ -33,7 +33,7 @@ def parameter_table(names: Iterable[str] = PARAMETERS) -> str:
     return "\n".join(f"  {name:<{width}}  {p.text} [{f'{p.default:g} {p.unit}'.rstrip()}]" for name, p in chosen.items())
 
 
-@verb(
+@command(
     epilog="\b\nParameters for --set, with their defaults:\n" + parameter_table(),
     examples=[
         "tunneldb run ringo-2024",
@@ -86,7 +86,7 @@ def run(
         if not tasks:
             click.echo(f"nothing of {survey} is stale")
         shown = _Shown(len(tasks))
-        tell(survey=survey, stages=shown.stages)
+        add_to_json(survey=survey, stages=shown.stages)
         with shown.progress:
             run_tasks(conn, found, tasks, shown.begin, shown.end)
         if any(task.stage.name == "detect" for task in tasks):
@@ -127,7 +127,7 @@ def _say_result(conn: psycopg.Connection[Any], survey: Survey) -> None:
         click.echo(f"no leaks were sought; the lining: tunneldb image {survey.name}, tunneldb qgis {survey.name} -o FILE.qgz")
         return
     leaks, area = sum_leaks(conn, survey)
-    tell(leaks=leaks, wet_area=area)
+    add_to_json(leaks=leaks, wet_area=area)
     if (statement := read_coverage(conn, survey).statement) is not None:
         notify(statement)
     click.echo(f"{survey.name}: {counted(leaks, 'leak')}, {area:.2f} m²: tunneldb leaks {survey.name}")

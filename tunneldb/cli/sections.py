@@ -8,13 +8,13 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.measure import every_option, number, output_option, require_ending, say_written, surveys_in, write_rows
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli.stretch import stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.errors import UserError
 
 
-@verb(examples=["tunneldb sections ringo-2024 --every 20", "tunneldb sections ringo-2024 --from 511+700 -o sections.xlsx"])
+@command(examples=["tunneldb sections ringo-2024 --every 20", "tunneldb sections ringo-2024 --from 511+700 -o sections.xlsx"])
 @click.argument("survey")
 @stretch_options
 @every_option(10.0, "Distance between listed sections, m.")
@@ -35,7 +35,7 @@ def sections(settings: Settings, survey: str, start: str | None, end: str | None
         rows = dimension_rows(conn, found, part.low, part.high, every)
     if not rows:
         raise UserError(f"survey {survey} has no section there: tunneldb status {survey}")
-    tell(survey=survey, every=every, sections=rows)
+    add_to_json(survey=survey, every=every, sections=rows)
     files: list[Path] = []
     if output is not None and output.suffix.lower() == ".xlsx":
         with replacing(output) as temporary:

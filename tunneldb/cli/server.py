@@ -5,12 +5,12 @@ from __future__ import annotations
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import VerbGroup, notify, tell
+from tunneldb.cli.output import CommandGroup, add_to_json, notify
 from tunneldb.database.server import Server
 from tunneldb.errors import UserError
 
 
-@click.group(cls=VerbGroup)
+@click.group(cls=CommandGroup)
 @click.pass_obj
 def server(settings: Settings) -> None:
     """Start, stop or inspect the embedded server.
@@ -25,7 +25,7 @@ def server(settings: Settings) -> None:
 def start() -> None:
     """Start it, and print its DSN."""
     dsn = Server().start()
-    tell(dsn=dsn)
+    add_to_json(dsn=dsn)
     click.echo(dsn)
 
 
@@ -34,7 +34,7 @@ def stop() -> None:
     """Stop it; running transactions of other commands are rolled back."""
     embedded = Server()
     stopped = embedded.stop()
-    tell(stopped=stopped, folder=embedded.folder)
+    add_to_json(stopped=stopped, folder=embedded.folder)
     notify(f"{'stopped' if stopped else 'was not running'}: {embedded.folder}")
 
 
@@ -43,10 +43,10 @@ def status() -> None:
     """Print its state and the place of its data."""
     embedded = Server()
     state = embedded.state()
-    tell(state=state, folder=embedded.folder)
+    add_to_json(state=state, folder=embedded.folder)
     click.echo(f"{state}: {embedded.folder}")
     if state == "absent":
         return
     home = embedded.home()
-    tell(data=home.cluster, log=home.log, socket=home.run)
+    add_to_json(data=home.cluster, log=home.log, socket=home.run)
     click.echo(f"data: {home.cluster}\nlog: {home.log}\nsocket: {home.run}")

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import click
 
-from tunneldb.cli.output import Verb, tell, verb
+from tunneldb.cli.output import Command, add_to_json, command
 from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.cli.simulate_options import NAME, SEED_NUMBER, SRID, parameter_option
@@ -208,7 +208,7 @@ _FLAGS = {
 }
 
 
-class _GroupedVerb(Verb):
+class _GroupedCommand(Command):
     """A command that lists its options under headings."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -235,8 +235,8 @@ def _options(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-@verb(
-    cls=_GroupedVerb,
+@command(
+    cls=_GroupedCommand,
     examples=[
         "tunneldb simulate demo --preset demo",
         "tunneldb simulate out --name bend --section horseshoe --length 100 --radius 300 --slope 4",
@@ -302,7 +302,7 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
 
         files = write(simulation, out, truth=not no_truth, progress=scanned)
     area = sum(leak.area for leak in simulation.leaks)
-    tell(points=files.points, leaks=len(simulation.leaks), leak_area=area, files=files)
+    add_to_json(points=files.points, leaks=len(simulation.leaks), leak_area=area, files=files)
     click.echo(
         f"{files.points:,} points, {counted(len(simulation.leaks), 'leak')} of {area:.2f} m²: "
         + ", ".join(str(p) for p in files.clouds)

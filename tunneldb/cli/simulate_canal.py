@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import say
 from tunneldb.cli.simulate_options import NAME, SEED_NUMBER, SRID, parameter_option
@@ -19,7 +19,7 @@ from tunneldb.simulate.canal import CanalParameters, simulate, write
 _option = partial(parameter_option, CanalParameters)
 
 
-@verb(
+@command(
     name="simulate-canal",
     examples=[
         "tunneldb simulate-canal out",
@@ -76,7 +76,7 @@ def simulate_canal(out: Path, **given: Any) -> None:
         scene = simulate(parameters, lambda what: say(f"scanned: {what}", err=True))
         files = write(scene, out)
     below = sum(len(scan.points) for scan in scene.sonar)
-    tell(points=len(scene.laser), sonar_points=below, files=files)
+    add_to_json(points=len(scene.laser), sonar_points=below, files=files)
     click.echo(
         f"{len(scene.laser):,} points above the water, {below:,} below it in {counted(len(scene.sonar), 'scan')}: {files.laser}"
     )

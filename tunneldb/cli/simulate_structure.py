@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli.param_types import FINITE, FilePath
 from tunneldb.cli.progress import bar
 from tunneldb.cli.simulate_options import NAME, SEED_NUMBER, SRID, parameter_option
@@ -18,7 +18,7 @@ from tunneldb.simulate.structure import StructureParameters, StructureScan, writ
 _option = partial(parameter_option, StructureParameters)
 
 
-@verb(
+@command(
     name="simulate-structure",
     examples=[
         "tunneldb simulate-structure out",
@@ -67,7 +67,7 @@ def simulate_structure(out: Path, **given: Any) -> None:
         task = progress.add_task(f"scanning {scan.parameters.name}", total=None)
         files = write_structure(scan, out, lambda points: progress.update(task, completed=points))
     counts = {"points": files.points, "faces": len(scan.structure.faces), "anomalies": len(scan.anomalies)}
-    tell(**counts, files=files)
+    add_to_json(**counts, files=files)
     click.echo(
         f"{files.points:,} points, {counted(counts['faces'], 'face')},"
         f" {counted(counts['anomalies'], 'anomaly', 'anomalies')}: {files.cloud}"

@@ -6,7 +6,7 @@ import click
 from rich.filesize import decimal
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, records, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify, records
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.store.listing import list_sizes
@@ -15,7 +15,7 @@ from tunneldb.store.survey import get_survey
 KINDS = ("points", "images", "sections", "results", "runs", "inputs")
 
 
-@verb("sizes", examples=["tunneldb survey sizes", "tunneldb survey sizes ringo-2024 --json"])
+@command("sizes", examples=["tunneldb survey sizes", "tunneldb survey sizes ringo-2024 --json"])
 @click.argument("name", required=False, metavar="[SURVEY]")
 @click.pass_obj
 def sizes(settings: Settings, name: str | None) -> None:
@@ -28,7 +28,7 @@ def sizes(settings: Settings, name: str | None) -> None:
         survey_id = None if name is None else get_survey(connection, name, site=True).id
         rows, database = list_sizes(connection, survey_id)
     names = ("survey", "kind", "rows", "bytes", "estimated")
-    tell(sizes=records(names, rows), database_bytes=database)
+    add_to_json(sizes=records(names, rows), database_bytes=database)
     table: dict[str | None, dict[str, tuple[int, bool]]] = {}
     for survey, kind, _, size, estimated in rows:
         there, about = table.setdefault(survey, {}).get(kind, (0, False))

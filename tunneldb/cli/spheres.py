@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
@@ -16,7 +16,7 @@ from tunneldb.errors import UserError
 from tunneldb.store.survey import get_survey
 
 
-@verb(
+@command(
     examples=[
         "tunneldb spheres ringo-2024 --radius 0.0725",
         "tunneldb spheres ringo-2024 --radius 0.0725 --control control.csv --report spheres.md",
@@ -97,8 +97,8 @@ def spheres(
         stationing = load_stationing(conn, chosen.tunnel_id)
     comparison = compare(found.spheres, points, within) if points else None
     count = len({row.number for row in found.spheres})
-    tell(survey=survey, count=count, spheres=found.spheres, others=len(found.refusals), points=found.points)
-    tell(comparison=comparison, file=report)
+    add_to_json(survey=survey, count=count, spheres=found.spheres, others=len(found.refusals), points=found.points)
+    add_to_json(comparison=comparison, file=report)
     if found.spheres:
         print_table(HEADER, sphere_rows(found.spheres, stationing), right=(0, 1, 3, 4, 5, 6, 7, 8, 9, 10))
     click.echo(f"{count} target spheres, seen {len(found.spheres)} times; {len(found.refusals)} other round things")

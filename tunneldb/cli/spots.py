@@ -9,7 +9,7 @@ import click
 
 from tunneldb.cli.coverage import say_no_crs
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.param_types import FilePath, FiniteRange
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.database import connect
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tunneldb.store.spots import Geometry, SpotList
 
 
-@verb(
+@command(
     examples=[
         "tunneldb spots hall-2024",
         "tunneldb spots hall-2024 --kind dark --min-area 0.01 -o spots.gpkg --geometry 3d",
@@ -82,8 +82,8 @@ def spots(
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey, site=True)
         listed = read_spots(conn, found, chosen, SpotSelection(cast(Kind, kind), min_area, min_confidence))
-    tell(survey=survey, statement=listed.statement, count=listed.count, area=listed.area, face_area=listed.face_area)
-    tell(seen_area=listed.seen_area, geometry=geometry, spots=listed.rows, file=output)
+    add_to_json(survey=survey, statement=listed.statement, count=listed.count, area=listed.area, face_area=listed.face_area)
+    add_to_json(seen_area=listed.seen_area, geometry=geometry, spots=listed.rows, file=output)
     if form == "geojson" and chosen != "face":
         say_no_crs(found.srid)
     if listed.statement:

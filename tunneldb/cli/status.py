@@ -11,7 +11,7 @@ import psycopg
 from rich.console import Console
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import printable, records, tell, verb, wants_json
+from tunneldb.cli.output import add_to_json, command, printable, records, wants_json
 from tunneldb.cli.param_types import FiniteRange
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -25,7 +25,7 @@ AT_ONCE = 50
 """Surveys whose stages are asked for together: of more, what is reckoned of them leaves the processor's cache."""
 
 
-@verb(examples=["tunneldb status", "tunneldb status pajares-2026 --watch", "tunneldb status pajares-2026 --json"])
+@command(examples=["tunneldb status", "tunneldb status pajares-2026 --watch", "tunneldb status pajares-2026 --json"])
 @click.argument("survey", required=False)
 @click.option("--watch", is_flag=True, help="Refresh until nothing is left to do, or Ctrl-C.")
 @click.option(
@@ -73,7 +73,9 @@ def _all(connection: psycopg.Connection[Any]) -> None:
     """Print a line for each survey: loaded data, and the number of kilometres that each stage has done."""
     rows = list_progress(connection, STAGE_NAMES, AT_ONCE)
     names = ("name", "tunnel", "date", "files", "points", "label_from", "label_to", "kilometres", "done")
-    tell(surveys=[row | {"done": dict(zip(STAGE_NAMES, row["done"] or (), strict=False))} for row in records(names, rows)])
+    add_to_json(
+        surveys=[row | {"done": dict(zip(STAGE_NAMES, row["done"] or (), strict=False))} for row in records(names, rows)]
+    )
     table = [[*fixed, there, *(done or [None] * len(STAGE_NAMES))] for *fixed, there, done in rows]
     print_table(
         ["survey", "tunnel", "date", "files", "points", "from", "to", "km", *STAGE_NAMES],
@@ -89,7 +91,7 @@ def _one(connection: psycopg.Connection[Any], survey: str) -> None:
     from tunneldb.queue.progress import overview
 
     seen = overview(connection, survey)
-    tell(**{field.name: getattr(seen, field.name) for field in dataclasses.fields(seen)})
+    add_to_json(**{field.name: getattr(seen, field.name) for field in dataclasses.fields(seen)})
     rows = describe_survey(connection, survey)
     print_table(["survey", "tunnel", "date", "files", "points", "from", "to"], rows, right=(3, 4, 5, 6))
     if seen.kilometres or seen.files:
@@ -99,7 +101,7 @@ def _one(connection: psycopg.Connection[Any], survey: str) -> None:
         click.echo()
         console.print(render(seen))
     remarks = read_remarks(connection, get_survey(connection, survey, site=True))
-    tell(remarks=remarks)
+    add_to_json(remarks=remarks)
     if remarks:
         click.echo()
     for remark in remarks:

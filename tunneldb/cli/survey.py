@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import VerbGroup, notify, records, tell
+from tunneldb.cli.output import CommandGroup, add_to_json, notify, records
 from tunneldb.cli.param_types import FINITE, FilePath, file_path
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.sizes import sizes
@@ -26,7 +26,7 @@ from tunneldb.store.survey import UNPOSED, get_survey
 FILE = FilePath()
 
 
-@click.group(cls=VerbGroup)
+@click.group(cls=CommandGroup)
 def survey() -> None:
     """Add, list, change, export, import or remove surveys of a tunnel, and remove files."""
 
@@ -148,7 +148,7 @@ def add(
             units=_units(unit, height_unit, no_poses),
         )
     notes = [*positions.notes, *([UNPOSED] if no_poses and intensity is not None else [])]
-    tell(survey=name, tunnel=tunnel, date=date.date(), poses=len(positions), notes=notes)
+    add_to_json(survey=name, tunnel=tunnel, date=date.date(), poses=len(positions), notes=notes)
     known = "no scanner positions" if no_poses else f"{len(positions)} {'poses' if trajectory else 'stations'}"
     notify(f"{name}: {known} of {tunnel}, {date:%Y-%m-%d}")
     for note in notes:
@@ -224,7 +224,7 @@ def set_(
         notes.append(f"{reload} of its files have to be loaded again: tunneldb load {name} FILE...")
     if stale:
         notes.append(f"{stale} stages are stale: tunneldb run {name} --stale")
-    tell(survey=name, notes=notes, reload=reload, stale=stale)
+    add_to_json(survey=name, notes=notes, reload=reload, stale=stale)
     notify(f"{name}: set")
     for note in notes:
         notify(f"{name}: {note}")
@@ -264,7 +264,7 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
         if found.site:
             connection.rollback()
             remove_site_files(connection, found, names)
-            tell(survey=name, files=names)
+            add_to_json(survey=name, files=names)
             notify(f"{name}: removed {', '.join(names)}; find its members anew: tunneldb members {name}")
             return
         emptied, work = work_at_stake(connection, found, names)
@@ -281,7 +281,7 @@ def remove_file(settings: Settings, name: str, files: tuple[Path, ...], yes: boo
         with bar("points") as progress:
             removed = remove_files(connection, found, names, step(progress))
         stale = count_stale(connection, found.id)
-    tell(
+    add_to_json(
         survey=name,
         files=names,
         reread=removed.reread,
@@ -315,7 +315,7 @@ def list_(settings: Settings) -> None:
     names = (
         "name", "tunnel", "date", "platform", "intensity_kind", "files", "points", "label_from", "label_to",
     )  # fmt: skip
-    tell(surveys=records(names, rows))
+    add_to_json(surveys=records(names, rows))
     header = ["survey", "tunnel", "date", "platform", "intensity", "files", "points", "from", "to"]
     print_table(header, rows, right=(5, 6, 7, 8))
 
@@ -338,7 +338,7 @@ def remove(settings: Settings, name: str, yes: bool) -> None:
         if not yes and not click.confirm(question, err=True):
             raise click.Abort
         remove_survey(connection, name)
-    tell(survey=name, points=held.points, anomalies=held.findings, reviewed=held.reviewed)
+    add_to_json(survey=name, points=held.points, anomalies=held.findings, reviewed=held.reviewed)
 
 
 def _areas(count: int) -> str:

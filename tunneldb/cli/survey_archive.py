@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.counted import counted
@@ -16,7 +16,7 @@ from tunneldb.files import exit_on_sigterm
 from tunneldb.store.survey import get_survey
 
 
-@verb("export", examples=["tunneldb survey export ringo-2024 -o ringo-2024.tdb"])
+@command("export", examples=["tunneldb survey export ringo-2024 -o ringo-2024.tdb"])
 @click.argument("name", metavar="SURVEY")
 @click.option("--output", "-o", type=FilePath(), required=True, help="File to write, such as ringo-2024.tdb.")
 @click.pass_obj
@@ -31,7 +31,7 @@ def export(settings: Settings, name: str, output: Path) -> None:
 
     with exit_on_sigterm(), connect(settings.dsn) as connection, bar("bytes") as progress:
         saved = save_survey(connection, get_survey(connection, name, site=True), output, step(progress))
-    tell(survey=name, file=output, bytes=saved.bytes, kilometres=saved.kilometres, rows=saved.rows)
+    add_to_json(survey=name, file=output, bytes=saved.bytes, kilometres=saved.kilometres, rows=saved.rows)
     notify(
         f"{name}: {sum(saved.rows.values())} rows of {sum(map(bool, saved.rows.values()))} tables, {saved.rows.get('point', 0)}"
         f" of them points in {counted(len(saved.kilometres), 'kilometre')}: {output}, {saved.bytes / 1e6:.1f} MB"
@@ -39,7 +39,7 @@ def export(settings: Settings, name: str, output: Path) -> None:
     notify(f"{name}: to free its room in the database: tunneldb survey remove {name}")
 
 
-@verb(
+@command(
     "import",
     examples=[
         "tunneldb survey import ringo-2024.tdb",
@@ -64,7 +64,7 @@ def import_(settings: Settings, file: Path, name: str | None) -> None:
     if loaded.left_out:
         listed = ", ".join(f"{count} of {table}" for table, count in sorted(loaded.left_out.items()))
         notes.append(f"left out are comparisons with surveys that are not in this database: {listed}")
-    tell(
+    add_to_json(
         survey=loaded.survey,
         tunnel=loaded.tunnel,
         new_tunnel=loaded.new_tunnel,

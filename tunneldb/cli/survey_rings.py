@@ -11,7 +11,7 @@ import psycopg
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.measure import number, surveys_in, with_progress
-from tunneldb.cli.output import notify, tell
+from tunneldb.cli.output import add_to_json, notify
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.counted import counted
@@ -70,9 +70,9 @@ def survey_rings(
         rows = ring_rows(conn, survey, part.low, part.high)
         if not rows:
             raise UserError(f"survey {name} has no rings there: say where they lie, by --length, --rings or --find")
-        tell(survey=name, made=made, rings=len(rows), file=output)
+        add_to_json(survey=name, made=made, rings=len(rows), file=output)
         if output is None:
-            tell(rows=rows)
+            add_to_json(rows=rows)
         else:
             with replacing(output) as temporary:
                 if output.suffix.lower() == ".gpkg":
@@ -92,7 +92,7 @@ def _define(conn: psycopg.Connection[Any], survey: Survey, definition: Definitio
         conn.rollback()
         define_rings(conn, survey, rings, "found")
         missing = int((~joints.seen).sum())
-        tell(pitch=joints.pitch, pitch_se=joints.pitch_se, joints=len(joints.seen), joints_missing=missing)
+        add_to_json(pitch=joints.pitch, pitch_se=joints.pitch_se, joints=len(joints.seen), joints_missing=missing)
         notify(
             f"rings of {joints.pitch:.4f} m (± {1e3 * joints.pitch_se:.1f} mm);"
             f" {counted(len(joints.seen), 'joint')}, {missing} of them not seen"
@@ -138,8 +138,8 @@ def _print(rows: list[Row], output: Path | None) -> None:
         said += f"; of {unseen} nothing is seen"
     click.echo(said)
     if told:
-        whence = {"option": "--diameter", "profile": "the design profile", "ring": "each ring's own mean"}
-        kinds = sorted({whence[row["diameter_from"]] for row in told})
+        sources = {"option": "--diameter", "profile": "the design profile", "ring": "each ring's own mean"}
+        kinds = sorted({sources[row["diameter_from"]] for row in told})
         click.echo(f"ovality is a share of the diameter of {' and '.join(kinds)}")
     if output is not None:
         notify(f"written to {output}")

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from tunneldb.arrays import Int64
 from tunneldb.classification.classes import PointClass
-from tunneldb.cli.output import printable, tell
+from tunneldb.cli.output import add_to_json, printable
 from tunneldb.errors import UserError
 
 _BY_SUFFIX = {".csv": "csv", ".geojson": "geojson", ".json": "geojson", ".gpkg": "gpkg", ".xlsx": "xlsx", ".txt": "table"}
@@ -61,7 +61,7 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[Any]], right: Seq
 def print_classes(counts: Int64) -> None:
     """Print a table of the classes that points (256,) have, and tell of them."""
     total = int(counts.sum())
-    tell(points=total, classes={klass.name.lower(): int(counts[klass]) for klass in PointClass if counts[klass]})
+    add_to_json(points=total, classes={klass.name.lower(): int(counts[klass]) for klass in PointClass if counts[klass]})
     rows = [
         (int(klass), klass.name.lower(), f"{int(counts[klass]):,}".replace(",", " "), f"{100.0 * counts[klass] / total:.2f} %")
         for klass in PointClass

@@ -20,14 +20,14 @@ from tunneldb.cli.measure import (
     with_progress,
     write_rows,
 )
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli.param_types import FiniteRange
 from tunneldb.cli.stretch import stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.errors import UserError
 
 
-@verb(
+@command(
     examples=[
         "tunneldb thickness excavation-2024 shotcrete-2024 --layer shotcrete --minimum 0.2",
         "tunneldb thickness ringo-2024 ringo-2025 --axis-sigma 0.005 -o thickness.csv",
@@ -70,9 +70,9 @@ def thickness(
         if not rows:
             raise UserError(f"surveys {before} and {after} have no common section there that was compared with layer {layer}")
         sections = section_rows(conn, old, new, layer, part.low, part.high)
-    tell(before=before, after=after, layer=layer, made=made, minimum=minimum, axis_sigma=axis_sigma, stretches=rows)
+    add_to_json(before=before, after=after, layer=layer, made=made, minimum=minimum, axis_sigma=axis_sigma, stretches=rows)
     if output is None:
-        tell(sections=sections)
+        add_to_json(sections=sections)
     files = [] if output is None else write_rows(output, COLUMNS, sections)
     print_table(
         ["from", "length m", "compared %", "volume m³", "±", "mean m", "least m", *(["thinner m²"] if minimum else [])],

@@ -9,7 +9,7 @@ import click
 
 from tunneldb.alignment.units import UNITS
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import VerbGroup, notify, records, tell
+from tunneldb.cli.output import CommandGroup, add_to_json, notify, records
 from tunneldb.cli.param_types import FINITE, FilePath, file_path
 from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.cli.tables import print_table
@@ -47,7 +47,7 @@ class Srid(click.ParamType[int]):
         return number
 
 
-@click.group(cls=VerbGroup)
+@click.group(cls=CommandGroup)
 def tunnel() -> None:
     """Add, list or remove tunnels; set their stationing."""
 
@@ -195,7 +195,7 @@ def add(
             _keep(found, axis_out or Path(f"{name}.found-axis.csv"), None, line.start, name)
     place = outside_area(srid, given.xyz[:, :2])
     notes = (*given.notes, place) if place else given.notes
-    tell(
+    add_to_json(
         tunnel=name,
         srid=srid,
         chainage_from=line.start,
@@ -210,7 +210,7 @@ def add(
     notify(f"chainage grows over {describe_line(given.xyz)}{turn}")
     if given.design is not None:
         plan, profiles = len(given.design.plan), len(given.design.profile)
-        tell(plan_elements=plan, profile_elements=profiles)
+        add_to_json(plan_elements=plan, profile_elements=profiles)
         notify(f"{given.source}: {counted(plan, 'element')} in plan, {profiles} in profile")
     for note in notes:
         notify(f"{axis}: {note}")
@@ -225,7 +225,7 @@ def _add_site(settings: Settings, name: str, srid: int, given: set[Any]) -> None
     with connect(settings.dsn) as connection:
         tell_warnings(connection)
         add_site(connection, name, srid)
-    tell(tunnel=name, srid=srid, site=True)
+    add_to_json(tunnel=name, srid=srid, site=True)
     notify(f"{name}: a site, without an axis")
 
 
@@ -287,7 +287,7 @@ def _keep(found: FoundAxis, path: Path, picture: Path | None, start: float, titl
         write_axis(written, found.xyz)
         write_found(found, drawn, start, title)
     lines = describe_found(found, start)
-    tell(
+    add_to_json(
         axis=path, picture=picture, length=found.length, width=found.width, height=found.height, sections=len(found.whole),
         whole_sections=int(found.whole.sum()), doubtful=found.doubtful, says=lines,
     )  # fmt: skip
@@ -320,7 +320,7 @@ def stationing(settings: Settings, name: str, file: Path | None, show: bool, cle
             save_equations(connection, tunnel_id, read_equations(file) if file else [])
         rows = list_station_pieces(connection, tunnel_id)
     names = ("chainage_from", "chainage_to", "label_from", "label_to", "direction")
-    tell(tunnel=name, pieces=records(names, rows))
+    add_to_json(tunnel=name, pieces=records(names, rows))
     print_table(["chainage from", "to", "station from", "to", "runs"], rows, right=(0, 1, 2, 3))
 
 
@@ -332,7 +332,7 @@ def list_(settings: Settings) -> None:
 
     with connect(settings.dsn) as connection:
         rows = list_tunnels(connection)
-    tell(tunnels=records(("name", "srid", "label_from", "length", "spacing", "surveys"), rows))
+    add_to_json(tunnels=records(("name", "srid", "label_from", "length", "spacing", "surveys"), rows))
     shown = [(name, "local" if srid == LOCAL else srid, *others) for name, srid, *others in rows]
     print_table(["tunnel", "SRID", "starts at", "length m", "spacing m", "surveys"], shown, right=(1, 2, 3, 4, 5))
 
@@ -347,4 +347,4 @@ def remove(settings: Settings, name: str) -> None:
     with connect(settings.dsn) as connection:
         tell_warnings(connection)
         remove_tunnel(connection, name)
-    tell(tunnel=name)
+    add_to_json(tunnel=name)

@@ -10,7 +10,7 @@ import click
 import numpy as np
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import records, tell, verb
+from tunneldb.cli.output import add_to_json, command, records
 from tunneldb.cli.param_types import FilePath
 from tunneldb.database import connect
 from tunneldb.errors import UserError
@@ -20,7 +20,7 @@ _SPACE = ("x", "y", "z")
 _PLANE = ("chainage", "arc", "offset")
 
 
-@verb(examples=["tunneldb unroll ringo-2024 points.csv -o unrolled.csv", "tunneldb unroll ringo-2024 niches.csv --inverse"])
+@command(examples=["tunneldb unroll ringo-2024 points.csv -o unrolled.csv", "tunneldb unroll ringo-2024 niches.csv --inverse"])
 @click.argument("survey")
 @click.argument("points", type=FilePath(dir_okay=False))
 @click.option("-o", "--output", type=FilePath(dir_okay=False), help="File to write, else standard output.")
@@ -54,9 +54,9 @@ def unroll(settings: Settings, survey: str, points: Path, output: Path | None, i
     table = [[*header, *added]]
     for row, values in zip(rows, result.tolist(), strict=True):
         table.append([*row, *("" if value != value else f"{value:.4f}" for value in values)])
-    tell(survey=survey, points=len(rows), off_tunnel=sum(row[-1] == "" for row in table[1:]), file=output)
+    add_to_json(survey=survey, points=len(rows), off_tunnel=sum(row[-1] == "" for row in table[1:]), file=output)
     if output is None:
-        tell(rows=records(table[0], table[1:]))
+        add_to_json(rows=records(table[0], table[1:]))
         csv.writer(sys.stdout, lineterminator="\n").writerows(table)
     else:
         with replacing(output) as path, path.open("w", newline="", encoding="utf-8") as stream:

@@ -6,7 +6,7 @@ import click
 from rich.filesize import decimal
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import notify, tell, verb
+from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
@@ -15,7 +15,7 @@ SHOWN = 20
 """Tables that are listed; the rest, which take less, are summed: there is one of each kilometre."""
 
 
-@verb(examples=["tunneldb vacuum", "tunneldb vacuum --yes"])
+@command(examples=["tunneldb vacuum", "tunneldb vacuum --yes"])
 @click.option("--yes", is_flag=True, help="Do it; without it, only show.")
 @click.pass_obj
 def vacuum(settings: Settings, yes: bool) -> None:
@@ -39,7 +39,7 @@ def vacuum(settings: Settings, yes: bool) -> None:
     others = [f"{t.schema}.{t.table}" for t in tables if not t.allowed]
     waiting = [f"{t.schema}.{t.table}" for t in busy]
     freed = sum(t.dead_bytes for t in tables)
-    tell(tables=tables, dead=sum(t.dead for t in tables), dead_bytes=freed, done=yes, locked=waiting, not_owned=others)
+    add_to_json(tables=tables, dead=sum(t.dead for t in tables), dead_bytes=freed, done=yes, locked=waiting, not_owned=others)
     if not tables:
         notify("nothing to vacuum")
     elif not yes:

@@ -10,14 +10,14 @@ import click
 import psycopg
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import tell, verb
+from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli.progress import bar
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.queue.watching import ask_workers_to_stop, count_jobs, server_time, workers_left
 
 
-@verb(examples=["tunneldb worker --concurrency 8"])
+@command(examples=["tunneldb worker --concurrency 8"])
 @click.option(
     "--concurrency", type=click.IntRange(1, 1000), default=1, show_default=True, metavar="N", help="Number of parallel jobs."
 )
@@ -52,7 +52,7 @@ def worker(settings: Settings, concurrency: int, threads: int) -> None:
                 progress.update(task, completed=done, total=done + left or None)
                 looked = time.monotonic()
             time.sleep(0.2)
-    tell(jobs=jobs.count()[0])
+    add_to_json(jobs=jobs.count()[0])
 
 
 class _Jobs:
@@ -73,7 +73,7 @@ class _Jobs:
         return self.seen
 
 
-@verb(examples=["tunneldb stop --wait"])
+@command(examples=["tunneldb stop --wait"])
 @click.option("--wait", is_flag=True, help="Wait until all have exited.")
 @click.pass_obj
 def stop(settings: Settings, wait: bool) -> None:
@@ -81,7 +81,7 @@ def stop(settings: Settings, wait: bool) -> None:
     with connect(settings.dsn) as conn:
         conn.autocommit = True
         asked = ask_workers_to_stop(conn)
-        tell(workers=len(asked))
+        add_to_json(workers=len(asked))
         click.echo(f"{len(asked)} worker{'s' * (len(asked) != 1)} asked to stop")
         while wait and workers_left(conn, asked):
             time.sleep(0.5)

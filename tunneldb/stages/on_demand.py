@@ -70,7 +70,7 @@ def refuse_beyond(conn: psycopg.Connection[Any], survey: Survey, low: float, hig
         raise UserError(f"survey {survey.name} has no data there: it extends from chainage {ends[0]:.3f} to {ends[1]:.3f} m")
 
 
-def refuse_wrong_pair(conn: psycopg.Connection[Any], one: Survey, other: Survey, verb: str) -> None:
+def refuse_wrong_pair(conn: psycopg.Connection[Any], one: Survey, other: Survey, command: str) -> None:
     """Refuse a pair that is one survey or a copy of it, surveys of two tunnels, or the older one in place of the newer.
 
     Surveys of one day may be given in either order.
@@ -81,21 +81,21 @@ def refuse_wrong_pair(conn: psycopg.Connection[Any], one: Survey, other: Survey,
         If they are.
     """
     if one.id == other.id:
-        raise UserError(f"survey {one.name} is given twice: {verb} needs two surveys of one tunnel")
+        raise UserError(f"survey {one.name} is given twice: {command} needs two surveys of one tunnel")
     if one.date > other.date:
         raise UserError(
             f"survey {one.name} is of {one.date}, {other.name} of {other.date}: the older survey comes first, or all changes"
-            f" would have the wrong sign: tunneldb {verb} {other.name} {one.name}; if a date is wrong:"
+            f" would have the wrong sign: tunneldb {command} {other.name} {one.name}; if a date is wrong:"
             " tunneldb survey set SURVEY --date YYYY-MM-DD"
         )
     pair = "SELECT FROM tunnel_internal.survey_copy WHERE survey_id = ANY (%(ids)s) AND of_id = ANY (%(ids)s)"
     if conn.execute(pair, {"ids": [one.id, other.id]}).fetchone() is not None:
         raise UserError(
             f"surveys {one.name} and {other.name} are the same scan, one is from an archive of the other:"
-            f" {verb} needs two scans of one tunnel"
+            f" {command} needs two scans of one tunnel"
         )
     if one.tunnel_id != other.tunnel_id:
         raise UserError(
-            f"survey {one.name} is of tunnel {one.tunnel}, {other.name} of {other.tunnel}: {verb} needs two surveys of one"
+            f"survey {one.name} is of tunnel {one.tunnel}, {other.name} of {other.tunnel}: {command} needs two surveys of one"
             " tunnel"
         )

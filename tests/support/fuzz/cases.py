@@ -64,7 +64,7 @@ OF_FILES: tuple[tuple[str, str], ...] = (
     ("stations.csv", "members {seeds}/cloud.las --stations {file} --intensity intensity --intensity-kind linear -o {out}.gpkg"),
     ("template.toml", "report demo-2024 --template {file} -o {out}.html"),
 )
-"""Files, and what reads them: each verb and option that takes a file is among them."""
+"""Files, and what reads them: each command and option that takes a file is among them."""
 
 OF_WORDS: tuple[str, ...] = (
     "tunnel list", "tunnel add {new} --srid 25830 --axis {seeds}/axis.csv", "tunnel stationing demo --show",
@@ -91,7 +91,7 @@ OF_WORDS: tuple[str, ...] = (
     "simulate {out}.d --length 10 --density 5", "simulate-structure {out}.d --stations 1 --angular-step 1",
     "simulate-canal {out}.d --length 10 --laser-stations 1 --sonar-stations 1 --laser-step 1 --sonar-step 1",
 )  # fmt: skip
-"""Commands to which options with hostile values are added: each verb is among them or in OF_FILES."""
+"""Commands to which options with hostile values are added: each command is among them or in OF_FILES."""
 
 UNTRIED = {
     "init": "has no options",
@@ -163,7 +163,7 @@ def _hostile_option(chance: random.Random, words: list[str]) -> str:
 
 
 def _hostile_word(chance: random.Random, words: list[str]) -> str:
-    """Put a hostile value in the place of a word that is no verb."""
+    """Put a hostile value in the place of a word that is no command."""
     first = len(verb_of(words).split())
     place, value = chance.randrange(first, len(words) + 1), chance.choice(VALUES)
     words[place : place + 1] = [value]
@@ -193,7 +193,7 @@ def _words(command: str, **names: str) -> list[str]:
 
 
 def verb_of(words: list[str]) -> str:
-    """Words that name the verb, as ``tunnel add``."""
+    """Words that name the command, as ``tunnel add``."""
     return " ".join(words[:2] if isinstance(_first(words), click.Group) else words[:1])
 
 

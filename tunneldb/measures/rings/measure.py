@@ -201,17 +201,19 @@ def _measured(
     chords = [(float(first), float(second)) for first, second in options["chords"]]
     patches = source.between(bounds.low - REACH - MARGIN, bounds.high)
     middle = 0.5 * (bounds.low + bounds.high)
-    diameter, whence = _diameter(options["diameter"], profiles, middle)
+    diameter, diameter_from = _diameter(options["diameter"], profiles, middle)
     if patches is None or len(patches.chainage) < 2:
         nothing = np.empty(0)
-        return MeasuredRing(bounds, LiningRing(0.0, None, None, (), "no image"), Steps(nothing, nothing, nothing), None, whence)
+        return MeasuredRing(
+            bounds, LiningRing(0.0, None, None, (), "no image"), Steps(nothing, nothing, nothing), None, diameter_from
+        )
     if isinstance(before, RingBounds):
         ahead = before.high - before.low if abs(before.high - bounds.low) < 1e-3 else 0.0
     else:
         ahead = before
     ring = measure_ring(patches, bounds.low, bounds.high, source.girth(middle), chords)
     centre = None if ring.ring is None else source.in_space(middle, *ring.ring.circle[:2].tolist())
-    return MeasuredRing(bounds, ring, joint_steps(patches, bounds.low, ahead, length), diameter, whence, centre)
+    return MeasuredRing(bounds, ring, joint_steps(patches, bounds.low, ahead, length), diameter, diameter_from, centre)
 
 
 def _diameter(given: float | None, profiles: Sequence[Profile], chainage: float) -> tuple[float | None, str]:

@@ -1,4 +1,4 @@
-"""The verb ``clearance`` on a survey whose track and walls are known."""
+"""The command ``clearance`` on a survey whose track and walls are known."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""CPU time of verbs that are asked of one survey, as their user waits for them: of the program, and of its backends."""
+"""CPU time of commands that are asked of one survey, as their user waits for them: of the program, and of its backends."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ VERBS = {
 
 @dataclass(frozen=True)
 class Run:
-    """CPU time of a verb: of the program and of its backends, s."""
+    """CPU time of a command: of the program and of its backends, s."""
 
     name: str
     program: float
@@ -42,8 +42,8 @@ class Run:
         return self.program + self.backends
 
 
-def ask_verbs(dsn: str, survey: str, folder: Path, only: str = "") -> list[Run]:
-    """Run each verb some times, or those whose names hold one of some words, parted by commas; the least counts."""
+def ask_commands(dsn: str, survey: str, folder: Path, only: str = "") -> list[Run]:
+    """Run each command some times, or those whose names hold one of some words, parted by commas; the least counts."""
     postmaster = postmaster_of(dsn)
     found = []
     for name, verb in VERBS.items():
@@ -56,7 +56,7 @@ def ask_verbs(dsn: str, survey: str, folder: Path, only: str = "") -> list[Run]:
 
 
 def cpu_times(dsn: str, arguments: list[str], postmaster: int) -> tuple[float, float]:
-    """CPU time of a verb, of the program and of its backends, s."""
+    """CPU time of a command, of the program and of its backends, s."""
     before = _ended(postmaster)
     with subprocess.Popen(
         [*COMMAND, "--dsn", dsn, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
