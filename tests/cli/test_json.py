@@ -144,7 +144,7 @@ def test_check_tells_what_is_wrong_and_what_mends_it(dsn: str, conn: psycopg.Con
     conn.execute("COMMENT ON SCHEMA tunnel_api IS 'Functions and views of tunneldb 0.0.9, abc'")
     conn.commit()
     (wrong,) = [finding for finding in told(1, "check")["findings"] if finding["level"] == "wrong"]
-    assert (wrong["subject"], wrong["mend"]) == ("schema tunnel_api", "tunneldb init")
+    assert (wrong["subject"], wrong["remedy"]) == ("schema tunnel_api", "tunneldb init")
     assert told(0, "init")["revision"] == told(0, "init")["before"]
 
 

@@ -24,6 +24,6 @@ def test_locks_suffice_for_a_dump_and_for_a_removal(conn: psycopg.Connection, mo
     found = health._locks(conn)
     assert found.level == "note"
     assert "remove the longest survey" in found.text
-    advised = re.search(r"max_locks_per_transaction = (\d+)", found.mend)
+    advised = re.search(r"max_locks_per_transaction = (\d+)", found.remedy)
     assert advised is not None
     assert int(advised[1]) * places >= locks * places + places * health.LOCKS_OF_A_SESSION

@@ -51,10 +51,10 @@ PHRASES: tuple[tuple[str, str], ...] = (
 """Phrases that readers stumbled on, as regular expressions, and replacements."""
 
 CODE = re.compile(
-    r"^```.*?^```$|^    \S.*$|``[^`]*``|`[^`]*`|--[a-z][a-z-]*|\]\([^)]*\)|^!\[.*$|\*[^*\n]+\*|\| appendage \|",
-    re.MULTILINE | re.DOTALL,
+    r"^```[\s\S]*?^```$|``[^`]*``|`[^`]*`|--[a-z][a-z-]*|\]\([^)]*\)|^!\[.*$|\*[^*\n]+\*|\| appendage \||^\w+(, \w+)*( : .*)?$",
+    re.MULTILINE,
 )
-"""Parts of a page that aren't its prose: code, names, targets of links, labels of other programs."""
+"""Parts of a page that aren't its prose: code, names, targets of links, labels of other programs, names of parameters."""
 
 VALUES = re.compile(r"\b(unseen|appendage)\b")
 """Values of columns, which comments and messages may name."""
@@ -84,16 +84,16 @@ def helps(command: click.Command = main, name: str = "tunneldb") -> Iterator[tup
 
 
 @cache
-def modules() -> tuple[tuple[str, ast.Module], ...]:
-    """Return the modules of the package, parsed."""
+def modules() -> tuple[tuple[str, list[ast.AST]], ...]:
+    """Return the modules of the package, each with the nodes of its syntax tree."""
     files = sorted((ROOT / "tunneldb").rglob("*.py"))
-    return tuple((str(path.relative_to(ROOT)), ast.parse(path.read_text("utf-8"))) for path in files)
+    return tuple((str(path.relative_to(ROOT)), list(ast.walk(ast.parse(path.read_text("utf-8"))))) for path in files)
 
 
 def docstrings() -> Iterator[tuple[str, str]]:
     """Yield docstrings of modules, classes and functions."""
-    for path, module in modules():
-        for node in ast.walk(module):
+    for path, nodes in modules():
+        for node in nodes:
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
                 name = "" if isinstance(node, ast.Module) else f":{node.lineno} {node.name}"
                 yield path + name, VALUES.sub(" ", CODE.sub(" ", ast.get_docstring(node) or ""))
@@ -101,9 +101,9 @@ def docstrings() -> Iterator[tuple[str, str]]:
 
 def messages() -> Iterator[tuple[str, str]]:
     """Yield strings of the package with three words or more that are neither docstrings nor SQL."""
-    for path, module in modules():
-        bare = {id(node.value) for node in ast.walk(module) if isinstance(node, ast.Expr)}
-        texts = (node for node in ast.walk(module) if isinstance(node, ast.Constant) and id(node) not in bare)
+    for path, nodes in modules():
+        bare = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+        texts = (node for node in nodes if isinstance(node, ast.Constant) and id(node) not in bare)
         for node in texts:
             text = node.value
             if isinstance(text, str) and len(text.split()) >= 3 and not re.search(r"\b(SELECT|WITH|FROM)\b", text):
@@ -155,8 +155,8 @@ def test_phrases_are_found() -> None:
 def test_function_docstrings_begin_with_a_verb() -> None:
     all_of_them = [
         f"{path}:{node.lineno} {text.splitlines()[0]}"
-        for path, module in modules()
-        for node in ast.walk(module)
+        for path, nodes in modules()
+        for node in nodes
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and (text := ast.get_docstring(node))
     ]
     relative = [line for line in all_of_them if RELATIVE.match(line.partition(" ")[2])]

@@ -26,7 +26,7 @@ def check(settings: Settings) -> None:
         mark = {"ok": "✓", "note": "•", "wrong": "✗"}[finding.level]
         colour = {"ok": "green", "note": "yellow", "wrong": "red"}[finding.level]
         click.echo(f"{click.style(mark, fg=colour)} {finding.subject}: {finding.text}")
-        if finding.mend:
-            click.echo(f"    {finding.mend}")
+        if finding.remedy:
+            click.echo(f"    {finding.remedy}")
     if any(finding.level == "wrong" for finding in findings):
         sys.exit(1)

@@ -107,7 +107,7 @@ SELECT format('policy %I on %s is not tunneldb''s: it runs', y.polname, y.polrel
 # and the id of the session.
 _EXPRESSIONS = f"""
 WITH RECURSIVE trusted AS ({_TRUSTED}), owned AS ({_OWN_TABLES}),
-expression (relation, what, tree, mend) AS (
+expression (relation, what, tree, remedy) AS (
     SELECT k.conrelid, format('check %I', k.conname), k.conbin::text,
            format('ALTER TABLE %s DROP CONSTRAINT %I;', k.conrelid::regclass, k.conname)
       FROM pg_constraint k JOIN owned ON owned.oid = k.conrelid WHERE k.contype = 'c' AND k.conislocal
@@ -135,7 +135,7 @@ named AS (
       FROM expression e CROSS JOIN LATERAL regexp_matches(e.tree, ':(funcid|opno|resulttype) (\\d+)', 'g') AS m
 ),
 called AS (
-    SELECT n.relation, n.what, n.mend, p.oid::regprocedure::text AS name
+    SELECT n.relation, n.what, n.remedy, p.oid::regprocedure::text AS name
       FROM named n LEFT JOIN pg_operator o ON n.kind = 'opno' AND o.oid = n.number
       JOIN pg_proc p ON p.oid = CASE n.kind WHEN 'funcid' THEN n.number WHEN 'opno' THEN o.oprcode END
      WHERE (p.proowner NOT IN (SELECT oid FROM trusted) AND NOT {_OF_EXTENSION.format("'pg_proc'::regclass", "p.oid")})
@@ -143,19 +143,19 @@ called AS (
             AND p.oid NOT IN ('now()'::regprocedure, 'clock_timestamp()'::regprocedure, 'pg_backend_pid()'::regprocedure,
                               'nextval(regclass)'::regprocedure))
     UNION ALL
-    SELECT n.relation, n.what, n.mend, format_type(t.oid, NULL)
+    SELECT n.relation, n.what, n.remedy, format_type(t.oid, NULL)
       FROM named n JOIN pg_type t ON n.kind = 'resulttype' AND t.oid = n.number
      WHERE t.typowner NOT IN (SELECT oid FROM trusted) AND NOT {_OF_EXTENSION.format("'pg_type'::regclass", "t.oid")}
 )
 SELECT format('%s of %s is not tunneldb''s: it runs %s', c.what, c.relation::regclass, string_agg(DISTINCT c.name, ', ')),
-       c.mend
-  FROM called c GROUP BY c.relation, c.what, c.mend ORDER BY 1
+       c.remedy
+  FROM called c GROUP BY c.relation, c.what, c.remedy ORDER BY 1
 """
 
 # Functions and operators in everybody's search path that share their name with one of PostgreSQL or of an extension.
 _OVERLOADS = f"""
 WITH trusted AS ({_TRUSTED}),
-routine (oid, name, catalog, namespace, owner, what, mend) AS (
+routine (oid, name, catalog, namespace, owner, what, remedy) AS (
     SELECT p.oid, p.proname, 'pg_proc'::regclass, p.pronamespace, p.proowner, 'function ' || p.oid::regprocedure,
            'DROP ROUTINE ' || p.oid::regprocedure || ' CASCADE;'
       FROM pg_proc p
@@ -169,7 +169,7 @@ given (name, catalog) AS (
      WHERE r.namespace = 'pg_catalog'::regnamespace OR {_OF_EXTENSION.format("r.catalog", "r.oid")}
 )
 SELECT r.what || ' is not tunneldb''s: it runs in the place of what a call means,'
-       || ' with the rights of whoever calls', r.mend
+       || ' with the rights of whoever calls', r.remedy
   FROM routine r
  WHERE r.namespace = 'public'::regnamespace AND r.owner NOT IN (SELECT oid FROM trusted)
    AND NOT {_OF_EXTENSION.format("r.catalog", "r.oid")} AND (r.name, r.catalog) IN (SELECT g.name, g.catalog FROM given g)
@@ -202,10 +202,10 @@ def foreign_objects(connection: psycopg.Connection[Any]) -> Iterator[tuple[str, 
     for subject, query in (
         ("triggers", _TRIGGERS), ("triggers", _REFERENCES), ("expressions", _RULES), ("expressions", _EXPRESSIONS),
     ):  # fmt: skip
-        for text, mend in _rows(connection, query):
-            yield subject, f"{text} with the rights of whoever writes there", mend
-    for text, mend in overloads(connection):
-        yield "functions", text, mend
+        for text, remedy in _rows(connection, query):
+            yield subject, f"{text} with the rights of whoever writes there", remedy
+    for text, remedy in overloads(connection):
+        yield "functions", text, remedy
 
 
 def overloads(connection: psycopg.Connection[Any]) -> list[tuple[str, str]]:

@@ -45,14 +45,14 @@ class CheckResult:
         ``ok``, ``note`` (works, but could be better) or ``wrong``.
     subject, text
         Subject of the check, and its state.
-    mend
+    remedy
         Command or statement to fix it; empty if nothing is wrong.
     """
 
     level: Literal["ok", "note", "wrong"]
     subject: str
     text: str
-    mend: str = ""
+    remedy: str = ""
 
 
 def examine(dsn: str | None) -> Iterator[CheckResult]:
@@ -142,9 +142,9 @@ def _roles(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
     existing = {row[0] for row in connection.execute("SELECT rolname FROM pg_roles WHERE rolname = ANY(%s)", [list(ROLES)])}
     missing = [role for role in ROLES if role not in existing]
     if missing:
-        mend = "; ".join(f"CREATE ROLE {role}" for role in missing)
-        mend = f"tunneldb init   -- if you may not create roles, first a superuser: {mend};"
-        yield CheckResult("wrong", "roles", f"missing: {', '.join(missing)}", mend)
+        remedy = "; ".join(f"CREATE ROLE {role}" for role in missing)
+        remedy = f"tunneldb init   -- if you may not create roles, first a superuser: {remedy};"
+        yield CheckResult("wrong", "roles", f"missing: {', '.join(missing)}", remedy)
         return
     granted = connection.execute(
         "SELECT bool_and(has_schema_privilege(role, 'tunnel_api', 'USAGE')) FROM unnest(%s::text[]) role", [list(ROLES)]
@@ -189,20 +189,20 @@ def _audit(connection: psycopg.Connection[Any]) -> CheckResult:
     if row is None:
         return CheckResult("wrong", "audit", "table tunnel_audit.entry is missing", "restore schema tunnel_audit from a backup")
     if not row[0]:
-        mend = "ALTER TABLE tunnel_audit.entry ENABLE TRIGGER append_only;"
-        return CheckResult("wrong", "audit", "entries can be changed and deleted: its trigger is disabled", mend)
+        remedy = "ALTER TABLE tunnel_audit.entry ENABLE TRIGGER append_only;"
+        return CheckResult("wrong", "audit", "entries can be changed and deleted: its trigger is disabled", remedy)
     if row[1]:
-        mend = f"ALTER SCHEMA tunnel_audit OWNER TO {row[2]}; ALTER TABLE tunnel_audit.entry OWNER TO {row[2]};"
-        return CheckResult("wrong", "audit", "its owner is the role of operators, who could drop it", mend)
+        remedy = f"ALTER SCHEMA tunnel_audit OWNER TO {row[2]}; ALTER TABLE tunnel_audit.entry OWNER TO {row[2]};"
+        return CheckResult("wrong", "audit", "its owner is the role of operators, who could drop it", remedy)
     return CheckResult("ok", "audit", "accepts only new entries")
 
 
 def _foreign(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
     """Check for foreign objects on the tables and in schema public, and for own triggers that are disabled."""
-    found = [("triggers", text, mend) for text, mend in silent_triggers(connection)]
+    found = [("triggers", text, remedy) for text, remedy in silent_triggers(connection)]
     found += foreign_objects(connection)
-    for subject, text, mend in found:
-        yield CheckResult("wrong", subject, text, mend)
+    for subject, text, remedy in found:
+        yield CheckResult("wrong", subject, text, remedy)
     for subject in SUBJECTS:
         if not any(subject == other for other, *_ in found):
             yield CheckResult("ok", subject, "none but tunneldb's own")
@@ -222,8 +222,8 @@ def _settings(connection: psycopg.Connection[Any], *, embedded: bool) -> Iterato
     ).fetchall()
     small = [(name, minimum) for name, size, required, minimum in rows if size < required]
     for name, minimum in small:
-        mend = f"as a superuser: ALTER SYSTEM SET {name} = '{minimum}'; then restart the server"
-        yield CheckResult("note", "settings", f"{name} is small for scans", mend)
+        remedy = f"as a superuser: ALTER SYSTEM SET {name} = '{minimum}'; then restart the server"
+        yield CheckResult("note", "settings", f"{name} is small for scans", remedy)
     if not small:
         yield CheckResult("ok", "settings", "memory and WAL are big enough")
 
@@ -268,8 +268,8 @@ def _work(state: Sequence[tuple[Any, ...]]) -> Iterator[CheckResult]:
     rows = [row for row in state if row[3] in ("interrupted", "failed")]
     for survey, km, stage, outcome, message, _ in rows:
         why = f": {message.splitlines()[0]}" if message else ""
-        mend = f"tunneldb run {survey} --km {km} --from {stage}" if stage != "load" else f"tunneldb load {survey} FILES"
-        yield CheckResult("note", "work", f"{survey} km {km}, {stage} {outcome}{why}", mend)
+        remedy = f"tunneldb run {survey} --km {km} --from {stage}" if stage != "load" else f"tunneldb load {survey} FILES"
+        yield CheckResult("note", "work", f"{survey} km {km}, {stage} {outcome}{why}", remedy)
     if not rows:
         yield CheckResult("ok", "work", "no stage failed or was interrupted")
 
@@ -280,8 +280,8 @@ def _queue(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
         "SELECT survey, name, path, message FROM tunnel_api.incoming WHERE state = 'failed' ORDER BY survey, name"
     ).fetchall():
         why = (message or "it could not be read").splitlines()[0]
-        mend = f"tunneldb batch {survey} {path}   -- after fixing the file; or tunneldb survey remove-file {survey} {name}"
-        yield CheckResult("note", "files", f"{survey}, {name}: {why}", mend)
+        remedy = f"tunneldb batch {survey} {path}   -- after fixing the file; or tunneldb survey remove-file {survey} {name}"
+        yield CheckResult("note", "files", f"{survey}, {name}: {why}", remedy)
     row = connection.execute(
         """
         SELECT (SELECT count(*) FROM tunnel_api.job WHERE state = 'queued'), (SELECT count(*) FROM tunnel_api.worker)

@@ -99,8 +99,8 @@ def _layer(path: Path, names: list[str], wanted: str | None) -> str:
     if wanted is not None and wanted not in names:
         raise InputError(f"{path} has no layer {wanted!r} of lines; it has {listed}")
     if wanted is None and len(names) != 1:
-        mend = "; choose one by --drawing-layer NAME" if names else ""
-        raise InputError(f"{path} has {len(names)} layers of lines: {listed}{mend}")
+        remedy = "; choose one by --drawing-layer NAME" if names else ""
+        raise InputError(f"{path} has {len(names)} layers of lines: {listed}{remedy}")
     return wanted or names[0]
 
 

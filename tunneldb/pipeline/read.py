@@ -182,8 +182,8 @@ class Reading:
 
     def check(self, header: ScanHeader) -> None:
         """Check a file against its survey."""
-        dimension, mend = self.survey.intensity_dimension, f"tunneldb survey set {self.survey.name} --intensity"
-        require_dimension(header.path, dimension, header.dimensions, "the survey's intensity", mend)
+        dimension, remedy = self.survey.intensity_dimension, f"tunneldb survey set {self.survey.name} --intensity"
+        require_dimension(header.path, dimension, header.dimensions, "the survey's intensity", remedy)
         check_header(header, dimension, self.survey.srid, needs_time=self.poses.mobile)
 
     def read(self, headers: Sequence[ScanHeader], given: Sequence[Path], begin: StartProgress = silent) -> list[Read]:
@@ -230,7 +230,7 @@ class Reading:
         reach = voxel_reach(self.settings.edge)
         return [file for file in rest if any(file.low <= old.high + reach and file.high >= old.low - reach for old in former)]
 
-    def find(self, file: Recorded, given: Sequence[Path], why: str, mend: str) -> ScanHeader:
+    def find(self, file: Recorded, given: Sequence[Path], why: str, remedy: str) -> ScanHeader:
         """Return the header of a file that must be read again, from its given current place.
 
         Raises
@@ -240,7 +240,7 @@ class Reading:
         """
         path = next((path for path in given if path.name == file.name), Path(file.path))
         if not path.is_file() or checksum(path) != file.checksum:
-            raise UserError(f"{why} {file.name}, which has to be read again and is not at {path} as it was loaded: {mend}")
+            raise UserError(f"{why} {file.name}, which has to be read again and is not at {path} as it was loaded: {remedy}")
         header = in_units(read_header(path), GivenUnits(file.units.plan, file.units.height))
         self.check(header)
         return header

@@ -172,8 +172,8 @@ def _withdraw(
     ]
     again = reading.overlapped(present, others)
     why = f"{', '.join(file.name for file in present)} overlaps"
-    mend = f"give its current path (tunneldb load {survey.name} FILE), then remove again; nothing was removed"
-    headers = [(reading.find(file, (), why, mend), file) for file in again]
+    remedy = f"give its current path (tunneldb load {survey.name} FILE), then remove again; nothing was removed"
+    headers = [(reading.find(file, (), why, remedy), file) for file in again]
     for file in former:
         reading.claim(file.name)
     for km in kilometres_of(conn, [file.id for file in [*present, *again]]):

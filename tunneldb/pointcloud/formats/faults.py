@@ -36,11 +36,11 @@ def line_of(error: BaseException) -> str:
 
 
 def require_dimension(
-    path: Path, dimension: str | None, dimensions: Collection[str], use: str | None = None, mend: str | None = None
+    path: Path, dimension: str | None, dimensions: Collection[str], use: str | None = None, remedy: str | None = None
 ) -> None:
     """Raise an InputError that lists the file's dimensions unless `dimension`, needed for `use`, is one of them.
 
-    `mend` with the most similar dimension is the command to type.
+    `remedy` with the most similar dimension is the command to type.
     """
     if dimension is None or dimension in dimensions:
         return
@@ -48,7 +48,7 @@ def require_dimension(
     needed = f", which {use} needs" if use else ""
     near = alike or next(iter(difflib.get_close_matches(dimension, dimensions, 1)), None)
     meant = f" (did you mean {near!r}?{' capitals matter' if alike else ''})" if near else ""
-    typed = f": {mend} {near or 'DIMENSION'}" if mend else ""
+    typed = f": {remedy} {near or 'DIMENSION'}" if remedy else ""
     available = ", ".join(dimensions) or "none"
     raise InputError(f"{path}: no dimension {dimension!r}{needed}{meant}; the file has {available}{typed}")
 
