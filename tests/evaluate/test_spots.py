@@ -11,11 +11,10 @@ import psycopg
 import pyogrio.raw
 import pytest
 import shapely
-from click.testing import CliRunner, Result
 from shapely.geometry import MultiPolygon, Polygon, box
+from support.command import command
 from support.example_structures import ALONG, NORMAL, ORIGIN, RADIUS, add_example_site, model, save_example_structures
 
-from tunneldb.cli.main import main
 from tunneldb.evaluate.surfaces import FoundFace, on_one_plane, project_on_face, project_on_faces
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -38,12 +37,6 @@ def rectangle(u0: float, z0: float, u1: float, z1: float) -> Polygon:
 def lens(radius: float, apart: float) -> float:
     """Area that two equal circles have in common (a closed formula)."""
     return 2 * radius**2 * math.acos(apart / (2 * radius)) - 0.5 * apart * math.sqrt(4 * radius**2 - apart**2)
-
-
-def command(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def gpkg(path: Path, shapes: list[Polygon], crs: str = "EPSG:25829") -> Path:

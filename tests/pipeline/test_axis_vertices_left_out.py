@@ -8,19 +8,12 @@ from pathlib import Path
 import numpy as np
 import psycopg
 import pytest
-from click.testing import CliRunner, Result
+from support.command import command
 
-from tunneldb.cli.main import main
 from tunneldb.simulate import Parameters, Simulation, write
 
 NAME = "bend"
 START, LENGTH = 1200.0, 90.0
-
-
-def command(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 @pytest.fixture(scope="module")

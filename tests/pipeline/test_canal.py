@@ -8,9 +8,8 @@ import numpy as np
 import psycopg
 import pytest
 import rasterio
-from click.testing import CliRunner, Result
+from support.command import command
 
-from tunneldb.cli.main import main
 from tunneldb.database import connect
 from tunneldb.export.qgis import write_project
 from tunneldb.simulate.canal import CanalParameters, CanalScene, simulate, write
@@ -32,12 +31,6 @@ def folder(scene: CanalScene, tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp(NAME)
     write(scene, made)
     return made
-
-
-def command(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def sections(conn: psycopg.Connection) -> list[tuple[float, list[float]]]:

@@ -11,7 +11,8 @@ import numpy as np
 import psycopg
 import pytest
 import shapely
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
+from support.command import command
 from support.databases import Copies
 
 from tunneldb.anomalies.evidence import standard_model
@@ -30,12 +31,6 @@ START = 12_310.0
 SMALLEST = 0.1
 APPENDAGE, FLOOR = (2,), (1, 5)  # the floor with its rails
 SECTIONS = {1: "circular", 2: "horseshoe", 3: "box"}
-
-
-def command(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
-    assert result.exit_code == code, result.output
-    return result
 
 
 def parameters(scanner: str, seed: int, **others: object) -> Parameters:

@@ -9,22 +9,15 @@ import numpy as np
 import psycopg
 import pytest
 import shapely
-from click.testing import CliRunner, Result
 from scipy.spatial.transform import Rotation
+from support.command import command
 
-from tunneldb.cli.main import main
 from tunneldb.simulate import Parameters, Simulation, write
 
 pytest.importorskip("pye57")
 from support import e57_files as e57
 
 START = 12_988.0  # the kilometre changes in the middle
-
-
-def command(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
-    assert result.exit_code == code, result.output
-    return result
 
 
 @pytest.fixture(scope="module")

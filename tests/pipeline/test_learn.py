@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import psycopg
 import pytest
-from click.testing import CliRunner, Result
 from psycopg.conninfo import make_conninfo
+from support.command import command
 
 from tunneldb.anomalies.evidence import standard_model
 from tunneldb.anomalies.features import FEATURES
 from tunneldb.anomalies.learning import Adjustment
-from tunneldb.cli.main import main
 from tunneldb.store.learned import STORED, apply_learned, feature_list, load_measured, model_in_force
 
 SURVEY = "demo-2024"
@@ -26,12 +25,6 @@ MANY = 120
 @pytest.fixture(scope="session")
 def template(example_template: str) -> str:
     return example_template
-
-
-def command(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def as_json(*arguments: object, code: int = 0) -> dict[str, Any]:

@@ -10,20 +10,13 @@ import numpy as np
 import psycopg
 import pytest
 import shapely
-from click.testing import CliRunner, Result
+from support.command import command
 
-from tunneldb.cli.main import main
 from tunneldb.simulate import Parameters, Simulation, write
 
 pytestmark = pytest.mark.slow
 
 SAID = "scanner positions are unknown"
-
-
-def command(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
-    assert result.exit_code == code, result.output
-    return result
 
 
 @pytest.fixture

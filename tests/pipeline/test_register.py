@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import psycopg
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from support.canal_scene import DEPTH, LEVEL, Canal, Sonar
+from support.command import command
 from support.databases import Copies
-
-from tunneldb.cli.main import main
 
 NAME = "canal"
 
@@ -29,12 +28,6 @@ def canal(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Sonar]]:
     for k, scan in enumerate(scans):
         np.savetxt(folder / f"s{k}.xyz", np.column_stack([scan.points, np.full(len(scan.points), 50)]), "%.4f")
     return folder, scans
-
-
-def command(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 @pytest.fixture(scope="module")

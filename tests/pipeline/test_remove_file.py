@@ -6,7 +6,8 @@ from pathlib import Path
 
 import psycopg
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
+from support.command import command
 from support.loaded_survey import SURVEY, add_survey, files, load, rows, tube, write
 
 import tunneldb.pipeline.remove as remove
@@ -27,12 +28,6 @@ def scans(tmp_path: Path) -> list[Path]:
     """Three files: a and b overlap in kilometre 0, b alone reaches into kilometre 1, c lies apart."""
     spans = (("a", 978.0, 992.0), ("b", 985.0, 1010.0), ("c", 971.0, 976.0))
     return [write(tmp_path / f"{name}.laz", tube(*span, 200, seed=k)) for k, (name, *span) in enumerate(spans)]
-
-
-def command(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def tables(conn: psycopg.Connection) -> list[str]:

@@ -8,17 +8,9 @@ import laspy
 import numpy as np
 import psycopg
 import pytest
-from click.testing import CliRunner, Result
-
-from tunneldb.cli.main import main
+from support.command import command
 
 POINTS = 5000
-
-
-def command(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 @pytest.fixture

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import psycopg
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
+from support.command import command
 from support.databases import Copies
 
 from tunneldb.cli.main import main
@@ -29,12 +30,6 @@ NAME = "curve"
 START = 960.0
 LENGTH = 80.0
 LINING = 0
-
-
-def command(*arguments: object) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exit_code == 0, result.output
-    return result
 
 
 def scan(folder: Path, section: str, seed: int) -> Simulation:

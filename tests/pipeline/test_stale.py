@@ -8,21 +8,14 @@ from typing import Any
 
 import psycopg
 import pytest
-from click.testing import CliRunner, Result
+from support.command import command
 from support.databases import Copies
 
-from tunneldb.cli.main import main
 from tunneldb.simulate import Parameters, Simulation, write
 
 NAME = "curve"
 MOVE = "UPDATE tunnel_api.axis_vertex SET geom = ST_Translate(geom, 0, 0, 0.05) WHERE n = %s"
 STALE = "SELECT stage, km FROM tunnel_api.stage_status WHERE stale ORDER BY step, km"
-
-
-def command(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,8 @@ import numpy as np
 import psycopg
 import pytest
 import shapely
-from click.testing import CliRunner, Result
+from support.command import command
 from support.structure_scene import Pipe, Plate, Seen, scan
-
-from tunneldb.cli.main import main
 
 STATION = (0.0, 0.0, 1.5)
 WALL = Plate((-1.5, 5.0, 0.0), (3.0, 0.0, 0.0), (0.0, 0.0, 3.0))
@@ -22,12 +20,6 @@ RUST = (-0.6, 1.5, 0.25)  # x, z and radius of a dark disc on the wall
 WALL_COLOUR, RUST_COLOUR = (150, 152, 160), (120, 60, 30)
 FLAKE = (0.7, 2.0, 0.2)  # of a bright one
 WINDOW = (-0.4, 0.4, -0.35, 0.35)
-
-
-def command(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def disc(seen: Seen, x: float, z: float, radius: float) -> np.ndarray:

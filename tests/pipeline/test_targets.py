@@ -9,21 +9,14 @@ from pathlib import Path
 import numpy as np
 import psycopg
 import pytest
-from click.testing import CliRunner, Result
+from support.command import command
 from support.databases import Copies
 
-from tunneldb.cli.main import main
 from tunneldb.simulate import Parameters, Simulation, write
 
 NAME = "t"
 START = 990.0
 """The end of a kilometre lies in the middle of it."""
-
-
-def command(*arguments: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
-    assert result.exit_code == code, result.output
-    return result
 
 
 @pytest.fixture(scope="module")

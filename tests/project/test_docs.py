@@ -6,11 +6,10 @@ import re
 import shlex
 from pathlib import Path
 
-import click
 import pytest
+from support.command_lines import mistake
 
 from tunneldb.classification.classes import PointClass
-from tunneldb.cli.main import main
 from tunneldb.stages.parameters import PARAMETERS
 
 ROOT = Path(__file__).parents[2]
@@ -19,7 +18,6 @@ PAGES = sorted([*(ROOT / name for name in OUTSIDE), *(ROOT / "docs").glob("*.md"
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 FOLDERS = ("benchmarks", "docs", "migrations", "scripts", "sql", "tests", "tunneldb")
-PLACEHOLDERS = ("COMMAND", "VERB", "…", "[OPTIONS]", "[--dsn", "DSN]", "--help", "-h")
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 
 
@@ -61,33 +59,6 @@ def commands(page: Path) -> list[list[str]]:
 def test_commands_exist(page: Path) -> None:
     wrong = [f"tunneldb {' '.join(words)}: {found}" for words in commands(page) if (found := mistake(words))]
     assert not wrong
-
-
-def mistake(words: list[str]) -> str | None:
-    """What the program would not understand of a command line."""
-    command: click.Command = main
-    words = list(words)
-    while words:
-        word = words.pop(0)
-        if word in ("|", ">", "&&", ";"):
-            return None
-        if word in PLACEHOLDERS:
-            continue
-        if word.startswith("-"):
-            option = next((p for p in command.params if isinstance(p, click.Option) and word in p.opts), None)
-            if option is None:
-                return f"{command.name} has no option {word}"
-            if word == "--set" and words[0] != "NAME=VALUE" and words[0].partition("=")[0] not in PARAMETERS:
-                return f"there is no parameter {words[0]}"
-            words = words if option.is_flag else words[option.nargs :]
-        elif isinstance(command, click.Group):
-            found = command.get_command(click.Context(command), word)
-            if found is None:
-                return f"there is no command {word}"
-            if found.name == "psql":
-                return None  # the rest is psql's own
-            command = found
-    return None
 
 
 def test_mistakes_are_found() -> None:
