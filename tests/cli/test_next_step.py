@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import re
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import laspy
 import numpy as np
 import psycopg
-import pyogrio
 import pytest
-import shapely
 from click.testing import CliRunner
 from pyproj import CRS
-from support.axis_files import J_LANDXML
 
 from tunneldb.cli.main import main
 
@@ -87,52 +82,3 @@ def test_a_misspelt_dimension_is_mended_by_what_is_said(refused: Callable[..., s
     said = refused("load", empty, tmp_path / "a.laz")
     assert "did you mean 'Reflectance'?" in said
     assert said.rstrip().endswith(": tunneldb survey set empty --intensity Reflectance")
-
-
-ADVICE: list[tuple[str, str, str]] = [
-    ("leaks demo", r"say which of its surveys: (\S+)", "leaks {0}"),
-    ("leaks demo-2023", r"Did you mean '(\S+)'\?", "leaks {0}"),
-    ("tunnel add demo --srid 25830 --axis no.csv", r"there is a tunnel 'demo' already: tunneldb (tunnel list)", "{0}"),
-    ("leaks demo-2024 --format gpkg", r"add -o (leaks\.gpkg)", "leaks demo-2024 --format gpkg -o {0}"),
-    ("leaks demo-2024 -o a.pdf", r"leaks are written as (\.csv), .* use one of these", "leaks demo-2024 -o a{0}"),
-    ("leaks demo-2024 --clock 10-10", r"is one position; give two, as (10-2)", "leaks demo-2024 --clock {0}"),
-    ("findings demo-2024 --count --from 0", r"leave out --from\b", "findings demo-2024 --count"),
-    ("survey set demo-2024", r"nothing to set: give (--date)", "survey set demo-2024 {0} 2024-05-05"),
-    ("status --watch", r"--watch is for one survey: tunneldb (status) SURVEY (--watch)", "status demo-2024"),
-    (
-        "profile add demo a.csv", r"remove one of them: tunneldb (profile remove demo) NAME (--layer lining)",
-        "{0} round {1} && profile add demo a.csv",
-    ),
-    ("findings import demo-2024 a.gpkg", "it has no geometry; draw it, or delete the row", "findings import demo-2024 b.gpkg"),
-    (
-        "tunnel add x --srid 25830 --axis a.xml --reverse", "for stations that decrease along the alignment use --stationing",
-        "tunnel add x --srid 25830 --axis a.xml --stationing s.csv",
-    ),
-    ("tunnel stationing demo", r"give either a FILE, or (--show)", "tunnel stationing demo {0}"),
-    ("leaks demo-2024 --from 900+000", r"has no such station: tunneldb (tunnel stationing demo --show)", "{0}"),
-]  # fmt: skip
-
-
-def write_inputs() -> None:
-    """Write a profile, and findings without and with a place."""
-    shutil.copy(J_LANDXML, "a.xml")
-    Path("s.csv").write_text("chainage,station,direction\n-90,1000,-1\n")
-    Path("a.csv").write_text("right,up\n-3,-2\n-3,0\n0,4\n3,0\n3,-2\n")
-    for name, place in (("a.gpkg", None), ("b.gpkg", shapely.to_wkb(shapely.Point(12350, 1)))):
-        kind = np.array(["missing_bolt"], object)
-        pyogrio.raw.write(name, np.array([place], object), [kind], ["kind"], geometry_type="Point", layer="a", crs=None)
-
-
-@pytest.mark.filterwarnings("ignore:'crs' was not provided")
-@pytest.mark.parametrize(("wrong", "advice", "right"), ADVICE, ids=[wrong for wrong, _, _ in ADVICE])
-def test_what_a_message_says_is_typed(
-    refused: Callable[..., str], dsn: str, wrong: str, advice: str, right: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    write_inputs()
-    said = refused(*wrong.split())
-    found = re.search(advice, said)
-    assert found, said
-    for command in right.format(*found.groups()).split(" && "):
-        result = CliRunner().invoke(main, ["--dsn", dsn, *command.split()])
-        assert result.exit_code == 0, result.stderr

@@ -15,11 +15,11 @@ import numpy as np
 import pyogrio
 import pytest
 import shapely
+from support.advice import advised
 from support.axis_files import J_LANDXML, LINE, SRID, chain, dxf, gis, pieces
 
 from tunneldb.alignment.given import read_given
 from tunneldb.csvfile import read_csv, read_texts
-from tunneldb.errors import UserError
 from tunneldb.pipeline.profile_file import read_profile
 from tunneldb.pointcloud.reader import read_chunks, read_header
 from tunneldb.pointcloud.rewrite import rewrite_with_numbers
@@ -31,15 +31,6 @@ from tunneldb.store.scanner import read_reference
 XYZ = [[1.5, 2.0, 3.0], [4640000.5, 5.0, 6.0]]
 
 Edit = Callable[[bytes, re.Match[str]], bytes]
-
-
-def advised(call: Callable[[], Any], advice: str) -> re.Match[str]:
-    """Return the match of an advice in the message of a refused call."""
-    with pytest.raises(UserError) as refused:
-        call()
-    found = re.search(advice, str(refused.value))
-    assert found, refused.value
-    return found
 
 
 def replaced(old: bytes, new: bytes) -> Edit:

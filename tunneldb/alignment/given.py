@@ -284,7 +284,7 @@ def _require_forward(xyz: Float, error: Callable[[int, str], InputError]) -> Non
         raise error(int(standing[0]) + 1, "the same x,y as the previous point; remove one of them")
     leap, _, rise = _leap(xyz)
     if leap is not None:
-        raise error(leap + 1, f"{plan[leap]:.6g} m after the previous point its z differs by {rise[leap]:.6g} m; check it")
+        raise error(leap + 1, f"{plan[leap]:.6g} m after the previous point its z differs by {rise[leap]:.6g} m; correct z")
     turns = np.flatnonzero(np.einsum("ij,ij->i", steps[1:], steps[:-1]) <= 0)
     if len(turns):
         raise error(int(turns[0]) + 2, "the axis reverses here; sort its points by ascending chainage")

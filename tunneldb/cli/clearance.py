@@ -155,7 +155,7 @@ def _widening(asked: dict[str, Any]) -> Widening:
     if vehicle and max(inside, outside) > 0.0:
         raise UserError("--curve-widening stands for --bogie-distance and --overhang: leave one out")
     if asked["flexibility"] > 0.0 and asked["speed"] == 0.0:
-        raise UserError("--flexibility needs --speed")
+        raise UserError("--flexibility needs the speed: add --speed KM/H")
     return Widening(
         asked["bogie_distance"], asked["overhang"], inside, outside, asked["speed"] / 3.6, asked["flexibility"],
         asked["roll_height"], asked["allowance"],

@@ -83,7 +83,7 @@ def evaluate(
         begin = step(progress)
         if spots or found.site:
             if km is not None:
-                raise UserError("--km is of leaks: spots of a structure are compared wherever they lie")
+                raise UserError("--km is of leaks: spots of a structure are compared wherever they lie; omit it")
             smallest = MIN_SPOT if min_area is None else min_area
             report, about, said = _of_spots(conn, found, truth, layer, smallest, begin)
         else:

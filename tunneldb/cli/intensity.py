@@ -61,11 +61,13 @@ def intensity(
         check_format(output)
     if survey.lower().endswith(_FILES):
         if km is not None:
-            raise UserError("--km is of a survey, not of a file")
+            raise UserError("--km is of a survey, not of a file; omit it")
         look = _diagnose_file(file_path(survey), intensity, intensity_kind, scanner)
     else:
         if intensity is not None or intensity_kind is not None or scanner is not None:
-            raise UserError(f"--intensity, --intensity-kind and --scanner are for a file; the survey {survey} has its own")
+            raise UserError(
+                f"--intensity, --intensity-kind and --scanner are for a file; the survey {survey} has its own: omit them"
+            )
         look = _diagnose_survey(settings, survey, km)
     add_to_json(title=look.title, dependence=look.dependence, verdict=look.dependence.verdict(), notes=look.notes, file=output)
     _print(look)

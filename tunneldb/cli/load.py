@@ -141,7 +141,7 @@ def load(
                     loaded = load_files(connection, found, laser, chosen, step(progress)) if laser else iter(())
                     if sonar:
                         if units != NOT_GIVEN:
-                            raise UserError("--unit and --height-unit are of laser scans; not registered sonar scans")
+                            raise UserError("--unit and --height-unit are of laser scans; load sonar scans without them")
                         from tunneldb.pipeline.load_sonar import load_sonar
 
                         loaded = chain(loaded, load_sonar(connection, found, sonar, step(progress)))

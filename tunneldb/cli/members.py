@@ -81,7 +81,7 @@ def members(
         _of_file(file_path(survey), stations, intensity, intensity_kind, reference, output, geometry)
         return
     if stations or output is not None or {intensity, intensity_kind, reference, geometry} != {None}:
-        raise UserError(f"these options are for a scan file by itself; the survey {survey} has its own: tunneldb survey set")
+        raise UserError(f"options are for a scan file by itself; the survey {survey} has its own: omit them")
     _of_survey(settings, survey)
 
 

@@ -33,7 +33,7 @@ class FilePath(click.Path):
         """Return the path."""
         text = os.fspath(value)
         if not text.isprintable():  # bytes that are no UTF-8 are surrogates, which are not
-            raise UserError(f"the name {text!a} has bytes that are no UTF-8, or a newline or the like; rename it")
+            raise UserError(f"the name {text!a} has bytes that are not UTF-8, or control characters; rename it")
         path = super().convert(value, param, ctx)
         require_regular(Path(os.fsdecode(path)))
         return path

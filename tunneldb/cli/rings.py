@@ -164,13 +164,13 @@ _OF_POINTS = {"axis": "--axis", "sigma": "--sigma", "harmonics": "--harmonics"}
 def _require_one_kind(context: click.Context, survey: str | None, points: Path | None) -> None:
     """Refuse a survey and points together, neither, and options of the one with the other."""
     if survey is not None and points is not None:
-        raise UserError("rings are of a survey or of --points, not of both")
+        raise UserError("rings are of a survey or of --points, not of both: omit one of them")
     if survey is None and points is None:
         raise UserError("rings of what? Give a survey, or --points with --axis and --diameter")
     for name, option in (_OF_POINTS if points is None else _OF_SURVEY).items():
         if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
             kind = "of --points" if points is None else "of a survey"
-            raise UserError(f"{option} is for rings {kind}")
+            raise UserError(f"{option} is for rings {kind}; omit it")
 
 
 def _require_writable(output: Path, inputs: tuple[Path, ...]) -> None:

@@ -124,9 +124,11 @@ def add(
     from tunneldb.store.catalog import Intensity, add_survey
 
     if [trajectory is not None, bool(stations), no_poses].count(True) != 1:
-        raise UserError("say where the scanner was: exactly one of --trajectory and --stations; or --no-poses, if nobody knows")
+        raise UserError(
+            "give exactly one of --trajectory FILE and --stations FILE, or --no-poses if the scanner positions are unknown"
+        )
     if backwards and trajectory is None:
-        raise UserError("--backwards is about a trajectory; stations have no direction")
+        raise UserError("--backwards is about a trajectory; stations have no direction: omit it")
     if time_offset is not None and trajectory is None:
         raise UserError("--time-offset is about a trajectory: give it with --trajectory")
     if intensity_kind == "none":
@@ -197,11 +199,11 @@ def set_(
     from tunneldb.store.catalog import SurveyChange, set_survey
 
     if trajectory is not None and stations:
-        raise UserError("say where the scanner was by one of --trajectory and --stations")
+        raise UserError("--trajectory and --stations exclude each other: omit one of them")
     if backwards and trajectory is None:
         raise UserError("--backwards is about a trajectory: give it with --trajectory")
     if time_offset is not None and stations:
-        raise UserError("--time-offset is about a trajectory; stations have no times")
+        raise UserError("--time-offset is about a trajectory; stations have no times: omit it")
     change = SurveyChange(
         None if date is None else date.date(),
         (trajectory,) if trajectory is not None else stations,

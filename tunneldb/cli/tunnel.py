@@ -155,8 +155,12 @@ def add(
     if (axis is None) != site:
         raise UserError("give a tunnel its --axis; or say --site, if it has none")
     if axis is None:
-        about_axis = {axis_layer, axis_unit, unit, height_unit, alignment, profile, start_chainage, equations, axis_out, *scans}
-        _add_site(settings, name, srid, about_axis)
+        about_axis = {
+            "--axis-layer": axis_layer, "--axis-unit": axis_unit, "--unit": unit, "--height-unit": height_unit,
+            "--alignment": alignment, "--profile": profile, "--start-chainage": start_chainage, "--stationing": equations,
+            "--axis-out": axis_out, "--reverse": reverse or None, "SCAN": scans or None,
+        }  # fmt: skip
+        _add_site(settings, name, srid, [option for option, value in about_axis.items() if value is not None])
         return
     units = GivenUnits(unit, height_unit)
     if units != NOT_GIVEN and not scans:
@@ -216,12 +220,12 @@ def add(
         notify(f"{axis}: {note}")
 
 
-def _add_site(settings: Settings, name: str, srid: int, given: set[Any]) -> None:
-    """Add a site; nothing that is about an axis may be given."""
+def _add_site(settings: Settings, name: str, srid: int, given: list[str]) -> None:
+    """Add a site; no option of an axis may be given."""
     from tunneldb.store.catalog import add_site
 
-    if given - {None}:
-        raise UserError("a --site has no axis: what is about one can't be given with it")
+    if given:
+        raise UserError(f"a --site has no axis: omit {', '.join(given)}")
     with connect(settings.dsn) as connection:
         tell_warnings(connection)
         add_site(connection, name, srid)

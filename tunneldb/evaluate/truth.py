@@ -66,7 +66,8 @@ def read_truth(conn: psycopg.Connection[Any], survey: Survey, path: Path, layer:
         shapes = [_unrolled(conn, survey, shape, given.naming(key)) for key, shape in zip(ids, shapes, strict=True)]
     for key, shape in zip(ids, shapes, strict=True):
         if not shape.is_valid:
-            raise InputError(f"{given.naming(key)} is not a valid polygon ({shapely.is_valid_reason(shape)}); fix it")
+            why = shapely.is_valid_reason(shape)
+            raise InputError(f"{given.naming(key)} is not a valid polygon ({why}); fix it (in QGIS: Fix geometries)")
     return Truth(ids, shapes)
 
 
@@ -150,12 +151,14 @@ def _polygons(wkb: NDArray[np.object_], ids: list[str], where: str, noun: str) -
         try:
             shape = None if data is None else shapely.from_wkb(data, on_invalid="ignore")
         except shapely.errors.GEOSException as error:
-            raise InputError(f"{where}, {noun} {key} is not a valid polygon ({_line(error)}); fix it") from None
+            raise InputError(
+                f"{where}, {noun} {key} is not a valid polygon ({_line(error)}); draw it again, or remove the row"
+            ) from None
         if not isinstance(shape, Polygon | MultiPolygon) or shape.is_empty:
             kind = "has no geometry; remove the row" if shape is None or shape.is_empty else f"is {shape.geom_type}"
             raise InputError(f"{where}, {noun} {key} {kind}; each {noun} must be a polygon")
         if not np.isfinite(shapely.get_coordinates(shape)).all():
-            raise InputError(f"{where}, {noun} {key} has an invalid coordinate; fix it")
+            raise InputError(f"{where}, {noun} {key} has an invalid coordinate; draw it again, or remove the row")
         shapes.append(shape)
     return shapes
 

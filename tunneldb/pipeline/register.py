@@ -62,7 +62,8 @@ class SonarInput:
         for speed in self.sound_speed or ():
             if not SPEEDS[0] <= speed <= SPEEDS[1]:
                 raise UserError(
-                    f"--sound-speed {speed:g}: sound in water goes {SPEEDS[0]:g} to {SPEEDS[1]:g} m/s; give ASSUMED=MEASURED"
+                    f"--sound-speed {speed:g}: sound in water goes {SPEEDS[0]:g} to {SPEEDS[1]:g} m/s;"
+                    " give ASSUMED=MEASURED, as 1500=1447"
                 )
 
     @property

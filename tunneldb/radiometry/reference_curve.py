@@ -38,7 +38,10 @@ class ReferenceCurve:
         if len(ranges) < 2:
             raise UserError(f"a reference curve needs at least 2 rows; this one has {len(ranges)}")
         if not (np.all(np.isfinite(ranges)) and np.all(np.isfinite(intensity))):
-            raise UserError("the reference curve has a value that is not a number: remove or correct that row")
+            row = int(np.argmin(np.isfinite(ranges) & np.isfinite(intensity)))
+            raise UserError(
+                f"row {row + 1} of the reference curve, {ranges[row]:g} m, {intensity[row]:g} dB, is not finite: remove it"
+            )
         if np.any(ranges <= 0):
             raise UserError(f"the reference curve has the range {ranges.min():g} m: ranges must be positive")
         if np.any(np.diff(ranges) <= 0):

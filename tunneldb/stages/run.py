@@ -46,8 +46,8 @@ def parse_km(text: str | None, there: list[int]) -> list[int]:
     wanted = km_range(text)
     chosen = [km for km in there if km in wanted]
     if not chosen:
-        loaded = ", ".join(map(str, there)) or "none"
-        raise UserError(f"no points are loaded in kilometre {text.strip()}; loaded: {loaded}")
+        loaded = f"loaded: {', '.join(map(str, there))}" if there else "no kilometre is: tunneldb load SURVEY FILE..."
+        raise UserError(f"no points are loaded in kilometre {text.strip()}; {loaded}")
     return chosen
 
 

@@ -67,7 +67,9 @@ def measure_evenness(
         steps, areas = [], []
         if grid is not None:
             if length < 4.0 * grid.cell:
-                raise UserError(f"--length {length:g} is less than four cells of {grid.cell:g} m, the minimum for these pixels")
+                raise UserError(
+                    f"--length {length:g} is less than four cells of {grid.cell:g} m: give {4.0 * grid.cell:g} or more"
+                )
             found = evenness(grid.cells, length, grid.cell)
             steps = list(steps_of(grid, found, km, limit, survey_ends(conn, survey) or (-np.inf, np.inf)))
             areas = list(polygons_of(grid, found, km, limit))

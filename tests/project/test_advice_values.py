@@ -1,0 +1,187 @@
+"""Messages about single values: each test calls a function, does what the refusal says, and calls it again."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+from support.advice import advised
+
+from tunneldb.cli.clearance import _widening
+from tunneldb.cli.load import density_of
+from tunneldb.cli.param_types import file_path
+from tunneldb.cli.register import _speeds
+from tunneldb.cli.rings import _chords
+from tunneldb.database.home import prepare_home
+from tunneldb.evaluate.truth import read_polygons
+from tunneldb.export.figures import axis_deviation, intensity_dependence
+from tunneldb.export.pointcloud import members
+from tunneldb.export.tables import workbook
+from tunneldb.pipeline.register import SonarInput
+from tunneldb.pipeline.target_control import read_control
+from tunneldb.radiometry.intensity_kind import doubt
+from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.simulate.canal.parameters import CanalParameters
+from tunneldb.simulate.structure.parameters import StructureParameters
+from tunneldb.stages.parameters import settings
+from tunneldb.stages.run import km_range, parse_km
+
+NO_WIDENING = {
+    "curve_widening": (0.0, 0.0), "bogie_distance": 0.0, "overhang": 0.0, "flexibility": 0.0, "speed": 0.0,
+    "roll_height": 0.0, "allowance": 0.0,
+}  # fmt: skip
+
+
+def widened(**options: Any) -> None:
+    _widening(NO_WIDENING | options)
+
+
+def target(path: Path) -> None:
+    members.check_target(Path("a.laz"), path)
+
+
+def named(suffix: str) -> Path:
+    return Path(f"out{suffix}")
+
+
+CASES: list[tuple[Callable[..., Any], Any, str, Callable[[re.Match[str]], Any]]] = [
+    (_chords, ("high",), r"as (300-60) in degrees", lambda found: (found[1],)),
+    (_chords, ("high",), r"or (9:00-3:00),", lambda found: (found[1],)),
+    (_chords, ("400-10",), r"there are 0 to (360) degrees", lambda found: (f"{found[1]}-10",)),
+    (_chords, ("1:00-13:00",), r"or 0:00 to (12:00)", lambda found: (f"1:00-{found[1]}",)),
+    (_speeds, "1447", r"as (1500=1447)", lambda found: found[1]),
+    (density_of, "dense", r"points per m², (1) or more", lambda found: found[1]),
+    (density_of, "0", r"or '(all)'", lambda found: found[1]),
+    (km_range, "12+300", r"a kilometre or a range, (511) or", lambda found: found[1]),
+    (km_range, "12,13", r"or (511-513)", lambda found: found[1]),
+    (lambda km: parse_km(km, [511, 512]), "12", r"loaded: (\d+),", lambda found: found[1]),
+    (axis_deviation.check_format, named(".xls"), r"as .*(\.png).* \(a figure\)", lambda found: named(found[1])),
+    (axis_deviation.check_format, named(".xls"), r"or (\.csv) \(a table\)", lambda found: named(found[1])),
+    (intensity_dependence.check_format, named(".jpg"), r"write the figure as .*(\.png)", lambda found: named(found[1])),
+    (target, named(".xyz"), r"points as (\.laz)", lambda found: named(found[1])),
+    (target, named(".xyz"), r"polygons as (\.gpkg)", lambda m: named(m[1])),
+    (settings, ["axis.max_rejected=few"], r"--set (\S+)", lambda found: [found[1]]),
+    (settings, ["axis.max_rejectd=0.5"], r"Did you mean '(\S+)'\?", lambda found: [f"{found[1]}=0.5"]),
+    (settings, ["section.angle_step=7"], r"must divide (180) degrees", lambda m: [f"section.angle_step={int(m[1]) / 36}"]),
+    (file_path, "a\nb.laz", "rename it", lambda _: "ab.laz"),
+    (lambda curve: ReferenceCurve(*np.array(curve).T), [(1.0, 2.0), (2.0, np.nan), (3.0, 1.0)], r"^row (2) .* remove it",
+     lambda found: np.delete([(1.0, 2.0), (2.0, np.nan), (3.0, 1.0)], int(found[1]) - 1, axis=0)),
+    (lambda speeds: SonarInput((), Path("l.csv"), 1, 0.0, None, speeds), (1500.0, 14.47), r"give ASSUMED=MEASURED, as (\S+)",
+     lambda found: _speeds(found[1])),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("call", "wrong", "advice", "right"), CASES)
+def test_a_value(call: Callable[[Any], Any], wrong: Any, advice: str, right: Callable[[re.Match[str]], Any]) -> None:
+    found = advised(lambda: call(wrong), advice)
+    call(right(found))
+
+
+OPTIONS: list[tuple[Callable[..., Any], dict[str, Any], str, Callable[[re.Match[str]], dict[str, Any]]]] = [
+    (widened, {"curve_widening": (36.0, 36.0), "overhang": 2.0}, "leave one out", lambda _: {"overhang": 2.0}),
+    (widened, {"curve_widening": (36.0, 36.0), "overhang": 2.0}, "leave one out", lambda _: {"curve_widening": (36.0, 36.0)}),
+    (widened, {"flexibility": 0.2}, "add --(speed)", lambda found: {"flexibility": 0.2, found[1]: 80.0}),
+    (CanalParameters, {"towpath": "up"}, r"give (\w+), (\w+) or (\w+)", lambda found: {"towpath": found[2]}),
+    (CanalParameters, {"sub_rays": 3}, r"give 1, 7, 13 or (\d+)", lambda found: {"sub_rays": int(found[1])}),
+    (CanalParameters, {"radius": 5.0}, r"at least (\d+) m", lambda found: {"radius": -float(found[1])}),
+    (CanalParameters, {"sonar_depth": (1.0, 0.5)}, "two ascending values from 0 on", lambda _: {"sonar_depth": (0.5, 1.0)}),
+    (StructureParameters, {"contrast": (5.0, 3.0)}, "give two ascending values above 0", lambda _: {"contrast": (3.0, 5.0)}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("call", "wrong", "advice", "right"), OPTIONS)
+def test_options(
+    call: Callable[..., Any], wrong: dict[str, Any], advice: str, right: Callable[[re.Match[str]], dict[str, Any]]
+) -> None:
+    found = advised(lambda: call(**wrong), advice)
+    call(**right(found))
+
+
+@pytest.mark.parametrize(
+    ("kind", "values"), [("linear", (-20.0, -5.0)), ("reflectance", (5.0, 30.0)), ("amplitude", (-20.0, -5.0))]
+)
+def test_no_doubt_is_left_by_the_kind_of_the_message(kind: str, values: tuple[float, float]) -> None:
+    intensity = np.linspace(*values, 1000)
+    said = doubt(kind, intensity)  # type: ignore[arg-type]
+    assert said
+    better = re.search(r"--intensity-kind (\w+)", said)
+    assert better, said
+    assert doubt(cast(Any, better[1]), intensity) is None
+
+
+SQUARE, BOW = shapely.box(0, 0, 1, 1), shapely.Polygon([(0, 0), (1, 1), (1, 0), (0, 1)])
+
+
+def layer(path: Path, shapes: list[bytes | None], name: str, *, append: bool = False) -> None:
+    data = np.array(shapes, object)
+    pyogrio.raw.write(path, data, [], [], geometry_type="Polygon", layer=name, crs=None, append=append)
+
+
+@pytest.mark.filterwarnings("ignore:'crs' was not provided")
+@pytest.mark.parametrize(
+    ("second", "advice"),
+    [
+        (None, "leak (2) has no geometry; remove the row"),
+        (shapely.to_wkb(shapely.Polygon([(0, 0), (np.nan, 1), (1, 1)])), "leak (2) .*; draw it again, or remove the row"),
+    ],
+)
+def test_a_reference_leak_without_outline(second: bytes | None, advice: str, tmp_path: Path) -> None:
+    path, rows = tmp_path / "a.gpkg", [shapely.to_wkb(SQUARE), second]
+
+    def read() -> list[Any]:
+        return read_polygons(path, cast(Any, None), None, "leak").shapes
+
+    layer(path, rows, "leak")
+    del rows[int(advised(read, advice)[1]) - 1]
+    path.unlink()
+    layer(path, rows, "leak")
+    assert [shape.area for shape in read()] == [1.0]
+
+
+@pytest.mark.filterwarnings("ignore:'crs' was not provided")
+def test_a_layer_of_reference_leaks_is_chosen(tmp_path: Path) -> None:
+    path = tmp_path / "a.gpkg"
+    layer(path, [shapely.to_wkb(SQUARE)], "north")
+    layer(path, [shapely.to_wkb(BOW)], "south", append=True)
+    found = advised(lambda: read_polygons(path, cast(Any, None), None, "leak"), r"has the layers (\w+), .* by --layer")
+    assert read_polygons(path, cast(Any, None), found[1], "leak").shapes == [SQUARE]
+
+
+def test_control_points_are_written_once(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("id,x,y,z\nA,1,2,3\nB,2,2,3\nA,5,2,3\n")
+    first = int(advised(lambda: read_control(path), r"duplicate \(line (\d+)\); write each point once")[1])
+    lines = path.read_text().splitlines()
+    del lines[first - 1]
+    path.write_text("\n".join(lines))
+    assert read_control(path).names == ["B", "A"]
+
+
+def test_a_shorter_stretch_fits_a_sheet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workbook, "MAX_ROWS", 3)
+    rows = [(k,) for k in range(3)]
+
+    def write(count: int) -> None:
+        workbook.write_workbook(tmp_path / "a.xlsx", [workbook.Sheet("s", (workbook.Column("n", 5.0),), rows[:count])], "s")
+
+    advised(lambda: write(3), "or a shorter stretch")
+    write(2)
+
+
+def test_the_output_has_another_name(tmp_path: Path) -> None:
+    source = tmp_path / "a.laz"
+    source.write_bytes(b"")
+    advised(lambda: members.check_target(source, source), "choose another name with -o")
+    members.check_target(source, tmp_path / "b.laz")
+
+
+def test_the_folder_of_the_server_is_another(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    advised(lambda: prepare_home(tmp_path / "file" / "home"), "set TUNNELDB_HOME to another")
+    assert prepare_home(tmp_path / "home").folder == tmp_path / "home"
