@@ -79,12 +79,12 @@ BEGIN
                 new_row := jsonb_set(new_row, ARRAY[key], was_row -> key);
             ELSIF was_row -> key <> old_row -> key AND was_row -> key <> new_row -> key THEN
                 RAISE EXCEPTION 'finding % was changed meanwhile: its % is %', was.id, key, coalesce(was_row ->> key, 'empty')
-                    USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
+                    USING ERRCODE = 'serialization_failure', HINT = 'Reload the row, then edit it again.';
             END IF;
         END LOOP;
         IF redrawn AND public.ST_AsEWKB(shape_before) IS DISTINCT FROM public.ST_AsEWKB(OLD.geom) THEN
             RAISE EXCEPTION 'finding % was redrawn meanwhile', was.id
-                USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
+                USING ERRCODE = 'serialization_failure', HINT = 'Reload the row, then edit it again.';
         END IF;
         NEW.kind := new_row ->> 'kind';
         NEW.severity := (new_row ->> 'severity')::smallint;

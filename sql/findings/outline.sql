@@ -59,7 +59,8 @@ BEGIN
         RAISE EXCEPTION 'the drawing is in SRID %, the view in SRID %', public.ST_SRID(given), srid
             USING ERRCODE = 'invalid_parameter_value', HINT = 'Transform it first (ST_Transform).';
     ELSIF place = '3d' AND public.ST_NDims(given) < 3 THEN
-        RAISE EXCEPTION 'a drawing in space needs heights' USING ERRCODE = 'invalid_parameter_value';
+        RAISE EXCEPTION 'a drawing in space needs heights'
+            USING ERRCODE = 'invalid_parameter_value', HINT = 'Draw it with z, or in finding_map or finding_unrolled.';
     END IF;
     unrolled := CASE place WHEN 'unrolled' THEN given
                            WHEN 'map' THEN tunnel_internal.unmap_strip(survey_id, public.ST_SetSRID(given, srid))

@@ -44,7 +44,7 @@ BEGIN
     END IF;
     IF NOT was.geom OPERATOR(public.=) OLD.geom THEN
         RAISE EXCEPTION 'axis vertex % at chainage % was moved meanwhile', OLD.n, OLD.label
-            USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
+            USING ERRCODE = 'serialization_failure', HINT = 'Reload the row, then edit it again.';
     END IF;
     NEW.source := 'edited';
     NEW.edited_by := session_user;
@@ -121,7 +121,7 @@ BEGIN
         RAISE EXCEPTION '% % % was changed meanwhile: it is %, with the kind % and %', OLD.kind, OLD.id,
             coalesce('at ' || OLD.label, 'of a site'), was.review, was.kind,
             coalesce('the remark ' || quote_literal(was.remark), 'no remark')
-            USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
+            USING ERRCODE = 'serialization_failure', HINT = 'Reload the row, then edit it again.';
     END IF;
     NEW.reviewed_by := session_user;
     NEW.reviewed_at := clock_timestamp();
@@ -256,7 +256,7 @@ BEGIN
         IF was.kind NOT IN (OLD.kind, NEW.kind) OR NOT (was.geom OPERATOR(public.=) OLD.geom OR was.geom OPERATOR(public.=) NEW.geom)
            OR (was.reason IS DISTINCT FROM OLD.reason AND was.reason IS DISTINCT FROM NEW.reason) THEN
             RAISE EXCEPTION 'region % was changed meanwhile', OLD.id
-                USING ERRCODE = 'serialization_failure', HINT = 'Look at it again.';
+                USING ERRCODE = 'serialization_failure', HINT = 'Reload the row, then edit it again.';
         END IF;
     ELSE
         SELECT s.* INTO its FROM tunnel.survey s

@@ -195,9 +195,11 @@ def test_two_who_judge_otherwise_are_not_both_right(
         made = person.execute(look).fetchone()
     with pytest.raises(psycopg.errors.SerializationFailure, match="meanwhile") as refused:
         olgas.result()
-    assert refused.value.diag.message_hint == "Look at it again."
+    assert refused.value.diag.message_hint == "Reload the row, then edit it again."
     assert conn.execute(look).fetchone() == made
     assert [who for who, *_ in entries(conn)] == ["ines"]
+    again = conn.execute(f"UPDATE tunnel_api.{view} SET {olga} WHERE id = {key}".encode())
+    assert again.rowcount == (made is not None), "what is no leak any more is not in the view"
 
 
 @pytest.mark.parametrize("person", ["ines"], indirect=True)
