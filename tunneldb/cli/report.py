@@ -23,6 +23,8 @@ from tunneldb.report.leak_table import CARDS
 from tunneldb.report.owner import Owner, read_owner
 from tunneldb.report.page import MAX_LISTED_LEAKS, Written, write_html, write_site_html
 from tunneldb.report.pdf import find_browser, print_pdf
+from tunneldb.report.pictures.addresses import parse_server
+from tunneldb.report.pictures.load import Source
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.survey import Survey, get_survey
 
@@ -31,6 +33,22 @@ if TYPE_CHECKING:
 
 _START = 3.0  # time in which a browser starts, s
 _PRINTING = 1.2  # time in which it prints a page as a multiple of that in which the page was written, as seen on 0.2 and 25 km
+
+
+class _PhotoServer(click.ParamType):
+    """A server, ``HOST`` or ``HOST:PORT``."""
+
+    name = "server"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the server in lower case."""
+        try:
+            return parse_server(value)
+        except ValueError:
+            raise UserError(f"--photo-server {value}: not a host or host:port, such as photos.example.org:8443") from None
+
+
+PHOTO_SERVER = _PhotoServer()
 
 
 @command(
@@ -56,7 +74,15 @@ _PRINTING = 1.2  # time in which it prints a page as a multiple of that in which
     "--photos",
     type=FilePath(),
     metavar="FOLDER",
-    help="Folder of relative photo paths. Default: the current folder.",
+    help="Folder of photos; files elsewhere are refused. Default: the current folder.",
+)
+@click.option(
+    "--photo-server",
+    "servers",
+    type=PHOTO_SERVER,
+    multiple=True,
+    metavar="HOST[:PORT]",
+    help="Server of photos that may have an internal address, and may be http://. Can be repeated.",
 )
 @click.option(
     "--list",
@@ -76,6 +102,7 @@ def report(
     end: str | None,
     template: Path | None,
     photos: Path | None,
+    servers: tuple[str, ...],
     listed: int,
 ) -> None:
     """Write the inspection report of SURVEY for signature.
@@ -97,6 +124,7 @@ def report(
     owner = read_owner(template) if template else Owner()
     if photos is not None and not photos.is_dir():
         raise UserError(f"--photos {photos}: there is no such folder")
+    source = Source(Path() if photos is None else photos, servers)
     with connect(settings.dsn) as conn:
         found = get_survey(conn, survey, site=True)
         if found.site:
@@ -108,11 +136,11 @@ def report(
         conn.rollback()
         with exit_on_sigterm(), replacing(output) as temporary, bar("strips") as shown:
             if browser is None:
-                written = _write(conn, found, stretch, temporary, shown, owner, photos, listed, paper=False)
+                written = _write(conn, found, stretch, temporary, shown, owner, source, listed, paper=False)
             else:
                 with tempfile.TemporaryDirectory(prefix="tunneldb-report-") as folder:
                     page = Path(folder) / "report.html"
-                    written = _write(conn, found, stretch, page, shown, owner, photos, listed, paper=True)
+                    written = _write(conn, found, stretch, page, shown, owner, source, listed, paper=True)
                     conn.close()  # a browser may take minutes
                     _print(browser, page, temporary, shown)
     leaks, missing = written.leaks, [photo.photo.path for photo in written.missing]
@@ -153,7 +181,7 @@ def _write(
     page: Path,
     shown: Progress,
     owner: Owner,
-    photos: Path | None,
+    photos: Source,
     listed: int,
     *,
     paper: bool,

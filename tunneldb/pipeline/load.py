@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -138,8 +138,9 @@ def merge(
             return Merged(km, 0, rows_in(conn, survey, km), {}, _told(conn, survey, km))
         stored = [file_id for file_id, count in waiting.items() if count and file_id not in held]
         for file_id in stored:
-            for rows in read_fragment(conn, survey, file_id, km, tags[file_id]):
-                spool.add(rows)
+            with closing(read_fragment(conn, survey, file_id, km, tags[file_id])) as blocks:
+                for rows in blocks:
+                    spool.add(rows)
         parts: list[tuple[Spool, int | None]] = [(spool, None)]
         parts += [(held[file_id], tags[file_id]) for file_id in waiting if file_id in held]
         # A file by itself is thinned already.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from tunneldb.report.findings import FindingsChapter, digest_findings, read_find
 from tunneldb.report.leak_sums import LeakSums, sum_leaks
 from tunneldb.report.lining import Form
 from tunneldb.report.owner import Owner
+from tunneldb.report.pictures.load import Source
 from tunneldb.report.strip import Progress, Strips
 from tunneldb.report.structures import StructuresChapter, read_structures
 from tunneldb.store.coverage import Coverage
@@ -38,8 +38,8 @@ class Request:
         Statement on the requested stretch, also beyond the survey.
     owner : Owner
         Owner's settings.
-    photos : Path
-        Folder in which relative paths of photos begin.
+    photos : Source
+        Folder and servers of photos.
     listed : int
         Maximum number of leaks that are listed and drawn.
     pictures : int or None
@@ -55,7 +55,7 @@ class Request:
     high: float
     search: Coverage
     owner: Owner
-    photos: Path
+    photos: Source
     listed: int
     pictures: int | None
     form: Form

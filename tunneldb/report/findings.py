@@ -7,8 +7,8 @@ import hashlib
 from bisect import insort
 from collections import Counter, defaultdict
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from tunneldb.arrays import Int64
 from tunneldb.export.tables.finding_counts import DARK, OTHERS, STATES, UNCOUNTED, KindCount, KindTally, in_order, sum_groups
 from tunneldb.report.drawing import line_path, outline_path
 from tunneldb.report.photos import Thumbnail, make_thumbnails, read_photos
+from tunneldb.report.pictures.load import Source
 from tunneldb.store.dry_regions import DryRegion
 from tunneldb.store.finding_kinds import read_kinds, read_severities, read_wet_kinds
 from tunneldb.store.findings import Chosen, Finding, stream_findings
@@ -176,7 +177,7 @@ def read_findings_chapter(
     stretch: tuple[float, float],
     leaks: frozenset[int],
     reported: Int64,
-    photos: Path,
+    photos: Source,
     *,
     table: bool,
 ) -> FindingsChapter | None:
@@ -192,8 +193,8 @@ def read_findings_chapter(
         Ids of those that are listed as leaks.
     reported : (n,) int64 array
         Growing ids of all leaks that are in the report's sums and digest, listed or not.
-    photos : Path
-        Folder in which relative paths of photos begin.
+    photos : Source
+        Folder and servers of photos.
     table : bool
         True if the report has a table of the leaks.
     """
@@ -203,17 +204,19 @@ def read_findings_chapter(
     by_id: dict[int, Finding] = {}
     merged: defaultdict[int, list[int]] = defaultdict(list)
     total = 0
-    for finding in stream_findings(conn, survey, chosen=Chosen(states=(), low=stretch[0], high=stretch[1])):
-        total += 1
-        place = int(np.searchsorted(reported, finding.id))
-        digested = place < len(reported) and reported[place] == finding.id and _is_plain(finding, tabled=True)
-        kinds[finding.kind].add(finding, tabled=table and finding.id in leaks, digested=digested)
-        if finding.id in leaks:
-            by_id[finding.id] = finding
-        if finding.merged_into is not None:
-            insort(merged[finding.merged_into], finding.id)
-        if finding.reviewed_by and finding.reviewed_at:
-            people[finding.reviewed_by].add(finding.review, finding.reviewed_at)
+    chosen = Chosen(states=(), low=stretch[0], high=stretch[1])
+    with closing(stream_findings(conn, survey, chosen=chosen)) as found:
+        for finding in found:
+            total += 1
+            place = int(np.searchsorted(reported, finding.id))
+            digested = place < len(reported) and reported[place] == finding.id and _is_plain(finding, tabled=True)
+            kinds[finding.kind].add(finding, tabled=table and finding.id in leaks, digested=digested)
+            if finding.id in leaks:
+                by_id[finding.id] = finding
+            if finding.merged_into is not None:
+                insort(merged[finding.merged_into], finding.id)
+            if finding.reviewed_by and finding.reviewed_at:
+                people[finding.reviewed_by].add(finding.review, finding.reviewed_at)
     if not total:
         return None
     chapters = [kinds[kind].chapter(kind) for kind in in_order(kinds, order)]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import re
 import tomllib
 from collections.abc import Mapping
@@ -11,10 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
-from PIL import Image
-
 from tunneldb.errors import InputError
 from tunneldb.finding_kind import SEVERITY_COLOURS
+from tunneldb.report.pictures.load import Source, load_pictures
 from tunneldb.report.words import ENGLISH, ENGLISH_PLURAL, Words, english_texts, languages, plural_forms, read_language
 
 CHAPTERS = {
@@ -42,13 +39,9 @@ CHAPTERS = {
 SCHEMES = ("GB 50108-2008",)
 """Rating schemes whose rules the program applies: the only standards that a report names."""
 
-LOGO = 640
-"""Maximum width and height of a logo, pixels."""
-
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _NAME = re.compile(r"\{\w+\}")
 _DAY_CODE = re.compile(r"%(?:-?[dejmUuVWwGgyY]|[aAbBCDFhx%])")
-_IMAGES = ("PNG", "JPEG", "WEBP", "GIF", "TIFF", "BMP")
 
 
 @dataclass(frozen=True)
@@ -247,12 +240,7 @@ def _logo(given: _Given, path: Path) -> str:
     """Return a logo as a data URL, reduced if larger than a cover needs."""
     if not path.is_file():
         given.refuse("logo", f"no file {path}")
-    try:
-        with Image.open(path, formats=_IMAGES) as image:
-            small = image.convert("RGBA")
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # as decoders of broken images raise
-        given.refuse("logo", f"{path} is not a readable image (PNG, JPEG, WebP, GIF, TIFF, BMP)")
-    small.thumbnail((LOGO, LOGO))
-    data = io.BytesIO()
-    small.save(data, "PNG", optimize=True)
-    return f"data:image/png;base64,{base64.b64encode(data.getvalue()).decode()}"
+    (picture,) = load_pictures([str(path)], Source(path.parent, confined=False), "logo").values()
+    if picture.trouble:
+        given.refuse("logo", f"{path}: {picture.trouble}; a logo is a PNG, JPEG, WebP, GIF, TIFF or BMP of up to 50 megapixels")
+    return picture.url

@@ -26,6 +26,7 @@ from tunneldb.report.leak_table import leak_table
 from tunneldb.report.lining import Form
 from tunneldb.report.owner import Owner
 from tunneldb.report.photos import Thumbnail
+from tunneldb.report.pictures.load import Source
 from tunneldb.report.strip import Progress
 from tunneldb.report.structures import read_structures
 from tunneldb.store.catalog import crs_text
@@ -64,7 +65,7 @@ def write_html(
     pictures: int | None = None,
     form: Form = "WEBP",
     owner: Owner | None = None,
-    photos: Path | None = None,
+    photos: Source | None = None,
     listed: int = MAX_LISTED_LEAKS,
 ) -> Written:
     """Write the report of a survey, or of the stretch between two chainages, m, as an HTML file; the connection must be idle.
@@ -81,8 +82,8 @@ def write_html(
         Format of the pictures.
     owner : Owner, optional
         Owner's settings.
-    photos : Path, optional
-        Folder in which relative paths of photos begin; else the current one.
+    photos : Source, optional
+        Folder and servers of photos; else files in the current folder, and the web.
     listed : int
         Maximum number of leaks, the largest, that are listed and drawn; rejected ones last. Totals and digest include all.
     """
@@ -90,8 +91,8 @@ def write_html(
     with snapshot(conn):
         search = read_coverage(conn, survey, low, high)
         ends = data.find_stretch(conn, survey, low, high)
-        folder = Path() if photos is None else photos
-        facts = Facts(conn, Request(survey, *ends, search, wanted, folder, listed, pictures, form, progress))
+        place = Source() if photos is None else photos
+        facts = Facts(conn, Request(survey, *ends, search, wanted, place, listed, pictures, form, progress))
         with path.open("w", encoding="utf-8") as file:
             file.writelines(_template("report.html", wanted).generate(_context(facts)))
         found = facts.findings

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import datetime as dt
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
@@ -153,13 +154,14 @@ def read_findings(
     conn: psycopg.Connection[Any], survey: Survey, geometry: Geometry = "unrolled", chosen: Chosen | None = None
 ) -> list[Finding]:
     """Read findings of a survey, in order of chainage."""
-    return list(stream_findings(conn, survey, geometry, chosen))
+    with closing(stream_findings(conn, survey, geometry, chosen)) as found:
+        return list(found)
 
 
 def stream_findings(
     conn: psycopg.Connection[Any], survey: Survey, geometry: Geometry = "unrolled", chosen: Chosen | None = None
-) -> Iterator[Finding]:
-    """Yield findings of a survey in order of chainage, with only BLOCK in memory; until the transaction ends."""
+) -> Generator[Finding, None, None]:
+    """Yield findings of a survey in order of chainage, BLOCK at a time, until the transaction ends or it is closed."""
     wanted = Chosen() if chosen is None else chosen
     query = sql.SQL(
         "SELECT {}, coalesce({}, 1), public.ST_AsBinary({}) FROM tunnel_api.finding WHERE survey_id = %(survey)s"

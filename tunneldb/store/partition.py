@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from typing import Any
 
@@ -212,14 +212,16 @@ def write_fragments(conn: psycopg.Connection[Any], survey: Survey, file_id: int,
     return held
 
 
-def read_fragment(conn: psycopg.Connection[Any], survey: Survey, file_id: int, km: int, tag: int) -> Iterator[Rows]:
+def read_fragment(
+    conn: psycopg.Connection[Any], survey: Survey, file_id: int, km: int, tag: int
+) -> Generator[Rows, None, None]:
     """Yield rows of a fragment, block by block in the order of chainage, with this tag.
 
-    The connection is busy until the last one has come.
+    The connection is busy until the last one has come, or the generator is closed.
     """
     query = sql.SQL("SELECT rows FROM {} ORDER BY number").format(_table(survey, file_id, km))
-    with conn.cursor(binary=True) as cursor:
-        for (block,) in cursor.stream(query):
+    with conn.cursor(binary=True) as cursor, closing(cursor.stream(query)) as blocks:
+        for (block,) in blocks:
             rows: Rows = np.frombuffer(block, ROW).copy()
             rows["tag"] = tag
             yield rows

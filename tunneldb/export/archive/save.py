@@ -55,7 +55,8 @@ def save_survey(conn: psycopg.Connection[Any], survey: Survey, path: Path, begin
         for stream in streams(conn, survey):
             held = Rows(conn, stream)
             columns = [(column.name, column.type) for column in stream.columns]
-            archive.add(stream.member, columns, _told(held, begin(stream.member, None)))
+            with held.chunks() as chunks:
+                archive.add(stream.member, columns, _told(chunks, begin(stream.member, None)))
             archive.counted(stream.member, held.count)
             rows[stream.table] = rows.get(stream.table, 0) + held.count
             if stream.table == "point" and stream.km is not None:
@@ -69,7 +70,9 @@ def save_survey(conn: psycopg.Connection[Any], survey: Survey, path: Path, begin
     return Saved(path.stat().st_size, rows, kms)
 
 
-def _told(rows: Rows, progress: Callable[[float], None]) -> Iterator[bytes | bytearray | memoryview]:
-    for chunk in rows:
+def _told(
+    chunks: Iterator[bytes | bytearray | memoryview], progress: Callable[[float], None]
+) -> Iterator[bytes | bytearray | memoryview]:
+    for chunk in chunks:
         progress(len(chunk))
         yield chunk

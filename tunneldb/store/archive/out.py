@@ -160,18 +160,19 @@ def streams(conn: psycopg.Connection[Any], survey: Survey) -> list[Stream]:
 
 
 class Rows:
-    """Chunks of binary COPY of a stream's rows; after the last one ``count`` is how many rows they were."""
+    """Rows of a stream as chunks of binary COPY; after `chunks`, ``count`` is how many rows they were."""
 
     def __init__(self, conn: psycopg.Connection[Any], stream: Stream) -> None:
         self._conn, self._stream = conn, stream
         self.count = 0
 
-    def __iter__(self) -> Iterator[bytes | bytearray | memoryview]:
-        """Yield the chunks."""
+    @contextmanager
+    def chunks(self) -> Iterator[Iterator[bytes | bytearray | memoryview]]:
+        """Yield the chunks within a with block, after which the connection is free, also if they were not all taken."""
         source = self._stream.query if self._stream.table == "point" else sql.SQL("({})").format(self._stream.query)
         with self._conn.cursor() as cursor:
             with cursor.copy(sql.SQL("COPY {} TO STDOUT (FORMAT binary)").format(source)) as copy:
-                yield from copy
+                yield iter(copy)
             self.count = cursor.rowcount
 
 
