@@ -35,7 +35,7 @@ _START = 3.0  # time in which a browser starts, s
 _PRINTING = 1.2  # time in which it prints a page as a multiple of that in which the page was written, as seen on 0.2 and 25 km
 
 
-class _PhotoServer(click.ParamType):
+class _PhotoServer(click.ParamType[str]):
     """A server, ``HOST`` or ``HOST:PORT``."""
 
     name = "server"

@@ -220,8 +220,8 @@ def read_fragment(
     The connection is busy until the last one has come, or the generator is closed.
     """
     query = sql.SQL("SELECT rows FROM {} ORDER BY number").format(_table(survey, file_id, km))
-    with conn.cursor(binary=True) as cursor, closing(cursor.stream(query)) as blocks:
-        for (block,) in blocks:
+    with conn.cursor(binary=True) as cursor:
+        for (block,) in cursor.stream(query):
             rows: Rows = np.frombuffer(block, ROW).copy()
             rows["tag"] = tag
             yield rows
