@@ -64,7 +64,8 @@ BEGIN
                 SELECT 0, public.ST_Segmentize(public.ST_Force2D(shape), 1.0) WHERE kind <> 'POLYGON') r
           CROSS JOIN LATERAL (
               SELECT coalesce(v.path[1], 1) AS j, tunnel_internal.unmap_point(survey_key, v.geom, near) AS carried
-              FROM public.ST_DumpPoints(r.line) v) p
+              FROM public.ST_DumpPoints(r.line) v
+              OFFSET 0) p  -- else each mention of carried computes it again
           GROUP BY r.i) q;
     IF rings IS NULL OR array_position(rings, NULL) IS NOT NULL THEN
         RETURN NULL;
@@ -162,7 +163,8 @@ BEGIN
          CROSS JOIN LATERAL (
             SELECT tunnel_api.roll(survey_id, public.ST_X(d.geom), public.ST_Y(d.geom)) AS here,
                    tunnel_api.roll(survey_id, public.ST_X(d.geom) + step, public.ST_Y(d.geom)) AS along,
-                   tunnel_api.roll(survey_id, public.ST_X(d.geom), public.ST_Y(d.geom) + step) AS across) p
+                   tunnel_api.roll(survey_id, public.ST_X(d.geom), public.ST_Y(d.geom) + step) AS across
+            OFFSET 0) p  -- else each mention of here, along and across computes it again
          CROSS JOIN LATERAL (
             SELECT (public.ST_X(p.along) - public.ST_X(p.here)) / step AS x, (public.ST_Y(p.along) - public.ST_Y(p.here)) / step AS y,
                    (public.ST_Z(p.along) - public.ST_Z(p.here)) / step AS z) l

@@ -48,7 +48,8 @@ BEGIN
                       WHEN 'map' THEN tunnel_internal.map_point(survey_id, public.ST_X(v.geom), public.ST_Y(v.geom))
                       WHEN 'unroll' THEN (SELECT public.ST_MakePoint(u.chainage, u.arc) FROM tunnel_api.unroll(survey_id, v.geom) u)
                   END AS carried
-              FROM public.ST_DumpPoints(r.line) v) p
+              FROM public.ST_DumpPoints(r.line) v
+              OFFSET 0) p  -- else each mention of carried computes it again
           GROUP BY r.i) q;
     IF array_position(rings, NULL) IS NOT NULL THEN
         RETURN NULL;

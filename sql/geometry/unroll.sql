@@ -1,9 +1,11 @@
 -- Stage 5 of Gonçalves et al. (2012): transformation between space and the unrolled plane. The same steps as
 -- tunneldb/geometry/unrolling.py.
 
--- Section at a chainage, interpolated between its neighbours: radius and arc at 361 nodes, m. NULL if no section is near. Two
--- sections are neighbours if at most one vertex spacing apart; the last one extends for half of that.
-CREATE OR REPLACE FUNCTION tunnel_api.section_at(survey_id int, chainage float8, OUT radius float8[], OUT arc float8[])
+-- The two sections between which a chainage lies: radius and arc at 361 nodes, m, and the weight of the second one. NULL if no
+-- section is near. Two sections are neighbours if at most one vertex spacing apart; the last one extends for half of that.
+CREATE OR REPLACE FUNCTION tunnel_internal.section_pair(
+    survey_id int, chainage float8, OUT radius_a float8[], OUT radius_b float8[], OUT arc_a float8[], OUT arc_b float8[],
+    OUT weight float8)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 SECURITY DEFINER SET search_path = pg_catalog, pg_temp
 AS $$
@@ -11,50 +13,66 @@ DECLARE
     reach float8;
     a tunnel.section;
     b tunnel.section;
-    g float8;
 BEGIN
     SELECT t.spacing INTO reach
-    FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = section_at.survey_id;
+    FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = section_pair.survey_id;
     SELECT s.* INTO a FROM tunnel.section s
-    WHERE s.survey_id = section_at.survey_id AND s.chainage <= section_at.chainage ORDER BY s.chainage DESC LIMIT 1;
+    WHERE s.survey_id = section_pair.survey_id AND s.chainage <= section_pair.chainage ORDER BY s.chainage DESC LIMIT 1;
     SELECT s.* INTO b FROM tunnel.section s
-    WHERE s.survey_id = section_at.survey_id AND s.chainage > section_at.chainage ORDER BY s.chainage LIMIT 1;
+    WHERE s.survey_id = section_pair.survey_id AND s.chainage > section_pair.chainage ORDER BY s.chainage LIMIT 1;
+    weight := 0;
     IF a.chainage IS NOT NULL AND b.chainage - a.chainage <= reach THEN
-        g := (section_at.chainage - a.chainage) / (b.chainage - a.chainage);
-        SELECT array_agg((1 - g) * q.ra + g * q.rb ORDER BY q.i), array_agg((1 - g) * q.la + g * q.lb ORDER BY q.i)
-        INTO radius, arc
-        FROM unnest(a.radius, b.radius, a.arc, b.arc) WITH ORDINALITY AS q (ra, rb, la, lb, i);
-    ELSIF section_at.chainage - a.chainage <= reach / 2 THEN
-        radius := a.radius;
-        arc := a.arc;
-    ELSIF b.chainage - section_at.chainage <= reach / 2 THEN
-        radius := b.radius;
-        arc := b.arc;
+        weight := (section_pair.chainage - a.chainage) / (b.chainage - a.chainage);
+    ELSIF section_pair.chainage - a.chainage <= reach / 2 THEN
+        b := a;
+    ELSIF b.chainage - section_pair.chainage <= reach / 2 THEN
+        a := b;
+    ELSE
+        RETURN;
     END IF;
+    radius_a := a.radius;
+    radius_b := b.radius;
+    arc_a := a.arc;
+    arc_b := b.arc;
 END
+$$;
+COMMENT ON FUNCTION tunnel_internal.section_pair(int, float8) IS
+'The two sections between which a chainage lies: radius and arc (m) at each degree from -180° to 180°, and the weight of the second one, 0 to 1; NULL if no section is near';
+
+
+-- Section at a chainage, interpolated between its neighbours: radius and arc at 361 nodes, m. NULL if no section is near.
+CREATE OR REPLACE FUNCTION tunnel_api.section_at(survey_id int, chainage float8, OUT radius float8[], OUT arc float8[])
+LANGUAGE sql STABLE PARALLEL SAFE STRICT
+AS $$
+    SELECT array_agg((1 - p.weight) * q.ra + p.weight * q.rb ORDER BY q.i),
+           array_agg((1 - p.weight) * q.la + p.weight * q.lb ORDER BY q.i)
+      FROM tunnel_internal.section_pair($1, $2) p
+     CROSS JOIN LATERAL unnest(p.radius_a, p.radius_b, p.arc_a, p.arc_b) WITH ORDINALITY AS q (ra, rb, la, lb, i)
 $$;
 COMMENT ON FUNCTION tunnel_api.section_at(int, float8) IS
 'Section at a chainage, interpolated between its neighbours: radius and arc (m) at each degree from -180° to 180°; NULL if no section is near';
 
 
--- Node of a section (modulo 360) and the unit direction of the section there, towards increasing angle: u, w, du, dw.
-CREATE OR REPLACE FUNCTION tunnel_internal.section_node(radius float8[], k int)
+-- Node of the section between two others (modulo 360) and the unit direction of the section there, towards increasing angle:
+-- u, w, du, dw. Only the nodes that a point needs are interpolated: all 361 would take ten times as long.
+CREATE OR REPLACE FUNCTION tunnel_internal.section_node(radius_a float8[], radius_b float8[], weight float8, k int)
 RETURNS float8[]
 LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE STRICT
 AS $$
 DECLARE
     i constant int := (k + 360) % 360;
-    before constant float8 := radius[(i + 359) % 360 + 1];
-    after constant float8 := radius[(i + 1) % 360 + 1];
+    here constant float8 := (1 - weight) * radius_a[i + 1] + weight * radius_b[i + 1];
+    before constant float8 := (1 - weight) * radius_a[(i + 359) % 360 + 1] + weight * radius_b[(i + 359) % 360 + 1];
+    after constant float8 := (1 - weight) * radius_a[(i + 1) % 360 + 1] + weight * radius_b[(i + 1) % 360 + 1];
     du constant float8 := after * sind(i - 179) - before * sind(i - 181);
     dw constant float8 := after * cosd(i - 179) - before * cosd(i - 181);
     length constant float8 := sqrt(du * du + dw * dw);
 BEGIN
-    RETURN ARRAY[radius[i + 1] * sind(i - 180), radius[i + 1] * cosd(i - 180), du / length, dw / length];
+    RETURN ARRAY[here * sind(i - 180), here * cosd(i - 180), du / length, dw / length];
 END
 $$;
-COMMENT ON FUNCTION tunnel_internal.section_node(float8[], int) IS
-'Node k (0-359, at -180° + k) of a section, right and up of the axis (m), and the unit direction of the section there';
+COMMENT ON FUNCTION tunnel_internal.section_node(float8[], float8[], float8, int) IS
+'Node k (0-359, at -180° + k) of the section between two others, with the weight of the second: right and up of the axis (m), and the unit direction of the section there';
 
 
 -- Chainage, arc and offset of a point of a survey's tunnel; NULL off the tunnel. chainage: m in plan along the axis; arc: m
@@ -78,7 +96,9 @@ DECLARE
     after float8;
     f float8;
     frame float8[];
-    section record;
+    radius_a float8[]; radius_b float8[];
+    arc_a float8[]; arc_b float8[];
+    weight float8;
     u float8; w float8;
     k int;
     n0 float8[]; n1 float8[];
@@ -120,9 +140,9 @@ BEGIN
     -- a point between the planes of two segments (where they cross, far from the axis) lies on the later one's first plane
     f := CASE WHEN before < 0 THEN 0 ELSE before / (before + after) END;
     frame := tunnel_internal.segment_frame(s.vertex_from || s.vertex_to || s.tangent_from || s.tangent_to, f);
-    SELECT q.* INTO section
-    FROM tunnel_api.section_at(survey_id, s.chainage_from + f * (s.chainage_to - s.chainage_from)) q;
-    IF section.radius IS NULL THEN
+    SELECT q.* INTO radius_a, radius_b, arc_a, arc_b, weight
+    FROM tunnel_internal.section_pair(survey_id, s.chainage_from + f * (s.chainage_to - s.chainage_from)) q;
+    IF radius_a IS NULL THEN
         RETURN;
     END IF;
     u := (x - frame[1]) * frame[7] + (y - frame[2]) * frame[8];
@@ -130,8 +150,8 @@ BEGIN
 
     -- the interval between whose normals the point lies
     k := (floor(degrees(atan2(u, w)) + 180))::int % 360;
-    n0 := tunnel_internal.section_node(section.radius, k);
-    n1 := tunnel_internal.section_node(section.radius, k + 1);
+    n0 := tunnel_internal.section_node(radius_a, radius_b, weight, k);
+    n1 := tunnel_internal.section_node(radius_a, radius_b, weight, k + 1);
     here := (u - n0[1]) * n0[3] + (w - n0[2]) * n0[4];
     following := (u - n1[1]) * n1[3] + (w - n1[2]) * n1[4];
     FOR step IN 1 .. 180 LOOP
@@ -139,14 +159,14 @@ BEGIN
             k := (k + 359) % 360;
             n1 := n0;
             following := here;
-            n0 := tunnel_internal.section_node(section.radius, k);
+            n0 := tunnel_internal.section_node(radius_a, radius_b, weight, k);
             here := (u - n0[1]) * n0[3] + (w - n0[2]) * n0[4];
             EXIT WHEN here >= 0;
         ELSIF following >= 0 THEN
             k := (k + 1) % 360;
             n0 := n1;
             here := following;
-            n1 := tunnel_internal.section_node(section.radius, k + 1);
+            n1 := tunnel_internal.section_node(radius_a, radius_b, weight, k + 1);
             following := (u - n1[1]) * n1[3] + (w - n1[2]) * n1[4];
             EXIT WHEN following < 0;
         ELSE
@@ -175,7 +195,8 @@ BEGIN
         RETURN;
     END IF;
     chainage := s.chainage_from + f * (s.chainage_to - s.chainage_from);
-    arc := (1 - t) * section.arc[k + 1] + t * section.arc[k + 2];
+    arc := (1 - t) * ((1 - weight) * arc_a[k + 1] + weight * arc_b[k + 1])
+        + t * ((1 - weight) * arc_a[k + 2] + weight * arc_b[k + 2]);
     "offset" := inward;
 END
 $$;
@@ -193,10 +214,13 @@ DECLARE
     s tunnel.segment;
     srid int;
     frame float8[];
-    section record;
+    radius_a float8[]; radius_b float8[];
+    arc_a float8[]; arc_b float8[];
+    weight float8;
     low int := 1;
     high int := 361;
     middle int;
+    before float8;
     t float8;
     n0 float8[]; n1 float8[];
     u float8; w float8; du float8; dw float8; length float8;
@@ -206,21 +230,23 @@ BEGIN
     IF s.n IS NULL OR roll.chainage > s.chainage_to THEN
         RETURN NULL;
     END IF;
-    SELECT q.* INTO section FROM tunnel_api.section_at(survey_id, chainage) q;
-    IF section.radius IS NULL OR arc < section.arc[1] - 1e-6 OR arc > section.arc[361] + 1e-6 THEN
+    SELECT q.* INTO radius_a, radius_b, arc_a, arc_b, weight FROM tunnel_internal.section_pair(survey_id, chainage) q;
+    IF radius_a IS NULL OR arc < (1 - weight) * arc_a[1] + weight * arc_b[1] - 1e-6
+       OR arc > (1 - weight) * arc_a[361] + weight * arc_b[361] + 1e-6 THEN
         RETURN NULL;
     END IF;
     WHILE high - low > 1 LOOP
         middle := (low + high) / 2;
-        IF section.arc[middle] <= arc THEN
+        IF (1 - weight) * arc_a[middle] + weight * arc_b[middle] <= arc THEN
             low := middle;
         ELSE
             high := middle;
         END IF;
     END LOOP;
-    t := (arc - section.arc[low]) / (section.arc[low + 1] - section.arc[low]);
-    n0 := tunnel_internal.section_node(section.radius, low - 1);
-    n1 := tunnel_internal.section_node(section.radius, low);
+    before := (1 - weight) * arc_a[low] + weight * arc_b[low];
+    t := (arc - before) / ((1 - weight) * arc_a[low + 1] + weight * arc_b[low + 1] - before);
+    n0 := tunnel_internal.section_node(radius_a, radius_b, weight, low - 1);
+    n1 := tunnel_internal.section_node(radius_a, radius_b, weight, low);
     du := n0[3] + t * (n1[3] - n0[3]);
     dw := n0[4] + t * (n1[4] - n0[4]);
     length := sqrt(du * du + dw * dw);
