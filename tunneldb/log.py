@@ -23,6 +23,9 @@ VARIABLE = "TUNNELDB_LOG"
 MESSAGES = "tunneldb.messages"
 """Logger of the messages that a command prints on standard error."""
 
+WAITS = "tunneldb.waits"
+"""Logger of lines about other sessions that the program waits for; commands print them on standard error."""
+
 
 class JsonFormatter(logging.Formatter):
     """Formatter that writes a record as one line of JSON."""

@@ -19,8 +19,9 @@ CREATE TABLE tunnel.finding_kind (
     position INTEGER NOT NULL,
     active BOOLEAN DEFAULT true NOT NULL,
     CONSTRAINT finding_kind_pkey PRIMARY KEY (code),
-    CONSTRAINT finding_kind_code_check CHECK (code ~ '^[a-z][a-z0-9_]*$'),
-    CONSTRAINT finding_kind_geometries_check CHECK (geometries <@ '{polygon,line,point}' AND cardinality(geometries) > 0),
+    CONSTRAINT finding_kind_code_check CHECK (code ~ '^[a-z][a-z0-9_]{0,62}$'),
+    CONSTRAINT finding_kind_label_at_most_200_characters_check CHECK (char_length(label) <= 200),
+    CONSTRAINT finding_kind_geometries_check CHECK (geometries <@ '{polygon,line,point}' AND cardinality(geometries) BETWEEN 1 AND 3),
     CONSTRAINT finding_kind_wet_check CHECK ((code <> 'leak' OR wet) AND (code NOT IN ('joint', 'dark') OR NOT wet)),
     CONSTRAINT finding_kind_id_key UNIQUE (id)
 );
@@ -83,7 +84,9 @@ CREATE TABLE tunnel.severity (
     label TEXT NOT NULL,
     text TEXT,
     CONSTRAINT severity_pkey PRIMARY KEY (id),
-    CONSTRAINT severity_id_check CHECK (id BETWEEN 1 AND 4)
+    CONSTRAINT severity_id_check CHECK (id BETWEEN 1 AND 4),
+    CONSTRAINT severity_label_at_most_200_characters_check CHECK (char_length(label) <= 200),
+    CONSTRAINT severity_text_at_most_1000_characters_check CHECK (char_length(text) <= 1000)
 );
 COMMENT ON TABLE tunnel.severity IS 'Words for the degrees of severity, which an owner changes to his own';
 COMMENT ON COLUMN tunnel.severity.id IS '1, the least, to 4';
@@ -123,8 +126,9 @@ CREATE TABLE tunnel.tunnel (
     design TEXT,
     created_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
     CONSTRAINT tunnel_pkey PRIMARY KEY (id),
-    CONSTRAINT tunnel_spacing_check CHECK (spacing > 0),
-    CONSTRAINT tunnel_dry_region_limit_check CHECK (dry_region_limit >= 0),
+    CONSTRAINT tunnel_spacing_check CHECK (spacing BETWEEN 0.1 AND 1000),
+    CONSTRAINT tunnel_dry_region_limit_check CHECK (dry_region_limit BETWEEN '0'::float8 AND '100000000'::float8),
+    CONSTRAINT tunnel_start_chainage_check CHECK (start_chainage BETWEEN '-100000000'::float8 AND '100000000'::float8),
     CONSTRAINT tunnel_name_key UNIQUE (name)
 );
 COMMENT ON TABLE tunnel.tunnel IS 'A structure: its spatial reference, stationing and given axis';
@@ -365,6 +369,7 @@ CREATE TABLE tunnel.survey (
     CONSTRAINT survey_platform_check CHECK (platform IN ('static', 'mobile', 'unknown')),
     CONSTRAINT survey_reference_check CHECK (reference IN ('none', 'measured', 'auto')),
     CONSTRAINT survey_intensity_dimension_check CHECK ((intensity_dimension IS NULL) = (intensity_kind = 'none')),
+    CONSTRAINT survey_date_check CHECK (date BETWEEN '1900-01-01' AND '2199-12-31'),
     CONSTRAINT survey_tunnel_id_fkey FOREIGN KEY(tunnel_id) REFERENCES tunnel.tunnel (id) ON DELETE CASCADE,
     CONSTRAINT survey_name_key UNIQUE (name)
 );
@@ -400,6 +405,8 @@ CREATE TABLE tunnel.axis_vertex (
     CONSTRAINT axis_vertex_pkey PRIMARY KEY (id),
     CONSTRAINT axis_vertex_survey_id_n_key UNIQUE (survey_id, n),
     CONSTRAINT axis_vertex_source_check CHECK (source IN ('measured', 'interpolated', 'edited')),
+    CONSTRAINT axis_vertex_geom_finite_check CHECK (coalesce(public.st_x(geom) BETWEEN '-100000000'::float8 AND '100000000'::float8, false) AND coalesce(public.st_y(geom) BETWEEN '-100000000'::float8 AND '100000000'::float8, false) AND coalesce(public.st_z(geom) BETWEEN '-100000000'::float8 AND '100000000'::float8, false)),
+    CONSTRAINT axis_vertex_given_finite_check CHECK (coalesce(public.st_x(given) BETWEEN '-100000000'::float8 AND '100000000'::float8, false) AND coalesce(public.st_y(given) BETWEEN '-100000000'::float8 AND '100000000'::float8, false) AND coalesce(public.st_z(given) BETWEEN '-100000000'::float8 AND '100000000'::float8, false)),
     CONSTRAINT axis_vertex_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
 );
 COMMENT ON TABLE tunnel.axis_vertex IS 'Axis of a survey: vertex n stands at chainage n * spacing of the given axis';
@@ -1112,6 +1119,7 @@ CREATE TABLE tunnel.pose (
     time DOUBLE PRECISION NOT NULL,
     geom geometry(POINTZ,-1) NOT NULL,
     CONSTRAINT pose_pkey PRIMARY KEY (survey_id, time),
+    CONSTRAINT pose_geom_finite_check CHECK (coalesce(public.st_x(geom) BETWEEN '-100000000'::float8 AND '100000000'::float8, false) AND coalesce(public.st_y(geom) BETWEEN '-100000000'::float8 AND '100000000'::float8, false) AND coalesce(public.st_z(geom) BETWEEN '-100000000'::float8 AND '100000000'::float8, false)),
     CONSTRAINT pose_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
 );
 COMMENT ON TABLE tunnel.pose IS 'Trajectory of a mobile scanner';
@@ -1190,6 +1198,7 @@ CREATE TABLE tunnel.region (
     approved_at TIMESTAMP WITH TIME ZONE,
     CONSTRAINT region_pkey PRIMARY KEY (id),
     CONSTRAINT region_kind_check CHECK (kind IN ('homogeneous', 'dry')),
+    CONSTRAINT region_reason_at_most_10000_characters_check CHECK (char_length(reason) <= 10000),
     CONSTRAINT region_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
 );
 COMMENT ON TABLE tunnel.region IS 'Regions of the lining that the user has drawn, to be used in place of automatic ones';
@@ -1545,6 +1554,7 @@ CREATE TABLE tunnel.station (
     scan_id INTEGER NOT NULL,
     geom geometry(POINTZ,-1) NOT NULL,
     CONSTRAINT station_pkey PRIMARY KEY (survey_id, scan_id),
+    CONSTRAINT station_geom_finite_check CHECK (coalesce(public.st_x(geom) BETWEEN '-100000000'::float8 AND '100000000'::float8, false) AND coalesce(public.st_y(geom) BETWEEN '-100000000'::float8 AND '100000000'::float8, false) AND coalesce(public.st_z(geom) BETWEEN '-100000000'::float8 AND '100000000'::float8, false)),
     CONSTRAINT station_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
 );
 COMMENT ON TABLE tunnel.station IS 'Stations of a static scanner';
@@ -1819,7 +1829,11 @@ CREATE TABLE tunnel.finding (
     CONSTRAINT finding_pkey PRIMARY KEY (id),
     CONSTRAINT finding_review_check CHECK (review IN ('open', 'confirmed', 'rejected')),
     CONSTRAINT finding_origin_check CHECK (origin IN ('detected', 'drawn', 'redrawn', 'split', 'merged')),
-    CONSTRAINT finding_width_mm_check CHECK (width_mm > 0),
+    CONSTRAINT finding_width_mm_check CHECK (width_mm > 0 AND width_mm <= 10000),
+    CONSTRAINT finding_place_check CHECK (chainage_from BETWEEN '-100000000'::float8 AND '100000000'::float8 AND chainage_to BETWEEN '-100000000'::float8 AND '100000000'::float8 AND arc_from BETWEEN '-100000000'::float8 AND '100000000'::float8 AND arc_to BETWEEN '-100000000'::float8 AND '100000000'::float8),
+    CONSTRAINT finding_size_check CHECK (area BETWEEN '0'::float8 AND '100000000'::float8 AND length BETWEEN '0'::float8 AND '100000000'::float8),
+    CONSTRAINT finding_clock_check CHECK (clock BETWEEN '0'::float8 AND '12'::float8),
+    CONSTRAINT finding_remark_at_most_10000_characters_check CHECK (char_length(remark) <= 10000),
     CONSTRAINT finding_other_check CHECK (merged_into <> id AND same_as <> id),
     CONSTRAINT finding_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE,
     CONSTRAINT finding_kind_fkey FOREIGN KEY(kind) REFERENCES tunnel.finding_kind (code),
@@ -2030,6 +2044,8 @@ CREATE TABLE tunnel.photo (
     added_at TIMESTAMP WITH TIME ZONE DEFAULT clock_timestamp() NOT NULL,
     CONSTRAINT photo_pkey PRIMARY KEY (id),
     CONSTRAINT photo_path_check CHECK (path <> ''),
+    CONSTRAINT photo_path_at_most_2000_characters_check CHECK (char_length(path) <= 2000),
+    CONSTRAINT photo_caption_at_most_1000_characters_check CHECK (char_length(caption) <= 1000),
     CONSTRAINT photo_finding_id_fkey FOREIGN KEY(finding_id) REFERENCES tunnel.finding (id) ON DELETE CASCADE
 );
 COMMENT ON TABLE tunnel.photo IS 'Photos of findings, by path or URL';
@@ -2069,6 +2085,7 @@ CREATE TABLE tunnel.spot (
     CONSTRAINT spot_pkey PRIMARY KEY (id),
     CONSTRAINT spot_kind_check CHECK (kind IN ('dark', 'bright')),
     CONSTRAINT spot_review_check CHECK (review IN ('open', 'confirmed', 'rejected')),
+    CONSTRAINT spot_remark_at_most_10000_characters_check CHECK (char_length(remark) <= 10000),
     CONSTRAINT spot_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE,
     CONSTRAINT spot_face_id_fkey FOREIGN KEY(face_id) REFERENCES tunnel.face (id) ON DELETE SET NULL
 );

@@ -17,20 +17,27 @@ DECLARE
     drawn public.geometry;
     shape_before public.geometry;
     redrawn boolean;
+    lapses boolean := false;  -- the review does not apply to the new outline
     kept jsonb;
     step bigint;
 BEGIN
+    IF TG_OP <> 'DELETE' THEN
+        PERFORM tunnel_internal.check_text('the remark', NEW.remark, 10000);
+        IF TG_OP = 'INSERT' OR public.ST_AsEWKB(NEW.geom) IS DISTINCT FROM public.ST_AsEWKB(OLD.geom) THEN
+            PERFORM tunnel_internal.check_shape('the drawing', NEW.geom);
+        END IF;
+    END IF;
     IF TG_OP = 'INSERT' THEN
         SELECT s.* INTO its FROM tunnel.survey s
          WHERE CASE WHEN NEW.survey_id IS NULL THEN s.name = NEW.survey ELSE s.id = NEW.survey_id END;
         IF NOT FOUND THEN
             RAISE EXCEPTION 'a finding needs the survey it belongs to; there is none %',
-                coalesce('with id ' || NEW.survey_id, 'named ' || NEW.survey, 'without a name')
+                coalesce('with id ' || NEW.survey_id, 'named ' || tunnel_internal.excerpt(NEW.survey), 'without a name')
                 USING ERRCODE = 'invalid_parameter_value';
         END IF;
         drawn := tunnel_internal.drawn_in(its.id, place, NEW.geom);
         PERFORM tunnel_internal.check_kind(NEW.kind, drawn);
-        PERFORM tunnel_internal.check_finding(NEW.kind, NEW.severity, NEW.width_mm, coalesce(NEW.review, 'confirmed'));
+        PERFORM tunnel_internal.check_finding(NEW.kind, NEW.severity, NEW.width_mm, coalesce(NEW.review, 'confirmed'), NEW.remark);
         PERFORM tunnel_internal.lock_findings(its.id);
         NEW.id := tunnel_internal.add_finding(its.id, NEW.kind, drawn, NEW.width_mm, NEW.severity, coalesce(NEW.review, 'confirmed'),
                                          NEW.remark, 'drawn', true, NULL);
@@ -91,7 +98,7 @@ BEGIN
         NEW.width_mm := (new_row ->> 'width_mm')::float8;
         NEW.review := new_row ->> 'review';
         NEW.remark := new_row ->> 'remark';
-        PERFORM tunnel_internal.check_finding(NEW.kind, NEW.severity, NEW.width_mm, NEW.review);
+        PERFORM tunnel_internal.check_finding(NEW.kind, NEW.severity, NEW.width_mm, NEW.review, NEW.remark);
         IF redrawn THEN
             drawn := tunnel_internal.drawn_in(was.survey_id, place, NEW.geom);
         ELSE
@@ -104,9 +111,14 @@ BEGIN
         END IF;
         IF redrawn OR (was.shape IS NOT NULL AND new_row -> 'width_mm' <> was_row -> 'width_mm') THEN
             kept := tunnel_internal.finding_measured(was.id);
+            lapses := redrawn AND new_row -> 'review' = was_row -> 'review' AND tunnel_internal.review_lapses(was.id, NULL, drawn);
             PERFORM tunnel_internal.redraw(was.id, drawn, NEW.width_mm, CASE was.origin WHEN 'detected' THEN 'redrawn' ELSE was.origin END);
         END IF;
-        IF new_row -> 'review' <> was_row -> 'review' OR new_row -> 'remark' <> was_row -> 'remark'
+        IF lapses THEN
+            NEW.review := 'open';
+            NEW.reviewed_by := NULL;
+            NEW.reviewed_at := NULL;
+        ELSIF new_row -> 'review' <> was_row -> 'review' OR new_row -> 'remark' <> was_row -> 'remark'
            OR new_row -> 'kind' <> was_row -> 'kind' THEN
             NEW.reviewed_by := session_user;
             NEW.reviewed_at := clock_timestamp();
@@ -125,6 +137,7 @@ BEGIN
     SELECT a.* INTO is_now FROM tunnel.finding a WHERE a.id = NEW.id;
     PERFORM tunnel_internal.note_edit((SELECT s.name FROM tunnel.survey s WHERE s.id = is_now.survey_id), 'finding', is_now.id,
                                  before, tunnel_internal.finding_state(is_now.id), kept => kept);
+    PERFORM tunnel_internal.check_hidden(is_now.id);
     PERFORM tunnel_internal.settle_findings(is_now.survey_id, public.ST_Collect(was.unrolled, is_now.unrolled));
     RETURN NEW;
 END

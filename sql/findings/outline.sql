@@ -13,7 +13,7 @@ BEGIN
     IF NOT FOUND THEN
         RAISE EXCEPTION 'the kind of a finding can be %, not %',
             (SELECT string_agg(k.code, ', ' ORDER BY k.position, k.code) FROM tunnel.finding_kind k WHERE k.active),
-            coalesce(kind, 'empty') USING ERRCODE = 'check_violation';
+            coalesce(tunnel_internal.excerpt(kind), 'empty') USING ERRCODE = 'check_violation';
     ELSIF way <> ALL (its.geometries) THEN
         RAISE EXCEPTION '% is drawn as %, not as %', kind, array_to_string(its.geometries, ' or '), way
             USING ERRCODE = 'check_violation';
@@ -23,7 +23,8 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.check_kind(text, geometry) IS
     'Raise an error unless a kind of findings with this code can be drawn with this geometry, or with any if none is given';
 
-CREATE OR REPLACE FUNCTION tunnel_internal.check_finding(kind text, severity int, width_mm float8, review text) RETURNS void
+CREATE OR REPLACE FUNCTION tunnel_internal.check_finding(kind text, severity int, width_mm float8, review text, remark text)
+RETURNS void
 LANGUAGE plpgsql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
     widest constant int := CASE kind WHEN 'crack' THEN 100 ELSE 10000 END;  -- mm
@@ -33,14 +34,12 @@ BEGIN
     ELSIF NOT width_mm BETWEEN 0.01 AND widest THEN
         RAISE EXCEPTION 'a % is 0.01 to % mm wide, not % mm: widths are in millimetres',
             kind, widest, width_mm USING ERRCODE = 'check_violation';
-    ELSIF review IS NULL OR review NOT IN ('open', 'confirmed', 'rejected') THEN
-        RAISE EXCEPTION 'the review of a finding can be open, confirmed or rejected, not %', coalesce(review, 'empty')
-            USING ERRCODE = 'check_violation';
     END IF;
+    PERFORM tunnel_internal.check_review('a finding', review, remark);
 END
 $$;
-COMMENT ON FUNCTION tunnel_internal.check_finding(text, int, float8, text) IS
-    'Raise an error unless severity, width (mm; of a crack at most 100) and review are valid';
+COMMENT ON FUNCTION tunnel_internal.check_finding(text, int, float8, text, text) IS
+    'Raise an error unless severity, width (mm; of a crack at most 100), review and remark are valid';
 
 -- Shape drawn in a view, in the unrolled plane: drawn there (finding_unrolled), on the map strip (finding_map) or in space
 -- (finding_3d).
@@ -53,6 +52,7 @@ DECLARE
         ELSE (SELECT t.srid FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = survey_id) END;
     unrolled public.geometry;
 BEGIN
+    PERFORM tunnel_internal.check_shape('the drawing', geom);
     IF given IS NULL OR public.ST_IsEmpty(given) OR public.ST_NumGeometries(given) > 1 THEN
         RETURN given;  -- drawn_figures reports it
     ELSIF public.ST_SRID(given) NOT IN (srid, 0) THEN

@@ -4,6 +4,7 @@
 CREATE OR REPLACE FUNCTION tunnel_internal.edit_photo() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
+    most constant int := 100;  -- of a finding
     name text;
 BEGIN
     IF TG_OP = 'DELETE' THEN
@@ -18,10 +19,15 @@ BEGIN
     IF coalesce(NEW.path, '') = '' THEN
         RAISE EXCEPTION 'a photo needs a path or URL' USING ERRCODE = 'null_value_not_allowed';
     END IF;
+    PERFORM tunnel_internal.check_text('the path of a photo', NEW.path, 2000),
+            tunnel_internal.check_text('the caption of a photo', NEW.caption, 1000);
     SELECT s.name INTO name FROM tunnel.finding a JOIN tunnel.survey s ON s.id = a.survey_id WHERE a.id = NEW.finding_id;
     IF NOT FOUND OR (TG_OP = 'UPDATE' AND NEW.finding_id <> OLD.finding_id) THEN
         RAISE EXCEPTION 'a photo is of one finding, which stays; there is no finding %', NEW.finding_id
             USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    IF TG_OP = 'INSERT' AND (SELECT count(*) FROM tunnel.photo p WHERE p.finding_id = NEW.finding_id) >= most THEN
+        RAISE EXCEPTION 'finding % has % photos, the most that a finding can have', NEW.finding_id, most USING ERRCODE = 'check_violation';
     END IF;
     NEW.survey := name;
     NEW.added_by := session_user;

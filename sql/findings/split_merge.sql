@@ -28,7 +28,9 @@ BEGIN
     IF was.id IS NULL OR was.merged_into IS NOT NULL THEN
         RAISE EXCEPTION 'finding % is %', finding, coalesce('merged into ' || was.merged_into || ', which stands for it', 'gone')
             USING ERRCODE = 'feature_not_supported';
-    ELSIF public.GeometryType(line) <> 'LINESTRING' OR public.GeometryType(was.shape) = 'POINT' THEN
+    END IF;
+    PERFORM tunnel_internal.check_shape('the line', line);
+    IF public.GeometryType(line) <> 'LINESTRING' OR public.GeometryType(was.shape) = 'POINT' THEN
         RAISE EXCEPTION 'a polygon or a line is split, by one line' USING ERRCODE = 'invalid_parameter_value';
     END IF;
     blade := public.ST_Force2D(tunnel_internal.drawn_in(survey_key, CASE public.ST_SRID(line) WHEN 0 THEN 'unrolled' ELSE 'map' END, line));
@@ -64,6 +66,8 @@ LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_pat
 DECLARE
     wanted constant bigint[] := ARRAY(SELECT DISTINCT i FROM unnest(ids) i ORDER BY i);
     gap constant float8 := 1.0;
+    most constant int := 1000;
+    lapses boolean;
     surveys int[];
     name text;
     oldest tunnel.finding;
@@ -78,6 +82,9 @@ DECLARE
 BEGIN
     IF cardinality(wanted) < 2 THEN
         RAISE EXCEPTION 'at least two findings are merged' USING ERRCODE = 'invalid_parameter_value';
+    ELSIF cardinality(wanted) > most THEN
+        RAISE EXCEPTION '% findings are given, more than % that are merged at a time', cardinality(wanted), most
+            USING ERRCODE = 'invalid_parameter_value';
     END IF;
     surveys := ARRAY(SELECT DISTINCT a.survey_id FROM tunnel.finding a WHERE a.id = ANY (wanted));
     IF cardinality(surveys) <> 1 OR (SELECT count(*) FROM tunnel.finding a WHERE a.id = ANY (wanted)) <> cardinality(wanted) THEN
@@ -123,9 +130,14 @@ BEGIN
     END LOOP;
     before := tunnel_internal.finding_state(oldest.id);
     kept := tunnel_internal.finding_measured(oldest.id);
+    lapses := tunnel_internal.review_lapses(oldest.id, (SELECT public.ST_Union(coalesce(a.shape, a.unrolled)) FROM tunnel.finding a
+                                                         WHERE a.id = ANY (wanted) AND a.review = oldest.review), whole);
     PERFORM tunnel_internal.redraw(oldest.id, whole, oldest.width_mm, 'merged');
-    UPDATE tunnel.finding a SET severity = m.severity, remark = m.remark
-      FROM (SELECT max(x.severity) AS severity, string_agg(DISTINCT x.remark, '; ') AS remark
+    UPDATE tunnel.finding a
+       SET severity = m.severity, remark = m.remark, review = CASE WHEN lapses THEN 'open' ELSE a.review END,
+           reviewed_by = CASE WHEN lapses THEN NULL ELSE a.reviewed_by END,
+           reviewed_at = CASE WHEN lapses THEN NULL ELSE a.reviewed_at END
+      FROM (SELECT max(x.severity) AS severity, left(string_agg(DISTINCT x.remark, '; '), 10000) AS remark
               FROM tunnel.finding x WHERE x.id = ANY (wanted)) m
      WHERE a.id = oldest.id;
     -- the merged ids are listed even if the outline of the oldest did not change
@@ -143,4 +155,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.finding_merge(bigint[]) IS
-'Merge findings of one kind (polygons, or lines end to end) that touch or lie within 1 m. The oldest keeps its id and review, and gets the outline of all, the highest severity and all remarks. The others get the state merged and are not counted. Returns the id of the oldest';
+'Merge findings of one kind (polygons, or lines end to end) that touch or lie within 1 m. The oldest keeps its id and gets the outline of all, the highest severity and all remarks. It keeps its review, unless somebody else reviewed less than most of the outline. The others get the state merged and are not counted. Returns the id of the oldest';

@@ -27,8 +27,8 @@ COMMENT ON FUNCTION tunnel_internal.finding_measured(bigint) IS
 -- Detection writes the findings of a survey under this lock: it sees everything drawn before, and nothing is drawn meanwhile.
 -- People who draw do not wait for each other.
 CREATE OR REPLACE FUNCTION tunnel_internal.lock_findings(survey_id int) RETURNS void
-LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp AS $$
-    SELECT pg_advisory_xact_lock_shared(-3, $1)
+LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_temp SET lock_timeout = '60 s' AS $$
+    SELECT tunnel_internal.wait_lock(-3, $1, true, 'the list of findings of survey ' || $1)
 $$;
 COMMENT ON FUNCTION tunnel_internal.lock_findings(int) IS
     'Block detection from writing the findings of a survey, or wait for it, until the transaction ends';

@@ -68,13 +68,12 @@ LANGUAGE sql VOLATILE PARALLEL UNSAFE STRICT SET search_path = pg_catalog, pg_te
     UPDATE tunnel.finding a
        SET drawn_by = CASE WHEN a.origin <> 'detected' THEN coalesce(d.who, a.drawn_by, session_user) END,
            drawn_at = CASE WHEN a.origin <> 'detected' THEN coalesce(d.at, a.drawn_at, clock_timestamp()) END,
-           reviewed_by = CASE WHEN c.reviewed THEN r.who ELSE a.reviewed_by END,
-           reviewed_at = CASE WHEN c.reviewed THEN r.at ELSE a.reviewed_at END
+           reviewed_by = CASE WHEN c.reviewed AND NOT r.opened THEN r.who WHEN NOT c.reviewed THEN a.reviewed_by END,
+           reviewed_at = CASE WHEN c.reviewed AND NOT r.opened THEN r.at WHEN NOT c.reviewed THEN a.reviewed_at END
       FROM (SELECT coalesce($2.before, '{}') || coalesce($2.after, '{}') ?| ARRAY['review', 'remark', 'kind'] AS reviewed) c
       LEFT JOIN LATERAL (SELECT s.who, s.at FROM stood s WHERE s.after ? 'geom' ORDER BY s.id DESC LIMIT 1) d ON true
-      LEFT JOIN LATERAL (SELECT s.who, s.at FROM stood s
-                          WHERE s.after ?| ARRAY['review', 'remark', 'kind'] AND NOT (s.action = 'insert' AND s.after ->> 'review' = 'open')
-                          ORDER BY s.id DESC LIMIT 1) r ON true
+      LEFT JOIN LATERAL (SELECT s.who, s.at, coalesce(s.after ->> 'review' = 'open' AND s.after ? 'geom', false) AS opened FROM stood s
+                          WHERE s.after ?| ARRAY['review', 'remark', 'kind'] ORDER BY s.id DESC LIMIT 1) r ON true
      WHERE a.id = $1
 $$;
 COMMENT ON FUNCTION tunnel_internal.stamp_finding(bigint, tunnel_audit.entry) IS
@@ -186,6 +185,7 @@ BEGIN
         PERFORM tunnel_internal.note_edit(step.survey, 'finding', part.row_id, before, tunnel_internal.finding_state(part.row_id),
                                      undoes => part.id, part_of => done);
     END LOOP;
+    PERFORM tunnel_internal.check_hidden(finding);
     place := public.ST_Collect(place, (SELECT a.unrolled FROM tunnel.finding a WHERE a.id = finding));
     PERFORM tunnel_internal.settle_findings(survey_key, place);
     RETURN CASE WHEN step.action = 'insert' THEN 'drawn' WHEN step.action = 'delete' THEN 'deleted'

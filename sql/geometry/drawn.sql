@@ -45,13 +45,15 @@ AS $$
 DECLARE
     survey_key constant int := survey_id;
     kind constant text := public.GeometryType(shape);
-    middle constant public.geometry := public.ST_Force2D(public.ST_PointOnSurface(shape));
+    middle public.geometry;
     near float8;
     rings public.geometry[];
 BEGIN
+    PERFORM tunnel_internal.check_shape('the drawing', shape);
     IF kind NOT IN ('POINT', 'LINESTRING', 'POLYGON') THEN
         RAISE EXCEPTION 'a point, a line or a polygon is needed, not a %', kind USING HINT = 'Use ST_Dump for the parts.';
     END IF;
+    middle := public.ST_Force2D(public.ST_PointOnSurface(shape));
     SELECT g.chainage_from + public.ST_LineLocatePoint(public.ST_Force2D(g.geom), middle) * (g.chainage_to - g.chainage_from) INTO near
       FROM tunnel.segment g WHERE g.survey_id = survey_key ORDER BY public.ST_Distance(public.ST_Force2D(g.geom), middle) LIMIT 1;
     SELECT array_agg(q.ring ORDER BY q.i) INTO rings

@@ -91,6 +91,14 @@ COMMENT ON FUNCTION tunnel_internal.segment_plan(int, int) IS
 'Segments of a kilometre computed from the axis vertices: number, chainage of both planes (m, in plan), vertex_from, vertex_to, tangent_from, tangent_to (12 numbers, tunnel''s SRID). Source: Gonçalves et al. (2012), stage 3';
 
 
+-- Numbers that are none, or too large to be coordinates, must not end the status of all surveys with an error.
+CREATE OR REPLACE FUNCTION tunnel_internal.coordinate(value float8) RETURNS float8
+LANGUAGE sql IMMUTABLE PARALLEL SAFE CALLED ON NULL INPUT
+AS $$ SELECT greatest(least($1, 1e9), -1e9) $$;
+COMMENT ON FUNCTION tunnel_internal.coordinate(float8) IS
+'A number limited to ±1,000,000 km, m; the greatest one for NULL and NaN';
+
+
 -- True if the planes of a segment differ from the present axis: a vertex at one of its ends moved by more than 0.1 mm since
 -- the segment was made, or a plane turned by as much there because the vertex beyond moved. A plane at the end of the axis
 -- turns with the vertices of the other plane. The neighbouring segments are not used: they can belong to another kilometre
@@ -101,19 +109,22 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT SECURITY DEFINER
 SET search_path = pg_catalog, pg_temp
 AS $$
     WITH vertex AS MATERIALIZED (
-        SELECT v.n - $2 AS i, public.st_x(v.geom) AS x, public.st_y(v.geom) AS y, public.st_z(v.geom) AS z
+        SELECT v.n - $2 AS i, tunnel_internal.coordinate(public.st_x(v.geom)) AS x, tunnel_internal.coordinate(public.st_y(v.geom)) AS y,
+               tunnel_internal.coordinate(public.st_z(v.geom)) AS z
           FROM tunnel.axis_vertex v WHERE v.survey_id = $1 AND v.n BETWEEN $2 - 1 AND $2 + 2
     )
     SELECT EXISTS (
         SELECT FROM vertex v
          WHERE v.i IN (0, 1)
-           AND (v.x - $3[3 * v.i + 1]) ^ 2 + (v.y - $3[3 * v.i + 2]) ^ 2 + (v.z - $3[3 * v.i + 3]) ^ 2 > 1e-8
+           AND (v.x - tunnel_internal.coordinate($3[3 * v.i + 1])) ^ 2 + (v.y - tunnel_internal.coordinate($3[3 * v.i + 2])) ^ 2
+               + (v.z - tunnel_internal.coordinate($3[3 * v.i + 3])) ^ 2 > 1e-8
     ) OR EXISTS (
         SELECT FROM vertex a
           JOIN vertex b ON b.i = a.i + 2
          CROSS JOIN LATERAL (SELECT sqrt((b.x - a.x) ^ 2 + (b.y - a.y) ^ 2 + (b.z - a.z) ^ 2) AS length) c
-         WHERE (b.x - a.x - c.length * $3[3 * a.i + 10]) ^ 2 + (b.y - a.y - c.length * $3[3 * a.i + 11]) ^ 2
-               + (b.z - a.z - c.length * $3[3 * a.i + 12]) ^ 2 > 1e-8
+         WHERE (b.x - a.x - c.length * tunnel_internal.coordinate($3[3 * a.i + 10])) ^ 2
+               + (b.y - a.y - c.length * tunnel_internal.coordinate($3[3 * a.i + 11])) ^ 2
+               + (b.z - a.z - c.length * tunnel_internal.coordinate($3[3 * a.i + 12])) ^ 2 > 1e-8
     )
 $$;
 COMMENT ON FUNCTION tunnel_internal.segment_moved(int, int, float8[]) IS

@@ -30,6 +30,7 @@ DECLARE
     kind constant text := public.GeometryType(shape);
     rings public.geometry[];
 BEGIN
+    PERFORM tunnel_internal.check_shape('the shape', shape);
     IF kind NOT IN ('POINT', 'LINESTRING', 'POLYGON') THEN
         RAISE EXCEPTION 'a point, a line or a polygon is needed, not a %', kind USING HINT = 'Use ST_Dump for the parts.';
     END IF;

@@ -6,7 +6,7 @@
 -- time determines the next jobs.
 CREATE OR REPLACE FUNCTION tunnel_internal.queue_lock(survey_id integer) RETURNS void
 LANGUAGE sql VOLATILE STRICT PARALLEL UNSAFE
-AS $$ SELECT pg_advisory_xact_lock(-2, survey_id) $$;
+AS $$ SELECT tunnel_internal.wait_lock(-2, survey_id, false, 'the queue of survey ' || survey_id) $$;
 COMMENT ON FUNCTION tunnel_internal.queue_lock(integer) IS
     'Wait until nobody commits a result of the survey, and block others until the transaction ends';
 

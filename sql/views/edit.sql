@@ -8,7 +8,9 @@
 CREATE OR REPLACE FUNCTION tunnel_internal.edit_axis_vertex() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
+    most constant float8 := 25;  -- m, the distance up to which points of the tunnel are selected
     was tunnel.axis_vertex;
+    given public.geometry;
 BEGIN
     IF (NEW.id, NEW.survey_id, NEW.survey, NEW.n, NEW.km, NEW.chainage, NEW.label, NEW.points, NEW.source,
         NEW.edited_by, NEW.edited_at, NEW.remark) IS DISTINCT FROM
@@ -21,6 +23,10 @@ BEGIN
         RAISE EXCEPTION 'axis vertex % at chainage % cannot be without a position', OLD.n, OLD.label
             USING ERRCODE = 'null_value_not_allowed';
     END IF;
+    IF public.GeometryType(NEW.geom) <> 'POINT' THEN
+        RAISE EXCEPTION 'the position of axis vertex % is a point, not a %', OLD.n, lower(public.GeometryType(NEW.geom))
+            USING ERRCODE = 'invalid_parameter_value';
+    END IF;
     IF public.ST_SRID(NEW.geom) <> public.ST_SRID(OLD.geom) THEN
         RAISE EXCEPTION 'axis vertex % is in SRID %, its new position in SRID %',
             OLD.n, public.ST_SRID(OLD.geom), public.ST_SRID(NEW.geom)
@@ -32,8 +38,14 @@ BEGIN
             OLD.n, public.ST_AsText(NEW.geom)
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
+    PERFORM tunnel_internal.check_coordinates(format('the new position of axis vertex %s', OLD.n), NEW.geom);
     IF NEW.geom OPERATOR(public.=) OLD.geom THEN
         RETURN NEW;
+    END IF;
+    given := (SELECT v.given FROM tunnel.axis_vertex v WHERE v.id = OLD.id);
+    IF public.ST_3DDistance(NEW.geom, given) > most THEN
+        RAISE EXCEPTION 'the new position of axis vertex % at chainage % is % m from the given axis, more than % m', OLD.n,
+            OLD.label, round(public.ST_3DDistance(NEW.geom, given)::numeric, 1), most USING ERRCODE = 'invalid_parameter_value';
     END IF;
     SELECT v.* INTO was FROM tunnel.axis_vertex v WHERE v.id = OLD.id FOR UPDATE;
     IF NOT FOUND THEN
@@ -77,15 +89,11 @@ DECLARE
     geometries CONSTANT text[] := ARRAY['unrolled', 'map', 'surface', 'outline', 'geom'];
     was record;
 BEGIN
+    PERFORM tunnel_internal.check_review(OLD.kind || ' ' || OLD.id, NEW.review, NEW.remark);
     IF to_jsonb(NEW) - editable - geometries IS DISTINCT FROM to_jsonb(OLD) - editable - geometries THEN
         RAISE EXCEPTION 'of % only % can be edited', TG_ARGV[1],
             CASE WHEN judging THEN 'the review, the remark and the kind' ELSE 'the review and the remark' END
             USING ERRCODE = 'feature_not_supported';
-    END IF;
-    IF NEW.review IS NULL OR NEW.review NOT IN ('open', 'confirmed', 'rejected') THEN
-        RAISE EXCEPTION 'the review of % % can be open, confirmed or rejected, not %',
-            OLD.kind, OLD.id, coalesce(NEW.review, 'empty')
-            USING ERRCODE = 'check_violation';
     END IF;
     IF kinds = ARRAY['any'] THEN
         IF NEW.kind IS DISTINCT FROM OLD.kind THEN
@@ -94,7 +102,7 @@ BEGIN
     ELSIF judging AND NEW.kind IS DISTINCT FROM OLD.kind AND (NEW.kind IS NULL OR NEW.kind <> ALL (kinds)) THEN
         RAISE EXCEPTION 'the kind of % % can be %, not %', OLD.kind, OLD.id,
             array_to_string(kinds[:cardinality(kinds) - 1], ', ') || ' or ' || kinds[cardinality(kinds)],
-            coalesce(NEW.kind, 'empty')
+            coalesce(tunnel_internal.excerpt(NEW.kind), 'empty')
             USING ERRCODE = 'check_violation';
     END IF;
     IF (NEW.review, NEW.remark, NEW.kind) IS NOT DISTINCT FROM (OLD.review, OLD.remark, OLD.kind) THEN
@@ -120,7 +128,7 @@ BEGIN
        OR (was.remark IS DISTINCT FROM OLD.remark AND was.remark IS DISTINCT FROM NEW.remark) THEN
         RAISE EXCEPTION '% % % was changed meanwhile: it is %, with the kind % and %', OLD.kind, OLD.id,
             coalesce('at ' || OLD.label, 'of a site'), was.review, was.kind,
-            coalesce('the remark ' || quote_literal(was.remark), 'no remark')
+            coalesce('the remark ' || quote_literal(tunnel_internal.excerpt(was.remark)), 'no remark')
             USING ERRCODE = 'serialization_failure', HINT = 'Reload the row, then edit it again.';
     END IF;
     NEW.reviewed_by := session_user;
@@ -135,6 +143,7 @@ BEGIN
                kind = CASE WHEN a.manual THEN NEW.kind ELSE a.kind END,
                kind_override = CASE WHEN a.manual THEN NULL WHEN NEW.kind = was.kind THEN a.kind_override ELSE nullif(NEW.kind, a.kind) END
          WHERE a.id = OLD.id;
+        PERFORM tunnel_internal.check_hidden(OLD.id);
         PERFORM tunnel_internal.settle_findings(a.survey_id, a.unrolled) FROM tunnel.finding a WHERE a.id = OLD.id;
     END IF;
     PERFORM tunnel_internal.note_edit(OLD.survey, TG_ARGV[0], OLD.id, to_jsonb(was),
@@ -217,6 +226,8 @@ DECLARE
     before jsonb;
     its tunnel.survey;
     most float8;
+    area float8;
+    taken float8 := 0;
 BEGIN
     IF TG_OP = 'DELETE' THEN
         PERFORM FROM tunnel.region r WHERE r.id = OLD.id FOR UPDATE;
@@ -229,8 +240,15 @@ BEGIN
         PERFORM tunnel_internal.mark_dry(was.survey_id, was.geom);
         RETURN OLD;
     END IF;
-    IF NOT coalesce(public.ST_IsValid(NEW.geom), false) THEN
-        RAISE EXCEPTION 'a region must be a valid polygon: %', coalesce(public.ST_IsValidReason(NEW.geom), 'it is empty')
+    PERFORM tunnel_internal.check_text('the reason', NEW.reason, 10000);
+    PERFORM tunnel_internal.check_coordinates('the region', NEW.geom);
+    IF NEW.kind IS NULL OR NEW.kind NOT IN ('dry', 'homogeneous') THEN
+        RAISE EXCEPTION 'the kind of a region can be dry or homogeneous, not %',
+            coalesce(tunnel_internal.excerpt(NEW.kind), 'empty') USING ERRCODE = 'check_violation';
+    END IF;
+    IF NOT coalesce(public.ST_IsValid(NEW.geom) AND public.ST_Area(NEW.geom) > 0, false) THEN
+        RAISE EXCEPTION 'a region must be a valid polygon: %',
+            CASE WHEN NOT public.ST_IsValid(NEW.geom) THEN public.ST_IsValidReason(NEW.geom) ELSE 'it is empty' END
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     IF TG_OP = 'UPDATE' THEN
@@ -263,7 +281,7 @@ BEGIN
          WHERE CASE WHEN NEW.survey_id IS NULL THEN s.name = NEW.survey ELSE s.id = NEW.survey_id END;
         IF NOT FOUND THEN
             RAISE EXCEPTION 'a region needs the survey it belongs to; there is none %',
-                coalesce('with id ' || NEW.survey_id, 'named ' || NEW.survey, 'without a name')
+                coalesce('with id ' || NEW.survey_id, 'named ' || tunnel_internal.excerpt(NEW.survey), 'without a name')
                 USING ERRCODE = 'invalid_parameter_value';
         END IF;
         NEW.survey_id := its.id;
@@ -271,20 +289,25 @@ BEGIN
     END IF;
     SELECT t.dry_region_limit INTO most
       FROM tunnel.survey s JOIN tunnel.tunnel t ON t.id = s.tunnel_id WHERE s.id = NEW.survey_id;
-    IF NEW.kind = 'dry' AND public.ST_Area(NEW.geom) > most AND coalesce(trim(NEW.reason), '') = '' THEN
-        RAISE EXCEPTION 'a dry region of % m² is larger than % m²: its reason must say why',
-            round(public.ST_Area(NEW.geom)::numeric, 1), most USING ERRCODE = 'check_violation';
-    END IF;
-    IF was.id IS NULL OR NOT NEW.geom OPERATOR(public.=) was.geom THEN
+    IF was.id IS NULL OR NEW.kind <> was.kind OR NOT NEW.geom OPERATOR(public.=) was.geom THEN
         NEW.drawn_by := session_user;
         NEW.drawn_at := clock_timestamp();
     ELSE
         NEW.drawn_by := was.drawn_by;
         NEW.drawn_at := was.drawn_at;
     END IF;
+    area := public.ST_Area(NEW.geom);
+    IF NEW.kind = 'dry' THEN
+        taken := tunnel_internal.area_taken(NEW.survey_id, NEW.drawn_by, was.id);
+        IF area + taken > most AND coalesce(trim(NEW.reason), '') = '' THEN
+            RAISE EXCEPTION 'a dry region of % m²% is larger than % m²: its reason must say why', round(area::numeric, 1),
+                CASE WHEN taken > 0 THEN format(', with %s m² that %s took away before in %s,', round(taken::numeric, 1), NEW.drawn_by, NEW.survey)
+                     ELSE '' END, most USING ERRCODE = 'check_violation';
+        END IF;
+    END IF;
     -- the approval applies to the region with its reason at that time
     IF was.id IS NULL OR NEW.kind <> was.kind OR NOT NEW.geom OPERATOR(public.=) was.geom OR NEW.reason IS DISTINCT FROM was.reason THEN
-        NEW.pending_approval := NEW.kind = 'dry' AND public.ST_Area(NEW.geom) > most;
+        NEW.pending_approval := NEW.kind = 'dry' AND area + taken > most;
         NEW.approved_by := NULL;
         NEW.approved_at := NULL;
     ELSE
@@ -312,7 +335,8 @@ COMMENT ON FUNCTION tunnel_internal.edit_region() IS 'Trigger of the view region
 CREATE OR REPLACE TRIGGER edit INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.region
     FOR EACH ROW EXECUTE FUNCTION tunnel_internal.edit_region();
 
--- A dry region larger than the tunnel's limit has no effect until an operator approves it.
+-- A dry region has no effect until an operator approves it, if it is larger than the tunnel's limit, with all else that the same
+-- person takes away in the survey (area_taken).
 CREATE OR REPLACE FUNCTION tunnel_api.dry_region_approve(region_id int) RETURNS int
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE STRICT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
 DECLARE
@@ -334,4 +358,4 @@ BEGIN
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.dry_region_approve(int) IS
-'Approve a dry region that is larger than dry_region_limit of its tunnel; for operators. Returns the number of open leaks that it excludes';
+'Approve a dry region that waits because its author takes away more than dry_region_limit of the tunnel; for operators. Returns the number of open leaks that it excludes';

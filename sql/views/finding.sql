@@ -178,7 +178,7 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.review, a.reviewed_by, a.reviewed_at, a.remark, a.detected, a.created_at, a.detected_at,
        a.detected AND a.review <> 'rejected' AS counted,
        tunnel_internal.evidence_text(a.evidence) AS evidence, a.model, a.wet, a.origin, a.severity,
-       v.label AS severity_label,
+       v.label AS severity_label, a.drawn_by, a.drawn_at,
        (public.st_xmin(coalesce(a.shape_surface, a.surface)) + public.st_xmax(coalesce(a.shape_surface, a.surface))) / 2 AS easting,
        (public.st_ymin(coalesce(a.shape_surface, a.surface)) + public.st_ymax(coalesce(a.shape_surface, a.surface))) / 2 AS northing,
        (public.st_zmin(coalesce(a.shape_surface, a.surface)) + public.st_zmax(coalesce(a.shape_surface, a.surface))) / 2 AS height,
@@ -234,6 +234,8 @@ BEGIN
         ('model', 'Version of the model of evidence that classified it'),
         ('severity', 'Severity, 1 (lowest) to 4; edited in the views of findings'),
         ('severity_label', 'Name of the severity'),
+        ('drawn_by', 'Role that drew its outline last, set by the database; NULL if it was detected'),
+        ('drawn_at', 'Time of the last drawing of its outline, set by the database'),
         ('unrolled', 'Polygon in the unrolled plane (chainage, arc), m, SRID 0: measure and compare leaks here'),
         ('map', 'Polygon on the map strip beside the axis, tunnel''s SRID'),
         ('surface', 'Polygon on the lining in space (3D), tunnel''s SRID. ST_Area of it is 0 on a vertical wall: use area')) AS t (name, text)
@@ -318,7 +320,7 @@ COMMENT ON COLUMN tunnel_api.dry_region.arc_from IS 'Smallest arc, m';
 COMMENT ON COLUMN tunnel_api.dry_region.arc_to IS 'Greatest arc, m';
 COMMENT ON COLUMN tunnel_api.dry_region.area IS 'Area in the unrolled plane, m²';
 COMMENT ON COLUMN tunnel_api.dry_region.area_limit IS
-    'Area above which a region needs a reason and the approval of an operator (tunnel.tunnel.dry_region_limit), m²';
+    'Area that a person can take away in a survey without a reason and the approval of an operator (tunnel.tunnel.dry_region_limit), m²';
 COMMENT ON COLUMN tunnel_api.dry_region.reason IS 'Reason why it was drawn';
 COMMENT ON COLUMN tunnel_api.dry_region.pending_approval IS
     'True if it waits for the approval of an operator (dry_region_approve); until then it has no effect';

@@ -50,12 +50,22 @@ SELECT 16 * f.id::bigint + n.k, f.survey_id, s.name, NULL, 'load', f.name, n.not
  UNION ALL
 SELECT 16 * s.id::bigint + 6, s.id, s.name, NULL, 'survey', NULL, s.positions_note
   FROM tunnel.survey s
- WHERE s.positions_note IS NOT NULL;
+ WHERE s.positions_note IS NOT NULL
+ UNION ALL
+SELECT 16 * min(h.id) + CASE WHEN bool_or(h.way = 'dry region') THEN 12 ELSE 13 END, h.survey_id, s.name, h.km, 'review', NULL,
+       format('%s not counted (%s m²), taken out by %s: %s', CASE sum(h.leaks) WHEN 1 THEN '1 leak is' ELSE sum(h.leaks) || ' leaks are' END,
+              round(sum(h.leaks_area)::numeric, 2), h.who,
+              string_agg(format('%s %s (%s m²%s)', h.way, h.id, round(h.area::numeric, 1), ', approved by ' || h.approved_by), ', '
+                         ORDER BY h.way, h.id))
+  FROM tunnel_internal.hiding h
+  JOIN tunnel.survey s ON s.id = h.survey_id
+ WHERE h.leaks > 0
+ GROUP BY h.survey_id, s.name, h.km, h.who;
 COMMENT ON VIEW tunnel_api.remark IS
-    'Notes on the results of surveys: notes of stages by kilometre, points of files that were left out, doubtful intensity, scanner positions and coordinates of files, differences between header and points, and notes on scanner positions';
+    'Notes on the results of surveys: notes of stages by kilometre, points of files that were left out, doubtful intensity, scanner positions and coordinates of files, differences between header and points, notes on scanner positions, and leaks that people took out of the totals by drawing';
 COMMENT ON COLUMN tunnel_api.remark.km IS 'Kilometre; NULL for a file or for the survey as a whole';
 COMMENT ON COLUMN tunnel_api.remark.stage IS
-    'Stage that wrote the note; survey for notes written when the survey was added or set';
+    'Stage that wrote the note; survey for notes written when the survey was added or set; review for leaks that people took out of the totals';
 COMMENT ON COLUMN tunnel_api.remark.file IS 'Name of the scan file; NULL for a kilometre';
 COMMENT ON COLUMN tunnel_api.remark.remark IS 'Text of the note';
 

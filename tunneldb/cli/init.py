@@ -10,7 +10,7 @@ from tunneldb.cli.progress import bar, step, tell_warnings
 from tunneldb.counted import counted
 from tunneldb.database import open_connection
 from tunneldb.database.foreign import catalogue_alone
-from tunneldb.database.schema import install, schema_revision
+from tunneldb.database.schema import close_database, install, schema_revision
 from tunneldb.stages.registry import REGISTRY
 from tunneldb.store.waterproof import keep_missing
 
@@ -20,7 +20,8 @@ from tunneldb.store.waterproof import keep_missing
 def init(settings: Settings) -> None:
     """Create or upgrade the schema, the functions and the roles.
 
-    Data are kept; schema tunnel_api is recreated. Run it once for a new database, and after each upgrade of tunneldb.
+    Data are kept; schema tunnel_api is recreated. Run it once for a new database, and after each upgrade of tunneldb. Logins
+    without a role of tunneldb can no longer connect.
 
     After an upgrade, statistics of waterproofing are recomputed kilometre by kilometre, each committed, while others
     work. If it is interrupted, views are correct but slower, and the next init continues.
@@ -31,11 +32,17 @@ def init(settings: Settings) -> None:
         connection.rollback()
         tell_warnings(connection)
         install(connection, REGISTRY)
+        closed = close_database(connection)
         after = schema_revision(connection)
         connection.rollback()
         change = "created" if before is None else "is up to date" if before == after else f"upgraded from {before}"
         where = "the embedded server" if settings.dsn is None else "the database"
         notify(f"{where}: schema tunnel {change} ({after}), tunnel_api installed")
+        if closed:
+            notify(
+                "logins without a role of tunneldb can no longer connect to this database; to allow one:"
+                f" GRANT CONNECT ON DATABASE {connection.info.dbname} TO NAME"
+            )
         with bar("km") as shown:
             kept = keep_missing(connection, step(shown))
     add_to_json(before=before, revision=after, waterproofing=kept)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib
+import io
 import logging
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,9 +16,21 @@ from typing import Any
 import click
 
 from tunneldb import __version__
-from tunneldb.cli.output import AS_JSON, AT_FAULT, DONE, JSON, QUIET, error_line, exit_code, notify, run_as_json, write_lines
+from tunneldb.cli.output import (
+    AS_JSON,
+    AT_FAULT,
+    DONE,
+    JSON,
+    QUIET,
+    WaitHandler,
+    error_line,
+    exit_code,
+    notify,
+    run_as_json,
+    write_lines,
+)
 from tunneldb.errors import UserError, did_you_mean
-from tunneldb.log import MESSAGES, fields, logging_to
+from tunneldb.log import MESSAGES, WAITS, fields, logging_to
 from tunneldb.stages.registry import MEASURES
 
 _WORDS = "tunneldb.words"
@@ -179,10 +193,19 @@ class LazyGroup(click.Group):
                 raise
             ctx.exit(run_as_json(ctx, partial(_raise, error), partial(_describe, ctx)))
 
+    def main(self, *args: Any, **options: Any) -> Any:
+        """Run the program; characters that the terminal's encoding lacks are printed by their codes."""
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+                stream.reconfigure(errors="backslashreplace")
+        return super().main(*args, **options)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; turn errors that the user can fix into one line and exit code 2."""
         ctx.meta[QUIET] = ctx.params["quiet"]
         run = partial(_logged, ctx.meta[_WORDS], partial(click.Group.invoke, self, ctx))
+        waits = WaitHandler()
+        logging.getLogger(WAITS).addHandler(waits)
         try:
             with logging_to(ctx.params["log_file"], ctx.params["verbosity"]):
                 if ctx.meta[AS_JSON]:
@@ -192,6 +215,8 @@ class LazyGroup(click.Group):
             message = _describe(ctx, error)
             if message is None:
                 raise
+        finally:
+            logging.getLogger(WAITS).removeHandler(waits)
         click.echo(error_line(message), err=True)
         return ctx.exit(2)
 
@@ -251,6 +276,10 @@ def _describe(ctx: click.Context, error: Exception) -> str | None:
     from tunneldb.database.failures import connection_lost, describe_failure
 
     message = describe_failure(error)
+    if message is None and not isinstance(error, (click.exceptions.Exit, click.ClickException, click.Abort)):
+        from tunneldb.database.broken import explain_by_broken_row
+
+        return explain_by_broken_row(ctx.params.get("dsn") or None)
     if message is not None and connection_lost(error) and ctx.params.get("dsn") is None:
         from tunneldb.database.server import Server
 

@@ -54,6 +54,15 @@ def notify(text: str) -> None:
         click.echo(text, err=True)
 
 
+class WaitHandler(logging.Handler):
+    """Handler that prints which session a command waits for."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print the line on standard error."""
+        if not is_quiet():
+            click.echo(f"tunneldb: {printable(record.getMessage())}", err=True)
+
+
 def is_quiet() -> bool:
     """Return True if the command is to print errors only (`--quiet`)."""
     context = click.get_current_context(silent=True)

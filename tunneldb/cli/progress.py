@@ -137,8 +137,8 @@ def say(text: str, *, err: bool = False) -> None:
         click.echo(printable(text), file=sys.stderr if err else sys.stdout)
 
 
-_ENDINGS = ("57P01", "57P02")
-"""Warnings with which the server ends a session: the error that follows says it."""
+_ENDINGS = ("57P01", "57P02", "55P03")
+"""Warnings with which the server ends a session, which the next error says, and of locks, which are logged (`WAITS`)."""
 
 
 def tell_warnings(connection: psycopg.Connection[Any]) -> None:

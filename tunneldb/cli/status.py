@@ -15,6 +15,8 @@ from tunneldb.cli.output import add_to_json, command, printable, records, wants_
 from tunneldb.cli.param_types import FiniteRange
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
+from tunneldb.database.broken import broken_rows
+from tunneldb.database.locks import lock_waits
 from tunneldb.errors import UserError
 from tunneldb.stages.registry import STAGE_NAMES
 from tunneldb.store.listing import describe_survey, list_progress
@@ -90,6 +92,14 @@ def _one(connection: psycopg.Connection[Any], survey: str) -> None:
     from tunneldb.cli.overview import render
     from tunneldb.queue.progress import overview
 
+    key = get_survey(connection, survey, site=True)
+    broken = [f"{row.name}: {row.fault}" for row in broken_rows(connection, key.id)]
+    waits = lock_waits(connection)
+    add_to_json(broken=broken, waits=waits)
+    for line in broken[:1]:
+        click.echo(f"Error: {printable(line)}{f', and {len(broken) - 1} more' if broken[1:] else ''}; tunneldb check")
+    for line in waits:
+        click.echo(f"Note: {printable(line)}")
     seen = overview(connection, survey)
     add_to_json(**{field.name: getattr(seen, field.name) for field in dataclasses.fields(seen)})
     rows = describe_survey(connection, survey)
@@ -100,7 +110,7 @@ def _one(connection: psycopg.Connection[Any], survey: str) -> None:
             console = Console(width=1000)  # a pipe has no width: let nothing be cut there
         click.echo()
         console.print(render(seen))
-    remarks = read_remarks(connection, get_survey(connection, survey, site=True))
+    remarks = read_remarks(connection, key)
     add_to_json(remarks=remarks)
     if remarks:
         click.echo()

@@ -12,12 +12,15 @@ from typing import Any, Literal, LiteralString
 import psycopg
 
 from tunneldb.counted import counted
+from tunneldb.database.broken import broken_rows
 from tunneldb.database.connection import MINIMUM_POSTGIS, open_connection
 from tunneldb.database.foreign import SUBJECTS, catalogue_alone, foreign_objects, silent_triggers
+from tunneldb.database.locks import lock_waits
 from tunneldb.database.schema import (
     HEAD,
     api_version,
     installed_api_version,
+    open_to_all,
     postgis_schema,
     postgis_version,
     revisions,
@@ -33,6 +36,8 @@ LOCKS_PER_TABLE = 6
 LOCKS_OF_A_SESSION = 16
 """Approximate number of locks of another session meanwhile."""
 GIB = 1024**3
+MAX_BROKEN = 5
+"""Greatest number of broken rows that are listed."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,8 @@ def examine(dsn: str | None) -> Iterator[CheckResult]:
             return
         yield from _settings(connection, embedded=dsn is None)
         yield _locks(connection)
+        yield from _waits(connection)
+        yield from _values(connection)
         state = connection.execute(_STATE).fetchall()
         yield from _work(state)
         yield from _queue(connection)
@@ -92,6 +99,7 @@ def _foundations(connection: psycopg.Connection[Any], *, embedded: bool) -> Gene
     if installed_api_version(connection) is None:
         return False
     yield from _roles(connection)
+    yield _logins(connection)
     yield _public(connection)
     yield _audit(connection)
     foreign = list(_foreign(connection))
@@ -153,6 +161,15 @@ def _roles(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
         yield CheckResult("wrong", "roles", "without their privileges, for example after a restore", "tunneldb init")
     else:
         yield CheckResult("ok", "roles", ", ".join(ROLES))
+
+
+def _logins(connection: psycopg.Connection[Any]) -> CheckResult:
+    """Check that only members of tunneldb's roles can connect: whoever can may take locks."""
+    if open_to_all(connection):
+        name = connection.info.dbname
+        mend = f"tunneldb init   -- or its owner: REVOKE CONNECT ON DATABASE {name} FROM PUBLIC;"
+        return CheckResult("note", "logins", "every login of the server can connect, and make others wait by locks", mend)
+    return CheckResult("ok", "logins", "only members of tunneldb's roles, and logins that the owner allowed")
 
 
 def _public(connection: psycopg.Connection[Any]) -> CheckResult:
@@ -255,6 +272,27 @@ def _locks(connection: psycopg.Connection[Any]) -> CheckResult:
         "note", "locks", f"{text}: too few {what}",
         f"as a superuser: ALTER SYSTEM SET max_locks_per_transaction = {advised}; then restart the server",
     )  # fmt: skip
+
+
+def _waits(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
+    """Report sessions that others wait for."""
+    waits = lock_waits(connection)
+    for sentence in waits:
+        mend = "ask them to end their transaction; or as a superuser: SELECT pg_terminate_backend(PROCESS);"
+        yield CheckResult("note", "waiting", sentence, mend)
+    if not waits:
+        yield CheckResult("ok", "waiting", "nobody waits for a lock")
+
+
+def _values(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
+    """Report rows with numbers that nothing can be computed with."""
+    rows = broken_rows(connection)
+    for row in rows[:MAX_BROKEN]:
+        yield CheckResult("wrong", "values", f"{row.name}: {row.fault}", row.mend)
+    if len(rows) > MAX_BROKEN:
+        yield CheckResult("wrong", "values", f"{len(rows) - MAX_BROKEN} more rows", "fix these first, then tunneldb check")
+    if not rows:
+        yield CheckResult("ok", "values", "positions, sizes and dates are possible numbers")
 
 
 _STATE: LiteralString = """

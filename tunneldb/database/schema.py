@@ -13,6 +13,7 @@ from psycopg import sql
 from tunneldb import __version__
 from tunneldb.database.connection import MINIMUM_POSTGIS, engine_on
 from tunneldb.database.foreign import catalogue_alone, overloads
+from tunneldb.database.locks import open_transactions
 from tunneldb.database.resources import resource_dir
 from tunneldb.errors import NotReadyError, UserError
 
@@ -97,8 +98,11 @@ def install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) -> 
         cause = error.orig if isinstance(error, sqlalchemy.exc.DBAPIError) and error.orig is not None else error
         if not isinstance(cause, psycopg.errors.LockNotAvailable):
             raise cause from None
+        connection.rollback()
+        holders = open_transactions(connection)
         raise UserError(
-            f"other programs have used the database for {_LOCK_TIMEOUT}; close QGIS, wait for runs, then type tunneldb init"
+            f"other programs have used the database for {_LOCK_TIMEOUT}{': ' if holders else ''}{holders}; "
+            "close QGIS, wait for runs, then type tunneldb init"
         ) from None
 
 
@@ -119,6 +123,41 @@ def _install(connection: psycopg.Connection[Any], stages: Sequence[StageRow]) ->
         command.upgrade(alembic_config(session), "head")
         _fill_stages(connection, stages)
         install_api(connection)
+
+
+def close_database(connection: psycopg.Connection[Any]) -> bool:
+    """Let only members of tunneldb's roles connect to the database, and those whom its owner granted it by name.
+
+    Whoever can connect can take locks, and make all others wait. The connection must be idle.
+
+    Returns
+    -------
+    bool
+        True if everybody could connect before; False also if this user may not change it, which `tunneldb check` reports.
+    """
+    with connection.transaction():
+        viewers = connection.execute("SELECT pg_catalog.to_regrole('tunnel_viewer')").fetchone()
+        if viewers == (None,) or not open_to_all(connection):
+            return False
+        name = sql.Identifier(connection.info.dbname)
+        try:
+            with connection.transaction():
+                connection.execute(sql.SQL("GRANT CONNECT ON DATABASE {} TO tunnel_viewer").format(name))
+                connection.execute(sql.SQL("REVOKE CONNECT ON DATABASE {} FROM PUBLIC").format(name))
+        except psycopg.errors.InsufficientPrivilege:
+            return False
+        return not open_to_all(connection)
+
+
+def open_to_all(connection: psycopg.Connection[Any]) -> bool:
+    """Return True if every login of the server can connect to the database."""
+    row = connection.execute(
+        "SELECT EXISTS (SELECT FROM pg_catalog.aclexplode(coalesce(d.datacl, pg_catalog.acldefault('d', d.datdba))) a"
+        "                WHERE a.grantee = 0 AND a.privilege_type = 'CONNECT')"
+        "  FROM pg_catalog.pg_database d WHERE d.datname = pg_catalog.current_database()"
+    ).fetchone()
+    assert row is not None
+    return bool(row[0])
 
 
 def _close_public(connection: psycopg.Connection[Any]) -> None:

@@ -8,7 +8,7 @@ from typing import Any, LiteralString
 
 import psycopg
 
-from tunneldb.database.connection import open_connection, resolve_dsn
+from tunneldb.database.connection import open_connection, prepare_session, resolve_dsn
 from tunneldb.database.schema import require_current_schema
 from tunneldb.threads import threads
 
@@ -44,6 +44,7 @@ def worker_session(dsn: str | None) -> Iterator[psycopg.Connection[Any]]:
         If its schema is not this program's.
     """
     with psycopg.connect(resolve_dsn(dsn), **CONNECT) as conn:
+        prepare_session(conn)
         require_current_schema(conn)
         conn.execute(SETTINGS)
         conn.execute("SELECT set_config('max_parallel_workers_per_gather', %s, false)", [str(threads() - 1)])

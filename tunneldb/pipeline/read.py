@@ -14,6 +14,7 @@ from typing import Any
 import psycopg
 
 from tunneldb.arrays import Single
+from tunneldb.database.locks import holder_text, wait_for_kilometre
 from tunneldb.errors import BusyError, UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.stationing import KILOMETRE
@@ -208,7 +209,7 @@ class Reading:
         others = [self.find(file, given, why, "give its place in the same command") for file in again]
         # Their kilometres change under nobody's hands; in this order, so that two never wait for each other.
         for km in kilometres_of(self.conn, [file.id for file in [*former, *again]]):
-            self.conn.execute("SELECT pg_advisory_xact_lock(%s, %s)", [self.survey.id, km])
+            wait_for_kilometre(self.conn, self.survey.id, km)
         found = []
         for header, again_ in [*((header, False) for header in headers), *((header, True) for header in others)]:
             old = recorded.get(header.path.name)
@@ -221,7 +222,10 @@ class Reading:
         key = -(1 << 30) - (zlib.crc32(name.encode()) >> 2)
         row = self.conn.execute("SELECT pg_try_advisory_xact_lock(%s, %s)", [self.survey.id, key]).fetchone()
         if row is None or not row[0]:
-            raise BusyError(f"another process is reading {name}: wait until it has finished (tunneldb status)")
+            raise BusyError(
+                f"another process is reading {name}: wait until it has finished (tunneldb status)"
+                f"{holder_text(self.conn, self.survey.id, key)}"
+            )
 
     def overlapped(self, former: Sequence[Recorded], rest: Iterable[Recorded]) -> list[Recorded]:
         """Return files that overlap a replaced one: their points may return where it was nearer to the centre."""

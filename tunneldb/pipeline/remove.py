@@ -10,6 +10,7 @@ from typing import Any
 import psycopg
 
 from tunneldb.counted import counted
+from tunneldb.database.locks import wait_for_kilometre
 from tunneldb.errors import UserError
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.pipeline.load import load_kilometre
@@ -177,7 +178,7 @@ def _withdraw(
     for file in former:
         reading.claim(file.name)
     for km in kilometres_of(conn, [file.id for file in [*present, *again]]):
-        conn.execute("SELECT pg_advisory_xact_lock(%s, %s)", [survey.id, km])
+        wait_for_kilometre(conn, survey.id, km)
     for header, file in headers:
         own = replace(reading, settings=_settings(conn, survey, file.name))
         own.reread(header, file, begin)

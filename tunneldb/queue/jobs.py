@@ -15,6 +15,7 @@ from procrastinate.jobs import Job as QueueJob
 from procrastinate.jobs import Status
 from procrastinate.manager import JobManager
 
+from tunneldb.database.connection import SESSION
 from tunneldb.database.failures import describe_failure
 from tunneldb.database.session import CONNECT, SETTINGS, worker_session
 from tunneldb.errors import UserError
@@ -80,6 +81,7 @@ def make_app(
     """
 
     async def configure(conn: psycopg.AsyncConnection[Any]) -> None:
+        await conn.execute(SESSION)
         await conn.execute("SELECT set_config('search_path', 'tunnel_queue, pg_temp', false)")
         await conn.execute(SETTINGS)
         await conn.commit()

@@ -128,7 +128,7 @@ async def _work(orders: Orders) -> None:
 @contextlib.asynccontextmanager
 async def _connected(orders: Orders) -> AsyncIterator[tuple[str, psycopg.AsyncConnection[Any]]]:
     """Yield the DSN of the queue, and the session for the worker's heartbeat."""
-    from tunneldb.database.connection import resolve_dsn
+    from tunneldb.database.connection import SESSION, resolve_dsn
     from tunneldb.database.schema import require_current_schema
     from tunneldb.database.session import CONNECT, SETTINGS
 
@@ -143,6 +143,7 @@ async def _connected(orders: Orders) -> AsyncIterator[tuple[str, psycopg.AsyncCo
 
     dsn = await asyncio.to_thread(prepare)
     async with await psycopg.AsyncConnection.connect(dsn, autocommit=True, **CONNECT) as presence:
+        await presence.execute(SESSION)
         await presence.execute(SETTINGS)
         yield dsn, presence
 

@@ -19,6 +19,7 @@ from psycopg.types.json import Jsonb
 
 from tunneldb import __version__
 from tunneldb.database.failures import describe_failure, first_line
+from tunneldb.database.locks import holder_text
 from tunneldb.errors import BusyError, UserError
 from tunneldb.log import fields
 
@@ -168,7 +169,10 @@ def lock(conn: psycopg.Connection[Any], survey_id: int, km: int | None, *, share
     taken = conn.execute(query, [survey_id, -1 if km is None else km]).fetchone()
     if taken is None or not taken[0]:
         where = "the survey" if km is None else f"kilometre {km}"
-        raise BusyError(f"another process is at work on {where}: wait until it has finished (tunneldb status)")
+        raise BusyError(
+            f"another process is at work on {where}: wait until it has finished (tunneldb status)"
+            f"{holder_text(conn, survey_id, -1 if km is None else km)}"
+        )
 
 
 def _hold(conn: psycopg.Connection[Any], job: Job) -> None:

@@ -21,7 +21,8 @@ def replace_boundary_regions(conn: psycopg.Connection[Any], survey: Survey, km: 
 
     No other transaction can do so for this survey until this one ends.
     """
-    conn.execute("SELECT pg_advisory_xact_lock(%s, %s)", (LOCK, survey.id))
+    what = f"the list of findings of {survey.name}"
+    conn.execute("SELECT tunnel_internal.wait_lock(%s, %s, false, %s)", [LOCK, survey.id, what])
     before = conn.execute(
         "DELETE FROM tunnel.boundary_region WHERE survey_id = %s AND km = %s RETURNING finding_id", (survey.id, km)
     ).fetchall()

@@ -52,6 +52,25 @@ def one_of(column: str, *values: str) -> CheckConstraint:
     return CheckConstraint(f"{column} IN ({listed})", name=column)
 
 
+def bounded(name: str, *columns: str, least: float = -1e8, most: float = 1e8) -> CheckConstraint:
+    """Return the constraint that numbers are finite and between two values; by default metres within 100,000 km."""
+    terms = (f"{column} BETWEEN '{least:.0f}'::float8 AND '{most:.0f}'::float8" for column in columns)
+    return CheckConstraint(" AND ".join(terms), name=name)
+
+
+def at_most(column: str, characters: int) -> CheckConstraint:
+    """Return the constraint that a text has at most a number of characters."""
+    return CheckConstraint(f"char_length({column}) <= {characters}", name=f"{column}_at_most_{characters}_characters")
+
+
+def finite(column: str) -> CheckConstraint:
+    """Return the constraint that the coordinates of a point are numbers within 100,000 km."""
+    terms = (
+        f"coalesce(public.st_{axis}({column}) BETWEEN '-100000000'::float8 AND '100000000'::float8, false)" for axis in "xyz"
+    )
+    return CheckConstraint(" AND ".join(terms), name=f"{column}_finite")
+
+
 def parent(table: str) -> ForeignKey:
     """Return the reference to a row of another table, with whose deletion this row is deleted."""
     return ForeignKey(f"{SCHEMA}.{table}.id", ondelete="CASCADE")

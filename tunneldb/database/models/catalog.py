@@ -8,7 +8,7 @@ from geoalchemy2 import WKBElement
 from sqlalchemy import CheckConstraint, Identity, Index, SmallInteger, text
 from sqlalchemy.orm import Mapped, mapped_column
 
-from tunneldb.database.models.base import NOW, SURVEY, TUNNEL, Base, geometry, one_of, parent
+from tunneldb.database.models.base import NOW, SURVEY, TUNNEL, Base, bounded, finite, geometry, one_of, parent
 
 
 class Tunnel(Base):
@@ -16,8 +16,9 @@ class Tunnel(Base):
 
     __tablename__ = "tunnel"
     __table_args__ = (
-        CheckConstraint("spacing > 0", name="spacing"),
-        CheckConstraint("dry_region_limit >= 0", name="dry_region_limit"),
+        CheckConstraint("spacing BETWEEN 0.1 AND 1000", name="spacing"),
+        bounded("dry_region_limit", "dry_region_limit", least=0),
+        bounded("start_chainage", "start_chainage"),
         {"comment": "A structure: its spatial reference, stationing and given axis"},
     )
 
@@ -105,6 +106,7 @@ class Survey(Base):
         one_of("platform", "static", "mobile", "unknown"),
         one_of("reference", "none", "measured", "auto"),
         CheckConstraint("(intensity_dimension IS NULL) = (intensity_kind = 'none')", name="intensity_dimension"),
+        CheckConstraint("date BETWEEN '1900-01-01' AND '2199-12-31'", name="date"),
         Index(None, "tunnel_id"),
         {"comment": "A scanning campaign (an epoch) of a tunnel"},
     )
@@ -146,7 +148,7 @@ class Pose(Base):
     """Pose of the scanner's trajectory."""
 
     __tablename__ = "pose"
-    __table_args__ = {"comment": "Trajectory of a mobile scanner"}  # noqa: RUF012
+    __table_args__ = (finite("geom"), {"comment": "Trajectory of a mobile scanner"})
 
     survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
     time: Mapped[float] = mapped_column(primary_key=True, comment="Time as in the points' gps_time, s")
@@ -157,7 +159,7 @@ class Station(Base):
     """Position of a static scanner."""
 
     __tablename__ = "station"
-    __table_args__ = {"comment": "Stations of a static scanner"}  # noqa: RUF012
+    __table_args__ = (finite("geom"), {"comment": "Stations of a static scanner"})
 
     survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
     scan_id: Mapped[int] = mapped_column(

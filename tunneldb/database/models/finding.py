@@ -10,7 +10,7 @@ from sqlalchemy import BigInteger, CheckConstraint, Computed, ForeignKey, Identi
 from sqlalchemy.dialects.postgresql import ARRAY
 from sqlalchemy.orm import Mapped, mapped_column
 
-from tunneldb.database.models.base import CLOCK, KM, SURVEY, Base, Floats, Review, geometry, one_of, parent
+from tunneldb.database.models.base import CLOCK, KM, SURVEY, Base, Floats, Review, at_most, bounded, geometry, one_of, parent
 from tunneldb.database.models.leak import Region
 
 _SUMMED = ["kind", "kind_override", "review", "detected", "area", "wet", "superseded"]
@@ -22,8 +22,9 @@ class FindingKind(Base):
 
     __tablename__ = "finding_kind"
     __table_args__ = (
-        CheckConstraint("code ~ '^[a-z][a-z0-9_]*$'", name="code"),
-        CheckConstraint("geometries <@ '{polygon,line,point}' AND cardinality(geometries) > 0", name="geometries"),
+        CheckConstraint("code ~ '^[a-z][a-z0-9_]{0,62}$'", name="code"),
+        at_most("label", 200),
+        CheckConstraint("geometries <@ '{polygon,line,point}' AND cardinality(geometries) BETWEEN 1 AND 3", name="geometries"),
         CheckConstraint("(code <> 'leak' OR wet) AND (code NOT IN ('joint', 'dark') OR NOT wet)", name="wet"),
         {"comment": "Kinds of findings, which an owner extends; those of detection are leak, joint and dark"},
     )
@@ -47,6 +48,8 @@ class Severity(Base):
     __tablename__ = "severity"
     __table_args__ = (
         CheckConstraint("id BETWEEN 1 AND 4", name="id"),
+        at_most("label", 200),
+        at_most("text", 1000),
         {"comment": "Words for the degrees of severity, which an owner changes to his own"},
     )
 
@@ -100,7 +103,11 @@ class Finding(Review, Base):
     __table_args__ = (
         one_of("review", "open", "confirmed", "rejected"),
         one_of("origin", "detected", "drawn", "redrawn", "split", "merged"),
-        CheckConstraint("width_mm > 0", name="width_mm"),
+        CheckConstraint("width_mm > 0 AND width_mm <= 10000", name="width_mm"),
+        bounded("place", "chainage_from", "chainage_to", "arc_from", "arc_to"),
+        bounded("size", "area", "length", least=0),
+        bounded("clock", "clock", least=0, most=12),
+        at_most("remark", 10000),
         CheckConstraint("merged_into <> id AND same_as <> id", name="other"),
         Index(None, "survey_id", "km", postgresql_include=[*_SUMMED, "darkening_max"]),
         Index(None, "survey_id", "chainage_from", "chainage_to", postgresql_include=["id", *_SUMMED]),
@@ -238,6 +245,8 @@ class Photo(Base):
     __tablename__ = "photo"
     __table_args__ = (
         CheckConstraint("path <> ''", name="path"),
+        at_most("path", 2000),
+        at_most("caption", 1000),
         Index(None, "finding_id"),
         {"comment": "Photos of findings, by path or URL"},
     )

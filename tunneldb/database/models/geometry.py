@@ -8,7 +8,7 @@ from geoalchemy2 import WKBElement
 from sqlalchemy import BigInteger, CheckConstraint, Identity, Index, SmallInteger, UniqueConstraint
 from sqlalchemy.orm import Mapped, mapped_column
 
-from tunneldb.database.models.base import KM, SURVEY, Base, Floats, geometry, one_of, parent
+from tunneldb.database.models.base import KM, SURVEY, Base, Floats, finite, geometry, one_of, parent
 
 
 class AxisVertex(Base):
@@ -18,6 +18,8 @@ class AxisVertex(Base):
     __table_args__ = (
         UniqueConstraint("survey_id", "n"),
         one_of("source", "measured", "interpolated", "edited"),
+        finite("geom"),
+        finite("given"),
         Index(None, "geom", postgresql_using="gist"),
         {"comment": "Axis of a survey: vertex n stands at chainage n * spacing of the given axis"},
     )

@@ -10,7 +10,7 @@ from sqlalchemy import BigInteger, Computed, Identity, Index, Text, text
 from sqlalchemy.dialects.postgresql import ARRAY
 from sqlalchemy.orm import Mapped, mapped_column
 
-from tunneldb.database.models.base import CLOCK, KM, NOW, SURVEY, Base, Floats, Reals, geometry, one_of, parent
+from tunneldb.database.models.base import CLOCK, KM, NOW, SURVEY, Base, Floats, Reals, at_most, geometry, one_of, parent
 
 
 class Radiometry(Base):
@@ -116,6 +116,7 @@ class Region(Base):
     __tablename__ = "region"
     __table_args__ = (
         one_of("kind", "homogeneous", "dry"),
+        at_most("reason", 10000),
         Index(None, "geom", postgresql_using="gist"),
         Index(None, "survey_id"),
         {"comment": "Regions of the lining that the user has drawn, to be used in place of automatic ones"},

@@ -7,7 +7,7 @@ from sqlalchemy import BigInteger, ForeignKey, Identity, Index, SmallInteger, Te
 from sqlalchemy.dialects.postgresql import ARRAY
 from sqlalchemy.orm import Mapped, mapped_column
 
-from tunneldb.database.models.base import SURVEY, Base, Floats, Review, geometry, one_of, parent
+from tunneldb.database.models.base import SURVEY, Base, Floats, Review, at_most, geometry, one_of, parent
 
 
 class Member(Base):
@@ -85,6 +85,7 @@ class Spot(Review, Base):
     __table_args__ = (
         one_of("kind", "dark", "bright"),
         one_of("review", "open", "confirmed", "rejected"),
+        at_most("remark", 10000),
         Index(None, "survey_id", "number"),
         Index(None, "face_id"),
         Index(None, "map", postgresql_using="gist"),

@@ -1,0 +1,212 @@
+"""Extreme values through every column that a role can write: refused with one line, or harmless to all commands."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import psycopg
+import pytest
+from click.testing import CliRunner, Result
+from psycopg.conninfo import make_conninfo
+
+from tunneldb.cli.main import main
+
+SURVEY = "demo-2024"
+
+WRITABLE = """
+SELECT c.relname, a.attname, format_type(a.atttypid, NULL), has_column_privilege(%(role)s, c.oid, a.attnum, 'UPDATE'),
+       has_column_privilege(%(role)s, c.oid, a.attnum, 'INSERT')
+  FROM pg_class c JOIN pg_attribute a ON a.attrelid = c.oid AND a.attnum > 0
+ WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v'
+   AND has_any_column_privilege(%(role)s, c.oid, 'UPDATE') AND has_column_privilege(%(role)s, c.oid, a.attnum, 'UPDATE, INSERT')
+ ORDER BY 1, 2
+"""
+
+NUMBERS = ["1e300", "1e154", "NaN", "Infinity", "-Infinity", "-1"]
+FAR = ["1e300", "1e154", "1e17", "NaN", "Infinity", "-Infinity"]
+EMPTY = ["POINT EMPTY", "LINESTRING EMPTY", "POLYGON EMPTY", "GEOMETRYCOLLECTION EMPTY", "POLYHEDRALSURFACE Z EMPTY"]
+CURVED = ["CIRCULARSTRING(12350 0, 12351 1, 12352 0)", "CURVEPOLYGON(CIRCULARSTRING(0 0, 1 1, 2 0, 1 -1, 0 0))"]
+VERTICES = 20_001
+
+REFUSED = {
+    "geometry": [
+        *(f"ST_MakePoint('{v}', '{v}', '{v}')" for v in FAR),
+        *(f"ST_MakeLine(ST_MakePoint(12350, 1, 600), ST_MakePoint('{v}', 1, 600))" for v in FAR),
+        *(
+            f"ST_MakePolygon(ST_MakeLine(ARRAY[{{p}}, ST_MakePoint(12351, 1, 0), ST_MakePoint('{v}', 2, 0), {{p}}]))".format(
+                p="ST_MakePoint(12350, 1, 0)"
+            )
+            for v in FAR
+        ),
+        *(f"'{wkt}'::geometry" for wkt in (*EMPTY, *CURVED)),
+        f"(SELECT ST_MakeLine(ST_MakePoint(12350 + i / 1e5, sin(i), 600) ORDER BY i) FROM generate_series(1, {VERTICES}) i)",
+        f"ST_Buffer('POINT(12350 1)', 0.5, {VERTICES // 4})",
+        "NULL",
+    ],
+    "double precision": [f"'{v}'" for v in NUMBERS],
+    "smallint": ["32767", "-1", "0"],
+    "text": ["repeat('x', 1000000)"],
+    "text[]": ["'{}'", "NULL", "array_fill('polygon'::text, ARRAY[100000])"],
+    "integer": ["2147483648", "'NaN'::float8", "NULL"],
+    "bigint": ["9223372036854775808", "-1"],
+    "boolean": ["NULL"],
+}
+"""Values that no column takes, by type."""
+
+HARMLESS = {"text": ["''", r"E'a\nb\tc'", r"E'\x1b[31m'", "'=1+1'"], "integer": ["2147483647"], "double precision": ["NULL"]}
+"""Values that a column may take."""
+
+FREE = "ST_SetSRID('POLYGON((12350 0.5,12350.2 0.5,12350.2 0.7,12350 0.5))'::geometry, 0)"
+ROWS = {
+    "region": {"survey": f"'{SURVEY}'", "kind": "'dry'", "geom": FREE},
+    "finding_photo": {"finding_id": "1", "path": "'a.jpg'"},
+    "finding_kind": {
+        "code": "'a' || floor(1e9 * random())::bigint", "label": "'a'", "geometries": "'{polygon}'", "position": "1",
+        "wet": "false", "active": "true",
+    },
+}  # fmt: skip
+"""Rows that are inserted with one value instead."""
+
+
+def drawn(view: str) -> dict[str, str]:
+    """Row of a view of findings."""
+    return {"survey": f"'{SURVEY}'", "kind": "'leak'", "geom": f"(SELECT geom FROM tunnel_api.{view} WHERE id = 7)"}
+
+
+def statements(view: str, column: str, value: str, update: bool, insert: bool) -> list[str]:
+    """Statements that write a value into a column."""
+    found = []
+    if update:
+        found.append(
+            f"UPDATE tunnel_api.{view} SET {column} = {value} WHERE {'code' if view == 'finding_kind' else 'id'}"
+            f" = (SELECT min({'code' if view == 'finding_kind' else 'id'}) FROM tunnel_api.{view})"
+        )
+    row = ROWS.get(view) or (drawn(view) if view.startswith(("finding_", "leak_")) else None)
+    if insert and row is not None and (update or column in row):
+        given = row | {column: value}
+        found.append(f"INSERT INTO tunnel_api.{view} ({', '.join(given)}) VALUES ({', '.join(given.values())})")
+    return found
+
+
+def attempt(person: psycopg.Connection, statement: str) -> str | None:
+    """Run a statement; return the message if it is refused, None if it changes a row."""
+    try:
+        return None if person.execute(statement.encode()).rowcount else "no row"
+    except psycopg.Error as error:
+        state, message = error.sqlstate or "", error.diag.message_primary or ""
+    assert state[:2] in ("22", "23", "0A"), (statement[:200], state, message)
+    assert "\n" not in message, statement[:200]
+    assert len(message) < 300, statement[:200]
+    return message
+
+
+def works(arguments: list[str], codes: tuple[int, ...] = (0, 1)) -> Result:
+    """Run a command, which must end without a traceback."""
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code in codes, (arguments, result.output, result.exception)
+    assert result.exception is None or isinstance(result.exception, SystemExit), arguments
+    return result
+
+
+@pytest.fixture(scope="session")
+def template(example_template: str) -> str:
+    return example_template
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("person", "role"), [("ines", "tunnel_inspector"), ("otto", "tunnel_operator")], indirect=["person"])
+def test_extreme_values_are_refused_or_harmless(
+    person: psycopg.Connection, role: str, conn: psycopg.Connection, dsn: str, tmp_path: Any
+) -> None:
+    """What was taken stays in the database while the commands run."""
+    columns = conn.execute(WRITABLE, {"role": role}).fetchall()
+    conn.rollback()
+    person.execute("SET statement_timeout = '20 s'")
+    tried, taken = 0, []
+    person.execute("INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (1, 'a.jpg')")
+    for view, column, kind, update, insert in columns:
+        for value in REFUSED.get(kind, []):
+            wrong = (
+                value
+                if kind != "geometry" or value == "NULL"
+                else f"ST_SetSRID({value}, {0 if 'unrolled' in view or view == 'region' else 25830})"
+            )
+            for statement in statements(view, column, wrong, update, insert):
+                tried += 1
+                if attempt(person, statement) is None:
+                    taken.append((view, column, value[:80]))
+        for value in HARMLESS.get(kind, []):
+            for statement in statements(view, column, value, update, insert):
+                attempt(person, statement)
+    assert tried > 200
+    empty = {"kind", "severity", "review", "geom", "finding_id", "survey", "survey_id"}
+    assert [(view, column, value) for view, column, value in taken if value != "NULL" or column not in empty] == []
+    person.close()
+    assert conn.execute("SELECT count(*) FROM tunnel_api.stage_status").fetchone() == (6,)
+    conn.rollback()
+    for arguments in (["status"], ["status", SURVEY], ["check"], ["leaks", SURVEY], ["findings", SURVEY, "--state", "all"]):
+        works(arguments)
+    works(["run", SURVEY, "--stale"], (0, 2))
+    works(["report", SURVEY, "-o", str(tmp_path / "report.html")])
+
+
+def bad(conn: psycopg.Connection, table: str, change: str) -> None:
+    """Change rows of a table, whose constraints a superuser has dropped."""
+    for (name,) in conn.execute(
+        "SELECT conname FROM pg_constraint WHERE conrelid = %s::regclass AND contype = 'c'", [f"tunnel.{table}"]
+    ).fetchall():
+        conn.execute(f'ALTER TABLE tunnel.{table} DROP CONSTRAINT "{name}"'.encode())
+    conn.execute("SET session_replication_role = replica")
+    conn.execute(f"UPDATE tunnel.{table} SET {change}".encode())
+    conn.execute("RESET session_replication_role")
+    conn.commit()
+
+
+EDITED = "source = 'edited', edited_at = now(), edited_by = 'root'"
+EXTREME = [
+    *(("axis_vertex", f"{EDITED}, geom = ST_SetSRID({point}, 25830) WHERE n = 1240", "axis vertex 1240")
+      for point in ("ST_MakePoint(1e300, 1e300, 1e300)", "ST_MakePoint('NaN', 0, 0)", "ST_MakePoint(0, 0, 0)",
+                    "'POINT Z EMPTY'::geometry")),
+    ("segment", "vertex_from = '{1e300,NaN,Infinity}', tangent_to = '{NaN,1e300,0}' WHERE n = 1240", "segment 1240"),
+    ("section", "radius = array_fill('NaN'::float8, ARRAY[361]), arc = array_fill('1e300'::float8, ARRAY[361])", "section"),
+    ("finding", "area = 'NaN', chainage_from = '-Infinity', chainage_to = 1e300 WHERE id = 2", "finding 2"),
+    ("survey", "date = 'infinity'", "survey demo-2024"),
+    ("tunnel", "start_chainage = 'NaN', spacing = 1e300", "tunnel demo"),
+]  # fmt: skip
+"""Rows that cannot come about by the views: table, change, and how the row is named."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("table", "change", "name"), EXTREME)
+def test_a_bad_row_of_one_survey_breaks_no_other(
+    table: str, change: str, name: str, people: None, conn: psycopg.Connection, dsn: str, tmp_path: Any
+) -> None:
+    """A second survey of another tunnel is there, whose commands work; those of the first end with one line."""
+    conn.execute(
+        "INSERT INTO tunnel.tunnel (name, srid, start_chainage, alignment)"
+        " SELECT 'good', srid, start_chainage, alignment FROM tunnel.tunnel;"
+        "INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)"
+        " SELECT id, 'good-2024', '2024-05-04', 'none', 'static' FROM tunnel.tunnel WHERE name = 'good'"
+    )
+    limit = {"axis_vertex": "", "tunnel": " WHERE name = 'demo'", "survey": f" WHERE name = '{SURVEY}'"}.get(table, "")
+    bad(conn, table, change + limit)
+    listed = json.loads(works(["status", "--json"]).stdout)["surveys"]
+    assert {row["name"] for row in listed} == {SURVEY, "good-2024"}
+    works(["status", "good-2024"])
+    works(["leaks", "good-2024"], (0, 1, 2))
+    checked = works(["check"], (1,)).output
+    assert f"{name}" in next(line for line in checked.splitlines() if line.startswith("✗ values"))
+    with psycopg.connect(make_conninfo(dsn, user="vera")) as vera:
+        vera.execute("SELECT * FROM tunnel_api.stage_status").fetchall()
+    for arguments in (
+        ["status", SURVEY],
+        ["leaks", SURVEY],
+        ["findings", SURVEY],
+        ["report", SURVEY, "-o", str(tmp_path / "r.html")],
+    ):
+        result = works(arguments, (0, 1, 2))
+        if result.exit_code == 2:
+            assert len(result.stderr.splitlines()) == 1
+        if arguments[0] == "status":
+            assert name in result.output
