@@ -1,7 +1,7 @@
 -- Rows with numbers that nothing can be computed with. Constraints and triggers refuse them; they come about by a superuser, or
 -- where a constraint was dropped.
 
-CREATE OR REPLACE FUNCTION tunnel_internal.broken_rows(of_survey int DEFAULT NULL) RETURNS TABLE (name text, fault text, mend text)
+CREATE OR REPLACE FUNCTION tunnel_internal.broken_rows(of_survey int DEFAULT NULL) RETURNS TABLE (name text, fault text, remedy text)
 LANGUAGE sql STABLE PARALLEL RESTRICTED CALLED ON NULL INPUT SECURITY DEFINER ROWS 1 SET search_path = pg_catalog, pg_temp AS $$
     SELECT format('tunnel %s', t.name), 'its start chainage, its spacing or its limit of dry regions is not a possible number',
            format('UPDATE tunnel.tunnel SET start_chainage = …, spacing = … WHERE id = %s;', t.id)
@@ -47,4 +47,4 @@ LANGUAGE sql STABLE PARALLEL RESTRICTED CALLED ON NULL INPUT SECURITY DEFINER RO
             OR a.clock NOT BETWEEN 0 AND 12)
 $$;
 COMMENT ON FUNCTION tunnel_internal.broken_rows(int) IS
-    'Tunnels, surveys, axis vertices, segments, sections and findings with numbers that nothing can be computed with, of one survey or of all (NULL): name, fault, and the statement or the command to mend it';
+    'Tunnels, surveys, axis vertices, segments, sections and findings with numbers that nothing can be computed with, of one survey or of all (NULL): name, fault, and the statement or the command to fix it';

@@ -88,7 +88,7 @@ def test_a_session_that_waits_is_listed_with_the_holder(conn: psycopg.Connection
 @pytest.mark.slow
 def test_init_lets_only_members_of_the_roles_connect(people: None, conn: psycopg.Connection, dsn: str) -> None:
     conn.close()
-    said = "logins without a role of tunneldb can no longer connect"
+    said = "logins that have none of the three roles can no longer connect"
     first = CliRunner().invoke(main, ["init"])
     assert first.exit_code == 0, first.output
     assert said in first.output

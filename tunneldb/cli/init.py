@@ -21,7 +21,7 @@ def init(settings: Settings) -> None:
     """Create or upgrade the schema, the functions and the roles.
 
     Data are kept; schema tunnel_api is recreated. Run it once for a new database, and after each upgrade of tunneldb. Logins
-    without a role of tunneldb can no longer connect.
+    that have none of the three roles can no longer connect.
 
     After an upgrade, statistics of waterproofing are recomputed kilometre by kilometre, each committed, while others
     work. If it is interrupted, views are correct but slower, and the next init continues.
@@ -40,7 +40,7 @@ def init(settings: Settings) -> None:
         notify(f"{where}: schema tunnel {change} ({after}), tunnel_api installed")
         if closed:
             notify(
-                "logins without a role of tunneldb can no longer connect to this database; to allow one:"
+                "logins that have none of the three roles can no longer connect to this database; to allow one:"
                 f" GRANT CONNECT ON DATABASE {connection.info.dbname} TO NAME"
             )
         with bar("km") as shown:

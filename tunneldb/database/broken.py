@@ -12,16 +12,16 @@ from tunneldb.errors import UserError
 
 
 class BrokenRow(NamedTuple):
-    """Row of a table: name, fault, and the statement or the command that mends it."""
+    """Row of a table: name, fault, and the statement or the command that fixes it."""
 
     name: str
     fault: str
-    mend: str
+    remedy: str
 
 
 def broken_rows(connection: psycopg.Connection[Any], survey_id: int | None = None) -> list[BrokenRow]:
     """Return the rows of a survey, or of all, with numbers that nothing can be computed with."""
-    rows = connection.execute("SELECT name, fault, mend FROM tunnel_internal.broken_rows(%s)", [survey_id])
+    rows = connection.execute("SELECT name, fault, remedy FROM tunnel_internal.broken_rows(%s)", [survey_id])
     return [BrokenRow(*row) for row in rows]
 
 

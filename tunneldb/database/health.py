@@ -288,7 +288,7 @@ def _values(connection: psycopg.Connection[Any]) -> Iterator[CheckResult]:
     """Report rows with numbers that nothing can be computed with."""
     rows = broken_rows(connection)
     for row in rows[:MAX_BROKEN]:
-        yield CheckResult("wrong", "values", f"{row.name}: {row.fault}", row.mend)
+        yield CheckResult("wrong", "values", f"{row.name}: {row.fault}", row.remedy)
     if len(rows) > MAX_BROKEN:
         yield CheckResult("wrong", "values", f"{len(rows) - MAX_BROKEN} more rows", "fix these first, then tunneldb check")
     if not rows:
