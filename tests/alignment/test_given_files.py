@@ -156,7 +156,7 @@ REFUSED: dict[str, tuple[Callable[[Path], Path], str]] = {
     "no lines": (lambda f: dxf(f / "a.dxf", lambda space: space.add_circle((0, 0), 5)), "no lines, but 1 CIRCLE; draw"),
     "sheet": (lambda f: dxf(f / "a.dxf", sheet), r"\(layout 'Layout1' has some\); draw the axis as a line in model space"),
     "comma": (lambda f: edited(dxf(f / "a.dxf", chain), "500050.0", "500050,0"), "Export it again, with decimal points"),
-    "nan": (lambda f: edited(dxf(f / "a.dxf", chain), "500050.0", "nan"), "2 lines of layer 'AXIS' have invalid coordinates"),
+    "nan": (lambda f: edited(dxf(f / "a.dxf", chain), "500050.0", "nan"), "2 lines of layer 'AXIS' with invalid coordinates"),
     "UTF-16": (lambda f: written(f / "a.dxf", "\ufeff0\nSECTION\n".encode("utf-16-le")), "text is UTF-16; save it as UTF-8"),
     "kml": (lambda f: written(f / "a.kml", b'<kml xmlns="http://www.opengis.net/kml/2.2"/>'), "root is kml, .* as GeoPackage"),
     "pdf": (lambda f: written(f / "a.pdf", b"%PDF-1.7"), "is a PDF; export its drawing as DXF"),

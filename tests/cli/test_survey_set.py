@@ -59,13 +59,13 @@ def test_what_is_set_makes_detection_stale_and_nothing_else(folder: Path, conn: 
     assert stale(conn) == {}
     said = command("survey", "set", NAME, "--trajectory", folder / f"{NAME}.trajectory.csv").stderr
     assert stale(conn) == {"detect": "positions, reference or intensity set since"}
-    assert f"1 stages are stale: tunneldb run {NAME} --stale" in said
+    assert f"1 stage is stale: tunneldb run {NAME} --stale" in said
     command("run", NAME, "--stale", *coarse)
     assert stale(conn) == {}
     command("survey", "set", NAME, "--reference", "auto")
     assert settings(conn) == ("2024-05-05", "amplitude", "Amplitude", "auto", "mobile")
     said = command("survey", "set", NAME, "--intensity", "intensity", "--intensity-kind", "linear").stderr
-    assert "1 of its files have to be loaded again" in said
+    assert "1 file has to be loaded again" in said
     assert "was changed since it was loaded; load it again" in command("run", NAME, "--stale", code=2).stderr
     assert "replaced" in command("load", NAME, *folder.glob("*.laz")).output
     assert settings(conn)[1:3] == ("linear", "intensity")

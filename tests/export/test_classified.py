@@ -17,12 +17,15 @@ from support.databases import Copies
 
 from tunneldb.classification.classes import PointClass
 from tunneldb.cli.main import main
+from tunneldb.geometry.units import METRES
 from tunneldb.simulate import Parameters, Simulation, write
+from tunneldb.store.scan_files import checksum
 from tunneldb.store.scene import load_scene
 from tunneldb.store.survey import get_survey
 
 NAME = "s"
 START, LENGTH, BORDER = 980.0, 50.0, 1015.0  # a kilometre ends in the middle of the first file
+FOOT = METRES["us-ft"]
 FLOOR, LINING = 1, 0  # of the truth
 FAR = 100.0  # m above the tunnel: points of nothing
 
@@ -133,6 +136,30 @@ def test_files_get_the_classes(conn: psycopg.Connection, scans: tuple[Path, dict
     assert not (tmp_path / "stale").exists()
     command("run", NAME, "--km", "0-1", "--from", "ground", "--to", "ground")
     export(tmp_path / "stale")
+
+
+def test_a_converted_file_is_written_in_its_own_unit(
+    conn: psycopg.Connection, scans: tuple[Path, dict[str, np.ndarray]], tmp_path: Path
+) -> None:
+    """And not as COPC, whose message says what to do instead."""
+    export(tmp_path / "metres", "--km", 0)
+    path = tmp_path / "a.laz"
+    las = laspy.read(scans[0] / "a.laz")
+    for scaled in (las.header, las.points):
+        scaled.scales, scaled.offsets = scaled.scales / FOOT, scaled.offsets / FOOT
+    las.write(path)
+    conn.execute(
+        "UPDATE tunnel.scan_file SET path = %s, bytes = %s, checksum = %s, unit = 'us-ft', height_unit = 'us-ft'"
+        " WHERE name = 'a.laz'",
+        [str(path), path.stat().st_size, checksum(path)],
+    )
+    conn.commit()
+    assert "export without --copc" in export(tmp_path / "feet", "--km", 0, "--copc", code=2)
+    assert "choose them by --km" in export(tmp_path / "feet", "--from", 0, code=2)
+    assert "x and y in us-ft, z in us-ft, as in the scan file" in export(tmp_path / "feet", "--km", 0)
+    metres, feet = (laspy.read(tmp_path / unit / "a.laz") for unit in ("metres", "feet"))
+    np.testing.assert_allclose(feet.xyz * FOOT, metres.xyz, atol=1e-6)
+    np.testing.assert_array_equal(feet.classification, metres.classification)
 
 
 def test_without_ground_it_says_what_to_type(copies: Copies, loaded: str, tmp_path: Path) -> None:

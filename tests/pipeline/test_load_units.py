@@ -9,15 +9,14 @@ from pathlib import Path
 import laspy
 import numpy as np
 import psycopg
-import pytest
 from click.testing import CliRunner
 from support.loaded_survey import ORIGIN, SURVEY, add_survey, files, rows, tube
 
 from tunneldb.cli.main import main
-from tunneldb.errors import UserError
 from tunneldb.export.pointcloud.survey import survey_files
 from tunneldb.geometry.units import METRES
 from tunneldb.pointcloud.reader import read_chunks
+from tunneldb.queue.batch import plan as plan_batch
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.sources import sources
 from tunneldb.store.survey import get_survey
@@ -67,5 +66,7 @@ def test_the_advice_for_feet_loads_metres(conn: psycopg.Connection, dsn: str, tm
     repeated = CliRunner().invoke(main, [*command, *options])
     assert "unchanged" in repeated.output
     conn.rollback()
-    with pytest.raises(UserError, match=r"converted from us-ft .*copies would not be"):
-        survey_files(conn, survey)
+    assert [file.units.scales.tolist() for file in survey_files(conn, survey)] == [[FOOT] * 3]
+    for reading, read_already in (({}, True), ({"load.unit": "us-ft"}, True), ({"load.unit": "ft"}, False)):
+        (planned,) = plan_batch(conn, survey, [path], kilometres=range(1), reading=reading).files
+        assert planned.already_read == read_already, reading

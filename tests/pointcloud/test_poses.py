@@ -62,7 +62,7 @@ def test_rounding_of_times_is_borne() -> None:
 
 def test_unknown_scan_is_named() -> None:
     unknown = points([0] * 4, [9, 3, 4, 9])
-    assert "no station for scan_id 4 (1 points), 9 (2 points)" in STATIONS.coverage.faults(unknown).text()
+    assert "no station for scan_id 4 (1 point), 9 (2 points)" in STATIONS.coverage.faults(unknown).text()
     assert np.isnan(STATIONS.positions(unknown)[:, 0]).tolist() == [True, False, True, True]
 
 

@@ -333,7 +333,9 @@ def test_points_whose_intensity_is_no_data_are_told(tmp_path: Path) -> None:
     np.testing.assert_allclose(points.intensity, stored * 0.01, rtol=1e-6)
     las.points.array["Amplitude"][[3, 7]] = -999
     las.write(tmp_path / "bad.laz")
-    with pytest.raises(UserError, match=r"bad\.laz: 2 points of a chunk have no Amplitude: their value is -999"):
+    with pytest.raises(
+        UserError, match=r"bad\.laz: 2 points of a chunk without Amplitude, with the header's no-data value -999"
+    ):
         list(read_chunks(tmp_path / "bad.laz", "Amplitude"))
     assert sum(map(len, read_chunks(tmp_path / "bad.laz", None))) == 20
 

@@ -11,6 +11,7 @@ from pyproj.exceptions import CRSError
 
 from tunneldb.alignment.joining import join_pieces
 from tunneldb.arrays import Bool, Float
+from tunneldb.counted import counted
 from tunneldb.errors import InputError
 from tunneldb.files import gdal_fault, vector_source
 from tunneldb.geometry.crs import LOCAL, describe_crs, describe_srid, fits_srid, is_local, srid_name
@@ -106,7 +107,7 @@ def read_vector(path: Path, layer: str | None, srid: int | None) -> Drawn:
     pieces = [shapely.get_coordinates(line, include_z=True) for line in geometries]
     broken = sum(not (np.abs(piece[:, :2]) <= MAX_COORDINATE).all() for piece in pieces)
     if broken:
-        raise InputError(f"{path}: {broken} lines of layer {chosen!r} have invalid coordinates")
+        raise InputError(f"{path}: {counted(broken, 'line')} of layer {chosen!r} with invalid coordinates; draw them again")
     return drawn_lines(path, join_pieces(pieces), chosen, notes)
 
 

@@ -16,6 +16,7 @@ from tunneldb.alignment.drawing import MAX_COORDINATE, Drawn, choose_layer, draw
 from tunneldb.alignment.joining import join_pieces
 from tunneldb.alignment.units import UNITS
 from tunneldb.arrays import Float
+from tunneldb.counted import counted
 from tunneldb.errors import InputError
 
 CHORD_ERROR = 0.0005  # m, of arcs and splines
@@ -88,7 +89,7 @@ def _lines(path: Path, drawing: Any, layer: str | None, unit: float | None, repa
     pieces = [scale * _vertices(part, CHORD_ERROR / scale) for part in parts]
     broken = sum(not (np.abs(piece) <= MAX_COORDINATE).all() for piece in pieces)
     if broken:
-        raise InputError(f"{path}: {broken} lines of layer {chosen!r} have invalid coordinates; draw them again")
+        raise InputError(f"{path}: {counted(broken, 'line')} of layer {chosen!r} with invalid coordinates; draw them again")
     lines = [_densified(line) if curved else line for line in join_pieces(pieces)]
     in_block = (
         "is in blocks" if in_blocks else f"has blocks with lines on layer {chosen!r}; left out" if chosen in left_out else ""
@@ -121,7 +122,7 @@ def open_drawing(path: Path) -> tuple[Any, str]:
     except Exception:
         raise InputError(f"{path} cannot be read as DXF: {fault}") from None
     faults = max(1, len(auditor.fixes) + len(auditor.errors))
-    return drawing, f"is damaged ({fault}) and was repaired, {faults} faults; check that the axis is complete"
+    return drawing, f"is damaged ({fault}) and was repaired, {counted(faults, 'fault')}; check that the axis is complete"
 
 
 def unit_name(code: int) -> str:

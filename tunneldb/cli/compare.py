@@ -14,6 +14,7 @@ from tunneldb.cli.output import add_to_json, command
 from tunneldb.cli.param_types import FiniteRange
 from tunneldb.cli.stretch import Stretch, stretch_options
 from tunneldb.cli.tables import print_table
+from tunneldb.counted import counted
 from tunneldb.files import by_kilometre, replacing
 from tunneldb.store.survey import Survey
 
@@ -142,7 +143,8 @@ def _print(rows: dict[str, list[Row]], whole: Row) -> None:
     told = ", ".join(f"{count} {_WORDS[state]}" for state, count in sorted(whole["leaks"].items())) or "none"
     click.echo(f"leaks: {told}")
     click.echo(
-        f"lining: {whole['compared']:.1f} m² compared, {whole['changed']:.2f} m² of it changed in {whole['regions']} regions;"
+        f"lining: {whole['compared']:.1f} m² compared, {whole['changed']:.2f} m² of it changed in"
+        f" {counted(whole['regions'], 'region')};"
         f" {whole['unseen']:.1f} m² that the older survey saw were not seen by the newer: of these nothing is known"
     )
     if whole["shift_greatest"] is not None:
@@ -151,4 +153,6 @@ def _print(rows: dict[str, list[Row]], whole: Row) -> None:
             " control points can separate registration error from movement"
         )
     if whole["sections_without_motion"]:
-        click.echo(f"in {whole['sections_without_motion']} sections too little was seen by both to tell how they moved")
+        click.echo(
+            f"in {counted(whole['sections_without_motion'], 'section')} too little was seen by both to tell how they moved"
+        )

@@ -74,7 +74,8 @@ def export(
     With --classified the scan files are written as LAZ 1.4 with the class of each point, from stage ground, which
     must be up to date in every kilometre of a file: 2 ground, 64 lining, 65 niche, 66 fixture, 67 rail, 68 object, 69
     target sphere, 70 noise, 1 outside the surveyed tunnel. All other data are kept. A file across several kilometres
-    is written once, whole; it appears when it is complete, and never overwrites a file of the survey.
+    is written once, whole; it appears when it is complete, and never overwrites a file of the survey. Coordinates keep
+    the unit of the scan file, also where it was converted on loading.
 
     With --classified --copc the points are written by kilometres, each as SURVEY-kmNNN.copc.laz, a Cloud Optimized
     Point Cloud (LAZ 1.4 in octree order), with SURVEY.vpc, a virtual point cloud of all for QGIS 3.32 and later and
@@ -126,7 +127,11 @@ def _write_classified(conn: psycopg.Connection[Any], survey: Survey, output: Pat
         for file in (export_copc if copc else export_classified)(conn, survey, output, wanted, step(progress)):
             points = int(file.counts.sum())
             rate = points / file.seconds / 1e6
-            say(f"{file.path}: {counted(points, 'point')}, {rate:.1f} million/s", err=True)
-            files.append({"file": file.path, "points": points, "seconds": file.seconds})
+            unit, height_unit = file.units.plan, file.units.height
+            units = "" if file.units.metric else f", x and y in {unit}, z in {height_unit}, as in the scan file"
+            say(f"{file.path}: {counted(points, 'point')}{units}, {rate:.1f} million/s", err=True)
+            files.append(
+                {"file": file.path, "points": points, "seconds": file.seconds, "unit": unit, "height_unit": height_unit}
+            )
             total += file.counts
     print_classes(total)

@@ -10,6 +10,7 @@ import click
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.tables import print_table
+from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 
@@ -89,7 +90,7 @@ def _print_plan(plan: Plan) -> None:
     for line in no_features(plan.unused):
         notify(line)
     sorts = ", ".join(f"{count} {sort}" for sort, count in plan.reviews.items())
-    click.echo(f"{lesson.reviews} reviews: {sorts}")
+    click.echo(f"{counted(lesson.reviews, 'review')}: {sorts}")
     rows = [
         (one.way, f"{one.loss:.3f}", one.false_leaks, one.missed, "chosen" if one.way == adjustment.way else "")
         for one in lesson.held_out

@@ -77,7 +77,7 @@ def prune(settings: Settings, name: str | None, before: dt.datetime | None, yes:
         again = " ".join(
             ["tunneldb prune", *([name] if name else []), *([f"--before {before:%Y-%m-%d}"] if before else []), "--yes"]
         )
-        notify(f"{sum(row.rows for row in found)} rows, {decimal(freed)}, would go: {again}")
+        notify(f"{counted(sum(row.rows for row in found), 'row')}, {decimal(freed)}, would go: {again}")
 
 
 def _delete(connection: psycopg.Connection, found: Sequence[Superseded], before: dt.date | None) -> tuple[int, int, list[str]]:

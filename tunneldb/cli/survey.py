@@ -223,9 +223,9 @@ def set_(
         notes, reload = set_survey(connection, name, change)
         stale = count_stale(connection, get_survey(connection, name, site=True).id)
     if reload:
-        notes.append(f"{reload} of its files have to be loaded again: tunneldb load {name} FILE...")
+        notes.append(f"{counted(reload, 'file has', 'files have')} to be loaded again: tunneldb load {name} FILE...")
     if stale:
-        notes.append(f"{stale} stages are stale: tunneldb run {name} --stale")
+        notes.append(f"{counted(stale, 'stage is', 'stages are')} stale: tunneldb run {name} --stale")
     add_to_json(survey=name, notes=notes, reload=reload, stale=stale)
     notify(f"{name}: set")
     for note in notes:

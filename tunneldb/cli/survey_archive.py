@@ -33,7 +33,8 @@ def export(settings: Settings, name: str, output: Path) -> None:
         saved = save_survey(connection, get_survey(connection, name, site=True), output, step(progress))
     add_to_json(survey=name, file=output, bytes=saved.bytes, kilometres=saved.kilometres, rows=saved.rows)
     notify(
-        f"{name}: {sum(saved.rows.values())} rows of {sum(map(bool, saved.rows.values()))} tables, {saved.rows.get('point', 0)}"
+        f"{name}: {counted(sum(saved.rows.values()), 'row')} of {counted(sum(map(bool, saved.rows.values())), 'table')},"
+        f" {saved.rows.get('point', 0)}"
         f" of them points in {counted(len(saved.kilometres), 'kilometre')}: {output}, {saved.bytes / 1e6:.1f} MB"
     )
     notify(f"{name}: to free its room in the database: tunneldb survey remove {name}")
@@ -76,7 +77,7 @@ def import_(settings: Settings, file: Path, name: str | None) -> None:
     )
     numbers = "the numbers that they had" if loaded.kept else "new numbers"
     notify(
-        f"{loaded.survey}: {sum(loaded.rows.values())} rows, {loaded.rows.get('point', 0)} of them points in"
+        f"{loaded.survey}: {counted(sum(loaded.rows.values()), 'row')}, {loaded.rows.get('point', 0)} of them points in"
         f" {counted(len(loaded.kilometres), 'kilometre')} of {loaded.tunnel}; rows have {numbers}"
     )
     for note in notes:

@@ -9,6 +9,7 @@ from tunneldb.cli.main import Settings
 from tunneldb.cli.output import add_to_json, command, notify
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
+from tunneldb.counted import counted
 from tunneldb.database import connect
 
 SHOWN = 20
@@ -38,18 +39,18 @@ def vacuum(settings: Settings, yes: bool) -> None:
                 busy = run(connection, tables, step(progress))
     others = [f"{t.schema}.{t.table}" for t in tables if not t.allowed]
     waiting = [f"{t.schema}.{t.table}" for t in busy]
-    freed = sum(t.dead_bytes for t in tables)
-    add_to_json(tables=tables, dead=sum(t.dead for t in tables), dead_bytes=freed, done=yes, locked=waiting, not_owned=others)
+    freed, dead = sum(t.dead_bytes for t in tables), sum(t.dead for t in tables)
+    add_to_json(tables=tables, dead=dead, dead_bytes=freed, done=yes, locked=waiting, not_owned=others)
     if not tables:
         notify("nothing to vacuum")
     elif not yes:
-        notify(f"{sum(t.dead for t in tables)} dead rows, {decimal(freed)}, in {len(tables)} tables: tunneldb vacuum --yes")
+        notify(f"{counted(dead, 'dead row')}, {decimal(freed)}, in {counted(len(tables), 'table')}: tunneldb vacuum --yes")
     else:
-        notify(f"vacuumed {len(tables) - len(others) - len(busy)} tables")
+        notify(f"vacuumed {counted(len(tables) - len(others) - len(busy), 'table')}")
     if waiting:
         notify(f"left out, for others are at work on them: {', '.join(waiting)}; again later: tunneldb vacuum --yes")
     if others:
-        notify(f"{len(others)} tables are not yours to vacuum, as {others[0]}: ask their owner or the database's")
+        notify(f"{counted(len(others), 'table is', 'tables are')} not yours to vacuum, as {others[0]}: ask the owner")
 
 
 def _show(tables: list[tuple[str, int, int, int, bool]]) -> None:
@@ -60,5 +61,5 @@ def _show(tables: list[tuple[str, int, int, int, bool]]) -> None:
     ]
     if rest := tables[SHOWN:]:
         dead, gone, size = (sum(column) for column in zip(*((row[1], row[2], row[3]) for row in rest), strict=True))
-        rows.append((f"{len(rest)} others", dead, decimal(gone), decimal(size), ""))
+        rows.append((counted(len(rest), "other"), dead, decimal(gone), decimal(size), ""))
     print_table(["table", "dead rows", "in them", "of", "analyzed"], rows, right=(1, 2, 3))

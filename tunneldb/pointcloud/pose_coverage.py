@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int32, Int64
+from tunneldb.counted import counted
 from tunneldb.pointcloud.clock_offsets import guess_clocks
 from tunneldb.pointcloud.points import Points
 
@@ -63,7 +64,7 @@ class PoseFaults:
     def text(self) -> str:
         """Return the message for the user: the fault and what to do."""
         if self.unknown:
-            scans = ", ".join(f"{scan} ({count} points)" for scan, count in sorted(self.unknown.items())[:10])
+            scans = ", ".join(f"{scan} ({counted(count, 'point')})" for scan, count in sorted(self.unknown.items())[:10])
             more = f" and {len(self.unknown) - 10} more" if len(self.unknown) > 10 else ""
             return (
                 f"no station for scan_id {scans}{more}; add them to the survey's stations "
@@ -74,8 +75,12 @@ class PoseFaults:
             for seconds, side in ((self.before, "before its start"), (self.after, "after its end"))
             if seconds > 0
         ]
-        lost = [f"gps_time of {self.outside} points is outside the trajectory, {' and '.join(where)}"] if self.outside else []
-        lost += [f"{self.gap} points lie in gaps of the trajectory"] if self.gap else []
+        lost = (
+            [f"gps_time of {counted(self.outside, 'point')} is outside the trajectory, {' and '.join(where)}"]
+            if self.outside
+            else []
+        )
+        lost += [f"{counted(self.gap, 'point lies', 'points lie')} in gaps of the trajectory"] if self.gap else []
         whole = "give the whole trajectory, in the time system of the file"
         return f"{' and '.join(lost)}; {self.guess + '; convert one of them' if self.guess else whole}"
 

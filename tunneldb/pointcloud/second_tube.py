@@ -16,6 +16,7 @@ import numpy as np
 
 from tunneldb.arrays import Bool, Float, Int32, Int64
 from tunneldb.compiled import kernel, point_kernel
+from tunneldb.counted import counted
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.frame import tangents
 from tunneldb.geometry.stationing import KILOMETRE, chainage_label
@@ -85,7 +86,8 @@ class SecondTubes:
             if len(stretches):
                 low, high = (self.km * KILOMETRE + STRETCH * end for end in (stretches[0], stretches[-1] + 1))
                 places.append(f"to the {side} between {chainage_label(low, 0)} and {chainage_label(high, 0)}")
-        return f"{points} points of a second tube left out, {' and '.join(places)}; results are for the tube around the axis"
+        left = counted(points, "point")
+        return f"{left} of a second tube left out, {' and '.join(places)}; results are for the tube around the axis"
 
 
 def find_second_tubes(parts: Iterable[Rows], alignment: Alignment, km: int) -> SecondTubes:

@@ -14,10 +14,11 @@ from psycopg.types.json import Jsonb
 from psycopg.types.range import Range
 
 from tunneldb.errors import UserError
+from tunneldb.geometry.units import Units
 from tunneldb.pipeline.load import parameters_of, settings_of
 from tunneldb.pointcloud.reader import check_header, read_header
 from tunneldb.pointcloud.selection import FilterSettings
-from tunneldb.pointcloud.units import in_units
+from tunneldb.pointcloud.units import NOT_GIVEN, GivenUnits, in_units
 from tunneldb.queue.expected import damaged_kilometres, expected_kilometres, kilometres_near_damaged
 from tunneldb.stages.registry import STAGE_NAMES
 from tunneldb.stages.run import loaded_kilometres
@@ -181,7 +182,7 @@ def _headers(
     read = {
         row[0]: row[1:]
         for row in conn.execute(
-            "SELECT f.name, f.path, f.bytes, f.loaded_at, ARRAY(SELECT k.km FROM tunnel.file_km k"
+            "SELECT f.name, f.path, f.bytes, f.loaded_at, f.unit, f.height_unit, ARRAY(SELECT k.km FROM tunnel.file_km k"
             " WHERE k.file_id = f.id AND k.rows > 0 ORDER BY k.km) FROM tunnel.scan_file f WHERE f.survey_id = %s",
             [survey.id],
         ).fetchall()
@@ -191,11 +192,14 @@ def _headers(
         size = path.stat().st_size
         points = 0
         try:
-            header = in_units(read_header(path), settings.units)
+            known = read.get(path.name)
+            same = known is not None and _untouched(path, size, *known[:3])
+            units = GivenUnits(*known[3:5]) if known and same and settings.units == NOT_GIVEN else settings.units
+            header = in_units(read_header(path), units)
             points = header.points
             check_header(header, survey.intensity_dimension, survey.srid, needs_time=mobile)
-            if path.name in read and _untouched(path, size, *read[path.name][:3]):
-                files.append(Incoming(path.name, path, size, points, tuple(read[path.name][3]), already_read=True))
+            if known and same and header.units == Units(*known[3:5]):
+                files.append(Incoming(path.name, path, size, points, tuple(known[5]), already_read=True))
                 continue
             expected = expected_kilometres(header, alignment, reach, wanted)
         except UserError as error:

@@ -11,6 +11,7 @@ import shapely
 from psycopg import sql
 from shapely.geometry import Polygon
 
+from tunneldb.counted import counted
 from tunneldb.store.survey import Survey
 
 Geometry = Literal["face", "map", "3d"]
@@ -105,9 +106,8 @@ class SpotList:
         """Return number, total area, and inspected area."""
         if not self.rows and not self.seen_area:
             return "spots were not searched for"
-        return (
-            f"{self.count} spots, {self.area:.4f} m², on {self.seen_area:.1f} m² inspected of {self.face_area:.1f} m² of faces"
-        )
+        count = counted(self.count, "spot")
+        return f"{count}, {self.area:.4f} m², on {self.seen_area:.1f} m² inspected of {self.face_area:.1f} m² of faces"
 
 
 def read_spots(

@@ -66,6 +66,7 @@ def export_copc(
     """
     files = [file for file in survey_files(conn, survey) if set(file.kilometres) & set(file.touched) & set(kilometres)]
     wanted = sorted(set(kilometres) & {km for file in files for km in set(file.kilometres) & set(file.touched)})
+    _require_metres(files)
     targets = [folder / f"{survey.name}-km{km:03d}.copc.laz" for km in wanted]
     require_no_scans(conn, targets)
     virtual = folder / f"{survey.name}.vpc"
@@ -87,6 +88,16 @@ def export_copc(
         with replacing(virtual) as temporary:
             write_vpc(temporary, cloud, survey.date, folder)
         yield Written(target, counts, perf_counter() - started)
+
+
+def _require_metres(files: Sequence[ScanFile]) -> None:
+    """Refuse files in other units: a merged file is in metres, and records are copied as they are."""
+    for file in files:
+        if not file.units.metric:
+            raise UserError(
+                f"{file.path}: its coordinates are in {file.units.plan}, its heights in {file.units.height}, but a merged file"
+                " is in metres: export without --copc"
+            )
 
 
 class _Divide:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -11,11 +11,13 @@ from typing import Any
 
 import psycopg
 
-from tunneldb.arrays import Int64
+from tunneldb.arrays import Float, Int64, UInt8
 from tunneldb.classification.classes import PointClass
+from tunneldb.classification.scene import Scene
 from tunneldb.database import snapshot
 from tunneldb.errors import NotReadyError, UserError
 from tunneldb.files import replacing
+from tunneldb.geometry.units import IN_METRES, Units
 from tunneldb.pointcloud.rewrite import rewrite
 from tunneldb.progress import StartProgress
 from tunneldb.stages.run import loaded_kilometres
@@ -42,6 +44,8 @@ class ScanFile:
         Kilometres with points of it that are in the database.
     touched : tuple of int
         Kilometres with points of it, without noise, in the database or not yet.
+    units : Units
+        Units of its coordinates.
     """
 
     name: str
@@ -51,15 +55,17 @@ class ScanFile:
     points: int
     kilometres: tuple[int, ...]
     touched: tuple[int, ...]
+    units: Units
 
 
 @dataclass(frozen=True)
 class Written:
-    """A file that was written: its points by class (256,), and how long it took, s."""
+    """A file that was written: its points by class (256,), how long it took, s, and the units of its coordinates."""
 
     path: Path
     counts: Int64
     seconds: float
+    units: Units = IN_METRES
 
 
 def export_classified(
@@ -71,7 +77,8 @@ def export_classified(
 ) -> Iterator[Written]:
     """Write the files that touch some kilometres into a folder, each whole and once, under its own name as ``.laz``.
 
-    All files are checked before the first one is written. A file appears when it is complete.
+    All files are checked before the first one is written. A file appears when it is complete. Its coordinates are those of the
+    scan file, in the same units.
 
     Parameters
     ----------
@@ -102,44 +109,30 @@ def export_classified(
             scene = load_scene(conn, survey, min(file.kilometres), max(file.kilometres))
         progress = begin(f"[{number}|{len(wanted)}] {file.name}", file.points)
         with replacing(target) as temporary:
-            counts = rewrite(source, temporary, scene.classes, CLASS_NAMES, progress)
-        yield Written(target, counts, perf_counter() - started)
+            counts = rewrite(source, temporary, _classes_of(scene, file.units), CLASS_NAMES, progress)
+        yield Written(target, counts, perf_counter() - started, file.units)
+
+
+def _classes_of(scene: Scene, units: Units) -> Callable[[Float], UInt8]:
+    """Return the function of the classes of points (n, 3) in some units."""
+    return scene.classes if units.metric else lambda xyz: scene.classes(xyz * units.scales)
 
 
 def survey_files(conn: psycopg.Connection[Any], survey: Survey) -> list[ScanFile]:
-    """Return the files of a survey in the order of chainage.
-
-    Raises
-    ------
-    UserError
-        If one is not in metres: copies have the coordinates of the file, but classes are found in metres.
-    """
-    _require_metres(conn, survey)
+    """Return the files of a survey in the order of chainage."""
     there = set(loaded_kilometres(conn, survey))
     rows = conn.execute(
         "SELECT f.name, f.path, f.checksum, f.bytes, f.points,"
         " array(SELECT k.km FROM tunnel.file_km k WHERE k.file_id = f.id AND NOT isempty(k.points) ORDER BY k.km),"
-        " array(SELECT k.km FROM tunnel.file_km k WHERE k.file_id = f.id AND k.rows > 0 ORDER BY k.km)"
+        " array(SELECT k.km FROM tunnel.file_km k WHERE k.file_id = f.id AND k.rows > 0 ORDER BY k.km),"
+        " f.unit, f.height_unit"
         " FROM tunnel.scan_file f WHERE f.survey_id = %s ORDER BY f.chainage_from, f.name",
         [survey.id],
     ).fetchall()
     return [
-        ScanFile(name, path, checksum, size, points, tuple(km for km in near if km in there), tuple(touched))
-        for name, path, checksum, size, points, near, touched in rows
+        ScanFile(name, path, checksum, size, points, tuple(km for km in near if km in there), tuple(touched), Units(*units))
+        for name, path, checksum, size, points, near, touched, *units in rows
     ]
-
-
-def _require_metres(conn: psycopg.Connection[Any], survey: Survey) -> None:
-    row = conn.execute(
-        "SELECT path, unit, height_unit FROM tunnel.scan_file WHERE survey_id = %s AND (unit <> 'm' OR height_unit <> 'm')"
-        " ORDER BY name LIMIT 1",
-        [survey.id],
-    ).fetchone()
-    if row is not None:
-        raise UserError(
-            f"{row[0]}: its coordinates were converted from {row[1]} (heights: {row[2]}) when it was loaded, and copies would"
-            " not be; transform the file to metres and load it again"
-        )
 
 
 def _targets(conn: psycopg.Connection[Any], files: Sequence[ScanFile], every: Sequence[ScanFile], folder: Path) -> list[Path]:

@@ -13,6 +13,7 @@ from laspy import DecompressionSelection, LazBackend
 from numpy.typing import NDArray
 
 from tunneldb.arrays import Float
+from tunneldb.counted import counted
 from tunneldb.errors import InputError
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_dimension
 from tunneldb.pointcloud.formats.las_bounds import POINTWISE, check_envelope, count_contradiction, point_counts
@@ -219,8 +220,8 @@ class _Taker:
             missing = int(np.count_nonzero(stored == self.extra.no_data))
             if missing:
                 raise InputError(
-                    f"{self.path}: {missing} points of a chunk have no {self.dimension}: their value is {self.extra.no_data}, "
-                    "the header's no-data value; remove these points, or the no-data entry of the header"
+                    f"{self.path}: {counted(missing, 'point')} of a chunk without {self.dimension}, with the header's no-data"
+                    f" value {self.extra.no_data}; remove these points, or the no-data entry of the header"
                 )
         if self.extra.scale == 1.0 and self.extra.offset == 0.0:
             return stored
