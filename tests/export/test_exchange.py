@@ -23,7 +23,7 @@ from psycopg.conninfo import make_conninfo
 from support.system import missing
 
 from tunneldb.cli.main import main
-from tunneldb.export.exchange.dxf import LAYERS
+from tunneldb.export.exchange.dxf import LAYERS, facts_of
 
 RADIUS, HEIGHT = 4.0, 2.5  # of the example's tunnel: a circle, and its floor below the axis, m
 CURVE, CENTRE = 300.0, np.array([500_300.0, 4_640_000.0])  # of its axis, in plan
@@ -255,6 +255,15 @@ def test_drawing_lies_in_its_true_place(files: Path) -> None:
 
 def number_of(entity: Any) -> int:
     return int(dict(fact.split("=") for _, fact in entity.get_xdata("TUNNELDB"))["id"])
+
+
+@pytest.mark.parametrize(("text", "whole"), [("", True), ("ä" * 1000, True), ("€ü" * 1000, False)])
+def test_a_long_remark_continues_in_further_facts(text: str, whole: bool) -> None:
+    facts = [fact.split("=") for fact in facts_of("remark", text)]
+    assert [name for name, _ in facts[:3]] == ["remark", "remark_2", "remark_3"][: len(facts)]
+    assert max(len("=".join(fact).encode()) for fact in facts) <= 255
+    joined = "".join(part for _, part in facts)
+    assert joined == text if whole else text.startswith(joined[:-1]) and joined[-1] == "…" and len(joined) > 1500
 
 
 def distances(points: np.ndarray, ring: np.ndarray) -> np.ndarray:

@@ -217,6 +217,9 @@ _FACTS = {
 MAX_FACT = 250
 """Maximum number of bytes of a fact: a string of extended data has at most 255."""
 
+MAX_FACTS = 16
+"""Maximum number of facts of one text: the extended data of an entity have at most 16 kB."""
+
 
 def _spot(row: dict[str, Any], shape: BaseGeometry, colour: str) -> Spot:
     texts = {
@@ -224,7 +227,7 @@ def _spot(row: dict[str, Any], shape: BaseGeometry, colour: str) -> Spot:
         for name, (column, form) in _FACTS.items()
         if row[column] is not None
     }
-    facts = [_shortened(f"{name}={text}") for name, text in texts.items()]
+    facts = [fact for name, text in texts.items() for fact in facts_of(name, text)]
     facts.append(f"counted={'yes' if row['counted'] else 'no'}")
     size = f"{row['area']:.2f} m²" if row["length"] is None else f"{row['length']:.2f} m"
     width = "" if row["width_mm"] is None else f", {row['width_mm']:.2f} mm"
@@ -235,10 +238,18 @@ def _spot(row: dict[str, Any], shape: BaseGeometry, colour: str) -> Spot:
     return Spot(int(row["id"]), row["kind"], bool(row["wet"]), colour, text, facts, shape)
 
 
-def _shortened(fact: str) -> str:
-    """Return a text of at most MAX_FACT bytes."""
-    data = fact.encode()
-    return fact if len(data) <= MAX_FACT else data[: MAX_FACT - 3].decode(errors="ignore") + "…"
+def facts_of(name: str, text: str) -> Iterator[str]:
+    """Yield a text as facts of at most MAX_FACT bytes: ``name=…``, continued in ``name_2=…``; an ellipsis ends a cut text."""
+    for number in range(1, MAX_FACTS + 1):
+        head = f"{name}=" if number == 1 else f"{name}_{number}="
+        data, room = text.encode(), MAX_FACT - len(head)
+        part = data[:room].decode(errors="ignore")
+        text = text[len(part) :]
+        if text and number == MAX_FACTS:
+            part = data[: room - len("…".encode())].decode(errors="ignore") + "…"
+        yield head + part
+        if not text:
+            return
 
 
 def _document(conn: psycopg.Connection[Any], survey: Survey, coverage: Coverage, remarks: list[Remark]) -> Any:
