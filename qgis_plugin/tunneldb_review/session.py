@@ -35,6 +35,8 @@ class Session:
         self.pace = Pace()
         self.steps: List[int] = []
         self.facts: Optional[Dict[str, Any]] = None
+        self.coverage = ""
+        """Statement on what was not searched for leaks, or hardly inspected, in the kilometres of the list; else empty."""
 
     def load(self, survey: str, asked: Filter, order: str) -> None:
         """Read the findings of a survey, and go to the first."""
@@ -61,6 +63,7 @@ class Session:
         was = self.work, self.facts
         self.work, self.facts = WorkList.of(self.findings.values(), asked, order), None
         try:
+            self._read_coverage(asked)
             self.next()
         except DatabaseError:
             self.work, self.facts = was
@@ -152,6 +155,13 @@ class Session:
     def progress(self) -> str:
         """Return how far one is, and how fast."""
         return progress_text(self.work, self.pace)
+
+    def _read_coverage(self, asked: Filter) -> None:
+        self.coverage = ""
+        backwards = None not in (asked.km_from, asked.km_to) and asked.km_from > asked.km_to  # type: ignore[operator]
+        if self.survey_id is not None and not backwards:
+            ((said,),) = self.database.rows(sql.coverage(self.survey_id, asked.km_from, asked.km_to))
+            self.coverage = str(said or "")
 
     def _note(self, key: int, values: Dict[str, str]) -> None:
         self.work.change(key, **values)

@@ -11,6 +11,9 @@ from typing import Any, Dict, Mapping, Optional, Sequence
 WRITTEN = ("review", "remark", "kind")
 """Columns of the view finding_unrolled that inspectors may update."""
 
+KILOMETRE = 1000
+"""Length of a kilometre of chainage, m."""
+
 SURVEYS = (
     "SELECT s.id, s.name, s.tunnel, s.date::text FROM tunnel_api.survey s"
     " WHERE EXISTS (SELECT FROM tunnel_api.tunnel t WHERE t.id = s.tunnel_id AND NOT t.site) ORDER BY s.tunnel, s.date, s.name"
@@ -45,6 +48,13 @@ def findings(survey_id: int) -> str:
         f"SELECT {columns} FROM tunnel_api.finding f WHERE f.survey_id = {int(survey_id)}"
         " AND f.state IN ('open', 'confirmed', 'rejected', 'gone')"
     )
+
+
+def coverage(survey_id: int, km_from: Optional[int] = None, km_to: Optional[int] = None) -> str:
+    """Return the query of the statement on stretches in which leaks could be missed, NULL if there are none."""
+    low = "-infinity" if km_from is None else str(KILOMETRE * int(km_from))
+    high = "infinity" if km_to is None else str(KILOMETRE * (int(km_to) + 1))
+    return f"SELECT tunnel_api.coverage_statement({int(survey_id)}, '{low}', '{high}')"
 
 
 def facts(finding_id: int) -> str:

@@ -136,7 +136,10 @@ def review(dock: Any) -> dict[str, Any]:
     press(dock, Qt.Key_Z)
     seen["said"] = dock.message.text()
     seen["after_undo"] = at(dock)
-    seen["progress"] = dock.told.text()
+    seen["progress"], seen["coverage"] = dock.told.text(), [dock.coverage.text()]
+    dock.filters.km_from.setValue(13)
+    seen["coverage"].append(dock.coverage.text())
+    dock.filters.km_from.setValue(dock.filters.km_from.minimum())
     dock.filters.open_only.setChecked(False)
     dock.filters.min_area.setValue(1.0)
     seen["large"] = [finding.id for finding in dock.session.work.findings]

@@ -169,6 +169,9 @@ def test_an_inspector_reviews_by_keys(
     assert did["focus_back"]
     assert did["after_undo"] == did["undone"]
     assert "undone" in did["said"]
+    (statement,) = conn.execute("SELECT tunnel_api.coverage_statement(1)").fetchone()  # type: ignore[misc]
+    assert did["coverage"] == [statement, ""], "the second is of kilometres beyond the survey"
+    assert statement
     rows = {key: rest for key, *rest in conn.execute("SELECT id, review, kind, remark, reviewed_by FROM tunnel_api.finding")}
     assert rows[did["first"]][0] == "confirmed"
     assert rows[did["rejected"]][0] == "rejected"
