@@ -31,12 +31,15 @@ TABLES = {
     "place.csv": "kind,chainage,position\nmissing_bolt,12350,1\n",
     "width.csv": "kind,chainage,arc,width\nmissing_bolt,12351,1,\n",
     "point.csv": "kind,chainage,arc\nmissing_bolt,12352,1\n",
+    "near.csv": "x,y,z\n100,100,5\n200,150,6\n",
+    "unsorted.csv": "time,x,y,z\n50,500001,4640100,601\n1,500000,4640000,601\n",
     "width.xlsx": "",
     "down.csv": "time,x,y,z\n1,500001,4640100,601\n50,500000,4640000,601\n",
 }
 """Files in the folder of the commands."""
 
-ADD = "survey add {} --tunnel demo --date 2024-06-01 --intensity Amplitude --intensity-kind reflectance"
+ADD = "--tunnel demo --date 2024-06-01 --intensity Amplitude --intensity-kind reflectance"
+"""Options of a survey."""
 
 CASES = """
 leaks demo-2024 --format xlsx | add (-o leaks.xlsx) | leaks demo-2024 --format xlsx \\1
@@ -82,13 +85,29 @@ findings import demo-2024 width.xlsx | save a workbook as (CSV) | findings impor
 learn demo-2024 --list --undo | one at a time | learn demo-2024 --list
 survey set demo-2024 --stations stations.csv --backwards | give it with (--trajectory) | survey set demo-2024 --backwards \\1 down.csv
 survey set demo-2024 --stations stations.csv --time-offset 1 | have no times: omit it | survey set demo-2024 --stations stations.csv
+survey add n1 ADD | or (--no-poses) if | survey add n1 ADD \\1
+survey add n2 ADD --stations stations.csv --trajectory trajectory.csv | exactly one of --trajectory FILE and (--stations) | survey add n2 ADD \\1 stations.csv
+survey add n3 ADD --stations stations.csv --backwards | have no direction: omit it | survey add n3 ADD --stations stations.csv
+survey add n4 ADD --stations stations.csv --time-offset 1 | give it with (--trajectory) | survey add n4 ADD --time-offset 1 \\1 trajectory.csv
+survey add n5 ADD --no-poses --unit m | give --trajectory or (--stations) | survey add n5 ADD --unit m \\1 stations.csv
+survey add n6 ADD --no-poses --intensity-kind amplitude | needs (--intensity-kind reflectance) | survey add n6 ADD --no-poses \\1
+survey add n7 ADD --stations stations.csv --reference auto | is not needed | survey add n7 ADD --stations stations.csv
+survey add n8 ADD --trajectory unsorted.csv | sort by time | survey add n9 ADD --trajectory trajectory.csv
+survey add n1 ADD --no-poses | (survey list) | \\1
+survey add n10 ADD --no-poses --tunnel demoo | Did you mean '(\\w+)' | survey add n10 ADD --no-poses --tunnel \\1
+survey add n11 ADD --no-poses --tunnel e | is not for a site | survey add n11 ADD --stations stations.csv --tunnel e
+survey add n12 ADD --trajectory trajectory.csv --tunnel e | takes the (--stations) | survey add n12 ADD \\1 stations.csv --tunnel e
+survey add n13 --tunnel demo --date 2024-06-01 --intensity-kind linear --no-poses | (--intensity) must name | survey add n13 ADD --no-poses \\1 Counts
+survey set n1 --stations stations.csv --trajectory trajectory.csv | omit one of them | survey set n1 --stations stations.csv
+profile remove demo none | tunneldb (profile list demo) | \\1
+deviation n1 --layer excavation | (profile add demo) profile.csv (--layer excavation) | \\1 round.csv \\2
 tunnel remove demo | remove them first .tunneldb (survey remove). | \\1 demo-2024 --yes
 """  # noqa: E501
 """Refused command, advice in its message, and the command that follows it."""
 
 
-def cases() -> list[tuple[str, ...]]:
-    return [tuple(line.split(" | ")) for line in CASES.strip().splitlines()]
+def cases(table: str = CASES) -> list[tuple[str, ...]]:
+    return [tuple(line.replace(" ADD", f" {ADD}").split(" | ")) for line in table.strip().splitlines()]
 
 
 def write_layers(folder: Path) -> None:
@@ -122,3 +141,20 @@ def test_options(refused: str, advice: str, right: str, folder: Path) -> None:
     assert found, message
     words = shlex.split(found.expand(right))
     command(*words)
+
+
+NOTES = """
+survey add n8 ADD --trajectory down.csv | .(--backwards) confirms that | survey add n14 ADD --trajectory down.csv \\1
+vacuum | tunneldb (vacuum --yes)$ | \\1
+tunnel add m --srid 25830 --axis axis.csv | (--reverse) turns it round | tunnel add o --srid 25830 --axis axis.csv \\1
+tunnel add p --srid 25830 --axis near.csv | use local coordinates .tunnel add (--srid local). | tunnel add q \\1 --axis near.csv
+"""
+"""Command, advice in its notes, and the command that follows it."""
+
+
+@pytest.mark.parametrize(("first", "advice", "right"), cases(NOTES), ids=lambda text: text[:60])
+def test_notes(first: str, advice: str, right: str, folder: Path) -> None:
+    message = command(*shlex.split(first)).stderr
+    found = re.search(advice, message)
+    assert found, message
+    assert command(*shlex.split(found.expand(right))).stderr.partition(":")[2] != message.partition(":")[2]

@@ -14,13 +14,12 @@ from tunneldb.pointcloud.contents import Contents
 from tunneldb.pointcloud.form import TunnelForm
 from tunneldb.pointcloud.formats.scans import PosedScan
 from tunneldb.pointcloud.pose_faults_text import stations_fault, trajectory_fault
+from tunneldb.pointcloud.pose_sample import MAX_POINTS
 from tunneldb.pointcloud.poses import longest_interval
 from tunneldb.pointcloud.station_fit import find_misfits
 from tunneldb.pointcloud.trajectory_file import read_trajectory
 from tunneldb.pointcloud.trajectory_fit import Track, fit_trajectory
 from tunneldb.pointcloud.week_end import cover_week_end
-
-_MAX_POINTS = 200_000
 
 
 def file_beside(paths: Sequence[Path], ending: str) -> Path | None:
@@ -40,7 +39,7 @@ def doubt_poses(
     """Return the time offset and the doubt of `tunneldb.pipeline.inspection.FileLook`."""
     if form is None:
         return None, None
-    some = slice(None, None, -(-len(contents.xyz) // _MAX_POINTS))
+    some = slice(None, None, -(-len(contents.xyz) // MAX_POINTS))
     place = places(form.line, contents.xyz[some])
     posed = [scan for scan in poses if scan.position is not None]
     if posed:

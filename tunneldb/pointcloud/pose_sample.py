@@ -9,6 +9,7 @@ import numpy as np
 from tunneldb.arrays import Float, Int32
 
 MAX_POINTS = 60_000
+"""Maximum number of points of a file that are compared with scanner positions, on loading as on inspection."""
 
 
 @dataclass(frozen=True)
