@@ -125,7 +125,7 @@ def read_positions(
     if wild.mean() > MAX_WILD_SHARE:
         raise table.error(
             int(np.argmax(wild)),
-            f"this pose and {counted(np.count_nonzero(wild) - 1, 'other')} ({100 * wild.mean():.2g} %) lie more than"
+            f"this pose and {counted(int(np.count_nonzero(wild)) - 1, 'other')} ({100 * wild.mean():.2g} %) lie more than"
             f" {MAX_AXIS_DISTANCE:g} m beside the axis of {tunnel!r}, {MAX_END_DISTANCE:g} m beyond its ends, or jump;"
             " fix the trajectory",
         )
