@@ -241,7 +241,9 @@ def test_kilometres_as_copc_hold_the_same_points(conn: psycopg.Connection, tmp_p
     assert (tmp_path / "copc" / names[0]).read_bytes() == again
     assert json.loads((tmp_path / "copc" / names[2]).read_text())["features"] == virtual["features"]
     (tmp_path / "copc" / names[2]).write_text("[]")
-    assert "is not a virtual point cloud" in export(tmp_path / "copc", "--copc", "--km", 1, code=2)
+    assert "is not a virtual point cloud: move it away" in export(tmp_path / "copc", "--copc", "--km", 1, code=2)
+    (tmp_path / "copc" / names[2]).rename(tmp_path / names[2])
+    export(tmp_path / "copc", "--copc", "--km", 1)
     assert "--copc goes with --classified" in command("export", NAME, "-o", tmp_path / "x", "--copc", code=2)
 
     # Where the other kilometre isn't loaded, its points wait for it.

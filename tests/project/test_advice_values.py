@@ -27,6 +27,7 @@ from tunneldb.pipeline.register import SonarInput
 from tunneldb.pipeline.target_control import read_control
 from tunneldb.radiometry.intensity_kind import doubt
 from tunneldb.radiometry.reference_curve import ReferenceCurve
+from tunneldb.simulate import Parameters, Simulation
 from tunneldb.simulate.canal.parameters import CanalParameters
 from tunneldb.simulate.structure.parameters import StructureParameters
 from tunneldb.stages.parameters import settings
@@ -93,6 +94,31 @@ OPTIONS: list[tuple[Callable[..., Any], dict[str, Any], str, Callable[[re.Match[
     (CanalParameters, {"sonar_depth": (1.0, 0.5)}, "two ascending values from 0 on", lambda _: {"sonar_depth": (0.5, 1.0)}),
     (StructureParameters, {"contrast": (5.0, 3.0)}, "give two ascending values above 0", lambda _: {"contrast": (3.0, 5.0)}),
 ]  # fmt: skip
+
+
+SHORT = {"length": 10.0, "straight": 2.0, "leaks": 0}
+FULL = [
+    ({"leaks": 30, "leak_area": (2.0, 3.0)}, "use fewer or smaller", {"leaks": 1, "leak_area": (0.2, 0.3)}),
+    ({"halos": 150}, "no room .*; use fewer halos", {"halos": 1}),
+    ({"patches": 200}, "use fewer patches", {"patches": 1}),
+    ({"ring_leaks": 40}, "no room for ring leak .*; use fewer leaks", {"ring_leaks": 1}),
+    ({"joint_leaks": 90, "lining": "cast"}, "use fewer leaks", {"joint_leaks": 1, "lining": "cast"}),
+    ({"sheets": 60}, "use fewer", {"sheets": 1}),
+    ({"spheres": 4, "sphere_radius": 0.5, "section": "box", "height": 2.5}, "use fewer or a longer", {"spheres": 1}),
+    ({"people": 200}, "use fewer objects", {"people": 1}),
+    ({"cable_leaks": 1, "appendages": False}, r"or add --(clutter)", {"cable_leaks": 1, "appendages": False, "clutter": 2}),
+    ({"pocket_leaks": 1, "lining": "cast"}, "use lining segments", {"pocket_leaks": 1, "lining": "segments"}),
+    ({"name": "a/b"}, "use letters, digits, - and _", {"name": "a-b"}),
+    ({"section": "hexagon"}, r"use (circular), ", {"section": "circular"}),
+    ({"scanner_offset": 3.9}, "change its height or offset", {"scanner_offset": 1.0}),
+    ({"invert": 9.0}, "give a depth between 0 and", {"invert": 1.0}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("wrong", "advice", "right"), FULL)
+def test_a_simulated_tunnel(wrong: dict[str, Any], advice: str, right: dict[str, Any]) -> None:
+    advised(lambda: Simulation(Parameters(**(SHORT | wrong))), advice)
+    Simulation(Parameters(**(SHORT | right)))
 
 
 @pytest.mark.parametrize(("call", "wrong", "advice", "right"), OPTIONS)

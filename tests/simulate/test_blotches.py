@@ -11,7 +11,6 @@ import pytest
 import shapely
 from support.lining_scans import BARE, inside, scan, whole_scan
 
-from tunneldb.errors import UserError
 from tunneldb.simulate import Parameters, Simulation, write
 from tunneldb.simulate.truth import bright_features, dry_features
 
@@ -115,8 +114,3 @@ def test_truth_has_what_is_bright_in_a_layer_of_its_own(tmp_path: Path) -> None:
         assert shapely.is_valid(shapely.from_wkb(wkb)).all()
     plain = write(Simulation(Parameters(**{**BARE, "profile_spacing": 0.5}, name="plain")), tmp_path)
     assert set(pyogrio.list_layers(plain.lining)[:, 0]) == {"leak", "dry"}
-
-
-def test_no_room_for_halos_is_the_users_error() -> None:
-    with pytest.raises(UserError, match="no room on the lining for halo"):
-        Simulation(Parameters(length=10.0, straight=2.0, halos=300))

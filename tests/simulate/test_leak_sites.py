@@ -9,7 +9,6 @@ import pytest
 import shapely
 from support.lining_scans import inside, levels, whole_scan
 
-from tunneldb.errors import UserError
 from tunneldb.simulate import Parameters, Simulation
 from tunneldb.simulate.truth import dry_features
 
@@ -102,10 +101,3 @@ def test_drips_hang_as_far_below_as_asked() -> None:
     assert len(apart) > 4
     assert np.median(apart) > 0.15  # straight below is 0.2 m and more; a streak of the leak beside it may be nearer
     assert max(apart) < 0.401
-
-
-def test_what_cannot_be_is_the_users_error() -> None:
-    with pytest.raises(UserError, match="cable leaks need cables along the wall"):
-        Simulation(Parameters(length=20.0, leaks=0, cable_leaks=1, appendages=False))
-    with pytest.raises(UserError, match="no room for ring leak"):
-        Simulation(Parameters(length=20.0, leaks=0, ring_leaks=40))

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import shapely
 
-from tunneldb.errors import UserError
 from tunneldb.simulate import Parameters, Simulation, simulate
 
 pytestmark = pytest.mark.slow
@@ -70,8 +69,3 @@ def test_the_same_seed_gives_the_same_leaks_and_another_other_ones() -> None:
     one, same, other = (Simulation(Parameters(length=60.0, seed=s)).leaks for s in (1, 1, 2))
     assert one == same
     assert one != other
-
-
-def test_no_room_is_the_users_error() -> None:
-    with pytest.raises(UserError, match="no room"):
-        Simulation(Parameters(length=10.0, straight=2.0, leaks=60, leak_area=(2.0, 3.0)))

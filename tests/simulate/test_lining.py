@@ -189,8 +189,6 @@ def test_marks_leave_leaks_and_each_other_alone() -> None:
     ]
     for mark in simulation.marks:
         assert all(mark.polygon().distance(leak.polygon) > 0.14 for leak in simulation.leaks)
-    with pytest.raises(UserError, match="no room on the lining for mark"):
-        Simulation(Parameters(length=10.0, straight=2.0, patches=200))
 
 
 def test_truth_of_the_lining_as_geopackage(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tunneldb.errors import UserError
 from tunneldb.simulate import Cloud, Parameters, Simulation, TargetSphere, simulate
 from tunneldb.simulate.objects.primitives import BALL, BEAM, ROD
 
@@ -252,10 +251,3 @@ def test_things_stand_on_the_floor_clear_of_each_other_and_of_the_scanner() -> N
     apart = np.linalg.norm(plan[:, None] - plan[None], axis=2) + 9.0 * np.eye(len(plan))
     assert apart.min() > 0.3
     assert len({t.number for t in simulation.things}) == len(simulation.things) == 23
-
-
-def test_no_room_is_the_users_error() -> None:
-    with pytest.raises(UserError, match="no room on the floor for another person"):
-        Simulation(Parameters(length=10.0, straight=2.0, leaks=0, people=200))
-    with pytest.raises(UserError, match="no room on the walls for another target sphere"):
-        Simulation(Parameters(length=10.0, straight=2.0, leaks=0, spheres=4, sphere_radius=0.5, section="box", height=2.5))

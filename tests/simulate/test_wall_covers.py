@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 from support.lining_scans import inside, whole_scan
 
-from tunneldb.errors import UserError
-from tunneldb.simulate import Parameters, Simulation
-
 pytestmark = pytest.mark.slow
 
 
@@ -62,8 +59,3 @@ def test_a_mesh_lies_before_the_lining_in_a_grid(lining: str) -> None:
     covered = 1.0 - (1.0 - mesh.wire / 0.1) ** 2
     assert share == pytest.approx(covered, rel=0.15) if lining == "plain" else 0.3 * covered < share < 1.2 * covered
     assert (cloud.leak[wires] == -1).all()
-
-
-def test_no_room_on_the_wall_is_the_users_error() -> None:
-    with pytest.raises(UserError, match="no room on the walls for sheet"):
-        Simulation(Parameters(length=10.0, straight=2.0, leaks=0, sheets=60))

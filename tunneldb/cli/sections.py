@@ -34,7 +34,8 @@ def sections(settings: Settings, survey: str, start: str | None, end: str | None
     with surveys_in(settings, [survey], start, end) as (conn, [found], part):
         rows = dimension_rows(conn, found, part.low, part.high, every)
     if not rows:
-        raise UserError(f"survey {survey} has no section there: tunneldb status {survey}")
+        run = f"tunneldb run {survey} --to sections"
+        raise UserError(f"survey {survey} has no section there: {run}, or give another --from and --to")
     add_to_json(survey=survey, every=every, sections=rows)
     files: list[Path] = []
     if output is not None and output.suffix.lower() == ".xlsx":

@@ -159,7 +159,7 @@ def _look_through(
             np.maximum(high, points.xyz.max(axis=0), out=high)
             counts.intensities.append(points.intensity[::SAMPLE_STEP].copy())
     counts.unposed = faults.points
-    invalid = "coordinates, times or intensities that are not numbers; fix the file"
+    invalid = "coordinates, times or intensities that are not numbers; remove these points"
     for count, reason in ((counts.invalid, invalid), (counts.unposed, faults.text())):
         if count > max_left_out * counts.points or count == counts.points:
             raise UserError(

@@ -61,7 +61,11 @@ CAUSES = (
     ),
     Cause("file missing", ("no such file", "is a folder"), "restore the file, or pass its present path"),
     Cause("file unreadable", ("cannot be read: Permission denied",), "make it readable for the workers (chmod)"),
-    Cause("file of another tunnel", ("off the given axis", "no points near the axis"), "check that it is of this tunnel"),
+    Cause(
+        "file of another tunnel",
+        ("off the given axis", "no points near the axis"),
+        "pass only files of this tunnel, in its coordinate system",
+    ),
     Cause(
         "coordinate system",
         ("its coordinate system is",),
@@ -70,12 +74,12 @@ CAUSES = (
     Cause(
         "poses",
         ("no station for scan_id", "has no pose", "gps_time of", "no dimension 'gps_time'"),
-        "pass the matching poses: tunneldb survey set --stations or --trajectory",
+        "pass the matching poses: tunneldb survey set SURVEY --stations FILE, or --trajectory FILE",
     ),
     Cause(
         "intensity",
         ("no dimension", "is no intensity", "cannot be the intensity"),
-        "name the dimension: tunneldb survey set --intensity",
+        "name the dimension: tunneldb survey set SURVEY --intensity DIMENSION",
     ),
     Cause(
         "file damaged",
@@ -90,7 +94,7 @@ CAUSES = (
             "is NaN or infinite",
             "invalid pose",
             "export the file again",
-            "fix the file",
+            "are not numbers",
         ),
         "copy the file again, or export it again",
     ),

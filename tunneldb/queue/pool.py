@@ -64,7 +64,7 @@ class WorkerPool:
                 self.members.remove(member)
                 if code == 2:
                     self.leave()
-                    raise UserError("a worker gave up, see above")
+                    raise UserError("a worker gave up: its error is above; remove the cause, and type the command again")
                 continue
             lived = time.monotonic() - member.started
             if lived > min(2.0**member.falls, _MIN_LIFETIME):

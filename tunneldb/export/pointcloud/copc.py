@@ -160,7 +160,7 @@ class _Source:
                 try:
                     group.add(placement.coordinates(own))
                 except ValueError as error:
-                    raise UserError(f"{self.file.path}: {error}; fix the file") from None
+                    raise UserError(f"{self.file.path}: {error}; export without --copc") from None
                 self.chunks[group.km].append(number)
             progress(len(xyz))
 
