@@ -189,7 +189,10 @@ def test_intensity_and_its_kind_belong_together(tunnel: Path) -> None:
         ("time,x,y,z\n1,500001,4640010,101\n1,500001,4640020,101\n", ["line 3", "time 1 repeats"]),
         ("time,x,y,z\n2,500001,4640010,101\n1,500001,4640020,101\n", ["line 3", "time 1 is less"]),
         ("time,x,y,z\n1,500001,4640010,nan\n2,500001,4640020,101\n", ["line 2", "z is nan"]),
-        ("time,x,y,z\n1,500090,4640010,101\n2,500090,4640020,101\n", ["never within 50 m", "this tunnel and SRID", "90 m"]),
+        (
+            "time,x,y,z\n1,500090,4640010,101\n2,500090,4640020,101\n",
+            ["never within 50 m", "in this tunnel, in its coordinate system", "90 m"],
+        ),
         ("time,x,y,z\n1,1,1,1\n2,1,2,1\n", ["never within 50 m"]),
         ("time,x,y,z\n1,500001,4639990,101\n2,500001,4639999,101\n", ["no pose is between the ends"]),
     ],

@@ -40,7 +40,12 @@ def _run(*arguments) -> tuple[int, str]:
 def test_a_file_by_itself(scan, tmp_path):
     path, place = scan
     figure = tmp_path / "figure.png"
-    code, says = _run(path, "--intensity", "Amplitude", "--intensity-kind", "amplitude", "--scanner", *place, "-o", figure)
+    words = [path, "-o", figure]
+    for advised, values in (("--intensity", ["Amplitude"]), ("--intensity-kind", ["amplitude"]), ("--scanner", place)):
+        code, says = _run(*words)
+        assert (code, f"{advised} " in says) == (2, True), says
+        words += [advised, *values]
+    code, says = _run(*words)
     assert code == 0, says
     assert "range" in says
     assert "dB/10°" in says

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -64,7 +65,10 @@ def test_a_vertex_that_jumps_is_interpolated_and_named(survey: psycopg.Connectio
             [*(4.6 * right).tolist(), n * 10 - 2.6, n * 10 + 2.6],
         )
     survey.commit()
-    out = command("run", NAME, "--to", "axis").output
+    refused = command("run", NAME, "--to", "axis", "--set", "axis.max_rejected=0", code=2).stderr
+    advice = re.search(r"or interpolate more: tunneldb (run .*)$", refused.strip())
+    assert advice, refused
+    out = command(*advice[1].split(), "--to", "axis").output
     after = axis(survey)
     assert {n for n, (_, _, remark) in after.items() if remark} == set(jumping)
     for n in jumping:
@@ -100,4 +104,6 @@ def test_a_kilometre_whose_vertices_do_not_rest_is_refused_by_their_names(survey
     line = refused.stderr.strip().splitlines()[-1]
     assert line.startswith("tunneldb: the axis of kilometre 1 was not found")
     assert "the vertex at 1+2" in line
-    assert "axis.max_rejected" in line
+    advice = re.search(r"or allow more passes: tunneldb (run .*)$", line)
+    assert advice, line
+    command(*advice[1].split(), "--to", "axis")

@@ -80,7 +80,7 @@ def test_clocks(tunnel: Path, trajectory: float, file: float, says: str) -> None
         (np.eye(3) / 0.3048, "they would fit as feet"),
         (np.eye(3) / 1000.0, "they would fit if the axis is in millimetres"),
         (np.eye(3) * 0.3048, "they would fit if the axis is in feet"),
-        (np.eye(3) * 0.9, "check that it belongs to this tunnel and SRID"),
+        (np.eye(3) * 0.9, "give the positions in this tunnel, in its coordinate system"),
     ],
     ids=["swapped", "millimetres", "feet", "axis in millimetres", "axis in feet", "elsewhere"],
 )

@@ -23,6 +23,8 @@ from tunneldb.evaluate.truth import read_polygons
 from tunneldb.export.figures import axis_deviation, intensity_dependence
 from tunneldb.export.pointcloud import members
 from tunneldb.export.tables import workbook
+from tunneldb.measures.rings.surveyed_points import require_size
+from tunneldb.pipeline.profile_file import read_profile
 from tunneldb.pipeline.register import SonarInput
 from tunneldb.pipeline.target_control import read_control
 from tunneldb.radiometry.intensity_kind import doubt
@@ -198,6 +200,22 @@ def test_a_shorter_stretch_fits_a_sheet(tmp_path: Path, monkeypatch: pytest.Monk
 
     advised(lambda: write(3), "or a shorter stretch")
     write(2)
+
+
+@pytest.mark.parametrize(
+    ("radius", "advice", "factor"), [(6.0, "is 6 m the radius?", 2.0), (1.5, "is 6 m twice the diameter?", 0.5)]
+)
+def test_the_diameter_of_rings_is_that_of_the_question(radius: float, advice: str, factor: float) -> None:
+    radii = np.full(5, radius)
+    advised(lambda: require_size(Path("a.csv"), radii, 6.0), re.escape(advice))
+    require_size(Path("a.csv"), radii, factor * 6.0)
+
+
+def test_the_layer_of_a_table_is_omitted(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("right,up\n-3,-3\n3,-3\n3,3\n-3,3\n-3,-3\n")
+    advised(lambda: read_profile(path, layer="0"), "--drawing-layer is for a .dxf; omit it")
+    assert read_profile(path).outline.area == pytest.approx(36.0)
 
 
 def test_the_output_has_another_name(tmp_path: Path) -> None:

@@ -52,6 +52,7 @@ def test_files_kilometres_and_gaps(tunnel: str, tmp_path: Path) -> None:
     files = [scan(tmp_path, *ends) for ends in ((970, 2000), (2000, 3000), (4000, 5400), (5700, 6990))]
     notes = tmp_path / "notes.laz"
     notes.write_text("no scan")
+    assert "is a folder; pass the files in it" in run(tmp_path).output
     result = run(*files, notes)
     assert result.exit_code == 0, result.output
     lines = [line.rstrip() for line in result.output.splitlines()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, LiteralString
 
@@ -49,9 +50,14 @@ def axis(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping
     named = ", ".join(f"the vertex at {label} {remark}" for label, remark in rejected[:MAX_NAMED])
     named += f" and {len(rejected) - MAX_NAMED} more" if len(rejected) > MAX_NAMED else ""
     if moved >= values["axis.tolerance"] or len(rejected) > max(1, values["axis.max_rejected"] * measured):
+        if moved >= values["axis.tolerance"]:
+            more, setting = "allow more passes", f"max_iterations={min(100, 2 * len(passes))}"
+        else:
+            share = min(1.0, math.ceil(100.0 * len(rejected) / max(measured - len(rejected), 1)) / 100.0)
+            more, setting = "interpolate more", f"max_rejected={share:g}"
         raise UserError(
             f"the axis of kilometre {km} was not found in {len(passes)} passes: {named or f'it still moves by {moved:.3f} m'};"
-            " look at the points and the given axis there, or let more be interpolated by axis.max_rejected"
+            f" correct the given axis there, or {more}: tunneldb run {survey.name} --km {km} --from axis --set axis.{setting}"
         )
     vertices = dict(
         conn.execute(

@@ -67,7 +67,7 @@ def read_profile(
     """
     suffix = path.suffix.lower()
     if suffix != ".dxf" and layer is not None:
-        raise UserError(f"{path}: --drawing-layer is for a .dxf")
+        raise UserError(f"{path}: --drawing-layer is for a .dxf; omit it")
     if suffix == ".csv":
         if unit not in (None, "m"):
             raise UserError(f"{path}: right, up and radius of a .csv are metres, not {unit}")

@@ -127,7 +127,7 @@ def read_positions(
             int(np.argmax(wild)),
             f"this pose and {counted(int(np.count_nonzero(wild)) - 1, 'other')} ({100 * wild.mean():.2g} %) lie more than"
             f" {MAX_AXIS_DISTANCE:g} m beside the axis of {tunnel!r}, {MAX_END_DISTANCE:g} m beyond its ends, or jump;"
-            " fix the trajectory",
+            " remove these rows, or give the trajectory of this tunnel, in its coordinate system",
         )
     notes = [*([ended] if ended else []), *_conversion(units)]
     if wild.any():
@@ -255,7 +255,7 @@ def _require_near(paths: Sequence[Path], xyz: Float, alignment: Alignment, tunne
         raise UserError(
             f"{', '.join(map(str, paths))}: the scanner was never within {FARTHEST_SCANNER:g} m of the axis of {tunnel!r} "
             f"({distance[nearest]:.0f} m at the nearest{', beyond its ends' if beyond[nearest] else ''}); "
-            f"{guess or 'check that it belongs to this tunnel and SRID'}"
+            f"{guess or 'give the positions in this tunnel, in its coordinate system'}"
         )
 
 
@@ -264,7 +264,7 @@ def _direction(path: Path, xyz: Float, alignment: Alignment, *, backwards: bool)
     chainage = alignment.chainage(xyz)
     within = chainage[np.isfinite(chainage)]
     if not len(within):
-        raise UserError(f"{path}: no pose is between the ends of the axis; check that it belongs to this tunnel")
+        raise UserError(f"{path}: no pose is between the ends of the axis; give the trajectory of this tunnel")
     run = within[-1] - within[0]
     if run > 0 and backwards:
         raise UserError(f"{path}: the trajectory runs {run:.0f} m up the axis, so --backwards is wrong")

@@ -22,7 +22,7 @@ def set_time_offset(connection: psycopg.Connection[Any], survey: Survey, seconds
         If the survey has no trajectory.
     """
     if survey.platform != "mobile":
-        raise UserError(f"--time-offset is about a trajectory; survey {survey.name} has none")
+        raise UserError(f"--time-offset is about a trajectory; survey {survey.name} has none; omit it")
     row = connection.execute("SELECT time_offset, positions_note FROM tunnel.survey WHERE id = %s", [survey.id]).fetchone()
     assert row is not None
     former, note = row

@@ -74,7 +74,7 @@ def classify_file(source: Path, target: Path, values: Mapping[str, float], begin
     scene, origin = find_scene_of(source, values, begin("points", count))
     lining = any(cluster.klass == PointClass.LINING for cluster in scene.clusters) or scene.relief is not None
     if scene.ground is None and not lining:
-        raise UserError(f"{source}: neither ground nor lining was found in its {count} points; check that it is a tunnel scan")
+        raise UserError(f"{source}: neither ground nor lining was found in its {count} points; pass a tunnel in metres")
     with replacing(target) as temporary:
         counts = rewrite(source, temporary, lambda xyz: scene.classes(xyz - origin), CLASS_NAMES, begin("classes", count))
     return Classified(counts, scene.ground is not None, lining)
