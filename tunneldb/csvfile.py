@@ -19,6 +19,7 @@ import numpy as np
 from tunneldb.arrays import Float, Int64
 from tunneldb.csvsheet import Sheet, opened
 from tunneldb.errors import InputError
+from tunneldb.numerals import parse_number
 
 MAX_MEASUREMENT = 1e12
 """Greatest measured value that is accepted; seconds since 1970 and coordinates are smaller."""
@@ -37,7 +38,7 @@ _ALIASES = {
 
 _UNIT = re.compile(r"[\[(](?:m|s|db)[\])]$")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d*(?:[eE][+-]?\d+)?")
-_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:[ '’.,\u00a0\u202f]\d{3})+(?:[.,]\d+)?")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:[ '’.,_\u00a0\u202f]\d{3})+(?:[.,]\d+)?")
 _FORMULA = re.compile(r"'*(?:[=@\t\r]|[+-](?![\d.+-]*$))")  # also with apostrophes, so that guarding can be undone
 _GUARD = "'"
 
@@ -253,7 +254,7 @@ def _indices(
 
 def _number(path: Path, line: int, name: str, text: str, decimal_comma: bool) -> float:
     try:
-        value = float(text)
+        value = parse_number(text)
     except ValueError:
         text = text.strip()
         if decimal_comma and _DECIMAL_COMMA.fullmatch(text):
@@ -279,4 +280,6 @@ def number_advice(text: str) -> str:
     """Return how to write a number, as the end of a message; empty if unknown."""
     if _DECIMAL_COMMA.fullmatch(text):
         return "; write decimals with a point"
-    return "; write it without separators of thousands" if _THOUSANDS.fullmatch(text) else ""
+    if _THOUSANDS.fullmatch(text):
+        return "; write it without separators of thousands"
+    return "; write it with the digits 0 to 9" if re.search(r"[^\D0-9]", text) else ""

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tunneldb.errors import InputError
+from tunneldb.numerals import parse_number
 
 if TYPE_CHECKING:
     import _csv
@@ -158,7 +159,7 @@ def _reader(lines: Iterable[str], separator: str) -> _csv.Reader:
 
 def _is_number(text: str) -> bool:
     try:
-        float(text.replace(",", "."))
+        parse_number(text.replace(",", "."))
     except ValueError:
         return False
     return True

@@ -11,7 +11,7 @@ def parse_number(text: str) -> float:
     ValueError
         If it is none.
     """
-    return float(_plain(text))
+    return float(_require_plain(text))
 
 
 def parse_whole(text: str) -> int:
@@ -22,11 +22,15 @@ def parse_whole(text: str) -> int:
     ValueError
         If it is none.
     """
-    return int(_plain(text))
+    return int(_require_plain(text))
 
 
-def _plain(text: str) -> str:
-    bare = text.strip()
-    if "_" in bare or not bare.isascii():
+def is_plain(text: str) -> bool:
+    """Return True if a text has no character that only Python reads as a part of a number."""
+    return text.strip().isascii() and "_" not in text
+
+
+def _require_plain(text: str) -> str:
+    if not is_plain(text):
         raise ValueError(f"{text!r} is not a number")
-    return bare
+    return text

@@ -53,7 +53,7 @@ class Drawn:
         count = "1 line" if len(self.lines) == 1 else f"{len(self.lines)} separate lines"
         if number is None:
             raise InputError(f"{path}: layer {self.layer!r} holds {count}: {listed}; choose one by --alignment NUMBER")
-        if not number.isdecimal() or not 1 <= int(number) <= len(self.lines):
+        if not (number.isascii() and number.isdecimal()) or not 1 <= int(number) <= len(self.lines):
             raise InputError(f"{path}: layer {self.layer!r} has no line {number!r}; it holds {count}: {listed}")
         return self.lines[int(number) - 1]
 

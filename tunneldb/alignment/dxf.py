@@ -24,6 +24,8 @@ MAX_STEP = 1.0  # m between vertices of a drawing with arcs, so that the spline 
 _ENTITIES = {"LINE", "ARC", "LWPOLYLINE", "POLYLINE", "SPLINE", "HELIX", "ELLIPSE"}
 _FRAME = 16  # flag of a vertex of a spline's control frame, which is no part of the line
 _MAX_VERTICES = 1e6  # of a line; longer ones are damage, which is refused later
+_MAX_CURVE = 1e6  # m, of an arc, or of the polygon of a spline's control points; ezdxf would divide a longer one without end
+_MAX_CURVE_VERTICES = 200_000  # of all curves: 126 km at a radius of 100 m
 _MAX_NESTING = 16  # blocks in blocks
 _MAX_IN_BLOCKS = 10_000  # entities
 _MAX_LISTED = 6
@@ -86,7 +88,7 @@ def _lines(path: Path, drawing: Any, layer: str | None, unit: float | None, repa
     scale, note = _dxf_unit(path, drawing.header.get("$INSUNITS", 0), unit)
     parts = [part for entity, name in placed if name == chosen for part in _simple(entity)]
     curved = any(part.dxftype() != "LINE" for part in parts)
-    pieces = [scale * _vertices(part, CHORD_ERROR / scale) for part in parts]
+    pieces = [scale * piece for piece in _flattened(path, parts, scale)]
     broken = sum(not (np.abs(piece) <= MAX_COORDINATE).all() for piece in pieces)
     if broken:
         raise InputError(f"{path}: {counted(broken, 'line')} of layer {chosen!r} with invalid coordinates; draw them again")
@@ -192,11 +194,44 @@ def _simple(entity: Any) -> list[Any]:
     return list(entity.virtual_entities()) if entity.dxftype() in ("LWPOLYLINE", "POLYLINE") else [entity]
 
 
-def _vertices(entity: Any, chord_error: float) -> Float:
-    """Return vertices (n, 3) along a line or a curve, in its drawing's unit."""
-    line = entity.dxftype() == "LINE"
-    vertices = (entity.dxf.start, entity.dxf.end) if line else entity.flattening(chord_error)
-    return np.array([tuple(vertex) for vertex in vertices], dtype=np.float64).reshape(-1, 3)
+def _flattened(path: Path, parts: list[Any], scale: float) -> list[Float]:
+    """Return vertices (n, 3) along lines and curves, in the drawing's unit of ``scale`` metres.
+
+    Raises
+    ------
+    InputError
+        If curves are larger, or need more vertices, than those of any tunnel, as an arc whose radius is damaged.
+    """
+    pieces, left = [], _MAX_CURVE_VERTICES
+    for part in parts:
+        if part.dxftype() == "LINE":
+            vertices = [tuple(part.dxf.start), tuple(part.dxf.end)]
+        else:
+            if not scale * _size(part) <= _MAX_CURVE:  # also NaN
+                raise InputError(
+                    f"{path}: the {part.dxftype()} on layer {part.dxf.layer!r} is longer than {_MAX_CURVE / 1000.0:g} km, as no"
+                    " tunnel is; draw it again, or pass the unit by --axis-unit"
+                )
+            vertices = [tuple(vertex) for vertex in itertools.islice(part.flattening(CHORD_ERROR / scale), left + 1)]
+            left -= len(vertices)
+        if left < 0:
+            raise InputError(
+                f"{path}: its curves need more than {_MAX_CURVE_VERTICES} vertices; write the axis alone to a file, or pass the"
+                " unit by --axis-unit"
+            )
+        pieces.append(np.array(vertices, dtype=np.float64).reshape(-1, 3))
+    return pieces
+
+
+def _size(curve: Any) -> float:
+    """Return the length of a curve or a bound of it, in the drawing's unit."""
+    kind = curve.dxftype()
+    if kind == "ARC":
+        return float(abs(curve.dxf.radius) * np.radians((curve.dxf.end_angle - curve.dxf.start_angle) % 360.0 or 360.0))
+    if kind == "ELLIPSE":
+        return float(2.0 * np.pi * np.linalg.norm(tuple(curve.dxf.major_axis)) * max(1.0, abs(curve.dxf.ratio)))
+    points = [tuple(point) for point in (*curve.control_points, *curve.fit_points)]
+    return float(np.linalg.norm(np.diff(np.array(points).reshape(-1, 3), axis=0), axis=1).sum())
 
 
 def _densified(line: Float) -> Float:

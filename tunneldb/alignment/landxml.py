@@ -16,6 +16,7 @@ from tunneldb.alignment.elements import PlanElement, clothoid_from_chord
 from tunneldb.alignment.profile import Pvi, profile_elements
 from tunneldb.alignment.units import UNITS, unit_of
 from tunneldb.errors import InputError
+from tunneldb.numerals import parse_number
 
 MISMATCH = 0.02  # m between a stated length and that of its points; files are rounded to millimetres or centimetres
 _PVIS = ("PVI", "ParaCurve", "UnsymParaCurve", "CircCurve")
@@ -281,7 +282,7 @@ def _tag(element: Element) -> str:
 
 
 def _number(text: str) -> float:
-    value = float(text)
+    value = parse_number(text)
     if not math.isfinite(value):
         raise ValueError(f"{text} is neither a position nor a length")
     return value

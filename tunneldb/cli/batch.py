@@ -15,7 +15,7 @@ from rich.console import Console
 from tunneldb.cli.load import density_of, say_notes
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import add_to_json, command, notify, wants_json
-from tunneldb.cli.param_types import FilePath
+from tunneldb.cli.param_types import FilePath, WholeRange
 from tunneldb.cli.units import unit_options
 from tunneldb.counted import counted
 from tunneldb.database import connect
@@ -47,7 +47,7 @@ OUTSIDE = "outside the kilometres of --km, by its header and a sample of its poi
 @click.argument("survey")
 @click.argument("files", nargs=-1, type=FilePath(), metavar="[FILES...]")
 @click.option(
-    "--workers", type=click.IntRange(1, 1000), metavar="N", help="Number of worker processes; default: one for each core."
+    "--workers", type=WholeRange(1, 1000), metavar="N", help="Number of worker processes; default: one for each core."
 )
 @click.option("--km", metavar="A[-B]", help="Only these kilometres, 511 or 511-512.")
 @click.option("--to", "last", metavar="STAGE", help="Last stage: load, axis, segments, sections, ground or detect (default).")

@@ -19,7 +19,7 @@ from tunneldb.cli.measure import (
     write_text,
 )
 from tunneldb.cli.output import add_to_json, command
-from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
+from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange, WholeRange
 from tunneldb.cli.stretch import stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.counted import counted
@@ -81,7 +81,7 @@ _LENGTH = FiniteRange(0.0)
 @click.option("--allowance", type=_LENGTH, default=0.0, metavar="M", help="Allowance for all else, to each side.")
 @click.option(
     "--group-points",
-    type=click.IntRange(1, 10**9),
+    type=WholeRange(1, 10**9),
     default=3,
     show_default=True,
     help="Least number of points of an obstacle, …",

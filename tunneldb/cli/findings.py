@@ -13,7 +13,7 @@ from tunneldb.cli.coverage import say_coverage, say_remarks
 from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import CommandGroup, add_to_json, notify, printable, records
-from tunneldb.cli.param_types import FilePath, FiniteRange
+from tunneldb.cli.param_types import FilePath, FiniteRange, WholeRange
 from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table, table_format
 from tunneldb.counted import counted
@@ -75,7 +75,7 @@ def findings() -> None:
     "--state", "states", multiple=True, type=click.Choice([*get_args(State), "all"]),
     help="Only this state, or all; may be repeated. Default: open and confirmed, which count.",
 )  # fmt: skip
-@click.option("--min-severity", type=click.IntRange(1, 4), help="Least severity.")
+@click.option("--min-severity", type=WholeRange(1, 4), help="Least severity.")
 @click.option("--min-area", type=FiniteRange(min=0), default=0.0, metavar="M2", help="Least area, m².")
 @stretch_options
 @click.option(
@@ -294,7 +294,7 @@ def import_(
 
 
 @findings.command("undo", examples=["tunneldb findings undo 12"])
-@click.argument("number", metavar="ID", type=click.IntRange(min=1))
+@click.argument("number", metavar="ID", type=WholeRange(min=1))
 @click.pass_obj
 def undo(settings: Settings, number: int) -> None:
     """Undo the last change of the finding ID: drawn, redrawn, reviewed, split, merged or deleted.

@@ -35,7 +35,7 @@ from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
 _WIDTH = 1000  # a pipe or a file has no width: nothing is to be cut there
-_HOUR = r"(1[0-2]|[1-9])(?::([0-5]\d))?"
+_HOUR = r"(1[0-2]|[1-9])(?::([0-5][0-9]))?"
 _CLOCK = re.compile(rf"{_HOUR}-{_HOUR}")
 
 

@@ -11,12 +11,13 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import add_to_json, command, notify, printable
-from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
+from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange, WholeRange
 from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.cli.units import unit_options
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.numerals import parse_number
 from tunneldb.store.remarks import read_remarks
 from tunneldb.store.survey import Survey, get_survey
 
@@ -45,7 +46,7 @@ MOST_NAMED = 5  # files of which the same is said
 )
 @click.option(
     "--noise-points",
-    type=click.IntRange(1, 1000),
+    type=WholeRange(1, 1000),
     default=5,
     show_default=True,
     help="Points with fewer points than this around them, including themselves, are noise; 1 keeps all.",
@@ -157,7 +158,7 @@ def density_of(text: str) -> float | None:
     if text == "all":
         return None
     try:
-        value = float(text)
+        value = parse_number(text)
     except ValueError:
         value = 0.0
     if not 1.0 <= value <= 1e6:

@@ -12,6 +12,7 @@ import click
 from tunneldb.csvfile import MAX_MEASUREMENT
 from tunneldb.errors import UserError
 from tunneldb.files import require_regular
+from tunneldb.numerals import is_plain
 
 SMALLEST = 1e-30
 """Numbers nearer to 0, which are not 0, cannot be meant; their squares are none in a database."""
@@ -44,6 +45,11 @@ def file_path(text: str) -> Path:
     return Path(os.fsdecode(FilePath().convert(text, None, None)))
 
 
+def _plain(value: Any) -> Any:
+    """Return a value without a number as only Python reads it, such as 272_000, which click then refuses."""
+    return f"'{value}'" if isinstance(value, str) and not is_plain(value) else value
+
+
 def _finite(number: float, value: Any, param: click.Parameter | None) -> float:
     if not math.isfinite(number) or abs(number) > MAX_MEASUREMENT or 0.0 < abs(number) < SMALLEST:
         name = "" if param is None else f"{param.opts[0]} "
@@ -56,7 +62,7 @@ class Finite(click.types.FloatParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return the number."""
-        return _finite(float(super().convert(value, param, ctx)), value, param)
+        return _finite(float(super().convert(_plain(value), param, ctx)), value, param)
 
 
 class FiniteRange(click.FloatRange):
@@ -66,8 +72,16 @@ class FiniteRange(click.FloatRange):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return the number."""
-        return _finite(float(super().convert(value, param, ctx)), value, param)
+        return _finite(float(super().convert(_plain(value), param, ctx)), value, param)
+
+
+class WholeRange(click.IntRange):
+    """A whole number in a range."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Return the number."""
+        return int(super().convert(_plain(value), param, ctx))
 
 
 FINITE = Finite()
-SEED = click.IntRange(0, 2**63 - 1)  # what random numbers start from, and formats keep
+SEED = WholeRange(0, 2**63 - 1)  # what random numbers start from, and formats keep

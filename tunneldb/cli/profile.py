@@ -12,6 +12,7 @@ from tunneldb.cli.stretch import parse_stretch, stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.numerals import parse_number
 
 
 @click.group(cls=CommandGroup)
@@ -128,7 +129,7 @@ def remove(settings: Settings, tunnel: str, name: str, layer: str) -> None:
 
 def _origin(text: str) -> tuple[float, float]:
     try:
-        right, up = (float(part) for part in text.split(","))
+        right, up = (parse_number(part) for part in text.split(","))
     except ValueError:
         raise UserError(f"--origin takes two numbers, as 0,1.5, not {text!r}") from None
     return right, up

@@ -14,6 +14,7 @@ from tunneldb.cli.progress import bar, step
 from tunneldb.cli.tables import print_table
 from tunneldb.database import connect
 from tunneldb.errors import UserError
+from tunneldb.numerals import parse_number
 from tunneldb.store.survey import get_survey
 
 if TYPE_CHECKING:
@@ -107,7 +108,7 @@ def _speeds(text: str | None) -> tuple[float, float] | None:
         return None
     assumed, _, measured = text.partition("=")
     try:
-        return float(assumed), float(measured)
+        return parse_number(assumed), parse_number(measured)
     except ValueError:
         raise UserError(f"--sound-speed takes ASSUMED=MEASURED in m/s, as 1500=1447, not {text!r}") from None
 

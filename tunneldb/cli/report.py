@@ -12,7 +12,7 @@ import psycopg
 from tunneldb.cli.coverage import say_coverage
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import add_to_json, command, notify, printable
-from tunneldb.cli.param_types import FilePath
+from tunneldb.cli.param_types import FilePath, WholeRange
 from tunneldb.cli.progress import bar
 from tunneldb.cli.stretch import Stretch, parse_stretch, stretch_options
 from tunneldb.counted import counted
@@ -87,7 +87,7 @@ PHOTO_SERVER = _PhotoServer()
 @click.option(
     "--list",
     "listed",
-    type=click.IntRange(1, 1_000_000),
+    type=WholeRange(1, 1_000_000),
     default=MAX_LISTED_LEAKS,
     show_default=True,
     metavar="N",

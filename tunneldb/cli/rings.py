@@ -10,7 +10,7 @@ import click
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import add_to_json, command, notify
-from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange
+from tunneldb.cli.param_types import FINITE, FilePath, FiniteRange, WholeRange
 from tunneldb.cli.stretch import stretch_options
 from tunneldb.cli.tables import print_table
 from tunneldb.counted import counted
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tunneldb.export.tables.rings import Chord
     from tunneldb.measures.rings.surveyed import SurveyedRings
 
-_END = r"(\d{1,3}(?:\.\d+)?|\d{1,2}:\d\d)"
+_END = r"([0-9]{1,3}(?:\.[0-9]+)?|[0-9]{1,2}:[0-9]{2})"
 _CHORD = re.compile(f"{_END}-{_END}")
 
 
@@ -68,7 +68,7 @@ _CHORD = re.compile(f"{_END}-{_END}")
 )
 @click.option(
     "--harmonics",
-    type=click.IntRange(2, 20),
+    type=WholeRange(2, 20),
     default=3,
     show_default=True,
     metavar="N",

@@ -14,7 +14,7 @@ import psycopg
 from tunneldb.csvfile import MAX_MEASUREMENT
 from tunneldb.errors import UserError
 
-_METRES = re.compile(r"-?\d+(\.\d*)?")
+_METRES = re.compile(r"-?[0-9]+(\.[0-9]*)?")
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 

@@ -20,6 +20,7 @@ from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.geometry.units import Units
+from tunneldb.numerals import is_plain
 from tunneldb.store.listing import count_holdings, count_stale, list_surveys
 from tunneldb.store.survey import UNPOSED, get_survey
 
@@ -45,7 +46,7 @@ class Day(click.DateTime):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the day."""
         try:
-            return super().convert(value, param, ctx)
+            return super().convert(value if not isinstance(value, str) or is_plain(value) else "", param, ctx)
         except click.BadParameter:
             self.fail(f"{value!r} is no day as YYYY-MM-DD: year, month, day, as 2024-05-31", param, ctx)
 

@@ -18,6 +18,7 @@ from tunneldb.counted import counted
 from tunneldb.database import connect
 from tunneldb.errors import UserError
 from tunneldb.files import exit_on_sigterm
+from tunneldb.numerals import parse_whole
 from tunneldb.store.listing import list_station_pieces, list_tunnels
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ class Srid(click.ParamType[int]):
         if value == "local":
             return LOCAL
         try:
-            number = int(value)
+            number = parse_whole(str(value))
         except ValueError:
             raise UserError(f"--srid {value!r} is neither an EPSG number, such as 25830, nor local") from None
         if number == LOCAL:  # PostGIS's number for it would be typed by mistake

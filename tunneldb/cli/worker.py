@@ -11,6 +11,7 @@ import psycopg
 
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import add_to_json, command
+from tunneldb.cli.param_types import WholeRange
 from tunneldb.cli.progress import bar
 from tunneldb.database import connect
 from tunneldb.errors import UserError
@@ -19,11 +20,11 @@ from tunneldb.queue.watching import ask_workers_to_stop, count_jobs, server_time
 
 @command(examples=["tunneldb worker --concurrency 8"])
 @click.option(
-    "--concurrency", type=click.IntRange(1, 1000), default=1, show_default=True, metavar="N", help="Number of parallel jobs."
+    "--concurrency", type=WholeRange(1, 1000), default=1, show_default=True, metavar="N", help="Number of parallel jobs."
 )
 @click.option(
     "--threads",
-    type=click.IntRange(1, 1000),
+    type=WholeRange(1, 1000),
     default=1,
     show_default=True,
     metavar="N",

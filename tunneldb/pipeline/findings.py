@@ -24,6 +24,7 @@ from tunneldb.csvfile import find_column, read_header, read_texts, row_lines
 from tunneldb.errors import UserError
 from tunneldb.files import gdal_fault, vector_source
 from tunneldb.geometry.crs import fits_srid, is_local, srid_name
+from tunneldb.numerals import parse_number
 from tunneldb.store.alignment import station_chainages
 from tunneldb.store.coverage import GAP_STATES
 from tunneldb.store.remarks import REMARK
@@ -157,7 +158,7 @@ def _number(row: Row, name: str, kind: type[int] | type[float]) -> float | None:
     if text is None:
         return None
     try:
-        value = float(text.replace(",", "."))
+        value = parse_number(text.replace(",", "."))
     except ValueError:
         raise ValueError(f"{name} is {text!r}, not a number") from None
     if not math.isfinite(value) or kind(value) != value:
@@ -244,7 +245,7 @@ def _depth(text: str) -> int:
 
 def _float(name: str, text: str, said: str = "a number") -> float:
     try:
-        value = float(text.replace(",", "."))
+        value = parse_number(text.replace(",", "."))
     except ValueError:
         raise ValueError(f"{name} is {text!r}, not {said}") from None
     if not math.isfinite(value):

@@ -14,6 +14,7 @@ from tunneldb.arrays import Float, Int64
 from tunneldb.csvfile import read_csv
 from tunneldb.csvsheet import read_text
 from tunneldb.errors import UserError
+from tunneldb.numerals import parse_number
 from tunneldb.pipeline.profile_drawing import METRES, read_drawing
 from tunneldb.shape.outline import TOLERANCE, Outline
 
@@ -134,7 +135,7 @@ def _read_points(path: Path, origin: tuple[float, float], unit: str | None) -> R
         if not cells[0] or cells[0].startswith("#"):
             continue
         try:
-            right, up = (float(cell) for cell in cells)
+            right, up = (parse_number(cell) for cell in cells)
         except ValueError:
             comma = "; write decimals with a point" if line.count(",") > 1 else ""
             raise UserError(f"{path}, line {number}: {line.strip()[:60]!r} is not two numbers, right and up{comma}") from None

@@ -99,7 +99,7 @@ def _read_off(path: Path) -> Float:
         if (lines.text() or "").upper() != "OFF":
             raise InputError(f"{path}, line 1: an OFF file begins with OFF")
         counts = (lines.text() or "").split()
-        if not counts or not counts[0].isdigit():
+        if not counts or not (counts[0].isascii() and counts[0].isdigit()):
             raise InputError(f"{path}, line 2: expected the numbers of vertices, faces and edges")
         wanted, parts, found = int(counts[0]), [np.zeros((0, 3))], 0
         while found < wanted:

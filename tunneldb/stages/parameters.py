@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from tunneldb.errors import InputError, did_you_mean
+from tunneldb.numerals import parse_number
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ def of_stage(values: Mapping[str, float], prefixes: Iterable[str]) -> dict[str, 
 def _value(name: str, text: str) -> float:
     parameter = PARAMETERS[name]
     try:
-        value = float(text)
+        value = parse_number(text)
     except ValueError:
         raise InputError(f"{name} needs a number, not {text!r}: --set {name}={parameter.default:g}") from None
     if not parameter.low <= value <= parameter.high:

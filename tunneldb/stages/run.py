@@ -24,7 +24,7 @@ def km_range(text: str) -> range:
     UserError
         If the text is no range.
     """
-    match = re.fullmatch(r"(-?\d+)(?:-(-?\d+))?", text.strip())
+    match = re.fullmatch(r"(-?[0-9]+)(?:-(-?[0-9]+))?", text.strip())
     if match is None:
         raise UserError(f"--km needs a kilometre or a range, 511 or 511-513, not {text!r}")
     first, last = int(match[1]), int(match[2] or match[1])

@@ -178,7 +178,7 @@ def _read_header(path: Path, lines: TextLines) -> Vertices:
                 order = _ORDERS[name]
             case ["comment" | "obj_info", *comment]:
                 comments.append(" ".join(comment))
-            case ["element", name, count] if count.isdigit():
+            case ["element", name, count] if count.isascii() and count.isdigit():
                 elements.append((name, int(count), []))
             case ["property", "list", _, _, name] if elements:
                 elements[-1][2].append((name, ""))

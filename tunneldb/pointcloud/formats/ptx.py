@@ -16,6 +16,7 @@ import numpy as np
 
 from tunneldb.arrays import Float
 from tunneldb.errors import InputError
+from tunneldb.numerals import parse_number
 from tunneldb.pointcloud.formats.faults import decoding
 from tunneldb.pointcloud.formats.scans import PosedScan, scan_number
 from tunneldb.pointcloud.formats.text import CloudBuilder, TextCloud, TextScan
@@ -85,7 +86,7 @@ def _read_head(path: Path, lines: TextLines) -> tuple[int, int, int, Float, Floa
         if text is None:
             raise InputError(f"{path}: truncated in the header of the scan that begins in line {begin}")
         try:
-            numbers = list(map(float, text.split()))
+            numbers = list(map(parse_number, text.split()))
         except ValueError:
             numbers = []
         if len(numbers) != count or not np.isfinite(numbers).all():

@@ -15,6 +15,7 @@ import numpy as np
 from tunneldb.arrays import Float
 from tunneldb.csvfile import NO_NUMBER, number_advice
 from tunneldb.errors import InputError
+from tunneldb.numerals import parse_number
 from tunneldb.pointcloud.formats.columns import SKIPPED
 
 BLOCK_BYTES = 1 << 24
@@ -152,7 +153,7 @@ def are_numbers(line: str, columns: Sequence[str] = ()) -> bool:
 
 def _is_number(text: str) -> bool:
     try:
-        float(text)
+        parse_number(text)
     except ValueError:
         return NO_NUMBER.fullmatch(text) is not None
     return True
@@ -226,7 +227,7 @@ def _fault(path: Path, block: bytes, first: int, divider: str | None, width: int
             return InputError(f"{path}, line {number}: {len(values)} values, expected {width}: {_short(line)!r}")
         for place in used:
             try:
-                float(values[place])
+                parse_number(values[place])
             except ValueError:
                 advice = number_advice(values[place].strip())
                 return InputError(f"{path}, line {number}: {_short(values[place])!r} is not a number{advice}")

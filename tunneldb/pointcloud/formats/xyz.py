@@ -86,7 +86,7 @@ def _read_pts(builder: CloudBuilder) -> None:
         if not text:
             continue
         at, count = lines.line - 1, None
-        if text.isdigit():
+        if text.isascii() and text.isdigit():
             count = int(text)
             text = lines.text() if count else ""
             if not text:
@@ -111,7 +111,7 @@ def _layout(path: Path, lines: TextLines) -> tuple[TextScan, _Count | None]:
             continue
         if text.startswith(COMMENTS) and len(remarks) < _MAX_COMMENTS:
             remarks.append(text)
-        elif text.isdecimal() and count is None:
+        elif text.isascii() and text.isdecimal() and count is None:
             count = _Count(lines.line - 1, int(text))
         elif comma := decimal_comma(text.split(divider_of(text))):
             raise InputError(f"{path}, line {lines.line - 1}: {comma!r} is not a number; write decimals with a point")
