@@ -6,9 +6,10 @@ import errno
 import os
 import re
 import signal
+import sqlite3
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
@@ -141,8 +142,8 @@ def vector_source(path: Path) -> str:
     Raises
     ------
     UserError
-        If it cannot be read, or is not a GeoPackage, GeoJSON, Shapefile or FlatGeobuf; or if a Shapefile is truncated or its
-        .shx is missing.
+        If it cannot be read, or is not a GeoPackage, GeoJSON, Shapefile or FlatGeobuf; if a GeoPackage has views; or if a
+        Shapefile is truncated or its .shx is missing.
     """
     try:
         with path.open("rb") as file:
@@ -151,7 +152,9 @@ def vector_source(path: Path) -> str:
         raise UserError(f"{path} cannot be read: {error.strerror}") from None
     if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{"):
         return f"GeoJSON:{path}"
-    if not head.startswith((b"SQLite format 3\0", b"fgb\x03", b"\0\0\x27\x0a")):
+    if head.startswith(_SQLITE):
+        _require_tables(path)
+    elif not head.startswith((b"fgb\x03", _SHAPEFILE)):
         raise UserError(f"{path} cannot be read: its content is not a GeoPackage, GeoJSON, Shapefile or FlatGeobuf")
     if head.startswith(_SHAPEFILE):
         _require_whole_shapefile(path, head)
@@ -160,6 +163,21 @@ def vector_source(path: Path) -> str:
 
 _HEAD = 1024
 _SHAPEFILE = b"\0\0\x27\x0a"
+_SQLITE = b"SQLite format 3\0"
+
+
+def _require_tables(path: Path) -> None:
+    """Refuse a GeoPackage with views, also in place of its catalogue: a recursive one never ends."""
+    try:
+        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as file:
+            views = file.execute("SELECT name FROM sqlite_master WHERE type = 'view' ORDER BY name LIMIT 1").fetchall()
+    except sqlite3.Error:
+        return  # of which GDAL says more
+    if views:
+        raise UserError(
+            f"{path}: {views[0][0]!r} is a view, which could run without end, so the file is not read; export its layer as a"
+            " table (QGIS: Export > Save Features As)"
+        )
 
 
 def _require_whole_shapefile(path: Path, head: bytes) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import Any, Dict, List, Tuple
 
 from qgis.PyQt.QtCore import Qt, pyqtSignal
@@ -54,11 +55,13 @@ class FactsPanel(QWidget):
             self.facts.setText("No finding is left in this selection.")
             self.remark.clear()
             return
+        raw = facts
+        facts = {name: escape(value) if isinstance(value, str) else value for name, value in raw.items()}  # labels are HTML
         badge = f"<span style='color:{REVIEW_COLOURS.get(facts['review'], '#000')}'>{facts['review']}</span>"
         self.head.setText(f"<b>{facts['label'] or ''}</b> &nbsp; no. {facts['id']} &nbsp; <b>{badge}</b>")
         self.facts.setText("<br>".join(_lines(facts, probability)))
-        self.kind.setCurrentIndex(self.kind.findData(facts["kind"]))
-        self.remark.setText(facts["remark"] or "")
+        self.kind.setCurrentIndex(self.kind.findData(raw["kind"]))
+        self.remark.setText(raw["remark"] or "")
 
     def _arrange(self) -> None:
         column = QVBoxLayout(self)

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import resource
+import signal
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyogrio
 import pytest
 import shapely
 from support.axis_files import LINE, chain, dxf, plan_length
@@ -133,3 +140,67 @@ def test_a_drawing_of_an_unknown_unit_is_read_in_the_given_one(tmp_path: Path) -
     with pytest.raises(UserError, match=r"unit is number 99 \(\$INSUNITS 99\).* pass --axis-unit meter"):
         read_given(path)
     np.testing.assert_allclose(read_given(path, unit="meter").xyz, LINE, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda space: space.add_arc((0, 0), 1e12, 0, 180),
+        lambda space: space.add_arc((0, 0), 1e300, 0, 180),
+        lambda space: space.add_ellipse((0, 0), (1e12, 0), 0.5, 0, 3.0),
+        lambda space: space.add_open_spline([(0, 0), (1e11, 1e11), (2e11, -1e11), (3e11, 0)]),
+        lambda space: space.add_spline([(0, 0), (1e12, 1e12), (2e12, -1e12), (3e12, 0)]),
+        lambda space: space.add_lwpolyline([(0, 0, 0.5), (1e12, 0, 0.5), (2e12, 0, 0)], format="xyb"),
+    ],
+    ids=["arc", "arc beyond numbers", "ellipse", "spline", "fitted spline", "bulge"],
+)
+def test_curves_without_end_are_refused_before_they_are_divided(tmp_path: Path, draw: Callable[[Any], object]) -> None:
+    with bounded(), pytest.raises(UserError, match=r"is longer than 1000 km, as no tunnel is"):
+        read_given(dxf(tmp_path / "a.dxf", draw))
+
+
+def test_curves_of_many_vertices_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tunneldb.alignment.dxf._MAX_CURVE_VERTICES", 1000)
+    zigzag = [(float(k), float(k % 2)) for k in range(1000)]
+    with pytest.raises(UserError, match="its curves need more than 1000 vertices"):
+        read_given(dxf(tmp_path / "a.dxf", lambda space: space.add_open_spline(zigzag)))
+
+
+@contextmanager
+def bounded() -> Iterator[None]:
+    """Raise an error if the process takes 10 s of time of the processor, or 2 GiB more memory."""
+
+    def late(number: int, frame: object) -> None:
+        raise AssertionError("10 s")
+
+    before, limit = signal.signal(signal.SIGVTALRM, late), resource.getrlimit(resource.RLIMIT_AS)
+    with Path("/proc/self/statm").open() as file:
+        used = int(file.read().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + (2 << 30), limit[1]))
+    signal.setitimer(signal.ITIMER_VIRTUAL, 10.0)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
+        resource.setrlimit(resource.RLIMIT_AS, limit)
+
+
+@pytest.mark.parametrize("name", ["gpkg_contents", "axis"])
+def test_a_view_without_end_is_refused_and_a_table_is_read(tmp_path: Path, name: str) -> None:
+    """A recursive view, as a layer or in place of the catalogue; without it the same file is read, as the message says."""
+    path = tmp_path / "axis.gpkg"
+    line = shapely.to_wkb(np.array([shapely.LineString([(0, 0, 0), (50, 0, 0), (100, 0, 0)])]))
+    pyogrio.raw.write(path, line, [], [], layer="line", geometry_type="LineString Z", crs="EPSG:25830", driver="GPKG")
+    endless = "WITH RECURSIVE r (a) AS (SELECT 1 UNION ALL SELECT a + 1 FROM r) SELECT a FROM r"
+    with closing(sqlite3.connect(path)) as file, file:
+        if name == "gpkg_contents":
+            file.execute("ALTER TABLE gpkg_contents RENAME TO kept")
+        file.execute(f"CREATE VIEW {name} AS {endless}")
+    with bounded(), pytest.raises(UserError, match=f"'{name}' is a view, .* export its layer as a table"):
+        read_given(path)
+    with closing(sqlite3.connect(path)) as file, file:
+        file.execute(f"DROP VIEW {name}")
+        if name == "gpkg_contents":
+            file.execute("ALTER TABLE kept RENAME TO gpkg_contents")
+    assert plan_length(read_given(path)) == pytest.approx(100.0)

@@ -43,15 +43,15 @@ _COMMAND = "tunneldb.command"
 
 
 def printable(text: str) -> str:
-    """Return text of others, a remark or a name in a file, as a terminal may have it: what would command it, by its code."""
-    return "".join(c if c in "\n\t" or _is_shown(c) else c.encode("unicode_escape").decode() for c in text)
+    """Return text of others, such as a remark or a name in a file, on one line, with control characters as their codes."""
+    return "".join(c if c == "\t" or _is_shown(c) else c.encode("unicode_escape").decode() for c in text)
 
 
 def notify(text: str) -> None:
     """Print a message on standard error, unless the command is to be quiet, and log it."""
     log.info("%s", text)
     if not is_quiet():
-        click.echo(text, err=True)
+        click.echo("\n".join(map(printable, text.split("\n"))), err=True)
 
 
 class WaitHandler(logging.Handler):
@@ -71,7 +71,7 @@ def is_quiet() -> bool:
 
 def error_line(message: str) -> str:
     """Return the line by which an error is told, whatever names are in it."""
-    return "tunneldb: " + printable(message).replace("\n", "\\n")
+    return "tunneldb: " + printable(message)
 
 
 def _is_shown(character: str) -> bool:

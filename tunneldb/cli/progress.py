@@ -123,7 +123,7 @@ def step(progress: Progress) -> StartProgress:
         progress.refresh()  # else the end of a short step would never be seen
         for task in progress.task_ids:
             progress.remove_task(task)
-        task = progress.add_task(printable(text).replace("\n", "\\n"), total=total)
+        task = progress.add_task(printable(text), total=total)
         return lambda count: progress.advance(task, count)
 
     return begin
@@ -134,7 +134,7 @@ def say(text: str, *, err: bool = False) -> None:
     if err:
         log.info("%s", text)
     if not (err and is_quiet()):
-        click.echo(printable(text), file=sys.stderr if err else sys.stdout)
+        click.echo("\n".join(map(printable, text.split("\n"))), file=sys.stderr if err else sys.stdout)
 
 
 _ENDINGS = ("57P01", "57P02", "55P03")

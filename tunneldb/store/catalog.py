@@ -34,6 +34,9 @@ from tunneldb.store.survey import get_survey
 from tunneldb.store.time_offset import set_time_offset
 from tunneldb.store.unknown import unknown_survey, unknown_tunnel
 
+MAX_NAME = 63
+"""Maximum characters of the name of a tunnel, a survey or a profile, as of names in PostgreSQL."""
+
 
 @dataclass(frozen=True)
 class Intensity:
@@ -114,6 +117,8 @@ def _taken(name: str) -> UserError:
 
 def _require_name(name: str) -> None:
     """Refuse names that are unsuitable for file names and the command line."""
+    if len(name) > MAX_NAME:
+        raise UserError(f"the name {name[:20]!r}… has {len(name)} characters: use at most {MAX_NAME}")
     if not re.fullmatch(r"[A-Za-z0-9][\w.-]*", name):
         raise UserError(f"invalid name {name!r}: begin with a letter or a digit (A-Z, 0-9); then - _ . may follow, too")
 

@@ -121,8 +121,8 @@ def finding_form(catalogue: Catalogue, geometry: str, layer: str, tables: Mappin
         _text("previewExpression", "\"id\" || ' ' || coalesce(\"kind_label\", '') || ' ' || \"label\""),
         _text(
             "mapTip",
-            '<b>[% "id" %] [% "kind_label" %]</b>, [% "label" %]<br>'
-            '[% coalesce("severity_label", \'no severity\') %], [% "state" %]'
+            f'<b>[% "id" %] [% {as_html("kind_label")} %]</b>, [% {as_html("label")} %]<br>'
+            f"[% coalesce({as_html('severity_label')}, 'no severity') %], [% {as_html('state')} %]"
             f"[% coalesce('<br>' || {as_html('remark')}, '') %]",
         ),
     ]

@@ -153,7 +153,7 @@
     <field name="label_to" editable="0"/>
   </editable>
   <previewExpression>"survey"</previewExpression>
-  <mapTip>&lt;b&gt;[% "survey" %]&lt;/b&gt;&lt;br&gt;[% "label_from" %] – [% "label_to" %]</mapTip>
+  <mapTip>&lt;b&gt;[% replace("survey", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;&lt;br&gt;[% replace("label_from", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %] – [% replace("label_to", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]</mapTip>
   <renderer-3d type="vector">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
     <symbol type="line" material_type="simpleline">

@@ -199,6 +199,6 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, vertex [% "n" %]&lt;br&gt;[% "source" %][% coalesce(' by ' || "edited_by", '') %]</mapTip>
+  <mapTip>&lt;b&gt;[% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;, vertex [% "n" %]&lt;br&gt;[% replace("source", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %][% coalesce(' by ' || replace("edited_by", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %]</mapTip>
   <layerGeometryType>0</layerGeometryType>
 </qgis>

@@ -283,7 +283,7 @@
     <alias index="16" field="clock_text" name="Clock position"/>
   </aliases>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock, [% format_number("area", 2) %] m²&lt;br&gt;[% if("change_mean" &gt; 0, 'inwards', 'outwards') %] by [% format_number(1000 * abs("change_mean"), 1) %] mm since [% "old_survey" %]; greatest [% format_number(1000 * abs("change_extreme"), 1) %] mm; detected from [% format_number(1000 * "lod", 1) %] mm</mapTip>
+  <mapTip>&lt;b&gt;[% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;, [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock, [% format_number("area", 2) %] m²&lt;br&gt;[% if("change_mean" &gt; 0, 'inwards', 'outwards') %] by [% format_number(1000 * abs("change_mean"), 1) %] mm since [% replace("old_survey", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]; greatest [% format_number(1000 * abs("change_extreme"), 1) %] mm; detected from [% format_number(1000 * "lod", 1) %] mm</mapTip>
   <renderer-3d type="rulebased">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
     <rules key="{change-regions}">

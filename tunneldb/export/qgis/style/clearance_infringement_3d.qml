@@ -161,7 +161,7 @@
     <alias index="14" field="points" name="Points"/>
   </aliases>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% "gauge" %] about track [% "track" %]: [% format_number("depth", 3) %] m inside, [% "class" %], [% "points" %] points[% if("counts", '', '; does not count, may be temporary') %]</mapTip>
+  <mapTip>&lt;b&gt;[% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;, [% replace("gauge", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %] about track [% replace("track", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]: [% format_number("depth", 3) %] m inside, [% replace("class", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %], [% "points" %] points[% if("counts", '', '; does not count, may be temporary') %]</mapTip>
   <renderer-3d type="vector">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
     <symbol type="point" shape="sphere" material_type="phong">

@@ -234,6 +234,6 @@
     <alias index="16" field="passing" name="Points inside of objects"/>
   </aliases>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% "gauge" %] about track [% "track" %]: [% coalesce(format_number("margin", 3) || ' m, ' || "class", 'no point that counts') %]; [% round(100 * "seen_share") %] % of the directions seen</mapTip>
+  <mapTip>&lt;b&gt;[% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;, [% replace("gauge", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %] about track [% replace("track", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]: [% coalesce(format_number("margin", 3) || ' m, ' || replace("class", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), 'no point that counts') %]; [% round(100 * "seen_share") %] % of the directions seen</mapTip>
   <layerGeometryType>1</layerGeometryType>
 </qgis>

@@ -262,6 +262,6 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"class_name" || ' ' || "label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "class_name" %]&lt;/b&gt; at [% "label" %]&lt;br&gt;[% round("height_from", 2) %] to [% round("height_to", 2) %] m above the ground, [% "points" %] points</mapTip>
+  <mapTip>&lt;b&gt;[% replace("class_name", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt; at [% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;br&gt;[% round("height_from", 2) %] to [% round("height_to", 2) %] m above the ground, [% "points" %] points</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -145,6 +145,6 @@
     <alias index="10" field="seen_share" name="Share seen"/>
   </aliases>
   <previewExpression>"label_from"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label_from" %] – [% "label_to" %]&lt;/b&gt;: [% "state" %]&lt;br&gt;[% replace("reason", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]</mapTip>
+  <mapTip>&lt;b&gt;[% replace("label_from", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %] – [% replace("label_to", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;: [% replace("state", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;br&gt;[% replace("reason", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -141,6 +141,6 @@
     <alias index="12" field="seen_share" name="Share seen"/>
   </aliases>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;: [% "kind" %] [% format_number("area", 3) %] m²&lt;br&gt;[% "layer" %], [% "profile" %]; [% format_number(100 * "seen_share", 0) %] % seen</mapTip>
+  <mapTip>&lt;b&gt;[% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;: [% replace("kind", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %] [% format_number("area", 3) %] m²&lt;br&gt;[% replace("layer", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %], [% replace("profile", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]; [% format_number(100 * "seen_share", 0) %] % seen</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -172,6 +172,6 @@
     <alias index="11" field="greatest" name="Greatest deviation (m)"/>
   </aliases>
   <previewExpression>"label_from"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label_from" %]&lt;/b&gt;: overbreak [% format_number("overbreak", 3) %] m², underbreak [% format_number("underbreak", 3) %] m² by metre&lt;br&gt;[% "layer" %]; [% format_number(100 * "seen_share", 0) %] % seen</mapTip>
+  <mapTip>&lt;b&gt;[% replace("label_from", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;: overbreak [% format_number("overbreak", 3) %] m², underbreak [% format_number("underbreak", 3) %] m² by metre&lt;br&gt;[% replace("layer", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]; [% format_number(100 * "seen_share", 0) %] % seen</mapTip>
   <layerGeometryType>1</layerGeometryType>
 </qgis>

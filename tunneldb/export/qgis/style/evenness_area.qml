@@ -154,6 +154,6 @@
     <alias index="12" field="direction" name="Straightedge direction"/>
   </aliases>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;: gap [% format_number(1000 * "gap", 0) %] mm beneath a straightedge [% "direction" %]&lt;br&gt;[% format_number("area", 2) %] m²</mapTip>
+  <mapTip>&lt;b&gt;[% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;: gap [% format_number(1000 * "gap", 0) %] mm beneath a straightedge [% replace("direction", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;br&gt;[% format_number("area", 2) %] m²</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -322,7 +322,7 @@
     <field name="bimodal" editable="0"/>
   </editable>
   <previewExpression>"number"</previewExpression>
-  <mapTip>&lt;b&gt;Face [% "number" %]&lt;/b&gt; of member [% "member" %], [% "kind" %]&lt;br&gt;[% format_number("area", 2) %] m², [% format_number(100 * "seen_share", 0) %] % inspected[% if("bimodal", '&lt;br&gt;more than half differs: its own surface cannot be identified', '') %]</mapTip>
+  <mapTip>&lt;b&gt;Face [% "number" %]&lt;/b&gt; of member [% replace("member", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %], [% replace("kind", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;br&gt;[% format_number("area", 2) %] m², [% format_number(100 * "seen_share", 0) %] % inspected[% if("bimodal", '&lt;br&gt;more than half differs: its own surface cannot be identified', '') %]</mapTip>
   <renderer-3d type="rulebased">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
     <rules key="{tunneldb-3d}">

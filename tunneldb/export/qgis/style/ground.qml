@@ -140,7 +140,7 @@
     <field name="arc_right" editable="0"/>
   </editable>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;Ground at [% "label" %]&lt;/b&gt;</mapTip>
+  <mapTip>&lt;b&gt;Ground at [% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;</mapTip>
   <renderer-3d type="vector">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
     <symbol type="line" material_type="simpleline">

@@ -560,7 +560,7 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label" %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock&lt;br&gt;[% "kind" %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% "kind_detected" %]&lt;br&gt;darkening [% format_number("darkening_mean", 1) %] dB, [% "review" %]</mapTip>
+  <mapTip>&lt;b&gt;[% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;, [% format_number("area", 2) %] m², [% with_variable('minutes', round("clock" * 60) % 720, to_string(if(@minutes &lt; 60, 12, floor(@minutes / 60))) || ':' || lpad(to_string(@minutes % 60), 2, '0')) %] o'clock&lt;br&gt;[% replace("kind", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %], confidence [% coalesce(round(100 * "confidence") || ' %', 'unknown') %] as [% replace("kind_detected", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;br&gt;darkening [% format_number("darkening_mean", 1) %] dB, [% replace("review", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]</mapTip>
   <renderer-3d type="rulebased">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
     <rules key="{tunneldb-leaks}">

@@ -173,6 +173,6 @@
     <field name="label" editable="0"/>
   </editable>
   <previewExpression>"number"</previewExpression>
-  <mapTip>&lt;b&gt;Member [% "number" %]&lt;/b&gt;, [% "kind" %], [% format_number("length", 2) %] m, [% format_number("area", 2) %] m²[% if("bimodal", '&lt;br&gt;more than half differs: its own surface cannot be identified', '') %]</mapTip>
+  <mapTip>&lt;b&gt;Member [% "number" %]&lt;/b&gt;, [% replace("kind", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %], [% format_number("length", 2) %] m, [% format_number("area", 2) %] m²[% if("bimodal", '&lt;br&gt;more than half differs: its own surface cannot be identified', '') %]</mapTip>
   <layerGeometryType>1</layerGeometryType>
 </qgis>

@@ -208,6 +208,6 @@
     <field name="spot_share" editable="0"/>
   </editable>
   <previewExpression>"number"</previewExpression>
-  <mapTip>&lt;b&gt;Member [% "number" %]&lt;/b&gt;, [% "kind" %], [% format_number("length", 2) %] m, [% format_number("area", 2) %] m²&lt;br&gt;[% format_number(100 * "seen_share", 0) %] % of it inspected, [% "spots" %] spots[% if("bimodal", '&lt;br&gt;more than half differs: its own surface cannot be identified', '') %]</mapTip>
+  <mapTip>&lt;b&gt;Member [% "number" %]&lt;/b&gt;, [% replace("kind", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %], [% format_number("length", 2) %] m, [% format_number("area", 2) %] m²&lt;br&gt;[% format_number(100 * "seen_share", 0) %] % of it inspected, [% "spots" %] spots[% if("bimodal", '&lt;br&gt;more than half differs: its own surface cannot be identified', '') %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -113,6 +113,6 @@
     <field name="farthest" editable="0"/>
   </editable>
   <previewExpression>"side"</previewExpression>
-  <mapTip>&lt;b&gt;Wall, [% "side" %]&lt;/b&gt;&lt;br&gt;[% "label_from" %] – [% "label_to" %]&lt;br&gt;[% format_number("nearest", 2) %] to [% format_number("farthest", 2) %] m from the axis</mapTip>
+  <mapTip>&lt;b&gt;Wall, [% replace("side", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;&lt;br&gt;[% replace("label_from", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %] – [% replace("label_to", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;br&gt;[% format_number("nearest", 2) %] to [% format_number("farthest", 2) %] m from the axis</mapTip>
   <layerGeometryType>1</layerGeometryType>
 </qgis>

@@ -185,6 +185,6 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"kind"</previewExpression>
-  <mapTip>&lt;b&gt;[% "kind" %]&lt;/b&gt;&lt;br&gt;drawn by [% "drawn_by" %][% if("pending_approval", ', pending approval', '') %][% coalesce('&lt;br&gt;' || replace("reason", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %]</mapTip>
+  <mapTip>&lt;b&gt;[% replace("kind", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;&lt;br&gt;drawn by [% replace("drawn_by", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %][% if("pending_approval", ', pending approval', '') %][% coalesce('&lt;br&gt;' || replace("reason", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -243,6 +243,6 @@
     <alias index="17" field="remark" name="Remark"/>
   </aliases>
   <previewExpression>"number"</previewExpression>
-  <mapTip>&lt;b&gt;Ring [% "number" %]&lt;/b&gt;, [% "label" %]&lt;br&gt;ovality [% coalesce(format_number("ovality", 2) || ' ± ' || format_number("ovality_se", 2) || ' ‰', 'not determined') %]&lt;br&gt;greatest step [% coalesce(format_number("step_greatest", 1) || ' mm', 'not determined') %]&lt;br&gt;[% coalesce(replace("remark", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %]</mapTip>
+  <mapTip>&lt;b&gt;Ring [% "number" %]&lt;/b&gt;, [% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;br&gt;ovality [% coalesce(format_number("ovality", 2) || ' ± ' || format_number("ovality_se", 2) || ' ‰', 'not determined') %]&lt;br&gt;greatest step [% coalesce(format_number("step_greatest", 1) || ' mm', 'not determined') %]&lt;br&gt;[% coalesce(replace("remark", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), '') %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

@@ -123,7 +123,7 @@
     <field name="height" editable="0"/>
   </editable>
   <previewExpression>"scan_id"</previewExpression>
-  <mapTip>&lt;b&gt;Scan [% "scan_id" %]&lt;/b&gt; [% coalesce("label", 'beyond the axis') %]&lt;br&gt;scanner at [% format_number("height", 2) %] m</mapTip>
+  <mapTip>&lt;b&gt;Scan [% "scan_id" %]&lt;/b&gt; [% coalesce(replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), 'beyond the axis') %]&lt;br&gt;scanner at [% format_number("height", 2) %] m</mapTip>
   <renderer-3d type="vector">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
     <symbol type="point" shape="sphere" material_type="phong">

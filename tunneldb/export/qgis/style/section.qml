@@ -147,7 +147,7 @@
     <field name="interpolated" editable="0"/>
   </editable>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;Section [% "label" %]&lt;/b&gt;&lt;br&gt;[% "interpolated" %] classes interpolated</mapTip>
+  <mapTip>&lt;b&gt;Section [% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;&lt;br&gt;[% "interpolated" %] classes interpolated</mapTip>
   <renderer-3d type="vector">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
     <symbol type="line" material_type="simpleline">

@@ -111,7 +111,7 @@
     <field name="length" editable="0"/>
   </editable>
   <previewExpression>"part"</previewExpression>
-  <mapTip>&lt;b&gt;[% "part" %]&lt;/b&gt;&lt;br&gt;[% format_number("chainage", 1) %] m</mapTip>
+  <mapTip>&lt;b&gt;[% replace("part", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;&lt;br&gt;[% format_number("chainage", 1) %] m</mapTip>
   <renderer-3d type="vector">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
     <symbol type="line" material_type="simpleline">

@@ -201,6 +201,6 @@
     <field name="interpolated" editable="0"/>
   </editable>
   <previewExpression>"label"</previewExpression>
-  <mapTip>&lt;b&gt;Section [% "label" %]&lt;/b&gt;&lt;br&gt;[% "interpolated" %] classes interpolated</mapTip>
+  <mapTip>&lt;b&gt;Section [% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;&lt;br&gt;[% "interpolated" %] classes interpolated</mapTip>
   <layerGeometryType>1</layerGeometryType>
 </qgis>

@@ -160,6 +160,6 @@
     <field name="stale" editable="0"/>
   </editable>
   <previewExpression>"label_from"</previewExpression>
-  <mapTip>&lt;b&gt;Segment [% "n" %]&lt;/b&gt;&lt;br&gt;[% "label_from" %] – [% "label_to" %]&lt;br&gt;slope [% format_number("slope", 2) %] %, [% "points" %] points[% if("stale", ', stale', '') %]</mapTip>
+  <mapTip>&lt;b&gt;Segment [% "n" %]&lt;/b&gt;&lt;br&gt;[% replace("label_from", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %] – [% replace("label_to", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;br&gt;slope [% format_number("slope", 2) %] %, [% "points" %] points[% if("stale", ', stale', '') %]</mapTip>
   <layerGeometryType>1</layerGeometryType>
 </qgis>

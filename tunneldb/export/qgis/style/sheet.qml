@@ -147,6 +147,6 @@
     </actionsetting>
   </attributeactions>
   <previewExpression>"label_from"</previewExpression>
-  <mapTip>&lt;b&gt;[% coalesce(with_variable('x', x(@layer_cursor_point), with_variable('i', floor((@x - "chainage_from") / 10), array_get("ticks", @i) || ' and ' || format_number(@x - "chainage_from" - 10 * @i, 2) || ' m on')), "label_from" || ' – ' || "label_to") %]&lt;/b&gt;[% coalesce('&lt;br&gt;chainage ' || format_number(x(@layer_cursor_point), 2) || ' m, arc ' || format_number(y(@layer_cursor_point), 2) || ' m', '') %]</mapTip>
+  <mapTip>&lt;b&gt;[% coalesce(with_variable('x', x(@layer_cursor_point), with_variable('i', floor((@x - "chainage_from") / 10), array_get("ticks", @i) || ' and ' || format_number(@x - "chainage_from" - 10 * @i, 2) || ' m on')), replace("label_from", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) || ' – ' || replace("label_to", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;'))) %]&lt;/b&gt;[% coalesce('&lt;br&gt;chainage ' || format_number(x(@layer_cursor_point), 2) || ' m, arc ' || format_number(y(@layer_cursor_point), 2) || ' m', '') %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

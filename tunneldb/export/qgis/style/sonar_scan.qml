@@ -214,7 +214,7 @@
     <field name="registered_at" editable="0"/>
   </editable>
   <previewExpression>"name"</previewExpression>
-  <mapTip>&lt;b&gt;[% replace("name", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;: [% "state" %]&lt;br&gt;± [% format_number(1000 * "sigma_x", 0) %], [% format_number(1000 * "sigma_y", 0) %], [% format_number(1000 * "sigma_z", 0) %] mm</mapTip>
+  <mapTip>&lt;b&gt;[% replace("name", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;: [% replace("state", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;br&gt;± [% format_number(1000 * "sigma_x", 0) %], [% format_number(1000 * "sigma_y", 0) %], [% format_number(1000 * "sigma_z", 0) %] mm</mapTip>
   <renderer-3d type="vector">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
     <symbol type="point" shape="sphere" material_type="phong">

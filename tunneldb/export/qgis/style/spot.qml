@@ -483,6 +483,6 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>"number"</previewExpression>
-  <mapTip>&lt;b&gt;Spot [% "number" %]&lt;/b&gt;, [% "kind" %], [% format_number(10000 * "area", 0) %] cm²&lt;br&gt;member [% coalesce("member" || ', ' || "member_kind", 'not found again') %], face [% "face" %]&lt;br&gt;[% format_number("difference", 1) %] dB, confidence [% round(100 * "confidence") %] %, [% "review" %]</mapTip>
+  <mapTip>&lt;b&gt;Spot [% "number" %]&lt;/b&gt;, [% replace("kind", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %], [% format_number(10000 * "area", 0) %] cm²&lt;br&gt;member [% coalesce(replace("member", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) || ', ' || replace("member_kind", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')), 'not found again') %], face [% "face" %]&lt;br&gt;[% format_number("difference", 1) %] dB, confidence [% round(100 * "confidence") %] %, [% replace("review", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]</mapTip>
   <layerGeometryType>2</layerGeometryType>
 </qgis>

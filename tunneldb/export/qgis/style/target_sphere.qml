@@ -256,7 +256,7 @@
     </attributeEditorContainer>
   </attributeEditorForm>
   <previewExpression>'T' || "number"</previewExpression>
-  <mapTip>&lt;b&gt;T[% "number" %]&lt;/b&gt; at [% "label" %], scan [% "scan_id" %]&lt;br&gt;radius [% format_number("radius" * 1000, 2) %] mm, rms [% format_number("rms" * 1000, 2) %] mm, [% round("coverage" * 100) %] % seen</mapTip>
+  <mapTip>&lt;b&gt;T[% "number" %]&lt;/b&gt; at [% replace("label", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %], scan [% "scan_id" %]&lt;br&gt;radius [% format_number("radius" * 1000, 2) %] mm, rms [% format_number("rms" * 1000, 2) %] mm, [% round("coverage" * 100) %] % seen</mapTip>
   <renderer-3d type="vector">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
     <symbol type="point" shape="sphere" material_type="phong">

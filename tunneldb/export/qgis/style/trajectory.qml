@@ -176,6 +176,6 @@
     <field name="speed" editable="0"/>
   </editable>
   <previewExpression>"label_from"</previewExpression>
-  <mapTip>&lt;b&gt;[% "label_from" %] to [% "label_to" %]&lt;/b&gt;&lt;br&gt;[% to_string("time_from") %] to [% to_string("time_to") %] s, [% format_number("speed", 2) %] m/s, [% "poses" %] positions</mapTip>
+  <mapTip>&lt;b&gt;[% replace("label_from", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %] to [% replace("label_to", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;&lt;br&gt;[% to_string("time_from") %] to [% to_string("time_to") %] s, [% format_number("speed", 2) %] m/s, [% "poses" %] positions</mapTip>
   <layerGeometryType>1</layerGeometryType>
 </qgis>

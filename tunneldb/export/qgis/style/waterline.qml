@@ -86,7 +86,7 @@
     <field name="height" editable="0"/>
   </editable>
   <previewExpression>"side"</previewExpression>
-  <mapTip>&lt;b&gt;Waterline, [% "side" %]&lt;/b&gt;&lt;br&gt;[% format_number("height", 3) %] m</mapTip>
+  <mapTip>&lt;b&gt;Waterline, [% replace("side", map('&amp;', '&amp;amp;', '&lt;', '&amp;lt;')) %]&lt;/b&gt;&lt;br&gt;[% format_number("height", 3) %] m</mapTip>
   <renderer-3d type="vector">
     <vector-layer-3d-tiling show-bounding-boxes="0" zoom-levels-count="3"/>
     <symbol type="line" material_type="simpleline">
