@@ -88,6 +88,25 @@ def test_with_room_the_same_command_succeeds(disk: SmallDisk, example: str) -> N
     assert disk.files() == ["leaks.gpkg"]
 
 
+def test_an_archive_is_whole_or_nothing_wherever_the_disk_ends(disk: SmallDisk, example: str, conn: psycopg.Connection) -> None:
+    """Also in the middle of a COPY, whose rollback would wait for its own end; locks are released each time."""
+    command = ["survey", "export", example, "-o", str(disk.folder / "kept.tdb")]
+    disk.resize(64 * 1024)
+    assert CliRunner().invoke(main, command).exit_code == 0
+    whole = (disk.folder / "kept.tdb").stat().st_size
+    (disk.folder / "kept.tdb").unlink()
+    for share in (0.2, 0.5, 0.8, 0.97):
+        disk.resize(max(8, int(share * whole / 1024)))
+        result = CliRunner().invoke(main, command)
+        assert result.exit_code == 2, result.exception
+        assert "No space left on device" in result.stderr.splitlines()[-1]
+        assert disk.files() == []
+        assert conn.execute("SELECT count(*) FROM pg_locks WHERE locktype = 'advisory'").fetchone() == (0,)
+        conn.rollback()
+    disk.resize(64 * 1024)
+    assert CliRunner().invoke(main, command).exit_code == 0
+
+
 @pytest.mark.server
 def test_the_embedded_server_says_so_and_is_whole_with_room(disk: SmallDisk, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without room for the cluster, for WAL, and for rows."""
