@@ -16,8 +16,8 @@ def describe_failure(error: Exception) -> str | None:
     Parameters
     ----------
     error : Exception
-        Error of the database, the disk, or any other. If it is described, only its own transaction was rolled back, and
-        no earlier one.
+        Error of the database, the disk, or any other. If it is described, its own transaction was rolled back, or, if the
+        connection broke, saved or rolled back; no earlier one was.
     """
     message = first_line(error)
     match error:
@@ -33,7 +33,11 @@ def describe_failure(error: Exception) -> str | None:
         case psycopg.errors.DeadlockDetected() | psycopg.errors.SerializationFailure():
             return f"another program was changing the same rows, the current work was rolled back: {message}; run it again"
         case psycopg.OperationalError():
-            return f"the connection to the database broke, the current work was rolled back: {message}"
+            # also within COMMIT, after which nobody can tell which of both it is
+            return (
+                f"the connection to the database broke: {message}; the current work was saved whole or not at all:"
+                " tunneldb status shows what is there"
+            )
         case OSError() if error.errno in NO_ROOM:
             where = f"{error.filename}: " if error.filename else ""
             return f"{where}{error.strerror}; the current work was rolled back: free some space, and run it again"
