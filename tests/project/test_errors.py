@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from support.loaded_survey import SURVEY, add_survey
 
 from tunneldb.cli.main import main
+from tunneldb.database.failures import describe_failure
 from tunneldb.errors import BusyError, InputError, NotReadyError, UserError
 from tunneldb.pointcloud.reader import read_header
 from tunneldb.stages.ledger import stage_run
@@ -61,3 +62,19 @@ def test_another_run_at_work_is_a_busy_error(conn: psycopg.Connection, dsn: str)
             stage_run(conn, survey.id, 0, "axis", {}),
         ):
             pass
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        psycopg.errors.InternalError_("cache lookup failed for function 18709\nPL/pgSQL function …"),
+        psycopg.errors.UndefinedTable("relation with OID 18709 does not exist"),
+    ],
+)
+def test_functions_that_init_replaces_under_a_stage_are_no_bug(error: psycopg.Error) -> None:
+    """As a stage meets them that runs while `tunneldb init` makes the functions anew."""
+    message = describe_failure(error)
+    assert message is not None
+    assert message.startswith("tunneldb init replaced the functions, the current work was rolled back: ")
+    assert message.endswith("; run it again")
+    assert describe_failure(psycopg.errors.UndefinedTable('relation "tunnel.nothing" does not exist')) is None

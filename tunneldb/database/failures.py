@@ -9,6 +9,9 @@ import psycopg
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 """Error numbers of a full disk, and of an exhausted quota."""
 
+_REPLACED = ("cache lookup failed", "relation with OID")
+"""Messages of statements whose functions or views another session dropped while they ran."""
+
 
 def describe_failure(error: Exception) -> str | None:
     """Return what happened and what to do; None for a bug.
@@ -32,6 +35,8 @@ def describe_failure(error: Exception) -> str | None:
             return f"the database cancelled the current work, which was rolled back: {message}"
         case psycopg.errors.DeadlockDetected() | psycopg.errors.SerializationFailure():
             return f"another program was changing the same rows, the current work was rolled back: {message}; run it again"
+        case psycopg.errors.InternalError_() | psycopg.errors.UndefinedTable() if any(word in message for word in _REPLACED):
+            return f"tunneldb init replaced the functions, the current work was rolled back: {message}; run it again"
         case psycopg.OperationalError():
             # also within COMMIT, after which nobody can tell which of both it is
             return (
