@@ -127,8 +127,8 @@ CREATE TABLE tunnel.tunnel (
     created_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
     CONSTRAINT tunnel_pkey PRIMARY KEY (id),
     CONSTRAINT tunnel_spacing_check CHECK (spacing BETWEEN 0.1 AND 1000),
-    CONSTRAINT tunnel_dry_region_limit_check CHECK (dry_region_limit BETWEEN '0'::float8 AND '100000000'::float8),
-    CONSTRAINT tunnel_start_chainage_check CHECK (start_chainage BETWEEN '-100000000'::float8 AND '100000000'::float8),
+    CONSTRAINT tunnel_dry_region_limit_check CHECK (dry_region_limit >= '0'::float8 AND dry_region_limit <= '100000000'::float8),
+    CONSTRAINT tunnel_start_chainage_check CHECK (start_chainage >= '-100000000'::float8 AND start_chainage <= '100000000'::float8),
     CONSTRAINT tunnel_name_key UNIQUE (name)
 );
 COMMENT ON TABLE tunnel.tunnel IS 'A structure: its spatial reference, stationing and given axis';
@@ -1830,9 +1830,9 @@ CREATE TABLE tunnel.finding (
     CONSTRAINT finding_review_check CHECK (review IN ('open', 'confirmed', 'rejected')),
     CONSTRAINT finding_origin_check CHECK (origin IN ('detected', 'drawn', 'redrawn', 'split', 'merged')),
     CONSTRAINT finding_width_mm_check CHECK (width_mm > 0 AND width_mm <= 10000),
-    CONSTRAINT finding_place_check CHECK (chainage_from BETWEEN '-100000000'::float8 AND '100000000'::float8 AND chainage_to BETWEEN '-100000000'::float8 AND '100000000'::float8 AND arc_from BETWEEN '-100000000'::float8 AND '100000000'::float8 AND arc_to BETWEEN '-100000000'::float8 AND '100000000'::float8),
-    CONSTRAINT finding_size_check CHECK (area BETWEEN '0'::float8 AND '100000000'::float8 AND length BETWEEN '0'::float8 AND '100000000'::float8),
-    CONSTRAINT finding_clock_check CHECK (clock BETWEEN '0'::float8 AND '12'::float8),
+    CONSTRAINT finding_place_check CHECK (chainage_from >= '-100000000'::float8 AND chainage_from <= '100000000'::float8 AND chainage_to >= '-100000000'::float8 AND chainage_to <= '100000000'::float8 AND arc_from >= '-100000000'::float8 AND arc_from <= '100000000'::float8 AND arc_to >= '-100000000'::float8 AND arc_to <= '100000000'::float8),
+    CONSTRAINT finding_size_check CHECK (area >= '0'::float8 AND area <= '100000000'::float8 AND length >= '0'::float8 AND length <= '100000000'::float8),
+    CONSTRAINT finding_clock_check CHECK (clock >= '0'::float8 AND clock <= '12'::float8),
     CONSTRAINT finding_remark_at_most_10000_characters_check CHECK (char_length(remark) <= 10000),
     CONSTRAINT finding_other_check CHECK (merged_into <> id AND same_as <> id),
     CONSTRAINT finding_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE,

@@ -196,7 +196,7 @@ class LazyGroup(click.Group):
     def main(self, *args: Any, **options: Any) -> Any:
         """Run the program; characters that the terminal's encoding lacks are printed by their codes."""
         for stream in (sys.stdout, sys.stderr):
-            if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            if isinstance(stream, io.TextIOWrapper) and (stream.errors == "strict" or stream.encoding.lower() != "utf-8"):
                 stream.reconfigure(errors="backslashreplace")
         return super().main(*args, **options)
 

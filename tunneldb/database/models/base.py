@@ -54,7 +54,8 @@ def one_of(column: str, *values: str) -> CheckConstraint:
 
 def bounded(name: str, *columns: str, least: float = -1e8, most: float = 1e8) -> CheckConstraint:
     """Return the constraint that numbers are finite and between two values; by default metres within 100,000 km."""
-    terms = (f"{column} BETWEEN '{least:.0f}'::float8 AND '{most:.0f}'::float8" for column in columns)
+    # BETWEEN would be restored from a dump as another expression
+    terms = (f"{column} >= '{least:.0f}'::float8 AND {column} <= '{most:.0f}'::float8" for column in columns)
     return CheckConstraint(" AND ".join(terms), name=name)
 
 
