@@ -151,6 +151,40 @@ def test_extreme_values_are_refused_or_harmless(
     works(["report", SURVEY, "-o", str(tmp_path / "report.html")])
 
 
+ARGUMENTS = {
+    "text": [f"'{SURVEY}'", "'demo'", f"'{SURVEY}'", "repeat('9', 100000)"],
+    "integer": ["1", "2147483647"],
+    "double precision": ["12345", "'1e300'", "'NaN'", "'Infinity'", "'-Infinity'", "1e-300", "-1"],
+    "double precision[]": ["array_fill('12345'::float8, ARRAY[100000])"],
+    "geometry": ["ST_MakeLine(ST_MakePoint(0, 0, 0), ST_MakePoint(1e7, 0, 0))", "ST_MakePoint(1e300, 1e300, 1e300)"],
+}
+"""Extreme arguments of functions, by type."""
+
+
+@pytest.mark.parametrize("person", ["vera"], indirect=True)
+def test_no_function_of_viewers_takes_the_server_down(person: psycopg.Connection) -> None:
+    """Each ends within seconds, with few rows or one line."""
+    functions = person.execute(
+        "SELECT p.proname, p.proargtypes::regtype[]::text[] FROM pg_proc p"
+        " WHERE p.pronamespace = 'tunnel_api'::regnamespace AND p.prokind = 'f' AND p.pronargs > 0"
+        "   AND has_function_privilege(p.oid, 'EXECUTE')"
+    ).fetchall()
+    assert len(functions) > 50
+    person.execute("SET statement_timeout = '10 s'")
+    for name, kinds in functions:
+        for number in range(7):
+            values = [ARGUMENTS[kind][(number + place) % len(ARGUMENTS[kind])] for place, kind in enumerate(kinds)]
+            given = ", ".join(f"{value}::{kind}" for value, kind in zip(values, kinds, strict=True))
+            state = None
+            try:
+                row = person.execute(f"SELECT count(*) FROM tunnel_api.{name}({given}) q".encode()).fetchone()
+                assert row is not None and row[0] <= 100_000, (name, values)  # noqa: PT018
+            except psycopg.Error as error:
+                state = error.sqlstate
+            assert state not in ("57014", "53200"), (name, values)
+            assert not person.closed, (name, values)
+
+
 def bad(conn: psycopg.Connection, table: str, change: str) -> None:
     """Change rows of a table, whose constraints a superuser has dropped."""
     for (name,) in conn.execute(
