@@ -117,3 +117,18 @@ def test_an_ifc_in_millimetres_is_that_in_metres(tmp_path: Path) -> None:
     given = read_given(tmp_path / "a.ifc")
     np.testing.assert_allclose(given.xyz, read_given(source).xyz, atol=1e-6)
     assert given.notes == ("lengths are converted to metres: 1 unit is 0.001 m",)
+
+
+@pytest.mark.parametrize("length", ["1e9", "1e12", "1e300"])
+def test_an_alignment_without_end_is_refused_before_it_is_divided(tmp_path: Path, length: str) -> None:
+    path = tmp_path / "axis.xml"
+    path.write_text(
+        '<LandXML xmlns="http://www.landxml.org/schema/LandXML-1.2" version="1.2"><Units><Metric linearUnit="meter"/></Units>'
+        f'<Alignments><Alignment name="a" length="{length}" staStart="0"><CoordGeom>'
+        f'<Line length="{length}"><Start>0 0</Start><End>0 {length}</End></Line></CoordGeom><Profile><ProfAlign name="p">'
+        f"<PVI>0 10</PVI><PVI>{length} 10</PVI></ProfAlign></Profile></Alignment></Alignments></LandXML>"
+    )
+    with pytest.raises(
+        UserError, match=r"axis\.xml: .*(km long, as no tunnel is|is neither a position nor a length|is off by)"
+    ):
+        read_given(path)

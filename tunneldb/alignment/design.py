@@ -14,6 +14,7 @@ CHORD_ERROR = 0.0005  # m; half of the documented error, for lines that bend in 
 MAX_STEP = 1.0  # m; the spline through the vertices needs even steps between line and arc
 GAP = 0.01  # m between the end of an element and the start of the next; files are rounded to millimetres
 MIN_RADIUS = 1.0  # m; smaller than any radius of a tunnel, in plan or profile
+MAX_LENGTH = 1e6  # m, of an axis or of one curve of it
 MAX_SHORTFALL = 0.1  # m by which a profile may be shorter than the plan before the alignment ends with it
 
 
@@ -70,7 +71,7 @@ class Design:
         return self.start + low, self.start + high
 
     def check(self) -> None:
-        """Raise an InputError if elements don't join end to end, or plan and profile have no common stretch."""
+        """Raise an InputError if elements don't join, or plan and profile have no common stretch, or one too long."""
         for number, (before, after) in enumerate(zip(self.plan, self.plan[1:], strict=False), start=1):
             gap = float(np.hypot(*(before.end - (after.x, after.y))))
             if gap > GAP:
@@ -93,6 +94,11 @@ class Design:
         low_end, high_end = self.reach
         if high_end - low_end < MAX_STEP:
             raise InputError("plan and profile have no common stretch; is the profile from another alignment?")
+        if not high_end - low_end <= MAX_LENGTH:
+            raise InputError(
+                f"the alignment is {(high_end - low_end) / 1000.0:.4g} km long, as no tunnel is; the file is damaged, or in"
+                " another unit"
+            )
 
     def _bending(self) -> float:
         """Return the greatest combined curvature of plan and profile, 1/m."""

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from tunneldb.alignment.design import MAX_LENGTH
 from tunneldb.alignment.drawing import MAX_COORDINATE, Drawn, choose_layer, drawn_lines
 from tunneldb.alignment.joining import join_pieces
 from tunneldb.alignment.units import UNITS
@@ -24,7 +25,6 @@ MAX_STEP = 1.0  # m between vertices of a drawing with arcs, so that the spline 
 _ENTITIES = {"LINE", "ARC", "LWPOLYLINE", "POLYLINE", "SPLINE", "HELIX", "ELLIPSE"}
 _FRAME = 16  # flag of a vertex of a spline's control frame, which is no part of the line
 _MAX_VERTICES = 1e6  # of a line; longer ones are damage, which is refused later
-_MAX_CURVE = 1e6  # m, of an arc, or of the polygon of a spline's control points; ezdxf would divide a longer one without end
 _MAX_CURVE_VERTICES = 200_000  # of all curves: 126 km at a radius of 100 m
 _MAX_NESTING = 16  # blocks in blocks
 _MAX_IN_BLOCKS = 10_000  # entities
@@ -207,9 +207,9 @@ def _flattened(path: Path, parts: list[Any], scale: float) -> list[Float]:
         if part.dxftype() == "LINE":
             vertices = [tuple(part.dxf.start), tuple(part.dxf.end)]
         else:
-            if not scale * _size(part) <= _MAX_CURVE:  # also NaN
+            if not scale * _size(part) <= MAX_LENGTH:  # also NaN; ezdxf would divide a longer one without end
                 raise InputError(
-                    f"{path}: the {part.dxftype()} on layer {part.dxf.layer!r} is longer than {_MAX_CURVE / 1000.0:g} km, as no"
+                    f"{path}: the {part.dxftype()} on layer {part.dxf.layer!r} is longer than {MAX_LENGTH / 1000.0:g} km, as no"
                     " tunnel is; draw it again, or pass the unit by --axis-unit"
                 )
             vertices = [tuple(vertex) for vertex in itertools.islice(part.flattening(CHORD_ERROR / scale), left + 1)]
