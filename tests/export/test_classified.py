@@ -11,12 +11,11 @@ import laspy.copc
 import numpy as np
 import psycopg
 import pytest
-from click.testing import CliRunner
 from pyproj import Transformer
+from support.command import output_of
 from support.databases import Copies
 
 from tunneldb.classification.classes import PointClass
-from tunneldb.cli.main import main
 from tunneldb.geometry.units import METRES
 from tunneldb.simulate import Parameters, Simulation, write
 from tunneldb.store.scan_files import checksum
@@ -28,12 +27,6 @@ START, LENGTH, BORDER = 980.0, 50.0, 1015.0  # a kilometre ends in the middle of
 FOOT = METRES["us-ft"]
 FLOOR, LINING = 1, 0  # of the truth
 FAR = 100.0  # m above the tunnel: points of nothing
-
-
-def command(*arguments: object, code: int = 0) -> str:
-    result = CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
-    assert result.exit_code == code, result.output
-    return result.output
 
 
 @pytest.fixture(scope="module")
@@ -67,12 +60,12 @@ def loaded(copies: Copies, template: str, scans: tuple[Path, dict[str, np.ndarra
     folder, _ = scans
 
     def fill() -> None:
-        command("tunnel", "add", NAME, "--srid", 25830, "--axis", folder / "whole.axis.csv", "--start-chainage", START)
-        command(
+        output_of("tunnel", "add", NAME, "--srid", 25830, "--axis", folder / "whole.axis.csv", "--start-chainage", START)
+        output_of(
             "survey", "add", NAME, "--tunnel", NAME, "--date", "2024-05-04",
             "--trajectory", folder / "whole.trajectory.csv", "--intensity", "Amplitude", "--intensity-kind", "amplitude",
         )  # fmt: skip
-        command("load", NAME, folder / "a.laz", folder / "b.las")
+        output_of("load", NAME, folder / "a.laz", folder / "b.las")
 
     with copies.prepared(template, fill) as name:
         yield name
@@ -81,12 +74,12 @@ def loaded(copies: Copies, template: str, scans: tuple[Path, dict[str, np.ndarra
 @pytest.fixture(scope="module")
 def classed(copies: Copies, loaded: str) -> Iterator[str]:
     """The same up to its ground."""
-    with copies.prepared(loaded, lambda: command("run", NAME, "--to", "ground")) as name:
+    with copies.prepared(loaded, lambda: output_of("run", NAME, "--to", "ground")) as name:
         yield name
 
 
 def export(out: Path, *options: object, code: int = 0) -> str:
-    return command("export", NAME, "--classified", "-o", out, *options, code=code)
+    return output_of("export", NAME, "--classified", "-o", out, *options, code=code)
 
 
 @pytest.fixture
@@ -129,12 +122,12 @@ def test_files_get_the_classes(conn: psycopg.Connection, scans: tuple[Path, dict
     assert (folder / "a.laz").read_bytes() == bytes_before
     assert not (folder / "b.laz").exists()
 
-    command("run", NAME, "--km", 1, "--from", "sections", "--to", "sections")
+    output_of("run", NAME, "--km", 1, "--from", "sections", "--to", "sections")
     text = export(tmp_path / "stale", code=2)
     assert "out of date" in text
     assert f"tunneldb run {NAME} --km 0-1 --from ground --to ground" in text
     assert not (tmp_path / "stale").exists()
-    command("run", NAME, "--km", "0-1", "--from", "ground", "--to", "ground")
+    output_of("run", NAME, "--km", "0-1", "--from", "ground", "--to", "ground")
     export(tmp_path / "stale")
 
 
@@ -168,13 +161,13 @@ def test_without_ground_it_says_what_to_type(copies: Copies, loaded: str, tmp_pa
 
 
 def _without_ground(tmp_path: Path) -> None:
-    assert "scan files by --classified" in command("export", NAME, "-o", tmp_path / "out", code=2)
+    assert "scan files by --classified" in output_of("export", NAME, "-o", tmp_path / "out", code=2)
     text = export(tmp_path / "out", code=2)
     assert text.count("\n") == 1
     assert f"kilometres 0, 1 without ground: tunneldb run {NAME} --km 0-1 --from axis --to ground" in text
     assert not (tmp_path / "out").exists()
-    command("run", NAME, "--to", "sections")
-    command("run", NAME, "--km", 0, "--from", "ground", "--to", "ground")
+    output_of("run", NAME, "--to", "sections")
+    output_of("run", NAME, "--km", 0, "--from", "ground", "--to", "ground")
     text = export(tmp_path / "out", "--km", 0, code=2)  # the file lies in both
     assert f"kilometre 1 without ground: tunneldb run {NAME} --km 1 --from ground --to ground" in text
 
@@ -244,7 +237,7 @@ def test_kilometres_as_copc_hold_the_same_points(conn: psycopg.Connection, tmp_p
     assert "is not a virtual point cloud: move it away" in export(tmp_path / "copc", "--copc", "--km", 1, code=2)
     (tmp_path / "copc" / names[2]).rename(tmp_path / names[2])
     export(tmp_path / "copc", "--copc", "--km", 1)
-    assert "--copc goes with --classified" in command("export", NAME, "-o", tmp_path / "x", "--copc", code=2)
+    assert "--copc goes with --classified" in output_of("export", NAME, "-o", tmp_path / "x", "--copc", code=2)
 
     # Where the other kilometre isn't loaded, its points wait for it.
     conn.execute(f"DROP TABLE tunnel.point_s{get_survey(conn, NAME).id}_km1")

@@ -8,25 +8,14 @@ import laspy
 import numpy as np
 import psycopg
 import pytest
-from click.testing import CliRunner
+from support.command import errors_of
 from support.loaded_survey import LENGTH, ORIGIN, START, tube, write
-
-from tunneldb.cli.main import main
 
 ALONG = np.array([1.0, 0.0, 0.0])
 AXIS = np.array([ORIGIN, ORIGIN + LENGTH * ALONG])
 POSES = np.column_stack([np.arange(LENGTH + 1), np.linspace(*AXIS, int(LENGTH) + 1)])
 STATIONS = np.array([[1, *(ORIGIN + 10.0 * ALONG)], [2, *(ORIGIN + 50.0 * ALONG)]])
 EPOCH = 1_400_000_000.0  # GPS time, s
-
-
-def command(*arguments: object, code: int = 0) -> str:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exit_code == code, result.output
-    if code:
-        assert result.stderr.count("\n") == 1
-        assert "Traceback" not in result.output
-    return result.stderr
 
 
 def table(path: Path, header: str, rows: np.ndarray) -> Path:
@@ -37,14 +26,14 @@ def table(path: Path, header: str, rows: np.ndarray) -> Path:
 @pytest.fixture
 def tunnel(conn: psycopg.Connection, tmp_path: Path) -> Path:
     axis = table(tmp_path / "axis.csv", "x,y,z", AXIS)
-    command("tunnel", "add", "t", "--srid", 25830, "--axis", axis, "--start-chainage", START)
+    errors_of("tunnel", "add", "t", "--srid", 25830, "--axis", axis, "--start-chainage", START)
     return tmp_path
 
 
 def add(folder: Path, kind: str, rows: np.ndarray, code: int = 0) -> str:
     header = "time,x,y,z" if kind == "--trajectory" else "scan_id,x,y,z"
     path = table(folder / "poses.csv", header, rows)
-    return command(
+    return errors_of(
         "survey", "add", "s", "--tunnel", "t", "--date", "2024-05-04", kind, path, "--intensity-kind", "none", code=code
     )
 
@@ -68,7 +57,7 @@ def scan(path: Path, time: float = 0.0, scan_id: int = 1) -> Path:
 )
 def test_clocks(tunnel: Path, trajectory: float, file: float, says: str) -> None:
     add(tunnel, "--trajectory", POSES + np.array([trajectory, 0, 0, 0]))
-    assert says in command("load", "s", scan(tunnel / "a.laz", file), code=2)
+    assert says in errors_of("load", "s", scan(tunnel / "a.laz", file), code=2)
 
 
 @pytest.mark.parametrize("kind", ["--trajectory", "--stations"])
@@ -102,16 +91,16 @@ def test_points(tunnel: Path, matrix: np.ndarray, says: str) -> None:
     las = laspy.LasData(header)
     las.x, las.y, las.z = (tube(975, 985, 100, seed=1) @ matrix.T).T
     las.write(tunnel / "a.laz")
-    assert says in command("load", "s", tunnel / "a.laz", code=2)
+    assert says in errors_of("load", "s", tunnel / "a.laz", code=2)
 
 
 def test_scan_numbers(tunnel: Path) -> None:
     twice = np.concatenate([STATIONS, STATIONS[:1] + np.array([0, 20.0, 0, 0])])
     assert "line 4: scan_id 1 is repeated" in add(tunnel, "--stations", twice, code=2)
     unnamed = table(tunnel / "names.csv", "name,x,y,z", STATIONS)
-    said = command(
+    said = errors_of(
         "survey", "add", "s", "--tunnel", "t", "--date", "2024-05-04", "--stations", unnamed, "--intensity-kind", "none", code=2
     )
     assert "names.csv has no column scan_id: the header is 'name,x,y,z'; scan_id is the number" in said
     add(tunnel, "--stations", STATIONS)
-    assert "no station for scan_id 7" in command("load", "s", scan(tunnel / "a.laz", scan_id=7), code=2)
+    assert "no station for scan_id 7" in errors_of("load", "s", scan(tunnel / "a.laz", scan_id=7), code=2)

@@ -11,13 +11,11 @@ import numpy as np
 import psycopg
 import pypdf
 import rasterio
-from click.testing import CliRunner
 from rasterio.errors import NotGeoreferencedWarning
+from support.command import output_of
 from support.example_structures import add_example_site, save_example_structures
 from support.qgis import act
 from support.system import missing
-
-from tunneldb.cli.main import main
 
 LAYERS = {
     "spot_map": ("Polygon", 3), "member": ("LineStringZ", 2), "spot_3d": ("PolygonZ", 3), "face": ("MultiPolygonZ", 4),
@@ -26,19 +24,13 @@ LAYERS = {
 }  # fmt: skip
 
 
-def command(*words: object, code: int = 0) -> str:
-    result = CliRunner().invoke(main, [str(word) for word in words])
-    assert result.exit_code == code, result.output
-    return result.output
-
-
 def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
     project = tmp_path / "hall.qgz"
     add_example_site(tmp_path)
-    assert "tunneldb members hall-1" in command("qgis", "hall-1", "-o", project, code=2)
+    assert "tunneldb members hall-1" in output_of("qgis", "hall-1", "-o", project, code=2)
     assert not project.exists()
     save_example_structures(conn, "hall-1")
-    assert "more than half of member 2 differs" in command("qgis", "hall-1", "-o", project)
+    assert "more than half of member 2 differs" in output_of("qgis", "hall-1", "-o", project)
     seen = act(project, "describe")
     assert {name: (layer["wkb"], layer["features"]) for name, layer in seen["layers"].items()} == LAYERS | {
         "remark": ("NoGeometry", 0), "scan_station": ("PointZ", 1),
@@ -105,10 +97,10 @@ def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
 def test_a_survey_of_a_tunnel(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
     conn.execute("DELETE FROM tunnel.image")
     conn.commit()
-    command("qgis", "demo-2024", "-o", tmp_path / "without.qgs")
+    output_of("qgis", "demo-2024", "-o", tmp_path / "without.qgs")
     assert "spot" not in (tmp_path / "without.qgs").read_text()
     save_example_structures(conn, "demo-2024")
-    command("qgis", "demo-2024", "-o", tmp_path / "with.qgz")
+    output_of("qgis", "demo-2024", "-o", tmp_path / "with.qgz")
     seen = act(tmp_path / "with.qgz", "describe")
     assert {name: layer["features"] for name, layer in seen["layers"].items() if name in LAYERS} == {
         name: count for name, (_, count) in LAYERS.items()

@@ -8,16 +8,8 @@ from pathlib import Path
 
 import psycopg
 import pytest
-from click.testing import CliRunner
+from support.command import output_of
 from support.example_structures import add_example_site, save_example_structures
-
-from tunneldb.cli.main import main
-
-
-def command(*words: object, code: int = 0) -> str:
-    result = CliRunner().invoke(main, [str(word) for word in words])
-    assert result.exit_code == code, result.output
-    return result.output
 
 
 def rows(page: str, table: str) -> list[list[str]]:
@@ -29,20 +21,20 @@ def rows(page: str, table: str) -> list[list[str]]:
 def test_a_site(conn: psycopg.Connection, tmp_path: Path) -> None:
     page = tmp_path / "hall.html"
     add_example_site(tmp_path)
-    assert "tunneldb members hall-1" in command("report", "hall-1", "-o", page, code=2)
+    assert "tunneldb members hall-1" in output_of("report", "hall-1", "-o", page, code=2)
     assert not page.exists()
     save_example_structures(conn, "hall-1")
-    assert "no chainage" in command("report", "hall-1", "-o", page, "--from", "0", code=2)
+    assert "no chainage" in output_of("report", "hall-1", "-o", page, "--from", "0", code=2)
     conn.execute("UPDATE tunnel_api.spot SET review = 'rejected', remark = 'a <shadow>' WHERE number = 2")
     conn.commit()
     (tmp_path / "owner.toml").write_text('language = "sl"\nclient = "Hala"', "utf-8")
-    assert "2 spots" in command("report", "hall-1", "-o", page, "--template", tmp_path / "owner.toml")
+    assert "2 spots" in output_of("report", "hall-1", "-o", page, "--template", tmp_path / "owner.toml")
     assert {"<h2>Konstrukcije</h2>", "<dt>Naročnik</dt><dd>Hala</dd>"} <= set(
         re.findall("<h2>.*</h2>|<dt>.*</dd>", page.read_text())
     )
-    command("report", "hall-1", "-o", page)
+    output_of("report", "hall-1", "-o", page)
     text = page.read_text()
-    listed = json.loads(command("spots", "hall-1", "--json"))
+    listed = json.loads(output_of("spots", "hall-1", "--json"))
     # What was not seen stands before any number.
     warning, figures = text.index('id="unjudged"'), text.index('class="figures"')
     assert warning < figures
@@ -81,12 +73,12 @@ def box(path: str) -> tuple[float, float, float, float]:
 
 
 def test_a_tunnel(conn: psycopg.Connection, example: str, tmp_path: Path) -> None:
-    command("report", "demo-2024", "-o", tmp_path / "without.html")
+    output_of("report", "demo-2024", "-o", tmp_path / "without.html")
     assert "tructures" not in (tmp_path / "without.html").read_text()
     save_example_structures(conn, "demo-2024")
     conn.execute("UPDATE tunnel_api.spot SET review = 'confirmed' WHERE number = 3")
     conn.commit()
-    command("report", "demo-2024", "-o", tmp_path / "with.html")
+    output_of("report", "demo-2024", "-o", tmp_path / "with.html")
     text = (tmp_path / "with.html").read_text()
     assert [row[0] for row in rows(text, "Spots")] == ["1", "2", "3"]
     assert "Leaks one by one" in text
@@ -101,7 +93,7 @@ def test_a_stretch_of_a_tunnel(conn: psycopg.Connection, example: str, tmp_path:
         conn.execute("UPDATE tunnel.spot SET chainage = %s WHERE number = %s", [chainage, number])
     conn.commit()
     for ends, spots, area in ((("--from", "12+400"), ["2"], "2.0"), (("--to", "12+400"), ["1"], "4.0")):
-        command("report", "demo-2024", "-o", tmp_path / "part.html", *ends)
+        output_of("report", "demo-2024", "-o", tmp_path / "part.html", *ends)
         text = (tmp_path / "part.html").read_text()
         assert [row[0] for row in rows(text, "Spots")] == spots
         assert [row[0] for row in rows(text, "Members")] == ["1"], "the member whose middle is elsewhere, for its spot"

@@ -12,3 +12,17 @@ def command(*words: object, code: int = 0) -> Result:
     result = CliRunner().invoke(main, [str(word) for word in words])
     assert result.exit_code == code, (result.output, result.exception)
     return result
+
+
+def output_of(*words: object, code: int = 0) -> str:
+    """Return what a command prints, on both streams."""
+    return command(*words, code=code).output
+
+
+def errors_of(*words: object, code: int = 0) -> str:
+    """Return what a command prints on standard error: one line if it is refused."""
+    result = command(*words, code=code)
+    if code:
+        assert result.stderr.count("\n") == 1, result.stderr
+        assert "Traceback" not in result.output
+    return result.stderr
