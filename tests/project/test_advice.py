@@ -112,7 +112,7 @@ TABLES: dict[str, tuple[bytes, str, Edit]] = {
         b"1.5,2,3\n", "the first line must name the columns (x,y,z)", lambda text, found: found[1].encode() + b"\n" + text,
     ),
     "separator": (b"x|y|z\n1.5|2|3\n", "separate columns by commas, semicolons, tabs or spaces", replaced(b"|", b";")),
-    "nothing": (b"", r"is empty; write a header .*, for example (x,y,z)", lambda _, found: found[1].encode() + b"\n1.5,2,3\n"),
+    "nothing": (b"", "is empty; write the header (x,y,z)", lambda _, found: found[1].encode() + b"\n1.5,2,3\n"),
     "no text": (b"x,y,z\n1.5,2,3\n\x00\x00\n", "save the table as CSV UTF-8", replaced(b"\x00", b"")),
 }  # fmt: skip
 
