@@ -54,7 +54,7 @@ def wrong_commands(text: str) -> list[str]:
     """Return the mistakes of the command lines in a text."""
     found = []
     for line in COMMAND.findall(text):
-        words = re.sub(r"['\\]|\.(?=\s|$).*| -- .*", " ", line, flags=re.DOTALL).split()
+        words = re.sub(r"['\\]|--set \S*VALUE\S*|\.(?=\s|$).*| -- .*", " ", line, flags=re.DOTALL).split()
         if words[0] not in PROSE and (fault := mistake([word for word in words if word != "--VALUE"])):
             found.append(f"tunneldb {' '.join(words)}: {fault}")
     return found
