@@ -9,7 +9,7 @@ import pytest
 from pyproj import CRS
 
 from tunneldb.arrays import Float
-from tunneldb.geometry.crs import LOCAL, fits_srid, outside_area
+from tunneldb.geometry.crs import LOCAL, fits_srid, mirroring_axes, outside_area
 
 PLACES = [  # published coordinates of places, m
     (3794, 462000.0, 101000.0, True),  # Ljubljana
@@ -65,3 +65,13 @@ def test_only_systems_of_no_place_are_local() -> None:
     assert not fits_srid(site, 3794)
     assert not fits_srid(CRS(3794), LOCAL)
     assert fits_srid(CRS("EPSG:3794+5778"), 3794)
+
+
+@pytest.mark.parametrize("srid", [25832, 3006, 5514, 2046, 2218, 3031])
+def test_axes_that_keep_left_and_right(srid: int) -> None:
+    assert mirroring_axes(srid) is None
+
+
+def test_axes_that_exchange_left_and_right() -> None:
+    assert mirroring_axes(5513) == ("south", "west")
+    assert mirroring_axes(3052) == ("west", "north")

@@ -34,6 +34,12 @@ def test_every_form_of_a_system_is_equal_to_its_code() -> None:
     assert wrong == []
 
 
+def test_a_projection_that_proj_lacks_is_known_by_its_code() -> None:
+    equal = {form for code, form, result, _ in TABLE.compare([3173]) if result == "equal"}
+    assert {"WKT1 GDAL", "WKT1 LAStools", "WKT2", "GeoTIFF key"} <= equal
+    assert not same_horizontally(CRS(3173), CRS(3144))  # another one, of the same method
+
+
 def test_a_text_of_another_program_has_the_code() -> None:
     for code, form in ((3006, "WKT1 LAStools"), (2193, "WKT1 ESRI"), (31256, "WKT1 GDAL without axes")):
         assert form in TABLE.FORMS

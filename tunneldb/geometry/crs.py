@@ -145,6 +145,15 @@ def describe_srid(srid: int) -> str:
     return LOCAL_NAME if srid == LOCAL else describe_crs(CRS.from_epsg(srid))
 
 
+def mirroring_axes(srid: int) -> tuple[str, str] | None:
+    """Return the directions of x and y of an EPSG code if left and right are exchanged in its coordinates; else None."""
+    try:
+        directions = tuple(axis.direction for axis in horizontal(CRS.from_epsg(srid)).axis_info[:2])
+    except CRSError:
+        return None
+    return directions if directions in (("south", "west"), ("west", "north")) else None
+
+
 def outside_area(srid: int | None, xy: Float) -> str | None:
     """Return a warning if coordinates are outside the area of use of their system.
 

@@ -9,6 +9,7 @@ Source: OGC 18-010r11, *Well-known text representation of coordinate reference s
 
 from __future__ import annotations
 
+import math
 import re
 from functools import lru_cache
 from typing import Any
@@ -65,7 +66,15 @@ def same_horizontally(one: CRS, other: CRS) -> bool:
         return True
     if a.geodetic_crs is None or b.geodetic_crs is None or a.is_projected != b.is_projected:
         return False
-    return _same_datum(a, b) and (not a.is_projected or plan_shift(a, b) < MAX_SHIFT)
+    if not _same_datum(a, b):
+        return False
+    if not a.is_projected:
+        return True
+    shift = plan_shift(a, b)
+    # PROJ lacks a few of EPSG's projections: systems of these are the same by their code only.
+    return shift < MAX_SHIFT or (
+        math.isinf(shift) and _identifier(a.to_json_dict()) == _identifier(b.to_json_dict()) is not None
+    )
 
 
 def lacks_datum(crs: CRS) -> bool:
