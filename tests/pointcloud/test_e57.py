@@ -324,3 +324,40 @@ def test_real_scan_as_pye57_reads_it() -> None:
     np.testing.assert_allclose([header.low, header.high], [points["xyz"].min(axis=0), points["xyz"].max(axis=0)], atol=2e-6)
     (scan,) = read_e57_scans(real_scan("pump.e57"))
     assert (scan.name, scan.position) == ("pumpA", None)
+
+
+def crc32c(data: bytes) -> int:
+    """Castagnoli's checksum, which pages of E57 end with."""
+    value = 0xFFFFFFFF
+    for byte in data:
+        value ^= byte
+        for _ in range(8):
+            value = value >> 1 ^ (0x82F63B78 if value & 1 else 0)
+    return value ^ 0xFFFFFFFF
+
+
+def state_count(path: Path, former: int, count: int) -> None:
+    """Change the number of points that the first scan states."""
+    pages = [path.read_bytes()[at : at + 1020] for at in range(0, path.stat().st_size, 1024)]
+    old, new = (f'recordCount="{number}"'.encode() for number in (former, count))
+    changed = b"".join(pages).replace(old, new, 1)
+    assert len(changed) == sum(map(len, pages))
+    assert new in changed
+    with path.open("r+b") as file:
+        for number, page in enumerate(pages):
+            data = changed[1020 * number : 1020 * (number + 1)]
+            if data != page:
+                file.seek(1024 * number)
+                file.write(data + crc32c(data).to_bytes(4, "big"))
+
+
+def test_a_number_of_points_that_the_data_contradict_is_named(tmp_path: Path) -> None:
+    path = e57.write(tmp_path / "a.e57", [e57.Scan(cloud(20_000), STATION)])
+    assert read_header(path).notes == ()
+    state_count(path, 20_000, 10_000)
+    (note,) = read_header(path).notes
+    assert "states 10000 points, which are read, but its data are of about 200" in note
+    assert len(read(path)["xyz"]) == 10_000
+    state_count(path, 10_000, 30_000)
+    with pytest.raises(UserError, match="ends after 20000 of 30000 points"):
+        read(path)

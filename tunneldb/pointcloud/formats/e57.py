@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from tunneldb.arrays import Bool, Float, UInt16
 from tunneldb.errors import InputError, UserError
+from tunneldb.pointcloud.formats.e57_counts import scan_name, surplus_notes
 from tunneldb.pointcloud.formats.e57_xml import require_bounded_xml
 from tunneldb.pointcloud.formats.faults import check_ranges, decoding, require_dimension
 from tunneldb.pointcloud.formats.scans import scan_number
@@ -125,6 +126,7 @@ def read_e57_header(path: Path) -> ScanHeader:
         scans = scans_of(path, image)
         boxes = [_box(image, scan) for scan in scans]
         stated = _stated_crs(image)
+        notes = surplus_notes(path, _libe57(), image)
     return ScanHeader(
         path,
         sum(scan.records for scan in scans),
@@ -132,6 +134,7 @@ def read_e57_header(path: Path) -> ScanHeader:
         stated,
         np.min([low for low, _ in boxes], axis=0),
         np.max([high for _, high in boxes], axis=0),
+        notes=tuple(notes),
         tight=False,
     )
 
@@ -380,7 +383,7 @@ def _scan(index: int, node: Any) -> Scan:
     points = node["points"]
     prototype = _libe57().StructureNode(points.prototype())
     fields = frozenset(prototype.get(i).elementName() for i in range(prototype.childCount()))
-    name = node["name"].value() if node.isDefined("name") else f"{index + 1}"
+    name = scan_name(node, index)
     guid = node["guid"].value() if node.isDefined("guid") else f"{name} {index}"
     rotation, position = _pose(node)
     start = value_of(node, "acquisitionStart/dateTimeValue")

@@ -49,13 +49,13 @@ def require_bounded_xml(path: Path) -> None:
     parser.EndElementHandler = lambda name: children.pop()
     parser.StartDoctypeDeclHandler = refuse
     try:
-        for block in _section(path):
+        for block in xml_section(path):
             parser.Parse(block, False)
     except expat.ExpatError:
         return
 
 
-def _section(path: Path) -> Iterator[bytes]:
+def xml_section(path: Path) -> Iterator[bytes]:
     """Yield blocks of the XML section, without page checksums; nothing if the header is invalid."""
     with path.open("rb") as file:
         head = file.read(_HEADER.size)
