@@ -8,14 +8,15 @@ from __future__ import annotations
 import importlib
 import json
 import os
+import resource
 import signal
 import sys
 import tempfile
 import traceback
 from pathlib import Path
 
-LIMIT = 300
-"""s; a command that isn't over by then is ended by a signal."""
+CPU_LIMIT, LIMIT = 300, 3600
+"""s of the processor, and s; a command that isn't over by then is ended by a signal."""
 LIBRARIES = (
     "laspy",
     "matplotlib.figure",
@@ -54,6 +55,7 @@ def _verb(folder: Path, words: list[str], out: int, err: int) -> None:
     """Be the program; never returns."""
     code = 1
     try:
+        resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT, CPU_LIMIT))
         signal.alarm(LIMIT)
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         os.dup2(out, 1)

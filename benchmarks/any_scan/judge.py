@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +16,7 @@ import shapely
 from benchmarks.any_scan.program import Call, Program
 from benchmarks.any_scan.scan import Leak
 from benchmarks.any_scan.tube import Tube
-from benchmarks.any_scan.ways import WAYS, first_word
+from benchmarks.any_scan.ways import WAYS, Step, steps_of
 
 NEAR = 0.10
 """m; so far from a true leak what was found may lie and still be of it."""
@@ -78,8 +79,8 @@ class Verdict:
     said: str
     seconds: float
     typed: str
-    learned: tuple[str, str] = ("", "")
-    """First message that names a mistake: the command and the line that it printed."""
+    steps: list[Step] = field(default_factory=list)
+    """Steps of a way of doing it wrong, and what each says of the mistake."""
 
 
 def judge(scene: Scene, folder: Path, program: Program) -> tuple[Verdict, list[Call]]:
@@ -111,7 +112,7 @@ def judge(scene: Scene, folder: Path, program: Program) -> tuple[Verdict, list[C
     verdict = Verdict(
         scene.name, scene.special, scene.expect, seen, not faults, faults, found, true, false, said[:300],
         round(sum(call.seconds for call in calls), 1), (refused or calls[-1]).line,
-        first_word(scene.name, scene.word, calls) if plan.inspect else ("", ""),
+        steps_of(scene.name, scene.word, calls) if plan.inspect else [],
     )  # fmt: skip
     return verdict, calls
 
@@ -124,7 +125,7 @@ def _spoken(scene: Scene, calls: list[Call]) -> str:
 
 def _run(scene: Scene, plan: Plan, folder: Path, program: Program) -> list[Call]:
     name = scene.name
-    calls = [program(folder, "inspect", *plan.files)] if plan.inspect else []
+    calls = [_inspect(plan, folder, program)] if plan.inspect else []
     # An inspection that can't read a file ends with 1; that is no refusal of the survey yet.
     steps: list[tuple[Any, ...]] = [
         ("tunnel", "add", name, *plan.tunnel),
@@ -143,6 +144,23 @@ def _run(scene: Scene, plan: Plan, folder: Path, program: Program) -> list[Call]
     calls.append(program(folder, "leaks", name, "--json", "--geometry", "3d"))
     calls.append(program(folder, "report", name, "-o", "report.html", "--json"))
     return calls
+
+
+def _inspect(plan: Plan, folder: Path, program: Program) -> Call:
+    """Inspect the scan, with the tables beside it named as inspect finds them."""
+    stem = plan.files[0].split(".", 1)[0]
+    named = dict(zip(plan.survey[::2], plan.survey[1::2], strict=False)) | dict(
+        zip(plan.tunnel[::2], plan.tunnel[1::2], strict=False)
+    )
+    copies = []
+    for option in ("--trajectory", "--stations", "--axis"):
+        if str(named.get(option, "")).endswith(".csv"):
+            copies.append(folder / f"{stem}.{option.removeprefix('--')}.csv")
+            shutil.copy(folder / named[option], copies[-1])
+    call = program(folder, "inspect", *plan.files)
+    for path in copies:
+        path.unlink()
+    return call
 
 
 def _refusal(scene: Scene, call: Call, folder: Path, program: Program) -> tuple[str, list[str]]:

@@ -36,22 +36,27 @@ least 30 % of it is covered. If several outcomes are listed, any of them is righ
 """
 
 
-WAYS_HEAD = """## Ways of doing it wrong
+WAYS_HEAD = """
+## Ways of doing it wrong
 
-The step at which the user first learns of a mistake, of `inspect` (with the scan files only), `tunnel add`, `survey add`,
-`load`, `run`, `leaks` and `report`.
+What each command says of a mistake, up to the one that refuses; `inspect` with stations, trajectory and axis beside the
+scan. The step at which the user first learns of it is bold.
 
-| mistake | scene | step | message |
-|---|---|---|---|
+| mistake | step | message |
+|---|---|---|
 """
 
 
 def _ways(verdicts: dict[str, Any]) -> str:
     rows = []
     for way, name in WAYS.items():
-        step, line = verdicts[name]["learned"] if name in verdicts else ("not run yet", "")
-        said = line.removeprefix("tunneldb: ").replace("|", "\\|").replace("<", "&lt;")
-        rows.append(f"| {way} | {name} | {f'`{step}`' if step else '**none**'} | {said} |")
+        first = True
+        for number, step in enumerate(verdicts[name]["steps"] if name in verdicts else []):
+            line = step["line"].removeprefix("tunneldb: ").replace("|", "\\|").replace("<", "&lt;")
+            command = f"`{step['command']}`"
+            bold, first = first and bool(line), first and not line
+            said = f"{'refused: ' if step['refused'] else ''}{line}" if line else "nothing"
+            rows.append(f"| {'' if number else f'{way} ({name})'} | {f'**{command}**' if bold else command} | {said} |")
     return WAYS_HEAD + "\n".join(rows) + "\n"
 
 
@@ -68,7 +73,6 @@ def page(verdicts: dict[str, Any], names: list[str]) -> str:
         rows.append("| " + " | ".join(map(str, [*cells, "yes" if v["right"] else "**no**"])) + " |")
     minutes = round(sum(v["seconds"] for v in verdicts.values()) / 60)
     text = HEAD.format(count=len(verdicts), right=sum(v["right"] for v in verdicts.values()), minutes=minutes)
-    text += "\n" + _ways(verdicts)
     wrong = [v for v in verdicts.values() if not v["right"]]
     text += "\n".join(rows) + "\n"
     if missing:
@@ -76,4 +80,4 @@ def page(verdicts: dict[str, Any], names: list[str]) -> str:
     if wrong:
         text += "\n## Wrong outcomes\n\n"
         text += "\n".join(f"- **{v['name']}**: {'; '.join(v['faults'])}".replace("<", "&lt;") for v in wrong) + "\n"
-    return text
+    return text + _ways(verdicts)

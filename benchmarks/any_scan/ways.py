@@ -1,9 +1,10 @@
-"""Ten ways of doing it wrong, each a scene of the matrix, and the step at which the user first learns of it."""
+"""Ten ways of doing it wrong, each a scene of the matrix, and what each step says of it."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from benchmarks.any_scan.program import Call
 
@@ -25,15 +26,25 @@ WAYS = {
 _COUNTS = re.compile(r"file +points|.*┃|\S+: [\d ]+ (stations|poses) of |.* m of axis, chainage |chainage grows over ")
 
 
-def first_word(name: str, word: str, calls: Sequence[Call]) -> tuple[str, str]:
-    """Return command and line that first name the matter `word` (regular expression) of the scene `name`; else empty."""
+@dataclass(frozen=True)
+class Step:
+    """A command of a way of doing it wrong: the line that names the mistake, or that it refuses with; empty if none does."""
+
+    command: str
+    line: str
+    refused: bool
+
+
+def steps_of(name: str, word: str, calls: Sequence[Call]) -> list[Step]:
+    """Return the steps of the scene `name`, whose mistake the regular expression `word` names."""
+    found = []
     for call in calls:
-        verb = " ".join(call.words[:2]) if call.words[0] in ("tunnel", "survey") else call.words[0]
-        lines = list(_doubts(call) if verb == "inspect" else _said(call))
+        command = " ".join(call.words[:2]) if call.words[0] in ("tunnel", "survey") else call.words[0]
+        lines = list(_doubts(call) if command == "inspect" else _said(call))
         named = [line for line in lines if re.search(word, line.replace(name, "").lower())]
-        if named or call.code == 2:
-            return verb, (named or lines)[-1]
-    return "", ""
+        refused = call.code == 2 or (command == "inspect" and call.code == 1)
+        found.append(Step(command, named[-1] if named else lines[-1] if refused and lines else "", refused))
+    return found
 
 
 def _said(call: Call) -> Iterator[str]:
