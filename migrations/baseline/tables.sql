@@ -361,6 +361,7 @@ CREATE TABLE tunnel.survey (
     created_at TIMESTAMP WITH TIME ZONE DEFAULT now() NOT NULL,
     positions_note TEXT,
     time_offset DOUBLE PRECISION DEFAULT 0 NOT NULL,
+    poses_accepted BOOLEAN DEFAULT false NOT NULL,
     longest_interval DOUBLE PRECISION,
     trajectory_gaps DOUBLE PRECISION[],
     settings_at TIMESTAMP WITH TIME ZONE,
@@ -385,6 +386,7 @@ COMMENT ON COLUMN tunnel.survey.reference IS 'Range curve: none, measured on a t
 COMMENT ON COLUMN tunnel.survey.created_at IS 'Time when it was added';
 COMMENT ON COLUMN tunnel.survey.positions_note IS 'Notes on its scanner positions: poses left out, gaps';
 COMMENT ON COLUMN tunnel.survey.time_offset IS 'Seconds added to the times of its trajectory''s file';
+COMMENT ON COLUMN tunnel.survey.poses_accepted IS 'True if files are loaded although their points do not fit the scanner positions';
 COMMENT ON COLUMN tunnel.survey.longest_interval IS 'Longest interval of its trajectory that is interpolated over, s; NULL without a trajectory';
 COMMENT ON COLUMN tunnel.survey.trajectory_gaps IS 'Longer intervals of its trajectory: times from and to, one after the other, s; NULL without a trajectory';
 COMMENT ON COLUMN tunnel.survey.settings_at IS 'Time of the last change of scanner positions, reference or intensity';

@@ -23,7 +23,8 @@ COMMENT ON COLUMN tunnel_api.tunnel.site IS 'True if it is a site: no axis, chai
 
 CREATE OR REPLACE VIEW tunnel_api.survey AS
 SELECT s.id, s.tunnel_id, t.name AS tunnel, s.name, s.date, s.platform, s.intensity_dimension, s.intensity_kind,
-       s.reference, t.srid, s.created_at, f.files, f.points, f.chainage_from, f.chainage_to, s.time_offset
+       s.reference, t.srid, s.created_at, f.files, f.points, f.chainage_from, f.chainage_to, s.time_offset,
+       s.poses_accepted
   FROM tunnel.survey s
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
   LEFT JOIN LATERAL (SELECT count(*) AS files, coalesce(sum(kept), 0)::bigint AS points,
@@ -31,6 +32,8 @@ SELECT s.id, s.tunnel_id, t.name AS tunnel, s.name, s.date, s.platform, s.intens
                        FROM tunnel.scan_file WHERE survey_id = s.id) f ON true;
 COMMENT ON VIEW tunnel_api.survey IS 'Surveys (scanning campaigns) of tunnels, with their loaded data';
 COMMENT ON COLUMN tunnel_api.survey.time_offset IS 'Seconds added to the times of the trajectory''s file; 0 if none';
+COMMENT ON COLUMN tunnel_api.survey.poses_accepted IS
+    'True if files are loaded although their points do not fit the scanner positions (survey set --accept-poses); each such file has a remark';
 COMMENT ON COLUMN tunnel_api.survey.points IS 'Number of points in the database, at survey density';
 COMMENT ON COLUMN tunnel_api.survey.intensity_kind IS 'amplitude (dB), reflectance (dB, range removed), linear (counts) or none';
 COMMENT ON COLUMN tunnel_api.survey.reference IS

@@ -125,6 +125,33 @@ def test_feet_are_noticed(tls: Path, tmp_path: Path) -> None:
     assert named["unit"].endswith("(NAD83 / New York Long Island (ftUS)), not metres; convert them by --unit us-ft")
 
 
+def test_millimetres_are_noticed_and_the_advised_unit_works(tls: Path, tmp_path: Path) -> None:
+    path = changed(tls, tmp_path / "a.las", 1000.0)
+    said = inspected(path)
+    (doubt,) = said["doubts"]
+    assert doubt.startswith("a.las: looks like millimetres: in millimetres the tunnel is 8.0 m wide")
+    (advised,) = said["commands"]
+    assert advised == f"tunneldb inspect {path} --unit mm"
+    again = inspected(*shlex.split(advised)[2:])
+    assert again["files"][0]["unit"] is None
+    assert again["commands"][1].endswith(" --unit mm")
+
+
+def test_tables_beside_a_scan_are_compared_with_its_points(tls: Path, tmp_path: Path) -> None:
+    scan = tmp_path / "scan.laz"
+    scan.symlink_to(tls)
+    stations = np.loadtxt(tls.with_name("bend.stations.csv"), delimiter=",", skiprows=1)
+    axis = np.loadtxt(tls.with_name("bend.axis.csv"), delimiter=",", skiprows=1)
+    for shift, stretch in ((0.0, 1.0), (3000.0, 3.2808)):
+        np.savetxt(tmp_path / "scan.axis.csv", axis + shift, "%.4f", ",", header="x,y,z", comments="")
+        origin = stations[:1, 1:]
+        places = np.column_stack([stations[:, 0], origin + (stations[:, 1:] - origin) * stretch + shift / 100.0])
+        np.savetxt(tmp_path / "scan.stations.csv", places, "%.4f", ",", header="scan_id,x,y,z", comments="")
+        doubts = "\n".join(inspected(scan)["doubts"])
+        assert ("the axis is not near the points" in doubts) == bool(shift)
+        assert ("scan.laz: scans were measured from other places" in doubts or "stations lie" in doubts) == bool(shift)
+
+
 def test_a_ptx_brings_its_stations(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     lines = []

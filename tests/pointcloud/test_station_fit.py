@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tunneldb.pointcloud.merged_scans import find_merged, scanner_places
 from tunneldb.pointcloud.station_fit import evenness, find_misfits
 
 RADIUS, FLOOR = 3.0, -2.0  # m
@@ -88,3 +89,37 @@ def test_directions_are_even_from_the_station_only() -> None:
     whole, filled = evenness(PARTS[0], STATIONS[0])
     assert filled > 0.9
     assert all(evenness(PARTS[0], STATIONS[0] + np.array([shift, 0.0, 0.0]))[0] < whole for shift in (-6.0, -3.0, 3.0, 6.0))
+
+
+def on_wall(points: np.ndarray, along: float) -> np.ndarray:
+    """Points of the first scan, where a wall across the tunnel ends what the scanner sees."""
+    away = points - STATIONS[0]
+    hit = points[:, 0] > along
+    out = points.copy()
+    out[hit] = STATIONS[0] + away[hit] * ((along - STATIONS[0, 0]) / away[hit, :1])
+    return out
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        PARTS[0],
+        thin(PARTS[0]),
+        scan(STATIONS[0], 10.0),
+        scan(STATIONS[0], 14.0, 40.0),
+        on_wall(PARTS[0], 14.0),
+        on_wall(PARTS[0], 18.0),
+        np.concatenate([PARTS[0], PARTS[0] + [2.0, 0.0, 0.0]]),
+    ],
+    ids=["whole", "thinned", "portal", "tile", "face", "far face", "two near"],
+)
+def test_one_place_is_found_of_one_scan(points: np.ndarray) -> None:
+    assert len(scanner_places(points[:, 0])) == 1
+
+
+@pytest.mark.parametrize("parts", [PARTS, THINNED], ids=["whole", "thinned"])
+def test_places_of_merged_scans_are_found(parts: list[np.ndarray]) -> None:
+    points = np.concatenate(parts)
+    (merged,) = find_merged(points[:, 0], np.ones(len(points), np.int64))
+    np.testing.assert_allclose(merged.places, STATIONS[:, 0], atol=1.0)
+    assert find_merged(*(array if k else array[:, 0] for k, array in enumerate(joined(parts)))) == []

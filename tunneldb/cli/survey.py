@@ -175,6 +175,12 @@ def add(
     "--time-offset", type=FINITE, metavar="SECONDS", help="Seconds to add to the times in the trajectory's file; 0 removes it."
 )
 @unit_options("the files of --trajectory and --stations")
+@click.option(
+    "--accept-poses",
+    is_flag=True,
+    help="Load files although their points do not fit the scanner positions, with a remark in all results; until other "
+    "positions are set.",
+)
 @click.option("--reference", metavar="FILE|auto", help="Intensity of the scanner by range, as for survey add.")
 @click.option("--intensity", metavar="DIMENSION", help="Dimension with the intensity; the files must be loaded again.")
 @click.option("--intensity-kind", type=click.Choice(["amplitude", "reflectance", "linear", "none"]), help="What it is.")
@@ -189,6 +195,7 @@ def set_(
     time_offset: float | None,
     unit: str | None,
     height_unit: str | None,
+    accept_poses: bool,
     reference: str | None,
     intensity: str | None,
     intensity_kind: str | None,
@@ -215,10 +222,12 @@ def set_(
         intensity_kind,
         intensity,
         _units(unit, height_unit, trajectory is None and not stations),
+        accept_poses,
     )
     if change == SurveyChange():
         raise UserError(
-            "nothing to set: give --date, --trajectory, --stations, --time-offset, --reference, --intensity or --intensity-kind"
+            "nothing to set: give --date, --trajectory, --stations, --time-offset, --accept-poses, --reference, --intensity or"
+            " --intensity-kind"
         )
     with connect(settings.dsn) as connection:
         notes, reload = set_survey(connection, name, change)

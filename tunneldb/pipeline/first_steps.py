@@ -49,8 +49,9 @@ class FirstSteps:
 
 
 def needs_axis(looks: Sequence[FileLook]) -> bool:
-    """Return True if no axis file is beside the scans, so that it must be found in them."""
-    return _beside(looks, "axis.csv") is None and not any(look.foreign_unit for look in looks)
+    """Return True if no axis file is beside the scans, so that it must be found in them, and they are in metres."""
+    foreign = any(look.foreign_unit for look in looks)
+    return _beside(looks, "axis.csv") is None and not foreign and not all(look.only_noise for look in looks)
 
 
 def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> FirstSteps:
@@ -73,11 +74,14 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         if look.misplaced or look.untimed
     ]
     doubts += [f"{look.path.name}: {look.pose_doubt}" for look in looks if look.pose_doubt]
+    doubts += [f"{look.path.name}: {look.axis_doubt}" for look in looks if look.axis_doubt]
     doubts += [
         f"{look.path.name}: its profiles are {look.profile_spacing:.2f} m apart; the lining between them was not measured"
         for look in looks
         if look.profile_spacing is not None and look.profile_spacing > FAR_APART
     ]
+    if foreign := [look for look in looks if look.foreign_unit]:
+        return FirstSteps(missing, doubts, [_in_metres(foreign, missing)])
     if all(look.only_noise for look in looks):
         doubts.append(
             "nothing to load: all points would be left out as noise, because none has others near enough on one surface;"
@@ -86,8 +90,6 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         return FirstSteps(missing, doubts, [])
     if axis_fault is not None:
         doubts.append(f"no axis can be found in the points (--axis auto is refused): {axis_fault}")
-    if foreign := [look for look in looks if look.foreign_unit]:
-        return FirstSteps(missing, doubts, [_in_metres(foreign, missing)])
     name, files = common_name([look.path for look in looks]), _files(looks)
     units = looks[0].unit_options
     srid = _srid(looks, missing, doubts)
@@ -134,7 +136,7 @@ def _in_metres(foreign: Sequence[FileLook], missing: list[str]) -> str:
     options = {look.suggested_units for look in foreign}
     if len(options) == 1 and (units := options.pop()):
         if "UNIT" in units.split():
-            missing.append(f"the unit of {names}, in place of UNIT: the file contradicts itself, see above")
+            missing.append(f"the unit of {names}, in place of UNIT, see above")
         return f"tunneldb inspect {' '.join(_quoted(look.path) for look in foreign)}{units}"
     missing.append(f"{names} in a projected coordinate system in metres: transform first")
     metric = [_quoted(look.path.with_name(f"TRANSFORMED-{look.path.name}")) for look in foreign]

@@ -15,7 +15,8 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.crs import describe_crs, describe_heights, in_metres
 from tunneldb.geometry.crs_equality import epsg_code, horizontal
 from tunneldb.geometry.units import Units
-from tunneldb.pipeline.inspected_poses import doubt_poses
+from tunneldb.pipeline.inspected_axis import doubt_axis
+from tunneldb.pipeline.inspected_poses import doubt_poses, file_beside
 from tunneldb.pointcloud.contents import Contents, read_contents, read_near, read_values
 from tunneldb.pointcloud.form import WINDOW, TunnelForm, profile_spacing, surface_density, tunnel_form
 from tunneldb.pointcloud.formats.las import read_las_facts
@@ -25,18 +26,10 @@ from tunneldb.pointcloud.formats.table import format_of, posed_scans
 from tunneldb.pointcloud.header_box import describe_box_difference
 from tunneldb.pointcloud.noise import noise_filter
 from tunneldb.pointcloud.reader import ScanHeader, read_header
+from tunneldb.pointcloud.unit_by_size import MIN_HEIGHT_RATIO, guess_unit
 from tunneldb.pointcloud.units import NOT_GIVEN, GivenUnits, conversion_note, in_units, suggested_options, unit_faults
 from tunneldb.progress import StartProgress
 from tunneldb.radiometry.intensity_kind import KindGuess, ValueRange, contradiction, guess_kind, value_range
-
-MAX_WIDTH = 20.0
-"""Width in metres from which a tunnel is probably in feet: three lanes with their shoulders have 16 to 18 m."""
-
-NARROWEST = 1.5
-"""Minimum width in metres for carrying a scanner through."""
-
-LOWEST = 0.3
-"""Height over width below which a cloud is open country and not a tunnel."""
 
 MIN_LENGTH_RATIO = 1.5
 """Length over width below which a cloud is a room and not a stretch of a tunnel."""
@@ -44,7 +37,6 @@ MIN_LENGTH_RATIO = 1.5
 SEARCHED = 50_000_000
 """Maximum number of points for reading a file again to test whether its axis can be found."""
 
-_FOOT = 0.3048  # m
 _PARTS = (0.25, 0.5, 0.75)  # of the tunnel's length, where profiles are looked for
 _GPS_EPOCH = dt.datetime(1980, 1, 6)
 _WEEK = 604_800.0  # s
@@ -115,9 +107,9 @@ class FileLook:
     sampled : int
         Points that these were found on.
     foreign_unit : bool
-        True if it states another unit than metres, or two different ones, and none was given.
+        True if it states another unit than metres, or two different ones, or seems to have another, and none was given.
     unit_options, suggested_units : str
-        Given units, as options of the next commands, and those that would convert what it states; empty for none.
+        Given units, as options of the next commands, and those that would convert the file; empty for none.
     heights : str or None
         System of its heights, and their unit; None if not stated.
     notes : list of str
@@ -144,7 +136,9 @@ class FileLook:
     time_offset : float or None
         Seconds to add to the times of the trajectory beside the file, so that it fits the points; None if it fits.
     pose_doubt : str or None
-        Why the trajectory beside the file, or the positions of its scans, do not fit the points.
+        Why the trajectory or the stations beside the file, or the positions of its scans, do not fit the points.
+    axis_doubt : str or None
+        Why the axis beside the file does not fit the points.
     header_note : str or None
         Difference between its header and its points.
     only_noise : bool
@@ -185,14 +179,15 @@ class FileLook:
     only_noise: bool = False
     time_offset: float | None = None
     pose_doubt: str | None = None
+    axis_doubt: str | None = None
 
     @property
     def other_than_a_tunnel(self) -> str | None:
-        """Return its probable nature by size; None if it can be a tunnel."""
+        """Return its probable nature by size; None if it can be a tunnel, perhaps in another unit."""
         if self.length is None or self.width is None or self.height is None:
-            return "no axis through it as through a tunnel"
+            return None if self.unit else "no axis through it as through a tunnel"
         size = f"{self.length:.1f} long, {self.width:.1f} wide and {self.height:.1f} high"
-        if self.height < LOWEST * self.width:
+        if self.height < MIN_HEIGHT_RATIO * self.width:
             return f"{size}: open country or a street rather than a tunnel"
         if self.length < MIN_LENGTH_RATIO * self.width:
             return f"{size}: a room or a single place rather than a tunnel"
@@ -222,6 +217,8 @@ def inspect_file(path: Path, begin: StartProgress, given: GivenUnits = NOT_GIVEN
     kind, time_kind = _described(path, contents)
     scans = posed_scans(path)
     poses = [_converted(scan, header.units) for scan in scans]
+    unit, unit_options = _unit_doubt(header, contents, form)
+    axis = file_beside([path], "axis.csv")
     time_offset, pose_doubt = doubt_poses(path, contents, form, poses)
     return FileLook(
         path,
@@ -240,7 +237,7 @@ def inspect_file(path: Path, begin: StartProgress, given: GivenUnits = NOT_GIVEN
         surface_density(contents.xyz, contents.share),
         len(contents.xyz),
         None if form is None else _spacing(path, contents, form, header.units),
-        _unit(header, contents, form),
+        unit,
         contents.times,
         time_kind,
         contents.untimed,
@@ -248,16 +245,17 @@ def inspect_file(path: Path, begin: StartProgress, given: GivenUnits = NOT_GIVEN
         contents.scans,
         poses,
         [_look_at(path, name, contents.points) for name in names],
-        bool(unit_faults(header)) or (header.crs is not None and _is_angular(header.crs)),
+        unit_options is not None,
         describe_box_difference(header, np.concatenate([contents.low, contents.high])),
         "".join(f" {option} {unit}" for option, unit in (("--unit", given.plan), ("--height-unit", given.height)) if unit),
-        suggested_options(header),
+        unit_options or "",
         describe_heights(header.crs, header.stated.heights),
         [*header.stated.notes, *header.notes, *filter(None, [conversion_note(header)]), *position_notes(scans)],
         lost_positions(scans),
         contents.share == 1.0 and bool(noise_filter(contents.xyz).all()),
         time_offset,
         pose_doubt,
+        None if axis is None else doubt_axis(axis, contents.xyz),
     )
 
 
@@ -326,26 +324,21 @@ def _spacing(path: Path, contents: Contents, form: TunnelForm, units: Units) -> 
     return float(np.median(found)) if 2 * len(found) > len(_PARTS) else None
 
 
-def _unit(header: ScanHeader, contents: Contents, form: TunnelForm | None) -> str | None:
+def _unit_doubt(header: ScanHeader, contents: Contents, form: TunnelForm | None) -> tuple[str | None, str | None]:
+    """Return why the coordinates may not be in metres, and the options that convert them, empty if none does; or two None."""
     faults = unit_faults(header)
     if faults:
-        return "; ".join(faults)
+        return "; ".join(faults), suggested_options(header)
     if header.crs is not None and _is_angular(header.crs):
-        return "not metres in plan, by its coordinate system: transform it to a projected system in metres"
+        return "not metres in plan, by its coordinate system: transform it to a projected system in metres", ""
     if header.crs is not None or header.unit_given:
-        return None
+        return None, None
     low, high = contents.low, contents.high
     inside = bool(np.all(np.abs([low[0], high[0]]) <= 180.0) and np.all(np.abs([low[1], high[1]]) <= 90.0))
     if inside and float(np.max(high[:2] - low[:2])) < 0.1 < float(high[2] - low[2]):
-        return "looks like degrees (longitude and latitude): transform it to a projected system in metres"
-    if form is None:
-        return None
-    size = f"the tunnel is {form.width:.4g} wide and {form.height:.4g} high"
-    if form.width > 1000.0 * NARROWEST:
-        return f"looks like millimetres: {size}"
-    if form.width > MAX_WIDTH and form.height > LOWEST * form.width:
-        return f"looks like feet: {size}, which in feet were {form.width * _FOOT:.1f} m and {form.height * _FOOT:.1f} m"
-    return None
+        return "looks like degrees (longitude and latitude): transform it to a projected system in metres", ""
+    guess = guess_unit(contents.xyz, contents.share, form)
+    return (guess.text, guess.option) if guess else (None, None)
 
 
 def _is_angular(crs: CRS) -> bool:

@@ -13,17 +13,21 @@ from tunneldb.arrays import Float, Int64
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.plan_line import PlanLine
-from tunneldb.pointcloud.pose_faults_text import stations_fault, trajectory_fault
+from tunneldb.pointcloud.pose_faults_text import trajectory_fault
 from tunneldb.pointcloud.pose_sample import SampledPoints
-from tunneldb.pointcloud.station_fit import find_misfits
-from tunneldb.pointcloud.trajectory_fit import Track, fit_trajectory, outside_section
+from tunneldb.pointcloud.station_doubt import doubt_stations
+from tunneldb.pointcloud.trajectory_fit import Track, fit_trajectory
 from tunneldb.store.poses import load_coarse_trajectory, load_poses
 from tunneldb.store.survey import Survey
 
-MAX_MISFIT_SHARE = 0.1
-"""Share of the points of scans with wrong stations from which a file is refused."""
 
-_NEAR = 10.0  # m along the tunnel within which the points of a station show the section about it
+@dataclass(frozen=True)
+class _Doubt:
+    """Doubt about the positions of a file's points: whether results would be wrong, and too many points have no position."""
+
+    text: str
+    refused: bool
+    unposed: bool = False
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,8 @@ class PoseCheck:
         Name of the survey.
     time_offset : float
         Seconds that were added to the times of the trajectory.
+    accepted : bool
+        True if the user accepts positions that do not fit.
     """
 
     line: PlanLine
@@ -50,20 +56,22 @@ class PoseCheck:
     stations: Float
     survey: str
     time_offset: float
+    accepted: bool
 
     @classmethod
     def of(cls, conn: psycopg.Connection[Any], survey: Survey, alignment: Alignment) -> PoseCheck | None:
         """Read the scanner positions of a survey; None if they are unknown."""
         if survey.platform == "unknown":
             return None
+        row = conn.execute("SELECT time_offset, poses_accepted FROM tunnel.survey WHERE id = %s", [survey.id]).fetchone()
+        assert row is not None
         line = PlanLine.of(alignment.vertices, alignment.number * alignment.spacing)
         if survey.platform == "static":
             poses = load_poses(conn, survey)
-            return cls(line, None, poses.scan_id, places(line, poses.station), survey.name, 0.0)
+            return cls(line, None, poses.scan_id, places(line, poses.station), survey.name, 0.0, row[1])
         poses = load_coarse_trajectory(conn, survey)
-        row = conn.execute("SELECT time_offset FROM tunnel.survey WHERE id = %s", [survey.id]).fetchone()
         track = Track(poses.time, places(line, poses.track), poses.longest)
-        return cls(line, track, np.empty(0, np.int64), np.empty((0, 3)), survey.name, float(row[0]) if row else 0.0)
+        return cls(line, track, np.empty(0, np.int64), np.empty((0, 3)), survey.name, *row)
 
     def check(self, path: Path, points: SampledPoints, max_left_out: float) -> str | None:
         """Return a doubt about the scanner positions of a file's points; None if they fit.
@@ -80,46 +88,41 @@ class PoseCheck:
         Raises
         ------
         UserError
-            If results from these positions would be wrong.
+            If results from these positions would be wrong, and the user does not accept them.
         """
         place = places(self.line, points.xyz)
         if self.track is None:
-            return self._check_stations(path, place, points.scan_id.astype(np.int64))
-        fit = fit_trajectory(points.time, place, self.track)
+            doubt = self._doubt_stations(place, points.scan_id.astype(np.int64))
+        else:
+            doubt = self._doubt_trajectory(points.time, place, max_left_out)
+        return self._accepted(path, doubt)
+
+    def _doubt_trajectory(self, time: Float, place: Float, max_left_out: float) -> _Doubt | None:
+        assert self.track is not None
+        fit = fit_trajectory(time, place, self.track)
         if fit is None:
             return None
         unposed = 1.0 - fit.known > max_left_out and (fit.offset is not None)
         if not (fit.refused or fit.doubtful or unposed):
             return None
         said = trajectory_fault(fit, self.time_offset, f"tunneldb survey set {self.survey} --time-offset")
-        if fit.refused or unposed:
-            raise UserError(f"{path}: {said}")
-        return said
+        return _Doubt(said, fit.refused or unposed, unposed)
 
-    def _check_stations(self, path: Path, place: Float, scan_id: Int64) -> str | None:
-        if not len(self.scans) or not len(place):
+    def _doubt_stations(self, place: Float, scan_id: Int64) -> _Doubt | None:
+        doubt = doubt_stations(place, scan_id, self.scans, self.stations)
+        if doubt is None:
             return None
-        at = np.minimum(np.searchsorted(self.scans, scan_id), len(self.scans) - 1)
-        scanner = np.where((self.scans[at] == scan_id)[:, None], self.stations[at], np.nan)
-        near = np.abs(scanner[:, 0] - place[:, 0]) < _NEAR
-        scanner[~near] = np.nan
-        outside = outside_section(place, scanner)
-        if outside > 0.0:
-            raise UserError(
-                f"{path}: the stations lie {outside:.0f} m outside the tunnel's section, which its points show: they are of"
-                f" another tunnel, or in another system; {self._again}"
-            )
-        misfits = find_misfits(place, scan_id, self.scans, self.stations)
-        if not misfits:
-            return None
-        said = f"{stations_fault(misfits)}; {self._again}"
-        if sum(one.share for one in misfits) > MAX_MISFIT_SHARE:
-            raise UserError(f"{path}: {said}")
-        return said
+        text, refused = doubt
+        return _Doubt(f"{text}; fix the stations, then: tunneldb survey set {self.survey} --stations FILE", refused)
 
-    @property
-    def _again(self) -> str:
-        return f"fix the stations, then: tunneldb survey set {self.survey} --stations FILE"
+    def _accepted(self, path: Path, doubt: _Doubt | None) -> str | None:
+        """Return a doubt as a note; refuse the file if results would be wrong, unless the user accepts the positions."""
+        if doubt is None or not doubt.refused:
+            return None if doubt is None else doubt.text
+        if not self.accepted:
+            accept = "" if doubt.unposed else f"; or load it all the same: tunneldb survey set {self.survey} --accept-poses"
+            raise UserError(f"{path}: {doubt.text}{accept}")
+        return f"{doubt.text}; loaded all the same (--accept-poses)"
 
 
 def places(line: PlanLine, xyz: Float) -> Float:

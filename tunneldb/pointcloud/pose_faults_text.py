@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
+from tunneldb.pointcloud.merged_scans import MergedScan
 from tunneldb.pointcloud.station_fit import Misfit
 from tunneldb.pointcloud.trajectory_fit import WRONG, TrajectoryFit
 
@@ -69,4 +71,18 @@ def stations_fault(misfits: Sequence[Misfit]) -> str:
     return (
         "scans were measured from other places along the axis than their stations (the directions to the points show it): "
         f"{'; '.join(named)}{more}"
+    )
+
+
+def merged_fault(merged: Sequence[MergedScan]) -> str:
+    """Return the message about scans that were merged under one number."""
+    named = [
+        f"scan {one.scan_id}: {len(one.places)} places, "
+        f"{' and '.join(f'{after - before:.0f} m' for before, after in pairwise(one.places))} apart"
+        for one in merged[:_NAMED]
+    ]
+    more = f"; and {len(merged) - _NAMED} more" if len(merged) > _NAMED else ""
+    return (
+        "points of one scan number were measured from several places (their numbers along the tunnel show it):"
+        f" {'; '.join(named)}{more}; scans were merged: export them with one number and one station each"
     )

@@ -17,7 +17,7 @@ import shapely
 from tunneldb.alignment.given import GivenAxis
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
-from tunneldb.geometry.crs import LOCAL, LOCAL_NAME
+from tunneldb.geometry.crs import LOCAL, LOCAL_NAME, mirroring_axes
 from tunneldb.geometry.units import IN_METRES, Units
 from tunneldb.store.alignment import save_design
 from tunneldb.store.scanner import (
@@ -135,6 +135,12 @@ def _require_metres(connection: psycopg.Connection[Any], srid: int) -> None:
     units = {axis.unit_name for axis in crs.axis_info}
     if units != {"metre"}:
         raise UserError(f"SRID {srid} ({crs.name}) is in {', '.join(sorted(units))}, not metres")
+    axes = mirroring_axes(srid)
+    if axes is not None:
+        raise UserError(
+            f"SRID {srid} ({crs.name}) counts x and y to the {axes[0]} and {axes[1]}, which exchanges left and right; transform"
+            " the files to a system that counts to the east and north"
+        )
 
 
 def survey_exists(name: str) -> UserError:
@@ -187,7 +193,7 @@ def add_survey(
     _require_name(name)
     tunnel_id, srid, alignment = _alignment(connection, tunnel)
     positions = read_positions(
-        poses, alignment, tunnel, mobile=mobile, backwards=backwards, time_offset=time_offset, units=units
+        poses, alignment, tunnel, srid, mobile=mobile, backwards=backwards, time_offset=time_offset, units=units
     )
     if poses is None:
         require_no_range(intensity.kind)
@@ -239,6 +245,8 @@ class SurveyChange:
         Dimension and kind of the intensity.
     units : Units
         Units of the coordinates in the files of `poses`.
+    accept_poses : bool
+        True if files are to be loaded although their points do not fit the positions.
     """
 
     date: dt.date | None = None
@@ -250,6 +258,7 @@ class SurveyChange:
     kind: str | None = None
     dimension: str | None = None
     units: Units = IN_METRES
+    accept_poses: bool = False
 
 
 def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyChange) -> tuple[list[str], int]:
@@ -282,11 +291,13 @@ def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyCha
         raise UserError(f"--intensity must name the dimension that holds the {kind}")
     if platform == "unknown" and not change.poses:
         require_no_range(kind)
+        if change.accept_poses:
+            raise UserError(f"--accept-poses is about scanner positions; survey {name} has none")
     notes: list[str] = []
     if change.poses:
         _, srid, alignment = _alignment(connection, tunnel)
         positions = read_positions(
-            change.poses, alignment, tunnel, mobile=change.mobile, backwards=change.backwards,
+            change.poses, alignment, tunnel, srid, mobile=change.mobile, backwards=change.backwards,
             time_offset=change.time_offset or 0.0, units=change.units,
         )  # fmt: skip
         notes += positions.notes
@@ -306,9 +317,12 @@ def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyCha
     if reference == "auto" and (change.reference is not None or change.kind is not None):
         require_range(kind)
     connection.execute(
-        "UPDATE tunnel.survey SET date = coalesce(%s, date), intensity_kind = %s, intensity_dimension = %s, reference = %s,"
+        "UPDATE tunnel.survey SET poses_accepted = %s OR poses_accepted AND NOT %s,"
+        " date = coalesce(%s, date), intensity_kind = %s, intensity_dimension = %s, reference = %s,"
         " settings_at = CASE WHEN %s THEN clock_timestamp() ELSE settings_at END WHERE id = %s",
         [
+            change.accept_poses,
+            moved,
             change.date,
             kind,
             dimension,

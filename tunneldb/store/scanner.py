@@ -19,6 +19,7 @@ from tunneldb.csvfile import CsvTable, read_csv
 from tunneldb.database.copy import PointZ, copy_binary, pack
 from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
+from tunneldb.geometry.crs import outside_area
 from tunneldb.geometry.misplacement import explain_misplacement
 from tunneldb.geometry.units import IN_METRES, Units, unit_name
 from tunneldb.pointcloud.formats.table import has_scans
@@ -66,6 +67,7 @@ def read_positions(
     paths: Sequence[Path] | None,
     alignment: Alignment | None,
     tunnel: str,
+    srid: int,
     *,
     mobile: bool,
     backwards: bool,
@@ -79,8 +81,8 @@ def read_positions(
     paths
         The only CSV of the trajectory (time,x,y,z) if `mobile`, else the files of the stations, see
         `tunneldb.pointcloud.stations.read_stations`; None for unknown scanner positions.
-    alignment, tunnel
-        Given axis, None for a site, whose positions are not checked; and the tunnel's name, for errors.
+    alignment, tunnel, srid
+        Given axis, None for a site, whose positions are not checked; the tunnel's name and SRID, for errors.
     backwards
         True if the trajectory runs towards decreasing chainage.
     time_offset
@@ -102,7 +104,7 @@ def read_positions(
         said = (*_stations_together(paths, stations), *stations.notes, *_conversion(units))
         if alignment is None:
             return Positions(False, stations.scan_id, places, said)
-        _require_near(paths, places, alignment, tunnel)
+        _require_near(paths, places, alignment, tunnel, srid)
         far = far_from_axis(places, alignment)
         if far.any():
             worst, more = int(np.argmax(far)), np.count_nonzero(far) - 1
@@ -119,7 +121,7 @@ def read_positions(
     time, xyz = table["time"], table.columns(XYZ) * units.scales
     if alignment is None:
         raise UserError(f"{tunnel!r} is a site; it takes the --stations of a static scanner")
-    _require_near(paths, xyz, alignment, tunnel)
+    _require_near(paths, xyz, alignment, tunnel, srid)
     far = far_from_axis(xyz, alignment)
     wild = (far > 0.0) | jumps(time, xyz)
     if wild.mean() > MAX_WILD_SHARE:
@@ -244,14 +246,14 @@ def _insert(connection: psycopg.Connection[Any], table: str, names: list[str], c
     copy_binary(connection, sql.Identifier("tunnel", table), names, [pack(columns)])
 
 
-def _require_near(paths: Sequence[Path], xyz: Float, alignment: Alignment, tunnel: str) -> None:
+def _require_near(paths: Sequence[Path], xyz: Float, alignment: Alignment, tunnel: str, srid: int) -> None:
     """Require that the scanner was near the axis at least once."""
     distance = alignment.distance(xyz)
     beyond = np.isnan(distance)
     distance[beyond] = np.linalg.norm(xyz[beyond, None] - alignment.vertices[[0, -1]], axis=2).min(axis=1)
     nearest = int(np.argmin(distance))
     if distance[nearest] > FARTHEST_SCANNER:
-        guess = explain_misplacement(xyz, alignment.vertices, FARTHEST_SCANNER)
+        guess = explain_misplacement(xyz, alignment.vertices, FARTHEST_SCANNER) or outside_area(srid, xyz[:, :2])
         raise UserError(
             f"{', '.join(map(str, paths))}: the scanner was never within {FARTHEST_SCANNER:g} m of the axis of {tunnel!r} "
             f"({distance[nearest]:.0f} m at the nearest{', beyond its ends' if beyond[nearest] else ''}); "

@@ -133,6 +133,9 @@ class Survey(Base):
     time_offset: Mapped[float] = mapped_column(
         server_default=text("0"), comment="Seconds added to the times of its trajectory's file"
     )
+    poses_accepted: Mapped[bool] = mapped_column(
+        server_default=text("false"), comment="True if files are loaded although their points do not fit the scanner positions"
+    )
     longest_interval: Mapped[float | None] = mapped_column(
         comment="Longest interval of its trajectory that is interpolated over, s; NULL without a trajectory"
     )
