@@ -128,8 +128,15 @@ def test_the_end_of_the_week_is_taken(folder: Path, conn: psycopg.Connection, or
     command("load", "s", folder / "a.laz")
     assert conn.execute("SELECT unposed, pose_note FROM tunnel.scan_file").fetchone() == (0, None)
     conn.rollback()
-    command("survey", "set", "s", "--time-offset", 18)
+    said = command("survey", "set", "s", "--time-offset", 18, code=2)
+    assert "the positions do not fit the loaded points: " in said
+    assert said.endswith("; or set them all the same: add --accept-poses\n")
+    command("survey", "set", "s", "--time-offset", 18, "--accept-poses")
+    assert "set all the same (--accept-poses)" in str(conn.execute("SELECT positions_note FROM tunnel.survey").fetchone())
+    conn.rollback()
     command("survey", "set", "s", "--time-offset", 0)
+    assert "all the same" not in str(conn.execute("SELECT positions_note FROM tunnel.survey").fetchone())
+    conn.rollback()
     assert "--time-offset" not in str(conn.execute("SELECT positions_note FROM tunnel.survey").fetchone())
     conn.rollback()
     las.gps_time = (np.asarray(las.gps_time) - 30.0) % WEEK + 30.0  # a scan whose seconds go on after the week's end
@@ -144,52 +151,65 @@ def test_what_is_no_trajectory_has_no_time_offset(folder: Path) -> None:
     assert "survey s has none" in command("survey", "set", "s", "--time-offset", 18, code=2)
 
 
-def test_exchanged_stations_are_named_and_the_right_ones_fit(folder: Path, conn: psycopg.Connection) -> None:
+def two_scans(folder: Path) -> tuple[Path, np.ndarray]:
+    """A file of two scans, and their stations."""
     places = np.array([[1, *(ORIGIN + 15.0 * ALONG)], [2, *(ORIGIN + 45.0 * ALONG)]])
     parts = [tube(START + low, START + low + 20.0, 20, seed=1) for low in (5.0, 35.0)]
     path = write(folder / "b.laz", np.concatenate(parts))
     las = laspy.read(path)
     las.point_source_id = np.repeat([1, 2], [len(part) for part in parts])
     las.write(path)
+    return path, places
+
+
+def remark(conn: psycopg.Connection, stage: str = "load") -> str:
+    (row,) = conn.execute("SELECT remark FROM tunnel_api.remark WHERE stage = %s", [stage]).fetchall()
+    conn.rollback()
+    return row[0]
+
+
+def test_exchanged_stations_are_named_and_accepted_or_corrected(folder: Path, conn: psycopg.Connection) -> None:
+    path, places = two_scans(folder)
     exchanged = places.copy()
     exchanged[:, 0] = [2, 1]
     add("--stations", table(folder / "s.csv", "scan_id,x,y,z", exchanged))
     said = command("load", "s", path, code=2)
     assert "scan 1: 30 m before its station, at that of scan 2; scan 2: 30 m after its station, at that of scan 1" in said
     assert "then: tunneldb survey set s --stations FILE; " in said
-    command("survey", "set", "s", "--stations", table(folder / "s.csv", "scan_id,x,y,z", places))
-    command("load", "s", path)
-    same = places.copy()
-    same[:, 1:] = places[0, 1:]
-    assert "all 2 stations are at one place" in command(
-        "survey", "set", "s", "--stations", table(folder / "s.csv", "scan_id,x,y,z", same)
-    )
-    las.classification = np.full(len(las), 1)
-    las.write(path)
-    said = command("load", "s", path, code=2)
-    assert "scan 2: 30 m after its station" in said
     command(*shlex.split(said.strip().rpartition("; or load it all the same: tunneldb ")[2]))
     command("load", "s", path)
-    (remark,) = (row[0] for row in conn.execute("SELECT remark FROM tunnel_api.remark WHERE stage = 'load'"))
-    assert "scan 2: 30 m after its station" in remark
-    assert remark.endswith("loaded all the same (--accept-poses)")
-    conn.rollback()
-    command("survey", "set", "s", "--stations", folder / "s.csv")
+    assert remark(conn).endswith("loaded all the same (--accept-poses)")
+    command("survey", "set", "s", "--stations", table(folder / "s.csv", "scan_id,x,y,z", places))
     assert conn.execute("SELECT poses_accepted FROM tunnel_api.survey").fetchone() == (False,)
+    assert conn.execute("SELECT pose_note FROM tunnel.scan_file").fetchone() == (None,)
     conn.rollback()
+
+
+def test_stations_that_loaded_points_contradict_are_refused(folder: Path, conn: psycopg.Connection) -> None:
+    path, places = two_scans(folder)
+    add("--stations", table(folder / "s.csv", "scan_id,x,y,z", places))
+    command("load", "s", path)
+    places[:, 1:] = places[0, 1:]
+    wrong = table(folder / "wrong.csv", "scan_id,x,y,z", places)
+    said = command("survey", "set", "s", "--stations", wrong, code=2)
+    assert "the positions do not fit the loaded points: scans were measured from other places" in said
+    assert "; or set them all the same: add --accept-poses" in said
+    assert "all 2 stations are at one place" in command("survey", "set", "s", "--stations", wrong, "--accept-poses")
+    assert remark(conn, "survey").endswith("set all the same (--accept-poses)")
 
 
 def test_scans_that_were_merged_under_one_number_are_named(folder: Path) -> None:
-    parts = [tube(START + low, START + low + 20.0, 20, seed=1) for low in (5.0, 35.0)]
-    path = write(folder / "b.laz", np.concatenate(parts))
-    add("--stations", table(folder / "s.csv", "scan_id,x,y,z", np.array([[1, *(ORIGIN + 15.0 * ALONG)]])))
+    path, places = two_scans(folder)
+    las = laspy.read(path)
+    numbers = np.array(las.point_source_id)
+    las.point_source_id = np.ones(len(las))
+    las.write(path)
+    add("--stations", table(folder / "s.csv", "scan_id,x,y,z", places[:1]))
     assert "scan 1: 2 places, 30 m apart" in command("load", "s", path, code=2)
     result = CliRunner().invoke(main, ["inspect", str(path)])
     assert "if the scanner stood on tripods: points of one scan number were measured from several places" in result.stdout
-    las = laspy.read(path)
-    las.point_source_id = np.repeat([1, 2], [len(part) for part in parts])
+    las.point_source_id = numbers
     las.write(path)
-    places = np.array([[number, *(ORIGIN + along * ALONG)] for number, along in ((1, 15.0), (2, 45.0))])
     command("survey", "set", "s", "--stations", table(folder / "s.csv", "scan_id,x,y,z", places))
     command("load", "s", path)
 

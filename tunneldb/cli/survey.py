@@ -204,6 +204,7 @@ def set_(
 
     Points, axis, sections and reviews stay.
     """
+    from tunneldb.pipeline.pose_check import check_loaded_points
     from tunneldb.store.catalog import SurveyChange, set_survey
 
     if trajectory is not None and stations:
@@ -231,6 +232,8 @@ def set_(
         )
     with connect(settings.dsn) as connection:
         notes, reload = set_survey(connection, name, change)
+        if change.poses or time_offset is not None:
+            notes += filter(None, [check_loaded_points(connection, get_survey(connection, name, site=True))])
         stale = count_stale(connection, get_survey(connection, name, site=True).id)
     if reload:
         notes.append(f"{counted(reload, 'file has', 'files have')} to be loaded again: tunneldb load {name} FILE...")

@@ -26,13 +26,16 @@ from tunneldb.pointcloud.formats.table import format_of, posed_scans
 from tunneldb.pointcloud.header_box import describe_box_difference
 from tunneldb.pointcloud.noise import noise_filter
 from tunneldb.pointcloud.reader import ScanHeader, read_header
-from tunneldb.pointcloud.unit_by_size import MIN_HEIGHT_RATIO, guess_unit
+from tunneldb.pointcloud.unit_by_size import MIN_HEIGHT_RATIO, guess_unit, typical_spacing
 from tunneldb.pointcloud.units import NOT_GIVEN, GivenUnits, conversion_note, in_units, suggested_options, unit_faults
 from tunneldb.progress import StartProgress
 from tunneldb.radiometry.intensity_kind import KindGuess, ValueRange, contradiction, guess_kind, value_range
 
 MIN_LENGTH_RATIO = 1.5
 """Length over width below which a cloud is a room and not a stretch of a tunnel."""
+
+MAX_SPACING = 3.0
+"""Distance of neighbouring points of the sample from which they show no surface in metres."""
 
 SEARCHED = 50_000_000
 """Maximum number of points for reading a file again to test whether its axis can be found."""
@@ -212,7 +215,7 @@ def inspect_file(path: Path, begin: StartProgress, given: GivenUnits = NOT_GIVEN
     """
     header = in_units(read_header(path), given)
     contents = read_contents(path, begin(path.name, header.points), header.units)
-    form = tunnel_form(contents.xyz)
+    form = tunnel_form(contents.xyz) if typical_spacing(contents.xyz) <= MAX_SPACING else None
     names = [name for name in header.dimensions if name.lower() not in _NO_INTENSITY]
     kind, time_kind = _described(path, contents)
     scans = posed_scans(path)

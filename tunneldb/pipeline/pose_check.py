@@ -14,15 +14,23 @@ from tunneldb.errors import UserError
 from tunneldb.geometry.alignment import Alignment
 from tunneldb.geometry.plan_line import PlanLine
 from tunneldb.pointcloud.pose_faults_text import trajectory_fault
-from tunneldb.pointcloud.pose_sample import SampledPoints
+from tunneldb.pointcloud.pose_sample import MAX_POINTS, SampledPoints
+from tunneldb.pointcloud.selection import FilterSettings
 from tunneldb.pointcloud.station_doubt import doubt_stations
 from tunneldb.pointcloud.trajectory_fit import Track, fit_trajectory
+from tunneldb.store.partition import rows_in
 from tunneldb.store.poses import load_coarse_trajectory, load_poses
+from tunneldb.store.scanner import MISFIT
+from tunneldb.store.sources import sample
+from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
+
+MAX_KILOMETRES = 20
+"""Greatest number of kilometres whose loaded points are compared with new positions."""
 
 
 @dataclass(frozen=True)
-class _Doubt:
+class PoseDoubt:
     """Doubt about the positions of a file's points: whether results would be wrong, and too many points have no position."""
 
     text: str
@@ -90,14 +98,22 @@ class PoseCheck:
         UserError
             If results from these positions would be wrong, and the user does not accept them.
         """
+        doubt = self.doubt(points, max_left_out)
+        if doubt is None or not doubt.refused:
+            return None if doubt is None else doubt.text
+        if not self.accepted:
+            accept = "" if doubt.unposed else f"; or load it all the same: tunneldb survey set {self.survey} --accept-poses"
+            raise UserError(f"{path}: {doubt.text}{accept}")
+        return f"{doubt.text}; loaded all the same (--accept-poses)"
+
+    def doubt(self, points: SampledPoints, max_left_out: float) -> PoseDoubt | None:
+        """Return a doubt about the positions of points; None if they fit. Parameters as for `check`."""
         place = places(self.line, points.xyz)
         if self.track is None:
-            doubt = self._doubt_stations(place, points.scan_id.astype(np.int64))
-        else:
-            doubt = self._doubt_trajectory(points.time, place, max_left_out)
-        return self._accepted(path, doubt)
+            return self._doubt_stations(place, points.scan_id.astype(np.int64))
+        return self._doubt_trajectory(points.time, place, max_left_out)
 
-    def _doubt_trajectory(self, time: Float, place: Float, max_left_out: float) -> _Doubt | None:
+    def _doubt_trajectory(self, time: Float, place: Float, max_left_out: float) -> PoseDoubt | None:
         assert self.track is not None
         fit = fit_trajectory(time, place, self.track)
         if fit is None:
@@ -106,23 +122,52 @@ class PoseCheck:
         if not (fit.refused or fit.doubtful or unposed):
             return None
         said = trajectory_fault(fit, self.time_offset, f"tunneldb survey set {self.survey} --time-offset")
-        return _Doubt(said, fit.refused or unposed, unposed)
+        return PoseDoubt(said, fit.refused or unposed, unposed)
 
-    def _doubt_stations(self, place: Float, scan_id: Int64) -> _Doubt | None:
+    def _doubt_stations(self, place: Float, scan_id: Int64) -> PoseDoubt | None:
         doubt = doubt_stations(place, scan_id, self.scans, self.stations)
         if doubt is None:
             return None
         text, refused = doubt
-        return _Doubt(f"{text}; fix the stations, then: tunneldb survey set {self.survey} --stations FILE", refused)
+        return PoseDoubt(f"{text}; fix the stations, then: tunneldb survey set {self.survey} --stations FILE", refused)
 
-    def _accepted(self, path: Path, doubt: _Doubt | None) -> str | None:
-        """Return a doubt as a note; refuse the file if results would be wrong, unless the user accepts the positions."""
-        if doubt is None or not doubt.refused:
-            return None if doubt is None else doubt.text
-        if not self.accepted:
-            accept = "" if doubt.unposed else f"; or load it all the same: tunneldb survey set {self.survey} --accept-poses"
-            raise UserError(f"{path}: {doubt.text}{accept}")
-        return f"{doubt.text}; loaded all the same (--accept-poses)"
+
+def check_loaded_points(conn: psycopg.Connection[Any], survey: Survey) -> str | None:
+    """Compare new scanner positions of a survey with its loaded points; a doubt becomes a note on the positions.
+
+    Raises
+    ------
+    UserError
+        If results from these positions would be wrong, and the user does not accept them.
+    """
+    conn.execute("UPDATE tunnel.scan_file SET pose_note = NULL WHERE survey_id = %s", [survey.id])
+    check = None if survey.site else PoseCheck.of(conn, survey, load_alignment(conn, survey))
+    kms = _some_kilometres(conn, survey)
+    if check is None or not kms:
+        return None
+    parts = [sample(conn, survey, km, MAX_POINTS // len(kms)) for km in kms]
+    points = SampledPoints(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("xyz", "time", "scan_id")))
+    doubt = check.doubt(points, FilterSettings().max_left_out)
+    if doubt is None:
+        return None
+    if doubt.refused and not check.accepted:
+        raise UserError(f"{MISFIT}{doubt.text}; or set them all the same: add --accept-poses")
+    note = f"{MISFIT}{doubt.text.replace('; ', ', ')}" + (", set all the same (--accept-poses)" if doubt.refused else "")
+    conn.execute(
+        "UPDATE tunnel.survey SET positions_note = concat_ws('; ', positions_note, %s::text) WHERE id = %s", [note, survey.id]
+    )
+    return note
+
+
+def _some_kilometres(conn: psycopg.Connection[Any], survey: Survey) -> list[int]:
+    """Return kilometres with points, at most MAX_KILOMETRES, spread evenly."""
+    rows = conn.execute(
+        "SELECT DISTINCT k.km FROM tunnel.file_km k JOIN tunnel.scan_file f ON f.id = k.file_id"
+        " WHERE f.survey_id = %s ORDER BY 1",
+        [survey.id],
+    ).fetchall()
+    kms = [km for (km,) in rows if rows_in(conn, survey, km)]
+    return [kms[k] for k in np.unique(np.linspace(0, len(kms) - 1, min(len(kms), MAX_KILOMETRES)).astype(int))]
 
 
 def places(line: PlanLine, xyz: Float) -> Float:

@@ -61,7 +61,7 @@ def guess_unit(xyz: Float, share: float, form: TunnelForm | None) -> UnitGuess |
         return None
     if float(np.ptp(xyz[:, :2], axis=0).max(initial=0.0)) <= MAX_WIDTH:
         return None
-    spacing = _spacing(xyz) * np.sqrt(share)
+    spacing = typical_spacing(xyz) * np.sqrt(share)
     xyz = np.random.default_rng(1).permutation(xyz)[:_SAMPLE]
     found = {unit: size for unit in _OTHERS if (size := _size(xyz, spacing, METRES[unit])) is not None}
     if not found:
@@ -88,8 +88,8 @@ def _size(xyz: Float, spacing: float, metres: float) -> tuple[float, float] | No
     return form.width, form.height
 
 
-def _spacing(xyz: Float) -> float:
-    """Return the typical distance of neighbouring points."""
+def typical_spacing(xyz: Float) -> float:
+    """Return the typical distance of neighbouring points of a sample (n, 3), in its unit."""
     some = np.unique(np.linspace(0, len(xyz) - 1, _NEAREST).astype(int))
     near = cKDTree(xyz).query(xyz[some], k=2)[0][:, 1]
     near = near[np.isfinite(near) & (near > 0.0)]

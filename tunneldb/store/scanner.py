@@ -34,6 +34,9 @@ FARTHEST_SCANNER = 50.0  # m from the axis; a scanner that was never nearer stoo
 MAX_NAMED = 10  # stations named in a message
 MAX_WILD_SHARE = 0.05  # share of a trajectory's poses that may be left out as they cannot be
 
+MISFIT = "the positions do not fit the loaded points: "
+"""Beginning of a survey's note on positions that are in the database together with points that contradict them."""
+
 
 @dataclass(frozen=True)
 class Positions:

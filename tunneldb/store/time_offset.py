@@ -9,7 +9,7 @@ import psycopg
 from tunneldb.errors import UserError
 from tunneldb.pointcloud.week_end import count_repeats
 from tunneldb.store.poses import load_poses
-from tunneldb.store.scanner import Positions, replace_positions, time_notes
+from tunneldb.store.scanner import MISFIT, Positions, replace_positions, time_notes
 from tunneldb.store.survey import Survey
 
 
@@ -29,7 +29,8 @@ def set_time_offset(connection: psycopg.Connection[Any], survey: Survey, seconds
     poses = load_poses(connection, survey)
     repeats = count_repeats(poses.time)
     time, xyz = poses.time[repeats:], poses.track[repeats:]
-    notes = [one for one in (note or "").split("; ") if one and one not in time_notes(time, xyz, former)]
+    own = time_notes(time, xyz, former)
+    notes = [one for one in (note or "").split("; ") if one and one not in own and not one.startswith(MISFIT)]
     time = time - former + seconds
     notes += time_notes(time, xyz, seconds)
     replace_positions(connection, survey.id, Positions(True, time, xyz, tuple(notes), seconds), survey.srid)
