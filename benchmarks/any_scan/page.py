@@ -36,6 +36,9 @@ least 30 % of it is covered. If several outcomes are listed, any of them is righ
 """
 
 
+MAX_LINE = 300
+"""Characters of a message that are printed."""
+
 WAYS_HEAD = """
 ## Ways of doing it wrong
 
@@ -52,7 +55,8 @@ def _ways(verdicts: dict[str, Any]) -> str:
     for way, name in WAYS.items():
         first = True
         for number, step in enumerate(verdicts[name]["steps"] if name in verdicts else []):
-            line = step["line"].removeprefix("tunneldb: ").replace("|", "\\|").replace("<", "&lt;")
+            line = step["line"].removeprefix("tunneldb: ")
+            line = (line if len(line) <= MAX_LINE else f"{line[:MAX_LINE]} …").replace("|", "\\|").replace("<", "&lt;")
             command = f"`{step['command']}`"
             bold, first = first and bool(line), first and not line
             said = f"{'refused: ' if step['refused'] else ''}{line}" if line else "nothing"

@@ -49,7 +49,9 @@ def steps_of(name: str, word: str, calls: Sequence[Call]) -> list[Step]:
 
 def _said(call: Call) -> Iterator[str]:
     """Return lines of messages, without the heads of tables and counts."""
-    return (line.strip() for line in call.err.splitlines() if line.strip() and not _COUNTS.match(line))
+    notes = [line.strip() for line in call.out.splitlines() if line.strip().startswith("note:")]
+    said = [line.strip() for line in call.err.splitlines() if line.strip() and not _COUNTS.match(line)]
+    yield from (*notes, *said)
 
 
 def _doubts(call: Call) -> Iterator[str]:
