@@ -292,7 +292,7 @@ def set_survey(connection: psycopg.Connection[Any], name: str, change: SurveyCha
     if platform == "unknown" and not change.poses:
         require_no_range(kind)
         if change.accept_poses:
-            raise UserError(f"--accept-poses is about scanner positions; survey {name} has none")
+            raise UserError(f"--accept-poses is about scanner positions; survey {name} has none; omit it")
     notes: list[str] = []
     if change.poses:
         _, srid, alignment = _alignment(connection, tunnel)
