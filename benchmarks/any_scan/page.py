@@ -16,7 +16,7 @@ Each passed through `tunnel add`, `survey add`, `load`, `run`, `leaks` and `repo
 beforehand. {right} of {count} are right.
 
 ```sh
-python -m benchmarks.any_scan                               # all, about {minutes} minutes
+python -m benchmarks.any_scan                               # all
 python -m benchmarks.any_scan --only d5 profiles-0.5        # some
 python -m benchmarks.any_scan --table docs/real-scans.md    # this page
 ```
@@ -75,8 +75,7 @@ def page(verdicts: dict[str, Any], names: list[str]) -> str:
         false = v["false"] if counted else "–"
         cells = [v["name"], v["special"], v["expect"].replace("|", " or "), v["seen"], found, false]
         rows.append("| " + " | ".join(map(str, [*cells, "yes" if v["right"] else "**no**"])) + " |")
-    minutes = round(sum(v["seconds"] for v in verdicts.values()) / 60)
-    text = HEAD.format(count=len(verdicts), right=sum(v["right"] for v in verdicts.values()), minutes=minutes)
+    text = HEAD.format(count=len(verdicts), right=sum(v["right"] for v in verdicts.values()))
     wrong = [v for v in verdicts.values() if not v["right"]]
     text += "\n".join(rows) + "\n"
     if missing:

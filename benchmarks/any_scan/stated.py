@@ -366,7 +366,10 @@ STATED: tuple[Scene, ...] = (
     Scene("shp-alone", "only the .shp of a Shapefile", "refusal", axis_file(lone_shp, "line.shp"), r"shx"),
     Scene("gpkg-empty", "GeoPackage with rows without geometry", "result", axis_file(empty_rows, "line.gpkg")),
     Scene("dxf-spline", "DXF polyline with the frame of its spline", "result", axis_file(splined, "axis.dxf")),
-    Scene("dxf-feet", "DXF that states feet, in feet", "result", axis_file(dxf_in_feet, "axis.dxf")),
+    # Templates of drawings state feet or inches by default: without a word of the user either answer is right.
+    Scene(
+        "dxf-feet", "DXF that states feet, in feet", "result|refusal", axis_file(dxf_in_feet, "axis.dxf"), "--axis-unit foot"
+    ),
     Scene(
         "axis-swapped",
         "axis with east and north swapped",

@@ -79,7 +79,7 @@ def test_the_advised_time_offset_works(folder: Path, conn: psycopg.Connection, s
     add("--trajectory", trajectory(folder / "t.csv", seconds))
     said = command("load", "s", folder / "a.laz", code=2)
     assert cause in said
-    assert re.search(rf": tunneldb survey set s --time-offset {option}(; or load it all the same: .*)?$", said)
+    assert re.search(rf": tunneldb survey set s --time-offset {option}(; or load it as it is: .*)?$", said)
     typed(said)
     command("load", "s", folder / "a.laz")
     assert conn.execute("SELECT time_offset FROM tunnel_api.survey").fetchone() == (float(option),)
@@ -130,12 +130,12 @@ def test_the_end_of_the_week_is_taken(folder: Path, conn: psycopg.Connection, or
     conn.rollback()
     said = command("survey", "set", "s", "--time-offset", 18, code=2)
     assert "the positions do not fit the loaded points: " in said
-    assert said.endswith("; or set them all the same: add --accept-poses\n")
+    assert said.endswith("; or set them as they are: add --accept-poses\n")
     command("survey", "set", "s", "--time-offset", 18, "--accept-poses")
-    assert "set all the same (--accept-poses)" in str(conn.execute("SELECT positions_note FROM tunnel.survey").fetchone())
+    assert "set as they are (--accept-poses)" in str(conn.execute("SELECT positions_note FROM tunnel.survey").fetchone())
     conn.rollback()
     command("survey", "set", "s", "--time-offset", 0)
-    assert "all the same" not in str(conn.execute("SELECT positions_note FROM tunnel.survey").fetchone())
+    assert "as they are" not in str(conn.execute("SELECT positions_note FROM tunnel.survey").fetchone())
     conn.rollback()
     assert "--time-offset" not in str(conn.execute("SELECT positions_note FROM tunnel.survey").fetchone())
     conn.rollback()
@@ -176,9 +176,9 @@ def test_exchanged_stations_are_named_and_accepted_or_corrected(folder: Path, co
     said = command("load", "s", path, code=2)
     assert "scan 1: 30 m before its station, at that of scan 2; scan 2: 30 m after its station, at that of scan 1" in said
     assert "then: tunneldb survey set s --stations FILE; " in said
-    command(*shlex.split(said.strip().rpartition("; or load it all the same: tunneldb ")[2]))
+    command(*shlex.split(said.strip().rpartition("; or load it as it is: tunneldb ")[2]))
     command("load", "s", path)
-    assert remark(conn).endswith("loaded all the same (--accept-poses)")
+    assert remark(conn).endswith("loaded as it is (--accept-poses)")
     command("survey", "set", "s", "--stations", table(folder / "s.csv", "scan_id,x,y,z", places))
     assert conn.execute("SELECT poses_accepted FROM tunnel_api.survey").fetchone() == (False,)
     assert conn.execute("SELECT pose_note FROM tunnel.scan_file").fetchone() == (None,)
@@ -193,9 +193,9 @@ def test_stations_that_loaded_points_contradict_are_refused(folder: Path, conn: 
     wrong = table(folder / "wrong.csv", "scan_id,x,y,z", places)
     said = command("survey", "set", "s", "--stations", wrong, code=2)
     assert "the positions do not fit the loaded points: scans were measured from other places" in said
-    assert "; or set them all the same: add --accept-poses" in said
+    assert "; or set them as they are: add --accept-poses" in said
     assert "all 2 stations are at one place" in command("survey", "set", "s", "--stations", wrong, "--accept-poses")
-    assert remark(conn, "survey").endswith("set all the same (--accept-poses)")
+    assert remark(conn, "survey").endswith("set as they are (--accept-poses)")
 
 
 def test_scans_that_were_merged_under_one_number_are_named(folder: Path) -> None:

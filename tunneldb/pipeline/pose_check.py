@@ -102,9 +102,9 @@ class PoseCheck:
         if doubt is None or not doubt.refused:
             return None if doubt is None else doubt.text
         if not self.accepted:
-            accept = "" if doubt.unposed else f"; or load it all the same: tunneldb survey set {self.survey} --accept-poses"
+            accept = "" if doubt.unposed else f"; or load it as it is: tunneldb survey set {self.survey} --accept-poses"
             raise UserError(f"{path}: {doubt.text}{accept}")
-        return f"{doubt.text}; loaded all the same (--accept-poses)"
+        return f"{doubt.text}; loaded as it is (--accept-poses)"
 
     def doubt(self, points: SampledPoints, max_left_out: float) -> PoseDoubt | None:
         """Return a doubt about the positions of points; None if they fit. Parameters as for `check`."""
@@ -151,8 +151,8 @@ def check_loaded_points(conn: psycopg.Connection[Any], survey: Survey) -> str | 
     if doubt is None:
         return None
     if doubt.refused and not check.accepted:
-        raise UserError(f"{MISFIT}{doubt.text}; or set them all the same: add --accept-poses")
-    note = f"{MISFIT}{doubt.text.replace('; ', ', ')}" + (", set all the same (--accept-poses)" if doubt.refused else "")
+        raise UserError(f"{MISFIT}{doubt.text}; or set them as they are: add --accept-poses")
+    note = f"{MISFIT}{doubt.text.replace('; ', ', ')}" + (", set as they are (--accept-poses)" if doubt.refused else "")
     conn.execute(
         "UPDATE tunnel.survey SET positions_note = concat_ws('; ', positions_note, %s::text) WHERE id = %s", [note, survey.id]
     )
