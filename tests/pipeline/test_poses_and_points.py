@@ -11,6 +11,7 @@ import numpy as np
 import psycopg
 import pytest
 from click.testing import CliRunner
+from support.command import errors_of
 from support.loaded_survey import LENGTH, ORIGIN, START, tube, write
 
 from tunneldb.cli.main import main
@@ -21,18 +22,9 @@ ALONG = np.array([1.0, 0.0, 0.0])
 STOOD = 60.0  # s before and after
 
 
-def command(*arguments: object, code: int = 0) -> str:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exit_code == code, result.output
-    if code:
-        assert result.stderr.count("\n") == 1
-        assert "Traceback" not in result.output
-    return result.stderr
-
-
 def typed(message: str) -> None:
     """Do what a message says first."""
-    command(*shlex.split(re.findall(r": tunneldb ([^;]+)", message.strip())[0]))
+    errors_of(*shlex.split(re.findall(r": tunneldb ([^;]+)", message.strip())[0]))
 
 
 def table(path: Path, header: str, rows: np.ndarray) -> Path:
@@ -52,7 +44,7 @@ def trajectory(path: Path, seconds: float = 0.0, scale: float = 1.0, aside: floa
 def folder(conn: psycopg.Connection, tmp_path: Path) -> Path:
     """A tunnel, and a scan of it from a trolley."""
     axis = table(tmp_path / "axis.csv", "x,y,z", np.array([ORIGIN, ORIGIN + LENGTH * ALONG]))
-    command("tunnel", "add", "t", "--srid", 25830, "--axis", axis, "--start-chainage", START)
+    errors_of("tunnel", "add", "t", "--srid", 25830, "--axis", axis, "--start-chainage", START)
     path = write(tmp_path / "a.laz", tube(START, START + LENGTH, 20, seed=1))
     las = laspy.read(path)
     las.gps_time = np.asarray(las.gps_time) + GPS
@@ -61,7 +53,7 @@ def folder(conn: psycopg.Connection, tmp_path: Path) -> Path:
 
 
 def add(kind: str, path: Path, *more: object, code: int = 0) -> str:
-    return command(
+    return errors_of(
         "survey", "add", "s", "--tunnel", "t", "--date", "2024-05-04", kind, path, "--intensity-kind", "none", *more, code=code
     )
 
@@ -77,11 +69,11 @@ def add(kind: str, path: Path, *more: object, code: int = 0) -> str:
 )
 def test_the_advised_time_offset_works(folder: Path, conn: psycopg.Connection, seconds: float, cause: str, option: str) -> None:
     add("--trajectory", trajectory(folder / "t.csv", seconds))
-    said = command("load", "s", folder / "a.laz", code=2)
+    said = errors_of("load", "s", folder / "a.laz", code=2)
     assert cause in said
     assert re.search(rf": tunneldb survey set s --time-offset {option}(; or load it as it is: .*)?$", said)
     typed(said)
-    command("load", "s", folder / "a.laz")
+    errors_of("load", "s", folder / "a.laz")
     assert conn.execute("SELECT time_offset FROM tunnel_api.survey").fetchone() == (float(option),)
     remark = f"{float(option):+.12g} s added to the times of the trajectory (--time-offset)"
     assert [row[0] for row in conn.execute("SELECT remark FROM tunnel_api.remark WHERE stage = 'survey'")] == [remark]
@@ -91,10 +83,10 @@ def test_the_advised_time_offset_works(folder: Path, conn: psycopg.Connection, s
 
 def test_a_time_offset_that_is_wrong_is_corrected_and_removed(folder: Path, conn: psycopg.Connection) -> None:
     add("--trajectory", trajectory(folder / "t.csv"), "--time-offset", 37)
-    typed(command("load", "s", folder / "a.laz", code=2))
+    typed(errors_of("load", "s", folder / "a.laz", code=2))
     assert conn.execute("SELECT time_offset, positions_note FROM tunnel.survey").fetchone() == (0.0, None)
     conn.rollback()
-    command("load", "s", folder / "a.laz")
+    errors_of("load", "s", folder / "a.laz")
 
 
 def test_times_in_milliseconds_are_divided_as_it_says(folder: Path) -> None:
@@ -102,16 +94,16 @@ def test_times_in_milliseconds_are_divided_as_it_says(folder: Path) -> None:
     las = laspy.read(folder / "a.laz")
     las.gps_time = np.asarray(las.gps_time) - GPS + 5000.0
     las.write(folder / "a.laz")
-    said = command("load", "s", folder / "a.laz", code=2)
+    said = errors_of("load", "s", folder / "a.laz", code=2)
     factor = re.search(r"in milliseconds: divide them by (\d+)$", said.strip())
     assert factor is not None
-    command("survey", "set", "s", "--trajectory", trajectory(folder / "t.csv", -GPS + 5000.0, 1000.0 / int(factor[1])))
-    command("load", "s", folder / "a.laz")
+    errors_of("survey", "set", "s", "--trajectory", trajectory(folder / "t.csv", -GPS + 5000.0, 1000.0 / int(factor[1])))
+    errors_of("load", "s", folder / "a.laz")
 
 
 def test_a_parallel_tunnel_is_refused(folder: Path) -> None:
     add("--trajectory", trajectory(folder / "t.csv", aside=15.0))
-    assert "13 m outside the section that the points show" in command("load", "s", folder / "a.laz", code=2)
+    assert "13 m outside the section that the points show" in errors_of("load", "s", folder / "a.laz", code=2)
 
 
 @pytest.mark.parametrize("order", ["measured", "sorted"])
@@ -125,30 +117,30 @@ def test_the_end_of_the_week_is_taken(folder: Path, conn: psycopg.Connection, or
     las.gps_time = (np.asarray(las.gps_time) + shift) % WEEK
     las.write(folder / "a.laz")
     assert "the GPS week ends during the trajectory" in add("--trajectory", path)
-    command("load", "s", folder / "a.laz")
+    errors_of("load", "s", folder / "a.laz")
     assert conn.execute("SELECT unposed, pose_note FROM tunnel.scan_file").fetchone() == (0, None)
     conn.rollback()
-    said = command("survey", "set", "s", "--time-offset", 18, code=2)
+    said = errors_of("survey", "set", "s", "--time-offset", 18, code=2)
     assert "the positions do not fit the loaded points: " in said
     assert said.endswith("; or set them as they are: add --accept-poses\n")
-    command("survey", "set", "s", "--time-offset", 18, "--accept-poses")
+    errors_of("survey", "set", "s", "--time-offset", 18, "--accept-poses")
     assert "set as they are (--accept-poses)" in str(conn.execute("SELECT positions_note FROM tunnel.survey").fetchone())
     conn.rollback()
-    command("survey", "set", "s", "--time-offset", 0)
+    errors_of("survey", "set", "s", "--time-offset", 0)
     assert "as they are" not in str(conn.execute("SELECT positions_note FROM tunnel.survey").fetchone())
     conn.rollback()
     assert "--time-offset" not in str(conn.execute("SELECT positions_note FROM tunnel.survey").fetchone())
     conn.rollback()
     las.gps_time = (np.asarray(las.gps_time) - 30.0) % WEEK + 30.0  # a scan whose seconds go on after the week's end
     las.write(folder / "a.laz")
-    command("load", "s", folder / "a.laz")
+    errors_of("load", "s", folder / "a.laz")
 
 
 def test_what_is_no_trajectory_has_no_time_offset(folder: Path) -> None:
     stations = table(folder / "s.csv", "scan_id,x,y,z", np.array([[1, *ORIGIN]]))
     assert "--time-offset is about a trajectory" in add("--stations", stations, "--time-offset", 18, code=2)
     add("--stations", stations)
-    assert "survey s has none" in command("survey", "set", "s", "--time-offset", 18, code=2)
+    assert "survey s has none" in errors_of("survey", "set", "s", "--time-offset", 18, code=2)
 
 
 def two_scans(folder: Path) -> tuple[Path, np.ndarray]:
@@ -173,13 +165,13 @@ def test_exchanged_stations_are_named_and_accepted_or_corrected(folder: Path, co
     exchanged = places.copy()
     exchanged[:, 0] = [2, 1]
     add("--stations", table(folder / "s.csv", "scan_id,x,y,z", exchanged))
-    said = command("load", "s", path, code=2)
+    said = errors_of("load", "s", path, code=2)
     assert "scan 1: 30 m before its station, at that of scan 2; scan 2: 30 m after its station, at that of scan 1" in said
     assert "then: tunneldb survey set s --stations FILE; " in said
-    command(*shlex.split(said.strip().rpartition("; or load it as it is: tunneldb ")[2]))
-    command("load", "s", path)
+    errors_of(*shlex.split(said.strip().rpartition("; or load it as it is: tunneldb ")[2]))
+    errors_of("load", "s", path)
     assert remark(conn).endswith("loaded as it is (--accept-poses)")
-    command("survey", "set", "s", "--stations", table(folder / "s.csv", "scan_id,x,y,z", places))
+    errors_of("survey", "set", "s", "--stations", table(folder / "s.csv", "scan_id,x,y,z", places))
     assert conn.execute("SELECT poses_accepted FROM tunnel_api.survey").fetchone() == (False,)
     assert conn.execute("SELECT pose_note FROM tunnel.scan_file").fetchone() == (None,)
     conn.rollback()
@@ -188,13 +180,13 @@ def test_exchanged_stations_are_named_and_accepted_or_corrected(folder: Path, co
 def test_stations_that_loaded_points_contradict_are_refused(folder: Path, conn: psycopg.Connection) -> None:
     path, places = two_scans(folder)
     add("--stations", table(folder / "s.csv", "scan_id,x,y,z", places))
-    command("load", "s", path)
+    errors_of("load", "s", path)
     places[:, 1:] = places[0, 1:]
     wrong = table(folder / "wrong.csv", "scan_id,x,y,z", places)
-    said = command("survey", "set", "s", "--stations", wrong, code=2)
+    said = errors_of("survey", "set", "s", "--stations", wrong, code=2)
     assert "the positions do not fit the loaded points: scans were measured from other places" in said
     assert "; or set them as they are: add --accept-poses" in said
-    assert "all 2 stations are at one place" in command("survey", "set", "s", "--stations", wrong, "--accept-poses")
+    assert "all 2 stations are at one place" in errors_of("survey", "set", "s", "--stations", wrong, "--accept-poses")
     assert remark(conn, "survey").endswith("set as they are (--accept-poses)")
 
 
@@ -205,13 +197,13 @@ def test_scans_that_were_merged_under_one_number_are_named(folder: Path) -> None
     las.point_source_id = np.ones(len(las))
     las.write(path)
     add("--stations", table(folder / "s.csv", "scan_id,x,y,z", places[:1]))
-    assert "scan 1: 2 places, 30 m apart" in command("load", "s", path, code=2)
+    assert "scan 1: 2 places, 30 m apart" in errors_of("load", "s", path, code=2)
     result = CliRunner().invoke(main, ["inspect", str(path)])
     assert "if the scanner stood on tripods: points of one scan number were measured from several places" in result.stdout
     las.point_source_id = numbers
     las.write(path)
-    command("survey", "set", "s", "--stations", table(folder / "s.csv", "scan_id,x,y,z", places))
-    command("load", "s", path)
+    errors_of("survey", "set", "s", "--stations", table(folder / "s.csv", "scan_id,x,y,z", places))
+    errors_of("load", "s", path)
 
 
 def test_inspect_finds_the_time_offset_before(folder: Path) -> None:
