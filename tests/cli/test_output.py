@@ -17,6 +17,7 @@ import pytest
 from click.testing import CliRunner
 from shapely.geometry import Point
 
+from tunneldb.cli import output
 from tunneldb.cli.main import COMMANDS, EXAMPLES, main
 from tunneldb.cli.output import Command, plain
 from tunneldb.cli.progress import rate
@@ -129,3 +130,13 @@ def test_a_survey_may_have_the_name_of_a_verb() -> None:
 def test_parameters_are_checked_together() -> None:
     with pytest.raises(UserError, match="half_width must not exceed"):
         check_together(settings() | {"section.half_width": 2.0, "section.max_half_width": 1.0})
+
+
+def test_a_line_of_an_error_is_one_line_of_a_readable_length() -> None:
+    """Names in files may hold line breaks that forge lines, control sequences, or be thousands."""
+    assert output.error_line("a\ntunneldb: forged \x1b[31m\r\u202e") == r"tunneldb: a\ntunneldb: forged \x1b[31m\r\u202e"
+    names = ", ".join(f"column{n}" for n in range(100_000))
+    line = output.error_line(f"a.csv: no column x: the header is {names}; name it x")
+    assert len(line) < 2100
+    assert line.startswith("tunneldb: a.csv: no column x: the header is column0, ")
+    assert line.endswith("column99999; name it x")

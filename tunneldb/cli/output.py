@@ -35,6 +35,9 @@ QUIET = "tunneldb.quiet"
 
 log = logging.getLogger(MESSAGES)
 
+MAX_LINE = 2000
+"""Maximum characters of the line of an error; a longer one lacks its middle."""
+
 _STDOUT = 1
 """Descriptor of standard output, which programs that are started inherit."""
 
@@ -71,7 +74,10 @@ def is_quiet() -> bool:
 
 def error_line(message: str) -> str:
     """Return the line by which an error is told, whatever names are in it."""
-    return "tunneldb: " + printable(message)
+    text = printable(message)
+    if len(text) > MAX_LINE:  # of a file with thousands of columns; the advice is at the end
+        text = f"{text[: MAX_LINE // 2]} … {text[-MAX_LINE // 2 :]}"
+    return "tunneldb: " + text
 
 
 def _is_shown(character: str) -> bool:
