@@ -202,7 +202,7 @@ AS $$
             SELECT g.n AS stretch, g.searched, row_number() OVER (PARTITION BY g.n, g.searched ORDER BY g.chainage_from) AS n,
                 format(CASE WHEN g.searched THEN '%3$s %1$s–%2$s%4$s' ELSE '%1$s–%2$s %3$s%4$s' END,
                     f.label, t.label, g.state, CASE g.state
-                        WHEN 'unseen' THEN format(' (%s %% of the lining seen)', round((100 * g.seen_share)::numeric))
+                        WHEN 'unseen' THEN format(' (%s %% of the lining inspected)', round((100 * g.seen_share)::numeric))
                         ELSE format(' (%s)', g.reason) END) AS said
             FROM tunnel.survey s
             CROSS JOIN LATERAL tunnel_internal.coverage_gaps_of(s.id, $2, $3) g

@@ -159,7 +159,7 @@ BEGIN
             AND l.chainage_from > t.chainage_from - 1e-6 - (
                 SELECT max(o.chainage_to - o.chainage_from) FROM tunnel.finding o WHERE o.survey_id = survey_key)
     ), breach AS (
-        SELECT c.id AS class, 1 AS n, format('wet area is %s ‰ of the lining seen > %s ‰',
+        SELECT c.id AS class, 1 AS n, format('wet area is %s ‰ of the inspected lining > %s ‰',
                 round((1000 * t.wet_ratio)::numeric, 2), 1000 * c.wet_ratio) AS text,
             (SELECT array_agg(l.id) FROM leak l) AS leaks
         FROM found t JOIN tunnel_api.waterproof_limit c ON t.wet_ratio > c.wet_ratio

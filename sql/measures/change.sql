@@ -12,7 +12,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_surve
   JOIN tunnel.survey s ON s.id = c.survey_id
   JOIN tunnel.survey o ON o.id = c.old_survey_id;
 COMMENT ON VIEW tunnel_api.change_section IS
-    'Rigid motion of lining sections between two surveys, and the change that remains. Only control points can separate registration error from movement';
+    'Rigid motion of lining sections between two surveys, and the change that remains, written by tunneldb compare. Only control points can separate registration error from movement';
 COMMENT ON COLUMN tunnel_api.change_section.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.change_section.old_survey IS 'Name of the survey that it is compared with';
 COMMENT ON COLUMN tunnel_api.change_section.unseen IS
@@ -27,7 +27,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_surve
   JOIN tunnel.survey s ON s.id = c.survey_id
   JOIN tunnel.survey o ON o.id = c.old_survey_id;
 COMMENT ON VIEW tunnel_api.change_region IS
-    'Areas of lining that changed significantly between two surveys, after removal of the rigid motion of the section, with three geometries';
+    'Areas of lining that changed significantly between two surveys, after removal of the rigid motion of the section, with three geometries; written by tunneldb compare';
 
 CREATE OR REPLACE VIEW tunnel_api.leak_change AS
 SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_survey, c.km, c.state, c.chainage_from, c.chainage_to,
@@ -40,7 +40,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.old_survey_id, o.name AS old_surve
   JOIN tunnel.survey s ON s.id = c.survey_id
   JOIN tunnel.survey o ON o.id = c.old_survey_id;
 COMMENT ON VIEW tunnel_api.leak_change IS
-    'Change of leaks between two surveys: state, area before and after, three geometries. What one survey did not inspect is unseen, never new or dry';
+    'Change of leaks between two surveys, written by tunneldb compare: state, area before and after, three geometries. What one survey did not inspect is unseen, never new or dry';
 COMMENT ON COLUMN tunnel_api.leak_change.area_change IS 'Wet area of the newer survey minus that of the older one, m²';
 COMMENT ON COLUMN tunnel_api.leak_change.area_change_se IS 'Standard error of area_change from resolution and threshold, m²';
 
@@ -221,4 +221,4 @@ LANGUAGE sql STABLE PARALLEL SAFE STRICT ROWS 1000 SECURITY DEFINER SET search_p
      ORDER BY q.k, q.date, q.name
 $$;
 COMMENT ON FUNCTION tunnel_api.leak_area_series(text, float8) IS
-'Wet area (m²) of each survey of a tunnel, without copies from archives, in stretches of step metres, by date: counted leaks, at their middle. A stretch without a row has no leak or was not inspected (tunnel_api.coverage_gaps)';
+'Wet area (m²) of each survey of a tunnel, without copies from archives, in stretches of step metres, by date: counted leaks, each with its whole area in the stretch of its middle (wet_area divides a leak between stretches). A stretch without a row has no leak or was not inspected (tunnel_api.coverage_gaps)';

@@ -23,7 +23,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.km, c.gauge, c.track, c.chainage_f
        c.widened_right, c.roll, c.margins, c.outline, c.geom::public.geometry AS geom
   FROM tunnel.clearance_section c JOIN tunnel.survey s ON s.id = c.survey_id;
 COMMENT ON VIEW tunnel_api.clearance_section IS
-    'Smallest distance of objects in the tunnel from a gauge, for each metre. Where seen_share is less than 1, an object that was not measured may be nearer';
+    'Smallest distance of objects in the tunnel from a gauge, for each metre, written by tunneldb clearance. Where seen_share is less than 1, an object that was not measured may be nearer';
 COMMENT ON COLUMN tunnel_api.clearance_section.gauge IS 'Name of the gauge';
 COMMENT ON COLUMN tunnel_api.clearance_section.track IS
     'single; left or right; with more than two tracks, the number from the left; given';
@@ -62,7 +62,7 @@ SELECT i.id, i.survey_id, s.name AS survey, i.km, i.gauge, i.track, i.chainage_f
        (SELECT l.label FROM tunnel_api.stationing(s.tunnel_id, (i.chainage_from + i.chainage_to) / 2) l) AS label, i.depth, i.clock, tunnel_internal.class_name(i.class) AS class,
        i.counts, i.cluster_id, i.points, i.unrolled, i.geom::public.geometry AS geom
   FROM tunnel.clearance_infringement i JOIN tunnel.survey s ON s.id = i.survey_id;
-COMMENT ON VIEW tunnel_api.clearance_infringement IS 'Groups of points inside a gauge, in pieces of at most 10 m';
+COMMENT ON VIEW tunnel_api.clearance_infringement IS 'Groups of points inside a gauge, in pieces of at most 10 m, written by tunneldb clearance';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.gauge IS 'Name of the gauge';
 COMMENT ON COLUMN tunnel_api.clearance_infringement.track IS
     'single; left or right; with more than two tracks, the number from the left; given';

@@ -53,7 +53,7 @@ SELECT d.id, d.survey_id, s.name AS survey, d.km, d.layer, d.profile, d.chainage
   FROM tunnel.deviation_section d
   JOIN tunnel.survey s ON s.id = d.survey_id;
 COMMENT ON VIEW tunnel_api.deviation_section IS
-    'Deviation of the lining from its design profile, for each metre of chainage. Lining that was not inspected is in no area; see seen_share';
+    'Deviation of the lining from its design profile, for each metre of chainage, written by tunneldb deviation. Lining that was not inspected is in no area; see seen_share';
 COMMENT ON COLUMN tunnel_api.deviation_section.layer IS 'Layer of the profile';
 COMMENT ON COLUMN tunnel_api.deviation_section.profile IS 'Name of the profile; in a transition, both names';
 COMMENT ON COLUMN tunnel_api.deviation_section.label IS 'Station of its middle, as 12+345.678';

@@ -9,7 +9,7 @@ SELECT d.id, d.survey_id, s.name AS survey, d.km, d.layer, d.straightedge, d.gap
   FROM tunnel.evenness_section d
   JOIN tunnel.survey s ON s.id = d.survey_id;
 COMMENT ON VIEW tunnel_api.evenness_section IS
-    'Evenness of the lining: gaps beneath a virtual straightedge along and around it, after removal of the design curvature, for each metre of chainage';
+    'Evenness of the lining: gaps beneath a virtual straightedge along and around it, after removal of the design curvature, for each metre of chainage; written by tunneldb evenness';
 COMMENT ON COLUMN tunnel_api.evenness_section.layer IS 'Layer whose profiles are the reference';
 COMMENT ON COLUMN tunnel_api.evenness_section.straightedge IS 'Length of the straightedge, m';
 COMMENT ON COLUMN tunnel_api.evenness_section.gap_limit IS 'Permitted gap, m';
@@ -42,7 +42,7 @@ SELECT d.id, d.survey_id, s.name AS survey, d.km, d.layer, public.st_xmin(d.geom
   FROM tunnel.evenness_area d
   JOIN tunnel.survey s ON s.id = d.survey_id;
 COMMENT ON VIEW tunnel_api.evenness_area IS
-    'Areas where the gap beneath a virtual straightedge is greater than the limit. An area across a kilometre boundary is in two parts';
+    'Areas where the gap beneath a virtual straightedge is greater than the limit, written by tunneldb evenness. An area across a kilometre boundary is in two parts';
 COMMENT ON COLUMN tunnel_api.evenness_area.layer IS 'Layer whose profiles are the reference';
 COMMENT ON COLUMN tunnel_api.evenness_area.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.evenness_area.arc_from IS 'Smallest arc, m';

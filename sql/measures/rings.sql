@@ -13,11 +13,11 @@ SELECT r.id, r.survey_id, s.name AS survey, r.km,
   FROM tunnel.ring r
   JOIN tunnel.survey s ON s.id = r.survey_id;
 COMMENT ON VIEW tunnel_api.ring IS
-    'Rings of segmental linings with their shape; each value with its standard error (_se). NULL: not measured, or not determined';
+    'Rings of segmental linings with their shape, written by tunneldb rings; each value with its standard error (_se). Clock positions are in degrees. NULL: not measured, or not determined';
 COMMENT ON COLUMN tunnel_api.ring.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.ring.number IS 'Number of the ring';
 COMMENT ON COLUMN tunnel_api.ring.origin IS 'Source of the rings: length, file, or found';
-COMMENT ON COLUMN tunnel_api.ring.joint IS 'Joint at its beginning: given, seen (detected), or missing';
+COMMENT ON COLUMN tunnel_api.ring.joint IS 'Joint at its beginning: given, seen (detected in the image), or missing';
 COMMENT ON COLUMN tunnel_api.ring.seen_share IS 'Inspected share of the circumference; NULL: not measured';
 COMMENT ON COLUMN tunnel_api.ring.shape IS 'Fitted shape: ellipse, circle, or none';
 COMMENT ON COLUMN tunnel_api.ring.centre_right IS 'Distance of the centre to the right of the given axis, m';
@@ -70,7 +70,7 @@ SELECT r.id * 1000 + n AS id, r.id AS ring_id, r.survey_id, s.name AS survey, r.
  CROSS JOIN LATERAL generate_subscripts(r.step, 1) AS n
  WHERE r.step[n] <> 'NaN';
 COMMENT ON VIEW tunnel_api.ring_step IS
-    'Steps of the lining from each ring to the next, in cells of arc. Cells without a determined step are left out';
+    'Steps of the lining from each ring to the next, written by tunneldb rings, in cells of arc. Cells without a determined step are left out';
 COMMENT ON COLUMN tunnel_api.ring_step.ring_id IS 'Key of the ring behind the joint';
 COMMENT ON COLUMN tunnel_api.ring_step.number IS 'Number of the ring behind the joint';
 COMMENT ON COLUMN tunnel_api.ring_step.cell IS 'Number of the cell, from the smallest arc up, from 1';
@@ -85,7 +85,7 @@ SELECT c.id, c.ring_id, r.survey_id, s.name AS survey, r.km, r.number, r.chainag
   JOIN tunnel.ring r ON r.id = c.ring_id
   JOIN tunnel.survey s ON s.id = r.survey_id;
 COMMENT ON VIEW tunnel_api.ring_chord IS
-    'Chords of rings between two clock positions. Their change between surveys is the convergence';
+    'Chords of rings between two clock positions, written by tunneldb rings --chord. Their change between surveys is the convergence';
 COMMENT ON COLUMN tunnel_api.ring_chord.ring_id IS 'Key of the ring';
 COMMENT ON COLUMN tunnel_api.ring_chord.number IS 'Number of the ring';
 COMMENT ON COLUMN tunnel_api.ring_chord.clock_from IS 'Clock position of one end, degrees from the crown to the right';
@@ -132,7 +132,7 @@ SELECT r.id, r.survey_id, r.survey, r.km, r.number, r.label, r.chainage_from, r.
 COMMENT ON VIEW tunnel_api.ring_unrolled IS 'Rings on the unrolled plane, with the columns that QGIS shows';
 COMMENT ON COLUMN tunnel_api.ring_unrolled.number IS 'Number of the ring';
 COMMENT ON COLUMN tunnel_api.ring_unrolled.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.ring_unrolled.joint IS 'Joint at its beginning: given, seen (detected), or missing';
+COMMENT ON COLUMN tunnel_api.ring_unrolled.joint IS 'Joint at its beginning: given, seen (detected in the image), or missing';
 COMMENT ON COLUMN tunnel_api.ring_unrolled.seen_share IS 'Inspected share of the circumference; NULL: not measured';
 COMMENT ON COLUMN tunnel_api.ring_unrolled.radius IS 'Mean radius, m';
 COMMENT ON COLUMN tunnel_api.ring_unrolled.ovality IS '(Largest − smallest diameter) / design diameter, per mille';
@@ -159,7 +159,7 @@ SELECT r.id, r.survey_id, r.survey, r.km, r.number, r.label, r.chainage_from, r.
 COMMENT ON VIEW tunnel_api.ring_map IS 'Rings on the map strip beside the axis, with the columns that QGIS shows';
 COMMENT ON COLUMN tunnel_api.ring_map.number IS 'Number of the ring';
 COMMENT ON COLUMN tunnel_api.ring_map.label IS 'Station of its middle, as 12+345.678';
-COMMENT ON COLUMN tunnel_api.ring_map.joint IS 'Joint at its beginning: given, seen (detected), or missing';
+COMMENT ON COLUMN tunnel_api.ring_map.joint IS 'Joint at its beginning: given, seen (detected in the image), or missing';
 COMMENT ON COLUMN tunnel_api.ring_map.seen_share IS 'Inspected share of the circumference; NULL: not measured';
 COMMENT ON COLUMN tunnel_api.ring_map.radius IS 'Mean radius, m';
 COMMENT ON COLUMN tunnel_api.ring_map.ovality IS '(Largest − smallest diameter) / design diameter, per mille';

@@ -10,7 +10,7 @@ SELECT d.id, d.survey_id, s.name AS survey, d.before_id, b.name AS before, d.km,
   JOIN tunnel.survey s ON s.id = d.survey_id
   JOIN tunnel.survey b ON b.id = d.before_id;
 COMMENT ON VIEW tunnel_api.thickness_section IS
-    'Layer thickness between the linings of two surveys, perpendicular to a layer''s design profile, for each metre of chainage. Lining that either survey did not inspect is in no area';
+    'Layer thickness between the linings of two surveys, perpendicular to a layer''s design profile, for each metre of chainage, written by tunneldb thickness. Lining that either survey did not inspect is in no area';
 COMMENT ON COLUMN tunnel_api.thickness_section.survey_id IS 'Key of the later survey';
 COMMENT ON COLUMN tunnel_api.thickness_section.survey IS 'Name of the later survey';
 COMMENT ON COLUMN tunnel_api.thickness_section.before_id IS 'Key of the earlier survey';

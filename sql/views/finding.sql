@@ -76,7 +76,7 @@ DECLARE
     comment record;
 BEGIN
     FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
-        ('id', 'Number by which lists, sheets, reports and QGIS name it'),
+        ('id', 'Number of the finding, the same in lists, sheets, reports and QGIS'),
         ('segment', 'Number of the segment at its middle'),
         ('label', 'Station of its middle, as 12+345.678'),
         ('chainage_from', 'Smallest chainage, m'),
@@ -202,7 +202,7 @@ DECLARE
     comment record;
 BEGIN
     FOR comment IN SELECT c.relname AS view, a.attname AS "column", t.text FROM (VALUES
-        ('id', 'Number by which lists, sheets, reports and QGIS name it'),
+        ('id', 'Number of the finding, the same in lists, sheets, reports and QGIS'),
         ('segment', 'Number of the segment at its middle'),
         ('label', 'Station of its middle, as 12+345.678'),
         ('chainage_from', 'Smallest chainage, m'),

@@ -63,7 +63,7 @@ SELECT p.id, p.survey_id, s.name AS survey, p.km,
   JOIN tunnel.survey s ON s.id = p.survey_id
   JOIN tunnel.tunnel t ON t.id = s.tunnel_id
  CROSS JOIN LATERAL (SELECT floor(p.chainage / t.spacing)::integer AS near) m;
-COMMENT ON VIEW tunnel_api.target_sphere IS 'Target spheres, one row for each scan that shows one (Li et al., 2023)';
+COMMENT ON VIEW tunnel_api.target_sphere IS 'Target spheres, one row for each scan that shows one, written by tunneldb spheres (Li et al., 2023)';
 COMMENT ON COLUMN tunnel_api.target_sphere.segment IS 'Number of the segment at its centre';
 COMMENT ON COLUMN tunnel_api.target_sphere.label IS 'Station of its centre, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.target_sphere.x IS 'Easting of the centre, tunnel''s SRID, m';

@@ -161,7 +161,7 @@ def test_kinds_are_listed_and_exported(conn, example, tmp_path, kind, number):
 
 def test_kilometres_are_summed_up(conn, example):
     said, *lines = run("leaks", example, "--by-km").stdout.splitlines()
-    assert said == "Searched, but unseen 12+300–12+310 (0 % of the lining seen)"
+    assert said == "Searched, but unseen 12+300–12+310 (0 % of the lining inspected)"
     header = ("km", "lining m²", "seen %", "wet m²", "wet ‰", "leaks", "largest m²", "in 100 m²", "class")
     assert lines[0].split() == " ".join(header).split()
     (areas,) = conn.execute("SELECT array_agg(area) FROM tunnel_api.leak WHERE review <> 'rejected'").fetchone()

@@ -76,7 +76,7 @@ CROWD = [Wet(1010 + 0.04 * n, 1010.03 + 0.04 * n, -6 + n, -5.5 + n) for n in ran
 
 WHOLE = Case(
     Scene("whole", leaks=[*INSIDE, *CROWD], dark=(1030.0, 1040.0), notes=dict.fromkeys((0, 1), "2 of 7 are bent"), unposed=7),
-    FIRST, LAST, 1.0, ("Searched, but unseen 1+030–1+040 (0 % of the lining seen)",), True,
+    FIRST, LAST, 1.0, ("Searched, but unseen 1+030–1+040 (0 % of the lining inspected)",), True,
     ("a.laz: 7 points (0.70 %) left out: the scanner's position is not known", "km 0–1, axis: 2 of 7 are bent"),
 )  # fmt: skip
 BY_AXIS = Case(

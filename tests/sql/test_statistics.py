@@ -355,7 +355,7 @@ def test_wet_area_is_held_against_the_lining_seen(conn: psycopg.Connection, plai
     assert classes(conn)[2] == (True, [], [])
     conn.execute("UPDATE tunnel.coverage SET seen = (SELECT array_agg(0.99 * v ORDER BY n) FROM unnest(lining) "
                  "WITH ORDINALITY AS l (v, n))")  # fmt: skip
-    assert classes(conn)[2] == (False, ["wet area is 2.01 ‰ of the lining seen > 2 ‰"], keys)
+    assert classes(conn)[2] == (False, ["wet area is 2.01 ‰ of the inspected lining > 2 ‰"], keys)
     assert classes(conn)[3][0] is True
     shares = [row["seen_share"] for row in ask(conn, "SELECT * FROM tunnel_api.waterproof_class('s', 0, 500)")]
     assert shares == pytest.approx([0.99] * 4)

@@ -140,7 +140,7 @@ def find_axis(points: Float) -> FoundAxis:
     local = points - origin
     parts = roofed_parts(local)
     if not parts:
-        raise InputError(f"no tunnel: nowhere is there a vault {CLEARANCE:g} m or more above a floor")
+        raise InputError(f"no tunnel: no place has a vault at least {CLEARANCE:g} m above a floor")
     if len(parts) > 1 and parts[1].area > _AMBIGUOUS_AREA_SHARE * parts[0].area:
         raise InputError(
             "the tunnel has separate parts, or there are several tunnels: "

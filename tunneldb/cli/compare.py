@@ -145,7 +145,7 @@ def _print(rows: dict[str, list[Row]], whole: Row) -> None:
     click.echo(
         f"lining: {whole['compared']:.1f} m² compared, {whole['changed']:.2f} m² of it changed in"
         f" {counted(whole['regions'], 'region')};"
-        f" {whole['unseen']:.1f} m² that the older survey saw were not seen by the newer: of these nothing is known"
+        f" {whole['unseen']:.1f} m² could be measured in the older survey only: their change is unknown"
     )
     if whole["shift_greatest"] is not None:
         click.echo(
@@ -154,5 +154,6 @@ def _print(rows: dict[str, list[Row]], whole: Row) -> None:
         )
     if whole["sections_without_motion"]:
         click.echo(
-            f"in {counted(whole['sections_without_motion'], 'section')} too little was seen by both to tell how they moved"
+            f"{counted(whole['sections_without_motion'], 'section')} without a computed motion: both surveys measured too"
+            " little of the same lining"
         )

@@ -61,9 +61,9 @@ _GROUPS: dict[str, list[_Option]] = {
             "static (tripod on stations) or profiler (on a trolley, one turn of the mirror a profile).",
             click.Choice(list(CHOICES["scanner"])),
         ),
-        _Option("station_spacing", "M", "static: greatest distance between stations."),
+        _Option("station_spacing", "M", "static: largest distance between stations."),
         _Option("angular_step", "DEG", "static: step of azimuth and zenith."),
-        _Option("profile_spacing", "M", "profiler: way of the trolley in one turn of the mirror."),
+        _Option("profile_spacing", "M", "profiler: distance that the trolley moves in one turn of the mirror."),
         _Option("profile_points", "N", "profiler: points in one turn.", int),
         _Option("speed", "M/S", "profiler: speed of the trolley."),
         _Option(
@@ -73,8 +73,8 @@ _GROUPS: dict[str, list[_Option]] = {
             "(100 is survey density) [the scanner's pattern].",
         ),
         _Option("scanner_height", "M", "Height above the floor."),
-        _Option("scanner_offset", "M", "Off the middle: trolley to the right, stations alternately right and left."),
-        _Option("max_range", "M", "Greatest range."),
+        _Option("scanner_offset", "M", "Distance from the middle: trolley to the right, stations alternately right and left."),
+        _Option("max_range", "M", "Largest range."),
         _Option("range_noise", "M", "Standard deviation along the ray."),
         _Option("outliers", "SHARE", "Share of isolated points, in the air or behind the wall."),
         _Option("relief", "M", "Height of small-scale relief of the lining."),
@@ -82,7 +82,7 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option(
             "range_curve",
             "NAME",
-            "How intensity falls with range: near_loss (with the loss of near ranges) or inverse_square.",
+            "Decrease of intensity with range: near_loss (with the loss at near ranges) or inverse_square.",
             click.Choice(list(CHOICES["range_curve"])),
         ),
     ],
@@ -91,30 +91,30 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option("intensity_noise", "DB", "Standard deviation of a point's intensity."),
         _Option("banding", "DB", "Standard deviation of the gain from line to line (turns of the mirror, columns)."),
         _Option("drift", "DB", "Standard deviation of the gain over time, in waves of a minute or two."),
-        _Option("gain_step", "DB", "Change of the gain at once, about the middle of the survey."),
-        _Option("saturation", "DB", "Greatest amplitude that the receiver gives [none]."),
+        _Option("gain_step", "DB", "Sudden change of the gain, about the middle of the survey."),
+        _Option("saturation", "DB", "Largest amplitude of the receiver [none]."),
         _Option(
             "noise_growth",
             "SHARE",
-            "By how much of itself noise has grown at 10 m; four times that at 20 m.",
+            "Relative increase of noise at 10 m range; four times as much at 20 m.",
         ),
-        _Option("ghosts", "SHARE", "Share of the floor's echoes that come from the wall by way of the floor, below ground."),
+        _Option("ghosts", "SHARE", "Share of the floor's echoes that are reflected to the wall and appear below the ground."),
         _Option("leaks", "N", "Number of leaks [one every 12 m].", int),
         _Option("leak_area", "MIN MAX", "Area of leaks, m².", FINITE, 2),
-        _Option("leak_drop", "MIN MAX", "How much darker than dry lining leaks are, dB.", FINITE, 2),
-        _Option("leak_edge", "M", "Width over which a leak goes from dry to wet; its outline lies in the middle."),
+        _Option("leak_drop", "MIN MAX", "Darkening of leaks, dB.", FINITE, 2),
+        _Option("leak_edge", "M", "Width of the transition from dry to wet; the outline of the leak is in the middle of it."),
         _Option("joint_leaks", "N", "Leaks along joints, bands 0.1 to 0.4 m wide; with --lining cast or segments.", int),
         _Option("niche_leaks", "N", "Leaks on the back walls of niches.", int),
         _Option("cable_leaks", "N", "Leaks across cables, pipes and trays.", int),
         _Option("foot_leaks", "N", "Leaks at the foot of the wall, down to the floor.", int),
         _Option("springline_leaks", "N", "Wet joints along the springline, 0.1 to 0.2 m by 5 to 8 m.", int),
         _Option("pocket_leaks", "N", "Weeping bolt pockets, each with a streak; with --lining segments.", int),
-        _Option("ring_leaks", "N", "Whole wet rings from foot to foot, across what hangs there.", int),
+        _Option("ring_leaks", "N", "Whole wet rings from foot to foot, across fixtures.", int),
         _Option("panel_leaks", "N", "Wet panels with straight edges: a segment, or a rectangle.", int),
         _Option("drip_gap", "MIN MAX", "Limits of the distance between a leak and its --drips, m.", FINITE, 2),
         _Option("salt_fringe", "M", "Width of the bright salts round each leak."),
     ],
-    "Make and looks of the lining": [
+    "Type and surface of the lining": [
         _Option(
             "lining",
             "NAME",
@@ -127,7 +127,7 @@ _GROUPS: dict[str, list[_Option]] = {
         _Option(
             "ring_shift", "M", "Standard deviation of the centre from ring to ring, to the right and up; circular section."
         ),
-        _Option("segment_step", "M", "Standard deviation of how far segments stand in or out of their ring."),
+        _Option("segment_step", "M", "Standard deviation of the offset of segments from their ring."),
         _Option(
             "ovality",
             "MIN MAX",
@@ -135,36 +135,36 @@ _GROUPS: dict[str, list[_Option]] = {
             FINITE,
             2,
         ),
-        _Option("radius_step", "M", "How much wider the section is over the second half."),
+        _Option("radius_step", "M", "Increase of the radius in the second half."),
         _Option("soot", "DB", "Darkening of the crown."),
         _Option("grime", "DB", "Darkening beneath cables and trays."),
         _Option("patches", "N", "Repaired rectangles.", int),
-        _Option("patch_level", "MIN MAX", "How much brighter they are, dB; negative: darker.", FINITE, 2),
-        _Option("patch_turn", "DEG", "By how much they are turned, either way."),
+        _Option("patch_level", "MIN MAX", "Brightness of the patches above the lining, dB; negative: darker.", FINITE, 2),
+        _Option("patch_turn", "DEG", "Rotation of the patches, to either side."),
         _Option("paint", "N", "Painted numbers and stripes in turn, 4 dB darker to 4 dB brighter.", int),
         _Option("stripe_width", "MIN MAX", "Width of the stripes, m.", FINITE, 2),
         _Option("salts", "%", "Share of the lining that is white with salts."),
-        _Option("salt_level", "DB", "How much brighter salts are."),
-        _Option("halos", "N", "Spots of grime shaped as leaks, which fade over 0.25 m.", int),
-        _Option("chamfers", "DB", "Drop of broken edges of the ring joints, 5 cm wide, slanting by a degree or so."),
+        _Option("salt_level", "DB", "Brightness of the salts above the lining."),
+        _Option("halos", "N", "Spots of grime in the shape of leaks, with edges that fade over 0.25 m.", int),
+        _Option("chamfers", "DB", "Darkening of broken edges of the ring joints, 5 cm wide, inclined by about a degree."),
         _Option("shade", "DB", "Standard deviation of the level from half ring to half ring."),
         _Option(
             "clutter",
             "N",
-            "Cables, bundles of cables and pipes in turn, seen 3 to 30 cm off the wall from end to end; with them a sign "
+            "Cables, bundles of cables and pipes in turn, 3 to 30 cm from the wall, along the whole tunnel; also a sign "
             "and a junction box every 10 m.",
             int,
         ),
         _Option("thin_cables", "N", "Bundles of cables and flat ducts on the wall, 3 to 25 mm thick.", int),
         _Option("trunking", "N", "Closed boxes along the whole tunnel, 0.1 to 0.4 m deep.", int),
-        _Option("sheets", "N", "Sheets before the wall, 1 to 8 m long.", int),
-        _Option("mesh", "M", "Distance between the wires of a mesh before the lining, 0: none."),
+        _Option("sheets", "N", "Sheets in front of the wall, 1 to 8 m long.", int),
+        _Option("mesh", "M", "Distance between the wires of a mesh in front of the lining, 0: none."),
     ],
-    "Floor and what stands free": [
-        _Option("people", "N", "People standing about.", int),
+    "Floor and free-standing objects": [
+        _Option("people", "N", "Standing people.", int),
         _Option("equipment", "N", "Cases, trolleys and tripods in turn.", int),
         _Option("bollards", "N", "Round-topped posts.", int),
-        _Option("globes", "N", "Round lamps on posts and on the wall in turn, no such radius as the target spheres.", int),
+        _Option("globes", "N", "Round lamps on posts and on the wall in turn, of another radius than the target spheres.", int),
         _Option(
             "spheres",
             "N",
@@ -173,7 +173,7 @@ _GROUPS: dict[str, list[_Option]] = {
             int,
         ),
         _Option("sphere_radius", "M", "Radius of the target spheres."),
-        _Option("free_cables", "N", "Cables on hangers off the wall, from end to end.", int),
+        _Option("free_cables", "N", "Cables on hangers away from the wall, along the whole tunnel.", int),
         _Option("ballast", "M", "Standard deviation of the floor's height: stones of 3 to 6 cm."),
         _Option("camber", "%", "Fall of the floor from its middle to both walls."),
         _Option(
@@ -183,15 +183,15 @@ _GROUPS: dict[str, list[_Option]] = {
     ],
     "A later scan of the same tunnel": [
         _Option("epoch", "N", "Number of the scan, with noise of its own; 0 is the first.", int),
-        _Option("grown_leaks", "N", "Leaks, the largest, that have twice the area.", int),
-        _Option("dried_leaks", "N", "Leaks, the smallest, that are dry.", int),
-        _Option("new_leaks", "N", "Leaks more.", int),
-        _Option("moved_wall", "M", "By how much a part of the right wall moved inwards."),
-        _Option("squeezed_ring", "M", "By how much a ring became narrower, and as much higher."),
+        _Option("grown_leaks", "N", "Number of leaks, the largest, that have twice the area.", int),
+        _Option("dried_leaks", "N", "Number of leaks, the smallest, that are dry.", int),
+        _Option("new_leaks", "N", "Number of additional leaks.", int),
+        _Option("moved_wall", "M", "Inward movement of a part of the right wall."),
+        _Option("squeezed_ring", "M", "Decrease of the width of a ring, equal to the increase of its height."),
         _Option("bulges", "N", "Squares of 1 m² that moved inwards.", int),
-        _Option("bulge", "M", "By how much they moved."),
-        _Option("pose_error", "M", "Error of the poses across the axis, which wanders along the tunnel."),
-        _Option("pose_turn", "DEG", "By how much the poses are turned, about the axis and at most across it."),
+        _Option("bulge", "M", "Inward movement of the squares."),
+        _Option("pose_error", "M", "Error of the poses across the axis, which varies slowly along the tunnel."),
+        _Option("pose_turn", "DEG", "Rotation of the poses about the axis; across it, the largest rotation."),
     ],
     "Other": [
         _Option(*NAME),
@@ -199,12 +199,12 @@ _GROUPS: dict[str, list[_Option]] = {
     ],
 }
 _FLAGS = {
-    "s_curve": ("--s-curve", True, "Bend back in the second half.", "Tunnel"),
+    "s_curve": ("--s-curve", True, "Curve in the other direction in the second half.", "Tunnel"),
     "appendages": ("--no-appendages", False, "No cables, trays, boxes, lamps and rails.", "Intensity and contents"),
     "niches": ("--no-niches", False, "No refuge niches.", "Intensity and contents"),
-    "drips": ("--drips", True, "Drips below leaks, apart from them, that belong to their truth.", "Intensity and contents"),
-    "catenary": ("--catenary", True, "A contact line over the track.", "Floor and what stands free"),
-    "sleepers": ("--sleepers", True, "Sleepers under the rails.", "Floor and what stands free"),
+    "drips": ("--drips", True, "Drips below leaks, parts of the same reference leak.", "Intensity and contents"),
+    "catenary": ("--catenary", True, "A contact line over the track.", "Floor and free-standing objects"),
+    "sleepers": ("--sleepers", True, "Sleepers under the rails.", "Floor and free-standing objects"),
 }
 
 
@@ -260,8 +260,8 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
 
     A section is swept along a curved and sloping axis, perpendicular to it. A static scanner or a profiler on a
     trolley shoots rays at the lining, which carries leaks, cables, a tray, boxes, lamps, rails and refuge niches, and
-    at what stands free, if asked for; what hides behind them is not seen. Intensity follows the range (with the loss
-    of near ranges), the incidence (Oren–Nayar), the material and the water, plus noise.
+    at free-standing objects, if options request them. Surfaces behind them get no points. Intensity depends on the
+    range (with the loss at near ranges), the incidence (Oren–Nayar), the material and the water, plus noise.
 
     \b
     OUT/NAME.laz             points: LAS 1.4, Amplitude and Reflectance in dB, intensity in linear counts
@@ -272,16 +272,16 @@ def simulate(out: Path, preset: str | None, no_truth: bool, **given: Any) -> Non
     OUT/NAME.reference.csv   range_m,intensity_db of a 30 % target
     OUT/NAME.truth.npz       chainage, arc, offset, class and leak of each point, in file order;
                              class 0 lining, 1 floor, 2 fixture, 3 niche, 4 outlier, 5 rail, 6 object, 7 target
-                             sphere; leak -1 for none; thing, where something stands free: its number, 0 for none
+                             sphere; leak -1 for none; thing: number of a free-standing object, 0 for none
     OUT/NAME.truth.geojson   leaks as polygons in the plane (chainage, arc), with drips as multipolygons
-    OUT/NAME.truth.gpkg      the same as layer leak; layer dry: what is dry dark areas (joint, pocket, patch, paint,
-                             stripe, soot, grime, halo, chamfer, shade); layer bright, if any: what is brighter
-                             (salts, fringe, patch, paint, stripe, shade), its drop negative; layer deformation,
-                             of a later scan: what moved (wall, ring, bulge), m inwards
+    OUT/NAME.truth.gpkg      the same as layer leak; layer dry: dry dark areas (joint, pocket, patch, paint,
+                             stripe, soot, grime, halo, chamfer, shade); layer bright, if any: brighter areas
+                             (salts, fringe, patch, paint, stripe, shade), with negative drop; layer deformation,
+                             of a later scan: moved areas (wall, ring, bulge), m inwards
     OUT/NAME.rings.csv       number,chainage_from,chainage_to of rings or blocks, if any, their centre from the axis
-                             (right, up), radius, ovality (share of the diameter), largest_clock, and the greatest
-                             step_greatest at its beginning and lip between segments, positive inwards, with their arc
-    OUT/NAME.spheres.csv     id,x,y,z,radius,kind of the target spheres, if any; id is their number among the things
+                             (right, up), radius, ovality (share of the diameter), largest_clock, the greatest
+                             step at its beginning (step_greatest) and between segments (lip), positive inwards, with their arc
+    OUT/NAME.spheres.csv     id,x,y,z,radius,kind of the target spheres, if any; id is their number among the objects (thing)
     OUT/NAME.json            all parameters, fixtures, niches, objects
 
     The kind of a leak is wall, joint, niche, cable, foot, springline, pocket, ring or panel.

@@ -130,16 +130,20 @@ def _print(rows: list[Row], output: Path | None) -> None:
     steps = [abs(row["step_greatest"]) for row in rows if row["step_greatest"] is not None]
     said = f"{counted(len(rows), 'ring')}, {len(told)} with an ellipse"
     if len(rows) > len(shown):
-        said += f", the {len(shown)} of most ovality shown"
+        said += f"; shown: the {len(shown)} with the largest ovality"
     if steps:
         said += f"; greatest step {1e3 * max(steps):.1f} mm"
     unseen = sum(not row["seen_share"] for row in rows)
     if unseen:
-        said += f"; of {unseen} nothing is seen"
+        said += f"; {unseen} without inspected lining"
     click.echo(said)
     if told:
-        sources = {"option": "--diameter", "profile": "the design profile", "ring": "each ring's own mean"}
+        sources = {
+            "option": "--diameter",
+            "profile": "the diameter of the design profile",
+            "ring": "the mean diameter of each ring",
+        }
         kinds = sorted({sources[row["diameter_from"]] for row in told})
-        click.echo(f"ovality is a share of the diameter of {' and '.join(kinds)}")
+        click.echo(f"ovality is relative to {' and '.join(kinds)}")
     if output is not None:
         notify(f"written to {output}")

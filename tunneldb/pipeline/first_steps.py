@@ -227,7 +227,8 @@ def _poses(looks: Sequence[FileLook], missing: list[str], doubts: list[str]) -> 
     missing.append(f"scanner positions: STATIONS.csv with scan_id,x,y,z, of scan_id {listed}")
     if len(scans) == 1:
         doubts.append(
-            "if this is several scans, merged, their positions are lost: export them one by one; or use --no-poses in place of "
+            "if several scans were merged into this file, their positions are lost: export each scan as a file; or use "
+            "--no-poses in place of "
             "--stations, with intensity of kind reflectance or none"
         )
     return "--stations STATIONS.csv"

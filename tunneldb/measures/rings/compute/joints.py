@@ -181,7 +181,7 @@ def ring_length(places: Float, weight: Float) -> float:
         If they repeat no better than random places.
     """
     if len(places) < 5:
-        raise NoRingsError(f"only {counted(len(places), 'place looks like a joint', 'places look like joints')} all around")
+        raise NoRingsError(f"only {counted(len(places), 'joint', 'joints')} found that run around the whole section")
     per_metre = np.arange(1.0 / MAX_RING_LENGTH, 1.0 / MIN_RING_LENGTH, 0.1 / STRETCH)
     power, parts = np.zeros(len(per_metre)), 0
     weight = np.minimum(weight, 4.0 * np.median(weight))
