@@ -711,7 +711,7 @@ COMMENT ON COLUMN tunnel.cluster.height_to IS 'Highest point above the ground, m
 COMMENT ON COLUMN tunnel.cluster.points IS 'Points of survey density in it';
 COMMENT ON COLUMN tunnel.cluster.cell IS 'Edge of its cells, m';
 COMMENT ON COLUMN tunnel.cluster.cells IS 'Cells that its points fill: floor(x / cell), floor(y / cell), floor(z / cell) of each';
-COMMENT ON COLUMN tunnel.cluster.geom IS 'Hull of it on the map, tunnel''s SRID, m';
+COMMENT ON COLUMN tunnel.cluster.geom IS 'Hull of the cluster on the map, tunnel''s SRID, m';
 CREATE INDEX cluster_geom_idx ON tunnel.cluster USING gist (geom);
 CREATE INDEX cluster_survey_id_km_idx ON tunnel.cluster (survey_id, km);
 
@@ -1112,7 +1112,7 @@ COMMENT ON COLUMN tunnel.member.number IS 'Number in the survey, from 1; dimensi
 COMMENT ON COLUMN tunnel.member.kind IS 'flat (planes that lie in one), pipe (cylinders about one axis) or profile (sides of one beam)';
 COMMENT ON COLUMN tunnel.member.length IS 'Length along its line, gaps counted, m';
 COMMENT ON COLUMN tunnel.member.area IS 'Area of its faces, m²';
-COMMENT ON COLUMN tunnel.member.bimodal IS 'True if so much of its surface differs from the rest that the reference surface is unknown';
+COMMENT ON COLUMN tunnel.member.bimodal IS 'True if the reference surface is unknown, because too much of the surface differs';
 COMMENT ON COLUMN tunnel.member.chainage IS 'Chainage of its middle, m; NULL of a site or beyond the sections';
 COMMENT ON COLUMN tunnel.member.line IS 'Middle line, tunnel''s SRID, m; for a flat member, along its longest side';
 
@@ -1692,7 +1692,7 @@ COMMENT ON COLUMN tunnel.waterproof.chainage_to IS 'End of the stretch, m';
 COMMENT ON COLUMN tunnel.waterproof.lining_area IS 'Lining, seen or not, m²';
 COMMENT ON COLUMN tunnel.waterproof.seen_share IS 'Share of it that was seen';
 COMMENT ON COLUMN tunnel.waterproof.wet_area IS 'Area of the leaks within the kilometre, m²';
-COMMENT ON COLUMN tunnel.waterproof.wet_ratio IS 'wet_area, of the lining seen';
+COMMENT ON COLUMN tunnel.waterproof.wet_ratio IS 'wet_area as a share of the inspected lining';
 COMMENT ON COLUMN tunnel.waterproof.patches IS 'Leaks in the kilometre or over its ends';
 COMMENT ON COLUMN tunnel.waterproof.largest_area IS 'Area of the largest of them, whole, m²';
 COMMENT ON COLUMN tunnel.waterproof.largest_leak IS 'Id of the largest leak';
@@ -1700,7 +1700,7 @@ COMMENT ON COLUMN tunnel.waterproof.window_patches IS 'Most leaks in any 100 m²
 COMMENT ON COLUMN tunnel.waterproof.window_from IS 'Chainage at which those 100 m² begin, m';
 COMMENT ON COLUMN tunnel.waterproof.window_to IS 'Chainage at which those 100 m² end, m';
 COMMENT ON COLUMN tunnel.waterproof.window_wet_area IS 'Greatest wet area in any 100 m² of lining, m²';
-COMMENT ON COLUMN tunnel.waterproof.class IS 'Best class of waterproofing that the lining seen keeps';
+COMMENT ON COLUMN tunnel.waterproof.class IS 'Best class of waterproofing whose limits the inspected lining meets';
 CREATE INDEX waterproof_survey_id_km_idx ON tunnel.waterproof (survey_id, km);
 
 CREATE TABLE tunnel.face (

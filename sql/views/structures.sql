@@ -27,7 +27,7 @@ COMMENT ON COLUMN tunnel_api.member.kind IS 'flat (planes that lie in one), pipe
 COMMENT ON COLUMN tunnel_api.member.length IS 'Length along its line, including gaps, m';
 COMMENT ON COLUMN tunnel_api.member.area IS 'Area of its faces, m²';
 COMMENT ON COLUMN tunnel_api.member.bimodal IS
-    'True if so much of its surface differs from the rest that the reference surface is unknown';
+    'True if the reference surface is unknown, because too much of the surface differs';
 COMMENT ON COLUMN tunnel_api.member.chainage IS 'Chainage of its middle, m; NULL on a site or beyond the sections';
 COMMENT ON COLUMN tunnel_api.member.label IS 'Station of its middle, as 12+345.678';
 COMMENT ON COLUMN tunnel_api.member.geom IS 'Middle line, tunnel''s SRID; for a flat member, along its longest side';
@@ -107,7 +107,7 @@ COMMENT ON COLUMN tunnel_api.member_statistics.faces IS 'Number of faces';
 COMMENT ON COLUMN tunnel_api.member_statistics.area IS 'Area of its faces, m²';
 COMMENT ON COLUMN tunnel_api.member_statistics.seen_share IS 'Inspected share of the area, 0 to 1';
 COMMENT ON COLUMN tunnel_api.member_statistics.bimodal IS
-    'True if so much of its surface differs from the rest that the reference surface is unknown';
+    'True if the reference surface is unknown, because too much of the surface differs';
 COMMENT ON COLUMN tunnel_api.member_statistics.spots IS 'Number of spots included in totals';
 COMMENT ON COLUMN tunnel_api.member_statistics.dark_area IS 'Area of darker spots, m²';
 COMMENT ON COLUMN tunnel_api.member_statistics.bright_area IS 'Area of brighter spots, m²';
@@ -253,7 +253,7 @@ COMMENT ON COLUMN tunnel_api.member_sheet.faces IS 'Number of faces';
 COMMENT ON COLUMN tunnel_api.member_sheet.area IS 'Area of its faces, m²';
 COMMENT ON COLUMN tunnel_api.member_sheet.seen_share IS 'Inspected share of the area, 0 to 1';
 COMMENT ON COLUMN tunnel_api.member_sheet.bimodal IS
-    'True if so much of its surface differs from the rest that the reference surface is unknown';
+    'True if the reference surface is unknown, because too much of the surface differs';
 COMMENT ON COLUMN tunnel_api.member_sheet.spots IS 'Number of spots included in totals';
 COMMENT ON COLUMN tunnel_api.member_sheet.dark_area IS 'Area of darker spots, m²';
 COMMENT ON COLUMN tunnel_api.member_sheet.bright_area IS 'Area of brighter spots, m²';

@@ -18,7 +18,10 @@ def unit_options(files: str) -> Callable[[Command], Command]:
     def add(command: Command) -> Command:
         choice = click.Choice(list(METRES))
         height = click.option(
-            "--height-unit", type=choice, metavar="UNIT", help=f"Unit of z in {files}. [default: as they state it, else --unit]"
+            "--height-unit",
+            type=choice,
+            metavar="UNIT",
+            help=f"Unit of z in {files}. [default: unit stated in {files}, else --unit]",
         )
         plan = click.option(
             "--unit",

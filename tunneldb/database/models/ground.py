@@ -85,7 +85,7 @@ class Cluster(Base):
     cells: Mapped[list[int]] = mapped_column(
         ARRAY(Integer), comment="Cells that its points fill: floor(x / cell), floor(y / cell), floor(z / cell) of each"
     )
-    geom: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="Hull of it on the map, tunnel's SRID, m")
+    geom: Mapped[WKBElement] = mapped_column(geometry("POLYGON"), comment="Hull of the cluster on the map, tunnel's SRID, m")
 
 
 class TargetSphere(Base):

@@ -99,7 +99,7 @@ class Waterproof(Base):
     lining_area: Mapped[float | None] = mapped_column(comment="Lining, seen or not, m²")
     seen_share: Mapped[float | None] = mapped_column(comment="Share of it that was seen")
     wet_area: Mapped[float | None] = mapped_column(comment="Area of the leaks within the kilometre, m²")
-    wet_ratio: Mapped[float | None] = mapped_column(comment="wet_area, of the lining seen")
+    wet_ratio: Mapped[float | None] = mapped_column(comment="wet_area as a share of the inspected lining")
     patches: Mapped[int | None] = mapped_column(comment="Leaks in the kilometre or over its ends")
     largest_area: Mapped[float | None] = mapped_column(comment="Area of the largest of them, whole, m²")
     largest_leak: Mapped[int | None] = mapped_column(BigInteger, comment="Id of the largest leak")
@@ -107,7 +107,9 @@ class Waterproof(Base):
     window_from: Mapped[float | None] = mapped_column(comment="Chainage at which those 100 m² begin, m")
     window_to: Mapped[float | None] = mapped_column(comment="Chainage at which those 100 m² end, m")
     window_wet_area: Mapped[float | None] = mapped_column(comment="Greatest wet area in any 100 m² of lining, m²")
-    class_: Mapped[int | None] = mapped_column("class", comment="Best class of waterproofing that the lining seen keeps")
+    class_: Mapped[int | None] = mapped_column(
+        "class", comment="Best class of waterproofing whose limits the inspected lining meets"
+    )
 
 
 class Region(Base):

@@ -29,7 +29,7 @@ class Member(Base):
     length: Mapped[float] = mapped_column(comment="Length along its line, gaps counted, m")
     area: Mapped[float] = mapped_column(comment="Area of its faces, m²")
     bimodal: Mapped[bool] = mapped_column(
-        comment="True if so much of its surface differs from the rest that the reference surface is unknown"
+        comment="True if the reference surface is unknown, because too much of the surface differs"
     )
     chainage: Mapped[float | None] = mapped_column(comment="Chainage of its middle, m; NULL of a site or beyond the sections")
     line: Mapped[WKBElement] = mapped_column(
