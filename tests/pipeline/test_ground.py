@@ -231,7 +231,7 @@ def test_killed_in_the_middle_nothing_changes(sections: psycopg.Connection, monk
         return count
 
     monkeypatch.setattr(stage, "save_clusters", kill)
-    assert "rolled back" in command("run", NAME, "--from", "ground", "--to", "ground", code=2).stderr
+    assert "saved whole or not at all" in command("run", NAME, "--from", "ground", "--to", "ground", code=2).stderr
     assert contents(conn) == before
     left = conn.execute("SELECT count(*) FROM pg_class WHERE relname LIKE '%\\_new'").fetchone()
     assert left == (0,)

@@ -53,7 +53,7 @@ class TestBadInput:
         las.gps_time[7000:10_000] = -12.5
         las.write(path)
         self.refused(
-            conn, [path], r"gps_time of 10000 points .* 12\.500 s before its start and up to .* s after its end.*--max-left"
+            conn, [path], r"gps_time of 10.000 points .* 12\.500 s before its start and up to .* s after its end.*--max-left"
         )
         load(conn, [write(path, xyz)])
 

@@ -16,8 +16,8 @@ from tunneldb.arrays import Float, Int64
 MIN_POINTS = 1000
 """Number of points of a scan below which nothing is concluded."""
 
-MIN_SHARE = 0.15
-"""Least share of a scan's points about each of the places."""
+MIN_SHARE = 0.25
+"""Least share of a scan's points about each of the places; an object across the tunnel that faces the scanner has fewer."""
 
 MIN_RATIO = 3.0
 """Ratio of the points per metre at a maximum to those between two maxima; less is due to fixtures and wider sections."""
@@ -67,24 +67,25 @@ def scanner_places(along: Float) -> list[float]:
     edges = np.arange(low, high + _STEP, _STEP)
     if len(edges) <= _SMOOTH:
         return [float(np.median(along))]
-    counts = _running_median(np.histogram(along, edges)[0].astype(np.float64))
+    points = np.histogram(along, edges)[0].astype(np.float64)
+    counts = _running_median(points)
     middles = (edges[1:] + edges[:-1]) / 2.0
-    parts = _split(counts, 0, len(counts), MIN_SHARE * float(counts.sum()))
+    parts = _split(counts, np.cumsum(points) / points.sum(), 0, len(counts))
     return [float(np.average(middles[first:last], weights=counts[first:last])) for first, last in parts]
 
 
-def _split(counts: Float, first: int, last: int, least: float) -> list[tuple[int, int]]:
-    """Return the ranges about single maxima of counts within a range, with at least some points each."""
+def _split(counts: Float, share: Float, first: int, last: int) -> list[tuple[int, int]]:
+    """Return the ranges about single maxima of counts within a range, each with the least share of the points."""
     part = counts[first:last]
     before, after = np.maximum.accumulate(part), np.maximum.accumulate(part[::-1])[::-1]
     lower = np.minimum(before, after)
     clear = (lower >= MIN_RATIO * part) & (lower - part > _CERTAIN * np.sqrt(lower))
-    total = np.cumsum(part)
-    clear &= (total >= least) & (total[-1] - total >= least)
+    ahead = share[first:last] - (share[first - 1] if first else 0.0)
+    clear &= (ahead >= MIN_SHARE) & (ahead[-1] - ahead >= MIN_SHARE)
     if not clear.any():
         return [(first, last)]
     cut = first + int(np.argmax(np.where(clear, lower - part, -np.inf)))
-    return [*_split(counts, first, cut, least), *_split(counts, cut, last, least)]
+    return [*_split(counts, share, first, cut), *_split(counts, share, cut, last)]
 
 
 def _running_median(counts: Float) -> Float:
