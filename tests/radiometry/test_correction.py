@@ -39,8 +39,8 @@ def test_reference_curve_is_piecewise_linear():
     ("ranges", "levels", "says"),
     [
         ([3.0], [1.0], "at least 2 rows"),
-        ([1.0, np.nan], [1.0, 2.0], "not a number"),
-        ([1.0, 2.0], [1.0, np.inf], "not a number"),
+        ([1.0, np.nan], [1.0, 2.0], "row 2 .* is not finite"),
+        ([1.0, 2.0], [1.0, np.inf], "row 2 .* is not finite"),
         ([0.0, 2.0], [1.0, 2.0], "positive"),
         ([2.0, 2.0], [1.0, 2.0], "2 m"),
     ],
