@@ -98,8 +98,8 @@ survey add n10 ADD --no-poses --tunnel demoo | Did you mean '(\\w+)' | survey ad
 survey add n11 ADD --no-poses --tunnel e | is not for a site | survey add n11 ADD --stations stations.csv --tunnel e
 survey add n12 ADD --trajectory trajectory.csv --tunnel e | takes the (--stations) | survey add n12 ADD \\1 stations.csv --tunnel e
 survey add n13 --tunnel demo --date 2024-06-01 --intensity-kind linear --no-poses | (--intensity) must name | survey add n13 ADD --no-poses \\1 Counts
-survey set n1 --stations stations.csv --trajectory trajectory.csv | omit one of them | survey set n1 --stations stations.csv
 survey set n1 --accept-poses --date 2024-06-02 | has none; omit it | survey set n1 --date 2024-06-02
+survey set n1 --stations stations.csv --trajectory trajectory.csv | omit one of them | survey set n1 --stations stations.csv
 survey set n1 --time-offset 1 --date 2024-06-02 | has none; omit it | survey set n1 --date 2024-06-02
 profile remove demo none | tunneldb (profile list demo) | \\1
 deviation n1 --layer excavation | (profile add demo) profile.csv (--layer excavation) | \\1 round.csv \\2
