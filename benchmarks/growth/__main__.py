@@ -29,7 +29,7 @@ SIZE = Size(leaks=2000, points=25_000, dry=1000, drawn=2000)
 """What the sample holds: little, so that what others cost shows."""
 
 Side = tuple[list[Asked], list[Run]]
-"""What one of the two databases took: views, and commands."""
+"""CPU time in one of the two databases: of the views and of the commands."""
 
 
 def main() -> None:

@@ -1,9 +1,7 @@
 """The model of evidence: probabilities, what features add to them, and its trees as a file."""
 
-import importlib.util
 import json
 import math
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -11,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from support.benchmark_files import load_benchmark
 
 from tunneldb.anomalies.evidence import EvidenceModel, reasons_of, standard_model
 from tunneldb.anomalies.features import FEATURES, NAMES
@@ -20,12 +19,7 @@ ANY = arrays(float, (5, len(FEATURES)), elements=st.floats(-20, 20) | st.just(ma
 
 def fitting() -> ModuleType:
     """The program that fits the model; what it needs takes seconds to import."""
-    spec = importlib.util.spec_from_file_location("fit", Path(__file__).parents[2] / "benchmarks/evidence/fit.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_benchmark("evidence/fit.py")
 
 
 def grown(sign: int, features: np.ndarray, names: set[str]) -> np.ndarray:

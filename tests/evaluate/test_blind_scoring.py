@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
-from types import ModuleType
-
 import numpy as np
 import psycopg
 import pytest
@@ -16,22 +11,11 @@ from hypothesis import strategies as st
 from psycopg import sql
 from scipy.stats import binomtest
 from shapely.geometry import MultiPolygon, Polygon, box
+from support.benchmark_files import load_benchmark
 
 from tunneldb.anomalies.coverage import Coverage
 
-
-def load(name: str) -> ModuleType:
-    """A file of the benchmarks, which are no package for tests."""
-    spec = importlib.util.spec_from_file_location(f"blind_{name}", Path(__file__).parents[2] / f"benchmarks/blind/{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-statistics, waterproof = load("statistics"), load("waterproof")
+statistics, waterproof = load_benchmark("blind/statistics.py"), load_benchmark("blind/waterproof.py")
 
 
 @given(count=st.integers(1, 400), part=st.floats(0, 1))

@@ -2,28 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-from types import ModuleType
-
 import pytest
 from pyproj import CRS
+from support.benchmark_files import load_benchmark
 
 from tunneldb.geometry.crs import heights_differ, in_metres
 from tunneldb.geometry.crs_equality import epsg_code, lacks_datum, same_horizontally, stated_code
 
-
-def _table() -> ModuleType:
-    """Return benchmarks/crs_table.py, which is no part of the installed package."""
-    spec = importlib.util.spec_from_file_location("crs_table", Path(__file__).parents[2] / "benchmarks/crs_table.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-TABLE = _table()
+TABLE = load_benchmark("crs_table.py")
 
 NORTHING_FIRST = [3006, 2193, 31256, 31467, 6677]  # Sweden, New Zealand, Austria, Germany, Japan
 HARD = [2326, 5514, 28992, 27561]  # Cassini, Krovak, stereographic, meridian of Paris in grads

@@ -1,4 +1,4 @@
-"""What inspectors can take out of the totals by drawing, and reviews that do not apply to another outline."""
+"""Limits of what inspectors take out of the totals by drawing, and reviews of findings that are redrawn."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def template(example_template: str) -> str:
 def test_extreme_values_are_refused_or_harmless(
     person: psycopg.Connection, role: str, conn: psycopg.Connection, dsn: str, tmp_path: Any
 ) -> None:
-    """What was taken stays in the database while the commands run."""
+    """Values that are accepted stay in the database while the commands run."""
     columns = conn.execute(WRITABLE, {"role": role}).fetchall()
     conn.rollback()
     person.execute("SET statement_timeout = '20 s'")
