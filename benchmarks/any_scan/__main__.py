@@ -19,6 +19,7 @@ from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
 
+from benchmarks.any_scan.galleries import GALLERIES
 from benchmarks.any_scan.judge import judge
 from benchmarks.any_scan.page import page
 from benchmarks.any_scan.program import Program
@@ -26,7 +27,7 @@ from benchmarks.any_scan.scenes import SCENES as FIRST
 from benchmarks.any_scan.stated import STATED
 from benchmarks.common import RESULTS, print_table, progress
 
-SCENES = (*FIRST, *STATED)
+SCENES = (*FIRST, *STATED, *GALLERIES)
 
 
 def main() -> None:

@@ -366,9 +366,14 @@ STATED: tuple[Scene, ...] = (
     Scene("shp-alone", "only the .shp of a Shapefile", "refusal", axis_file(lone_shp, "line.shp"), r"shx"),
     Scene("gpkg-empty", "GeoPackage with rows without geometry", "result", axis_file(empty_rows, "line.gpkg")),
     Scene("dxf-spline", "DXF polyline with the frame of its spline", "result", axis_file(splined, "axis.dxf")),
-    # Templates of drawings state feet or inches by default: without a word of the user either answer is right.
+    # Templates of drawings state feet or inches by default, also for drawings in metres. A result would rest on a guess. Right
+    # is a refusal that names the option for each of the two.
     Scene(
-        "dxf-feet", "DXF that states feet, in feet", "result|refusal", axis_file(dxf_in_feet, "axis.dxf"), "--axis-unit foot"
+        "dxf-feet",
+        "DXF that states feet, in feet",
+        "refusal",
+        axis_file(dxf_in_feet, "axis.dxf"),
+        r"--axis-unit foot.*--axis-unit meter",
     ),
     Scene(
         "axis-swapped",

@@ -132,6 +132,31 @@ def test_a_line_drawn_in_plan_takes_heights_from_the_scan(
     refused(run(*add[:2], "u", *add[3:6], "space.csv", scan), "space.csv has heights; SCAN files go with --axis auto")
 
 
+def test_a_gallery_open_on_one_side_takes_its_axis_as_a_table(
+    dsn: str, conn: psycopg.Connection, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    p = np.random.default_rng(6).uniform((0.0, -4.0, -3.0), (40.0, 4.0, 3.0), (60_000, 3))
+    p[:20_000, 2], p[20_000:40_000, 2], p[40_000:, 1] = -3.0, 3.0, -4.0
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales, header.offsets = np.full(3, 0.001), np.array([500_000.0, 4_640_000.0, 100.0])
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = (p + header.offsets).T
+    las.write("open.las")
+    add = ["tunnel", "add", "t", "--srid", 25830, "--axis"]
+    refused(
+        run(*add, "auto", "open.las"), "0 have two walls, a vault and a floor; ", " are open on one side", ": --axis axis.csv"
+    )
+    Path("axis.csv").write_text("x,y,z\n500000,4640000.5,99.5\n500040,4640000.5,99.5\n")
+    done(*add, "axis.csv")
+    done("survey", "add", "s", "--tunnel", "t", "--date", "2024-05-01", "--no-poses", "--intensity-kind", "none")
+    done("load", "s", "open.las")
+    done("run", "s", "--to", "sections")
+    ends = conn.execute("SELECT count(*), max(abs(ST_Y(geom) - 4640000)) FROM tunnel.axis_vertex").fetchone()
+    assert ends is not None
+    assert ends[1] < 2.0  # inside the gallery
+
+
 def test_files_of_two_systems_and_stray_points(
     bend: tuple[Simulation, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -241,7 +241,7 @@ def _centred(points: Float, line: Float, reach: float) -> tuple[Float, Centres, 
     spacing = float(np.median(np.diff(_distances(line))))
     placed = place_points(points, frames, reach)
     centres = section_centres(placed, len(line), 0.5 * spacing + 0.25)
-    _require_tunnel(centres.whole)
+    _require_tunnel(centres)
     shift = np.nan_to_num(centres.right)[:, None] * frames.right + np.nan_to_num(centres.up)[:, None] * frames.up
     first, *_, last = np.flatnonzero(centres.whole)
     # beyond the tunnel the line keeps its direction
@@ -252,10 +252,18 @@ def _centred(points: Float, line: Float, reach: float) -> tuple[Float, Centres, 
     return smooth_line(raw, seen), centres, raw
 
 
-def _require_tunnel(whole: Bool) -> None:
-    count = int(whole.sum())
-    if count < _MIN_CONSECUTIVE_SECTIONS or count < _MIN_COMPLETE_SHARE * len(whole):
-        raise InputError(f"no tunnel: of {len(whole)} sections of the roofed area, {count} have two walls, a vault and a floor")
+def _require_tunnel(centres: Centres) -> None:
+    sections, count, open_side = len(centres.whole), int(centres.whole.sum()), int(centres.open_side.sum())
+    if count >= max(_MIN_CONSECUTIVE_SECTIONS, _MIN_COMPLETE_SHARE * sections):
+        return
+    advice = (
+        f"; {open_side} are open on one side, so that they have no centre: write its axis, or a line along it inside, as a"
+        " table of x, y, z, and pass it: --axis axis.csv"
+    )
+    raise InputError(
+        f"no tunnel: of {sections} sections of the roofed area, {count} have two walls, a vault and a floor"
+        + (advice if open_side > sections // 2 else "")
+    )
 
 
 def _inside(centres: Centres, gap: int) -> slice:

@@ -76,12 +76,15 @@ class Centres:
         Shift, m; NaN if a wall, the vault or the floor is not visible.
     width, height : (k,) float arrays
         Distance between the walls, and from floor to vault, m; NaN likewise.
+    open_side : (k,) bool array
+        True where only one of the walls is visible, with vault and floor.
     """
 
     right: Float
     up: Float
     width: Float
     height: Float
+    open_side: Bool
 
     @property
     def whole(self) -> Bool:
@@ -124,7 +127,10 @@ def section_centres(placed: Placed, count: int, half_width: float) -> Centres:
     roofed = np.isfinite(radius[:, vault]).mean(axis=1) >= _VAULT
     up = np.where(roofed, _median((radius[:, vault] - depth[:, None] / cosine[vault]) / 2.0), np.nan)
     height = np.where(roofed, depth + _median(radius[:, vault] * cosine[vault]), np.nan)
-    return Centres(right, up, width, height)
+    left_wall, right_wall = (
+        np.isfinite(radius[:, np.abs(angle - middle) < _WALL]).sum(axis=1) >= _MIN_CLASSES for middle in (-90.0, 90.0)
+    )
+    return Centres(right, up, width, height, np.isfinite(up) & (left_wall != right_wall))
 
 
 def vault_gap(placed: Placed, distance: Float) -> float:

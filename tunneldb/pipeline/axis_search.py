@@ -133,7 +133,8 @@ def describe_found(found: FoundAxis, start: float = 0.0) -> list[str]:
     if found.off_line_share > TRUSTED_ASIDE and found.off_line_centre is not None:
         lines.append(
             f"{100 * found.off_line_share:.0f} % of the roofed area is not along the line, most of it around "
-            f"{found.off_line_centre[0]:.0f},{found.off_line_centre[1]:.0f}: a side room, or the tunnel beyond a gap"
+            f"{found.off_line_centre[0]:.0f},{found.off_line_centre[1]:.0f}: a side room, or the tunnel beyond a "
+            "gap or where one side is open"
         )
     if whole < TRUSTED_SHARE * count or far > TRUSTED_DISTANCE:
         lines.append("doubtful as a whole: check the picture before you continue, or draw the line")
