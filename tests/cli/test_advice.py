@@ -42,6 +42,10 @@ ADD = "--tunnel demo --date 2024-06-01 --intensity Amplitude --intensity-kind re
 """Options of a survey."""
 
 CASES = """
+rings demo-2024 --length 10 --find | by one of (--length), | rings demo-2024 \\1 10
+rings demo-2024 --start 12300 | give (--length), too | rings demo-2024 --start 12300 \\1 10
+rings demo-2024 --axis axis.csv | --axis is for rings of --points; omit it | rings demo-2024 --length 10
+rings | Give a survey, | rings demo-2024 --length 10
 leaks demo-2024 --format xlsx | add (-o leaks.xlsx) | leaks demo-2024 --format xlsx \\1
 leaks demo-2024 --format gpkg | add (-o leaks.gpkg) | leaks demo-2024 --format gpkg \\1
 leaks demo-2024 -o leaks.dxf | written as .*(\\.csv).*: use one of these endings | leaks demo-2024 -o leaks\\1
@@ -103,6 +107,8 @@ survey set n1 --stations stations.csv --trajectory trajectory.csv | omit one of 
 survey set n1 --time-offset 1 --date 2024-06-02 | has none; omit it | survey set n1 --date 2024-06-02
 profile remove demo none | tunneldb (profile list demo) | \\1
 deviation n1 --layer excavation | (profile add demo) profile.csv (--layer excavation) | \\1 round.csv \\2
+tunnel add z1 --srid 25830 --site --reverse | omit (--reverse) | tunnel add z1 --srid 25830 --site
+qgis demo-2024 | say where the project goes: (-o) | qgis demo-2024 \\1 a.qgz
 tunnel remove demo | remove them first .tunneldb (survey remove). | \\1 demo-2024 --yes
 """  # noqa: E501
 """Refused command, advice in its message, and the command that follows it."""

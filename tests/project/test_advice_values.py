@@ -34,6 +34,7 @@ from tunneldb.simulate.canal.parameters import CanalParameters
 from tunneldb.simulate.structure.parameters import StructureParameters
 from tunneldb.stages.parameters import settings
 from tunneldb.stages.run import km_range, parse_km
+from tunneldb.store.catalog import _require_name
 
 NO_WIDENING = {
     "curve_widening": (0.0, 0.0), "bogie_distance": 0.0, "overhang": 0.0, "flexibility": 0.0, "speed": 0.0,
@@ -73,6 +74,8 @@ CASES: list[tuple[Callable[..., Any], Any, str, Callable[[re.Match[str]], Any]]]
     (settings, ["axis.max_rejectd=0.5"], r"Did you mean '(\S+)'\?", lambda found: [f"{found[1]}=0.5"]),
     (settings, ["section.angle_step=7"], r"must divide (180) degrees", lambda m: [f"section.angle_step={int(m[1]) / 36}"]),
     (file_path, "a\nb.laz", "rename it", lambda _: "ab.laz"),
+    (_require_name, "a" * 200, r"use at most (\d+)$", lambda found: "a" * int(found[1])),
+    (_require_name, ".a", "begin with a letter or a digit", lambda _: "a"),
     (lambda curve: ReferenceCurve(*np.array(curve).T), [(1.0, 2.0), (2.0, np.nan), (3.0, 1.0)], r"^row (2) .* remove it",
      lambda found: np.delete([(1.0, 2.0), (2.0, np.nan), (3.0, 1.0)], int(found[1]) - 1, axis=0)),
     (lambda speeds: SonarInput((), Path("l.csv"), 1, 0.0, None, speeds), (1500.0, 14.47), r"give ASSUMED=MEASURED, as (\S+)",
@@ -114,6 +117,25 @@ FULL = [
     ({"section": "hexagon"}, r"use (circular), ", {"section": "circular"}),
     ({"scanner_offset": 3.9}, "change its height or offset", {"scanner_offset": 1.0}),
     ({"invert": 9.0}, "give a depth between 0 and", {"invert": 1.0}),
+    ({"straight": 20.0}, "give 0 to less than the length, 10 m", {"straight": 9.0}),
+    ({"density": 0.01}, "give 0.1 to 1000000", {"density": 0.1}),
+    ({"seed": -1}, "give 0 or more", {"seed": 0}),
+    ({"leak_area": (3.0, 2.0)}, "give two ascending numbers from 0.001", {"leak_area": (2.0, 3.0)}),
+    ({"ovality": (0.1, 9.0), "lining": "segments"}, "give 0 to 5 %", {"ovality": (0.1, 5.0), "lining": "segments"}),
+    ({"ring_shift": 0.01, "lining": "segments", "section": "horseshoe"}, "use circular",
+     {"ring_shift": 0.01, "lining": "segments", "section": "circular"}),
+    ({"joint_leaks": 1}, "use lining cast or segments", {"joint_leaks": 1, "lining": "cast"}),
+    ({"segment_step": 0.01, "lining": "cast"}, "use lining segments", {"segment_step": 0.01, "lining": "segments"}),
+    ({"grown_leaks": 1}, r"add --epoch 1", {"grown_leaks": 0, "epoch": 1}),
+    ({"mesh": 0.01}, "give 0 for none, or 0.02 m and more", {"mesh": 0.02}),
+    ({"radius": 30.0}, "give 50 m or more, or 0", {"radius": 50.0}),
+    ({"length": 5.0}, "give 10 to 100000 m", {"length": 10.0}),
+    ({"srid": 999999}, "give the EPSG code of a projected system", {"srid": 25830}),
+    ({"srid": 4326}, "is not projected in metres: give one that is", {"srid": 25830}),
+    ({"radius": 60.0, "straight": 9.0, "transition": 9.0}, "shorten them or lengthen the tunnel",
+     {"radius": 60.0, "straight": 1.0, "transition": 2.0}),
+    ({"section": "box", "width": 50.0}, "give 1 to 40 m", {"section": "box", "width": 40.0}),
+    ({"clutter": 400}, "give 0 to 30 runs", {"clutter": 30, "length": 60.0}),
 ]  # fmt: skip
 
 

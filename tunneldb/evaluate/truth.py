@@ -127,8 +127,8 @@ def _layer(path: Path, wanted: str | None, noun: str) -> str:
         layers = [str(name) for name, kind in pyogrio.list_layers(source) if kind is not None]  # not tables
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: a layer name is not UTF-8: {_line(error)}") from None
-    except DataSourceError:
-        raise InputError(f"{path} is neither GeoPackage nor GeoJSON; convert it to one of these") from None
+    except DataSourceError as error:
+        raise InputError(f"{path} cannot be read: {gdal_fault(error)}") from None
     listed = ", ".join(layers) or "none"
     if wanted is not None:
         if wanted not in layers:

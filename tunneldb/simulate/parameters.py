@@ -249,8 +249,8 @@ class Parameters:
                 )
         if self.radius and not abs(self.radius) >= 50.0:
             raise UserError(f"radius of the curve is {self.radius:g} m: give 50 m or more, or 0 for a straight tunnel")
-        if self.straight is not None and not 0.0 <= self.straight <= self.length:
-            raise UserError(f"straight is {self.straight:g} m: give 0 to the length, {self.length:g} m")
+        if self.straight is not None and not 0.0 <= self.straight < self.length:
+            raise UserError(f"straight is {self.straight:g} m: give 0 to less than the length, {self.length:g} m")
         if self.density is not None and not 0.1 <= self.density <= 1e6:
             raise UserError(f"density is {self.density:g} points/m²: give 0.1 to 1000000")
         if self.seed < 0:
