@@ -1,4 +1,4 @@
-"""Numbers in texts: digits 0 to 9, without separators of thousands. Python also reads 272_000 and ２７２."""
+"""Numbers in texts: digits 0 to 9, no separators of thousands (Python reads 272_000 and ２７２, too); shares in per cent."""
 
 from __future__ import annotations
 
@@ -23,6 +23,17 @@ def parse_whole(text: str) -> int:
         If it is none.
     """
     return int(_require_plain(text))
+
+
+def percent_number(share: float, decimals: int = 1) -> str:
+    """Return a share in per cent, without the sign; 100 only for all, 0 only for nothing."""
+    least = 10**-decimals
+    value = 100.0 * share
+    if 0.0 < value < least:
+        return f"< {least:.{decimals}f}"
+    if 100.0 - least / 2.0 <= value < 100.0:
+        return f"> {100.0 - least:.{decimals}f}"
+    return f"{value:.{decimals}f}"
 
 
 def is_plain(text: str) -> bool:

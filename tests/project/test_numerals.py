@@ -18,7 +18,7 @@ from tunneldb.cli.survey import DAY
 from tunneldb.cli.tunnel import Srid
 from tunneldb.csvfile import number_advice, read_csv
 from tunneldb.errors import InputError, UserError
-from tunneldb.numerals import parse_number, parse_whole
+from tunneldb.numerals import parse_number, parse_whole, percent_number
 from tunneldb.pointcloud.formats.text_lines import are_numbers
 from tunneldb.stages.parameters import _value
 from tunneldb.stages.run import km_range
@@ -83,3 +83,12 @@ def test_texts_are_read_as_numbers_in_one_place() -> None:
     assert found == set()
     of_click = [path.name for path in root.rglob("*.py") if "click.IntRange" in path.read_text("utf-8")]
     assert of_click == ["param_types.py"], "of which WholeRange is a kind"
+
+
+@pytest.mark.parametrize(
+    ("share", "decimals", "text"),
+    [(0.0, 1, "0.0"), (0.0004, 1, "< 0.1"), (0.5, 1, "50.0"), (0.9994, 1, "99.9"), (0.9998, 1, "> 99.9"), (1.0, 1, "100.0"),
+     (0.996, 0, "> 99"), (1.0, 0, "100")],
+)  # fmt: skip
+def test_a_share_is_all_or_nothing_only_if_it_is(share: float, decimals: int, text: str) -> None:
+    assert percent_number(share, decimals) == text

@@ -25,6 +25,7 @@ from tunneldb.cli.tables import print_table
 from tunneldb.counted import counted
 from tunneldb.errors import UserError
 from tunneldb.files import replacing
+from tunneldb.numerals import percent_number
 
 if TYPE_CHECKING:
     from tunneldb.measures.clearance.compute.gauge import Widening
@@ -178,9 +179,9 @@ def _print(kilometres: list[Row], rows: list[Row], inside: list[Row], track: str
             "passing", "ground",
         ],
         [
-            (row["km"], f"{row['metres']} of {row['run']['metres']}", f"{100 * row['run']['track_seen']:.1f}",
+            (row["km"], f"{row['metres']} of {row['run']['metres']}", percent_number(row["run"]["track_seen"]),
              f"{1e3 * row['run'].get('axis_se', 0.0):.1f}", f"{1e3 * row['run'].get('cant_se', 0.0):.1f}",
-             number(row["margin"], 3), row["metres_inside"], f"{100 * row['seen_share']:.1f}",
+             number(row["margin"], 3), row["metres_inside"], percent_number(row["seen_share"]),
              row["stray"], row["passing"], row["ground"])
             for row in kilometres
         ],

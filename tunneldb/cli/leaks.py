@@ -25,6 +25,7 @@ from tunneldb.export.tables.leaks import as_table
 from tunneldb.export.tables.workbooks import write_leaks
 from tunneldb.files import replacing
 from tunneldb.geometry.stationing import KILOMETRE
+from tunneldb.numerals import percent_number
 from tunneldb.stages.run import loaded_kilometres, parse_km
 from tunneldb.store.coverage import read_coverage
 from tunneldb.store.dry_regions import DryRegion, read_dry_regions
@@ -194,7 +195,7 @@ def parse_clock(text: str) -> tuple[float, float]:
 
 _BY_KM = (
     ("lining_area", "lining m²", ".0f"),
-    ("seen_share", "seen %", ".1%"),
+    ("seen_share", "seen %", "%"),
     ("wet_area", "wet m²", ".2f"),
     ("wet_per_mille", "wet ‰", ".2f"),
     ("patches", "leaks", "d"),
@@ -212,11 +213,16 @@ def _print_classes(conn: psycopg.Connection, survey: Survey, low: float, high: f
     add_to_json(survey=survey.name, kilometres=kilometres, total=records(names, total)[0] if total else None)
     formats = [form for _, _, form in _BY_KM]
     lines = [
-        [km, *("-" if v is None else format(v, form).removesuffix("%") for v, form in zip(values, formats, strict=True))]
-        for km, *values in [*rows, *total]
+        [km, *(_shown(value, form) for value, form in zip(values, formats, strict=True))] for km, *values in [*rows, *total]
     ]
     header = ["km", *(heading for _, heading, _ in _BY_KM)]
     print_table(header, lines, right=range(len(header)))
+
+
+def _shown(value: float | None, form: str) -> str:
+    if value is None:
+        return "-"
+    return percent_number(value) if form == "%" else format(value, form)
 
 
 def _print(listed: LeakList, form: str, geometry: Geometry, survey: Survey) -> None:

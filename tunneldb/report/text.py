@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 from markupsafe import Markup
 
+from tunneldb.numerals import percent_number
 from tunneldb.report.data import Edit, Row
 
 DASH = "–"
@@ -23,15 +24,7 @@ SPACE = "\u202f"
 
 def percent(share: float | None, decimals: int = 1) -> str:
     """Return a share in per cent; 100 % only for all, 0 % only for nothing."""
-    if share is None:
-        return DASH
-    least = 10**-decimals
-    value = 100 * share
-    if 0 < value < least:
-        return f"< {least:.{decimals}f} %"
-    if 100 - least / 2 <= value < 100:
-        return f"> {100 - least:.{decimals}f} %"
-    return f"{value:.{decimals}f} %"
+    return DASH if share is None else f"{percent_number(share, decimals)} %"
 
 
 def number(value: float | None, decimals: int = 2) -> str:

@@ -14,6 +14,7 @@ from tunneldb.export.exchange.entity import write
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.measures.clearance.compute.track import metre_places
 from tunneldb.measures.clearance.rows import load_classed
+from tunneldb.numerals import percent_number
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
 
@@ -64,9 +65,8 @@ def write_clearance(
                 space.add_circle(point, 0.1, dxfattribs={"layer": "NEAREST"})
         for arm in ((_CROSS, 0.0), (0.0, _CROSS)):
             space.add_line(at - arm, at + arm, dxfattribs={"layer": "TRACK"})
-        said = (
-            f"{label}  " + ("nothing seen" if margin is None else f"{margin:.3f} m, {klass}") + f", seen {100.0 * seen:.0f} %"
-        )
+        found = "nothing seen" if margin is None else f"{margin:.3f} m, {klass}"
+        said = f"{label}  {found}, seen {percent_number(seen, 0)} %"
         write(space, said, (at[0] - 3.0, at[1] - 2.0), _TEXT, "TEXT")
     document.saveas(path)
     return len(rows)

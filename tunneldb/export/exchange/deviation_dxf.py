@@ -11,6 +11,7 @@ from ezdxf import filemanagement
 from ezdxf.units import M
 
 from tunneldb.export.exchange.entity import write
+from tunneldb.numerals import percent_number
 from tunneldb.shape.outline import Outline
 from tunneldb.store.design import load_design
 from tunneldb.store.survey import Survey
@@ -57,7 +58,7 @@ def write_sections(
         outline = by_name[profile].at((begin + end) / 2.0)
         at = np.array([(number % ROW) * wide, -(number // ROW) * tall])
         _draw(space, outline, np.array(values, dtype=np.float64), at)
-        said = f"{label}  over {over:.3f} m2, under {under:.3f} m2, seen {100.0 * seen:.0f} %"
+        said = f"{label}  over {over:.3f} m2, under {under:.3f} m2, seen {percent_number(seen, 0)} %"
         write(space, said, (at[0] - wide / 2.0 + _GAP / 2.0, at[1] + outline.elements[:, 1].min() - 2.0 * _TEXT), _TEXT, "TEXT")
     document.saveas(path)
     return len(rows)

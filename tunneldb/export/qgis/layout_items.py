@@ -38,6 +38,14 @@ def cut(text: str, letters: int | str, more: str = "") -> str:
     )
 
 
+def percent_expression(share: str) -> str:
+    """Return an expression for a share in per cent with one decimal, without the sign; 100 only for all, 0 only for nothing."""
+    return (
+        f"if({share} >= 0.9995 and {share} < 1, '> 99.9', if({share} > 0 and {share} < 0.001, '< 0.1',"
+        f" format_number(100 * {share}, 1)))"
+    )
+
+
 def key(layout: str, name: str) -> str:
     """Return the key of an item of a layout: the same in each project."""
     return f"{{{uuid.uuid5(uuid.NAMESPACE_OID, f'{layout} {name}')}}}"

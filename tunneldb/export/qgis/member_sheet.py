@@ -19,6 +19,7 @@ from tunneldb.export.qgis.layout_items import (
     item,
     key,
     label,
+    percent_expression,
     table,
     text_style,
 )  # fmt: skip
@@ -105,7 +106,7 @@ def _texts(survey: Survey) -> list[ET.Element]:
     what = f"{'Site' if survey.site else 'Tunnel'} {survey.tunnel}, survey {survey.name} of {survey.date:%Y-%m-%d}"
     sums = (
         f"[% {faces} %] face[% if({faces} = 1, '', 's') %], [% format_number({area}, 2) %] m², "
-        f"[% format_number(100 * {seen}, 1) %] % inspected; [% {spots} %] spot[% if({spots} = 1, '', 's') %], "
+        f"[% {percent_expression(seen)} %] % inspected; [% {spots} %] spot[% if({spots} = 1, '', 's') %], "
         f"dark [% format_number({dark}, 4) %] m², bright [% format_number({bright}, 4) %] m²"
     )
     doubt = (

@@ -9,7 +9,18 @@ from tunneldb import __version__
 from tunneldb.export.qgis.catalogue import HALOS, Catalogue
 from tunneldb.export.qgis.extent import Extent
 from tunneldb.export.qgis.layer import SHEETS
-from tunneldb.export.qgis.layout_items import MAP_ITEM, PAGE, PAGE_ITEM, SCALE_BAR, cut, item, key, label, text_style
+from tunneldb.export.qgis.layout_items import (
+    MAP_ITEM,
+    PAGE,
+    PAGE_ITEM,
+    SCALE_BAR,
+    cut,
+    item,
+    key,
+    label,
+    percent_expression,
+    text_style,
+)
 from tunneldb.export.qgis.sheet_tables import (
     FINDING_PAGES,
     FINDINGS,
@@ -151,7 +162,7 @@ def _texts(survey: Survey, scale: int, goes_on: Sequence[str]) -> list[ET.Elemen
         ON_PAGE.format(name) for name in ("lining_area", "seen_share", "leaks", "wet_area", "gaps")
     )
     sums = (
-        f"Lining [% coalesce(format_number({lining}, 0) || ' m², ' || format_number(100 * {seen}, 1) || ' % of it seen',"
+        f"Lining [% coalesce(format_number({lining}, 0) || ' m², ' || {percent_expression(seen)} || ' % of it seen',"
         f" 'not seen yet') %]; leaks [% coalesce({leaks} || ', ' || format_number({wet}, 2) || ' m²', 'not searched for') %]"
     )
     how = f"Unrolled lining from inside, 1:{scale} on A4; up it arc from the crown, m, right wall above; {FILL_NOTE}. "
