@@ -130,7 +130,7 @@ def outcome(conn: psycopg.Connection[Any], scene: Scene, folder: Path, seconds: 
     true, properties = layer(conn, survey, folder / "truth.geojson")
     other, marks = layer(conn, survey, folder / "other.geojson")
     rows = conn.execute(
-        "SELECT public.ST_AsBinary(unrolled), coalesce(judged, kind), coalesce(confidence, 0.0), reasons"
+        "SELECT public.ST_AsBinary(unrolled), coalesce(kind_override, kind), coalesce(confidence, 0.0), reasons"
         " FROM tunnel.finding WHERE survey_id = %s AND detected ORDER BY id",
         (survey.id,),
     ).fetchall()

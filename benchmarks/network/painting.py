@@ -1,0 +1,155 @@
+"""Painted pictures for training: things of ``benchmarks.evidence.painted`` on lining as scans show it.
+
+    python -m benchmarks.network.painting --cache DIR --count 300       # about a second each
+
+Added to what is painted there: water and dirt along the foot of the walls without an end, tones of segments and rings, joints,
+courses of brick, ribs of cast iron, rows of bolt pockets, posts with their shadows, banding, noise, sparse points, grey steps.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+
+from benchmarks.evidence.painted import CELL, HALF, LONG, PIXEL, THINGS, Painting
+from benchmarks.network.sample import DRY, NONE, OTHER, WET, Sample
+from tunneldb.raster.pixel_state import PixelState
+
+DARK = 0.4
+"""Painted darkening from which dry lining counts as dark, dB."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.network.painting", description=__doc__.splitlines()[0])
+    parser.add_argument("--cache", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--count", type=int, default=300)
+    parser.add_argument("--first", type=int, default=1, help="seed of the first one")
+    arguments = parser.parse_args()
+    folder = arguments.cache / "scenes" / "painted"
+    folder.mkdir(parents=True, exist_ok=True)
+    for seed in range(arguments.first, arguments.first + arguments.count):
+        path = folder / f"{seed:05}.npz"
+        if not path.is_file():
+            paint(seed).save(path)
+
+
+def paint(seed: int) -> Sample:
+    """Paint a picture."""
+    art = Painting(100_000 + seed)
+    rng = art.rng
+    art.state[np.abs(np.broadcast_to(art.y, art.state.shape)) > HALF - rng.uniform(0.1, 1.0)] = PixelState.FLOOR
+    makers, often = [make for make, _ in THINGS], np.array([share for _, share in THINGS])
+    if rng.random() < 0.25:
+        often = np.where(rng.random(len(often)) < 0.2, 1.0, 1e-9)
+    busy = rng.uniform(0.1, 1.0)
+    for s in np.arange(CELL / 2, LONG, CELL):
+        for a in (-HALF + CELL / 2, 0.1, HALF - CELL / 2):
+            if rng.random() < busy:
+                make = makers[rng.choice(len(makers), p=often / often.sum())]
+                make(art, float(s + rng.uniform(-0.4, 0.4)), float(a + rng.uniform(-0.4, 0.4)))
+    dark = art.drop > DARK
+    for side in (-1, 1):
+        if rng.random() < 0.5:
+            dark |= foot(art, side, wet=bool(rng.random() < 0.65))
+    label = np.where(art.wet, WET, np.where(dark, OTHER, DRY)).astype(np.uint8)
+    level = -art.drop * rng.uniform(0.5, 1.1) + lining(art, label)
+    return scanned(art, level, label)
+
+
+def foot(art: Painting, side: int, *, wet: bool) -> np.ndarray:
+    """Darken the foot of a wall along the whole picture: water that rises, its upper edge ragged, or straight dirt."""
+    rng = art.rng
+    edge = float(np.abs(art.y[(art.state[:, 0] != PixelState.FLOOR)]).max())
+    up = edge - side * art.y
+    if wet:
+        rag = sum(ndimage.gaussian_filter1d(rng.normal(0, 1, len(art.x)), w, mode="wrap") * np.sqrt(w) for w in (3, 12, 40))
+        height = art.log(0.08, 0.9) * np.clip(1 + art.uniform(0.1, 0.4) * rag, 0.1, 3.0)
+        if rng.random() < 0.5:
+            at = (art.x - art.uniform(0, 1.5)) % art.uniform(1.0, 2.0)
+            height = height + art.uniform(0.1, 0.5) * np.exp(-at / art.uniform(0.03, 0.2))
+        amount = np.clip((height - up) / art.log(0.01, 0.15) + 0.5, 0, 1) * (up > 0)
+    else:
+        low, height = art.uniform(0.0, 0.5), art.log(0.05, 1.5)
+        soft = art.log(0.01, 0.1) if rng.random() < 0.6 else height
+        amount = np.clip((low + height - up) / soft + 0.5, 0, 1) * (up > low) * np.ones(len(art.x))
+    field = ndimage.gaussian_filter(rng.normal(0, 1, art.drop.shape), art.uniform(3, 20))
+    drop = art.log(1.8, 8.0) * np.clip(1 + art.uniform(0, 0.35) * field / field.std(), 0.3, 1.6)
+    art.paint(amount, drop, wet=wet)
+    return amount >= DARK
+
+
+def lining(art: Painting, label: np.ndarray) -> np.ndarray:
+    """Level of dry lining, dB: tones, joints, texture, fittings; joints and fittings are marked as dark but dry."""
+    rng, x, y = art.rng, art.x, art.y
+    level = np.zeros(art.drop.shape)
+    ring, from_ = art.uniform(1.0, 2.4), art.uniform(0, 2)
+    number = np.floor((x + from_) / ring).astype(int)
+    if rng.random() < 0.7:
+        level += rng.normal(0, art.uniform(0, 0.6), number.max() + 1)[number]
+    joints = np.zeros(label.shape, np.bool_)
+    if rng.random() < 0.6:
+        joints |= np.broadcast_to(((x + from_) % ring) < 0.04, label.shape)
+        part = art.uniform(1.2, 3.0)
+        shift = rng.integers(0, 2, number.max() + 1)[number] * part / 2
+        joints |= ((y + 10 + shift) % part) < 0.03
+        tone = rng.normal(0, art.uniform(0, 0.5), (64, 64))
+        level += tone[np.floor((y + 10 + shift) / part).astype(int) % 64, number % 64]
+        level[joints] -= art.log(0.3, 4.0)
+    kind = rng.random()
+    if kind < 0.12:
+        course = art.uniform(0.07, 0.12)
+        row = np.floor((y + 10) / course).astype(int)
+        stone = np.floor((x + 0.11 * (row % 2)) / 0.23).astype(int)
+        level += rng.normal(0, art.uniform(0.3, 1.2), (512, 512))[row % 512, stone % 512]
+    elif kind < 0.22:
+        rib = art.uniform(0.4, 0.8)
+        level -= art.log(0.5, 3.0) * (((x + from_) % rib) < 0.1)
+        level -= art.log(0.5, 3.0) * (((y + 10) % art.uniform(0.5, 1.6)) < 0.1)
+    if rng.random() < 0.35:
+        size, across = art.uniform(0.06, 0.2), art.uniform(0.8, 1.6)
+        marks = (np.abs((x + from_) % ring - 0.3) < size / 2) & (np.abs((y + 10) % across - 0.4) < size / 2)
+        level[marks] -= art.log(0.5, 5.0)
+        label[marks & (label == DRY)] = OTHER
+    if rng.random() < 0.25:
+        low, high = sorted(rng.uniform(1.0, HALF, 2))
+        posts = ((x % art.uniform(0.8, 2.0)) < art.log(0.04, 0.12)) & (y * rng.choice([-1, 1]) > low) & (np.abs(y) < high)
+        level[posts] -= art.log(1.0, 6.0)
+        label[posts & (label == DRY)] = OTHER
+    for scale in (4, 15, 60, 150):
+        field = ndimage.gaussian_filter(rng.normal(0, 1, label.shape), scale)
+        level += art.uniform(0, 0.5) * field / field.std()
+    level += art.uniform(0, 0.3) * rng.normal(0, 1, len(x)) * (rng.random() < 0.4)
+    level += art.uniform(-0.8, 0.8) * (y / HALF) ** 2 + art.uniform(-0.5, 0.5) * y / HALF
+    label[joints & (label == DRY)] = OTHER
+    return level
+
+
+def scanned(art: Painting, level: np.ndarray, label: np.ndarray) -> Sample:
+    """See the picture with noise, at some density, in steps."""
+    rng = art.rng
+    noisy = level + rng.normal(0, art.log(0.15, 1.2), level.shape)
+    step = rng.choice([0.0, 0.0, 0.08, 0.25])
+    if step:
+        noisy = np.rint(noisy / step) * step
+    density = art.log(50.0, 4000.0) if rng.random() < 0.4 else 4000.0
+    empty = rng.random(level.shape) > 1.0 - np.exp(-density * PIXEL**2 * 1.5)
+    if rng.random() < 0.15:
+        every = int(rng.integers(2, 12))
+        empty |= np.broadcast_to(np.arange(level.shape[1]) % every != 0, level.shape)
+    state = np.where(empty & (art.state <= PixelState.RECESS), PixelState.EMPTY, art.state).astype(np.uint8)
+    deep = np.where(art.state == PixelState.RECESS, 0.05, 0.0) + rng.normal(0, art.log(0.001, 0.006), level.shape)
+    deep -= np.where(art.state == PixelState.OFF, art.uniform(0.03, 0.15), 0.0)
+    offset = np.where(empty, NONE, np.rint(1000 * deep)).astype(np.int16)
+    seen = np.where(empty, NONE, np.rint(100 * (noisy + 40.0))).astype(np.int16)
+    nothing = np.zeros(level.shape, np.uint8)
+    return Sample(
+        state, seen, offset, np.where(empty, NONE, 0).astype(np.int16), nothing.astype(np.uint16), label, nothing, [], PIXEL,
+        0.0, art.grid.bottom,
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
