@@ -15,11 +15,16 @@ from types import FrameType
 
 from tunneldb.errors import UserError
 
+MAX_JSON_MEGABYTES = 200
+"""Maximum size of a GeoJSON file, which is read as a whole; GDAL has the same limit for an object."""
+
 _PLAIN = re.compile(r"[^A-Za-z0-9_]+")
 
 
 def require_regular(path: Path) -> None:
-    """Refuse a path at which there is a device, a pipe or a socket instead of a file or a folder.
+    """Refuse a path at which there is a device, a pipe, a socket or a file of the kernel instead of a file or a folder.
+
+    Files in /proc and /sys have no size, and some never end.
 
     Raises
     ------
@@ -34,6 +39,23 @@ def require_regular(path: Path) -> None:
         kinds = {"a pipe": path.is_fifo(), "a socket": path.is_socket()}
         kind = next((name for name, matches in kinds.items() if matches), "a device")
         raise UserError(f"{path} is {kind}, not a file")
+    if there and path.resolve().parts[1:2] in (("proc",), ("sys",)):
+        raise UserError(f"{path} is in a folder of the kernel, not a file on disk")
+
+
+def require_at_most(path: Path, megabytes: int, noun: str) -> None:
+    """Refuse a file that is too large to be read as a whole.
+
+    Raises
+    ------
+    UserError
+        Names the size and the limit.
+    OSError
+        If it cannot be looked at.
+    """
+    size = path.stat().st_size / 1e6
+    if size > megabytes:
+        raise UserError(f"{path} has {size:.0f} MB; {noun} has at most {megabytes} MB")
 
 
 @contextmanager
@@ -151,6 +173,7 @@ def vector_source(path: Path) -> str:
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}") from None
     if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{"):
+        require_at_most(path, MAX_JSON_MEGABYTES, "a file of GeoJSON")
         return f"GeoJSON:{path}"
     if head.startswith(_SQLITE):
         _require_tables(path)

@@ -21,16 +21,17 @@ SET search_path = pg_catalog, pg_temp
 AS $$
 DECLARE
     part text[];
+    given constant text := CASE WHEN length(label) <= 40 THEN btrim(label) END;
 BEGIN
-    part := regexp_match(btrim(label), '^(-?)(\d+)\+(\d{3}(?:\.\d*)?)$');
+    part := regexp_match(given, '^(-?)(\d+)\+(\d{3}(?:\.\d*)?)$');
     IF part IS NOT NULL THEN
         RETURN ((part[1] || '1')::numeric * (part[2]::numeric * 1000 + part[3]::numeric))::float8;
     END IF;
-    part := regexp_match(btrim(label), '^(-?\d+(?:\.\d*)?)$');
+    part := regexp_match(given, '^(-?\d+(?:\.\d*)?)$');
     IF part IS NOT NULL THEN
         RETURN part[1]::float8;
     END IF;
-    RAISE EXCEPTION '"%" is no chainage: write 12+345.678 or metres', label USING ERRCODE = 'invalid_text_representation';
+    RAISE EXCEPTION '"%" is no chainage: write 12+345.678 or metres', left(label, 40) USING ERRCODE = 'invalid_text_representation';
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.chainage_parse(text) IS

@@ -11,7 +11,7 @@ DECLARE
 BEGIN
     SELECT s.id INTO found FROM tunnel.survey s WHERE s.name = survey;
     IF found IS NULL THEN
-        RAISE EXCEPTION 'there is no survey %', survey USING HINT = 'SELECT name FROM tunnel_api.survey';
+        RAISE EXCEPTION 'there is no survey %', left(survey, 63) USING HINT = 'SELECT name FROM tunnel_api.survey';
     END IF;
     RETURN found;
 END

@@ -15,7 +15,7 @@ DECLARE
 BEGIN
     SELECT t.id INTO found FROM tunnel.tunnel t WHERE t.name = tunnel;
     IF found IS NULL THEN
-        RAISE EXCEPTION 'there is no tunnel %', tunnel USING HINT = 'SELECT name FROM tunnel_api.tunnel';
+        RAISE EXCEPTION 'there is no tunnel %', left(tunnel, 63) USING HINT = 'SELECT name FROM tunnel_api.tunnel';
     END IF;
     RETURN found;
 END

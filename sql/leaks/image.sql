@@ -23,7 +23,7 @@ DECLARE
     place record;
 BEGIN
     IF wanted <> ALL (kinds) THEN
-        RAISE EXCEPTION 'there is no image %: there are %', quote_literal(wanted), array_to_string(kinds, ', ')
+        RAISE EXCEPTION 'there is no image %: there are %', quote_literal(left(wanted, 40)), array_to_string(kinds, ', ')
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
     IF cardinality(x) <> cardinality(y) THEN

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import signal
 import sqlite3
@@ -164,6 +165,31 @@ def test_curves_of_many_vertices_are_refused(tmp_path: Path, monkeypatch: pytest
     zigzag = [(float(k), float(k % 2)) for k in range(1000)]
     with pytest.raises(UserError, match="its curves need more than 1000 vertices"):
         read_given(dxf(tmp_path / "a.dxf", lambda space: space.add_open_spline(zigzag)))
+
+
+def test_a_drawing_of_many_lines_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A layer of another subject; the axis alone on a layer is read."""
+    monkeypatch.setattr("tunneldb.alignment.dxf._MAX_ENTITIES", 50)
+
+    def draw(space: Any) -> None:
+        for k in range(51):
+            space.add_line((0, k), (1, k), dxfattribs={"layer": "SITE"})
+        space.add_polyline3d(LINE)
+
+    path = dxf(tmp_path / "a.dxf", draw)
+    with pytest.raises(UserError, match="layer 'SITE' has 51 lines and arcs, an axis has at most 50"):
+        read_given(path, layer="SITE")
+    np.testing.assert_allclose(read_given(path, layer="0").xyz, LINE, atol=1e-6)
+
+
+def test_a_file_larger_than_can_be_read_is_refused(tmp_path: Path) -> None:
+    """Nearly all of it is a hole, which takes no space on the disk."""
+    for name, text in (("a.dxf", "0\nSECTION\n"), ("a.ifc", "ISO-10303-21;"), ("a.geojson", '{"type": "FeatureCollection"')):
+        path = tmp_path / name
+        path.write_text(text)
+        os.truncate(path, 1 << 40)
+        with bounded(), pytest.raises(UserError, match=rf"{name} has 1099512 MB; a .* has at most \d+ MB"):
+            read_given(path)
 
 
 @contextmanager

@@ -53,6 +53,7 @@ def test_a_stretch_that_begins_where_the_survey_ends(example: str, conn: psycopg
             ("tunnel", "add", "new", "--srid", "25830", "--axis", "AXIS", "--spacing", "1e-8"),
             "must divide 1000 m and be 0.1 m or more",
         ),
+        (("inspect", "/proc/kmsg"), "/proc/kmsg is in a folder of the kernel, not a file on disk"),
         (("profile", "add", "demo", "lining", "PIPE"), "is a pipe, not a file"),
         (("survey", "set", "demo-2024", "--reference", "PIPE"), "is a pipe, not a file"),
         (("deviation", "demo-2024", "--axis-sigma", "1e-300"), "--axis-sigma 1e-300: that is no number which can be meant"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 import re
 import sqlite3
 import zipfile
@@ -151,3 +152,6 @@ def test_a_shape_nested_without_end_is_refused(conn: psycopg.Connection, example
     template.write_text("client = " + "[" * 100_000)
     result = CliRunner().invoke(main, ["report", example, "--template", str(template), "-o", str(tmp_path / "a.html")])
     assert (result.exit_code, result.stderr) == (2, f"tunneldb: {template}: its lists are nested too deep\n")
+    os.truncate(template, 1 << 40)
+    result = CliRunner().invoke(main, ["report", example, "--template", str(template), "-o", str(tmp_path / "a.html")])
+    assert (result.exit_code, result.stderr) == (2, f"tunneldb: {template} has 1099512 MB; a template has at most 1 MB\n")

@@ -193,6 +193,10 @@ _TABLES = {
     "tables": "SELECT relname FROM pg_class WHERE relnamespace = 'tunnel'::regnamespace AND relkind IN ('r', 'p') ORDER BY 1",
     "goal": "SELECT km, stage, parameters::text FROM tunnel.goal ORDER BY km",
     "incoming": "SELECT name, message FROM tunnel.incoming ORDER BY name",
+    "run": "SELECT km, stage, coalesce(parameters ->> 'file', ''), parameters,"
+    # which of two kilometres finds a leak across their boundary first, is chance
+    " counts - '{leaks_new,leaks_again,leaks_over_ends}'::text[] FROM tunnel.run WHERE outcome = 'done'"
+    " ORDER BY stage, km, 3, id",
     "status": "SELECT km, stage, outcome, stale, reason FROM tunnel_api.stage_status ORDER BY km, step",
     "jobs": "SELECT status::text, args::text FROM tunnel_queue.procrastinate_jobs WHERE status IN ('todo', 'doing')",
 }
@@ -286,10 +290,19 @@ def same(a: object, b: object) -> bool:
         return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-9) or (math.isnan(a) and math.isnan(b))
     if isinstance(a, (list, tuple)) and isinstance(b, (list, tuple)):
         return len(a) == len(b) and all(map(same, a, b))
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
     return a == b
 
 
 def _pair(a: Sequence[object], b: Sequence[object]) -> str:
     key = " ".join(map(str, a[:3]))
-    unequal = [(i, str(x)[:80], str(y)[:80]) for i, (x, y) in enumerate(zip(a, b, strict=True)) if not same(x, y)]
+    unequal = [(i, _of(x, y)[:200], _of(y, x)[:200]) for i, (x, y) in enumerate(zip(a, b, strict=True)) if not same(x, y)]
     return f"{key}: (column, one, other) {unequal[:3]}"
+
+
+def _of(one: object, other: object) -> str:
+    """Text of a value; of a dictionary only entries that the other one does not have."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return str({key: value for key, value in one.items() if key not in other or not same(value, other[key])})
+    return str(one)

@@ -9,84 +9,9 @@ import psycopg
 import pytest
 from click.testing import CliRunner, Result
 from psycopg.conninfo import make_conninfo
+from support.fuzz.writes import ARGUMENTS, CALLABLE, HARMLESS, REFUSED, SURVEY, WRITABLE, placed, statements
 
 from tunneldb.cli.main import main
-
-SURVEY = "demo-2024"
-
-WRITABLE = """
-SELECT c.relname, a.attname, format_type(a.atttypid, NULL), has_column_privilege(%(role)s, c.oid, a.attnum, 'UPDATE'),
-       has_column_privilege(%(role)s, c.oid, a.attnum, 'INSERT')
-  FROM pg_class c JOIN pg_attribute a ON a.attrelid = c.oid AND a.attnum > 0
- WHERE c.relnamespace = 'tunnel_api'::regnamespace AND c.relkind = 'v'
-   AND has_any_column_privilege(%(role)s, c.oid, 'UPDATE') AND has_column_privilege(%(role)s, c.oid, a.attnum, 'UPDATE, INSERT')
- ORDER BY 1, 2
-"""
-
-NUMBERS = ["1e300", "1e154", "NaN", "Infinity", "-Infinity", "-1"]
-FAR = ["1e300", "1e154", "1e17", "NaN", "Infinity", "-Infinity"]
-EMPTY = ["POINT EMPTY", "LINESTRING EMPTY", "POLYGON EMPTY", "GEOMETRYCOLLECTION EMPTY", "POLYHEDRALSURFACE Z EMPTY"]
-CURVED = ["CIRCULARSTRING(12350 0, 12351 1, 12352 0)", "CURVEPOLYGON(CIRCULARSTRING(0 0, 1 1, 2 0, 1 -1, 0 0))"]
-VERTICES = 20_001
-
-REFUSED = {
-    "geometry": [
-        *(f"ST_MakePoint('{v}', '{v}', '{v}')" for v in FAR),
-        *(f"ST_MakeLine(ST_MakePoint(12350, 1, 600), ST_MakePoint('{v}', 1, 600))" for v in FAR),
-        *(
-            f"ST_MakePolygon(ST_MakeLine(ARRAY[{{p}}, ST_MakePoint(12351, 1, 0), ST_MakePoint('{v}', 2, 0), {{p}}]))".format(
-                p="ST_MakePoint(12350, 1, 0)"
-            )
-            for v in FAR
-        ),
-        *(f"'{wkt}'::geometry" for wkt in (*EMPTY, *CURVED)),
-        f"(SELECT ST_MakeLine(ST_MakePoint(12350 + i / 1e5, sin(i), 600) ORDER BY i) FROM generate_series(1, {VERTICES}) i)",
-        f"ST_Buffer('POINT(12350 1)', 0.5, {VERTICES // 4})",
-        "NULL",
-    ],
-    "double precision": [f"'{v}'" for v in NUMBERS],
-    "smallint": ["32767", "-1", "0"],
-    "text": ["repeat('x', 1000000)"],
-    "text[]": ["'{}'", "NULL", "array_fill('polygon'::text, ARRAY[100000])"],
-    "integer": ["2147483648", "'NaN'::float8", "NULL"],
-    "bigint": ["9223372036854775808", "-1"],
-    "boolean": ["NULL"],
-}
-"""Values that no column takes, by type."""
-
-HARMLESS = {"text": ["''", r"E'a\nb\tc'", r"E'\x1b[31m'", "'=1+1'"], "integer": ["2147483647"], "double precision": ["NULL"]}
-"""Values that a column may take."""
-
-FREE = "ST_SetSRID('POLYGON((12350 0.5,12350.2 0.5,12350.2 0.7,12350 0.5))'::geometry, 0)"
-ROWS = {
-    "region": {"survey": f"'{SURVEY}'", "kind": "'dry'", "geom": FREE},
-    "finding_photo": {"finding_id": "1", "path": "'a.jpg'"},
-    "finding_kind": {
-        "code": "'a' || floor(1e9 * random())::bigint", "label": "'a'", "geometries": "'{polygon}'", "position": "1",
-        "wet": "false", "active": "true",
-    },
-}  # fmt: skip
-"""Rows that are inserted with one value instead."""
-
-
-def drawn(view: str) -> dict[str, str]:
-    """Row of a view of findings."""
-    return {"survey": f"'{SURVEY}'", "kind": "'leak'", "geom": f"(SELECT geom FROM tunnel_api.{view} WHERE id = 7)"}
-
-
-def statements(view: str, column: str, value: str, update: bool, insert: bool) -> list[str]:
-    """Statements that write a value into a column."""
-    found = []
-    if update:
-        found.append(
-            f"UPDATE tunnel_api.{view} SET {column} = {value} WHERE {'code' if view == 'finding_kind' else 'id'}"
-            f" = (SELECT min({'code' if view == 'finding_kind' else 'id'}) FROM tunnel_api.{view})"
-        )
-    row = ROWS.get(view) or (drawn(view) if view.startswith(("finding_", "leak_")) else None)
-    if insert and row is not None and (update or column in row):
-        given = row | {column: value}
-        found.append(f"INSERT INTO tunnel_api.{view} ({', '.join(given)}) VALUES ({', '.join(given.values())})")
-    return found
 
 
 def attempt(person: psycopg.Connection, statement: str) -> str | None:
@@ -127,11 +52,7 @@ def test_extreme_values_are_refused_or_harmless(
     person.execute("INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (1, 'a.jpg')")
     for view, column, kind, update, insert in columns:
         for value in REFUSED.get(kind, []):
-            wrong = (
-                value
-                if kind != "geometry" or value == "NULL"
-                else f"ST_SetSRID({value}, {0 if 'unrolled' in view or view == 'region' else 25830})"
-            )
+            wrong = value if kind != "geometry" or value == "NULL" else placed(view, value)
             for statement in statements(view, column, wrong, update, insert):
                 tried += 1
                 if attempt(person, statement) is None:
@@ -151,24 +72,10 @@ def test_extreme_values_are_refused_or_harmless(
     works(["report", SURVEY, "-o", str(tmp_path / "report.html")])
 
 
-ARGUMENTS = {
-    "text": [f"'{SURVEY}'", "'demo'", f"'{SURVEY}'", "repeat('9', 100000)"],
-    "integer": ["1", "2147483647"],
-    "double precision": ["12345", "'1e300'", "'NaN'", "'Infinity'", "'-Infinity'", "1e-300", "-1"],
-    "double precision[]": ["array_fill('12345'::float8, ARRAY[100000])"],
-    "geometry": ["ST_MakeLine(ST_MakePoint(0, 0, 0), ST_MakePoint(1e7, 0, 0))", "ST_MakePoint(1e300, 1e300, 1e300)"],
-}
-"""Extreme arguments of functions, by type."""
-
-
 @pytest.mark.parametrize("person", ["vera"], indirect=True)
 def test_no_function_of_viewers_takes_the_server_down(person: psycopg.Connection) -> None:
     """Each ends within seconds, with few rows or one line."""
-    functions = person.execute(
-        "SELECT p.proname, p.proargtypes::regtype[]::text[] FROM pg_proc p"
-        " WHERE p.pronamespace = 'tunnel_api'::regnamespace AND p.prokind = 'f' AND p.pronargs > 0"
-        "   AND has_function_privilege(p.oid, 'EXECUTE')"
-    ).fetchall()
+    functions = person.execute(CALLABLE, {"role": "vera"}).fetchall()
     assert len(functions) > 50
     person.execute("SET statement_timeout = '10 s'")
     for name, kinds in functions:

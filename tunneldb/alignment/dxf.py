@@ -6,7 +6,7 @@ import io
 import itertools
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from tunneldb.alignment.units import UNITS
 from tunneldb.arrays import Float
 from tunneldb.counted import counted
 from tunneldb.errors import InputError
+from tunneldb.files import require_at_most
 
 CHORD_ERROR = 0.0005  # m, of arcs and splines
 MAX_STEP = 1.0  # m between vertices of a drawing with arcs, so that the spline through them keeps straights straight
@@ -29,6 +30,8 @@ _MAX_CURVE_VERTICES = 200_000  # of all curves: 126 km at a radius of 100 m
 _MAX_NESTING = 16  # blocks in blocks
 _MAX_IN_BLOCKS = 10_000  # entities
 _MAX_LISTED = 6
+_MAX_ENTITIES = 20_000  # of the axis: 20 km of pieces of 1 m
+_MAX_MEGABYTES = 100  # ezdxf takes ten times that of memory, and a minute or more
 
 _INSUNITS = {
     1: ("inches", "inch"), 2: ("feet", "foot"), 3: ("miles", "mile"), 4: ("millimetres", "millimeter"),
@@ -86,7 +89,13 @@ def _lines(path: Path, drawing: Any, layer: str | None, unit: float | None, repa
         raise InputError(f"{path} holds no lines{_others(drawing)}; draw the axis as a line in model space")
     chosen = choose_layer(path, names, layer)
     scale, note = _dxf_unit(path, drawing.header.get("$INSUNITS", 0), unit)
-    parts = [part for entity, name in placed if name == chosen for part in _simple(entity)]
+    of_layer = [entity for entity, name in placed if name == chosen]
+    if len(of_layer) > _MAX_ENTITIES:
+        raise InputError(
+            f"{path}: layer {chosen!r} has {len(of_layer)} lines and arcs, an axis has at most {_MAX_ENTITIES}; write the axis"
+            " alone to a file"
+        )
+    parts = [part for entity in of_layer for part in _simple(entity)]
     curved = any(part.dxftype() != "LINE" for part in parts)
     pieces = [scale * piece for piece in _flattened(path, parts, scale)]
     broken = sum(not (np.abs(piece) <= MAX_COORDINATE).all() for piece in pieces)
@@ -109,6 +118,8 @@ def open_drawing(path: Path) -> tuple[Any, str]:
     """
     from ezdxf import filemanagement, recover
 
+    with suppress(OSError):  # of which ezdxf says more
+        require_at_most(path, _MAX_MEGABYTES, "a drawing")
     try:
         return filemanagement.readfile(str(path)), ""
     except Exception as error:  # for damaged files ezdxf raises StopIteration, OverflowError and others

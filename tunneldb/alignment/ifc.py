@@ -18,6 +18,7 @@ import numpy as np
 from tunneldb.alignment.design import Design, StationPiece
 from tunneldb.alignment.elements import PlanElement, PlanKind, ProfileElement, ProfileKind
 from tunneldb.errors import InputError, UserError
+from tunneldb.files import require_at_most
 
 PLAN: dict[str, PlanKind] = {"LINE": "line", "CIRCULARARC": "arc", "CLOTHOID": "clothoid"}
 PROFILE: dict[str, ProfileKind] = {"CONSTANTGRADIENT": "grade", "PARABOLICARC": "parabola", "CIRCULARARC": "circle"}
@@ -26,6 +27,7 @@ STATION_TOLERANCE = 0.001  # m; tolerance for a station that continues the previ
 SCHEMAS = ("IFC4X3", "IFC4X3_TC1", "IFC4X3_ADD1", "IFC4X3_ADD2")
 _END = "END-ISO-10303-21"
 _END_WITHIN = 1000  # characters at the end of a file that contain it
+_MAX_MEGABYTES = 1000  # read as a whole
 _STRING_OR_COMMENT = re.compile(r"('(?:[^']|'')*')|/\*.*?\*/", re.DOTALL)
 _STRING_OR_SCHEMA = re.compile(r"'(?:[^']|'')*'|FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'")
 ARM = 1e6  # m; length for computing directions on the map, long enough for coordinates of millions
@@ -231,6 +233,7 @@ def _open(path: Path) -> Any:
 def _schema(path: Path) -> tuple[str, str]:
     """Return the schema in the header of a STEP file, and its text with the schema that ifcopenshell is to use."""
     try:
+        require_at_most(path, _MAX_MEGABYTES, "a file of an alignment")
         text = path.read_bytes().removeprefix(b"\xef\xbb\xbf").decode("latin-1")  # STEP escapes other letters
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None

@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from tunneldb.arrays import Bool
 from tunneldb.errors import InputError
 from tunneldb.evaluate.truth import read_polygons
+from tunneldb.files import MAX_JSON_MEGABYTES, require_at_most
 from tunneldb.geometry.crs import LOCAL, srid_name
 from tunneldb.store.survey import Survey
 
@@ -76,6 +77,7 @@ def _simulated(path: Path) -> dict[str, Any] | None:
     if path.suffix.lower() != ".json" or not path.is_file():
         return None
     try:
+        require_at_most(path, MAX_JSON_MEGABYTES, "a file of JSON")
         content = json.loads(path.read_text("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is not JSON: {error}") from None

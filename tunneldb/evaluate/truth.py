@@ -19,7 +19,7 @@ from pyproj.exceptions import CRSError
 from shapely.geometry import MultiPolygon, Polygon
 
 from tunneldb.errors import InputError
-from tunneldb.files import gdal_fault, vector_source
+from tunneldb.files import MAX_JSON_MEGABYTES, gdal_fault, require_at_most, vector_source
 from tunneldb.geometry.crs import LOCAL
 from tunneldb.store.survey import Survey
 
@@ -190,6 +190,7 @@ def _bare_geojson(path: Path) -> bool:
     if path.suffix.lower() not in (".geojson", ".json"):
         return False
     try:
+        require_at_most(path, MAX_JSON_MEGABYTES, "a file of JSON")
         content = json.loads(path.read_text("utf-8-sig"))
     except (ValueError, RecursionError):
         return False

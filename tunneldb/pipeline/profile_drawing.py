@@ -18,6 +18,7 @@ METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
 MAX_JOINED_GAP = 0.001
 """Maximum gap between ends that are joined, m."""
 
+_MAX_ELEMENTS = 5000  # of a profile: 30 m in pieces of 6 mm
 _PLAIN = ("LINE", "ARC", "CIRCLE")
 _POLYLINES = ("LWPOLYLINE", "POLYLINE")
 _CURVES = ("SPLINE", "ELLIPSE")
@@ -70,6 +71,10 @@ def read_drawing(path: Path, unit: str | None, layer: str | None) -> DrawnOutlin
                 if np.hypot(element[2] - element[0], element[3] - element[1]) * metres > 1e-6:
                     elements.append(element)
                     names.append(name)
+        if len(elements) > _MAX_ELEMENTS:
+            raise InputError(
+                f"{path}: layer {chosen!r} has more than {_MAX_ELEMENTS} lines and arcs; draw the profile alone on a layer"
+            )
     if not elements:
         raise InputError(f"{path}: layer {chosen!r} has no line with a length")
     scaled = np.array(elements)
@@ -120,19 +125,19 @@ def _elements(entity: Any) -> list[list[float]]:
 
 def _joined(path: Path, elements: Float, names: list[str]) -> tuple[Float, list[str]]:
     """Connect elements one after the other, reversed if drawn in the other direction."""
-    chain, order, left = [elements[0]], [0], list(range(1, len(elements)))
+    chain, order = [elements[0]], [0]
+    ends, free = elements[:, :4].reshape(-1, 2, 2), np.arange(len(elements)) > 0
 
     def nearest(x: float, y: float) -> tuple[float, int, bool]:
         """Return the distance of the nearest free end, its element, and whether it is an end and not a beginning."""
-        away = [
-            (float(np.hypot(elements[k, i] - x, elements[k, i + 1] - y)), k, i == 2) for k in left for i in (0, 2)
-        ]  # fmt: skip
-        return min(away)
+        away = np.where(free[:, None], np.hypot(ends[:, :, 0] - x, ends[:, :, 1] - y), np.inf)
+        k, end = divmod(int(np.argmin(away)), 2)
+        return float(away[k, end]), k, end == 1
 
-    while left:
+    while free.any():
         ahead, behind = nearest(*chain[-1][2:4]), nearest(*chain[0][:2])
         away, k, at_end = min(ahead, behind)
-        if away > MAX_JOINED_GAP:
+        if not away <= MAX_JOINED_GAP:
             x, y = chain[-1][2:4] if away == ahead[0] else chain[0][:2]
             beside = order[-1] if away == ahead[0] else order[0]
             raise InputError(
@@ -150,7 +155,7 @@ def _joined(path: Path, elements: Float, names: list[str]) -> tuple[Float, list[
             element[2:4] = chain[0][:2]
             chain.insert(0, element)
             order.insert(0, k)
-        left.remove(k)
+        free[k] = False
     if len(chain) > 1 and np.hypot(*(chain[-1][2:4] - chain[0][:2])) <= MAX_JOINED_GAP:
         chain[-1][2:4] = chain[0][:2]
     return np.array(chain), [names[k] for k in order]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from tunneldb.errors import InputError
+from tunneldb.files import require_at_most
 from tunneldb.finding_kind import SEVERITY_COLOURS
 from tunneldb.report.pictures.load import Source, load_pictures
 from tunneldb.report.words import ENGLISH, ENGLISH_PLURAL, Words, english_texts, languages, plural_forms, read_language
@@ -98,12 +99,14 @@ def read_owner(path: Path) -> Owner:
     )
 
 
+_MAX_MEGABYTES = 1
 _DEEP = re.compile(r"(?:[\[{]\s*){100}")
 """Lists in each other, deeper than any settings need."""
 
 
 def _load(path: Path) -> dict[str, Any]:
     try:
+        require_at_most(path, _MAX_MEGABYTES, "a template")
         text = path.read_text("utf-8-sig")
         # Else the parser would use up the stack, and what is collected meanwhile would fail in its finalizer.
         if _DEEP.search(text):

@@ -1,14 +1,17 @@
-"""Commands with a wrong file or a hostile word, by number: the same number and seed make the same case."""
+"""Commands with a wrong file, a hostile word, or after a hostile statement; a number and a seed always make the same case."""
 
 from __future__ import annotations
 
 import random
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
 from support.fuzz.mutations import mutate
+from support.fuzz.sources import make_source
+from support.fuzz.writes import Rights, make_call, make_write
 from tunneldb.cli.main import main
 
 # {new} is a name that is not taken, {stretch} where a profile is to hold, {out} a path in a folder of the case's own, {file}
@@ -120,20 +123,61 @@ VALUES = (
 )  # fmt: skip
 
 
+AFTER_WRITES: tuple[str, ...] = (
+    "status", "status demo-2024", "check", "leaks demo-2024", "leaks demo-2024 -o {out}.xlsx",
+    "findings list demo-2024 --state all",
+    "findings list demo-2024 -o {out}.gpkg", "run demo-2024 --stale", "batch demo-2024 --preview", "learn demo-2024",
+    "evaluate demo-2024 {seeds}/truth.geojson", "export demo-2024 -o {out}.gpkg", "export demo-2024 -o {out}.dxf",
+    "qgis demo-2024 -o {out}.qgz", "report demo-2024 -o {out}.html", "image demo-2024 -o {out}",
+    "sections demo-2024 --from 12+300 --to 12+310 --every 5 -o {out}.csv", "axis demo-2024 -o {out}.csv",
+    "survey export demo-2024 -o {out}.tdb", "unroll demo-2024 {seeds}/points.csv",
+)  # fmt: skip
+"""Commands that are run after an extreme value was taken."""
+
+DRIP = "report demo-2024 -o {out}.html --from 12310 --to 12320 --photo-server {server}"
+"""The command that reads from a server of photos."""
+
+
 @dataclass(frozen=True)
 class Case:
-    """A command; what is wrong with it."""
+    """A command, what is wrong with it, and a statement that somebody has run before it; only the statement if no command."""
 
     words: list[str]
     wrong: str
     kind: str
+    login: str = ""
+    statement: str = ""
 
 
-def make_case(seed: int, number: int, seeds: Path, folder: Path) -> Case:
+@dataclass(frozen=True)
+class Ground:
+    """What cases are made from: the folder of right files, what people may do, and host and port of a server that drips."""
+
+    seeds: Path
+    rights: Sequence[Rights]
+    server: str
+
+
+def make_case(seed: int, number: int, ground: Ground, folder: Path) -> Case:
     """Return a case, and write its file into its folder."""
     chance = random.Random(seed * 1_000_003 + number)
+    seeds = ground.seeds
     names = _names(number, seeds, folder)
-    if chance.random() < 0.65:
+    kind = chance.choices(("file", "words", "write", "call", "source", "server"), SHARES)[0]
+    if kind == "write":
+        login, statement = make_write(chance, ground.rights)
+        return Case(_words(chance.choice(AFTER_WRITES), **names), statement, kind, login, statement)
+    if kind == "call":
+        login, statement = make_call(chance, ground.rights)
+        return Case([], statement, kind, login, statement)
+    if kind == "source":
+        name, command = chance.choice(OF_FILES)
+        wrong = make_source(chance, folder / name, (seeds / name).read_bytes())
+        return Case(_words(command, file=str(folder / name), **names), f"{name}: {wrong}", kind)
+    if kind == "server":
+        statement = f"INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (1, 'http://{ground.server}/a.jpg')"
+        return Case(_words(DRIP, server=ground.server, **names), "photo from a server that drips", kind, "ines", statement)
+    if kind == "file":
         name, command = chance.choice(OF_FILES)
         text = Path(name).suffix not in {".las", ".laz", ".e57", ".tdb"}
         data, wrong = mutate(chance, (seeds / name).read_bytes(), text=text)
@@ -143,6 +187,10 @@ def make_case(seed: int, number: int, seeds: Path, folder: Path) -> Case:
     words = _words(chance.choice(OF_WORDS), **names)
     wrong = _hostile_option(chance, words) if chance.random() < 0.9 else _hostile_word(chance, words)
     return Case(words, wrong, "words")
+
+
+SHARES = (0.45, 0.22, 0.2, 0.08, 0.047, 0.003)
+"""Share of cases with a malformed file, a hostile word, an extreme value or argument, a source, and a server that drips."""
 
 
 def _hostile_option(chance: random.Random, words: list[str]) -> str:

@@ -3,6 +3,7 @@
     python -m support.fuzz.run --cases 10000 --seed 1 --seeds FOLDER     # as tests/cli/test_fuzz.py does
 
 Right is: exit code 0; or 2 with one line on standard error that is no traceback, all rows as they were and no file left behind.
+A statement is done or refused in one line, and the command after it like any other.
 """
 
 from __future__ import annotations
@@ -15,12 +16,14 @@ import pkgutil
 import random
 import resource
 import signal
+import socket
 import sys
 import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -31,7 +34,9 @@ from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
 import tunneldb
 from support.databases import create_database
-from support.fuzz.cases import Case, make_case, right_cases, verb_of
+from support.fuzz.cases import Case, Ground, make_case, right_cases, verb_of
+from support.fuzz.sources import serve_drips
+from support.fuzz.writes import read_rights
 from tunneldb.cli.main import main
 
 BEFORE = (
@@ -44,17 +49,20 @@ BEFORE = (
 """Commands that are run before all cases, in this process: each case begins with the compiled loops that they load, and need
 not load them itself. None reads LAZ, whose decoder keeps threads that a child would wait for in vain."""
 
-PATIENCE = 90
-"""Seconds of computing that a case may take: small files are read in one or two; the first case of a loop also compiles it."""
+PATIENCE = 20
+"""Seconds of computing that a case may take: small files are read in one or two."""
 
-WAITING = 300
+WAITING = 120
 """Seconds that it may take on a machine that others are busy on, or waiting for what never comes."""
 
-MEMORY = 4 * 1024**3
-"""Bytes that a case may take beyond what the process has."""
+MEMORY = 2 * 1024**3
+"""Bytes that a case, or the server's session of a statement, may take beyond what the process has."""
 
 USAGE = 3
 """Lines of click's own complaint: usage, where help is, what is wrong."""
+
+PEOPLE = {"vera": "tunnel_viewer", "ines": "tunnel_inspector", "otto": "tunnel_operator"}
+"""Who runs statements, with the role."""
 
 NOTED = {"tunnel.run"}
 """Tables that may change although a command is refused: the ledger notes what failed."""
@@ -105,7 +113,7 @@ class Fresh:
             conn.execute(sql.SQL("DROP DATABASE IF EXISTS {} WITH (FORCE)").format(sql.Identifier(self._name)))
 
 
-def run_cases(seed: int, numbers: Iterable[int], seconds: float, seeds: Path, fresh: Fresh) -> list[Outcome]:
+def run_cases(seed: int, numbers: Iterable[int], seconds: float, ground: Ground, fresh: Fresh) -> list[Outcome]:
     """Run cases until they, or so many seconds, are over; each begins with the database as it was given."""
     began = time.monotonic()
     before = _rows(fresh.dsn)
@@ -114,7 +122,11 @@ def run_cases(seed: int, numbers: Iterable[int], seconds: float, seeds: Path, fr
         if time.monotonic() - began > seconds:
             break
         with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
-            done.append(_judged(number, make_case(seed, number, seeds, Path(name)), Path(name), fresh, before))
+            done.append(_judged(number, make_case(seed, number, ground, Path(name)), Path(name), fresh, before))
+        if done[-1].fault:  # a long run shows at once what it finds
+            print(f"{number}: {done[-1].command} ({done[-1].wrong[:200]}): {done[-1].fault}", file=sys.stderr, flush=True)
+        elif number % 500 == 499:
+            print(f"{number + 1} cases, {time.monotonic() - began:.0f} s", file=sys.stderr, flush=True)
     return done
 
 
@@ -140,19 +152,76 @@ def _judged(number: int, case: Case, folder: Path, fresh: Fresh, before: Rows) -
     """Run a case, judge it, and put the database back if it changed."""
     given = set(folder.rglob("*"))
     start = time.monotonic()
-    code, said, fault = _run(case, folder, fresh.dsn)
+    written = False
+    code, said, fault = None, "", ""
+    if case.statement:
+        said, fault, written = execute(fresh.dsn, case.login, case.statement)
+        code = 2 if said else 0
+        if written:
+            before = _rows(fresh.dsn)
+    if case.words and not said and not fault:
+        code, said, fault = _run(case, folder, fresh.dsn)
+        fault = fault or _fault(code, said)
     took = time.monotonic() - start
     after = _rows(fresh.dsn)
     changed = sorted(name for name in {*before, *after} if after.get(name) != before.get(name))
-    fault = fault or _fault(code, said)
     if not fault and code == 2 and set(changed) - NOTED:
         fault = "rows changed: " + ", ".join(changed)
     left = [path.name for path in folder.rglob("*") if path not in given]
     if not fault and code == 2 and left:
         fault = f"left {', '.join(left)}"
-    if changed or fault:
+    if changed or fault or written:
         fresh.renew()
-    return Outcome(number, " ".join(case.words), verb_of(case.words), case.wrong, case.kind, code, said, fault, took)
+    verb = verb_of(case.words) if case.words else "SELECT"
+    return Outcome(number, f"{case.login} {' '.join(case.words)}".strip(), verb, case.wrong, case.kind, code, said, fault, took)
+
+
+def execute(dsn: str, login: str, statement: str) -> tuple[str, str, bool]:
+    """Run somebody's statement; return the refusal, the fault, and whether it changed a row."""
+    with psycopg.connect(make_conninfo(dsn, user=login), autocommit=True) as person:
+        person.execute("SELECT set_config('statement_timeout', %s, false)", [f"{PATIENCE}s"])
+        held = peak_memory(person)
+        refusal, changed = "", False
+        try:
+            changed = person.execute(statement.encode("utf-8", "surrogatepass")).rowcount > 0 and not statement.startswith(
+                "SELECT"
+            )
+        except psycopg.Error as error:
+            if person.closed:
+                wait_for_server(dsn)
+                return "", f"the server's session ended: {str(error).splitlines()[0]}", True
+            refusal = error.diag.message_primary or "?"
+            of_postgis = error.sqlstate == "XX000" and statement.startswith("SELECT")  # the only state that PostGIS has
+            if (error.sqlstate or "")[:2] not in REFUSALS and error.sqlstate != DENIED and not of_postgis:
+                return refusal, f"{error.sqlstate} {refusal}", False
+            if ("\n" in refusal and not statement.startswith("SELECT")) or len(refusal) > LINE:
+                return refusal, "more than one line", False
+        if (took := peak_memory(person) - held) > MEMORY:
+            return refusal, f"the server's session took {took >> 20} MB", changed
+        return refusal, "", changed
+
+
+def wait_for_server(dsn: str) -> None:
+    """Wait until the server has recovered from the end of a process."""
+    for _ in range(WAITING):
+        with suppress(psycopg.OperationalError), psycopg.connect(dsn):
+            return
+        time.sleep(1)
+
+
+def peak_memory(session: psycopg.Connection) -> int:
+    """Return the most memory that the server's process of a session has had, bytes."""
+    status = Path(f"/proc/{session.info.backend_pid}/status").read_text()
+    return int(status.split("VmHWM:")[1].split()[0]) << 10
+
+
+REFUSALS = ("22", "23", "0A", "P0")
+"""Classes of the refusals of a value: wrong data, a constraint, unsupported, a message of a function."""
+
+DENIED = "42501"
+
+LINE = 300
+"""Most letters of a refusal."""
 
 
 def _run(case: Case, folder: Path, dsn: str) -> tuple[int | None, str, str]:
@@ -226,6 +295,18 @@ def table(outcomes: list[Outcome], by: str) -> str:
     return "\n".join(lines)
 
 
+@contextmanager
+def dripping() -> Iterator[str]:
+    """Host and port of a server that drips."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        child = os.fork()
+        if child == 0:
+            serve_drips(listening)
+        yield "{}:{}".format(*listening.getsockname())
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+
+
 def _main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--cases", type=int, default=1000)
@@ -238,10 +319,11 @@ def _main() -> None:
     for module in pkgutil.walk_packages(tunneldb.__path__, "tunneldb."):  # else each child would import what it needs
         importlib.import_module(module.name)
     _run_before(given.seeds)
-    with Fresh(os.environ["TUNNELDB_DSN"]) as fresh:
+    with Fresh(os.environ["TUNNELDB_DSN"]) as fresh, dripping() as server:
+        ground = Ground(given.seeds, read_rights(fresh.dsn, PEOPLE), server)
         numbers = range(given.first, given.first + given.cases)
         outcomes = run_right(given.seed, given.right, given.seeds, fresh)
-        outcomes += run_cases(given.seed, numbers, given.seconds, given.seeds, fresh)
+        outcomes += run_cases(given.seed, numbers, given.seconds, ground, fresh)
     json.dump([asdict(one) for one in outcomes], sys.stdout)
 
 
