@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -9,9 +10,11 @@ from concurrent.futures import ThreadPoolExecutor
 import psycopg
 import pytest
 from click.testing import CliRunner
+from psycopg import sql
 from psycopg.conninfo import make_conninfo
 
 from tunneldb.cli.main import main
+from tunneldb.database import connect
 from tunneldb.errors import BusyError
 from tunneldb.stages.ledger import stage_run
 
@@ -98,3 +101,38 @@ def test_init_lets_only_members_of_the_roles_connect(people: None, conn: psycopg
     for name in ("vera", "ines", "otto"):
         psycopg.connect(make_conninfo(dsn, user=name)).close()
     assert said not in CliRunner().invoke(main, ["init"]).output
+
+
+def test_a_database_of_one_owner_is_closed_to_the_people_of_another(people: None, conn: psycopg.Connection, dsn: str) -> None:
+    """As docs/howto-operate.md says: the roles are those of the whole server."""
+    conn.close()
+    assert CliRunner().invoke(main, ["init"]).exit_code == 0
+    with psycopg.connect(dsn, autocommit=True) as owner:
+        name = sql.Identifier(owner.info.dbname)
+        owner.execute(sql.SQL("REVOKE CONNECT ON DATABASE {} FROM tunnel_viewer").format(name))
+        owner.execute(sql.SQL("GRANT CONNECT ON DATABASE {} TO ines").format(name))
+    assert CliRunner().invoke(main, ["init"]).exit_code == 0
+    for stranger in ("vera", "otto"):
+        with pytest.raises(psycopg.OperationalError, match="permission denied for database"):
+            psycopg.connect(make_conninfo(dsn, user=stranger))
+    with psycopg.connect(make_conninfo(dsn, user="ines")) as ines:
+        ines.execute("SELECT * FROM tunnel_api.leak").fetchall()
+
+
+def test_init_limits_queries_of_other_programs(people: None, conn: psycopg.Connection, dsn: str) -> None:
+    """Commands of tunneldb are not limited; a limit that the owner sets stays."""
+    conn.close()
+    result = CliRunner().invoke(main, ["init"])
+    (advice,) = re.findall(r"for another limit: (ALTER DATABASE \w+ SET statement_timeout = '1h')", result.output)
+    shown = "SELECT current_setting('statement_timeout')"
+    with psycopg.connect(make_conninfo(dsn, user="vera")) as vera, connect(dsn) as command:
+        assert vera.execute(shown).fetchone() == ("10min",)
+        assert command.execute(shown).fetchone() == ("0",)
+        vera.execute("SET statement_timeout = '0.1s'")
+        with pytest.raises(psycopg.errors.QueryCanceled):
+            vera.execute("SELECT count(*) FROM generate_series(1, 1e9)")
+    with psycopg.connect(dsn, autocommit=True) as owner:
+        owner.execute(advice)
+    assert "for another limit" not in CliRunner().invoke(main, ["init"]).output
+    with psycopg.connect(make_conninfo(dsn, user="vera")) as vera:
+        assert vera.execute(shown).fetchone() == ("1h",)

@@ -26,6 +26,7 @@ SESSION: LiteralString = """
                    ('client_encoding', 'UTF8'), ('extra_float_digits', '1'), ('bytea_output', 'hex'),
                    ('standard_conforming_strings', 'on'), ('quote_all_identifiers', 'off'), ('transform_null_equals', 'off'),
                    ('client_min_messages', 'notice'), ('default_transaction_isolation', 'read committed'),
+                   ('statement_timeout', '0'),
                    ('lock_timeout', CASE pg_catalog.current_setting('lock_timeout') WHEN '0' THEN '10min'
                                          ELSE pg_catalog.current_setting('lock_timeout') END)) AS s (name, value)
 """

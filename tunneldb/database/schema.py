@@ -149,6 +149,38 @@ def close_database(connection: psycopg.Connection[Any]) -> bool:
         return not open_to_all(connection)
 
 
+def limit_queries(connection: psycopg.Connection[Any]) -> bool:
+    """Limit the time of queries of other programs, unless the database has a limit of its own. The connection must be idle.
+
+    A limit of a group role would not apply to its members. Commands of tunneldb set their own.
+
+    Returns
+    -------
+    bool
+        True if the limit was set; False also if this user may not set it.
+    """
+    with connection.transaction():
+        row = connection.execute(
+            "SELECT EXISTS (SELECT FROM pg_catalog.pg_db_role_setting s JOIN pg_catalog.pg_database d ON d.oid = s.setdatabase,"
+            "                      unnest(s.setconfig) AS c (setting)"
+            "                WHERE d.datname = pg_catalog.current_database() AND s.setrole = 0"
+            "                  AND c.setting LIKE 'statement\\_timeout=%')"
+        ).fetchone()
+        if row == (True,):
+            return False
+        name = sql.Identifier(connection.info.dbname)
+        try:
+            with connection.transaction():
+                connection.execute(sql.SQL("ALTER DATABASE {} SET statement_timeout = {}").format(name, QUERY_TIMEOUT))
+        except psycopg.errors.InsufficientPrivilege:
+            return False
+        return True
+
+
+QUERY_TIMEOUT = "10min"
+"""Maximum time of a query of QGIS, psql and others, unless the session sets another."""
+
+
 def open_to_all(connection: psycopg.Connection[Any]) -> bool:
     """Return True if every login of the server can connect to the database."""
     row = connection.execute(
