@@ -123,3 +123,9 @@ def test_places_of_merged_scans_are_found(parts: list[np.ndarray]) -> None:
     (merged,) = find_merged(points[:, 0], np.ones(len(points), np.int64))
     np.testing.assert_allclose(merged.places, STATIONS[:, 0], atol=1.0)
     assert find_merged(*(array if k else array[:, 0] for k, array in enumerate(joined(parts)))) == []
+
+
+@pytest.mark.parametrize(("every", "places"), [(3, 2), (8, 1)])
+def test_a_place_has_a_fifth_of_the_points(every: int, places: int) -> None:
+    points = np.concatenate([PARTS[0], PARTS[0][::every] + np.array([25.0, 0.0, 0.0])])
+    assert len(scanner_places(points[:, 0])) == places

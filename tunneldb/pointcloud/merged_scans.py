@@ -16,8 +16,9 @@ from tunneldb.arrays import Float, Int64
 MIN_POINTS = 1000
 """Number of points of a scan below which nothing is concluded."""
 
-MIN_SHARE = 0.25
-"""Least share of a scan's points about each of the places; an object across the tunnel that faces the scanner has fewer."""
+MIN_SHARE = 0.2
+"""Least share of a scan's points about each of the places. A wall across the tunnel, or a second scan of a detail from the same
+tripod, has fewer: of 1,500 computed scans in front of a wall, one reaches 0.2, and 11 reach 0.15."""
 
 MIN_RATIO = 3.0
 """Ratio of the points per metre at a maximum to those between two maxima; less is due to fixtures and wider sections."""
