@@ -59,11 +59,11 @@ def main() -> None:
             today.append(old)
             network.append(regions(sample, p, old))
             both.append(judged(sample, p, old))
-        rows = [_cells("today", 0.5, today)]
+        rows = [cells("today", 0.5, today)]
         for name, outcomes in (("network", network), ("today's regions, network's verdict", both)):
-            rows.append(_cells(name, 0.5, outcomes))
+            rows.append(cells(name, 0.5, outcomes))
             level = as_many_false(outcomes, row(hold(today))["false"])
-            rows.append(_cells(f"{name}, as many false", level, called(outcomes, level)))
+            rows.append(cells(f"{name}, as many false", level, called(outcomes, level)))
         print_table(f"{family}: {len(today)} scenes", HEADER, rows)
         print_table(f"{family}: area F1", ("scene", "today", "network", "both"), [
             (one.scene, *(f"{row(hold([o]))['area_f1']:.3f}" for o in (one, two, three)))
@@ -136,7 +136,8 @@ def as_many_false(outcomes: Sequence[Outcome], most: float) -> float:
     return next((float(level) for level in LEVELS if row(hold(called(outcomes, level)))["false"] <= most), 1.0)
 
 
-def _cells(name: str, level: float, outcomes: Sequence[Outcome]) -> list[str]:
+def cells(name: str, level: float, outcomes: Sequence[Outcome]) -> list[str]:
+    """Row of a table with HEADER."""
     v = row(hold(outcomes))
     counts = [str(int(v[key])) for key in ("true", "found", "called", "right", "false")]
     shares = [f"{v[key]:.3f}" for key in ("f1", "area_recall", "area_precision", "area_f1")]
