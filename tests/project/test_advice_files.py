@@ -20,6 +20,7 @@ from tunneldb.pipeline.profile_file import read_profile
 from tunneldb.pointcloud.reader import read_chunks
 from tunneldb.pointcloud.sonar import read_sonar
 from tunneldb.pointcloud.stations import read_stations
+from tunneldb.store.scanner import _stations_together
 
 POSE = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n"
 PTX = f"2\n1\n{POSE}{{}} 0 0 0\n0 {{}} 0 0\n0 0 {{}} 0\n0 0 0 1\n1 0 0 0.5\n2 0 0 0.5\n"
@@ -132,3 +133,12 @@ def test_the_unit_of_a_drawn_profile_is_its_own(tmp_path: Path) -> None:
     path = dxf(tmp_path / "a.dxf", lambda space: space.add_lwpolyline(square, close=True), ezdxf.units.M)
     advised(lambda: read_profile(path, unit="ft"), "--unit says ft; omit --unit")
     assert read_profile(path).outline.area == pytest.approx(36.0)
+
+
+def test_stations_of_scans_without_poses_are_a_table(tmp_path: Path) -> None:
+    scan, table = tmp_path / "a.ptx", tmp_path / "stations.csv"
+    scan.write_text(PTX.format(1, 1, 1) * 2)
+    advice = r"CSV file with (scan_id,x,y,z): --stations FILE, scan_id (\d+), (\d+)$"
+    found = advised(lambda: _stations_together([scan], read_stations([scan])), advice)
+    table.write_text(f"{found[1]}\n{found[2]},0,0,1\n{found[3]},9,0,1\n")
+    assert _stations_together([table], read_stations([table])) == ()

@@ -20,6 +20,7 @@ CRACK = (
 REGION = (
     "INSERT INTO tunnel_api.region (survey, kind, geom{}) VALUES ('demo-2024', 'dry', ST_MakeEnvelope(12410, -5, 12460, 5){})"
 )
+DRAWN = "INSERT INTO tunnel_api.finding_unrolled (survey, kind, geom) VALUES ('demo-2024', '{}', '{}')"
 WITH = f"WITH p AS ({POINT}), q AS ({MAP}) "
 
 CASES = [
@@ -56,6 +57,19 @@ CASES = [
      r"INSERT INTO tunnel_api.finding_photo (finding_id, \1) VALUES (1, 'a.jpg')"),
     ("UPDATE tunnel_api.axis_vertex SET geom = ST_Transform(geom, 25829) WHERE n = 1240", r"Transform .* first .(ST_Transform)",
      r"UPDATE tunnel_api.axis_vertex SET geom = \1(ST_Transform(geom, 25829), 25830) WHERE n = 1240"),
+    (DRAWN.format("spalling", "LINESTRING(12350 1, 12351 2)"),
+     r"can be .*, (spall), ",
+     DRAWN.format(r"\1", "POLYGON((12350 1, 12351 1, 12351 2, 12350 1))")),
+    ("INSERT INTO tunnel_api.finding_unrolled (survey, kind) VALUES ('demo-2024', 'spall')", "needs a place: .* or a (point)",
+     DRAWN.format("missing_bolt", r"\1(12350 1)")),
+    ("UPDATE tunnel_api.finding_unrolled SET area = 5 WHERE id = 1", r"only the kind, the (severity), the width",
+     r"UPDATE tunnel_api.finding_unrolled SET \1 = 3 WHERE id = 1"),
+    ("UPDATE tunnel_api.leak SET area = 5 WHERE id = 1", r"only the review, the (remark) and the kind can be edited",
+     r"UPDATE tunnel_api.leak SET \1 = 'drips' WHERE id = 1"),
+    ("UPDATE tunnel_api.axis_vertex SET n = 1 WHERE n = 1240", r"only the position \((geom)\) can be edited",
+     r"UPDATE tunnel_api.axis_vertex SET \1 = ST_Translate(geom, 0.01, 0, 0) WHERE n = 1240"),
+    (REGION.format("", "").replace("'dry'", "'wet'"), r"can be dry or (homogeneous), not wet",
+     REGION.format("", "").replace("'dry'", r"'\1'")),
     ("SELECT tunnel_api.finding_split(1, 'LINESTRING(12317.9 1, 12318.1 1)')", "cross it from side to side",
      "SELECT tunnel_api.finding_split(1, 'LINESTRING(12310 1, 12326 1)')"),
 ]  # fmt: skip
