@@ -21,6 +21,10 @@ BEGIN
     END IF;
     PERFORM tunnel_internal.check_text('the path of a photo', NEW.path, 2000),
             tunnel_internal.check_text('the caption of a photo', NEW.caption, 1000);
+    IF NEW.path ~* '(^(file:)?/|\.\./)[./]*(dev|proc|sys)(/|$)' THEN  -- some never end, and QGIS would wait for them
+        RAISE EXCEPTION 'the photo % is a device or a file of the kernel, not a picture', left(NEW.path, 60)
+            USING ERRCODE = 'invalid_parameter_value';
+    END IF;
     SELECT s.name INTO name FROM tunnel.finding a JOIN tunnel.survey s ON s.id = a.survey_id WHERE a.id = NEW.finding_id;
     IF NOT FOUND OR (TG_OP = 'UPDATE' AND NEW.finding_id <> OLD.finding_id) THEN
         RAISE EXCEPTION 'a photo is of one finding, which stays; there is no finding %', NEW.finding_id

@@ -72,6 +72,20 @@ def test_extreme_values_are_refused_or_harmless(
     works(["report", SURVEY, "-o", str(tmp_path / "report.html")])
 
 
+@pytest.mark.parametrize("person", ["ines"], indirect=True)
+@pytest.mark.parametrize(
+    "path", ["/proc/kmsg", "//proc/./kmsg", "file:///dev/zero", "../../proc/kmsg", "a/../../sys/kernel/notes", "/DEV/zero"]
+)
+def test_a_photo_is_no_file_of_the_kernel(person: psycopg.Connection, path: str) -> None:
+    """QGIS 3.22 hangs when a form shows /proc/kmsg as a picture."""
+    add = "INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (1, %s)"
+    for right in ("/photos/dev/a.jpg", "dev/a.jpg", "https://example.org/proc/a.jpg", "../photos/a.jpg", "C:\\sys\\a.jpg"):
+        with person.transaction(force_rollback=True):
+            person.execute(add, [right])
+    with pytest.raises(psycopg.errors.InvalidParameterValue, match="is a device or a file of the kernel, not a picture"):
+        person.execute(add, [path])
+
+
 @pytest.mark.parametrize("person", ["vera"], indirect=True)
 def test_no_function_of_viewers_takes_the_server_down(person: psycopg.Connection) -> None:
     """Each ends within seconds, with few rows or one line."""
