@@ -56,7 +56,7 @@ SELECT g.id, g.survey_id, g.survey, g.km, g.chainage_from, g.chainage_to, g.lini
         SELECT max(q.seen) - min(q.seen) AS seen, max(q.wet) - min(q.wet) AS wet
           FROM tunnel_internal.coverage_at(g.survey_id, ARRAY[g.chainage_from, g.chainage_to]) q) c ON g.lining_area IS NOT NULL
  CROSS JOIN LATERAL (SELECT coalesce(c.seen, (
-        SELECT (r.counts ->> 'lining_pixels')::float8 * (r.parameters ->> 'image.pixel')::float8 ^ 2
+        SELECT (r.counts ->> 'lining_pixels')::float8 * coalesce(r.counts ->> 'pixel', r.parameters ->> 'image.pixel')::float8 ^ 2
           FROM tunnel.run r
          WHERE r.survey_id = g.survey_id AND r.km = g.km AND r.stage = 'detect' AND r.outcome = 'done'
          ORDER BY r.finished_at DESC, r.id DESC LIMIT 1)) AS seen) d

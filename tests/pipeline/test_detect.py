@@ -273,7 +273,7 @@ def test_what_was_measured_is_stored_with_what_it_says(detected: psycopg.Connect
     survey, values = get_survey(conn, NAME), settings()
     inputs = job.load_inputs(conn, survey, int(START // 1000), values)
     assert inputs.sample is not None
-    result = job.compute_detection(inputs, inputs.sample, values, lambda window: None, lambda share: None)
+    result = job.compute_detection(inputs, inputs.sample, values, lambda grid, window: None, lambda share: None)
     rows = conn.execute(
         "SELECT ST_AsBinary(a.unrolled), a.features, a.evidence, a.model, a.kind, a.confidence, l.names"
         "  FROM tunnel.finding a JOIN tunnel.feature_list l ON l.id = a.feature_list_id"

@@ -122,7 +122,7 @@ def uncut(sections: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> list
 
     monkeypatch.setattr(radiometry, "roughness_of", lambda *_: ROUGHNESS)
     monkeypatch.setattr(job, "map_background", even)
-    result = job.compute_detection(elsewhere, inputs.sample, values, lambda window: None, lambda share: None)
+    result = job.compute_detection(elsewhere, inputs.sample, values, lambda grid, window: None, lambda share: None)
     dry = result.background
     monkeypatch.setattr(job, "map_background", lambda picture, _: flat(picture.grid, dry.mean, dry.spread))
     return [shapely.affinity.translate(anomaly.outline, SHIFT) for anomaly in result.anomalies.anomalies]

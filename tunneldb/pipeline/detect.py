@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -23,6 +25,7 @@ from tunneldb.geometry.section_outliers import MAX_GIRTH_SHARE, SectionOutliers
 from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.geometry.surface import Surface
 from tunneldb.pipeline.calibration import UNKNOWN, Calibration, calibrate, dry_sigma
+from tunneldb.pipeline.detection_notes import describe, pixel_note
 from tunneldb.pipeline.replace_findings import replace_findings
 from tunneldb.pointcloud.points import Points
 from tunneldb.pointcloud.reader import ScanSource
@@ -34,6 +37,7 @@ from tunneldb.raster.geotiff import KINDS
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import halo, halo_of_profiles, lining_image
 from tunneldb.raster.observation import Observer, Radiometer
+from tunneldb.raster.pixel_size import SMALLEST, choose_factor, coarse_grid, coarsen
 from tunneldb.raster.profiles import find_gaps
 from tunneldb.raster.rasterize import Counts, rasterize
 from tunneldb.store.coverage import seen_share
@@ -74,7 +78,7 @@ class DetectionInputs:
     observer : Observer
         Surface, floor and scanner; without a radiometer if there is no intensity.
     grid : Grid
-        Pixels of the kilometre and its halo.
+        Pixels of the kilometre and its halo, into which the points are sorted.
     files : list of ScanSource
         Files to read at full density.
     sample : Points or None
@@ -107,6 +111,8 @@ class DetectionResult:
 
     Attributes
     ----------
+    grid : Grid
+        Pixels of the images.
     counts : dict
         Points that were read and seen.
     calibration : Calibration
@@ -123,6 +129,7 @@ class DetectionResult:
         Measurements of drawn outlines.
     """
 
+    grid: Grid
     counts: Counts
     calibration: Calibration
     background: BackgroundMap
@@ -151,8 +158,8 @@ def detect(
     """
     inputs = load_inputs(conn, survey, km, values)
     if inputs.sample is None:
-        images = ImageStore(conn, survey, inputs.grid, ["offset"])
-        counts = make_offset_images(inputs, images.save, progress)
+        images = ImageStore(conn, survey, ["offset"])
+        counts = make_offset_images(inputs, values, images.save, progress)
         drop_radiometry(conn, survey, km)
         drop_coverage(conn, survey, km)
         save_range_curve(conn, survey, km, None)
@@ -162,9 +169,9 @@ def detect(
             "learned": inputs.judge.id,
             "pixels": images.pixels,
             "leaks": 0,
-            "note": "no intensity: offset image only, leaks not searched for",
+            "note": "; ".join(["no intensity: offset image only, leaks not searched for", *pixel_note(counts)]),
         }
-    images = ImageStore(conn, survey, inputs.grid, KINDS)
+    images = ImageStore(conn, survey, KINDS)
     result = compute_detection(inputs, inputs.sample, values, images.save, progress)
     return _save(conn, survey, inputs, result, images, values["leak.min_area"])
 
@@ -178,7 +185,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
         If there are no sections, stage ground has not run, or a file is gone or was changed.
     """
     surface = load_surface(conn, survey, km * KILOMETRE - SURFACE_MARGIN, (km + 1) * KILOMETRE + SURFACE_MARGIN)
-    grid = kilometre_grid(surface, km, values["image.pixel"])
+    grid = kilometre_grid(surface, km, values["image.pixel"] or SMALLEST)
     files = sources(conn, survey, km)
     radiometer = load_radiometer(conn, survey, km, values)
     beyond = grid.halo * grid.pixel
@@ -205,7 +212,7 @@ def compute_detection(
     inputs: DetectionInputs,
     sample: Points,
     values: Mapping[str, float],
-    save_block: Callable[[Window], None],
+    save_block: Callable[[Grid, Window], None],
     progress: Callable[[float], None],
 ) -> DetectionResult:
     """Calibrate the intensity, make the images from the files, and find dark areas in them.
@@ -218,45 +225,51 @@ def compute_detection(
     values : mapping
         Parameters of the stage.
     save_block : callable
-        Given each block of the images as soon as no more points fall into it.
+        Given the pixels, and each block of the images.
     progress : callable
         Given the share of the points that were read.
     """
     calibration = calibrate(sample, inputs.observer, inputs.homogeneous, inputs.survey, own_curve=inputs.own_curve)
     observer, view, roughness = calibration.observer, calibration.view, calibration.roughness
-    with Accumulator(inputs.grid) as image:
-        counts = _gather(observer, inputs.files, image, roughness.sigma, progress)
+    with ExitStack() as stack:
+        image, counts = _gather(observer, inputs, values, roughness.sigma, progress, stack)
         outliers = SectionOutliers.of(observer.surface, MAX_GIRTH_SHARE)
         gaps = find_gaps(image, values["image.spacing"])
-        lining = lining_image(image, gaps, observer, outliers, values["appendage.distance"], save_block)
+        grid = image.grid
+        lining = lining_image(image, gaps, observer, outliers, values["appendage.distance"], partial(save_block, grid))
     if gaps is not None:
         counts["profile_spacing"] = round(gaps.spacing, 3)
-    density = least_density(values["image.min_density"], inputs.grid.pixel)
+    density = least_density(values["image.min_density"], grid.pixel)
     if (sparse := leave_out_sparse(lining, density)) >= MIN_NOTED_SPARSE_SHARE:
         counts |= {"sparse": round(sparse, 4), "least_density": round(density, 1)}
     background = map_background(lining, inputs.dry)
     contrast = contrast_image(lining, background)
     found = find_anomalies(contrast, background, values["leak.min_area"], inputs.judge.model)
     return DetectionResult(
+        grid,
         counts,
         calibration,
         background,
         contrast.state,
         found,
         dry_sigma(view, contrast, found, roughness, inputs.dry),
-        measure_coverage(contrast.state, found.wet, inputs.grid, found.size),
+        measure_coverage(contrast.state, found.wet, grid, found.size),
         [measure_outline(contrast, finding.outline) for finding in inputs.drawn] if background.count else [],
     )
 
 
 def make_offset_images(
-    inputs: DetectionInputs, save_block: Callable[[Window], None], progress: Callable[[float], None]
+    inputs: DetectionInputs,
+    values: Mapping[str, float],
+    save_block: Callable[[Grid, Window], None],
+    progress: Callable[[float], None],
 ) -> Counts:
     """Make the offset image of a survey without intensity."""
-    with Accumulator(inputs.grid) as image:
-        counts = _gather(inputs.observer, inputs.files, image, 0.0, progress)
+    with ExitStack() as stack:
+        image, counts = _gather(inputs.observer, inputs, values, 0.0, progress, stack)
+        width = image.grid.block_columns
         for block in image.inner_blocks():
-            save_block(image.window(block * image.grid.block_columns, (block + 1) * image.grid.block_columns))
+            save_block(image.grid, image.window(block * width, (block + 1) * width))
     return counts
 
 
@@ -269,7 +282,7 @@ def _save(
     min_area: float,
 ) -> Counts:
     km, surface, found, roughness = inputs.grid.km, inputs.observer.surface, result.anomalies, result.calibration.roughness
-    images.save_states(result.state, found.dark)
+    images.save_states(result.grid, result.state, found.dark)
     save_range_curve(conn, survey, km, result.calibration.found)
     save_radiometry(conn, survey, km, roughness, result.background, found.pixels, found.wet_pixels, result.dry_levels)
     save_coverage(conn, survey, km, result.coverage)
@@ -294,7 +307,7 @@ def _save(
         "leaks_again": matched.again,
         "leaks_kept_for_review": matched.kept,
         "leaks_gone": matched.gone,
-        **_report(result, [survey.note, inputs.judge.note], other_pixels),
+        **describe(result.counts, roughness, [survey.note, inputs.judge.note, result.calibration.note], other_pixels),
     }
 
 
@@ -339,15 +352,32 @@ def load_floor(conn: psycopg.Connection[Any], survey: Survey, surface: Surface, 
 
 
 def _gather(
-    observer: Observer, files: list[ScanSource], image: Accumulator, roughness: float, progress: Callable[[float], None]
-) -> Counts:
-    """Read the files into the image, which must not show the halo alone."""
-    counts = rasterize(observer, files, image, roughness, progress)
+    observer: Observer,
+    inputs: DetectionInputs,
+    values: Mapping[str, float],
+    roughness: float,
+    progress: Callable[[float], None],
+    stack: ExitStack,
+) -> tuple[Accumulator, Counts]:
+    """Read the files into an image, which must not show the halo alone; its pixels are enlarged where points are few.
+
+    Profiles apart stay on small pixels: between them the nearest one is shown.
+    """
+    image = stack.enter_context(Accumulator(inputs.grid))
+    counts = rasterize(observer, inputs.files, image, roughness, progress)
     if not image.inner_blocks():
         raise UserError(
-            f"no point of {', '.join(file.path.name for file in files)} is on the lining of kilometre {observer.km}"
+            f"no point of {', '.join(file.path.name for file in inputs.files)} is on the lining of kilometre {observer.km}"
         )
-    return counts
+    if values["image.pixel"] == 0.0 and find_gaps(image, values["image.spacing"]) is None:
+        factor, density = choose_factor(image)
+        if factor > 1:
+            large = stack.enter_context(Accumulator(coarse_grid(image.grid, factor, halo(factor * image.grid.pixel))))
+            coarsen(image, large)
+            image = large
+            counts["density"] = round(density)
+    counts["pixel"] = image.grid.pixel
+    return image, counts
 
 
 def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:
@@ -361,41 +391,3 @@ def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:
     beyond_sections = surface.reach + pixel  # so that no lining touches an end that is not the kilometre's
     ends = surface.chainages[0] - beyond_sections, surface.chainages[-1] + beyond_sections
     return Grid.covering(km, pixel, low, high, halo_of_profiles(pixel), ends)
-
-
-def _report(result: DetectionResult, known_before: list[str | None], other_pixels: list[int]) -> Counts:
-    """Return the ledger's text on the roughness, and further notes."""
-    roughness = result.calibration.roughness
-
-    def known(value: float, digits: int) -> float | None:
-        return round(value, digits) if np.isfinite(value) else None
-
-    report: Counts = {
-        "roughness": known(roughness.sigma, 2),
-        "roughness_determined": roughness.determined,
-        "roughness_contrast_db": known(roughness.contrast, 3),
-        "regions": roughness.regions,
-        "incidence_from": known(roughness.incidence_from, 1),
-        "incidence_to": known(roughness.incidence_to, 1),
-    }
-    notes = [note for note in (*known_before, result.calibration.note) if note]
-    if text := roughness.note:
-        notes.append(text)
-    if other_pixels:
-        notes.append(
-            f"leaks across the boundary to kilometre {' and '.join(map(str, other_pixels))} are in two pieces: its pixels have"
-            " another size; run detect on both with the same image.pixel"
-        )
-    if (sparse := result.counts.get("sparse")) is not None:
-        notes.append(
-            f"{100.0 * sparse:.3g} % of the lining has fewer than {result.counts['least_density']:g} points/m², too few to"
-            " distinguish wet from dry: it was not searched for leaks and counts as not inspected (image.min_density)"
-        )
-    if (spacing := result.counts.get("profile_spacing")) is not None:
-        notes.append(
-            f"profiles {spacing:g} m apart: between them the images show the nearest one; the ends of leaks along the"
-            f" tunnel are uncertain by {0.5 * spacing:.2g} m, and those shorter than {spacing:g} m may be missed"
-        )
-    if notes:
-        report["note"] = "; ".join(notes)
-    return report

@@ -28,7 +28,7 @@ from tunneldb.pointcloud.selection import MEMORY
 from tunneldb.pointcloud.units import NOT_GIVEN, in_units
 from tunneldb.queue.batch import Incoming, Plan
 from tunneldb.queue.expected import RUN_POINTS, RUNS
-from tunneldb.stages.parameters import PARAMETERS
+from tunneldb.raster.pixel_size import SMALLEST
 from tunneldb.stages.registry import STAGE_NAMES
 from tunneldb.store.surface import load_alignment
 from tunneldb.store.survey import Survey
@@ -299,7 +299,7 @@ def _whole(gap: tuple[float, float], missing: Sequence[int]) -> bool:
 
 
 def _disk(plan: Plan, rows: float, area: float, length: float, workers: int, wal: float) -> Disk:
-    pixel = float(plan.parameters.get("image.pixel", PARAMETERS["image.pixel"].default))
+    pixel = float(plan.parameters.get("image.pixel", 0.0)) or SMALLEST  # of larger pixels there are fewer
     detects = plan.stage in (None, STAGE_NAMES[-1])
     return Disk(
         ROW_BYTES * rows,

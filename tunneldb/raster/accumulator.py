@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from tunneldb.arrays import Bool, Int32, Single, Whole
+from tunneldb.arrays import Bool, Int32, Int64, Single, Whole
 from tunneldb.compiled import kernel, point_inner, point_kernel
 from tunneldb.errors import UserError
 from tunneldb.raster.grid import Grid
@@ -171,6 +171,21 @@ class Accumulator:
     def has_points(self, block: int) -> Bool:
         """Return True for pixels (rows, columns) of a block that have points."""
         return np.asarray(self._fetch(block)[:, :, 0] > 0, dtype=np.bool_)
+
+    def sums(self, block: int) -> Whole:
+        """Return the sums (rows, columns of a block, CHANNELS) of a block that has points."""
+        return self._fetch(block)
+
+    def put(self, block: int, sums: Int64) -> None:
+        """Replace the sums of a block.
+
+        Raises
+        ------
+        UserError
+            If the temporary folder has no space for the blocks that do not fit in memory.
+        """
+        self._fetch(block)[:] = sums
+        self._changed.add(block)
 
     def _fetch(self, block: int) -> Whole:
         """Return the sums of a block, loaded into memory, from the file or new."""

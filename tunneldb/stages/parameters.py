@@ -53,7 +53,9 @@ PARAMETERS: dict[str, Parameter] = {
     "cluster.region": Parameter(0.4, 0.05, 1.0, "", "part of the tunnel's height, from the ground, with objects"),
     "lining.tolerance": Parameter(0.5, 0.01, 5.0, "m", "maximum distance of lining inside the surface"),
     "lining.recess": Parameter(1.2, 0.01, 3.0, "m", "maximum distance of lining behind the surface, niches included"),
-    "image.pixel": Parameter(0.02, 0.005, 0.5, "m", "edge of a pixel of the unrolled images"),
+    "image.pixel": Parameter(
+        0.0, 0.0, 0.5, "m", "edge of a pixel of the unrolled images; 0: 0.02, 0.04, 0.08 or 0.2, by the density of points"
+    ),
     "image.spacing": Parameter(
         0.0,
         0.0,

@@ -85,8 +85,6 @@ class ImageStore:
     ----------
     conn, survey
         Place.
-    grid : Grid
-        The pixels.
     kinds : sequence of str
         Kinds of images.
 
@@ -96,14 +94,14 @@ class ImageStore:
         Number of saved pixels with points.
     """
 
-    def __init__(self, conn: psycopg.Connection[Any], survey: Survey, grid: Grid, kinds: Sequence[str]) -> None:
-        self.conn, self.survey, self.grid, self.kinds = conn, survey, grid, kinds
+    def __init__(self, conn: psycopg.Connection[Any], survey: Survey, kinds: Sequence[str]) -> None:
+        self.conn, self.survey, self.kinds = conn, survey, kinds
         self.pixels = 0
         self._blocks: list[int] = []
 
-    def save(self, window: Window) -> None:
-        """Save a whole block as points fell into it."""
-        grid, columns = self.grid, window.columns
+    def save(self, grid: Grid, window: Window) -> None:
+        """Save a whole block of a grid as points fell into it."""
+        columns = window.columns
         block = grid.first_block + columns.start // grid.block_columns
         if not self._blocks:  # only now: what makes the images takes long, and others look at those that are there
             # Deviation is not made here: it stays, stale, with its sections.
@@ -114,21 +112,20 @@ class ImageStore:
         self.pixels += int(np.count_nonzero(window.weight))
         self._blocks.append(block)
         for kind in self.kinds:
-            self._insert(kind, block, Raster(_values(window, kind), grid.transform(columns.start)))
+            self._insert(grid, kind, block, Raster(_values(window, kind), grid.transform(columns.start)))
 
-    def save_states(self, state: UInt8, dark: Bool) -> None:
+    def save_states(self, grid: Grid, state: UInt8, dark: Bool) -> None:
         """Save the states of the pixels (rows, columns) of the kilometre, in blocks saved before; ``DARK`` for dark ones."""
-        grid = self.grid
         for block in self._blocks:
             first = (block - grid.first_block) * grid.block_columns
             columns = slice(first, first + grid.block_columns)
             values = np.where(dark[:, columns], np.float32(PixelState.DARK), state[:, columns].astype(np.float32))
-            self._insert("state", block, Raster(values, grid.transform(first)))
+            self._insert(grid, "state", block, Raster(values, grid.transform(first)))
 
-    def _insert(self, kind: str, block: int, raster: Raster) -> None:
+    def _insert(self, grid: Grid, kind: str, block: int, raster: Raster) -> None:
         self.conn.execute(
             "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %b)",
-            (self.survey.id, self.grid.km, kind, block, encode(raster, kind)),
+            (self.survey.id, grid.km, kind, block, encode(raster, kind)),
         )
 
 
