@@ -63,7 +63,6 @@ def disk() -> Iterator[SmallDisk]:
         ["image", "demo-2024", "-o", "{disk}/images"],
         ["qgis", "demo-2024", "-o", "{disk}/kept.qgz"],
         ["report", "demo-2024", "--from", "12310", "--to", "12320", "-o", "{disk}/kept.html"],
-        ["sections", "demo-2024", "--from", "12+300", "--to", "12+500", "--every", "0.1", "-o", "{disk}/kept.csv"],
         ["simulate", "{disk}/sim", "--length", "10", "--density", "5"],
         ["simulate-structure", "{disk}/sim", "--stations", "1", "--angular-step", "1"],
     ],
