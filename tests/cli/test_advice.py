@@ -42,6 +42,10 @@ ADD = "--tunnel demo --date 2024-06-01 --intensity Amplitude --intensity-kind re
 """Options of a survey."""
 
 CASES = """
+leaks demo-2024 --by-km --format csv | --by-km prints a table of all leaks | leaks demo-2024 --by-km
+tunnel stationing demo --show --clear | give either a FILE, or (--show), | tunnel stationing demo \\1
+report demo-2024 -o r.html --photo-server a/b | such as (photos.example.org:8443)$ | report demo-2024 -o r.html --photo-server \\1
+tunnel add z3 --srid 25830 --axis axis.csv near.csv | SCAN files go with --axis auto, or with a line that has none | tunnel add z3 --srid 25830 --axis axis.csv
 rings demo-2024 --length 10 --find | by one of (--length), | rings demo-2024 \\1 10
 rings demo-2024 --start 12300 | give (--length), too | rings demo-2024 --start 12300 \\1 10
 rings demo-2024 --axis axis.csv | --axis is for rings of --points; omit it | rings demo-2024 --length 10

@@ -23,6 +23,7 @@ from tunneldb.pointcloud.stations import read_stations
 from tunneldb.store.scanner import _stations_together
 
 POSE = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n"
+IFC = J_LANDXML.with_name("aplitop-3.ifc")
 PTX = f"2\n1\n{POSE}{{}} 0 0 0\n0 {{}} 0 0\n0 0 {{}} 0\n0 0 0 1\n1 0 0 0.5\n2 0 0 0.5\n"
 PLY = "ply\nformat ascii 1.0\n{}element vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n{}1 2 3\n"
 FACE = "element face 1\nproperty list uchar int vertex_indices\n"
@@ -53,6 +54,7 @@ TEXTS: list[tuple[str, Callable[[Path], Any], str, str, Callable[[re.Match[str]]
     ("a.ply", points, PLY.format(FACE, "3 0 0 0\n"), "export only the points", lambda _: PLY.format("", "")),
     ("a.xyz", read_sonar, "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n", "type git lfs pull",
      lambda _: "1 2 3\n4 5 6\n"),
+    ("a.xyz", read_sonar, "nan 0 0\n1 2 3\n", "have invalid coordinates; export it again", lambda _: "0 1 0\n1 2 3\n"),
     ("a.csv", stations, "scan_id,x,y,z\n1,0,0,0\n1,5,0,0\n", "scan_id (1) is repeated; list each station once",
      lambda found: f"scan_id,x,y,z\n{found[1]},0,0,0\n"),
 ]  # fmt: skip
@@ -84,6 +86,15 @@ def arc(path: Path) -> Path:
     return dxf(path, draw, 0)
 
 
+def bytes_of(path: Path, content: bytes) -> Path:
+    path.write_bytes(content)
+    return path
+
+
+def table(folder: Path) -> Path:
+    return bytes_of(folder / "b.csv", csvfile.write_csv(("x", "y", "z"), LINE.tolist()).encode())
+
+
 def landxml(path: Path, count: int) -> Path:
     """Write the design with so many alignments of different names."""
     head, rest = J_LANDXML.read_text().split("    <Alignment ", 1)
@@ -107,6 +118,12 @@ AXES: list[tuple[Callable[[Path], Path], dict[str, Any], str, Callable[[Path], P
      lambda _: {}),
     (lambda f: arc(f / "a.dxf"), {}, "or pass the unit by --axis-(unit)", lambda f: f / "a.dxf",
      lambda found: {found[1]: "millimeter"}),
+    (lambda f: bytes_of(f / "a.dwg", b"AC1032" + bytes(2000)), {}, "is a DWG drawing; save it as DXF",
+     lambda f: dxf(f / "a.dxf", chain), lambda _: {}),
+    (lambda f: bytes_of(f / "a.pdf", b"%PDF-1.7" + bytes(2000)), {}, "or its table as CSV", table, lambda _: {}),
+    (lambda f: bytes_of(f / "a.xlsx", b"PK\x03\x04" + bytes(2000)), {}, "or save the table as CSV", table, lambda _: {}),
+    (lambda f: bytes_of(f / "a.ifc", IFC.read_bytes()[:-200]), {}, "is truncated: .*; copy or export it again", lambda _: IFC,
+     lambda _: {}),
     (lambda f: landxml(f / "a.xml", 0), {}, "holds no alignment; export the design alignment, with plan and profile",
      lambda f: landxml(f / "a.xml", 1), lambda _: {}),
     (lambda f: landxml(f / "a.xml", 2), {}, r"alignments: '(\w+)', .* choose one by --(alignment) NAME", lambda f: f / "a.xml",

@@ -32,6 +32,7 @@ from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.simulate import Parameters, Simulation
 from tunneldb.simulate.canal.parameters import CanalParameters
 from tunneldb.simulate.structure.parameters import StructureParameters
+from tunneldb.simulate.tunnel.section import box, circular, horseshoe
 from tunneldb.stages.parameters import settings
 from tunneldb.stages.run import km_range, parse_km
 from tunneldb.store.catalog import _require_name
@@ -73,6 +74,10 @@ CASES: list[tuple[Callable[..., Any], Any, str, Callable[[re.Match[str]], Any]]]
     (settings, ["axis.max_rejected=few"], r"--set (\S+)", lambda found: [found[1]]),
     (settings, ["axis.max_rejectd=0.5"], r"Did you mean '(\S+)'\?", lambda found: [f"{found[1]}=0.5"]),
     (settings, ["section.angle_step=7"], r"must divide (180) degrees", lambda m: [f"section.angle_step={int(m[1]) / 36}"]),
+    (box, 50.0, r"give 1 to (40) m", lambda found: float(found[1])),
+    (circular, 30.0, r"up to (20) m", lambda found: float(found[1])),
+    (horseshoe, 30.0, r"up to (20) m", lambda found: float(found[1])),
+    (lambda lean: horseshoe(inclination=lean), 40.0, r"give 0 to (30)", lambda found: float(found[1])),
     (file_path, "a\nb.laz", "rename it", lambda _: "ab.laz"),
     (_require_name, "a" * 200, r"use at most (\d+)$", lambda found: "a" * int(found[1])),
     (_require_name, ".a", "begin with a letter or a digit", lambda _: "a"),
