@@ -14,6 +14,7 @@ import shapely
 from support.advice import advised
 
 from tunneldb.cli.clearance import _widening
+from tunneldb.cli.leaks import parse_clock
 from tunneldb.cli.load import density_of
 from tunneldb.cli.param_types import file_path
 from tunneldb.cli.register import _speeds
@@ -27,6 +28,8 @@ from tunneldb.measures.rings.surveyed_points import require_size
 from tunneldb.pipeline.profile_file import read_profile
 from tunneldb.pipeline.register import SonarInput
 from tunneldb.pipeline.target_control import read_control
+from tunneldb.pointcloud.sonar import read_sonar
+from tunneldb.queue.batch import _require_files
 from tunneldb.radiometry.intensity_kind import doubt
 from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.simulate import Parameters, Simulation
@@ -79,6 +82,8 @@ CASES: list[tuple[Callable[..., Any], Any, str, Callable[[re.Match[str]], Any]]]
     (horseshoe, 30.0, r"up to (20) m", lambda found: float(found[1])),
     (lambda lean: horseshoe(inclination=lean), 40.0, r"give 0 to (30)", lambda found: float(found[1])),
     (file_path, "a\nb.laz", "rename it", lambda _: "ab.laz"),
+    (parse_clock, "noon", r"as (10-2) or", lambda found: found[1]),
+    (parse_clock, "noon", r"or (10:30-1:30)", lambda found: found[1]),
     (_require_name, "a" * 200, r"use at most (\d+)$", lambda found: "a" * int(found[1])),
     (_require_name, ".a", "begin with a letter or a digit", lambda _: "a"),
     (lambda curve: ReferenceCurve(*np.array(curve).T), [(1.0, 2.0), (2.0, np.nan), (3.0, 1.0)], r"^row (2) .* remove it",
@@ -256,3 +261,25 @@ def test_the_folder_of_the_server_is_another(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     advised(lambda: prepare_home(tmp_path / "file" / "home"), "set TUNNELDB_HOME to another")
     assert prepare_home(tmp_path / "home").folder == tmp_path / "home"
+
+
+def test_points_of_a_profile_have_a_unit(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text("-3 -3\n0 -3\n3 -3\n3 0\n3 3\n0 3\n-3 3\n-3 0\n")
+    unit = advised(lambda: read_profile(path), r"say it by --unit (\w+)")[1]
+    assert read_profile(path, unit=unit).outline.area == pytest.approx(36.0)
+
+
+def test_raw_data_of_a_sonar_are_exported(tmp_path: Path) -> None:
+    suffix = advised(lambda: read_sonar(tmp_path / "a.son"), r"export it from the maker's software as (\.xyz)")[1]
+    path = tmp_path / f"a{suffix}"
+    path.write_text("1 2 3\n4 5 6\n")
+    assert len(read_sonar(path)[0]) == 2
+
+
+def test_files_of_a_batch_have_names_of_their_own(tmp_path: Path) -> None:
+    for name in ("a/1.laz", "b/1.laz", "b/2.laz"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(b"")
+    advised(lambda: _require_files([tmp_path / "a/1.laz", tmp_path / "b/1.laz"]), "rename one")
+    _require_files([tmp_path / "a/1.laz", tmp_path / "b/2.laz"])
