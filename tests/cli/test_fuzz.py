@@ -94,7 +94,7 @@ def test_what_is_wrong_is_said_in_one_line(people: None, conn: psycopg.Connectio
     allowed = {"right": (0, 1), "refused": (2,)}
     wrong = [f"{one.command}: {one.said}{one.fault}" for one in outcomes if one.code not in allowed.get(one.kind, (one.code,))]
     assert not wrong, "\n".join(wrong)
-    print(table(outcomes, "kind"), table(outcomes, "command"), sep="\n\n")
+    print(table(outcomes, "kind"), table(outcomes, "verb"), sep="\n\n")
     assert {one.code for one in outcomes} >= {0, 2}
     faults = [f"{one.number}: {one.command} ({one.wrong}): {one.fault}" for one in outcomes if one.fault]
     assert not faults, "\n".join(faults)

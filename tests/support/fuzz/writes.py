@@ -191,15 +191,16 @@ def _shape(chance: random.Random) -> str:
         f"ST_Translate({origin}, {', '.join(_offset(chance) for _ in range(3))})" for _ in range(chance.choice((1, 3, 5, 40)))
     ]
     line = f"ST_MakeLine(ARRAY[{', '.join(moved)}])"
+    polygon = f"ST_MakePolygon(ST_AddPoint({line}, {moved[0]}))" if len(moved) > 2 else moved[0]
     return chance.choice(
         (
             moved[0],
             f"ST_Force2D({moved[0]})",
             line,
             f"ST_Force2D({line})",
-            f"ST_MakePolygon(ST_AddPoint({line}, {moved[0]}))",
-            f"ST_Force2D(ST_MakePolygon(ST_AddPoint({line}, {moved[0]})))",
-            f"ST_Multi(ST_Force2D(ST_MakePolygon(ST_AddPoint({line}, {moved[0]}))))",
+            polygon,
+            f"ST_Force2D({polygon})",
+            f"ST_Multi(ST_Force2D({polygon}))",
             # a radius that is no number ends the server's process in GEOS 3.11, whoever calls ST_Buffer
             f"ST_Buffer({moved[0]}, {abs(chance.gauss(0, 1)):.3f}, {10 ** chance.randrange(5)})",
             f"ST_Collect({moved[0]}, {line})",
