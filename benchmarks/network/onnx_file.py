@@ -60,3 +60,13 @@ def write_onnx(weights: Mapping[str, np.ndarray], channels: int, path: Path) -> 
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
     onnx.checker.check_model(model)
     onnx.save(model, path)
+
+
+def read_weights(path: Path) -> dict[str, np.ndarray]:
+    """Read the weights that :func:`write_onnx` wrote."""
+    constants = {one.name: numpy_helper.to_array(one) for one in onnx.load(path).graph.initializer}
+    return {
+        name: value.transpose(2, 3, 1, 0) if name.endswith(".w") else value
+        for name, value in constants.items()
+        if name.endswith((".w", ".b"))
+    }

@@ -12,12 +12,15 @@ import argparse
 import time
 from pathlib import Path
 
+import jax
 import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
 from benchmarks.network.features import see
+from benchmarks.network.onnx_file import read_weights
 from benchmarks.network.sample import Sample
+from benchmarks.network.train import forward
 from benchmarks.network.unet import HALO, STRIDE
 
 TILE = 512
@@ -29,7 +32,7 @@ def main() -> None:
     parser.add_argument("model", type=Path, metavar="FILE.onnx")
     parser.add_argument("families", nargs="+", metavar="FAMILY")
     parser.add_argument("--cache", type=Path, required=True, metavar="DIR")
-    parser.add_argument("--check", action="store_true", help="compare tiles and threads; writes nothing")
+    parser.add_argument("--check", action="store_true", help="compare tiles, threads and JAX; writes nothing")
     arguments = parser.parse_args()
     network = session(arguments.model)
     for family in arguments.families:
@@ -44,6 +47,7 @@ def main() -> None:
                     "one tile": probabilities(network, images, 100_000),
                     "2 threads": probabilities(session(arguments.model, 2), images),
                     "again": probabilities(network, images),
+                    "JAX": trained(arguments.model, images),
                 }
                 print(f"{family} {path.stem}", {name: float(np.abs(p - found).max()) for name, p in others.items()}, flush=True)
                 continue
@@ -51,6 +55,15 @@ def main() -> None:
             target.parent.mkdir(parents=True, exist_ok=True)
             np.save(target, found.astype(np.float16))
             print(f"{family} {path.stem}: {images.shape[0]} x {images.shape[1]} pixels in {seconds:.1f} s", flush=True)
+
+
+def trained(path: Path, images: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the same by the code that trains."""
+    rows, columns, channels = images.shape
+    whole = np.zeros((1, -(-rows // STRIDE) * STRIDE, -(-columns // STRIDE) * STRIDE, channels), np.float32)
+    whole[0, :rows, :columns] = images
+    found = jax.nn.softmax(forward(read_weights(path), whole))
+    return np.asarray(found)[0, :rows, :columns].transpose(2, 0, 1)
 
 
 def session(path: Path, threads: int = 1) -> onnxruntime.InferenceSession:
