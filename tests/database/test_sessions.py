@@ -6,6 +6,8 @@ import json
 import os
 import subprocess
 import sys
+import time
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +53,19 @@ def outputs(folder: Path) -> list[Any]:
 
 
 @pytest.mark.slow
+def test_a_clock_that_is_set_back_prevents_no_file(example: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """ZIP states times from 1980 on."""
+    local = time.localtime
+    monkeypatch.setattr(time, "localtime", lambda seconds=None: local(1000 if seconds is None else seconds))
+    monkeypatch.setattr(time, "time", lambda: 1000.0)
+    for words in (["qgis", example, "-o"], ["survey", "export", example, "-o"], ["leaks", example, "-o"]):
+        path = tmp_path / {"qgis": "a.qgz", "survey": "a.tdb", "leaks": "a.xlsx"}[words[0]]
+        result = CliRunner().invoke(main, [*words, str(path)])
+        assert result.exit_code == 0, result.exception
+        with zipfile.ZipFile(path) as archive:
+            assert archive.testzip() is None
+
+
 def test_settings_of_others_change_no_output(conn: psycopg.Connection, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("plain", "database", "options"):
         (tmp_path / name).mkdir()

@@ -76,7 +76,10 @@ class Manifest:
 
 
 class ArchiveWriter:
-    """Writes an archive, member after member; the manifest comes last."""
+    """Writes an archive, member after member; the manifest comes last.
+
+    Members have no time, since ZIP cannot state one of a clock that is set before 1980.
+    """
 
     def __init__(self, path: Path) -> None:
         self._zip = zipfile.ZipFile(path, "w", zipfile.ZIP_STORED, allowZip64=True)
@@ -93,7 +96,7 @@ class ArchiveWriter:
     def add(self, name: str, columns: Iterable[tuple[str, str]], chunks: Iterable[bytes | bytearray | memoryview]) -> None:
         """Write a member; `counted` sets its number of rows."""
         digest, size = hashlib.sha256(), 0
-        with self._zip.open(name, "w", force_zip64=True) as file:
+        with self._zip.open(zipfile.ZipInfo(name), "w", force_zip64=True) as file:
             packer = zstandard.ZstdCompressor(level=_LEVEL, write_checksum=False).chunker(chunk_size=_CHUNK)
             for chunk in chunks:
                 digest.update(chunk)
@@ -111,7 +114,7 @@ class ArchiveWriter:
     def finish(self, manifest: Manifest) -> None:
         """Write the manifest, with the entries of all members."""
         text = json.dumps({**asdict(manifest), "members": {k: asdict(m) for k, m in self._members.items()}}, indent=1)
-        self._zip.writestr(MANIFEST, text, zipfile.ZIP_DEFLATED)
+        self._zip.writestr(zipfile.ZipInfo(MANIFEST), text, zipfile.ZIP_DEFLATED)
 
 
 class ArchiveReader:

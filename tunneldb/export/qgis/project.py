@@ -271,5 +271,5 @@ def _archive(text: str, name: str) -> bytes:
     """Return a project in the form of a .qgz file."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr(f"{name}.qgs", text)
+        archive.writestr(zipfile.ZipInfo(f"{name}.qgs"), text, zipfile.ZIP_DEFLATED)  # without a time: ZIP has none before 1980
     return content.getvalue()
