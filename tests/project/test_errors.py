@@ -78,3 +78,16 @@ def test_functions_that_init_replaces_under_a_stage_are_no_bug(error: psycopg.Er
     assert message.startswith("tunneldb init replaced the functions, the current work was rolled back: ")
     assert message.endswith("; run it again")
     assert describe_failure(psycopg.errors.UndefinedTable('relation "tunnel.nothing" does not exist')) is None
+
+
+def test_a_survey_that_another_program_removes_is_no_bug(conn: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a report meets it that has found the survey, and then asks for its leaks."""
+    add_survey(conn)
+    conn.commit()
+    found = get_survey(conn, SURVEY)
+    monkeypatch.setattr("tunneldb.cli.report.get_survey", lambda *args, **kwargs: found)
+    conn.execute("DELETE FROM tunnel.survey")
+    conn.commit()
+    result = CliRunner().invoke(main, ["report", SURVEY, "-o", "a.html", "--from", "980", "--to", "990"])
+    assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1), result.output
+    assert "another program removed it, the current work was rolled back: there is no survey" in result.stderr

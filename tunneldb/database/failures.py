@@ -12,6 +12,9 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 _REPLACED = ("cache lookup failed", "relation with OID")
 """Messages of statements whose functions or views another session dropped while they ran."""
 
+_REMOVED = ("there is no survey ", "there is no tunnel ")
+"""Messages of statements about what another session removed after the command had found it."""
+
 
 def describe_failure(error: Exception) -> str | None:
     """Return what happened and what to do; None for a bug.
@@ -37,6 +40,8 @@ def describe_failure(error: Exception) -> str | None:
             return f"another program was changing the same rows, the current work was rolled back: {message}; run it again"
         case psycopg.errors.InternalError_() | psycopg.errors.UndefinedTable() if any(word in message for word in _REPLACED):
             return f"tunneldb init replaced the functions, the current work was rolled back: {message}; run it again"
+        case psycopg.errors.RaiseException() if message.startswith(_REMOVED):
+            return f"another program removed it, the current work was rolled back: {message}"
         case psycopg.OperationalError():
             # also within COMMIT, after which nobody can tell which of both it is
             return (
