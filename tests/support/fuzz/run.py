@@ -302,9 +302,11 @@ def dripping() -> Iterator[str]:
         child = os.fork()
         if child == 0:
             serve_drips(listening)
-        yield "{}:{}".format(*listening.getsockname())
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
+        try:
+            yield "{}:{}".format(*listening.getsockname())
+        finally:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
 
 
 def _main() -> None:
