@@ -193,10 +193,11 @@ _TABLES = {
     "tables": "SELECT relname FROM pg_class WHERE relnamespace = 'tunnel'::regnamespace AND relkind IN ('r', 'p') ORDER BY 1",
     "goal": "SELECT km, stage, parameters::text FROM tunnel.goal ORDER BY km",
     "incoming": "SELECT name, message FROM tunnel.incoming ORDER BY name",
-    "run": "SELECT km, stage, coalesce(parameters ->> 'file', ''), parameters,"
-    # which of two kilometres finds a leak across their boundary first, is chance
+    # The last of each: how many there are is compared by `runs`. Which of two kilometres finds a leak across their boundary
+    # first, is chance.
+    "run": "SELECT DISTINCT ON (stage, km, 3) km, stage, coalesce(parameters ->> 'file', ''), parameters,"
     " counts - '{leaks_new,leaks_again,leaks_over_ends}'::text[] FROM tunnel.run WHERE outcome = 'done'"
-    " ORDER BY stage, km, 3, id",
+    " ORDER BY stage, km, 3, id DESC",
     "status": "SELECT km, stage, outcome, stale, reason FROM tunnel_api.stage_status ORDER BY km, step",
     "jobs": "SELECT status::text, args::text FROM tunnel_queue.procrastinate_jobs WHERE status IN ('todo', 'doing')",
 }
