@@ -334,6 +334,29 @@ def test_what_operators_put_on_the_tables_gets_at_the_audit_and_is_reported(
 
 
 @pytest.mark.parametrize("person", ["otto"], indirect=True)
+def test_a_condition_on_a_trigger_of_tunneldb_is_reported(person: psycopg.Connection) -> None:
+    """Name and function of the trigger are tunneldb's, and the condition runs with the rights of whoever writes."""
+    person.execute(FORGE)
+    person.execute(
+        "CREATE OR REPLACE TRIGGER set_subject BEFORE INSERT OR UPDATE ON tunnel.run FOR EACH ROW"
+        " WHEN (tunnel.mine(NEW.stage)) EXECUTE FUNCTION tunnel.set_subject()"
+    )
+    result = CliRunner().invoke(main, ["check"])
+    assert result.exit_code == 1
+    assert "condition of trigger set_subject of tunnel.run is not tunneldb's: it runs tunnel.mine(text)" in result.output
+
+
+@pytest.mark.parametrize("person", ["otto"], indirect=True)
+def test_a_name_cannot_forge_a_line_of_check(person: psycopg.Connection) -> None:
+    person.execute(FORGE)
+    person.execute('ALTER TABLE tunnel.region ADD CONSTRAINT "x\n✓ forged" CHECK (tunnel.mine(kind))')
+    result = CliRunner().invoke(main, ["check"])
+    assert result.exit_code == 1
+    assert r'check "x\n✓ forged" of tunnel.region' in result.output
+    assert not any(line.startswith("✓ forged") for line in result.output.splitlines())
+
+
+@pytest.mark.parametrize("person", ["otto"], indirect=True)
 def test_a_table_is_not_made_part_of_another_unseen(person: psycopg.Connection, conn: psycopg.Connection) -> None:
     """A partition takes the triggers, checks and indexes of its parent, which may lie anywhere."""
     conn.execute("CREATE SCHEMA elsewhere; GRANT ALL ON SCHEMA elsewhere TO tunnel_operator")

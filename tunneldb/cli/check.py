@@ -7,7 +7,7 @@ import sys
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import add_to_json, command
+from tunneldb.cli.output import add_to_json, command, printable
 
 
 @command(examples=["tunneldb check", "tunneldb check --json"], wrong="a check failed; the list has the fix")
@@ -25,8 +25,8 @@ def check(settings: Settings) -> None:
         findings.append(finding)
         mark = {"ok": "✓", "note": "•", "wrong": "✗"}[finding.level]
         colour = {"ok": "green", "note": "yellow", "wrong": "red"}[finding.level]
-        click.echo(f"{click.style(mark, fg=colour)} {finding.subject}: {finding.text}")
+        click.echo(f"{click.style(mark, fg=colour)} {finding.subject}: {printable(finding.text)}")
         if finding.remedy:
-            click.echo(f"    {finding.remedy}")
+            click.echo(f"    {printable(finding.remedy)}")
     if any(finding.level == "wrong" for finding in findings):
         sys.exit(1)

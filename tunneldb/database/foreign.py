@@ -121,6 +121,9 @@ expression (relation, what, tree, remedy) AS (
            format('DROP INDEX %s;', x.indexrelid::regclass)
       FROM pg_index x JOIN owned ON owned.oid = x.indrelid JOIN pg_class i ON i.oid = x.indexrelid AND NOT i.relispartition
     UNION ALL
+    SELECT t.tgrelid, format('condition of trigger %I', t.tgname), t.tgqual::text, 'restore the table from a backup'
+      FROM pg_trigger t JOIN owned ON owned.oid = t.tgrelid WHERE t.tgparentid = 0 AND t.tgqual IS NOT NULL
+    UNION ALL
     SELECT p.partrelid, 'partition key', p.partexprs::text, 'restore the table from a backup'
       FROM pg_partitioned_table p JOIN owned ON owned.oid = p.partrelid
     UNION ALL
