@@ -152,7 +152,7 @@ def close_database(connection: psycopg.Connection[Any]) -> bool:
 def limit_queries(connection: psycopg.Connection[Any]) -> bool:
     """Limit the time of queries of other programs, unless the database has a limit of its own. The connection must be idle.
 
-    A limit of a group role would not apply to its members. Commands of tunneldb set their own.
+    A limit of a group role would not apply to its members. The connections of commands have none.
 
     Returns
     -------
