@@ -325,6 +325,9 @@ def test_the_last_change_is_taken_back_or_why_not_is_one_line(conn: psycopg.Conn
     refused = run("findings", "undo", key)
     assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
     assert f"there is no change of a finding {key} to be taken back" in refused.stderr
+    beyond = run("findings", "undo", 2**63)  # more than an id of the database can be
+    assert beyond.exit_code == 2
+    assert "is not in the range" in beyond.stderr
 
 
 def test_a_width_without_a_unit_is_refused_and_the_advice_helps(conn: psycopg.Connection, tmp_path: Path) -> None:

@@ -294,7 +294,7 @@ def import_(
 
 
 @findings.command("undo", examples=["tunneldb findings undo 12"])
-@click.argument("number", metavar="ID", type=WholeRange(min=1))
+@click.argument("number", metavar="ID", type=WholeRange(1, 2**63 - 1))
 @click.pass_obj
 def undo(settings: Settings, number: int) -> None:
     """Undo the last change of the finding ID: drawn, redrawn, reviewed, split, merged or deleted.
