@@ -96,11 +96,11 @@ def measure(name: str, dsn: str | None) -> dict[str, Any]:
     conditions = measure_conditions(contrast, picture.state, found.dark)
     trials = Trials.of([run_trial(picture, found.dark, conditions, wet_pixels, k) for k in range(PASSES)])
     chance = Chance.fit(trials)
-    leaks = [one for one in features if mask_of(picture, one).any()]
-    masks = [mask_of(picture, one) for one in leaks]
+    shown = [(one, mask) for one in features if (mask := mask_of(picture, one)).any()]
+    masks = [mask for _, mask in shown]
     stated = chance.probability(
-        np.array([shape(one["geometry"]).area for one in leaks]),
-        np.array([one["properties"]["drop_db"] for one in leaks]),
+        np.array([shape(one["geometry"]).area for one, _ in shown]),
+        np.array([one["properties"]["drop_db"] for one, _ in shown]),
         np.array([at(conditions, mask) for mask in masks]),
     )
     typical = np.median(conditions.values[:, conditions.lining > 0], axis=1)

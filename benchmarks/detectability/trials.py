@@ -54,8 +54,6 @@ class Trials:
     @classmethod
     def of(cls, parts: list[Trials]) -> Trials:
         """Join the trials of several passes."""
-        if not parts:
-            return cls(np.empty(0), np.empty(0), np.empty((0, len(NAMES))), np.empty(0, np.bool_))
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__dataclass_fields__))
 
 
@@ -123,7 +121,7 @@ def _plant(level: Int16, picture: LiningImage, dark: Bool, number: int) -> list[
 
 
 def _cells(count: int, first: int, side: int) -> Int64:
-    """Return the middles of the cells among so many pixels, of which the first has this number."""
+    """Return the positions of the middles of the cells in a row of ``count`` pixels; ``first`` is the first pixel's number."""
     return np.arange((side // 2 - first) % side, count, side, dtype=np.int64)
 
 
@@ -136,10 +134,9 @@ def _is_blank(planted: _Planted, state: UInt8, dark: Bool) -> bool:
 
 
 def _darken(level: Int16, planted: _Planted) -> None:
-    box = (
-        slice(planted.row, planted.row + len(planted.leak.wet)),
-        slice(planted.column, planted.column + len(planted.leak.wet)),
-    )
+    """Darken levels by a leak that lies within the picture, in place."""
+    box = _box(planted, level.shape)
+    assert box is not None
     here = level[box]
     steps = np.rint(planted.leak.darkening / STEP["corrected"]).astype(np.int32)
     darker = np.maximum(here.astype(np.int32) - steps, NODATA + 1).astype(np.int16)

@@ -1,4 +1,4 @@
-"""What becomes of leaks if a dark band along the tunnel is not taken for the level of dry lining.
+"""Compare ways to find leaks in which a dark band along the tunnel is no part of the level of dry lining.
 
     python -m benchmarks.network.background --cache DIR round_09 metro     # 10 s a scene and way
 

@@ -38,7 +38,7 @@ from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import halo, halo_of_profiles, lining_image
 from tunneldb.raster.observation import Observer, Radiometer
 from tunneldb.raster.pixel_size import SMALLEST, choose_factor, coarse_grid, coarsen
-from tunneldb.raster.profiles import find_gaps
+from tunneldb.raster.profiles import ProfileGaps, find_gaps
 from tunneldb.raster.rasterize import Counts, rasterize
 from tunneldb.store.coverage import seen_share
 from tunneldb.store.drawn_findings import Drawn, load_drawn, save_measured
@@ -232,9 +232,8 @@ def compute_detection(
     calibration = calibrate(sample, inputs.observer, inputs.homogeneous, inputs.survey, own_curve=inputs.own_curve)
     observer, view, roughness = calibration.observer, calibration.view, calibration.roughness
     with ExitStack() as stack:
-        image, counts = _gather(observer, inputs, values, roughness.sigma, progress, stack)
+        image, gaps, counts = _gather(observer, inputs, values, roughness.sigma, progress, stack)
         outliers = SectionOutliers.of(observer.surface, MAX_GIRTH_SHARE)
-        gaps = find_gaps(image, values["image.spacing"])
         grid = image.grid
         lining = lining_image(image, gaps, observer, outliers, values["appendage.distance"], partial(save_block, grid))
     if gaps is not None:
@@ -266,7 +265,7 @@ def make_offset_images(
 ) -> Counts:
     """Make the offset image of a survey without intensity."""
     with ExitStack() as stack:
-        image, counts = _gather(inputs.observer, inputs, values, 0.0, progress, stack)
+        image, _, counts = _gather(inputs.observer, inputs, values, 0.0, progress, stack)
         width = image.grid.block_columns
         for block in image.inner_blocks():
             save_block(image.grid, image.window(block * width, (block + 1) * width))
@@ -358,10 +357,10 @@ def _gather(
     roughness: float,
     progress: Callable[[float], None],
     stack: ExitStack,
-) -> tuple[Accumulator, Counts]:
-    """Read the files into an image, which must not show the halo alone; its pixels are enlarged where points are few.
+) -> tuple[Accumulator, ProfileGaps | None, Counts]:
+    """Read the files into an image, which must not show the halo alone, and find the gaps between its profiles.
 
-    Profiles apart stay on small pixels: between them the nearest one is shown.
+    Its pixels are enlarged where points are few, unless profiles are apart: between them the nearest one is shown.
     """
     image = stack.enter_context(Accumulator(inputs.grid))
     counts = rasterize(observer, inputs.files, image, roughness, progress)
@@ -369,7 +368,8 @@ def _gather(
         raise UserError(
             f"no point of {', '.join(file.path.name for file in inputs.files)} is on the lining of kilometre {observer.km}"
         )
-    if values["image.pixel"] == 0.0 and find_gaps(image, values["image.spacing"]) is None:
+    gaps = find_gaps(image, values["image.spacing"])
+    if values["image.pixel"] == 0.0 and gaps is None:
         factor, density = choose_factor(image)
         if factor > 1:
             large = stack.enter_context(Accumulator(coarse_grid(image.grid, factor, halo(factor * image.grid.pixel))))
@@ -377,7 +377,7 @@ def _gather(
             image = large
             counts["density"] = round(density)
     counts["pixel"] = image.grid.pixel
-    return image, counts
+    return image, gaps, counts
 
 
 def kilometre_grid(surface: Surface, km: int, pixel: float) -> Grid:
