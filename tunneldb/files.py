@@ -104,7 +104,7 @@ def disk_full_as_oserror(folder: Path) -> Iterator[None]:
         raise
 
 
-_WRITERS = {"lazrs", "pyogrio", "rasterio", "sqlite3"}
+_WRITERS = {"lazrs", "pyogrio", "rasterio", "sqlite3", "zlib"}
 _FULL = ("disk is full", "No space left")
 _TEST_BYTES = 1 << 20
 """Bytes for the test of free space after a file could not be written."""

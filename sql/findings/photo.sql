@@ -25,6 +25,14 @@ BEGIN
         RAISE EXCEPTION 'the photo % is a device or a file of the kernel, not a picture', left(NEW.path, 60)
             USING ERRCODE = 'invalid_parameter_value';
     END IF;
+    IF NEW.path ~* '^file:.*%(2[ef]|5c|[46][1-9a-f]|[57][0-9a])' THEN  -- a code for a letter, a full stop or a slash hides a folder
+        RAISE EXCEPTION 'the photo % has codes where letters do, such as %%2F for /: write the path without them', left(NEW.path, 60)
+            USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    IF NEW.path ~* '^(\\\\|//|file:(//[^/]|////|/*\\\\))' THEN  -- opening it sends the reader's login to that server
+        RAISE EXCEPTION 'the photo % is on another computer: write its path from the folder of photos', left(NEW.path, 60)
+            USING ERRCODE = 'invalid_parameter_value';
+    END IF;
     SELECT s.name INTO name FROM tunnel.finding a JOIN tunnel.survey s ON s.id = a.survey_id WHERE a.id = NEW.finding_id;
     IF NOT FOUND OR (TG_OP = 'UPDATE' AND NEW.finding_id <> OLD.finding_id) THEN
         RAISE EXCEPTION 'a photo is of one finding, which stays; there is no finding %', NEW.finding_id

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import psycopg
 import pytest
 from click.testing import CliRunner
@@ -18,6 +19,7 @@ from tunneldb.cli.main import main
 from tunneldb.database.server import Server
 from tunneldb.errors import UserError
 from tunneldb.files import made_folder, replacing
+from tunneldb.simulate import Parameters, Simulation, write
 
 KEPT = b"what was there before"
 
@@ -78,6 +80,23 @@ def test_output_is_whole_or_as_it_was(disk: SmallDisk, example: str, words: list
     assert line == result.stderr.splitlines()[-1]
     assert disk.files() == [kept.name]
     assert kept.read_bytes() == KEPT
+
+
+def test_a_figure_is_whole_or_as_it_was(disk: SmallDisk, tmp_path: Path) -> None:
+    """Writers of figures compress, and their compressors have errors of their own after a failed write."""
+    shape = Parameters(length=14, radius=0, station_spacing=14, angular_step=0.5, leaks=0, section="box", seed=2)
+    scan = write(Simulation(shape), tmp_path, truth=False)
+    place = [f"{value:.4f}" for value in np.loadtxt(scan.poses, delimiter=",", skiprows=1)[1:]]
+    words = ["intensity", str(scan.clouds[0]), "--intensity", "Amplitude", "--intensity-kind", "amplitude", "--scanner", *place]
+    for suffix in (".pdf", ".png"):
+        kept = disk.folder / f"kept{suffix}"
+        kept.write_bytes(KEPT)
+        result = CliRunner().invoke(main, [*words, "-o", str(kept)])
+        assert result.exit_code == 2, result.exception
+        assert "No space left on device" in result.stderr.splitlines()[-1]
+        assert disk.files() == [kept.name]
+        assert kept.read_bytes() == KEPT
+        kept.unlink()
 
 
 def test_with_room_the_same_command_succeeds(disk: SmallDisk, example: str) -> None:

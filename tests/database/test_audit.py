@@ -347,6 +347,21 @@ def test_a_condition_on_a_trigger_of_tunneldb_is_reported(person: psycopg.Connec
 
 
 @pytest.mark.parametrize("person", ["otto"], indirect=True)
+def test_a_function_in_statistics_is_reported(person: psycopg.Connection) -> None:
+    """It runs whenever somebody analyses the table."""
+    person.execute(FORGE)
+    person.execute("CREATE STATISTICS tunnel.usual ON kind, review FROM tunnel.finding")
+    person.execute("CREATE STATISTICS tunnel.mine ON (tunnel.mine(review)) FROM tunnel.finding")
+    result = CliRunner().invoke(main, ["check"])
+    assert result.exit_code == 1
+    assert "statistics tunnel.mine of tunnel.finding is not tunneldb's: it runs tunnel.mine(text)" in result.output
+    assert "tunnel.usual" not in result.output
+    (mend,) = [line.strip() for line in result.output.splitlines() if "DROP STATISTICS" in line]
+    person.execute(mend.encode())
+    assert "✓ expressions" in CliRunner().invoke(main, ["check"]).output
+
+
+@pytest.mark.parametrize("person", ["otto"], indirect=True)
 def test_a_name_cannot_forge_a_line_of_check(person: psycopg.Connection) -> None:
     person.execute(FORGE)
     person.execute('ALTER TABLE tunnel.region ADD CONSTRAINT "x\n✓ forged" CHECK (tunnel.mine(kind))')

@@ -86,6 +86,28 @@ def test_a_photo_is_no_file_of_the_kernel(person: psycopg.Connection, path: str)
         person.execute(add, [path])
 
 
+@pytest.mark.parametrize("person", ["ines"], indirect=True)
+@pytest.mark.parametrize(
+    ("path", "says"),
+    [
+        ("file:///%70roc/kmsg", "has codes where letters do"),
+        ("file:///photos/..%2F..%2fproc/kmsg", "has codes where letters do"),
+        (r"\\server\photos\a.jpg", "is on another computer"),
+        ("//server/photos/a.jpg", "is on another computer"),
+        ("file://server/photos/a.jpg", "is on another computer"),
+        ("file:////server/photos/a.jpg", "is on another computer"),
+    ],
+)
+def test_a_photo_hides_no_folder_and_no_server(person: psycopg.Connection, path: str, says: str) -> None:
+    """QGIS on Windows sends the reader's login to the server of a path such as //server/photos."""
+    add = "INSERT INTO tunnel_api.finding_photo (finding_id, path) VALUES (1, %s)"
+    for right in ("file:///photos/a%20b.jpg", "a%41.jpg", "photos//a.jpg", "C:\\photos\\a.jpg", "https://example.org/%41.jpg"):
+        with person.transaction(force_rollback=True):
+            person.execute(add, [right])
+    with pytest.raises(psycopg.errors.InvalidParameterValue, match=says):
+        person.execute(add, [path])
+
+
 @pytest.mark.parametrize("person", ["vera"], indirect=True)
 def test_no_function_of_viewers_takes_the_server_down(person: psycopg.Connection) -> None:
     """Each ends within seconds, with few rows or one line."""

@@ -2,8 +2,9 @@
 
 Operators own the tables. A trigger (also on a table that refers to one of them), a rule, a policy, a view in place of a
 table, or a function in a check, a default, a generated column or an index runs with the rights of whoever writes: with those
-of the database's owner behind the views and in the owner's own runs. A function or an operator in schema public that matches a
-call better than that of PostgreSQL or PostGIS is called instead.
+of the database's owner behind the views and in the owner's own runs. A function in extended statistics runs whenever somebody
+analyses the table. A function or an operator in schema public that matches a call better than that of PostgreSQL or PostGIS is
+called instead.
 """
 
 from __future__ import annotations
@@ -123,6 +124,10 @@ expression (relation, what, tree, remedy) AS (
     UNION ALL
     SELECT t.tgrelid, format('condition of trigger %I', t.tgname), t.tgqual::text, 'restore the table from a backup'
       FROM pg_trigger t JOIN owned ON owned.oid = t.tgrelid WHERE t.tgparentid = 0 AND t.tgqual IS NOT NULL
+    UNION ALL
+    SELECT x.stxrelid, format('statistics %I.%I', x.stxnamespace::regnamespace, x.stxname), x.stxexprs::text,
+           format('DROP STATISTICS %I.%I;', x.stxnamespace::regnamespace, x.stxname)
+      FROM pg_statistic_ext x JOIN owned ON owned.oid = x.stxrelid
     UNION ALL
     SELECT p.partrelid, 'partition key', p.partexprs::text, 'restore the table from a backup'
       FROM pg_partitioned_table p JOIN owned ON owned.oid = p.partrelid
