@@ -1,12 +1,14 @@
-"""Files that would take forever, or all memory, by how they are nested: E57's XML, IFC, DXF. LandXML: tests/alignment."""
+"""Files that would take forever or all memory, by nesting or by holes: E57, IFC, DXF, LAS. LandXML: tests/alignment."""
 
 from __future__ import annotations
 
+import os
 import struct
 import time
 from pathlib import Path
 
 import ezdxf
+import laspy
 import numpy as np
 import pytest
 from support.e57_files import Scan, write
@@ -98,3 +100,17 @@ def test_ifc_that_is_nested_without_end(tmp_path: Path, wrong: str, right: str) 
         Ifc(path).design(0, 0)
     assert "\n" not in str(refused.value)
     assert time.process_time() - began < 10
+
+
+def test_a_file_of_points_with_a_hole_of_a_terabyte(tmp_path: Path) -> None:
+    """The checksum would read all of it."""
+    path = tmp_path / "a.las"
+    points = laspy.create(point_format=0, file_version="1.2")
+    points.x = points.y = points.z = np.arange(100.0)
+    points.write(path)
+    size = path.stat().st_size
+    os.truncate(path, size + 7)  # some bytes behind the points are usual
+    assert read_header(path).points == 100
+    os.truncate(path, size + (1 << 40) + 7)
+    with pytest.raises(UserError, match=r"a\.las: .*its header states 100 points, but it contains 5\d{10}; export it again"):
+        read_header(path)

@@ -21,6 +21,7 @@ POINTWISE = 1
 _INTERNAL_WAVEFORMS = 1 << 1  # of the header's flags
 _STREAMED = -1  # the offset of the chunk table is in the file's last 8 bytes
 _MAX_CHUNK = 1 << 32  # bytes
+_MAX_APPENDED = 1 << 30  # bytes after the points that no record describes
 _FULL_HEADER = 375  # bytes, of version 1.4
 _LEGACY_COUNT_AT, _COUNT_AT = 107, 247
 _BOX_AT = 179
@@ -140,8 +141,9 @@ def _end_of_points(head: bytes, size: int) -> int:
 def _require_all_stated(count: int, room: int, record: int) -> None:
     """Refuse a file with more points than its header states: its writer was interrupted before it wrote the number.
 
-    Other bytes may follow the points; they count as points if they make up whole ones, or if the header states none.
+    Other bytes may follow the points; they count as points if they make up whole ones, if the header states none, or if they
+    are more than any program appends.
     """
     there = room // max(record, 1)
-    if there > count and (count == 0 or room % record == 0):
+    if there > count and (count == 0 or room % record == 0 or room - count * record > max(_MAX_APPENDED, count * record)):
         raise ValueError(f"its header states {count} points, but it contains {there}; export it again")
