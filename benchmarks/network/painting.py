@@ -1,9 +1,10 @@
-"""Painted pictures for training: things of ``benchmarks.evidence.painted`` on lining as scans show it.
+"""Painted pictures for training: water and dry marks on lining as scans show it.
 
     python -m benchmarks.network.painting --cache DIR --count 300       # about a second each
 
-Added to what is painted there: water and dirt along the foot of the walls without an end, tones of segments and rings, joints,
-courses of brick, ribs of cast iron, rows of bolt pockets, posts with their shadows, banding, noise, sparse points, grey steps.
+Painted are the shapes of :mod:`benchmarks.network.shapes`, and: water and dirt along the foot of the walls without an end,
+tones of segments and rings, joints, courses of brick, ribs of cast iron, rows of bolt pockets, posts with their shadows,
+banding, noise, sparse points, grey steps. The rims of water count neither as wet nor as dry.
 """
 
 from __future__ import annotations
@@ -14,12 +15,18 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from benchmarks.evidence.painted import CELL, HALF, LONG, PIXEL, THINGS, Painting
-from benchmarks.network.sample import DRY, NONE, OTHER, WET, Sample
+from benchmarks.evidence.painted import CELL, HALF, LONG, PIXEL, Painting
+from benchmarks.network.sample import DRY as CLEAN
+from benchmarks.network.sample import LIMIT, NONE, OTHER, WET, Sample
+from benchmarks.network.shapes import DRY, WATER, Joints
 from tunneldb.raster.pixel_state import PixelState
 
 DARK = 0.4
 """Painted darkening from which dry lining counts as dark, dB."""
+
+
+RIM = 4
+"""Width of the rims of water, pixels."""
 
 
 def main() -> None:
@@ -41,21 +48,24 @@ def paint(seed: int) -> Sample:
     art = Painting(100_000 + seed)
     rng = art.rng
     art.state[np.abs(np.broadcast_to(art.y, art.state.shape)) > HALF - rng.uniform(0.1, 1.0)] = PixelState.FLOOR
-    makers, often = [make for make, _ in THINGS], np.array([share for _, share in THINGS])
-    if rng.random() < 0.25:
-        often = np.where(rng.random(len(often)) < 0.2, 1.0, 1e-9)
-    busy = rng.uniform(0.1, 1.0)
-    for s in np.arange(CELL / 2, LONG, CELL):
-        for a in (-HALF + CELL / 2, 0.1, HALF - CELL / 2):
-            if rng.random() < busy:
-                make = makers[rng.choice(len(makers), p=often / often.sum())]
-                make(art, float(s + rng.uniform(-0.4, 0.4)), float(a + rng.uniform(-0.4, 0.4)))
-    dark = art.drop > DARK
+    joints = Joints.of(rng)
+    busy, leaky = rng.uniform(0.1, 1.0), rng.uniform(0.1, 0.8)
+    few = rng.random() < 0.25
+    chosen = {wet: np.array([share if not few or rng.random() < 0.25 else 1e-9 for _, share in things])
+              for wet, things in ((True, WATER), (False, DRY))}  # fmt: skip
+    cells = [(s, a) for s in np.arange(CELL / 2, LONG, CELL) for a in (-HALF + CELL / 2, 0.1, HALF - CELL / 2)]
+    busy_cells = [cell for cell in cells if rng.random() < busy]
+    for s, a, wet in sorted(((s, a, bool(rng.random() < leaky)) for s, a in busy_cells), key=lambda cell: cell[2]):
+        often = chosen[wet]  # what is dry first: water lies on top
+        make, _ = (WATER if wet else DRY)[rng.choice(len(often), p=often / often.sum())]
+        make(art, joints, float(s + rng.uniform(-1.2, 1.2)), float(a + rng.uniform(-1.2, 1.2)))
+    dark = np.abs(art.drop) > DARK
     for side in (-1, 1):
         if rng.random() < 0.5:
             dark |= foot(art, side, wet=bool(rng.random() < 0.65))
-    label = np.where(art.wet, WET, np.where(dark, OTHER, DRY)).astype(np.uint8)
-    level = -art.drop * rng.uniform(0.5, 1.1) + lining(art, label)
+    label = np.where(art.wet, WET, np.where(dark, OTHER, CLEAN)).astype(np.uint8)
+    label[ndimage.binary_dilation(art.wet, iterations=RIM) & ~art.wet & (art.drop > DARK)] = LIMIT
+    level = -art.drop * rng.uniform(0.7, 1.1) + lining(art, label, joints)
     return scanned(art, level, label)
 
 
@@ -81,17 +91,18 @@ def foot(art: Painting, side: int, *, wet: bool) -> np.ndarray:
     return amount >= DARK
 
 
-def lining(art: Painting, label: np.ndarray) -> np.ndarray:
+def lining(art: Painting, label: np.ndarray, at: Joints) -> np.ndarray:
     """Level of dry lining, dB: tones, joints, texture, fittings; joints and fittings are marked as dark but dry."""
     rng, x, y = art.rng, art.x, art.y
     level = np.zeros(art.drop.shape)
-    ring, from_ = art.uniform(1.0, 2.4), art.uniform(0, 2)
+    ring = float(np.diff(at.around).mean()) if len(at.around) > 1 else 12.0
+    from_ = ring - float(at.around[0])
     number = np.floor((x + from_) / ring).astype(int)
     if rng.random() < 0.7:
         level += rng.normal(0, art.uniform(0, 0.6), number.max() + 1)[number]
     joints = np.zeros(label.shape, np.bool_)
     if rng.random() < 0.6:
-        joints |= np.broadcast_to(((x + from_) % ring) < 0.04, label.shape)
+        joints |= np.broadcast_to(((x + from_ + 0.02) % ring) < 0.04, label.shape)
         part = art.uniform(1.2, 3.0)
         shift = rng.integers(0, 2, number.max() + 1)[number] * part / 2
         joints |= ((y + 10 + shift) % part) < 0.03
@@ -112,18 +123,18 @@ def lining(art: Painting, label: np.ndarray) -> np.ndarray:
         size, across = art.uniform(0.06, 0.2), art.uniform(0.8, 1.6)
         marks = (np.abs((x + from_) % ring - 0.3) < size / 2) & (np.abs((y + 10) % across - 0.4) < size / 2)
         level[marks] -= art.log(0.5, 5.0)
-        label[marks & (label == DRY)] = OTHER
+        label[marks & (label == CLEAN)] = OTHER
     if rng.random() < 0.25:
         low, high = sorted(rng.uniform(1.0, HALF, 2))
         posts = ((x % art.uniform(0.8, 2.0)) < art.log(0.04, 0.12)) & (y * rng.choice([-1, 1]) > low) & (np.abs(y) < high)
         level[posts] -= art.log(1.0, 6.0)
-        label[posts & (label == DRY)] = OTHER
+        label[posts & (label == CLEAN)] = OTHER
     for scale in (4, 15, 60, 150):
         field = ndimage.gaussian_filter(rng.normal(0, 1, label.shape), scale)
         level += art.uniform(0, 0.5) * field / field.std()
     level += art.uniform(0, 0.3) * rng.normal(0, 1, len(x)) * (rng.random() < 0.4)
     level += art.uniform(-0.8, 0.8) * (y / HALF) ** 2 + art.uniform(-0.5, 0.5) * y / HALF
-    label[joints & (label == DRY)] = OTHER
+    label[joints & (label == CLEAN)] = OTHER
     return level
 
 

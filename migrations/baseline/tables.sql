@@ -745,6 +745,31 @@ COMMENT ON COLUMN tunnel.coverage.lining_sums IS 'Sum of lining before each step
 COMMENT ON COLUMN tunnel.coverage.seen_sums IS 'Sum of seen before each step, and of all, m²';
 COMMENT ON COLUMN tunnel.coverage.wet_sums IS 'Sum of wet before each step, and of all, m²';
 
+CREATE TABLE tunnel.dark_band (
+    survey_id INTEGER NOT NULL,
+    km INTEGER NOT NULL,
+    n INTEGER NOT NULL,
+    chainage_from DOUBLE PRECISION NOT NULL,
+    chainage_to DOUBLE PRECISION NOT NULL,
+    arc_from DOUBLE PRECISION NOT NULL,
+    arc_to DOUBLE PRECISION NOT NULL,
+    darkening DOUBLE PRECISION NOT NULL,
+    area DOUBLE PRECISION NOT NULL,
+    CONSTRAINT dark_band_pkey PRIMARY KEY (survey_id, km, n),
+    CONSTRAINT dark_band_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
+);
+COMMENT ON TABLE tunnel.dark_band IS 'Dark bands along the tunnel that are part of the background, in pieces: wet or dirty is not decided';
+COMMENT ON COLUMN tunnel.dark_band.survey_id IS 'Survey that the row belongs to';
+COMMENT ON COLUMN tunnel.dark_band.km IS 'Kilometre: floor(chainage / 1000)';
+COMMENT ON COLUMN tunnel.dark_band.n IS 'Number in the kilometre, from 0';
+COMMENT ON COLUMN tunnel.dark_band.chainage_from IS 'Beginning, m';
+COMMENT ON COLUMN tunnel.dark_band.chainage_to IS 'End, m';
+COMMENT ON COLUMN tunnel.dark_band.arc_from IS 'Least arc, m, positive right looking up-chainage';
+COMMENT ON COLUMN tunnel.dark_band.arc_to IS 'Greatest arc, m';
+COMMENT ON COLUMN tunnel.dark_band.darkening IS 'Mean difference from the brightest lining beside it, dB';
+COMMENT ON COLUMN tunnel.dark_band.area IS 'Lining in it that was seen, m²';
+CREATE INDEX dark_band_survey_id_chainage_from_idx ON tunnel.dark_band (survey_id, chainage_from);
+
 CREATE TABLE tunnel.deviation_section (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
     survey_id INTEGER NOT NULL,
@@ -1680,6 +1705,8 @@ CREATE TABLE tunnel.waterproof (
     window_to DOUBLE PRECISION,
     window_wet_area DOUBLE PRECISION,
     class INTEGER,
+    undecided_area DOUBLE PRECISION,
+    class_if_wet INTEGER,
     CONSTRAINT waterproof_pkey PRIMARY KEY (id),
     CONSTRAINT waterproof_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
 );
@@ -1701,6 +1728,8 @@ COMMENT ON COLUMN tunnel.waterproof.window_from IS 'Chainage at which those 100 
 COMMENT ON COLUMN tunnel.waterproof.window_to IS 'Chainage at which those 100 m² end, m';
 COMMENT ON COLUMN tunnel.waterproof.window_wet_area IS 'Greatest wet area in any 100 m² of lining, m²';
 COMMENT ON COLUMN tunnel.waterproof.class IS 'Best class of waterproofing whose limits the inspected lining meets';
+COMMENT ON COLUMN tunnel.waterproof.undecided_area IS 'Dark bands that may be wet or dirty, m²';
+COMMENT ON COLUMN tunnel.waterproof.class_if_wet IS 'Best class if those bands are wet';
 CREATE INDEX waterproof_survey_id_km_idx ON tunnel.waterproof (survey_id, km);
 
 CREATE TABLE tunnel.face (

@@ -28,6 +28,7 @@ LANGUAGE sql IMMUTABLE PARALLEL SAFE ROWS 60 SET search_path = pg_catalog, pg_te
         ('dry_region', 'Polygon', true),
         ('region', 'Polygon', true),
         ('coverage_gap', 'Polygon', true),
+        ('dark_band', 'Polygon', true),
         ('sheet', 'Polygon', true),
         ('sheet_finding', 'Geometry', true),
         ('sheet_leak', 'Polygon', true),

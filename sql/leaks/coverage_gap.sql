@@ -1,6 +1,6 @@
--- Stretches where leaks could be missed: not loaded, not searched, failed, searched before something changed, or with little
--- inspected lining. Every document that lists leaks reads this. Needs stage_state (stages/status.sql), coverage_at and
--- km_ends (leaks/coverage.sql).
+-- Stretches where leaks could be missed: not loaded, not searched, failed, searched before something changed, with little
+-- inspected lining, or with dark bands that may be wet. Every document that lists leaks reads this. Needs stage_state
+-- (stages/status.sql), coverage_at and km_ends (leaks/coverage.sql), and dark_band (leaks/dark_band.sql).
 
 -- A kilometre was searched if detection wrote the inspected lining (tunnel.coverage). A kilometre that was not searched
 -- begins and ends with its segments, or else with the points of its files along the given axis; the two differ by
@@ -134,6 +134,15 @@ BEGIN
                 WINDOW of_part AS (PARTITION BY d.n, d.part), of_whole AS (PARTITION BY d.n, d.whole)) l
             WHERE l.length >= least_length
             WINDOW along AS (PARTITION BY l.n ORDER BY l.low)) d
+    ), band AS (  -- dark bands of which nobody knows whether they are wet, as far as they lie in a stretch
+        SELECT s.n, greatest(b.chainage_from, s.low) AS low, least(b.chainage_to, s.high) AS high,
+            b.area * (least(b.chainage_to, s.high) - greatest(b.chainage_from, s.low)) / (b.chainage_to - b.chainage_from) AS area
+        FROM tunnel_api.dark_band b
+        JOIN stretch s ON b.chainage_from < s.high AND b.chainage_to > s.low
+        WHERE b.survey_id = survey_key AND NOT b.decided AND NOT blind
+    ), banded AS (
+        SELECT r.n, lower(r.part)::float8 AS low, upper(r.part)::float8 AS high
+        FROM (SELECT b.n, unnest(range_agg(numrange(b.low::numeric, b.high::numeric))) AS part FROM band b GROUP BY b.n) r
     ), gap AS (
         SELECT s.n, j.low, j.high, j.state, j.reason, j.searched, NULL::float8 AS seen
         FROM judged j JOIN stretch s ON j.low < s.high AND j.high > s.low
@@ -150,6 +159,11 @@ BEGIN
             coalesce(sum(d.seen) / nullif(sum(d.lining), 0), 0)
         FROM dark d
         GROUP BY d.n, d.piece, d.said
+        UNION ALL
+        SELECT r.n, r.low, r.high, 'undecided',
+            format('dark bands along the tunnel, %s m²: wet or dirty', round((
+                SELECT sum(b.area) FROM band b WHERE b.n = r.n AND b.low < r.high AND b.high > r.low)::numeric, 1)), true, NULL
+        FROM banded r
     ), cut AS (
         SELECT s.n, greatest(g.low, s.low) AS low, least(g.high, s.high) AS high, g.state, g.reason, g.searched, g.seen
         FROM gap g
@@ -181,7 +195,7 @@ AS $$
     FROM tunnel_internal.coverage_gaps_of($1, ARRAY[$2], ARRAY[$3]) g
 $$;
 COMMENT ON FUNCTION tunnel_api.coverage_gaps(int, float8, float8) IS
-'Stretches between two chainages (m) of a survey where leaks could be missed, and why; stretches that were not searched come first. state: not scanned (no points or no lining), not loaded, not searched, failed, interrupted, stale (something changed since the search), unseen (5 m or more with less than half of the lining inspected), no intensity. searched: true if the stretch has results of a search. No rows: everything was searched, is up to date, and more than half of the lining was inspected';
+'Stretches between two chainages (m) of a survey where leaks could be missed, and why; stretches that were not searched come first. state: not scanned (no points or no lining), not loaded, not searched, failed, interrupted, stale (something changed since the search), unseen (5 m or more with less than half of the lining inspected), undecided (dark bands that may be wet or dirty: dark_band), no intensity. searched: true if the stretch has results of a search. No rows: everything was searched, is up to date, and decided, and more than half of the lining was inspected';
 
 
 CREATE OR REPLACE FUNCTION tunnel_internal.coverage_statements(survey_id int, starts float8[], ends float8[])
@@ -243,7 +257,7 @@ SELECT s.id::bigint * 1000000 + row_number() OVER (PARTITION BY s.id, s.name) AS
 COMMENT ON VIEW tunnel_api.coverage_gap IS
     'Stretches of surveys where leaks could be missed, and why (see coverage_gaps), as rectangles of the unrolled plane (chainage, arc), SRID 0';
 COMMENT ON COLUMN tunnel_api.coverage_gap.id IS 'Key, valid until something is loaded, run or edited';
-COMMENT ON COLUMN tunnel_api.coverage_gap.state IS 'not scanned, not loaded, not searched, failed, interrupted, stale, unseen or no intensity';
+COMMENT ON COLUMN tunnel_api.coverage_gap.state IS 'not scanned, not loaded, not searched, failed, interrupted, stale, unseen, undecided or no intensity';
 COMMENT ON COLUMN tunnel_api.coverage_gap.reason IS 'Cause of the gap';
 COMMENT ON COLUMN tunnel_api.coverage_gap.searched IS 'True if the stretch has results of a search for leaks';
 COMMENT ON COLUMN tunnel_api.coverage_gap.seen_share IS

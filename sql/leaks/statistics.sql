@@ -9,7 +9,7 @@ RETURNS TABLE (
     n int, chainage_from float8, chainage_to float8, lining_area float8, seen_area float8, seen_share float8,
     wet_area float8, wet_ratio float8, patches int, largest_area float8, largest_leak bigint,
     window_patches int, window_from float8, window_to float8, window_leaks bigint[], window_wet_area float8, class int,
-    searched_share float8)
+    searched_share float8, undecided_area float8, class_if_wet int)
 LANGUAGE plpgsql STABLE PARALLEL SAFE STRICT
 ROWS 100
 SECURITY DEFINER SET search_path = pg_catalog, pg_temp
@@ -76,6 +76,16 @@ BEGIN
         LEFT JOIN slid w ON w.n = p.n
         WHERE w.n IS NULL OR (p.a < p.b AND p.a <= w.b AND p.b >= w.a)
         GROUP BY p.n
+    ), band AS (  -- dark bands of which nobody knows whether they are wet
+        SELECT b.chainage_from AS low, b.chainage_to AS high, b.area, generate_series(
+            greatest(width_bucket(b.chainage_from, starts), 1), width_bucket(b.chainage_to, starts)) AS n
+        FROM tunnel_api.dark_band b
+        WHERE b.survey_id = survey_key AND NOT b.decided AND b.chainage_to > first_start AND b.chainage_from < last_end
+    ), undecided AS (
+        SELECT b.n, sum(b.area * (least(b.high, ends[b.n]) - greatest(b.low, starts[b.n])) / (b.high - b.low)) AS area,
+            max(b.area) AS largest, count(*)::int AS bands
+        FROM band b WHERE b.high > starts[b.n] AND b.low < ends[b.n]
+        GROUP BY b.n
     ), result AS (
         SELECT s.n, s.low, s.high, nullif(s.b - s.a, 0) AS lining, s.seen,
             CASE WHEN coalesce(s.looked_at, 0) > 0 THEN s.seen / nullif(s.b - s.a, 0) * least(s.looked_at / (s.high - s.low), 1)
@@ -90,20 +100,21 @@ BEGIN
             CASE WHEN p.n IS NOT NULL THEN greatest(p.low, s.low) WHEN w.n IS NULL AND s.b > s.a THEN s.low END AS crowd_low,
             CASE WHEN p.n IS NOT NULL THEN least(p.high, s.high) WHEN w.n IS NULL AND s.b > s.a THEN s.high END AS crowd_high,
             CASE WHEN s.b > s.a THEN m.leaks END AS leaks,
-            CASE WHEN w.n IS NOT NULL THEN w.wet_area WHEN s.b > s.a THEN coalesce(t.area, 0) END AS window_wet
+            CASE WHEN w.n IS NOT NULL THEN w.wet_area WHEN s.b > s.a THEN coalesce(t.area, 0) END AS window_wet,
+            CASE WHEN s.looked_at > 0 THEN coalesce(u.area, 0) END AS unsure, u.largest AS unsure_largest, u.bands
         FROM stretch s
         LEFT JOIN total t ON t.n = s.n
         LEFT JOIN largest l ON l.n = s.n
         LEFT JOIN slid w ON w.n = s.n
         LEFT JOIN placed p ON p.n = s.n
         LEFT JOIN named m ON m.n = s.n
+        LEFT JOIN undecided u ON u.n = s.n
     )
     SELECT r.n, r.low, r.high, r.lining, r.seen, r.seen_share, r.wet, r.ratio, r.patches, r.largest, r.id,
         r.crowd, r.crowd_low, r.crowd_high, r.leaks, r.window_wet,
-        (SELECT min(c.id) FROM tunnel_api.waterproof_limit c
-         WHERE r.seen > 0 AND (r.ratio > c.wet_ratio) IS NOT TRUE AND (r.largest > c.patch_area) IS NOT TRUE
-            AND (r.crowd > c.patches_per_100 OR (c.patches_per_100 = 0 AND r.patches > 0)) IS NOT TRUE),
-        r.searched_share
+        tunnel_internal.best_class(r.seen, r.ratio, r.largest, r.crowd, r.patches), r.searched_share, r.unsure,
+        tunnel_internal.best_class(r.seen, r.ratio + r.unsure / nullif(r.seen, 0), greatest(r.largest, r.unsure_largest), r.crowd,
+            r.patches + coalesce(r.bands, 0))
     FROM result r
     ORDER BY r.n;
 END
@@ -117,13 +128,13 @@ RETURNS TABLE (
     chainage_from float8, chainage_to float8, lining_area float8, seen_area float8, seen_share float8,
     wet_area float8, wet_ratio float8, patches int, largest_area float8, largest_leak bigint,
     window_patches int, window_from float8, window_to float8, window_leaks bigint[], window_wet_area float8, class int,
-    searched_share float8)
+    searched_share float8, undecided_area float8, class_if_wet int)
 LANGUAGE sql STABLE PARALLEL SAFE STRICT
 ROWS 1
 AS $$
     SELECT t.chainage_from, t.chainage_to, t.lining_area, t.seen_area, t.seen_share, t.wet_area, t.wet_ratio, t.patches,
         t.largest_area, t.largest_leak, t.window_patches, t.window_from, t.window_to, t.window_leaks, t.window_wet_area, t.class,
-        t.searched_share
+        t.searched_share, t.undecided_area, t.class_if_wet
     FROM (SELECT tunnel_api.survey_id($1) AS id) s
     CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
     CROSS JOIN LATERAL (SELECT greatest($2, e.chainage_from) AS low, least($3, e.chainage_to) AS high) r
@@ -131,7 +142,7 @@ AS $$
     WHERE e.chainage_from IS NOT NULL AND r.low < r.high AND tunnel_internal.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.leak_statistics(text, float8, float8) IS
-'Statistics of leaks of a survey between two chainages (m), within the surveyed part. Counts leaks that the last detection found and nobody rejected. lining_area and seen_area: of the part searched for leaks, which makes up searched_share of the length. seen_share: inspected share of the lining of the whole stretch; what was not searched counts as not inspected. wet_ratio: wet_area / seen_area. patches and wet_area are NULL if nothing was searched. A leak across an end counts in part in wet_area and as one patch; largest_area and largest_leak use whole leaks. window_patches: largest number of leaks in any 100 m² of lining, between window_from and window_to; window_wet_area: largest wet area in any 100 m² (m²). class: best class of GB 50108-2008 that the inspected lining meets; NULL if nothing was inspected';
+'Statistics of leaks of a survey between two chainages (m), within the surveyed part. Counts leaks that the last detection found and nobody rejected. lining_area and seen_area: of the part searched for leaks, which makes up searched_share of the length. seen_share: inspected share of the lining of the whole stretch; what was not searched counts as not inspected. wet_ratio: wet_area / seen_area. patches and wet_area are NULL if nothing was searched. A leak across an end counts in part in wet_area and as one patch; largest_area and largest_leak use whole leaks. window_patches: largest number of leaks in any 100 m² of lining, between window_from and window_to; window_wet_area: largest wet area in any 100 m² (m²). class: best class of GB 50108-2008 that the inspected lining meets; NULL if nothing was inspected. undecided_area: dark bands of which it is not decided whether they are wet (dark_band, m²); class_if_wet: class if they are';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.waterproof_class(survey text, chainage_from float8, chainage_to float8)

@@ -11,7 +11,8 @@
 CREATE OR REPLACE VIEW tunnel_api.km_waterproof AS
 SELECT s.id::bigint * 1000000 + 500000 + k.km AS id, s.id AS survey_id, s.name AS survey, k.km,
        k.chainage_from, k.chainage_to, t.lining_area, t.seen_share, t.wet_area, t.wet_ratio, t.patches, t.largest_area,
-       t.largest_leak, t.window_patches, t.window_from, t.window_to, t.window_wet_area, t.class
+       t.largest_leak, t.window_patches, t.window_from, t.window_to, t.window_wet_area, t.class,
+       t.undecided_area, t.class_if_wet
   FROM tunnel.survey s
   CROSS JOIN LATERAL (SELECT e.* FROM tunnel_internal.km_ends e WHERE e.survey_id = s.id OFFSET 0) k  -- of this survey, not of all
   LEFT JOIN LATERAL (
@@ -21,11 +22,11 @@ SELECT s.id::bigint * 1000000 + 500000 + k.km AS id, s.id AS survey_id, s.name A
          LIMIT 1) w ON true
  CROSS JOIN LATERAL (
         SELECT w.lining_area, w.seen_share, w.wet_area, w.wet_ratio, w.patches, w.largest_area, w.largest_leak,
-               w.window_patches, w.window_from, w.window_to, w.window_wet_area, w.class
+               w.window_patches, w.window_from, w.window_to, w.window_wet_area, w.class, w.undecided_area, w.class_if_wet
          WHERE w.id IS NOT NULL
          UNION ALL
         SELECT f.lining_area, f.seen_share, f.wet_area, f.wet_ratio, f.patches, f.largest_area, f.largest_leak,
-               f.window_patches, f.window_from, f.window_to, f.window_wet_area, f.class
+               f.window_patches, f.window_from, f.window_to, f.window_wet_area, f.class, f.undecided_area, f.class_if_wet
           FROM tunnel_internal.stretch_statistics(s.id, ARRAY[k.chainage_from], ARRAY[k.chainage_to]) f
          WHERE w.id IS NULL) t;
 COMMENT ON VIEW tunnel_api.km_waterproof IS
@@ -46,6 +47,9 @@ COMMENT ON COLUMN tunnel_api.km_waterproof.window_to IS 'Chainage at which those
 COMMENT ON COLUMN tunnel_api.km_waterproof.window_wet_area IS 'Largest wet area in any 100 m² of lining, m²';
 COMMENT ON COLUMN tunnel_api.km_waterproof.class IS
     'Best class that the inspected lining meets; NULL if nothing was inspected';
+COMMENT ON COLUMN tunnel_api.km_waterproof.undecided_area IS
+    'Dark bands of which it is not decided whether they are wet (dark_band), m²';
+COMMENT ON COLUMN tunnel_api.km_waterproof.class_if_wet IS 'Best class if those bands are wet';
 
 -- Compute the statistics of a kilometre and store them, replacing its marks and old values. An error is reported as a warning
 -- and does not prevent the change that caused the call. A kilometre without segments, or whose segments extend beyond its
@@ -64,10 +68,11 @@ BEGIN
                            FOR UPDATE SKIP LOCKED)
     )
     INSERT INTO tunnel.waterproof (survey_id, km, chainage_from, chainage_to, lining_area, seen_share, wet_area, wet_ratio,
-        patches, largest_area, largest_leak, window_patches, window_from, window_to, window_wet_area, class)
+        patches, largest_area, largest_leak, window_patches, window_from, window_to, window_wet_area, class,
+        undecided_area, class_if_wet)
     SELECT survey_key, kilometre, coalesce(f.chainage_from, 'NaN'), coalesce(f.chainage_to, 'NaN'), f.lining_area, f.seen_share,
         f.wet_area, f.wet_ratio, f.patches, f.largest_area, f.largest_leak, f.window_patches, f.window_from, f.window_to,
-        f.window_wet_area, f.class
+        f.window_wet_area, f.class, f.undecided_area, f.class_if_wet
       FROM (SELECT) one
       LEFT JOIN (
         SELECT t.*

@@ -16,3 +16,16 @@ COMMENT ON COLUMN tunnel_api.waterproof_limit.wet_ratio IS 'Largest permitted we
 COMMENT ON COLUMN tunnel_api.waterproof_limit.patch_area IS 'Largest permitted area of a leak, m²';
 COMMENT ON COLUMN tunnel_api.waterproof_limit.patches_per_100 IS 'Largest permitted number of leaks in any 100 m² of lining';
 COMMENT ON COLUMN tunnel_api.waterproof_limit.description IS 'Requirement of the class';
+
+
+-- The planner inlines the body.
+CREATE OR REPLACE FUNCTION tunnel_internal.best_class(seen float8, ratio float8, largest float8, crowd int, patches int)
+RETURNS int
+LANGUAGE sql STABLE PARALLEL SAFE CALLED ON NULL INPUT
+AS $$
+    SELECT min(c.id) FROM tunnel_api.waterproof_limit c
+     WHERE $1 > 0 AND ($2 > c.wet_ratio) IS NOT TRUE AND ($3 > c.patch_area) IS NOT TRUE
+       AND ($4 > c.patches_per_100 OR (c.patches_per_100 = 0 AND $5 > 0)) IS NOT TRUE
+$$;
+COMMENT ON FUNCTION tunnel_internal.best_class(float8, float8, float8, int, int) IS
+'Best class of waterproofing that lining meets, from its inspected area (m²), wet share, area of its largest leak (m²), most leaks in 100 m² and number of leaks; NULL if nothing was inspected';

@@ -6,6 +6,7 @@ from shapely.geometry import box
 
 from tunneldb.anomalies.background.contrast import contrast_image
 from tunneldb.anomalies.background.level_map import map_background
+from tunneldb.anomalies.bands import find_bands
 from tunneldb.anomalies.threshold import dark_pixels
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
@@ -285,3 +286,46 @@ def test_drop_is_the_level_of_the_background_less_level_in_the_memory_of_the_pic
     expected = dry.level.levels(slice(0, lining.grid.rows), slice(0, lining.grid.columns)) * 100 - level
     np.testing.assert_allclose(found.drop[held], expected[held], atol=0.51)
     assert (found.drop[~held] == NODATA).all()
+
+
+def bands_of(lining, drawn=()):
+    picture = lining.picture()
+    background = map_background(picture, drawn)
+    return find_bands(contrast_image(picture, background), background)
+
+
+def test_a_dark_foot_of_the_wall_is_a_band_where_it_is_dark():
+    lining = Lining(pixel=0.05, length=200.0, start=400.0)
+    dark = lining.within(430.0, 600.0, -4.0, -3.5)
+    lining.dry[dark] -= 4.0
+    bands = bands_of(lining)
+    assert {(round(band.arc_from, 3), round(band.arc_to, 3)) for band in bands} == {(-4.0, -3.5)}
+    assert sorted(band.chainage_from for band in bands) == [430.0, 450.0, 500.0, 550.0]
+    assert max(band.chainage_to for band in bands) == 600.0
+    assert sum(band.area for band in bands) == pytest.approx(170 * 0.5, rel=0.01)
+    assert all(abs(band.darkening - 4.0) < 0.1 for band in bands)
+
+
+def test_soot_and_joints_are_no_bands():
+    lining = Lining(pixel=0.05)
+    lining.dry -= 5.0 * np.exp(-((lining.arc / 1.5) ** 2))  # 2.5 m wide at half of its depth
+    lining.dry[lining.within(0, 1000, 3.0, 3.05)] -= 4.0
+    assert bands_of(lining) == []
+
+
+def test_a_drawn_dry_region_decides_a_band():
+    lining = Lining(pixel=0.05)
+    lining.dry[lining.within(0, 1000, -4.0, -3.5)] -= 4.0
+    assert len(bands_of(lining)) == 2
+    assert [(band.chainage_from, band.chainage_to) for band in bands_of(lining, [box(399.0, -4.0, 431.0, -3.5)])] == [
+        (431.0, 450.0),
+        (450.0, 460.0),
+    ]
+
+
+def test_the_edge_of_a_band_may_be_ragged():
+    """As the upper edge of damp that rises from the foot of a wall."""
+    lining = Lining(pixel=0.05)
+    height = 0.5 + 0.2 * np.sin(lining.chainage) * np.sin(2.7 * lining.chainage)
+    lining.dry[lining.arc < -4.0 + height] -= 4.0
+    assert sum(band.area for band in bands_of(lining)) == pytest.approx(60 * 0.5, rel=0.3)

@@ -180,6 +180,8 @@ _TABLES = {
     "pixels, wet_pixels FROM tunnel.radiometry ORDER BY km",
     "image": "SELECT km, kind, block, tiff FROM tunnel.image ORDER BY 1, 2, 3",
     "coverage": "SELECT km, step, lining, seen, wet FROM tunnel.coverage ORDER BY km",
+    "dark_band": "SELECT km, n, chainage_from, chainage_to, arc_from, arc_to, darkening, area"
+    " FROM tunnel.dark_band ORDER BY km, n",
     "range_curve": "SELECT km, range_m, intensity_db, sigma_db FROM tunnel.range_curve ORDER BY km",
     "finding": "SELECT km, chainage_from, chainage_to, arc_from, arc_to, clock, area, darkening_mean, darkening_max,"
     " image_share, "

@@ -51,7 +51,8 @@ ON_MAP = {
 IMAGES = ("raw", "corrected", "corrected-filled", "offset", "state", "class")
 UNROLLED = {
     "leak_unrolled": "Polygon", "dark_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon",
-    "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon", "clearance_unrolled": "Polygon",
+    "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon", "dark_band": "Polygon",
+    "clearance_unrolled": "Polygon",
     "clearance_infringement_unrolled": "MultiPolygon",
     "ring_unrolled": "Polygon", "deviation_bar": "Polygon", "evenness_area": "Polygon",
 }  # fmt: skip
@@ -188,6 +189,7 @@ def test_only_what_may_be_edited_is_editable(seen: dict[str, Any]) -> None:
             "sheet",
             "leak_sheet",
             "coverage_gap",
+            "dark_band",
         )
     )
 
@@ -198,7 +200,7 @@ def test_themes_and_views(seen: dict[str, Any]) -> None:
     }  # fmt: skip
     assert set(seen["themes"]["Deviation"]) == {"deviation_bar", "evenness_area"}
     assert set(seen["themes"]["Inspection sheets"]) == {
-        "coverage_gap", "leak_sheet", *ON_SHEETS, "demo-2024-km012-corrected", "demo-2024-km012-corrected-filled",
+        "coverage_gap", "dark_band", "leak_sheet", *ON_SHEETS, "demo-2024-km012-corrected", "demo-2024-km012-corrected-filled",
     }  # fmt: skip
     assert set(seen["themes"]["Map"]) == {
         "axis", "axis_vertex", "segment", "section", "leak_map", "target_sphere", "cluster", "outline",

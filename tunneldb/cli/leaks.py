@@ -202,6 +202,8 @@ _BY_KM = (
     ("largest_area", "largest m²", ".2f"),
     ("window_patches", "in 100 m²", "d"),
     ("class", "class", "d"),
+    ("undecided_area", "undecided m²", ".2f"),
+    ("class_if_wet", "class if wet", "d"),
 )
 """Name in JSON, heading and format of what is stated of each kilometre."""
 

@@ -14,6 +14,7 @@ from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.contrast import contrast_image
 from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
+from tunneldb.anomalies.bands import DarkBand, find_bands
 from tunneldb.anomalies.coverage import Coverage, measure_coverage
 from tunneldb.anomalies.detect import Detection, find_anomalies
 from tunneldb.anomalies.measure import Measurement, measure_outline
@@ -44,10 +45,12 @@ from tunneldb.store.coverage import seen_share
 from tunneldb.store.drawn_findings import Drawn, load_drawn, save_measured
 from tunneldb.store.images import (
     ImageStore,
+    drop_bands,
     drop_coverage,
     drop_radiometry,
     load_reference,
     load_regions,
+    save_bands,
     save_coverage,
     save_radiometry,
     save_range_curve,
@@ -125,6 +128,7 @@ class DetectionResult:
     dry_levels : three DryLevel
         Dry lining points, raw and corrected by Lambert's law and Oren–Nayar.
     coverage : Coverage
+    bands : list of DarkBand
     drawn : list of Measurement
         Measurements of drawn outlines.
     """
@@ -137,6 +141,7 @@ class DetectionResult:
     anomalies: Detection
     dry_levels: tuple[DryLevel, DryLevel, DryLevel]
     coverage: Coverage
+    bands: list[DarkBand]
     drawn: list[Measurement]
 
 
@@ -162,6 +167,7 @@ def detect(
         counts = make_offset_images(inputs, values, images.save, progress)
         drop_radiometry(conn, survey, km)
         drop_coverage(conn, survey, km)
+        drop_bands(conn, survey, km)
         save_range_curve(conn, survey, km, None)
         replace_findings(conn, survey, km, inputs.observer.surface, [], [], 0.0)
         return {
@@ -244,6 +250,8 @@ def compute_detection(
     background = map_background(lining, inputs.dry)
     contrast = contrast_image(lining, background)
     found = find_anomalies(contrast, background, values["leak.min_area"], inputs.judge.model)
+    bands = find_bands(contrast, background)
+    counts["bands_area"] = round(sum(band.area for band in bands), 3)
     return DetectionResult(
         grid,
         counts,
@@ -253,6 +261,7 @@ def compute_detection(
         found,
         dry_sigma(view, contrast, found, roughness, inputs.dry),
         measure_coverage(contrast.state, found.wet, grid, found.size),
+        bands,
         [measure_outline(contrast, finding.outline) for finding in inputs.drawn] if background.count else [],
     )
 
@@ -285,6 +294,7 @@ def _save(
     save_range_curve(conn, survey, km, result.calibration.found)
     save_radiometry(conn, survey, km, roughness, result.background, found.pixels, found.wet_pixels, result.dry_levels)
     save_coverage(conn, survey, km, result.coverage)
+    save_bands(conn, survey, km, result.bands)
     matched, other_pixels = replace_findings(
         conn, survey, km, surface, found.anomalies, found.cut, min_area, inputs.judge.model
     )

@@ -51,6 +51,11 @@ def describe(counts: Counts, roughness: Roughness, known_before: list[str | None
             f"profiles {spacing:g} m apart: between them the images show the nearest one; the ends of leaks along the"
             f" tunnel are uncertain by {0.5 * spacing:.2g} m, and those shorter than {spacing:g} m may be missed"
         )
+    if counts.get("bands_area"):
+        notes.append(
+            f"dark bands along the tunnel, {counts['bands_area']:.1f} m²: wet or dirty is not decided (tunnel_api.dark_band);"
+            " draw a leak over them, or a dry region and run detect again"
+        )
     notes += pixel_note(counts)
     if notes:
         report["note"] = "; ".join(notes)

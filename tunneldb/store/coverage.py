@@ -12,7 +12,9 @@ from psycopg.rows import class_row
 
 from tunneldb.store.survey import Survey
 
-GAP_STATES = ("not scanned", "not loaded", "not searched", "failed", "interrupted", "stale", "unseen", "no intensity")
+GAP_STATES = (
+    "not scanned", "not loaded", "not searched", "failed", "interrupted", "stale", "unseen", "undecided", "no intensity",
+)  # fmt: skip
 """States of a gap, by ``tunnel_api.coverage_gaps``."""
 
 
@@ -27,7 +29,7 @@ class CoverageGap:
     label_from, label_to : str
         The same in the tunnel's stationing.
     state : str
-        not scanned, not loaded, not searched, failed, interrupted, stale, unseen or no intensity.
+        not scanned, not loaded, not searched, failed, interrupted, stale, unseen, undecided or no intensity.
     reason : str
         Why.
     searched : bool

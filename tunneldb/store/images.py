@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import astuple
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.level_map import BackgroundMap
+from tunneldb.anomalies.bands import DarkBand
 from tunneldb.anomalies.coverage import Coverage
 from tunneldb.arrays import Bool, Single, UInt8, known
 from tunneldb.geometry.stationing import KILOMETRE
@@ -184,6 +186,22 @@ def save_coverage(conn: psycopg.Connection[Any], survey: Survey, km: int, covera
         "INSERT INTO tunnel.coverage (survey_id, km, step, lining, seen, wet) VALUES (%s, %s, %s, %s, %s, %s)",
         (survey.id, km, coverage.step, *(areas.tolist() for areas in (coverage.lining, coverage.seen, coverage.wet))),
     )
+
+
+def save_bands(conn: psycopg.Connection[Any], survey: Survey, km: int, bands: Sequence[DarkBand]) -> None:
+    """Replace the dark bands of a kilometre."""
+    drop_bands(conn, survey, km)
+    with conn.cursor() as cursor:
+        cursor.executemany(
+            "INSERT INTO tunnel.dark_band (survey_id, km, n, chainage_from, chainage_to, arc_from, arc_to, darkening, area)"
+            " VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s)",
+            [(survey.id, km, n, *astuple(band)) for n, band in enumerate(bands)],
+        )
+
+
+def drop_bands(conn: psycopg.Connection[Any], survey: Survey, km: int) -> None:
+    """Delete the dark bands of a kilometre."""
+    conn.execute("DELETE FROM tunnel.dark_band WHERE survey_id = %s AND km = %s", (survey.id, km))
 
 
 def drop_coverage(conn: psycopg.Connection[Any], survey: Survey, km: int) -> None:

@@ -76,6 +76,26 @@ class Coverage(Base):
     )
 
 
+class DarkBand(Base):
+    """Dark band along the tunnel, of which detection does not decide whether it is wet."""
+
+    __tablename__ = "dark_band"
+    __table_args__ = (
+        Index(None, "survey_id", "chainage_from"),
+        {"comment": "Dark bands along the tunnel that are part of the background, in pieces: wet or dirty is not decided"},
+    )
+
+    survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
+    km: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment=KM)
+    n: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, comment="Number in the kilometre, from 0")
+    chainage_from: Mapped[float] = mapped_column(comment="Beginning, m")
+    chainage_to: Mapped[float] = mapped_column(comment="End, m")
+    arc_from: Mapped[float] = mapped_column(comment="Least arc, m, positive right looking up-chainage")
+    arc_to: Mapped[float] = mapped_column(comment="Greatest arc, m")
+    darkening: Mapped[float] = mapped_column(comment="Mean difference from the brightest lining beside it, dB")
+    area: Mapped[float] = mapped_column(comment="Lining in it that was seen, m²")
+
+
 class Waterproof(Base):
     """Cached waterproofing of a kilometre, or a note that something has changed there."""
 
@@ -110,6 +130,8 @@ class Waterproof(Base):
     class_: Mapped[int | None] = mapped_column(
         "class", comment="Best class of waterproofing whose limits the inspected lining meets"
     )
+    undecided_area: Mapped[float | None] = mapped_column(comment="Dark bands that may be wet or dirty, m²")
+    class_if_wet: Mapped[int | None] = mapped_column(comment="Best class if those bands are wet")
 
 
 class Region(Base):

@@ -156,6 +156,7 @@ LAYERS = (
     VectorLayer(
         "coverage_gap", "Where leaks could be missed", "coverage_gap", "Polygon", "coverage_gap", UNROLLED, (UNROLLED, SHEETS)
     ),
+    VectorLayer("dark_band", "Dark bands, wet or dirty", "dark_band", "Polygon", "dark_band", UNROLLED, (UNROLLED, SHEETS)),
     VectorLayer("leak_unrolled", "Leaks (review)", "leak_unrolled", "Polygon", "leak", UNROLLED, (UNROLLED,), True),
     VectorLayer(
         "dark_unrolled", "Dry dark areas (review)", "finding_unrolled", "Polygon", "dark", UNROLLED, (), True,

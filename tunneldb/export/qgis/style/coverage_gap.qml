@@ -3,7 +3,7 @@
   <renderer-v2 type="categorizedSymbol" attr="searched" forceraster="0" enableorderby="0" symbollevels="0">
     <categories>
       <category symbol="0" value="false" type="bool" label="Not searched for leaks" render="true"/>
-      <category symbol="1" value="true" type="bool" label="Out of date, or hardly inspected" render="true"/>
+      <category symbol="1" value="true" type="bool" label="Out of date, hardly inspected or undecided" render="true"/>
     </categories>
     <symbols>
       <symbol name="0" type="fill" alpha="1" clip_to_extent="1" force_rhr="0">
