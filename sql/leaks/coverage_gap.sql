@@ -134,7 +134,7 @@ BEGIN
                 WINDOW of_part AS (PARTITION BY d.n, d.part), of_whole AS (PARTITION BY d.n, d.whole)) l
             WHERE l.length >= least_length
             WINDOW along AS (PARTITION BY l.n ORDER BY l.low)) d
-    ), band AS (  -- dark bands of which nobody knows whether they are wet, as far as they lie in a stretch
+    ), band AS (  -- dark bands that may be wet or dirty, as far as they lie in a stretch
         SELECT s.n, greatest(b.chainage_from, s.low) AS low, least(b.chainage_to, s.high) AS high,
             b.area * (least(b.chainage_to, s.high) - greatest(b.chainage_from, s.low)) / (b.chainage_to - b.chainage_from) AS area
         FROM tunnel_api.dark_band b

@@ -76,7 +76,7 @@ BEGIN
         LEFT JOIN slid w ON w.n = p.n
         WHERE w.n IS NULL OR (p.a < p.b AND p.a <= w.b AND p.b >= w.a)
         GROUP BY p.n
-    ), band AS (  -- dark bands of which nobody knows whether they are wet
+    ), band AS (  -- dark bands that may be wet or dirty
         SELECT b.chainage_from AS low, b.chainage_to AS high, b.area, generate_series(
             greatest(width_bucket(b.chainage_from, starts), 1), width_bucket(b.chainage_to, starts)) AS n
         FROM tunnel_api.dark_band b
@@ -142,7 +142,7 @@ AS $$
     WHERE e.chainage_from IS NOT NULL AND r.low < r.high AND tunnel_internal.in_order($2, $3)
 $$;
 COMMENT ON FUNCTION tunnel_api.leak_statistics(text, float8, float8) IS
-'Statistics of leaks of a survey between two chainages (m), within the surveyed part. Counts leaks that the last detection found and nobody rejected. lining_area and seen_area: of the part searched for leaks, which makes up searched_share of the length. seen_share: inspected share of the lining of the whole stretch; what was not searched counts as not inspected. wet_ratio: wet_area / seen_area. patches and wet_area are NULL if nothing was searched. A leak across an end counts in part in wet_area and as one patch; largest_area and largest_leak use whole leaks. window_patches: largest number of leaks in any 100 m² of lining, between window_from and window_to; window_wet_area: largest wet area in any 100 m² (m²). class: best class of GB 50108-2008 that the inspected lining meets; NULL if nothing was inspected. undecided_area: dark bands of which it is not decided whether they are wet (dark_band, m²); class_if_wet: class if they are';
+'Statistics of leaks of a survey between two chainages (m), within the surveyed part. Counts leaks that the last detection found and nobody rejected. lining_area and seen_area: of the part searched for leaks, which makes up searched_share of the length. seen_share: inspected share of the lining of the whole stretch; what was not searched counts as not inspected. wet_ratio: wet_area / seen_area. patches and wet_area are NULL if nothing was searched. A leak across an end counts in part in wet_area and as one patch; largest_area and largest_leak use whole leaks. window_patches: largest number of leaks in any 100 m² of lining, between window_from and window_to; window_wet_area: largest wet area in any 100 m² (m²). class: best class of GB 50108-2008 that the inspected lining meets; NULL if nothing was inspected. undecided_area: dark bands that may be wet or dirty (dark_band, m²); class_if_wet: class if they are';
 
 
 CREATE OR REPLACE FUNCTION tunnel_api.waterproof_class(survey text, chainage_from float8, chainage_to float8)

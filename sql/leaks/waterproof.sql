@@ -48,7 +48,7 @@ COMMENT ON COLUMN tunnel_api.km_waterproof.window_wet_area IS 'Largest wet area 
 COMMENT ON COLUMN tunnel_api.km_waterproof.class IS
     'Best class that the inspected lining meets; NULL if nothing was inspected';
 COMMENT ON COLUMN tunnel_api.km_waterproof.undecided_area IS
-    'Dark bands of which it is not decided whether they are wet (dark_band), m²';
+    'Dark bands that may be wet or dirty (dark_band), m²';
 COMMENT ON COLUMN tunnel_api.km_waterproof.class_if_wet IS 'Best class if those bands are wet';
 
 -- Compute the statistics of a kilometre and store them, replacing its marks and old values. An error is reported as a warning

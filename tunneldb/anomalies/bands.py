@@ -122,7 +122,7 @@ def _below_brightest(levels: Float, seen: Bool, pixel: float) -> Float:
 
 
 def _strips(below: Float, least: int) -> Iterator[slice]:
-    """Yield rows in a row that are dark, at least so many, of which one is dark enough."""
+    """Yield runs of dark rows that are long enough and have one that is dark enough."""
     label, _ = ndimage.label(below >= 0.5 * MIN_DROP)
     for (rows,) in ndimage.find_objects(label):
         if rows.stop - rows.start >= least and below[rows].max() >= MIN_DROP:

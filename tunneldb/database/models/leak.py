@@ -77,7 +77,7 @@ class Coverage(Base):
 
 
 class DarkBand(Base):
-    """Dark band along the tunnel, of which detection does not decide whether it is wet."""
+    """Dark band along the tunnel; detection does not decide whether it is wet."""
 
     __tablename__ = "dark_band"
     __table_args__ = (
