@@ -230,6 +230,16 @@ def crack(art: Painting, joints: Joints, s: float, a: float) -> None:
     art.paint(np.clip(depth / 0.01 + 0.5, 0, 1), art.log(0.8, 5.0))
 
 
+def bars(art: Painting, joints: Joints, s: float, a: float) -> None:
+    """Straight stripes side by side, down the wall: rubbed dirt, formwork, paint."""
+    half, apart, length = art.log(0.02, 0.1), art.log(0.1, 0.5), art.log(0.3, 2.5)
+    drop = art.log(0.6, 4.0)
+    for k in range(int(art.rng.integers(1, 6))):
+        x = s + k * max(apart, 3 * half)
+        ends = sorted((a, a + down_of(a) * length * art.uniform(0.9, 1.1)))
+        art.paint(art.cover(box(x - half, ends[0], x + half, ends[1]), art.log(0.005, 0.03)) * uneven(art), drop)
+
+
 def writing(art: Painting, joints: Joints, s: float, a: float) -> None:
     """A number plate, paint, or writing: small bars."""
     for k in range(int(art.rng.integers(1, 6))):
@@ -247,7 +257,8 @@ WATER = (
     (crossed, 1.0), (tongue, 1.5),
 )  # fmt: skip
 DRY = (
-    (soot, 2.0), (dry_joint, 2.0), (stain, 2.0), (lime, 1.0), (crack, 1.0), (writing, 1.0), (_plain(painted.repair), 3.0),
+    (soot, 2.0), (dry_joint, 3.0), (stain, 2.0), (lime, 1.0), (crack, 1.0), (writing, 1.0), (bars, 1.5),
+    (_plain(painted.repair), 3.0),
     (_plain(painted.shade), 1.0), (_plain(painted.halo), 1.0), (_plain(painted.stripe), 1.5), (_plain(painted.grime), 1.5),
     (_plain(painted.shadow), 1.0), (_plain(painted.between), 1.0), (_plain(painted.pocket), 1.5),
 )  # fmt: skip

@@ -17,7 +17,10 @@ from support.real_scans import real_scan
 
 from tunneldb.cli.main import main
 from tunneldb.errors import UserError
+from tunneldb.pipeline.remove import remove_files
 from tunneldb.pointcloud.selection import FilterSettings
+from tunneldb.store import scan_files
+from tunneldb.store.survey import get_survey
 
 
 @pytest.fixture
@@ -109,6 +112,25 @@ def test_a_copy_that_was_loaded_is_told(survey: psycopg.Connection, tmp_path: Pa
     assert name == "copy.laz"
     assert remark.startswith("has the same content as a.laz: ")
     assert remark.endswith("remove-file s copy.laz")
+
+
+def test_a_file_that_is_removed_while_it_is_compared_is_loaded(
+    survey: psycopg.Connection, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write(tmp_path / "a.laz", tube(980, 1020, 200, seed=1))
+    load(survey, [path])
+    before = rows(survey)
+    checksum = scan_files.checksum
+
+    def then_removed(given: Path) -> str:
+        monkeypatch.setattr(scan_files, "checksum", checksum)
+        remove_files(survey, get_survey(survey, SURVEY), [path.name])
+        return checksum(given)
+
+    monkeypatch.setattr(scan_files, "checksum", then_removed)
+    (loaded,) = load(survey, [path])
+    assert loaded.state == "loaded"
+    assert rows(survey) == before
 
 
 def test_a_file_that_was_moved_is_known_and_found(survey: psycopg.Connection, tmp_path: Path) -> None:

@@ -129,6 +129,8 @@ def unchanged(conn: psycopg.Connection[Any], path: Path, recorded: Recorded | No
         or checksum(path) != recorded.checksum
     ):
         return None
+    if conn.execute("SELECT FROM tunnel.scan_file WHERE id = %s FOR KEY SHARE", [recorded.id]).fetchone() is None:
+        return None  # removed meanwhile
     place = str(path.resolve())
     state = "unchanged" if recorded.path == place else "moved"
     if state == "moved":
