@@ -109,7 +109,7 @@ def _lines(facts: Dict[str, Any], probability: float | None) -> List[str]:
             darker += f"; seen\u00a0{100 * facts['image_share']:.0f}\u00a0%"
         lines.append(darker)
     if facts["evidence"]:
-        lines.append(f"for (+) and against (-): {facts['evidence']}")
+        lines.append(str(facts["evidence"]))
     if facts["reviewed_by"]:
         lines.append(f"reviewed by {facts['reviewed_by']}, {facts['reviewed_at']}")
     if facts["photos"]:

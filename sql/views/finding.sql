@@ -3,14 +3,41 @@
 -- arc; SRID 0), on the map beside the axis, and in space. Findings are drawn and edited through finding_unrolled, finding_map and
 -- finding_3d (findings/draw.sql). Needs stationing (geometry/stationing.sql) and make_geometry_views (views/geometry.sql).
 
--- Contribution of each reason to the logarithm of the odds of a leak, the strongest first, as "faint +2.3, rectangular -1.2".
+-- What a reason says: why it speaks for a leak, or against one. A reason that is not listed says its name.
+CREATE OR REPLACE FUNCTION tunnel_internal.evidence_words(reason text, log_odds float8) RETURNS text
+LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE SET search_path = pg_catalog, pg_temp AS $$
+    SELECT coalesce((
+        SELECT CASE WHEN $2 > 0 THEN w.leak ELSE w.dry END
+          FROM (VALUES
+            ('faint', 'clearly dark', 'faint'),
+            ('thin', 'wider or more wavy than a joint', 'thin and straight like a joint'),
+            ('recess', 'not set back', 'set back like a bolt pocket'),
+            ('gradual', 'sharp edge', 'fades out like soot'),
+            ('rectangular', 'irregular outline', 'straight sides like a repair'),
+            ('stripe', 'no stripe along the tunnel', 'stripe along the tunnel'),
+            ('shadow', 'no fixture beside it', 'beside a fixture like its shadow'),
+            ('shape', 'shape of running water', 'shape unlike running water'),
+            ('salts', 'salts at the rim', 'no salts at the rim'),
+            ('foot', 'place at the floor', 'place at the floor'),
+            ('small', 'large', 'small'),
+            ('repeated', 'not repeated along the tunnel', 'repeated along the tunnel')) AS w (reason, leak, dry)
+         WHERE w.reason = $1), $1)
+$$;
+COMMENT ON FUNCTION tunnel_internal.evidence_words(text, float8) IS
+    'Words for a reason of detection, by the sign of its contribution to the logarithm of the odds of a leak';
+
+-- As "for a leak: irregular outline 1.9, clearly dark 0.4; against: fades out like soot 0.8".
 CREATE OR REPLACE FUNCTION tunnel_internal.evidence_text(evidence jsonb) RETURNS text
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE SET search_path = pg_catalog, pg_temp AS $$
-    SELECT string_agg(e.key || ' ' || to_char(e.value::numeric, 'FMSG990.0'), ', ' ORDER BY abs(e.value::numeric) DESC, e.key)
-      FROM jsonb_each_text($1) e WHERE abs(e.value::numeric) >= 0.05
+    SELECT nullif(concat_ws('; ',
+        'for a leak: ' || string_agg(e.words, ', ' ORDER BY e.value DESC, e.words) FILTER (WHERE e.value > 0),
+        'against: ' || string_agg(e.words, ', ' ORDER BY e.value, e.words) FILTER (WHERE e.value < 0)), '')
+      FROM (SELECT v.value::numeric AS value, tunnel_internal.evidence_words(v.key, v.value::float8)
+                   || to_char(abs(v.value::numeric), 'FM" "990.0') AS words
+              FROM jsonb_each_text($1) v WHERE abs(v.value::numeric) >= 0.05) e
 $$;
 COMMENT ON FUNCTION tunnel_internal.evidence_text(jsonb) IS
-    'Evidence for a leak and against it as text: logarithms of odds by reason, the strongest first';
+    'Evidence for a leak and against it in words, each with the logarithm of odds that it contributes, the strongest first';
 
 CREATE OR REPLACE VIEW tunnel_api.finding_kind AS
 SELECT k.id, k.code, k.label, k.geometries, k.wet, k.position, k.active FROM tunnel.finding_kind k;
@@ -123,7 +150,7 @@ BEGIN
         ('counted', 'True if totals include it: detected or drawn, not rejected, not superseded'),
         ('state', 'open, confirmed, rejected, gone (not detected again), dry (in a dry region), same or merged (another is included instead)'),
         ('photos', 'Number of photos (finding_photo)'),
-        ('evidence', 'Evidence for a leak (+) and against it (-): logarithms of odds by reason, the strongest first; NULL for a drawn finding'),
+        ('evidence', 'Evidence for a leak and against it in words, with logarithms of odds, the strongest first; NULL for a drawn finding'),
         ('model', 'Version of the model of evidence that classified it'),
         ('superseded', 'True if another finding (merged_into, same_as) or a dry region replaces it'),
         ('unrolled', 'Geometry in the unrolled plane (chainage, arc), m, SRID 0'),
@@ -154,7 +181,8 @@ COMMENT ON COLUMN tunnel_api.finding_polygon.map IS 'Polygon on the map strip be
 COMMENT ON COLUMN tunnel_api.finding_polygon.surface IS 'Polygon on the lining in space (3D), tunnel''s SRID';
 
 CREATE OR REPLACE VIEW tunnel_api.finding_evidence AS
-SELECT a.id * 100 + e.n AS id, a.id AS finding_id, a.survey_id, s.name AS survey, e.reason, e.log_odds
+SELECT a.id * 100 + e.n AS id, a.id AS finding_id, a.survey_id, s.name AS survey, e.reason, e.log_odds,
+       tunnel_internal.evidence_words(e.reason, e.log_odds) AS words
   FROM tunnel.finding a
   JOIN tunnel.survey s ON s.id = a.survey_id
  CROSS JOIN LATERAL (SELECT v.key AS reason, v.value::double precision AS log_odds, row_number() OVER (ORDER BY v.key) AS n
@@ -164,6 +192,7 @@ COMMENT ON COLUMN tunnel_api.finding_evidence.finding_id IS 'Id of the finding';
 COMMENT ON COLUMN tunnel_api.finding_evidence.reason IS 'Measured property: faint, thin, rectangular, …';
 COMMENT ON COLUMN tunnel_api.finding_evidence.log_odds IS
     'Contribution to the logarithm of the odds of a leak; negative: evidence against a leak';
+COMMENT ON COLUMN tunnel_api.finding_evidence.words IS 'What the reason says for or against a leak: irregular outline, straight sides like a repair, …';
 
 CREATE OR REPLACE VIEW tunnel_api.leak AS
 SELECT a.id, a.survey_id, s.name AS survey, a.km,
@@ -230,7 +259,7 @@ BEGIN
         ('counted', 'True if totals include it: detected last, and not rejected'),
         ('wet', 'True if its kind counts as wet: those are in the views of leaks'),
         ('origin', 'Origin of its outline: detected, drawn, redrawn, split or merged'),
-        ('evidence', 'Evidence for a leak (+) and against it (-): logarithms of odds by reason, the strongest first'),
+        ('evidence', 'Evidence for a leak and against it in words, with logarithms of odds, the strongest first'),
         ('model', 'Version of the model of evidence that classified it'),
         ('severity', 'Severity, 1 (lowest) to 4; edited in the views of findings'),
         ('severity_label', 'Name of the severity'),

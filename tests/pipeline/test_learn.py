@@ -245,7 +245,7 @@ def test_operators_apply_and_undo_and_nobody_else(
 
 def test_evidence_is_told_by_the_views(reviewed: psycopg.Connection) -> None:
     rows = reviewed.execute("SELECT evidence, model FROM tunnel_api.leak_map WHERE model IS NOT NULL").fetchall()
-    assert set(rows) == {("salts +2.0, faint -1.3", "1")}
+    assert set(rows) == {("for a leak: salts at the rim 2.0; against: faint 1.3", "1")}
     assert reviewed.execute("SELECT count(*) FROM tunnel_api.leak WHERE evidence IS NULL").fetchone() == (7,)
     shown = reviewed.execute(
         "SELECT reason, log_odds FROM tunnel_api.finding_evidence WHERE finding_id = (SELECT max(id) FROM tunnel.finding)"

@@ -28,7 +28,7 @@ _ALIASES = {
     "drawn_at": "Drawn at", "detected": "Found by the last detection", "created_at": "First found or drawn",
     "detected_at": "Last detected", "also_detected": "Also detected", "detected_as": "Detected as", "parent_id": "Split off",
     "merged_into": "Merged into", "merged": "Merged into this", "same_as": "Same as", "dry_region_id": "In dry region",
-    "counted": "Included in totals", "state": "State", "photos": "Photos", "evidence": "Evidence for (+) and against (-)",
+    "counted": "Included in totals", "state": "State", "photos": "Photos", "evidence": "Evidence for and against a leak",
     "model": "Classified by model", "easting": "Easting (m)", "northing": "Northing (m)", "height": "Height (m)",
     "superseded": "Superseded", CLOCK_TEXT: "Clock position",
 }  # fmt: skip

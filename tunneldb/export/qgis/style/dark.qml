@@ -608,7 +608,7 @@
     <alias index="45" field="counted" name="Included in totals"/>
     <alias index="46" field="state" name="State"/>
     <alias index="47" field="photos" name="Photos"/>
-    <alias index="48" field="evidence" name="Evidence for (+) and against (-)"/>
+    <alias index="48" field="evidence" name="Evidence for and against a leak"/>
     <alias index="49" field="model" name="Classified by model"/>
     <alias index="50" field="superseded" name="Superseded"/>
     <alias index="51" field="clock_text" name="Clock position"/>

@@ -490,7 +490,7 @@
     <alias index="27" field="created_at" name="First detected"/>
     <alias index="28" field="detected_at" name="Last detected"/>
     <alias index="29" field="counted" name="Included in totals"/>
-    <alias index="30" field="evidence" name="Evidence for (+) and against (-)"/>
+    <alias index="30" field="evidence" name="Evidence for and against a leak"/>
     <alias index="31" field="model" name="Classified by model"/>
     <alias index="32" field="wet" name="Wet"/>
     <alias index="33" field="origin" name="Origin of the outline"/>
