@@ -14,7 +14,7 @@ TOPICS = {
     "Axis and sections": ("stationing", "survey", "survey_ends", "outline", "alignment", "section_dimension"),
     "The scanner": ("scanner",),
     "Leaks and findings": ("finding", "learned"),
-    "How wet, and what was seen": ("coverage", "statistics", "waterproof", "coverage_gap", "dark_band"),
+    "How wet, and what was seen": ("coverage", "statistics", "waterproof", "coverage_gap", "dark_band", "detectability"),
     "Ground and objects": ("ground",),
     "Inspection sheets": ("sheet",),
     "Change between surveys": ("measures/change",),

@@ -24,13 +24,14 @@ import numpy as np
 from shapely.geometry import shape
 
 from benchmarks.common import RESULTS, print_table, progress, save, scratch_database
-from benchmarks.detectability.chance import Chance
-from benchmarks.detectability.conditions import Conditions, measure_conditions
-from benchmarks.detectability.trials import MIN_OVERLAP, Trials, run_trial
 from benchmarks.scene import Scene
 from tunneldb.anomalies.background.contrast import ContrastImage, contrast_image
 from tunneldb.anomalies.background.level_map import map_background
 from tunneldb.anomalies.detect import Detection, find_anomalies
+from tunneldb.anomalies.detectability.chance import Chance
+from tunneldb.anomalies.detectability.conditions import Conditions, measure_conditions
+from tunneldb.anomalies.detectability.pieces import Pieces
+from tunneldb.anomalies.detectability.trials import MIN_OVERLAP
 from tunneldb.arrays import Bool
 from tunneldb.database import connect
 from tunneldb.pipeline import detect as stage
@@ -58,7 +59,6 @@ TUNNELS: dict[str, tuple[object, ...]] = {
         "--patches", 4, "--seed", 34,
     ),
 }  # fmt: skip
-PASSES = 4
 CERTAIN = 0.9
 DEMAND = (0.3, 3.0)
 """A leak of this area, m², and darkening, dB."""
@@ -92,9 +92,10 @@ def measure(name: str, dsn: str | None) -> dict[str, Any]:
         scene.run(scratch, last="ground")
         picture = picture_of(scratch)
         features = json.loads(scene.file("truth.geojson").read_text())["features"]
+    pieces = Pieces.of(picture)
     contrast, found = search(copied(picture))
-    conditions = measure_conditions(contrast, picture.state, found.dark)
-    trials = Trials.of([run_trial(picture, found.dark, conditions, wet_pixels, k) for k in range(PASSES)])
+    conditions = measure_conditions(contrast, found.dark, found.size)
+    trials = pieces.try_out(found.dark, conditions, wet_pixels)
     chance = Chance.fit(trials)
     shown = [(one, mask) for one in features if (mask := mask_of(picture, one)).any()]
     masks = [mask for _, mask in shown]
@@ -103,7 +104,7 @@ def measure(name: str, dsn: str | None) -> dict[str, Any]:
         np.array([one["properties"]["drop_db"] for one, _ in shown]),
         np.array([at(conditions, mask) for mask in masks]),
     )
-    typical = np.median(conditions.values[:, conditions.lining > 0], axis=1)
+    typical = np.median(conditions.values[:, conditions.seen > 0], axis=1)
     return {
         "pixel": picture.grid.pixel,
         "injected": len(trials.found),

@@ -770,6 +770,43 @@ COMMENT ON COLUMN tunnel.dark_band.darkening IS 'Mean difference from the bright
 COMMENT ON COLUMN tunnel.dark_band.area IS 'Lining in it that was seen, m²';
 CREATE INDEX dark_band_survey_id_chainage_from_idx ON tunnel.dark_band (survey_id, chainage_from);
 
+CREATE TABLE tunnel.detectability (
+    id BIGINT GENERATED ALWAYS AS IDENTITY,
+    survey_id INTEGER NOT NULL,
+    km INTEGER NOT NULL,
+    chainage_from DOUBLE PRECISION NOT NULL,
+    chainage_to DOUBLE PRECISION NOT NULL,
+    arc_from DOUBLE PRECISION NOT NULL,
+    arc_to DOUBLE PRECISION NOT NULL,
+    lining_area DOUBLE PRECISION NOT NULL,
+    trials INTEGER NOT NULL,
+    demand_area DOUBLE PRECISION NOT NULL,
+    demand_drop DOUBLE PRECISION NOT NULL,
+    probability DOUBLE PRECISION,
+    smallest_1_5_db DOUBLE PRECISION,
+    smallest_3_db DOUBLE PRECISION,
+    smallest_6_db DOUBLE PRECISION,
+    CONSTRAINT detectability_pkey PRIMARY KEY (id),
+    CONSTRAINT detectability_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
+);
+COMMENT ON TABLE tunnel.detectability IS 'Leaks that detection would find, by blocks of the inspected lining; written by stage detect';
+COMMENT ON COLUMN tunnel.detectability.id IS 'Key';
+COMMENT ON COLUMN tunnel.detectability.survey_id IS 'Survey that the row belongs to';
+COMMENT ON COLUMN tunnel.detectability.km IS 'Kilometre: floor(chainage / 1000)';
+COMMENT ON COLUMN tunnel.detectability.chainage_from IS 'Beginning of the block''s inspected lining, m';
+COMMENT ON COLUMN tunnel.detectability.chainage_to IS 'End of it, m';
+COMMENT ON COLUMN tunnel.detectability.arc_from IS 'Smallest arc of it, m, from the crown, positive right';
+COMMENT ON COLUMN tunnel.detectability.arc_to IS 'Greatest arc of it, m';
+COMMENT ON COLUMN tunnel.detectability.lining_area IS 'Inspected lining, m²';
+COMMENT ON COLUMN tunnel.detectability.trials IS 'Synthetic leaks in the kilometre from which this is estimated';
+COMMENT ON COLUMN tunnel.detectability.demand_area IS 'Area of the leaks that must be found (leak.demand_area), m²';
+COMMENT ON COLUMN tunnel.detectability.demand_drop IS 'Darkening of these leaks (leak.demand_drop), dB';
+COMMENT ON COLUMN tunnel.detectability.probability IS 'Probability that such a leak is found if it lies anywhere in the block; NULL: unknown';
+COMMENT ON COLUMN tunnel.detectability.smallest_1_5_db IS 'Area of the smallest leak of 1.5 dB found with 90 % probability, m², at least 0.05; NULL: none up to 3 m² is, or unknown';
+COMMENT ON COLUMN tunnel.detectability.smallest_3_db IS 'The same for leaks of 3 dB, m²';
+COMMENT ON COLUMN tunnel.detectability.smallest_6_db IS 'The same for leaks of 6 dB, m²';
+CREATE INDEX detectability_survey_id_km_idx ON tunnel.detectability (survey_id, km);
+
 CREATE TABLE tunnel.deviation_section (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
     survey_id INTEGER NOT NULL,

@@ -29,6 +29,8 @@ LANGUAGE sql IMMUTABLE PARALLEL SAFE ROWS 60 SET search_path = pg_catalog, pg_te
         ('region', 'Polygon', true),
         ('coverage_gap', 'Polygon', true),
         ('dark_band', 'Polygon', true),
+        ('detectability', 'Polygon', true),
+        ('detectability_map', 'Polygon', false),
         ('sheet', 'Polygon', true),
         ('sheet_finding', 'Geometry', true),
         ('sheet_leak', 'Polygon', true),

@@ -51,6 +51,7 @@ BEGIN
                                              WHEN v.relname = 'sheet_finding' THEN 'tunnel_api.finding_unrolled'
                                              WHEN v.relname = 'sheet_leak' THEN 'tunnel_api.leak_unrolled'
                                              WHEN v.relname ~ '^clearance_(map|unrolled)$' THEN 'tunnel_api.clearance_section'
+                                             WHEN v.relname = 'detectability_map' THEN 'tunnel.detectability'
                                              WHEN v.relname ~ '^clearance_infringement_' THEN 'tunnel_api.clearance_infringement'
                                              WHEN v.relname ~ '^(change_region|leak_change)(_|$)'
                                              THEN 'tunnel.' || substring(v.relname FROM '^(change_region|leak_change)')

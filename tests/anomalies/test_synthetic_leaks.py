@@ -1,20 +1,19 @@
-"""Synthetic leaks that the benchmark of detectability injects into images."""
+"""Synthetic leaks that are injected into images."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.benchmark_files import load_benchmark
 
-SYNTHETIC = load_benchmark("detectability/synthetic.py")
+from tunneldb.anomalies.detectability.synthetic import AREAS, draw_leak
 
 
 @pytest.mark.parametrize("pixel", [0.02, 0.08])
 def test_areas_and_darkening_span_what_is_asked(pixel: float) -> None:
     rng = np.random.default_rng(5)
-    leaks = [SYNTHETIC.draw_leak(rng, pixel, downward=True) for _ in range(200)]
+    leaks = [draw_leak(rng, pixel, downward=True) for _ in range(200)]
     area = np.array([np.count_nonzero(leak.wet) * pixel**2 for leak in leaks])
-    low, high = SYNTHETIC.AREAS
+    low, high = AREAS
     assert area.min() >= 0.8 * low
     assert area.max() <= 1.05 * high
     assert np.quantile(np.log(area), [0.25, 0.5, 0.75]) == pytest.approx(
@@ -34,7 +33,7 @@ def test_streaks_run_downward() -> None:
     reach = {}
     for downward in (True, False):
         rng = np.random.default_rng(1)
-        leaks = [SYNTHETIC.draw_leak(rng, 0.02, downward=downward) for _ in range(100)]
+        leaks = [draw_leak(rng, 0.02, downward=downward) for _ in range(100)]
         middle = [len(leak.wet) // 2 for leak in leaks]
         rows = [np.flatnonzero(leak.wet.any(axis=1)) for leak in leaks]
         reach[downward] = np.mean([one.max() + one.min() - 2 * half for one, half in zip(rows, middle, strict=True)])

@@ -182,6 +182,8 @@ _TABLES = {
     "coverage": "SELECT km, step, lining, seen, wet FROM tunnel.coverage ORDER BY km",
     "dark_band": "SELECT km, n, chainage_from, chainage_to, arc_from, arc_to, darkening, area"
     " FROM tunnel.dark_band ORDER BY km, n",
+    "detectability": "SELECT km, chainage_from, chainage_to, arc_from, arc_to, lining_area, trials, probability, "
+    "smallest_1_5_db, smallest_3_db, smallest_6_db FROM tunnel.detectability ORDER BY km, chainage_from, arc_from",
     "range_curve": "SELECT km, range_m, intensity_db, sigma_db FROM tunnel.range_curve ORDER BY km",
     "finding": "SELECT km, chainage_from, chainage_to, arc_from, arc_to, clock, area, darkening_mean, darkening_max,"
     " image_share, "

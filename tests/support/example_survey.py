@@ -123,6 +123,7 @@ def _fill(conn: psycopg.Connection) -> None:
     _sections(conn, survey_id, surface)
     outlines = _anomalies(conn, survey_id, surface)
     _coverage(conn, survey_id)
+    _detectability(conn, survey_id)
     _images(conn, survey_id, surface, outlines)
     _ground(conn, survey_id, surface)
     _things(conn, survey_id, surface)
@@ -278,6 +279,19 @@ def _coverage(conn: psycopg.Connection, survey_id: int) -> None:
     )
 
 
+def _detectability(conn: psycopg.Connection, survey_id: int) -> None:
+    """Blocks of 10 m by 3 m: a leak of the demanded size is found from 12330, not before; left of -6 m it is unknown."""
+    conn.execute(
+        "INSERT INTO tunnel.detectability (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, lining_area, trials, "
+        "demand_area, demand_drop, probability, smallest_1_5_db, smallest_3_db, smallest_6_db) "
+        "SELECT %s, %s, c, c + 10, a, a + 3, 30, 120, 0.3, 3, "
+        "CASE WHEN a < -6 THEN NULL WHEN c < 12330 THEN 0.4 ELSE 0.97 END, NULL, "
+        "CASE WHEN a < -6 THEN NULL WHEN c < 12330 THEN 0.9 ELSE 0.2 END, CASE WHEN a < -6 THEN NULL ELSE 0.05 END "
+        "FROM generate_series(12310, 12490, 10) c, generate_series(-7.5, 4.5, 3) a",
+        (survey_id, KM),
+    )
+
+
 def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines: list[Polygon]) -> None:
     """Lining in bands of shade, darker where it leaks; the floor, with what stands on it, has an offset only."""
     rng = np.random.default_rng(2)
@@ -306,7 +320,7 @@ def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines
 
 def without_intensity(conn: psycopg.Connection, every: int = 1) -> None:
     """Make the example a survey without intensity, of whose offset images only every so manyth column holds points."""
-    for table in ("finding", "coverage", "radiometry", "range_curve"):
+    for table in ("finding", "coverage", "detectability", "radiometry", "range_curve"):
         conn.execute(sql.SQL("DELETE FROM tunnel.{}").format(sql.Identifier(table)))
     conn.execute("DELETE FROM tunnel.image WHERE kind <> 'offset'")
     conn.execute("UPDATE tunnel.survey SET intensity_kind = 'none', intensity_dimension = NULL, reference = 'none'")

@@ -12,11 +12,14 @@ import numpy as np
 import psycopg
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.contrast import contrast_image
+from tunneldb.anomalies.background.contrast import ContrastImage, contrast_image
 from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
 from tunneldb.anomalies.bands import DarkBand, find_bands
 from tunneldb.anomalies.coverage import Coverage, measure_coverage
 from tunneldb.anomalies.detect import Detection, find_anomalies
+from tunneldb.anomalies.detectability.blocks import Detectability, measure_detectability
+from tunneldb.anomalies.detectability.conditions import measure_conditions
+from tunneldb.anomalies.detectability.pieces import Pieces
 from tunneldb.anomalies.measure import Measurement, measure_outline
 from tunneldb.anomalies.sparse import least_density, leave_out_sparse
 from tunneldb.arrays import UInt8
@@ -36,12 +39,13 @@ from tunneldb.raster.accumulator import Accumulator, Window
 from tunneldb.raster.floor import MAX_HIDDEN_LENGTH, Floor
 from tunneldb.raster.geotiff import KINDS
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.image import halo, halo_of_profiles, lining_image
+from tunneldb.raster.image import LiningImage, halo, halo_of_profiles, lining_image
 from tunneldb.raster.observation import Observer, Radiometer
 from tunneldb.raster.pixel_size import SMALLEST, choose_factor, coarse_grid, coarsen
 from tunneldb.raster.profiles import ProfileGaps, find_gaps
 from tunneldb.raster.rasterize import Counts, rasterize
 from tunneldb.store.coverage import seen_share
+from tunneldb.store.detectability import detectability_statement, drop_detectability, save_detectability
 from tunneldb.store.drawn_findings import Drawn, load_drawn, save_measured
 from tunneldb.store.images import (
     ImageStore,
@@ -129,6 +133,7 @@ class DetectionResult:
         Dry lining points, raw and corrected by Lambert's law and Oren–Nayar.
     coverage : Coverage
     bands : list of DarkBand
+    detectability : Detectability
     drawn : list of Measurement
         Measurements of drawn outlines.
     """
@@ -142,6 +147,7 @@ class DetectionResult:
     dry_levels: tuple[DryLevel, DryLevel, DryLevel]
     coverage: Coverage
     bands: list[DarkBand]
+    detectability: Detectability
     drawn: list[Measurement]
 
 
@@ -168,6 +174,7 @@ def detect(
         drop_radiometry(conn, survey, km)
         drop_coverage(conn, survey, km)
         drop_bands(conn, survey, km)
+        drop_detectability(conn, survey, km)
         save_range_curve(conn, survey, km, None)
         replace_findings(conn, survey, km, inputs.observer.surface, [], [], 0.0)
         return {
@@ -179,7 +186,7 @@ def detect(
         }
     images = ImageStore(conn, survey, KINDS)
     result = compute_detection(inputs, inputs.sample, values, images.save, progress)
-    return _save(conn, survey, inputs, result, images, values["leak.min_area"])
+    return _save(conn, survey, inputs, result, images, values)
 
 
 def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: Mapping[str, float]) -> DetectionInputs:
@@ -247,9 +254,10 @@ def compute_detection(
     density = least_density(values["image.min_density"], grid.pixel)
     if (sparse := leave_out_sparse(lining, density)) >= MIN_NOTED_SPARSE_SHARE:
         counts |= {"sparse": round(sparse, 4), "least_density": round(density, 1)}
-    background = map_background(lining, inputs.dry)
-    contrast = contrast_image(lining, background)
-    found = find_anomalies(contrast, background, values["leak.min_area"], inputs.judge.model)
+    pieces = Pieces.of(lining)
+    background, contrast, found = _search(lining, inputs, values["leak.min_area"])
+    conditions = measure_conditions(contrast, found.dark, found.size)
+    trials = pieces.try_out(found.dark, conditions, lambda picture: _search(picture, inputs, values["leak.min_area"])[2].wet)
     bands = find_bands(contrast, background)
     counts["bands_area"] = round(sum(band.area for band in bands), 3)
     return DetectionResult(
@@ -262,8 +270,16 @@ def compute_detection(
         dry_sigma(view, contrast, found, roughness, inputs.dry),
         measure_coverage(contrast.state, found.wet, grid, found.size),
         bands,
+        measure_detectability(grid, conditions, trials, values["leak.demand_area"], values["leak.demand_drop"]),
         [measure_outline(contrast, finding.outline) for finding in inputs.drawn] if background.count else [],
     )
+
+
+def _search(picture: LiningImage, inputs: DetectionInputs, min_area: float) -> tuple[BackgroundMap, ContrastImage, Detection]:
+    """Find dark areas in a picture, whose levels are overwritten."""
+    background = map_background(picture, inputs.dry)
+    contrast = contrast_image(picture, background)
+    return background, contrast, find_anomalies(contrast, background, min_area, inputs.judge.model)
 
 
 def make_offset_images(
@@ -287,7 +303,7 @@ def _save(
     inputs: DetectionInputs,
     result: DetectionResult,
     images: ImageStore,
-    min_area: float,
+    values: Mapping[str, float],
 ) -> Counts:
     km, surface, found, roughness = inputs.grid.km, inputs.observer.surface, result.anomalies, result.calibration.roughness
     images.save_states(result.grid, result.state, found.dark)
@@ -295,11 +311,13 @@ def _save(
     save_radiometry(conn, survey, km, roughness, result.background, found.pixels, found.wet_pixels, result.dry_levels)
     save_coverage(conn, survey, km, result.coverage)
     save_bands(conn, survey, km, result.bands)
+    save_detectability(conn, survey, km, result.detectability, values["leak.demand_area"], values["leak.demand_drop"])
     matched, other_pixels = replace_findings(
-        conn, survey, km, surface, found.anomalies, found.cut, min_area, inputs.judge.model
+        conn, survey, km, surface, found.anomalies, found.cut, values["leak.min_area"], inputs.judge.model
     )
     if result.background.count:
         save_measured(conn, inputs.drawn, result.drawn)
+    notes = [survey.note, inputs.judge.note, result.calibration.note, detectability_statement(conn, survey, km)]
     return {
         **result.counts,
         "model": inputs.judge.model.version,
@@ -316,7 +334,7 @@ def _save(
         "leaks_again": matched.again,
         "leaks_kept_for_review": matched.kept,
         "leaks_gone": matched.gone,
-        **describe(result.counts, roughness, [survey.note, inputs.judge.note, result.calibration.note], other_pixels),
+        **describe(result.counts, roughness, notes, other_pixels),
     }
 
 

@@ -19,7 +19,7 @@ def describe(counts: Counts, roughness: Roughness, known_before: list[str | None
     roughness : Roughness
         Of the lining.
     known_before : list of str or None
-        Notes on the survey, its calibration and its evidence model.
+        Notes on the survey, its calibration, its evidence model and its detectability.
     other_pixels : list of int
         Adjacent kilometres whose pixels have another size.
     """

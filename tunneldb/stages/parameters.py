@@ -78,6 +78,10 @@ PARAMETERS: dict[str, Parameter] = {
     ),
     "appendage.distance": Parameter(0.03, 0.005, 0.5, "m", "distance from the local plane from which a pixel is a fixture"),
     "leak.min_area": Parameter(0.05, 0.0, 100.0, "m²", "minimum area of a leak"),
+    "leak.demand_area": Parameter(
+        0.3, 0.05, 3.0, "m²", "area of the leaks that the survey must show; where it may miss them is stated (detectability)"
+    ),
+    "leak.demand_drop": Parameter(3.0, 0.7, 9.0, "dB", "darkening of these leaks relative to dry lining"),
 }
 
 

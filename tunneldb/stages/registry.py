@@ -48,7 +48,7 @@ STAGES: tuple[Stage, ...] = (
         reads=("load", "axis", "segments", "sections", "ground", "survey", "sonar", "learned"),
         reads_beside=("ground",),
         parameters=("lining", "image", "intensity", "appendage", "leak"),
-        tables=("range_curve", "radiometry", "image", "coverage", "dark_band", "finding", "boundary_region"),
+        tables=("range_curve", "radiometry", "image", "coverage", "dark_band", "detectability", "finding", "boundary_region"),
     ),
 )
 """Stages of a kilometre, in their order."""

@@ -57,7 +57,7 @@ class BackgroundLevel:
         column = np.arange(columns.start, columns.stop)
         before, w = self._place(column)
         after = np.minimum(before + 1, self.smooth.shape[1] - 1)
-        lines = self.lines(np.arange(rows.start, rows.stop))
+        lines = self.lines(np.arange(rows.start, rows.stop, rows.step or 1))
         levels: Single = (self.rings[columns] + lines[:, before]) + w * (lines[:, after] - lines[:, before])
         return levels
 

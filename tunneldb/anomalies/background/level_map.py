@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.level import BackgroundLevel
+from tunneldb.anomalies.background.level import ROWS, BackgroundLevel
 from tunneldb.anomalies.background.model import BackgroundFit
 from tunneldb.arrays import Int64, Single, UInt8
 from tunneldb.raster.grid import Grid
@@ -106,9 +106,9 @@ def _mean_level(level: BackgroundLevel, state: UInt8) -> float:
     rows, columns = state.shape
     every = max(1, rows * columns // SAMPLE_PIXELS)
     levels = []
-    for row in range(every // 2, rows, every):
-        here = state[row] == PixelState.LINING
-        levels.append(level.levels(slice(row, row + 1), slice(0, columns))[0, here])
+    for first in range(every // 2, rows, every * ROWS):
+        some = slice(first, min(first + every * ROWS, rows), every)
+        levels.append(level.levels(some, slice(0, columns))[state[some] == PixelState.LINING])
     values = np.concatenate(levels)
     return float(np.median(values)) if len(values) else np.nan
 

@@ -96,6 +96,37 @@ class DarkBand(Base):
     area: Mapped[float] = mapped_column(comment="Lining in it that was seen, m²")
 
 
+class Detectability(Base):
+    """Leaks that detection would find in a block of the inspected lining."""
+
+    __tablename__ = "detectability"
+    __table_args__ = (
+        Index(None, "survey_id", "km"),
+        {"comment": "Leaks that detection would find, by blocks of the inspected lining; written by stage detect"},
+    )
+
+    id: Mapped[int] = mapped_column(BigInteger, Identity(always=True), primary_key=True, comment="Key")
+    survey_id: Mapped[int] = mapped_column(parent("survey"), comment=SURVEY)
+    km: Mapped[int] = mapped_column(comment=KM)
+    chainage_from: Mapped[float] = mapped_column(comment="Beginning of the block's inspected lining, m")
+    chainage_to: Mapped[float] = mapped_column(comment="End of it, m")
+    arc_from: Mapped[float] = mapped_column(comment="Smallest arc of it, m, from the crown, positive right")
+    arc_to: Mapped[float] = mapped_column(comment="Greatest arc of it, m")
+    lining_area: Mapped[float] = mapped_column(comment="Inspected lining, m²")
+    trials: Mapped[int] = mapped_column(comment="Synthetic leaks in the kilometre from which this is estimated")
+    demand_area: Mapped[float] = mapped_column(comment="Area of the leaks that must be found (leak.demand_area), m²")
+    demand_drop: Mapped[float] = mapped_column(comment="Darkening of these leaks (leak.demand_drop), dB")
+    probability: Mapped[float | None] = mapped_column(
+        comment="Probability that such a leak is found if it lies anywhere in the block; NULL: unknown"
+    )
+    smallest_1_5_db: Mapped[float | None] = mapped_column(
+        comment="Area of the smallest leak of 1.5 dB found with 90 % probability, m², at least 0.05; NULL: none up to 3 m² is, "
+        "or unknown"
+    )
+    smallest_3_db: Mapped[float | None] = mapped_column(comment="The same for leaks of 3 dB, m²")
+    smallest_6_db: Mapped[float | None] = mapped_column(comment="The same for leaks of 6 dB, m²")
+
+
 class Waterproof(Base):
     """Cached waterproofing of a kilometre, or a note that something has changed there."""
 

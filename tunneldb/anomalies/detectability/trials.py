@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.detectability.conditions import NAMES, Conditions
-from benchmarks.detectability.synthetic import SyntheticLeak, draw_leak
+from tunneldb.anomalies.detectability.conditions import NAMES, Conditions
+from tunneldb.anomalies.detectability.synthetic import SyntheticLeak, draw_leak
 from tunneldb.arrays import Bool, Float, Int16, Int64, UInt8
 from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.image import LiningImage
@@ -50,6 +50,11 @@ class Trials:
     drop: Float
     conditions: Float
     found: Bool
+
+    @classmethod
+    def none(cls) -> Trials:
+        """Return no trials."""
+        return cls(np.zeros(0), np.zeros(0), np.zeros((0, len(NAMES))), np.zeros(0, np.bool_))
 
     @classmethod
     def of(cls, parts: list[Trials]) -> Trials:
@@ -102,9 +107,12 @@ def _plant(level: Int16, picture: LiningImage, dark: Bool, number: int) -> list[
     grid = picture.grid
     side = round(CELL / grid.pixel)
     shift = np.array([number % 2, number // 2 % 2]) * (side // 2)
+    possible = picture.state <= PixelState.RECESS
     planted = []
     for row in _cells(grid.rows, -grid.bottom - grid.rows + int(shift[0]), side):
         for column in _cells(grid.columns, grid.first_column + int(shift[1]), side):
+            if not possible[max(row - side // 2, 0) : row + side // 2, max(column - side // 2, 0) : column + side // 2].any():
+                continue
             # By the cell's place in the tunnel: the same whichever kilometre it is seen from.
             place = (grid.bottom + grid.rows - row, grid.first_column + column)
             rng = np.random.default_rng([number, abs(place[0]), int(place[0] < 0), abs(place[1]), int(place[1] < 0)])

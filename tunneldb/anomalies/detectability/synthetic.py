@@ -21,6 +21,9 @@ RIMS = (0.006, 0.06)
 HARMONICS = 8
 """Number of harmonics of an irregular outline."""
 
+ANGLES = 361
+"""Number of angles between which the outline is interpolated."""
+
 MAX_ELONGATION = 2.0
 """Maximum ratio of the longer to the shorter side of a patch."""
 
@@ -85,10 +88,12 @@ def draw_leak(rng: np.random.Generator, pixel: float, *, downward: bool) -> Synt
 def _outline(rng: np.random.Generator, angle: Float) -> Float:
     """Return the radius of an irregular outline at angles, about 1."""
     roughness = rng.uniform(0.05, 0.3)
-    radius = np.ones_like(angle)
+    at = np.linspace(-np.pi, np.pi, ANGLES)
+    radius = np.ones_like(at)
     for k in range(2, HARMONICS):
-        radius += rng.normal(0.0, roughness / k) * np.cos(k * angle + rng.uniform(0.0, 2.0 * np.pi))
-    return np.maximum(radius, 0.3)
+        radius += rng.normal(0.0, roughness / k) * np.cos(k * at + rng.uniform(0.0, 2.0 * np.pi))
+    outline: Float = np.interp(angle, at, np.maximum(radius, 0.3))
+    return outline
 
 
 def _streak(rng: np.random.Generator, across: Float, down: Float, radius: float) -> Float:

@@ -10,12 +10,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.detectability.conditions import NAMES
-from benchmarks.detectability.trials import Trials
-from tunneldb.arrays import Float
+from tunneldb.anomalies.detectability.conditions import NAMES
+from tunneldb.anomalies.detectability.trials import Trials
+from tunneldb.arrays import Bool, Float
 
 PRIOR = 2.0
 """Standard deviation of the slopes before any trial, for standardised variables."""
+
+SIGNS = np.array([1.0, 1.0, -1.0, 1.0, -1.0])
+"""Signs that the slopes can have: larger or darker leaks, and leaks in less noise, with more points, in less clutter are not
+found less often."""
+
+_GOOD = SIGNS[2:]
 
 MAX_STEPS = 50
 """Maximum number of Newton steps."""
@@ -34,32 +40,35 @@ class Chance:
         Means and standard deviations of the variables.
     coefficients : (3 + len(NAMES),) float array
         Constant, and slopes of the standardised variables.
+    best, worst : (len(NAMES),) float arrays
+        Conditions of the trials that are best and worst for detection.
     """
 
     centre: Float
     scale: Float
     coefficients: Float
+    best: Float
+    worst: Float
 
     @classmethod
     def fit(cls, trials: Trials) -> Chance:
-        """Fit the model to trials (n ≥ 1).
-
-        Large or dark leaks are not found less often than others: a slope that says so is set to 0.
-        """
+        """Fit the model to trials (n ≥ 1); a slope against SIGNS is set to 0."""
         raw = _variables(trials.area, trials.drop, trials.conditions)
+        best = (_GOOD * trials.conditions).max(axis=0) * _GOOD
+        worst = (_GOOD * trials.conditions).min(axis=0) * _GOOD
         centre, scale = raw.mean(axis=0), np.maximum(raw.std(axis=0), 1e-6)
         x = np.column_stack([np.ones(len(raw)), (raw - centre) / scale])
         used = np.ones(x.shape[1], np.bool_)
         while True:
             coefficients = np.zeros(x.shape[1])
             coefficients[used] = _newton(x[:, used], trials.found.astype(np.float64))
-            wrong = np.flatnonzero(coefficients[1:3] < 0.0) + 1
+            wrong = np.flatnonzero(SIGNS * coefficients[1:] < 0.0) + 1
             if not len(wrong):
-                return cls(centre, scale, coefficients)
+                return cls(centre, scale, coefficients, best, worst)
             used[wrong] = False
 
     def probability(self, area: Float, drop: Float, conditions: Float) -> Float:
-        """Return the probability that leaks are found.
+        """Return the probability that leaks are found; conditions better than in all trials count as the best of these.
 
         Parameters
         ----------
@@ -67,8 +76,14 @@ class Chance:
             Area, m², and mean darkening, dB.
         conditions : (n, len(NAMES)) float array
         """
-        x = (_variables(area, drop, conditions) - self.centre) / self.scale
+        limited = _GOOD * np.minimum(_GOOD * conditions, _GOOD * self.best)
+        x = (_variables(area, drop, limited) - self.centre) / self.scale
         return _logistic(self.coefficients[0] + x @ self.coefficients[1:])
+
+    def covers(self, conditions: Float) -> Bool:
+        """Return True for conditions (n, len(NAMES)) that are not worse than in all trials."""
+        covered: Bool = np.all(_GOOD * conditions >= _GOOD * self.worst, axis=1)
+        return covered
 
 
 def _variables(area: Float, drop: Float, conditions: Float) -> Float:
