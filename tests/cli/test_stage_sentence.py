@@ -37,6 +37,11 @@ def template(example_template: str) -> str:
             DETECTED,
             "1 leak, 93.4 % of the lining inspected; dry dark areas: 2 joints and 1 other area; 3 not found again",
         ),
+        (
+            "detect",
+            DETECTED | {"seen": 0.99997, "joints": 0, "dark": 0, "leaks_gone": 0},
+            "1 leak, > 99.9 % of the lining inspected; dry dark areas: 0 joints and 0 other areas",
+        ),
         ("detect", {"pixels": 1234, "leaks": 0}, "offset image of 1 234 pixels"),
     ],
 )

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from tunneldb.counted import counted, grouped
+from tunneldb.numerals import percent_number
 
 Counts = Mapping[str, Any]
 
@@ -60,7 +61,7 @@ _CLASSES = ("unassigned", "ground", "lining", "niche", "appendage", "rail", "obj
 def _detect(counts: Counts) -> str:
     if "seen" not in counts:
         return f"offset image of {counted(counts['pixels'], 'pixel')}"
-    said = f"{counted(counts['leaks'], 'leak')}, {100 * counts['seen']:.1f} % of the lining inspected"
+    said = f"{counted(counts['leaks'], 'leak')}, {percent_number(counts['seen'])} % of the lining inspected"
     dry = [counted(counts["joints"], "joint"), counted(counts["dark"], "other area")]
     said += f"; dry dark areas: {' and '.join(dry)}"
     changes = {

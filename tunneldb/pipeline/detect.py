@@ -325,7 +325,7 @@ def _save(
         "pixels": images.pixels,
         "lining_pixels": found.pixels,
         "wet_pixels": found.wet_pixels,
-        "seen": round(seen_share(conn, survey, km), 4),
+        "seen": round(seen_share(conn, survey, km), 9),
         "leaks": matched.new + matched.again,
         "joints": matched.kinds[FindingKind.JOINT],
         "dark": matched.kinds[FindingKind.DARK],
