@@ -45,18 +45,19 @@ ON_MAP = {
     "leak_3d": "PolygonZ",
     "clearance_map": "LineString",
     "clearance_infringement_3d": "MultiPointZ",
+    "detectability_map": "Polygon",
     "ring_map": "Polygon",
     "deviation_map": "LineString",
 }
 IMAGES = ("raw", "corrected", "corrected-filled", "offset", "state", "class")
 UNROLLED = {
     "leak_unrolled": "Polygon", "dark_unrolled": "Polygon", "section_unrolled": "LineString", "region": "Polygon",
-    "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon", "dark_band": "Polygon",
+    "sheet": "Polygon", "leak_sheet": "Polygon", "coverage_gap": "Polygon", "dark_band": "Polygon", "detectability": "Polygon",
     "clearance_unrolled": "Polygon",
     "clearance_infringement_unrolled": "MultiPolygon",
     "ring_unrolled": "Polygon", "deviation_bar": "Polygon", "evenness_area": "Polygon",
 }  # fmt: skip
-NOT_AT_FIRST = {"dark_unrolled", "leak_sheet", "ring_unrolled", "deviation_bar", "evenness_area"}
+NOT_AT_FIRST = {"dark_unrolled", "detectability", "leak_sheet", "ring_unrolled", "deviation_bar", "evenness_area"}
 """Layers of the unrolled plane that its theme does not show."""
 FINDINGS = {
     f"finding_{name}_{place}": kind + z
@@ -190,6 +191,8 @@ def test_only_what_may_be_edited_is_editable(seen: dict[str, Any]) -> None:
             "leak_sheet",
             "coverage_gap",
             "dark_band",
+            "detectability",
+            "detectability_map",
         )
     )
 

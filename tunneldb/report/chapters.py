@@ -147,6 +147,19 @@ class Seen(_OfLeaks):
         """Length of the stretch that was not searched for leaks, m."""
         return float((1 - self.facts.total["searched_share"]) * (self.facts.high - self.facts.low))
 
+    @cached_property
+    def detectability(self) -> list[data.DetectabilityShares]:
+        """Shares of the inspected lining by whether leaks of the demanded size would be found."""
+        return data.read_detectability(*self._of)
+
+    @cached_property
+    def ribbon(self) -> list[tuple[float, float, float, float]]:
+        """Bins of the drawing of detectability, 1000 wide: beginning, width, and shares where the demand is met and not met."""
+        low, high = self.facts.low, self.facts.high
+        scale = 1000.0 / (high - low)
+        bins = data.read_detectability_bins(*self._of, max(10.0, step_for(high - low, 500)))
+        return [((a - low) * scale, (b - a) * scale, met, missed) for a, b, met, missed in bins]
+
     @property
     def gaps(self) -> list[Any]:
         """Stretches where leaks could be missed: not searched ones first, then the longest."""

@@ -120,6 +120,54 @@ class CoverageBins:
         )
 
 
+@dataclass(frozen=True)
+class DetectabilityShares:
+    """Shares of the inspected lining of a stretch, 0 to 1, by whether leaks of the demanded size would be found.
+
+    Attributes
+    ----------
+    demand_area, demand_drop : float
+        Demand: area, m², and darkening, dB.
+    met_share, not_met_share, unknown_share : float
+        Found with at least 90 % probability, with less, or unknown.
+    """
+
+    demand_area: float
+    demand_drop: float
+    met_share: float
+    not_met_share: float
+    unknown_share: float
+
+
+def read_detectability(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> list[DetectabilityShares]:
+    """Read the shares of a stretch, m, one for each demand with which it was searched."""
+    with conn.cursor(row_factory=class_row(DetectabilityShares)) as cursor:
+        return cursor.execute(
+            "SELECT demand_area, demand_drop, met_share, not_met_share, unknown_share"
+            " FROM tunnel_api.detectability_shares(%s, %s, %s)",
+            [survey.name, low, high],
+        ).fetchall()
+
+
+def read_detectability_bins(
+    conn: psycopg.Connection[Any], survey: Survey, low: float, high: float, length: float
+) -> list[tuple[float, float, float, float]]:
+    """Read bins along a stretch, m: ends within it, and the shares of inspected lining where the demand is met and not met."""
+    rows = conn.execute(
+        """
+        SELECT greatest(min(d.chainage_from), %(low)s), least(max(d.chainage_to), %(high)s),
+               coalesce(sum(d.lining_area) FILTER (WHERE d.demand = 'met'), 0) / sum(d.lining_area),
+               coalesce(sum(d.lining_area) FILTER (WHERE d.demand = 'not met'), 0) / sum(d.lining_area)
+          FROM tunnel_api.detectability d
+         WHERE d.survey_id = %(survey)s AND d.chainage_from < %(high)s AND d.chainage_to > %(low)s
+         GROUP BY floor((d.chainage_from + d.chainage_to) / 2 / %(length)s)
+         ORDER BY 1
+        """,
+        {"survey": survey.id, "low": low, "high": high, "length": length},
+    ).fetchall()
+    return [(float(a), float(b), float(met), float(missed)) for a, b, met, missed in rows]
+
+
 def find_stretch(conn: psycopg.Connection[Any], survey: Survey, low: float, high: float) -> tuple[float, float]:
     """Return the stretch to report, m: the requested one, limited to the survey.
 

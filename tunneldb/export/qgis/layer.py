@@ -152,11 +152,15 @@ LAYERS = (
     VectorLayer("section", "Sections", "section", "LineStringZ", "section", MAP, (MAP, SPACE)),
     VectorLayer("outline", "Walls, at their widest", "outline", "LineString", "outline", MAP, (MAP, FINDINGS_MAP)),
     VectorLayer("cluster", "Objects, rails, fixtures", "cluster", "Polygon", "cluster", MAP, (MAP,)),
+    VectorLayer(
+        "detectability_map", "What could be found, beside the axis", "detectability_map", "Polygon", "detectability", MAP, ()
+    ),
     *_findings("unrolled", UNROLLED, FINDINGS),
     VectorLayer(
         "coverage_gap", "Where leaks could be missed", "coverage_gap", "Polygon", "coverage_gap", UNROLLED, (UNROLLED, SHEETS)
     ),
     VectorLayer("dark_band", "Dark bands, wet or dirty", "dark_band", "Polygon", "dark_band", UNROLLED, (UNROLLED, SHEETS)),
+    VectorLayer("detectability", "What could be found", "detectability", "Polygon", "detectability", UNROLLED, ()),
     VectorLayer("leak_unrolled", "Leaks (review)", "leak_unrolled", "Polygon", "leak", UNROLLED, (UNROLLED,), True),
     VectorLayer(
         "dark_unrolled", "Dry dark areas (review)", "finding_unrolled", "Polygon", "dark", UNROLLED, (), True,
