@@ -135,8 +135,8 @@ def test_every_layer_is_valid_and_whole(rows: psycopg.Connection, seen: dict[str
     assert seen["crs"] == "EPSG:25830"
     for name, kind in (ON_MAP | UNROLLED).items():
         layer = layers[name]
-        view = "sheet_leak" if name == "leak_sheet" else name.replace("dark", "finding")
-        dry = "AND kind IN ('joint', 'dark') AND GeometryType(geom) = 'POLYGON'" if name.startswith("dark") else ""
+        view = {"leak_sheet": "sheet_leak", "dark_map": "finding_map", "dark_unrolled": "finding_unrolled"}.get(name, name)
+        dry = "AND kind IN ('joint', 'dark') AND GeometryType(geom) = 'POLYGON'" if view.startswith("finding_") else ""
         on_sheet = "AND review <> 'rejected'" if name == "leak_sheet" else ""
         (count,) = rows.execute(  # type: ignore[misc]
             f"SELECT count(*) FROM tunnel_api.{view} WHERE survey = 'demo-2024' {dry} {on_sheet}"  # type: ignore[arg-type]

@@ -79,7 +79,7 @@ def find_bands(contrast: ContrastImage, background: BackgroundMap) -> list[DarkB
     decided = np.zeros(contrast.state.shape, np.bool_)
     for columns, mask in mask_of_polygons(grid, contrast.drawn):
         decided[:, columns] |= mask
-    bands = []
+    bands: list[DarkBand] = []
     for block in range(grid.inner.start // grid.block_columns, grid.inner.stop // grid.block_columns):
         columns = slice(block * grid.block_columns, (block + 1) * grid.block_columns)
         lining = on_lining(contrast.state[:, columns]) & (contrast.drop[:, columns] != NODATA) & ~decided[:, columns]
