@@ -1,6 +1,6 @@
 """Painted pictures for training: water and dry marks on lining as scans show it.
 
-    python -m benchmarks.network.painting --cache DIR --count 300       # about a second each
+    python -m benchmarks.network.painting --cache DIR --count 300       # about three seconds each
 
 Painted are the shapes of :mod:`benchmarks.network.shapes`, and: water and dirt along the foot of the walls without an end,
 tones of segments and rings, joints, courses of brick, ribs of cast iron, rows of bolt pockets, posts with their shadows,
