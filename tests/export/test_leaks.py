@@ -162,7 +162,9 @@ def test_kinds_are_listed_and_exported(conn, example, tmp_path, kind, number):
 def test_kilometres_are_summed_up(conn, example):
     said, *lines = run("leaks", example, "--by-km").stdout.splitlines()
     assert said == "Searched, but unseen 12+300–12+310 (0 % of the lining inspected)"
-    header = ("km", "lining m²", "seen %", "wet m²", "wet ‰", "leaks", "largest m²", "in 100 m²", "class")
+    header = (
+        "km", "lining m²", "seen %", "wet m²", "wet ‰", "leaks", "largest m²", "in 100 m²", "class", "undecided m²", "class if wet",
+    )  # fmt: skip
     assert lines[0].split() == " ".join(header).split()
     (areas,) = conn.execute("SELECT array_agg(area) FROM tunnel_api.leak WHERE review <> 'rejected'").fetchone()
     # 200 m of tunnel with 18.0 m of wall around, of which the first 10 m were not seen
@@ -170,6 +172,7 @@ def test_kilometres_are_summed_up(conn, example):
     wet = sum(areas)
     assert lines[1].split() == [
         "12", f"{lining:.0f}", "95.0", f"{wet:.2f}", f"{1000 * wet / (0.95 * lining):.2f}", "6", f"{max(areas):.2f}", "1", "4",
+        "0.00", "4",
     ]  # fmt: skip
     assert lines[2].split() == ["all", *lines[1].split()[1:]]
     assert run("leaks", example, "--by-km", "--kind", "all", code=2).stderr.count("\n") == 1
