@@ -163,7 +163,8 @@ def test_kilometres_are_summed_up(conn, example):
     said, *lines = run("leaks", example, "--by-km").stdout.splitlines()
     assert said == "Searched, but unseen 12+300–12+310 (0 % of the lining inspected)"
     header = (
-        "km", "lining m²", "seen %", "wet m²", "wet ‰", "leaks", "largest m²", "in 100 m²", "class", "undecided m²", "class if wet",
+        "km", "lining m²", "seen %", "wet m²", "wet ‰", "leaks", "largest m²", "in 100 m²", "class", "undecided m²",
+        "class if wet",
     )  # fmt: skip
     assert lines[0].split() == " ".join(header).split()
     (areas,) = conn.execute("SELECT array_agg(area) FROM tunnel_api.leak WHERE review <> 'rejected'").fetchone()
