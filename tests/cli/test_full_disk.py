@@ -50,7 +50,7 @@ def disk() -> Iterator[SmallDisk]:
         folder.rmdir()
         missing("the right to mount a disk")
     yield SmallDisk(folder)
-    subprocess.run(["umount", str(folder)], check=True)
+    subprocess.run(["umount", "--lazy", str(folder)], check=True)  # a traceback may hold an open file
     folder.rmdir()
 
 

@@ -198,6 +198,7 @@ def test_labels_of_every_view_are_stations(conn: psycopg.Connection, example: st
     add_surfaces(conn, conn.execute("SELECT id FROM tunnel.survey WHERE name = %s", [example]).fetchone()[0])
     for table in ("member", "face", "spot"):
         conn.execute(sql.SQL("UPDATE tunnel.{} SET chainage = 12345.678 + id").format(sql.Identifier(table)))
+    conn.execute("INSERT INTO tunnel.dark_band SELECT id, 12, 0, 12350, 12400, -7, -6.6, 3, 20 FROM tunnel.survey")
     inner = "SELECT survey_id, n, geom FROM tunnel.axis_vertex ORDER BY n OFFSET 2 LIMIT 7"
     conn.execute(f"INSERT INTO tunnel.pose (survey_id, time, geom) {inner}")
     conn.execute(f"INSERT INTO tunnel.station {inner}")
