@@ -32,7 +32,7 @@ RADIUS, POINTS, SIMPLE = 2.75, 4, 0.02
 """Radius of the arch, m; points of a pixel; tolerance of the outlines by eye, m."""
 
 PLACE = np.array([500_000.0, 4_000_000.0, 10.0])
-"""Where the axis begins; it runs east."""
+"""Coordinates of the beginning of the axis, m. The axis runs east."""
 
 CABLE_OFFSET = 0.08
 """Distance of cables from the lining, m."""

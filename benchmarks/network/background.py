@@ -16,7 +16,6 @@ from pathlib import Path
 from unittest import mock
 
 import numpy as np
-from scipy import ndimage
 
 from benchmarks.blind.run import Outcome
 from benchmarks.common import print_table
@@ -25,6 +24,7 @@ from benchmarks.network.features import CONTRAST, NAMES, see
 from benchmarks.network.measure import HEADER, cells, picture_of, regions
 from benchmarks.network.sample import Sample
 from tunneldb.anomalies.background.model import BackgroundFit
+from tunneldb.anomalies.bands import close_rows
 from tunneldb.raster.pixel_state import PixelState
 
 CLOSED = ((2.0, 1.0), (2.0, 2.0))
@@ -76,14 +76,6 @@ def closed(width: float, least: float) -> AbstractContextManager[object]:
         self.bands[seen] = np.where(level - self.bands[seen] > least, level, self.bands[seen])
 
     return mock.patch.object(BackgroundFit, "add_bands", add_bands)
-
-
-def close_rows(bands: np.ndarray, half: int) -> np.ndarray:
-    """Fill what is dark and narrower than 2 half + 1 rows, or half + 1 at an edge."""
-    far, size = 1e3, (2 * half + 1, 1)
-    padded = np.pad(bands, ((half, half), (0, 0)), constant_values=-far)
-    bright = ndimage.grey_dilation(padded, size, mode="constant", cval=-far)[half : half + len(bands)]
-    return ndimage.grey_erosion(bright, size, mode="constant", cval=far)
 
 
 def darker(cache: Path, family: str, path: Path) -> Outcome:

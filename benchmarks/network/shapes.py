@@ -26,7 +26,7 @@ STEP = 0.03
 
 @dataclass(frozen=True)
 class Joints:
-    """Where ring joints are (chainages) and joints along the tunnel (arcs), m."""
+    """Chainages of ring joints and arcs of joints along the tunnel, m."""
 
     around: Array
     along: Array
@@ -262,4 +262,4 @@ DRY = (
     (_plain(painted.shade), 1.0), (_plain(painted.halo), 1.0), (_plain(painted.stripe), 1.5), (_plain(painted.grime), 1.5),
     (_plain(painted.shadow), 1.0), (_plain(painted.between), 1.0), (_plain(painted.pocket), 1.5),
 )  # fmt: skip
-"""What is painted, and how often in proportion."""
+"""Makers of wet and of dry shapes, with their relative frequencies."""

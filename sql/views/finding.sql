@@ -3,7 +3,7 @@
 -- arc; SRID 0), on the map beside the axis, and in space. Findings are drawn and edited through finding_unrolled, finding_map and
 -- finding_3d (findings/draw.sql). Needs stationing (geometry/stationing.sql) and make_geometry_views (views/geometry.sql).
 
--- What a reason says: why it speaks for a leak, or against one. A reason that is not listed says its name.
+-- Words for a reason: one text if it supports a leak, another if it does not. A reason without a text keeps its name.
 CREATE OR REPLACE FUNCTION tunnel_internal.evidence_words(reason text, log_odds float8) RETURNS text
 LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE SET search_path = pg_catalog, pg_temp AS $$
     SELECT coalesce((

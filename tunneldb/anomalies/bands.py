@@ -103,22 +103,26 @@ def _row_levels(background: BackgroundMap, block: int) -> Float:
 
 
 def _below_brightest(levels: Float, seen: Bool, pixel: float) -> Float:
-    """Return by how much rows are darker than the brightest rows beside them, dB; 0 where no lining was seen.
-
-    A morphological closing over MAX_WIDTH; at the edge of the lining, over half of it.
-    """
+    """Return by how much rows are darker than the brightest rows beside them, dB; 0 where no lining was seen."""
     below = np.zeros(len(levels))
     rows = np.flatnonzero(seen)
     if not len(rows):
         return below
     known = np.interp(np.arange(rows[0], rows[-1] + 1), rows, levels[rows])
-    half, far = round(MAX_WIDTH / pixel / 2), 1e3
-    padded = np.pad(known, half, constant_values=-far)
-    size = 2 * half + 1
-    bright = ndimage.grey_dilation(padded, size, mode="constant", cval=-far)[half : half + len(known)]
-    closed = ndimage.grey_erosion(bright, size, mode="constant", cval=far)
-    below[rows[0] : rows[-1] + 1] = closed - known
+    below[rows[0] : rows[-1] + 1] = close_rows(known[:, None], round(MAX_WIDTH / pixel / 2))[:, 0] - known
     return below
+
+
+def close_rows(levels: Float, half: int) -> Float:
+    """Raise levels (rows, columns) where a column is dark over at most 2 half + 1 rows, or half + 1 at its ends.
+
+    A morphological closing, dB.
+    """
+    far, size = 1e3, (2 * half + 1, 1)
+    padded = np.pad(levels, ((half, half), (0, 0)), constant_values=-far)
+    bright = ndimage.grey_dilation(padded, size, mode="constant", cval=-far)[half : half + len(levels)]
+    closed: Float = ndimage.grey_erosion(bright, size, mode="constant", cval=far)
+    return closed
 
 
 def _strips(below: Float, least: int) -> Iterator[slice]:
