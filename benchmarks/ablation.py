@@ -30,9 +30,11 @@ from benchmarks.leaks import HEADER, Outcome, chosen, plain, row, values
 from benchmarks.scene import Scene
 from tunneldb.anomalies import detect as detection
 from tunneldb.anomalies import regions as region
+from tunneldb.anomalies.background import relate as relating
 from tunneldb.anomalies.background.level import BackgroundLevel
 from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
 from tunneldb.anomalies.verdict import Verdict, classify
+from tunneldb.arrays import Bool
 from tunneldb.cli.main import main as command
 from tunneldb.database import connect
 from tunneldb.pipeline import detect as stage
@@ -90,7 +92,7 @@ def _other_curve(dsn: str, scene: Scene) -> Iterator[None]:
         conn.commit()
 
 
-def one_level(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) -> BackgroundMap:
+def one_level(picture: LiningImage, dry_regions: Sequence[Polygon] = (), wet: Bool | None = None) -> BackgroundMap:
     """One mean and one standard deviation for all of the lining (eq. 19)."""
     local = map_background(picture)
     dry = robust_statistics(picture.level[picture.state == PixelState.LINING][::7] * STEP["corrected"])
@@ -162,7 +164,7 @@ def law(name: str) -> str:
     return Part.points if given == "Oren-Nayar" else given
 
 
-GLOBAL: list[Replacement] = [(stage, "map_background", one_level)]
+GLOBAL: list[Replacement] = [(relating, "map_background", one_level)]
 
 
 def nothing_off(distance: np.ndarray, *others: Any) -> np.ndarray:

@@ -60,8 +60,7 @@ class Steps:
     def watch(self) -> None:
         """Look at what goes in and comes out of each step."""
         self._after("lining_image", self._picture)
-        self._after("map_background", self._background)
-        self._after("contrast_image", self._contrast)
+        self._after("relate", self._related)
         self._after("find_anomalies", self._anomalies)
 
     def _after(self, name: str, look: Callable[..., None]) -> None:
@@ -98,10 +97,9 @@ class Steps:
         self._keep("state", picture.state[:, self.columns])
         self._keep("corrected", decibel(picture.level[:, self.columns]))
 
-    def _background(self, background: Any, picture: Any, *_: Any) -> None:
-        self._keep("dry", background.level.levels(slice(0, picture.grid.rows), self.columns))
-
-    def _contrast(self, contrast: Any, *_: Any) -> None:
+    def _related(self, related: Any, *_: Any) -> None:
+        background, contrast = related
+        self._keep("dry", background.level.levels(slice(0, contrast.grid.rows), self.columns))
         self._keep("drop", decibel(contrast.drop[:, self.columns]))
         tile = contrast.tile
         row = np.arange(contrast.state.shape[0]) // tile

@@ -13,7 +13,7 @@ from tunneldb.database.schema import sql_files
 TOPICS = {
     "Axis and sections": ("stationing", "survey", "survey_ends", "outline", "alignment", "section_dimension"),
     "The scanner": ("scanner",),
-    "Leaks and findings": ("finding", "learned"),
+    "Leaks and findings": ("finding", "learned", "network"),
     "How wet, and what was seen": ("coverage", "statistics", "waterproof", "coverage_gap", "dark_band", "detectability"),
     "Ground and objects": ("ground",),
     "Inspection sheets": ("sheet",),

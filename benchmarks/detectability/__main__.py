@@ -15,7 +15,7 @@ import json
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -26,8 +26,8 @@ from shapely.geometry import shape
 
 from benchmarks.common import RESULTS, print_table, progress, save, scratch_database
 from benchmarks.scene import Scene
-from tunneldb.anomalies.background.contrast import ContrastImage, contrast_image
-from tunneldb.anomalies.background.level_map import map_background
+from tunneldb.anomalies.background.contrast import ContrastImage
+from tunneldb.anomalies.background.relate import relate
 from tunneldb.anomalies.detect import Detection, find_anomalies
 from tunneldb.anomalies.detectability.chance import Chance
 from tunneldb.anomalies.detectability.conditions import Conditions, measure_conditions
@@ -52,6 +52,13 @@ TUNNELS: dict[str, tuple[object, ...]] = {
     "d150 plain": ("--density", 150, "--section", "horseshoe", "--seed", 5),
     "d150 segments": ("--density", 150, "--lining", "segments", "--intensity-noise", 0.6, "--seed", 6),
     "d60 segments": ("--density", 60, "--lining", "segments", "--intensity-noise", 0.6, "--seed", 8),
+    **{
+        f"sparse d{density} n{noise}": (
+            "--density", density, "--lining", "segments", "--intensity-noise", noise, "--seed", 40 + k,
+        )
+        for k, (density, noise) in enumerate(product((50, 100, 150, 500), (0.3, 0.6, 1.2)))
+    },
+    "profiles 0.5": ("--scanner", "profiler", "--profile-spacing", 0.5, "--lining", "segments", "--seed", 35),
     "profiles 0.1": ("--scanner", "profiler", "--profile-spacing", 0.1, "--section", "horseshoe", "--seed", 31),
     "profiles 0.25": ("--scanner", "profiler", "--profile-spacing", 0.25, "--lining", "cast", "--seed", 32),
     "brick": ("--density", 1500, "--section", "horseshoe", "--lining", "brick", "--intensity-noise", 0.5, "--seed", 33),
@@ -132,13 +139,13 @@ def picture_of(dsn: str) -> LiningImage:
 def picture_taken() -> Iterator[list[LiningImage]]:
     """Keep copies of the pictures whose background is mapped meanwhile."""
     taken: list[LiningImage] = []
-    original = stage.map_background
+    original = stage.relate
 
     def tap(picture: LiningImage, *rest: Any) -> Any:
         taken.append(copied(picture))
         return original(picture, *rest)
 
-    with mock.patch.object(stage, "map_background", tap):
+    with mock.patch.object(stage, "relate", tap):
         yield taken
 
 
@@ -148,8 +155,7 @@ def copied(picture: LiningImage) -> LiningImage:
 
 def search(picture: LiningImage) -> tuple[ContrastImage, Detection]:
     """Detect leaks in a picture, which is overwritten."""
-    background = map_background(picture)
-    contrast = contrast_image(picture, background)
+    background, contrast = relate(picture, [], None)
     return contrast, find_anomalies(contrast, background, settings()["leak.min_area"])
 
 

@@ -22,6 +22,7 @@ from benchmarks.common import print_table
 from benchmarks.evidence.candidates import candidates, together
 from benchmarks.evidence.fit import Array, cooled, fit_model, left_out, loss, temperature, weights_of
 from benchmarks.evidence.judge import Regions, judge
+from benchmarks.evidence.networks import Networks
 from benchmarks.evidence.painted import paintings
 from benchmarks.evidence.pictures import pictures
 from tunneldb.anomalies import evidence
@@ -45,10 +46,12 @@ def main() -> None:
         "--write", action="store_true", help="put the model in the place of the one that comes with the program"
     )
     parser.add_argument("--judge", action="store_true", help="detect in each family by a model fitted to the others")
+    parser.add_argument("--networks", type=Path, help="folder of networks, of which one was trained without each family")
     parser.add_argument("--dsn", help="server to use; default: the embedded one")
     arguments = parser.parse_args()
+    networks = Networks(arguments.networks)
     parts = [
-        candidates(family, picture, truth)
+        candidates(family, picture, truth, networks.of(family))
         for family in arguments.families
         for picture, truth in pictures(family, arguments.pictures, arguments.dsn)
     ]
@@ -67,7 +70,7 @@ def main() -> None:
     )
     if arguments.judge:
         regions = Regions(features, leak, weights, families, held[best])
-        judge(regions, best, arguments.families, arguments.pictures, arguments.dsn)
+        judge(regions, best, arguments.families, arguments.pictures, networks, arguments.dsn)
     count = {family: int((families == family).sum()) for family in sorted(set(families))}
     model = fit_model(features, leak, weights, best, VERSION, {"regions": count, "rounds": best})
     model = cooled(model, max(temperature(held[best][scanned], leak[scanned], weights[scanned]), 1.0))

@@ -10,11 +10,11 @@ import shapely
 from numpy.typing import NDArray
 
 from benchmarks.blind.run import Outcome
-from tunneldb.anomalies.background.contrast import contrast_image
-from tunneldb.anomalies.background.level_map import map_background
+from tunneldb.anomalies.background.relate import relate
 from tunneldb.anomalies.detect import find_dark, find_dark_regions, is_large_enough
 from tunneldb.anomalies.features import measure_regions
 from tunneldb.raster.image import LiningImage
+from tunneldb.segmentation.network import Network
 
 MOSTLY = 0.5
 """A region is a leak if so much of its area is wet."""
@@ -42,11 +42,10 @@ class Candidates:
     leak: NDArray[np.bool_]
 
 
-def candidates(family: str, picture: LiningImage, truth: Outcome) -> Candidates:
+def candidates(family: str, picture: LiningImage, truth: Outcome, network: Network | None) -> Candidates:
     """Find the dark regions of a tunnel, and hold them against the truth; those on leaks that can't be told are left out."""
     picture = LiningImage(picture.grid, picture.state, picture.level.copy(), picture.gaps)
-    background = map_background(picture, [])
-    contrast = contrast_image(picture, background)
+    _, contrast = relate(picture, [], network)
     dark, _ = find_dark(contrast)
     wet = shapely.union_all(truth.true)
     dim = shapely.union_all([shape for shape, limit in zip(truth.true, truth.limits, strict=True) if limit])

@@ -9,13 +9,13 @@ from unittest import mock
 from benchmarks.blind.run import Outcome
 from benchmarks.evidence.candidates import LEAST
 from tunneldb.anomalies import verdict
-from tunneldb.anomalies.background.contrast import contrast_image
-from tunneldb.anomalies.background.level_map import map_background
+from tunneldb.anomalies.background.relate import relate
 from tunneldb.anomalies.coverage import Coverage, measure_coverage
 from tunneldb.anomalies.detect import Detection, classify_region, find_anomalies
 from tunneldb.anomalies.evidence import EvidenceModel
 from tunneldb.anomalies.records import Anomaly
 from tunneldb.raster.image import LiningImage
+from tunneldb.segmentation.network import Network
 
 
 @contextmanager
@@ -25,7 +25,7 @@ def judged_by(model: EvidenceModel) -> Iterator[None]:
         yield
 
 
-def detect(picture: LiningImage, truth: Outcome) -> tuple[Outcome, dict[int, Coverage]]:
+def detect(picture: LiningImage, truth: Outcome, network: Network | None) -> tuple[Outcome, dict[int, Coverage]]:
     """Find what is dark in a picture.
 
     Parameters
@@ -34,6 +34,8 @@ def detect(picture: LiningImage, truth: Outcome) -> tuple[Outcome, dict[int, Cov
         Stays as it is.
     truth : Outcome
         What was found when the picture was made counts no more.
+    network : Network or None
+        The segmentation network.
 
     Returns
     -------
@@ -43,8 +45,7 @@ def detect(picture: LiningImage, truth: Outcome) -> tuple[Outcome, dict[int, Cov
         Of the picture's kilometre.
     """
     picture = LiningImage(picture.grid, picture.state, picture.level.copy(), picture.gaps)
-    background = map_background(picture, [])
-    contrast = contrast_image(picture, background)
+    background, contrast = relate(picture, [], network)
     found = find_anomalies(contrast, background, LEAST)
     coverage = measure_coverage(contrast.state, found.wet, picture.grid, found.size)
     anomalies = _whole(found)

@@ -20,7 +20,7 @@ DIGITS = 5
 """Of what is stored."""
 
 GROWS = {
-    "contrast", "drop", "width", "waviness", "step", "far_step", "box_waviness", "taper", "support",
+    "contrast", "drop", "water", "certain", "width", "waviness", "step", "far_step", "box_waviness", "taper", "support",
 }  # fmt: skip
 FALLS = {
     "line", "recess", "recess_rim", "straight", "box", "corners", "turned_box", "beside", "alike", "thin_degree",

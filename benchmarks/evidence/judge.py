@@ -14,6 +14,7 @@ from benchmarks.blind.score import calibration_error, hold, row
 from benchmarks.common import print_table, progress
 from benchmarks.evidence.detection import detect, judged_by
 from benchmarks.evidence.fit import Array, cooled, fit_model, temperature
+from benchmarks.evidence.networks import Networks
 from benchmarks.evidence.pictures import pictures
 from tunneldb.anomalies.evidence import EvidenceModel
 
@@ -51,12 +52,13 @@ class Regions:
         return cooled(model, max(temperature(self.held[scanned], self.leak[scanned], self.weights[scanned]), 1.0))
 
 
-def judge(regions: Regions, rounds: int, families: Sequence[str], folder: Path, dsn: str | None) -> None:
+def judge(regions: Regions, rounds: int, families: Sequence[str], folder: Path, networks: Networks, dsn: str | None) -> None:
     """Detect in the pictures of each family by a model that knows none of it, and print what came out."""
     rows, every = [], []
     for family in families:
         with judged_by(regions.model_without(family, rounds)):
-            outcomes = [detect(picture, truth)[0] for picture, truth in pictures(family, folder, dsn)]
+            seen = networks.of(family)
+            outcomes = [detect(picture, truth, seen)[0] for picture, truth in pictures(family, folder, dsn)]
         rows.append(_cells(family, outcomes))
         progress("  ".join(rows[-1]))
         every += outcomes

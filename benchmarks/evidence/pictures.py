@@ -94,8 +94,8 @@ def _tapped(work: Callable[[], float]) -> tuple[LiningImage | None, float]:
         seen.append(replace(picture, state=picture.state.copy(), level=picture.level.copy()))
         return original(picture, *rest)
 
-    original = stage.map_background
-    with mock.patch.object(stage, "map_background", tap):
+    original = stage.relate
+    with mock.patch.object(stage, "relate", tap):
         try:
             out = work()
         except SystemExit:

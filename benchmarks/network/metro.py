@@ -67,12 +67,8 @@ def metro_sample(grey: np.ndarray, wet: np.ndarray) -> Sample:
     state = np.where(mean(floor, every) >= 0.5, PixelState.FLOOR, state).astype(np.uint8)
     # Row 0 of the image, at one end of the circumference, becomes the greatest arc; the crown is in the middle.
     steps = np.where(np.isnan(level), NONE, np.rint(100 * np.nan_to_num(level))).astype(np.int16)
-    flat = np.where(np.isnan(level), NONE, 0).astype(np.int16)
     label = np.where(state == PixelState.OFF, OTHER, np.where(mean(wet, every) >= 0.5, WET, 0)).astype(np.uint8)
-    nothing = np.zeros(state.shape, np.uint8)
-    return Sample(
-        state, steps, flat, flat, nothing.astype(np.uint16), label, nothing, [], PIXEL, 0.0, -(rows // 2),
-    )  # fmt: skip
+    return Sample(state, steps, label, PIXEL, 0.0, -(rows // 2))
 
 
 if __name__ == "__main__":

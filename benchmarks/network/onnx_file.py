@@ -12,8 +12,8 @@ from onnx import TensorProto, helper, numpy_helper
 from benchmarks.network import unet
 
 
-def write_onnx(weights: Mapping[str, np.ndarray], channels: int, path: Path) -> None:
-    """Write the graph; rows and columns must be multiples of :data:`benchmarks.network.unet.STRIDE`."""
+def write_onnx(weights: Mapping[str, np.ndarray], channels: int, path: Path, notes: Mapping[str, str]) -> None:
+    """Write the graph; rows and columns must be multiples of :data:`tunneldb.segmentation.channels.STRIDE`."""
     nodes, constants = [], [numpy_helper.from_array(np.array([1, 1, 2, 2], np.float32), "twice")]
 
     def conv(x: str, name: str, *, relu: bool = True) -> str:
@@ -33,7 +33,9 @@ def write_onnx(weights: Mapping[str, np.ndarray], channels: int, path: Path) -> 
             nodes.append(helper.make_node("Relu", [f"{name}.y"], [name]))
         return name if relu else f"{name}.y"
 
-    x, kept = "images", []
+    # Four neighbours, one after the other, of all channels: as in training.
+    nodes.append(helper.make_node("SpaceToDepth", ["images"], ["fours"], blocksize=2))
+    x, kept = "fours", list[str]()
     for k in range(len(unet.WIDTHS) - 1):
         x = conv(conv(x, f"down{k}a"), f"down{k}b")
         kept.append(x)
@@ -50,7 +52,8 @@ def write_onnx(weights: Mapping[str, np.ndarray], channels: int, path: Path) -> 
         )  # fmt: skip
         nodes.append(helper.make_node("Concat", [f"larger{k}", kept[k]], [f"both{k}"], axis=1))
         x = conv(conv(f"both{k}", f"up{k}a"), f"up{k}b")
-    nodes.append(helper.make_node("Softmax", [conv(x, "out", relu=False)], ["probabilities"], axis=1))
+    nodes.append(helper.make_node("DepthToSpace", [conv(x, "out", relu=False)], ["logits"], blocksize=2, mode="DCR"))
+    nodes.append(helper.make_node("Softmax", ["logits"], ["probabilities"], axis=1))
     graph = helper.make_graph(
         nodes, "wet lining",
         [helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, channels, "rows", "columns"])],
@@ -58,6 +61,7 @@ def write_onnx(weights: Mapping[str, np.ndarray], channels: int, path: Path) -> 
         constants,
     )  # fmt: skip
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    helper.set_model_props(model, dict(notes))
     onnx.checker.check_model(model)
     onnx.save(model, path)
 

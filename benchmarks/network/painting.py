@@ -19,6 +19,7 @@ from benchmarks.evidence.painted import CELL, HALF, LONG, PIXEL, Painting
 from benchmarks.network.sample import DRY as CLEAN
 from benchmarks.network.sample import LIMIT, NONE, OTHER, WET, Sample
 from benchmarks.network.shapes import DRY, WATER, Joints
+from tunneldb.raster.pixel_size import FACTORS, MIN_POINTS
 from tunneldb.raster.pixel_state import PixelState
 
 DARK = 0.4
@@ -139,27 +140,45 @@ def lining(art: Painting, label: np.ndarray, at: Joints) -> np.ndarray:
 
 
 def scanned(art: Painting, level: np.ndarray, label: np.ndarray) -> Sample:
-    """See the picture with noise, at some density, in steps."""
+    """See the picture with noise, in steps, by points of some density or profiles apart, on pixels as the program's."""
     rng = art.rng
-    noisy = level + rng.normal(0, art.log(0.15, 1.2), level.shape)
+    density = art.log(40.0, 4000.0) if rng.random() < 0.5 else 4000.0
+    points = rng.poisson(density * PIXEL**2, level.shape)
+    if rng.random() < 0.15:
+        every = int(rng.integers(2, 16))
+        points[:, np.arange(level.shape[1]) % every != 0] = 0
+    points[art.state > PixelState.RECESS] = 1
+    sigma = art.log(0.15, 1.2) * (1.0 if density > 1000.0 or rng.random() < 0.5 else 0.5)
+    noisy = level + rng.normal(0, 1, level.shape) * sigma / np.sqrt(np.maximum(points, 1))
     step = rng.choice([0.0, 0.0, 0.08, 0.25])
     if step:
         noisy = np.rint(noisy / step) * step
-    density = art.log(50.0, 4000.0) if rng.random() < 0.4 else 4000.0
-    empty = rng.random(level.shape) > 1.0 - np.exp(-density * PIXEL**2 * 1.5)
-    if rng.random() < 0.15:
-        every = int(rng.integers(2, 12))
-        empty |= np.broadcast_to(np.arange(level.shape[1]) % every != 0, level.shape)
-    state = np.where(empty & (art.state <= PixelState.RECESS), PixelState.EMPTY, art.state).astype(np.uint8)
-    deep = np.where(art.state == PixelState.RECESS, 0.05, 0.0) + rng.normal(0, art.log(0.001, 0.006), level.shape)
-    deep -= np.where(art.state == PixelState.OFF, art.uniform(0.03, 0.15), 0.0)
-    offset = np.where(empty, NONE, np.rint(1000 * deep)).astype(np.int16)
-    seen = np.where(empty, NONE, np.rint(100 * (noisy + 40.0))).astype(np.int16)
-    nothing = np.zeros(level.shape, np.uint8)
-    return Sample(
-        state, seen, offset, np.where(empty, NONE, 0).astype(np.int16), nothing.astype(np.uint16), label, nothing, [], PIXEL,
-        0.0, art.grid.bottom,
-    )  # fmt: skip
+    factor = next((f for f in FACTORS if density * (PIXEL * f) ** 2 >= MIN_POINTS), FACTORS[-1])
+    rows, columns = (n // factor * factor for n in level.shape)
+    first = (art.grid.bottom + art.grid.rows) % factor  # rows above the first whole pixel
+    here = np.s_[first : first + (rows - first) // factor * factor, :columns]
+
+    def blocks(image: np.ndarray) -> np.ndarray:
+        high, wide = image[here].shape
+        return (
+            image[here]
+            .reshape(high // factor, factor, wide // factor, factor)
+            .swapaxes(1, 2)
+            .reshape(-1, wide // factor, factor**2)
+        )
+
+    count = blocks(points).sum(-1)
+    mean = (blocks(noisy) * blocks(points)).sum(-1) / np.maximum(count, 1)
+    state = np.sort(blocks(art.state), axis=-1)[..., factor**2 // 2]
+    empty = count == 0
+    state = np.where(empty & (state <= PixelState.RECESS), PixelState.EMPTY, state).astype(np.uint8)
+    seen = np.where(empty, NONE, np.rint(100 * (mean + 40.0))).astype(np.int16)
+    marks = blocks(label)
+    wet = (marks == WET).mean(-1)
+    marks = np.where((marks == LIMIT).mean(-1) >= 0.25, LIMIT, np.where((marks == OTHER).mean(-1) >= 0.5, OTHER, CLEAN))
+    marks = np.where(wet >= 0.5, WET, marks).astype(np.uint8)
+    bottom = (art.grid.bottom + art.grid.rows - first) // factor - len(state)
+    return Sample(state, seen, marks, PIXEL * factor, 0.0, bottom)
 
 
 if __name__ == "__main__":

@@ -84,11 +84,12 @@ def trail(art: Painting, s: float, a: float, length: float, half: float, *, stra
 
 
 def water(art: Painting, depth: Array, drop: tuple[float, float] = (1.0, 8.0), rim: tuple[float, float] = (0.01, 0.12)) -> None:
-    """Paint water where a depth is positive, with a ragged rim of some width, darker in places."""
+    """Paint water where a depth is positive, with a ragged rim of some width, darker in places, on soot too."""
     field = ndimage.gaussian_filter(art.rng.normal(0, 1, depth.shape), art.log(1.5, 8.0))
     depth = depth + art.log(0.003, 0.05) * field / field.std()
     amount = np.clip(depth / art.log(*rim) + 0.5, 0, 1)
-    art.paint(amount * uneven(art), art.log(*drop), wet=True)
+    art.drop = art.drop + amount * uneven(art) * art.log(*drop)
+    art.wet |= amount >= 0.4
 
 
 def joint_leak(art: Painting, joints: Joints, s: float, a: float) -> None:
@@ -257,8 +258,8 @@ WATER = (
     (crossed, 1.0), (tongue, 1.5),
 )  # fmt: skip
 DRY = (
-    (soot, 2.0), (dry_joint, 3.0), (stain, 2.0), (lime, 1.0), (crack, 1.0), (writing, 1.0), (bars, 1.5),
-    (_plain(painted.repair), 3.0),
+    (soot, 4.0), (dry_joint, 3.0), (stain, 2.0), (lime, 1.0), (crack, 1.0), (writing, 1.0), (bars, 1.5),
+    (_plain(painted.repair), 6.0),
     (_plain(painted.shade), 1.0), (_plain(painted.halo), 1.0), (_plain(painted.stripe), 1.5), (_plain(painted.grime), 1.5),
     (_plain(painted.shadow), 1.0), (_plain(painted.between), 1.0), (_plain(painted.pocket), 1.5),
 )  # fmt: skip

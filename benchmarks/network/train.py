@@ -20,11 +20,12 @@ import numpy as np
 import optax
 
 from benchmarks.network import unet
-from benchmarks.network.features import DOWN, NAMES, Seen, see
 from benchmarks.network.onnx_file import write_onnx
 from benchmarks.network.sample import LIMIT, OTHER, WET, Sample
+from benchmarks.network.seen import Seen, see
+from tunneldb.segmentation.channels import DOWNWARDS, NAMES
 
-CROP, BATCH = 160, 4
+CROP, BATCH = 192, 4
 """Side of a crop, pixels, and crops of a step."""
 
 PAINTED = 0.5
@@ -35,6 +36,15 @@ WARM = 50
 
 WEIGHTS = (1.0, 2.0, 1.5)
 """Of pixels of each class."""
+
+STRONGER = (0.6, 1.5)
+"""Factors on the contrasts of a crop: by them all is fainter or stronger, the noise too."""
+
+CONTRASTS, ROUGH = 5, 5
+"""Number of the first channels, which are contrasts; the channel of the noise's logarithm."""
+
+MEMORY = 0.998
+"""What is kept of the mean of the weights, which is the result, in a step."""
 
 
 def main() -> None:
@@ -52,7 +62,11 @@ def main() -> None:
     painted = [see(Sample.load(path)) for path in sorted((arguments.cache / "scenes" / "painted").glob("*.npz"))]
     print(f"{len(scans)} scans of {', '.join(f.name for f in families)}, {len(painted)} painted pictures", flush=True)
     weights = train(scans, painted, arguments)
-    write_onnx({name: np.asarray(value) for name, value in weights.items()}, len(NAMES), arguments.output)
+    notes = {
+        "version": arguments.output.stem, "without": " ".join(arguments.without), "seed": str(arguments.seed),
+        "steps": str(arguments.steps), "scans": str(len(scans)), "painted": str(len(painted)),
+    }  # fmt: skip
+    write_onnx({name: np.asarray(value) for name, value in weights.items()}, len(NAMES), arguments.output, notes)
 
 
 def train(scans: Sequence[Seen], painted: Sequence[Seen], options: argparse.Namespace) -> dict[str, Any]:
@@ -60,7 +74,7 @@ def train(scans: Sequence[Seen], painted: Sequence[Seen], options: argparse.Name
     rng = np.random.default_rng(options.seed)
     weights = jax.tree.map(jnp.asarray, unet.initial(len(NAMES), options.seed))
     machine = optax.inject_hyperparams(optax.adamw)(learning_rate=options.rate, weight_decay=1e-4)
-    state, start, losses = machine.init(weights), time.monotonic(), list[float]()
+    state, start, losses, mean = machine.init(weights), time.monotonic(), list[float](), weights
 
     @jax.jit
     def step(weights: Any, state: Any, images: Any, label: Any, use: Any) -> Any:
@@ -79,31 +93,41 @@ def train(scans: Sequence[Seen], painted: Sequence[Seen], options: argparse.Name
         rate = options.rate * min(1.0, (count + 1) / WARM) * 0.5 * (1.0 + np.cos(np.pi * share))
         state.hyperparams["learning_rate"] = jnp.asarray(rate)
         weights, state, value = step(weights, state, images, label, use)
+        kept = min(MEMORY, (count + 1) / (count + 10))
+        mean = jax.tree.map(partial(mixed, kept), mean, weights)
         losses.append(float(value))
         if len(losses) % 50 == 0:
             print(f"{len(losses)} steps, {time.monotonic() - start:.0f} s, loss {np.mean(losses[-50:]):.4f}", flush=True)
     print(f"{len(losses)} steps, {time.monotonic() - start:.0f} s", flush=True)
-    return weights
+    return mean
+
+
+def mixed(share: float, a: Any, b: Any) -> Any:
+    """Return the mean of two arrays, the first with a share."""
+    return share * a + (1.0 - share) * b
 
 
 def crop(pictures: Sequence[Seen], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cut a piece out of a picture, half of them about wet lining if there is any, perhaps mirrored or upside down."""
+    """Cut a piece out of a picture, half of them about wet lining if there is any, perhaps mirrored, upside down or fainter."""
     one = pictures[rng.integers(len(pictures))]
     wet = np.argwhere(one.label == WET) if rng.random() < 0.5 else np.empty((0, 2), int)
-    middle = wet[rng.integers(len(wet))] + rng.integers(-60, 61, 2) if len(wet) else rng.integers(0, one.label.shape)
-    images = np.zeros((CROP, CROP, one.images.shape[2]), np.float32)
+    middle = wet[rng.integers(len(wet))] + rng.integers(-70, 71, 2) if len(wet) else rng.integers(0, one.label.shape)
+    images = np.zeros((CROP, CROP, one.images.shape[0]), np.float32)
     label, use = np.zeros((CROP, CROP), np.int32), np.zeros((CROP, CROP), np.float32)
-    low = [int(np.clip(m - CROP // 2, 0, max(n - CROP, 0))) for m, n in zip(middle, one.label.shape, strict=True)]
+    low = [int(np.clip(m - CROP // 2, 0, max(n - CROP, 0))) // 2 * 2 for m, n in zip(middle, one.label.shape, strict=True)]
     there = tuple(slice(a, a + CROP) for a in low)
     height, width = one.label[there].shape
-    images[:height, :width] = one.images[there]
+    images[:height, :width] = one.images[:, *there].transpose(1, 2, 0)
     label[:height, :width] = np.where(one.label[there] == OTHER, 2, one.label[there] == WET)
     use[:height, :width] = one.lining[there] & (one.label[there] != LIMIT)
+    factor = np.exp(rng.uniform(*np.log(STRONGER)))
+    images[..., :CONTRASTS] *= factor
+    images[..., ROUGH] += np.log(factor)
     if rng.random() < 0.5:
         images, label, use = images[:, ::-1], label[:, ::-1], use[:, ::-1]
     if rng.random() < 0.5:
         images, label, use = images[::-1].copy(), label[::-1], use[::-1]
-        images[..., DOWN] *= -1
+        images[..., DOWNWARDS] *= -1
     return images, label, use
 
 
@@ -129,6 +153,12 @@ def forward(weights: Any, x: Any) -> Any:
         return y + weights[f"{name}.b"]
 
     kept = []
+    n, rows, columns, channels = x.shape
+    x = (
+        x.reshape(n, rows // 2, 2, columns // 2, 2, channels)
+        .transpose(0, 1, 3, 2, 4, 5)
+        .reshape(n, rows // 2, columns // 2, -1)
+    )
     for k in range(len(unet.WIDTHS) - 1):
         x = jax.nn.relu(conv(jax.nn.relu(conv(x, f"down{k}a")), f"down{k}b"))
         kept.append(x)
@@ -138,7 +168,8 @@ def forward(weights: Any, x: Any) -> Any:
     for k in reversed(range(len(unet.WIDTHS) - 1)):
         x = jnp.concatenate([jnp.repeat(jnp.repeat(x, 2, 1), 2, 2), kept[k]], -1)
         x = jax.nn.relu(conv(jax.nn.relu(conv(x, f"up{k}a")), f"up{k}b"))
-    return conv(x, "out")
+    x = conv(x, "out").reshape(n, rows // 2, columns // 2, 2, 2, unet.CLASSES)
+    return x.transpose(0, 1, 3, 2, 4, 5).reshape(n, rows, columns, unet.CLASSES)
 
 
 if __name__ == "__main__":

@@ -6,26 +6,20 @@ from typing import Any
 
 import numpy as np
 
-WIDTHS = (8, 16, 32, 48)
-"""Channels at 4, 8, 16 and 32 cm."""
+WIDTHS = (16, 32, 48, 64)
+"""Channels at 8, 16, 32 and 64 cm: pixels of 4 cm come in, and go out, in fours."""
 
-DILATIONS = (1, 1, 2, 4)
+DILATIONS = (1, 1, 2)
 """Of the convolutions at the coarsest pixels."""
 
 CLASSES = 3
 """Dry lining, wet, dark but dry or bright."""
 
-STRIDE = 2 ** (len(WIDTHS) - 1)
-"""Tiles begin at multiples of it, pixels."""
-
-HALO = 128
-"""Pixels about a tile on which what is found in it may depend; the receptive field reaches 100 pixels."""
-
 
 def shapes(channels: int) -> dict[str, tuple[int, int, int, int]]:
     """Shapes (height, width, in, out) of all convolutions by name."""
     out: dict[str, tuple[int, int, int, int]] = {}
-    before = channels
+    before = 4 * channels
     for k, width in enumerate(WIDTHS[:-1]):
         out[f"down{k}a"], out[f"down{k}b"] = (3, 3, before, width), (3, 3, width, width)
         before = width
@@ -36,7 +30,7 @@ def shapes(channels: int) -> dict[str, tuple[int, int, int, int]]:
         width = WIDTHS[k]
         out[f"up{k}a"], out[f"up{k}b"] = (3, 3, before + width, width), (3, 3, width, width)
         before = width
-    out["out"] = (1, 1, before, CLASSES)
+    out["out"] = (1, 1, before, 4 * CLASSES)
     return out
 
 

@@ -79,6 +79,24 @@ COMMENT ON COLUMN tunnel.point.classification IS 'Class as in the file (ASPRS)';
 COMMENT ON COLUMN tunnel.point.class IS 'Class found by stage ground (tunnel_api.class); none before it has run';
 CREATE INDEX point_chainage_idx ON tunnel.point USING brin (chainage) WITH (pages_per_range = 16);
 
+CREATE TABLE tunnel.segmentation_network (
+    id INTEGER GENERATED ALWAYS AS IDENTITY,
+    version TEXT NOT NULL,
+    checksum TEXT NOT NULL,
+    model BYTEA NOT NULL,
+    added_by TEXT DEFAULT session_user NOT NULL,
+    added_at TIMESTAMP WITH TIME ZONE DEFAULT clock_timestamp() NOT NULL,
+    CONSTRAINT segmentation_network_pkey PRIMARY KEY (id),
+    CONSTRAINT segmentation_network_checksum_key UNIQUE (checksum)
+);
+COMMENT ON TABLE tunnel.segmentation_network IS 'Segmentation networks that owners trained (tunneldb run --set detect.model=FILE.onnx)';
+COMMENT ON COLUMN tunnel.segmentation_network.id IS 'Key, the value of detect.model';
+COMMENT ON COLUMN tunnel.segmentation_network.version IS 'Name of the network';
+COMMENT ON COLUMN tunnel.segmentation_network.checksum IS 'SHA-256 of the file';
+COMMENT ON COLUMN tunnel.segmentation_network.model IS 'The file (ONNX)';
+COMMENT ON COLUMN tunnel.segmentation_network.added_by IS 'Role that added it';
+COMMENT ON COLUMN tunnel.segmentation_network.added_at IS 'Time when it was added';
+
 CREATE TABLE tunnel.severity (
     id SMALLINT NOT NULL,
     label TEXT NOT NULL,

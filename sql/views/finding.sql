@@ -18,6 +18,7 @@ LANGUAGE sql IMMUTABLE STRICT PARALLEL SAFE SET search_path = pg_catalog, pg_tem
             ('shadow', 'no fixture beside it', 'beside a fixture like its shadow'),
             ('shape', 'shape of running water', 'shape unlike running water'),
             ('salts', 'salts at the rim', 'no salts at the rim'),
+            ('picture', 'looks like water in its surroundings', 'looks unlike water in its surroundings'),
             ('foot', 'place at the floor', 'place at the floor'),
             ('small', 'large', 'small'),
             ('repeated', 'not repeated along the tunnel', 'repeated along the tunnel')) AS w (reason, leak, dry)

@@ -16,6 +16,7 @@ from support.databases import Copies
 from support.loaded_survey import SURVEY, add_survey
 
 from tests.pipeline.test_detect import APPENDAGE, FLOOR, NAME, command, counts, outlines, parameters, prepare, share_of
+from tunneldb.anomalies.background import relate as relating
 from tunneldb.anomalies.background.level import BackgroundLevel
 from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
 from tunneldb.anomalies.reconcile import Boundary, gather_boundary
@@ -116,15 +117,15 @@ def uncut(sections: psycopg.Connection, monkeypatch: pytest.MonkeyPatch) -> list
     )
     conn.rollback()
 
-    def even(picture: LiningImage, _: object) -> BackgroundMap:
+    def even(picture: LiningImage, *_: object) -> BackgroundMap:
         dry = map_background(picture)
         return flat(picture.grid, dry.mean, dry.spread)
 
     monkeypatch.setattr(radiometry, "roughness_of", lambda *_: ROUGHNESS)
-    monkeypatch.setattr(job, "map_background", even)
+    monkeypatch.setattr(relating, "map_background", even)
     result = job.compute_detection(elsewhere, inputs.sample, values, lambda grid, window: None, lambda share: None)
     dry = result.background
-    monkeypatch.setattr(job, "map_background", lambda picture, _: flat(picture.grid, dry.mean, dry.spread))
+    monkeypatch.setattr(relating, "map_background", lambda picture, *_: flat(picture.grid, dry.mean, dry.spread))
     return [shapely.affinity.translate(anomaly.outline, SHIFT) for anomaly in result.anomalies.anomalies]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import ndimage
 
 from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.background.level_map import BackgroundMap
@@ -31,6 +32,9 @@ MIN_UNSCANNED_LENGTH = 5.0
 
 MAX_SINGLE_SPACINGS = 1.6
 """Maximum length of a spot on a single profile, in spacings: half a gap is closed on either side of it."""
+
+RIM = 0.06
+"""Width of the rim of water that is no region of its own, m: pixels of 4 cm, and the blur of a boundary."""
 
 MIN_JOINT_LENGTH = 0.5
 """Minimum seen length of joints, m."""
@@ -151,23 +155,36 @@ def find_dark(contrast: ContrastImage) -> tuple[Bool, int]:
     """
     lining, possible = _lining_in_columns(contrast.state, contrast.grid.inner)
     size = filter_size(_scanned_share(lining, possible, round(MIN_UNSCANNED_LENGTH / contrast.grid.pixel)))
-    return refine_boundary(dark_pixels(contrast, size), contrast, size), size
+    dark = refine_boundary(dark_pixels(contrast, size), contrast, size)
+    if (wet := contrast.wet()) is not None:
+        dark |= wet
+    return dark, size
 
 
 def find_dark_regions(dark: Bool, contrast: ContrastImage, min_area: float) -> list[Region]:
     """Find the regions of dark pixels that may be leaks, joints or dry dark areas, with joints cut off."""
     inner, pixel = contrast.grid.inner, contrast.grid.pixel
-    joints = find_joints(dark, inner.start, inner.stop, pixel, contrast.spacing)
-    plain = dark & ~joints
+    wet = contrast.wet()
+    rest = dark if wet is None else dark & ~_widened(wet, round(RIM / pixel))
+    joints = find_joints(rest, inner.start, inner.stop, pixel, contrast.spacing)
+    plain = rest & ~joints
     weak = weaker_parts(plain, contrast)
     # For the darker region, the weaker part of a region is not dark lining: the region ends at it.
     parts = [(plain & ~weak, dark & ~weak), (weak, dark), (joints, dark)]
+    if wet is not None:
+        parts.append((wet, wet))
     found = []
     for part, others in parts:
         if part.any():
             whole = part | behind_strips(part, contrast.state, inner.start, inner.stop, pixel)
             found += find_regions(whole, others, contrast, min_area, _may_drip)
     return sorted(found, key=lambda region: region.place)
+
+
+def _widened(mask: Bool, by: int) -> Bool:
+    """Return the pixels of a mask and those within a square about each."""
+    size = 2 * by + 1
+    return np.asarray(ndimage.maximum_filter(mask.view(np.uint8), size) > 0)
 
 
 def _may_drip(region: Region) -> bool:

@@ -70,6 +70,8 @@ FEATURES = (
     Feature("taper", "shape", "how far its middle lies above that of its extent, in parts of this"),
     Feature("upright", "shape", "extent around the tunnel over that along it, as a logarithm"),
     Feature("bright_rim", "salts", "share of its rim with lining brighter than dry lining is by chance"),
+    Feature("water", "picture", "mean probability of water by the segmentation network"),
+    Feature("certain", "picture", "share of its pixels that the network is certain are wet, by 0.9 and more"),
     Feature("foot", "foot", "share of its sides that face the floor"),
     Feature("support", "small", "pixels that were measured, as a logarithm"),
     Feature("alike", "repeated", "number of similar regions within 5 m along the tunnel, as a logarithm: built objects repeat"),
@@ -162,7 +164,9 @@ def _place(region: Region, shape: Shape) -> tuple[float, ...]:
         _ratio(properties.perimeter_off, properties.perimeter), _ratio(properties.off_above, properties.perimeter),
         math.log(_perimeter(region.mask) * region.pixel / (2.0 * math.sqrt(math.pi * shape.area))),
         _taper(region), math.log(shape.across / shape.along),
-        _ratio(properties.bright, properties.steps), _ratio(properties.floor, properties.perimeter),
+        _ratio(properties.bright, properties.steps),
+        _ratio(properties.water, properties.judged), _ratio(properties.certain, properties.judged),
+        _ratio(properties.floor, properties.perimeter),
     )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from tunneldb.arrays import Bool, Float, Int64, Intp
 from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import outline
+from tunneldb.segmentation.network import CERTAIN
 
 MIN_JOINT_LENGTH = 0.5
 """Minimum length of small regions that are kept, m: joints."""
@@ -54,6 +55,9 @@ class RegionProperties(NamedTuple):
         Number of ``steps`` with lining outside that is brighter than dry lining is by chance.
     off_above, floor : float
         Number of sides towards a fixture in the direction of the crown, and towards the floor.
+    judged, water, certain : float
+        Number of pixels that a segmentation network judged, sum of their probabilities of water, and number of those of 0.9
+        and more.
     """
 
     sigma: float = 0.0
@@ -73,6 +77,9 @@ class RegionProperties(NamedTuple):
     bright: float = 0.0
     off_above: float = 0.0
     floor: float = 0.0
+    judged: float = 0.0
+    water: float = 0.0
+    certain: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -222,7 +229,7 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
     Runs are (row, first column, column behind the last one), in order of the numbers of their regions.
     """
     edges, found = Edges(dark, contrast), []
-    pixels, recess, steps, squares, sigma, between = (np.zeros(count) for _ in range(6))
+    pixels, recess, steps, squares, sigma, between, judged, water, certain = (np.zeros(count) for _ in range(9))
     highest = np.full(count, NODATA, np.int16)
     until = np.cumsum(runs[:, 2] - runs[:, 1])
     for part in np.split(
@@ -234,6 +241,11 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
         row, column, label = row[is_dark], column[is_dark], label[is_dark]
         found.append(edges.sides(label, row, column))
         recess += np.bincount(label[contrast.state[row, column] == PixelState.RECESS], minlength=count)
+        if contrast.water is not None:
+            chance = contrast.water[row, column]
+            judged += np.bincount(label, minlength=count)
+            water += np.bincount(label, chance / CERTAIN, count)
+            certain += np.bincount(label[chance >= 0.9 * CERTAIN], minlength=count)
         drop = contrast.drop[row, column]
         selected = drop != NODATA
         row, column, label, drop = row[selected], column[selected], label[selected], drop[selected]
@@ -252,7 +264,7 @@ def _sums(runs: Int64, number: Intp, count: int, dark: Bool, contrast: ContrastI
     squares *= STEP["corrected"] ** 2
     return np.column_stack(
         [pixels, darkening_sum, darkening_max, sigma, recess, perimeter[:, :3], about[:, :3], straight, between, squares,
-         about[:, 3:], perimeter[:, 3:]]
+         about[:, 3:], perimeter[:, 3:], judged, water, certain]
     )  # fmt: skip
 
 

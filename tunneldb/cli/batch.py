@@ -84,17 +84,20 @@ def batch(
     """
     from tunneldb.queue.batch import plan, register
     from tunneldb.stages.run import km_range
+    from tunneldb.store.networks import add_networks, names_network
 
     if last is not None and last not in STAGE_NAMES:
         raise UserError(f"unknown stage {last!r}; the stages are {', '.join(STAGE_NAMES)}")
-    values = settings(assignments)
+    settings(one for one in assignments if not names_network(one))
     kilometres = None if km is None else km_range(km)
-    chosen = {name: values[name] for name in (text.partition("=")[0] for text in assignments) if name in PARAMETERS}
     reading: dict[str, Any] = {} if density is None else {"load.density": "all" if density == "all" else density_of(density)}
     reading |= {"load.unit": unit, "load.height_unit": height_unit}
     with connect(settings_.dsn) as conn:
         conn.autocommit = True
         found = get_survey(conn, survey)
+        assignments = tuple(add_networks(conn, assignments))
+        values = settings(assignments)
+        chosen = {name: values[name] for name in (text.partition("=")[0] for text in assignments) if name in PARAMETERS}
         asked = plan(
             conn, found, files, kilometres=kilometres, stage=last, reading=reading, parameters=chosen, retry=retry_failed
         )

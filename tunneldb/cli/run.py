@@ -68,11 +68,14 @@ def run(
     repeated at any time. Axis vertices moved by hand and reviews are kept. --json has all counts.
     """
     from tunneldb.stages.run import choose_stages, loaded_kilometres, parse_km, run_tasks, stage_tasks, stale_tasks
+    from tunneldb.store.networks import add_networks, names_network
 
-    values = settings(assignments)
+    settings(one for one in assignments if not names_network(one))
     stages = choose_stages(first, last)
     with connect(settings_.dsn) as conn:
         found = get_survey(conn, survey)
+        assignments = tuple(add_networks(conn, assignments))
+        values = settings(assignments)
         there = loaded_kilometres(conn, found)
         conn.rollback()
         if not there:

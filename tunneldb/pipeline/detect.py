@@ -12,8 +12,9 @@ import numpy as np
 import psycopg
 from shapely.geometry import Polygon
 
-from tunneldb.anomalies.background.contrast import ContrastImage, contrast_image
-from tunneldb.anomalies.background.level_map import BackgroundMap, map_background
+from tunneldb.anomalies.background.contrast import ContrastImage
+from tunneldb.anomalies.background.level_map import BackgroundMap
+from tunneldb.anomalies.background.relate import relate
 from tunneldb.anomalies.bands import DarkBand, find_bands
 from tunneldb.anomalies.coverage import Coverage, measure_coverage
 from tunneldb.anomalies.detect import Detection, find_anomalies
@@ -44,6 +45,7 @@ from tunneldb.raster.observation import Observer, Radiometer
 from tunneldb.raster.pixel_size import SMALLEST, choose_factor, coarse_grid, coarsen
 from tunneldb.raster.profiles import ProfileGaps, find_gaps
 from tunneldb.raster.rasterize import Counts, rasterize
+from tunneldb.segmentation.network import Network
 from tunneldb.store.coverage import seen_share
 from tunneldb.store.detectability import detectability_statement, drop_detectability, save_detectability
 from tunneldb.store.drawn_findings import Drawn, load_drawn, save_measured
@@ -60,6 +62,7 @@ from tunneldb.store.images import (
     save_range_curve,
 )
 from tunneldb.store.learned import InForce, model_in_force
+from tunneldb.store.networks import load_network
 from tunneldb.store.poses import load_poses
 from tunneldb.store.scene import load_arcs
 from tunneldb.store.sonar import water_level
@@ -94,6 +97,8 @@ class DetectionInputs:
         True if the range curve must be estimated from the lining.
     homogeneous, dry : list of Polygon
         Regions that the user drew.
+    network : Network or None
+        Segmentation network, if one is to be asked.
     judge : InForce
         Evidence model, with the tunnel's adjustments.
     drawn : list of Drawn
@@ -108,6 +113,7 @@ class DetectionInputs:
     own_curve: bool
     homogeneous: list[Polygon]
     dry: list[Polygon]
+    network: Network | None
     judge: InForce
     drawn: list[Drawn]
 
@@ -216,6 +222,7 @@ def load_inputs(conn: psycopg.Connection[Any], survey: Survey, km: int, values: 
         survey.reference == "auto",
         load_regions(conn, survey, km, "homogeneous"),
         load_regions(conn, survey, km, "dry"),
+        load_network(conn, int(values["detect.model"])),
         model_in_force(conn, survey.tunnel_id),
         load_drawn(conn, survey, km),
     )
@@ -277,8 +284,7 @@ def compute_detection(
 
 def _search(picture: LiningImage, inputs: DetectionInputs, min_area: float) -> tuple[BackgroundMap, ContrastImage, Detection]:
     """Find dark areas in a picture, whose levels are overwritten."""
-    background = map_background(picture, inputs.dry)
-    contrast = contrast_image(picture, background)
+    background, contrast = relate(picture, inputs.dry, inputs.network)
     return background, contrast, find_anomalies(contrast, background, min_area, inputs.judge.model)
 
 
@@ -321,6 +327,7 @@ def _save(
     return {
         **result.counts,
         "model": inputs.judge.model.version,
+        "network": None if inputs.network is None else inputs.network.version,
         "learned": inputs.judge.id,
         "pixels": images.pixels,
         "lining_pixels": found.pixels,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,6 +17,9 @@ from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.observation import Observer
 from tunneldb.raster.pixel_state import PixelState, pixel_states, reach
 from tunneldb.raster.profiles import ProfileGaps, farthest
+
+CONTEXT = 15.6
+"""Length beyond the ends of a kilometre whose lining is seen, m: so far the segmentation network looks."""
 
 WET_EDGE = 3
 """Number of pixels around a wet one that do not count as dry lining."""
@@ -52,7 +56,7 @@ class LiningImage:
 
 def halo(pixel: float) -> int:
     """Return the number of columns beyond the ends of a kilometre whose points affect its own pixels."""
-    return _judged() + reach(pixel)
+    return _judged(pixel) + reach(pixel)
 
 
 def halo_of_profiles(pixel: float) -> int:
@@ -60,9 +64,9 @@ def halo_of_profiles(pixel: float) -> int:
     return halo(pixel) + 2 * farthest(pixel)
 
 
-def _judged() -> int:
-    """Return the columns beyond the ends whose state matters: half a median filter around pixels next to the last dry one."""
-    return MAX_MEDIAN // 2 + WET_EDGE
+def _judged(pixel: float) -> int:
+    """Return the columns beyond the ends whose state matters: CONTEXT, or half a median filter around the last dry pixel."""
+    return max(math.ceil(CONTEXT / pixel), MAX_MEDIAN // 2 + WET_EDGE)
 
 
 def lining_image(
@@ -94,7 +98,7 @@ def lining_image(
     state = np.full((grid.rows, grid.columns), PixelState.OFF, np.uint8)
     level = np.full((grid.rows, grid.columns), NODATA, np.int16)
     beyond = 0 if gaps is None else int(gaps.longest.max())
-    verdicts, about = min(_judged() + beyond, grid.halo), reach(grid.pixel) + beyond
+    verdicts, about = min(_judged(grid.pixel) + beyond, grid.halo), reach(grid.pixel) + beyond
     inner = set(image.inner_blocks())
     for block in sorted({*image.blocks(), *_with_surface(grid, outliers.surface)}):
         first = max(block * grid.block_columns, grid.inner.start - verdicts)

@@ -77,6 +77,14 @@ PARAMETERS: dict[str, Parameter] = {
         0.05, 0.0, 1.0, "", "maximum share of the lining's points outside the reference curve, which are left out"
     ),
     "appendage.distance": Parameter(0.03, 0.005, 0.5, "m", "distance from the local plane from which a pixel is a fixture"),
+    "detect.model": Parameter(
+        0,
+        0,
+        2**31 - 1,
+        "",
+        "segmentation network: FILE.onnx, or the number of one that was used before; 0: none",
+        whole=True,
+    ),
     "leak.min_area": Parameter(0.05, 0.0, 100.0, "m²", "minimum area of a leak"),
     "leak.demand_area": Parameter(
         0.3, 0.05, 3.0, "m²", "area of the leaks that the survey must show; where it may miss them is stated (detectability)"

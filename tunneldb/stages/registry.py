@@ -47,7 +47,7 @@ STAGES: tuple[Stage, ...] = (
         "tunneldb.pipeline.detect:detect",
         reads=("load", "axis", "segments", "sections", "ground", "survey", "sonar", "learned"),
         reads_beside=("ground",),
-        parameters=("lining", "image", "intensity", "appendage", "leak"),
+        parameters=("lining", "image", "intensity", "appendage", "detect", "leak"),
         tables=("range_curve", "radiometry", "image", "coverage", "dark_band", "detectability", "finding", "boundary_region"),
     ),
 )

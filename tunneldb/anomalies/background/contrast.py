@@ -14,6 +14,7 @@ from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import PixelGrid
 from tunneldb.raster.image import LiningImage
 from tunneldb.raster.polygons import mask_of_polygons
+from tunneldb.segmentation.network import HALF
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,8 @@ class ContrastImage:
         are as close as pixels.
     between : (rows, columns) bool array or None
         True for those pixels.
+    water : (rows, columns) uint8 array or None
+        Probability of water of each pixel by a segmentation network, in steps of 1/255; None if none was asked.
     texture : Texture or None
         Windows over which lining is averaged before dark lining is detected, and to which ``sigma`` refers. None: single
         pixels.
@@ -54,10 +57,23 @@ class ContrastImage:
     spacing: float = 0.0
     between: Bool | None = None
     texture: Texture | None = None
+    water: UInt8 | None = None
+
+    def wet(self) -> Bool | None:
+        """Return the pixels that are more likely wet than not, by the network; None if none was asked."""
+        return None if self.water is None else self.water >= HALF
 
 
-def contrast_image(picture: LiningImage, background: BackgroundMap) -> ContrastImage:
-    """Subtract all pixels from the background level, in the memory of ``picture.level``, which is overwritten."""
+def contrast_image(picture: LiningImage, background: BackgroundMap, water: UInt8 | None = None) -> ContrastImage:
+    """Subtract all pixels from the background level, in the memory of ``picture.level``, which is overwritten.
+
+    Parameters
+    ----------
+    picture : LiningImage
+    background : BackgroundMap
+    water : (rows, columns) uint8 array, optional
+        Probability of water by a segmentation network, in steps of 1/255.
+    """
     drop = picture.level
     background.level.subtract(drop)
     spacing, between = 0.0, None
@@ -68,8 +84,10 @@ def contrast_image(picture: LiningImage, background: BackgroundMap) -> ContrastI
     for block, mask in mask_of_polygons(picture.grid, background.drawn):
         here = drop[:, block]
         here[mask] = np.minimum(here[mask], 0)
+        if water is not None:
+            water[:, block][mask] = 0
     tile, texture, sigma = background.level.tile, None, background.sigma
     if not spacing and background.count:
         texture = measure_texture(picture.state, drop, sigma, tile, picture.grid.pixel)
         sigma = texture.sigma
-    return ContrastImage(picture.grid, picture.state, drop, tile, sigma, background.drawn, spacing, between, texture)
+    return ContrastImage(picture.grid, picture.state, drop, tile, sigma, background.drawn, spacing, between, texture, water)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.level import ROWS, BackgroundLevel
 from tunneldb.anomalies.background.model import BackgroundFit
-from tunneldb.arrays import Int64, Single, UInt8
+from tunneldb.arrays import Bool, Int64, Single, UInt8
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import LiningImage
 from tunneldb.raster.pixel_state import PixelState
@@ -55,7 +55,7 @@ class BackgroundMap:
     drawn: tuple[Polygon, ...] = ()
 
 
-def map_background(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) -> BackgroundMap:
+def map_background(picture: LiningImage, dry_regions: Sequence[Polygon] = (), wet: Bool | None = None) -> BackgroundMap:
     """Map the background of a picture.
 
     Level and standard deviation are those of the dry part of the lining (`radiometry.robust_statistics`): of a column, of a row
@@ -69,9 +69,13 @@ def map_background(picture: LiningImage, dry_regions: Sequence[Polygon] = ()) ->
     dry_regions : sequence of Polygon
         Dry lining that the user drew, in the unrolled plane, m. Tiles mostly inside it take plain mean and standard deviation
         (Xu et al., 2018, eq. 19) of the pixels in it, however dark these are; other tiles are not affected.
+    wet : (rows, columns) bool array, optional
+        Pixels that are no part of the background wherever other lining gives one: water, however long.
     """
     spacing = 0.0 if picture.gaps is None else picture.gaps.spacing
     picture = picture.measured()
+    if wet is not None:
+        picture = replace(picture, state=np.where(wet, np.uint8(PixelState.EMPTY), picture.state))
     grid, state = picture.grid, picture.state
     tile, count = _tile_side(grid), int(np.count_nonzero(state == PixelState.LINING))
     if count == 0:

@@ -220,6 +220,22 @@ class Image(Base):
     tiff: Mapped[bytes] = mapped_column(comment="GeoTIFF in the unrolled plane (chainage, arc), m")
 
 
+class SegmentationNetwork(Base):
+    """Segmentation network that an owner trained."""
+
+    __tablename__ = "segmentation_network"
+    __table_args__ = {  # noqa: RUF012
+        "comment": "Segmentation networks that owners trained (tunneldb run --set detect.model=FILE.onnx)"
+    }
+
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key, the value of detect.model")
+    version: Mapped[str] = mapped_column(comment="Name of the network")
+    checksum: Mapped[str] = mapped_column(unique=True, comment="SHA-256 of the file")
+    model: Mapped[bytes] = mapped_column(comment="The file (ONNX)")
+    added_by: Mapped[str] = mapped_column(server_default=text("session_user"), comment="Role that added it")
+    added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time when it was added")
+
+
 class LearnedModel(Base):
     """Model of evidence adapted to the reviews of a tunnel."""
 

@@ -1,0 +1,1 @@
+"""Segmentation of the lining by a small network: which pixels are wet."""

@@ -1,0 +1,146 @@
+"""Probability of water by a segmentation network, run by ONNX Runtime in strips along the tunnel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tunneldb.arrays import Int16, Single, UInt8
+from tunneldb.errors import UserError
+from tunneldb.raster.geotiff import NODATA
+from tunneldb.raster.image import LiningImage
+from tunneldb.raster.pixel_state import PixelState
+from tunneldb.segmentation.channels import NAMES, REACH, STRIDE, Scale, channels
+from tunneldb.threads import in_blocks
+
+if TYPE_CHECKING:
+    from onnxruntime import InferenceSession
+
+INPUT, OUTPUT = "images", "probabilities"
+"""Names of the network's input (1, channels, rows, columns) and output (1, classes, rows, columns)."""
+
+CLASSES = ("dry", "water", "dry dark area")
+"""Classes of the output."""
+
+WATER = CLASSES.index("water")
+
+FIELD = 9 * STRIDE
+"""Maximum distance of pixels that a pixel's probability may depend on, pixels."""
+
+STRIP = 250 * STRIDE
+"""Length of the strips that are computed one by one, pixels: 160 m."""
+
+HALF = 128
+"""Stored probability from which lining is more likely wet than not."""
+
+CERTAIN = 255
+"""Stored probability of 1."""
+
+
+@dataclass(frozen=True)
+class Network:
+    """A segmentation network.
+
+    Attributes
+    ----------
+    version : str
+        Name of the network.
+    session : InferenceSession
+        Its graph, which computes with one thread, so that results do not depend on the number of threads.
+    """
+
+    version: str
+    session: InferenceSession
+
+    @classmethod
+    def load(cls, content: bytes, name: str) -> Network:
+        """Load a network from the content of an ONNX file.
+
+        Parameters
+        ----------
+        content : bytes
+            The file.
+        name : str
+            Its version, unless its metadata have one.
+
+        Raises
+        ------
+        ValueError
+            If it cannot be read, or its input or output is not that of a segmentation network.
+        """
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = 3
+        try:
+            session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+        except Exception as error:
+            raise ValueError(str(error).splitlines()[0]) from None
+        takes = {one.name: one.shape for one in session.get_inputs()}
+        gives = {one.name: one.shape for one in session.get_outputs()}
+        if set(takes) != {INPUT} or len(takes[INPUT]) != 4 or takes[INPUT][1] != len(NAMES):
+            raise ValueError(f"it has the inputs {takes}, not {INPUT} (1, {len(NAMES)}, rows, columns)")
+        if OUTPUT not in gives or len(gives[OUTPUT]) != 4 or gives[OUTPUT][1] != len(CLASSES):
+            raise ValueError(f"it has the outputs {gives}, not {OUTPUT} (1, {len(CLASSES)}, rows, columns)")
+        metadata = session.get_modelmeta().custom_metadata_map
+        return cls(metadata.get("version", name), session)
+
+    def probabilities(self, images: Single) -> Single:
+        """Return the probability of each class (len(CLASSES), rows, columns) from channels (len(NAMES), rows, columns)."""
+        (found,) = self.session.run([OUTPUT], {INPUT: images[None]})
+        if found.shape[2:] != images.shape[1:] or not (found.min() >= 0.0 and found.max() <= 1.0 + 1e-4):
+            raise UserError(
+                f"the network {self.version} gives no probabilities for each pixel: use another, or --set detect.model=0"
+            )
+        return np.asarray(found[0], np.float32)
+
+    def water(self, picture: LiningImage) -> UInt8:
+        """Return the probability of water of each pixel of a picture (rows, columns), in steps of 1/255.
+
+        It is 0 off the lining, and beyond the ends of a kilometre.
+        """
+        grid, inner = picture.grid, picture.grid.inner
+        unit = Scale.of(grid.pixel).unit
+        step, around = STRIP // STRIDE * unit, (REACH + FIELD) // STRIDE * unit
+        out = np.zeros(picture.state.shape, np.uint8)
+
+        def strip(first: int, stop: int) -> None:
+            first, stop = inner.start + first, inner.start + stop
+            low, high = max(first - around, 0), min(stop + around, grid.columns)
+            here = np.s_[:, low:high]
+            found = self._strip(picture.state[here], picture.level[here], grid.pixel, grid.bottom, grid.first_column + low)
+            out[:, first:stop] = found[:, first - low : stop - low]
+
+        in_blocks(strip, inner.stop - inner.start, step)
+        out[picture.state > PixelState.RECESS] = 0
+        return out
+
+    def _strip(self, state: UInt8, level: Int16, pixel: float, bottom: int, first_column: int) -> UInt8:
+        """Return the probability of water of the pixels of a strip."""
+        rows, columns = state.shape
+        if not (level != NODATA).any():
+            return np.zeros(state.shape, np.uint8)
+        images, margins = channels(state, level, pixel, bottom, first_column)
+        found = resized(self.probabilities(images)[WATER], Scale.of(pixel))
+        found = found[margins.above : margins.above + rows, margins.left : margins.left + columns]
+        return np.rint(CERTAIN * found).astype(np.uint8)
+
+
+def resized(image: Single, scale: Scale) -> Single:
+    """Bring an image of the network's pixels to those of a picture, linearly between their middles."""
+    if scale.repeated > 1:
+        n = scale.repeated
+        rows, columns = (size // n for size in image.shape)
+        return np.asarray(image.reshape(rows, n, columns, n).mean(axis=(1, 3)))
+    n = scale.combined
+    for axis in (0, 1):
+        size = image.shape[axis]
+        at = np.clip((np.arange(size * n) + 0.5) / n - 0.5, 0, size - 1)
+        low = np.minimum(at.astype(np.intp), size - 2)
+        part = (at - low).astype(np.float32)
+        part = part[:, None] if axis == 0 else part[None]
+        image = image.take(low, axis) * (1 - part) + image.take(low + 1, axis) * part
+    return image
