@@ -80,7 +80,7 @@ COMMENT ON COLUMN tunnel.point.class IS 'Class found by stage ground (tunnel_api
 CREATE INDEX point_chainage_idx ON tunnel.point USING brin (chainage) WITH (pages_per_range = 16);
 
 CREATE TABLE tunnel.segmentation_network (
-    id INTEGER GENERATED ALWAYS AS IDENTITY,
+    id INTEGER NOT NULL,
     version TEXT NOT NULL,
     checksum TEXT NOT NULL,
     model BYTEA NOT NULL,
@@ -90,7 +90,7 @@ CREATE TABLE tunnel.segmentation_network (
     CONSTRAINT segmentation_network_checksum_key UNIQUE (checksum)
 );
 COMMENT ON TABLE tunnel.segmentation_network IS 'Segmentation networks that owners trained (tunneldb run --set detect.model=FILE.onnx)';
-COMMENT ON COLUMN tunnel.segmentation_network.id IS 'Key, the value of detect.model';
+COMMENT ON COLUMN tunnel.segmentation_network.id IS 'Key, the value of detect.model: the first 31 bits of the checksum';
 COMMENT ON COLUMN tunnel.segmentation_network.version IS 'Name of the network';
 COMMENT ON COLUMN tunnel.segmentation_network.checksum IS 'SHA-256 of the file';
 COMMENT ON COLUMN tunnel.segmentation_network.model IS 'The file (ONNX)';

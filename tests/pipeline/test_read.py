@@ -17,7 +17,7 @@ from tunneldb.database import open_connection
 from tunneldb.errors import UserError
 from tunneldb.pipeline.load import load_kilometre, parameters_of, settings_of
 from tunneldb.pipeline.read import read_file
-from tunneldb.pointcloud.selection import FilterSettings
+from tunneldb.pointcloud.selection import MARGIN, FilterSettings
 from tunneldb.pointcloud.spool import ROW, Rows, Spool
 from tunneldb.store.partition import read_fragment, write_fragments
 from tunneldb.store.survey import get_survey
@@ -147,7 +147,7 @@ def test_a_file_read_anew_leaves_every_kilometre_that_it_touched(
         load_km(survey, 0)
         load_km(survey, 1)
     survey.commit()
-    write(path, tube(1012, 1025, 200, seed=3))
+    write(path, tube(1019, 1032, 200, seed=3))
     counts = read(survey, path)
     survey.commit()
     assert (counts["state"], counts["kilometres"]) == ("replaced", [0, 1])
@@ -163,7 +163,7 @@ def test_a_file_read_anew_leaves_every_kilometre_that_it_touched(
     assert (rows(survey), files(survey)) == found
 
 
-def test_ranges_hold_the_points_of_a_kilometre_and_ten_metres_more(survey: psycopg.Connection, tmp_path: Path) -> None:
+def test_ranges_hold_the_points_of_a_kilometre_and_its_margin(survey: psycopg.Connection, tmp_path: Path) -> None:
     xyz = tube(971, 1025, 400, seed=1)
     xyz = xyz[np.argsort(xyz[:, 0])]  # as a profiler scans
     far = np.tile(ORIGIN + np.array([10.0, 100.0, 0.0]), (70_000, 1))
@@ -178,7 +178,7 @@ def test_ranges_hold_the_points_of_a_kilometre_and_ten_metres_more(survey: psyco
             inside[part.lower : part.upper] = True
             assert part.lower % 50_000 == 0
             assert part.upper % 50_000 == 0 or part.upper == len(chainage)
-        wanted = (chainage >= km * 1000 - 10) & (chainage < km * 1000 + 1010)
+        wanted = (chainage >= km * 1000 - MARGIN) & (chainage < (km + 1) * 1000 + MARGIN)
         assert inside[wanted].all()
         assert len(ranges) == 1
         blocks = np.flatnonzero(wanted) // 50_000

@@ -115,7 +115,7 @@ def test_every_view_begins_with_a_stable_integer_key(
     add_change_run(conn, "demo-2024")
     add_surfaces(conn, one(conn, "SELECT id FROM tunnel.survey WHERE name = %s", example))
     conn.execute("INSERT INTO tunnel.dark_band SELECT id, 12, 0, 12350, 12400, -7, -6.6, 3, 20 FROM tunnel.survey")
-    conn.execute("INSERT INTO tunnel.segmentation_network (version, checksum, model) VALUES ('toy', 'abc', '\\x00')")
+    conn.execute("INSERT INTO tunnel.segmentation_network (id, version, checksum, model) VALUES (7, 'toy', 'abc', '\\x00')")
     conn.execute("INSERT INTO tunnel.station SELECT survey_id, n, geom FROM tunnel.axis_vertex")
     conn.execute("INSERT INTO tunnel.pose SELECT survey_id, n, geom FROM tunnel.axis_vertex")
     conn.execute(  # the earlier survey saw kilometre 12, too

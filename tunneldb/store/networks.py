@@ -68,14 +68,14 @@ def _add(conn: psycopg.Connection[Any], path: Path) -> int:
     except ValueError as error:
         raise InputError(f"{path}: no segmentation network: {error}; see docs/network.md for its inputs and outputs") from None
     checksum = hashlib.sha256(content).hexdigest()
+    number = int(checksum[:8], 16) >> 1  # the same in every database
     conn.execute(
-        "INSERT INTO tunnel.segmentation_network (version, checksum, model) VALUES (%s, %s, %s) ON CONFLICT DO NOTHING",
-        [network.version, checksum, content],
+        "INSERT INTO tunnel.segmentation_network (id, version, checksum, model) VALUES (%s, %s, %s, %s)"
+        " ON CONFLICT (checksum) DO NOTHING",
+        [number, network.version, checksum, content],
     )
-    row = conn.execute("SELECT id FROM tunnel.segmentation_network WHERE checksum = %s", [checksum]).fetchone()
     conn.commit()
-    assert row is not None
-    return int(row[0])
+    return number
 
 
 @lru_cache(2)

@@ -21,6 +21,9 @@ TILE = 0.5
 PASSES = 2
 """Number of passes in which bands, rings and the smooth part are fitted again, each to the residuals of the others."""
 
+MIN_DRY_SHARE = 0.1
+"""Minimum share of the lining that must be left for the background if wet pixels are not used."""
+
 SAMPLE_PIXELS = 2_000_000
 """Approximate number of pixels for mean and spread of the kilometre."""
 
@@ -70,12 +73,12 @@ def map_background(picture: LiningImage, dry_regions: Sequence[Polygon] = (), we
         Dry lining that the user drew, in the unrolled plane, m. Tiles mostly inside it take plain mean and standard deviation
         (Xu et al., 2018, eq. 19) of the pixels in it, however dark these are; other tiles are not affected.
     wet : (rows, columns) bool array, optional
-        Pixels that are no part of the background wherever other lining gives one: water, however long.
+        Pixels that are not used, unless less than MIN_DRY_SHARE of the lining would be left: water, however long.
     """
     spacing = 0.0 if picture.gaps is None else picture.gaps.spacing
     picture = picture.measured()
     if wet is not None:
-        picture = replace(picture, state=np.where(wet, np.uint8(PixelState.EMPTY), picture.state))
+        picture = _without(picture, wet)
     grid, state = picture.grid, picture.state
     tile, count = _tile_side(grid), int(np.count_nonzero(state == PixelState.LINING))
     if count == 0:
@@ -88,6 +91,14 @@ def map_background(picture: LiningImage, dry_regions: Sequence[Polygon] = (), we
     sigma, level = fit.sigma(), fit.level
     spread = _weighted_median(sigma, fit.lining)
     return BackgroundMap(grid, level, sigma, _mean_level(level, state), spread, count, tuple(dry_regions))
+
+
+def _without(picture: LiningImage, wet: Bool) -> LiningImage:
+    """Return a picture without its wet lining, or as it is if hardly any dry lining would be left."""
+    lining = picture.state == PixelState.LINING
+    if np.count_nonzero(lining & ~wet) < MIN_DRY_SHARE * np.count_nonzero(lining):
+        return picture
+    return replace(picture, state=np.where(wet, np.uint8(PixelState.EMPTY), picture.state))
 
 
 def _tile_side(grid: Grid) -> int:

@@ -228,7 +228,9 @@ class SegmentationNetwork(Base):
         "comment": "Segmentation networks that owners trained (tunneldb run --set detect.model=FILE.onnx)"
     }
 
-    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key, the value of detect.model")
+    id: Mapped[int] = mapped_column(
+        primary_key=True, autoincrement=False, comment="Key, the value of detect.model: the first 31 bits of the checksum"
+    )
     version: Mapped[str] = mapped_column(comment="Name of the network")
     checksum: Mapped[str] = mapped_column(unique=True, comment="SHA-256 of the file")
     model: Mapped[bytes] = mapped_column(comment="The file (ONNX)")

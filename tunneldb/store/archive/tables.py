@@ -20,6 +20,7 @@ EXCLUDED = {
     "stage_input": "made anew by tunneldb init",
     "worker": "who serves the queue at the moment",
     "incoming": "files that wait to be read, which a batch asks for again",
+    "segmentation_network": "files of owners, which have the same numbers in every database",
     "finding_sum": "sums that triggers keep",
     "waterproof": "statistics of kilometres, worked out anew",
 }
