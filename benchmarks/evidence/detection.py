@@ -25,7 +25,7 @@ def judged_by(model: EvidenceModel) -> Iterator[None]:
         yield
 
 
-def detect(picture: LiningImage, truth: Outcome, network: Network | None) -> tuple[Outcome, dict[int, Coverage]]:
+def detect(picture: LiningImage, truth: Outcome, network: Network | None = None) -> tuple[Outcome, dict[int, Coverage]]:
     """Find what is dark in a picture.
 
     Parameters
@@ -34,8 +34,8 @@ def detect(picture: LiningImage, truth: Outcome, network: Network | None) -> tup
         Stays as it is.
     truth : Outcome
         What was found when the picture was made counts no more.
-    network : Network or None
-        The segmentation network.
+    network : Network, optional
+        A segmentation network.
 
     Returns
     -------

@@ -41,7 +41,8 @@ def boosted(rounds: int) -> HistGradientBoostingClassifier:
 def fit_model(
     features: Array, leak: NDArray[np.bool_], weights: Array, rounds: int, version: str, notes: dict[str, Any]
 ) -> EvidenceModel:
-    """Fit the trees."""
+    """Fit the trees; they ask for no feature that none of the regions has."""
+    features = np.where(np.isnan(features).all(axis=0), 0.0, features)
     machine = boosted(rounds).fit(features, leak, sample_weight=weights)
     trees = [trees[0].nodes for trees in machine._predictors]  # the only way to its nodes
     roots = np.concatenate([[0], np.cumsum([len(tree) for tree in trees])[:-1]]).astype(np.intp)
