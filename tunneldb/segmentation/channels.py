@@ -147,7 +147,7 @@ def channels(state: UInt8, level: Int16, pixel: float, bottom: int, first_column
     images[:6] = _contrasts(values, filled, column // COARSE)
     images[6], images[7], images[8], images[9] = filled, off, recess, floor
     images[10], images[11] = np.clip(arc, -1.0, 1.0), np.clip(np.abs(arc) / HIGH, 0.0, 1.0)
-    images[12] = 1.0 if away is None else _enlarged(np.clip(away / LOW, 0.0, 1.0).astype(np.float32))
+    images[12] = 1.0 if away is None else enlarged(np.clip(away / LOW, 0.0, 1.0).astype(np.float32))
     return images, margins
 
 
@@ -171,13 +171,13 @@ def _contrasts(values: Single, filled: Single, column: int) -> Single:
     ring = _ring(coarse, total > 0, column)
     far = _filled(_level(coarse, total, FAR), ring)
     near = _filled(_level(coarse, total, NEAR), far)
-    ring, near, far = _enlarged(ring)[:1], _enlarged(near), _enlarged(far)
+    ring, near, far = enlarged(ring)[:1], enlarged(near), enlarged(far)
     local = _filled(_level(values, weight, LOCAL), near)
     fine = _filled(_level(values, weight, FINE), local)
     own = np.where(known, values, fine)
     rough = _level(_divided(_sums((own - fine) ** 2), total), total, ROUGH)
     noise = np.log(np.maximum(np.sqrt(np.nan_to_num(rough, nan=NOISE**2)), MIN_NOISE) / NOISE)
-    out = np.stack([own - ring, fine - ring, own - local, fine - near, fine - far, CONTRAST * _enlarged(noise)])
+    out = np.stack([own - ring, fine - ring, own - local, fine - near, fine - far, CONTRAST * enlarged(noise)])
     out /= np.float32(CONTRAST)
     return np.clip(out, -MAX_CONTRAST, MAX_CONTRAST, out=out)
 
@@ -198,10 +198,10 @@ def _sums(image: Single) -> Single:
     return np.asarray(image.reshape(rows, COARSE, columns, COARSE).sum(axis=(1, 3), dtype=np.float32))
 
 
-def _enlarged(image: Single) -> Single:
-    """Interpolate an image of large pixels linearly between their middles."""
+def enlarged(image: Single, times: int = COARSE) -> Single:
+    """Interpolate an image of large pixels linearly between their middles, on pixels so many times smaller."""
     for axis in (0, 1):
-        at = np.clip((np.arange(image.shape[axis] * COARSE) + 0.5) / COARSE - 0.5, 0, image.shape[axis] - 1)
+        at = np.clip((np.arange(image.shape[axis] * times) + 0.5) / times - 0.5, 0, image.shape[axis] - 1)
         low = np.minimum(at.astype(np.intp), max(image.shape[axis] - 2, 0))
         high = np.minimum(low + 1, image.shape[axis] - 1)
         part = (at - low).astype(np.float32)

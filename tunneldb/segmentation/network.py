@@ -12,7 +12,7 @@ from tunneldb.errors import UserError
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.image import LiningImage
 from tunneldb.raster.pixel_state import PixelState
-from tunneldb.segmentation.channels import NAMES, REACH, STRIDE, Scale, channels
+from tunneldb.segmentation.channels import NAMES, REACH, STRIDE, Scale, channels, enlarged
 from tunneldb.threads import in_blocks
 
 if TYPE_CHECKING:
@@ -135,12 +135,4 @@ def resized(image: Single, scale: Scale) -> Single:
         n = scale.repeated
         rows, columns = (size // n for size in image.shape)
         return np.asarray(image.reshape(rows, n, columns, n).mean(axis=(1, 3)))
-    n = scale.combined
-    for axis in (0, 1):
-        size = image.shape[axis]
-        at = np.clip((np.arange(size * n) + 0.5) / n - 0.5, 0, size - 1)
-        low = np.minimum(at.astype(np.intp), size - 2)
-        part = (at - low).astype(np.float32)
-        part = part[:, None] if axis == 0 else part[None]
-        image = image.take(low, axis) * (1 - part) + image.take(low + 1, axis) * part
-    return image
+    return enlarged(image, scale.combined)
