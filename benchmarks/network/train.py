@@ -94,17 +94,12 @@ def train(scans: Sequence[Seen], painted: Sequence[Seen], options: argparse.Name
         state.hyperparams["learning_rate"] = jnp.asarray(rate)
         weights, state, value = step(weights, state, images, label, use)
         kept = min(MEMORY, (count + 1) / (count + 10))
-        mean = jax.tree.map(partial(mixed, kept), mean, weights)
+        mean = optax.incremental_update(weights, mean, 1.0 - kept)
         losses.append(float(value))
         if len(losses) % 50 == 0:
             print(f"{len(losses)} steps, {time.monotonic() - start:.0f} s, loss {np.mean(losses[-50:]):.4f}", flush=True)
     print(f"{len(losses)} steps, {time.monotonic() - start:.0f} s", flush=True)
     return mean
-
-
-def mixed(share: float, a: Any, b: Any) -> Any:
-    """Return the mean of two arrays, the first with a share."""
-    return share * a + (1.0 - share) * b
 
 
 def crop(pictures: Sequence[Seen], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -88,6 +88,7 @@ def batch(
 
     if last is not None and last not in STAGE_NAMES:
         raise UserError(f"unknown stage {last!r}; the stages are {', '.join(STAGE_NAMES)}")
+    # Checked before the database is opened; a network becomes a number there.
     settings(one for one in assignments if not names_network(one))
     kilometres = None if km is None else km_range(km)
     reading: dict[str, Any] = {} if density is None else {"load.density": "all" if density == "all" else density_of(density)}

@@ -70,6 +70,7 @@ def run(
     from tunneldb.stages.run import choose_stages, loaded_kilometres, parse_km, run_tasks, stage_tasks, stale_tasks
     from tunneldb.store.networks import add_networks, names_network
 
+    # Checked before the database is opened; a network becomes a number there.
     settings(one for one in assignments if not names_network(one))
     stages = choose_stages(first, last)
     with connect(settings_.dsn) as conn:
