@@ -27,7 +27,7 @@ from benchmarks.evidence.painted import paintings
 from benchmarks.evidence.pictures import pictures
 from tunneldb.anomalies import evidence
 
-FAMILIES = ("known", *(f"round_{k:02}" for k in range(1, 9)), "set-1")
+FAMILIES = ("known", *(f"round_{k:02}" for k in range(1, 10)), "set-1")
 PAINTINGS, PAINTED = 320, 0.5
 """How many pictures are painted, and how much their regions count: less than those of scans."""
 
@@ -55,7 +55,7 @@ def main() -> None:
         for family in arguments.families
         for picture, truth in pictures(family, arguments.pictures, arguments.dsn)
     ]
-    parts += paintings(PAINTINGS)
+    parts += paintings(PAINTINGS, networks.of("painted"))
     features, leak, families = together(parts)
     scenes = np.concatenate([np.full(len(part.leak), f"{part.family} {part.scene}", dtype=object) for part in parts])
     weights = weights_of(scenes) * np.where(families == "painted", PAINTED, 1.0)

@@ -86,7 +86,7 @@ def _of_set(family: str, name: str, folder: Path, dsn: str) -> tuple[LiningImage
 def _tapped(work: Callable[[], float]) -> tuple[LiningImage | None, float]:
     """Do something that seeks leaks in this process; return the picture in which they were sought, and what was returned.
 
-    No picture where it was refused.
+    No picture where it was refused. Pictures after the first are those of trials of detectability: leaks were added to them.
     """
     seen: list[LiningImage] = []
 
@@ -100,7 +100,7 @@ def _tapped(work: Callable[[], float]) -> tuple[LiningImage | None, float]:
             out = work()
         except SystemExit:
             return None, np.nan
-    return seen[-1], out
+    return seen[0], out
 
 
 def _here(*words: object, dsn: str | None = None) -> float:

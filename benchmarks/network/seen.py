@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from benchmarks.network.sample import LIMIT, OTHER, WET, Sample
 from tunneldb.raster.pixel_state import PixelState
-from tunneldb.segmentation.channels import Scale, channels, resampled
+from tunneldb.segmentation.channels import Scale, channels, repeated
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,15 @@ def see(sample: Sample) -> Seen:
     images, margins = channels(sample.state, sample.level, sample.pixel, sample.bottom, column)
     scale = Scale.of(sample.pixel)
     labels = margins.pad(sample.label, 0)
-    label = np.where(resampled(labels == OTHER, scale) >= 0.5, OTHER, 0)
-    label = np.where(resampled(labels == WET, scale) >= 0.5, WET, label)
-    label = np.where(resampled(labels == LIMIT, scale) > 0.0, LIMIT, label).astype(np.uint8)
-    lining = resampled(margins.pad(sample.state, PixelState.OFF) <= PixelState.RECESS, scale) >= 0.5
+    label = np.where(_shares(labels == OTHER, scale) >= 0.5, OTHER, 0)
+    label = np.where(_shares(labels == WET, scale) >= 0.5, WET, label)
+    label = np.where(_shares(labels == LIMIT, scale) > 0.0, LIMIT, label).astype(np.uint8)
+    lining = _shares(margins.pad(sample.state, PixelState.OFF) <= PixelState.RECESS, scale) >= 0.5
     return Seen(images.astype(np.float16), label, lining)
+
+
+def _shares(mask: NDArray[np.bool_], scale: Scale) -> NDArray[np.float64]:
+    """Return the share of the image pixels of each pixel of the network that are in a mask."""
+    n = scale.combined
+    rows, columns = (size // n for size in mask.shape)
+    return np.asarray(repeated(mask.reshape(rows, n, columns, n).mean(axis=(1, 3)), scale))

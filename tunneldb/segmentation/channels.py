@@ -17,6 +17,7 @@ from scipy import ndimage
 from tunneldb.arrays import Bool, Float, Int16, Single, UInt8
 from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.pixel_state import PixelState
+from tunneldb.segmentation.smoothing import count_states, enlarged, mean_about
 
 PIXEL = 0.04
 """Side of the network's pixels, m."""
@@ -86,6 +87,11 @@ class Scale:
         """Number of image pixels side by side that make whole pixels of STRIDE."""
         return self.combined * STRIDE // math.gcd(STRIDE, self.repeated)
 
+    @property
+    def span(self) -> int:
+        """Number of pixels of the network side by side in as many image pixels as `unit`."""
+        return self.unit // self.combined * self.repeated
+
 
 @dataclass(frozen=True)
 class Margins:
@@ -132,54 +138,48 @@ def channels(state: UInt8, level: Int16, pixel: float, bottom: int, first_column
     scale = Scale.of(pixel)
     margins = Margins.of(state.shape, bottom, first_column, scale.unit)
     state, level = margins.pad(state, PixelState.OFF), margins.pad(level, NODATA)
-    known = ((state == PixelState.LINING) | (state == PixelState.RECESS)) & (level != NODATA)
-    filled = resampled(known, scale)
-    values = _divided(resampled(np.where(known, level, np.int16(0)), scale), filled) * np.float32(STEP["corrected"])
-    off = resampled(state == PixelState.OFF, scale) > 0.5
-    recess = resampled(state == PixelState.RECESS, scale) > 0.5
-    floor = resampled((state == PixelState.FLOOR) | (state == PixelState.SUBMERGED), scale) > 0.5
+    filled, values, mostly = count_states(state, level, scale.combined)
+    values *= np.float32(STEP["corrected"])
+    filled, values = repeated(filled, scale), repeated(values, scale)
+    off, recess, floor = (repeated(one, scale) for one in mostly)
     side = pixel * scale.combined / scale.repeated
     lowest = (bottom - margins.below) // scale.combined * scale.repeated
     arc = ((lowest + len(values) - np.arange(len(values)) - 0.5) * side).astype(np.float32)[:, None]
     column = (first_column - margins.left) // scale.combined * scale.repeated
-    away = ndimage.distance_transform_edt(~floor[::COARSE, ::COARSE]) * (COARSE * side) if floor.any() else None
+    away = ndimage.distance_transform_edt(floor[::COARSE, ::COARSE] == 0) * (COARSE * side) if floor.any() else None
     images = np.empty((len(NAMES), *values.shape), np.float32)
-    images[:6] = _contrasts(values, filled, column // COARSE)
+    _contrasts(values, filled, column // COARSE, images[:6])
     images[6], images[7], images[8], images[9] = filled, off, recess, floor
     images[10], images[11] = np.clip(arc, -1.0, 1.0), np.clip(np.abs(arc) / HIGH, 0.0, 1.0)
-    images[12] = 1.0 if away is None else enlarged(np.clip(away / LOW, 0.0, 1.0).astype(np.float32))
+    images[12] = 1.0 if away is None else enlarged(np.clip(away / LOW, 0.0, 1.0).astype(np.float32), COARSE)
     return images, margins
 
 
-def resampled(image: Bool | Int16, scale: Scale) -> Single:
-    """Return the mean over the image pixels of each pixel of the network, of an image of whole ones."""
-    n = scale.combined
-    total: Single = np.zeros((image.shape[0] // n, image.shape[1] // n), np.float32)
-    for row in range(n):
-        for column in range(n):
-            total += image[row::n, column::n]
-    total /= np.float32(n * n)
-    return total.repeat(scale.repeated, axis=0).repeat(scale.repeated, axis=1) if scale.repeated > 1 else total
+def repeated(image: NDArray[Any], scale: Scale) -> NDArray[Any]:
+    """Repeat the pixels of an image by a scale."""
+    return image.repeat(scale.repeated, axis=0).repeat(scale.repeated, axis=1) if scale.repeated > 1 else image
 
 
-def _contrasts(values: Single, filled: Single, column: int) -> Single:
-    """Return the levels relative to other levels (5) and the noise, of pixels whose first large column has this number."""
+def _contrasts(values: Single, filled: Single, column: int, out: Single) -> None:
+    """Write the levels relative to other levels (5) and the noise; the first large column has the number ``column``."""
     known = filled > 0
     weight = known.astype(np.float32)
     total = _sums(weight)
     coarse = _divided(_sums(values), total)
     ring = _ring(coarse, total > 0, column)
-    far = _filled(_level(coarse, total, FAR), ring)
-    near = _filled(_level(coarse, total, NEAR), far)
-    ring, near, far = enlarged(ring)[:1], enlarged(near), enlarged(far)
-    local = _filled(_level(values, weight, LOCAL), near)
-    fine = _filled(_level(values, weight, FINE), local)
+    far = _filled(mean_about(coarse, total, FAR, TRUNCATE), ring)
+    near = _filled(mean_about(coarse, total, NEAR, TRUNCATE), far)
+    ring, near, far = enlarged(ring, COARSE)[:1], enlarged(near, COARSE), enlarged(far, COARSE)
+    local = _filled(mean_about(values, weight, LOCAL, TRUNCATE), near)
+    fine = _filled(mean_about(values, weight, FINE, TRUNCATE), local)
     own = np.where(known, values, fine)
-    rough = _level(_divided(_sums((own - fine) ** 2), total), total, ROUGH)
+    rough = mean_about(_divided(_sums((own - fine) ** 2), total), total, ROUGH, TRUNCATE)
     noise = np.log(np.maximum(np.sqrt(np.nan_to_num(rough, nan=NOISE**2)), MIN_NOISE) / NOISE)
-    out = np.stack([own - ring, fine - ring, own - local, fine - near, fine - far, CONTRAST * enlarged(noise)])
-    out /= np.float32(CONTRAST)
-    return np.clip(out, -MAX_CONTRAST, MAX_CONTRAST, out=out)
+    for k, (one, other) in enumerate([(own, ring), (fine, ring), (own, local), (fine, near), (fine, far)]):
+        np.subtract(one, other, out=out[k])
+    out[:5] /= np.float32(CONTRAST)
+    out[5] = enlarged(noise, COARSE)
+    np.clip(out, -MAX_CONTRAST, MAX_CONTRAST, out=out)
 
 
 def _divided(sums: Single, counts: Single) -> Single:
@@ -196,25 +196,6 @@ def _sums(image: Single) -> Single:
     """Return the sums over large pixels."""
     rows, columns = (size // COARSE for size in image.shape)
     return np.asarray(image.reshape(rows, COARSE, columns, COARSE).sum(axis=(1, 3), dtype=np.float32))
-
-
-def enlarged(image: Single, times: int = COARSE) -> Single:
-    """Interpolate an image of large pixels linearly between their middles, on pixels so many times smaller."""
-    for axis in (0, 1):
-        at = np.clip((np.arange(image.shape[axis] * times) + 0.5) / times - 0.5, 0, image.shape[axis] - 1)
-        low = np.minimum(at.astype(np.intp), max(image.shape[axis] - 2, 0))
-        high = np.minimum(low + 1, image.shape[axis] - 1)
-        part = (at - low).astype(np.float32)
-        part = part[:, None] if axis == 0 else part[None]
-        image = image.take(low, axis) * (1 - part) + image.take(high, axis) * part
-    return image
-
-
-def _level(values: Single, weight: Single, sigma: float) -> Single:
-    """Return the mean about each pixel, NaN where there is hardly any weight."""
-    total = ndimage.gaussian_filter(weight, sigma, truncate=TRUNCATE, mode="constant")
-    mean = ndimage.gaussian_filter(values * weight, sigma, truncate=TRUNCATE, mode="constant")
-    return np.where(total > 1e-3, mean / np.maximum(total, 1e-3), np.nan).astype(np.float32)
 
 
 def _ring(level: Single, known: Bool, column: int) -> Single:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +14,8 @@ from tunneldb.errors import UserError
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.image import LiningImage
 from tunneldb.raster.pixel_state import PixelState
-from tunneldb.segmentation.channels import NAMES, REACH, STRIDE, Scale, channels, enlarged
+from tunneldb.segmentation.channels import NAMES, REACH, STRIDE, Scale, channels
+from tunneldb.segmentation.smoothing import enlarged
 from tunneldb.threads import in_blocks
 
 if TYPE_CHECKING:
@@ -29,14 +32,20 @@ WATER = CLASSES.index("water")
 FIELD = 9 * STRIDE
 """Maximum distance of pixels that a pixel's probability may depend on, pixels."""
 
-STRIP = 250 * STRIDE
-"""Length of the strips that are computed one by one, pixels: 160 m."""
+STRIP = 150 * STRIDE
+"""Length of the strips that are computed one by one, pixels: 96 m."""
 
 HALF = 128
 """Stored probability from which lining is more likely wet than not."""
 
 CERTAIN = 255
 """Stored probability of 1."""
+
+
+@cache
+def standard_network() -> Network:
+    """Return the network that comes with the program; ``python -m benchmarks.network.train`` trains it."""
+    return Network.load(files("tunneldb.segmentation").joinpath("water.onnx").read_bytes(), "water")
 
 
 @dataclass(frozen=True)
@@ -74,6 +83,7 @@ class Network:
 
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.enable_cpu_mem_arena = False  # memory is free again after each strip
         options.log_severity_level = 3
         try:
             session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
@@ -103,30 +113,47 @@ class Network:
         It is 0 off the lining, and beyond the ends of a kilometre.
         """
         grid, inner = picture.grid, picture.grid.inner
-        unit = Scale.of(grid.pixel).unit
-        step, around = STRIP // STRIDE * unit, (REACH + FIELD) // STRIDE * unit
+        scale = Scale.of(grid.pixel)
+        step, around = (-(-length // scale.span) * scale.unit for length in (STRIP, REACH + FIELD))
         out = np.zeros(picture.state.shape, np.uint8)
 
         def strip(first: int, stop: int) -> None:
             first, stop = inner.start + first, inner.start + stop
-            low, high = max(first - around, 0), min(stop + around, grid.columns)
-            here = np.s_[:, low:high]
-            found = self._strip(picture.state[here], picture.level[here], grid.pixel, grid.bottom, grid.first_column + low)
-            out[:, first:stop] = found[:, first - low : stop - low]
+            low = max(first - around, 0)
+            here, within = np.s_[:, low : stop + around], slice(first - low, stop - low)
+            level, column = picture.level[here], grid.first_column + low
+            out[:, first:stop] = self.water_of(picture.state[here], level, grid.pixel, grid.bottom, column, within)
 
         in_blocks(strip, inner.stop - inner.start, step)
-        out[picture.state > PixelState.RECESS] = 0
         return out
 
-    def _strip(self, state: UInt8, level: Int16, pixel: float, bottom: int, first_column: int) -> UInt8:
-        """Return the probability of water of the pixels of a strip."""
+    def water_of(
+        self, state: UInt8, level: Int16, pixel: float, bottom: int, first_column: int, within: slice | None = None
+    ) -> UInt8:
+        """Return the probability of water of the pixels of a strip, in steps of 1/255; 0 off the lining.
+
+        Parameters
+        ----------
+        state, level, pixel, bottom, first_column
+            See :func:`tunneldb.segmentation.channels.channels`.
+        within : slice, optional
+            Columns whose probabilities are returned; the others are their surroundings. By default all.
+        """
         rows, columns = state.shape
+        start, stop = (within.start, within.stop) if within else (0, columns)
+        off = state[:, start:stop] > PixelState.RECESS
         if not (level != NODATA).any():
-            return np.zeros(state.shape, np.uint8)
+            return np.zeros(off.shape, np.uint8)
         images, margins = channels(state, level, pixel, bottom, first_column)
-        found = resized(self.probabilities(images)[WATER], Scale.of(pixel))
-        found = found[margins.above : margins.above + rows, margins.left : margins.left + columns]
-        return np.rint(CERTAIN * found).astype(np.uint8)
+        scale = Scale.of(pixel)
+        around = -(-FIELD // scale.span)
+        begin = max((margins.left + start) // scale.unit - around, 0)
+        end = -(-(margins.left + stop) // scale.unit) + around
+        images = np.ascontiguousarray(images[:, :, begin * scale.span : end * scale.span])
+        found = resized(self.probabilities(images)[WATER], scale)
+        first = margins.left + start - begin * scale.unit
+        found = found[margins.above : margins.above + rows, first : first + stop - start]
+        return np.where(off, 0, np.rint(CERTAIN * found)).astype(np.uint8)
 
 
 def resized(image: Single, scale: Scale) -> Single:

@@ -25,7 +25,7 @@ from tunneldb.log import fields
 
 log = logging.getLogger(__name__)
 
-_LIBRARIES = ("numpy", "scipy", "numba", "laspy", "lazrs", "shapely", "rasterio", "psycopg")
+_LIBRARIES = ("numpy", "scipy", "numba", "onnxruntime", "laspy", "lazrs", "shapely", "rasterio", "psycopg")
 
 
 _TRANSIENT = (
