@@ -233,3 +233,13 @@ def test_files_are_concluded_from_together(tls: Path, tmp_path: Path) -> None:
     assert any("different coordinate systems" in doubt for doubt in both["doubts"])
     assert "--intensity intensity " in both["commands"][2]  # which is what they have in common
     assert inspected(tmp_path / "km-3.laz", code=2)["ok"] is False
+
+
+def test_a_scan_with_few_points_is_doubted(tls: Path, tmp_path: Path) -> None:
+    las, whole = laspy.read(tls), inspected(tls)
+    las[np.random.default_rng(1).random(len(las.points)) < 60.0 / whole["files"][0]["density"][1]].write(tmp_path / "few.laz")
+    few = inspected(tmp_path / "few.laz")
+    assert few["files"][0]["density"][1] == pytest.approx(60.0, rel=0.2)
+    (doubt,) = (line for line in few["doubts"] if "points per m²" in line)
+    assert "most leaks of 0.3 m² and 3 dB are not found" in doubt
+    assert not any("points per m²" in line for line in whole["doubts"])

@@ -22,6 +22,10 @@ from tunneldb.store.scanner import FARTHEST_SCANNER
 FAR_APART = 0.1
 """Profile spacing from which missed leaks are worth a remark, m."""
 
+FEW_POINTS = 200.0
+"""Density below which most leaks of 0.3 m² and 3 dB are missed, points/m²: two of five are found at 150 on smooth lining
+(docs/figures.md)."""
+
 _NO_INTENSITY = "--intensity-kind none"
 _MAX_FILES = 5  # named one by one
 _PREFERRED = ("reflectance", "amplitude", "linear")
@@ -79,6 +83,12 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         f"{look.path.name}: its profiles are {look.profile_spacing:.2f} m apart; the lining between them was not measured"
         for look in looks
         if look.profile_spacing is not None and look.profile_spacing > FAR_APART
+    ]
+    doubts += [
+        f"{look.path.name}: it has {look.density[1]:.3g} points per m²; with less than {FEW_POINTS:.0f}, most leaks of 0.3 m² and"
+        " 3 dB are not found, and tunneldb run states which could be"
+        for look in looks
+        if look.density[1] < FEW_POINTS and look.intensities and not look.foreign_unit
     ]
     if foreign := [look for look in looks if look.foreign_unit]:
         return FirstSteps(missing, doubts, [_in_metres(foreign, missing)])
