@@ -29,6 +29,7 @@ from benchmarks.common import RESULTS, progress, save, scratch_database
 from benchmarks.evidence.detection import detect
 from benchmarks.evidence.pictures import names, pictures
 from tunneldb.database import connect
+from tunneldb.segmentation.network import standard_network
 
 ROUNDS = ("known", *sorted(path.name for path in Path(__file__).parent.glob("round_*")))
 
@@ -90,7 +91,7 @@ def measure_pictures(name: str, only: str, folder: Path, dsn: str | None) -> tup
     """Detect in the pictures of a round; also names of the scenes of which there is none, for the program refused them."""
     found = []
     for picture, truth in pictures(name, folder, dsn, only):
-        found.append(detect(picture, truth))
+        found.append(detect(picture, truth, standard_network()))
         progress(f"{name} " + "  ".join(cells(truth.scene, [found[-1][0]])))
     with scratch_database(dsn) as database, connect(database) as conn:
         outcomes = [one.classed(conn, coverage) for one, coverage in found]

@@ -25,6 +25,7 @@ from tunneldb.evaluate.measure import MIN_OVERLAP
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.image import LiningImage
 from tunneldb.raster.pixel_state import PixelState
+from tunneldb.segmentation.network import standard_network
 
 GREEN, RED, BLUE = "#00a050", "#e02020", "#2060ff"
 
@@ -41,7 +42,7 @@ def main() -> None:
     if arguments.scene not in names(arguments.round):
         parser.error(f"{arguments.round} has no scene {arguments.scene}")
     for picture, truth in pictures(arguments.round, arguments.pictures, arguments.dsn, arguments.scene):
-        draw(picture, detect(picture, truth)[0], arguments.box, arguments.output)
+        draw(picture, detect(picture, truth, standard_network())[0], arguments.box, arguments.output)
 
 
 def draw(picture: LiningImage, outcome: Outcome, box: list[float] | None, path: Path) -> None:

@@ -39,6 +39,7 @@ from tunneldb.pipeline import detect as stage
 from tunneldb.raster.image import LiningImage
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import mask_of_polygons
+from tunneldb.segmentation.network import standard_network
 from tunneldb.stages.parameters import settings
 from tunneldb.store.survey import get_survey
 
@@ -155,7 +156,7 @@ def copied(picture: LiningImage) -> LiningImage:
 
 def search(picture: LiningImage) -> tuple[ContrastImage, Detection]:
     """Detect leaks in a picture, which is overwritten."""
-    background, contrast = relate(picture, [], None)
+    background, contrast = relate(picture, [], standard_network())
     return contrast, find_anomalies(contrast, background, settings()["leak.min_area"])
 
 

@@ -35,7 +35,7 @@ ROUNDS = (80, 120, 180)
 WORSE = 1.01
 """The fewest rounds are taken whose loss is no more than so many times the least."""
 
-VERSION = "2"
+VERSION = "3"
 
 
 def main() -> None:

@@ -25,7 +25,7 @@ def judged_by(model: EvidenceModel) -> Iterator[None]:
         yield
 
 
-def detect(picture: LiningImage, truth: Outcome, network: Network | None = None) -> tuple[Outcome, dict[int, Coverage]]:
+def detect(picture: LiningImage, truth: Outcome, network: Network | None) -> tuple[Outcome, dict[int, Coverage]]:
     """Find what is dark in a picture.
 
     Parameters

@@ -354,7 +354,9 @@ def test_dry_and_homogeneous_regions_that_the_user_drew(detected: psycopg.Connec
 def test_what_people_drew_is_measured_and_stays(detected: psycopg.Connection) -> None:
     conn = detected
     key, drop, held = conn.execute(
-        "SELECT id, darkening_mean, image_share FROM tunnel_api.leak WHERE counted AND area > 0.2 ORDER BY area DESC LIMIT 1"
+        "SELECT l.id, l.darkening_mean, l.image_share FROM tunnel_api.leak l JOIN tunnel_api.finding_unrolled f USING (id)"
+        " WHERE l.counted AND l.area > 0.2 AND ST_GeometryType(ST_Buffer(f.geom, -0.05)) = 'ST_Polygon'"
+        " ORDER BY l.area DESC LIMIT 1"
     ).fetchone()
     conn.execute(
         "UPDATE tunnel_api.finding_unrolled SET geom = ST_Buffer(geom, -0.05), review = 'confirmed' WHERE id = %s", [key]

@@ -13,6 +13,7 @@ from support.databases import Copies
 from support.toy_network import toy_network
 
 from tests.pipeline.test_detect import NAME, START, counts, outlines, parameters, prepare
+from tunneldb.segmentation.network import standard_network
 from tunneldb.simulate import Simulation, generate, write
 from tunneldb.simulate.lining.leaks import Leak
 
@@ -63,6 +64,12 @@ def test_what_a_network_takes_for_water_is_a_region_however_long(conn: psycopg.C
     assert wet(conn) > max(0.9, before + 0.3)
     (mean,) = conn.execute("SELECT max(darkening_mean) FROM tunnel_api.finding WHERE detected").fetchone()
     assert mean == pytest.approx(4.0, abs=0.5)  # relative to dry lining, of which the band is no part
+
+
+def test_the_network_of_the_program_is_used_unless_another_is_given(conn: psycopg.Connection) -> None:
+    command("run", NAME, "--from", "detect")
+    assert counts(conn)["network"] == standard_network().version
+    assert conn.execute("SELECT count(*) FROM tunnel.segmentation_network").fetchone() == (0,)  # it is not stored
 
 
 def test_the_ledger_names_the_network_and_its_number_can_be_used_again(conn: psycopg.Connection, toy: Path) -> None:

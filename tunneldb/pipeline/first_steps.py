@@ -85,8 +85,8 @@ def first_steps(looks: Sequence[FileLook], axis_fault: str | None = None) -> Fir
         if look.profile_spacing is not None and look.profile_spacing > FAR_APART
     ]
     doubts += [
-        f"{look.path.name}: it has {look.density[1]:.3g} points per m²; with less than {FEW_POINTS:.0f}, most leaks of 0.3 m² and"
-        " 3 dB are not found, and tunneldb run states which could be"
+        f"{look.path.name}: it has {look.density[1]:.3g} points per m²; with less than {FEW_POINTS:.0f}, most leaks of 0.3 m²"
+        " and 3 dB are not found, and tunneldb run states which could be"
         for look in looks
         if look.density[1] < FEW_POINTS and look.intensities and not look.foreign_unit
     ]

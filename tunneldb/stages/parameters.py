@@ -78,11 +78,11 @@ PARAMETERS: dict[str, Parameter] = {
     ),
     "appendage.distance": Parameter(0.03, 0.005, 0.5, "m", "distance from the local plane from which a pixel is a fixture"),
     "detect.model": Parameter(
-        0,
+        1,
         0,
         2**31 - 1,
         "",
-        "segmentation network: FILE.onnx, or the number of one that was used before; 0: none",
+        "segmentation network; 1: that of tunneldb, FILE.onnx or the number of one that was used before: your own, 0: none",
         whole=True,
     ),
     "leak.min_area": Parameter(0.05, 0.0, 100.0, "m²", "minimum area of a leak"),

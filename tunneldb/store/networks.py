@@ -11,10 +11,13 @@ from typing import Any
 import psycopg
 
 from tunneldb.errors import InputError
-from tunneldb.segmentation.network import Network
+from tunneldb.segmentation.network import Network, standard_network
 
 PARAMETER = "detect.model"
 """Parameter whose value is the number of a network."""
+
+NONE, STANDARD = 0, 1
+"""Numbers of no network, and of that which comes with the program."""
 
 MAX_BYTES = 50_000_000
 """Maximum size of a network's file."""
@@ -39,15 +42,17 @@ def add_networks(conn: psycopg.Connection[Any], assignments: Sequence[str]) -> l
 
 
 def load_network(conn: psycopg.Connection[Any], number: int) -> Network | None:
-    """Return a stored network by its number; None for 0.
+    """Return a network by its number: NONE, STANDARD, or that of a stored one.
 
     Raises
     ------
     InputError
         If there is none.
     """
-    if number == 0:
+    if number == NONE:
         return None
+    if number == STANDARD:
+        return standard_network()
     row = conn.execute("SELECT version, model FROM tunnel.segmentation_network WHERE id = %s", [number]).fetchone()
     if row is None:
         raise InputError(
