@@ -55,7 +55,7 @@ def main() -> None:
         for family in arguments.families
         for picture, truth in pictures(family, arguments.pictures, arguments.dsn)
     ]
-    parts += paintings(PAINTINGS, networks.of("painted"))
+    parts += paintings(PAINTINGS)
     features, leak, families = together(parts)
     scenes = np.concatenate([np.full(len(part.leak), f"{part.family} {part.scene}", dtype=object) for part in parts])
     weights = weights_of(scenes) * np.where(families == "painted", PAINTED, 1.0)

@@ -46,7 +46,7 @@ def candidates(family: str, picture: LiningImage, truth: Outcome, network: Netwo
     """Find the dark regions of a tunnel, and hold them against the truth; those on leaks that can't be told are left out."""
     picture = LiningImage(picture.grid, picture.state, picture.level.copy(), picture.gaps)
     _, contrast = relate(picture, [], network)
-    dark, _ = find_dark(contrast)
+    dark = find_dark(contrast)
     wet = shapely.union_all(truth.true)
     dim = shapely.union_all([shape for shape, limit in zip(truth.true, truth.limits, strict=True) if limit])
     features, leak = [], []

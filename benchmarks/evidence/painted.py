@@ -23,7 +23,6 @@ from tunneldb.anomalies.features import measure_regions
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import FaceGrid
 from tunneldb.raster.pixel_state import PixelState
-from tunneldb.segmentation.network import Network
 
 PIXEL, TILE = 0.02, 25
 LONG, HALF = 15.0, 4.5
@@ -64,17 +63,15 @@ class Painting:
         self.drop = np.maximum(self.drop, drop * amount)
         self.wet[amount >= 0.4] = wet
 
-    def regions(self, network: Network | None) -> Iterator[tuple[Array, bool]]:
+    def regions(self) -> Iterator[tuple[Array, bool]]:
         """Features of the dark regions, and whether each is a leak."""
         noisy = self.drop + self.rng.normal(0, self.sigma, self.drop.shape)
         empty = (self.rng.random(self.drop.shape) > self.filled) & (self.state != PixelState.OFF)
         drop = np.where(empty, NODATA, np.rint(100 * noisy)).astype(np.int16)
         state = np.where(empty, PixelState.EMPTY, self.state).astype(np.uint8)
         sigma = np.full((self.grid.rows // TILE, self.grid.columns // TILE), self.sigma, np.float32)
-        level = np.where(empty, NODATA, -drop).astype(np.int16)
-        water = None if network is None else network.water_of(state, level, PIXEL, self.grid.bottom, 0)
-        contrast = ContrastImage(self.grid, state, drop, TILE, sigma, water=water)
-        dark, _ = find_dark(contrast)
+        contrast = ContrastImage(self.grid, state, drop, TILE, sigma)
+        dark = find_dark(contrast)
         regions = [region for region in find_dark_regions(dark, contrast, LEAST) if is_large_enough(region, LEAST)]
         for region, features in zip(regions, measure_regions(regions), strict=True):
             rows, columns = region.mask.shape
@@ -234,8 +231,8 @@ ALONE = 0.4
 """Share of the pictures that show one or two sorts of things only."""
 
 
-def paintings(count: int, network: Network | None, first: int = 1) -> list[Candidates]:
-    """Regions of so many pictures, to which a network that was not trained on them may give water."""
+def paintings(count: int, first: int = 1) -> list[Candidates]:
+    """Regions of so many pictures."""
     makers = [make for make, _ in THINGS]
     parts = []
     for seed in range(first, first + count):
@@ -248,7 +245,7 @@ def paintings(count: int, network: Network | None, first: int = 1) -> list[Candi
         for s in np.arange(CELL / 2, LONG, CELL):
             for a in (-HALF + CELL / 2, 0.1, HALF - CELL / 2):
                 makers[art.rng.choice(len(makers), p=often / often.sum())](art, float(s), float(a))
-        found = list(art.regions(network))
+        found = list(art.regions())
         features = np.array([row for row, _ in found]).reshape(len(found), -1)
         parts.append(Candidates(f"painting {seed}", "painted", features, np.array([leak for _, leak in found], np.bool_)))
     return parts

@@ -55,7 +55,7 @@ def test_a_leak_in_masonry_is_found_whole(spread, along, across, drop):
     row, column = np.mgrid[:400, :800] * PIXEL
     wet = np.hypot(row - 4.0, column - 8.0) < 0.7
     sigma = float(np.hypot(spread, NOISE))
-    dark, _ = find_dark(image(shown + drop * wet, sigma))
+    dark = find_dark(image(shown + drop * wet, sigma)).pixels
     part, _ = ndimage.label(dark[:, :800])
     found = part == np.bincount(part[wet])[1:].argmax() + 1  # single dark bricks elsewhere are no part of it
     assert found[wet].mean() > 0.85

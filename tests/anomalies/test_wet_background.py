@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.background.level_map import map_background
+from tunneldb.anomalies.detect import find_dark, find_dark_regions
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import LiningImage
 from tunneldb.raster.pixel_state import PixelState
@@ -41,3 +43,17 @@ def test_where_hardly_any_dry_lining_would_be_left_all_of_it_counts(picture):
     background = map_background(image, [], wet)
     assert background.count == image.state.size
     assert level_of(image, wet, slice(0, 340)) == pytest.approx(DRY, abs=0.1)
+
+
+@pytest.mark.parametrize("by", [-2, 2, 4])
+def test_water_that_a_network_outlines_too_tight_or_too_wide_ends_where_it_is_half_as_dark(by):
+    """A disc of 0.6 m, 3 dB: outlined by 4 cm too small, and by 4 and 8 cm too large."""
+    grid = Grid(0, 0.02, -200, 400, 0, (0, 1))
+    rows, columns = np.mgrid[:400, : grid.columns]
+    distance = np.hypot(rows - 200, columns - 1000)
+    drop = np.rint(100 * (3.0 * (distance < 15) + np.random.default_rng(2).normal(0, 0.2, distance.shape))).astype(np.int16)
+    water = np.where(distance < 15 + by, 255, 0).astype(np.uint8)
+    sigma = np.full((16, grid.columns // 25), 0.2, np.float32)
+    image = ContrastImage(grid, np.full(drop.shape, PixelState.LINING, np.uint8), drop, 25, sigma, water=water)
+    (found,) = (region for region in find_dark_regions(find_dark(image), image, 0.05) if region.area > 0.05)
+    assert found.area == pytest.approx(np.pi * 0.3**2, rel=0.1)

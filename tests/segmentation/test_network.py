@@ -10,7 +10,7 @@ from tunneldb.raster.grid import FaceGrid
 from tunneldb.raster.image import CONTEXT, LiningImage
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.segmentation.channels import PIXEL, REACH
-from tunneldb.segmentation.network import CERTAIN, FIELD, HALF, Network
+from tunneldb.segmentation.network import BEYOND, CERTAIN, FIELD, HALF, Network
 
 
 def picture(columns=3000, pixel=0.02, seed=1, first=0):
@@ -78,7 +78,7 @@ def test_the_number_of_threads_changes_nothing(monkeypatch):
 
 
 def test_the_context_of_a_kilometre_is_what_the_network_sees():
-    assert CONTEXT >= (REACH + FIELD) * PIXEL
+    assert CONTEXT >= (REACH + FIELD + BEYOND) * PIXEL
 
 
 @pytest.mark.parametrize(

@@ -69,6 +69,25 @@ class Detection:
     wet_pixels: int
 
 
+@dataclass(frozen=True)
+class DarkPixels:
+    """Dark pixels of a picture.
+
+    Attributes
+    ----------
+    pixels : (rows, columns) bool array
+        All dark pixels.
+    water : (rows, columns) bool array or None
+        Those of them that a segmentation network classifies as water; None if there is none.
+    size : int
+        Side of the median filter that was applied, pixels.
+    """
+
+    pixels: Bool
+    water: Bool | None
+    size: int
+
+
 def find_anomalies(
     contrast: ContrastImage, background: BackgroundMap, min_area: float, model: EvidenceModel | None = None
 ) -> Detection:
@@ -91,7 +110,7 @@ def find_anomalies(
     wet = np.zeros(state.shape, np.bool_)
     if not background.count:
         return Detection([], [], wet.copy(), wet, filter_size(1.0), pixels, 0)
-    dark, size = find_dark(contrast)
+    dark = find_dark(contrast)
     anomalies, cut, leaks = [], [], []
     ends = (grid.first_column + grid.inner.start, grid.first_column + grid.inner.stop)
     regions = find_dark_regions(dark, contrast, min_area)
@@ -106,8 +125,8 @@ def find_anomalies(
         if anomaly is not None and anomaly.verdict.kind == FindingKind.LEAK:
             leaks.append(region)
     _draw(wet, leaks, grid)
-    wet &= dark
-    return Detection(anomalies, cut, dark, wet, size, pixels, sum(region.filled for region in leaks))
+    wet &= dark.pixels
+    return Detection(anomalies, cut, dark.pixels, wet, dark.size, pixels, sum(region.filled for region in leaks))
 
 
 def is_large_enough(region: Region, min_area: float) -> bool:
@@ -144,35 +163,30 @@ def _classified(regions: Sequence[Region], min_area: float, model: EvidenceModel
     return found
 
 
-def find_dark(contrast: ContrastImage) -> tuple[Bool, int]:
-    """Mark dark pixels: above the threshold, with the boundary moved to half of their contrast.
-
-    Returns
-    -------
-    dark : (rows, columns) bool array
-    size : int
-        Side of the median filter, pixels.
-    """
+def find_dark(contrast: ContrastImage) -> DarkPixels:
+    """Mark dark pixels: above the threshold, or water, with the boundaries moved to half of their contrast."""
     lining, possible = _lining_in_columns(contrast.state, contrast.grid.inner)
     size = filter_size(_scanned_share(lining, possible, round(MIN_UNSCANNED_LENGTH / contrast.grid.pixel)))
     dark = refine_boundary(dark_pixels(contrast, size), contrast, size)
-    if (wet := contrast.wet()) is not None:
-        dark |= wet
-    return dark, size
+    water = contrast.wet()
+    if water is not None:
+        water = refine_boundary(water, contrast, size)
+        dark |= water
+    return DarkPixels(dark, water, size)
 
 
-def find_dark_regions(dark: Bool, contrast: ContrastImage, min_area: float) -> list[Region]:
+def find_dark_regions(dark: DarkPixels, contrast: ContrastImage, min_area: float) -> list[Region]:
     """Find the regions of dark pixels that may be leaks, joints or dry dark areas, with joints cut off."""
     inner, pixel = contrast.grid.inner, contrast.grid.pixel
-    wet = contrast.wet()
-    rest = dark if wet is None else dark & ~_widened(wet, round(RIM / pixel))
+    pixels, water = dark.pixels, dark.water
+    rest = pixels if water is None else pixels & ~_widened(water, round(RIM / pixel))
     joints = find_joints(rest, inner.start, inner.stop, pixel, contrast.spacing)
     plain = rest & ~joints
     weak = weaker_parts(plain, contrast)
     # For the darker region, the weaker part of a region is not dark lining: the region ends at it.
-    parts = [(plain & ~weak, dark & ~weak), (weak, dark), (joints, dark)]
-    if wet is not None:
-        parts.append((wet, wet))
+    parts = [(plain & ~weak, pixels & ~weak), (weak, pixels), (joints, pixels)]
+    if water is not None:
+        parts.append((water, water))
     found = []
     for part, others in parts:
         if part.any():

@@ -152,7 +152,7 @@ class ScanSource:
     path : Path
         Path at the time of reading.
     ranges : list of (int, int)
-        Half-open ranges of point indices, from 0, that contain all points of the kilometre and 17 m on both sides.
+        Half-open ranges of point indices, from 0, that contain all points of the kilometre and 18 m on both sides.
     dimension : str or None
         The survey's intensity dimension.
     units : Units

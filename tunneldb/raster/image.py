@@ -18,8 +18,8 @@ from tunneldb.raster.observation import Observer
 from tunneldb.raster.pixel_state import PixelState, pixel_states, reach
 from tunneldb.raster.profiles import ProfileGaps, farthest
 
-CONTEXT = 15.6
-"""Length beyond the ends of a kilometre whose lining is seen, m: so far the segmentation network looks."""
+CONTEXT = 17.0
+"""Length beyond the ends of a kilometre whose lining is seen, m: what the segmentation network sees from 1.28 m beyond."""
 
 WET_EDGE = 3
 """Number of pixels around a wet one that do not count as dry lining."""

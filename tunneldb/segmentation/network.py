@@ -32,6 +32,9 @@ WATER = CLASSES.index("water")
 FIELD = 9 * STRIDE
 """Maximum distance of pixels that a pixel's probability may depend on, pixels."""
 
+BEYOND = 2 * STRIDE
+"""Distance from the ends of a kilometre to which water is computed, pixels: so far the boundaries of regions depend on it."""
+
 STRIP = 150 * STRIDE
 """Length of the strips that are computed one by one, pixels: 96 m."""
 
@@ -110,21 +113,22 @@ class Network:
     def water(self, picture: LiningImage) -> UInt8:
         """Return the probability of water of each pixel of a picture (rows, columns), in steps of 1/255.
 
-        It is 0 off the lining, and beyond the ends of a kilometre.
+        It is 0 off the lining, and farther than BEYOND from the kilometre.
         """
         grid, inner = picture.grid, picture.grid.inner
         scale = Scale.of(grid.pixel)
-        step, around = (-(-length // scale.span) * scale.unit for length in (STRIP, REACH + FIELD))
+        step, around, beyond = (-(-length // scale.span) * scale.unit for length in (STRIP, REACH + FIELD, BEYOND))
+        begin, end = max(inner.start - beyond, 0), min(inner.stop + beyond, grid.columns)
         out = np.zeros(picture.state.shape, np.uint8)
 
         def strip(first: int, stop: int) -> None:
-            first, stop = inner.start + first, inner.start + stop
+            first, stop = begin + first, begin + stop
             low = max(first - around, 0)
             here, within = np.s_[:, low : stop + around], slice(first - low, stop - low)
             level, column = picture.level[here], grid.first_column + low
             out[:, first:stop] = self.water_of(picture.state[here], level, grid.pixel, grid.bottom, column, within)
 
-        in_blocks(strip, inner.stop - inner.start, step)
+        in_blocks(strip, end - begin, step)
         return out
 
     def water_of(
