@@ -14,7 +14,7 @@ from shapely.geometry import Polygon
 
 from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.background.level_map import BackgroundMap
-from tunneldb.anomalies.background.relate import relate
+from tunneldb.anomalies.background.relate import relate, usable
 from tunneldb.anomalies.bands import DarkBand, find_bands
 from tunneldb.anomalies.coverage import Coverage, measure_coverage
 from tunneldb.anomalies.detect import Detection, find_anomalies
@@ -323,11 +323,12 @@ def _save(
     )
     if result.background.count:
         save_measured(conn, inputs.drawn, result.drawn)
+    network = usable(inputs.network, result.grid.pixel)
     notes = [survey.note, inputs.judge.note, result.calibration.note, detectability_statement(conn, survey, km)]
     return {
         **result.counts,
         "model": inputs.judge.model.version,
-        "network": None if inputs.network is None else inputs.network.version,
+        "network": None if network is None else network.version,
         "learned": inputs.judge.id,
         "pixels": images.pixels,
         "lining_pixels": found.pixels,
