@@ -23,7 +23,7 @@ from tunneldb.store.scene import load_scene
 from tunneldb.store.survey import get_survey
 
 NAME = "s"
-START, LENGTH, BORDER = 980.0, 50.0, 1018.0  # a kilometre ends in the middle of the first file
+START, LENGTH, BORDER = 980.0, 50.0, 1020.0  # a kilometre ends in the first file, and its margin too
 FOOT = METRES["us-ft"]
 FLOOR, LINING = 1, 0  # of the truth
 FAR = 100.0  # m above the tunnel: points of nothing
