@@ -148,6 +148,10 @@ def outcome(conn: psycopg.Connection[Any], scene: Scene, folder: Path, seconds: 
     return made.classed(conn, read_coverage(conn, survey.id))
 
 
+LEAST_HOLE = 0.05
+"""Length around the smallest hole of an outline that counts, m; authors' outlines have holes without an area."""
+
+
 def layer(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> tuple[list[BaseGeometry], list[dict[str, Any]]]:
     """Polygons of a file, in the unrolled plane, and their properties; none where there is no file.
 
@@ -157,7 +161,8 @@ def layer(conn: psycopg.Connection[Any], survey: Survey, path: Path) -> tuple[li
     shapes = []
     for feature in features:
         parts = []
-        for part in shapely.get_parts(shapely.from_geojson(json.dumps(feature["geometry"]))):
+        for whole in shapely.get_parts(shapely.from_geojson(json.dumps(feature["geometry"]))):
+            part = shapely.Polygon(whole.exterior, [hole for hole in whole.interiors if hole.length > LEAST_HOLE])
             (flat,) = conn.execute(
                 "SELECT public.ST_AsBinary(tunnel_api.unroll_shape(%s, public.ST_GeomFromWKB(%s, %s)))",
                 (survey.id, shapely.to_wkb(part), survey.srid),
