@@ -34,8 +34,8 @@ def detect(picture: LiningImage, truth: Outcome, network: Network | None) -> tup
         Stays as it is.
     truth : Outcome
         What was found when the picture was made counts no more.
-    network : Network, optional
-        A segmentation network.
+    network : Network or None
+        The segmentation network.
 
     Returns
     -------

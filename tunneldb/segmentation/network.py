@@ -126,25 +126,17 @@ class Network:
             low = max(first - around, 0)
             here, within = np.s_[:, low : stop + around], slice(first - low, stop - low)
             level, column = picture.level[here], grid.first_column + low
-            out[:, first:stop] = self.water_of(picture.state[here], level, grid.pixel, grid.bottom, column, within)
+            out[:, first:stop] = self._water_of(picture.state[here], level, grid.pixel, grid.bottom, column, within)
 
         in_blocks(strip, end - begin, step)
         return out
 
-    def water_of(
-        self, state: UInt8, level: Int16, pixel: float, bottom: int, first_column: int, within: slice | None = None
-    ) -> UInt8:
-        """Return the probability of water of the pixels of a strip, in steps of 1/255; 0 off the lining.
+    def _water_of(self, state: UInt8, level: Int16, pixel: float, bottom: int, first_column: int, within: slice) -> UInt8:
+        """Return the probability of water of the columns ``within`` a strip, in steps of 1/255; 0 off the lining.
 
-        Parameters
-        ----------
-        state, level, pixel, bottom, first_column
-            See :func:`tunneldb.segmentation.channels.channels`.
-        within : slice, optional
-            Columns whose probabilities are returned; the others are their surroundings. By default all.
+        The other columns are their surroundings. For the rest see :func:`tunneldb.segmentation.channels.channels`.
         """
-        rows, columns = state.shape
-        start, stop = (within.start, within.stop) if within else (0, columns)
+        rows, start, stop = len(state), within.start, within.stop
         off = state[:, start:stop] > PixelState.RECESS
         if not (level != NODATA).any():
             return np.zeros(off.shape, np.uint8)
