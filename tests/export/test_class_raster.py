@@ -20,6 +20,7 @@ from tunneldb.geometry.frame import segment_rows, tangents
 from tunneldb.geometry.stationing import Stationing
 from tunneldb.geometry.surface import Surface
 from tunneldb.raster.geotiff import Raster
+from tunneldb.raster.overview import shrink_codes
 
 RADIUS = 4.0
 
@@ -130,7 +131,7 @@ def test_smaller_picture_shows_the_commonest_class() -> None:
     values[:2, :2] = [[2, 64], [64, 0]]
     values[2:, :2] = [[0, 0], [0, 66]]
     values[:2, 2:4] = [[2, 2], [67, 67]]
-    small = preview.shrink_codes(values, 2)
+    small = shrink_codes(values, 2)
     assert small[:, :2].tolist() == [[64, 67], [66, pytest.approx(np.nan, nan_ok=True)]]
     assert np.isnan(small[:, 2]).all()
 

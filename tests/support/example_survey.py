@@ -23,7 +23,10 @@ from tunneldb.geometry.frame import frames_at, segment_rows, tangents
 from tunneldb.geometry.surface import Surface
 from tunneldb.raster.geotiff import KINDS, Raster, decode, encode
 from tunneldb.raster.grid import BLOCK, Grid
+from tunneldb.raster.overview import Overview
 from tunneldb.raster.pixel_state import PixelState
+from tunneldb.store.images import save_overview
+from tunneldb.store.survey import get_survey
 
 DATABASE = "tunneldb_example"
 NAME, SRID, SPACING = "demo-2024", 25830, 10.0
@@ -296,6 +299,7 @@ def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines
     """Lining in bands of shade, darker where it leaks; the floor, with what stands on it, has an offset only."""
     rng = np.random.default_rng(2)
     grid = Grid.covering(KM, PIXEL, *surface.arc_range(12402.5))
+    overviews = {kind: Overview(kind) for kind in (*KINDS, "state")}
     for block in range(int(12300 / BLOCK), int(12500 / BLOCK)):
         columns = slice((block - grid.first_block) * grid.block_columns, (block - grid.first_block + 1) * grid.block_columns)
         x, y = np.meshgrid(grid.chainages(columns), grid.arcs())
@@ -316,6 +320,9 @@ def _images(conn: psycopg.Connection, survey_id: int, surface: Surface, outlines
                 "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %s)",
                 (survey_id, KM, kind, block, encode(Raster(held, grid.transform(columns.start)), kind)),
             )
+            overviews[kind].add(Raster(held, grid.transform(columns.start)))
+    for overview in overviews.values():
+        save_overview(conn, get_survey(conn, NAME), KM, overview)
 
 
 def without_intensity(conn: psycopg.Connection, every: int = 1) -> None:

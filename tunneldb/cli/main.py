@@ -69,6 +69,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "ground": ("tunneldb.cli.ground:ground", "Classify the points of one scan file, without a database."),
     },
     "Review": {
+        "serve": ("tunneldb.cli.serve:serve", "Serve the desk, a page for inspections in a browser."),
         "leaks": ("tunneldb.cli.leaks:leaks", "List or export detected leaks."),
         "findings": ("tunneldb.cli.findings:findings", "List, export or import findings of all kinds, detected or drawn."),
         "spots": ("tunneldb.cli.spots:spots", "List or export spots on the members of a structure."),

@@ -177,6 +177,7 @@ def detect(
     if inputs.sample is None:
         images = ImageStore(conn, survey, ["offset"])
         counts = make_offset_images(inputs, values, images.save, progress)
+        images.save_overviews(inputs.grid)
         drop_radiometry(conn, survey, km)
         drop_coverage(conn, survey, km)
         drop_bands(conn, survey, km)
@@ -313,6 +314,7 @@ def _save(
 ) -> Counts:
     km, surface, found, roughness = inputs.grid.km, inputs.observer.surface, result.anomalies, result.calibration.roughness
     images.save_states(result.grid, result.state, found.dark)
+    images.save_overviews(result.grid)
     save_range_curve(conn, survey, km, result.calibration.found)
     save_radiometry(conn, survey, km, roughness, result.background, found.pixels, found.wet_pixels, result.dry_levels)
     save_coverage(conn, survey, km, result.coverage)

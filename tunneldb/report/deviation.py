@@ -15,11 +15,11 @@ from psycopg import sql
 from psycopg.rows import dict_row
 
 from tunneldb.arrays import Single, UInt8
-from tunneldb.export.images.preview import shrink
 from tunneldb.measures.deviation.rows import layers_held
 from tunneldb.raster.gap_fill import MAX_FILL_DISTANCE, fill_gaps
 from tunneldb.raster.geotiff import DEVIATION_KINDS
 from tunneldb.raster.grid import BLOCK
+from tunneldb.raster.overview import shrink
 from tunneldb.report.data import label_chainages
 from tunneldb.report.drawing import line_path, step_for, ticks
 from tunneldb.report.lining import QUALITY, Form

@@ -22,7 +22,8 @@ from tunneldb.radiometry.robust_statistics import DryLevel
 from tunneldb.radiometry.roughness import Roughness
 from tunneldb.raster.accumulator import Window
 from tunneldb.raster.geotiff import Raster, decode, encode
-from tunneldb.raster.grid import Grid
+from tunneldb.raster.grid import BLOCKS, Grid
+from tunneldb.raster.overview import PREFIX, Overview
 from tunneldb.raster.pixel_state import PixelState
 from tunneldb.store.survey import Survey
 
@@ -100,6 +101,7 @@ class ImageStore:
         self.conn, self.survey, self.kinds = conn, survey, kinds
         self.pixels = 0
         self._blocks: list[int] = []
+        self._overviews = {kind: Overview(kind) for kind in (*kinds, "state")}
 
     def save(self, grid: Grid, window: Window) -> None:
         """Save a whole block of a grid as points fell into it."""
@@ -108,7 +110,7 @@ class ImageStore:
         if not self._blocks:  # only now: what makes the images takes long, and others look at those that are there
             # Deviation is not made here: it stays, stale, with its sections.
             self.conn.execute(
-                "DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind NOT LIKE 'deviation%%'",
+                "DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind NOT LIKE '%%deviation%%'",
                 (self.survey.id, grid.km),
             )
         self.pixels += int(np.count_nonzero(window.weight))
@@ -124,11 +126,29 @@ class ImageStore:
             values = np.where(dark[:, columns], np.float32(PixelState.DARK), state[:, columns].astype(np.float32))
             self._insert(grid, "state", block, Raster(values, grid.transform(first)))
 
+    def save_overviews(self, grid: Grid) -> None:
+        """Save the overviews of the images saved before."""
+        for overview in self._overviews.values():
+            save_overview(self.conn, self.survey, grid.km, overview)
+
     def _insert(self, grid: Grid, kind: str, block: int, raster: Raster) -> None:
-        self.conn.execute(
-            "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %b)",
-            (self.survey.id, grid.km, kind, block, encode(raster, kind)),
-        )
+        self._overviews[kind].add(raster)
+        insert_image(self.conn, self.survey, grid.km, kind, block, encode(raster, kind))
+
+
+def insert_image(conn: psycopg.Connection[Any], survey: Survey, km: int, kind: str, block: int, tiff: bytes) -> None:
+    """Add a block of an image."""
+    conn.execute(
+        "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %b)",
+        (survey.id, km, kind, block, tiff),
+    )
+
+
+def save_overview(conn: psycopg.Connection[Any], survey: Survey, km: int, overview: Overview) -> None:
+    """Add the overview of a kilometre, if it has blocks; the former one must be deleted before."""
+    raster = overview.raster()
+    if raster is not None:
+        insert_image(conn, survey, km, PREFIX + overview.kind, km * BLOCKS, encode(raster, overview.kind))
 
 
 def _values(window: Window, kind: str) -> Single:

@@ -199,7 +199,20 @@ class Image(Base):
     __tablename__ = "image"
     __table_args__ = (
         one_of(
-            "kind", "raw", "corrected", "offset", "state", "deviation_lining", "deviation_shotcrete", "deviation_excavation"
+            "kind",
+            *(
+                f"{prefix}{kind}"
+                for prefix in ("", "overview_")
+                for kind in (
+                    "raw",
+                    "corrected",
+                    "offset",
+                    "state",
+                    "deviation_lining",
+                    "deviation_shotcrete",
+                    "deviation_excavation",
+                )
+            ),
         ),
         {
             "comment": "Unrolled images in blocks of 50 m: partition image_s<survey>",
@@ -212,10 +225,12 @@ class Image(Base):
     kind: Mapped[str] = mapped_column(
         primary_key=True,
         comment="raw or corrected intensity, dB, offset from the surface, m, state of the pixel, or deviation from the design "
-        "profiles of a layer, m",
+        "profiles of a layer, m; overview_KIND: the same of a whole kilometre, with pixels of about 0.4 m",
     )
     block: Mapped[int] = mapped_column(
-        primary_key=True, autoincrement=False, comment="Block along the tunnel: floor(chainage / 50)"
+        primary_key=True,
+        autoincrement=False,
+        comment="Block along the tunnel: floor(chainage / 50); of an overview the first of its kilometre",
     )
     tiff: Mapped[bytes] = mapped_column(comment="GeoTIFF in the unrolled plane (chainage, arc), m")
 

@@ -25,6 +25,7 @@ from tunneldb.geometry.stationing import KILOMETRE
 from tunneldb.raster.gap_fill import FILL_NOTE, MAX_FILL_DISTANCE, fill_blocks
 from tunneldb.raster.geotiff import DEVIATION_KINDS, KINDS, laid
 from tunneldb.raster.grid import BLOCK
+from tunneldb.raster.overview import shrink, shrink_codes
 from tunneldb.store.alignment import load_stationing
 from tunneldb.store.images import image_blocks, load_block
 from tunneldb.store.survey import Survey
@@ -94,7 +95,7 @@ def _export_filled(conn: psycopg.Connection, survey: Survey, km: int, kind: str,
             raster = load_block(conn, survey, other, kind, block)
             if raster.transform.a == first.transform.a:
                 pixels = raster.values if other == km else laid(raster, first)
-                yield (block - blocks[0]) * columns, preview.shrink(pixels, factor)
+                yield (block - blocks[0]) * columns, shrink(pixels, factor)
 
     path = folder / f"{survey.name}-km{km:03d}-{kind}-filled.tif"
     filled = fill_blocks(shrunk(), MAX_FILL_DISTANCE / extent.transform.a)
@@ -158,8 +159,8 @@ class _Sheet:
 
     def note(self, west: float, pixels: NDArray[Any]) -> None:
         """Add a block that begins at a chainage, m."""
-        shrink: Callable[[NDArray[Any], int], Single] = preview.shrink_codes if pixels.dtype == np.uint8 else preview.shrink
-        self._blocks.append((west, shrink(pixels, self._factor)))
+        smaller: Callable[[NDArray[Any], int], Single] = shrink_codes if pixels.dtype == np.uint8 else shrink
+        self._blocks.append((west, smaller(pixels, self._factor)))
 
     def strips(self) -> Iterator[preview.Strip]:
         """Place the blocks in strips of 100 m."""

@@ -55,33 +55,6 @@ class Strip:
     values: Single
 
 
-def shrink(values: Single, factor: int) -> Single:
-    """Average blocks of ``factor`` × ``factor`` pixels, passing over NaNs; the image is filled up to whole blocks."""
-    rows, columns = (-(-n // factor) * factor for n in values.shape)
-    padded = np.full((rows, columns), np.nan, np.float32)
-    padded[: values.shape[0], : values.shape[1]] = values
-    blocks = padded.reshape(rows // factor, factor, columns // factor, factor)
-    held = np.isfinite(blocks)
-    count = held.sum(axis=(1, 3))
-    total = np.where(held, blocks, 0.0).sum(axis=(1, 3))
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan).astype(np.float32)
-
-
-def shrink_codes(values: UInt8, factor: int) -> Single:
-    """Return the most frequent code of ``factor`` × ``factor`` pixels, the greater of two; ignores 0, which becomes NaN."""
-    rows, columns = (-(-n // factor) * factor for n in values.shape)
-    padded = np.zeros((rows, columns), np.uint8)
-    padded[: values.shape[0], : values.shape[1]] = values
-    blocks = padded.reshape(rows // factor, factor, columns // factor, factor)
-    out = np.full((rows // factor, columns // factor), np.nan, np.float32)
-    most = np.ones(out.shape, np.int64)
-    for code in np.flatnonzero(np.bincount(values.ravel(), minlength=256)[1:]) + 1:
-        count = (blocks == code).sum(axis=(1, 3))
-        out[count >= most] = code
-        most = np.maximum(most, count)
-    return out
-
-
 def _filled(kind: str, values: Single, reach: float) -> Single:
     """Fill the gaps of an image; fixtures in them do not colour their surroundings. Gaps between states are shown."""
     if kind == "state":

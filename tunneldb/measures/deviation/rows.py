@@ -12,8 +12,9 @@ from tunneldb.arrays import Bool
 from tunneldb.measures.deviation.compute import Step
 from tunneldb.raster.geotiff import DEVIATION_KINDS, Raster, encode
 from tunneldb.raster.grid import BLOCK
+from tunneldb.raster.overview import PREFIX, Overview
 from tunneldb.raster.pixel_state import shows_lining
-from tunneldb.store.images import image_blocks, load_kinds
+from tunneldb.store.images import image_blocks, insert_image, load_kinds, save_overview
 from tunneldb.store.survey import Survey
 
 
@@ -36,13 +37,15 @@ def load_offsets(conn: psycopg.Connection[Any], survey: Survey, km: int) -> Iter
 def replace_image(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str, blocks: Iterable[Raster]) -> None:
     """Replace the image of a kilometre's deviation from a layer; blocks that show nothing are left out."""
     kind = DEVIATION_KINDS[layer]
-    conn.execute("DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = %s", [survey.id, km, kind])
+    conn.execute(
+        "DELETE FROM tunnel.image WHERE survey_id = %s AND km = %s AND kind = ANY(%s)", [survey.id, km, [kind, PREFIX + kind]]
+    )
+    overview = Overview(kind)
     for raster in blocks:
         if np.isfinite(raster.values).any():
-            conn.execute(
-                "INSERT INTO tunnel.image (survey_id, km, kind, block, tiff) VALUES (%s, %s, %s, %s, %b)",
-                (survey.id, km, kind, round(raster.transform.c / BLOCK), encode(raster, kind)),
-            )
+            insert_image(conn, survey, km, kind, round(raster.transform.c / BLOCK), encode(raster, kind))
+            overview.add(raster)
+    save_overview(conn, survey, km, overview)
 
 
 def save_steps(conn: psycopg.Connection[Any], survey: Survey, km: int, layer: str, steps: Sequence[Step]) -> None:

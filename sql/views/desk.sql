@@ -1,0 +1,162 @@
+-- What the desk in a browser (tunneldb serve) reads of a survey: image blocks, the ribbon of the whole tunnel, and vector tiles of
+-- findings. Needs stretch_statistics (leaks/statistics.sql).
+
+-- Images are partitioned by survey. A generic plan would open the partitions of all surveys.
+CREATE OR REPLACE FUNCTION tunnel_api.image_versions(survey_id int, kind text, first_block int, last_block int)
+RETURNS TABLE (block int, version bigint)
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 20
+SET search_path = pg_catalog, pg_temp
+SET plan_cache_mode = force_custom_plan
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    wanted constant text := kind;
+BEGIN
+    RETURN QUERY SELECT i.block, i.xmin::text::bigint FROM tunnel.image i
+                  WHERE i.survey_id = survey_key AND i.kind = wanted AND i.block BETWEEN first_block AND last_block
+                    AND i.km BETWEEN floor(first_block / 20.0) AND floor(last_block / 20.0) ORDER BY i.block;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.image_versions(int, text, int, int) IS
+'Blocks of 50 m of an unrolled image that exist, from a first to a last one (floor(chainage / 50)), each with a number that changes if the block is written again. Kinds are those of image_value, and overview_KIND: one image of a kilometre with pixels of about 0.4 m, under the number of its first block';
+
+CREATE OR REPLACE FUNCTION tunnel_api.image_tiffs(survey_id int, kind text, blocks int[])
+RETURNS TABLE (block int, tiff bytea)
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 5
+SET search_path = pg_catalog, pg_temp
+SET plan_cache_mode = force_custom_plan
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    wanted constant text := kind;
+    chosen constant int[] := blocks;
+BEGIN
+    RETURN QUERY SELECT i.block, i.tiff FROM tunnel.image i
+                  WHERE i.survey_id = survey_key AND i.kind = wanted AND i.block = ANY (chosen)
+                    AND i.km = ANY (SELECT floor(b / 20.0)::int FROM unnest(chosen) AS b) ORDER BY i.block;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.image_tiffs(int, text, int[]) IS
+'Blocks of an unrolled image as GeoTIFF in the unrolled plane (chainage, arc; m), by their numbers (image_versions): 16-bit integers with a scale, in dB or m';
+
+CREATE OR REPLACE FUNCTION tunnel_api.image_kinds(survey_id int)
+RETURNS SETOF text
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 10
+SET search_path = pg_catalog, pg_temp
+SET plan_cache_mode = force_custom_plan
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+BEGIN
+    RETURN QUERY SELECT DISTINCT i.kind FROM tunnel.image i WHERE i.survey_id = survey_key ORDER BY 1;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.image_kinds(int) IS
+'Kinds of the unrolled images of a survey: raw, corrected, offset, state, deviation_…, and their overviews (image_versions)';
+
+CREATE OR REPLACE FUNCTION tunnel_api.ribbon(survey_id int, chainage_from float8, chainage_to float8, bins int)
+RETURNS TABLE (n int, seen_share float8, wet_area float8, findings jsonb, reviewed int, probability float8)
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 1000
+SET search_path = pg_catalog, pg_temp
+SET jit = off
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    low constant float8 := chainage_from;
+    step constant float8 := (chainage_to - chainage_from) / bins;
+    count constant int := bins;
+BEGIN
+    IF count NOT BETWEEN 1 AND 2000 OR NOT step > 0 THEN
+        RAISE EXCEPTION 'a ribbon has 1 to 2000 bins and a length above 0' USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    RETURN QUERY
+    WITH place AS MATERIALIZED (
+        SELECT least(floor(((a.chainage_from + a.chainage_to) / 2 - low) / step)::int + 1, count) AS n,
+               coalesce(a.kind_override, a.kind) AS kind, a.review
+          FROM tunnel.finding a
+         WHERE a.survey_id = survey_key AND a.detected AND a.review <> 'rejected' AND NOT a.superseded
+    ), kinds AS (
+        SELECT c.n, jsonb_object_agg(c.kind, c.number) AS findings
+          FROM (SELECT p.n, p.kind, count(*) AS number FROM place p GROUP BY p.n, p.kind) c GROUP BY c.n
+    ), reviews AS (
+        SELECT p.n, count(*) FILTER (WHERE p.review <> 'open')::int AS reviewed FROM place p GROUP BY p.n
+    ), found AS (
+        SELECT g.n, sum(d.probability * d.lining_area) / nullif(sum(d.lining_area) FILTER (WHERE d.probability IS NOT NULL), 0) AS probability
+          FROM tunnel.detectability d
+         CROSS JOIN LATERAL generate_series(greatest(floor((d.chainage_from - low) / step)::int + 1, 1),
+                                            least(ceil((d.chainage_to - low) / step)::int, count)) AS g (n)
+         WHERE d.survey_id = survey_key
+         GROUP BY g.n
+    )
+    SELECT t.n, t.seen_share, t.wet_area, coalesce(k.findings, '{}'), coalesce(r.reviewed, 0), f.probability
+      FROM tunnel_internal.stretch_statistics(survey_key,
+                (SELECT array_agg(low + (b - 1) * step ORDER BY b) FROM generate_series(1, count) b),
+                (SELECT array_agg(low + b * step ORDER BY b) FROM generate_series(1, count) b)) t
+      LEFT JOIN kinds k ON k.n = t.n
+      LEFT JOIN reviews r ON r.n = t.n
+      LEFT JOIN found f ON f.n = t.n
+     ORDER BY t.n;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.ribbon(int, float8, float8, int) IS
+'A survey from one chainage to another in bins of one length: inspected share and wet area as in leak_statistics (NULL where leaks were not searched for), number of the findings that count by kind and how many of them are reviewed (by their middle), and mean probability of finding the leaks of the demand (detectability)';
+
+-- A far tile shows places with findings, a near one outlines.
+CREATE OR REPLACE FUNCTION tunnel_api.finding_tile(
+    survey_id int, west float8, south float8, east float8, north float8, outlines boolean)
+RETURNS bytea
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER
+SET search_path = pg_catalog, pg_temp
+SET jit = off
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    frame constant public.box2d := public.ST_MakeBox2D(public.ST_MakePoint(west, south), public.ST_MakePoint(east, north));
+    margin constant float8 := (east - west) / 16;
+    cell constant float8 := (east - west) / 32;
+BEGIN
+    IF NOT outlines THEN
+        RETURN (
+            WITH place AS (
+                SELECT floor((a.chainage_from + a.chainage_to) / 2 / cell) AS i, floor((a.arc_from + a.arc_to) / 2 / cell) AS k,
+                       coalesce(a.kind_override, a.kind) AS kind, a.review, a.id,
+                       CASE WHEN a.manual THEN CASE WHEN a.wet THEN 1.0 ELSE 0.0 END
+                            WHEN a.kind = 'leak' THEN a.confidence ELSE 1 - a.confidence END AS probability, a.wet
+                  FROM tunnel.finding a
+                 WHERE a.survey_id = survey_key AND a.chainage_to > west AND a.chainage_from < east
+                   AND (a.chainage_from + a.chainage_to) / 2 >= west AND (a.chainage_from + a.chainage_to) / 2 < east
+                   AND (a.arc_from + a.arc_to) / 2 >= south AND (a.arc_from + a.arc_to) / 2 < north
+                   AND a.detected AND a.review <> 'rejected' AND NOT a.superseded
+            ), grouped AS (
+                SELECT min(p.id) AS id, count(*)::int AS count, bool_or(p.wet) AS wet, max(p.probability)::float8 AS probability,
+                       mode() WITHIN GROUP (ORDER BY p.kind) AS kind,
+                       CASE WHEN bool_or(p.review = 'open') THEN 'open' ELSE 'confirmed' END AS review,
+                       CASE WHEN bool_or(p.review = 'open') THEN 'open' ELSE 'confirmed' END AS state,
+                       public.ST_AsMVTGeom(public.ST_MakePoint((p.i + 0.5) * cell, (p.k + 0.5) * cell), frame, 4096, 64, false) AS geom
+                  FROM place p GROUP BY p.i, p.k)
+            SELECT public.ST_AsMVT(g, 'findings', 4096, 'geom') FROM grouped g);
+    END IF;
+    RETURN (
+        WITH shown AS (
+            SELECT a.id, coalesce(a.kind_override, a.kind) AS kind, a.review, a.wet,
+                   CASE WHEN a.merged_into IS NOT NULL THEN 'merged' WHEN a.same_as IS NOT NULL THEN 'same'
+                        WHEN a.review = 'rejected' THEN 'rejected' WHEN a.superseded THEN 'dry' WHEN NOT a.detected THEN 'gone'
+                        ELSE a.review END AS state,
+                   (CASE WHEN a.manual THEN CASE WHEN a.wet THEN 1.0 ELSE 0.0 END
+                         WHEN a.kind = 'leak' THEN a.confidence ELSE 1 - a.confidence END)::float8 AS probability,
+                   public.ST_AsMVTGeom(coalesce(a.shape, a.unrolled), frame, 4096, 256, true) AS geom
+              FROM tunnel.finding a
+             WHERE a.survey_id = survey_key AND a.chainage_to > west - margin AND a.chainage_from < east + margin
+               AND a.arc_to > south - margin AND a.arc_from < north + margin
+               AND a.merged_into IS NULL AND a.same_as IS NULL
+             ORDER BY a.area DESC, a.id LIMIT 5000)
+        SELECT public.ST_AsMVT(s, 'findings', 4096, 'geom', 'id') FROM shown s WHERE s.geom IS NOT NULL);
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.finding_tile(int, float8, float8, float8, float8, boolean) IS
+'Findings in a rectangle of the unrolled plane (chainage, arc; m) as a vector tile (MVT), layer findings: outlines of at most 5000, the largest; or, without outlines, one point for each group in a raster of 32 × 32 with its number (count)';

@@ -1,0 +1,112 @@
+"""The command ``serve``."""
+
+from __future__ import annotations
+
+import ipaddress
+import secrets
+import socket
+import webbrowser
+from pathlib import Path
+
+import click
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.output import command
+from tunneldb.cli.param_types import FilePath, WholeRange
+from tunneldb.database import connect, resolve_dsn
+from tunneldb.errors import UserError
+
+
+@command(
+    examples=[
+        "tunneldb serve",
+        "tunneldb --dsn service=tunnels serve --host 0.0.0.0 --certificate desk.pem --key desk.key",
+        "tunneldb --dsn service=tunnels serve --host 0.0.0.0 --behind-proxy",
+    ]
+)
+@click.option("--port", type=WholeRange(0, 65535), default=8080, show_default=True, help="Port; 0 for a free one.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
+@click.option("--certificate", type=FilePath(), metavar="FILE", help="TLS certificate, PEM.")
+@click.option("--key", type=FilePath(), metavar="FILE", help="Private key of the certificate, PEM.")
+@click.option(
+    "--behind-proxy", is_flag=True, help="A proxy with TLS is in front: other machines may reach it without a certificate."
+)
+@click.option("--no-open", is_flag=True, help="Do not open a browser.")
+@click.pass_obj
+def serve(
+    settings: Settings, port: int, host: str, certificate: Path | None, key: Path | None, behind_proxy: bool, no_open: bool
+) -> None:
+    """Serve the desk, a page for inspections in a browser, until stopped.
+
+    With the embedded server the desk is for this machine only: the printed address has a token that works once. With
+    --dsn each person signs in with a database role of their own and its password; the roles decide what is allowed.
+
+    Ends on Ctrl-C or SIGTERM.
+    """
+    import uvicorn
+
+    from tunneldb.web.app import create_app
+    from tunneldb.web.config import Desk
+
+    loopback = _is_loopback(host)
+    if settings.dsn is None and not loopback:
+        raise UserError(f"--host {host}: the embedded server is for this machine only; give a server of your own with --dsn")
+    if (certificate is None) != (key is None):
+        raise UserError("--certificate and --key belong together")
+    if not loopback and certificate is None and not behind_proxy:
+        raise UserError(
+            f"--host {host}: passwords would cross the network unencrypted; give --certificate and --key,"
+            " or --behind-proxy if a proxy with TLS is in front"
+        )
+    dsn = resolve_dsn(settings.dsn)
+    with connect(settings.dsn):
+        pass  # the schema is there and of this version
+    token = secrets.token_urlsafe(32) if settings.dsn is None else None
+    desk = Desk(dsn, token, loopback=loopback and not behind_proxy, secure=certificate is not None or behind_proxy)
+    listener = _listen(host, port)
+    scheme = "http" if certificate is None else "https"
+    name = f"[{host}]" if ":" in host else host
+    address = f"{scheme}://{name}:{listener.getsockname()[1]}/" + (f"enter?token={token}" if token else "")
+    server = uvicorn.Server(
+        uvicorn.Config(
+            create_app(desk),
+            access_log=False,
+            log_level="warning",
+            ssl_certfile=certificate,
+            ssl_keyfile=key,
+            proxy_headers=behind_proxy,
+            server_header=False,
+            timeout_graceful_shutdown=10,
+        )
+    )
+    click.echo(address)
+    if not no_open and loopback:
+        webbrowser.open(address)
+    with listener:
+        server.run(sockets=[listener])
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    """Return a socket that listens on an address.
+
+    Raises
+    ------
+    UserError
+        If it cannot.
+    """
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
+        listener = socket.socket(family, kind, protocol)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
+        listener.listen(128)
+    except OSError as error:
+        raise UserError(f"cannot listen on {host}, port {port}: {error.strerror}; choose another --host or --port") from None
+    return listener

@@ -1,0 +1,63 @@
+"""Tiles of unrolled images as PNG."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+
+import numpy as np
+from PIL import Image
+
+from tunneldb.arrays import Single, UInt8
+from tunneldb.export.images.palette import PALETTES
+
+BLUE, WHITE, RED = (33, 102, 172), (247, 247, 247), (178, 24, 43)
+"""Colours of the least, the middle and the greatest value of images whose values have a sign."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Values that get the darkest and the brightest colour, in the image's unit."""
+
+    low: float
+    high: float
+
+
+def is_signed(kind: str) -> bool:
+    """Return True if the values of a kind of image have a sign: offset and deviation, m."""
+    return kind == "offset" or kind.startswith("deviation")
+
+
+def tile_png(values: Single, kind: str, stretch: Stretch) -> bytes:
+    """Return values (rows, columns) as a PNG, transparent where they are NaN."""
+    if kind in PALETTES:
+        image = Image.fromarray(_painted(values, kind), "RGBA")
+    elif is_signed(kind):
+        image = Image.fromarray(_signed(values, stretch), "RGBA")
+    else:
+        image = Image.fromarray(_grey(values, stretch), "LA")
+    written = io.BytesIO()
+    image.save(written, "PNG", compress_level=1)
+    return written.getvalue()
+
+
+def _grey(values: Single, stretch: Stretch) -> UInt8:
+    shown = np.isfinite(values)
+    share = (np.where(shown, values, stretch.low) - stretch.low) / max(stretch.high - stretch.low, 1e-9)
+    return np.dstack([np.clip(255.0 * share, 0, 255), np.where(shown, 255, 0)]).astype(np.uint8)
+
+
+def _signed(values: Single, stretch: Stretch) -> UInt8:
+    shown = np.isfinite(values)
+    share = np.clip(np.where(shown, values, 0.0) / max(stretch.high, 1e-9), -1.0, 1.0)[..., None]
+    ends = np.where(share < 0, np.array(BLUE), np.array(RED))
+    colour = np.array(WHITE) + np.abs(share) * (ends - np.array(WHITE))
+    return np.dstack([colour, np.where(shown, 255, 0)]).astype(np.uint8)
+
+
+def _painted(values: Single, kind: str) -> UInt8:
+    table = np.zeros((256, 4), np.uint8)
+    for code, (_, colour) in PALETTES[kind].entries.items():
+        table[code] = (*colour, 255)
+    codes = np.where(np.isfinite(values), values, PALETTES[kind].nodata).astype(np.uint8)
+    return np.asarray(table[codes])

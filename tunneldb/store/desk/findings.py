@@ -1,0 +1,160 @@
+"""Findings for the desk: read, reviewed, drawn and undone through the views and functions of ``tunnel_api``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import psycopg
+from psycopg import sql
+
+REVIEWED = ("review", "remark", "kind")
+"""Columns that a review writes."""
+
+PROBABILITY = (
+    "CASE WHEN f.confidence IS NULL THEN CASE WHEN f.wet THEN 1.0 ELSE 0.0 END"
+    " WHEN f.kind_detected = 'leak' THEN f.confidence ELSE 1.0 - f.confidence END::float8"
+)
+"""Probability that a finding is a leak, by detection; 1 if a person drew it as wet."""
+
+ORDERS = {
+    "likely": "probability DESC, chainage_from, id",
+    "unlikely": "probability, chainage_from, id",
+    "doubtful": "abs(probability - 0.5), chainage_from, id",
+    "large": "area DESC, chainage_from, id",
+    "chainage": "chainage_from, arc_from, id",
+}
+"""Orders of the work list, as in the QGIS plugin."""
+
+MOST = 5000
+"""Maximum length of a work list."""
+
+
+def worklist(
+    conn: psycopg.Connection[Any], survey_id: int, order: str, kinds: Sequence[str], low: float, high: float, min_area: float
+) -> list[dict[str, Any]]:
+    """Return the findings to review in a stretch, m, in an order of ORDERS; of all kinds if none is given."""
+    rows = conn.execute(
+        sql.SQL(
+            "SELECT * FROM (SELECT f.id, f.kind, f.review, f.chainage_from, f.chainage_to, f.arc_from, f.arc_to, {} AS probability,"
+            " f.area FROM tunnel_api.finding f WHERE f.survey_id = %s AND f.state IN ('open', 'confirmed', 'rejected', 'gone')"
+            " AND f.chainage_to > %s AND f.chainage_from < %s AND f.area >= %s AND (%s OR f.kind = ANY(%s))) f"
+            " ORDER BY {} LIMIT {}"
+        ).format(sql.SQL(PROBABILITY), sql.SQL(ORDERS[order]), MOST),
+        [survey_id, low, high, min_area, not kinds, list(kinds)],
+    )
+    return _named(rows)
+
+
+def finding(conn: psycopg.Connection[Any], finding_id: int) -> dict[str, Any] | None:
+    """Return a finding with its evidence, photos and history; None if there is none."""
+    rows = conn.execute(
+        "SELECT f.id, f.survey, f.label, f.clock, f.chainage_from, f.chainage_to, f.arc_from, f.arc_to, f.kind, f.kind_label,"
+        " f.kind_detected, f.origin, f.state, f.review, f.severity, f.width_mm, f.remark, f.area, f.length, f.darkening_mean,"
+        " f.darkening_max, f.contrast, f.confidence, f.reviewed_by, to_char(f.reviewed_at, 'YYYY-MM-DD HH24:MI') AS reviewed_at,"
+        " f.drawn_by, public.ST_AsGeoJSON(f.unrolled, 4)::json AS outline FROM tunnel_api.finding f WHERE f.id = %s",
+        [finding_id],
+    )
+    found = _named(rows)
+    if not found:
+        return None
+    evidence = conn.execute(
+        "SELECT e.words, e.log_odds FROM tunnel_api.finding_evidence e WHERE e.finding_id = %s AND abs(e.log_odds) >= 0.05"
+        " ORDER BY abs(e.log_odds) DESC, e.words",
+        [finding_id],
+    )
+    photos = conn.execute(
+        "SELECT p.id, p.path, p.caption FROM tunnel_api.finding_photo p WHERE p.finding_id = %s ORDER BY p.id", [finding_id]
+    )
+    history = conn.execute(
+        "SELECT to_char(a.at, 'YYYY-MM-DD HH24:MI') AS at, a.who AS by, a.action, a.before, a.after FROM tunnel_api.audit a"
+        " WHERE a.row_id = %s AND a.view LIKE 'finding%%' ORDER BY a.id DESC LIMIT 50",
+        [finding_id],
+    )
+    return {**found[0], "evidence": _named(evidence), "photos": _named(photos), "history": _named(history)}
+
+
+def write_review(conn: psycopg.Connection[Any], finding_id: int, seen: Mapping[str, Any], values: Mapping[str, Any]) -> bool:
+    """Write columns of REVIEWED if all of them are still as seen; return False if nothing was written.
+
+    The view's trigger locks the row, and writes nothing where another person writes the same at the same moment.
+    """
+    changes = sql.SQL(", ").join(sql.SQL("{} = {}").format(sql.Identifier(name), sql.Literal(values[name])) for name in values)
+    same = sql.SQL(" AND ").join(
+        sql.SQL("f.{} IS NOT DISTINCT FROM {}").format(sql.Identifier(name), sql.Literal(seen[name])) for name in REVIEWED
+    )
+    row = conn.execute(
+        sql.SQL(
+            "WITH done AS (UPDATE tunnel_api.finding_unrolled f SET {} WHERE f.id = {} AND {} RETURNING f.id, f.reviewed_at)"
+            " SELECT d.id FROM done d WHERE d.reviewed_at >= statement_timestamp()"
+        ).format(changes, sql.Literal(finding_id), same)
+    ).fetchone()
+    return row is not None
+
+
+def undo(conn: psycopg.Connection[Any], finding_id: int) -> str:
+    """Undo the last change of a finding; return what it was."""
+    return str(_value(conn, "SELECT tunnel_api.finding_undo(%s)", [finding_id]))
+
+
+def draw(conn: psycopg.Connection[Any], survey: str, geometry: Any, values: Mapping[str, Any]) -> int:
+    """Add a drawn finding, a GeoJSON geometry in the unrolled plane; return its id."""
+    return int(
+        _value(
+            conn,
+            "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width_mm, remark, geom) VALUES"
+            " (%s, %s, %s, %s, %s, public.ST_SetSRID(public.ST_GeomFromGeoJSON(%s), 0)) RETURNING id",
+            [survey, values["kind"], values["severity"], values["width_mm"], values["remark"], json.dumps(geometry)],
+        )
+    )
+
+
+def redraw(conn: psycopg.Connection[Any], finding_id: int, geometry: Any) -> bool:
+    """Replace the outline of a finding; return False if there is none."""
+    done = conn.execute(
+        "UPDATE tunnel_api.finding_unrolled SET geom = public.ST_SetSRID(public.ST_GeomFromGeoJSON(%s), 0) WHERE id = %s",
+        [json.dumps(geometry), finding_id],
+    )
+    return done.rowcount > 0
+
+
+def split(conn: psycopg.Connection[Any], finding_id: int, line: Any) -> list[int]:
+    """Split a finding by a GeoJSON line; return the ids of the parts."""
+    parts = _value(
+        conn,
+        "SELECT tunnel_api.finding_split(%s, public.ST_SetSRID(public.ST_GeomFromGeoJSON(%s), 0))",
+        [finding_id, json.dumps(line)],
+    )
+    return [int(part) for part in parts]
+
+
+def merge(conn: psycopg.Connection[Any], ids: Sequence[int]) -> int:
+    """Merge findings; return the id of the one that remains."""
+    return int(_value(conn, "SELECT tunnel_api.finding_merge(%s::bigint[])", [list(ids)]))
+
+
+def delete(conn: psycopg.Connection[Any], finding_id: int) -> bool:
+    """Delete a drawn finding; return False if there is none."""
+    return conn.execute("DELETE FROM tunnel_api.finding_unrolled WHERE id = %s", [finding_id]).rowcount > 0
+
+
+def finding_tile(
+    conn: psycopg.Connection[Any], survey_id: int, bounds: tuple[float, float, float, float], outlines: bool
+) -> bytes:
+    """Return the findings between west, south, east and north, m, as a vector tile."""
+    row = conn.execute(
+        "SELECT tunnel_api.finding_tile(%s, %s, %s, %s, %s, %s)", [survey_id, *bounds, outlines], binary=True
+    ).fetchone()
+    return bytes(row[0]) if row is not None and row[0] is not None else b""
+
+
+def _value(conn: psycopg.Connection[Any], query: str, parameters: Sequence[Any]) -> Any:
+    row = conn.execute(query, parameters).fetchone()
+    assert row is not None
+    return row[0]
+
+
+def _named(rows: psycopg.Cursor[Any]) -> list[dict[str, Any]]:
+    names = [column.name for column in rows.description or ()]
+    return [dict(zip(names, row, strict=True)) for row in rows.fetchall()]

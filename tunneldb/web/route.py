@@ -1,0 +1,156 @@
+"""From a request to a handler and back: session, token against forged requests, JSON, and errors as one line."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Any
+
+import psycopg
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+
+from tunneldb.errors import UserError
+from tunneldb.web.config import Desk
+from tunneldb.web.security import SAFE_METHODS
+from tunneldb.web.sessions import RefusedError, Session, SignedOutError
+
+COOKIE = "tunneldb_session"
+
+CHALLENGE = 'Basic realm="tunneldb", charset="UTF-8"'
+
+LOG = logging.getLogger("tunneldb.web")
+
+NOT_WRITTEN = "the database cannot be reached; nothing was written: try again"
+
+
+class NotFoundError(UserError):
+    """What a request asks for does not exist."""
+
+
+class ConflictError(UserError):
+    """The request contradicts what is stored now.
+
+    Parameters
+    ----------
+    message : str
+    values : dict
+        Further members of the answer.
+    """
+
+    def __init__(self, message: str, **values: Any) -> None:
+        super().__init__(message)
+        self.values = values
+
+
+@dataclass(frozen=True)
+class Call:
+    """Request of a person who is signed in."""
+
+    desk: Desk
+    session: Session
+    path: dict[str, Any]
+    query: dict[str, list[str]]
+    body: Any
+    headers: dict[str, str]
+
+    def number(self, name: str, default: float) -> float:
+        """Return a number of the query string."""
+        text = self.query.get(name, [""])[0]
+        if not text:
+            return default
+        try:
+            return float(text)
+        except ValueError:
+            raise UserError(f"{name}={text[:40]}: not a number") from None
+
+
+UNREACHABLE = 503
+
+STATUS = {
+    "08": UNREACHABLE, "57P": UNREACHABLE, "53": UNREACHABLE,  # connection, shutdown, resources
+    "57014": 504, "55P03": 504, "40P01": 504,  # took too long, waited too long, deadlock
+    "42501": 403,  # no privilege
+    "40001": 409, "0A": 409, "55": 409, "P0": 409,  # what is stored does not permit it
+    "22": 400, "23": 400, "XX000": 400,  # values, constraints, geometries that PostGIS refuses
+}  # fmt: skip
+"""Status of the answer by the beginning of an error's SQLSTATE, the first that fits."""
+
+Handler = Callable[[Call], Any]
+
+
+def route(handler: Handler) -> Callable[[Request], Awaitable[Response]]:
+    """Return the endpoint of a handler, which runs in a thread and returns a response or a value for JSON."""
+
+    async def endpoint(request: Request) -> Response:
+        desk: Desk = request.app.state.desk
+        session = desk.sessions.find(request.cookies.get(COOKIE))
+        if session is None and "authorization" in request.headers and desk.token is None and request.method in SAFE_METHODS:
+            address = request.client.host if request.client else ""
+            try:
+                session = await run_in_threadpool(desk.basic.session, desk.dsn, request.headers["authorization"], address)
+            except UserError as error:
+                return JSONResponse({"error": str(error)}, 401, {"WWW-Authenticate": CHALLENGE})
+        if session is None:
+            return JSONResponse({"error": "sign in"}, 401)
+        if request.method not in SAFE_METHODS and request.headers.get("x-csrf-token") != session.csrf:
+            return JSONResponse({"error": "the page is out of date: load it again"}, 403)
+        try:
+            call = Call(desk, session, dict(request.path_params), _query(request), await _body(request), dict(request.headers))
+            result = await run_in_threadpool(handler, call)
+        except Exception as error:
+            return answer_to(error)
+        return result if isinstance(result, Response) else JSONResponse(result)
+
+    return endpoint
+
+
+def answer_to(error: Exception) -> Response:
+    """Return the answer that states an error; a bug is logged with its traceback."""
+    match error:
+        case SignedOutError():
+            return JSONResponse({"error": str(error)}, 401)
+        case RefusedError():
+            return JSONResponse({"error": str(error)}, 403)
+        case NotFoundError():
+            return JSONResponse({"error": str(error)}, 404)
+        case ConflictError():
+            return JSONResponse({"error": str(error), **error.values}, 409)
+        case UserError():
+            return JSONResponse({"error": str(error)}, 400)
+        case psycopg.Error() if (status := _status(error)) is not None:
+            text = NOT_WRITTEN if error.sqlstate is None or status == UNREACHABLE else _line(error)
+            return JSONResponse({"error": f"you have no right to do this: {text}" if status == 403 else text}, status)
+    LOG.error("a request failed", exc_info=error)
+    return JSONResponse({"error": "the server has an error, which is in its log"}, 500)
+
+
+def _status(error: psycopg.Error) -> int | None:
+    """Return the status that tells whose fault an error of the database is; None for a bug."""
+    state = error.sqlstate
+    if state is None:
+        return UNREACHABLE if isinstance(error, psycopg.OperationalError | psycopg.InterfaceError) else None
+    return next((status for start, status in STATUS.items() if state.startswith(start)), None)
+
+
+def _line(error: psycopg.Error) -> str:
+    return error.diag.message_primary or str(error).splitlines()[0]
+
+
+def _query(request: Request) -> dict[str, list[str]]:
+    return {name: request.query_params.getlist(name) for name in request.query_params}
+
+
+async def _body(request: Request) -> Any:
+    if request.method in SAFE_METHODS:
+        return None
+    content = await request.body()
+    if not content:
+        return None
+    try:
+        return json.loads(content)
+    except (ValueError, RecursionError):
+        raise UserError("the body of the request is not JSON") from None

@@ -1,0 +1,100 @@
+/** Requests to the server. */
+
+const csrf = document.querySelector('meta[name=csrf]')?.content ?? '';
+
+/** Refusal of the server, or a server that is away (status 0). */
+export class ApiError extends Error {
+  constructor(status, message, data = null) {
+    super(message);
+    this.status = status;
+    this.data = data;
+  }
+
+  /** True if the same request may succeed later. */
+  get away() {
+    return this.status === 0 || [502, 503, 504].includes(this.status);
+  }
+}
+
+const AWAY = 'The server cannot be reached.';
+const LIMIT = 20000;
+
+/**
+ * Send a request; return the JSON of the answer, or null.
+ * @throws {ApiError}
+ */
+export async function request(method, path, body = undefined, { signal = null } = {}) {
+  const response = await answer(method, path, body, signal);
+  if (response.status === 204) return null;
+  try {
+    return await response.json();
+  } catch (error) {
+    if (error.name === 'AbortError') throw error;
+    // A cut connection leaves half an answer: whether the server has written is then unknown.
+    throw new ApiError(0, AWAY);
+  }
+}
+
+/** Download a file of the server to the user's folder; return its name. */
+export async function download(path) {
+  const response = await answer('GET', path, undefined, null, 600000);
+  const header = response.headers.get('Content-Disposition') ?? '';
+  const name = /filename="?([^";]+)"?/.exec(header)?.[1] ?? 'tunneldb';
+  saveBlob(await response.blob(), name);
+  return name;
+}
+
+/** Hand a blob to the user as a file. */
+export function saveBlob(blob, name) {
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+}
+
+export const get = (path, options) => request('GET', path, undefined, options);
+export const post = (path, body) => request('POST', path, body ?? {});
+export const put = (path, body) => request('PUT', path, body);
+export const patch = (path, body) => request('PATCH', path, body);
+export const remove = (path) => request('DELETE', path);
+
+/** Return the path of a survey's resource. */
+export function surveyPath(name, rest = '') {
+  return `/api/surveys/${encodeURIComponent(name)}${rest}`;
+}
+
+/** Return the path of a finding's resource. */
+export function findingPath(id, rest = '') {
+  return `/api/findings/${encodeURIComponent(id)}${rest}`;
+}
+
+async function answer(method, path, body, signal, limit = LIMIT) {
+  const headers = { Accept: 'application/json' };
+  if (method !== 'GET') headers['X-CSRF-Token'] = csrf;
+  if (body !== undefined) headers['Content-Type'] = 'application/json';
+  const own = new AbortController();
+  const timer = setTimeout(() => own.abort(), limit);
+  signal?.addEventListener('abort', () => own.abort());
+  let response;
+  try {
+    response = await fetch(path, {
+      method, headers, signal: own.signal, credentials: 'same-origin', body: body === undefined ? undefined : JSON.stringify(body),
+    });
+  } catch (error) {
+    if (signal?.aborted) throw error;
+    throw new ApiError(0, AWAY);
+  } finally {
+    clearTimeout(timer);
+  }
+  if (response.status === 401) {
+    const next = encodeURIComponent(location.pathname + location.hash);
+    location.assign(`/login?next=${next}`);
+    throw new ApiError(401, 'Sign in again.');
+  }
+  if (!response.ok) {
+    const data = await response.json().catch(() => null);
+    throw new ApiError(response.status, data?.error ?? `The server answered with status ${response.status}.`, data);
+  }
+  return response;
+}

@@ -1,0 +1,104 @@
+/** Layers of the lining: image, findings, and a hatch where there is no image. */
+
+import { hatch } from './ribbon.js';
+import { findingsAddress, imageAddress, MAX_TILE_ZOOM, projection, surveyExtent, tileGridOf } from './plane.js';
+
+const { ol } = globalThis;
+
+export const REVIEW_COLOURS = { open: '#e67e00', confirmed: '#005caf', rejected: '#6e6e6e' };
+export const DETECTED_DRY = ['joint', 'dark'];
+const COUNTED = ['open', 'confirmed'];
+const WHITE = 'rgba(255,255,255,.8)';
+
+/** Return the layer of an image of a survey. */
+export function imageLayer(survey, kind) {
+  const source = new ol.source.XYZ({
+    projection, tileGrid: tileGridOf(surveyExtent(survey)), url: imageAddress(survey.name, kind), wrapX: false, transition: 0, interpolate: false,
+  });
+  return new ol.layer.Tile({ source, extent: surveyExtent(survey), preload: 2, properties: { kind } });
+}
+
+/** Return the layer that shows where a survey has no image. */
+export function hatchLayer(survey) {
+  const tile = document.createElement('canvas');
+  tile.width = 6;
+  tile.height = 6;
+  const context = tile.getContext('2d');
+  hatch(context, 0, 0, 6, 6);
+  const style = new ol.style.Style({ fill: new ol.style.Fill({ color: context.createPattern(tile, 'repeat') }), stroke: stroke('#8a6a3f', 1) });
+  const feature = new ol.Feature(ol.geom.Polygon.fromExtent(surveyExtent(survey)));
+  return new ol.layer.Vector({ source: new ol.source.Vector({ features: [feature] }), style });
+}
+
+/**
+ * Return the layer of the findings of a survey.
+ * @param {Object} survey
+ * @param {Object} shown - switches: findings, dry, removed.
+ * @param {number} version - another one reads the tiles again.
+ */
+export function findingsLayer(survey, shown, version) {
+  const kinds = new Map(survey.finding_kinds.map((kind) => [kind.code, kind]));
+  const source = new ol.source.VectorTile({
+    format: new ol.format.MVT({ idProperty: 'id' }), projection, tileGrid: tileGridOf(surveyExtent(survey)), wrapX: false,
+    url: findingsAddress(survey.name, version), maxZoom: MAX_TILE_ZOOM,
+  });
+  // No extent: it would cut the circles of a tunnel that is one pixel high.
+  return new ol.layer.VectorTile({ source, style: styler(kinds, shown), renderBuffer: 40 });
+}
+
+/** Return the colour of a finding: of its review if it is wet, of its kind otherwise. */
+export function colourOf(kind, review) {
+  if (review === 'rejected') return REVIEW_COLOURS.rejected;
+  return kind?.wet ? REVIEW_COLOURS[review] ?? REVIEW_COLOURS.open : kind?.colour ?? '#e66ab1';
+}
+
+function styler(kinds, shown) {
+  const styles = new Map();
+  return (feature) => {
+    const kind = feature.get('kind');
+    const review = feature.get('review');
+    const state = feature.get('state') ?? review;
+    const counted = COUNTED.includes(state);
+    if (!shown.findings || (!counted && !shown.removed) || (DETECTED_DRY.includes(kind) && !shown.dry)) return null;
+    const many = Math.min(Math.ceil(Math.log2(feature.get('count') ?? 1)), 8);
+    const type = feature.getType();
+    const key = `${kind}|${review}|${counted}|${many}|${type}`;
+    if (!styles.has(key)) styles.set(key, looks(colourOf(kinds.get(kind), review), counted, many, type));
+    return styles.get(key);
+  };
+}
+
+function looks(colour, counted, many, type) {
+  const line = counted ? undefined : [4, 4];
+  if (type.endsWith('Point')) {
+    const image = new ol.style.Circle({ radius: 4 + 1.5 * many, fill: new ol.style.Fill({ color: counted ? colour : '#b9c0c7' }), stroke: stroke('#fff', 1.5) });
+    return [new ol.style.Style({ image })];
+  }
+  const halo = new ol.style.Style({ stroke: stroke(WHITE, 4) });
+  const main = new ol.style.Style({ stroke: stroke(colour, counted ? 2 : 1.2, line), fill: new ol.style.Fill({ color: `${colour}18` }) });
+  return [halo, main];
+}
+
+function stroke(color, width, lineDash = undefined) {
+  return new ol.style.Stroke({ color, width, lineDash, lineJoin: 'round' });
+}
+
+/** Return the layer of the finding that is shown in the panel. */
+export function highlightLayer() {
+  const style = [
+    new ol.style.Style({
+      stroke: stroke('#fff', 6),
+      image: new ol.style.Circle({ radius: 11, stroke: stroke('#fff', 5) }),
+    }),
+    new ol.style.Style({
+      stroke: stroke('#d0021b', 3),
+      image: new ol.style.Circle({ radius: 11, stroke: stroke('#d0021b', 3) }),
+    }),
+  ];
+  return new ol.layer.Vector({ source: new ol.source.Vector(), style, zIndex: 20 });
+}
+
+/** Return the geometry of a finding's outline. */
+export function geometryOf(outline) {
+  return outline ? new ol.format.GeoJSON().readGeometry(outline) : null;
+}

@@ -1,0 +1,265 @@
+/** The desk: connects address, survey, map and panel. */
+
+import { get, surveyPath } from './api.js';
+import { button, debounce, el } from './dom.js';
+import { station } from './format.js';
+import { downloadsPanel } from './downloads.js';
+import { DrawPanel } from './draw.js';
+import { notesPanel, showLimits } from './limits.js';
+import { Lining } from './lining.js';
+import { Panel } from './panel.js';
+import { Review } from './review.js';
+import { Ribbon } from './ribbon.js';
+import { format, parse, replace } from './router.js';
+import { Saver } from './saver.js';
+import { SectionPanel } from './section.js';
+import { Session } from './session.js';
+import { showSurveys } from './surveys.js';
+import { fillToolbar } from './toolbar.js';
+
+const meta = (name) => document.querySelector(`meta[name=${name}]`)?.content ?? '';
+const node = (id) => document.getElementById(id);
+const user = meta('user');
+const canWrite = ['inspector', 'operator'].includes(meta('role'));
+
+const app = { surveys: [], survey: null, finding: null };
+
+function say(text, wrong = false) {
+  const state = node('state');
+  state.className = wrong ? 'state wrong' : 'state';
+  state.textContent = text;
+  clearTimeout(say.timer);
+  if (!wrong) say.timer = setTimeout(() => { state.textContent = ''; }, 8000);
+}
+
+/** Show what becomes of a write: saved only when the server has said so. */
+function showState({ state, job, seconds, text }) {
+  const what = `Finding ${job.id}: ${Object.values(job.values).map((value) => value ?? 'no remark').join(', ')}`;
+  const alerts = node('alerts');
+  alerts.replaceChildren();
+  if (state === 'saving') say('Saving …');
+  else if (state === 'saved') say(`Saved. ${what}.`);
+  else if (state === 'failed') say(`Not saved. ${text}`, true);
+  else {
+    say('Not saved yet.', true);
+    alerts.append(el('div', { class: 'alert', role: 'alert' },
+      el('p', { text: `Not saved yet. ${what}. ${/[.!?]$/.test(text) ? text : `${text}.`} The next attempt is in ${seconds} s; any review key tries again now.` }),
+      button('Try now', () => saver.retry()), button('Discard', () => saver.discard())));
+  }
+}
+
+const saver = new Saver(user, showState);
+const session = new Session(user, saver);
+const panel = new Panel(node('panel'), (tab) => showTab(tab));
+const ribbon = new Ribbon(node('ribbon'), (x) => lining.goTo(x));
+const lining = new Lining(node('lining'), { moved, picked, failed: (text) => say(text, true) });
+const review = new Review(session, {
+  canWrite, say,
+  extent: stretch,
+  shown: (finding, fit) => show(finding, fit),
+  marked: (finding) => mark(finding),
+  changed: () => changed(),
+  outlines: (on) => {
+    lining.shown.findings = on;
+    const box = node('show-findings');
+    if (box) box.checked = on;
+    lining.restyle();
+    say(on ? 'Outlines on.' : 'Outlines off.');
+  },
+});
+const section = new SectionPanel(() => lining.view.x, () => session.facts);
+const draw = new DrawPanel(lining, {
+  canWrite, say,
+  current: () => session.facts,
+  open: (id) => review.open(id, false),
+  changed: () => changed(0),
+  closed: () => {
+    session.facts = null;
+    app.finding = null;
+    lining.mark(null);
+    review.refresh();
+    address();
+  },
+});
+
+/** Return the stretch in view, within the survey. */
+function stretch() {
+  const [from, , to] = lining.extent;
+  const { survey } = app;
+  return [Math.min(Math.max(from, survey.from), survey.to), Math.min(Math.max(to, survey.from), survey.to)];
+}
+
+function moved(view, [from, , to]) {
+  ribbon.mark(from, to);
+  app.view = view;
+  address();
+}
+
+const address = debounce(() => {
+  if (!app.survey) return;
+  replace({ survey: app.survey.name, finding: app.finding, ...app.view, kind: lining.kind, tab: panel.tab === 'finding' ? null : panel.tab });
+}, 200);
+
+function picked(id) {
+  if (draw.pick(id)) return;
+  if (!['finding', 'review'].includes(panel.tab)) panel.choose('finding');
+  panel.fold(false);
+  review.open(id, false);
+}
+
+function show(finding, fit) {
+  if (!finding) return;
+  if (finding.survey !== app.survey.name) {
+    location.hash = format({ survey: finding.survey, finding: finding.id });
+    return;
+  }
+  mark(finding);
+  if (fit) follow(finding);
+  address();
+}
+
+function mark(finding) {
+  app.finding = finding.id;
+  lining.mark(finding);
+  draw.refresh();
+}
+
+// Drawing the map takes longer than a verdict: it follows when the reviewer pauses.
+const follow = debounce((finding) => lining.fitFinding(finding), 250);
+
+const reread = debounce(async () => {
+  lining.refresh();
+  await readRibbon(app.survey);
+}, 1500);
+
+/** Read findings and ribbon again after a write, once writes pause. */
+function changed(wait = null) {
+  if (wait === 0) lining.refresh();
+  else reread();
+}
+
+function showTab(tab) {
+  review.setReviewing(tab === 'review');
+  if (tab !== 'draw') draw.cancel();
+  const content = {
+    finding: () => review.root, review: () => review.root, draw: () => draw.root, section: () => section.root,
+    downloads: () => downloadsPanel(app.survey, stretch), notes: () => notesPanel(app.survey, summaryOf(app.survey)),
+  }[tab]();
+  panel.fill(content);
+  if (tab === 'section') section.open();
+  if (tab === 'draw') draw.refresh();
+  address();
+  lining.map.updateSize();
+}
+
+function summaryOf(survey) {
+  return app.surveys.find(({ name }) => name === survey.name);
+}
+
+async function readRibbon(survey) {
+  try {
+    const data = await get(surveyPath(survey.name, '/ribbon'));
+    if (survey !== app.survey) return;
+    ribbon.show(data, survey);
+    lining.setRibbon(data);
+  } catch (error) {
+    say(`Overview: ${error.message}`, true);
+  }
+}
+
+async function openSurvey(name, state) {
+  const survey = await get(surveyPath(name));
+  if (parse().survey !== name) return;
+  app.survey = survey;
+  app.finding = null;
+  if (!saver.busy) say('');
+  node('surveys').hidden = true;
+  node('desk').hidden = false;
+  document.title = `${survey.name} – tunneldb desk`;
+  node('desk-title').textContent = survey.name;
+  node('survey-facts').textContent = [survey.tunnel, survey.date, `${station(survey.from, 0)} to ${station(survey.to, 0)}`].filter(Boolean).join(' · ');
+  node('survey-choice').value = name;
+  showLimits(node('limits'), survey, summaryOf(survey));
+  ribbon.show(null, survey);
+  lining.map.updateSize();
+  lining.mark(null);
+  lining.setSurvey(survey, state.kind, state.x !== null && state.y !== null && state.z !== null ? state : null);
+  fillToolbar(lining, (text) => say(text, true));
+  review.setSurvey(survey);
+  section.setSurvey(survey);
+  draw.setSurvey(survey);
+  panel.choose(state.finding === null ? state.tab ?? panel.tab ?? 'finding' : 'finding');
+  readRibbon(survey);
+}
+
+async function showTable() {
+  app.survey = null;
+  app.surveys = await get('/api/surveys');
+  fillChoice();
+  node('desk').hidden = true;
+  node('surveys').hidden = false;
+  node('survey-facts').textContent = '';
+  node('survey-choice').value = '';
+  document.title = 'tunneldb desk';
+  showSurveys(node('surveys'), app.surveys);
+}
+
+function fillChoice() {
+  const options = app.surveys.map(({ name, tunnel }) => el('option', { value: name, text: name === tunnel ? name : `${name} (${tunnel})` }));
+  node('survey-choice').replaceChildren(el('option', { value: '', text: 'All surveys' }), ...options);
+}
+
+/** Show what the address says. */
+async function route() {
+  const state = parse();
+  try {
+    if (!state.survey) {
+      await showTable();
+      return;
+    }
+    if (!app.surveys.length) {
+      app.surveys = await get('/api/surveys');
+      fillChoice();
+    }
+    const other = app.survey?.name !== state.survey;
+    if (other) await openSurvey(state.survey, state);
+    if (state.finding !== null && state.finding !== app.finding) {
+      if (!['finding', 'review'].includes(panel.tab)) panel.choose('finding');
+      await review.open(state.finding, !other || state.x === null);
+    } else if (!other && state.x !== null && state.y !== null && state.z !== null) {
+      lining.goTo(state.x, state.y, state.z);
+    }
+  } catch (error) {
+    say(error.message, true);
+  }
+}
+
+/** Offer a verdict of an earlier visit that was not saved. */
+function offerLeft() {
+  const left = saver.left();
+  if (!left || !canWrite) return;
+  const values = Object.entries(left.values).map(([name, value]) => `${name}: ${value ?? 'none'}`).join(', ');
+  const box = el('div', { class: 'alert', role: 'alert' }, el('p', { text: `A review of your last visit was not saved: finding ${left.id}, ${values}.` }),
+    button('Save now', async () => {
+      try {
+        await saver.save(left.id, left.seen, left.values);
+        changed();
+      } catch (error) {
+        say(`Not saved. ${error.message}`, true);
+      }
+    }),
+    button('Discard', () => {
+      saver.forget();
+      box.remove();
+    }));
+  node('alerts').append(box);
+}
+
+node('survey-choice').addEventListener('change', (event) => { location.hash = format({ survey: event.target.value || null }); });
+node('skip').addEventListener('click', (event) => {
+  event.preventDefault();
+  node('map')?.focus();
+});
+window.addEventListener('hashchange', route);
+offerLeft();
+route();

@@ -1,0 +1,80 @@
+/** Tools of the lining: image, layers, comparison, zoom. */
+
+import { button, check, choice, el, field } from './dom.js';
+import { number } from './format.js';
+
+const RAMPS = { offset: 'ramp-diverging', deviation: 'ramp-diverging', change: 'ramp-diverging', depth: 'ramp-depth', raw: 'ramp-grey', corrected: 'ramp-grey' };
+
+/** Fill the toolbar of a lining for its survey. */
+export function fillToolbar(lining, onError) {
+  const { survey } = lining;
+  const kinds = choice(survey.kinds.map(({ kind, label }) => [kind, label]), lining.kind, {
+    onchange: (event) => {
+      lining.setKind(event.target.value);
+      showLegend(lining);
+    },
+  });
+  const image = survey.kinds.length ? field('Image', kinds, { class: 'field inline' }) : el('span', { class: 'warn-text', text: 'This survey has no image.' });
+  lining.tools.replaceChildren(
+    image, menu('Layers', layers(lining)), ...(survey.neighbours.length ? [menu('Compare', compare(lining, onError))] : []),
+    button('Fit height', () => lining.fitHeight()), button('Whole survey', () => lining.fitAll()),
+  );
+  showLegend(lining);
+}
+
+/** Return a button that unfolds a box. */
+function menu(title, content) {
+  const node = el('details', { class: 'menu' }, el('summary', { text: title }), el('div', { class: 'menu-box' }, ...content));
+  node.addEventListener('keydown', (event) => {
+    if (event.key !== 'Escape') return;
+    node.open = false;
+    node.firstChild.focus();
+  });
+  document.addEventListener('pointerdown', (event) => {
+    if (!node.contains(event.target)) node.open = false;
+  });
+  return node;
+}
+
+function layers(lining) {
+  const set = (name) => (value) => {
+    lining.shown[name] = value;
+    lining.restyle();
+  };
+  const key = el('ul', { class: 'key' }, ...[['Leak, open', '#e67e00'], ['Leak, confirmed', '#005caf']].map(keyRow));
+  key.append(...lining.survey.finding_kinds.filter((kind) => !kind.wet).map((kind) => keyRow([kind.label, kind.colour])));
+  return [
+    check('Findings (H)', lining.shown.findings, set('findings'), { id: 'show-findings' }),
+    check('Joints and dry dark areas', lining.shown.dry, set('dry')),
+    check('Rejected, merged and removed', lining.shown.removed, set('removed')),
+    key,
+    el('p', { class: 'muted small' }, 'Hatched: no image. Green band at the upper edge: share of the lining that was inspected.'),
+  ];
+}
+
+function keyRow([text, colour]) {
+  const mark = el('i');
+  mark.style.background = colour;
+  return el('li', {}, mark, text);
+}
+
+function compare(lining, onError) {
+  const { comparison, survey } = lining;
+  const modes = choice([['swipe', 'Swipe'], ['stack', 'One above the other']], comparison.mode, { onchange: show });
+  const other = choice([['', 'None'], ...survey.neighbours.map((name) => [name, name])], '', { onchange: show });
+  function show() {
+    comparison.show(other.value, modes.value).catch((error) => onError(error.message));
+  }
+  return [field('Other survey', other), field('Show', modes)];
+}
+
+function showLegend(lining) {
+  const kind = lining.survey.kinds.find((other) => other.kind === lining.kind);
+  lining.legend.replaceChildren();
+  if (!kind || kind.low === null || kind.low === undefined) return;
+  const decimals = Math.abs(kind.high - kind.low) < 5 ? 2 : 0;
+  lining.legend.append(
+    el('span', { text: number(kind.low, decimals) }), el('i', { class: `ramp ${RAMPS[kind.kind] ?? 'ramp-none'}` }),
+    el('span', { text: number(kind.high, decimals, kind.unit ?? '') }),
+  );
+}

@@ -1,0 +1,133 @@
+"""Requests on surveys: list, one survey, its ribbon, a section."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tunneldb.errors import UserError
+from tunneldb.export.images.tile_png import is_signed
+from tunneldb.finding_kind import FindingKind
+from tunneldb.store.desk import sections, surveys
+from tunneldb.store.desk.images import KINDS, image_kinds
+from tunneldb.store.desk.surveys import Place
+from tunneldb.web.route import Call, NotFoundError
+from tunneldb.web.sessions import Connection
+from tunneldb.web.tile_source import survey_stretch
+
+BINS = 1500
+"""Maximum number of bins of a ribbon."""
+
+SHORTEST_BIN = 1.0
+"""Minimum length of a bin of a ribbon, m."""
+
+KIND_COLOURS = {
+    FindingKind.LEAK: "#005caf", FindingKind.DRIP: "#0aa0c8", FindingKind.CRACK: "#b8171d", FindingKind.SPALL: "#e0660b",
+    FindingKind.DELAMINATION: "#c9a100", FindingKind.EFFLORESCENCE: "#8a5fb0", FindingKind.DAMAGED_JOINT: "#a0522d",
+    FindingKind.MISSING_BOLT: "#d0408f", FindingKind.CORRODED: "#7a4a1e", FindingKind.OBSTRUCTION: "#444444",
+    FindingKind.JOINT: "#7f8a94", FindingKind.DARK: "#6e6e6e",
+}  # fmt: skip
+"""Colours of the kinds of findings."""
+
+OTHER_COLOUR = "#3a8f5c"
+"""Colour of a kind without one of its own."""
+
+
+def survey_of(conn: Connection, name: str) -> Place:
+    """Return the survey of a tunnel with a name, which has an axis.
+
+    Raises
+    ------
+    NotFoundError
+        If there is none.
+    """
+    survey = surveys.find_survey(conn, name)
+    if survey is None:
+        raise NotFoundError(f"there is no survey {name[:80]!r} of a tunnel")
+    return survey
+
+
+def measured(survey: Place) -> tuple[float, float]:
+    """Return the ends of a survey's axis, m; raise UserError if it has none."""
+    if survey.low is None or survey.high is None:
+        raise UserError(f"survey {survey.name} has no axis yet: tunneldb run {survey.name}")
+    return survey.low, survey.high
+
+
+def list_all(call: Call) -> Any:
+    """Return all surveys."""
+    with call.session.connection() as conn:
+        return surveys.list_surveys(conn)
+
+
+def one(call: Call) -> Any:
+    """Return a survey with what is needed to show it."""
+    with call.session.connection() as conn:
+        survey = survey_of(conn, call.path["survey"])
+        low, high = measured(survey)
+        ends = surveys.arcs(conn, survey.id) or (0.0, 0.0)
+        kinds = []
+        for kind in image_kinds(conn, survey.id):
+            stretch = survey_stretch(call.desk.blocks, conn, survey, kind)
+            label, unit = KINDS[kind]
+            kinds.append(
+                {
+                    "kind": kind,
+                    "label": label,
+                    "unit": unit,
+                    "low": stretch.low,
+                    "high": stretch.high,
+                    "signed": is_signed(kind),
+                }
+            )
+        return {
+            "id": survey.id, "name": survey.name, "tunnel": survey.tunnel, "date": survey.date, "from": low, "to": high,
+            "arc_from": ends[0], "arc_to": ends[1], "kinds": kinds,
+            "remarks": surveys.remarks(conn, survey.id), "statement": surveys.statement(conn, survey.id),
+            "finding_kinds": [{**k, "colour": KIND_COLOURS.get(k["code"], OTHER_COLOUR)} for k in surveys.finding_kinds(conn)],
+            "severities": surveys.severities(conn), "neighbours": surveys.neighbours(conn, survey),
+        }  # fmt: skip
+
+
+def ribbon(call: Call) -> Any:
+    """Return the whole survey in bins."""
+    with call.session.connection() as conn:
+        survey = survey_of(conn, call.path["survey"])
+        low, high = measured(survey)
+        bins = int(np.clip((high - low) / SHORTEST_BIN, 1, BINS))
+        rows = surveys.ribbon(conn, survey, bins)
+    kinds = sorted({kind for row in rows for kind in row[2]})
+    counts = [sum(row[2].values()) for row in rows]
+    return {
+        "from": low,
+        "to": high,
+        "step": (high - low) / bins,
+        "inspected": [row[0] for row in rows],
+        "wet": [row[1] for row in rows],
+        "findings": {kind: [row[2].get(kind, 0) for row in rows] for kind in kinds},
+        "reviewed": [row[3] / count if count else None for row, count in zip(rows, counts, strict=True)],
+        "probability": [row[4] for row in rows],
+    }
+
+
+def section(call: Call) -> Any:
+    """Return the section at a chainage."""
+    chainage = call.number("chainage", np.nan)
+    with call.session.connection() as conn:
+        survey = survey_of(conn, call.path["survey"])
+        low, high = measured(survey)
+        if not low <= chainage <= high:
+            raise UserError(f"chainage={chainage:g}: the survey reaches from {low:.1f} to {high:.1f} m")
+        found = sections.load_section(conn, survey.id, survey.name, chainage)
+        if found is None:
+            raise NotFoundError(f"no section is near chainage {chainage:.1f} m")
+        label = sections.station_label(conn, survey.tunnel_id, chainage)
+    points = np.column_stack([found.points.round(3), found.classes])
+    return {
+        "chainage": chainage,
+        "label": label,
+        "points": points.tolist(),
+        "curve": found.curve.round(4).tolist(),
+        "centre": [0, 0],
+    }
