@@ -17,7 +17,7 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
 from tunneldb.errors import UserError
-from tunneldb.web import findings, ogc, sign_in, surveys, tiles
+from tunneldb.web import exports, findings, ogc, sign_in, surveys, tiles
 from tunneldb.web.config import Desk
 from tunneldb.web.pages import FOLDER
 from tunneldb.web.route import route
@@ -62,6 +62,7 @@ def create_app(desk: Desk) -> Starlette:
             Route(survey, route(surveys.one)),
             Route(f"{survey}/ribbon", route(surveys.ribbon)),
             Route(f"{survey}/section", route(surveys.section)),
+            Route(f"{survey}/export", route(exports.export)),
             Route(f"{survey}/worklist", route(findings.worklist)),
             Route(f"{survey}/findings", route(findings.draw), methods=["POST"]),
             Route("/api/findings/merge", route(findings.merge), methods=["POST"]),

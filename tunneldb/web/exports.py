@@ -1,0 +1,83 @@
+"""Downloads of a stretch: report, workbook and GeoPackage, as the commands write them."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psycopg
+from starlette.background import BackgroundTask
+from starlette.responses import FileResponse, Response
+
+from tunneldb.errors import UserError
+from tunneldb.export.exchange import write_survey
+from tunneldb.export.tables.stretch_workbook import write_stretch_workbook
+from tunneldb.report.page import write_html
+from tunneldb.report.pictures.load import Source
+from tunneldb.store.survey import Survey, get_survey
+from tunneldb.web.route import Call, NotFoundError
+from tunneldb.web.sessions import Connection, RefusedError
+
+Writer = Callable[[Connection, Survey, float, float, Path], Any]
+
+
+def _report(conn: Connection, survey: Survey, low: float, high: float, path: Path) -> None:
+    # No file of the server may get into a report: photos are those with an address on the web.
+    write_html(conn, survey, path, low, high, photos=Source(path.parent / "photos"))
+
+
+def _geopackage(conn: Connection, survey: Survey, low: float, high: float, path: Path) -> None:
+    write_survey(conn, survey, low, high, path)
+
+
+WRITERS: dict[str, tuple[str, str, Writer]] = {
+    "report": ("html", "text/html", _report),
+    "xlsx": ("xlsx", "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet", write_stretch_workbook),
+    "gpkg": ("gpkg", "application/geopackage+sqlite3", _geopackage),
+}
+"""Suffix, media type and function of each kind of download."""
+
+
+def export(call: Call) -> Response:
+    """Return a file of a stretch."""
+    what = call.query.get("what", [""])[0]
+    if what not in WRITERS:
+        raise NotFoundError(f"what={what[:40]}: one of {', '.join(WRITERS)}")
+    suffix, media, write = WRITERS[what]
+    low, high = call.number("from", -np.inf), call.number("to", np.inf)
+    if not low < high:
+        raise UserError("the stretch ends before it begins")
+    folder = Path(tempfile.mkdtemp(prefix="tunneldb-desk-"))
+    try:
+        with call.session.connection() as conn:
+            survey = _written(conn, call.path["survey"], write, low, high, folder / f"download.{suffix}")
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    ends = "" if np.isinf([low, high]).all() else f"-{low:.0f}-{high:.0f}"
+    return FileResponse(
+        folder / f"download.{suffix}",
+        media_type=media,
+        filename=f"{survey.name}{ends}.{suffix}",
+        background=BackgroundTask(shutil.rmtree, folder, ignore_errors=True),
+    )
+
+
+def _written(conn: Connection, name: str, write: Writer, low: float, high: float, path: Path) -> Survey:
+    """Write a file from one moment of the database."""
+    conn.autocommit = False
+    try:
+        survey = get_survey(conn, name)
+        conn.rollback()
+        write(conn, survey, low, high, path)
+        return survey
+    except psycopg.errors.InsufficientPrivilege:
+        raise RefusedError("downloads need the role tunnel_operator") from None
+    finally:
+        if not conn.closed:
+            conn.rollback()
+            conn.autocommit = True
