@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ipaddress
 import secrets
+import signal
 import socket
+import ssl
 import webbrowser
 from pathlib import Path
 
@@ -58,6 +60,8 @@ def serve(
             f"--host {host}: passwords would cross the network unencrypted; give --certificate and --key,"
             " or --behind-proxy if a proxy with TLS is in front"
         )
+    if certificate is not None and key is not None:
+        _check(certificate, key)
     dsn = resolve_dsn(settings.dsn)
     with connect(settings.dsn):
         pass  # the schema is there and of this version
@@ -82,8 +86,18 @@ def serve(
     click.echo(address)
     if not no_open and loopback:
         webbrowser.open(address)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: None)  # uvicorn sends itself the signal again when all is closed
     with listener:
         server.run(sockets=[listener])
+
+
+def _check(certificate: Path, key: Path) -> None:
+    """Raise UserError if these files are no certificate and its key."""
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key)
+    except (OSError, ssl.SSLError) as error:
+        raise UserError(f"{certificate}, {key}: not a certificate and its key without a passphrase, PEM: {error}") from None
 
 
 def _is_loopback(host: str) -> bool:
@@ -107,6 +121,7 @@ def _listen(host: str, port: int) -> socket.socket:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind(address)
         listener.listen(128)
-    except OSError as error:
-        raise UserError(f"cannot listen on {host}, port {port}: {error.strerror}; choose another --host or --port") from None
+    except (OSError, UnicodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "no such name"
+        raise UserError(f"cannot listen on {host}, port {port}: {reason}; choose another --host or --port") from None
     return listener

@@ -1,13 +1,14 @@
 /** Layers of the lining: image, findings, and a hatch where there is no image. */
 
 import { hatch } from './ribbon.js';
-import { findingsAddress, imageAddress, MAX_TILE_ZOOM, projection, surveyExtent, tileGridOf } from './plane.js';
+import { findingsAddress, imageAddress, MAX_TILE_ZOOM, MIN_ZOOM, projection, resolutionAt, surveyExtent, tileGridOf } from './plane.js';
 
 const { ol } = globalThis;
 
 export const REVIEW_COLOURS = { open: '#e67e00', confirmed: '#005caf', rejected: '#6e6e6e' };
 export const DETECTED_DRY = ['joint', 'dark'];
 const COUNTED = ['open', 'confirmed'];
+const TALL = 4 * resolutionAt(MIN_ZOOM);
 const WHITE = 'rgba(255,255,255,.8)';
 
 /** Return the layer of an image of a survey. */
@@ -38,11 +39,12 @@ export function hatchLayer(survey) {
  */
 export function findingsLayer(survey, shown, version) {
   const kinds = new Map(survey.finding_kinds.map((kind) => [kind.code, kind]));
+  // Of the tunnel alone, less than a pixel high from afar, OpenLayers would load no tile and cut the circles.
+  const [from, low, to, high] = surveyExtent(survey);
   const source = new ol.source.VectorTile({
-    format: new ol.format.MVT({ idProperty: 'id' }), projection, tileGrid: tileGridOf(surveyExtent(survey)), wrapX: false,
+    format: new ol.format.MVT({ idProperty: 'id' }), projection, tileGrid: tileGridOf([from, low - TALL, to, high + TALL]), wrapX: false,
     url: findingsAddress(survey.name, version), maxZoom: MAX_TILE_ZOOM,
   });
-  // No extent: it would cut the circles of a tunnel that is one pixel high.
   return new ol.layer.VectorTile({ source, style: styler(kinds, shown), renderBuffer: 40 });
 }
 

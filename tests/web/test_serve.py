@@ -1,0 +1,86 @@
+"""The command: prints one line, serves, and ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from http.cookiejar import CookieJar
+
+import pytest
+from support.command import errors_of
+
+COMMAND = [sys.executable, "-c", "from tunneldb.cli.main import main; main()", "serve", "--no-open"]
+
+
+@pytest.fixture
+def served(server_dsn: str, dsn: str, example: str) -> Iterator[subprocess.Popen[str]]:
+    """A desk at which people sign in with passwords."""
+    process = subprocess.Popen(
+        [*COMMAND, "--port", "0"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "TUNNELDB_DSN": dsn},
+    )
+    yield process
+    process.kill()
+    process.wait()
+
+
+def test_it_prints_its_address_and_ends_on_sigterm(served: subprocess.Popen[str]) -> None:
+    assert served.stdout is not None
+    address = served.stdout.readline().strip()
+    assert address.startswith("http://127.0.0.1:")
+    with urllib.request.urlopen(address + "healthz", timeout=20) as answer:
+        assert answer.read() == b"ok"
+    with pytest.raises(urllib.error.HTTPError, match="401"):
+        urllib.request.urlopen(address + "api/surveys", timeout=20)
+    served.send_signal(signal.SIGTERM)
+    out, err = served.communicate(timeout=30)
+    assert (served.returncode, out, err) == (0, "", "")
+
+
+def test_embedded_server_prints_a_token_that_lets_in(installed: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    environment = {name: value for name, value in os.environ.items() if name != "TUNNELDB_DSN"}
+    subprocess.run([*COMMAND[:3], "init"], env=environment, check=True, capture_output=True)
+    with subprocess.Popen([*COMMAND, "--port", "0"], stdout=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stdout is not None
+        address = process.stdout.readline().strip()
+        jar = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
+        with jar.open(address, timeout=20) as page:
+            assert "tunneldb" in page.read().decode()
+        root = address.partition("enter")[0]
+        with jar.open(root + "api/surveys", timeout=20) as answer:
+            assert answer.read() == b"[]"
+        process.terminate()
+        assert process.wait(30) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--host", "0.0.0.0"], "passwords would cross the network unencrypted"),
+        (["--certificate", "pyproject.toml"], "--certificate and --key belong together"),
+        (["--host", "192.0.2.1", "--behind-proxy"], "cannot listen on 192.0.2.1"),
+        (["--host", "no such name", "--behind-proxy"], "cannot listen on no such name"),
+        (["--certificate", "pyproject.toml", "--key", "pyproject.toml"], "not a certificate and its key"),
+    ],
+)
+def test_wrong_options_get_one_line(dsn: str, words: list[str], said: str) -> None:
+    assert said in errors_of("serve", "--no-open", *words, code=2)
+
+
+def test_embedded_server_is_for_this_machine_only(installed: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("TUNNELDB_DSN", raising=False)
+    assert "for this machine only" in errors_of("serve", "--host", "0.0.0.0", code=2)
+
+
+def test_taken_port(dsn: str, served: subprocess.Popen[str]) -> None:
+    assert served.stdout is not None
+    port = served.stdout.readline().strip().rstrip("/").rpartition(":")[2]
+    assert f"cannot listen on 127.0.0.1, port {port}" in errors_of("serve", "--no-open", "--port", port, code=2)
