@@ -57,5 +57,6 @@ Done in $((SECONDS - start)) s. Look at
   demo/demo.qgz        project for QGIS
   demo/report.html     inspection report
   demo/intensity.png   intensity against range and incidence, before and after correction
+or in a browser: TUNNELDB_HOME=$TUNNELDB_HOME $tunneldb serve
 The server of the demo keeps running for QGIS. To stop it: TUNNELDB_HOME=$TUNNELDB_HOME $tunneldb server stop
 TEXT

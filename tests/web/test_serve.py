@@ -12,7 +12,9 @@ from collections.abc import Iterator
 from http.cookiejar import CookieJar
 
 import pytest
+from psycopg.conninfo import make_conninfo
 from support.command import errors_of
+from web.conftest import PASSWORD
 
 COMMAND = [sys.executable, "-c", "from tunneldb.cli.main import main; main()", "serve", "--no-open"]
 
@@ -45,6 +47,15 @@ def test_it_prints_its_address_and_ends_on_sigterm(served: subprocess.Popen[str]
     assert (served.returncode, out, err) == (0, "", "")
 
 
+def test_the_role_of_the_desk_may_be_a_viewer(logins: None, dsn: str, example: str) -> None:
+    environment = {**os.environ, "TUNNELDB_DSN": make_conninfo(dsn, user="viola_web", password=PASSWORD)}
+    with subprocess.Popen([*COMMAND, "--port", "0"], stdout=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stdout is not None
+        with urllib.request.urlopen(process.stdout.readline().strip() + "healthz", timeout=20) as answer:
+            assert answer.read() == b"ok"
+        process.terminate()
+
+
 def test_embedded_server_prints_a_token_that_lets_in(installed: str, monkeypatch: pytest.MonkeyPatch) -> None:
     environment = {name: value for name, value in os.environ.items() if name != "TUNNELDB_DSN"}
     subprocess.run([*COMMAND[:3], "init"], env=environment, check=True, capture_output=True)
@@ -73,6 +84,11 @@ def test_embedded_server_prints_a_token_that_lets_in(installed: str, monkeypatch
 )
 def test_wrong_options_get_one_line(dsn: str, words: list[str], said: str) -> None:
     assert said in errors_of("serve", "--no-open", *words, code=2)
+
+
+def test_a_database_without_tunneldb_is_refused(empty_dsn: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TUNNELDB_DSN", empty_dsn)
+    assert "type tunneldb init" in errors_of("serve", "--no-open", code=2)
 
 
 def test_embedded_server_is_for_this_machine_only(installed: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,8 @@ import click
 from tunneldb.cli.main import Settings
 from tunneldb.cli.output import command
 from tunneldb.cli.param_types import FilePath, WholeRange
-from tunneldb.database import connect, resolve_dsn
+from tunneldb.database import open_connection, resolve_dsn
+from tunneldb.database.schema import installed_api_version
 from tunneldb.errors import UserError
 
 
@@ -63,8 +64,7 @@ def serve(
     if certificate is not None and key is not None:
         _check(certificate, key)
     dsn = resolve_dsn(settings.dsn)
-    with connect(settings.dsn):
-        pass  # the schema is there and of this version
+    _require_schema(dsn)
     token = secrets.token_urlsafe(32) if settings.dsn is None else None
     desk = Desk(dsn, token, loopback=loopback and not behind_proxy, secure=certificate is not None or behind_proxy)
     listener = _listen(host, port)
@@ -90,6 +90,13 @@ def serve(
         signal.signal(number, lambda *_: None)  # uvicorn sends itself the signal again when all is closed
     with listener:
         server.run(sockets=[listener])
+
+
+def _require_schema(dsn: str) -> None:
+    """Raise UserError if the database lacks tunneldb; the role of the desk may be one that only reads."""
+    with open_connection(dsn) as conn:
+        if installed_api_version(conn) is None:
+            raise UserError("the database is not set up for tunneldb yet; type tunneldb init")
 
 
 def _check(certificate: Path, key: Path) -> None:

@@ -40,8 +40,8 @@ def guard(loopback: bool) -> Callable[[Request, Next], Awaitable[Response]]:
         response = refusal(request, loopback) or await proceed(request)
         for name, value in HEADERS.items():
             response.headers.setdefault(name, value)
-        if not request.url.path.startswith(("/static/", "/tiles/")):
-            response.headers.setdefault("Cache-Control", "no-store")
+        static = request.url.path.startswith("/static/")
+        response.headers.setdefault("Cache-Control", "no-cache" if static else "no-store")
         return response
 
     return dispatch
