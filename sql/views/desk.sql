@@ -70,6 +70,7 @@ DECLARE
     step constant float8 := (chainage_to - chainage_from) / bins;
     count constant int := bins;
 BEGIN
+    PERFORM tunnel_internal.in_order(chainage_from, chainage_to);
     IF count NOT BETWEEN 1 AND 2000 OR NOT step > 0 THEN
         RAISE EXCEPTION 'a ribbon has 1 to 2000 bins and a length above 0' USING ERRCODE = 'invalid_parameter_value';
     END IF;

@@ -101,6 +101,31 @@ def example(conn: psycopg.Connection) -> str:
     return NAME
 
 
+def add_later_survey(conn: psycopg.Connection, name: str = "demo-2026") -> None:
+    """Add a second survey of the tunnel that found the same lining and images, and no leak."""
+    (later,) = conn.execute(
+        "INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_dimension, intensity_kind, platform, reference) "
+        "SELECT tunnel_id, %s, '2026-05-04', intensity_dimension, intensity_kind, platform, reference FROM tunnel.survey "
+        "WHERE name = %s RETURNING id",
+        (name, NAME),
+    ).fetchone()
+    for table in ("axis_vertex", "segment", "section", "coverage", "image"):
+        columns = [
+            column
+            for (column,) in conn.execute(
+                "SELECT attname FROM pg_attribute WHERE attrelid = format('tunnel.%%I', %s::text)::regclass AND attnum > 0 "
+                "AND NOT attisdropped AND attidentity = '' AND attgenerated = '' AND attname <> 'survey_id'",
+                [table],
+            )
+        ]
+        names = sql.SQL(", ").join(map(sql.Identifier, columns))
+        conn.execute(
+            sql.SQL("INSERT INTO tunnel.{} (survey_id, {}) SELECT {}, {} FROM tunnel.{}").format(
+                sql.Identifier(table), names, sql.Literal(later), names, sql.Identifier(table)
+            )
+        )
+
+
 def _fill(conn: psycopg.Connection) -> None:
     surface, vertices = example_surface()
     tunnel_id = conn.execute(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tunneldb.errors import UserError
+from tunneldb.numerals import parse_number
 from tunneldb.raster.tiles import EDGE, SIZE, ZOOMS
 from tunneldb.store.desk import features
 from tunneldb.store.desk.features import Layer
@@ -171,7 +172,7 @@ def _box(call: Call) -> tuple[float, float, float, float] | None:
     if not text:
         return None
     try:
-        west, south, east, north = map(float, text.split(","))
+        west, south, east, north = map(parse_number, text.split(","))
     except ValueError:
         raise UserError("bbox has four numbers: west,south,east,north, degrees") from None
     return west, south, east, north

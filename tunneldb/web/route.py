@@ -14,6 +14,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from tunneldb.errors import UserError
+from tunneldb.numerals import parse_number
 from tunneldb.web.config import Desk
 from tunneldb.web.security import SAFE_METHODS
 from tunneldb.web.sessions import RefusedError, Session, SignedOutError
@@ -63,7 +64,7 @@ class Call:
         if not text:
             return default
         try:
-            return float(text)
+            return parse_number(text)
         except ValueError:
             raise UserError(f"{name}={text[:40]}: not a number") from None
 

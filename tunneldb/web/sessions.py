@@ -209,7 +209,7 @@ def _prepared(conn: Connection) -> Connection:
     conn.autocommit = True
     conn.execute(
         "SELECT set_config('statement_timeout', %s, false), set_config('lock_timeout', %s, false),"
-        " set_config('application_name', 'tunneldb desk', false)",
+        " set_config('application_name', 'tunneldb serve', false)",
         [STATEMENT_TIMEOUT, LOCK_TIMEOUT],
     )
     return conn

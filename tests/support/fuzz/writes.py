@@ -74,6 +74,8 @@ ARGUMENTS = {
     "double precision": ["12345", "'1e300'", "'NaN'", "'Infinity'", "'-Infinity'", "1e-300", "-1"],
     "double precision[]": ["array_fill('12345'::float8, ARRAY[100000])"],
     "geometry": ["ST_MakeLine(ST_MakePoint(0, 0, 0), ST_MakePoint(1e7, 0, 0))", "ST_MakePoint(1e300, 1e300, 1e300)"],
+    "boolean": ["true", "false"],
+    "integer[]": ["'{1,2}'", "array_fill(240, ARRAY[100000])"],
 }
 """Extreme arguments of functions, by type."""
 

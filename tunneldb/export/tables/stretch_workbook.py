@@ -1,4 +1,4 @@
-"""Workbook of the findings of a stretch that count, as ``tunneldb findings -o FILE.xlsx`` writes it."""
+"""Workbook of the findings of a stretch that count, as ``tunneldb findings SURVEY -o FILE.xlsx`` writes it."""
 
 from __future__ import annotations
 
