@@ -136,18 +136,19 @@ def test_it_is_stale_after_what_it_rests_on_and_written_as_files(survey: str, co
     lining = drawing.query('LWPOLYLINE[layer=="LINING"]').first
     assert np.hypot(*np.array(lining.get_points("xy")).T) == pytest.approx(RADIUS, abs=1e-3)
 
-    def stored() -> int:
+    def stored(kind: str) -> int:
         conn.rollback()
-        return conn.execute("SELECT count(*) FROM tunnel.image WHERE kind = 'deviation_lining'").fetchone()[0]
+        return conn.execute("SELECT count(*) FROM tunnel.image WHERE kind = %s", [kind]).fetchone()[0]
 
-    assert stored() == 4  # blocks of 50 m, with the one before the survey's end and the one after
+    assert stored("overview_deviation_lining") == 2
+    assert stored("deviation_lining") == 4  # blocks of 50 m, with the one before the survey's end and the one after
     written = [Path(name).name for name in run("image", survey, "-o", tmp_path, "--km", 1)["files"]]
     assert "straight-km001-deviation_lining.tif" in written
     with rasterio.open(tmp_path / "straight-km001-deviation_lining.tif") as image:
         assert np.array_equal(image.read(1), values, equal_nan=True)
 
     run("profile", "remove", survey, "round")
-    assert stored() == 0
+    assert stored("deviation_lining") == stored("overview_deviation_lining") == 0
     assert reasons() == [(0, "design profiles changed since"), (1, "design profiles changed since")]
     path.write_text(path.read_text().replace("4.05", "4.06"))
     run("profile", "add", survey, "round", path)

@@ -404,7 +404,7 @@ def test_other_kinds_of_intensity(conn: psycopg.Connection, scan: tuple[Simulati
 def test_without_intensity_there_is_the_offset_image_only(conn: psycopg.Connection, scan: tuple[Simulation, Path]) -> None:
     prepare(scan[1], "profiler", "none")
     command("run", NAME)
-    assert {row[0] for row in conn.execute("SELECT kind FROM tunnel.image")} == {"offset"}
+    assert {row[0] for row in conn.execute("SELECT kind FROM tunnel.image")} == {"offset", "overview_offset"}
     assert not outlines(conn)
     assert "no intensity" in counts(conn)["note"]
 
