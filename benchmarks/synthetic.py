@@ -306,7 +306,7 @@ FROM moved m
 # What people drew, eight kinds in turn: lines and points have the outline of a spot about them. A drawn leak stands for the
 # next that was detected; one in fifty waits to be measured.
 DRAWN = """
-INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, area, length, width,
+INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, area, length, width_mm,
     severity,
     darkening_mean, darkening_max, image_share, contrast, unrolled, map, surface, shape, shape_map, shape_surface, review,
     reviewed_by,
@@ -315,7 +315,7 @@ SELECT %(id)s, floor((o.chainage_from + o.chainage_to) / 2000), o.chainage_from,
     12 - mod((12 - 6 * s.arc / %(radius)s / pi())::numeric, 12)::float8, s.kind,
     CASE WHEN q.line THEN 0.002 * 2 * s.along WHEN q.point THEN 0 ELSE ST_Area(o.unrolled) END,
         CASE WHEN q.line THEN 2 * s.along END,
-    CASE s.kind WHEN 'crack' THEN 0.002 END,
+    CASE s.kind WHEN 'crack' THEN 2.0 END,
         CASE WHEN s.fate < 0.02 THEN 4 WHEN s.fate < 0.1 THEN 3 WHEN s.fate < 0.5 THEN 2 ELSE 1 END,
     m.drop, m.drop, m.drop / 3, m.drop, o.unrolled, o.map, o.surface,
     g.shapes[1], g.shapes[2], g.shapes[3], CASE WHEN s.luck < 0.03 THEN 'open' ELSE 'confirmed' END, q.who, q.at, 'drawn', true,
