@@ -90,8 +90,10 @@ def served(dsn: str) -> Iterator[tuple[str, psutil.Process]]:
         command, stdout=subprocess.PIPE, text=True, env={**os.environ, "TUNNELDB_DSN": dsn}, stderr=sys.stderr
     ) as process:
         assert process.stdout is not None
-        yield process.stdout.readline().strip().rstrip("/"), psutil.Process(process.pid)
-        process.terminate()
+        try:
+            yield process.stdout.readline().strip().rstrip("/"), psutil.Process(process.pid)
+        finally:
+            process.terminate()
 
 
 def measure(dsn: str, address: str, process: psutil.Process, names: list[str], length: float) -> dict[str, float]:

@@ -31,7 +31,8 @@ def sign_in(address: str, name: str) -> Person:
     client = httpx.Client(base_url=address, timeout=30.0)
     token = re.search(r'name="csrf" value="([^"]+)"', client.get("/login").text)
     assert token
-    client.post("/login", data={"user": name, "password": PASSWORD, "csrf": token[1]}).raise_for_status()
+    answer = client.post("/login", data={"user": name, "password": PASSWORD, "csrf": token[1]})
+    assert answer.status_code == 303, answer.text
     page = client.get("/").text
     csrf = re.search(r'name="csrf" content="([^"]+)"', page)
     assert csrf, page
