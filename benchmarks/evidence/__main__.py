@@ -27,7 +27,7 @@ from benchmarks.evidence.painted import paintings
 from benchmarks.evidence.pictures import pictures
 from tunneldb.anomalies import evidence
 
-FAMILIES = ("known", *(f"round_{k:02}" for k in range(1, 10)), "set-1")
+FAMILIES = ("known", *(f"round_{k:02}" for k in range(1, 13)), "set-1")
 PAINTINGS, PAINTED = 320, 0.5
 """How many pictures are painted, and how much their regions count: less than those of scans."""
 
@@ -35,7 +35,7 @@ ROUNDS = (80, 120, 180)
 WORSE = 1.01
 """The fewest rounds are taken whose loss is no more than so many times the least."""
 
-VERSION = "3"
+VERSION = "4"
 
 
 def main() -> None:
