@@ -8,7 +8,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import httpx
+import httpx2
 import numpy as np
 
 from benchmarks.serve.survey import PASSWORD, SURVEY
@@ -20,7 +20,7 @@ class Person:
     """Somebody who is signed in."""
 
     name: str
-    client: httpx.Client
+    client: httpx2.Client
     seconds: list[float] = field(default_factory=list)
     written: list[int] = field(default_factory=list)
     errors: list[str] = field(default_factory=list)
@@ -28,7 +28,7 @@ class Person:
 
 def sign_in(address: str, name: str) -> Person:
     """Sign somebody in."""
-    client = httpx.Client(base_url=address, timeout=30.0)
+    client = httpx2.Client(base_url=address, timeout=30.0)
     token = re.search(r'name="csrf" value="([^"]+)"', client.get("/login").text)
     assert token
     answer = client.post("/login", data={"user": name, "password": PASSWORD, "csrf": token[1]})

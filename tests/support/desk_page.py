@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from axe_playwright_python.sync_playwright import Axe
@@ -11,7 +11,7 @@ from playwright.sync_api import BrowserContext, Locator, Page, expect
 
 DESKTOP = {"width": 1440, "height": 900}
 
-PATIENCE = 10_000
+PATIENCE = 30_000
 """Longest wait for anything on the page, ms."""
 
 expect.set_options(timeout=PATIENCE)
@@ -92,16 +92,25 @@ def position(page: Page) -> dict[str, float]:
 def settled(page: Page) -> dict[str, float]:
     """Return the view, once it no longer moves: an animation lasts 0.25 s, and the address follows within 0.3 s."""
     before = None
-    page.wait_for_timeout(350)
+    page.wait_for_timeout(300)
     while (view := position(page)) != before:
         before = view
-        page.wait_for_timeout(350)
+        page.wait_for_timeout(200)
     return view
+
+
+def comes_to(page: Page, fits: Callable[[dict[str, float]], object]) -> dict[str, float]:
+    """Wait until the view fits; return it."""
+    for _ in range(PATIENCE // 100):
+        if fits(view := position(page)):
+            return view
+        page.wait_for_timeout(100)
+    raise AssertionError(f"the view stays at {view}")
 
 
 def accessibility_findings(page: Page) -> list[str]:
     """Return the serious and critical findings of axe."""
-    found = Axe().run(page).response["violations"]
+    found = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
     return [
         f"{one['id']}: {one['help']}: {[node['target'] for node in one['nodes']][:3]}"
         for one in found

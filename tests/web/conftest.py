@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
-import httpx
+import httpx2
 import psycopg
 import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 from psycopg import sql
 from starlette.testclient import TestClient
+from support.databases import Copies
+from support.desk_page import DESKTOP, enter, opened
+from support.desk_server import DeskServer
+from support.example_survey import NAME, add_later_survey
 
 from tunneldb.web.app import create_app
 from tunneldb.web.config import Desk
@@ -76,8 +82,77 @@ def signed_in(desk: Desk) -> Iterator[SignIn]:
     desk.sessions.close()
 
 
-def sign_in(browser: TestClient, user: str, password: str = PASSWORD) -> httpx.Response:
+def sign_in(browser: TestClient, user: str, password: str = PASSWORD) -> httpx2.Response:
     """Fill in the form."""
     form = browser.get("/login").text
     token = form.partition('name="csrf" value="')[2].partition('"')[0]
     return browser.post("/login", data={"user": user, "password": password, "csrf": token})
+
+
+@pytest.fixture(scope="module")
+def survey_dsn(logins: None, copies: Copies, example_template: str) -> Iterator[str]:
+    """DSN of the database that the tests of a module share: the example, and a later survey of its tunnel."""
+    with copies.copy(example_template) as dsn:
+        with psycopg.connect(dsn) as conn:
+            add_later_survey(conn)
+            conn.execute("CREATE TABLE public.as_detected AS SELECT id, review, kind_override, wet, remark FROM tunnel.finding")
+        yield dsn
+
+
+@pytest.fixture
+def database(survey_dsn: str) -> Iterator[psycopg.Connection]:
+    """Connection to the database under the desk, whose detected findings are as they were before the tests."""
+    with psycopg.connect(survey_dsn, autocommit=True) as conn:
+        conn.execute("DELETE FROM tunnel.finding WHERE id NOT IN (SELECT id FROM public.as_detected)")
+        conn.execute(
+            "UPDATE tunnel.finding f SET review = d.review, kind_override = d.kind_override, wet = d.wet, remark = d.remark,"
+            " reviewed_by = NULL, reviewed_at = NULL FROM public.as_detected d WHERE d.id = f.id"
+        )
+        yield conn
+
+
+@pytest.fixture(scope="module")
+def server(survey_dsn: str) -> Iterator[DeskServer]:
+    """The desk as a server."""
+    desk = DeskServer(survey_dsn)
+    yield desk
+    desk.stop()
+
+
+@pytest.fixture(scope="module")
+def chrome(chromium: Path) -> Iterator[Browser]:
+    """Chromium."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def context_of(chrome: Browser, server: DeskServer) -> Iterator[Callable[..., BrowserContext]]:
+    """Return a function that returns the browser in which somebody is signed in, the same one each time."""
+    contexts: dict[str, BrowserContext] = {}
+
+    def make(user: str, **settings: Any) -> BrowserContext:
+        key = f"{user} {settings}"
+        if key not in contexts:
+            contexts[key] = chrome.new_context(base_url=server.address, **{"viewport": DESKTOP, **settings})
+            enter(contexts[key], user, PASSWORD)
+        return contexts[key]
+
+    yield make
+    for context in contexts.values():
+        context.close()
+
+
+@pytest.fixture(scope="module")
+def ines_context(context_of: Callable[..., BrowserContext]) -> BrowserContext:
+    """Browser in which an inspector is signed in."""
+    return context_of("ines_web")
+
+
+@pytest.fixture
+def page(ines_context: BrowserContext, database: psycopg.Connection) -> Iterator[Page]:
+    """Page of the example survey at the desk of an inspector; at the end nothing went wrong in it."""
+    with opened(ines_context, f"/#/{NAME}") as page:
+        yield page

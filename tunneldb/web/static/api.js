@@ -88,8 +88,8 @@ async function answer(method, path, body, signal, limit = LIMIT) {
     clearTimeout(timer);
   }
   if (response.status === 401) {
-    const next = encodeURIComponent(location.pathname + location.hash);
-    location.assign(`/login?next=${next}`);
+    // The part of the address after # comes back after the sign-in (login.js).
+    location.assign(`/login${location.hash}`);
     throw new ApiError(401, 'Sign in again.');
   }
   if (!response.ok) {

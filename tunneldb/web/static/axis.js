@@ -5,6 +5,8 @@ import { arc, clock, niceStep, percent, station } from './format.js';
 import { hatch } from './ribbon.js';
 
 const BAND = 7;
+/** Height of the zoom buttons at the upper left, px. */
+const CLEAR = matchMedia('(pointer: coarse), (max-width: 820px)').matches ? 125 : 95;
 
 /** Clock positions by arc, from the curve of one section: about right elsewhere in the tunnel. */
 export class ClockScale {
@@ -90,7 +92,7 @@ function arcs(c, y, width, height, bottom, top, survey, clocks) {
   const step = niceStep(((top - bottom) * 60) / height);
   for (let at = Math.ceil(bottom / step) * step; at <= top; at += step) {
     const py = y(at);
-    if (at < survey.arc_from || at > survey.arc_to || py < 95 || py > height - 24) continue;
+    if (at < survey.arc_from || at > survey.arc_to || py < CLEAR || py > height - 24) continue;
     const hours = clocks?.at(at) ?? null;
     const metres = `${at > 0 ? '+' : at < 0 ? '−' : ''}${Math.abs(at).toFixed(step < 0.1 ? 2 : step < 1 ? 1 : 0)}`;
     c.strokeStyle = 'rgba(30,40,50,.75)';
@@ -116,7 +118,7 @@ function band(c, x, width, ribbon, survey) {
     c.fillStyle = '#5d8a6a';
     c.fillRect(from, BAND * (1 - share), wide, BAND * share);
     const left = Math.max(from, 70) + 4;
-    if (Math.min(from + wide, width) - left > 110 && share < 0.995) text(c, `${percent(1 - share)} not inspected`, left, BAND + 3, 'left', 'top');
+    if (Math.min(from + wide, width) - left > 110 && share < 0.995) text(c, share > 0 ? `${percent(share)} inspected` : 'not inspected', left, BAND + 3, 'left', 'top');
   }
 }
 

@@ -47,11 +47,10 @@ export class Cutouts {
     this.draw();
   }
 
-  /** Switch the outlines; return whether they are drawn. */
-  toggle() {
-    this.outlined = !this.outlined;
+  /** Draw the outlines, or not. */
+  showOutlines(on) {
+    this.outlined = on;
     this.draw();
-    return this.outlined;
   }
 
   /** Load the images of findings that come next. */

@@ -9,8 +9,8 @@ const FILES = [
   ['gpkg', 'GeoPackage', 'findings with their outlines'],
 ];
 
-/** Return the panel of downloads. */
-export function downloadsPanel(survey, extent) {
+/** Return the panel of downloads; who may not download sees why. */
+export function downloadsPanel(survey, extent, permitted) {
   const from = el('input', { type: 'text', inputmode: 'decimal' });
   const to = el('input', { type: 'text', inputmode: 'decimal' });
   const told = el('p', { role: 'status', 'aria-live': 'polite' });
@@ -38,8 +38,9 @@ export function downloadsPanel(survey, extent) {
     control.disabled = false;
   }
   set(...extent());
-  const rows = FILES.map(([what, name, text]) => el('li', {}, button(name, (event) => fetchFile(what, event.target)), el('span', { class: 'muted', text })));
+  const rows = FILES.map(([what, name, text]) => el('li', {}, button(name, (event) => fetchFile(what, event.target), { disabled: !permitted }), el('span', { class: 'muted', text })));
   return el('div', { class: 'pad' }, el('h2', { text: 'Downloads' }),
+    permitted ? null : el('p', { class: 'warn-text', text: 'Downloads need the role tunnel_operator.' }),
     el('div', { class: 'row' }, field('From', from), field('To', to)),
     el('div', { class: 'row' }, button('Stretch in view', () => set(...extent())), button('Whole survey', () => set(survey.from, survey.to))),
     el('ul', { class: 'downloads' }, ...rows), told);

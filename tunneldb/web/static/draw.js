@@ -1,7 +1,7 @@
 /** Panel to draw and change findings. */
 
 import { findingPath, post, put, remove, surveyPath } from './api.js';
-import { button, choice, el, field } from './dom.js';
+import { button, el, field } from './dom.js';
 import { number } from './format.js';
 import { Sketch } from './sketch.js';
 
@@ -157,7 +157,8 @@ export class DrawPanel {
     const was = this.kind.value;
     this.kind.replaceChildren(...kinds.map(({ code, label }) => el('option', { value: code, text: label })));
     if (kinds.some(({ code }) => code === was)) this.kind.value = was;
-    this.severity.replaceChildren(...choice([['', 'none'], ...this.survey.severities.map(({ id, label }) => [id, `${id}, ${label}`])], '').children);
+    const severities = this.survey.severities.map(({ id, label }) => el('option', { value: id, text: `${id}, ${label}` }));
+    this.severity.replaceChildren(el('option', { value: '', text: 'none' }), ...severities);
   }
 
   refresh() {
@@ -181,7 +182,7 @@ export class DrawPanel {
     if (name === null) return finding ? `Shown: finding ${finding.id}.` : 'Click a finding on the lining to change it.';
     if (name === 'merge') return `Click the findings to merge: ${this.merging.join(', ')}.`;
     if (sketch.pen) {
-      return { point: 'Click the place.', line: 'Click the points of the line; double-click ends it.', polygon: 'Click the corners; double-click ends the polygon.' }[sketch.shape];
+      return { point: 'Click the place.', line: 'Click the points of the line; a double click or Finish ends it.', polygon: 'Click the corners; a double click or Finish ends the polygon.' }[sketch.shape];
     }
     const length = measure(sketch.geometry);
     return `Drag corners to change it${length ? ` (${length})` : ''}, then save.`;

@@ -32,14 +32,13 @@ export function number(value, decimals = 2, unit = '') {
   return value.toFixed(decimals) + (unit ? `\u00a0${unit}` : '');
 }
 
-/** Format a share as percent; below 100 % is never rounded up to 100. */
-export function percent(share, decimals = 0) {
+/** Format a share as percent, rounded down to one decimal: 100 % is all of it, 0 % is nothing. */
+export function percent(share) {
   if (share === null || share === undefined) return NONE;
-  const unit = 10 ** decimals;
-  const rounded = Math.round(share * 100 * unit) / unit;
-  const value = rounded >= 100 && share < 1 ? Math.floor(share * 100 * unit) / unit : rounded;
-  const shown = value >= 100 && share < 1 ? 100 - 1 / unit : value;
-  return `${shown.toFixed(decimals)}\u00a0%`;
+  if (share >= 1 || share <= 0) return `${share >= 1 ? 100 : 0}\u00a0%`;
+  // 0.29 is stored as a little less than 0.29.
+  const tenths = Math.min(Math.floor(share * 1000 + 1e-6), 999);
+  return `${(tenths / 10).toFixed(1)}\u00a0%`;
 }
 
 /** Format a signed arc, m. */

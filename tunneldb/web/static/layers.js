@@ -42,7 +42,7 @@ export function findingsLayer(survey, shown, version) {
   // Of the tunnel alone, less than a pixel high from afar, OpenLayers would load no tile and cut the circles.
   const [from, low, to, high] = surveyExtent(survey);
   const source = new ol.source.VectorTile({
-    format: new ol.format.MVT({ idProperty: 'id' }), projection, tileGrid: tileGridOf([from, low - TALL, to, high + TALL]), wrapX: false,
+    format: new ol.format.MVT(), projection, tileGrid: tileGridOf([from, low - TALL, to, high + TALL]), wrapX: false,
     url: findingsAddress(survey.name, version), maxZoom: MAX_TILE_ZOOM,
   });
   return new ol.layer.VectorTile({ source, style: styler(kinds, shown), renderBuffer: 40 });

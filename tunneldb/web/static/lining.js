@@ -46,6 +46,7 @@ export class Lining {
       interactions: ol.interaction.defaults.defaults({ altShiftDragRotate: false, pinchRotate: false }),
       view: new ol.View({ projection, center: [0, 0], zoom: 18, minZoom: MIN_ZOOM, maxZoom: MAX_ZOOM, enableRotation: false }),
     });
+    for (const control of this.box.querySelectorAll('.ol-zoom button')) control.setAttribute('aria-label', control.title);
     map.on('moveend', () => this.moved());
     map.on('postrender', () => this.paintAxes());
     map.on('pointermove', (event) => {

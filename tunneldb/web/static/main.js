@@ -1,6 +1,6 @@
 /** The desk: connects address, survey, map and panel. */
 
-import { get, surveyPath } from './api.js';
+import { get, post, surveyPath } from './api.js';
 import { button, debounce, el } from './dom.js';
 import { station } from './format.js';
 import { downloadsPanel } from './downloads.js';
@@ -11,7 +11,7 @@ import { Panel } from './panel.js';
 import { Review } from './review.js';
 import { Ribbon } from './ribbon.js';
 import { format, parse, replace } from './router.js';
-import { Saver } from './saver.js';
+import { DiscardedError, Saver } from './saver.js';
 import { SectionPanel } from './section.js';
 import { Session } from './session.js';
 import { showSurveys } from './surveys.js';
@@ -22,7 +22,7 @@ const node = (id) => document.getElementById(id);
 const user = meta('user');
 const canWrite = ['inspector', 'operator'].includes(meta('role'));
 
-const app = { surveys: [], survey: null, finding: null };
+const app = { surveys: [], survey: null, finding: null, routing: false, turn: 0, hash: '' };
 
 function say(text, wrong = false) {
   const state = node('state');
@@ -59,6 +59,7 @@ const review = new Review(session, {
   shown: (finding, fit) => show(finding, fit),
   marked: (finding) => mark(finding),
   changed: () => changed(),
+  outlined: () => lining.shown.findings,
   outlines: (on) => {
     lining.shown.findings = on;
     const box = node('show-findings');
@@ -96,8 +97,10 @@ function moved(view, [from, , to]) {
 }
 
 const address = debounce(() => {
-  if (!app.survey) return;
+  // While the page follows an address, or is about to, it does not write one.
+  if (!app.survey || app.routing || location.hash !== app.hash) return;
   replace({ survey: app.survey.name, finding: app.finding, ...app.view, kind: lining.kind, tab: panel.tab === 'finding' ? null : panel.tab });
+  app.hash = location.hash;
 }, 200);
 
 function picked(id) {
@@ -143,7 +146,7 @@ function showTab(tab) {
   if (tab !== 'draw') draw.cancel();
   const content = {
     finding: () => review.root, review: () => review.root, draw: () => draw.root, section: () => section.root,
-    downloads: () => downloadsPanel(app.survey, stretch), notes: () => notesPanel(app.survey, summaryOf(app.survey)),
+    downloads: () => downloadsPanel(app.survey, stretch, meta('role') === 'operator'), notes: () => notesPanel(app.survey, summaryOf(app.survey)),
   }[tab]();
   panel.fill(content);
   if (tab === 'section') section.open();
@@ -167,9 +170,9 @@ async function readRibbon(survey) {
   }
 }
 
-async function openSurvey(name, state) {
+async function openSurvey(name, state, latest) {
   const survey = await get(surveyPath(name));
-  if (parse().survey !== name) return;
+  if (!latest()) return;
   app.survey = survey;
   app.finding = null;
   if (!saver.busy) say('');
@@ -181,6 +184,10 @@ async function openSurvey(name, state) {
   node('survey-choice').value = name;
   showLimits(node('limits'), survey, summaryOf(survey));
   ribbon.show(null, survey);
+  const tab = state.finding === null ? state.tab ?? panel.tab ?? 'finding' : 'finding';
+  // On a narrow screen an empty panel would cover the lining.
+  const empty = state.finding === null && tab === 'finding' && matchMedia('(max-width: 820px)').matches;
+  panel.fold(empty);
   lining.map.updateSize();
   lining.mark(null);
   lining.setSurvey(survey, state.kind, state.x !== null && state.y !== null && state.z !== null ? state : null);
@@ -188,13 +195,15 @@ async function openSurvey(name, state) {
   review.setSurvey(survey);
   section.setSurvey(survey);
   draw.setSurvey(survey);
-  panel.choose(state.finding === null ? state.tab ?? panel.tab ?? 'finding' : 'finding');
+  panel.choose(tab);
+  panel.fold(empty);
   readRibbon(survey);
 }
 
-async function showTable() {
+async function showTable(latest) {
   app.survey = null;
   app.surveys = await get('/api/surveys');
+  if (!latest()) return;
   fillChoice();
   node('desk').hidden = true;
   node('surveys').hidden = false;
@@ -209,12 +218,16 @@ function fillChoice() {
   node('survey-choice').replaceChildren(el('option', { value: '', text: 'All surveys' }), ...options);
 }
 
-/** Show what the address says. */
+/** Show what the address says; an answer that comes after the next change of the address is dropped. */
 async function route() {
+  app.hash = location.hash;
   const state = parse();
+  const turn = (app.turn += 1);
+  const latest = () => turn === app.turn;
+  app.routing = true;
   try {
     if (!state.survey) {
-      await showTable();
+      await showTable(latest);
       return;
     }
     if (!app.surveys.length) {
@@ -222,15 +235,22 @@ async function route() {
       fillChoice();
     }
     const other = app.survey?.name !== state.survey;
-    if (other) await openSurvey(state.survey, state);
+    if (other) await openSurvey(state.survey, state, latest);
+    if (!latest()) return;
     if (state.finding !== null && state.finding !== app.finding) {
       if (!['finding', 'review'].includes(panel.tab)) panel.choose('finding');
+      panel.fold(false);
       await review.open(state.finding, !other || state.x === null);
     } else if (!other && state.x !== null && state.y !== null && state.z !== null) {
       lining.goTo(state.x, state.y, state.z);
     }
   } catch (error) {
     say(error.message, true);
+  } finally {
+    if (latest()) {
+      app.routing = false;
+      address();
+    }
   }
 }
 
@@ -239,13 +259,21 @@ function offerLeft() {
   const left = saver.left();
   if (!left || !canWrite) return;
   const values = Object.entries(left.values).map(([name, value]) => `${name}: ${value ?? 'none'}`).join(', ');
-  const box = el('div', { class: 'alert', role: 'alert' }, el('p', { text: `A review of your last visit was not saved: finding ${left.id}, ${values}.` }),
+  const link = el('span');
+  const box = el('div', { class: 'alert', role: 'alert' }, el('p', { text: `A review of your last visit was not saved: finding ${left.id}, ${values}.` }), link,
     button('Save now', async () => {
       try {
         await saver.save(left.id, left.seen, left.values);
         changed();
+        if (app.finding === left.id) review.open(left.id, false);
       } catch (error) {
+        // Nothing is lost: the review stays on offer, beside what others have written since.
+        const survey = error.data?.finding?.survey;
+        if (survey) link.replaceChildren(el('a', { href: format({ survey, finding: left.id }), text: `Show finding ${left.id}` }));
         say(`Not saved. ${error.message}`, true);
+        if (error instanceof DiscardedError) return;
+        saver.keep(left);
+        node('alerts').append(box);
       }
     }),
     button('Discard', () => {
@@ -259,6 +287,14 @@ node('survey-choice').addEventListener('change', (event) => { location.hash = fo
 node('skip').addEventListener('click', (event) => {
   event.preventDefault();
   node('map')?.focus();
+});
+node('sign-out').addEventListener('click', async () => {
+  try {
+    await post('/logout');
+    location.assign('/login');
+  } catch (error) {
+    say(`Not signed out. ${error.message}`, true);
+  }
 });
 window.addEventListener('hashchange', route);
 offerLeft();

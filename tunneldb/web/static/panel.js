@@ -17,7 +17,11 @@ export class Panel {
     this.grip = el('button', { type: 'button', class: 'grip', 'aria-expanded': 'true', onclick: () => this.fold(!this.root.classList.contains('folded')) }, 'Hide');
     this.tabs = TABS.map(([name, text]) => el('button', {
       type: 'button', role: 'tab', id: `tab-${name}`, 'aria-controls': 'panel-body', 'aria-selected': 'false', tabindex: '-1', data: { name }, text,
-      onclick: () => this.choose(name),
+      onclick: (event) => {
+        this.choose(name);
+        // After a click the keys belong to the content; with the keyboard, arrow keys go on to the next tab.
+        if (event.detail) this.body.focus({ preventScroll: true });
+      },
     }));
     const list = el('div', { class: 'tabs', role: 'tablist', 'aria-label': 'Panel', onkeydown: (event) => this.key(event) }, ...this.tabs);
     this.body = el('div', { id: 'panel-body', class: 'panel-body', role: 'tabpanel', tabindex: '0' });
@@ -32,6 +36,7 @@ export class Panel {
       const on = tab.dataset.name === name;
       tab.setAttribute('aria-selected', String(on));
       tab.tabIndex = on ? 0 : -1;
+      if (on) tab.scrollIntoView({ block: 'nearest', inline: 'nearest' });
     }
     this.body.setAttribute('aria-labelledby', `tab-${name}`);
     this.root.classList.toggle('wide', name === 'review');

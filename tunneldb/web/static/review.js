@@ -16,7 +16,7 @@ const AHEAD = 2;
 export class Review {
   /**
    * @param {Session} session
-   * @param {Object} app - canWrite, say(text, wrong), shown(finding, fit), changed(), extent().
+   * @param {Object} app - canWrite, say(text, wrong), shown(finding, fit), changed(), extent(), outlined(), outlines(on).
    */
   constructor(session, app) {
     this.session = session;
@@ -278,6 +278,11 @@ export class Review {
     }
   }
 
+  showOutlines(on) {
+    this.cutouts.showOutlines(on);
+    this.app.outlines(on);
+  }
+
   takeKeys() {
     document.activeElement?.blur();
   }
@@ -300,7 +305,7 @@ export class Review {
     const steps = { n: 'next', ArrowRight: 'next', p: 'previous', ArrowLeft: 'previous' };
     const writes = { c: 'confirm', r: 'reject', o: 'reopen', z: 'undo' };
     if (name in steps) return this.reviewing ? () => this[steps[name]]() : null;
-    if (name === 'h') return () => this.cutouts.toggle() !== null && this.app.outlines(this.cutouts.outlined);
+    if (name === 'h') return () => this.showOutlines(!this.app.outlined());
     if (name === '+') return () => this.cutouts.zoomBy(ZOOM);
     if (name === '-') return () => this.cutouts.zoomBy(1 / ZOOM);
     if (!this.app.canWrite) return name in writes || name === 'm' || this.keys.has(name) ? () => this.app.say('A viewer cannot review.', true) : null;

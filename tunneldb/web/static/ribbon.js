@@ -132,6 +132,7 @@ export class Ribbon {
     const gap = 3;
     const room = height - AXIS - gap * ROWS.length;
     let y = 0;
+    this.maxima = [];
     for (const [name, , share] of ROWS) {
       const tall = (room * share) / total;
       c.fillStyle = '#f3f5f7';
@@ -141,6 +142,7 @@ export class Ribbon {
     }
     this.axis(c, width, height);
     this.box(c, width, height - AXIS);
+    this.maxima.forEach(([top, text]) => maximum(c, text, width, top));
   }
 
   /** Draw a row: bars of values, hatched where a value is not known. */
@@ -180,16 +182,8 @@ export class Ribbon {
         c.fillRect(x, top + tall - part, wide, part);
       }
     }
-    if (name === 'wet' || name === 'findings') {
-      c.font = '10px system-ui, sans-serif';
-      c.textAlign = 'right';
-      c.textBaseline = 'top';
-      const text = name === 'wet' ? `max ${number(most < 1e-6 ? 0 : most, 1, 'm²')}` : `max ${most < 1 ? 0 : most}`;
-      c.fillStyle = 'rgba(255,255,255,.8)';
-      c.fillRect(width - c.measureText(text).width - 6, top, c.measureText(text).width + 6, 12);
-      c.fillStyle = COLOURS.axis;
-      c.fillText(text, width - 3, top + 1);
-    }
+    if (name === 'wet') this.maxima.push([top, `max ${number(most < 1e-6 ? 0 : most, 1, 'm²')}`]);
+    if (name === 'findings') this.maxima.push([top, `max ${most < 1 ? 0 : most}`]);
   }
 
   stacks() {
@@ -228,6 +222,18 @@ export class Ribbon {
     c.lineWidth = 1.5;
     c.strokeRect(left, 0.75, wide, height - 1.5);
   }
+}
+
+/** State the largest value of a row at its right end. */
+function maximum(c, text, width, top) {
+  c.font = '10px system-ui, sans-serif';
+  c.textAlign = 'right';
+  c.textBaseline = 'top';
+  const wide = c.measureText(text).width + 6;
+  c.fillStyle = 'rgba(255,255,255,.9)';
+  c.fillRect(width - wide, top, wide, 12);
+  c.fillStyle = COLOURS.axis;
+  c.fillText(text, width - 3, top + 1);
 }
 
 let pattern = null;

@@ -45,6 +45,11 @@ export class Saver {
     }
   }
 
+  /** Keep a write of an earlier visit that could not be saved. */
+  keep(job) {
+    localStorage.setItem(this.key, JSON.stringify(job));
+  }
+
   /** Forget the write of an earlier visit. */
   forget() {
     localStorage.removeItem(this.key);

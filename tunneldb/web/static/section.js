@@ -68,7 +68,7 @@ export class SectionPanel {
       if (survey !== this.survey) return;
       this.section = section;
       this.draw();
-      this.say(`${section.label ?? station(section.chainage, 2)}: ${section.points.length} points.${section.points.length ? '' : ' Nothing was scanned here.'}`);
+      this.say(`${section.label ?? station(section.chainage, 2)}: ${section.points.length ? `${section.points.length} points` : 'no points are stored here'}.`);
     } catch (error) {
       this.say(error.message, true);
     }
@@ -117,7 +117,7 @@ export class SectionPanel {
     for (let x = Math.ceil(left / step) * step; x < right; x += step) {
       root.append(svg('line', { x1: x, x2: x, y1: -low, y2: -high, ...line }), svg('text', { x: x + 2 * unit, y: -low - 3 * unit, ...label }, `${+x.toFixed(2)}`));
     }
-    for (let y = Math.ceil(low / step) * step; y < high; y += step) {
+    for (let y = Math.ceil(low / step) * step; y < high - 14 * unit; y += step) {
       root.append(svg('line', { x1: left, x2: right, y1: -y, y2: -y, ...line }), svg('text', { x: left + 2 * unit, y: -y - 2 * unit, ...label }, `${+y.toFixed(2)}`));
     }
   }
