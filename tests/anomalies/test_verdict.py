@@ -171,8 +171,7 @@ def test_repairs_and_stripes_have_straight_sides(drop: float) -> None:
     found = canvas.detect().anomalies
     assert len(found) == 5
     assert all(anomaly.verdict.kind == "dark" for anomaly in found)
-    assert sum("rectangular" in anomaly.verdict.reasons for anomaly in found) == 4
-    assert sum("stripe" in anomaly.verdict.reasons for anomaly in found) == 1
+    assert sorted(anomaly.verdict.reasons[0] for anomaly in found) == ["rectangular"] * 4 + ["stripe"]
 
 
 @pytest.mark.parametrize("drop", [1.2, 2.0])

@@ -47,7 +47,7 @@ def stale(conn: psycopg.Connection) -> list[tuple[str, str]]:
 def reviewed(conn: psycopg.Connection) -> psycopg.Connection:
     """The example with MANY anomalies more, a metre apart: half of what the model calls leaks was rejected by an inspector."""
     rng = np.random.default_rng(1)
-    pool = rng.normal(0, 2, (12000, len(FEATURES)))
+    pool = rng.normal(0, 2, (40000, len(FEATURES)))
     p = standard_model().probabilities(pool)
     pool = pool[(p > 0.55) & (p < 0.95)][:MANY]
     assert len(pool) == MANY

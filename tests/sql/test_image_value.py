@@ -72,7 +72,9 @@ def test_who_may_not_open_the_format_is_told(conn: psycopg.Connection[Any], surv
     conn.execute(sql.SQL("GRANT USAGE ON SCHEMA tunnel, tunnel_api TO plain"))
     conn.execute("GRANT SELECT ON ALL TABLES IN SCHEMA tunnel TO plain")
     conn.execute("ALTER FUNCTION tunnel_api.image_values(int, text, float8[], float8[]) OWNER TO plain")
-    place = conn.execute("SELECT min(block) * 50.0 + 1 FROM tunnel.image WHERE survey_id = %s AND kind = 'offset'", [survey_id]).fetchone()
+    place = conn.execute(
+        "SELECT min(block) * 50.0 + 1 FROM tunnel.image WHERE survey_id = %s AND kind = 'offset'", [survey_id]
+    ).fetchone()
     assert place is not None
     with pytest.raises(psycopg.errors.ObjectNotInPrerequisiteState, match="may not read GeoTIFF") as told:
         conn.execute(QUERY, [survey_id, "offset", [float(place[0])], [0.0]])

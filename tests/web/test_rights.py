@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import json
+
 import psycopg
 import pytest
 from web.conftest import SignIn
 
 from tunneldb.web.security import HEADERS, MAX_BODY
 
+SEEN = {"review": "open", "remark": None, "kind": "leak"}
+DRAWING = {"geometry": {"type": "Point", "coordinates": [12350, 0]}, "kind": "other"}
+NOTHING = {"severity": None, "width_mm": None, "remark": None}
+
 WRITES = [
-    ("PATCH", "/api/findings/1", {"seen": {"review": "open", "remark": None, "kind": "leak"}, "values": {"review": "confirmed"}}),
+    ("PATCH", "/api/findings/1", {"seen": SEEN, "values": {"review": "confirmed"}}),
     ("POST", "/api/findings/1/undo", {}),
     ("PUT", "/api/findings/1/outline", {"geometry": {"type": "Point", "coordinates": [12350, 0]}}),
     ("POST", "/api/findings/1/split", {"line": {"type": "LineString", "coordinates": [[12300, -5], [12400, 5]]}}),
     ("POST", "/api/findings/merge", {"ids": [1, 2]}),
     ("DELETE", "/api/findings/1", None),
-    ("POST", "/api/surveys/demo-2024/findings",
-     {"geometry": {"type": "Point", "coordinates": [12350, 0]}, "kind": "other", "severity": None, "width_mm": None, "remark": None}),
+    ("POST", "/api/surveys/demo-2024/findings", DRAWING | NOTHING),
 ]  # fmt: skip
 
 
@@ -45,7 +50,8 @@ PATHS = [
     "/tiles/demo-2024/corrected/99/0/0.png", "/tiles/demo-2024/corrected/-1/0/0.png", "/tiles/demo-2024/secret/15/0/0.png",
     "/tiles/demo-2024/corrected/15/999999999999/0.png", "/tiles/demo-2024/findings/15/x/0.mvt", "/tiles/nothing/raw/15/1/1.png",
     "/static/../app.py", "/static/%2e%2e/app.py", "/static/..%2fconfig.py", "/collections/pg_authid/items",
-    "/collections/finding_map/items?pg_sleep(9)=1", "/collections/finding_map/items?bbox=1,2", "/collections/finding_map/items?limit=-1",
+    "/collections/finding_map/items?pg_sleep(9)=1", "/collections/finding_map/items?bbox=1,2",
+    "/collections/finding_map/items?limit=-1",
     "/tileMatrixSets/other", "/tiles/demo-2024/secret",
 ]  # fmt: skip
 
@@ -59,11 +65,18 @@ def test_hostile_paths_get_one_line(signed_in: SignIn, path: str) -> None:
 
 
 BODIES = [
-    b"", b"{", b"[]", b"null", b'"x"', b'{"seen": 1}', b"[" * 100_000, b'{"ids": ["1"]}', b'{"ids": [1e99]}', b'{"ids": [true]}',
-    b'{"geometry": {"type": "Point", "coordinates": [1e308, 0]}, "kind": "other"}', b'{"geometry": {"type": "Nothing"}, "kind": "other"}',
-    b'{"geometry": {"type": "Polygon", "coordinates": []}, "kind": "other"}', b'{"geometry": {}, "kind": 5}',
-    b'{"line": {"type": "LineString", "coordinates": [[1]]}}', b'{"seen": {"review": "open", "remark": null, "kind": "leak"}, "values": {"id": "9"}}',
-    b'{"seen": {"review": "open", "remark": null, "kind": "leak"}, "values": {"review": {"a": 1}}}', b"\xff\xfe", b'{"a": "\\u0000"}',
+    b"", b"{", b"[]", b"null", b'"x"', b'{"seen": 1}', b"[" * 100_000, b"\xff\xfe", b'{"a": "\\u0000"}',
+    *(json.dumps(body).encode() for body in (
+        {"ids": ["1"]}, {"ids": [1e99]}, {"ids": [True]},
+        DRAWING | {"geometry": {"type": "Point", "coordinates": [1e308, 0]}},
+        DRAWING | {"geometry": {"type": "Nothing"}},
+        DRAWING | {"geometry": {"type": "Polygon", "coordinates": []}},
+        {"geometry": {}, "kind": 5},
+        {"line": {"type": "LineString", "coordinates": [[1]]}},
+        {"seen": SEEN, "values": {"id": "9"}},
+        {"seen": SEEN, "values": {"review": {"a": 1}}},
+        {"seen": SEEN, "values": {"review": "\0"}},
+    )),
 ]  # fmt: skip
 
 

@@ -31,8 +31,8 @@ def test_cookie_is_for_tls_only_where_there_is_tls(logins: None, dsn: str, examp
 
 @pytest.mark.parametrize(
     ("user", "password"),
-    [("viola_web", "wrong"), ("nobody", PASSWORD), ("viola_web", ""), ("", PASSWORD), ("nemo_web", PASSWORD), ("viola_web' --", PASSWORD),
-     ("viola_web dbname=postgres", PASSWORD), ("v" * 5000, PASSWORD)],
+    [("viola_web", "wrong"), ("nobody", PASSWORD), ("viola_web", ""), ("", PASSWORD), ("nemo_web", PASSWORD),
+     ("viola_web' --", PASSWORD),     ("viola_web dbname=postgres", PASSWORD), ("v" * 5000, PASSWORD)],
 )  # fmt: skip
 def test_others_stay_outside(client: TestClient, user: str, password: str) -> None:
     answer = sign_in(client, user, password)

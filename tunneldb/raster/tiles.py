@@ -14,7 +14,7 @@ SIZE = 256
 """Pixels of a side of a tile."""
 
 EDGE = 20037508.342789244
-"""Half of the side of the only tile of zoom 0, m: as web maps have it, so that their programs read these tiles in their place."""
+"""Half of the side of the only tile of zoom 0, m, as in web maps: so their programs show these tiles in their place."""
 
 ZOOMS = (10, 23)
 """First and last zoom: pixels of 153 m and of 19 mm."""

@@ -123,7 +123,7 @@ def answer_to(error: Exception) -> Response:
         case UserError():
             return JSONResponse({"error": str(error)}, 400)
         case psycopg.Error() if (status := _status(error)) is not None:
-            text = NOT_WRITTEN if error.sqlstate is None or status == UNREACHABLE else _line(error)
+            text = NOT_WRITTEN if status == UNREACHABLE else _line(error)
             return JSONResponse({"error": f"you have no right to do this: {text}" if status == 403 else text}, status)
     LOG.error("a request failed", exc_info=error)
     return JSONResponse({"error": "the server has an error, which is in its log"}, 500)
@@ -132,6 +132,8 @@ def answer_to(error: Exception) -> Response:
 def _status(error: psycopg.Error) -> int | None:
     """Return the status that tells whose fault an error of the database is; None for a bug."""
     state = error.sqlstate
+    if state is None and isinstance(error, psycopg.DataError):  # a text with a zero byte, which psycopg refuses
+        return 400
     if state is None:
         return UNREACHABLE if isinstance(error, psycopg.OperationalError | psycopg.InterfaceError) else None
     return next((status for start, status in STATUS.items() if state.startswith(start)), None)

@@ -1,1 +1,1 @@
-"""Queries of the desk in a browser, by the views and functions of ``tunnel_api`` and with the rights of the person signed in."""
+"""Queries of the desk in a browser: they use ``tunnel_api`` alone, with the rights of the person signed in."""

@@ -36,8 +36,10 @@ def layers(conn: psycopg.Connection[Any]) -> dict[str, Layer]:
         " (array_agg(a.attname::text ORDER BY a.attnum) FILTER (WHERE t.typname = 'geometry'))[1],"
         " array_agg(a.attname::text ORDER BY a.attnum) FILTER (WHERE t.typname <> 'geometry')"
         " FROM tunnel_api.layer_types() l JOIN pg_class c ON c.oid = to_regclass('tunnel_api.' || quote_ident(l.layer))"
-        " JOIN pg_attribute a ON a.attrelid = c.oid AND a.attnum > 0 AND NOT a.attisdropped JOIN pg_type t ON t.oid = a.atttypid"
-        " WHERE NOT l.plane AND l.layer <> 'point' AND has_table_privilege(c.oid, 'SELECT') GROUP BY l.layer, c.oid ORDER BY l.layer"
+        " JOIN pg_attribute a ON a.attrelid = c.oid AND a.attnum > 0 AND NOT a.attisdropped"
+        " JOIN pg_type t ON t.oid = a.atttypid"
+        " WHERE NOT l.plane AND l.layer <> 'point' AND has_table_privilege(c.oid, 'SELECT')"
+        " GROUP BY l.layer, c.oid ORDER BY l.layer"
     )
     return {name: Layer(name, title, geometry, tuple(columns)) for name, title, geometry, columns in rows if geometry}
 
@@ -71,7 +73,8 @@ def features(
     members = sql.SQL(", ").join(sql.SQL("v.{}").format(sql.Identifier(name)) for name in layer.columns if name != "id")
     rows = conn.execute(
         sql.SQL(
-            "SELECT v.id, public.ST_AsGeoJSON(public.ST_Force2D({}), 8)::json, (SELECT row_to_json(r) FROM (SELECT {}) r) FROM tunnel_api.{} v"
+            "SELECT v.id, public.ST_AsGeoJSON(public.ST_Force2D({}), 8)::json,"
+            " (SELECT row_to_json(r) FROM (SELECT {}) r) FROM tunnel_api.{} v"
             " WHERE {} ORDER BY v.id LIMIT {} OFFSET {}"
         ).format(shape, members, sql.Identifier(layer.name), sql.SQL(" AND ").join(conditions), limit, offset)
     )

@@ -37,8 +37,9 @@ def worklist(
     """Return the findings to review in a stretch, m, in an order of ORDERS; of all kinds if none is given."""
     rows = conn.execute(
         sql.SQL(
-            "SELECT * FROM (SELECT f.id, f.kind, f.review, f.chainage_from, f.chainage_to, f.arc_from, f.arc_to, {} AS probability,"
-            " f.area FROM tunnel_api.finding f WHERE f.survey_id = %s AND f.state IN ('open', 'confirmed', 'rejected', 'gone')"
+            "SELECT * FROM (SELECT f.id, f.kind, f.review, f.chainage_from, f.chainage_to, f.arc_from, f.arc_to,"
+            " {} AS probability, f.area"
+            " FROM tunnel_api.finding f WHERE f.survey_id = %s AND f.state IN ('open', 'confirmed', 'rejected', 'gone')"
             " AND f.chainage_to > %s AND f.chainage_from < %s AND f.area >= %s AND (%s OR f.kind = ANY(%s))) f"
             " ORDER BY {} LIMIT {}"
         ).format(sql.SQL(PROBABILITY), sql.SQL(ORDERS[order]), MOST),
@@ -52,7 +53,8 @@ def finding(conn: psycopg.Connection[Any], finding_id: int) -> dict[str, Any] | 
     rows = conn.execute(
         "SELECT f.id, f.survey, f.label, f.clock, f.chainage_from, f.chainage_to, f.arc_from, f.arc_to, f.kind, f.kind_label,"
         " f.kind_detected, f.origin, f.state, f.review, f.severity, f.width_mm, f.remark, f.area, f.length, f.darkening_mean,"
-        " f.darkening_max, f.contrast, f.confidence, f.reviewed_by, to_char(f.reviewed_at, 'YYYY-MM-DD HH24:MI') AS reviewed_at,"
+        " f.darkening_max, f.contrast, f.confidence, f.reviewed_by,"
+        " to_char(f.reviewed_at, 'YYYY-MM-DD HH24:MI') AS reviewed_at,"
         " f.drawn_by, public.ST_AsGeoJSON(f.unrolled, 4)::json AS outline FROM tunnel_api.finding f WHERE f.id = %s",
         [finding_id],
     )
