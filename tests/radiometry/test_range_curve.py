@@ -163,7 +163,7 @@ def test_range_and_incidence_that_are_one_function_are_refused():
         estimate_range_curve(IntensitySamples(place, scan, range_m, 4.0 / range_m, level)).require()
 
 
-@pytest.mark.parametrize(("uncertain", "remarked", "refused"), [(0.29, False, False), (0.43, True, False), (0.76, True, True)])
+@pytest.mark.parametrize(("uncertain", "remarked", "refused"), [(0.29, False, False), (0.89, True, False), (3.1, True, True)])
 def test_an_uncertain_curve_is_remarked_and_a_useless_one_refused(uncertain, remarked, refused):
     nodes = np.geomspace(2.0, 15.0, 30)
     sigma = np.where(np.arange(30) == 20, uncertain, 0.05)

@@ -34,9 +34,11 @@ from tunneldb.radiometry.roughness import MAX_INCIDENCE
 MAX_SIGMA = 0.3
 """Maximum standard deviation of a curve without a remark, dB: less than one of dry lining (Xu et al., 2018, Table 1)."""
 
-MAX_SIGMA_FOR_DETECTION = 0.75
-"""Maximum standard deviation of a curve for detecting darkening relative to the surrounding lining, dB: damp lining loses at
-least twice as much (1.5 dB), and only the change of the error within some metres matters."""
+MAX_SIGMA_FOR_DETECTION = 3.0
+"""Maximum standard deviation of a curve for detecting darkening relative to the surrounding lining, dB: the darkening of water.
+
+Only the change of the error within some metres matters, and the error of the curve and that of the roughness found with it cancel
+where range and incidence change together. A curve that is not determined is uncertain by much more."""
 
 MIN_CELLS = 200
 """Minimum number of cells; fewer do not average out the surface's texture."""
