@@ -37,7 +37,7 @@ MAX_SIGMA = 0.3
 MAX_SIGMA_FOR_DETECTION = 3.0
 """Maximum standard deviation of a curve for detecting darkening relative to the surrounding lining, dB: the darkening of water.
 
-Only the change of the error within some metres matters, and the error of the curve and that of the roughness found with it cancel
+Only the change of the error within some metres matters, and the errors of the curve and of the roughness found with it cancel
 where range and incidence change together. A curve that is not determined is uncertain by much more."""
 
 MIN_CELLS = 200
