@@ -9,7 +9,7 @@ from affine import Affine
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.overview import Overview, overview_factor
 from tunneldb.raster.pixel_state import PixelState
-from tunneldb.raster.tiles import Tile, reduce, sample
+from tunneldb.raster.tiles import FILL_DISTANCE, Tile, display, reduce, sample
 
 
 @pytest.mark.parametrize(("pixel", "factor"), [(0.02, 20), (0.04, 10), (0.08, 5), (0.2, 2), (0.5, 1), (0.01, 40), (0.05, 8)])
@@ -72,3 +72,21 @@ def test_tile_shows_the_pixel_at_its_place() -> None:
         x, y = (column + 0.5) * tile.pixel, (row + 0.5) * tile.pixel
         expected = image.values[int(y // 10), int(x // 10)] if x < 40 and y < 30 else np.nan
         np.testing.assert_equal(values[row, column], expected)
+
+
+def test_narrow_gaps_are_filled_for_display_and_wide_ones_stay() -> None:
+    values = np.ones((100, 300), np.float32)
+    values[20:22] = np.nan  # 4 cm
+    values[50:70] = np.nan  # 40 cm
+    tile = Tile(23, 2**22, 2**22)
+    image = Raster(values, Affine(0.02, 0, -1.0, 0, -0.02, 0.0))
+    plain, shown = sample(tile, [image]), display(tile, [image], codes=False)
+    row = (np.array([0.42, 1.2]) / tile.pixel).astype(int)
+    assert np.isnan(plain[row, 100]).all()
+    assert shown[row[0], 100] == 1.0
+    assert np.isnan(shown[row[1], 100])
+    assert np.isnan(shown[:99]).mean() < np.isnan(plain[:99]).mean()
+    assert np.array_equal(display(tile, [image], codes=True), plain, equal_nan=True)
+    far = Tile(18, 2**17, 2**17)
+    assert far.pixel > FILL_DISTANCE
+    assert np.array_equal(display(far, [image], codes=False), sample(far, [image]), equal_nan=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tunneldb.arrays import Float, Single
+from tunneldb.raster.gap_fill import fill_gaps
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.overview import shrink, shrink_codes
 
@@ -18,6 +19,9 @@ EDGE = 20037508.342789244
 
 ZOOMS = (10, 23)
 """First and last zoom: pixels of 153 m and of 19 mm."""
+
+FILL_DISTANCE = 0.05
+"""Maximum distance of the value that fills a pixel without a point, m."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,15 @@ class Tile:
         return self.north - SIZE * self.pixel
 
 
+def display(tile: Tile, images: list[Raster], codes: bool) -> Single:
+    """Return the values (256, 256) of a tile as shown: gaps between neighbouring points are filled, except in codes."""
+    reach = FILL_DISTANCE / tile.pixel
+    if codes or reach < 1.0:
+        return sample(tile, images)
+    margin = int(np.ceil(reach))
+    return fill_gaps(sample(tile, images, margin), reach)[margin:-margin, margin:-margin]
+
+
 def reduce(raster: Raster, pixel: float, codes: bool) -> Raster:
     """Return an image with pixels of at most a side, m: the mean, or the most frequent code, of whole pixels."""
     side = raster.transform.a
@@ -73,11 +86,23 @@ def reduce(raster: Raster, pixel: float, codes: bool) -> Raster:
     return Raster(values, raster.transform @ raster.transform.scale(factor))
 
 
-def sample(tile: Tile, images: list[Raster]) -> Single:
-    """Return the values (256, 256) of a tile, those of the nearest pixels of images; NaN without a value."""
-    middle: Float = np.asarray((np.arange(SIZE) + 0.5) * tile.pixel, np.float64)
+def sample(tile: Tile, images: list[Raster], margin: int = 0) -> Single:
+    """Return the values of a tile, those of the nearest pixels of images; NaN without a value.
+
+    Parameters
+    ----------
+    tile : Tile
+    images : list of Raster
+    margin : int
+        Number of further pixels on each side.
+
+    Returns
+    -------
+    (256 + 2 margin, 256 + 2 margin) float32 array
+    """
+    middle: Float = np.asarray((np.arange(-margin, SIZE + margin) + 0.5) * tile.pixel, np.float64)
     chainage, arc = tile.west + middle, tile.north - middle
-    out = np.full((SIZE, SIZE), np.nan, np.float32)
+    out = np.full((len(middle), len(middle)), np.nan, np.float32)
     for image in images:
         rows, columns = image.values.shape
         column = np.floor((chainage - image.transform.c) / image.transform.a).astype(np.int64)

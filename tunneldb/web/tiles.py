@@ -8,7 +8,7 @@ from starlette.responses import Response
 
 from tunneldb.errors import UserError
 from tunneldb.export.images.tile_png import tile_png
-from tunneldb.raster.tiles import Tile, sample
+from tunneldb.raster.tiles import Tile, display
 from tunneldb.store.desk.findings import finding_tile
 from tunneldb.store.desk.images import KINDS
 from tunneldb.web.route import Call, NotFoundError
@@ -36,7 +36,7 @@ def image_tile(call: Call) -> Response:
         if not images:
             return Response(status_code=204, headers=headers)
         stretch = survey_stretch(call.desk.blocks, conn, survey, kind)
-    return Response(tile_png(sample(tile, images), kind, stretch), media_type="image/png", headers=headers)
+    return Response(tile_png(display(tile, images, kind == "state"), kind, stretch), media_type="image/png", headers=headers)
 
 
 def vector_tile(call: Call) -> Response:
