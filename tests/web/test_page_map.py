@@ -17,6 +17,8 @@ from support.desk_server import DeskServer
 from support.example_survey import LEAKS, NAME
 from web.conftest import PASSWORD
 
+from tunneldb.numerals import percent_number
+
 ORANGE = (230, 126, 0)
 """Colour of the outline of an open leak."""
 
@@ -50,7 +52,7 @@ def test_a_survey_is_chosen_from_the_table_and_from_the_list(
         (share,) = database.execute(
             "SELECT seen_share FROM tunnel_api.leak_statistics(%s, '-infinity', 'infinity')", [NAME]
         ).fetchone()  # type: ignore[misc]
-        shown = f"{np.floor(share * 1000) / 10:.1f}\u00a0%"
+        shown = f"{percent_number(share)}\u00a0%"
         expect(rows.first).to_contain_text(shown)
         page.get_by_role("link", name=NAME).click()
         expect(page.locator("#limits")).to_contain_text(f"Inspected: {shown} of the lining.")

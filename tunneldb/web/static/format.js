@@ -32,13 +32,13 @@ export function number(value, decimals = 2, unit = '') {
   return value.toFixed(decimals) + (unit ? `\u00a0${unit}` : '');
 }
 
-/** Format a share as percent, rounded down to one decimal: 100 % is all of it, 0 % is nothing. */
+/** Format a share as percent, as all documents do: 100 % only for all, 0 % only for nothing. */
 export function percent(share) {
   if (share === null || share === undefined) return NONE;
-  if (share >= 1 || share <= 0) return `${share >= 1 ? 100 : 0}\u00a0%`;
-  // 0.29 is stored as a little less than 0.29.
-  const tenths = Math.min(Math.floor(share * 1000 + 1e-6), 999);
-  return `${(tenths / 10).toFixed(1)}\u00a0%`;
+  const value = 100 * share;
+  if (value > 0 && value < 0.1) return '< 0.1\u00a0%';
+  if (value >= 99.95 && value < 100) return '> 99.9\u00a0%';
+  return `${value === 0 || value >= 100 ? Math.min(value, 100) : value.toFixed(1)}\u00a0%`;
 }
 
 /** Format a signed arc, m. */
