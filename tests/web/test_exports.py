@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import tempfile
 from pathlib import Path
 
 import openpyxl
@@ -33,6 +34,13 @@ def test_report_is_a_download_and_no_page_of_the_desk(signed_in: SignIn) -> None
     answer = signed_in("olga_web").get("/api/surveys/demo-2024/export?what=report&from=12340&to=12360")
     assert answer.headers["content-disposition"].startswith("attachment")
     assert "demo-2024" in answer.text
+
+
+@pytest.mark.parametrize("span", ["bytes=zz", "bytes=999999999-", "bytes=0-10"])
+def test_no_file_stays_behind(signed_in: SignIn, span: str) -> None:
+    before = set(Path(tempfile.gettempdir()).glob("tunneldb-desk-*"))
+    signed_in("olga_web").get("/api/surveys/demo-2024/export?what=xlsx", headers={"Range": span})
+    assert set(Path(tempfile.gettempdir()).glob("tunneldb-desk-*")) == before
 
 
 @pytest.mark.parametrize("what", ["report", "xlsx", "gpkg"])

@@ -52,6 +52,7 @@ PATHS = [
     "/static/../app.py", "/static/%2e%2e/app.py", "/static/..%2fconfig.py", "/collections/pg_authid/items",
     "/collections/finding_map/items?pg_sleep(9)=1", "/collections/finding_map/items?bbox=1,2",
     "/collections/finding_map/items?limit=-1",
+    "/api/findings/" + "9" * 4400, "/api/surveys?" + "&".join(f"a{n}=1" for n in range(4000)),
     "/tileMatrixSets/other", "/tiles/demo-2024/secret",
 ]  # fmt: skip
 
@@ -76,6 +77,7 @@ BODIES = [
         {"seen": SEEN, "values": {"id": "9"}},
         {"seen": SEEN, "values": {"review": {"a": 1}}},
         {"seen": SEEN, "values": {"review": "\0"}},
+        {"seen": SEEN, "values": {"remark": "\ud800"}},
     )),
 ]  # fmt: skip
 

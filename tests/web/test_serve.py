@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import urllib.error
@@ -15,6 +16,8 @@ import pytest
 from psycopg.conninfo import make_conninfo
 from support.command import errors_of
 from web.conftest import PASSWORD
+
+from tunneldb.web.protocol import FIRST_REQUEST
 
 COMMAND = [sys.executable, "-c", "from tunneldb.cli.main import main; main()", "serve", "--no-open"]
 
@@ -94,6 +97,20 @@ def test_a_database_without_tunneldb_is_refused(empty_dsn: str, monkeypatch: pyt
 def test_embedded_server_is_for_this_machine_only(installed: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("TUNNELDB_DSN", raising=False)
     assert "for this machine only" in errors_of("serve", "--host", "0.0.0.0", code=2)
+
+
+def test_embedded_server_is_not_for_a_proxy(installed: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("TUNNELDB_DSN", raising=False)
+    assert "for this machine only" in errors_of("serve", "--behind-proxy", code=2)
+
+
+def test_half_requests_are_closed(served: subprocess.Popen[str]) -> None:
+    assert served.stdout is not None
+    port = int(served.stdout.readline().strip().rstrip("/").rpartition(":")[2])
+    with socket.create_connection(("127.0.0.1", port)) as slow:
+        slow.sendall(b"GET / HT")
+        slow.settimeout(FIRST_REQUEST + 10)
+        assert slow.recv(100) == b""
 
 
 def test_taken_port(dsn: str, served: subprocess.Popen[str]) -> None:

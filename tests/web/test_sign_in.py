@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+
 import psycopg
 import pytest
 from starlette.testclient import TestClient
@@ -9,8 +13,8 @@ from web.conftest import PASSWORD, SignIn, sign_in
 
 from tunneldb.web.app import create_app
 from tunneldb.web.config import Desk
-from tunneldb.web.rate_limit import MAX_FAILURES, PERIOD, RateLimit
-from tunneldb.web.sessions import Sessions, open_for, open_own
+from tunneldb.web.rate_limit import MAX_ADDRESS_FAILURES, MAX_FAILURES, PERIOD, RateLimit
+from tunneldb.web.sessions import CONNECTIONS, MAX_OF_USER, Sessions, SignedOutError, open_for, open_own
 
 
 def test_role_and_password_let_in_with_a_strict_cookie(client: TestClient) -> None:
@@ -67,11 +71,99 @@ def test_failures_are_forgotten_after_a_while() -> None:
     now = [0.0]
     limit = RateLimit(lambda: now[0])
     for _ in range(MAX_FAILURES):
-        limit.failed("a")
-    assert limit.refuses("a", "b")
-    assert not limit.refuses("b")
+        assert limit.attempt("ines", "10.0.0.1")
+    assert not limit.attempt("ines", "10.0.0.1")
+    assert limit.attempt("ines", "10.0.0.2")
+    assert limit.attempt("ivo", "10.0.0.1")
     now[0] = PERIOD + 1
-    assert not limit.refuses("a")
+    assert limit.attempt("ines", "10.0.0.1")
+
+
+def test_success_is_no_failure() -> None:
+    limit = RateLimit(lambda: 0.0)
+    for _ in range(3 * MAX_FAILURES):
+        assert limit.attempt("ines", "10.0.0.1")
+        limit.succeeded("ines", "10.0.0.1")
+
+
+def test_one_address_cannot_try_all_users() -> None:
+    limit = RateLimit(lambda: 0.0)
+    passed = sum(limit.attempt(f"user {n}", "10.0.0.1") for n in range(100))
+    assert passed == MAX_ADDRESS_FAILURES
+
+
+def test_attempts_at_the_same_time_are_counted(client: TestClient) -> None:
+    """The database answers later than all of them have come."""
+    form = client.get("/login").text
+    token = form.partition('name="csrf" value="')[2].partition('"')[0]
+
+    def guess(n: int) -> int:
+        return client.post("/login", data={"user": "ivo_web", "password": f"guess {n}", "csrf": token}).status_code
+
+    with ThreadPoolExecutor(30) as threads:
+        answers = Counter(threads.map(guess, range(30)))
+    # A refused form has another token: what comes later is refused, too, without a look at the password.
+    assert answers[303] == 0
+    assert answers[429] + answers[403] == 30
+
+
+@pytest.mark.parametrize(
+    ("kind", "body"),
+    [("multipart/form-data; boundary=XX; charset=punycode",
+      b'--XX\r\nContent-Disposition: form-data; name="user"\r\n\r\n-' + b"a" * 300_000 + b"\r\n--XX--\r\n"),
+     ("application/x-www-form-urlencoded", b"&" * 1_900_000), ("application/x-www-form-urlencoded", b"a=1&" * 100),
+     ("application/x-www-form-urlencoded", b"user=\xff\xfe&csrf=%ff"), ("text/plain", b"user=a")],
+)  # fmt: skip
+def test_other_forms_are_refused_at_once(client: TestClient, kind: str, body: bytes) -> None:
+    start = time.perf_counter()
+    answer = client.post("/login", content=body, headers={"Content-Type": kind})
+    assert answer.status_code == 403
+    assert time.perf_counter() - start < 1.0
+
+
+def test_a_user_has_so_many_sessions_at_most(logins: None, dsn: str, example: str) -> None:
+    sessions = Sessions(60.0)
+    made = [sessions.begin(open_for(dsn, "viola_web", PASSWORD), None) for _ in range(MAX_OF_USER + 2)]
+    assert [sessions.find(one.key) is not None for one in made] == [False] * 2 + [True] * MAX_OF_USER
+    with psycopg.connect(dsn) as conn:
+        row = conn.execute("SELECT count(*) FROM pg_stat_activity WHERE usename = 'viola_web' AND datname = current_database()")
+        assert row.fetchone() == (MAX_OF_USER * CONNECTIONS,)
+    sessions.close()
+
+
+def test_a_session_ends_although_it_is_used(logins: None, dsn: str, example: str) -> None:
+    now = [0.0]
+    sessions = Sessions(60.0, lambda: now[0])
+    session = sessions.begin(open_for(dsn, "viola_web", PASSWORD), None, 100.0)
+    for at in (50.0, 99.0):
+        now[0] = at
+        assert sessions.find(session.key) is session
+    now[0] = 101.0
+    assert sessions.find(session.key) is None
+
+
+def test_what_waits_for_a_session_that_ends_is_not_done(logins: None, dsn: str, example: str) -> None:
+    sessions = Sessions(60.0)
+    session = sessions.begin(open_for(dsn, "ines_web", PASSWORD), None)
+    with session.connection() as lent:
+        sessions.end(session)
+        with pytest.raises(SignedOutError), session.connection():
+            pass
+    assert lent.closed
+
+
+def test_signing_in_again_ends_the_session_before(signed_in: SignIn, desk: Desk) -> None:
+    browser = signed_in("viola_web")
+    before = browser.cookies["tunneldb_session"]
+    assert sign_in(browser, "ines_web").status_code == 303
+    assert desk.sessions.find(before) is None
+
+
+def test_a_browser_that_comes_from_a_file_gets_a_page_that_leads_on(dsn: str, example: str) -> None:
+    with TestClient(create_app(Desk(dsn, "token")), base_url="http://localhost:8080", follow_redirects=False) as browser:
+        answer = browser.get("/enter?token=token", headers={"Sec-Fetch-Site": "cross-site"})
+        assert (answer.status_code, "url=/" in answer.text) == (200, True)
+        assert browser.get("/api/surveys").status_code == 200
 
 
 def test_session_ends_without_requests(logins: None, dsn: str, example: str) -> None:

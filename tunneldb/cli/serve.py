@@ -7,7 +7,10 @@ import secrets
 import signal
 import socket
 import ssl
+import tempfile
 import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import click
@@ -50,10 +53,11 @@ def serve(
 
     from tunneldb.web.app import create_app
     from tunneldb.web.config import Desk
+    from tunneldb.web.protocol import PunctualProtocol, raise_file_limit
 
     loopback = _is_loopback(host)
-    if settings.dsn is None and not loopback:
-        raise UserError(f"--host {host}: the embedded server is for this machine only; give a server of your own with --dsn")
+    if settings.dsn is None and (behind_proxy or not loopback):
+        raise UserError("the embedded server is for this machine only; give a server of your own with --dsn")
     if (certificate is None) != (key is None):
         raise UserError("--certificate and --key belong together")
     if not loopback and certificate is None and not behind_proxy:
@@ -74,6 +78,7 @@ def serve(
     server = uvicorn.Server(
         uvicorn.Config(
             create_app(desk),
+            http=PunctualProtocol,
             access_log=False,
             log_level="warning",
             ssl_certfile=certificate,
@@ -84,11 +89,10 @@ def serve(
         )
     )
     click.echo(address)
-    if not no_open and loopback:
-        webbrowser.open(address)
+    raise_file_limit()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: None)  # uvicorn sends itself the signal again when all is closed
-    with listener:
+    with listener, _opened(None if no_open or not loopback else address):
         server.run(sockets=[listener])
 
 
@@ -105,6 +109,19 @@ def _check(certificate: Path, key: Path) -> None:
         ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key)
     except (OSError, ssl.SSLError) as error:
         raise UserError(f"{certificate}, {key}: not a certificate and its key without a passphrase, PEM: {error}") from None
+
+
+@contextmanager
+def _opened(address: str | None) -> Iterator[None]:
+    """Open an address in a browser, by a file of this user alone: others could read a token on the browser's command line."""
+    if address is None:
+        yield
+        return
+    with tempfile.NamedTemporaryFile("w", prefix="tunneldb-", suffix=".html") as page:
+        page.write(f'<!doctype html><meta http-equiv="refresh" content="0; url={address}"><title>tunneldb</title>')
+        page.flush()
+        webbrowser.open(Path(page.name).as_uri())
+        yield
 
 
 def _is_loopback(host: str) -> bool:

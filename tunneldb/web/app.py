@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
+import numpy as np
 import psycopg
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
+from starlette.convertors import Convertor, register_url_convertor
 from starlette.middleware import Middleware
 from starlette.middleware.base import BaseHTTPMiddleware
 from starlette.middleware.gzip import GZipMiddleware
@@ -24,18 +28,70 @@ from tunneldb.web.route import route
 from tunneldb.web.security import guard
 from tunneldb.web.sessions import open_own
 
+HEALTH_KEPT = 2.0
+"""Time for which the answer to a question for the health is kept, s."""
+
+SWEEP = 30.0
+"""Time between two looks for sessions that are over, s."""
+
 
 async def health(request: Request) -> Response:
     """Return 200 if the database answers, else 503."""
+    healthy = await request.app.state.health.ask()
+    return PlainTextResponse("ok") if healthy else PlainTextResponse("no database", 503)
 
-    def ask() -> bool:
+
+class Health:
+    """Whether the database answers, asked by one request at a time and kept for a moment.
+
+    Parameters
+    ----------
+    dsn : str
+        Database.
+    """
+
+    def __init__(self, dsn: str) -> None:
+        self._dsn = dsn
+        self._lock = asyncio.Lock()
+        self._asked = -np.inf
+        self._healthy = False
+
+    async def ask(self) -> bool:
+        """Return True if the database answers, or did so within HEALTH_KEPT."""
+        async with self._lock:
+            if time.monotonic() - self._asked > HEALTH_KEPT:
+                self._healthy = await run_in_threadpool(self._answers)
+                self._asked = time.monotonic()
+            return self._healthy
+
+    def _answers(self) -> bool:
         try:
-            with open_own(request.app.state.desk.dsn) as conn:
+            with open_own(self._dsn) as conn:
                 return conn.execute("SELECT 1").fetchone() == (1,)
         except (UserError, psycopg.Error):
             return False
 
-    return PlainTextResponse("ok") if await run_in_threadpool(ask) else PlainTextResponse("no database", 503)
+
+class _Key(Convertor[int]):
+    """Key of a row in a path: at most 18 digits."""
+
+    regex = "[0-9]{1,18}"
+
+    def convert(self, value: str) -> int:
+        return int(value)
+
+    def to_string(self, value: int) -> str:
+        return str(value)
+
+
+register_url_convertor("key", _Key())
+
+
+async def _end_idle(desk: Desk) -> None:
+    """End sessions that are over, for ever."""
+    while True:
+        await asyncio.sleep(SWEEP)
+        await run_in_threadpool(desk.sessions.end_idle)
 
 
 def create_app(desk: Desk) -> Starlette:
@@ -43,11 +99,13 @@ def create_app(desk: Desk) -> Starlette:
 
     @asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
+        timer = asyncio.create_task(_end_idle(desk))
         yield
+        timer.cancel()
         desk.sessions.close()
 
     survey = "/api/surveys/{survey}"
-    finding = "/api/findings/{id:int}"
+    finding = "/api/findings/{id:key}"
     tile = "/tiles/{survey}"
     app = Starlette(
         lifespan=lifespan,
@@ -85,9 +143,10 @@ def create_app(desk: Desk) -> Starlette:
             Mount("/static", StaticFiles(directory=FOLDER / "static")),
         ],
         middleware=[
-            Middleware(BaseHTTPMiddleware, dispatch=guard(desk.loopback)),
+            Middleware(BaseHTTPMiddleware, dispatch=guard(desk.loopback, desk.secure)),
             Middleware(GZipMiddleware, minimum_size=1000),
         ],
     )
     app.state.desk = desk
+    app.state.health = Health(desk.dsn)
     return app

@@ -12,6 +12,9 @@ import threading
 from tunneldb.web.rate_limit import RateLimit
 from tunneldb.web.sessions import RefusedError, Session, Sessions, open_for
 
+MAX_AGE = 600.0
+"""Time after which a password is checked again, s."""
+
 
 class BasicSessions:
     """Sessions of programs: user and password, which come with each request, find the session that they began.
@@ -45,14 +48,11 @@ class BasicSessions:
             session = self._sessions.find(self._keys.get(digest))
             if session is not None:
                 return session
-            names = f"address {address}", f"user {user[:200]}"
-            if self._limit.refuses(*names):
+            if not self._limit.attempt(user, address):
                 raise RefusedError("too many failed attempts: wait a minute")
-            try:
-                session = self._sessions.begin(open_for(dsn, user, password), None)
-            except RefusedError:
-                self._limit.failed(*names)
-                raise
+            session = self._sessions.begin(open_for(dsn, user, password), None, MAX_AGE)
+            self._limit.succeeded(user, address)
+            self._keys = {known: key for known, key in self._keys.items() if self._sessions.find(key) is not None}
             self._keys[digest] = session.key
             return session
 

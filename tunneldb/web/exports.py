@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import psycopg
-from starlette.background import BackgroundTask
 from starlette.responses import FileResponse, Response
+from starlette.types import Receive, Scope, Send
 
 from tunneldb.errors import UserError
 from tunneldb.export.exchange import write_survey
@@ -59,12 +59,17 @@ def export(call: Call) -> Response:
         shutil.rmtree(folder, ignore_errors=True)
         raise
     ends = "" if np.isinf([low, high]).all() else f"-{low:.0f}-{high:.0f}"
-    return FileResponse(
-        folder / f"download.{suffix}",
-        media_type=media,
-        filename=f"{survey.name}{ends}.{suffix}",
-        background=BackgroundTask(shutil.rmtree, folder, ignore_errors=True),
-    )
+    return _Download(folder / f"download.{suffix}", media_type=media, filename=f"{survey.name}{ends}.{suffix}")
+
+
+class _Download(FileResponse):
+    """A file that is deleted, with its folder, however the answer ends."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            shutil.rmtree(Path(self.path).parent, ignore_errors=True)
 
 
 def _written(conn: Connection, name: str, write: Writer, low: float, high: float, path: Path) -> Survey:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
+
+from starlette.responses import Response
 
 from tunneldb.errors import UserError
 from tunneldb.numerals import parse_number
@@ -27,7 +30,7 @@ CRS84 = "http://www.opengis.net/def/crs/OGC/1.3/CRS84"
 
 MATRIX_SET = "UnrolledPlane"
 
-PAGE, MAX_PAGE = 100, 10_000
+PAGE, MAX_PAGE = 100, 1000
 """Number of features of an answer, unless ``limit`` states another, and its maximum."""
 
 _PIXEL = 0.00028  # side of a pixel by which OGC defines scales, m
@@ -68,7 +71,11 @@ def items(call: Call) -> Any:
     links = [_link("self", path, "application/geo+json")]
     if len(found) == min(limit, MAX_PAGE):
         links.append(_link("next", f"{path}?limit={limit}&offset={offset + len(found)}", "application/geo+json"))
-    return {"type": "FeatureCollection", "features": found, "numberReturned": len(found), "links": links}
+    content = (
+        f'{{"type": "FeatureCollection", "numberReturned": {len(found)}, "links": {json.dumps(links)},'
+        f' "features": [{", ".join(found)}]}}'
+    )
+    return Response(content, media_type="application/geo+json")
 
 
 def tile_matrix_sets(call: Call) -> Any:

@@ -13,13 +13,17 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from tunneldb.errors import UserError
+from tunneldb.errors import BusyError, UserError
 from tunneldb.numerals import parse_number
 from tunneldb.web.config import Desk
 from tunneldb.web.security import SAFE_METHODS
-from tunneldb.web.sessions import RefusedError, Session, SignedOutError
+from tunneldb.web.sessions import MAX_WAITING, RefusedError, Session, SignedOutError
 
 COOKIE = "tunneldb_session"
+"""Name of the session's cookie; with TLS it has the prefix that keeps other hosts of the domain from setting it."""
+
+MAX_QUERY = 100
+"""Maximum number of values in the query string."""
 
 CHALLENGE = 'Basic realm="tunneldb", charset="UTF-8"'
 
@@ -80,6 +84,12 @@ STATUS = {
 }  # fmt: skip
 """Status of the answer by the beginning of an error's SQLSTATE, the first that fits."""
 
+
+def cookie_name(desk: Desk) -> str:
+    """Return the name of the session's cookie."""
+    return f"__Host-{COOKIE}" if desk.secure else COOKIE
+
+
 Handler = Callable[[Call], Any]
 
 
@@ -88,7 +98,7 @@ def route(handler: Handler) -> Callable[[Request], Awaitable[Response]]:
 
     async def endpoint(request: Request) -> Response:
         desk: Desk = request.app.state.desk
-        session = desk.sessions.find(request.cookies.get(COOKIE))
+        session = desk.sessions.find(request.cookies.get(cookie_name(desk)))
         if session is None and "authorization" in request.headers and desk.token is None and request.method in SAFE_METHODS:
             address = request.client.host if request.client else ""
             try:
@@ -101,12 +111,27 @@ def route(handler: Handler) -> Callable[[Request], Awaitable[Response]]:
             return JSONResponse({"error": "the page is out of date: load it again"}, 403)
         try:
             call = Call(desk, session, dict(request.path_params), _query(request), await _body(request), dict(request.headers))
-            result = await run_in_threadpool(handler, call)
+            result = await _in_turn(session, handler, call)
+            return result if isinstance(result, Response) else JSONResponse(result)
         except Exception as error:
             return answer_to(error)
-        return result if isinstance(result, Response) else JSONResponse(result)
 
     return endpoint
+
+
+async def _in_turn(session: Session, handler: Handler, call: Call) -> Any:
+    """Run a handler in a thread when a connection of its session is free: nobody takes the threads of others."""
+    if session.waiting >= MAX_WAITING:
+        raise BusyError("too many requests at once: try again")
+    session.waiting += 1
+    try:
+        await session.gate.acquire()
+    finally:
+        session.waiting -= 1
+    try:
+        return await run_in_threadpool(handler, call)
+    finally:
+        session.gate.release()
 
 
 def answer_to(error: Exception) -> Response:
@@ -120,8 +145,12 @@ def answer_to(error: Exception) -> Response:
             return JSONResponse({"error": str(error)}, 404)
         case ConflictError():
             return JSONResponse({"error": str(error), **error.values}, 409)
+        case BusyError():
+            return JSONResponse({"error": str(error)}, 503)
         case UserError():
             return JSONResponse({"error": str(error)}, 400)
+        case UnicodeEncodeError():
+            return JSONResponse({"error": "a text has characters that no text can have"}, 400)
         case psycopg.Error() if (status := _status(error)) is not None:
             text = NOT_WRITTEN if status == UNREACHABLE else _line(error)
             return JSONResponse({"error": f"you have no right to do this: {text}" if status == 403 else text}, status)
@@ -144,7 +173,12 @@ def _line(error: psycopg.Error) -> str:
 
 
 def _query(request: Request) -> dict[str, list[str]]:
-    return {name: request.query_params.getlist(name) for name in request.query_params}
+    found: dict[str, list[str]] = {}
+    for number, (name, value) in enumerate(request.query_params.multi_items()):
+        if number >= MAX_QUERY:
+            raise UserError(f"more than {MAX_QUERY} values in the address")
+        found.setdefault(name, []).append(value)
+    return found
 
 
 async def _body(request: Request) -> Any:

@@ -33,12 +33,21 @@ SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 Next = Callable[[Request], Awaitable[Response]]
 
 
-def guard(loopback: bool) -> Callable[[Request, Next], Awaitable[Response]]:
-    """Return the middleware function; with ``loopback`` only requests to names of this machine are answered."""
+def guard(loopback: bool, secure: bool) -> Callable[[Request, Next], Awaitable[Response]]:
+    """Return the middleware function.
+
+    Parameters
+    ----------
+    loopback : bool
+        True to answer only requests to names of this machine.
+    secure : bool
+        True if the desk is reached by TLS.
+    """
+    headers = HEADERS | ({"Strict-Transport-Security": "max-age=31536000"} if secure else {})
 
     async def dispatch(request: Request, proceed: Next) -> Response:
         response = refusal(request, loopback) or await proceed(request)
-        for name, value in HEADERS.items():
+        for name, value in headers.items():
             response.headers.setdefault(name, value)
         static = request.url.path.startswith("/static/")
         response.headers.setdefault("Cache-Control", "no-cache" if static else "no-store")

@@ -6,6 +6,7 @@ PostgreSQL, ends, and the person signs in again. The session of the embedded ser
 
 from __future__ import annotations
 
+import asyncio
 import queue
 import secrets
 import threading
@@ -26,8 +27,14 @@ Connection = psycopg.Connection[Any]
 CONNECTIONS = 3
 """Number of connections of a session: a browser asks for several tiles at once."""
 
-PATIENCE = 20.0
-"""Time in which a request waits for a connection of its session, s."""
+MAX_AGE = 12 * 3600.0
+"""Time after which a session ends although it is used, s: so a changed password or a locked login is noticed."""
+
+MAX_OF_USER, MAX_SESSIONS = 5, 25
+"""Maximum number of sessions of a user, and of all; the one that was not used longest ends. Each holds CONNECTIONS."""
+
+MAX_WAITING = 30
+"""Maximum number of requests of a session that wait for a connection; further ones are refused."""
 
 STATEMENT_TIMEOUT, LOCK_TIMEOUT = "60s", "5s"
 """Limits of a statement of the desk."""
@@ -58,8 +65,16 @@ class Session:
         Database role, and the group of ROLES that it is in.
     reopen : callable or None
         Opens a connection anew without a password; None where one is needed.
-    used : float
-        Time of the last request, by the monotonic clock, s.
+    used, ends : float
+        Time of the last request, and time at which the session ends at the latest, by the monotonic clock, s.
+    idle : queue
+        Connections that are not lent.
+    closed : bool
+        True if the session has ended.
+    waiting : int
+        Number of requests that wait for a connection.
+    gate : asyncio.Semaphore
+        Lets as many requests through as there are connections; the others wait without a thread.
     """
 
     key: str
@@ -68,26 +83,36 @@ class Session:
     role: str
     reopen: Callable[[], Connection] | None
     used: float
+    ends: float
     idle: queue.LifoQueue[Connection] = field(default_factory=queue.LifoQueue)
+    closed: bool = False
+    waiting: int = 0
+    gate: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(CONNECTIONS))
 
     @contextmanager
     def connection(self) -> Iterator[Connection]:
         """Lend a connection in autocommit mode; raise SignedOutError if it was cut and cannot be opened without a password."""
         try:
-            conn = self.idle.get(timeout=PATIENCE)
+            conn = self.idle.get(timeout=1.0)
         except queue.Empty:
-            raise UserError("the server is busy: try again") from None
+            raise SignedOutError("sign in") from None
         try:
+            if self.closed:
+                raise SignedOutError("sign in")
             if conn.closed:
                 if self.reopen is None:
                     raise SignedOutError("the connection to the database was lost: sign in again")
                 conn = self.reopen()
             yield conn
         finally:
-            self.idle.put(conn)
+            if self.closed:
+                conn.close()
+            else:
+                self.idle.put(conn)
 
     def close(self) -> None:
-        """Close the connections that are not lent; those that are lent are closed with the process."""
+        """Close the connections; those that are lent are closed when they come back."""
+        self.closed = True
         while True:
             try:
                 self.idle.get_nowait().close()
@@ -112,22 +137,41 @@ class Sessions:
         self._lock = threading.Lock()
         self._by_key: dict[str, Session] = {}
 
-    def begin(self, connections: list[Connection], reopen: Callable[[], Connection] | None) -> Session:
-        """Begin a session with open connections of one role.
+    def begin(
+        self, connections: list[Connection], reopen: Callable[[], Connection] | None, max_age: float = MAX_AGE
+    ) -> Session:
+        """Begin a session with open connections of one role; end the longest unused ones if there are too many.
 
         Raises
         ------
         RefusedError
             If the role may not read the views of tunnel_api.
         """
-        user, role = _person(connections[0])
-        session = Session(secrets.token_urlsafe(32), secrets.token_urlsafe(32), user, role, reopen, self._clock())
+        try:
+            user, role = _person(connections[0])
+        except BaseException:
+            for conn in connections:
+                conn.close()
+            raise
+        now = self._clock()
+        session = Session(secrets.token_urlsafe(32), secrets.token_urlsafe(32), user, role, reopen, now, now + max_age)
         for conn in connections:
             session.idle.put(conn)
         with self._lock:
             self._end_idle()
+            others = sorted(self._by_key.values(), key=lambda other: other.used)
+            own = [other for other in others if other.user == user]
+            surplus = own[: max(len(own) - MAX_OF_USER + 1, 0)] or others[: max(len(others) - MAX_SESSIONS + 1, 0)]
+            for old in surplus:
+                del self._by_key[old.key]
+                old.close()
             self._by_key[session.key] = session
         return session
+
+    def end_idle(self) -> None:
+        """End the sessions that are over."""
+        with self._lock:
+            self._end_idle()
 
     def find(self, key: str | None) -> Session | None:
         """Return the session with a key, and note that it is used; None if there is none."""
@@ -154,7 +198,7 @@ class Sessions:
     def _end_idle(self) -> None:
         now = self._clock()
         for key, session in list(self._by_key.items()):
-            if now - session.used > self._idle_limit:
+            if now - session.used > self._idle_limit or now > session.ends:
                 del self._by_key[key]
                 session.close()
 

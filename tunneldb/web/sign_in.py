@@ -3,26 +3,33 @@
 from __future__ import annotations
 
 import secrets
+from urllib.parse import parse_qsl
 
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 
 from tunneldb import __version__
 from tunneldb.errors import UserError
 from tunneldb.web.config import Desk
 from tunneldb.web.pages import TEMPLATES
-from tunneldb.web.route import COOKIE, Call
+from tunneldb.web.route import LOG, Call, cookie_name
 from tunneldb.web.sessions import CONNECTIONS, RefusedError, Session, open_for, open_own
 
 FORM_COOKIE = "tunneldb_form"
 """Cookie that the sign-in form repeats, so that no other page can send it."""
 
+ENTERED = '<!doctype html><meta http-equiv="refresh" content="0; url=/"><title>tunneldb</title>'
+"""Page that leads to the desk."""
+
+MAX_FORM, MAX_FIELDS = 8192, 5
+"""Maximum length of the sign-in form, bytes, and of the number of its fields."""
+
 
 async def page(request: Request) -> Response:
     """Show the desk, or the way to it."""
     desk: Desk = request.app.state.desk
-    session = desk.sessions.find(request.cookies.get(COOKIE))
+    session = desk.sessions.find(request.cookies.get(cookie_name(desk)))
     if session is None:
         return RedirectResponse("/login", 303)
     return TEMPLATES.TemplateResponse(
@@ -50,41 +57,57 @@ async def enter(request: Request) -> Response:
     session = await run_in_threadpool(
         lambda: desk.sessions.begin([open_own(desk.dsn) for _ in range(CONNECTIONS)], lambda: open_own(desk.dsn))
     )
-    return _signed_in(desk, session)
+    # A browser that comes from a file or another program sends the strict cookie only after a step of the page itself.
+    foreign = request.headers.get("sec-fetch-site") == "cross-site"
+    return _signed_in(desk, session, HTMLResponse(ENTERED) if foreign else RedirectResponse("/", 303))
 
 
 async def sign_in(request: Request) -> Response:
     """Check user and password against the database, and begin a session."""
     desk: Desk = request.app.state.desk
-    sent = await request.form(max_files=0, max_fields=5)
-    user, password, token = (str(sent.get(name) or "") for name in ("user", "password", "csrf"))
+    sent = await _fields(request)
+    user, password, token = (sent.get(name, "") for name in ("user", "password", "csrf"))
     given = request.cookies.get(FORM_COOKIE, "")
     if desk.token is not None or not given or not secrets.compare_digest(given.encode(), token.encode()):
         return _form(request, "The form was out of date: try again.", 403)
-    names = f"address {request.client.host if request.client else ''}", f"user {user[:200]}"
-    if desk.limit.refuses(*names):
+    address = request.client.host if request.client else ""
+    if not desk.limit.attempt(user, address):
         return _form(request, "Too many failed attempts: wait a minute.", 429)
     try:
         session = await run_in_threadpool(lambda: desk.sessions.begin(open_for(desk.dsn, user, password), None))
     except RefusedError as error:
-        desk.limit.failed(*names)
         return _form(request, f"Not signed in: {error}.", 403)
     except UserError as error:
-        return _form(request, f"Not signed in: {error}.", 503)
-    return _signed_in(desk, session)
+        LOG.warning("nobody can sign in: %s", error)
+        return _form(request, "Not signed in: the database cannot be reached.", 503)
+    desk.limit.succeeded(user, address)
+    if (former := desk.sessions.find(request.cookies.get(cookie_name(desk)))) is not None:
+        desk.sessions.end(former)
+    return _signed_in(desk, session, RedirectResponse("/", 303))
 
 
 def sign_out(call: Call) -> Response:
     """End the session."""
     call.desk.sessions.end(call.session)
     response = JSONResponse({})
-    response.delete_cookie(COOKIE)
+    response.delete_cookie(cookie_name(call.desk), secure=call.desk.secure, httponly=True, samesite="strict")
     return response
 
 
-def _signed_in(desk: Desk, session: Session) -> Response:
-    response = RedirectResponse("/", 303)
-    response.set_cookie(COOKIE, session.key, httponly=True, samesite="strict", secure=desk.secure)
+async def _fields(request: Request) -> dict[str, str]:
+    """Return the fields of the sign-in form; none if it is too long or of another kind."""
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind != "application/x-www-form-urlencoded" or int(request.headers.get("content-length", "0")) > MAX_FORM:
+        return {}
+    text = (await request.body()).decode("utf-8", "replace")
+    try:
+        return dict(parse_qsl(text, max_num_fields=MAX_FIELDS))
+    except ValueError:
+        return {}
+
+
+def _signed_in(desk: Desk, session: Session, response: Response) -> Response:
+    response.set_cookie(cookie_name(desk), session.key, httponly=True, samesite="strict", secure=desk.secure)
     return response
 
 

@@ -51,8 +51,8 @@ def features(
     box: tuple[float, float, float, float] | None,
     limit: int,
     offset: int,
-) -> list[dict[str, Any]]:
-    """Return features of a layer as GeoJSON; those in local coordinates have no place on the earth and are left out.
+) -> list[str]:
+    """Return features of a layer, each as a text of GeoJSON; those in local coordinates are left out.
 
     Parameters
     ----------
@@ -73,9 +73,10 @@ def features(
     members = sql.SQL(", ").join(sql.SQL("v.{}").format(sql.Identifier(name)) for name in layer.columns if name != "id")
     rows = conn.execute(
         sql.SQL(
-            "SELECT v.id, public.ST_AsGeoJSON(public.ST_Force2D({}), 8)::json,"
-            " (SELECT row_to_json(r) FROM (SELECT {}) r) FROM tunnel_api.{} v"
+            "SELECT json_build_object('type', 'Feature', 'id', v.id, 'geometry',"
+            " public.ST_AsGeoJSON(public.ST_Force2D({}), 8)::json,"
+            " 'properties', (SELECT row_to_json(r) FROM (SELECT {}) r))::text FROM tunnel_api.{} v"
             " WHERE {} ORDER BY v.id LIMIT {} OFFSET {}"
         ).format(shape, members, sql.Identifier(layer.name), sql.SQL(" AND ").join(conditions), limit, offset)
     )
-    return [{"type": "Feature", "id": key, "geometry": where, "properties": values} for key, where, values in rows]
+    return [text for (text,) in rows]
