@@ -65,6 +65,8 @@ OF_FILES: tuple[tuple[str, str], ...] = (
     ),
     ("cloud.las", "members {file} --stations {seeds}/stations.csv --intensity intensity --intensity-kind linear -o {out}.gpkg"),
     ("stations.csv", "members {seeds}/cloud.las --stations {file} --intensity intensity --intensity-kind linear -o {out}.gpkg"),
+    ("axis.csv", "serve --no-open --port 0 --certificate {file} --key {seeds}/axis.csv"),
+    ("axis.csv", "serve --no-open --port 0 --certificate {seeds}/axis.csv --key {file}"),
     ("template.toml", "report demo-2024 --template {file} -o {out}.html"),
 )
 """Files, and what reads them: each command and option that takes a file is among them."""
@@ -102,6 +104,7 @@ UNTRIED = {
     "findings import": "what goes wrong lies in its file",
     "survey remove-file": "has no options but the file",
     "tunnel find-axis": "what goes wrong lies in its file",
+    "serve": "serves until it is told to leave",
     "worker": "works until it is told to leave",
     "psql": "hands its words on to another program",
     "server start": "has no options",
@@ -112,7 +115,7 @@ UNTRIED = {
 
 REFUSED = (
     "clearance", "compare", "evaluate", "export scan-2024", "findings undo", "ground", "intensity", "learn demo-2024",
-    "members demo", "profile remove", "register", "run", "spheres", "survey remove-file", "thickness",
+    "members demo", "profile remove", "register", "run", "serve", "spheres", "survey remove-file", "thickness",
     "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
 )  # fmt: skip
 """What right commands begin with that the survey made by hand has no rows for: they are to say so in one line."""
