@@ -185,6 +185,17 @@ def test_a_worker_tells_when_it_leaves(dsn: str, conn: psycopg.Connection) -> No
     assert (json.loads(output)["jobs"], errors) == (0, "")
 
 
+def test_a_desk_tells_its_address_when_it_is_stopped(dsn: str) -> None:
+    with subprocess.Popen(
+        [*TUNNELDB, "serve", "--json", "--no-open", "--port", "0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as desk:
+        assert desk.stderr is not None
+        address = desk.stderr.readline().strip()
+        desk.terminate()
+        output, _ = desk.communicate(timeout=60)
+    assert json.loads(output)["address"] == address
+
+
 def test_what_a_scan_holds_is_told(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("x,y,z,Amplitude\n" + "".join(f"{i % 9},{i % 7},{i % 5},{i}\n" for i in range(900)))
     (look,) = told(0, "inspect", tmp_path / "a.csv")["files"]

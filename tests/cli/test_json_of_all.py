@@ -33,7 +33,7 @@ def noisy():
 check.check = noisy
 main()
 """
-WAIT = {"worker"}
+WAIT = {"worker", "serve"}
 """Verbs that go on until they are told to stop."""
 
 

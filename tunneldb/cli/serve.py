@@ -16,7 +16,7 @@ from pathlib import Path
 import click
 
 from tunneldb.cli.main import Settings
-from tunneldb.cli.output import command
+from tunneldb.cli.output import AS_JSON, add_to_json, command
 from tunneldb.cli.param_types import FilePath, WholeRange
 from tunneldb.database import open_connection, resolve_dsn
 from tunneldb.database.schema import installed_api_version
@@ -88,10 +88,16 @@ def serve(
             timeout_graceful_shutdown=10,
         )
     )
-    click.echo(address)
-    raise_file_limit()
+
+    def leave(number: int, frame: object) -> None:
+        server.should_exit = True
+
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: None)  # uvicorn sends itself the signal again when all is closed
+        signal.signal(number, leave)  # until uvicorn has its own, and when it sends itself the signal again at the end
+    # With --json, standard output is one object, at the end.
+    click.echo(address, err=bool(click.get_current_context().meta.get(AS_JSON)))
+    add_to_json(address=address.partition("enter")[0])
+    raise_file_limit()
     with listener, _opened(None if no_open or not loopback else address):
         server.run(sockets=[listener])
 
