@@ -195,7 +195,7 @@ def _layer(path: Path, layer: str, column: str) -> tuple[list[BaseGeometry], NDA
 def prepare(case: Case, seed: int, folder: Path, dsn: str, among: Sequence[Case] = SET) -> Scene:
     """Simulate a tunnel of a set, unless its files are there, and take it as far as the ground."""
     number = among.index(case)
-    name = case.name.replace(",", "").replace(" ", "-")
+    name = case.name.replace(",", "").replace("%", "per-cent").replace(" ", "-")
     scene = Scene(folder, name, KILOMETRE * (12 + number) + 310.0)
     arguments = case.arguments(seed, number)
     made_with = folder / f"{name}.options.json"
