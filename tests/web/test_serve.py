@@ -59,6 +59,12 @@ def test_the_role_of_the_desk_may_be_a_viewer(logins: None, dsn: str, example: s
         process.terminate()
 
 
+def test_the_database_may_be_an_option_of_the_command(dsn: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TUNNELDB_DSN", make_conninfo(dsn, dbname="nothing"))
+    assert "nothing" in errors_of("serve", "--no-open", code=2)
+    assert "cannot connect" in errors_of("serve", "--no-open", "--dsn", make_conninfo(dsn, dbname="neither"), code=2)
+
+
 def test_embedded_server_prints_a_token_that_lets_in(installed: str, monkeypatch: pytest.MonkeyPatch) -> None:
     environment = {name: value for name, value in os.environ.items() if name != "TUNNELDB_DSN"}
     subprocess.run([*COMMAND[:3], "init"], env=environment, check=True, capture_output=True)

@@ -37,10 +37,18 @@ from tunneldb.errors import UserError
 @click.option(
     "--behind-proxy", is_flag=True, help="A proxy with TLS is in front: other machines may reach it without a certificate."
 )
+@click.option("--dsn", "own_dsn", metavar="DSN", help="Database, as tunneldb --dsn.")
 @click.option("--no-open", is_flag=True, help="Do not open a browser.")
 @click.pass_obj
 def serve(
-    settings: Settings, port: int, host: str, certificate: Path | None, key: Path | None, behind_proxy: bool, no_open: bool
+    settings: Settings,
+    port: int,
+    host: str,
+    certificate: Path | None,
+    key: Path | None,
+    behind_proxy: bool,
+    own_dsn: str | None,
+    no_open: bool,
 ) -> None:
     """Serve the desk, a page for inspections in a browser, until stopped.
 
@@ -55,8 +63,9 @@ def serve(
     from tunneldb.web.config import Desk
     from tunneldb.web.protocol import PunctualProtocol, raise_file_limit
 
+    given = settings.dsn if own_dsn is None else own_dsn
     loopback = _is_loopback(host)
-    if settings.dsn is None and (behind_proxy or not loopback):
+    if given is None and (behind_proxy or not loopback):
         raise UserError("the embedded server is for this machine only; give a server of your own with --dsn")
     if (certificate is None) != (key is None):
         raise UserError("--certificate and --key belong together")
@@ -67,9 +76,9 @@ def serve(
         )
     if certificate is not None and key is not None:
         _check(certificate, key)
-    dsn = resolve_dsn(settings.dsn)
+    dsn = resolve_dsn(given)
     _require_schema(dsn)
-    token = secrets.token_urlsafe(32) if settings.dsn is None else None
+    token = secrets.token_urlsafe(32) if given is None else None
     desk = Desk(dsn, token, loopback=loopback and not behind_proxy, secure=certificate is not None or behind_proxy)
     listener = _listen(host, port)
     scheme = "http" if certificate is None else "https"
