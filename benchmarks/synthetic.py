@@ -255,7 +255,8 @@ FROM (
     CROSS JOIN LATERAL (SELECT s.chainage + s.along * r.reach * cos(pi() * (i %% 16) / 8) AS chainage,
                                s.arc + s.across * r.reach * sin(pi() * (i %% 16) / 8) AS arc) p
 ) v
-JOIN tunnel.segment g ON g.survey_id = %(id)s AND g.n = floor(v.chainage / %(spacing)s)
+JOIN tunnel.segment g ON g.survey_id = %(id)s  -- a vertex just beyond the ends lies in the first or the last one
+    AND g.n = least(greatest(floor(v.chainage / %(spacing)s), 0), %(kilometres)s * 1000 / %(spacing)s - 1)
 CROSS JOIN LATERAL (SELECT tunnel_internal.segment_frame(g.vertex_from || g.vertex_to || g.tangent_from || g.tangent_to,
     (v.chainage - g.chainage_from) / (g.chainage_to - g.chainage_from)) AS f OFFSET 0) q
 GROUP BY v.number
