@@ -359,8 +359,8 @@ SELECT a.id, 'photos/' || a.id || '.jpg' FROM tunnel.finding a WHERE a.survey_id
 """
 
 DRY_REGIONS = """
-INSERT INTO tunnel_api.region (survey_id, kind, geom)
-SELECT %(id)s, 'dry', ST_MakeEnvelope(km * 1000 + 500, -1, km * 1000 + 504, 1, 0) FROM generate_series(0,
+INSERT INTO tunnel_api.region (survey_id, kind, geom, reason)
+SELECT %(id)s, 'dry', ST_MakeEnvelope(km * 1000 + 500, -1, km * 1000 + 504, 1, 0), 'fresh paint' FROM generate_series(0,
     %(kilometres)s - 1) AS km
 """
 
