@@ -37,10 +37,10 @@ def test_report_is_a_download_and_no_page_of_the_desk(signed_in: SignIn) -> None
 
 
 @pytest.mark.parametrize("span", ["bytes=zz", "bytes=999999999-", "bytes=0-10"])
-def test_no_file_stays_behind(signed_in: SignIn, span: str) -> None:
-    before = set(Path(tempfile.gettempdir()).glob("tunneldb-desk-*"))
+def test_no_file_stays_behind(signed_in: SignIn, span: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     signed_in("olga_web").get("/api/surveys/demo-2024/export?what=xlsx", headers={"Range": span})
-    assert set(Path(tempfile.gettempdir()).glob("tunneldb-desk-*")) == before
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("what", ["report", "xlsx", "gpkg"])

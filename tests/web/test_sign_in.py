@@ -110,7 +110,7 @@ def test_attempts_at_the_same_time_are_counted(client: TestClient) -> None:
 @pytest.mark.parametrize(
     ("kind", "body"),
     [("multipart/form-data; boundary=XX; charset=punycode",
-      b'--XX\r\nContent-Disposition: form-data; name="user"\r\n\r\n-' + b"a" * 300_000 + b"\r\n--XX--\r\n"),
+      b'--XX\r\nContent-Disposition: form-data; name="user"\r\n\r\n-' + b"a" * 1_000_000 + b"\r\n--XX--\r\n"),
      ("application/x-www-form-urlencoded", b"&" * 1_900_000), ("application/x-www-form-urlencoded", b"a=1&" * 100),
      ("application/x-www-form-urlencoded", b"user=\xff\xfe&csrf=%ff"), ("text/plain", b"user=a")],
 )  # fmt: skip
@@ -118,7 +118,7 @@ def test_other_forms_are_refused_at_once(client: TestClient, kind: str, body: by
     start = time.perf_counter()
     answer = client.post("/login", content=body, headers={"Content-Type": kind})
     assert answer.status_code == 403
-    assert time.perf_counter() - start < 1.0
+    assert time.perf_counter() - start < 5.0  # decoding it takes 13 s
 
 
 def test_a_user_has_so_many_sessions_at_most(logins: None, dsn: str, example: str) -> None:
