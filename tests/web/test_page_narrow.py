@@ -54,6 +54,7 @@ def test_a_phone_reviews_by_touch(phone: Page, database: psycopg.Connection) -> 
     expect(page.locator(".badge")).to_have_text("open")
     assert database.execute("SELECT review FROM tunnel_api.finding WHERE id = 1").fetchone() == ("open",)
     page.get_by_role("tab", name="Review").tap()
+    expect(page.locator(".pace")).to_contain_text("reviewed")  # the list is there, from which the next one comes
     page.locator(".verdicts").get_by_role("button", name="Reject").tap()
     expect(page.locator(".finding-head")).to_contain_text("no. 2")
     assert database.execute("SELECT review FROM tunnel_api.finding WHERE id = 1").fetchone() == ("rejected",)
