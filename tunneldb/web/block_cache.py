@@ -6,9 +6,10 @@ import threading
 from collections import OrderedDict
 from collections.abc import Hashable
 
+from tunneldb.export.images.tile_png import Stretch
 from tunneldb.raster.geotiff import Raster
 
-MAX_BYTES = 128 * 2**20
+MAX_BYTES = 64 * 2**20
 """Maximum size of the kept images, bytes."""
 
 
@@ -26,6 +27,8 @@ class BlockCache:
         self._lock = threading.Lock()
         self._images: OrderedDict[Hashable, Raster] = OrderedDict()
         self._bytes = 0
+        self.stretches: dict[str, Stretch] = {}
+        """Colours of the images of surveys, by the tag of these."""
 
     def find(self, key: Hashable) -> Raster | None:
         """Return the image of a key; None if it is not kept."""

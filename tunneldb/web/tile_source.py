@@ -19,6 +19,9 @@ from tunneldb.web.sessions import Connection
 PERCENTILES = (2.0, 98.0)
 """Shares of the pixels of an image that are darker than the darkest colour and than the brightest one, %."""
 
+SAMPLE = 200_000
+"""Number of pixels, about, from which the colours are chosen."""
+
 SPANS = (0.02, 0.05, 0.1, 0.2, 0.5)
 """Values of the full colour of images with a sign, m: the first within which nine tenths of the image are."""
 
@@ -52,11 +55,19 @@ def _images(
 def survey_stretch(cache: BlockCache, conn: Connection, survey: Place, kind: str) -> Stretch:
     """Return the values of the darkest and the brightest colour of a survey's image, from its overviews."""
     whole = (int(np.floor((survey.low or 0.0) / BLOCK)) - BLOCKS, int(np.ceil((survey.high or 0.0) / BLOCK)))
-    images, _ = _images(cache, conn, survey.id, kind, overview_of(kind), whole, PIXEL)
+    images, tag = _images(cache, conn, survey.id, kind, overview_of(kind), whole, PIXEL)
+    known = cache.stretches.get(tag)
+    if known is None:
+        known = cache.stretches[tag] = _stretch(images, kind)
+    return known
+
+
+def _stretch(images: list[Raster], kind: str) -> Stretch:
     values = [image.values[np.isfinite(image.values)] for image in images]
     shown = np.concatenate(values) if values else np.empty(0, np.float32)
     if not len(shown):
         return Stretch(0.0, 1.0)
+    shown = shown[:: max(1, len(shown) // SAMPLE)]
     if is_signed(kind):
         reach = float(np.percentile(np.abs(shown), 90.0))
         span = next((s for s in SPANS if s >= reach), SPANS[-1])
