@@ -1,4 +1,4 @@
-"""What people do at the desk, by requests, with the time of each."""
+"""Requests of people at the desk, and their times."""
 
 from __future__ import annotations
 

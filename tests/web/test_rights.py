@@ -1,4 +1,4 @@
-"""What a login may do, tried as somebody who wants more."""
+"""Rights of each login: attempts to do more are refused."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ async def health(request: Request) -> Response:
 
 
 class Health:
-    """Whether the database answers, asked by one request at a time and kept for a moment.
+    """Health of the database. One request at a time asks it; the answer is kept for HEALTH_KEPT.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ NOT_WRITTEN = "the database cannot be reached; nothing was written: try again"
 
 
 class NotFoundError(UserError):
-    """What a request asks for does not exist."""
+    """The requested object does not exist."""
 
 
 class ConflictError(UserError):

@@ -6,6 +6,7 @@ import hashlib
 
 import numpy as np
 
+from tunneldb.export.images.preview import OFFSET_SPANS
 from tunneldb.export.images.tile_png import Stretch, is_signed
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.grid import BLOCK, BLOCKS
@@ -21,9 +22,6 @@ PERCENTILES = (2.0, 98.0)
 
 SAMPLE = 200_000
 """Number of pixels, about, from which the colours are chosen."""
-
-SPANS = (0.02, 0.05, 0.1, 0.2, 0.5)
-"""Values of the full colour of images with a sign, m: the first within which nine tenths of the image are."""
 
 
 def tile_images(cache: BlockCache, conn: Connection, survey: Place, kind: str, tile: Tile) -> tuple[list[Raster], str]:
@@ -70,7 +68,7 @@ def _stretch(images: list[Raster], kind: str) -> Stretch:
     shown = shown[:: max(1, len(shown) // SAMPLE)]
     if is_signed(kind):
         reach = float(np.percentile(np.abs(shown), 90.0))
-        span = next((s for s in SPANS if s >= reach), SPANS[-1])
+        span = next((s for s in OFFSET_SPANS if s >= reach), OFFSET_SPANS[-1])
         return Stretch(-span, span)
     low, high = (float(v) for v in np.percentile(shown, PERCENTILES))
     return Stretch(round(low, 3), round(max(high, low + 1e-3), 3))

@@ -9,6 +9,8 @@ from typing import Any
 import psycopg
 from psycopg import sql
 
+from tunneldb.store.desk.rows import named
+
 REVIEWED = ("review", "remark", "kind")
 """Columns that a review writes."""
 
@@ -45,7 +47,7 @@ def worklist(
         ).format(sql.SQL(PROBABILITY), sql.SQL(ORDERS[order]), MOST),
         [survey_id, low, high, min_area, not kinds, list(kinds)],
     )
-    return _named(rows)
+    return named(rows)
 
 
 def finding(conn: psycopg.Connection[Any], finding_id: int) -> dict[str, Any] | None:
@@ -58,7 +60,7 @@ def finding(conn: psycopg.Connection[Any], finding_id: int) -> dict[str, Any] | 
         " f.drawn_by, public.ST_AsGeoJSON(f.unrolled, 4)::json AS outline FROM tunnel_api.finding f WHERE f.id = %s",
         [finding_id],
     )
-    found = _named(rows)
+    found = named(rows)
     if not found:
         return None
     evidence = conn.execute(
@@ -74,7 +76,7 @@ def finding(conn: psycopg.Connection[Any], finding_id: int) -> dict[str, Any] | 
         " WHERE a.row_id = %s AND a.view LIKE 'finding%%' ORDER BY a.id DESC LIMIT 50",
         [finding_id],
     )
-    return {**found[0], "evidence": _named(evidence), "photos": _named(photos), "history": _named(history)}
+    return {**found[0], "evidence": named(evidence), "photos": named(photos), "history": named(history)}
 
 
 def write_review(conn: psycopg.Connection[Any], finding_id: int, seen: Mapping[str, Any], values: Mapping[str, Any]) -> bool:
@@ -155,8 +157,3 @@ def _value(conn: psycopg.Connection[Any], query: str, parameters: Sequence[Any])
     row = conn.execute(query, parameters).fetchone()
     assert row is not None
     return row[0]
-
-
-def _named(rows: psycopg.Cursor[Any]) -> list[dict[str, Any]]:
-    names = [column.name for column in rows.description or ()]
-    return [dict(zip(names, row, strict=True)) for row in rows.fetchall()]

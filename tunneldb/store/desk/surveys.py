@@ -7,6 +7,8 @@ from typing import Any
 
 import psycopg
 
+from tunneldb.store.desk.rows import named
+
 
 @dataclass(frozen=True)
 class Place:
@@ -43,7 +45,7 @@ def list_surveys(conn: psycopg.Connection[Any]) -> list[dict[str, Any]]:
         " sum(f.confirmed)::bigint AS confirmed, sum(f.rejected)::bigint AS rejected FROM tunnel_api.finding_count f"
         " WHERE f.survey_id = s.id) c ON true ORDER BY s.date DESC, s.name"
     )
-    return _named(rows)
+    return named(rows)
 
 
 def find_survey(conn: psycopg.Connection[Any], name: str) -> Place | None:
@@ -67,7 +69,7 @@ def arcs(conn: psycopg.Connection[Any], survey_id: int) -> tuple[float, float] |
 
 def finding_kinds(conn: psycopg.Connection[Any]) -> list[dict[str, Any]]:
     """Return the kinds of findings in the order of lists."""
-    return _named(
+    return named(
         conn.execute(
             "SELECT k.code, k.label, k.wet, k.geometries, k.active FROM tunnel_api.finding_kind k ORDER BY k.position, k.code"
         )
@@ -76,7 +78,7 @@ def finding_kinds(conn: psycopg.Connection[Any]) -> list[dict[str, Any]]:
 
 def severities(conn: psycopg.Connection[Any]) -> list[dict[str, Any]]:
     """Return the degrees of severity."""
-    return _named(conn.execute("SELECT v.id, v.label FROM tunnel_api.severity v ORDER BY v.id"))
+    return named(conn.execute("SELECT v.id, v.label FROM tunnel_api.severity v ORDER BY v.id"))
 
 
 def neighbours(conn: psycopg.Connection[Any], survey: Place) -> list[str]:
@@ -105,8 +107,3 @@ def ribbon(conn: psycopg.Connection[Any], survey: Place, bins: int) -> list[tupl
         "SELECT r.seen_share, r.wet_area, r.findings, r.reviewed, r.probability FROM tunnel_api.ribbon(%s, %s, %s, %s) r",
         [survey.id, survey.low, survey.high, bins],
     ).fetchall()
-
-
-def _named(rows: psycopg.Cursor[Any]) -> list[dict[str, Any]]:
-    names = [column.name for column in rows.description or ()]
-    return [dict(zip(names, row, strict=True)) for row in rows.fetchall()]
