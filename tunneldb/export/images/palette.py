@@ -9,6 +9,9 @@ from tunneldb.raster.pixel_state import PixelState
 
 Colour = tuple[int, int, int]
 
+BLUE, WHITE, RED = (33, 102, 172), (247, 247, 247), (178, 24, 43)
+"""Colours of the least, the middle and the greatest value of images whose values have a sign."""
+
 COLOURS: dict[PointClass, Colour] = {
     PointClass.UNASSIGNED: (176, 176, 176),
     PointClass.GROUND: (166, 129, 76),

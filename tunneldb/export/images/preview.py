@@ -15,7 +15,7 @@ from shapely.geometry import Polygon
 
 from tunneldb.arrays import Single, UInt8
 from tunneldb.classification.classes import PointClass
-from tunneldb.export.images.palette import PALETTES
+from tunneldb.export.images.palette import BLUE, PALETTES, RED, WHITE
 from tunneldb.finding_kind import REVIEW_COLOURS, rgb
 from tunneldb.geometry.stationing import Stationing
 from tunneldb.raster.gap_fill import MAX_FILL_DISTANCE, fill_gaps
@@ -36,7 +36,7 @@ _SIGNED = ("offset", *DEVIATION_KINDS.values())
 _MARGIN, _HEAD, _GAP = 84, 40, 26
 _TICK = 10  # of chainage, m
 _BACK, _INK, _GRID, _EMPTY = (255, 255, 255), (40, 40, 40), (150, 170, 200), (226, 229, 233)
-_BLUE, _WHITE, _RED = np.array([33, 102, 172.0]), np.array([247, 247, 247.0]), np.array([178, 24, 43.0])
+_BLUE, _WHITE, _RED = (np.array(colour, np.float64) for colour in (BLUE, WHITE, RED))
 
 
 @dataclass(frozen=True)

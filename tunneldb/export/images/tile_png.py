@@ -9,10 +9,7 @@ import numpy as np
 from PIL import Image
 
 from tunneldb.arrays import Single, UInt8
-from tunneldb.export.images.palette import PALETTES
-
-BLUE, WHITE, RED = (33, 102, 172), (247, 247, 247), (178, 24, 43)
-"""Colours of the least, the middle and the greatest value of images whose values have a sign."""
+from tunneldb.export.images.palette import BLUE, PALETTES, RED, WHITE
 
 
 @dataclass(frozen=True)
