@@ -1196,6 +1196,24 @@ COMMENT ON COLUMN tunnel.member.bimodal IS 'True if the reference surface is unk
 COMMENT ON COLUMN tunnel.member.chainage IS 'Chainage of its middle, m; NULL of a site or beyond the sections';
 COMMENT ON COLUMN tunnel.member.line IS 'Middle line, tunnel''s SRID, m; for a flat member, along its longest side';
 
+CREATE TABLE tunnel.photo_file (
+    survey_id INTEGER NOT NULL,
+    name TEXT NOT NULL,
+    content BYTEA NOT NULL,
+    added_by TEXT DEFAULT SESSION_USER NOT NULL,
+    added_at TIMESTAMP WITH TIME ZONE DEFAULT clock_timestamp() NOT NULL,
+    CONSTRAINT photo_file_pkey PRIMARY KEY (survey_id, name),
+    CONSTRAINT photo_file_name_check CHECK (name = encode(sha256(content), 'hex') || '.jpg'),
+    CONSTRAINT photo_file_content_check CHECK (octet_length(content) <= 30000000),
+    CONSTRAINT photo_file_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE
+);
+COMMENT ON TABLE tunnel.photo_file IS 'Photos that are stored in the database, each once in a survey';
+COMMENT ON COLUMN tunnel.photo_file.survey_id IS 'Survey that the row belongs to';
+COMMENT ON COLUMN tunnel.photo_file.name IS 'SHA-256 of the content in hexadecimal digits, and .jpg: the path of photos that show it';
+COMMENT ON COLUMN tunnel.photo_file.content IS 'The photo as JPEG';
+COMMENT ON COLUMN tunnel.photo_file.added_by IS 'Role that added it first';
+COMMENT ON COLUMN tunnel.photo_file.added_at IS 'Time when it was added first';
+
 CREATE TABLE tunnel.pose (
     survey_id INTEGER NOT NULL,
     time DOUBLE PRECISION NOT NULL,

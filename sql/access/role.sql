@@ -108,7 +108,7 @@ BEGIN
         tunnel_api.finding_unrolled, tunnel_api.finding_map, tunnel_api.finding_3d TO tunnel_inspector;
     GRANT INSERT, DELETE, UPDATE (path, caption) ON tunnel_api.finding_photo TO tunnel_inspector;
     GRANT EXECUTE ON FUNCTION tunnel_api.finding_split(bigint, geometry), tunnel_api.finding_merge(bigint[]),
-        tunnel_api.finding_undo(bigint) TO tunnel_inspector;
+        tunnel_api.finding_undo(bigint), tunnel_api.finding_photo_add(bigint, bytea, text) TO tunnel_inspector;
 END
 $$;
 

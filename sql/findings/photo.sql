@@ -61,3 +61,46 @@ COMMENT ON FUNCTION tunnel_internal.edit_photo() IS 'Trigger of the view finding
 
 CREATE OR REPLACE TRIGGER edit INSTEAD OF INSERT OR UPDATE OR DELETE ON tunnel_api.finding_photo
     FOR EACH ROW EXECUTE FUNCTION tunnel_internal.edit_photo();
+
+-- Photos that are stored in the database. A file stays as long as its survey: the audit can restore a deleted finding with its photos.
+CREATE OR REPLACE FUNCTION tunnel_api.finding_photo_add(finding_id bigint, content bytea, caption text) RETURNS bigint
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE CALLED ON NULL INPUT SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+#variable_conflict use_column
+DECLARE
+    finding_key constant bigint := finding_id;
+    photo constant bytea := content;
+    words constant text := caption;
+    file constant text := encode(sha256(photo), 'hex') || '.jpg';
+    most constant int := 30000000;  -- bytes
+    survey_key int;
+    photo_id bigint;
+BEGIN
+    IF octet_length(photo) > most OR (substr(photo, 1, 3) = '\xffd8ff') IS NOT TRUE THEN
+        RAISE EXCEPTION 'a photo is a JPEG of at most % bytes', most USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    SELECT a.survey_id INTO survey_key FROM tunnel.finding a WHERE a.id = finding_key FOR NO KEY UPDATE;
+    IF NOT FOUND THEN
+        RAISE EXCEPTION 'there is no finding %', finding_key USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    SELECT p.id INTO photo_id FROM tunnel.photo p WHERE p.finding_id = finding_key AND p.path = file ORDER BY p.id LIMIT 1;
+    IF FOUND THEN
+        RETURN photo_id;  -- sent again, because the answer was lost
+    END IF;
+    INSERT INTO tunnel.photo_file (survey_id, name, content) VALUES (survey_key, file, photo) ON CONFLICT DO NOTHING;
+    INSERT INTO tunnel_api.finding_photo (finding_id, path, caption) VALUES (finding_key, file, words) RETURNING id INTO photo_id;
+    RETURN photo_id;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.finding_photo_add(bigint, bytea, text) IS
+'Store a photo, a JPEG of at most 30 MB, in the database, add it to a finding with a caption, and return its id in finding_photo. The same photo is stored once in a survey and shown once by a finding';
+
+CREATE OR REPLACE FUNCTION tunnel_api.finding_photo_content(id bigint) RETURNS bytea
+LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp AS $$
+    SELECT f.content
+      FROM tunnel.photo p
+      JOIN tunnel.finding a ON a.id = p.finding_id
+      JOIN tunnel.photo_file f ON f.survey_id = a.survey_id AND f.name = p.path
+     WHERE p.id = $1
+$$;
+COMMENT ON FUNCTION tunnel_api.finding_photo_content(bigint) IS
+'A photo (id in finding_photo) as JPEG, if it is stored in the database; NULL if it is a path or URL';

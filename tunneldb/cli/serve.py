@@ -37,6 +37,9 @@ from tunneldb.errors import UserError
 @click.option(
     "--behind-proxy", is_flag=True, help="A proxy with TLS is in front: other machines may reach it without a certificate."
 )
+@click.option(
+    "--photos", type=FilePath(), metavar="FOLDER", help="Folder to store uploaded photos in. Default: in the database."
+)
 @click.option("--dsn", "own_dsn", metavar="DSN", help="Database, as tunneldb --dsn.")
 @click.option("--no-open", is_flag=True, help="Do not open a browser.")
 @click.pass_obj
@@ -47,6 +50,7 @@ def serve(
     certificate: Path | None,
     key: Path | None,
     behind_proxy: bool,
+    photos: Path | None,
     own_dsn: str | None,
     no_open: bool,
 ) -> None:
@@ -76,10 +80,14 @@ def serve(
         )
     if certificate is not None and key is not None:
         _check(certificate, key)
+    if photos is not None:
+        _require_folder(photos)
     dsn = resolve_dsn(given)
     _require_schema(dsn)
     token = secrets.token_urlsafe(32) if given is None else None
-    desk = Desk(dsn, token, loopback=loopback and not behind_proxy, secure=certificate is not None or behind_proxy)
+    desk = Desk(
+        dsn, token, loopback=loopback and not behind_proxy, secure=certificate is not None or behind_proxy, photos=photos
+    )
     listener = _listen(host, port)
     scheme = "http" if certificate is None else "https"
     name = f"[{host}]" if ":" in host else host
@@ -116,6 +124,17 @@ def _require_schema(dsn: str) -> None:
     with open_connection(dsn) as conn:
         if installed_api_version(conn) is None:
             raise UserError("the database is not set up for tunneldb yet; type tunneldb init")
+
+
+def _require_folder(path: Path) -> None:
+    """Raise UserError if this is not a folder in which files can be written."""
+    if not path.is_dir():
+        raise UserError(f"--photos {path}: there is no such folder; create it")
+    try:
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        raise UserError(f"--photos {path}: cannot be written to: {error.strerror or error}") from None
 
 
 def _check(certificate: Path, key: Path) -> None:

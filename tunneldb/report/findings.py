@@ -222,7 +222,7 @@ def read_findings_chapter(
     chapters = [kinds[kind].chapter(kind) for kind in in_order(kinds, order)]
     taken = [finding.id for chapter in chapters for _, rows in chapter.groups for finding in rows if finding.photos]
     pictures: defaultdict[int, list[Thumbnail]] = defaultdict(list)
-    for photo in make_thumbnails(read_photos(conn, survey, taken), photos):
+    for photo in make_thumbnails(conn, read_photos(conn, survey, taken), photos):
         pictures[photo.photo.finding_id].append(photo)
     reviews = [people[name].person(name) for name in sorted(people)]
     return FindingsChapter(

@@ -21,7 +21,7 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
 from tunneldb.errors import UserError
-from tunneldb.web import exports, findings, ogc, sign_in, surveys, tiles
+from tunneldb.web import exports, findings, ogc, photos, pictures, sign_in, surveys, tiles
 from tunneldb.web.config import Desk
 from tunneldb.web.pages import FOLDER
 from tunneldb.web.route import route
@@ -130,6 +130,10 @@ def create_app(desk: Desk) -> Starlette:
             Route(f"{finding}/undo", route(findings.undo), methods=["POST"]),
             Route(f"{finding}/outline", route(findings.redraw), methods=["PUT"]),
             Route(f"{finding}/split", route(findings.split), methods=["POST"]),
+            Route(f"{finding}/photos", pictures.add, methods=["POST"]),
+            Route(f"{finding}/photos/{{photo:key}}", route(photos.change), methods=["PATCH"]),
+            Route(f"{finding}/photos/{{photo:key}}", route(photos.delete), methods=["DELETE"]),
+            Route("/photos/{id:key}", pictures.show),
             Route(f"{tile}/findings/{{z}}/{{x}}/{{y}}", route(tiles.vector_tile)),
             Route(f"{tile}/{{kind}}/{{z}}/{{x}}/{{y}}", route(tiles.image_tile)),
             Route("/tiles", route(ogc.tile_sets)),
@@ -148,5 +152,6 @@ def create_app(desk: Desk) -> Starlette:
         ],
     )
     app.state.desk = desk
+    app.state.decoding = pictures.Decoding()
     app.state.health = Health(desk.dsn)
     return app

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from tunneldb.web.basic import BasicSessions
 from tunneldb.web.block_cache import BlockCache
@@ -28,12 +29,15 @@ class Desk:
         True if only this machine is served.
     secure : bool
         True if cookies are sent by TLS only.
+    photos : Path or None
+        Folder of uploaded photos; None if they are stored in the database.
     """
 
     dsn: str
     token: str | None
     loopback: bool = True
     secure: bool = False
+    photos: Path | None = None
     sessions: Sessions = field(default_factory=lambda: Sessions(IDLE_LIMIT))
     limit: RateLimit = field(default_factory=RateLimit)
     blocks: BlockCache = field(default_factory=BlockCache)

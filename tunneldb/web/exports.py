@@ -6,7 +6,6 @@ import shutil
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import psycopg
@@ -22,21 +21,26 @@ from tunneldb.store.survey import Survey, get_survey
 from tunneldb.web.route import Call, NotFoundError
 from tunneldb.web.sessions import Connection, RefusedError
 
-Writer = Callable[[Connection, Survey, float, float, Path], Any]
+Writer = Callable[[Connection, Survey, float, float, Path, Path | None], None]
+"""Writes a file of a survey between two chainages, m, with the photos of a folder."""
 
 
-def _report(conn: Connection, survey: Survey, low: float, high: float, path: Path) -> None:
-    # No file of the server may get into a report: photos are those with an address on the web.
-    write_html(conn, survey, path, low, high, photos=Source(path.parent / "photos"))
+def _report(conn: Connection, survey: Survey, low: float, high: float, path: Path, photos: Path | None) -> None:
+    # No other file of the server may get into a report.
+    write_html(conn, survey, path, low, high, photos=Source(path.parent / "photos" if photos is None else photos))
 
 
-def _geopackage(conn: Connection, survey: Survey, low: float, high: float, path: Path) -> None:
+def _geopackage(conn: Connection, survey: Survey, low: float, high: float, path: Path, photos: Path | None) -> None:
     write_survey(conn, survey, low, high, path)
+
+
+def _workbook(conn: Connection, survey: Survey, low: float, high: float, path: Path, photos: Path | None) -> None:
+    write_stretch_workbook(conn, survey, low, high, path)
 
 
 WRITERS: dict[str, tuple[str, str, Writer]] = {
     "report": ("html", "text/html", _report),
-    "xlsx": ("xlsx", "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet", write_stretch_workbook),
+    "xlsx": ("xlsx", "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet", _workbook),
     "gpkg": ("gpkg", "application/geopackage+sqlite3", _geopackage),
 }
 """Suffix, media type and function of each kind of download."""
@@ -54,7 +58,7 @@ def export(call: Call) -> Response:
     folder = Path(tempfile.mkdtemp(prefix="tunneldb-desk-"))
     try:
         with call.session.connection() as conn:
-            survey = _written(conn, call.path["survey"], write, low, high, folder / f"download.{suffix}")
+            survey = _written(conn, call, write, low, high, folder / f"download.{suffix}")
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -72,13 +76,13 @@ class _Download(FileResponse):
             shutil.rmtree(Path(self.path).parent, ignore_errors=True)
 
 
-def _written(conn: Connection, name: str, write: Writer, low: float, high: float, path: Path) -> Survey:
+def _written(conn: Connection, call: Call, write: Writer, low: float, high: float, path: Path) -> Survey:
     """Write a file from one moment of the database."""
     conn.autocommit = False
     try:
-        survey = get_survey(conn, name)
+        survey = get_survey(conn, call.path["survey"])
         conn.rollback()
-        write(conn, survey, low, high, path)
+        write(conn, survey, low, high, path, call.desk.photos)
         return survey
     except psycopg.errors.InsufficientPrivilege:
         raise RefusedError("downloads need the role tunnel_operator") from None

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -97,21 +98,11 @@ def route(handler: Handler) -> Callable[[Request], Awaitable[Response]]:
     """Return the endpoint of a handler, which runs in a thread and returns a response or a value for JSON."""
 
     async def endpoint(request: Request) -> Response:
-        desk: Desk = request.app.state.desk
-        session = desk.sessions.find(request.cookies.get(cookie_name(desk)))
-        if session is None and "authorization" in request.headers and desk.token is None and request.method in SAFE_METHODS:
-            address = request.client.host if request.client else ""
-            try:
-                session = await run_in_threadpool(desk.basic.session, desk.dsn, request.headers["authorization"], address)
-            except UserError as error:
-                return JSONResponse({"error": str(error)}, 401, {"WWW-Authenticate": CHALLENGE})
-        if session is None:
-            return JSONResponse({"error": "sign in"}, 401)
-        if request.method not in SAFE_METHODS and request.headers.get("x-csrf-token") != session.csrf:
-            return JSONResponse({"error": "the page is out of date: load it again"}, 403)
+        session = await session_of(request)
+        if isinstance(session, Response):
+            return session
         try:
-            call = Call(desk, session, dict(request.path_params), _query(request), await _body(request), dict(request.headers))
-            result = await _in_turn(session, handler, call)
+            result = await in_turn(session, handler, make_call(request, session, await _body(request)))
             return result if isinstance(result, Response) else JSONResponse(result)
         except Exception as error:
             return answer_to(error)
@@ -119,8 +110,38 @@ def route(handler: Handler) -> Callable[[Request], Awaitable[Response]]:
     return endpoint
 
 
-async def _in_turn(session: Session, handler: Handler, call: Call) -> Any:
-    """Run a handler in a thread when a connection of its session is free: nobody takes the threads of others."""
+async def session_of(request: Request) -> Session | Response:
+    """Return the session of a request, or the answer to a request without one."""
+    desk: Desk = request.app.state.desk
+    session = desk.sessions.find(request.cookies.get(cookie_name(desk)))
+    if session is None and "authorization" in request.headers and desk.token is None and request.method in SAFE_METHODS:
+        address = request.client.host if request.client else ""
+        try:
+            session = await run_in_threadpool(desk.basic.session, desk.dsn, request.headers["authorization"], address)
+        except UserError as error:
+            return JSONResponse({"error": str(error)}, 401, {"WWW-Authenticate": CHALLENGE})
+    if session is None:
+        return JSONResponse({"error": "sign in"}, 401)
+    if request.method not in SAFE_METHODS and request.headers.get("x-csrf-token") != session.csrf:
+        return JSONResponse({"error": "the page is out of date: load it again"}, 403)
+    return session
+
+
+def make_call(request: Request, session: Session, body: Any) -> Call:
+    """Return the call of a request."""
+    desk: Desk = request.app.state.desk
+    return Call(desk, session, dict(request.path_params), _query(request), body, dict(request.headers))
+
+
+async def in_turn(session: Session, handler: Handler, call: Call) -> Any:
+    """Run a handler in a thread in the turn of its session."""
+    async with turn(session):
+        return await run_in_threadpool(handler, call)
+
+
+@asynccontextmanager
+async def turn(session: Session) -> AsyncIterator[None]:
+    """Wait until a connection of a session is free: nobody takes the threads of others."""
     if session.waiting >= MAX_WAITING:
         raise BusyError("too many requests at once: try again")
     session.waiting += 1
@@ -129,7 +150,7 @@ async def _in_turn(session: Session, handler: Handler, call: Call) -> Any:
     finally:
         session.waiting -= 1
     try:
-        return await run_in_threadpool(handler, call)
+        yield
     finally:
         session.gate.release()
 

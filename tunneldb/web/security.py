@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Awaitable, Callable
 
 from starlette.requests import Request
@@ -24,6 +25,11 @@ HEADERS = {
 
 MAX_BODY = 2_000_000
 """Maximum length of a request's body, bytes."""
+
+MAX_PHOTO = 25_000_000
+"""Maximum length of a photo, bytes."""
+
+_PHOTOS = re.compile(r"/api/findings/[0-9]{1,18}/photos")
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 """Names of this machine; a page of another name that leads here is refused (DNS rebinding)."""
@@ -68,7 +74,12 @@ def refusal(request: Request, loopback: bool) -> Response | None:
             return JSONResponse({"error": "the request comes from another page"}, 403)
         if "transfer-encoding" in request.headers:
             return JSONResponse({"error": "state the length of the request"}, 411)
-        length = request.headers.get("content-length", "0")
-        if not length.isdigit() or int(length) > MAX_BODY:
-            return JSONResponse({"error": f"the request is longer than {MAX_BODY:,} bytes"}, 413)
+        length, most = request.headers.get("content-length", "0"), _most(request)
+        if not length.isdigit() or int(length) > most:
+            return JSONResponse({"error": f"the request is longer than {most:,} bytes"}, 413)
     return None
+
+
+def _most(request: Request) -> int:
+    """Return the maximum length of a request's body, bytes."""
+    return MAX_PHOTO if request.method == "POST" and _PHOTOS.fullmatch(request.scope["path"]) else MAX_BODY

@@ -75,6 +75,8 @@ class Session:
         Number of requests that wait for a connection.
     gate : asyncio.Semaphore
         Lets as many requests through as there are connections; the others wait without a thread.
+    upload_turn : asyncio.Lock
+        Held while a photo is received and stored.
     """
 
     key: str
@@ -88,6 +90,7 @@ class Session:
     closed: bool = False
     waiting: int = 0
     gate: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(CONNECTIONS))
+    upload_turn: asyncio.Lock = field(default_factory=asyncio.Lock)
 
     @contextmanager
     def connection(self) -> Iterator[Connection]:

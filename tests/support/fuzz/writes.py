@@ -71,6 +71,8 @@ HARMLESS = {"text": ["''", r"E'a\nb\tc'", r"E'\x1b[31m'", "'=1+1'"], "integer": 
 ARGUMENTS = {
     "text": [f"'{SURVEY}'", "'demo'", f"'{SURVEY}'", "repeat('9', 100000)"],
     "integer": ["1", "2147483647"],
+    "bigint": ["1", "9223372036854775807"],
+    "bytea": [r"'\xffd8ff'", "sha256('a')", r"'\xffd8ff' || convert_to(repeat('x', 31000000), 'UTF8')"],
     "double precision": ["12345", "'1e300'", "'NaN'", "'Infinity'", "'-Infinity'", "1e-300", "-1"],
     "double precision[]": ["array_fill('12345'::float8, ARRAY[100000])"],
     "geometry": ["ST_MakeLine(ST_MakePoint(0, 0, 0), ST_MakePoint(1e7, 0, 0))", "ST_MakePoint(1e300, 1e300, 1e300)"],

@@ -259,6 +259,25 @@ class Photo(Base):
     added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time when it was added")
 
 
+class PhotoFile(Base):
+    """Photo that is stored in the database."""
+
+    __tablename__ = "photo_file"
+    __table_args__ = (
+        CheckConstraint("name = encode(sha256(content), 'hex') || '.jpg'", name="name"),
+        CheckConstraint("octet_length(content) <= 30000000", name="content"),
+        {"comment": "Photos that are stored in the database, each once in a survey"},
+    )
+
+    survey_id: Mapped[int] = mapped_column(parent("survey"), primary_key=True, comment=SURVEY)
+    name: Mapped[str] = mapped_column(
+        primary_key=True, comment="SHA-256 of the content in hexadecimal digits, and .jpg: the path of photos that show it"
+    )
+    content: Mapped[bytes] = mapped_column(comment="The photo as JPEG")
+    added_by: Mapped[str] = mapped_column(server_default=text("SESSION_USER"), comment="Role that added it first")
+    added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time when it was added first")
+
+
 class BoundaryRegion(Base):
     """Dark region that reaches an end of its kilometre."""
 

@@ -24,6 +24,7 @@ from tunneldb.report.pictures.addresses import is_web
 from tunneldb.report.pictures.decode import shrink_logo, shrink_photo
 from tunneldb.report.pictures.local import open_picture
 from tunneldb.report.pictures.trouble import TOO_LARGE, UNKNOWN_SCHEME, PictureError
+from tunneldb.report.pictures.upload import clean_photo
 from tunneldb.report.pictures.web import fetch
 
 MAX_BYTES = 60_000_000
@@ -33,7 +34,11 @@ MAX_MEMORY = 1 << 30
 """Maximum address space of the process, bytes."""
 
 _SPARE = 5.0  # s after its deadline at which the process ends by itself, if the other one is gone
-_SHRINK: dict[str, Callable[[BinaryIO], tuple[bytes, str]]] = {"photo": shrink_photo, "logo": shrink_logo}
+_SHRINK: dict[str, Callable[[BinaryIO], tuple[bytes, str]]] = {
+    "photo": shrink_photo,
+    "logo": shrink_logo,
+    "upload": clean_photo,
+}
 
 
 def main(descriptor: int) -> None:

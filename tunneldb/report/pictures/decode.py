@@ -31,7 +31,7 @@ def shrink_photo(file: BinaryIO) -> tuple[bytes, str]:
     PictureError
         If it is not an image, or too large.
     """
-    with _opened(file, PHOTO) as image:
+    with opened(file, PHOTO) as image:
         upright = ImageOps.exif_transpose(image).convert("RGBA")
         upright.thumbnail((PHOTO, PHOTO))
         paper = Image.new("RGB", upright.size, "white")
@@ -49,7 +49,7 @@ def shrink_logo(file: BinaryIO) -> tuple[bytes, str]:
     PictureError
         If it is not an image, or too large.
     """
-    with _opened(file, LOGO) as image:
+    with opened(file, LOGO) as image:
         small = image.convert("RGBA")
         small.thumbnail((LOGO, LOGO))
         out = io.BytesIO()
@@ -58,8 +58,14 @@ def shrink_logo(file: BinaryIO) -> tuple[bytes, str]:
 
 
 @contextmanager
-def _opened(file: BinaryIO, size: int) -> Iterator[Image.Image]:
-    """Open an image of at most MAX_PIXELS, reduced to twice a size."""
+def opened(file: BinaryIO, size: int) -> Iterator[Image.Image]:
+    """Open an image of at most MAX_PIXELS, reduced to twice a size.
+
+    Raises
+    ------
+    PictureError
+        If it is not an image, or too large.
+    """
     Image.MAX_IMAGE_PIXELS = None  # the limit here also knows at which size a JPEG is decoded
     try:
         with Image.open(file, formats=_FORMATS) as image:

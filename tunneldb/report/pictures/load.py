@@ -31,6 +31,9 @@ TOGETHER = 900.0
 
 _PROCESSES = 4
 
+Form = Literal["photo", "logo", "upload"]
+"""Purpose of a picture."""
+
 
 @dataclass(frozen=True)
 class Source:
@@ -53,7 +56,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Picture:
-    """A small picture as a data URL, or the reason why there is none; the other of both is empty."""
+    """A picture as a data URL, or the reason why there is none; the other of both is empty."""
 
     url: str
     trouble: str
@@ -94,7 +97,7 @@ class _Process:
 class _Loader:
     """State of a loading: pictures that wait, processes, and results. Files are read in parallel, and decoded one at a time."""
 
-    def __init__(self, paths: Iterable[str], source: Source, form: Literal["photo", "logo"]) -> None:
+    def __init__(self, paths: Iterable[str], source: Source, form: Form) -> None:
         self.waiting = deque(dict.fromkeys(paths))
         self.source, self.form = source, form
         self.idle: list[_Process] = []
@@ -168,15 +171,15 @@ class _Loader:
         self.results[process.path] = Picture("", trouble)
 
 
-def load_pictures(paths: Iterable[str], source: Source, form: Literal["photo", "logo"] = "photo") -> dict[str, Picture]:
-    """Return small versions of pictures by path, each read once.
+def load_pictures(paths: Iterable[str], source: Source, form: Form = "photo") -> dict[str, Picture]:
+    """Return versions of pictures by path, each read once.
 
     Parameters
     ----------
     paths : iterable of str
         Files, or web addresses.
     source : Source
-    form : {'photo', 'logo'}
-        Photos are upright JPEGs, logos PNGs with transparency.
+    form : {'photo', 'logo', 'upload'}
+        Photos are small upright JPEGs, logos PNGs with transparency, uploads large upright JPEGs (`upload.clean_photo`).
     """
     return _Loader(paths, source, form).run()

@@ -9,6 +9,7 @@ from typing import Any
 import psycopg
 from psycopg import sql
 
+from tunneldb.store.desk.photos import is_stored
 from tunneldb.store.desk.rows import named
 
 REVIEWED = ("review", "remark", "kind")
@@ -69,14 +70,17 @@ def finding(conn: psycopg.Connection[Any], finding_id: int) -> dict[str, Any] | 
         [finding_id],
     )
     photos = conn.execute(
-        "SELECT p.id, p.path, p.caption FROM tunnel_api.finding_photo p WHERE p.finding_id = %s ORDER BY p.id", [finding_id]
+        "SELECT p.id, p.path, p.caption, p.added_by, to_char(p.added_at, 'YYYY-MM-DD HH24:MI') AS added_at"
+        " FROM tunnel_api.finding_photo p WHERE p.finding_id = %s ORDER BY p.id",
+        [finding_id],
     )
     history = conn.execute(
         "SELECT to_char(a.at, 'YYYY-MM-DD HH24:MI') AS at, a.who AS by, a.action, a.before, a.after FROM tunnel_api.audit a"
         " WHERE a.row_id = %s AND a.view LIKE 'finding%%' ORDER BY a.id DESC LIMIT 50",
         [finding_id],
     )
-    return {**found[0], "evidence": named(evidence), "photos": named(photos), "history": named(history)}
+    listed = [photo | {"stored": is_stored(photo["path"])} for photo in named(photos)]
+    return {**found[0], "evidence": named(evidence), "photos": listed, "history": named(history)}
 
 
 def write_review(conn: psycopg.Connection[Any], finding_id: int, seen: Mapping[str, Any], values: Mapping[str, Any]) -> bool:
