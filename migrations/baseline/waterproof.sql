@@ -19,12 +19,35 @@ COMMENT ON FUNCTION tunnel.note_finding() IS
 'Trigger on tunnel.finding: notes the kilometres that what changed reaches into';
 CREATE TRIGGER note_insert AFTER INSERT ON tunnel.finding
     REFERENCING NEW TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_finding();
-CREATE TRIGGER note_update_old AFTER UPDATE ON tunnel.finding
-    REFERENCING OLD TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_finding();
-CREATE TRIGGER note_update_new AFTER UPDATE ON tunnel.finding
-    REFERENCING NEW TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_finding();
 CREATE TRIGGER note_delete AFTER DELETE ON tunnel.finding
     REFERENCING OLD TABLE AS changed FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_finding();
+
+-- Most reviews confirm what was counted before: then the statistics hold.
+CREATE FUNCTION tunnel.note_finding_update() RETURNS trigger
+LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp
+AS $$
+BEGIN
+    INSERT INTO tunnel.waterproof (survey_id, km)
+    WITH earlier AS MATERIALIZED (
+        SELECT f.id, f.survey_id, f.chainage_from, f.chainage_to, f.detected, f.area, f.unrolled::bytea AS shape
+          FROM old_rows f WHERE f.wet AND f.review <> 'rejected' AND NOT f.superseded
+    ), later AS MATERIALIZED (
+        SELECT f.id, f.survey_id, f.chainage_from, f.chainage_to, f.detected, f.area, f.unrolled::bytea AS shape
+          FROM new_rows f WHERE f.wet AND f.review <> 'rejected' AND NOT f.superseded
+    ), changed AS (
+        (TABLE earlier EXCEPT TABLE later) UNION ALL (TABLE later EXCEPT TABLE earlier)
+    )
+    SELECT DISTINCT c.survey_id, k.km
+      FROM changed c
+     CROSS JOIN generate_series(
+            floor((c.chainage_from - 0.01) / 1000)::int, floor((c.chainage_to + 0.01) / 1000)::int) AS k (km);
+    RETURN NULL;
+END
+$$;
+COMMENT ON FUNCTION tunnel.note_finding_update() IS
+'Trigger on tunnel.finding: notes the kilometres of wet findings that began or ceased to count, or changed their place';
+CREATE TRIGGER note_update AFTER UPDATE ON tunnel.finding
+    REFERENCING OLD TABLE AS old_rows NEW TABLE AS new_rows FOR EACH STATEMENT EXECUTE FUNCTION tunnel.note_finding_update();
 
 CREATE FUNCTION tunnel.note_coverage() RETURNS trigger
 LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp

@@ -392,11 +392,11 @@ def test_a_table_is_not_made_part_of_another_unseen(person: psycopg.Connection, 
 
 
 def test_own_triggers_that_do_not_fire_are_reported(conn: psycopg.Connection) -> None:
-    conn.execute("ALTER TABLE tunnel.finding DISABLE TRIGGER note_update_new; DROP TRIGGER drop_points ON tunnel.survey")
+    conn.execute("ALTER TABLE tunnel.finding DISABLE TRIGGER note_update; DROP TRIGGER drop_points ON tunnel.survey")
     conn.commit()
     output = CliRunner().invoke(main, ["check"]).output
-    assert "note_update_new on tunnel.finding is switched off" in output
-    assert "ALTER TABLE tunnel.finding ENABLE TRIGGER note_update_new; then tunneldb init" in output
+    assert "note_update on tunnel.finding is switched off" in output
+    assert "ALTER TABLE tunnel.finding ENABLE TRIGGER note_update; then tunneldb init" in output
     assert "drop_points on tunnel.survey is missing" in output
 
 

@@ -162,19 +162,57 @@ def change(conn: psycopg.Connection, survey: int, side: int, rng: np.random.Gene
         conn.execute(query, (fate, side, low, low + 400))
 
 
-def test_many_reviews_of_a_transaction_are_worked_out_once(conn: psycopg.Connection, survey: int) -> None:
-    def last_id() -> int:
-        return int(ask(conn, "SELECT last_value FROM tunnel.waterproof_id_seq")[0]["last_value"])
+def notes_made(conn: psycopg.Connection) -> int:
+    """Return the number of notes and statistics that were ever written."""
+    return int(ask(conn, "SELECT last_value FROM tunnel.waterproof_id_seq")[0]["last_value"])
 
+
+def test_many_reviews_of_a_transaction_are_worked_out_once(conn: psycopg.Connection, survey: int) -> None:
     rows = ask(conn, "SELECT id FROM tunnel_api.leak WHERE chainage_from BETWEEN 4010 AND 4900")
-    before = last_id()
+    before = notes_made(conn)
     for row in rows:
-        conn.execute("UPDATE tunnel_api.leak SET review = 'confirmed' WHERE id = %s", (row["id"],))
+        conn.execute("UPDATE tunnel_api.leak SET review = 'rejected' WHERE id = %s", (row["id"],))
     conn.commit()
-    # each leaves a note of what was and one of what is
     assert len(rows) > 10
-    assert last_id() == before + 2 * len(rows) + 1
+    assert notes_made(conn) == before + len(rows) + 1, "each leaves one note, and all leave one row of statistics"
     assert kept(conn) == [3, 4, 5]
+    assert differences(conn) == []
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "UPDATE tunnel_api.leak SET review = 'confirmed'",
+        "UPDATE tunnel_api.leak SET remark = 'seen'",
+        "UPDATE tunnel_api.finding_unrolled SET review = 'rejected' WHERE NOT wet",
+    ],
+)
+def test_reviews_that_change_no_number_keep_the_statistics(conn: psycopg.Connection, survey: int, change: str) -> None:
+    before = notes_made(conn)
+    conn.execute(change)
+    conn.commit()
+    assert notes_made(conn) == before
+    assert differences(conn) == []
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "UPDATE tunnel.finding SET detected = false WHERE id = %(id)s",
+        "UPDATE tunnel.finding SET area = area + 1 WHERE id = %(id)s",
+        "UPDATE tunnel.finding SET chainage_to = chainage_to + 0.5 WHERE id = %(id)s",
+        "UPDATE tunnel.finding SET unrolled = public.st_translate(unrolled, 0, 0.1) WHERE id = %(id)s",
+        "UPDATE tunnel_api.leak SET kind = 'dark' WHERE id = %(id)s",
+        "UPDATE tunnel.finding SET same_as = (SELECT min(id) FROM tunnel.finding WHERE id <> %(id)s) WHERE id = %(id)s",
+    ],
+)
+def test_changes_of_what_counts_leave_a_note(conn: psycopg.Connection, survey: int, change: str) -> None:
+    (row,) = ask(conn, "SELECT id FROM tunnel_api.leak WHERE chainage_from BETWEEN 4010 AND 4900 ORDER BY id LIMIT 1")
+    before = notes_made(conn)
+    conn.execute(change, {"id": row["id"]})
+    conn.commit()
+    assert notes_made(conn) == before + 2
+    assert differences(conn) == []
 
 
 @pytest.mark.parametrize("person", ["ines", "otto"], indirect=True)

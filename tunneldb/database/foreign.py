@@ -39,10 +39,14 @@ _OWN_TABLES = """
 """
 
 # Table, trigger, schema and name of its function.
-_NOTES = ("note_insert", "note_update_old", "note_update_new", "note_delete")
 _OWN = (
     *(("survey", name, "tunnel", name) for name in ("drop_points", "make_images")),
-    *((table, name, "tunnel", f"note_{table}") for table in ("finding", "coverage") for name in _NOTES),
+    *(("finding", name, "tunnel", "note_finding") for name in ("note_insert", "note_delete")),
+    ("finding", "note_update", "tunnel", "note_finding_update"),
+    *(
+        ("coverage", name, "tunnel", "note_coverage")
+        for name in ("note_insert", "note_update_old", "note_update_new", "note_delete")
+    ),
     *((table, "note_truncate", "tunnel", "forget_waterproof") for table in ("finding", "coverage")),
     *(("finding", name, "tunnel", name) for name in ("set_wet", "count_insert", "count_update", "count_delete")),
     ("finding", "count_truncate", "tunnel", "forget_findings"),
