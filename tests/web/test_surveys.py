@@ -36,15 +36,6 @@ def test_list_has_the_class_of_the_database(signed_in: SignIn, conn: psycopg.Con
     assert (one["class"], one["wet_area"], one["inspected_share"]) == row.fetchone()
 
 
-def test_section_is_the_curve_of_the_example(signed_in: SignIn) -> None:
-    """A circle of 4 m with a floor 2.5 m below the axis."""
-    section = signed_in("viola_web").get("/api/surveys/demo-2024/section?chainage=12350").json()
-    curve = np.array(section["curve"])
-    above = curve[curve[:, 1] > -2.3]
-    assert np.hypot(*above.T) == pytest.approx(4.0, abs=0.02)
-    assert curve[:, 1].min() == pytest.approx(-2.5, abs=0.02)
-
-
 def test_features_lie_where_the_tunnel_is(signed_in: SignIn, conn: psycopg.Connection) -> None:
     browser = signed_in("viola_web")
     names = [one["id"] for one in browser.get("/collections").json()["collections"]]

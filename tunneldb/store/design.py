@@ -97,11 +97,11 @@ def remove_profile(conn: psycopg.Connection[Any], tunnel_id: int, tunnel: str, n
 def load_profiles(conn: psycopg.Connection[Any], tunnel_id: int, layer: str) -> list[Profile]:
     """Return the profiles of a layer, in order of chainage."""
     rows = conn.execute(
-        "SELECT name, chainage_from, chainage_to, outline FROM tunnel.design_profile"
+        "SELECT name, chainage_from, chainage_to, outline FROM tunnel_api.design_profile"
         " WHERE tunnel_id = %s AND layer = %s ORDER BY chainage_from",
         [tunnel_id, layer],
     ).fetchall()
-    return [Profile(name, low, high, _outline(np.array(numbers))) for name, low, high, numbers in rows]
+    return [Profile(name, low, high, outline_of(numbers)) for name, low, high, numbers in rows]
 
 
 def load_design(conn: psycopg.Connection[Any], tunnel_id: int, tunnel: str, layer: str) -> list[Stretch]:
@@ -139,6 +139,7 @@ def _vertices(outline: Outline) -> Float:
     return np.vstack([elements[:, [0, 1, 4]], [[*elements[-1, 2:4], 0.0]]])
 
 
-def _outline(numbers: Float) -> Outline:
-    rows = numbers.reshape(-1, 3)
+def outline_of(numbers: Sequence[float]) -> Outline:
+    """Return the outline of a stored one: right, up and bulge of each vertex, one after the other."""
+    rows = np.reshape(numbers, (-1, 3))
     return Outline(np.column_stack([rows[:-1, :2], rows[1:, :2], rows[:-1, 2]]))

@@ -23,8 +23,8 @@ def load_alignment(conn: psycopg.Connection[Any], survey: Survey, spacing: float
 def alignment_of(conn: psycopg.Connection[Any], tunnel_id: int, spacing: float | None = None) -> Alignment | None:
     """Load the given axis of a tunnel, with stations this far apart, m; None: its vertices. None for a site."""
     rows = conn.execute(
-        "SELECT ST_X(d.geom), ST_Y(d.geom), ST_Z(d.geom), t.start_chainage, t.spacing"
-        " FROM tunnel.tunnel t, ST_DumpPoints(t.alignment) d WHERE t.id = %s ORDER BY d.path",
+        "SELECT public.ST_X(d.geom), public.ST_Y(d.geom), public.ST_Z(d.geom), t.start_chainage, t.spacing"
+        " FROM tunnel_api.tunnel t, public.ST_DumpPoints(t.geom) d WHERE t.id = %s ORDER BY d.path",
         [tunnel_id],
     ).fetchall()
     if not rows:

@@ -21,7 +21,7 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
 from tunneldb.errors import UserError
-from tunneldb.web import exports, findings, ogc, photos, pictures, sign_in, surveys, tiles
+from tunneldb.web import exports, findings, ogc, photos, pictures, points, sections, sign_in, surveys, tiles
 from tunneldb.web.config import Desk
 from tunneldb.web.pages import FOLDER
 from tunneldb.web.route import route
@@ -119,7 +119,10 @@ def create_app(desk: Desk) -> Starlette:
             Route("/api/surveys", route(surveys.list_all)),
             Route(survey, route(surveys.one)),
             Route(f"{survey}/ribbon", route(surveys.ribbon)),
-            Route(f"{survey}/section", route(surveys.section)),
+            Route(f"{survey}/section", route(sections.section)),
+            Route(f"{survey}/section.dxf", route(sections.drawing)),
+            Route(f"{survey}/points", route(points.points)),
+            Route(f"{survey}/outlines", route(points.outlines)),
             Route(f"{survey}/export", route(exports.export)),
             Route(f"{survey}/worklist", route(findings.worklist)),
             Route(f"{survey}/findings", route(findings.draw), methods=["POST"]),

@@ -1,4 +1,4 @@
-"""Requests on surveys: list, one survey, its ribbon, a section."""
+"""Requests on surveys: list, one survey, its ribbon."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from tunneldb.errors import UserError
 from tunneldb.export.images.tile_png import is_signed
 from tunneldb.finding_kind import FindingKind
-from tunneldb.store.desk import sections, surveys
+from tunneldb.store.desk import surveys
 from tunneldb.store.desk.images import KINDS, image_kinds
 from tunneldb.store.desk.surveys import Place
 from tunneldb.web.route import Call, NotFoundError
@@ -108,26 +108,4 @@ def ribbon(call: Call) -> Any:
         "findings": {kind: [row[2].get(kind, 0) for row in rows] for kind in kinds},
         "reviewed": [row[3] / count if count else None for row, count in zip(rows, counts, strict=True)],
         "probability": [row[4] for row in rows],
-    }
-
-
-def section(call: Call) -> Any:
-    """Return the section at a chainage."""
-    chainage = call.number("chainage", np.nan)
-    with call.session.connection() as conn:
-        survey = survey_of(conn, call.path["survey"])
-        low, high = measured(survey)
-        if not low <= chainage <= high:
-            raise UserError(f"chainage={chainage:g}: the survey reaches from {low:.1f} to {high:.1f} m")
-        found = sections.load_section(conn, survey.id, survey.name, chainage)
-        if found is None:
-            raise NotFoundError(f"no section is near chainage {chainage:.1f} m")
-        label = sections.station_label(conn, survey.tunnel_id, chainage)
-    points = np.column_stack([found.points.round(3), found.classes])
-    return {
-        "chainage": chainage,
-        "label": label,
-        "points": points.tolist(),
-        "curve": found.curve.round(4).tolist(),
-        "centre": [0, 0],
     }

@@ -76,7 +76,7 @@ def finding(conn: psycopg.Connection[Any], finding_id: int) -> dict[str, Any] | 
     )
     history = conn.execute(
         "SELECT to_char(a.at, 'YYYY-MM-DD HH24:MI') AS at, a.who AS by, a.action, a.before, a.after FROM tunnel_api.audit a"
-        " WHERE a.row_id = %s AND a.view LIKE 'finding%%' ORDER BY a.id DESC LIMIT 50",
+        " WHERE a.row_id = %s AND a.view = 'finding' ORDER BY a.id DESC LIMIT 50",
         [finding_id],
     )
     listed = [photo | {"stored": is_stored(photo["path"])} for photo in named(photos)]
@@ -88,15 +88,17 @@ def write_review(conn: psycopg.Connection[Any], finding_id: int, seen: Mapping[s
 
     The view's trigger locks the row, and writes nothing where another person writes the same at the same moment.
     """
-    changes = sql.SQL(", ").join(sql.SQL("{} = {}").format(sql.Identifier(name), sql.Literal(values[name])) for name in values)
+    changes = sql.SQL(", ").join(sql.SQL("{} = {}").format(sql.Identifier(name), sql.Placeholder(name)) for name in values)
     same = sql.SQL(" AND ").join(
-        sql.SQL("f.{} IS NOT DISTINCT FROM {}").format(sql.Identifier(name), sql.Literal(seen[name])) for name in REVIEWED
+        sql.SQL("f.{} IS NOT DISTINCT FROM {}").format(sql.Identifier(name), sql.Placeholder(f"seen_{name}"))
+        for name in REVIEWED
     )
     row = conn.execute(
         sql.SQL(
-            "WITH done AS (UPDATE tunnel_api.finding_unrolled f SET {} WHERE f.id = {} AND {} RETURNING f.id, f.reviewed_at)"
+            "WITH done AS (UPDATE tunnel_api.finding_unrolled f SET {} WHERE f.id = %(id)s AND {} RETURNING f.id, f.reviewed_at)"
             " SELECT d.id FROM done d WHERE d.reviewed_at >= statement_timestamp()"
-        ).format(changes, sql.Literal(finding_id), same)
+        ).format(changes, same),
+        {"id": finding_id, **values, **{f"seen_{name}": seen[name] for name in REVIEWED}},
     ).fetchone()
     return row is not None
 

@@ -18,11 +18,34 @@ MOST_POINTS = 20_000
 
 
 @dataclass(frozen=True)
+class Frame:
+    """Plane of a section.
+
+    Attributes
+    ----------
+    centre : (3,) float array
+        Point of the measured axis, in the tunnel's SRID, m.
+    across, up : (3,) float array
+        Unit vectors to the right, looking up-chainage, and up.
+    """
+
+    centre: Float
+    across: Float
+    up: Float
+
+    def places(self, xyz: Float) -> Float:
+        """Return points (n, 3) in the plane, right and up of the axis, (n, 2), m."""
+        away = xyz - self.centre
+        return np.column_stack([away @ self.across, away @ self.up])
+
+
+@dataclass(frozen=True)
 class Section:
     """A section, looking up-chainage.
 
     Attributes
     ----------
+    frame : Frame
     curve : (361, 2) float array
         Right and up of the axis, m, at each degree from straight below, clockwise.
     points : (n, 2) float array
@@ -31,6 +54,7 @@ class Section:
         Classes of the points.
     """
 
+    frame: Frame
     curve: Float
     points: Float
     classes: Int64
@@ -47,16 +71,14 @@ def load_section(conn: psycopg.Connection[Any], survey_id: int, survey: str, cha
     left, crown, right = (_on_lining(conn, survey_id, chainage, float(arc[node])) for node in (90, 180, 270))
     # The walls at the height of the axis give its place and the direction to the right; the crown, what is up.
     centre = (left * radius[270] + right * radius[90]) / (radius[90] + radius[270])
-    across = (right - left) / np.linalg.norm(right - left)
-    up = (crown - centre) / np.linalg.norm(crown - centre)
+    frame = Frame(centre, (right - left) / np.linalg.norm(right - left), (crown - centre) / np.linalg.norm(crown - centre))
     rows = conn.execute(
         "SELECT public.ST_X(p.geom), public.ST_Y(p.geom), public.ST_Z(p.geom), coalesce(p.class, 0)"
         " FROM tunnel_api.points(%s, %s, %s) p LIMIT %s",
         [survey, chainage - THICKNESS / 2, chainage + THICKNESS / 2, MOST_POINTS],
     ).fetchall()
     table = np.array(rows, dtype=np.float64).reshape(-1, 4)
-    away = table[:, :3] - centre
-    return Section(curve, np.column_stack([away @ across, away @ up]), table[:, 3].astype(np.int64))
+    return Section(frame, curve, frame.places(table[:, :3]), table[:, 3].astype(np.int64))
 
 
 def station_label(conn: psycopg.Connection[Any], tunnel_id: int, chainage: float) -> str:

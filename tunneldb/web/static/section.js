@@ -10,6 +10,7 @@ const CLASSES = {
   67: ['rail', '#b3261e'], 68: ['object on the ground', '#c98a00'], 69: ['target sphere', '#d0021b'], 70: ['noise', '#b9c0c7'],
   40: ['bed', '#8a6a3f'], 41: ['water surface', '#2f7fb5'], 42: ['submerged lining', '#1c4a6e'], 43: ['object in the water', '#c98a00'],
 };
+const LINES = { curve: ['measured section', '#0b5fa5'], design: ['design', '#2e7d32'], gauge: ['gauge', '#8e24aa'] };
 const MARGIN = 0.6;
 const STEP = 0.05;
 
@@ -27,11 +28,12 @@ export class SectionPanel {
     this.box = el('div', { class: 'section-box' });
     this.key = el('ul', { class: 'key' });
     this.save = button('Download SVG', () => this.download(), { disabled: true });
+    this.drawing = el('a', { class: 'button', download: '', hidden: true, text: 'Download DXF' });
     this.root = el('div', { class: 'pad' }, el('h2', { text: 'Section' }),
       el('div', { class: 'row' }, field('Chainage', this.at), button('Show', () => this.read(parseStation(this.at.value))),
         button('Middle of the map', () => this.read(this.here())), button('At the finding', () => this.atFinding())),
       this.told, this.box, this.key,
-      el('div', { class: 'row' }, this.save, button('Clear distance', () => this.clear())),
+      el('div', { class: 'row' }, this.save, this.drawing, button('Clear distance', () => this.clear())),
       el('p', { class: 'muted small', text: 'Looking up-chainage. Click two points to measure; with the keyboard: arrow keys move the cross, Enter sets a point.' }));
   }
 
@@ -41,6 +43,7 @@ export class SectionPanel {
     this.box.replaceChildren();
     this.key.replaceChildren();
     this.save.disabled = true;
+    this.drawing.hidden = true;
     this.told.textContent = '';
   }
 
@@ -75,8 +78,8 @@ export class SectionPanel {
   }
 
   draw() {
-    const { points, curve, centre } = this.section;
-    const all = [...points, ...curve, centre];
+    const { points, curve, lines, centre } = this.section;
+    const all = [...points, ...curve, ...lines.flatMap((line) => line.places), centre];
     const range = (n, pick) => pick(...chunks(all.map((point) => point[n]), pick));
     const [left, right, low, high] = [range(0, Math.min) - MARGIN, range(0, Math.max) + MARGIN, range(1, Math.min) - MARGIN, range(1, Math.max) + MARGIN];
     const size = Math.max(right - left, high - low);
@@ -92,7 +95,12 @@ export class SectionPanel {
       const path = group.map(([x, y]) => `M${x.toFixed(3)} ${(-y).toFixed(3)}h0`).join('');
       root.append(svg('path', { d: path, stroke: CLASSES[code]?.[1] ?? '#777', 'stroke-width': 1.6 * unit, 'stroke-linecap': 'round', fill: 'none' }));
     }
-    if (curve.length) root.append(svg('polyline', { points: curve.map(([x, y]) => `${x},${-y}`).join(' '), fill: 'none', stroke: '#0b5fa5', 'stroke-width': unit, opacity: '.8' }));
+    const drawn = [{ kind: 'curve', name: '', places: curve }, ...lines];
+    for (const { kind, name, places } of drawn) {
+      const line = svg('polyline', { points: places.map(([x, y]) => `${x},${-y}`).join(' '), fill: 'none', stroke: LINES[kind][1], 'stroke-width': unit, opacity: '.8' });
+      line.append(svg('title', {}, name || LINES[kind][0]));
+      root.append(line);
+    }
     const [x, y] = centre;
     root.append(svg('path', { d: `M${x - 8 * unit} ${-y}h${16 * unit}M${x} ${-y - 8 * unit}v${16 * unit}`, stroke: '#b3261e', 'stroke-width': unit }));
     this.mark(root, curve, unit);
@@ -102,12 +110,12 @@ export class SectionPanel {
     root.addEventListener('click', (event) => this.click(event, root));
     root.addEventListener('keydown', (event) => this.press(event));
     this.box.replaceChildren(root);
-    this.key.replaceChildren(...[...groups.keys()].map((code) => {
-      const mark = el('i');
-      mark.style.background = CLASSES[code]?.[1] ?? '#777';
-      return el('li', {}, mark, CLASSES[code]?.[0] ?? `class ${code}`);
-    }));
+    this.key.replaceChildren(
+      ...[...groups.keys()].map((code) => entry(CLASSES[code]?.[0] ?? `class ${code}`, CLASSES[code]?.[1] ?? '#777')),
+      ...drawn.map(({ kind, name }) => entry(name ? `${LINES[kind][0]} (${name})` : LINES[kind][0], LINES[kind][1])));
     this.save.disabled = false;
+    this.drawing.hidden = false;
+    this.drawing.href = surveyPath(this.survey.name, `/section.dxf?chainage=${this.section.chainage.toFixed(3)}`);
   }
 
   grid(root, left, right, low, high, unit) {
@@ -189,6 +197,13 @@ export class SectionPanel {
 
 function distance([x1, y1], [x2, y2]) {
   return Math.hypot(x2 - x1, y2 - y1);
+}
+
+/** Return an entry of the key. */
+function entry(text, colour) {
+  const mark = el('i');
+  mark.style.background = colour;
+  return el('li', {}, mark, text);
 }
 
 function grouped(points) {

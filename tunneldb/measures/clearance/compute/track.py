@@ -118,15 +118,19 @@ class Track:
         return np.column_stack([found[:, 0] + cosine * right + sine * up, found[:, 1] - sine * right + cosine * up])
 
 
+def metre_track(begin: float, right: float, up: float, cant: float) -> Track:
+    """Return the track of a metre: its middle right of the given axis and above it, m; cant: left rail above the right one."""
+    same, none = np.array([begin, begin + 1.0]), np.zeros(2)
+    return Track(same, none + right, none + up, none + cant, none, none, none, np.ones(2, np.bool_), reach=1.0)
+
+
 def metre_places(about: Float, begin: float, right: float, up: float, cant: float) -> tuple[Float, Bool]:
     """Return the points of a metre in its track's frame, (k, 2), m, and which of the points about the axis (n, 3) they are.
 
-    The track's middle is right of the given axis and above it, m; cant is the height of its left rail above the right one.
+    The track is that of :func:`metre_track`.
     """
     selected = np.asarray((about[:, 0] >= begin) & (about[:, 0] < begin + 1.0))
-    same, none = np.array([begin, begin + 1.0]), np.zeros(2)
-    here = Track(same, none + right, none + up, none + cant, none, none, none, np.ones(2, np.bool_), reach=1.0)
-    return here.places(*about[selected].T), selected
+    return metre_track(begin, right, up, cant).places(*about[selected].T), selected
 
 
 def rail_pairs(points: Float, gauge: float = GAUGE) -> Pairs:
