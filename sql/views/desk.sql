@@ -161,3 +161,53 @@ END
 $$;
 COMMENT ON FUNCTION tunnel_api.finding_tile(int, float8, float8, float8, float8, boolean) IS
 'Findings in a rectangle of the unrolled plane (chainage, arc; m) as a vector tile (MVT), layer findings: outlines of at most 5000, the largest; or, without outlines, one point for each group in a raster of 32 × 32 with its number (count)';
+
+CREATE OR REPLACE FUNCTION tunnel_api.segment_planes(survey_id int, chainage_from float8, chainage_to float8)
+RETURNS TABLE (n int, first float8, last float8, planes float8[])
+LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 10
+SET search_path = pg_catalog, pg_temp
+AS $$
+    SELECT g.n, g.chainage_from, g.chainage_to, g.vertex_from || g.vertex_to || g.tangent_from || g.tangent_to
+      FROM tunnel.segment g
+     WHERE g.survey_id = $1 AND g.chainage_to >= $2 AND g.chainage_from <= $3 AND tunnel_internal.in_order($2, $3)
+     ORDER BY g.n
+$$;
+COMMENT ON FUNCTION tunnel_api.segment_planes(int, float8, float8) IS
+'Segments between two chainages: number, chainages (m) of their two planes, and these: vertices and tangents of the measured axis, each first and last (x, y, z)';
+
+-- Each point is kept or not by the hash of its place in the table, so that scans of any number of workers choose the same points.
+CREATE OR REPLACE FUNCTION tunnel_api.point_sample(survey_id int, chainage_from float8, chainage_to float8, max_points int)
+RETURNS TABLE (x float8, y float8, z float8, intensity float4, class smallint, total bigint)
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 100000
+SET search_path = pg_catalog, pg_temp
+SET plan_cache_mode = force_custom_plan
+SET jit = off
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    low constant float8 := chainage_from;
+    high constant float8 := chainage_to;
+    km_low constant int := greatest(floor((chainage_from - 50) / 1000), -1e6);
+    km_high constant int := least(floor((chainage_to + 50) / 1000), 1e6);
+    count bigint;
+    hashes bigint;
+BEGIN
+    PERFORM tunnel_internal.in_order(chainage_from, chainage_to);
+    IF max_points NOT BETWEEN 1000 AND 1000000 OR NOT high - low <= 50 THEN
+        RAISE EXCEPTION 'a sample has 1000 to 1000000 points of at most 50 m' USING ERRCODE = 'invalid_parameter_value';
+    END IF;
+    SELECT count(*) INTO count FROM tunnel.point p
+     WHERE p.survey_id = survey_key AND p.km BETWEEN km_low AND km_high AND p.chainage >= low AND p.chainage < high;
+    -- four standard deviations fewer than may come: the limit itself would cut off the end of the stretch
+    hashes := CASE WHEN count <= max_points THEN 1 ELSE (max_points - 4 * sqrt(max_points)) / count END * 4294967296;
+    RETURN QUERY
+    SELECT public.ST_X(p.geom), public.ST_Y(p.geom), public.ST_Z(p.geom), p.intensity, coalesce(p.class, 0::smallint), count
+      FROM tunnel.point p
+     WHERE p.survey_id = survey_key AND p.km BETWEEN km_low AND km_high AND p.chainage >= low AND p.chainage < high
+       AND hashtid(p.ctid) + 2147483648 < hashes
+     LIMIT max_points;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.point_sample(int, float8, float8, int) IS
+'Points of at most 50 m of a survey, thinned evenly to at most max_points. total: number of points of the stretch. Intensity as in the file; class 0: not classified';

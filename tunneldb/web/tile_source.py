@@ -20,6 +20,9 @@ from tunneldb.web.sessions import Connection
 PERCENTILES = (2.0, 98.0)
 """Shares of the pixels of an image that are darker than the darkest colour and than the brightest one, %."""
 
+POINT_PIXEL = Tile(22, 0, 0).pixel
+"""Side of the pixels from which points are coloured, m."""
+
 SAMPLE = 200_000
 """Number of pixels, about, from which the colours are chosen."""
 
@@ -32,6 +35,12 @@ def tile_images(cache: BlockCache, conn: Connection, survey: Place, kind: str, t
     if far:
         first = first // BLOCKS * BLOCKS
     return _images(cache, conn, survey.id, kind, stored, (first, last), tile.pixel)
+
+
+def stretch_images(cache: BlockCache, conn: Connection, survey: Place, kind: str, ends: tuple[float, float]) -> list[Raster]:
+    """Return the images of a stretch, m, with pixels of POINT_PIXEL."""
+    first, last = (int(np.floor(end / BLOCK)) for end in ends)
+    return _images(cache, conn, survey.id, kind, kind, (first, last), POINT_PIXEL)[0]
 
 
 def _images(
