@@ -5,7 +5,8 @@
 
 Only this script needs npm: the files it writes are committed and travel in the wheel. ``vendor.json`` has the version and the
 integrity of each npm package, and the SHA-256 of each file. Packages with ``"files": {}`` are compiled into ``ol.js``: only
-their licences are kept, in ``LICENSES.txt``.
+their licences are kept, in ``LICENSES.txt``. The 3D view uses a small part of three.js, which esbuild compiles into
+``three.js``.
 """
 
 from __future__ import annotations
@@ -32,8 +33,24 @@ PACKAGES: dict[str, tuple[str, dict[str, str]]] = {
     "quickselect": ("3", {}),
     "rbush": ("4", {}),
     "zarrita": ("0.7", {}),
+    "three": ("0", {"LICENSE": "three/LICENSE"}),
 }
 """Range of versions of each package, and its files: path in the package, path below ``vendor/``."""
+
+THREE, ESBUILD = "three/three.js", "0.28.2"
+"""Module of the 3D view, and the version of esbuild that writes it."""
+
+THREE_ENTRY = """
+export {
+  BufferAttribute, BufferGeometry, ColorManagement, Fog, LinearSRGBColorSpace, PerspectiveCamera, Points, PointsMaterial,
+  Raycaster, Scene, Vector2, Vector3, WebGLRenderer,
+} from 'three';
+export { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+export { LineMaterial } from 'three/addons/lines/LineMaterial.js';
+export { LineSegments2 } from 'three/addons/lines/LineSegments2.js';
+export { LineSegmentsGeometry } from 'three/addons/lines/LineSegmentsGeometry.js';
+"""
+"""What the 3D view uses of three.js."""
 
 
 def main() -> None:
@@ -47,11 +64,15 @@ def main() -> None:
         wanted = pinned[package]["version"] if package in pinned else versions
         with tempfile.TemporaryDirectory() as folder:
             item, licence = fetch(package, wanted, files, Path(folder), pinned.get(package))
+            if package == "three":
+                three = bundle(Path(folder), item["version"])
         items.append(item)
+        if package == "three":
+            continue
         licences.append(f"{package} {item['version']}\n\n{licence.strip()}\n")
     text = "Libraries that are compiled into ol.js, with their licences.\n\n" + ("\n" + "-" * 80 + "\n\n").join(licences)
     (VENDOR / LICENCES).write_text(text, "utf-8")
-    lock = {"packages": items, "generated": {LICENCES: digest(text.encode())}}
+    lock = {"packages": items, "generated": {LICENCES: digest(text.encode()), THREE: digest(three)}}
     LOCK.write_text(json.dumps(lock, indent=2) + "\n", "utf-8")
     print(f"{LOCK}: {len(items)} packages")
 
@@ -89,6 +110,18 @@ def fetch(
         "files": hashes,
     }  # fmt: skip
     return entry, text
+
+
+def bundle(folder: Path, version: str) -> bytes:
+    """Write the module of the 3D view from the package in a folder; return its content."""
+    with tarfile.open(folder / f"three-{version}.tgz") as tar:
+        tar.extractall(folder, filter="data")
+    (folder / "node_modules").mkdir()
+    (folder / "package").rename(folder / "node_modules" / "three")
+    (folder / "entry.js").write_text(THREE_ENTRY, "utf-8")
+    options = ["--bundle", "--minify", "--format=esm", "--legal-comments=inline", f"--outfile={VENDOR / THREE}"]
+    npm("exec", "--yes", f"--package=esbuild@{ESBUILD}", "--", "esbuild", str(folder / "entry.js"), *options)
+    return (VENDOR / THREE).read_bytes()
 
 
 def newest(package: str, versions: str) -> str:
