@@ -18,13 +18,14 @@ export class ApiError extends Error {
 
 const AWAY = 'The server cannot be reached.';
 const LIMIT = 20000;
+const UPLOAD_LIMIT = 300000;
 
 /**
- * Send a request; return the JSON of the answer, or null.
+ * Send a request, a file as it is or else JSON; return the JSON of the answer, or null.
  * @throws {ApiError}
  */
-export async function request(method, path, body = undefined, { signal = null } = {}) {
-  const response = await answer(method, path, body, signal);
+export async function request(method, path, body = undefined, { signal = null, limit = LIMIT } = {}) {
+  const response = await answer(method, path, body, signal, limit);
   if (response.status === 204) return null;
   try {
     return await response.json();
@@ -33,6 +34,11 @@ export async function request(method, path, body = undefined, { signal = null } 
     // A cut connection leaves half an answer: whether the server has written is then unknown.
     throw new ApiError(0, AWAY);
   }
+}
+
+/** Return the bytes of an answer. */
+export async function getBuffer(path) {
+  return (await answer('GET', path, undefined, null, 60000)).arrayBuffer();
 }
 
 /** Download a file of the server to the user's folder; return its name. */
@@ -57,6 +63,7 @@ export const get = (path, options) => request('GET', path, undefined, options);
 export const post = (path, body) => request('POST', path, body ?? {});
 export const put = (path, body) => request('PUT', path, body);
 export const patch = (path, body) => request('PATCH', path, body);
+export const upload = (path, file) => request('POST', path, file, { limit: UPLOAD_LIMIT });
 export const remove = (path) => request('DELETE', path);
 
 /** Return the path of a survey's resource. */
@@ -72,14 +79,15 @@ export function findingPath(id, rest = '') {
 async function answer(method, path, body, signal, limit = LIMIT) {
   const headers = { Accept: 'application/json' };
   if (method !== 'GET') headers['X-CSRF-Token'] = csrf;
-  if (body !== undefined) headers['Content-Type'] = 'application/json';
+  const file = body instanceof Blob;
+  if (body !== undefined) headers['Content-Type'] = file ? body.type || 'application/octet-stream' : 'application/json';
   const own = new AbortController();
   const timer = setTimeout(() => own.abort(), limit);
   signal?.addEventListener('abort', () => own.abort());
   let response;
   try {
     response = await fetch(path, {
-      method, headers, signal: own.signal, credentials: 'same-origin', body: body === undefined ? undefined : JSON.stringify(body),
+      method, headers, signal: own.signal, credentials: 'same-origin', body: file || body === undefined ? body : JSON.stringify(body),
     });
   } catch (error) {
     if (signal?.aborted) throw error;

@@ -1,4 +1,4 @@
-/** What is known of a finding: values, evidence, history, photos. */
+/** What is known of a finding: values, evidence, history. */
 
 import { button, el } from './dom.js';
 import { arc, clock, number, percent, station, time } from './format.js';
@@ -14,10 +14,10 @@ export function headOf(finding) {
     STATES[finding.state] ? el('p', { class: 'warn-text', text: `Not included in the totals: ${STATES[finding.state]}.` }) : null);
 }
 
-/** Return the values, evidence, history and photos of a finding. */
-export function factsOf(finding, survey, severities, say) {
+/** Return the photos, values, evidence and history of a finding. */
+export function factsOf(finding, survey, severities, photos, say) {
   return el('div', { class: 'finding-facts' },
-    valuesOf(finding, severities), evidenceOf(finding), photosOf(finding), historyOf(finding), linkOf(finding, survey, say));
+    photos, valuesOf(finding, severities), evidenceOf(finding), historyOf(finding), linkOf(finding, survey, say));
 }
 
 function valuesOf(finding, severities) {
@@ -53,13 +53,6 @@ function evidenceOf(finding) {
     el('h3', { text: 'Evidence' }),
     el('ul', { class: 'evidence' }, ...rows),
     el('p', { class: 'muted small', text: 'Log odds: right and + for a leak, left and − against.' }));
-}
-
-function photosOf(finding) {
-  const photos = finding.photos ?? [];
-  if (!photos.length) return null;
-  return el('section', {}, el('h3', { text: `Photos (${photos.length})` }),
-    el('ul', { class: 'plain' }, ...photos.map(({ path, caption }) => el('li', {}, el('code', { text: path }), caption ? ` ${caption}` : ''))));
 }
 
 function historyOf(finding) {

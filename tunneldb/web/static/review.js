@@ -5,6 +5,7 @@ import { Cutouts } from './cutouts.js';
 import { button, check, choice, el, field, takesKeys } from './dom.js';
 import { Filter } from './filter.js';
 import { factsOf, headOf } from './finding.js';
+import { Photos } from './photos.js';
 import { DiscardedError } from './saver.js';
 import { ConflictError, LIST_LIMIT } from './session.js';
 import { kindKeys, OPEN, progressText } from './worklist.js';
@@ -27,6 +28,7 @@ export class Review {
     this.typed = false;
     this.keys = new Map();
     this.cutouts = new Cutouts();
+    this.photos = new Photos({ canWrite: app.canWrite, say: app.say, changed: (finding) => this.takePhotos(finding) });
     this.filter = new Filter((value) => this.load(value));
     this.build();
     document.addEventListener('keydown', (event) => this.key(event));
@@ -241,9 +243,18 @@ export class Review {
     if (this.drawn !== facts) {
       this.drawn = facts;
       this.cutouts.show(facts);
-      this.facts.replaceChildren(factsOf(facts, survey, survey.severities, this.app.say));
+      this.photos.show(facts);
+      this.facts.replaceChildren(factsOf(facts, survey, survey.severities, this.photos.root, this.app.say));
       this.app.marked(facts);
     }
+  }
+
+  /** Show the photos of a finding as they are now; the review that is in progress stays as it is. */
+  takePhotos({ id, photos }) {
+    const { facts } = this.session;
+    if (facts?.id !== id) return;
+    facts.photos = photos;
+    this.photos.show(facts);
   }
 
   get draftKey() {
