@@ -44,7 +44,7 @@ from tunneldb.raster import rasterize as gather
 from tunneldb.raster.accumulator import Accumulator
 from tunneldb.raster.geotiff import STEP
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 Replacement = tuple[Any, str, Any]
 

@@ -28,7 +28,7 @@ from benchmarks.synthetic import CORNER, Size, make
 from tunneldb.database import connect
 from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.report.pdf import find_browser
 
 SURVEY = "demo-2024"

@@ -33,7 +33,7 @@ from tunneldb.anomalies.records import Anomaly
 from tunneldb.database import connect
 from tunneldb.pipeline import detect as stage
 from tunneldb.raster.geotiff import NODATA, STEP
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.stages.parameters import settings
 from tunneldb.store.survey import get_survey
 

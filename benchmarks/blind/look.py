@@ -24,7 +24,7 @@ from benchmarks.evidence.pictures import names, pictures
 from tunneldb.evaluate.measure import MIN_OVERLAP
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.segmentation.network import standard_network
 
 GREEN, RED, BLUE = "#00a050", "#e02020", "#2060ff"

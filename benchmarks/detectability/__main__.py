@@ -37,8 +37,8 @@ from tunneldb.arrays import Bool
 from tunneldb.database import connect
 from tunneldb.pipeline import detect as stage
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import mask_of_polygons
+from tunneldb.raster.state import PixelState
 from tunneldb.segmentation.network import standard_network
 from tunneldb.stages.parameters import settings
 from tunneldb.store.survey import get_survey

@@ -22,7 +22,7 @@ from tunneldb.anomalies.detect import find_dark, find_dark_regions, is_large_eno
 from tunneldb.anomalies.features import measure_regions
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import FaceGrid
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 PIXEL, TILE = 0.02, 25
 LONG, HALF = 15.0, 4.5

@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from benchmarks.network.sample import NONE, OTHER, WET, Sample
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 GIRTH = np.pi * 5.5
 """Circumference, m: all rows of the image."""

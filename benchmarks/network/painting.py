@@ -20,7 +20,7 @@ from benchmarks.network.sample import DRY as CLEAN
 from benchmarks.network.sample import LIMIT, NONE, OTHER, WET, Sample
 from benchmarks.network.shapes import DRY, WATER, Joints
 from tunneldb.raster.pixel_size import FACTORS, MIN_POINTS
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 DARK = 0.4
 """Painted darkening from which dry lining counts as dark, dB."""

@@ -22,7 +22,7 @@ class Sample:
     Attributes
     ----------
     state : uint8 array
-        Values of :class:`tunneldb.raster.pixel_state.PixelState`.
+        Values of :class:`tunneldb.raster.state.PixelState`.
     level : int16 array
         Corrected intensity, 0.01 dB.
     label : uint8 array

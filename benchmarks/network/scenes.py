@@ -21,7 +21,7 @@ from benchmarks.common import progress
 from benchmarks.evidence.pictures import names, pictures
 from benchmarks.network.sample import DRY, LIMIT, OTHER, WET, Sample
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 
 def main() -> None:

@@ -17,7 +17,7 @@ from shapely.geometry import box
 
 from benchmarks.evidence import painted
 from benchmarks.evidence.painted import HALF, LONG, PIXEL, Painting, blob, uneven
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 Array = NDArray[np.float64]
 STEP = 0.03

@@ -11,7 +11,7 @@ from benchmarks.common import progress
 from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import BLOCK, BLOCKS, Grid
 from tunneldb.raster.overview import Overview
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.store.images import insert_image, save_overview
 from tunneldb.store.survey import get_survey
 

@@ -166,7 +166,7 @@ SELECT c.id, c.survey_id, s.name AS survey, c.km, c.segment, c.half, c.chainage,
            )::public.geometry(LineString, 0) AS geom
   FROM tunnel.section c
   JOIN tunnel.survey s ON s.id = c.survey_id
- CROSS JOIN LATERAL (SELECT min(a) AS arc_from, max(a) AS arc_to FROM unnest(c.arc) a) e;
+ CROSS JOIN LATERAL (SELECT c.arc[1] AS arc_from, c.arc[cardinality(c.arc)] AS arc_to) e;
 COMMENT ON VIEW tunnel_api.section_unrolled IS 'Cross-sections in the unrolled plane (chainage, arc), SRID 0';
 COMMENT ON COLUMN tunnel_api.section_unrolled.arc_from IS 'Arc at the left end, straight below the axis, m';
 COMMENT ON COLUMN tunnel_api.section_unrolled.arc_to IS 'Arc at the right end, straight below the axis, m';

@@ -11,7 +11,7 @@ from tunneldb.anomalies.threshold import dark_pixels
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 pytestmark = pytest.mark.slow
 

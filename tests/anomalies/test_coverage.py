@@ -6,7 +6,7 @@ from scipy import ndimage
 
 from tunneldb.anomalies.coverage import measure_coverage
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 
 def picture(rng, grid):

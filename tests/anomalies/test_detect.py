@@ -16,8 +16,8 @@ from tunneldb.raster.accumulator import LEVEL, OFFSET, Accumulator
 from tunneldb.raster.appendages import distance_from_plane, off_plane, reach, recessed
 from tunneldb.raster.geotiff import NODATA, Raster, decode, encode
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.projection import WEIGHT, Pixels
+from tunneldb.raster.state import PixelState
 
 PIXEL = 0.02
 

@@ -20,7 +20,7 @@ from tunneldb.anomalies.detectability.trials import Trials
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 GRID = Grid(12, 0.1, -100, 200, 5, (2, 5))  # 150 m by 20 m
 BARE = slice(0, 40)  # rows without points, of arc 6 to 10 m

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tunneldb.anomalies.hidden import MAX_STRIP_WIDTH, behind_strips
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 PIXEL = 0.02
 MOST = round(MAX_STRIP_WIDTH / PIXEL)

@@ -6,7 +6,7 @@ import pytest
 from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.levels import weaker_parts
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 ROW, COLUMN = np.mgrid[:200, :300]
 

@@ -10,7 +10,7 @@ from tunneldb.anomalies.threshold import MEDIAN_PIXELS
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import MAX_MEDIAN, LiningImage
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 PIXEL = 0.02
 GRID = Grid(0, PIXEL, -250, 500)

@@ -9,7 +9,7 @@ from tunneldb.anomalies.background.texture import TYPICAL_DARKENING, measure_tex
 from tunneldb.anomalies.detect import find_dark
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 PIXEL, TILE, NOISE = 0.02, 25, 0.3
 

@@ -9,7 +9,7 @@ from tunneldb.anomalies.threshold import dark_pixels, filter_size
 from tunneldb.radiometry.robust_statistics import plain_statistics, robust_statistics
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 TILE = 25
 

@@ -15,7 +15,7 @@ from tunneldb.anomalies.regions import Region, RegionProperties
 from tunneldb.anomalies.verdict import classify
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 pytestmark = pytest.mark.slow
 

@@ -8,7 +8,7 @@ from tunneldb.anomalies.background.level_map import map_background
 from tunneldb.anomalies.detect import find_dark, find_dark_regions
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 DRY, DARKER = -20.0, 4.0
 

@@ -17,7 +17,7 @@ from support.straight_survey import FIRST, LAST, RADIUS, Scene, Wet, make_survey
 from tunneldb.cli.main import main
 from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 PIXEL, NOISE = 0.025, 0.002
 PATCH = (1009.5, 1012.5, -1.0, 1.0)

@@ -20,7 +20,7 @@ from tunneldb.cli.main import main
 from tunneldb.measures.deviation.compute import Design
 from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.shape.profile import Profile, stretches
 
 PIXEL = 0.05

@@ -15,7 +15,7 @@ from support.straight_survey import FIRST, LAST, RADIUS, Scene, make_survey
 from tunneldb.cli.main import main
 from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 PIXEL = 0.025
 DESIGN = 4.05

@@ -19,7 +19,7 @@ from support.straight_survey import FIRST, LAST, RADIUS, Scene, make_survey
 from tunneldb.cli.main import main
 from tunneldb.raster.geotiff import Raster, encode
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 PIXEL, HIDDEN = 0.05, 9.0
 JOINT, STEP = 1000.7, 0.012

@@ -14,9 +14,10 @@ from tunneldb.raster.accumulator import Accumulator, Window
 from tunneldb.raster.floor import Floor
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.observation import Observer, Radiometer
-from tunneldb.raster.pixel_state import PixelState, pixel_states, reach
+from tunneldb.raster.pixel_state import pixel_states, reach
 from tunneldb.raster.projection import WEIGHT, pixel_weight
 from tunneldb.raster.rasterize import Projector
+from tunneldb.raster.state import PixelState
 
 PIXEL, RADIUS, ROUGHNESS = 0.05, 4.0, 12.0
 ROUND = straight(np.full(361, RADIUS))

@@ -8,7 +8,7 @@ from affine import Affine
 
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.overview import Overview, overview_factor
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.raster.tiles import FILL_DISTANCE, Tile, display, reduce, sample
 
 

@@ -19,8 +19,9 @@ from tunneldb.raster import ring_steps as step
 from tunneldb.raster.accumulator import Accumulator
 from tunneldb.raster.floor import FLOOR_EDGE, Floor
 from tunneldb.raster.grid import Grid
-from tunneldb.raster.pixel_state import PixelState, pixel_states, reach
+from tunneldb.raster.pixel_state import pixel_states, reach
 from tunneldb.raster.projection import Pixels
+from tunneldb.raster.state import PixelState
 
 
 def box(half_width: float, up: float, down: float) -> np.ndarray:

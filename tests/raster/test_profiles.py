@@ -17,8 +17,8 @@ from tunneldb.raster.appendages import distance_from_plane, off_plane, recessed
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.profiles import ProfileGaps, profile_spacing
+from tunneldb.raster.state import PixelState
 
 PIXEL = 0.02
 

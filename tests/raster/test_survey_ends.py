@@ -11,8 +11,8 @@ from tunneldb.raster.accumulator import Accumulator
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import lining_image
 from tunneldb.raster.observation import Observer
-from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.rasterize import Projector
+from tunneldb.raster.state import PixelState
 
 PIXEL, ENDS = 0.1, (12.34, 40.0)
 FIRST, STOP = 124, 400

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tunneldb.raster.geotiff import NODATA
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.segmentation.channels import CONTRAST, NAMES, REACH, channels
 
 

@@ -8,7 +8,7 @@ from tunneldb.errors import UserError
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import FaceGrid
 from tunneldb.raster.image import CONTEXT, LiningImage
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.segmentation.channels import PIXEL, REACH
 from tunneldb.segmentation.network import BEYOND, CERTAIN, FIELD, HALF, Network
 

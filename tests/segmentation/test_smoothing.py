@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 from tunneldb.raster.geotiff import NODATA
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.segmentation.smoothing import MIN_WEIGHT, count_states, enlarged, mean_about
 
 

@@ -24,7 +24,7 @@ from tunneldb.geometry.surface import Surface
 from tunneldb.raster.geotiff import KINDS, Raster, decode, encode
 from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.overview import Overview
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.store.images import save_overview
 from tunneldb.store.survey import get_survey
 

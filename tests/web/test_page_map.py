@@ -198,9 +198,9 @@ def altered(page: Page, **values: Any) -> Iterator[None]:
         response = route.fetch()
         route.fulfill(response=response, json={**response.json(), **values})
 
-    page.route(f"**/api/surveys/{NAME}", answer)
+    page.route(f"**/api/surveys/{NAME}/summary", answer)
     yield
-    page.unroute(f"**/api/surveys/{NAME}")
+    page.unroute(f"**/api/surveys/{NAME}/summary")
 
 
 def test_what_was_not_inspected_is_stated_above_the_map(page: Page, database: psycopg.Connection) -> None:

@@ -8,6 +8,7 @@ import psycopg
 import pytest
 from web.conftest import SignIn
 
+from tunneldb.web.pages import STATIC
 from tunneldb.web.security import HEADERS, MAX_BODY
 
 SEEN = {"review": "open", "remark": None, "kind": "leak"}
@@ -49,7 +50,8 @@ PATHS = [
     "/api/surveys/demo-2024/worklist?order=id;DROP", "/api/surveys/demo-2024/worklist?from=x",
     "/tiles/demo-2024/corrected/99/0/0.png", "/tiles/demo-2024/corrected/-1/0/0.png", "/tiles/demo-2024/secret/15/0/0.png",
     "/tiles/demo-2024/corrected/15/999999999999/0.png", "/tiles/demo-2024/findings/15/x/0.mvt", "/tiles/nothing/raw/15/1/1.png",
-    "/static/../app.py", "/static/%2e%2e/app.py", "/static/..%2fconfig.py", "/collections/pg_authid/items",
+    f"{STATIC}/../app.py", f"{STATIC}/%2e%2e/app.py", f"{STATIC}/..%2fconfig.py", "/static/main.js",
+    "/collections/pg_authid/items",
     "/collections/finding_map/items?pg_sleep(9)=1", "/collections/finding_map/items?bbox=1,2",
     "/collections/finding_map/items?limit=-1",
     "/api/findings/" + "9" * 4400, "/api/surveys?" + "&".join(f"a{n}=1" for n in range(4000)),
@@ -103,7 +105,7 @@ def test_long_requests_are_refused(signed_in: SignIn) -> None:
 
 def test_every_answer_has_the_headers(signed_in: SignIn) -> None:
     browser = signed_in("viola_web")
-    for path in ("/", "/healthz", "/api/surveys", "/api/nothing", "/static/main.js", "/tiles/demo-2024/corrected/15/1/1.png"):
+    for path in ("/", "/healthz", "/api/surveys", "/api/nothing", f"{STATIC}/main.js", "/tiles/demo-2024/corrected/15/1/1.png"):
         answer = browser.get(path)
         for name, value in HEADERS.items():
             assert answer.headers[name] == value, path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -48,6 +49,21 @@ def test_it_prints_its_address_and_ends_on_sigterm(served: subprocess.Popen[str]
     served.send_signal(signal.SIGTERM)
     out, err = served.communicate(timeout=30)
     assert (served.returncode, out, err) == (0, "", "")
+
+
+def test_files_of_the_page_are_kept_by_browsers_and_nothing_else_is(served: subprocess.Popen[str]) -> None:
+    """Each has the version in its path, so a browser need not ask again; the page itself names the present version."""
+    assert served.stdout is not None
+    address = served.stdout.readline().strip()
+    with urllib.request.urlopen(address + "login", timeout=20) as answer:
+        page = answer.read().decode()
+        assert answer.headers["Cache-Control"] == "no-store"
+    (script,) = re.findall(r'<script type="module" src="/([^"]+)"', page)
+    with urllib.request.urlopen(address + script, timeout=20) as answer:
+        assert "immutable" in answer.headers["Cache-Control"]
+    with pytest.raises(urllib.error.HTTPError, match="404") as missing:
+        urllib.request.urlopen(address + script.replace("login.js", "nothing.js"), timeout=20)
+    assert missing.value.headers["Cache-Control"] == "no-store"
 
 
 def test_the_role_of_the_desk_may_be_a_viewer(logins: None, dsn: str, example: str) -> None:

@@ -22,18 +22,34 @@ def test_ribbon_sums_are_those_of_the_statistics(signed_in: SignIn, conn: psycop
 
 
 def test_survey_states_what_could_be_missed(signed_in: SignIn, conn: psycopg.Connection) -> None:
-    one = signed_in("viola_web").get("/api/surveys/demo-2024").json()
+    browser = signed_in("viola_web")
+    one = browser.get("/api/surveys/demo-2024/summary").json()
     assert one["statement"] == conn.execute("SELECT tunnel_api.coverage_statement('demo-2024')").fetchone()[0]  # type: ignore[index]
     assert one["remarks"] == [row[0] for row in conn.execute("SELECT said FROM tunnel_api.remarks('demo-2024')")]
-    assert {kind["kind"] for kind in one["kinds"]} >= {"corrected", "raw", "offset", "state"}
+    kinds = browser.get("/api/surveys/demo-2024").json()["kinds"]
+    assert {kind["kind"] for kind in kinds} >= {"corrected", "raw", "offset", "state"}
 
 
-def test_list_has_the_class_of_the_database(signed_in: SignIn, conn: psycopg.Connection) -> None:
-    (one,) = [s for s in signed_in("viola_web").get("/api/surveys").json() if s["name"] == "demo-2024"]
+def test_summary_has_the_class_of_the_database(signed_in: SignIn, conn: psycopg.Connection) -> None:
+    one = signed_in("viola_web").get("/api/surveys/demo-2024/summary").json()
     row = conn.execute(
-        "SELECT class, wet_area, seen_share FROM tunnel_api.leak_statistics('demo-2024', '-infinity', 'infinity')"
+        "SELECT class, wet_area, seen_share, patches FROM tunnel_api.leak_statistics('demo-2024', '-infinity', 'infinity')"
     )
-    assert (one["class"], one["wet_area"], one["inspected_share"]) == row.fetchone()
+    assert (one["class"], one["wet_area"], one["inspected_share"], one["leaks"]) == row.fetchone()
+
+
+def test_map_has_the_given_axes_of_all_tunnels(signed_in: SignIn, conn: psycopg.Connection) -> None:
+    """In degrees, at the place of the survey's axis; tunnels in local coordinates have none, sites are left out."""
+    conn.execute(
+        "INSERT INTO tunnel.tunnel (name, srid, start_chainage, spacing, alignment) SELECT 'local', 0, start_chainage, spacing,"
+        " public.ST_SetSRID(alignment, 0) FROM tunnel.tunnel WHERE name = 'demo'"
+    )
+    conn.commit()
+    browser = signed_in("viola_web")
+    found = {one["name"]: one["axis"] for one in browser.get("/api/tunnels").json()}
+    assert found["local"] is None
+    axis = browser.get("/collections/axis/items").json()["features"][0]["geometry"]["coordinates"]
+    assert np.mean(found["demo"]["coordinates"], axis=0) == pytest.approx(np.mean(axis, axis=0), abs=1e-3)
 
 
 def test_features_lie_where_the_tunnel_is(signed_in: SignIn, conn: psycopg.Connection) -> None:

@@ -42,7 +42,7 @@ def test_pixels_are_those_of_the_stored_image(signed_in: SignIn, conn: psycopg.C
         pytest.skip("no postgis_raster")
     conn.execute("CREATE EXTENSION postgis_raster SCHEMA public")
     browser = signed_in("viola_web")
-    (survey,) = [one for one in browser.get("/api/surveys/demo-2024").json()["kinds"] if one["kind"] == "corrected"]
+    ends = browser.get("/api/surveys/demo-2024/colours/corrected").json()
     tile = tile_at(23, 12350.0, -1.0)
     image = picture(browser, "corrected", tile)
     rng = np.random.default_rng(1)
@@ -55,7 +55,7 @@ def test_pixels_are_those_of_the_stored_image(signed_in: SignIn, conn: psycopg.C
     ).fetchall()
     value = np.array([row[0] for row in found], dtype=np.float64)
     assert np.isfinite(value).sum() > 100
-    grey = np.clip(255 * (value - survey["low"]) / (survey["high"] - survey["low"]), 0, 255)
+    grey = np.clip(255 * (value - ends["low"]) / (ends["high"] - ends["low"]), 0, 255)
     shown = image[rows, columns]
     assert (shown[:, 3] == np.where(np.isfinite(value), 255, 0)).all()
     assert np.abs(shown[:, 0] - grey)[np.isfinite(value)].max() <= 1.0

@@ -9,8 +9,8 @@ from tunneldb.anomalies.windows import row_blocks
 from tunneldb.arrays import Bool, Int16, Int64, Single, UInt8
 from tunneldb.compiled import kernel
 from tunneldb.raster.geotiff import NODATA, STEP
-from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import mask_of_polygons
+from tunneldb.raster.state import PixelState
 
 BAND_PIXELS = 2
 """Width of the zone on both sides of the boundary in which pixels may change sides, pixels, per iteration."""

@@ -10,7 +10,7 @@ from tunneldb.anomalies.threshold import seen_lining
 from tunneldb.anomalies.windows import count_in_columns
 from tunneldb.arrays import Bool, Single, UInt8
 from tunneldb.raster.grid import BLOCKS, Grid
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 STEP = 0.1
 """Minimum length of a step along the tunnel, m."""
@@ -43,7 +43,7 @@ def measure_coverage(state: UInt8, dark: Bool, grid: Grid, size: int) -> Coverag
     Parameters
     ----------
     state : (rows, columns) uint8 array
-        Values of :class:`tunneldb.raster.pixel_state.PixelState`.
+        Values of :class:`tunneldb.raster.state.PixelState`.
     dark : (rows, columns) bool array
         Wet pixels after the median filter.
     grid : Grid

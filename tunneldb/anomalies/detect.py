@@ -25,7 +25,7 @@ from tunneldb.arrays import Bool, Float, Int64, UInt8
 from tunneldb.finding_kind import FindingKind
 from tunneldb.raster.grid import PixelGrid
 from tunneldb.raster.image import WET_EDGE
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 MIN_UNSCANNED_LENGTH = 5.0
 """Length of the tunnel without any seen lining from which it was not scanned, m; profiles are closer."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from tunneldb.arrays import Bool, UInt8
 from tunneldb.compiled import kernel
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 MAX_STRIP_WIDTH = 0.25
 """Maximum width of strips, m: a pipe of 0.15 m, and on either side the pixels at its edges that are no lining."""
@@ -23,7 +23,7 @@ def behind_strips(dark: Bool, state: UInt8, first: int, stop: int, pixel: float)
     dark : (rows, columns) bool array
         Dark pixels, none of them hidden.
     state : (rows, columns) uint8 array
-        Values of :class:`tunneldb.raster.pixel_state.PixelState`.
+        Values of :class:`tunneldb.raster.state.PixelState`.
     first, stop : int
         Range of columns to process.
     pixel : float

@@ -9,7 +9,7 @@ import numpy as np
 from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.arrays import Bool, Float, Int64, Intp
 from tunneldb.raster.geotiff import NODATA, STEP
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 STEP_DISTANCE = 0.06
 """Distance inside and outside of a side at which the step is measured, m: a wet patch ends within it, soot does not."""

@@ -15,8 +15,8 @@ from tunneldb.anomalies.region_edges import Edges, Sides
 from tunneldb.anomalies.runs import Components, connected, pixels_of, row_runs
 from tunneldb.arrays import Bool, Float, Int64, Intp
 from tunneldb.raster.geotiff import NODATA, STEP
-from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import outline
+from tunneldb.raster.state import PixelState
 from tunneldb.segmentation.network import CERTAIN
 
 MIN_JOINT_LENGTH = 0.5

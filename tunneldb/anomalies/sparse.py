@@ -12,7 +12,7 @@ from tunneldb.anomalies.windows import count_in_columns, on_lining
 from tunneldb.arrays import Int64
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.image import MAX_MEDIAN, LiningImage
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 TILE = MAX_MEDIAN // 3
 """Side of the tiles, pixels: three by three are as large as the widest median filter."""

@@ -12,8 +12,8 @@ from tunneldb.anomalies.windows import count_about, on_lining, row_blocks
 from tunneldb.arrays import Bool, Int16, UInt8
 from tunneldb.raster.geotiff import STEP
 from tunneldb.raster.image import MAX_MEDIAN
-from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import mask_of_polygons
+from tunneldb.raster.state import PixelState
 
 MEDIAN = 5
 """Side of the median filter if every pixel has points, pixels."""
@@ -83,7 +83,7 @@ def seen_lining(state: UInt8, size: int) -> Iterator[tuple[slice, Bool]]:
     Parameters
     ----------
     state : (rows, columns) uint8 array
-        Values of :class:`tunneldb.raster.pixel_state.PixelState`.
+        Values of :class:`tunneldb.raster.state.PixelState`.
     size : int
         Side of the median filter, pixels.
 

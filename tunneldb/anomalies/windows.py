@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from tunneldb.arrays import Bool, Int64, UInt8, UInt16
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 Counts = TypeVar("Counts", UInt8, UInt16)
 

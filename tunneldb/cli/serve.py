@@ -65,6 +65,7 @@ def serve(
 
     from tunneldb.web.app import create_app
     from tunneldb.web.config import Desk
+    from tunneldb.web.memory import return_freed_memory
     from tunneldb.web.protocol import PunctualProtocol, raise_file_limit
 
     given = settings.dsn if own_dsn is None else own_dsn
@@ -115,6 +116,7 @@ def serve(
     click.echo(address, err=bool(click.get_current_context().meta.get(AS_JSON)))
     add_to_json(address=address.partition("enter")[0])
     raise_file_limit()
+    return_freed_memory()
     with listener, _opened(None if no_open or not loopback else address):
         server.run(sockets=[listener])
 

@@ -9,4 +9,4 @@ from .image import lining_image as lining_image
 from .observation import ObservedPoints as ObservedPoints
 from .observation import Observer as Observer
 from .observation import Radiometer as Radiometer
-from .pixel_state import PixelState as PixelState
+from .state import PixelState as PixelState

@@ -116,7 +116,9 @@ def decode(tiff: bytes) -> Raster:
         warnings.simplefilter("ignore", NotGeoreferencedWarning)
         with MemoryFile(tiff) as memory, memory.open(driver="GTiff") as image:
             steps = image.read(1)
-            values = np.where(steps == image.nodata, np.nan, steps * image.scales[0]).astype(np.float32)
+            values = np.empty(steps.shape, np.float32)
+            np.multiply(steps, image.scales[0], out=values, casting="same_kind")  # no array of doubles
+            values[steps == image.nodata] = np.nan
             return Raster(values, image.transform)
 
 

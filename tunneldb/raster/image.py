@@ -15,8 +15,9 @@ from tunneldb.raster.accumulator import Accumulator, Window
 from tunneldb.raster.geotiff import NODATA, whole
 from tunneldb.raster.grid import BLOCK, Grid
 from tunneldb.raster.observation import Observer
-from tunneldb.raster.pixel_state import PixelState, pixel_states, reach
+from tunneldb.raster.pixel_state import pixel_states, reach
 from tunneldb.raster.profiles import ProfileGaps, farthest
+from tunneldb.raster.state import PixelState
 
 CONTEXT = 17.0
 """Length beyond the ends of a kilometre whose lining is seen, m: what the segmentation network sees from 1.28 m beyond."""
@@ -34,7 +35,7 @@ class LiningImage:
     grid : Grid
         The pixels.
     state : (rows, columns) uint8 array
-        Values of :class:`tunneldb.raster.pixel_state.PixelState`.
+        Values of :class:`tunneldb.raster.state.PixelState`.
     level : (rows, columns) int16 array
         Corrected intensity in steps of the stored image, NODATA without a point.
     gaps : ProfileGaps or None

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
-
 import numpy as np
 
-from tunneldb.arrays import Bool, Single, UInt8
+from tunneldb.arrays import UInt8
 from tunneldb.geometry.section_outliers import SectionOutliers
 from tunneldb.raster import appendages as appendage
 from tunneldb.raster import relief
@@ -14,23 +12,7 @@ from tunneldb.raster import ring_steps as step
 from tunneldb.raster.accumulator import Window
 from tunneldb.raster.floor import Floor
 from tunneldb.raster.grid import Grid
-
-
-class PixelState(IntEnum):
-    """State of a pixel."""
-
-    EMPTY = 0
-    LINING = 1
-    RECESS = 2  # lining set back behind the wall: the back of a niche, a bolt pocket
-    OFF = 3  # a fixture, or the mixed pixels of an edge
-    FLOOR = 4
-    DARK = 5  # only in the stored image of states: lining that is dark
-    SUBMERGED = 6  # below the water
-
-
-def shows_lining(state: Single) -> Bool:
-    """Return True for pixels of a stored image of states that show lining, dark or not."""
-    return np.asarray((state == PixelState.LINING) | (state == PixelState.DARK))
+from tunneldb.raster.state import PixelState
 
 
 def reach(pixel: float) -> int:

@@ -20,7 +20,7 @@ from tunneldb.raster.gap_fill import MAX_FILL_DISTANCE, fill_gaps
 from tunneldb.raster.geotiff import Raster, decode
 from tunneldb.raster.grey import grey_range
 from tunneldb.raster.grid import BLOCK
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.store.survey import Survey
 
 Form = Literal["WEBP", "JPEG"]

@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from tunneldb.arrays import Bool, Float, Int16, Single, UInt8
 from tunneldb.raster.geotiff import NODATA, STEP
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.segmentation.smoothing import count_states, enlarged, mean_about
 
 PIXEL = 0.04
@@ -119,7 +119,7 @@ def channels(state: UInt8, level: Int16, pixel: float, bottom: int, first_column
     Parameters
     ----------
     state : (rows, columns) uint8 array
-        Values of :class:`tunneldb.raster.pixel_state.PixelState`, the first row at the greatest arc.
+        Values of :class:`tunneldb.raster.state.PixelState`, the first row at the greatest arc.
     level : (rows, columns) int16 array
         Corrected intensity in steps of the stored image, NODATA without a point.
     pixel : float

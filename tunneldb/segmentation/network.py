@@ -13,7 +13,7 @@ from tunneldb.arrays import Int16, Single, UInt8
 from tunneldb.errors import UserError
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.segmentation.channels import NAMES, REACH, STRIDE, Scale, channels
 from tunneldb.segmentation.smoothing import enlarged
 from tunneldb.threads import in_blocks

@@ -7,7 +7,7 @@ import numpy as np
 from tunneldb.arrays import Int16, Single, UInt8
 from tunneldb.compiled import inner, kernel
 from tunneldb.raster.geotiff import NODATA
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 LINING, RECESS, FLOOR, SUBMERGED, OFF = (
     int(one) for one in (PixelState.LINING, PixelState.RECESS, PixelState.FLOOR, PixelState.SUBMERGED, PixelState.OFF)

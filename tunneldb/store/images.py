@@ -24,7 +24,7 @@ from tunneldb.raster.accumulator import Window
 from tunneldb.raster.geotiff import Raster, decode, encode
 from tunneldb.raster.grid import BLOCKS, Grid
 from tunneldb.raster.overview import PREFIX, Overview
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.store.survey import Survey
 
 

@@ -13,7 +13,7 @@ from tunneldb.radiometry.reference_curve import ReferenceCurve
 from tunneldb.radiometry.robust_statistics import robust_statistics
 from tunneldb.raster.geotiff import NODATA
 from tunneldb.raster.grid import FaceGrid
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.structures.face_raster import BEAM, DIVERGENCE, STEP, TOLERANCE, Layout, Sums
 from tunneldb.structures.level import MAX_PAIRS, MIN_LEVEL_POINTS, OWN, SHORTH, LevelCurve, level_curve
 from tunneldb.structures.models import RADIUS, normals_at, to_space

@@ -16,7 +16,7 @@ from tunneldb.anomalies.regions import Region, find_regions
 from tunneldb.anomalies.threshold import filter_size, seen_lining
 from tunneldb.arrays import Bool, Int32, Single
 from tunneldb.raster.geotiff import NODATA
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.structures.contrast import FaceContrast
 from tunneldb.structures.face_raster import STEP
 from tunneldb.structures.significance import Scatter, significance

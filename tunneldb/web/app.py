@@ -23,7 +23,7 @@ from starlette.staticfiles import StaticFiles
 from tunneldb.errors import UserError
 from tunneldb.web import exports, findings, ogc, photos, pictures, points, sections, sign_in, surveys, tiles
 from tunneldb.web.config import Desk
-from tunneldb.web.pages import FOLDER
+from tunneldb.web.pages import FOLDER, STATIC
 from tunneldb.web.route import route
 from tunneldb.web.security import guard
 from tunneldb.web.sessions import open_own
@@ -116,8 +116,11 @@ def create_app(desk: Desk) -> Starlette:
             Route("/login", sign_in.form),
             Route("/login", sign_in.sign_in, methods=["POST"]),
             Route("/logout", route(sign_in.sign_out), methods=["POST"]),
+            Route("/api/tunnels", route(surveys.tunnels)),
             Route("/api/surveys", route(surveys.list_all)),
             Route(survey, route(surveys.one)),
+            Route(f"{survey}/summary", route(surveys.summary)),
+            Route(f"{survey}/colours/{{kind}}", route(surveys.colours)),
             Route(f"{survey}/ribbon", route(surveys.ribbon)),
             Route(f"{survey}/section", route(sections.section)),
             Route(f"{survey}/section.dxf", route(sections.drawing)),
@@ -147,7 +150,7 @@ def create_app(desk: Desk) -> Starlette:
             Route("/collections", route(ogc.collections)),
             Route("/collections/{layer}", route(ogc.collection)),
             Route("/collections/{layer}/items", route(ogc.items)),
-            Mount("/static", StaticFiles(directory=FOLDER / "static")),
+            Mount(STATIC, StaticFiles(directory=FOLDER / "static")),
         ],
         middleware=[
             Middleware(BaseHTTPMiddleware, dispatch=guard(desk.loopback, desk.secure)),

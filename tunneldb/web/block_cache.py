@@ -13,6 +13,10 @@ MAX_BYTES = 64 * 2**20
 """Maximum size of the kept images, bytes."""
 
 
+LOADERS = 2
+"""Number of requests that decode images at once."""
+
+
 class BlockCache:
     """Images by key; those not used longest are dropped first.
 
@@ -27,6 +31,8 @@ class BlockCache:
         self._lock = threading.Lock()
         self._images: OrderedDict[Hashable, Raster] = OrderedDict()
         self._bytes = 0
+        self.loading = threading.Semaphore(LOADERS)
+        """Bounds the images that are decoded at once, and so the memory for it."""
         self.stretches: dict[str, Stretch] = {}
         """Colours of the images of surveys, by the tag of these."""
 

@@ -1,4 +1,7 @@
-"""Downloads of a stretch: report, workbook and GeoPackage, as the commands write them."""
+"""Downloads of a stretch: report, workbook and GeoPackage, as the commands write them.
+
+The writers are imported when they are first used: they need as much memory as the rest of the desk.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +16,6 @@ from starlette.responses import FileResponse, Response
 from starlette.types import Receive, Scope, Send
 
 from tunneldb.errors import UserError
-from tunneldb.export.exchange import write_survey
-from tunneldb.export.tables.stretch_workbook import write_stretch_workbook
-from tunneldb.report.page import write_html
-from tunneldb.report.pictures.load import Source
 from tunneldb.store.survey import Survey, get_survey
 from tunneldb.web.route import Call, NotFoundError
 from tunneldb.web.sessions import Connection, RefusedError
@@ -26,15 +25,22 @@ Writer = Callable[[Connection, Survey, float, float, Path, Path | None], None]
 
 
 def _report(conn: Connection, survey: Survey, low: float, high: float, path: Path, photos: Path | None) -> None:
+    from tunneldb.report.page import write_html
+    from tunneldb.report.pictures.load import Source
+
     # No other file of the server may get into a report.
     write_html(conn, survey, path, low, high, photos=Source(path.parent / "photos" if photos is None else photos))
 
 
 def _geopackage(conn: Connection, survey: Survey, low: float, high: float, path: Path, photos: Path | None) -> None:
+    from tunneldb.export.exchange import write_survey
+
     write_survey(conn, survey, low, high, path)
 
 
 def _workbook(conn: Connection, survey: Survey, low: float, high: float, path: Path, photos: Path | None) -> None:
+    from tunneldb.export.tables.stretch_workbook import write_stretch_workbook
+
     write_stretch_workbook(conn, survey, low, high, path)
 
 

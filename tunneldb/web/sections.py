@@ -8,7 +8,6 @@ import numpy as np
 from starlette.responses import Response
 
 from tunneldb.errors import UserError
-from tunneldb.export.exchange.section_dxf import section_dxf
 from tunneldb.export.exchange.section_lines import SectionLine, section_lines
 from tunneldb.store.desk import sections
 from tunneldb.store.desk.sections import Section
@@ -32,6 +31,8 @@ def section(call: Call) -> Any:
 
 def drawing(call: Call) -> Response:
     """Return the section at a chainage as a DXF drawing."""
+    from tunneldb.export.exchange.section_dxf import section_dxf  # its library is large
+
     survey, chainage, label, found, lines = _section(call)
     text = section_dxf(f"{survey.name}  {label}", found, lines)
     name = f"section-{survey.name}-{chainage:.2f}.dxf"

@@ -8,6 +8,8 @@ from collections.abc import Awaitable, Callable
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
+from tunneldb.web.pages import STATIC
+
 POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; style-src 'self'; script-src 'self'; worker-src 'self' blob:;"
     " connect-src 'self'; object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
@@ -55,8 +57,8 @@ def guard(loopback: bool, secure: bool) -> Callable[[Request, Next], Awaitable[R
         response = refusal(request, loopback) or await proceed(request)
         for name, value in headers.items():
             response.headers.setdefault(name, value)
-        static = request.url.path.startswith("/static/")
-        response.headers.setdefault("Cache-Control", "no-cache" if static else "no-store")
+        kept = response.status_code == 200 and request.url.path.startswith(f"{STATIC}/")
+        response.headers.setdefault("Cache-Control", "public, max-age=31536000, immutable" if kept else "no-store")
         return response
 
     return dispatch

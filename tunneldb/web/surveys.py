@@ -61,33 +61,54 @@ def list_all(call: Call) -> Any:
         return surveys.list_surveys(conn)
 
 
+def tunnels(call: Call) -> Any:
+    """Return the tunnels for the map."""
+    with call.session.connection() as conn:
+        return surveys.tunnels(conn)
+
+
 def one(call: Call) -> Any:
     """Return a survey with what is needed to show it."""
     with call.session.connection() as conn:
         survey = survey_of(conn, call.path["survey"])
         low, high = measured(survey)
         ends = surveys.arcs(conn, survey.id) or (0.0, 0.0)
-        kinds = []
-        for kind in image_kinds(conn, survey.id):
-            stretch = survey_stretch(call.desk.blocks, conn, survey, kind)
-            label, unit = KINDS[kind]
-            kinds.append(
-                {
-                    "kind": kind,
-                    "label": label,
-                    "unit": unit,
-                    "low": stretch.low,
-                    "high": stretch.high,
-                    "signed": is_signed(kind),
-                }
-            )
+        kinds = [
+            {"kind": kind, "label": KINDS[kind][0], "unit": KINDS[kind][1], "signed": is_signed(kind)}
+            for kind in image_kinds(conn, survey.id)
+        ]
         return {
             "id": survey.id, "name": survey.name, "tunnel": survey.tunnel, "date": survey.date, "from": low, "to": high,
             "arc_from": ends[0], "arc_to": ends[1], "kinds": kinds,
-            "remarks": surveys.remarks(conn, survey.id), "statement": surveys.statement(conn, survey.id),
             "finding_kinds": [{**k, "colour": KIND_COLOURS.get(k["code"], OTHER_COLOUR)} for k in surveys.finding_kinds(conn)],
             "severities": surveys.severities(conn), "neighbours": surveys.neighbours(conn, survey),
         }  # fmt: skip
+
+
+def summary(call: Call) -> Any:
+    """Return the statistics of a whole survey, its remarks, and where leaks could be missed: slow for a long one."""
+    with call.session.connection() as conn:
+        survey = survey_of(conn, call.path["survey"])
+        return {
+            **surveys.statistics(conn, survey),
+            "remarks": surveys.remarks(conn, survey.id),
+            "statement": surveys.statement(conn, survey.id),
+        }
+
+
+def colours(call: Call) -> Any:
+    """Return the values of the darkest and the brightest colour of an image."""
+    kind = call.path["kind"]
+    if kind not in KINDS:
+        raise no_kind(kind)
+    with call.session.connection() as conn:
+        stretch = survey_stretch(call.desk.blocks, conn, survey_of(conn, call.path["survey"]), kind)
+    return {"low": stretch.low, "high": stretch.high}
+
+
+def no_kind(kind: str) -> NotFoundError:
+    """Return the error for a kind of image that does not exist."""
+    return NotFoundError(f"there is no kind of image {kind[:40]!r}: there are {', '.join(KINDS)}")
 
 
 def ribbon(call: Call) -> Any:

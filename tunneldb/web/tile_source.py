@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Hashable, Mapping
 
 import numpy as np
 
@@ -50,13 +51,20 @@ def _images(
     size = round(np.log2(pixel))
     there = blocks(conn, survey_id, stored, *ends)
     keys = {block.number: (survey_id, stored, block.number, block.version, size) for block in there}
-    found = {number: image for number, key in keys.items() if (image := cache.find(key)) is not None}
-    missing = [number for number in keys if number not in found]
-    for number, raster in (load_blocks(conn, survey_id, stored, missing) if missing else {}).items():
-        found[number] = reduce(raster, pixel, kind == "state")
-        cache.keep(keys[number], found[number])
+    found = _kept(cache, keys)
+    if len(found) < len(keys):
+        with cache.loading:
+            found = _kept(cache, keys)  # another request may have read them in the meantime
+            missing = [number for number in keys if number not in found]
+            for number, raster in load_blocks(conn, survey_id, stored, missing):
+                found[number] = reduce(raster, pixel, kind == "state")
+                cache.keep(keys[number], found[number])
     tag = hashlib.sha256(repr((size, sorted(keys.values()))).encode()).hexdigest()[:20]
     return [found[number] for number in sorted(found)], tag
+
+
+def _kept(cache: BlockCache, keys: Mapping[int, Hashable]) -> dict[int, Raster]:
+    return {number: image for number, key in keys.items() if (image := cache.find(key)) is not None}
 
 
 def survey_stretch(cache: BlockCache, conn: Connection, survey: Place, kind: str) -> Stretch:
@@ -70,11 +78,11 @@ def survey_stretch(cache: BlockCache, conn: Connection, survey: Place, kind: str
 
 
 def _stretch(images: list[Raster], kind: str) -> Stretch:
-    values = [image.values[np.isfinite(image.values)] for image in images]
-    shown = np.concatenate(values) if values else np.empty(0, np.float32)
+    step = max(1, sum(image.values.size for image in images) // SAMPLE)
+    values = np.concatenate([np.empty(0, np.float32), *(image.values.ravel()[::step] for image in images)])
+    shown = values[np.isfinite(values)]
     if not len(shown):
         return Stretch(0.0, 1.0)
-    shown = shown[:: max(1, len(shown) // SAMPLE)]
     if is_signed(kind):
         reach = float(np.percentile(np.abs(shown), 90.0))
         span = next((s for s in OFFSET_SPANS if s >= reach), OFFSET_SPANS[-1])

@@ -12,7 +12,7 @@ from tunneldb.raster.tiles import Tile, display
 from tunneldb.store.desk.findings import finding_tile
 from tunneldb.store.desk.images import KINDS
 from tunneldb.web.route import Call, NotFoundError
-from tunneldb.web.surveys import survey_of
+from tunneldb.web.surveys import no_kind, survey_of
 from tunneldb.web.tile_source import survey_stretch, tile_images
 
 OUTLINE_ZOOM = 16
@@ -26,7 +26,7 @@ def image_tile(call: Call) -> Response:
     """Return a tile of an image; 304 if the browser has it."""
     kind, tile = call.path["kind"], tile_of(call, "png")
     if kind not in KINDS:
-        raise NotFoundError(f"there is no kind of image {kind[:40]!r}: there are {', '.join(KINDS)}")
+        raise no_kind(kind)
     with call.session.connection() as conn:
         survey = survey_of(conn, call.path["survey"])
         images, tag = tile_images(call.desk.blocks, conn, survey, kind, tile)

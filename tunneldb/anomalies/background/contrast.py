@@ -26,7 +26,7 @@ class ContrastImage:
     grid : PixelGrid
         The pixels.
     state : (rows, columns) uint8 array
-        Values of :class:`tunneldb.raster.pixel_state.PixelState`.
+        Values of :class:`tunneldb.raster.state.PixelState`.
     drop : (rows, columns) int16 array
         Darkening: level of the background minus that of the pixel, in steps of 0.01 dB, positive where the pixel is darker;
         NODATA where there is no point. In drawn dry regions it is at most 0.

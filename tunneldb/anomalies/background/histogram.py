@@ -14,7 +14,7 @@ from tunneldb.compiled import kernel
 from tunneldb.radiometry.robust_statistics import CLIP, CLIPPED_SIGMA
 from tunneldb.raster.geotiff import STEP
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 from tunneldb.robust import MAD_TO_SIGMA
 
 BIN = 0.05

@@ -13,7 +13,7 @@ from tunneldb.anomalies.background.model import BackgroundFit
 from tunneldb.arrays import Bool, Int64, Single, UInt8
 from tunneldb.raster.grid import Grid
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 TILE = 0.5
 """Approximate side of a tile, m."""

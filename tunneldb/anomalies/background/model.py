@@ -17,8 +17,8 @@ from tunneldb.arrays import Bool, Float, Int16, Int64, Single, UInt8, UInt16
 from tunneldb.radiometry.robust_statistics import robust_statistics
 from tunneldb.raster.geotiff import STEP
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.polygons import mask_of_polygons
+from tunneldb.raster.state import PixelState
 
 SAMPLE, LINES = 15_000_000, 6_000_000
 """Approximate number of pixels used for tiles; rows and columns use the same, and have far more each."""

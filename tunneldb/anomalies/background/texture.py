@@ -12,7 +12,7 @@ from tunneldb.anomalies.background.smooth import extrapolate
 from tunneldb.arrays import Bool, Float, Int16, Int32, Int64, Single, UInt8
 from tunneldb.compiled import kernel
 from tunneldb.raster.geotiff import NODATA, STEP
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 TYPICAL_DARKENING = 2.0
 """Darkening that should be three standard deviations of dry lining, dB: wet lining is rarely less dark (Xu et al., 2018)."""

@@ -11,7 +11,7 @@ from tunneldb.anomalies.background.contrast import ContrastImage
 from tunneldb.anomalies.threshold import seen_lining
 from tunneldb.anomalies.windows import count_in_columns, on_lining
 from tunneldb.arrays import Bool, Float, Int64, UInt8
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 REACH = 1
 """Number of tiles around one whose points and clutter count."""

@@ -13,8 +13,8 @@ from tunneldb.anomalies.windows import on_lining
 from tunneldb.arrays import Bool, Int16, UInt8
 from tunneldb.raster.grid import BLOCKS, Grid
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
 from tunneldb.raster.profiles import ProfileGaps
+from tunneldb.raster.state import PixelState
 
 INTERVAL = 4
 """Interval of the blocks of 50 m in which trials are made first."""

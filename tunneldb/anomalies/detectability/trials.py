@@ -12,7 +12,7 @@ from tunneldb.anomalies.detectability.synthetic import SyntheticLeak, draw_leak
 from tunneldb.arrays import Bool, Float, Int16, Int64, UInt8
 from tunneldb.raster.geotiff import NODATA, STEP
 from tunneldb.raster.image import LiningImage
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 CELL = 3.0
 """Side of the cells that take one leak each, m."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tunneldb.classification.classes import PointClass
-from tunneldb.raster.pixel_state import PixelState
+from tunneldb.raster.state import PixelState
 
 Colour = tuple[int, int, int]
 

@@ -43,7 +43,7 @@ from tunneldb.measures.change.rows import (
 from tunneldb.measures.deviation.measure import lining_by_class
 from tunneldb.progress import StartProgress
 from tunneldb.raster.geotiff import Raster
-from tunneldb.raster.pixel_state import PixelState, shows_lining
+from tunneldb.raster.state import PixelState, shows_lining
 from tunneldb.stages.on_demand import measure_kilometres, refuse_beyond, refuse_wrong_pair
 from tunneldb.stages.stale import Result, refuse_blocked, result_states
 from tunneldb.store.images import image_blocks, load_block

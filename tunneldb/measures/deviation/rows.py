@@ -13,7 +13,7 @@ from tunneldb.measures.deviation.compute import Step
 from tunneldb.raster.geotiff import DEVIATION_KINDS, Raster, encode
 from tunneldb.raster.grid import BLOCK
 from tunneldb.raster.overview import PREFIX, Overview
-from tunneldb.raster.pixel_state import shows_lining
+from tunneldb.raster.state import shows_lining
 from tunneldb.store.images import image_blocks, insert_image, load_kinds, save_overview
 from tunneldb.store.survey import Survey
 

@@ -17,7 +17,7 @@ from tunneldb.measures.deviation.measure import lining_by_class
 from tunneldb.measures.rings.compute.patches import PATCH, Patches, average, join
 from tunneldb.raster.geotiff import Raster
 from tunneldb.raster.grid import BLOCK
-from tunneldb.raster.pixel_state import shows_lining
+from tunneldb.raster.state import shows_lining
 from tunneldb.store.images import load_kinds
 from tunneldb.store.surface import load_surface
 from tunneldb.store.survey import Survey

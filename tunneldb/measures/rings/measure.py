@@ -28,7 +28,7 @@ from tunneldb.measures.rings.rows import (
     save_rings,
 )
 from tunneldb.progress import StartProgress
-from tunneldb.raster.pixel_state import shows_lining
+from tunneldb.raster.state import shows_lining
 from tunneldb.shape.circle import taubin
 from tunneldb.shape.profile import Profile
 from tunneldb.stages.on_demand import measure_kilometres, refuse_beyond

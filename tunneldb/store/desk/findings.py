@@ -95,8 +95,8 @@ def write_review(conn: psycopg.Connection[Any], finding_id: int, seen: Mapping[s
     )
     row = conn.execute(
         sql.SQL(
-            "WITH done AS (UPDATE tunnel_api.finding_unrolled f SET {} WHERE f.id = %(id)s AND {} RETURNING f.id, f.reviewed_at)"
-            " SELECT d.id FROM done d WHERE d.reviewed_at >= statement_timestamp()"
+            "WITH done AS (UPDATE tunnel_api.finding_unrolled f SET {} WHERE f.id = %(id)s AND {}"
+            " RETURNING f.id, f.reviewed_at) SELECT d.id FROM done d WHERE d.reviewed_at >= statement_timestamp()"
         ).format(changes, same),
         {"id": finding_id, **values, **{f"seen_{name}": seen[name] for name in REVIEWED}},
     ).fetchone()

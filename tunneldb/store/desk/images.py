@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,12 +51,15 @@ def blocks(conn: psycopg.Connection[Any], survey_id: int, kind: str, first: int,
     return [Block(*row) for row in rows]
 
 
-def load_blocks(conn: psycopg.Connection[Any], survey_id: int, kind: str, numbers: Sequence[int]) -> dict[int, Raster]:
-    """Read blocks of an image by their numbers; those that no longer exist are missing."""
+def load_blocks(
+    conn: psycopg.Connection[Any], survey_id: int, kind: str, numbers: Sequence[int]
+) -> Iterator[tuple[int, Raster]]:
+    """Yield the number and the image of blocks, by their numbers; those that no longer exist are missing."""
     rows = conn.execute(
         "SELECT block, tiff FROM tunnel_api.image_tiffs(%s, %s, %s)", [survey_id, kind, list(numbers)], binary=True
     )
-    return {number: decode(tiff) for number, tiff in rows.fetchall()}
+    for number, tiff in rows.fetchall():
+        yield number, decode(tiff)
 
 
 def overview_of(kind: str) -> str:

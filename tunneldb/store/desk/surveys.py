@@ -9,6 +9,9 @@ import psycopg
 
 from tunneldb.store.desk.rows import named
 
+MAP_ERROR = 1.0
+"""Maximum deviation of a tunnel's line on the map of all tunnels, m."""
+
 
 @dataclass(frozen=True)
 class Place:
@@ -33,17 +36,38 @@ class Place:
 
 
 def list_surveys(conn: psycopg.Connection[Any]) -> list[dict[str, Any]]:
-    """Return the surveys of tunnels with their state, the latest first."""
+    """Return the surveys of tunnels with the number of their findings, the latest first."""
     rows = conn.execute(
         "SELECT s.id, s.name, s.tunnel, s.date::text AS date, e.chainage_from AS from, e.chainage_to AS to,"
-        " t.seen_share AS inspected_share, t.class, t.patches AS leaks, t.wet_area, coalesce(c.findings, 0) AS findings,"
+        " coalesce(c.findings, 0) AS findings,"
         " coalesce(c.open, 0) AS open, coalesce(c.confirmed, 0) AS confirmed, coalesce(c.rejected, 0) AS rejected"
         " FROM tunnel_api.survey s JOIN tunnel_api.tunnel u ON u.id = s.tunnel_id AND NOT u.site"
         " CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e"
-        " LEFT JOIN LATERAL tunnel_api.leak_statistics(s.name, '-infinity', 'infinity') t ON e.chainage_from IS NOT NULL"
         " LEFT JOIN LATERAL (SELECT sum(f.counted)::bigint AS findings, sum(f.open)::bigint AS open,"
         " sum(f.confirmed)::bigint AS confirmed, sum(f.rejected)::bigint AS rejected FROM tunnel_api.finding_count f"
         " WHERE f.survey_id = s.id) c ON true ORDER BY s.date DESC, s.name"
+    )
+    return named(rows)
+
+
+def statistics(conn: psycopg.Connection[Any], survey: Place) -> dict[str, Any]:
+    """Return inspected share, class, number and area of the leaks of a whole survey; None where they are not known."""
+    return named(
+        conn.execute(
+            "SELECT t.seen_share AS inspected_share, t.class, t.patches AS leaks, t.wet_area"
+            " FROM (SELECT) one LEFT JOIN tunnel_api.leak_statistics(%s, '-infinity', 'infinity') t ON true",
+            [survey.name],
+        )
+    )[0]
+
+
+def tunnels(conn: psycopg.Connection[Any]) -> list[dict[str, Any]]:
+    """Return the tunnels with their given axes in longitude and latitude, to MAP_ERROR; None for local coordinates."""
+    rows = conn.execute(
+        "SELECT t.name, CASE WHEN t.srid > 0 THEN public.ST_AsGeoJSON(public.ST_Transform("
+        "public.ST_Simplify(public.ST_Force2D(t.geom), %s), 4326), 6)::json END AS axis"
+        " FROM tunnel_api.tunnel t WHERE NOT t.site ORDER BY t.name",
+        [MAP_ERROR],
     )
     return named(rows)
 

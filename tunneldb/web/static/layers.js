@@ -54,14 +54,19 @@ export function colourOf(kind, review) {
   return kind?.wet ? REVIEW_COLOURS[review] ?? REVIEW_COLOURS.open : kind?.colour ?? '#e66ab1';
 }
 
+/** Return True if a finding is shown by the switches: findings, dry, removed. */
+export function isShown(kind, state, shown) {
+  return shown.findings && (COUNTED.includes(state) || shown.removed) && (!DETECTED_DRY.includes(kind) || shown.dry);
+}
+
 function styler(kinds, shown) {
   const styles = new Map();
   return (feature) => {
     const kind = feature.get('kind');
     const review = feature.get('review');
     const state = feature.get('state') ?? review;
+    if (!isShown(kind, state, shown)) return null;
     const counted = COUNTED.includes(state);
-    if (!shown.findings || (!counted && !shown.removed) || (DETECTED_DRY.includes(kind) && !shown.dry)) return null;
     const many = Math.min(Math.ceil(Math.log2(feature.get('count') ?? 1)), 8);
     const type = feature.getType();
     const key = `${kind}|${review}|${counted}|${many}|${type}`;

@@ -3,27 +3,28 @@
 import { el } from './dom.js';
 import { percent } from './format.js';
 
-/** Show the limits of a survey in one line; its remarks unfold. */
-export function showLimits(root, survey, summary) {
-  const remarks = survey.remarks ?? [];
-  const text = el('p', {}, el('strong', { text: inspected(summary) }), survey.statement ? ` ${survey.statement}` : null);
+/** Show the limits of a survey in one line; its remarks unfold. Without a summary they are not known yet. */
+export function showLimits(root, summary) {
+  const remarks = summary?.remarks ?? [];
+  const text = el('p', {}, el('strong', { text: inspected(summary) }), summary?.statement ? ` ${summary.statement}` : null);
   const more = remarks.length ? el('details', { class: 'fold remarks' }, el('summary', { text: `${remarks.length} ${remarks.length === 1 ? 'remark' : 'remarks'}` }), list(remarks)) : null;
   const key = el('span', { class: 'hatch-key' }, el('i', {}), 'not inspected or not known');
   root.replaceChildren(text, ...(more ? [more] : []), key);
   const share = summary?.inspected_share ?? 0;
-  root.classList.toggle('warn', share < 0.98 || Boolean(survey.statement) || remarks.length > 0);
+  root.classList.toggle('warn', share < 0.98 || Boolean(summary?.statement) || remarks.length > 0);
 }
 
 /** Return the panel of notes of a survey. */
-export function notesPanel(survey, summary) {
+export function notesPanel(summary) {
   return el('div', { class: 'pad' }, el('h2', { text: 'Notes and limitations' }),
     el('p', { text: `${inspected(summary)} What was not inspected is not dry.` }),
-    survey.statement ? el('p', { text: survey.statement }) : null,
-    survey.remarks?.length ? list(survey.remarks) : el('p', { class: 'muted', text: 'No remarks.' }));
+    summary?.statement ? el('p', { text: summary.statement }) : null,
+    summary?.remarks.length ? list(summary.remarks) : el('p', { class: 'muted', text: summary ? 'No remarks.' : '' }));
 }
 
 function inspected(summary) {
-  const share = summary?.inspected_share ?? null;
+  if (!summary) return 'Inspected share: being read …';
+  const share = summary.inspected_share;
   return share === null ? 'Inspected share: not known.' : `Inspected: ${percent(share)} of the lining.`;
 }
 

@@ -15,14 +15,16 @@ import { DiscardedError, Saver } from './saver.js';
 import { SectionPanel } from './section.js';
 import { Session } from './session.js';
 import { showSurveys } from './surveys.js';
+import { Space } from './space.js';
 import { fillToolbar } from './toolbar.js';
+import { tunnelMap } from './tunnels.js';
 
 const meta = (name) => document.querySelector(`meta[name=${name}]`)?.content ?? '';
 const node = (id) => document.getElementById(id);
 const user = meta('user');
 const canWrite = ['inspector', 'operator'].includes(meta('role'));
 
-const app = { surveys: [], survey: null, finding: null, routing: false, turn: 0, hash: '' };
+const app = { surveys: [], survey: null, summary: null, finding: null, routing: false, turn: 0, hash: '' };
 
 function say(text, wrong = false) {
   const state = node('state');
@@ -51,7 +53,7 @@ function showState({ state, job, seconds, text }) {
 const saver = new Saver(user, showState);
 const session = new Session(user, saver);
 const panel = new Panel(node('panel'), (tab) => showTab(tab));
-const ribbon = new Ribbon(node('ribbon'), (x) => lining.goTo(x));
+const ribbon = new Ribbon(node('ribbon'), (x) => (space.open ? space.go(x) : lining.goTo(x)));
 const lining = new Lining(node('lining'), { moved, picked, failed: (text) => say(text, true) });
 const review = new Review(session, {
   canWrite, say,
@@ -62,12 +64,14 @@ const review = new Review(session, {
   outlined: () => lining.shown.findings,
   outlines: (on) => {
     lining.shown.findings = on;
+    space.restyle();
     const box = node('show-findings');
     if (box) box.checked = on;
     lining.restyle();
     say(on ? 'Outlines on.' : 'Outlines off.');
   },
 });
+const space = new Space(node('space'), { picked, closed, shown: () => lining.shown });
 const section = new SectionPanel(() => lining.view.x, () => session.facts);
 const draw = new DrawPanel(lining, {
   canWrite, say,
@@ -103,6 +107,19 @@ const address = debounce(() => {
   app.hash = location.hash;
 }, 200);
 
+/** Show the lining in 3D, in place of the unrolled one. */
+function openSpace() {
+  draw.cancel();
+  node('lining').hidden = true;
+  space.show(lining.view.x);
+}
+
+function closed(chainage) {
+  node('lining').hidden = false;
+  lining.map.updateSize();
+  if (chainage !== null) lining.goTo(chainage);
+}
+
 function picked(id) {
   if (draw.pick(id)) return;
   if (!['finding', 'review'].includes(panel.tab)) panel.choose('finding');
@@ -124,14 +141,16 @@ function show(finding, fit) {
 function mark(finding) {
   app.finding = finding.id;
   lining.mark(finding);
+  space.mark(finding);
   draw.refresh();
 }
 
 // Drawing the map takes longer than a verdict: it follows when the reviewer pauses.
-const follow = debounce((finding) => lining.fitFinding(finding), 250);
+const follow = debounce((finding) => (space.open ? space.follow(finding) : lining.fitFinding(finding)), 250);
 
 const reread = debounce(async () => {
   lining.refresh();
+  space.refresh();
   await readRibbon(app.survey);
 }, 1500);
 
@@ -144,9 +163,10 @@ function changed(wait = null) {
 function showTab(tab) {
   review.setReviewing(tab === 'review');
   if (tab !== 'draw') draw.cancel();
+  else if (space.open) space.close();
   const content = {
     finding: () => review.root, review: () => review.root, draw: () => draw.root, section: () => section.root,
-    downloads: () => downloadsPanel(app.survey, stretch, meta('role') === 'operator'), notes: () => notesPanel(app.survey, summaryOf(app.survey)),
+    downloads: () => downloadsPanel(app.survey, stretch, meta('role') === 'operator'), notes: () => notesPanel(app.summary),
   }[tab]();
   panel.fill(content);
   if (tab === 'section') section.open();
@@ -155,8 +175,19 @@ function showTab(tab) {
   lining.map.updateSize();
 }
 
-function summaryOf(survey) {
-  return app.surveys.find(({ name }) => name === survey.name);
+/** Read what was not inspected; it takes longer than the picture of a long survey. */
+async function readSummary(survey) {
+  app.summary = null;
+  showLimits(node('limits'), null);
+  try {
+    const summary = await get(surveyPath(survey.name, '/summary'));
+    if (survey !== app.survey) return;
+    app.summary = summary;
+    showLimits(node('limits'), summary);
+    if (panel.tab === 'notes') showTab('notes');
+  } catch (error) {
+    say(`Inspected share: ${error.message}`, true);
+  }
 }
 
 async function readRibbon(survey) {
@@ -182,7 +213,6 @@ async function openSurvey(name, state, latest) {
   node('desk-title').textContent = survey.name;
   node('survey-facts').textContent = [survey.tunnel, survey.date, `${station(survey.from, 0)} to ${station(survey.to, 0)}`].filter(Boolean).join(' · ');
   node('survey-choice').value = name;
-  showLimits(node('limits'), survey, summaryOf(survey));
   ribbon.show(null, survey);
   const tab = state.finding === null ? state.tab ?? panel.tab ?? 'finding' : 'finding';
   // On a narrow screen an empty panel would cover the lining.
@@ -192,12 +222,15 @@ async function openSurvey(name, state, latest) {
   lining.mark(null);
   lining.setSurvey(survey, state.kind, state.x !== null && state.y !== null && state.z !== null ? state : null);
   fillToolbar(lining, (text) => say(text, true));
+  lining.tools.append(button('3D', openSpace));
   review.setSurvey(survey);
   section.setSurvey(survey);
+  space.setSurvey(survey);
   draw.setSurvey(survey);
   panel.choose(tab);
   panel.fold(empty);
   readRibbon(survey);
+  readSummary(survey);
 }
 
 async function showTable(latest) {
@@ -210,7 +243,18 @@ async function showTable(latest) {
   node('survey-facts').textContent = '';
   node('survey-choice').value = '';
   document.title = 'tunneldb desk';
-  showSurveys(node('surveys'), app.surveys);
+  const filter = showSurveys(node('surveys'), app.surveys, tunnelMap((name) => filter(name)));
+}
+
+/** Read the list of surveys beside the survey that is shown. */
+async function readChoice() {
+  try {
+    app.surveys = await get('/api/surveys');
+    fillChoice();
+    node('survey-choice').value = app.survey?.name ?? '';
+  } catch (error) {
+    say(`List of surveys: ${error.message}`, true);
+  }
 }
 
 function fillChoice() {
@@ -230,10 +274,7 @@ async function route() {
       await showTable(latest);
       return;
     }
-    if (!app.surveys.length) {
-      app.surveys = await get('/api/surveys');
-      fillChoice();
-    }
+    if (!app.surveys.length) readChoice();
     const other = app.survey?.name !== state.survey;
     if (other) await openSurvey(state.survey, state, latest);
     if (!latest()) return;

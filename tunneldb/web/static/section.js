@@ -2,14 +2,10 @@
 
 import { get, saveBlob, surveyPath } from './api.js';
 import { arcsOf } from './axis.js';
+import { classColour, classLabel } from './classes.js';
 import { button, el, field, svg } from './dom.js';
 import { niceStep, number, parseStation, station } from './format.js';
 
-const CLASSES = {
-  1: ['unassigned', '#9aa5af'], 2: ['ground', '#8a6a3f'], 64: ['lining', '#4a5a68'], 65: ['niche', '#7b3fbf'], 66: ['fixture', '#0a8f8f'],
-  67: ['rail', '#b3261e'], 68: ['object on the ground', '#c98a00'], 69: ['target sphere', '#d0021b'], 70: ['noise', '#b9c0c7'],
-  40: ['bed', '#8a6a3f'], 41: ['water surface', '#2f7fb5'], 42: ['submerged lining', '#1c4a6e'], 43: ['object in the water', '#c98a00'],
-};
 const LINES = { curve: ['measured section', '#0b5fa5'], design: ['design', '#2e7d32'], gauge: ['gauge', '#8e24aa'] };
 const MARGIN = 0.6;
 const STEP = 0.05;
@@ -93,7 +89,7 @@ export class SectionPanel {
     const groups = grouped(points);
     for (const [code, group] of groups) {
       const path = group.map(([x, y]) => `M${x.toFixed(3)} ${(-y).toFixed(3)}h0`).join('');
-      root.append(svg('path', { d: path, stroke: CLASSES[code]?.[1] ?? '#777', 'stroke-width': 1.6 * unit, 'stroke-linecap': 'round', fill: 'none' }));
+      root.append(svg('path', { d: path, stroke: classColour(code), 'stroke-width': 1.6 * unit, 'stroke-linecap': 'round', fill: 'none' }));
     }
     const drawn = [{ kind: 'curve', name: '', places: curve }, ...lines];
     for (const { kind, name, places } of drawn) {
@@ -111,7 +107,7 @@ export class SectionPanel {
     root.addEventListener('keydown', (event) => this.press(event));
     this.box.replaceChildren(root);
     this.key.replaceChildren(
-      ...[...groups.keys()].map((code) => entry(CLASSES[code]?.[0] ?? `class ${code}`, CLASSES[code]?.[1] ?? '#777')),
+      ...[...groups.keys()].map((code) => entry(classLabel(code), classColour(code))),
       ...drawn.map(({ kind, name }) => entry(name ? `${LINES[kind][0]} (${name})` : LINES[kind][0], LINES[kind][1])));
     this.save.disabled = false;
     this.drawing.hidden = false;

@@ -1,6 +1,7 @@
 /** Table of the surveys. */
 
-import { el } from './dom.js';
+import { get, surveyPath } from './api.js';
+import { debounce, el } from './dom.js';
 import { number, percent, station } from './format.js';
 import { format } from './router.js';
 
@@ -9,16 +10,19 @@ const COLUMNS = [
   ['Tunnel', (s) => s.tunnel, 'tunnel'],
   ['Date', (s) => s.date ?? '–', 'date'],
   ['Stretch', (s) => `${station(s.from, 0)} to ${station(s.to, 0)}`, 'from'],
-  ['Inspected', (s) => share(s.inspected_share, 'not known', 'warn'), 'inspected_share'],
-  ['Class', (s) => s.class ?? '–', 'class'],
-  ['Leaks', (s) => count(s.leaks), 'leaks', 'right'],
-  ['Wet area', (s) => number(s.wet_area, 1, 'm²'), 'wet_area', 'right'],
+  ['Inspected', (s) => known(s, () => share(s.inspected_share, 'not known', 'warn')), 'inspected_share'],
+  ['Class', (s) => known(s, () => s.class ?? '–'), 'class'],
+  ['Leaks', (s) => known(s, () => count(s.leaks)), 'leaks', 'right'],
+  ['Wet area', (s) => known(s, () => number(s.wet_area, 1, 'm²')), 'wet_area', 'right'],
   ['Findings', (s) => count(s.findings), 'findings', 'right'],
   ['Reviewed', (s) => review(s), 'open'],
 ];
 
-/** Show the surveys in an element. */
-export function showSurveys(root, surveys) {
+/** Number of surveys whose statistics are read at once. */
+const READERS = 2;
+
+/** Show the surveys in an element, with a map above; return a function that filters by a text. */
+export function showSurveys(root, surveys, map) {
   let sorted = { name: 'date', down: true };
   const filter = el('input', { type: 'search', placeholder: 'Tunnel or survey', oninput: () => fill() });
   const body = el('tbody');
@@ -29,6 +33,7 @@ export function showSurveys(root, surveys) {
   const found = el('p', { class: 'muted', role: 'status' });
   root.replaceChildren(
     el('div', { class: 'head' }, el('h1', { id: 'surveys-title', text: 'Surveys' }), el('label', { class: 'field' }, el('span', { text: 'Filter' }), filter), found),
+    map,
     el('div', { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': 'Table of surveys' }, el('table', {}, el('thead', {}, el('tr', {}, ...heads)), body)),
   );
 
@@ -50,6 +55,34 @@ export function showSurveys(root, surveys) {
   }
 
   fill();
+  readStatistics(surveys, () => root.contains(body), debounce(fill, 100));
+  return (text) => {
+    filter.value = text;
+    fill();
+  };
+}
+
+/** Read the statistics of surveys, a few at a time, as long as they are wanted. */
+function readStatistics(surveys, wanted, shown) {
+  const left = surveys.filter((survey) => survey.from !== null && !survey.summary);
+  const reader = async () => {
+    while (left.length && wanted()) {
+      const survey = left.shift();
+      try {
+        survey.summary = await get(surveyPath(survey.name, '/summary'));
+        Object.assign(survey, survey.summary);
+      } catch {
+        survey.summary = {};
+      }
+      shown();
+    }
+  };
+  for (let n = 0; n < READERS; n += 1) reader();
+}
+
+/** Return what a survey's statistics show, once they are read. */
+function known(survey, show) {
+  return survey.from !== null && !survey.summary ? el('span', { class: 'muted', text: '…' }) : show();
 }
 
 function row(survey) {

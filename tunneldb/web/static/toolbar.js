@@ -1,5 +1,6 @@
 /** Tools of the lining: image, layers, comparison, zoom. */
 
+import { get, surveyPath } from './api.js';
 import { button, check, choice, el, field } from './dom.js';
 import { number } from './format.js';
 
@@ -11,7 +12,7 @@ export function fillToolbar(lining, onError) {
   const kinds = choice(survey.kinds.map(({ kind, label }) => [kind, label]), lining.kind, {
     onchange: (event) => {
       lining.setKind(event.target.value);
-      showLegend(lining);
+      showLegend(lining, onError);
     },
   });
   const image = survey.kinds.length ? field('Image', kinds, { class: 'field inline' }) : el('span', { class: 'warn-text', text: 'This survey has no image.' });
@@ -19,7 +20,7 @@ export function fillToolbar(lining, onError) {
     image, menu('Layers', layers(lining)), ...(survey.neighbours.length ? [menu('Compare', compare(lining, onError))] : []),
     button('Fit height', () => lining.fitHeight()), button('Whole survey', () => lining.fitAll()),
   );
-  showLegend(lining);
+  showLegend(lining, onError);
 }
 
 /** Return a button that unfolds a box. */
@@ -68,13 +69,20 @@ function compare(lining, onError) {
   return [field('Other survey', other), field('Show', modes)];
 }
 
-function showLegend(lining) {
-  const kind = lining.survey.kinds.find((other) => other.kind === lining.kind);
+async function showLegend(lining, onError) {
+  const { survey } = lining;
+  const kind = survey.kinds.find((other) => other.kind === lining.kind);
   lining.legend.replaceChildren();
-  if (!kind || kind.low === null || kind.low === undefined) return;
-  const decimals = Math.abs(kind.high - kind.low) < 5 ? 2 : 0;
-  lining.legend.append(
-    el('span', { text: number(kind.low, decimals) }), el('i', { class: `ramp ${RAMPS[kind.kind] ?? 'ramp-none'}` }),
-    el('span', { text: number(kind.high, decimals, kind.unit ?? '') }),
-  );
+  if (!kind?.unit) return;
+  try {
+    const { low, high } = await get(surveyPath(survey.name, `/colours/${kind.kind}`));
+    if (survey !== lining.survey || kind.kind !== lining.kind) return;
+    const decimals = Math.abs(high - low) < 5 ? 2 : 0;
+    lining.legend.replaceChildren(
+      el('span', { text: number(low, decimals) }), el('i', { class: `ramp ${RAMPS[kind.kind] ?? 'ramp-none'}` }),
+      el('span', { text: number(high, decimals, kind.unit) }),
+    );
+  } catch (error) {
+    onError(`Colours: ${error.message}`);
+  }
 }
