@@ -1,4 +1,4 @@
--- Photos of findings.
+-- Photos of findings: paths and URLs that people give, and photos that are stored in the database.
 
 -- Insert, change or delete a photo of a finding: a path or URL, and a caption.
 CREATE OR REPLACE FUNCTION tunnel_internal.edit_photo() RETURNS trigger

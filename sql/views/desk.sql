@@ -58,7 +58,8 @@ COMMENT ON FUNCTION tunnel_api.image_kinds(int) IS
 'Kinds of the unrolled images of a survey: raw, corrected, offset, state, deviation_…, and their overviews (image_versions)';
 
 CREATE OR REPLACE FUNCTION tunnel_api.ribbon(survey_id int, chainage_from float8, chainage_to float8, bins int)
-RETURNS TABLE (n int, seen_share float8, wet_area float8, findings jsonb, reviewed int, probability float8)
+RETURNS TABLE (n int, seen_share float8, wet_area float8, findings jsonb, reviewed int, probability float8,
+    layer text, deviation_least float8, deviation_greatest float8)
 LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 1000
 SET search_path = pg_catalog, pg_temp
 SET jit = off
@@ -92,19 +93,31 @@ BEGIN
                                             least(ceil((d.chainage_to - low) / step)::int, count)) AS g (n)
          WHERE d.survey_id = survey_key
          GROUP BY g.n
+    ), deviations AS (
+        SELECT g.n, min(d.layer) AS layer, min(d.deviation_least) AS least, max(d.deviation_greatest) AS greatest
+          FROM tunnel.deviation_section d
+         CROSS JOIN LATERAL generate_series(greatest(floor((d.chainage_from - low) / step)::int + 1, 1),
+                                            least(ceil((d.chainage_to - low) / step)::int, count)) AS g (n)
+         WHERE d.survey_id = survey_key AND d.layer = (
+                SELECT o.layer FROM unnest(ARRAY['lining', 'shotcrete', 'excavation']) WITH ORDINALITY AS o (layer, place)
+                 WHERE EXISTS (SELECT FROM tunnel.deviation_section e WHERE e.survey_id = survey_key AND e.layer = o.layer)
+                 ORDER BY o.place LIMIT 1)
+         GROUP BY g.n
     )
-    SELECT t.n, t.seen_share, t.wet_area, coalesce(k.findings, '{}'), coalesce(r.reviewed, 0), f.probability
+    SELECT t.n, t.seen_share, t.wet_area, coalesce(k.findings, '{}'), coalesce(r.reviewed, 0), f.probability,
+           v.layer, v.least, v.greatest
       FROM tunnel_internal.stretch_statistics(survey_key,
                 (SELECT array_agg(low + (b - 1) * step ORDER BY b) FROM generate_series(1, count) b),
                 (SELECT array_agg(low + b * step ORDER BY b) FROM generate_series(1, count) b)) t
       LEFT JOIN kinds k ON k.n = t.n
       LEFT JOIN reviews r ON r.n = t.n
       LEFT JOIN found f ON f.n = t.n
+      LEFT JOIN deviations v ON v.n = t.n
      ORDER BY t.n;
 END
 $$;
 COMMENT ON FUNCTION tunnel_api.ribbon(int, float8, float8, int) IS
-'A survey from one chainage to another in bins of one length: inspected share and wet area as in leak_statistics (NULL where leaks were not searched for), number of the findings that count by kind and how many of them are reviewed (by their middle), and mean probability of finding the leaks of the demand (detectability)';
+'A survey from one chainage to another in bins of one length: inspected share and wet area as in leak_statistics (NULL where leaks were not searched for), number of the findings that count by kind and how many of them are reviewed (by their middle), mean probability of finding the leaks of the demand (detectability), and smallest and greatest deviation from the design, m, of the first of the layers lining, shotcrete and excavation that was measured';
 
 -- A far tile shows places with findings, a near one outlines.
 CREATE OR REPLACE FUNCTION tunnel_api.finding_tile(

@@ -285,9 +285,10 @@ SELECT p.id, p.finding_id, a.survey_id, s.name AS survey, p.path, p.caption, p.a
   FROM tunnel.photo p
   JOIN tunnel.finding a ON a.id = p.finding_id
   JOIN tunnel.survey s ON s.id = a.survey_id;
-COMMENT ON VIEW tunnel_api.finding_photo IS 'Photos of findings, by path or URL; rows may be added, changed and deleted';
+COMMENT ON VIEW tunnel_api.finding_photo IS 'Photos of findings, by path or URL, or stored in the database (finding_photo_content); rows may be added, changed and deleted';
 COMMENT ON COLUMN tunnel_api.finding_photo.finding_id IS 'Id of the finding';
-COMMENT ON COLUMN tunnel_api.finding_photo.path IS 'Path or URL';
+COMMENT ON COLUMN tunnel_api.finding_photo.path IS
+    'Path or URL; of a photo that the desk stored, the SHA-256 of its content in hexadecimal digits, and .jpg';
 COMMENT ON COLUMN tunnel_api.finding_photo.caption IS 'Caption';
 COMMENT ON COLUMN tunnel_api.finding_photo.added_by IS 'Role that added it, set by the database';
 COMMENT ON COLUMN tunnel_api.finding_photo.added_at IS 'Time when it was added, set by the database';

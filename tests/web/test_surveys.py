@@ -21,6 +21,24 @@ def test_ribbon_sums_are_those_of_the_statistics(signed_in: SignIn, conn: psycop
     assert {len(ribbon[name]) for name in ("wet", "inspected", "reviewed", "probability")} == {len(ribbon["wet"])}
 
 
+def test_ribbon_has_the_deviation_of_the_lining(signed_in: SignIn) -> None:
+    """The example lies 0.1 m outside its design everywhere, and 60 mm inside it from 12340 to 12343, else 40 mm."""
+    ribbon = signed_in("viola_web").get("/api/surveys/demo-2024/ribbon").json()
+    deviation = ribbon["deviation"]
+    middles = ribbon["from"] + ribbon["step"] * (np.arange(len(ribbon["wet"])) + 0.5)
+    assert deviation["layer"] == "lining"
+    assert set(deviation["least"]) == {-0.1}
+    greatest = np.array(deviation["greatest"])
+    assert set(greatest[(middles > 12341) & (middles < 12342)]) == {0.06}
+    assert set(greatest[(middles < 12339) | (middles > 12344)]) == {0.04}
+
+
+def test_survey_without_a_design_has_no_deviation(signed_in: SignIn, conn: psycopg.Connection) -> None:
+    conn.execute("DELETE FROM tunnel.deviation_section")
+    conn.commit()
+    assert signed_in("viola_web").get("/api/surveys/demo-2024/ribbon").json()["deviation"] is None
+
+
 def test_survey_states_what_could_be_missed(signed_in: SignIn, conn: psycopg.Connection) -> None:
     browser = signed_in("viola_web")
     one = browser.get("/api/surveys/demo-2024/summary").json()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -129,4 +130,11 @@ def ribbon(call: Call) -> Any:
         "findings": {kind: [row[2].get(kind, 0) for row in rows] for kind in kinds},
         "reviewed": [row[3] / count if count else None for row, count in zip(rows, counts, strict=True)],
         "probability": [row[4] for row in rows],
+        "deviation": _deviation(rows),
     }
+
+
+def _deviation(rows: Sequence[tuple[Any, ...]]) -> dict[str, Any] | None:
+    """Return layer and deviations of the bins, m; None if no deviation was measured."""
+    layer = next((row[5] for row in rows if row[5] is not None), None)
+    return None if layer is None else {"layer": layer, "least": [row[6] for row in rows], "greatest": [row[7] for row in rows]}

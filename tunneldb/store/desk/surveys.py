@@ -126,8 +126,12 @@ def statement(conn: psycopg.Connection[Any], survey_id: int) -> str | None:
 
 
 def ribbon(conn: psycopg.Connection[Any], survey: Place, bins: int) -> list[tuple[Any, ...]]:
-    """Return the bins of a survey: inspected share, wet area, findings by kind, reviewed ones, probability."""
+    """Return the bins of a survey: inspected share, wet area, findings by kind, reviewed ones, probability, deviation.
+
+    Deviation is layer, smallest and greatest value, m; None where it was not measured.
+    """
     return conn.execute(
-        "SELECT r.seen_share, r.wet_area, r.findings, r.reviewed, r.probability FROM tunnel_api.ribbon(%s, %s, %s, %s) r",
+        "SELECT r.seen_share, r.wet_area, r.findings, r.reviewed, r.probability, r.layer, r.deviation_least,"
+        " r.deviation_greatest FROM tunnel_api.ribbon(%s, %s, %s, %s) r",
         [survey.id, survey.low, survey.high, bins],
     ).fetchall()

@@ -9,6 +9,9 @@ import { MAX_ZOOM, MIN_ZOOM, projection, resolutionAt, surveyExtent, zoomAt } fr
 
 const { ol } = globalThis;
 
+/** Time after which the rest of a page does not wait for the picture, ms. */
+const PICTURE_WAIT = 2000;
+
 /** Map of a survey's lining. */
 export class Lining {
   /**
@@ -82,7 +85,16 @@ export class Lining {
     this.rebuild();
     if (view) this.goTo(view.x, view.y, view.z);
     else this.fitHeight(survey.from);
-    this.readClocks(survey);
+    // What takes longer follows the picture: a session has few connections.
+    this.drawn = this.pictured().then(() => this.readClocks(survey));
+  }
+
+  /** Wait until the map has its tiles, or for PICTURE_WAIT. */
+  pictured() {
+    return new Promise((resolve) => {
+      this.map.once('loadend', resolve);
+      setTimeout(resolve, PICTURE_WAIT);
+    });
   }
 
   /** Show another image. */

@@ -177,8 +177,6 @@ function showTab(tab) {
 
 /** Read what was not inspected; it takes longer than the picture of a long survey. */
 async function readSummary(survey) {
-  app.summary = null;
-  showLimits(node('limits'), null);
   try {
     const summary = await get(surveyPath(survey.name, '/summary'));
     if (survey !== app.survey) return;
@@ -229,8 +227,12 @@ async function openSurvey(name, state, latest) {
   draw.setSurvey(survey);
   panel.choose(tab);
   panel.fold(empty);
-  readRibbon(survey);
-  readSummary(survey);
+  app.summary = null;
+  showLimits(node('limits'), null);
+  lining.drawn.then(() => {
+    readRibbon(survey);
+    readSummary(survey);
+  });
 }
 
 async function showTable(latest) {

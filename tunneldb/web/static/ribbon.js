@@ -7,8 +7,12 @@ const COLOURS = { wet: '#005caf', inspected: '#5d8a6a', probability: '#6a4c93', 
 const AXIS = 16;
 const ROWS = [
   ['wet', 'Wet area', 1.3], ['findings', 'Findings', 1.3], ['inspected', 'Inspected', 0.8], ['probability', 'Detectability', 1],
-  ['reviewed', 'Reviewed', 0.7],
+  ['deviation', 'Deviation', 1], ['reviewed', 'Reviewed', 0.7],
 ];
+
+/** Colours of deviations inside and outside the design. */
+const INSIDE = '#b3261e';
+const OUTSIDE = '#2f6db5';
 
 /** Overview of a survey. */
 export class Ribbon {
@@ -24,11 +28,7 @@ export class Ribbon {
       tabindex: '0', role: 'slider', 'aria-label': 'Chainage in view', 'aria-orientation': 'horizontal', 'aria-valuemin': '0',
       'aria-valuemax': '0', 'aria-valuenow': '0', data: { keys: '' },
     });
-    this.labels = el('div', { class: 'labels' }, ...ROWS.map(([, text, share]) => {
-      const label = el('span', { text });
-      label.style.flexGrow = share;
-      return label;
-    }));
+    this.labels = el('div', { class: 'labels' });
     this.tip = el('p', { class: 'tip', hidden: true });
     root.replaceChildren(this.labels, el('div', { class: 'strip' }, this.canvas, this.tip));
     this.listen();
@@ -39,6 +39,13 @@ export class Ribbon {
   show(data, survey) {
     this.data = data;
     this.survey = survey;
+    // A survey without a design has no deviation.
+    this.rows = ROWS.filter(([name]) => name !== 'deviation' || data?.deviation);
+    this.labels.replaceChildren(...this.rows.map(([, text, share]) => {
+      const label = el('span', { text });
+      label.style.flexGrow = share;
+      return label;
+    }));
     this.colours = new Map(survey.finding_kinds.map((kind) => [kind.code, kind]));
     this.canvas.setAttribute('aria-valuemin', survey.from);
     this.canvas.setAttribute('aria-valuemax', survey.to);
@@ -118,6 +125,11 @@ export class Ribbon {
     }
     const probability = data.probability[n];
     parts.push(probability === null ? 'detection probability: not known' : `detection probability ${percent(probability)}`);
+    const { deviation } = data;
+    if (deviation) {
+      const least = deviation.least[n];
+      parts.push(least === null ? 'deviation: not known' : `deviation of the ${deviation.layer} ${millimetres(least)} to ${millimetres(deviation.greatest[n])}`);
+    }
     if (data.reviewed[n] !== null) parts.push(`reviewed ${percent(data.reviewed[n])}`);
     return parts.join('; ');
   }
@@ -128,16 +140,18 @@ export class Ribbon {
     const { context: c, width, height } = fitCanvas(this.canvas);
     c.clearRect(0, 0, width, height);
     if (!this.survey || width < 10) return;
-    const total = ROWS.reduce((sum, [, , share]) => sum + share, 0);
+    const { rows } = this;
+    const total = rows.reduce((sum, [, , share]) => sum + share, 0);
     const gap = 3;
-    const room = height - AXIS - gap * ROWS.length;
+    const room = height - AXIS - gap * rows.length;
     let y = 0;
     this.maxima = [];
-    for (const [name, , share] of ROWS) {
+    for (const [name, , share] of rows) {
       const tall = (room * share) / total;
       c.fillStyle = '#f3f5f7';
       c.fillRect(0, y, width, tall);
-      if (this.data) this.row(c, name, y, width, tall);
+      if (this.data && name === 'deviation') this.deviations(c, y, width, tall);
+      else if (this.data) this.row(c, name, y, width, tall);
       y += tall + gap;
     }
     this.axis(c, width, height);
@@ -148,15 +162,11 @@ export class Ribbon {
   /** Draw a row: bars of values, hatched where a value is not known. */
   row(c, name, top, width, tall) {
     const { data } = this;
-    const { from, to } = this.survey;
-    const scale = width / (to - from);
     const bars = name === 'findings' ? this.stacks() : null;
     const values = name === 'findings' ? bars.totals : data[name];
     const most = name === 'wet' || name === 'findings' ? Math.max(...values.map((value) => value ?? 0), 1e-9) : 1;
     for (let n = 0; n < values.length; n += 1) {
-      // Whole pixels: edges between pixels would show as stripes.
-      const x = Math.floor((data.from + n * data.step - from) * scale);
-      const wide = Math.max(Math.floor((data.from + (n + 1) * data.step - from) * scale) - x, 1);
+      const [x, wide] = this.bin(n, width);
       const value = values[n];
       const none = name === 'reviewed' && value === null;
       // No leak is no all-clear where nothing was inspected, or where that is not known.
@@ -184,6 +194,36 @@ export class Ribbon {
     }
     if (name === 'wet') this.maxima.push([top, `max ${number(most < 1e-6 ? 0 : most, 1, 'm²')}`]);
     if (name === 'findings') this.maxima.push([top, `max ${most < 1 ? 0 : most}`]);
+  }
+
+  /** Draw deviations from the middle of a row: inside the design upwards, outside downwards. */
+  deviations(c, top, width, tall) {
+    const { data } = this;
+    const { least, greatest } = data.deviation;
+    const most = Math.max(...least.map((value) => Math.abs(value ?? 0)), ...greatest.map((value) => Math.abs(value ?? 0)), 1e-9);
+    const middle = top + tall / 2;
+    for (let n = 0; n < least.length; n += 1) {
+      const [x, wide] = this.bin(n, width);
+      if (least[n] === null) {
+        hatch(c, x, top, wide, tall);
+      } else {
+        c.fillStyle = INSIDE;
+        const inside = (Math.max(greatest[n], 0) / most) * (tall / 2);
+        c.fillRect(x, middle - inside, wide, inside);
+        c.fillStyle = OUTSIDE;
+        c.fillRect(x, middle, wide, (Math.max(-least[n], 0) / most) * (tall / 2));
+      }
+    }
+    this.maxima.push([top, `max ${millimetres(most)}`]);
+  }
+
+  /** Return left edge and width of a bin, in whole pixels: edges between pixels would show as stripes. */
+  bin(n, width) {
+    const { data } = this;
+    const { from, to } = this.survey;
+    const scale = width / (to - from);
+    const x = Math.floor((data.from + n * data.step - from) * scale);
+    return [x, Math.max(Math.floor((data.from + (n + 1) * data.step - from) * scale) - x, 1)];
   }
 
   stacks() {
@@ -222,6 +262,10 @@ export class Ribbon {
     c.lineWidth = 1.5;
     c.strokeRect(left, 0.75, wide, height - 1.5);
   }
+}
+
+function millimetres(value) {
+  return `${number(1000 * value, 0)} mm`;
 }
 
 /** State the largest value of a row at its right end. */
