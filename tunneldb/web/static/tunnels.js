@@ -42,7 +42,7 @@ function draw(box, tunnels, picked) {
   const map = new ol.Map({
     target: box,
     layers: [
-      new ol.layer.Graticule({ showLabels: true, wrapX: false, strokeStyle: new ol.style.Stroke({ color: '#d9dfe4', width: 1 }), lonLabelStyle: label('#55626e'), latLabelStyle: label('#55626e') }),
+      new ol.layer.Graticule({ showLabels: true, wrapX: false, lonLabelPosition: 0.04, latLabelPosition: 0.94, strokeStyle: new ol.style.Stroke({ color: '#d9dfe4', width: 1 }), lonLabelStyle: label('#55626e'), latLabelStyle: label('#55626e') }),
       new ol.layer.Vector({ source, style, declutter: true }),
     ],
     controls: [new ol.control.Zoom({ zoomInTipLabel: 'Zoom in', zoomOutTipLabel: 'Zoom out' }), new ol.control.ScaleLine({ units: 'metric' })],
