@@ -32,6 +32,10 @@ NO_ROWS = {("run", "job_id"), ("point", "scan_id"), ("station", "scan_id"), ("ta
 NUMBERS = re.compile(r"id|.*_id|.*_ids|row_id|number|undoes|part_of|merged|merged_into|same_as|largest_leak|imported_.*")
 RENUMBERED = {"survey", "name", "old_survey", "parameters"}
 
+PHOTO = b"\xff\xd8\xff of a crown"
+
+STORED = "SELECT tunnel_api.finding_photo_content(id) FROM tunnel_api.finding_photo WHERE survey = %s ORDER BY id"
+
 Rows = dict[str, list[tuple[object, ...]]]
 
 
@@ -55,6 +59,7 @@ def edit(conn: psycopg.Connection) -> None:
     assert parts is not None
     conn.execute("SELECT tunnel_api.finding_merge(%s)", parts)
     conn.execute("INSERT INTO tunnel_api.finding_photo (finding_id, path, caption) VALUES (%s, 'a.jpg', 'crown')", [leaks[4]])
+    conn.execute("SELECT tunnel_api.finding_photo_add(%s, %b, 'crown')", [leaks[4], PHOTO])
     conn.execute(
         "INSERT INTO tunnel_api.finding_unrolled (survey, kind, geom)"
         " VALUES (%s, 'leak', ST_MakeEnvelope(12350, 1, 12351, 2, 0))",
@@ -165,6 +170,7 @@ def test_back_in_its_database_a_survey_is_what_it_was_with_its_numbers(
     assert not loaded.left_out
     assert different(before, views(conn, NAME, exact=True)) == {}
     assert conn.execute(points).fetchall() == former
+    assert conn.execute(STORED, [NAME]).fetchall() == [(None,), (PHOTO,)]
 
 
 def test_under_another_name_it_is_the_same_up_to_numbers_and_steps_can_be_taken_back(
@@ -176,6 +182,7 @@ def test_under_another_name_it_is_the_same_up_to_numbers_and_steps_can_be_taken_
     loaded = load_survey(conn, save(conn, tmp_path / "demo.tdb"), "other", silent)
     assert not loaded.kept
     assert different(before, views(conn, "other", exact=False)) == {}
+    assert conn.execute(STORED, ["other"]).fetchall() == [(None,), (PHOTO,)]
     merged = conn.execute(
         "SELECT e.row_id FROM tunnel_api.audit e WHERE e.survey = 'other' AND e.after ? 'merged' AND e.imported_by IS NOT NULL"
     ).fetchone()

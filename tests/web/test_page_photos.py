@@ -112,7 +112,7 @@ def test_what_is_no_photo_is_said_in_one_line(shown: Page, database: psycopg.Con
     choose(page, "Add photos", [page_file, *files(4)])
     expect(page.locator(".thumb")).to_have_count(1)
     line = page.locator(".upload")
-    expect(line).to_contain_text("evil.jpg: not saved: the photo was not saved: not a JPEG, PNG or WebP picture")
+    expect(line).to_contain_text("evil.jpg: not saved: the photo is not a JPEG, PNG or WebP picture")
     line.get_by_role("button", name="Discard").click()
     expect(line).to_have_count(0)
     large: FilePayload = {"name": "large.jpg", "mimeType": "image/jpeg", "buffer": bytes(26_000_000)}

@@ -105,6 +105,8 @@ def test_embedded_server_prints_a_token_that_lets_in(installed: str, monkeypatch
         (["--host", "192.0.2.1", "--behind-proxy"], "cannot listen on 192.0.2.1"),
         (["--host", "no such name", "--behind-proxy"], "cannot listen on no such name"),
         (["--certificate", "pyproject.toml", "--key", "pyproject.toml"], "not a certificate and its key"),
+        (["--photos", "nowhere"], "--photos nowhere: there is no such folder; create it"),
+        (["--photos", "pyproject.toml"], "--photos pyproject.toml: there is no such folder; create it"),
     ],
 )
 def test_wrong_options_get_one_line(dsn: str, words: list[str], said: str) -> None:

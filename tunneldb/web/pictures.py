@@ -18,6 +18,7 @@ from tunneldb.errors import UserError
 from tunneldb.report.pictures.decode import MAX_PIXELS
 from tunneldb.report.pictures.load import Source, load_pictures
 from tunneldb.report.pictures.trouble import NO_IMAGE, OUT_OF_TIME, TOO_LARGE
+from tunneldb.report.pictures.upload import NOT_A_PHOTO
 from tunneldb.web import photos
 from tunneldb.web.route import Call, answer_to, in_turn, make_call, session_of, turn
 
@@ -31,9 +32,10 @@ MAX_SMALL = 300
 """Number of small photos that are kept."""
 
 REASONS = {
-    TOO_LARGE: f"it has more than {MAX_PIXELS // 1_000_000} megapixels",
-    NO_IMAGE: "it is damaged, or not a picture",
-    OUT_OF_TIME: "it could not be decoded in time",
+    NOT_A_PHOTO: f"the photo is {NOT_A_PHOTO}",
+    TOO_LARGE: f"the photo has more than {MAX_PIXELS // 1_000_000} megapixels",
+    NO_IMAGE: "the photo is damaged",
+    OUT_OF_TIME: "the photo could not be decoded in time",
 }
 """What a person reads for some of the reasons why a picture is not available."""
 
@@ -142,5 +144,5 @@ def _decoded(folder: Path, form: Literal["photo", "upload"]) -> bytes:
     """
     picture = load_pictures([FILE], Source(folder), form)[FILE]
     if picture.trouble:
-        raise UserError(f"the photo was not saved: {REASONS.get(picture.trouble, picture.trouble)}")
+        raise UserError(REASONS.get(picture.trouble, picture.trouble))
     return base64.b64decode(picture.url.partition(",")[2])

@@ -142,6 +142,11 @@ export class Photos {
     this.send();
   }
 
+  discard(job) {
+    this.drop(job);
+    this.app.say(`Discarded: ${job.file.name}.`);
+  }
+
   drop(job) {
     this.jobs = this.jobs.filter((other) => other !== job);
     this.refresh();
@@ -161,6 +166,6 @@ export class Photos {
     const name = `${job.file.name}${job.id === this.finding?.id ? '' : ` (finding ${job.id})`}`;
     if (job.text === null) return el('span', {}, el('progress', { 'aria-label': `Saving ${name}` }), ` ${name}: not saved yet`);
     return el('span', {}, el('span', { class: 'warn-text', text: `${name}: not saved: ${job.text}` }), ' ',
-      button('Try again', () => this.again(job)), ' ', button('Discard', () => this.drop(job)));
+      button('Try again', () => this.again(job)), ' ', button('Discard', () => this.discard(job)));
   }
 }
