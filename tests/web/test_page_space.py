@@ -264,7 +264,7 @@ def test_a_phone_turns_and_selects_by_touch(context_of: Callable[..., BrowserCon
         assert (np.abs(picture(page) - before).sum(axis=2) > 30).mean() > 0.1
         page.get_by_role("button", name="Outside").tap()
         x, y = outline(page)
-        page.touchscreen.tap(box["x"] + x, box["y"] + y)
+        view(page).tap(position={"x": x, "y": y})
         expect(page.locator(".finding-head")).to_contain_text("no. 2")
 
 

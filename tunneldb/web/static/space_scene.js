@@ -13,6 +13,8 @@ const MARKED_WIDTH = 6;
 const LOOK = 0.6;
 const CROSS = 0.06;
 const CLICK = 5;
+const REACH = 8;
+const TOUCH_REACH = 18;
 
 three.ColorManagement.enabled = false;
 
@@ -54,10 +56,10 @@ export class SpaceScene {
   listen() {
     const { canvas } = this;
     let down = null;
-    canvas.addEventListener('pointerdown', (event) => { down = [event.clientX, event.clientY]; });
-    canvas.addEventListener('pointerup', (event) => {
-      if (!down || Math.hypot(event.clientX - down[0], event.clientY - down[1]) > CLICK) return;
-      const id = this.idAt(event.offsetX, event.offsetY, event.pointerType === 'mouse' ? 8 : 18);
+    canvas.addEventListener('pointerdown', (event) => { down = event; });
+    canvas.addEventListener('click', (event) => {
+      if (!down || Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY) > CLICK) return;
+      const id = this.idAt(event.offsetX, event.offsetY, down.pointerType === 'mouse' ? REACH : TOUCH_REACH);
       if (id !== null) this.on.picked(id);
     });
     canvas.addEventListener('wheel', (event) => this.inside && this.on.walked(event.deltaY < 0 ? 1 : -1), { passive: true });
