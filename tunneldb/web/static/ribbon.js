@@ -49,6 +49,7 @@ export class Ribbon {
     this.colours = new Map(survey.finding_kinds.map((kind) => [kind.code, kind]));
     this.canvas.setAttribute('aria-valuemin', survey.from);
     this.canvas.setAttribute('aria-valuemax', survey.to);
+    if (!this.tip.hidden) this.tip.textContent = this.describe(this.pointed);
     this.draw();
   }
 
@@ -105,6 +106,7 @@ export class Ribbon {
   }
 
   hint(chainage, x) {
+    this.pointed = chainage;
     this.tip.textContent = this.describe(chainage);
     this.tip.hidden = false;
     const room = this.canvas.clientWidth - this.tip.offsetWidth;
