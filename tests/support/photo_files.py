@@ -41,12 +41,14 @@ def photo(kind: str = "JPEG", size: tuple[int, int] = (400, 300), *, turned: boo
     return out.getvalue()
 
 
-def bomb(width: int, height: int) -> bytes:
-    """Return a small PNG file of many white pixels."""
+def bomb(width: int, height: int, text: int = 0) -> bytes:
+    """Return a small PNG file of many white pixels, with a text of so many bytes."""
     rows = (
         zlib.compress(bytes(1), 9) if width * height > 1_000_000_000 else zlib.compress((b"\0" + b"\xff" * width) * height, 9)
     )
-    chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)), (b"IDAT", rows), (b"IEND", b"")]
+    head = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    words = [(b"zTXt", b"a\0\0" + zlib.compress(bytes(text), 9))] if text else []
+    chunks = [(b"IHDR", head), *words, (b"IDAT", rows), (b"IEND", b"")]
     parts = [struct.pack(">I", len(d)) + n + d + struct.pack(">I", zlib.crc32(n + d)) for n, d in chunks]
     return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
 

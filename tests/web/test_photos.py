@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import io
 import os
 import re
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 
 import psycopg
 import pytest
+from PIL import Image, ImageCms
 from starlette.testclient import TestClient
 from support.photo_files import BLUE, RED, SERIAL, TAKEN, bomb, near, opened, photo
 from web.conftest import SignIn
@@ -104,6 +106,27 @@ def test_png_and_webp_become_jpeg(signed_in: SignIn, kind: str) -> None:
     assert SERIAL.encode() not in content
 
 
+@pytest.mark.parametrize("kind", ["PNG", "WEBP", "MPO"])
+def test_of_several_pictures_the_first_is_stored(signed_in: SignIn, kind: str) -> None:
+    out = io.BytesIO()
+    Image.new("RGB", (80, 60), RED).save(out, kind, save_all=True, append_images=[Image.new("RGB", (80, 60), BLUE)])
+    browser = signed_in("ines_web")
+    content = browser.get(f"/photos/{sent(browser, out.getvalue())['id']}").content
+    assert near(opened(content).getpixel((40, 30)), RED)
+
+
+def test_colours_are_those_of_the_profile(signed_in: SignIn) -> None:
+    """A profile of a display whose red is blue, and the reverse."""
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    swapped = profile.replace(b"rXYZ", b"????", 1).replace(b"bXYZ", b"rXYZ", 1).replace(b"????", b"bXYZ", 1)
+    out = io.BytesIO()
+    Image.new("RGB", (80, 60), RED).save(out, "JPEG", icc_profile=swapped)
+    browser = signed_in("ines_web")
+    content = browser.get(f"/photos/{sent(browser, out.getvalue())['id']}").content
+    assert near(opened(content).getpixel((40, 30)), BLUE)
+    assert "icc_profile" not in opened(content).info
+
+
 def test_a_large_photo_is_stored_smaller(signed_in: SignIn) -> None:
     browser = signed_in("ines_web")
     image = opened(browser.get(f"/photos/{sent(browser, photo(size=(8000, 6000)))['id']}").content)
@@ -179,6 +202,7 @@ REFUSED = {
     "cut WebP": (photo("WEBP")[:-100], "damaged"),
     "3600 megapixels": (bomb(60_000, 60_000), "more than 50 megapixels"),
     "60 megapixels": (bomb(10_000, 6_000), "more than 50 megapixels"),
+    "900 MB of text": (bomb(80, 60, text=900_000_000), "damaged"),
     "GIF": (b"GIF89a\x01\0\x01\0\0\0\0;", "not a JPEG, PNG or WebP picture"),
 }
 
