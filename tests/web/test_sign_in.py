@@ -13,6 +13,7 @@ from web.conftest import PASSWORD, SignIn, sign_in
 
 from tunneldb.web.app import create_app
 from tunneldb.web.config import Desk
+from tunneldb.web.pages import STATIC
 from tunneldb.web.rate_limit import MAX_ADDRESS_FAILURES, MAX_FAILURES, PERIOD, RateLimit
 from tunneldb.web.sessions import CONNECTIONS, MAX_OF_USER, Sessions, SignedOutError, open_for, open_own
 
@@ -162,7 +163,7 @@ def test_signing_in_again_ends_the_session_before(signed_in: SignIn, desk: Desk)
 def test_a_browser_that_comes_from_a_file_gets_a_page_that_leads_on(dsn: str, example: str) -> None:
     with TestClient(create_app(Desk(dsn, "token")), base_url="http://localhost:8080", follow_redirects=False) as browser:
         answer = browser.get("/enter?token=token", headers={"Sec-Fetch-Site": "cross-site"})
-        assert (answer.status_code, "url=/" in answer.text) == (200, True)
+        assert (answer.status_code, f"{STATIC}/again.js" in answer.text) == (200, True)
         assert browser.get("/api/surveys").status_code == 200
 
 

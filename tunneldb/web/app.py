@@ -112,6 +112,7 @@ def create_app(desk: Desk) -> Starlette:
         routes=[
             Route("/healthz", health),
             Route("/", sign_in.page),
+            Route("/open", sign_in.open_desk),
             Route("/enter", sign_in.enter),
             Route("/login", sign_in.form),
             Route("/login", sign_in.sign_in, methods=["POST"]),

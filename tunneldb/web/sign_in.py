@@ -7,7 +7,7 @@ from urllib.parse import parse_qsl
 
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from starlette.responses import JSONResponse, RedirectResponse, Response
 
 from tunneldb import __version__
 from tunneldb.errors import UserError
@@ -19,8 +19,6 @@ from tunneldb.web.sessions import CONNECTIONS, RefusedError, Session, open_for, 
 FORM_COOKIE = "tunneldb_form"
 """Cookie that the sign-in form repeats, so that no other page can send it."""
 
-ENTERED = '<!doctype html><meta http-equiv="refresh" content="0; url=/"><title>tunneldb</title>'
-"""Page that leads to the desk."""
 
 MAX_FORM, MAX_FIELDS = 8192, 5
 """Maximum length of the sign-in form, bytes, and of the number of its fields."""
@@ -31,12 +29,17 @@ async def page(request: Request) -> Response:
     desk: Desk = request.app.state.desk
     session = desk.sessions.find(request.cookies.get(cookie_name(desk)))
     if session is None:
-        return RedirectResponse("/login", 303)
+        return _again(request) if _from_elsewhere(request) else RedirectResponse("/login", 303)
     return TEMPLATES.TemplateResponse(
         request,
         "desk.html",
         {"version": __version__, "csrf": session.csrf, "user": session.user, "role": session.role},
     )
+
+
+async def open_desk(request: Request) -> Response:
+    """Lead to the desk: where a step from ``/`` to itself would not ask the server (`_again`)."""
+    return RedirectResponse("/", 303)
 
 
 async def form(request: Request) -> Response:
@@ -57,9 +60,17 @@ async def enter(request: Request) -> Response:
     session = await run_in_threadpool(
         lambda: desk.sessions.begin([open_own(desk.dsn) for _ in range(CONNECTIONS)], lambda: open_own(desk.dsn))
     )
-    # A browser that comes from a file or another program sends the strict cookie only after a step of the page itself.
-    foreign = request.headers.get("sec-fetch-site") == "cross-site"
-    return _signed_in(desk, session, HTMLResponse(ENTERED) if foreign else RedirectResponse("/", 303))
+    return _signed_in(desk, session, _again(request) if _from_elsewhere(request) else RedirectResponse("/", 303))
+
+
+def _from_elsewhere(request: Request) -> bool:
+    """Return True if a link of another page, a file or another program leads here: the browser then sends no strict cookie."""
+    return request.headers.get("sec-fetch-site") == "cross-site"
+
+
+def _again(request: Request) -> Response:
+    """Return a page that opens the desk at the same place, as a step of the desk itself: then the cookie is sent."""
+    return TEMPLATES.TemplateResponse(request, "again.html")
 
 
 async def sign_in(request: Request) -> Response:

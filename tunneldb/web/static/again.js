@@ -1,0 +1,3 @@
+/** Open the desk at the place that the address names: the part after # is not sent to the server. */
+
+location.replace(`/open${location.hash}`);
