@@ -51,6 +51,8 @@ export class Lining {
     });
     for (const control of this.box.querySelectorAll('.ol-zoom button')) control.setAttribute('aria-label', control.title);
     map.on('moveend', () => this.moved());
+    map.on('change:size', () => this.atBeginning && this.showBeginning());
+    for (const name of ['pointerdown', 'wheel', 'keydown']) this.box.addEventListener(name, () => { this.atBeginning = false; }, { passive: true });
     map.on('postrender', () => this.paintAxes());
     map.on('pointermove', (event) => {
       this.position.textContent = positionText(event.coordinate, this.clocks);
@@ -84,9 +86,15 @@ export class Lining {
     this.comparison.survey = null;
     this.rebuild();
     if (view) this.goTo(view.x, view.y, view.z);
-    else this.fitHeight(survey.from);
+    else this.showBeginning();
     // What takes longer follows the picture: a session has few connections.
     this.drawn = this.pictured().then(() => this.readClocks(survey));
+  }
+
+  /** Show the beginning in full height, again whenever the map changes its size, until the user goes elsewhere. */
+  showBeginning() {
+    this.fitHeight(this.survey.from);
+    this.atBeginning = true;
   }
 
   /** Wait until the map has its tiles, or for PICTURE_WAIT. */
@@ -143,6 +151,7 @@ export class Lining {
 
   /** Go to a place, and keep the zoom unless it is given. */
   goTo(x, y = null, z = null) {
+    this.atBeginning = false;
     const view = this.map.getView();
     if (z !== null) view.setZoom(z);
     view.setCenter([x, y ?? view.getCenter()[1]]);
@@ -159,6 +168,7 @@ export class Lining {
 
   /** Fit the whole survey. */
   fitAll() {
+    this.atBeginning = false;
     this.map.getView().fit(surveyExtent(this.survey), { padding: [20, 20, 20, 20] });
   }
 
