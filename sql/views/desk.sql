@@ -139,15 +139,14 @@ BEGIN
             WITH place AS (
                 SELECT floor((a.chainage_from + a.chainage_to) / 2 / cell) AS i, floor((a.arc_from + a.arc_to) / 2 / cell) AS k,
                        coalesce(a.kind_override, a.kind) AS kind, a.review, a.id,
-                       CASE WHEN a.manual THEN CASE WHEN a.wet THEN 1.0 ELSE 0.0 END
-                            WHEN a.kind = 'leak' THEN a.confidence ELSE 1 - a.confidence END AS probability, a.wet
+                       tunnel_api.leak_probability(a.kind, a.confidence, a.wet) AS probability, a.wet
                   FROM tunnel.finding a
                  WHERE a.survey_id = survey_key AND a.chainage_to > west AND a.chainage_from < east
                    AND (a.chainage_from + a.chainage_to) / 2 >= west AND (a.chainage_from + a.chainage_to) / 2 < east
                    AND (a.arc_from + a.arc_to) / 2 >= south AND (a.arc_from + a.arc_to) / 2 < north
                    AND a.detected AND a.review <> 'rejected' AND NOT a.superseded
             ), grouped AS (
-                SELECT min(p.id) AS id, count(*)::int AS count, bool_or(p.wet) AS wet, max(p.probability)::float8 AS probability,
+                SELECT min(p.id) AS id, count(*)::int AS count, bool_or(p.wet) AS wet, max(p.probability) AS probability,
                        mode() WITHIN GROUP (ORDER BY p.kind) AS kind,
                        CASE WHEN bool_or(p.review = 'open') THEN 'open' ELSE 'confirmed' END AS review,
                        CASE WHEN bool_or(p.review = 'open') THEN 'open' ELSE 'confirmed' END AS state,
@@ -158,11 +157,9 @@ BEGIN
     RETURN (
         WITH shown AS (
             SELECT a.id, coalesce(a.kind_override, a.kind) AS kind, a.review, a.wet,
-                   CASE WHEN a.merged_into IS NOT NULL THEN 'merged' WHEN a.same_as IS NOT NULL THEN 'same'
-                        WHEN a.review = 'rejected' THEN 'rejected' WHEN a.superseded THEN 'dry' WHEN NOT a.detected THEN 'gone'
-                        ELSE a.review END AS state,
-                   (CASE WHEN a.manual THEN CASE WHEN a.wet THEN 1.0 ELSE 0.0 END
-                         WHEN a.kind = 'leak' THEN a.confidence ELSE 1 - a.confidence END)::float8 AS probability,
+                   tunnel_internal.finding_state_name(
+                       a.review, a.merged_into IS NOT NULL, a.same_as IS NOT NULL, a.superseded, a.detected) AS state,
+                   tunnel_api.leak_probability(a.kind, a.confidence, a.wet) AS probability,
                    public.ST_AsMVTGeom(coalesce(a.shape, a.unrolled), frame, 4096, 256, true) AS geom
               FROM tunnel.finding a
              WHERE a.survey_id = survey_key AND a.chainage_to > west - margin AND a.chainage_from < east + margin

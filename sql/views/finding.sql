@@ -40,6 +40,21 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.evidence_text(jsonb) IS
     'Evidence for a leak and against it in words, each with the logarithm of odds that it contributes, the strongest first';
 
+CREATE OR REPLACE FUNCTION tunnel_internal.finding_state_name(
+    review text, merged boolean, same boolean, superseded boolean, detected boolean) RETURNS text
+LANGUAGE sql IMMUTABLE CALLED ON NULL INPUT PARALLEL SAFE
+RETURN CASE WHEN merged THEN 'merged' WHEN same THEN 'same' WHEN review = 'rejected' THEN 'rejected' WHEN superseded THEN 'dry'
+            WHEN NOT detected THEN 'gone' ELSE review END;
+COMMENT ON FUNCTION tunnel_internal.finding_state_name(text, boolean, boolean, boolean, boolean) IS
+    'State of a finding: merged or same (it is part of another one), rejected, dry (a dry region covers it), gone (no longer detected), open or confirmed';
+
+CREATE OR REPLACE FUNCTION tunnel_api.leak_probability(kind_detected text, confidence float8, wet boolean) RETURNS float8
+LANGUAGE sql IMMUTABLE CALLED ON NULL INPUT PARALLEL SAFE
+RETURN CASE WHEN confidence IS NULL THEN CASE WHEN wet THEN 1.0 ELSE 0.0 END
+            WHEN kind_detected = 'leak' THEN confidence ELSE 1.0 - confidence END;
+COMMENT ON FUNCTION tunnel_api.leak_probability(text, float8, boolean) IS
+    'Probability that a finding is a leak, by its columns kind_detected and confidence; of a drawn finding, which has no confidence, 1 if it is wet and 0 if not';
+
 CREATE OR REPLACE VIEW tunnel_api.finding_kind AS
 SELECT k.id, k.code, k.label, k.geometries, k.wet, k.position, k.active FROM tunnel.finding_kind k;
 COMMENT ON VIEW tunnel_api.finding_kind IS
@@ -77,9 +92,8 @@ SELECT a.id, a.survey_id, s.name AS survey, a.km,
        a.parent_id, a.merged_into, (SELECT array_agg(x.id ORDER BY x.id) FROM tunnel.finding x WHERE x.merged_into = a.id) AS merged,
        a.same_as, a.dry_region_id,
        a.detected AND a.review <> 'rejected' AND NOT a.superseded AS counted,
-       CASE WHEN a.merged_into IS NOT NULL THEN 'merged' WHEN a.same_as IS NOT NULL THEN 'same'
-            WHEN a.review = 'rejected' THEN 'rejected' WHEN a.superseded THEN 'dry' WHEN NOT a.detected THEN 'gone'
-            ELSE a.review END AS state,
+       tunnel_internal.finding_state_name(a.review, a.merged_into IS NOT NULL, a.same_as IS NOT NULL, a.superseded, a.detected)
+           AS state,
        (SELECT count(*) FROM tunnel.photo p WHERE p.finding_id = a.id) AS photos,
        tunnel_internal.evidence_text(a.evidence) AS evidence, a.model, a.superseded,
        (public.st_xmin(coalesce(a.shape_surface, a.surface)) + public.st_xmax(coalesce(a.shape_surface, a.surface))) / 2 AS easting,

@@ -15,12 +15,6 @@ from tunneldb.store.desk.rows import named
 REVIEWED = ("review", "remark", "kind")
 """Columns that a review writes."""
 
-PROBABILITY = (
-    "CASE WHEN f.confidence IS NULL THEN CASE WHEN f.wet THEN 1.0 ELSE 0.0 END"
-    " WHEN f.kind_detected = 'leak' THEN f.confidence ELSE 1.0 - f.confidence END::float8"
-)
-"""Probability that a finding is a leak, by detection; 1 if a person drew it as wet."""
-
 ORDERS = {
     "likely": "probability DESC, chainage_from, id",
     "unlikely": "probability, chainage_from, id",
@@ -41,11 +35,11 @@ def worklist(
     rows = conn.execute(
         sql.SQL(
             "SELECT * FROM (SELECT f.id, f.kind, f.review, f.chainage_from, f.chainage_to, f.arc_from, f.arc_to,"
-            " {} AS probability, f.area"
+            " tunnel_api.leak_probability(f.kind_detected, f.confidence, f.wet) AS probability, f.area"
             " FROM tunnel_api.finding f WHERE f.survey_id = %s AND f.state IN ('open', 'confirmed', 'rejected', 'gone')"
             " AND f.chainage_to > %s AND f.chainage_from < %s AND f.area >= %s AND (%s OR f.kind = ANY(%s))) f"
             " ORDER BY {} LIMIT {}"
-        ).format(sql.SQL(PROBABILITY), sql.SQL(ORDERS[order]), MOST),
+        ).format(sql.SQL(ORDERS[order]), MOST),
         [survey_id, low, high, min_area, not kinds, list(kinds)],
     )
     return named(rows)
