@@ -3,73 +3,26 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-import numpy as np
-import psycopg
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.convertors import Convertor, register_url_convertor
 from starlette.middleware import Middleware
 from starlette.middleware.base import BaseHTTPMiddleware
 from starlette.middleware.gzip import GZipMiddleware
-from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from tunneldb.errors import UserError
-from tunneldb.web import exports, findings, ogc, photos, pictures, points, sections, sign_in, surveys, tiles
+from tunneldb.web import exports, findings, health, ogc, photos, pictures, points, sections, sign_in, surveys, tiles
 from tunneldb.web.config import Desk
 from tunneldb.web.pages import FOLDER, STATIC
 from tunneldb.web.route import route
 from tunneldb.web.security import guard
-from tunneldb.web.sessions import open_own
-
-HEALTH_KEPT = 2.0
-"""Time for which the answer to a question for the health is kept, s."""
 
 SWEEP = 30.0
 """Time between two looks for sessions that are over, s."""
-
-
-async def health(request: Request) -> Response:
-    """Return 200 if the database answers, else 503."""
-    healthy = await request.app.state.health.ask()
-    return PlainTextResponse("ok") if healthy else PlainTextResponse("no database", 503)
-
-
-class Health:
-    """Health of the database. One request at a time asks it; the answer is kept for HEALTH_KEPT.
-
-    Parameters
-    ----------
-    dsn : str
-        Database.
-    """
-
-    def __init__(self, dsn: str) -> None:
-        self._dsn = dsn
-        self._lock = asyncio.Lock()
-        self._asked = -np.inf
-        self._healthy = False
-
-    async def ask(self) -> bool:
-        """Return True if the database answers, or did so within HEALTH_KEPT."""
-        async with self._lock:
-            if time.monotonic() - self._asked > HEALTH_KEPT:
-                self._healthy = await run_in_threadpool(self._answers)
-                self._asked = time.monotonic()
-            return self._healthy
-
-    def _answers(self) -> bool:
-        try:
-            with open_own(self._dsn) as conn:
-                return conn.execute("SELECT 1").fetchone() == (1,)
-        except (UserError, psycopg.Error):
-            return False
 
 
 class _Key(Convertor[int]):
@@ -110,7 +63,7 @@ def create_app(desk: Desk) -> Starlette:
     app = Starlette(
         lifespan=lifespan,
         routes=[
-            Route("/healthz", health),
+            Route("/healthz", health.answer),
             Route("/", sign_in.page),
             Route("/open", sign_in.open_desk),
             Route("/enter", sign_in.enter),
@@ -160,5 +113,5 @@ def create_app(desk: Desk) -> Starlette:
     )
     app.state.desk = desk
     app.state.decoding = pictures.Decoding()
-    app.state.health = Health(desk.dsn)
+    app.state.health = health.Health(desk.dsn)
     return app
