@@ -34,8 +34,12 @@ PACKAGES: dict[str, tuple[str, dict[str, str]]] = {
     "rbush": ("4", {}),
     "zarrita": ("0.7", {}),
     "three": ("0", {"LICENSE": "three/LICENSE"}),
+    "idb": ("8", {"build/index.js": "idb/idb.js", "LICENSE": "idb/LICENSE"}),
 }
 """Range of versions of each package, and its files: path in the package, path below ``vendor/``."""
+
+OWN_LICENCE = ("three", "idb")
+"""Packages whose licence is a file beside them."""
 
 THREE, ESBUILD = "three/three.js", "0.28.2"
 """Module of the 3D view, and the version of esbuild that writes it."""
@@ -67,7 +71,7 @@ def main() -> None:
             if package == "three":
                 three = bundle(Path(folder), item["version"])
         items.append(item)
-        if package == "three":
+        if package in OWN_LICENCE:
             continue
         licences.append(f"{package} {item['version']}\n\n{licence.strip()}\n")
     text = "Libraries that are compiled into ol.js, with their licences.\n\n" + ("\n" + "-" * 80 + "\n\n").join(licences)

@@ -17,7 +17,7 @@ from starlette.staticfiles import StaticFiles
 
 from tunneldb.web import exports, findings, health, ogc, photos, pictures, points, sections, sign_in, surveys, tiles
 from tunneldb.web.config import Desk
-from tunneldb.web.pages import FOLDER, STATIC
+from tunneldb.web.pages import FOLDER, STATIC, worker
 from tunneldb.web.route import route
 from tunneldb.web.security import guard
 
@@ -65,6 +65,7 @@ def create_app(desk: Desk) -> Starlette:
         routes=[
             Route("/healthz", health.answer),
             Route("/", sign_in.page),
+            Route("/worker.js", worker),
             Route("/open", sign_in.open_desk),
             Route("/enter", sign_in.enter),
             Route("/login", sign_in.form),

@@ -6,6 +6,8 @@ import hashlib
 import re
 from pathlib import Path
 
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
 from starlette.templating import Jinja2Templates
 
 FOLDER = Path(__file__).parent
@@ -35,5 +37,13 @@ def _modules(folder: Path, name: str) -> list[str]:
 
 STATIC = f"/static/{_digest(FOLDER / 'static')}"
 """Path of the files; another one with each version, so browsers need not ask whether a file has changed."""
+
+WORKER_HEADERS = {"Cache-Control": "no-cache", "Service-Worker-Allowed": "/"}
+
+
+async def worker(request: Request) -> Response:
+    """Return the service worker; a browser asks each time whether it has changed."""
+    return FileResponse(FOLDER / "static" / "worker.js", media_type="text/javascript", headers=WORKER_HEADERS)
+
 
 TEMPLATES.env.globals |= {"static": STATIC, "modules": _modules(FOLDER / "static", "main.js")}

@@ -2,11 +2,13 @@
 
 import { get, post, surveyPath } from './api.js';
 import { button, debounce, el } from './dom.js';
-import { station } from './format.js';
+import { station, time } from './format.js';
 import { downloadsPanel } from './downloads.js';
 import { DrawPanel } from './draw.js';
 import { notesPanel, showLimits } from './limits.js';
+import { heldStretches, removeAll, removeOthers } from './held.js';
 import { Lining } from './lining.js';
+import { Network } from './network.js';
 import { Panel } from './panel.js';
 import { Review } from './review.js';
 import { Ribbon } from './ribbon.js';
@@ -72,6 +74,7 @@ const review = new Review(session, {
   },
 });
 const space = new Space(node('space'), { picked, closed, shown: () => lining.shown });
+const network = new Network(meta('held') || null, { away: showNetwork, back: reconnected });
 const section = new SectionPanel(() => lining.view.x, () => session.facts);
 const draw = new DrawPanel(lining, {
   canWrite, say,
@@ -166,13 +169,53 @@ function showTab(tab) {
   else if (space.open) space.close();
   const content = {
     finding: () => review.root, review: () => review.root, draw: () => draw.root, section: () => section.root,
-    downloads: () => downloadsPanel(app.survey, stretch, meta('role') === 'operator'), notes: () => notesPanel(app.summary),
+    offline: () => offlineRoot, downloads: () => downloadsPanel(app.survey, stretch, meta('role') === 'operator'), notes: () => notesPanel(app.summary),
   }[tab]();
   panel.fill(content);
   if (tab === 'section') section.open();
   if (tab === 'draw') draw.refresh();
+  if (tab === 'offline') openOffline();
   address();
   lining.map.updateSize();
+}
+
+const offlineRoot = el('div', {});
+
+/** Show what can be taken offline; the module comes when it is first needed. */
+async function openOffline() {
+  try {
+    const { OfflinePanel } = await import('./offline.js');
+    app.offline ??= new OfflinePanel(user, { extent: stretch, kind: () => lining.kind, changed: showNetwork });
+    offlineRoot.replaceChildren(app.offline.root);
+    app.offline.open(app.survey);
+  } catch {
+    offlineRoot.replaceChildren(el('p', { class: 'pad warn-text', text: 'The server cannot be reached, and this part of the page was not taken offline.' }));
+  }
+}
+
+/** State whether the page shows the database, or what was taken offline, and from when that is. */
+async function showNetwork() {
+  const box = node('network');
+  box.hidden = !network.away;
+  if (!network.away) return;
+  const held = await heldStretches(user);
+  const places = held.map(({ survey, from, to }) => `${survey}, ${station(from)} to ${station(to)}`).join('; ');
+  const since = network.since ?? (held.length ? new Date(Math.min(...held.map(({ at }) => at))).toISOString() : null);
+  box.textContent = `Offline: as of ${time(since)}. ${places ? `Held on this device: ${places}. Elsewhere: not taken offline.` : 'Nothing was taken offline.'}`;
+}
+
+/** Read again what the page shows, after the network was away. */
+function reconnected() {
+  showNetwork();
+  say('The server can be reached again.');
+  if (!app.survey) {
+    route();
+    return;
+  }
+  lining.refresh();
+  readRibbon(app.survey);
+  readSummary(app.survey);
+  if (app.finding !== null) review.open(app.finding, false);
 }
 
 /** Read what was not inspected; it takes longer than the picture of a long survey. */
@@ -334,6 +377,7 @@ node('skip').addEventListener('click', (event) => {
 node('sign-out').addEventListener('click', async () => {
   try {
     await post('/logout');
+    await removeAll();
     location.assign('/login');
   } catch (error) {
     say(`Not signed out. ${error.message}`, true);
@@ -341,4 +385,12 @@ node('sign-out').addEventListener('click', async () => {
 });
 window.addEventListener('hashchange', route);
 offerLeft();
-route();
+
+/** Begin, once nothing of another user is left on the device. */
+async function begin() {
+  await removeOthers(user);
+  showNetwork();
+  route();
+  if (!network.away && (await heldStretches(user)).length) import('./offline.js').then(({ renewShell }) => renewShell(user));
+}
+begin();

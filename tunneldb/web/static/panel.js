@@ -2,7 +2,7 @@
 
 import { el } from './dom.js';
 
-const TABS = [['finding', 'Finding'], ['review', 'Review'], ['draw', 'Draw'], ['section', 'Section'], ['downloads', 'Download'], ['notes', 'Notes']];
+const TABS = [['finding', 'Finding'], ['review', 'Review'], ['draw', 'Draw'], ['section', 'Section'], ['downloads', 'Download'], ['offline', 'Offline'], ['notes', 'Notes']];
 
 /** Panel with tabs. */
 export class Panel {
