@@ -96,8 +96,8 @@ def test_a_photo_is_not_saved_until_the_server_has_it(shown: Page, database: psy
     page.context.set_offline(True)
     try:
         choose(page, "Add photos", files(3))
-        expect(page.locator(".upload")).to_contain_text("IMG_3.jpg: not saved: The server cannot be reached.")
-        expect(page.locator("#state")).to_have_text("Not saved: photo of finding 1.")
+        expect(page.locator(".upload")).to_contain_text("IMG_3.jpg: recorded on this device, not in the database yet")
+        expect(page.locator("#state")).to_have_text("Recorded on this device. Photo of finding 1.")
         assert rows(database) == []
     finally:
         page.context.set_offline(False)

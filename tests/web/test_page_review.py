@@ -212,74 +212,98 @@ def verdict(database: psycopg.Connection) -> str:
     return str(value)
 
 
+WAITS = "Recorded on this device, not in the database yet: 1."
+
+
 def test_a_verdict_waits_for_the_network(finding: Page, database: psycopg.Connection) -> None:
-    """It is tried again by itself, and can be discarded."""
+    """It is sent by itself, and can be discarded."""
     page = finding
     alert = page.locator("#alerts")
     page.context.set_offline(True)
     page.keyboard.press("c")
-    expect(alert).to_contain_text("Not saved yet. Finding 1: confirmed. The server cannot be reached.")
-    expect(page.locator("#state")).to_have_text("Not saved yet.")
+    expect(alert).to_contain_text(WAITS)
+    says(page, "Recorded on this device. Finding 1: confirmed.")
+    expect(page.locator(".finding-head")).to_contain_text("confirmed")
+    expect(page.locator(".finding-head")).to_contain_text("Recorded on this device, not in the database yet.")
     assert verdict(database) == "open"
     page.context.set_offline(False)
-    expect(page.locator("#state")).to_contain_text("Saved. Finding 1: confirmed.")
+    says(page, "Saved. Finding 1: confirmed.")
     assert verdict(database) == "confirmed"
     expect(alert).to_be_empty()
-    expect(page.locator(".finding-head .badge")).to_have_text("confirmed")
+    shows(page, 1, "confirmed")
+    expect(page.locator(".finding-head")).not_to_contain_text("Recorded")
     page.context.set_offline(True)
     page.keyboard.press("r")
-    expect(alert).to_contain_text("Not saved yet. Finding 1: rejected.")
-    page.get_by_role("button", name="Discard").click()
-    expect(page.locator("#state")).to_contain_text("Discarded: not saved.")
+    expect(alert).to_contain_text(WAITS)
+    alert.locator("summary").click()
+    expect(alert).to_contain_text("Finding 1: rejected")
+    alert.get_by_role("button", name="Discard").click()
+    expect(alert).to_be_empty()
     page.context.set_offline(False)
-    expect(page.locator(".finding-head .badge")).to_have_text("confirmed")
+    page.reload()
+    shows(page, 1, "confirmed")
     assert verdict(database) == "confirmed"
     forgive(page, "ERR_INTERNET_DISCONNECTED")
 
 
-def test_a_verdict_of_the_last_visit_meets_that_of_another_person(finding: Page, database: psycopg.Connection) -> None:
-    """It is not written over the other one, and stays on offer until it is discarded."""
+def test_undo_takes_a_verdict_back_that_waits(finding: Page, database: psycopg.Connection) -> None:
     page = finding
-    page.evaluate(
-        "localStorage.setItem('tunneldb.unsaved.ines_web', JSON.stringify("
-        "{ id: 1, seen: { review: 'open', remark: null, kind: 'leak' }, values: { review: 'confirmed' } }))"
-    )
+    page.context.set_offline(True)
+    page.keyboard.press("r")
+    expect(page.locator("#alerts")).to_contain_text(WAITS)
+    page.keyboard.press("z")
+    says(page, "Finding 1: undone; the database did not have it yet.")
+    shows(page, 1, "open")
+    expect(page.locator("#alerts")).to_be_empty()
+    page.context.set_offline(False)
+    assert verdict(database) == "open"
+    forgive(page, "ERR_INTERNET_DISCONNECTED")
+
+
+def test_a_verdict_of_the_last_visit_meets_that_of_another_person(finding: Page, database: psycopg.Connection) -> None:
+    """It is not written over the other one, and stays on offer until the person decides."""
+    page = finding
+    alert = page.locator("#alerts")
+    page.route("**/api/findings/1", lambda route: route.abort() if route.request.method == "PATCH" else route.fallback())
+    page.keyboard.press("c")
+    expect(alert).to_contain_text(WAITS)
     database.execute("UPDATE tunnel.finding SET review = 'rejected', reviewed_by = 'ivo_web', reviewed_at = now() WHERE id = 1")
+    page.unroute("**/api/findings/1")
     page.goto("/#/")
     page.reload()
-    page.get_by_role("button", name="Save now").click()
-    expect(page.locator("#state")).to_contain_text("Not saved. ivo_web has changed finding 1 in the meantime")
-    expect(page.locator("#alerts")).to_contain_text("A review of your last visit was not saved: finding 1, review: confirmed.")
+    expect(alert).to_contain_text(f"{WAITS} Your decision is needed: 1.")
     assert verdict(database) == "rejected"
-    page.get_by_role("link", name="Show finding 1").click()
-    expect(page.locator(".finding-head .badge")).to_have_text("rejected")
-    page.get_by_role("button", name="Discard").click()
+    alert.locator("summary").click()
+    expect(alert).to_contain_text("In the database: rejected, Leak, no remark, by ivo_web. Yours: review: confirmed.")
+    alert.get_by_role("link", name="Finding 1: confirmed").click()
+    shows(page, 1, "rejected")
     page.reload()
-    expect(page.locator(".finding-head .badge")).to_have_text("rejected")
-    expect(page.locator("#alerts")).to_be_empty()
-    forgive(page, "status of 409")
+    alert.locator("summary").click()
+    alert.get_by_role("button", name="Keep theirs").click()
+    expect(alert).to_be_empty()
+    page.reload()
+    shows(page, 1, "rejected")
+    expect(alert).to_be_empty()
+    assert verdict(database) == "rejected"
+    forgive(page, "status of 409|ERR_FAILED")
 
 
 def test_a_verdict_survives_a_restart_of_the_server(finding: Page, database: psycopg.Connection, server: DeskServer) -> None:
-    """The restart ends all sessions: after the sign-in the finding is shown, and the verdict is offered again."""
+    """The restart ends all sessions: after the sign-in the finding is shown, and the verdict is sent."""
     page = finding
     server.stop()
     page.keyboard.press("c")
-    expect(page.locator("#alerts")).to_contain_text("Not saved yet. Finding 1: confirmed.")
+    expect(page.locator("#alerts")).to_contain_text(WAITS)
     assert "Saved." not in page.locator("#state").inner_text()
     assert verdict(database) == "open"
     server.start()
     expect(page.get_by_label("Password")).to_be_visible()
     assert verdict(database) == "open"
     sign_in(page, "ines_web", PASSWORD)
-    expect(page.locator(".finding-head")).to_contain_text("no. 1")
-    expect(page.locator("#alerts")).to_contain_text("A review of your last visit was not saved: finding 1, review: confirmed.")
-    page.get_by_role("button", name="Save now").click()
-    expect(page.locator("#state")).to_contain_text("Saved. Finding 1: confirmed.")
-    assert verdict(database) == "confirmed"
+    shows(page, 1, "confirmed")
     expect(page.locator("#alerts")).to_be_empty()
-    expect(page.locator(".finding-head .badge")).to_have_text("confirmed")
+    assert verdict(database) == "confirmed"
     page.reload()
-    expect(page.locator(".finding-head .badge")).to_have_text("confirmed")
+    shows(page, 1, "confirmed")
     expect(page.locator("#alerts")).to_be_empty()
     forgive(page, "ERR_CONNECTION_REFUSED|status of 401|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET")

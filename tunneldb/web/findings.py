@@ -63,15 +63,20 @@ def undo(call: Call) -> Any:
 
 
 def draw(call: Call) -> Response:
-    """Add a drawn finding."""
+    """Add a drawn finding.
+
+    With ``again`` the request was sent before and its answer was lost: if it was done then, return that finding.
+    """
     body = _object(call.body)
     values = {name: body.get(name) for name in ("kind", "severity", "width_mm", "remark")}
     for name, types in (("kind", str), ("severity", int | None), ("width_mm", int | float | None), ("remark", str | None)):
         if not isinstance(values[name], types) or isinstance(values[name], bool):
             raise UserError(f"{name} is missing, or of a wrong type")
+    if not isinstance(body.get("again", False), bool):
+        raise UserError("again is true or false")
     with call.session.connection() as conn:
         survey = survey_of(conn, call.path["survey"])
-        key = findings.draw(conn, survey.name, _object(body.get("geometry")), values)
+        key = findings.draw(conn, survey.name, _object(body.get("geometry")), values, again=body.get("again", False))
         return JSONResponse(_finding(conn, key), 201)
 
 

@@ -102,16 +102,40 @@ def undo(conn: psycopg.Connection[Any], finding_id: int) -> str:
     return str(_value(conn, "SELECT tunnel_api.finding_undo(%s)", [finding_id]))
 
 
-def draw(conn: psycopg.Connection[Any], survey: str, geometry: Any, values: Mapping[str, Any]) -> int:
-    """Add a drawn finding, a GeoJSON geometry in the unrolled plane; return its id."""
-    return int(
-        _value(
-            conn,
-            "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width_mm, remark, geom) VALUES"
-            " (%s, %s, %s, %s, %s, public.ST_SetSRID(public.ST_GeomFromGeoJSON(%s), 0)) RETURNING id",
-            [survey, values["kind"], values["severity"], values["width_mm"], values["remark"], json.dumps(geometry)],
+def draw(conn: psycopg.Connection[Any], survey: str, geometry: Any, values: Mapping[str, Any], *, again: bool = False) -> int:
+    """Add a drawn finding, a GeoJSON geometry in the unrolled plane; return its id.
+
+    Parameters
+    ----------
+    again : bool
+        True to return the finding that the person has drawn with this outline before, if there is one.
+    """
+    outline = json.dumps(geometry)
+    with conn.transaction():
+        # The first request may still be under way: drawings of a person follow each other.
+        conn.execute("SELECT pg_advisory_xact_lock(hashtextextended('tunneldb drawing ' || session_user, 0))")
+        if again and (found := _drawn(conn, survey, outline)) is not None:
+            return found
+        return int(
+            _value(
+                conn,
+                "INSERT INTO tunnel_api.finding_unrolled (survey, kind, severity, width_mm, remark, geom) VALUES"
+                " (%s, %s, %s, %s, %s, public.ST_SetSRID(public.ST_GeomFromGeoJSON(%s), 0)) RETURNING id",
+                [survey, values["kind"], values["severity"], values["width_mm"], values["remark"], outline],
+            )
         )
-    )
+
+
+def _drawn(conn: psycopg.Connection[Any], survey: str, outline: str) -> int | None:
+    """Return the finding that the person has drawn with an outline, by the audit: also if it was changed or deleted since."""
+    row = conn.execute(
+        "SELECT a.row_id FROM tunnel_api.audit a WHERE a.survey = %s AND a.view = 'finding' AND a.action = 'insert'"
+        " AND a.who = session_user AND a.undoes IS NULL AND a.imported_by IS NULL"
+        " AND public.ST_Equals(public.ST_GeomFromEWKT(a.after ->> 'geom'),"
+        " public.ST_SetSRID(public.ST_GeomFromGeoJSON(%s), 0)) ORDER BY a.id DESC LIMIT 1",
+        [survey, outline],
+    ).fetchone()
+    return None if row is None else int(row[0])
 
 
 def redraw(conn: psycopg.Connection[Any], finding_id: int, geometry: Any) -> bool:

@@ -1,6 +1,8 @@
 /** Requests to the server. */
 
-const csrf = document.querySelector('meta[name=csrf]')?.content ?? '';
+const meta = (page, name) => page.querySelector(`meta[name=${name}]`)?.content ?? '';
+const user = meta(document, 'user');
+let csrf = meta(document, 'csrf');
 
 /** Refusal of the server, or a server that is away (status 0). */
 export class ApiError extends Error {
@@ -17,6 +19,7 @@ export class ApiError extends Error {
 }
 
 const AWAY = 'The server cannot be reached.';
+const OUT_OF_DATE = 'the page is out of date';
 const LIMIT = 20000;
 const UPLOAD_LIMIT = 300000;
 
@@ -77,6 +80,25 @@ export function findingPath(id, rest = '') {
 }
 
 async function answer(method, path, body, signal, limit = LIMIT) {
+  const writes = method !== 'GET';
+  if (writes && !csrf) await readToken();
+  let response = await send(method, path, body, signal, limit);
+  let data = await refusal(response);
+  if (writes && response.status === 403 && data?.error?.startsWith(OUT_OF_DATE)) {
+    await readToken();
+    response = await send(method, path, body, signal, limit);
+    data = await refusal(response);
+  }
+  if (response.status === 401) signIn();
+  if (!response.ok) throw new ApiError(response.status, data?.error ?? `The server answered with status ${response.status}.`, data);
+  return response;
+}
+
+async function refusal(response) {
+  return response.ok || response.status === 401 ? null : response.json().catch(() => null);
+}
+
+async function send(method, path, body, signal, limit) {
   const headers = { Accept: 'application/json' };
   if (method !== 'GET') headers['X-CSRF-Token'] = csrf;
   const file = body instanceof Blob;
@@ -84,9 +106,8 @@ async function answer(method, path, body, signal, limit = LIMIT) {
   const own = new AbortController();
   const timer = setTimeout(() => own.abort(), limit);
   signal?.addEventListener('abort', () => own.abort());
-  let response;
   try {
-    response = await fetch(path, {
+    return await fetch(path, {
       method, headers, signal: own.signal, credentials: 'same-origin', body: file || body === undefined ? body : JSON.stringify(body),
     });
   } catch (error) {
@@ -95,14 +116,23 @@ async function answer(method, path, body, signal, limit = LIMIT) {
   } finally {
     clearTimeout(timer);
   }
-  if (response.status === 401) {
-    // The part of the address after # comes back after the sign-in (login.js).
-    location.assign(`/login${location.hash}`);
-    throw new ApiError(401, 'Sign in again.');
+}
+
+/** Read the token against forged requests from the page: a copy of the page has none, and each session has its own. */
+async function readToken() {
+  const response = await send('GET', '/', undefined, null, LIMIT);
+  const page = new DOMParser().parseFromString(await response.text().catch(() => ''), 'text/html');
+  if (!response.ok) throw new ApiError(response.status, AWAY);
+  if (!meta(page, 'csrf')) signIn();
+  if (meta(page, 'user') !== user) {
+    location.reload(); // Another person has signed in: this page must not write in their name.
+    throw new ApiError(401, 'Another person has signed in.');
   }
-  if (!response.ok) {
-    const data = await response.json().catch(() => null);
-    throw new ApiError(response.status, data?.error ?? `The server answered with status ${response.status}.`, data);
-  }
-  return response;
+  csrf = meta(page, 'csrf');
+}
+
+function signIn() {
+  // The part of the address after # comes back after the sign-in (login.js).
+  location.assign(`/login${location.hash}`);
+  throw new ApiError(401, 'Sign in again.');
 }

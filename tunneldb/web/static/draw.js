@@ -1,6 +1,6 @@
 /** Panel to draw and change findings. */
 
-import { findingPath, post, put, remove, surveyPath } from './api.js';
+import { ApiError, findingPath, post, put, remove } from './api.js';
 import { button, el, field } from './dom.js';
 import { number } from './format.js';
 import { Sketch } from './sketch.js';
@@ -11,7 +11,7 @@ const SHAPES = { polygon: 'Polygon', line: 'Line', point: 'Point' };
 export class DrawPanel {
   /**
    * @param {Lining} lining
-   * @param {Object} app - canWrite, say(text, wrong), current(), open(id), closed(), changed().
+   * @param {Object} app - canWrite, say(text, wrong), current(), open(id), closed(), changed(), outbox.
    */
   constructor(lining, app) {
     this.lining = lining;
@@ -91,7 +91,7 @@ export class DrawPanel {
   ask() {
     const { id } = this.app.current();
     const dialog = el('dialog', { 'aria-labelledby': 'delete-title' },
-      el('h2', { id: 'delete-title', text: `Delete finding ${id}?` }),
+      el('h2', { id: 'delete-title', text: id > 0 ? `Delete finding ${id}?` : 'Delete this drawing?' }),
       el('p', { text: 'Only drawn findings can be deleted. Reject a detected one instead.' }),
       el('div', { class: 'row' }, button('Delete', () => {
         dialog.close();
@@ -104,10 +104,18 @@ export class DrawPanel {
 
   delete(id) {
     return this.send(async () => {
-      await remove(findingPath(id));
-      this.app.say(`Finding ${id} deleted.`);
+      if (id > 0) await remove(findingPath(id));
+      else await this.discard(id);
+      this.app.say(id > 0 ? `Finding ${id} deleted.` : 'Drawing deleted.');
       this.app.closed();
     });
+  }
+
+  /** Drop a drawing that the database does not have yet. */
+  async discard(id) {
+    const { outbox } = this.app;
+    const record = outbox.records.find(({ type, key }) => type === 'draw' && key === -id);
+    if (!record || !(await outbox.discard(record))) throw new ApiError(0, 'it is being sent: try again');
   }
 
   save() {
@@ -115,21 +123,33 @@ export class DrawPanel {
     const { geometry } = sketch;
     const text = (box) => box.value.trim() || null;
     const act = {
-      new: async () => (await post(surveyPath(survey.name, '/findings'), {
+      new: () => this.record(survey.name, {
         geometry, kind: this.kind.value, severity: this.severity.value ? Number(this.severity.value) : null,
         width_mm: this.width.value ? Number(this.width.value) : null, remark: text(this.remark),
-      })).id,
+      }),
       outline: async () => (await put(findingPath(task.id, '/outline'), { geometry })).id,
       split: async () => (await post(findingPath(task.id, '/split'), { line: geometry })).ids[0],
       merge: async () => (await post('/api/findings/merge', { ids: this.merging })).id,
     }[task.name];
     return this.send(async () => {
       const id = await act();
-      this.app.say(`Saved: finding ${id}.`);
+      this.app.say(id > 0 ? `Saved: finding ${id}.` : 'Recorded on this device, not in the database yet.');
       this.cancel();
       this.width.value = this.remark.value = '';
       this.app.open(id);
     });
+  }
+
+  /** Record a new finding; return its number. If the server refuses it, the sketch stays in its place. */
+  async record(survey, body) {
+    const { outbox } = this.app;
+    const record = await outbox.add({ type: 'draw', survey, body });
+    try {
+      return (await outbox.submit(record))?.id ?? -record.key;
+    } catch (error) {
+      await outbox.discard(record);
+      throw error;
+    }
   }
 
   /** Send; if the server refuses or is away, the sketch and the entries stay. */
@@ -169,7 +189,7 @@ export class DrawPanel {
       control.disabled = !app.canWrite;
       control.setAttribute('aria-pressed', String(name === 'new' && control.dataset.shape === task.shape));
     }
-    for (const control of this.changes.children) control.disabled = !app.canWrite || !finding;
+    for (const control of this.changes.children) control.disabled = !app.canWrite || !finding || (finding.id < 0 && !control.classList.contains('danger'));
     this.form.hidden = name !== 'new';
     this.byKeys.hidden = !sketch.pen;
     this.ends.hidden = !task;
@@ -179,7 +199,7 @@ export class DrawPanel {
 
   advice(name, finding) {
     const { sketch } = this;
-    if (name === null) return finding ? `Shown: finding ${finding.id}.` : 'Click a finding on the lining to change it.';
+    if (name === null) return finding ? (finding.id > 0 ? `Shown: finding ${finding.id}.` : 'Shown: a drawing that is not in the database yet.') : 'Click a finding on the lining to change it.';
     if (name === 'merge') return `Click the findings to merge: ${this.merging.join(', ')}.`;
     if (sketch.pen) {
       return { point: 'Click the place.', line: 'Click the points of the line; a double click or Finish ends it.', polygon: 'Click the corners; a double click or Finish ends the polygon.' }[sketch.shape];

@@ -9,15 +9,16 @@ const STATES = { merged: 'merged into another finding', same: 'same as another f
 /** Return the head of a finding: place, number and review. */
 export function headOf(finding) {
   return el('div', { class: 'finding-head' },
-    el('h2', { text: `${finding.label ?? station((finding.chainage_from + finding.chainage_to) / 2)}, ${clock(finding.clock)} o’clock` }),
-    el('p', {}, el('span', { class: `badge ${finding.review}`, text: finding.review }), ` ${finding.kind_label ?? finding.kind}, no. ${finding.id}`),
+    el('h2', { text: `${finding.label ?? station((finding.chainage_from + finding.chainage_to) / 2)}${finding.clock === null ? '' : `, ${clock(finding.clock)} o’clock`}` }),
+    el('p', {}, el('span', { class: `badge ${finding.review}`, text: finding.review }), ` ${finding.kind_label ?? finding.kind}${finding.id > 0 ? `, no. ${finding.id}` : ''}`),
+    finding.recorded ? el('p', { class: 'warn-text', text: 'Recorded on this device, not in the database yet.' }) : null,
     STATES[finding.state] ? el('p', { class: 'warn-text', text: `Not included in the totals: ${STATES[finding.state]}.` }) : null);
 }
 
 /** Return the photos, values, evidence and history of a finding. */
 export function factsOf(finding, survey, severities, photos, say) {
   return el('div', { class: 'finding-facts' },
-    photos, valuesOf(finding, severities), evidenceOf(finding), historyOf(finding), linkOf(finding, survey, say));
+    photos, valuesOf(finding, severities), evidenceOf(finding), historyOf(finding), finding.id > 0 ? linkOf(finding, survey, say) : null);
 }
 
 function valuesOf(finding, severities) {

@@ -34,7 +34,7 @@ export function hatchLayer(survey) {
 /**
  * Return the layer of the findings of a survey.
  * @param {Object} survey
- * @param {Object} shown - switches: findings, dry, removed.
+ * @param {Object} shown - switches: findings, dry, removed; and waits, verdicts that the database does not have yet.
  * @param {number} version - another one reads the tiles again.
  */
 export function findingsLayer(survey, shown, version) {
@@ -62,9 +62,11 @@ export function isShown(kind, state, shown) {
 function styler(kinds, shown) {
   const styles = new Map();
   return (feature) => {
-    const kind = feature.get('kind');
-    const review = feature.get('review');
-    const state = feature.get('state') ?? review;
+    // A verdict that the database does not have yet is shown as it will be.
+    const waits = shown.waits.get(Number(feature.get('id') ?? feature.getId()));
+    const kind = waits?.kind ?? feature.get('kind');
+    const review = waits?.review ?? feature.get('review');
+    const state = waits?.review ?? feature.get('state') ?? review;
     if (!isShown(kind, state, shown)) return null;
     const counted = COUNTED.includes(state);
     const many = Math.min(Math.ceil(Math.log2(feature.get('count') ?? 1)), 8);
@@ -88,6 +90,15 @@ function looks(colour, counted, many, type) {
 
 function stroke(color, width, lineDash = undefined) {
   return new ol.style.Stroke({ color, width, lineDash, lineJoin: 'round' });
+}
+
+/** Return the layer of drawn findings that the database does not have yet. */
+export function recordedLayer() {
+  const style = [
+    new ol.style.Style({ stroke: stroke('#fff', 4), image: new ol.style.Circle({ radius: 7, stroke: stroke('#fff', 4) }) }),
+    new ol.style.Style({ stroke: stroke('#8e24aa', 2, [7, 5]), image: new ol.style.Circle({ radius: 7, stroke: stroke('#8e24aa', 2, [4, 3]) }) }),
+  ];
+  return new ol.layer.Vector({ source: new ol.source.Vector(), style, zIndex: 15 });
 }
 
 /** Return the layer of the finding that is shown in the panel. */

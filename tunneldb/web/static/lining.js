@@ -4,7 +4,7 @@ import { get, surveyPath } from './api.js';
 import { ClockScale, drawAxes, positionText } from './axis.js';
 import { Comparison } from './compare.js';
 import { debounce, el } from './dom.js';
-import { findingsLayer, geometryOf, hatchLayer, highlightLayer, imageLayer } from './layers.js';
+import { findingsLayer, geometryOf, hatchLayer, highlightLayer, imageLayer, recordedLayer } from './layers.js';
 import { MAX_ZOOM, MIN_ZOOM, projection, resolutionAt, surveyExtent, zoomAt } from './plane.js';
 
 const { ol } = globalThis;
@@ -22,7 +22,7 @@ export class Lining {
     this.on = on;
     this.survey = null;
     this.kind = null;
-    this.shown = { findings: true, dry: false, removed: false };
+    this.shown = { findings: true, dry: false, removed: false, waits: new Map() };
     this.version = Date.now();
     this.picking = true;
     this.box = el('div', { id: 'map', class: 'map', tabindex: '0', role: 'application', 'aria-label': 'Lining: arrow keys move, + and - zoom, Enter opens the finding in the middle' });
@@ -35,13 +35,14 @@ export class Lining {
     const first = el('div', { class: 'first' }, this.box, this.axes, this.comparison.line, this.comparison.names, this.comparison.slider);
     root.replaceChildren(this.tools, el('div', { class: 'maps' }, first, this.comparison.box), el('div', { class: 'readout' }, this.position, this.legend, this.scale));
     this.highlight = highlightLayer();
+    this.recorded = recordedLayer();
     this.map = this.build();
   }
 
   build() {
     const map = new ol.Map({
       target: this.box,
-      layers: [this.highlight],
+      layers: [this.recorded, this.highlight],
       controls: [
         new ol.control.Zoom({ zoomInTipLabel: 'Zoom in', zoomOutTipLabel: 'Zoom out' }),
         new ol.control.ScaleLine({ target: this.scale, units: 'metric', minWidth: 80 }),
@@ -190,6 +191,19 @@ export class Lining {
     source.addFeature(new ol.Feature(geometryOf(finding.outline) ?? new ol.geom.Point(middle)));
   }
 
+  /** Show what the database does not have yet: verdicts by finding, and drawn findings. */
+  showRecorded(waits, drawn) {
+    this.shown.waits = waits;
+    const source = this.recorded.getSource();
+    source.clear();
+    source.addFeatures(drawn.map(({ id, geometry }) => {
+      const feature = new ol.Feature(geometryOf(geometry));
+      feature.setId(id);
+      return feature;
+    }));
+    this.restyle();
+  }
+
   /** Use the ribbon's data for the band of what was inspected. */
   setRibbon(ribbon) {
     this.ribbon = ribbon;
@@ -199,7 +213,7 @@ export class Lining {
   idAt(pixel, hitTolerance = 5) {
     let found = null;
     this.map.forEachFeatureAtPixel(pixel, (feature, layer) => {
-      if (layer !== this.findings || found !== null) return;
+      if ((layer !== this.findings && layer !== this.recorded) || found !== null) return;
       found = feature.get('id') ?? feature.getId() ?? null;
     }, { hitTolerance });
     return found === null ? null : Number(found);

@@ -1,21 +1,23 @@
 /** The desk: connects address, survey, map and panel. */
 
-import { get, post, surveyPath } from './api.js';
+import { get, surveyPath } from './api.js';
 import { button, debounce, el } from './dom.js';
 import { station, time } from './format.js';
 import { downloadsPanel } from './downloads.js';
 import { DrawPanel } from './draw.js';
 import { notesPanel, showLimits } from './limits.js';
-import { heldStretches, removeAll, removeOthers } from './held.js';
+import { heldStretches, removeOthers } from './held.js';
 import { Lining } from './lining.js';
 import { Network } from './network.js';
 import { Panel } from './panel.js';
 import { Review } from './review.js';
 import { Ribbon } from './ribbon.js';
+import { findingOf, Outbox, textOf } from './outbox.js';
+import { OutboxBox } from './outbox_box.js';
 import { format, parse, replace } from './router.js';
-import { DiscardedError, Saver } from './saver.js';
 import { SectionPanel } from './section.js';
 import { Session } from './session.js';
+import { signOut } from './sign_out.js';
 import { showSurveys } from './surveys.js';
 import { Space } from './space.js';
 import { fillToolbar } from './toolbar.js';
@@ -36,29 +38,48 @@ function say(text, wrong = false) {
   if (!wrong) say.timer = setTimeout(() => { state.textContent = ''; }, 8000);
 }
 
-/** Show what becomes of a write: saved only when the server has said so. */
-function showState({ state, job, seconds, text }) {
-  const what = `Finding ${job.id}: ${Object.values(job.values).map((value) => value ?? 'no remark').join(', ')}`;
-  const alerts = node('alerts');
-  alerts.replaceChildren();
+/** State what becomes of a record: saved only when the server has said so. */
+function showState({ state, record, text }) {
   if (state === 'saving') say('Saving …');
-  else if (state === 'saved') say(`Saved. ${what}.`);
   else if (state === 'failed') say(`Not saved. ${text}`, true);
-  else {
-    say('Not saved yet.', true);
-    alerts.append(el('div', { class: 'alert', role: 'alert' },
-      el('p', { text: `Not saved yet. ${what}. ${/[.!?]$/.test(text) ? text : `${text}.`} The next attempt is in ${seconds} s; any review key tries again now.` }),
-      button('Try now', () => saver.retry()), button('Discard', () => saver.discard())));
-  }
+  else if (state === 'waiting') say(`Recorded on this device. ${textOf(record)}.`);
+  else say(`Saved. ${textOf(record)}.`);
 }
 
-const saver = new Saver(user, showState);
-const session = new Session(user, saver);
+/** Show what the database does not have yet, on the lining and in its list. */
+function showRecords() {
+  outboxBox.refresh();
+  review.photos.refresh();
+  const own = outbox.records.filter(({ survey, stopped }) => survey === app.survey?.name && !stopped);
+  const waits = new Map();
+  for (const { type, finding, values } of own) if (type === 'review') waits.set(finding, { ...waits.get(finding), ...values });
+  lining.showRecorded(waits, own.filter(({ type }) => type === 'draw').map((record) => ({ id: findingOf(record), geometry: record.body.geometry })));
+}
+
+/** Show what the server wrote of a record that had waited. */
+function sent(record, answer) {
+  const id = record.type === 'draw' ? answer.id : record.finding;
+  if (app.finding === findingOf(record) && !review.busy) review.open(id, false);
+  app.renew = [...(app.renew ?? []), id];
+  renewHeld();
+  changed();
+}
+
+/** Renew what is held offline of findings that were changed, once writes pause. */
+const renewHeld = debounce(async () => {
+  const ids = app.renew;
+  app.renew = [];
+  if ((await heldStretches(user)).length) (await import('./offline.js')).renewFindings(user, ids).catch((error) => say(error.message, true));
+}, 3000);
+
+const outbox = new Outbox(user, { changed: () => showRecords(), state: showState, sent });
+const outboxBox = new OutboxBox(node('alerts'), outbox);
+const session = new Session(user, outbox);
 const panel = new Panel(node('panel'), (tab) => showTab(tab));
 const ribbon = new Ribbon(node('ribbon'), (x) => (space.open ? space.go(x) : lining.goTo(x)));
 const lining = new Lining(node('lining'), { moved, picked, failed: (text) => say(text, true) });
 const review = new Review(session, {
-  canWrite, say,
+  canWrite, say, outbox,
   extent: stretch,
   shown: (finding, fit) => show(finding, fit),
   marked: (finding) => mark(finding),
@@ -77,7 +98,7 @@ const space = new Space(node('space'), { picked, closed, shown: () => lining.sho
 const network = new Network(meta('held') || null, { away: showNetwork, back: reconnected });
 const section = new SectionPanel(() => lining.view.x, () => session.facts);
 const draw = new DrawPanel(lining, {
-  canWrite, say,
+  canWrite, say, outbox,
   current: () => session.facts,
   open: (id) => review.open(id, false),
   changed: () => changed(0),
@@ -106,7 +127,7 @@ function moved(view, [from, , to]) {
 const address = debounce(() => {
   // While the page follows an address, or is about to, it does not write one.
   if (!app.survey || app.routing || location.hash !== app.hash) return;
-  replace({ survey: app.survey.name, finding: app.finding, ...app.view, kind: lining.kind, tab: panel.tab === 'finding' ? null : panel.tab });
+  replace({ survey: app.survey.name, finding: app.finding > 0 ? app.finding : null, ...app.view, kind: lining.kind, tab: panel.tab === 'finding' ? null : panel.tab });
   app.hash = location.hash;
 }, 200);
 
@@ -212,6 +233,7 @@ function reconnected() {
     route();
     return;
   }
+  outbox.send();
   lining.refresh();
   readRibbon(app.survey);
   readSummary(app.survey);
@@ -247,7 +269,6 @@ async function openSurvey(name, state, latest) {
   if (!latest()) return;
   app.survey = survey;
   app.finding = null;
-  if (!saver.busy) say('');
   node('surveys').hidden = true;
   node('desk').hidden = false;
   document.title = `${survey.name} – tunneldb desk`;
@@ -268,6 +289,7 @@ async function openSurvey(name, state, latest) {
   section.setSurvey(survey);
   space.setSurvey(survey);
   draw.setSurvey(survey);
+  showRecords();
   panel.choose(tab);
   panel.fold(empty);
   app.summary = null;
@@ -340,35 +362,6 @@ async function route() {
   }
 }
 
-/** Offer a verdict of an earlier visit that was not saved. */
-function offerLeft() {
-  const left = saver.left();
-  if (!left || !canWrite) return;
-  const values = Object.entries(left.values).map(([name, value]) => `${name}: ${value ?? 'none'}`).join(', ');
-  const link = el('span');
-  const box = el('div', { class: 'alert', role: 'alert' }, el('p', { text: `A review of your last visit was not saved: finding ${left.id}, ${values}.` }), link,
-    button('Save now', async () => {
-      try {
-        await saver.save(left.id, left.seen, left.values);
-        changed();
-        if (app.finding === left.id) review.open(left.id, false);
-      } catch (error) {
-        // Nothing is lost: the review stays on offer, beside what others have written since.
-        const survey = error.data?.finding?.survey;
-        if (survey) link.replaceChildren(el('a', { href: format({ survey, finding: left.id }), text: `Show finding ${left.id}` }));
-        say(`Not saved. ${error.message}`, true);
-        if (error instanceof DiscardedError) return;
-        saver.keep(left);
-        node('alerts').append(box);
-      }
-    }),
-    button('Discard', () => {
-      saver.forget();
-      box.remove();
-    }));
-  node('alerts').append(box);
-}
-
 node('survey-choice').addEventListener('change', (event) => { location.hash = format({ survey: event.target.value || null }); });
 node('skip').addEventListener('click', (event) => {
   event.preventDefault();
@@ -376,15 +369,12 @@ node('skip').addEventListener('click', (event) => {
 });
 node('sign-out').addEventListener('click', async () => {
   try {
-    await post('/logout');
-    await removeAll();
-    location.assign('/login');
+    await signOut(outbox);
   } catch (error) {
     say(`Not signed out. ${error.message}`, true);
   }
 });
 window.addEventListener('hashchange', route);
-offerLeft();
 
 /** Begin, once nothing of another user is left on the device. */
 async function begin() {

@@ -16,7 +16,10 @@ export class Network {
     worker?.addEventListener('message', ({ data }) => this.leave(data.held));
     window.addEventListener('offline', () => worker?.controller && this.leave(null));
     window.addEventListener('online', () => this.probe());
-    if (held || (!navigator.onLine && worker?.controller)) this.leave(held);
+    if (!held && (navigator.onLine || !worker?.controller)) return;
+    this.away = true;
+    this.since = held;
+    this.later();
   }
 
   /** Note that the server cannot be reached, and the time of what is shown instead. */

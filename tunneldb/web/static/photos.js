@@ -1,22 +1,21 @@
 /** Photos of a finding: small ones in the panel, a large one in a dialog, and uploads. */
 
-import { ApiError, findingPath, patch, remove, upload } from './api.js';
+import { ApiError, findingPath, patch, remove } from './api.js';
 import { button, el, field } from './dom.js';
 import { time } from './format.js';
 
 const TYPES = 'image/jpeg,image/png,image/webp';
 const MAX_MEGABYTES = 25;
 
-/** Photos of the finding that is shown, and those that are being uploaded, also to other findings. */
+/** Photos of the finding that is shown, and those that the database does not have yet, also of other findings. */
 export class Photos {
   /**
-   * @param {Object} app - canWrite, say(text, wrong), changed(finding).
+   * @param {Object} app - canWrite, say(text, wrong), changed(finding), outbox.
    */
   constructor(app) {
     this.app = app;
     this.finding = null;
-    this.jobs = [];
-    this.sending = false;
+    this.refused = [];
     this.title = el('h3');
     this.list = el('ul', { class: 'thumbs' });
     this.paths = el('ul', { class: 'plain' });
@@ -25,10 +24,6 @@ export class Photos {
       this.chooser('Add photos', { multiple: true }), this.chooser('Take photo', { capture: 'environment' }, 'camera'));
     this.tools.hidden = !app.canWrite;
     this.root = el('section', { class: 'photos' }, this.title, this.list, this.paths, this.waiting, this.tools);
-    window.addEventListener('online', () => this.jobs.filter(({ away }) => away).forEach((job) => this.again(job)));
-    window.addEventListener('beforeunload', (event) => {
-      if (this.jobs.length) event.preventDefault();
-    });
   }
 
   /** Return a button that opens the file chooser, or the camera of a phone. */
@@ -99,56 +94,42 @@ export class Photos {
     close.focus();
   }
 
-  /** Upload files, one after the other. */
-  add(files) {
-    const { id } = this.finding;
-    for (const file of files) {
-      const job = { id, file, text: null, away: false };
-      if (file.size > MAX_MEGABYTES * 1e6) job.text = `it has ${(file.size / 1e6).toFixed(0)} MB; a photo has at most ${MAX_MEGABYTES} MB`;
-      this.jobs.push(job);
-    }
-    this.refresh();
-    this.send();
-  }
-
-  async send() {
-    if (this.sending) return;
-    this.sending = true;
-    try {
-      for (let job; (job = this.jobs.find(({ text }) => text === null));) await this.sendOne(job);
-    } finally {
-      this.sending = false;
-    }
+  /** Keep files on this device, and upload them one after the other. */
+  async add(files) {
+    const { id, survey } = this.finding;
+    await Promise.all(files.map((file) => this.addOne(id, survey, file)));
   }
 
   /** Upload a photo; it is shown as saved when the server has said so. */
-  async sendOne(job) {
+  async addOne(finding, survey, file) {
+    if (file.size > MAX_MEGABYTES * 1e6) {
+      this.refuse(finding, file, `it has ${(file.size / 1e6).toFixed(0)} MB; a photo has at most ${MAX_MEGABYTES} MB`);
+      return;
+    }
+    let record;
     try {
-      this.take(await upload(findingPath(job.id, '/photos'), job.file));
-      this.drop(job);
-      this.app.say(`Saved. Photo of finding ${job.id}.`);
+      record = await this.app.outbox.add({ type: 'photo', survey, finding, file });
+      const answer = finding > 0 ? await this.app.outbox.submit(record) : null;
+      if (answer) this.take(answer);
     } catch (error) {
       if (!(error instanceof ApiError)) throw error;
-      job.text = error.message;
-      job.away = error.away;
-      this.app.say(`Not saved: photo of finding ${job.id}.`, true);
-      this.refresh();
+      if (!record) this.refuse(finding, file, error.message);
+      this.app.say(`Not saved: photo of finding ${finding}.`, true);
     }
-  }
-
-  again(job) {
-    job.text = null;
     this.refresh();
-    this.send();
   }
 
-  discard(job) {
-    this.drop(job);
-    this.app.say(`Discarded: ${job.file.name}.`);
+  /** List a photo that was not kept. */
+  refuse(finding, file, text) {
+    this.refused.push({ finding, file, stopped: { text } });
+    this.refresh();
   }
 
-  drop(job) {
-    this.jobs = this.jobs.filter((other) => other !== job);
+  async discard(record) {
+    const { outbox } = this.app;
+    if (this.refused.includes(record)) this.refused = this.refused.filter((other) => other !== record);
+    else if (!(await outbox.discard(record))) return;
+    this.app.say(`Discarded: ${record.file.name}.`);
     this.refresh();
   }
 
@@ -157,15 +138,30 @@ export class Photos {
     this.app.changed(finding);
   }
 
+  /** List the photos that the database does not have yet. */
   refresh() {
-    this.waiting.replaceChildren(...this.jobs.map((job) => el('li', { class: 'upload' }, this.stateOf(job))));
+    const records = [...this.app.outbox.records.filter(({ type }) => type === 'photo'), ...this.refused];
+    this.waiting.replaceChildren(...records.map((record) => el('li', { class: 'upload' }, this.stateOf(record))));
     this.root.hidden = !this.app.canWrite && !this.finding?.photos.length;
   }
 
-  stateOf(job) {
-    const name = `${job.file.name}${job.id === this.finding?.id ? '' : ` (finding ${job.id})`}`;
-    if (job.text === null) return el('span', {}, el('progress', { 'aria-label': `Saving ${name}` }), ` ${name}: not saved yet`);
-    return el('span', {}, el('span', { class: 'warn-text', text: `${name}: not saved: ${job.text}` }), ' ',
-      button('Try again', () => this.again(job)), ' ', button('Discard', () => this.discard(job)));
+  stateOf(record) {
+    const { outbox } = this.app;
+    const name = `${record.file.name}${record.finding === this.finding?.id ? '' : ` (${record.finding > 0 ? `finding ${record.finding}` : 'a drawn finding'})`}`;
+    const discard = button('Discard', () => this.discard(record));
+    if (record.stopped) {
+      const again = record.key ? button('Try again', () => outbox.retry(record)) : null;
+      return el('span', {}, el('span', { class: 'warn-text', text: `${name}: not saved: ${record.stopped.text}` }), ' ', again, ' ', discard);
+    }
+    if (outbox.waiting.includes(record) || record.finding < 0) return el('span', {}, this.preview(record), ` ${name}: recorded on this device, not in the database yet `, discard);
+    return el('span', {}, el('progress', { 'aria-label': `Saving ${name}` }), ` ${name}: not saved yet`);
+  }
+
+  /** Return a small picture of a photo that waits. */
+  preview({ file }) {
+    const address = URL.createObjectURL(file);
+    const image = el('img', { src: address, alt: '', class: 'waiting-photo' });
+    for (const name of ['load', 'error']) image.addEventListener(name, () => URL.revokeObjectURL(address));
+    return image;
   }
 }

@@ -51,3 +51,8 @@ export function placeText([x, y]) {
   const side = Math.abs(y) < 0.005 ? 'at the crown' : `${Math.abs(y).toFixed(2)} m ${y > 0 ? 'right' : 'left'} of the crown`;
   return `${station(x, 2)}, ${side}`;
 }
+
+/** Return the extent of a GeoJSON geometry. */
+export function geometryExtent(geometry) {
+  return new ol.format.GeoJSON().readGeometry(geometry).getExtent();
+}

@@ -6,7 +6,6 @@ import { button, check, choice, el, field, takesKeys } from './dom.js';
 import { Filter } from './filter.js';
 import { factsOf, headOf } from './finding.js';
 import { Photos } from './photos.js';
-import { DiscardedError } from './saver.js';
 import { ConflictError, LIST_LIMIT } from './session.js';
 import { kindKeys, OPEN, progressText } from './worklist.js';
 
@@ -17,7 +16,7 @@ const AHEAD = 2;
 export class Review {
   /**
    * @param {Session} session
-   * @param {Object} app - canWrite, say(text, wrong), shown(finding, fit), changed(), extent(), outlined(), outlines(on).
+   * @param {Object} app - canWrite, say(text, wrong), shown(finding, fit), changed(), extent(), outlined(), outlines(on), outbox.
    */
   constructor(session, app) {
     this.session = session;
@@ -28,7 +27,7 @@ export class Review {
     this.typed = false;
     this.keys = new Map();
     this.cutouts = new Cutouts();
-    this.photos = new Photos({ canWrite: app.canWrite, say: app.say, changed: (finding) => this.takePhotos(finding) });
+    this.photos = new Photos({ canWrite: app.canWrite, say: app.say, outbox: app.outbox, changed: (finding) => this.takePhotos(finding) });
     this.filter = new Filter((value) => this.load(value));
     this.build();
     document.addEventListener('keydown', (event) => this.key(event));
@@ -64,6 +63,7 @@ export class Review {
   setSurvey(survey) {
     this.survey = survey;
     this.session.clear();
+    this.session.labels = new Map(survey.finding_kinds.map(({ code, label }) => [code, label]));
     const active = survey.finding_kinds.filter(({ active: offered }) => offered);
     this.keys = kindKeys(active);
     const keyOf = new Map([...this.keys].map(([key, code]) => [code, key.toUpperCase()]));
@@ -147,7 +147,7 @@ export class Review {
       this.typed = false;
       if (!this.reviewing || !this.goOn.firstChild.checked) return;
       if (await this.session.step(1)) this.shown(true);
-      else this.app.say('Saved. That was the last finding of this selection.');
+      else this.app.say(`${this.session.facts.recorded ? 'Recorded on this device.' : 'Saved.'} That was the last finding of this selection.`);
     });
   }
 
@@ -171,7 +171,7 @@ export class Review {
   /** Do something once at a time; show its error in one line. */
   async act(what) {
     if (this.busy) {
-      this.session.saver.retry();
+      this.session.outbox.send();
       return;
     }
     this.busy = true;
@@ -181,7 +181,7 @@ export class Review {
       await what();
     } catch (error) {
       if (error instanceof ConflictError) this.showConflict(error);
-      else if (error instanceof ApiError || error instanceof DiscardedError) this.app.say(error.message, true);
+      else if (error instanceof ApiError) this.app.say(error.message, true);
       else throw error;
     } finally {
       this.busy = false;
@@ -190,7 +190,7 @@ export class Review {
     }
   }
 
-  showConflict({ message, wanted }) {
+  showConflict({ message, wanted, record }) {
     const mine = Object.entries(wanted).map(([name, value]) => `${name}: ${value ?? 'none'}`).join(', ');
     this.conflict.hidden = false;
     this.conflict.replaceChildren(
@@ -198,6 +198,7 @@ export class Review {
       el('div', { class: 'row' },
         button('Write mine', () => this.act(async () => { await this.write(wanted); })),
         button('Keep theirs', () => {
+          this.session.outbox.discard(record);
           this.conflict.hidden = true;
           this.typed = false;
           this.refresh();

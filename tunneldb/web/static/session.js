@@ -1,6 +1,6 @@
 /** A review in progress: its rules, without the page. */
 
-import { findingPath, get, post, surveyPath } from './api.js';
+import { ApiError, findingPath, get, post, surveyPath } from './api.js';
 import { OPEN, Pace, WorkList } from './worklist.js';
 
 /** Findings in one answer of the server. */
@@ -8,12 +8,13 @@ export const LIST_LIMIT = 5000;
 
 /** Somebody else has changed the finding; nothing was written. */
 export class ConflictError extends Error {
-  constructor(finding, wanted) {
+  constructor(finding, wanted, record) {
     const remark = finding.remark ? `, remark “${finding.remark}”` : '';
     super(`${finding.reviewed_by ?? 'Somebody'} has changed finding ${finding.id} in the meantime: it is ${finding.review}, `
       + `${finding.kind_label ?? finding.kind}${remark}. Your review was not written.`);
     this.finding = finding;
     this.wanted = wanted;
+    this.record = record;
   }
 }
 
@@ -21,11 +22,12 @@ export class ConflictError extends Error {
 export class Session {
   /**
    * @param {string} user
-   * @param {Saver} saver
+   * @param {Outbox} outbox
    */
-  constructor(user, saver) {
+  constructor(user, outbox) {
     this.user = user;
-    this.saver = saver;
+    this.outbox = outbox;
+    this.labels = new Map();
     this.clear();
   }
 
@@ -44,7 +46,7 @@ export class Session {
     for (const kind of filter.kinds) query.append('kind', kind);
     for (const name of ['from', 'to', 'min_area']) if (filter[name] !== null) query.set(name, filter[name]);
     const findings = await get(surveyPath(survey, `/worklist?${query}`));
-    this.work = new WorkList(findings, filter.openOnly);
+    this.work = new WorkList(findings.map((finding) => this.outbox.overlay(finding)), filter.openOnly);
     this.listed = true;
     if (this.facts) this.work.go(this.facts.id);
   }
@@ -95,15 +97,17 @@ export class Session {
     const seen = { review: facts.review, remark: facts.remark, kind: facts.kind };
     let answer;
     try {
-      answer = await this.saver.save(facts.id, seen, wanted);
+      const former = this.outbox.conflict(facts.id, wanted);
+      answer = await (former ? this.outbox.again(former, seen, wanted) : this.outbox.save({ type: 'review', survey: facts.survey, finding: facts.id, seen, values: wanted }));
     } catch (error) {
       if (error.status !== 409 || !error.data?.finding) throw error;
       this.take(error.data.finding);
-      throw new ConflictError(error.data.finding, wanted);
+      throw new ConflictError(error.data.finding, wanted, error.record);
     }
-    this.take(answer.finding);
+    if (answer) this.take(answer.finding);
+    else this.takeRecorded({ ...facts, ...wanted, reviewed_by: this.user, reviewed_at: new Date().toISOString(), recorded: true });
     // An answer may have been lost with the connection: what this person wrote is a step of theirs.
-    if (!answer.written && answer.finding.reviewed_by !== this.user) return false;
+    if (answer && !answer.written && answer.finding.reviewed_by !== this.user) return false;
     this.steps.push(facts.id);
     if ((wanted.review ?? OPEN) !== OPEN) this.pace.count(performance.now());
     return true;
@@ -113,6 +117,8 @@ export class Session {
   async undo() {
     const id = this.steps.at(-1);
     if (id === undefined) return 'There is no review to undo.';
+    const waits = this.outbox.lastReview(id);
+    if (waits) return this.takeBack(waits);
     let answer;
     try {
       answer = await post(findingPath(id, '/undo'));
@@ -127,6 +133,17 @@ export class Session {
     return `Finding ${id}: undone: ${answer.undone}${listed || !this.listed ? '.' : '; it is not in the current selection.'}`;
   }
 
+  /** Drop a verdict that the database does not have yet. */
+  async takeBack(record) {
+    const { finding: id, seen } = record;
+    if (!(await this.outbox.discard(record))) throw new ApiError(0, 'This verdict is being sent: try again.');
+    this.steps.pop();
+    if (this.facts?.id === id) this.takeRecorded({ ...this.facts, ...seen, recorded: this.outbox.lastReview(id) !== null });
+    else await this.read(id);
+    this.work.go(id);
+    return `Finding ${id}: undone; the database did not have it yet.`;
+  }
+
   /** True if the last step was one of the current finding. */
   get undoesShown() {
     return this.facts !== null && this.steps.at(-1) === this.facts.id;
@@ -138,8 +155,16 @@ export class Session {
     this.work.change(finding.id, { review: finding.review, kind: finding.kind });
   }
 
+  /** Take a finding with values that the database does not have yet. */
+  takeRecorded(finding) {
+    this.take({ ...finding, kind_label: this.labels.get(finding.kind) ?? finding.kind });
+  }
+
   async read(id) {
-    this.take(await get(findingPath(id)));
+    const finding = id < 0 ? this.outbox.drawn(id) : this.outbox.overlay(await get(findingPath(id)));
+    if (!finding) throw new ApiError(404, 'This drawing is in the database now: choose it on the lining.');
+    if (finding.recorded) this.takeRecorded(finding);
+    else this.take(finding);
   }
 
   async exists(id) {
