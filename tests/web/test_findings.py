@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import psycopg
+import pytest
 from starlette.testclient import TestClient
 from web.conftest import SignIn
 
@@ -72,6 +75,40 @@ def test_draw_redraw_split_merge_delete(signed_in: SignIn) -> None:
     assert len(ids) == 2
     assert browser.post("/api/findings/merge", json={"ids": ids}).json()["id"] == one["id"]
     assert browser.delete(f"/api/findings/{one['id']}").status_code in (204, 409)
+
+
+LINE = {"type": "LineString", "coordinates": [[12351.1234, 1.5], [12352.5, 2.0001], [12353, 1]]}
+POINT = {"type": "Point", "coordinates": [12354.1111, 1.2222]}
+
+
+@pytest.mark.parametrize(("geometry", "kind"), [(POLYGON, "spall"), (LINE, "crack"), (POINT, "missing_bolt")])
+def test_a_drawing_that_is_sent_again_is_one_finding(signed_in: SignIn, geometry: dict, kind: str) -> None:
+    """Also after it was changed, redrawn or deleted; another person and another outline make another finding."""
+    browser, path = signed_in("ines_web"), "/api/surveys/demo-2024/findings"
+    body = {"geometry": geometry, "kind": kind, "severity": 2, "width_mm": None, "remark": "edge", "again": True}
+    first = browser.post(path, json=body).json()["id"]
+    assert browser.post(path, json=body).json()["id"] == first
+    verdict(browser, browser.get(f"/api/findings/{first}").json(), kind="other", remark="niche")
+    assert browser.post(path, json=body).json()["remark"] == "niche"
+    moved = {**geometry, "coordinates": [12355, 1] if kind == "missing_bolt" else LINE["coordinates"][:2]}
+    if kind != "spall":
+        assert browser.put(f"/api/findings/{first}/outline", json={"geometry": moved}).status_code == 200
+        assert browser.post(path, json=body).json()["id"] == first
+    assert signed_in("ivo_web").post(path, json=body).json()["id"] != first
+    second = browser.post(path, json={**body, "again": False}).json()["id"]
+    assert second > first
+    assert browser.delete(f"/api/findings/{second}").status_code == 204
+    answer = browser.post(path, json=body)
+    assert (answer.status_code, answer.json()["error"]) == (404, f"finding {second} does not exist")
+    assert browser.post(path, json={**body, "again": "yes"}).status_code == 400
+
+
+def test_a_drawing_that_is_sent_twice_at_once_is_one_finding(signed_in: SignIn) -> None:
+    browser, path = signed_in("ines_web"), "/api/surveys/demo-2024/findings"
+    body = {"geometry": POLYGON, "kind": "spall", "severity": None, "width_mm": None, "remark": None, "again": True}
+    with ThreadPoolExecutor(3) as threads:
+        answers = list(threads.map(lambda _: browser.post(path, json=body).json()["id"], range(3)))
+    assert len(set(answers)) == 1
 
 
 def test_drawings_off_the_lining_are_refused_in_one_line(signed_in: SignIn) -> None:

@@ -18,6 +18,16 @@ from tunneldb.web.rate_limit import MAX_ADDRESS_FAILURES, MAX_FAILURES, PERIOD, 
 from tunneldb.web.sessions import CONNECTIONS, MAX_OF_USER, Sessions, SignedOutError, open_for, open_own
 
 
+def test_the_service_worker_is_for_the_whole_desk(client: TestClient) -> None:
+    answer = client.get("/worker.js")
+    assert (answer.status_code, answer.headers["cache-control"], answer.headers["service-worker-allowed"]) == (
+        200,
+        "no-cache",
+        "/",
+    )
+    assert answer.headers["content-type"].startswith("text/javascript")
+
+
 def test_role_and_password_let_in_with_a_strict_cookie(client: TestClient) -> None:
     answer = sign_in(client, "viola_web")
     assert (answer.status_code, answer.headers["location"]) == (303, "/")

@@ -89,7 +89,13 @@ export class Cutouts {
       if (this.outlined) this.outline(context, frame, width, finding);
     };
     paint();
-    tiles.forEach(({ address }) => load(address)?.then(paint));
+    const loads = tiles.map(({ address }) => load(address)?.then(paint));
+    Promise.all(loads).then(() => {
+      if (this.finding !== finding || tiles.some(({ address }) => cache.get(address)?.ready)) return;
+      context.fillStyle = '#55626e';
+      context.font = '12px system-ui, sans-serif';
+      context.fillText('no image here', 8, 18);
+    });
   }
 
   outline(context, frame, width, finding) {

@@ -3,10 +3,11 @@
 import { button, check, el, field } from './dom.js';
 import { parseStation, station, time } from './format.js';
 import { heldStretches, possible, removeStretch, shellName } from './held.js';
-import { estimate, FullError, keepShell, MAX_LENGTH, refresh, Take } from './take.js';
+import { estimate, keepShell, MAX_LENGTH, refresh, Take } from './take.js';
 
-const megabytes = (bytes) => (bytes < 1e6 ? 'less than 1 MB' : `${Math.round(bytes / 1e6)} MB`);
-const text = (error) => (error.name === 'AbortError' ? 'Stopped.' : error.message);
+const megabytes = (bytes) => (bytes < 1e6 ? 'less than 1 MB' : `about ${Math.round(bytes / 1e6)} MB`);
+const TEXTS = { AbortError: 'Stopped.', QuotaExceededError: 'This device has no space left: remove another stretch, or take a shorter one.' };
+const text = (error) => TEXTS[error.name] ?? error.message;
 
 /** Panel of what is taken offline. */
 export class OfflinePanel {
@@ -91,8 +92,8 @@ export class OfflinePanel {
       const { tiles, bytes } = await estimate(this.survey, stretch);
       const { quota = Infinity, usage = 0 } = await navigator.storage.estimate();
       const free = quota - usage;
-      if (bytes > free) this.say(`About ${megabytes(bytes)}, ${tiles} tiles of images: this device has ${megabytes(free)} of space left. Take a shorter stretch.`, true);
-      else this.say(`About ${megabytes(bytes)}, ${tiles} tiles of images.`);
+      if (bytes > free) this.say(`Size: ${megabytes(bytes)}, ${tiles} tiles of images. This device has ${megabytes(free)} of space left. Take a shorter stretch.`, true);
+      else this.say(`Size: ${megabytes(bytes)}, ${tiles} tiles of images.`);
       this.start.disabled = bytes > free;
     } catch (error) {
       this.say(text(error), true);
@@ -117,7 +118,7 @@ export class OfflinePanel {
     } catch (error) {
       const { done, total } = this.take.facts;
       const more = total ? ` ${done} of ${total} parts are held.` : '';
-      this.say(`${text(error)}${more}${error instanceof FullError ? ' Remove another stretch, or take a shorter one.' : ''}`, true);
+      this.say(`${text(error)}${more}`, true);
     }
     this.take = null;
     this.busy(false);

@@ -15,9 +15,6 @@ const SMALL = 2000;
 const LIMIT = 60000;
 const LAZY = ['offline.js', 'take.js'];
 
-/** The device is full. */
-export class FullError extends Error {}
-
 /** Return the tiles of a stretch, from the whole of it to single pixels. */
 export function tilesOf(survey, from, to) {
   const first = Math.min(Math.max(Math.floor(zoomAt((to - from) / SCREEN)), MIN_ZOOM), MAX_TILE_ZOOM);
@@ -78,7 +75,7 @@ export class Take {
 
   /**
    * Read everything.
-   * @throws {ApiError|FullError}
+   * @throws {ApiError|DOMException} The server or the device refuses.
    */
   async run() {
     const { user, survey, facts } = this;
@@ -154,7 +151,7 @@ export class Take {
     try {
       await this.cache.put(path, new Response(body.size ? body : null, { status: body.size ? 200 : 204, headers }));
     } catch (error) {
-      throw this.stop(error.name === 'QuotaExceededError' ? new FullError('This device has no space left.') : error);
+      throw this.stop(error);
     }
     this.there.add(new URL(path, location.href).href);
     this.facts.bytes += body.size;
@@ -218,7 +215,8 @@ export async function keepShell(user) {
   const files = new Set([...page.querySelectorAll('[src], [href^="/static/"]')].map((node) => node.getAttribute('src') ?? node.getAttribute('href')));
   LAZY.forEach((name) => files.add(here(name)));
   const cache = await caches.open(shellName(user));
-  await cache.addAll([...files]);
+  const there = await Promise.all([...files].map((path) => cache.match(path)));
+  await cache.addAll([...files].filter((_, n) => !there[n]));
   const headers = new Headers(response.headers);
   headers.delete('Content-Encoding');
   await cache.put('/', new Response(held, { headers }));
