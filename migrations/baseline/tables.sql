@@ -79,6 +79,33 @@ COMMENT ON COLUMN tunnel.point.classification IS 'Class as in the file (ASPRS)';
 COMMENT ON COLUMN tunnel.point.class IS 'Class found by stage ground (tunnel_api.class); none before it has run';
 CREATE INDEX point_chainage_idx ON tunnel.point USING brin (chainage) WITH (pages_per_range = 16);
 
+CREATE TABLE tunnel.rating_scheme (
+    id INTEGER GENERATED ALWAYS AS IDENTITY,
+    name TEXT NOT NULL,
+    version TEXT NOT NULL,
+    source TEXT NOT NULL,
+    valid_from DATE,
+    results TEXT[] NOT NULL,
+    min_inspected DOUBLE PRECISION DEFAULT 0.95 NOT NULL,
+    added_at TIMESTAMP WITH TIME ZONE DEFAULT clock_timestamp() NOT NULL,
+    CONSTRAINT rating_scheme_pkey PRIMARY KEY (id),
+    CONSTRAINT rating_scheme_name_version_key UNIQUE (name, version),
+    CONSTRAINT rating_scheme_name_at_most_100_characters_check CHECK (char_length(name) <= 100),
+    CONSTRAINT rating_scheme_version_at_most_100_characters_check CHECK (char_length(version) <= 100),
+    CONSTRAINT rating_scheme_source_at_most_1000_characters_check CHECK (char_length(source) <= 1000),
+    CONSTRAINT rating_scheme_results_check CHECK (cardinality(results) BETWEEN 2 AND 20),
+    CONSTRAINT rating_scheme_min_inspected_check CHECK (min_inspected >= 0 AND min_inspected <= 1)
+);
+COMMENT ON TABLE tunnel.rating_scheme IS 'Schemes by which owners rate elements; a version is never changed';
+COMMENT ON COLUMN tunnel.rating_scheme.id IS 'Key';
+COMMENT ON COLUMN tunnel.rating_scheme.name IS 'Name';
+COMMENT ON COLUMN tunnel.rating_scheme.version IS 'Version';
+COMMENT ON COLUMN tunnel.rating_scheme.source IS 'Directive or standard with section, in the owner''s words';
+COMMENT ON COLUMN tunnel.rating_scheme.valid_from IS 'Date from which it is valid';
+COMMENT ON COLUMN tunnel.rating_scheme.results IS 'Results from the best to the worst';
+COMMENT ON COLUMN tunnel.rating_scheme.min_inspected IS 'Inspected share below which a result is a lower bound, 0 to 1';
+COMMENT ON COLUMN tunnel.rating_scheme.added_at IS 'Time when it was added';
+
 CREATE TABLE tunnel.segmentation_network (
     id INTEGER NOT NULL,
     version TEXT NOT NULL,
@@ -278,6 +305,25 @@ COMMENT ON COLUMN tunnel.design_profile.outline IS 'Vertices: to the right of th
 COMMENT ON COLUMN tunnel.design_profile.source IS 'File that it was read from';
 COMMENT ON COLUMN tunnel.design_profile.added_at IS 'Time when it was added';
 
+CREATE TABLE tunnel.element_set (
+    id INTEGER GENERATED ALWAYS AS IDENTITY,
+    tunnel_id INTEGER NOT NULL,
+    name TEXT NOT NULL,
+    source TEXT NOT NULL,
+    added_at TIMESTAMP WITH TIME ZONE DEFAULT clock_timestamp() NOT NULL,
+    CONSTRAINT element_set_pkey PRIMARY KEY (id),
+    CONSTRAINT element_set_tunnel_id_name_key UNIQUE (tunnel_id, name),
+    CONSTRAINT element_set_name_at_most_100_characters_check CHECK (char_length(name) <= 100),
+    CONSTRAINT element_set_source_check CHECK (source IN ('file', 'length', 'rings')),
+    CONSTRAINT element_set_tunnel_id_fkey FOREIGN KEY(tunnel_id) REFERENCES tunnel.tunnel (id) ON DELETE CASCADE
+);
+COMMENT ON TABLE tunnel.element_set IS 'Divisions of tunnels into elements that are rated: rings, blocks, stretches, zones';
+COMMENT ON COLUMN tunnel.element_set.id IS 'Key';
+COMMENT ON COLUMN tunnel.element_set.tunnel_id IS 'Tunnel that the row belongs to';
+COMMENT ON COLUMN tunnel.element_set.name IS 'Name';
+COMMENT ON COLUMN tunnel.element_set.source IS 'file, length (equal stretches) or rings (of a survey)';
+COMMENT ON COLUMN tunnel.element_set.added_at IS 'Time when it was added';
+
 CREATE TABLE tunnel.gauge (
     id INTEGER GENERATED ALWAYS AS IDENTITY,
     tunnel_id INTEGER NOT NULL,
@@ -334,6 +380,31 @@ COMMENT ON COLUMN tunnel.learned_model.active_from IS 'Since when it is in force
 COMMENT ON COLUMN tunnel.learned_model.undone_by IS 'Role that undid it';
 COMMENT ON COLUMN tunnel.learned_model.undone_at IS 'Time when it was undone';
 CREATE INDEX learned_model_tunnel_id_idx ON tunnel.learned_model (tunnel_id);
+
+CREATE TABLE tunnel.rating_rule (
+    scheme_id INTEGER NOT NULL,
+    number INTEGER NOT NULL,
+    text TEXT NOT NULL,
+    kinds TEXT[] NOT NULL,
+    measure TEXT NOT NULL,
+    inclusive BOOLEAN NOT NULL,
+    limits DOUBLE PRECISION[] NOT NULL,
+    results TEXT[] NOT NULL,
+    CONSTRAINT rating_rule_pkey PRIMARY KEY (scheme_id, number),
+    CONSTRAINT rating_rule_text_at_most_500_characters_check CHECK (char_length(text) <= 500),
+    CONSTRAINT rating_rule_measure_check CHECK (measure IN ('area', 'share', 'largest_area', 'length', 'width_mm', 'severity', 'count')),
+    CONSTRAINT rating_rule_limits_check CHECK (cardinality(limits) BETWEEN 1 AND 20 AND cardinality(limits) = cardinality(results)),
+    CONSTRAINT rating_rule_scheme_id_fkey FOREIGN KEY(scheme_id) REFERENCES tunnel.rating_scheme (id) ON DELETE CASCADE
+);
+COMMENT ON TABLE tunnel.rating_rule IS 'Rules of rating schemes; the worst result of all rules is that of an element';
+COMMENT ON COLUMN tunnel.rating_rule.scheme_id IS 'Scheme';
+COMMENT ON COLUMN tunnel.rating_rule.number IS 'Number of the rule, from 1';
+COMMENT ON COLUMN tunnel.rating_rule.text IS 'Rule in the owner''s words';
+COMMENT ON COLUMN tunnel.rating_rule.kinds IS 'Codes of the kinds of findings; empty: all wet ones';
+COMMENT ON COLUMN tunnel.rating_rule.measure IS 'area (m², sum), share (area over the inspected lining), largest_area (m²), length (m, sum), width_mm (greatest), severity (greatest) or count';
+COMMENT ON COLUMN tunnel.rating_rule.inclusive IS 'True if a value equal to a limit reaches it';
+COMMENT ON COLUMN tunnel.rating_rule.limits IS 'Limits in ascending order';
+COMMENT ON COLUMN tunnel.rating_rule.results IS 'Result at each limit';
 
 CREATE TABLE tunnel.stage_input (
     stage TEXT NOT NULL,
@@ -884,6 +955,33 @@ COMMENT ON COLUMN tunnel.deviation_section.greatest_at IS 'Distance of that cell
 COMMENT ON COLUMN tunnel.deviation_section.deviation IS 'Mean deviation in cells of equal length along the profile, from its beginning, m, positive inside; NaN: not inspected';
 CREATE INDEX deviation_section_survey_id_layer_overbreak_idx ON tunnel.deviation_section (survey_id, layer, overbreak);
 CREATE INDEX deviation_section_survey_id_layer_underbreak_idx ON tunnel.deviation_section (survey_id, layer, underbreak);
+
+CREATE TABLE tunnel.element (
+    id INTEGER GENERATED ALWAYS AS IDENTITY,
+    element_set_id INTEGER NOT NULL,
+    number INTEGER NOT NULL,
+    name TEXT NOT NULL,
+    chainage_from DOUBLE PRECISION NOT NULL,
+    chainage_to DOUBLE PRECISION NOT NULL,
+    clock_from DOUBLE PRECISION,
+    clock_to DOUBLE PRECISION,
+    CONSTRAINT element_pkey PRIMARY KEY (id),
+    CONSTRAINT element_element_set_id_number_key UNIQUE (element_set_id, number),
+    CONSTRAINT element_name_at_most_200_characters_check CHECK (char_length(name) <= 200),
+    CONSTRAINT element_place_check CHECK (chainage_from >= '-100000000'::float8 AND chainage_from <= '100000000'::float8 AND chainage_to >= '-100000000'::float8 AND chainage_to <= '100000000'::float8),
+    CONSTRAINT element_order_check CHECK (chainage_from < chainage_to),
+    CONSTRAINT element_clock_check CHECK ((clock_from IS NULL) = (clock_to IS NULL) AND clock_from >= 0 AND clock_from <= 12 AND clock_to >= 0 AND clock_to <= 12 AND clock_from <> clock_to),
+    CONSTRAINT element_element_set_id_fkey FOREIGN KEY(element_set_id) REFERENCES tunnel.element_set (id) ON DELETE CASCADE
+);
+COMMENT ON TABLE tunnel.element IS 'Elements of tunnels: stretches of the lining, all round or between two clock positions';
+COMMENT ON COLUMN tunnel.element.id IS 'Key';
+COMMENT ON COLUMN tunnel.element.element_set_id IS 'Division that it is part of';
+COMMENT ON COLUMN tunnel.element.number IS 'Number in its division, from 1';
+COMMENT ON COLUMN tunnel.element.name IS 'Name, such as a ring number';
+COMMENT ON COLUMN tunnel.element.chainage_from IS 'Chainage of its beginning, m';
+COMMENT ON COLUMN tunnel.element.chainage_to IS 'Chainage of its end, m';
+COMMENT ON COLUMN tunnel.element.clock_from IS 'Clock position at which it begins, clockwise looking up-chainage, hours; NULL: all round';
+COMMENT ON COLUMN tunnel.element.clock_to IS 'Clock position at which it ends, hours';
 
 CREATE TABLE tunnel.evenness_area (
     id BIGINT GENERATED ALWAYS AS IDENTITY,

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
 from tunneldb.errors import InputError
-from tunneldb.files import require_at_most
 from tunneldb.finding_kind import SEVERITY_COLOURS
 from tunneldb.report.pictures.load import Source, load_pictures
 from tunneldb.report.words import ENGLISH, ENGLISH_PLURAL, Words, english_texts, languages, plural_forms, read_language
+from tunneldb.tomlfile import read_toml
 
 CHAPTERS = {
     "summary": "Summary",
@@ -85,7 +84,7 @@ def read_owner(path: Path) -> Owner:
     InputError
         If it cannot be read, or something in it is wrong: with file, key and value.
     """
-    given = _Given(path, _load(path))
+    given = _Given(path, read_toml(path, "a template"))
     given.refuse_others(_KEYS)
     logo, scheme = given.text("logo"), _scheme(given)
     return Owner(
@@ -97,27 +96,6 @@ def read_owner(path: Path) -> Owner:
         chapters=_chapters(given, scheme),
         colours=_colours(given),
     )
-
-
-_MAX_MEGABYTES = 1
-_DEEP = re.compile(r"(?:[\[{]\s*){100}")
-"""Lists in each other, deeper than any settings need."""
-
-
-def _load(path: Path) -> dict[str, Any]:
-    try:
-        require_at_most(path, _MAX_MEGABYTES, "a template")
-        text = path.read_text("utf-8-sig")
-        # Else the parser would use up the stack, and what is collected meanwhile would fail in its finalizer.
-        if _DEEP.search(text):
-            raise RecursionError
-        return tomllib.loads(text)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is not TOML: {error}") from error
-    except RecursionError:
-        raise InputError(f"{path}: its lists are nested too deep") from None
 
 
 @dataclass(frozen=True)
@@ -194,7 +172,7 @@ def _words(given: _Given) -> Words:
     name = given.text("language") or ENGLISH
     if name.endswith(".toml"):
         path = given.path.parent / name
-        own = _Given(path, _load(path))
+        own = _Given(path, read_toml(path, "a template"))
         own.refuse_others(("date", "plural", "texts"))
         code, date, plural = path.stem, own.day_format("date"), own.plural("plural")
         texts = own.texts("texts", plural)

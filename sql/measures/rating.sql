@@ -1,0 +1,308 @@
+-- Elements of tunnels, and their ratings by owners' schemes. Needs coverage_at (leaks/coverage.sql), survey_ends
+-- (geometry/survey_ends.sql) and stationing (geometry/stationing.sql).
+
+CREATE OR REPLACE VIEW tunnel_api.element AS
+SELECT e.id, t.id AS tunnel_id, t.name AS tunnel, d.name AS element_set, d.source, e.number, e.name, e.chainage_from, e.chainage_to,
+       tunnel_api.station_label(t.id, e.chainage_from) AS label_from, tunnel_api.station_label(t.id, e.chainage_to) AS label_to,
+       e.clock_from, e.clock_to
+  FROM tunnel.element e
+  JOIN tunnel.element_set d ON d.id = e.element_set_id
+  JOIN tunnel.tunnel t ON t.id = d.tunnel_id;
+COMMENT ON VIEW tunnel_api.element IS
+    'Elements of tunnels that are rated: rings, blocks, stretches or zones, written by tunneldb elements add';
+COMMENT ON COLUMN tunnel_api.element.element_set IS 'Name of the division of the tunnel';
+COMMENT ON COLUMN tunnel_api.element.source IS 'Source of the division: file, length or rings';
+COMMENT ON COLUMN tunnel_api.element.number IS 'Number in its division, from 1';
+COMMENT ON COLUMN tunnel_api.element.name IS 'Name of the element';
+COMMENT ON COLUMN tunnel_api.element.clock_from IS
+    'Clock position at which it begins, clockwise looking up-chainage, hours; NULL: all round';
+COMMENT ON COLUMN tunnel_api.element.clock_to IS 'Clock position at which it ends, hours';
+
+CREATE OR REPLACE VIEW tunnel_api.rating_scheme AS
+SELECT r.id, r.name, r.version, r.source, r.valid_from, r.results, r.min_inspected, r.added_at,
+       (SELECT count(*) FROM tunnel.rating_rule u WHERE u.scheme_id = r.id) AS rules
+  FROM tunnel.rating_scheme r;
+COMMENT ON VIEW tunnel_api.rating_scheme IS 'Schemes by which owners rate elements, written by tunneldb rating add';
+COMMENT ON COLUMN tunnel_api.rating_scheme.version IS 'Version; a version is never changed';
+COMMENT ON COLUMN tunnel_api.rating_scheme.source IS 'Directive or standard, in the owner''s words';
+COMMENT ON COLUMN tunnel_api.rating_scheme.valid_from IS 'Date from which it is valid';
+COMMENT ON COLUMN tunnel_api.rating_scheme.results IS 'Results from the best to the worst';
+COMMENT ON COLUMN tunnel_api.rating_scheme.min_inspected IS 'Inspected share below which a result is a lower bound, 0 to 1';
+COMMENT ON COLUMN tunnel_api.rating_scheme.rules IS 'Number of rules';
+
+CREATE OR REPLACE VIEW tunnel_api.rating_rule AS
+SELECT r.scheme_id::bigint * 1000 + r.number AS id, r.scheme_id, s.name AS scheme, s.version, r.number, r.text, r.kinds, r.measure,
+       r.inclusive, r.limits, r.results
+  FROM tunnel.rating_rule r JOIN tunnel.rating_scheme s ON s.id = r.scheme_id;
+COMMENT ON VIEW tunnel_api.rating_rule IS 'Rules of rating schemes: an element that reaches a limit has at least its result';
+COMMENT ON COLUMN tunnel_api.rating_rule.number IS 'Number of the rule in its scheme, from 1';
+COMMENT ON COLUMN tunnel_api.rating_rule.text IS 'Rule in the owner''s words';
+COMMENT ON COLUMN tunnel_api.rating_rule.kinds IS 'Codes of the kinds of findings (finding_kind); empty: all wet ones';
+COMMENT ON COLUMN tunnel_api.rating_rule.measure IS
+    'area (m², sum), share (area over the inspected lining), largest_area (m²), length (m, sum), width_mm (greatest), severity (greatest) or count';
+COMMENT ON COLUMN tunnel_api.rating_rule.inclusive IS 'True if a value equal to a limit reaches it';
+COMMENT ON COLUMN tunnel_api.rating_rule.limits IS 'Limits in ascending order';
+COMMENT ON COLUMN tunnel_api.rating_rule.results IS 'Result at each limit';
+
+-- A zone between two clock positions is one rectangle of the unrolled plane, or two if it goes through 6 o'clock, where the plane
+-- is cut. Its arcs are those of the section nearest to the element's middle.
+CREATE OR REPLACE FUNCTION tunnel_internal.element_boxes(survey_id int, set_id int)
+RETURNS TABLE (element_id int, low float8, high float8, arc_from float8, arc_to float8, girth_share float8)
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 1000 SET search_path = pg_catalog, pg_temp SET jit = off
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    set_key constant int := set_id;
+BEGIN
+    RETURN QUERY
+    WITH part AS MATERIALIZED (
+        SELECT e.id, greatest(e.chainage_from, v.chainage_from) AS low, least(e.chainage_to, v.chainage_to) AS high,
+               -- degrees clockwise from the crown, -180 to 180
+               mod((e.clock_from * 30 + 180)::numeric, 360)::float8 - 180 AS begins,
+               mod((e.clock_to * 30 + 180)::numeric, 360)::float8 - 180 AS ends
+          FROM tunnel.element e CROSS JOIN tunnel_api.survey_ends(survey_key) v
+         WHERE e.element_set_id = set_key AND e.chainage_to > v.chainage_from AND e.chainage_from < v.chainage_to
+    ), middle AS MATERIALIZED (
+        SELECT DISTINCT (p.low + p.high) / 2 AS chainage FROM part p WHERE p.begins IS NOT NULL
+    ), curve AS MATERIALIZED (
+        SELECT m.chainage, n.arc
+          FROM middle m
+         CROSS JOIN LATERAL (
+               SELECT c.arc FROM (
+                   (SELECT s.chainage, s.arc FROM tunnel.section s
+                     WHERE s.survey_id = survey_key AND s.chainage <= m.chainage ORDER BY s.chainage DESC LIMIT 1)
+                   UNION ALL
+                   (SELECT s.chainage, s.arc FROM tunnel.section s
+                     WHERE s.survey_id = survey_key AND s.chainage > m.chainage ORDER BY s.chainage LIMIT 1)) c
+                ORDER BY abs(c.chainage - m.chainage) LIMIT 1) n
+    ), zone AS (
+        SELECT p.id, p.low, p.high, p.begins, p.ends, c.arc[1] AS first, c.arc[361] AS last,
+               c.arc[round(p.begins)::int + 181] AS a, c.arc[round(p.ends)::int + 181] AS b
+          FROM part p JOIN curve c ON c.chainage = (p.low + p.high) / 2
+         WHERE p.begins IS NOT NULL
+    ), box AS (
+        SELECT p.id, p.low, p.high, '-infinity'::float8 AS arc_from, 'infinity'::float8 AS arc_to, 1::float8 AS share
+          FROM part p WHERE p.begins IS NULL
+        UNION ALL
+        SELECT z.id, z.low, z.high, z.a, z.b, (z.b - z.a) / (z.last - z.first) FROM zone z WHERE z.begins < z.ends
+        UNION ALL
+        SELECT z.id, z.low, z.high, z.a, z.last, (z.last - z.a) / (z.last - z.first) FROM zone z WHERE z.begins > z.ends
+        UNION ALL
+        SELECT z.id, z.low, z.high, z.first, z.b, (z.b - z.first) / (z.last - z.first) FROM zone z WHERE z.begins > z.ends
+    )
+    SELECT b.id, b.low, b.high, b.arc_from, b.arc_to, b.share FROM box b WHERE b.arc_from < b.arc_to;
+END
+$$;
+COMMENT ON FUNCTION tunnel_internal.element_boxes(int, int) IS
+'Elements of a division in the unrolled plane of a survey: chainages and arcs (m), and share of the circumference. An element that goes through 6 o''clock has two rows; one outside the survey has none';
+
+CREATE OR REPLACE FUNCTION tunnel_internal.element_extent(survey_id int, set_id int)
+RETURNS TABLE (element_id int, lining float8, inspected_share float8)
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 1000 SET search_path = pg_catalog, pg_temp SET jit = off
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    set_key constant int := set_id;
+BEGIN
+    RETURN QUERY
+    WITH box AS MATERIALIZED (
+        SELECT b.element_id, min(b.low) AS low, min(b.high) AS high, sum(b.girth_share) AS share
+          FROM tunnel_internal.element_boxes(survey_key, set_key) b GROUP BY b.element_id
+    ), place AS MATERIALIZED (
+        SELECT array_agg(DISTINCT p.chainage) AS chainages FROM (SELECT b.low AS chainage FROM box b UNION SELECT b.high FROM box b) p
+    ), sums AS MATERIALIZED (
+        SELECT c.* FROM place CROSS JOIN LATERAL tunnel_internal.coverage_at(survey_key, place.chainages) c
+    )
+    SELECT e.id, coalesce((t.lining - f.lining) * b.share, 0),
+           CASE WHEN t.length > f.length
+                -- what of the element lies beyond the survey was not inspected either
+                THEN (t.seen - f.seen) / nullif(t.lining - f.lining, 0) * least((t.length - f.length) / (e.chainage_to - e.chainage_from), 1)
+                ELSE 0 END
+      FROM tunnel.element e
+      LEFT JOIN box b ON b.element_id = e.id
+      LEFT JOIN sums f ON f.chainage = b.low
+      LEFT JOIN sums t ON t.chainage = b.high
+     WHERE e.element_set_id = set_key;
+END
+$$;
+COMMENT ON FUNCTION tunnel_internal.element_extent(int, int) IS
+'Lining of the elements of a division in a survey, searched for leaks, m², and its inspected share. The share is that of the stretch, all round: coverage is known by chainage only. 0 where leaks were not searched for';
+
+CREATE OR REPLACE FUNCTION tunnel_internal.element_parts(survey_id int, set_id int)
+RETURNS TABLE (element_id int, finding_id bigint, kind text, wet boolean, severity int, width_mm float8, area float8, part float8,
+    length float8)
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 10000 SET search_path = pg_catalog, pg_temp
+SET jit = off
+SET enable_nestloop = off  -- the number of rows is unknown at planning
+SET enable_mergejoin = off
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    set_key constant int := set_id;
+    cell constant float8 := 20;  -- m: pairs are sought by equal cells of this length
+BEGIN
+    RETURN QUERY
+    WITH box AS MATERIALIZED (
+        SELECT b.*, g.n FROM tunnel_internal.element_boxes(survey_key, set_key) b
+         CROSS JOIN LATERAL generate_series(floor(b.low / cell)::int, floor(b.high / cell)::int) AS g (n)
+    ), found AS MATERIALIZED (
+        SELECT f.id, f.chainage_from, f.chainage_to, f.arc_from, f.arc_to, f.unrolled, coalesce(f.kind_override, f.kind) AS kind, f.wet,
+               f.severity, f.width_mm, f.area, f.length, g.n
+          FROM tunnel.finding f
+         CROSS JOIN LATERAL generate_series(floor(f.chainage_from / cell)::int, floor(f.chainage_to / cell)::int) AS g (n)
+         WHERE f.survey_id = survey_key AND f.detected AND f.review <> 'rejected' AND NOT f.superseded
+    ), pair AS (
+        SELECT b.element_id, f.*,
+               CASE WHEN f.chainage_from >= b.low AND f.chainage_to <= b.high AND f.arc_from >= b.arc_from AND f.arc_to <= b.arc_to
+                    THEN 1
+                    ELSE public.ST_Area(public.ST_ClipByBox2D(f.unrolled, public.ST_MakeBox2D(
+                            public.ST_MakePoint(b.low, greatest(b.arc_from, -1e4)), public.ST_MakePoint(b.high, least(b.arc_to, 1e4)))))
+                         / nullif(public.ST_Area(f.unrolled), 0) END AS share
+          FROM box b JOIN found f ON f.n = b.n AND f.n = floor(greatest(f.chainage_from, b.low) / cell)::int
+           AND f.chainage_to > b.low AND f.chainage_from < b.high AND f.arc_to > b.arc_from AND f.arc_from < b.arc_to
+    )
+    SELECT p.element_id, p.id, p.kind, p.wet, p.severity::int, p.width_mm, p.area, p.area * sum(p.share), p.length * sum(p.share)
+      FROM pair p WHERE p.share > 0
+     GROUP BY p.element_id, p.id, p.kind, p.wet, p.severity, p.width_mm, p.area, p.length;
+END
+$$;
+COMMENT ON FUNCTION tunnel_internal.element_parts(int, int) IS
+'Counted findings of a survey in the elements of a division: area of the whole finding and of its part in the element (m²), and length of that part (m)';
+
+CREATE OR REPLACE FUNCTION tunnel_internal.element_set_id(survey text, element_set text) RETURNS int
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp
+AS $$
+DECLARE
+    found int;
+BEGIN
+    SELECT d.id INTO found
+      FROM tunnel.survey s JOIN tunnel.element_set d ON d.tunnel_id = s.tunnel_id
+     WHERE s.id = tunnel_api.survey_id(element_set_id.survey) AND d.name = element_set_id.element_set;
+    IF found IS NULL THEN
+        RAISE EXCEPTION 'the tunnel of survey % has no elements named %', survey, element_set
+            USING ERRCODE = 'no_data_found', HINT = 'tunneldb elements list shows them';
+    END IF;
+    RETURN found;
+END
+$$;
+COMMENT ON FUNCTION tunnel_internal.element_set_id(text, text) IS
+'Key of a division of a survey''s tunnel, by its name. Raises an error if there is none';
+
+CREATE OR REPLACE FUNCTION tunnel_api.element_findings(survey text, element_set text)
+RETURNS TABLE (element_id int, number int, name text, lining_area float8, inspected_share float8, findings int, leaks int,
+    wet_area float8, wet_share float8, largest_leak float8, crack_length float8, crack_width_mm float8, worst_severity int)
+LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 1000 SET search_path = pg_catalog, pg_temp
+AS $$
+    WITH key AS MATERIALIZED (
+        SELECT tunnel_api.survey_id($1) AS survey, tunnel_internal.element_set_id($1, $2) AS part
+    ), sum AS MATERIALIZED (
+        SELECT p.element_id, count(*)::int AS findings, (count(*) FILTER (WHERE p.kind = 'leak'))::int AS leaks,
+               coalesce(sum(p.part) FILTER (WHERE p.wet), 0) AS wet, max(p.area) FILTER (WHERE p.kind = 'leak') AS largest,
+               sum(p.length) FILTER (WHERE p.kind = 'crack') AS cracks, max(p.width_mm) FILTER (WHERE p.kind = 'crack') AS width,
+               max(p.severity) AS severity
+          FROM key CROSS JOIN LATERAL tunnel_internal.element_parts(key.survey, key.part) p GROUP BY p.element_id
+    )
+    SELECT e.id, e.number, e.name, x.lining, x.inspected_share, coalesce(s.findings, 0), coalesce(s.leaks, 0), coalesce(s.wet, 0),
+           coalesce(s.wet, 0) / nullif(x.lining * x.inspected_share, 0), s.largest, s.cracks, s.width, s.severity
+      FROM key
+     CROSS JOIN LATERAL tunnel_internal.element_extent(key.survey, key.part) x
+      JOIN tunnel.element e ON e.id = x.element_id
+      LEFT JOIN sum s ON s.element_id = e.id
+     ORDER BY e.number
+$$;
+COMMENT ON FUNCTION tunnel_api.element_findings(text, text) IS
+'Elements of a division in a survey with their lining that was searched for leaks (m²), its inspected share, counted findings, number of leaks, wet area (m²) and its share of the inspected lining, largest leak (m²), length of cracks (m), greatest width of a crack (mm) and worst severity. An element with inspected_share 0 was not inspected: 0 findings do not mean that it is dry';
+
+CREATE OR REPLACE FUNCTION tunnel_internal.rating_scheme_id(scheme text, version text) RETURNS int
+LANGUAGE plpgsql STABLE CALLED ON NULL INPUT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp
+AS $$
+DECLARE
+    found int;
+BEGIN
+    SELECT r.id INTO found FROM tunnel.rating_scheme r
+     WHERE r.name = rating_scheme_id.scheme AND (rating_scheme_id.version IS NULL OR r.version = rating_scheme_id.version)
+     ORDER BY r.added_at DESC, r.id DESC LIMIT 1;
+    IF found IS NULL THEN
+        RAISE EXCEPTION 'there is no rating scheme % %', scheme, coalesce(version, '')
+            USING ERRCODE = 'no_data_found', HINT = 'tunneldb rating list shows them';
+    END IF;
+    RETURN found;
+END
+$$;
+COMMENT ON FUNCTION tunnel_internal.rating_scheme_id(text, text) IS
+'Key of a rating scheme by name and version; without a version the one added last. Raises an error if there is none';
+
+CREATE OR REPLACE FUNCTION tunnel_api.rating(survey text, element_set text, scheme text, version text DEFAULT NULL)
+RETURNS TABLE (element_id int, number int, name text, chainage_from float8, chainage_to float8, clock_from float8, clock_to float8,
+    inspected_share float8, findings int, result text, level int, complete boolean, rule int, measure text, value float8,
+    limit_reached float8, finding_id bigint, why text)
+LANGUAGE plpgsql STABLE CALLED ON NULL INPUT PARALLEL SAFE SECURITY DEFINER ROWS 1000 SET search_path = pg_catalog, pg_temp
+SET jit = off
+SET enable_nestloop = off  -- the number of rows is unknown at planning
+SET enable_mergejoin = off
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := tunnel_api.survey_id(survey);
+    set_key constant int := tunnel_internal.element_set_id(survey, element_set);
+    scheme_key constant int := tunnel_internal.rating_scheme_id(scheme, version);
+    chosen tunnel.rating_scheme;
+BEGIN
+    SELECT r.* INTO chosen FROM tunnel.rating_scheme r WHERE r.id = scheme_key;
+    RETURN QUERY
+    WITH part AS MATERIALIZED (
+        SELECT p.* FROM tunnel_internal.element_parts(survey_key, set_key) p
+    ), extent AS MATERIALIZED (
+        SELECT x.* FROM tunnel_internal.element_extent(survey_key, set_key) x
+    ), counted AS MATERIALIZED (
+        SELECT p.element_id, count(*)::int AS findings FROM part p GROUP BY p.element_id
+    ), rule_kind AS MATERIALIZED (
+        SELECT r.number, r.measure, k.code
+          FROM tunnel.rating_rule r JOIN tunnel.finding_kind k ON k.code = ANY (r.kinds) OR (cardinality(r.kinds) = 0 AND k.wet)
+         WHERE r.scheme_id = chosen.id
+    ), term AS (
+        SELECT p.element_id, r.number, r.measure, p.finding_id,
+               CASE r.measure WHEN 'largest_area' THEN p.area WHEN 'length' THEN p.length WHEN 'width_mm' THEN p.width_mm
+                              WHEN 'severity' THEN p.severity WHEN 'count' THEN 1 ELSE p.part END AS amount
+          FROM part p JOIN rule_kind r ON r.code = p.kind
+    ), fact AS (
+        SELECT t.element_id, t.number, t.measure,
+               CASE WHEN t.measure IN ('largest_area', 'width_mm', 'severity') THEN max(t.amount) ELSE sum(t.amount) END AS amount,
+               (array_agg(t.finding_id ORDER BY t.amount DESC NULLS LAST, t.finding_id))[1] AS decisive
+          FROM term t GROUP BY t.element_id, t.number, t.measure
+    ), value AS (
+        SELECT f.element_id, f.number, f.measure, f.decisive,
+               CASE f.measure WHEN 'share' THEN f.amount / nullif(x.lining * x.inspected_share, 0) ELSE f.amount END AS amount
+          FROM fact f JOIN extent x ON x.element_id = f.element_id
+    ), reached AS (
+        SELECT v.element_id, v.number, v.measure, v.decisive, v.amount, r.text, r.inclusive, r.limits[g.n] AS boundary,
+               r.results[g.n] AS result, array_position(chosen.results, r.results[g.n]) AS level
+          FROM value v JOIN tunnel.rating_rule r ON r.scheme_id = chosen.id AND r.number = v.number
+         CROSS JOIN LATERAL (
+               SELECT max(i) AS n FROM generate_subscripts(r.limits, 1) AS i
+                WHERE v.amount > r.limits[i] OR (r.inclusive AND v.amount = r.limits[i])) g
+         WHERE g.n IS NOT NULL
+    ), worst AS (
+        SELECT DISTINCT ON (r.element_id) r.* FROM reached r ORDER BY r.element_id, r.level DESC, r.number
+    )
+    SELECT e.id, e.number, e.name, e.chainage_from, e.chainage_to, e.clock_from, e.clock_to, x.inspected_share,
+           coalesce(c.findings, 0),
+           -- where nothing was inspected, no finding is no good result
+           CASE WHEN w.result IS NOT NULL THEN w.result WHEN x.inspected_share > 0 THEN chosen.results[1] END,
+           CASE WHEN w.level IS NOT NULL THEN w.level WHEN x.inspected_share > 0 THEN 1 END,
+           x.inspected_share >= chosen.min_inspected,
+           w.number, w.measure, w.amount, w.boundary, w.decisive,
+           w.text || format(': %s %s %s', round(w.amount::numeric, 4)::float8, CASE WHEN w.inclusive THEN '≥' ELSE '>' END, w.boundary)
+      FROM tunnel.element e
+      JOIN extent x ON x.element_id = e.id
+      LEFT JOIN counted c ON c.element_id = e.id
+      LEFT JOIN worst w ON w.element_id = e.id
+     WHERE e.element_set_id = set_key
+     ORDER BY e.number;
+END
+$$;
+COMMENT ON FUNCTION tunnel_api.rating(text, text, text, text) IS
+'Rating of the elements of a division in a survey by a scheme; without a version by the one added last. result: the worst of all rules, with its place in the scheme''s results (level, from 1, the best); the scheme''s best result without a rule that was reached; NULL where nothing was inspected and nothing found. complete: false if less than min_inspected of the element was inspected: the result is then a lower bound. rule, measure, value, limit_reached, finding_id and why: what decided, and the finding that contributed most';

@@ -1,0 +1,157 @@
+"""Elements and ratings by command: files, advice, an owner's scheme from end to end."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import psycopg
+import pytest
+from click.testing import CliRunner, Result
+from support.example_survey import NAME
+
+from tunneldb.cli.main import main
+
+EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "rating-example.toml"
+
+
+def run(*words: str) -> Result:
+    return CliRunner().invoke(main, list(words))
+
+
+def done(*words: str) -> Result:
+    result = run(*words)
+    assert result.exit_code == 0, result.output
+    return result
+
+
+def refused(*words: str) -> str:
+    result = run(*words)
+    assert result.exit_code == 2, result.output
+    assert "Traceback" not in result.output
+    return result.output.strip()
+
+
+def test_an_owners_scheme_from_end_to_end(dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
+    """Blocks of 50 m are added, rated by the scheme of the documentation, and written; each number is that of SQL."""
+    done("rating", "add", str(EXAMPLE))
+    done("elements", "add", "demo", "fifty", "--length", "50")
+    path = tmp_path / "rating.csv"
+    result = done("rating", "apply", NAME, "--elements", "fifty", "--scheme", "example", "--version", "2026-1", "-o", str(path))
+    rows = list(csv.DictReader(path.open()))
+    known = conn.execute(
+        "SELECT name, result, complete, finding_id FROM tunnel_api.rating(%s, 'fifty', 'example', '2026-1')", [NAME]
+    ).fetchall()
+    assert [row["name"] for row in rows] == [row[0] for row in known] == ["12300", "12350", "12400", "12450"]
+    assert [row["result"] for row in rows] == [row[1] or "" for row in known]
+    assert "at least" in result.output, "the first 10 m were not inspected"
+    words = ["--elements", "fifty", "--scheme", "example", "--version", "2026-1", "--json"]
+    shown = json.loads(done("rating", "apply", NAME, *words).stdout)
+    assert [one["result"] for one in shown["ratings"]] == [row[1] for row in known]
+
+
+def test_lists_and_removal(dsn: str, example: str, conn: psycopg.Connection) -> None:
+    done("rating", "add", str(EXAMPLE))
+    assert "2026-1" in done("rating", "list").output
+    assert "≥ 0.2: 1; ≥ 0.5: 2; ≥ 2: 3" in done("rating", "show", "example", "2026-1").output
+    assert "blocks" in done("elements", "list", "demo").output
+    done("rating", "remove", "example", "2026-1")
+    done("elements", "remove", "demo", "blocks")
+    assert refused("rating", "show", "example", "2026-1").endswith("tunneldb rating list")
+    assert refused("elements", "remove", "demo", "blocks").endswith("tunneldb elements list demo")
+
+
+def test_a_version_is_never_changed(dsn: str, example: str) -> None:
+    done("rating", "add", str(EXAMPLE))
+    message = refused("rating", "add", str(EXAMPLE))
+    assert "a version is never changed" in message
+    assert "tunneldb rating remove example 2026-1" in message
+
+
+def test_rings_and_zones_become_elements(dsn: str, example: str, conn: psycopg.Connection) -> None:
+    done("elements", "add", "demo", "rings", "--rings", NAME, "--zones")
+    rows = conn.execute(
+        "SELECT name, chainage_from, chainage_to, clock_from, clock_to FROM tunnel_api.element WHERE element_set = 'rings'"
+        " ORDER BY number"
+    ).fetchall()
+    assert rows[0] == ("ring 1 crown", 12300, 12302, 10, 2)
+    assert len(rows) == 4 * 100
+
+
+def test_elements_of_a_file(dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
+    path = tmp_path / "blocks.csv"
+    path.write_text("name,chainage_from,chainage_to,clock_from,clock_to\nportal,12300,12310,0,12\nvault 1,12310,12330,9,3\n")
+    refused("elements", "add", "demo", "own", "--file", str(path))  # 0 and 12 are one place
+    path.write_text("name,chainage_from,chainage_to,clock_from,clock_to\nportal,12300,12310,6,5.9\nvault 1,12310,12330,9,3\n")
+    done("elements", "add", "demo", "own", "--file", str(path))
+    rows = conn.execute("SELECT name, clock_from FROM tunnel_api.element WHERE element_set = 'own' ORDER BY number").fetchall()
+    assert rows == [("portal", 6), ("vault 1", 9)]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("name,chainage_from,chainage_to\na,10,10\n", "line 2: chainage_to 10 is not greater than chainage_from 10"),
+        ("name,chainage_from,chainage_to\n ,10,20\n", "line 2: the element has no name"),
+        ("name,chainage_from,chainage_to,clock_from,clock_to\na,10,20,3,3\n", "line 2: clock_from 3 and clock_to 3 are two"),
+        ("name,chainage_from,chainage_to,clock_from,clock_to\na,10,20,3,13\n", "line 2: clock_from 3 and clock_to 13 are two"),
+        ("name,chainage_from,chainage_to\n", "has no row below its header"),
+        ("chainage_from,chainage_to\n1,2\n", "name"),
+    ],
+)
+def test_wrong_elements_are_refused_with_their_line(dsn: str, example: str, tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "wrong.csv"
+    path.write_text(text)
+    assert message in refused("elements", "add", "demo", "own", "--file", str(path))
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--length", "10", "--rings", NAME], "exactly one of --length M, --rings SURVEY and --file FILE"),
+        ([], "exactly one of --length M, --rings SURVEY and --file FILE"),
+        (["--rings", "nothing"], "no survey 'nothing'"),
+    ],
+)
+def test_wrong_words_are_refused(dsn: str, example: str, words: list[str], message: str) -> None:
+    assert message in refused("elements", "add", "demo", "own", *words)
+
+
+GOOD = EXAMPLE.read_text()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('measure = "share"', 'measure = "part"', "rule 1: measure: 'part' is none of area, share, largest_area"),
+        ('"3" = 0.01 }', '"3" = 0.0001 }', "rule 1: above: a worse result needs a higher limit"),
+        ('"3" = 0.01 }', '"7" = 0.01 }', "rule 1: above: '7' is none of the results 0, 1, 2, 3, 4"),
+        ('"3" = 0.01 }', '"3" = 0.002 }', "rule 1: above: two results have the same limit"),
+        ('"3" = 0.01 }', '"3" = "x" }', "rule 1: above: {RESULT = LIMIT, …} with a number"),
+        ('kinds = ["crack"]', 'kinds = ["crak"]', "rule 3: there is no kind of finding 'crak'"),
+        ('kinds = ["crack"]', 'kinds = "crack"', "rule 3: kinds: a list of texts is needed"),
+        ('version = "2026-1"', "version = 2026", "version: a text of at most 500 characters is needed"),
+        ("valid_from = 2026-01-01", 'valid_from = "2026-01-01"', "valid_from: a date without quotes"),
+        ("min_inspected = 0.95", "min_inspected = 95", "min_inspected: a number from 0 to 1"),
+        ('results = ["0", "1", "2", "3", "4"]', 'results = ["0", "0"]', "results: 2 to 20 different texts"),
+        ('source = "Example; no directive"', 'sauce = "x"', "sauce: there is no such key Did you mean 'source'?"),
+        ('from = { "1" = 0.2', 'above = { "1" = 1 }\nfrom = { "1" = 0.2', "rule 3: above: a rule has either above"),
+        ("[[rule]]", "[[ruel]]", "ruel: there is no such key"),
+        ("name = ", "name == ", "is not TOML"),
+    ],
+)
+def test_wrong_schemes_are_refused_with_their_key(
+    dsn: str, example: str, tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    path = tmp_path / "scheme.toml"
+    assert old in GOOD
+    path.write_text(GOOD.replace(old, new, 1) if old != "[[rule]]" else GOOD.replace(old, new))
+    said = refused("rating", "add", str(path))
+    assert message in said
+    assert str(path) in said or "there is no kind" in said
+
+
+def test_rating_names_what_is_missing(dsn: str, example: str) -> None:
+    assert "tunneldb rating list" in refused("rating", "apply", NAME, "--elements", "blocks", "--scheme", "nothing")
+    assert "tunneldb elements list" in refused("rating", "apply", NAME, "--elements", "nothing", "--scheme", "example")

@@ -1,0 +1,104 @@
+"""The command ``elements``: elements of a tunnel that are rated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tunneldb.cli.main import Settings
+from tunneldb.cli.output import CommandGroup, add_to_json, notify
+from tunneldb.cli.param_types import FilePath, FiniteRange
+from tunneldb.cli.tables import print_table
+from tunneldb.counted import counted
+from tunneldb.database import connect
+from tunneldb.errors import UserError
+
+
+@click.group(cls=CommandGroup)
+def elements() -> None:
+    """Add, list or remove the elements of a tunnel: rings, blocks, stretches or zones, which a scheme rates."""
+
+
+@elements.command(
+    examples=[
+        "tunneldb elements add ringo stretches --length 10",
+        "tunneldb elements add ringo rings --rings ringo-2024 --zones",
+        "tunneldb elements add ringo blocks --file blocks.csv",
+    ]
+)
+@click.argument("tunnel")
+@click.argument("name")
+@click.option("--length", type=FiniteRange(0.1, 1e6), metavar="M", help="Stretches of this length, from multiples of it.")
+@click.option("--rings", "survey", metavar="SURVEY", help="Rings of a survey (tunneldb rings).")
+@click.option("--file", type=FilePath(dir_okay=False), metavar="FILE", help="CSV of elements.")
+@click.option("--zones", is_flag=True, help="Divide each into crown, right wall, invert and left wall by clock position.")
+@click.pass_obj
+def add(
+    settings: Settings, tunnel: str, name: str, length: float | None, survey: str | None, file: Path | None, zones: bool
+) -> None:
+    """Add elements to TUNNEL as a division called NAME.
+
+    FILE has name,chainage_from,chainage_to (m) and optionally clock_from,clock_to (hours, clockwise looking
+    up-chainage). Zones: crown 10 to 2 o'clock, right 2 to 5, invert 5 to 7, left 7 to 10.
+    """
+    from tunneldb.pipeline.rating_file import read_elements, stretches_of
+    from tunneldb.store.catalog import get_tunnel
+    from tunneldb.store.design import get_design_tunnel
+    from tunneldb.store.rating import ring_elements, save_elements, zoned
+    from tunneldb.store.survey import get_survey
+
+    if sum(given is not None for given in (length, survey, file)) != 1:
+        raise UserError("give exactly one of --length M, --rings SURVEY and --file FILE")
+    found = read_elements(file) if file is not None else []
+    if zones and any(one.clock for one in found):
+        raise UserError(f"{file} has clock positions: leave out --zones")
+    with connect(settings.dsn) as conn:
+        place = get_design_tunnel(conn, get_tunnel(conn, tunnel), tunnel)
+        if length is not None:
+            found = stretches_of(length, place.start, place.end)
+        elif survey is not None:
+            there = get_survey(conn, survey)
+            if there.tunnel_id != place.tunnel_id:
+                raise UserError(f"survey {survey} is of tunnel {there.tunnel}, not of {tunnel}")
+            found = ring_elements(conn, there.id, survey)
+        found = zoned(found) if zones else found
+        source = "file" if file is not None else "length" if length is not None else "rings"
+        save_elements(conn, place.tunnel_id, tunnel, name, source, found)
+    add_to_json(tunnel=tunnel, name=name, source=source, elements=len(found))
+    notify(f"{name}: {counted(len(found), 'element')} of {tunnel}")
+
+
+@elements.command("list", examples=["tunneldb elements list ringo"])
+@click.argument("tunnel")
+@click.pass_obj
+def list_(settings: Settings, tunnel: str) -> None:
+    """List the divisions of TUNNEL into elements."""
+    from tunneldb.store.catalog import get_tunnel
+    from tunneldb.store.rating import list_elements
+
+    with connect(settings.dsn) as conn:
+        rows = list_elements(conn, get_tunnel(conn, tunnel))
+    add_to_json(tunnel=tunnel, element_sets=rows)
+    print_table(
+        ["name", "source", "elements", "from", "to"],
+        [
+            (row["element_set"], row["source"], row["elements"], f"{row['chainage_from']:.3f}", f"{row['chainage_to']:.3f}")
+            for row in rows
+        ],
+        right=(2, 3, 4),
+    )
+
+
+@elements.command(examples=["tunneldb elements remove ringo blocks"])
+@click.argument("tunnel")
+@click.argument("name")
+@click.pass_obj
+def remove(settings: Settings, tunnel: str, name: str) -> None:
+    """Remove the division NAME of TUNNEL."""
+    from tunneldb.store.catalog import get_tunnel
+    from tunneldb.store.rating import remove_elements
+
+    with connect(settings.dsn) as conn:
+        remove_elements(conn, get_tunnel(conn, tunnel), tunnel, name)
+    add_to_json(tunnel=tunnel, name=name)

@@ -1,0 +1,108 @@
+"""Elements of tunnels, and the schemes by which owners rate them."""
+
+from __future__ import annotations
+
+import datetime as dt
+
+from sqlalchemy import CheckConstraint, Identity, Integer, Text, UniqueConstraint, text
+from sqlalchemy.dialects.postgresql import ARRAY
+from sqlalchemy.orm import Mapped, mapped_column
+
+from tunneldb.database.models.base import CLOCK, TUNNEL, Base, Floats, at_most, bounded, one_of, parent
+
+
+class ElementSet(Base):
+    """Division of a tunnel into elements."""
+
+    __tablename__ = "element_set"
+    __table_args__ = (
+        UniqueConstraint("tunnel_id", "name"),
+        at_most("name", 100),
+        one_of("source", "file", "length", "rings"),
+        {"comment": "Divisions of tunnels into elements that are rated: rings, blocks, stretches, zones"},
+    )
+
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
+    tunnel_id: Mapped[int] = mapped_column(parent("tunnel"), comment=TUNNEL)
+    name: Mapped[str] = mapped_column(comment="Name")
+    source: Mapped[str] = mapped_column(comment="file, length (equal stretches) or rings (of a survey)")
+    added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time when it was added")
+
+
+class Element(Base):
+    """Element of a tunnel."""
+
+    __tablename__ = "element"
+    __table_args__ = (
+        UniqueConstraint("element_set_id", "number"),
+        at_most("name", 200),
+        bounded("place", "chainage_from", "chainage_to"),
+        CheckConstraint("chainage_from < chainage_to", name="order"),
+        CheckConstraint(
+            "(clock_from IS NULL) = (clock_to IS NULL) AND clock_from >= 0 AND clock_from <= 12 AND clock_to >= 0"
+            " AND clock_to <= 12 AND clock_from <> clock_to",
+            name="clock",
+        ),
+        {"comment": "Elements of tunnels: stretches of the lining, all round or between two clock positions"},
+    )
+
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
+    element_set_id: Mapped[int] = mapped_column(parent("element_set"), comment="Division that it is part of")
+    number: Mapped[int] = mapped_column(Integer, comment="Number in its division, from 1")
+    name: Mapped[str] = mapped_column(comment="Name, such as a ring number")
+    chainage_from: Mapped[float] = mapped_column(comment="Chainage of its beginning, m")
+    chainage_to: Mapped[float] = mapped_column(comment="Chainage of its end, m")
+    clock_from: Mapped[float | None] = mapped_column(
+        comment="Clock position at which it begins, clockwise looking up-chainage, hours; NULL: all round"
+    )
+    clock_to: Mapped[float | None] = mapped_column(comment="Clock position at which it ends, hours")
+
+
+class RatingScheme(Base):
+    """Scheme by which an owner rates elements."""
+
+    __tablename__ = "rating_scheme"
+    __table_args__ = (
+        UniqueConstraint("name", "version"),
+        at_most("name", 100),
+        at_most("version", 100),
+        at_most("source", 1000),
+        CheckConstraint("cardinality(results) BETWEEN 2 AND 20", name="results"),
+        CheckConstraint("min_inspected >= 0 AND min_inspected <= 1", name="min_inspected"),
+        {"comment": "Schemes by which owners rate elements; a version is never changed"},
+    )
+
+    id: Mapped[int] = mapped_column(Identity(always=True), primary_key=True, comment="Key")
+    name: Mapped[str] = mapped_column(comment="Name")
+    version: Mapped[str] = mapped_column(comment="Version")
+    source: Mapped[str] = mapped_column(comment="Directive or standard with section, in the owner's words")
+    valid_from: Mapped[dt.date | None] = mapped_column(comment="Date from which it is valid")
+    results: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Results from the best to the worst")
+    min_inspected: Mapped[float] = mapped_column(
+        server_default=text("0.95"), comment="Inspected share below which a result is a lower bound, 0 to 1"
+    )
+    added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time when it was added")
+
+
+class RatingRule(Base):
+    """Rule of a scheme: limits of a measure, each with the result of an element that reaches it."""
+
+    __tablename__ = "rating_rule"
+    __table_args__ = (
+        at_most("text", 500),
+        one_of("measure", "area", "share", "largest_area", "length", "width_mm", "severity", "count"),
+        CheckConstraint("cardinality(limits) BETWEEN 1 AND 20 AND cardinality(limits) = cardinality(results)", name="limits"),
+        {"comment": "Rules of rating schemes; the worst result of all rules is that of an element"},
+    )
+
+    scheme_id: Mapped[int] = mapped_column(parent("rating_scheme"), primary_key=True, comment="Scheme")
+    number: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False, comment="Number of the rule, from 1")
+    text: Mapped[str] = mapped_column(comment="Rule in the owner's words")
+    kinds: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Codes of the kinds of findings; empty: all wet ones")
+    measure: Mapped[str] = mapped_column(
+        comment="area (m², sum), share (area over the inspected lining), largest_area (m²), length (m, sum), width_mm"
+        " (greatest), severity (greatest) or count"
+    )
+    inclusive: Mapped[bool] = mapped_column(comment="True if a value equal to a limit reaches it")
+    limits: Mapped[Floats] = mapped_column(comment="Limits in ascending order")
+    results: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Result at each limit")

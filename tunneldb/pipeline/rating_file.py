@@ -1,0 +1,141 @@
+"""Files of elements (CSV) and of rating schemes (TOML)."""
+
+from __future__ import annotations
+
+import datetime as dt
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+from tunneldb.csvfile import find_column, read_csv, read_header, read_texts
+from tunneldb.errors import InputError, did_you_mean
+from tunneldb.store.rating import MEASURES, Element, Rule, Scheme
+from tunneldb.tomlfile import read_toml
+
+SCHEME_KEYS = ("name", "version", "source", "valid_from", "results", "min_inspected", "rule")
+RULE_KEYS = ("text", "kinds", "measure", "above", "from")
+MIN_INSPECTED = 0.95
+"""Inspected share below which a result is a lower bound, if a scheme does not state another one."""
+
+
+def read_elements(path: Path) -> list[Element]:
+    """Read elements: name,chainage_from,chainage_to and perhaps clock_from,clock_to (hours); m.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, an element has no length or no name, or a clock position is none; with the line.
+    """
+    header = read_header(path)
+    clocked = find_column(path, header, "clock_from") is not None
+    names = ("chainage_from", "chainage_to", *(("clock_from", "clock_to") if clocked else ()))
+    table = read_csv(path, names)
+    texts = read_texts(path, "name")
+    if not len(table):
+        raise InputError(f"{path} has no row below its header; it needs one for each element")
+    found = []
+    for row, name in enumerate(texts):
+        low, high = float(table["chainage_from"][row]), float(table["chainage_to"][row])
+        if not name.strip():
+            raise table.error(row, "the element has no name")
+        if not low < high:
+            raise table.error(row, f"chainage_to {high:g} is not greater than chainage_from {low:g}")
+        clock = (float(table["clock_from"][row]), float(table["clock_to"][row])) if clocked else None
+        if clock is not None and (not all(0.0 <= hours <= 12.0 for hours in clock) or clock[0] % 12 == clock[1] % 12):
+            raise table.error(row, f"clock_from {clock[0]:g} and clock_to {clock[1]:g} are two different hours from 0 to 12")
+        found.append(Element(name.strip(), low, high, clock))
+    return found
+
+
+def stretches_of(length: float, low: float, high: float) -> list[Element]:
+    """Return elements of equal length, m, between multiples of it, from one chainage to another."""
+    first, last = math.floor(low / length + 1e-9), math.ceil(high / length - 1e-9)
+    return [Element(f"{n * length:.10g}", n * length, (n + 1) * length) for n in range(first, last)]
+
+
+def read_scheme(path: Path) -> Scheme:
+    """Read a rating scheme.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or a key is unknown, missing or wrong; with the key.
+    """
+    given = _Given(path, "", read_toml(path, "a rating scheme"))
+    given.refuse_others(SCHEME_KEYS)
+    results = given.texts("results")
+    if len(set(results)) != len(results) or not 2 <= len(results) <= 20:
+        given.refuse("results", "2 to 20 different texts, from the best to the worst")
+    valid_from = given.values.get("valid_from")
+    if valid_from is not None and (not isinstance(valid_from, dt.date) or isinstance(valid_from, dt.datetime)):
+        given.refuse("valid_from", "a date without quotes, as 2026-01-31")
+    share = given.values.get("min_inspected", MIN_INSPECTED)
+    if not _is_number(share) or not 0.0 <= share <= 1.0:
+        given.refuse("min_inspected", "a number from 0 to 1")
+    rules = given.values.get("rule")
+    if not isinstance(rules, list) or not rules or not all(isinstance(rule, dict) for rule in rules):
+        given.refuse("rule", "the file needs a part [[rule]] for each rule")
+    return Scheme(
+        given.text("name"), given.text("version"), given.text("source"), valid_from, results, float(share),
+        tuple(_rule(_Given(path, f"rule {n}: ", rule), results) for n, rule in enumerate(rules, start=1)),
+    )  # fmt: skip
+
+
+def _rule(given: _Given, results: Sequence[str]) -> Rule:
+    given.refuse_others(RULE_KEYS)
+    measure = given.text("measure")
+    if measure not in MEASURES:
+        given.refuse("measure", f"{measure!r} is none of {', '.join(MEASURES)}")
+    if ("above" in given.values) == ("from" in given.values):
+        given.refuse("above", "a rule has either above = {RESULT = LIMIT, …}, or from = {…}, whose limits count as reached")
+    key = "above" if "above" in given.values else "from"
+    limits = given.values[key]
+    if not isinstance(limits, dict) or not limits or not all(_is_number(limit) for limit in limits.values()):
+        given.refuse(key, "{RESULT = LIMIT, …} with a number for each result")
+    for result in limits:
+        if result not in results:
+            given.refuse(key, f"{result!r} is none of the results {', '.join(results)}")
+    ordered = sorted(limits.items(), key=lambda item: float(item[1]))
+    if [results.index(result) for result, _ in ordered] != sorted({results.index(result) for result in limits}):
+        given.refuse(key, "a worse result needs a higher limit")
+    if len({limit for _, limit in ordered}) < len(ordered):
+        given.refuse(key, "two results have the same limit")
+    return Rule(
+        given.text("text"), given.texts("kinds") if "kinds" in given.values else (), measure, key == "from",
+        tuple(float(limit) for _, limit in ordered), tuple(result for result, _ in ordered),
+    )  # fmt: skip
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+@dataclass(frozen=True)
+class _Given:
+    """Table of a file; errors are reported with the file's name, the place and the key."""
+
+    path: Path
+    place: str
+    values: dict[str, Any]
+
+    def refuse(self, key: str, reason: str) -> NoReturn:
+        raise InputError(f"{self.path}: {self.place}{key}: {reason}")
+
+    def refuse_others(self, known: tuple[str, ...]) -> None:
+        for key in self.values:
+            if key not in known:
+                self.refuse(key, f"there is no such key{did_you_mean(key, known)}; there are {', '.join(known)}")
+
+    def text(self, key: str) -> str:
+        value = self.values.get(key)
+        if not isinstance(value, str) or not value.strip() or len(value) > 500:
+            self.refuse(key, "a text of at most 500 characters is needed")
+        return value.strip()
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        value = self.values.get(key)
+        if not isinstance(value, list) or not value or not all(isinstance(one, str) and one.strip() for one in value):
+            self.refuse(key, "a list of texts is needed")
+        return tuple(one.strip() for one in value)

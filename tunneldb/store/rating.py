@@ -1,0 +1,247 @@
+"""Elements of tunnels and rating schemes, to and from the database."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import psycopg
+from psycopg.rows import dict_row
+
+from tunneldb.errors import UserError
+
+MEASURES = {
+    "area": "m²",
+    "share": "",
+    "largest_area": "m²",
+    "length": "m",
+    "width_mm": "mm",
+    "severity": "",
+    "count": "",
+}
+"""Measures of rules, with their units."""
+
+ZONES = {"crown": (10.0, 2.0), "right": (2.0, 5.0), "invert": (5.0, 7.0), "left": (7.0, 10.0)}
+"""Zones of the circumference by clock position, clockwise looking up-chainage, hours."""
+
+
+@dataclass(frozen=True)
+class Element:
+    """Element of a tunnel.
+
+    Attributes
+    ----------
+    name : str
+    chainage_from, chainage_to : float
+        Along the given axis, m.
+    clock : (float, float) or None
+        Clock positions at which it begins and ends, hours; None for all round.
+    """
+
+    name: str
+    chainage_from: float
+    chainage_to: float
+    clock: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Rule of a scheme.
+
+    Attributes
+    ----------
+    text : str
+        Rule in the owner's words.
+    kinds : tuple of str
+        Codes of the kinds of findings; empty for all wet ones.
+    measure : str
+        One of :data:`MEASURES`.
+    inclusive : bool
+        True if a value equal to a limit reaches it.
+    limits : tuple of float
+        Limits, ascending.
+    results : tuple of str
+        Result at each limit.
+    """
+
+    text: str
+    kinds: tuple[str, ...]
+    measure: str
+    inclusive: bool
+    limits: tuple[float, ...]
+    results: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """Rating scheme of an owner.
+
+    Attributes
+    ----------
+    name, version, source : str
+    valid_from : date or None
+    results : tuple of str
+        Results from the best to the worst.
+    min_inspected : float
+        Inspected share below which a result is a lower bound.
+    rules : tuple of Rule
+    """
+
+    name: str
+    version: str
+    source: str
+    valid_from: dt.date | None
+    results: tuple[str, ...]
+    min_inspected: float
+    rules: tuple[Rule, ...]
+
+
+def zoned(elements: Sequence[Element]) -> list[Element]:
+    """Divide elements into the zones of :data:`ZONES`."""
+    return [
+        Element(f"{one.name} {zone}", one.chainage_from, one.chainage_to, clock)
+        for one in elements
+        for zone, clock in ZONES.items()
+    ]
+
+
+def save_elements(
+    conn: psycopg.Connection[Any], tunnel_id: int, tunnel: str, name: str, source: str, elements: Sequence[Element]
+) -> None:
+    """Add a division of a tunnel.
+
+    Raises
+    ------
+    UserError
+        If the name is taken.
+    """
+    row = conn.execute(
+        "INSERT INTO tunnel.element_set (tunnel_id, name, source) VALUES (%s, %s, %s) ON CONFLICT DO NOTHING RETURNING id",
+        [tunnel_id, name, source],
+    ).fetchone()
+    if row is None:
+        raise UserError(f"tunnel {tunnel} has elements named {name!r}: tunneldb elements remove {tunnel} {name}")
+    clocks = [one.clock or (None, None) for one in elements]
+    conn.execute(
+        "INSERT INTO tunnel.element (element_set_id, number, name, chainage_from, chainage_to, clock_from, clock_to)"
+        " SELECT %s, v.n, v.name, v.low, v.high, v.a, v.b FROM unnest(%s::text[], %s::float8[], %s::float8[], %s::float8[],"
+        " %s::float8[]) WITH ORDINALITY AS v (name, low, high, a, b, n)",
+        [
+            row[0], [one.name for one in elements], [one.chainage_from for one in elements],
+            [one.chainage_to for one in elements], [clock[0] for clock in clocks], [clock[1] for clock in clocks],
+        ],
+    )  # fmt: skip
+
+
+def list_elements(conn: psycopg.Connection[Any], tunnel_id: int) -> list[dict[str, Any]]:
+    """Return the divisions of a tunnel with the number of their elements and their ends, m."""
+    rows = conn.cursor(row_factory=dict_row).execute(
+        "SELECT e.element_set, e.source, count(*) AS elements, min(e.chainage_from) AS chainage_from,"
+        " max(e.chainage_to) AS chainage_to FROM tunnel_api.element e WHERE e.tunnel_id = %s GROUP BY 1, 2 ORDER BY 1",
+        [tunnel_id],
+    )
+    return rows.fetchall()
+
+
+def remove_elements(conn: psycopg.Connection[Any], tunnel_id: int, tunnel: str, name: str) -> None:
+    """Remove a division of a tunnel; raise UserError if there is none."""
+    done = conn.execute("DELETE FROM tunnel.element_set WHERE tunnel_id = %s AND name = %s", [tunnel_id, name])
+    if not done.rowcount:
+        raise UserError(f"tunnel {tunnel} has no elements named {name!r}: tunneldb elements list {tunnel}")
+
+
+def ring_elements(conn: psycopg.Connection[Any], survey_id: int, survey: str) -> list[Element]:
+    """Return the rings of a survey as elements; raise UserError if it has none."""
+    rows = conn.execute(
+        "SELECT r.number, r.chainage_from, r.chainage_to FROM tunnel_api.ring r WHERE r.survey_id = %s"
+        " ORDER BY r.chainage_from",
+        [survey_id],
+    ).fetchall()
+    if not rows:
+        raise UserError(f"survey {survey} has no rings: tunneldb rings {survey}")
+    return [Element(f"ring {number}", low, high) for number, low, high in rows]
+
+
+def save_scheme(conn: psycopg.Connection[Any], scheme: Scheme) -> None:
+    """Add a scheme.
+
+    Raises
+    ------
+    UserError
+        If there is this version of it, or a rule has a kind that the database lacks.
+    """
+    known = {code for (code,) in conn.execute("SELECT k.code FROM tunnel_api.finding_kind k")}
+    for number, rule in enumerate(scheme.rules, start=1):
+        for kind in rule.kinds:
+            if kind not in known:
+                raise UserError(f"rule {number}: there is no kind of finding {kind!r}: {', '.join(sorted(known))}")
+    row = conn.execute(
+        "INSERT INTO tunnel.rating_scheme (name, version, source, valid_from, results, min_inspected)"
+        " VALUES (%s, %s, %s, %s, %s, %s) ON CONFLICT DO NOTHING RETURNING id",
+        [scheme.name, scheme.version, scheme.source, scheme.valid_from, list(scheme.results), scheme.min_inspected],
+    ).fetchone()
+    if row is None:
+        raise UserError(
+            f"there is version {scheme.version} of {scheme.name}, and a version is never changed: give another version, or"
+            f" tunneldb rating remove {scheme.name} {scheme.version}"
+        )
+    for number, rule in enumerate(scheme.rules, start=1):
+        conn.execute(
+            "INSERT INTO tunnel.rating_rule (scheme_id, number, text, kinds, measure, inclusive, limits, results)"
+            " VALUES (%s, %s, %s, %s, %s, %s, %s, %s)",
+            [
+                row[0], number, rule.text, list(rule.kinds), rule.measure, rule.inclusive, list(rule.limits),
+                list(rule.results),
+            ],
+        )  # fmt: skip
+
+
+def list_schemes(conn: psycopg.Connection[Any]) -> list[dict[str, Any]]:
+    """Return the schemes, the one added last first."""
+    return conn.cursor(row_factory=dict_row).execute(
+        "SELECT s.name, s.version, s.source, s.valid_from, s.results, s.min_inspected, s.rules FROM tunnel_api.rating_scheme s"
+        " ORDER BY s.added_at DESC, s.id DESC"
+    ).fetchall()  # fmt: skip
+
+
+def scheme_rules(conn: psycopg.Connection[Any], name: str, version: str | None) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Return a scheme, without a version the one added last, and its rules; raise UserError if there is none."""
+    scheme = next((s for s in list_schemes(conn) if s["name"] == name and version in (None, s["version"])), None)
+    if scheme is None:
+        raise UserError(f"there is no rating scheme {' '.join(filter(None, (name, version)))!r}: tunneldb rating list")
+    rows = conn.cursor(row_factory=dict_row).execute(
+        "SELECT r.number, r.text, r.kinds, r.measure, r.inclusive, r.limits, r.results FROM tunnel_api.rating_rule r"
+        " WHERE r.scheme = %s AND r.version = %s ORDER BY r.number",
+        [scheme["name"], scheme["version"]],
+    )
+    return scheme, rows.fetchall()
+
+
+def remove_scheme(conn: psycopg.Connection[Any], name: str, version: str) -> None:
+    """Remove a version of a scheme; raise UserError if there is none."""
+    done = conn.execute("DELETE FROM tunnel.rating_scheme WHERE name = %s AND version = %s", [name, version])
+    if not done.rowcount:
+        raise UserError(f"there is no rating scheme {name} {version}: tunneldb rating list")
+
+
+def rate(
+    conn: psycopg.Connection[Any], survey: str, element_set: str, scheme: str, version: str | None
+) -> list[dict[str, Any]]:
+    """Return the rating of the elements of a survey, as the function ``rating`` does.
+
+    Raises
+    ------
+    UserError
+        If there is no such division or scheme.
+    """
+    try:
+        return conn.cursor(row_factory=dict_row).execute(
+            "SELECT r.number, r.name, r.chainage_from, r.chainage_to, r.clock_from, r.clock_to, r.inspected_share, r.findings,"
+            " r.result, r.level, r.complete, r.rule, r.measure, r.value, r.limit_reached, r.finding_id, r.why"
+            " FROM tunnel_api.rating(%s, %s, %s, %s) r",
+            [survey, element_set, scheme, version],
+        ).fetchall()  # fmt: skip
+    except psycopg.errors.NoDataFound as error:
+        raise UserError(f"{error.diag.message_primary}; {error.diag.message_hint}") from None
