@@ -21,6 +21,7 @@ TOPICS = {
     "Design profile": ("deviation", "deviation_layer", "thickness", "evenness"),
     "Clearance": ("clearance", "clearance_layer"),
     "Rings": ("rings",),
+    "Elements and ratings": ("rating",),
     "Structures": ("structures",),
     "Under water": ("sonar", "closed_section"),
     "Stages and queue": ("status", "state", "queue", "remark", "size"),
@@ -34,6 +35,7 @@ OWNERS = {"tunnel", "survey"}
 LEADS_TO = {
     "finding_id": "finding",
     "profile_id": "design_profile",
+    "scheme_id": "rating_scheme",
     "scan_id": "scan_station",
     "sonar_point.scan_id": "sonar_scan",
     "registration_residual.scan_id": "sonar_scan",

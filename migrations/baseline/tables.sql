@@ -393,7 +393,7 @@ CREATE TABLE tunnel.rating_rule (
     CONSTRAINT rating_rule_pkey PRIMARY KEY (scheme_id, number),
     CONSTRAINT rating_rule_text_at_most_500_characters_check CHECK (char_length(text) <= 500),
     CONSTRAINT rating_rule_measure_check CHECK (measure IN ('area', 'share', 'largest_area', 'length', 'width_mm', 'severity', 'count')),
-    CONSTRAINT rating_rule_limits_check CHECK (cardinality(limits) BETWEEN 1 AND 20 AND cardinality(limits) = cardinality(results)),
+    CONSTRAINT rating_rule_limits_check CHECK (cardinality(limits) >= 1 AND cardinality(limits) <= 20 AND cardinality(limits) = cardinality(results)),
     CONSTRAINT rating_rule_scheme_id_fkey FOREIGN KEY(scheme_id) REFERENCES tunnel.rating_scheme (id) ON DELETE CASCADE
 );
 COMMENT ON TABLE tunnel.rating_rule IS 'Rules of rating schemes; the worst result of all rules is that of an element';

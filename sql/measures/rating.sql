@@ -35,6 +35,8 @@ SELECT r.scheme_id::bigint * 1000 + r.number AS id, r.scheme_id, s.name AS schem
        r.inclusive, r.limits, r.results
   FROM tunnel.rating_rule r JOIN tunnel.rating_scheme s ON s.id = r.scheme_id;
 COMMENT ON VIEW tunnel_api.rating_rule IS 'Rules of rating schemes: an element that reaches a limit has at least its result';
+COMMENT ON COLUMN tunnel_api.rating_rule.scheme IS 'Name of the scheme';
+COMMENT ON COLUMN tunnel_api.rating_rule.version IS 'Version of the scheme';
 COMMENT ON COLUMN tunnel_api.rating_rule.number IS 'Number of the rule in its scheme, from 1';
 COMMENT ON COLUMN tunnel_api.rating_rule.text IS 'Rule in the owner''s words';
 COMMENT ON COLUMN tunnel_api.rating_rule.kinds IS 'Codes of the kinds of findings (finding_kind); empty: all wet ones';

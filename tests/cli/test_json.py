@@ -65,6 +65,13 @@ def test_what_is_listed_is_what_the_views_hold(example: str, conn: psycopg.Conne
     vertices = rows(conn, "SELECT count(*)::int FROM tunnel_api.axis_vertex WHERE source <> 'interpolated'")[0][0]
     assert all(0 < element["vertices"] <= vertices for element in told(0, "axis", example)["elements"])
     assert told(0, "tunnel", "stationing", "demo", "--show")["tunnel"] == "demo"
+    (blocks, zones) = told(0, "elements", "list", "demo")["element_sets"]
+    assert (blocks["elements"], zones["elements"]) == (4, 16)
+    (scheme,) = told(0, "rating", "list")["schemes"]
+    assert len(told(0, "rating", "show", scheme["name"])["rules"]) == scheme["rules"] == 2
+    ratings = told(0, "rating", "apply", example, "--elements", "blocks", "--scheme", "example")["ratings"]
+    held = rows(conn, f"SELECT name, result, level FROM tunnel_api.rating('{example}', 'blocks', 'example')")
+    assert [(one["name"], one["result"], one["level"]) for one in ratings] == held
 
 
 LEAK = (

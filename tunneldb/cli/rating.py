@@ -120,8 +120,8 @@ def remove(settings: Settings, scheme: str, version: str) -> None:
 def apply(settings: Settings, survey: str, element_set: str, scheme: str, version: str | None, output: Path | None) -> None:
     """Rate the elements of SURVEY.
 
-    The worst result of all rules is that of the element. An element of which less was inspected than the scheme asks
-    for is marked "at least"; one that was not inspected, and has no findings, has no result.
+    The worst result of all rules is that of the element. If less than the scheme's minimum was inspected, the result
+    is a lower bound, marked "at least". An element that was not inspected and has no findings has no result.
     """
     from tunneldb.store.rating import rate, scheme_rules
     from tunneldb.store.survey import get_survey

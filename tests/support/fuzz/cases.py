@@ -68,6 +68,8 @@ OF_FILES: tuple[tuple[str, str], ...] = (
     ("axis.csv", "serve --no-open --port 0 --certificate {file} --key {seeds}/axis.csv"),
     ("axis.csv", "serve --no-open --port 0 --certificate {seeds}/axis.csv --key {file}"),
     ("template.toml", "report demo-2024 --template {file} -o {out}.html"),
+    ("elements.csv", "elements add demo {new} --file {file}"),
+    ("rating.toml", "rating add {file}"),
 )
 """Files, and what reads them: each command and option that takes a file is among them."""
 
@@ -86,6 +88,8 @@ OF_WORDS: tuple[str, ...] = (
     "rings --points {seeds}/rings-points.csv --axis {seeds}/rings-axis.csv --diameter 5.8 -o {out}.csv", "rings demo-2024",
     "sections demo-2024 --from 12+300 --to 12+310 --every 5 -o {out}.csv",
     "profile add demo {new} {seeds}/profile.csv {stretch}", "profile list demo", "profile remove demo {new}",
+    "elements add demo {new} --length 10", "elements list demo", "elements remove demo {new}", "rating list",
+    "rating show example", "rating remove {new} 1", "rating apply demo-2024 --elements blocks --scheme example",
     "deviation demo-2024 -o {out}.csv", "thickness demo-2024 scan-2024", "evenness demo-2024", "compare demo-2024 scan-2024",
     "clearance demo-2024 --gauge {seeds}/profile.csv --track single", "unroll demo-2024 {seeds}/points.csv",
     "ground {seeds}/cloud.las -o {out}.laz", "intensity demo-2024 -o {out}.png", "image demo-2024 -o {out}",
@@ -102,6 +106,7 @@ UNTRIED = {
     "init": "has no options",
     "inspect": "has no options",
     "findings import": "what goes wrong lies in its file",
+    "rating add": "what goes wrong lies in its file",
     "survey remove-file": "has no options but the file",
     "tunnel find-axis": "what goes wrong lies in its file",
     "serve": "serves until it is told to leave",
@@ -114,8 +119,8 @@ UNTRIED = {
 """Verbs that are in none of OF_WORDS, and why."""
 
 REFUSED = (
-    "clearance", "compare", "evaluate", "export scan-2024", "findings undo", "ground", "intensity", "learn demo-2024",
-    "members demo", "profile remove", "register", "run", "serve", "spheres", "survey remove-file", "thickness",
+    "clearance", "compare", "elements remove", "evaluate", "export scan-2024", "findings undo", "ground", "intensity", "learn demo-2024",
+    "members demo", "profile remove", "rating remove", "register", "run", "serve", "spheres", "survey remove-file", "thickness",
     "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
 )  # fmt: skip
 """What right commands begin with that the survey made by hand has no rows for: they are to say so in one line."""

@@ -13,6 +13,7 @@ from support.e57_files import Scan, write
 from tunneldb.geometry.surface import Surface
 
 DATA = Path(__file__).parents[2] / "data"
+RATING = Path(__file__).parents[3] / "docs" / "examples" / "rating-example.toml"
 
 
 def write_seeds(folder: Path, axis: np.ndarray, surface: Surface) -> None:
@@ -61,6 +62,8 @@ def write_seeds(folder: Path, axis: np.ndarray, surface: Surface) -> None:
         "ladder,rung,height,stile_gap,diameter\n" + "\n".join(f"A,{n},{599 + 0.3 * n:.2f},0.4,0.03" for n in range(6)),
     )
     _write(folder / "start.csv", f"file,x,y,within\npoints.csv,{axis[5][0]:.1f},{axis[5][1]:.1f},3")
+    _write(folder / "elements.csv", "name,chainage_from,chainage_to,clock_from,clock_to\nvault,12300,12350,9,3\n")
+    _write(folder / "rating.toml", RATING.read_text("utf-8"))
     _write(folder / "template.toml", 'client = "Owner"\nlanguage = "de"\n\n[headings]\n"Leak" = "Wasserzutritt"\n')
     for name in ("points", "axis"):
         lines = (DATA / "wriggle" / f"{name}.csv").read_text().splitlines()[: 60 if name == "points" else None]

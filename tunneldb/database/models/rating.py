@@ -91,7 +91,10 @@ class RatingRule(Base):
     __table_args__ = (
         at_most("text", 500),
         one_of("measure", "area", "share", "largest_area", "length", "width_mm", "severity", "count"),
-        CheckConstraint("cardinality(limits) BETWEEN 1 AND 20 AND cardinality(limits) = cardinality(results)", name="limits"),
+        CheckConstraint(
+            "cardinality(limits) >= 1 AND cardinality(limits) <= 20 AND cardinality(limits) = cardinality(results)",
+            name="limits",
+        ),
         {"comment": "Rules of rating schemes; the worst result of all rules is that of an element"},
     )
 

@@ -22,6 +22,8 @@ EXCLUDED = {
     "incoming": "files that wait to be read, which a batch asks for again",
     "segmentation_network": "files of owners, which have the same numbers in every database",
     "finding_sum": "sums that triggers keep",
+    "rating_scheme": "the owner's for all surveys, added from a file",
+    "rating_rule": "the owner's for all surveys, added from a file",
     "waterproof": "statistics of kilometres, worked out anew",
 }
 """Tables of schema tunnel that are not archived, with the reason."""
