@@ -11,7 +11,7 @@ import click
 from tunneldb.cli.main import Settings
 from tunneldb.cli.measure import number, output_option, require_ending, say_written, write_rows
 from tunneldb.cli.output import CommandGroup, add_to_json, notify
-from tunneldb.cli.param_types import file_path
+from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.tables import print_table
 from tunneldb.counted import counted
 from tunneldb.database import connect
@@ -29,9 +29,9 @@ def rating() -> None:
 
 
 @rating.command(examples=["tunneldb rating add owner-scheme.toml"])
-@click.argument("file")
+@click.argument("file", type=FilePath(dir_okay=False))
 @click.pass_obj
-def add(settings: Settings, file: str) -> None:
+def add(settings: Settings, file: Path) -> None:
     """Add the rating scheme of FILE.
 
     FILE is TOML: name, version, source, results (from the best to the worst), and a [[rule]] for each rule: text,
@@ -41,7 +41,7 @@ def add(settings: Settings, file: str) -> None:
     from tunneldb.pipeline.rating_file import read_scheme
     from tunneldb.store.rating import save_scheme
 
-    scheme = read_scheme(file_path(file))
+    scheme = read_scheme(file)
     with connect(settings.dsn) as conn:
         save_scheme(conn, scheme)
     add_to_json(name=scheme.name, version=scheme.version, rules=len(scheme.rules))
