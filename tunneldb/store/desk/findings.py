@@ -47,32 +47,33 @@ def worklist(
 
 def finding(conn: psycopg.Connection[Any], finding_id: int) -> dict[str, Any] | None:
     """Return a finding with its evidence, photos and history; None if there is none."""
-    rows = conn.execute(
-        "SELECT f.id, f.survey, f.label, f.clock, f.chainage_from, f.chainage_to, f.arc_from, f.arc_to, f.kind, f.kind_label,"
-        " f.kind_detected, f.origin, f.state, f.review, f.severity, f.width_mm, f.remark, f.area, f.length, f.darkening_mean,"
-        " f.darkening_max, f.contrast, f.confidence, f.reviewed_by,"
-        " to_char(f.reviewed_at, 'YYYY-MM-DD HH24:MI') AS reviewed_at,"
-        " f.drawn_by, public.ST_AsGeoJSON(f.unrolled, 4)::json AS outline FROM tunnel_api.finding f WHERE f.id = %s",
-        [finding_id],
-    )
+    with conn.pipeline():  # one round trip for all
+        rows = conn.execute(
+            "SELECT f.id, f.survey, f.label, f.clock, f.chainage_from, f.chainage_to, f.arc_from, f.arc_to, f.kind,"
+            " f.kind_label, f.kind_detected, f.origin, f.state, f.review, f.severity, f.width_mm, f.remark, f.area, f.length,"
+            " f.darkening_mean, f.darkening_max, f.contrast, f.confidence, f.reviewed_by,"
+            " to_char(f.reviewed_at, 'YYYY-MM-DD HH24:MI') AS reviewed_at,"
+            " f.drawn_by, public.ST_AsGeoJSON(f.unrolled, 4)::json AS outline FROM tunnel_api.finding f WHERE f.id = %s",
+            [finding_id],
+        )
+        evidence = conn.execute(
+            "SELECT e.words, e.log_odds FROM tunnel_api.finding_evidence e WHERE e.finding_id = %s AND abs(e.log_odds) >= 0.05"
+            " ORDER BY abs(e.log_odds) DESC, e.words",
+            [finding_id],
+        )
+        photos = conn.execute(
+            "SELECT p.id, p.path, p.caption, p.added_by, to_char(p.added_at, 'YYYY-MM-DD HH24:MI') AS added_at"
+            " FROM tunnel_api.finding_photo p WHERE p.finding_id = %s ORDER BY p.id",
+            [finding_id],
+        )
+        history = conn.execute(
+            "SELECT to_char(a.at, 'YYYY-MM-DD HH24:MI') AS at, a.who AS by, a.action, a.before, a.after FROM tunnel_api.audit a"
+            " WHERE a.row_id = %s AND a.view = 'finding' ORDER BY a.id DESC LIMIT 50",
+            [finding_id],
+        )
     found = named(rows)
     if not found:
         return None
-    evidence = conn.execute(
-        "SELECT e.words, e.log_odds FROM tunnel_api.finding_evidence e WHERE e.finding_id = %s AND abs(e.log_odds) >= 0.05"
-        " ORDER BY abs(e.log_odds) DESC, e.words",
-        [finding_id],
-    )
-    photos = conn.execute(
-        "SELECT p.id, p.path, p.caption, p.added_by, to_char(p.added_at, 'YYYY-MM-DD HH24:MI') AS added_at"
-        " FROM tunnel_api.finding_photo p WHERE p.finding_id = %s ORDER BY p.id",
-        [finding_id],
-    )
-    history = conn.execute(
-        "SELECT to_char(a.at, 'YYYY-MM-DD HH24:MI') AS at, a.who AS by, a.action, a.before, a.after FROM tunnel_api.audit a"
-        " WHERE a.row_id = %s AND a.view = 'finding' ORDER BY a.id DESC LIMIT 50",
-        [finding_id],
-    )
     listed = [photo | {"stored": is_stored(photo["path"])} for photo in named(photos)]
     return {**found[0], "evidence": named(evidence), "photos": listed, "history": named(history)}
 
@@ -113,7 +114,7 @@ def draw(conn: psycopg.Connection[Any], survey: str, geometry: Any, values: Mapp
     outline = json.dumps(geometry)
     with conn.transaction():
         # The first request may still be under way: drawings of a person follow each other.
-        conn.execute("SELECT pg_advisory_xact_lock(hashtextextended('tunneldb drawing ' || session_user, 0))")
+        conn.execute("SELECT pg_advisory_xact_lock(hashtextextended('drawing by ' || session_user, 0))")
         if again and (found := _drawn(conn, survey, outline)) is not None:
             return found
         return int(
