@@ -131,12 +131,15 @@ def test_a_shift_without_a_network(tablets: Tablets, database: psycopg.Connectio
         add_photo(page, "IMG_1.jpg", 1)
         expect(page.locator(".upload")).to_contain_text("IMG_1.jpg: recorded on this device, not in the database yet")
         waits(page, 5)
-        page.screenshot(path="/tmp/off2.png")
+        page.keyboard.press("m")
+        page.keyboard.type("niche, 2 cm deep")
+        page.keyboard.press("Enter")
+        waits(page, 6)
         forgive(page, QUIET)
     assert [review for _, review, _, _ in reviews(database, 1, 2)] == ["open", "open"]
     with opened(tablet, f"/#/{NAME}/finding/1") as page:
         shows(page, "confirmed.*no. 1")
-        waits(page, 5)
+        waits(page, 6)
         page.goto(f"/#/{NAME}/finding/7")
         expect(page.locator("#state")).to_contain_text("The server cannot be reached, and this was not taken offline.")
         server.stop()
@@ -150,11 +153,11 @@ def test_a_shift_without_a_network(tablets: Tablets, database: psycopg.Connectio
         forgive(page, QUIET)
     assert reviews(database, 1, 2) == [(1, "confirmed", None, "ines_web"), (2, "rejected", "dry in May", "ines_web")]
     ((key, *values),) = drawn(database)
-    assert values == ["spall", "edge of the niche", "ines_web"]
+    assert values == ["spall", "niche, 2 cm deep", "ines_web"]
     assert database.execute("SELECT finding_id, added_by FROM tunnel_api.finding_photo").fetchall() == [(key, "ines_web")]
-    audit = database.execute("SELECT view, action, who FROM tunnel_api.audit ORDER BY id DESC LIMIT 5").fetchall()
+    audit = database.execute("SELECT view, action, who FROM tunnel_api.audit ORDER BY id DESC LIMIT 6").fetchall()
     assert sorted(audit) == sorted(
-        [("finding", "update", "ines_web")] * 3 + [("finding", "insert", "ines_web"), ("photo", "insert", "ines_web")]
+        [("finding", "update", "ines_web")] * 4 + [("finding", "insert", "ines_web"), ("photo", "insert", "ines_web")]
     )
 
 
@@ -163,7 +166,6 @@ def test_a_phone_records_by_touch(tablets: Tablets, database: psycopg.Connection
     with opened(phone, VIEW) as page:
         take(page)
         assert not overflows(page)
-        page.screenshot(path="/tmp/off3.png")
         phone.set_offline(True)
         page.goto(f"/#/{NAME}/finding/1")
         shows(page, "no. 1")
@@ -172,7 +174,6 @@ def test_a_phone_records_by_touch(tablets: Tablets, database: psycopg.Connection
         page.reload()
         shows(page, "confirmed.*no. 1")
         assert not overflows(page)
-        page.screenshot(path="/tmp/off4.png")
         page.locator("#alerts summary").tap()
         for control in page.locator("#alerts button").all():
             box = control.bounding_box()
@@ -245,7 +246,6 @@ def test_another_inspector_was_faster(
         expect(page.locator("#alerts")).to_contain_text(
             "In the database: rejected, Leak, no remark, by ivo_web. Yours: review: confirmed."
         )
-        page.screenshot(path="/tmp/off5.png")
         page.locator("#alerts").get_by_role("button", name=button).click()
         expect(page.locator("#alerts")).to_be_empty()
         shows(page, f"{expected[0]}.*no. 1")
@@ -382,3 +382,33 @@ def test_wrong_stretches_get_one_line(tablets: Tablets, stretch: tuple[str, str]
         panel.get_by_role("button", name="State size").click()
         expect(panel.get_by_role("status")).to_contain_text(said)
         expect(panel.get_by_role("button", name="Take offline")).to_be_disabled()
+
+
+def test_what_is_older_than_a_day_is_removed(tablets: Tablets) -> None:
+    tablet = tablets()
+    with opened(tablet, VIEW) as page:
+        take(page)
+        page.evaluate(
+            """async () => {
+              const name = (await caches.keys()).find((one) => one.startsWith('tunneldb.stretch.'));
+              const [former, now] = [await caches.open(name), name.split('.').at(-1)];
+              const old = await caches.open(name.replace(now, now - 25 * 3600 * 1000));
+              for (const request of await former.keys()) await old.put(request, await former.match(request));
+              await caches.delete(name);
+            }"""
+        )
+        tablet.set_offline(True)
+        page.reload()
+        expect(page.locator("#network")).to_contain_text("Nothing is held on this device.")
+        expect(page.locator("#state")).to_contain_text("this was not taken offline")
+        page.wait_for_function("caches.keys().then((names) => names.length === 1)")
+        forgive(page, QUIET)
+
+
+def test_without_https_the_page_says_why(tablets: Tablets) -> None:
+    tablet = tablets()
+    tablet.add_init_script("Object.defineProperty(window, 'isSecureContext', { value: false })")
+    with opened(tablet, VIEW) as page:
+        panel = tab(page, "Offline")
+        expect(panel).to_contain_text("A browser works without a network only at an address with https, or at localhost.")
+        expect(panel.get_by_role("button")).to_have_count(0)

@@ -256,6 +256,8 @@ def test_undo_takes_a_verdict_back_that_waits(finding: Page, database: psycopg.C
     shows(page, 1, "open")
     expect(page.locator("#alerts")).to_be_empty()
     page.context.set_offline(False)
+    page.reload()
+    shows(page, 1, "open")
     assert verdict(database) == "open"
     forgive(page, "ERR_INTERNET_DISCONNECTED")
 

@@ -222,7 +222,7 @@ async function showNetwork() {
   const held = await heldStretches(user);
   const places = held.map(({ survey, from, to }) => `${survey}, ${station(from)} to ${station(to)}`).join('; ');
   const since = network.since ?? (held.length ? new Date(Math.min(...held.map(({ at }) => at))).toISOString() : null);
-  box.textContent = `Offline: as of ${time(since)}. ${places ? `Held on this device: ${places}. Elsewhere: not taken offline.` : 'Nothing was taken offline.'}`;
+  box.textContent = `Offline: as of ${time(since)}. ${places ? `Held on this device: ${places}. Elsewhere: not taken offline.` : 'Nothing is held on this device.'}`;
 }
 
 /** Read again what the page shows, after the network was away. */
@@ -381,6 +381,6 @@ async function begin() {
   await removeOthers(user);
   showNetwork();
   route();
-  if (!network.away && (await heldStretches(user)).length) import('./offline.js').then(({ renewShell }) => renewShell(user));
+  if (!network.away && (await heldStretches(user)).length) import('./offline.js').then(({ renewShell }) => renewShell(user)).catch((error) => say(`Copy of the page: ${error.message}`, true));
 }
 begin();

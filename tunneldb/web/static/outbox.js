@@ -40,7 +40,7 @@ export class Outbox {
    * @param {Object} on - changed(), state({state, record, text}), sent(record, answer) for a record nobody waits for.
    */
   constructor(user, on) {
-    Object.assign(this, { user, on, records: [], db: null, away: false, failures: 0, waiters: new Map(), lanes: {}, sending: new Set(), gone: new Set(), last: 0 });
+    Object.assign(this, { user, on, records: [], db: null, away: false, failures: 0, waiters: new Map(), lanes: {}, sending: new Set(), gone: new Set(), fresh: new Set(), last: 0 });
     this.name = `tunneldb.${user}`;
     window.addEventListener('online', () => this.send());
     window.addEventListener('beforeunload', (event) => {
@@ -64,7 +64,7 @@ export class Outbox {
 
   /** Records that wait for the network, or for the person. */
   get waiting() {
-    return this.records.filter((record) => record.stopped || this.away || (record.tried && !this.sending.has(record)));
+    return this.records.filter((record) => record.stopped || this.away || !this.fresh.has(record.key));
   }
 
   /** Keep a record; return it. It fails if the device has no space. */
@@ -72,6 +72,7 @@ export class Outbox {
     await this.ready;
     this.last = Math.max(this.last + 1, Date.now());
     const record = { ...fields, key: this.last, at: new Date().toISOString(), tried: 0, stopped: null };
+    this.fresh.add(record.key);
     try {
       await this.db?.add(STORE, record);
     } catch (error) {
@@ -106,7 +107,11 @@ export class Outbox {
     this.send();
     try {
       const answer = await Promise.race([settled, late]);
-      if (answer === null) this.on.state({ state: 'waiting', record });
+      if (answer === null) {
+        this.fresh.delete(record.key);
+        this.on.changed();
+        this.on.state({ state: 'waiting', record });
+      }
       return answer;
     } catch (error) {
       error.record = record;
