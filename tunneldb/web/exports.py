@@ -18,7 +18,7 @@ from starlette.types import Receive, Scope, Send
 from tunneldb.errors import UserError
 from tunneldb.store.survey import Survey, get_survey
 from tunneldb.web.route import Call, NotFoundError
-from tunneldb.web.sessions import Connection, RefusedError
+from tunneldb.web.sessions import PREPARED, Connection, RefusedError
 
 Writer = Callable[[Connection, Survey, float, float, Path, Path | None], None]
 """Writes a file of a survey between two chainages, m, with the photos of a folder."""
@@ -85,6 +85,7 @@ class _Download(FileResponse):
 def _written(conn: Connection, call: Call, write: Writer, low: float, high: float, path: Path) -> Survey:
     """Write a file from one moment of the database."""
     conn.autocommit = False
+    conn.prepare_threshold = None  # the plan of a statement would be that for the partitions of all surveys
     try:
         survey = get_survey(conn, call.path["survey"])
         conn.rollback()
@@ -96,3 +97,4 @@ def _written(conn: Connection, call: Call, write: Writer, low: float, high: floa
         if not conn.closed:
             conn.rollback()
             conn.autocommit = True
+            conn.prepare_threshold = PREPARED

@@ -36,6 +36,9 @@ MAX_OF_USER, MAX_SESSIONS = 5, 25
 MAX_WAITING = 30
 """Maximum number of requests of a session that wait for a connection; further ones are refused."""
 
+PREPARED = 3
+"""Number of times that a connection plans a statement before the plan is kept."""
+
 STATEMENT_TIMEOUT, LOCK_TIMEOUT = "60s", "5s"
 """Limits of a statement of the desk."""
 
@@ -254,6 +257,8 @@ def open_own(dsn: str) -> Connection:
 
 def _prepared(conn: Connection) -> Connection:
     conn.autocommit = True
+    # Planning takes longer than most requests of the desk; its functions choose among the partitions of surveys themselves.
+    conn.prepare_threshold = PREPARED
     conn.execute(
         "SELECT set_config('statement_timeout', %s, false), set_config('lock_timeout', %s, false),"
         " set_config('application_name', 'tunneldb serve', false)",
