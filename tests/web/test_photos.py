@@ -18,6 +18,7 @@ from support.photo_files import BLUE, RED, SERIAL, TAKEN, bomb, near, opened, ph
 from web.conftest import SignIn
 from web.test_findings import POLYGON
 
+from tunneldb.web import photos
 from tunneldb.web.config import Desk
 from tunneldb.web.security import MAX_BODY, MAX_PHOTO
 
@@ -274,6 +275,30 @@ def test_no_other_file_of_the_server_is_shown(desk: Desk, signed_in: SignIn, con
             assert (answer.status_code, answer.json()) == (404, {"error": f"photo {row[0]} is not here"}), path
     assert browser.get("/photos/..%2f..%2fetc%2fpasswd").status_code == 404
     assert browser.get("/photos/999999").status_code == 404
+
+
+@pytest.mark.parametrize("size", ["", "?size=small"])
+def test_a_row_that_changes_while_its_photo_is_read_shows_no_other(
+    signed_in: SignIn, conn: psycopg.Connection, monkeypatch: pytest.MonkeyPatch, size: str
+) -> None:
+    """Or the small picture of one photo would be kept under the name of the other, for all people."""
+    browser = signed_in("ines_web")
+    first, second = sent(browser, photo(seed=1)), sent(browser, photo(seed=2), "/api/findings/2/photos")
+    name_of = photos.name_of
+
+    def slow(call: Any) -> str:
+        name = name_of(call)
+        conn.execute("UPDATE tunnel_api.finding_photo SET path = %s WHERE id = %s", [second["path"], first["id"]])
+        conn.commit()
+        return name
+
+    expected = browser.get(f"/photos/{second['id']}{size}").content
+    monkeypatch.setattr(photos, "name_of", slow)
+    conn.execute("SELECT tunnel_api.finding_photo_add(2, content, NULL) FROM tunnel.photo_file WHERE name = %s", [first["path"]])
+    conn.commit()
+    assert browser.get(f"/photos/{first['id']}{size}").status_code == 404
+    monkeypatch.undo()
+    assert browser.get(f"/photos/{first['id']}{size}").content == expected
 
 
 def test_only_photos_may_be_long(signed_in: SignIn) -> None:

@@ -15,6 +15,8 @@ from support.example_points import CABLE, CABLE_OFFSET, add_points
 from support.example_survey import example_surface
 from web.conftest import SignIn
 
+from tunneldb.web import points as requests
+
 POINTS = "/api/surveys/demo-2024/points"
 OUTLINES = "/api/surveys/demo-2024/outlines"
 
@@ -177,3 +179,12 @@ def test_drawn_points_and_lines_have_outlines(signed_in: SignIn, conn: psycopg.C
     (line,) = one["lines"]
     assert (len(line) == 1) is shape.startswith("POINT")
     assert {len(place) for place in line} == {3}
+
+
+def test_a_stretch_of_the_greatest_length_is_not_too_long_by_rounding(
+    signed_in: SignIn, points: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """125.3 + 50 - 125.3 is more than 50 in floating point."""
+    monkeypatch.setattr(requests, "measured", lambda survey: (0.0, 13_000.0))
+    answer = signed_in("viola_web").get(f"{POINTS}?from=125.3&to=175.3")
+    assert (answer.status_code, "no points of demo-2024 are stored" in answer.json()["error"]) == (404, True)

@@ -111,6 +111,11 @@ def test_every_answer_has_the_headers(signed_in: SignIn) -> None:
             assert answer.headers[name] == value, path
 
 
+def test_a_host_with_a_path_makes_no_answer_public(signed_in: SignIn) -> None:
+    answer = signed_in("viola_web").get("/api/surveys", headers={"Host": f"desk.example.org{STATIC}/?"})
+    assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-store")
+
+
 def test_nothing_is_read_without_a_session(signed_in: SignIn) -> None:
     browser = signed_in("viola_web")
     browser.cookies.clear()

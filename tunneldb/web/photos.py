@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -91,15 +92,19 @@ def content_of(call: Call, name: str) -> bytes:
     Raises
     ------
     NotFoundError
-        If neither has it, or it is not a JPEG.
+        If neither has it, it is not a JPEG, or another one than the name says: its row was changed in the meantime.
     """
     with call.session.connection() as conn:
         content = photos.content(conn, call.path["id"])
     if content is None and call.desk.photos is not None:
         content = read_photo(call.desk.photos, name)
-    if content is None or not content.startswith(b"\xff\xd8\xff"):
+    if content is None or not content.startswith(b"\xff\xd8\xff") or _name(content) != name:
         raise _gone(call.path["id"])
     return content
+
+
+def _name(content: bytes) -> str:
+    return f"{hashlib.sha256(content).hexdigest()}.jpg"
 
 
 def _text(value: str | None) -> str | None:

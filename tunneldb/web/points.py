@@ -87,6 +87,8 @@ def _stretch(call: Call, survey: Place) -> tuple[float, float]:
     low, high = max(low, first), min(high, last, low + MAX_LENGTH)
     if not low < high:
         raise UserError(f"the stretch is outside the survey, which reaches from {first:.1f} to {last:.1f} m")
+    if high - low > MAX_LENGTH:  # by rounding
+        high = float(np.nextafter(high, low))
     return low, high
 
 

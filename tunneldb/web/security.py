@@ -57,7 +57,7 @@ def guard(loopback: bool, secure: bool) -> Callable[[Request, Next], Awaitable[R
         response = refusal(request, loopback) or await proceed(request)
         for name, value in headers.items():
             response.headers.setdefault(name, value)
-        kept = response.status_code == 200 and request.url.path.startswith(f"{STATIC}/")
+        kept = response.status_code == 200 and request.scope["path"].startswith(f"{STATIC}/")
         response.headers.setdefault("Cache-Control", "public, max-age=31536000, immutable" if kept else "no-store")
         return response
 
