@@ -145,7 +145,12 @@ DECLARE
     survey_key constant int := survey_id;
     set_key constant int := set_id;
     cell constant float8 := 20;  -- m: pairs are sought by equal cells of this length
+    first float8;
+    last float8;
+    longest constant float8 := (
+        SELECT coalesce(max(f.chainage_to - f.chainage_from), 0) FROM tunnel.finding f WHERE f.survey_id = survey_key);
 BEGIN
+    SELECT min(b.low), max(b.high) INTO first, last FROM tunnel_internal.element_boxes(survey_key, set_key) b;
     RETURN QUERY
     WITH box AS MATERIALIZED (
         SELECT b.*, g.n FROM tunnel_internal.element_boxes(survey_key, set_key) b
@@ -156,6 +161,7 @@ BEGIN
           FROM tunnel.finding f
          CROSS JOIN LATERAL generate_series(floor(f.chainage_from / cell)::int, floor(f.chainage_to / cell)::int) AS g (n)
          WHERE f.survey_id = survey_key AND f.detected AND f.review <> 'rejected' AND NOT f.superseded
+           AND f.chainage_from > first - longest AND f.chainage_from < last
     ), pair AS (
         SELECT b.element_id, f.*,
                CASE WHEN f.chainage_from >= b.low AND f.chainage_to <= b.high AND f.arc_from >= b.arc_from AND f.arc_to <= b.arc_to
