@@ -10,6 +10,7 @@ import uvicorn
 
 from tunneldb.web.app import create_app
 from tunneldb.web.config import Desk
+from tunneldb.web.protocol import PunctualProtocol
 
 PATIENCE = 30.0
 
@@ -35,7 +36,9 @@ class DeskServer:
 
     def start(self) -> None:
         app = create_app(Desk(self._dsn, None))
-        config = uvicorn.Config(app, port=self._port, log_level="warning", access_log=False, timeout_graceful_shutdown=1)
+        config = uvicorn.Config(
+            app, http=PunctualProtocol, port=self._port, log_level="warning", access_log=False, timeout_graceful_shutdown=1
+        )
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._server.run, daemon=True)
         self._thread.start()

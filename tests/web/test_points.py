@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import json
+import socket
 import struct
+import time
 from typing import Any
 
+import httpx2
 import numpy as np
 import psycopg
 import pytest
 import shapely
+from support.desk_server import DeskServer
 from support.example_objects import CORNER
 from support.example_points import CABLE, CABLE_OFFSET, add_points
 from support.example_survey import example_surface
-from web.conftest import SignIn
+from web.conftest import SignIn, sign_in
 
+from tunneldb.store.desk import points as stored
 from tunneldb.web import points as requests
+from tunneldb.web import protocol
 
 POINTS = "/api/surveys/demo-2024/points"
 OUTLINES = "/api/surveys/demo-2024/outlines"
@@ -188,3 +194,47 @@ def test_a_stretch_of_the_greatest_length_is_not_too_long_by_rounding(
     monkeypatch.setattr(requests, "measured", lambda survey: (0.0, 13_000.0))
     answer = signed_in("viola_web").get(f"{POINTS}?from=125.3&to=175.3")
     assert (answer.status_code, "no points of demo-2024 are stored" in answer.json()["error"]) == (404, True)
+
+
+def test_answers_that_nobody_reads_end_and_are_few(
+    logins: None, dsn: str, example: str, conn: psycopg.Connection, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They would fill the memory of the server; meanwhile the person and others work."""
+    monkeypatch.setattr(protocol, "READ_SECONDS", 8.0)
+    add_points(conn, 700_000, 12_330.0, 12_380.0)
+    loaded: list[float] = []
+    load = stored.load_points
+
+    def counted(*arguments: Any) -> Any:
+        loaded.append(time.monotonic())
+        return load(*arguments)
+
+    monkeypatch.setattr(stored, "load_points", counted)
+    server = DeskServer(dsn)
+    viola = httpx2.Client(base_url=server.address, timeout=60)
+    sign_in(viola, "viola_web")  # type: ignore[arg-type]
+    cookies = "; ".join(f"{name}={value}" for name, value in viola.cookies.items())
+    request = f"GET {POINTS}?from=12330&to=12380&limit=1000000 HTTP/1.1\r\nHost: a\r\nCookie: {cookies}\r\n\r\n".encode()
+    sockets = []
+    for _ in range(3):
+        reader = socket.socket()
+        reader.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        reader.connect(("127.0.0.1", int(server.address.rpartition(":")[2])))
+        reader.sendall(request)
+        sockets.append(reader)
+    time.sleep(5.0)
+    assert len(loaded) == 1
+    assert viola.get("/api/findings/1").status_code == 200
+    assert viola.get(f"{POINTS}?from=12330&to=12340").status_code == 200
+    assert loaded[1] - loaded[0] >= 7.0
+    for reader in sockets:
+        reader.close()
+    viola.close()
+    server.stop()
+
+
+@pytest.mark.parametrize("path", ["points?from=12330&to=12380", "section?chainage=12350", "section.dxf?chainage=12350"])
+def test_a_refused_large_answer_ends_its_turn(signed_in: SignIn, points: None, path: str) -> None:
+    browser = signed_in("viola_web")
+    for survey, status in (("none", 404), ("demo-2024", 200), ("demo-2024", 200)):
+        assert browser.get(f"/api/surveys/{survey}/{path}").status_code == status

@@ -18,7 +18,7 @@ from starlette.staticfiles import StaticFiles
 from tunneldb.web import exports, findings, health, ogc, photos, pictures, points, sections, sign_in, surveys, tiles
 from tunneldb.web.config import Desk
 from tunneldb.web.pages import FOLDER, STATIC, worker
-from tunneldb.web.route import route
+from tunneldb.web.route import MAX_LARGE, route
 from tunneldb.web.security import guard
 
 SWEEP = 30.0
@@ -77,9 +77,9 @@ def create_app(desk: Desk) -> Starlette:
             Route(f"{survey}/summary", route(surveys.summary)),
             Route(f"{survey}/colours/{{kind}}", route(surveys.colours)),
             Route(f"{survey}/ribbon", route(surveys.ribbon)),
-            Route(f"{survey}/section", route(sections.section)),
-            Route(f"{survey}/section.dxf", route(sections.drawing)),
-            Route(f"{survey}/points", route(points.points)),
+            Route(f"{survey}/section", route(sections.section, large=True)),
+            Route(f"{survey}/section.dxf", route(sections.drawing, large=True)),
+            Route(f"{survey}/points", route(points.points, large=True)),
             Route(f"{survey}/outlines", route(points.outlines)),
             Route(f"{survey}/export", route(exports.export)),
             Route(f"{survey}/worklist", route(findings.worklist)),
@@ -113,6 +113,7 @@ def create_app(desk: Desk) -> Starlette:
         ],
     )
     app.state.desk = desk
+    app.state.large = asyncio.Semaphore(MAX_LARGE)
     app.state.decoding = pictures.Decoding()
     app.state.health = health.Health(desk.dsn)
     return app

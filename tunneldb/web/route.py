@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -13,6 +14,7 @@ import psycopg
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
+from starlette.types import Receive, Scope, Send
 
 from tunneldb.errors import BusyError, UserError
 from tunneldb.numerals import parse_number
@@ -25,6 +27,12 @@ COOKIE = "tunneldb_session"
 
 MAX_QUERY = 100
 """Maximum number of values in the query string."""
+
+MAX_LARGE = 2
+"""Number of large answers that are made at once."""
+
+PART = 64 * 1024
+"""Length of the parts in which a large answer is sent, bytes."""
 
 CHALLENGE = 'Basic realm="tunneldb", charset="UTF-8"'
 
@@ -94,20 +102,66 @@ def cookie_name(desk: Desk) -> str:
 Handler = Callable[[Call], Any]
 
 
-def route(handler: Handler) -> Callable[[Request], Awaitable[Response]]:
-    """Return the endpoint of a handler, which runs in a thread and returns a response or a value for JSON."""
+def route(handler: Handler, *, large: bool = False) -> Callable[[Request], Awaitable[Response]]:
+    """Return the endpoint of a handler, which runs in a thread and returns a response or a value for JSON.
+
+    With ``large`` few run at once, and a session gets one answer after the other: they need much memory and time.
+    """
 
     async def endpoint(request: Request) -> Response:
         session = await session_of(request)
         if isinstance(session, Response):
             return session
         try:
-            result = await in_turn(session, handler, make_call(request, session, await _body(request)))
-            return result if isinstance(result, Response) else JSONResponse(result)
+            call = make_call(request, session, await _body(request))
+            if large:
+                return await _large(request, handler, call)
+            return _response(await in_turn(session, handler, call))
         except Exception as error:
             return answer_to(error)
 
     return endpoint
+
+
+class _InParts(Response):
+    """Large answer that is sent in parts as its reader takes them, and ends the turn of its session.
+
+    Parameters
+    ----------
+    whole : Response
+    turn : asyncio.Semaphore
+    """
+
+    def __init__(self, whole: Response, turn: asyncio.Semaphore) -> None:
+        super().__init__(whole.body, whole.status_code)
+        self.raw_headers = whole.raw_headers
+        self._turn = turn
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+            for begin in range(0, len(self.body), PART):
+                part = self.body[begin : begin + PART]
+                await send({"type": "http.response.body", "body": part, "more_body": True})
+            await send({"type": "http.response.body", "body": b""})
+        finally:
+            self._turn.release()
+
+
+async def _large(request: Request, handler: Handler, call: Call) -> Response:
+    """Run a handler whose answer is large."""
+    session = call.session
+    await _wait(session, session.large_turn)
+    try:
+        async with turn(session), request.app.state.large:
+            return _InParts(_response(await run_in_threadpool(handler, call)), session.large_turn)
+    except BaseException:
+        session.large_turn.release()
+        raise
+
+
+def _response(result: Any) -> Response:
+    return result if isinstance(result, Response) else JSONResponse(result)
 
 
 async def session_of(request: Request) -> Session | Response:
@@ -142,17 +196,28 @@ async def in_turn(session: Session, handler: Handler, call: Call) -> Any:
 @asynccontextmanager
 async def turn(session: Session) -> AsyncIterator[None]:
     """Wait until a connection of a session is free: nobody takes the threads of others."""
-    if session.waiting >= MAX_WAITING:
-        raise BusyError("too many requests at once: try again")
-    session.waiting += 1
-    try:
-        await session.gate.acquire()
-    finally:
-        session.waiting -= 1
+    await _wait(session, session.gate)
     try:
         yield
     finally:
         session.gate.release()
+
+
+async def _wait(session: Session, gate: asyncio.Semaphore) -> None:
+    """Wait at a gate of a session.
+
+    Raises
+    ------
+    BusyError
+        If too many requests of the session wait.
+    """
+    if session.waiting >= MAX_WAITING:
+        raise BusyError("too many requests at once: try again")
+    session.waiting += 1
+    try:
+        await gate.acquire()
+    finally:
+        session.waiting -= 1
 
 
 def answer_to(error: Exception) -> Response:

@@ -78,6 +78,8 @@ class Session:
         Number of requests that wait for a connection.
     gate : asyncio.Semaphore
         Lets as many requests through as there are connections; the others wait without a thread.
+    large_turn : asyncio.Semaphore
+        Lets one large answer through, until it is sent.
     upload_turn : asyncio.Lock
         Held while a photo is received and stored.
     """
@@ -93,6 +95,7 @@ class Session:
     closed: bool = False
     waiting: int = 0
     gate: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(CONNECTIONS))
+    large_turn: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(1))
     upload_turn: asyncio.Lock = field(default_factory=asyncio.Lock)
 
     @contextmanager
