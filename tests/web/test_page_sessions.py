@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import psycopg
-from playwright.sync_api import Browser, BrowserContext, expect
-from support.desk_page import DESKTOP, PATIENCE, forgive, opened, sign_in
+from playwright.sync_api import Browser, BrowserContext, Page, expect
+from support.desk_page import DESKTOP, PATIENCE, enter, forgive, opened, sign_in
 from support.desk_server import DeskServer
 from support.example_survey import NAME
 from web.conftest import PASSWORD
@@ -70,6 +70,46 @@ def test_a_restart_of_postgresql_loses_no_verdict(chrome: Browser, server: DeskS
         expect(page.locator("#state")).to_contain_text("Saved.")
         assert reviewed(database, key) == ("confirmed", "ivo_web")
         forgive(page, "status of (401|503)")
+    context.close()
+
+
+def hold(page: Page, *names: str) -> None:
+    """Make caches as of stretches that were taken offline."""
+    page.evaluate("(names) => Promise.all(names.map((name) => caches.open(name)))", names)
+
+
+def held(page: Page) -> list[str]:
+    return page.evaluate("caches.keys()")
+
+
+def test_a_user_whose_name_begins_with_that_of_another_sees_nothing(chrome: Browser, server: DeskServer) -> None:
+    """Names of users may have full stops: viola_web.b took a stretch before."""
+    context = chrome.new_context(base_url=server.address, viewport=DESKTOP)
+    enter(context, "viola_web", PASSWORD)
+    with opened(context, f"/#/{NAME}") as page:
+        now = page.evaluate("Date.now()")
+        own, other = f"tunneldb.stretch.viola_web.{now}", f"tunneldb.stretch.viola_web.b.{now}"
+        hold(page, own, other, "tunneldb.shell.viola_web", "tunneldb.shell.viola_web.b")
+        page.reload()
+        expect(page.locator("#panel-body")).to_be_visible()
+        page.wait_for_function("caches.keys().then((names) => names.length === 2)")
+        assert sorted(held(page)) == ["tunneldb.shell.viola_web", own]
+    context.close()
+
+
+def test_sign_out_after_the_session_has_ended_removes_what_is_held(chrome: Browser, server: DeskServer) -> None:
+    """The person who hands on the tablet sees the sign-in form, and nothing is left."""
+    context = chrome.new_context(base_url=server.address, viewport=DESKTOP)
+    enter(context, "viola_web", PASSWORD)
+    with opened(context, f"/#/{NAME}") as page:
+        expect(page.locator("#limits")).to_contain_text("Inspected: 95.0")
+        page.wait_for_load_state("networkidle")
+        hold(page, f"tunneldb.stretch.viola_web.{page.evaluate('Date.now()')}")
+        context.clear_cookies()
+        page.get_by_role("button", name="Sign out").click()
+        expect(page.get_by_label("Password")).to_be_visible()
+        assert held(page) == []
+        forgive(page, "status of 401")
     context.close()
 
 

@@ -3,6 +3,7 @@
 const meta = (page, name) => page.querySelector(`meta[name=${name}]`)?.content ?? '';
 const user = meta(document, 'user');
 let csrf = meta(document, 'csrf');
+let leaving = false;
 
 /** Refusal of the server, or a server that is away (status 0). */
 export class ApiError extends Error {
@@ -131,8 +132,18 @@ async function readToken() {
   csrf = meta(page, 'csrf');
 }
 
+/** Run an action of a person who leaves: if the session has ended, the action fails with status 401, but does not lead to the sign-in. */
+export async function withoutSignIn(act) {
+  leaving = true;
+  try {
+    await act();
+  } finally {
+    leaving = false;
+  }
+}
+
 function signIn() {
   // The part of the address after # comes back after the sign-in (login.js).
-  location.assign(`/login${location.hash}`);
+  if (!leaving) location.assign(`/login${location.hash}`);
   throw new ApiError(401, 'Sign in again.');
 }

@@ -16,11 +16,16 @@ export const shellName = (user) => `${SHELL}${encodeURIComponent(user)}`;
 /** Return the name of the cache of a stretch that a user took at a time, ms. */
 export const stretchName = (user, at) => `${STRETCH}${encodeURIComponent(user)}.${at}`;
 
+/** Return the time, ms, at which a user took the stretch of a cache; NaN if it is of another one: names of users may have full stops. */
+function takenAt(name, user) {
+  const at = Number(name.split('.').at(-1));
+  return name === stretchName(user, at) ? at : NaN;
+}
+
 /** Return the facts of the stretches of a user: survey, from, to, kinds, at, done, total, bytes, complete. */
 export async function heldStretches(user) {
   if (!possible()) return [];
-  const start = `${STRETCH}${encodeURIComponent(user)}.`;
-  const names = (await caches.keys()).filter((name) => name.startsWith(start) && Date.now() - Number(name.slice(start.length)) < MAX_AGE);
+  const names = (await caches.keys()).filter((name) => Date.now() - takenAt(name, user) < MAX_AGE);
   const found = await Promise.all(names.map(async (name) => (await (await caches.open(name)).match(FACTS))?.json()));
   return found.filter(Boolean);
 }
@@ -37,7 +42,7 @@ export const removeStretch = (user, at) => caches.delete(stretchName(user, at));
 /** Remove what the device holds of other users: it may be shared. */
 export async function removeOthers(user) {
   if (!possible()) return;
-  const own = (name) => name === shellName(user) || name.startsWith(`${STRETCH}${encodeURIComponent(user)}.`);
+  const own = (name) => name === shellName(user) || takenAt(name, user) >= 0;
   await removeCaches((name) => !own(name));
 }
 

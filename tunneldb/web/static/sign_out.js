@@ -1,16 +1,20 @@
 /** Sign out: nothing of the user stays on the device, and what the database does not have yet is not dropped without a word. */
 
-import { post } from './api.js';
+import { post, withoutSignIn } from './api.js';
 import { button, el } from './dom.js';
 import { removeAll } from './held.js';
 
-/** Sign out, and remove all that the device holds of the user. */
+/** Sign out, and remove all that the device holds of the user, also if the session has ended already. */
 export async function signOut(outbox) {
-  if (!(await mayLeave(outbox))) return;
-  await post('/logout');
-  await outbox.clear();
-  await removeAll();
-  location.assign('/login');
+  await withoutSignIn(async () => {
+    if (!(await mayLeave(outbox))) return;
+    await post('/logout').catch((error) => {
+      if (error.status !== 401) throw error;
+    });
+    await outbox.clear();
+    await removeAll();
+    location.assign('/login');
+  });
 }
 
 /** Return true if nothing waits for the database, or the person signs out in spite of it. */
