@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from urllib.parse import quote
 
 import ezdxf
 import numpy as np
@@ -68,6 +69,21 @@ def test_drawing_has_the_lines_of_the_page(signed_in: SignIn) -> None:
         assert np.array(line.get_points("xy")) == pytest.approx(np.array(places), abs=1e-4)
     points = drawing.modelspace().query("POINT")
     assert len(points) == len(page["points"])
+
+
+@pytest.mark.parametrize("name", ["Łódź", 'a".html', "a\r\nSet-Cookie: b=c", "0\nENDSEC\n0\nEOF"])
+def test_drawing_of_a_survey_with_any_name(signed_in: SignIn, conn: psycopg.Connection, name: str) -> None:
+    conn.execute("UPDATE tunnel.survey SET name = %s WHERE name = 'demo-2024'", [name])
+    conn.commit()
+    answer = signed_in("viola_web").get(DRAWING.replace("demo-2024", quote(name, safe="")))
+    assert (
+        answer.headers["content-disposition"]
+        == f"attachment; filename*=utf-8''{quote(f'section-{name}-12350.00.dxf', safe='')}"
+    )
+    assert "set-cookie" not in answer.headers
+    drawing = ezdxf.read(io.StringIO(answer.text))
+    assert not drawing.audit().errors
+    assert len(drawing.modelspace().query("TEXT")) == 1
 
 
 @pytest.mark.parametrize("path", [SECTION, DRAWING])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 from starlette.responses import Response
@@ -36,7 +37,9 @@ def drawing(call: Call) -> Response:
     survey, chainage, label, found, lines = _section(call)
     text = section_dxf(f"{survey.name}  {label}", found, lines)
     name = f"section-{survey.name}-{chainage:.2f}.dxf"
-    return Response(text, media_type="image/vnd.dxf", headers={"Content-Disposition": f'attachment; filename="{name}"'})
+    coded = quote(name, safe="")
+    shown = f'filename="{name}"' if coded == name else f"filename*=utf-8''{coded}"
+    return Response(text, media_type="image/vnd.dxf", headers={"Content-Disposition": f"attachment; {shown}"})
 
 
 def _section(call: Call) -> tuple[Place, float, str, Section, list[SectionLine]]:

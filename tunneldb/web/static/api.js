@@ -49,7 +49,8 @@ export async function getBuffer(path) {
 export async function download(path) {
   const response = await answer('GET', path, undefined, null, 600000);
   const header = response.headers.get('Content-Disposition') ?? '';
-  const name = /filename="?([^";]+)"?/.exec(header)?.[1] ?? 'tunneldb';
+  const coded = /filename\*=utf-8''([^;]+)/.exec(header)?.[1];
+  const name = coded ? decodeURIComponent(coded) : /filename="([^"]+)"/.exec(header)?.[1] ?? 'tunneldb';
   saveBlob(await response.blob(), name);
   return name;
 }
