@@ -72,7 +72,9 @@ def load_points(conn: psycopg.Connection[Any], survey_id: int, low: float, high:
         " TO STDOUT (FORMAT binary)"
     ).format(survey_id, low, high, limit)
     with conn.cursor().copy(query) as copy:
-        sent = b"".join(bytes(part) for part in copy)
+        sent = bytearray()  # a list of the rows would need several times the memory
+        for part in copy:
+            sent += part
     count = (len(sent) - _COPY_HEADER) // _ROW.itemsize
     rows = np.frombuffer(sent, _ROW, count, _COPY_HEADER)
     xyz = np.column_stack([rows[name] for name in "xyz"]).astype(np.float64)
