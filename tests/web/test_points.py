@@ -213,8 +213,8 @@ def test_answers_that_nobody_reads_end_and_are_few(
     server = DeskServer(dsn)
     viola = httpx2.Client(base_url=server.address, timeout=60)
     sign_in(viola, "viola_web")  # type: ignore[arg-type]
-    cookies = "; ".join(f"{name}={value}" for name, value in viola.cookies.items())
-    request = f"GET {POINTS}?from=12330&to=12380&limit=1000000 HTTP/1.1\r\nHost: a\r\nCookie: {cookies}\r\n\r\n".encode()
+    cookie = "; ".join(f"{name}={value}" for name, value in viola.cookies.items())
+    request = f"GET {POINTS}?from=12330&to=12380&limit=1000000 HTTP/1.1\r\nHost: localhost\r\nCookie: {cookie}\r\n\r\n".encode()
     sockets = []
     for _ in range(3):
         reader = socket.socket()
