@@ -21,6 +21,9 @@ const ORDERS = {
 
 let awayUntil = 0;
 
+/** True from the sign-in page on until the server has given the page: it may be that of another user. */
+let signingIn = false;
+
 self.addEventListener('install', () => self.skipWaiting());
 self.addEventListener('activate', (event) => event.waitUntil(self.clients.claim()));
 self.addEventListener('message', ({ data }) => {
@@ -31,6 +34,7 @@ self.addEventListener('fetch', (event) => {
   const url = new URL(request.url);
   if (request.method !== 'GET' || url.origin !== self.location.origin) return;
   if (request.mode === 'navigate') {
+    if (url.pathname === '/login') signingIn = true;
     if (url.pathname === '/') event.respondWith(page(request));
   } else if (url.pathname.startsWith('/static/')) event.respondWith(file(request));
   else if (/^\/(api|tiles|photos)\//.test(url.pathname)) event.respondWith(data(event, url));
@@ -39,7 +43,11 @@ self.addEventListener('fetch', (event) => {
 /** Return the page; without the server, the copy of it. */
 async function page(request) {
   const [copy] = await matches(SHELL, '/');
-  if (!copy) return fetch(request);
+  if (!copy || signingIn) {
+    const response = await fetch(request);
+    signingIn = false;
+    return response;
+  }
   try {
     return await answer(request);
   } catch {
