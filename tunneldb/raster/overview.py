@@ -21,11 +21,21 @@ def shrink(values: Single, factor: int) -> Single:
     rows, columns = (-(-n // factor) * factor for n in values.shape)
     padded = np.full((rows, columns), np.nan, np.float32)
     padded[: values.shape[0], : values.shape[1]] = values
-    blocks = padded.reshape(rows // factor, factor, columns // factor, factor)
-    held = np.isfinite(blocks)
-    count = held.sum(axis=(1, 3))
-    total = np.where(held, blocks, 0.0).sum(axis=(1, 3))
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan).astype(np.float32)
+    held = np.isfinite(padded)
+    padded[~held] = 0.0
+    # Whole rows are added first, then every factor-th column: that is many times as fast as adding blocks.
+    bands = (rows // factor, factor, columns)
+    total = _add_columns(padded.reshape(bands).sum(axis=1), factor)
+    count = _add_columns(held.reshape(bands).sum(axis=1, dtype=np.float32), factor)
+    return np.where(count > 0, total / np.maximum(count, 1.0), np.nan).astype(np.float32)
+
+
+def _add_columns(values: Single, factor: int) -> Single:
+    """Add ``factor`` neighbouring columns."""
+    total = values[:, ::factor].copy()
+    for k in range(1, factor):
+        total += values[:, k::factor]
+    return total
 
 
 def shrink_codes(values: UInt8, factor: int) -> Single:
