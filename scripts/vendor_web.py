@@ -54,7 +54,7 @@ export { LineMaterial } from 'three/addons/lines/LineMaterial.js';
 export { LineSegments2 } from 'three/addons/lines/LineSegments2.js';
 export { LineSegmentsGeometry } from 'three/addons/lines/LineSegmentsGeometry.js';
 """
-"""What the 3D view uses of three.js."""
+"""Entry module with the parts of three.js that the 3D view uses."""
 
 
 def main() -> None:

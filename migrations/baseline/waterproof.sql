@@ -39,6 +39,7 @@ BEGIN
     )
     SELECT DISTINCT c.survey_id, k.km
       FROM changed c
+      JOIN tunnel.survey s ON s.id = c.survey_id
      CROSS JOIN generate_series(
             floor((c.chainage_from - 0.01) / 1000)::int, floor((c.chainage_to + 0.01) / 1000)::int) AS k (km);
     RETURN NULL;

@@ -145,12 +145,11 @@ DECLARE
     survey_key constant int := survey_id;
     set_key constant int := set_id;
     cell constant float8 := 20;  -- m: pairs are sought by equal cells of this length
-    first float8;
-    last float8;
+    first constant float8 := (SELECT min(e.chainage_from) FROM tunnel.element e WHERE e.element_set_id = set_key);
+    last constant float8 := (SELECT max(e.chainage_to) FROM tunnel.element e WHERE e.element_set_id = set_key);
     longest constant float8 := (
         SELECT coalesce(max(f.chainage_to - f.chainage_from), 0) FROM tunnel.finding f WHERE f.survey_id = survey_key);
 BEGIN
-    SELECT min(b.low), max(b.high) INTO first, last FROM tunnel_internal.element_boxes(survey_key, set_key) b;
     RETURN QUERY
     WITH box AS MATERIALIZED (
         SELECT b.*, g.n FROM tunnel_internal.element_boxes(survey_key, set_key) b

@@ -260,7 +260,7 @@ def stored(page: Page) -> list[str]:
 
 
 def test_sign_out_removes_what_is_held(tablets: Tablets) -> None:
-    """What was not sent is removed only if the person says so."""
+    """The page removes unsent records only after the person has confirmed it."""
     tablet = tablets()
     with opened(tablet, f"/#/{NAME}/finding/1") as page:
         take(page)
@@ -330,7 +330,7 @@ def test_a_viewer_takes_a_stretch_and_records_nothing(tablets: Tablets) -> None:
 
 
 def test_a_full_device_is_one_line(tablets: Tablets, server: DeskServer) -> None:
-    """What fits stays; it is resumed once there is space, or removed."""
+    """A full device keeps a part of the stretch. The person resumes the download when there is space, or removes the part."""
     tablet = tablets()
     with opened(tablet, VIEW) as page:
         take(page, ("12+300", "12+310"))

@@ -28,7 +28,7 @@ def test_section_names_its_lines_and_downloads_as_a_drawing(page: Page) -> None:
 
 
 def test_ribbon_tells_the_deviation(page: Page) -> None:
-    """Where the lining stands in most, the ribbon says by how much."""
+    """The ribbon states the smallest and the greatest deviation at the pointer."""
     strip = page.locator("#ribbon canvas")
     expect(page.locator("#ribbon .labels")).to_contain_text("Deviation")
     box = strip.bounding_box()

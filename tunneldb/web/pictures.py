@@ -37,7 +37,7 @@ REASONS = {
     NO_IMAGE: "the photo is damaged",
     OUT_OF_TIME: "the photo could not be decoded in time",
 }
-"""What a person reads for some of the reasons why a picture is not available."""
+"""Messages for the reasons why a photo is refused."""
 
 FILE = "photo"
 

@@ -24,7 +24,7 @@ _UNITS = {"amplitude": "dB", "reflectance": "dB", "linear": ""}
 """Units of the kinds of intensity."""
 
 _DEPTHS = {"Point": 0, "LineString": 0, "Polygon": 1, "MultiPoint": 1, "MultiLineString": 1, "MultiPolygon": 2}
-"""How deep the lines, or points, of a GeoJSON geometry lie in its coordinates."""
+"""Number of nested lists around the lines, or points, in the coordinates of each type of GeoJSON geometry."""
 
 _COPY_HEADER = 19
 """Length of the header of a binary COPY, bytes."""
