@@ -97,6 +97,7 @@ export class Review {
     if (!filter) return;
     if (this.busy) {
       this.waiting = filter;
+      this.refresh();
       return;
     }
     this.act(async () => {
