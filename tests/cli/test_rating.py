@@ -136,7 +136,7 @@ GOOD = EXAMPLE.read_text()
         ("min_inspected = 0.95", "min_inspected = 95", "min_inspected: a number from 0 to 1"),
         ('results = ["0", "1", "2", "3", "4"]', 'results = ["0", "0"]', "results: 2 to 20 different texts"),
         ('source = "Example; no directive"', 'sauce = "x"', "sauce: there is no such key Did you mean 'source'?"),
-        ('from = { "1" = 0.2', 'above = { "1" = 1 }\nfrom = { "1" = 0.2', "rule 3: above: a rule has either above"),
+        ('from = { "1" = 0.2', 'above = { "1" = 1 }\nfrom = { "1" = 0.2', "rule 3: above: there is either above, or from"),
         ("[[rule]]", "[[ruel]]", "ruel: there is no such key"),
         ("name = ", "name == ", "is not TOML"),
     ],
