@@ -31,10 +31,10 @@ def rating() -> None:
 
 @rating.command(examples=["tunneldb rating add owner-scheme.toml", "tunneldb rating add --shipped gb-50108-2008"])
 @click.argument("file", type=FilePath(dir_okay=False), required=False)
-@click.option("--shipped", metavar="NAME", help="Scheme of tunneldb, instead of FILE (tunneldb rating list --shipped).")
+@click.option("--shipped", metavar="NAME", help="Scheme that is part of tunneldb, instead of FILE (tunneldb rating list --shipped).")
 @click.pass_obj
 def add(settings: Settings, file: Path | None, shipped: str | None) -> None:
-    """Add the rating scheme of FILE, or one of tunneldb.
+    """Add the rating scheme of FILE, or one that is part of tunneldb.
 
     FILE is TOML: name, version, source, results (from the best to the worst), and a [[rule]] for each rule: text,
     measure, kinds, and limits as above = {RESULT = LIMIT} or from = {…}. Measures: area (m²), share (of the inspected
@@ -55,7 +55,7 @@ def add(settings: Settings, file: Path | None, shipped: str | None) -> None:
 
 
 @rating.command("list", examples=["tunneldb rating list", "tunneldb rating list --shipped"])
-@click.option("--shipped", is_flag=True, help="Schemes of tunneldb with their sources, instead of those in the database.")
+@click.option("--shipped", is_flag=True, help="List the schemes that are part of tunneldb, not those of the database.")
 @click.pass_obj
 def list_(settings: Settings, shipped: bool) -> None:
     """List the rating schemes, the one added last first."""
