@@ -31,7 +31,9 @@ def rating() -> None:
 
 @rating.command(examples=["tunneldb rating add owner-scheme.toml", "tunneldb rating add --shipped gb-50108-2008"])
 @click.argument("file", type=FilePath(dir_okay=False), required=False)
-@click.option("--shipped", metavar="NAME", help="Scheme that is part of tunneldb, instead of FILE (tunneldb rating list --shipped).")
+@click.option(
+    "--shipped", metavar="NAME", help="Scheme that is part of tunneldb, instead of FILE (tunneldb rating list --shipped)."
+)
 @click.pass_obj
 def add(settings: Settings, file: Path | None, shipped: str | None) -> None:
     """Add the rating scheme of FILE, or one that is part of tunneldb.
