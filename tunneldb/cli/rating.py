@@ -40,11 +40,14 @@ def rating() -> None:
     """Add, list, show or remove rating schemes, and rate the elements of a survey."""
 
 
-@rating.command(examples=["tunneldb rating add owner-scheme.toml"])
-@click.argument("file", type=FilePath(dir_okay=False))
+@rating.command(examples=["tunneldb rating add owner-scheme.toml", "tunneldb rating add --shipped gb-50108-2008"])
+@click.argument("file", type=FilePath(dir_okay=False), required=False)
+@click.option(
+    "--shipped", metavar="NAME", help="Scheme that is part of tunneldb, instead of FILE (tunneldb rating list --shipped)."
+)
 @click.pass_obj
-def add(settings: Settings, file: Path) -> None:
-    """Add the rating scheme of FILE.
+def add(settings: Settings, file: Path | None, shipped: str | None) -> None:
+    """Add the rating scheme of FILE, or one that is part of tunneldb.
 
     FILE is TOML: name, version, source, results (from the best to the worst), and a [[rule]] for each rule: text,
     measure, kinds, and limits as above = {RESULT = LIMIT} or from = {…}. Measures: area (m²), share (of the inspected
@@ -52,9 +55,13 @@ def add(settings: Settings, file: Path) -> None:
     growth (m² per year since the earlier inspection). A rule can be a matrix of two measures, and the rules' points can
     be summed. A version is never changed.
     """
-    from tunneldb.pipeline.rating_file import read_scheme
+    from tunneldb.pipeline.rating_file import read_scheme, shipped_scheme
     from tunneldb.store.rating import save_scheme
 
+    if file is None and shipped is not None:
+        file = shipped_scheme(shipped)
+    elif file is None or shipped is not None:
+        raise UserError("give exactly one of FILE and --shipped NAME")
     scheme = read_scheme(file)
     with connect(settings.dsn) as conn:
         save_scheme(conn, scheme)
@@ -62,12 +69,22 @@ def add(settings: Settings, file: Path) -> None:
     notify(f"{scheme.name} {scheme.version}: {counted(len(scheme.rules), 'rule')}, results {', '.join(scheme.results)}")
 
 
-@rating.command("list", examples=["tunneldb rating list"])
+@rating.command("list", examples=["tunneldb rating list", "tunneldb rating list --shipped"])
+@click.option("--shipped", is_flag=True, help="List the schemes that are part of tunneldb, not those of the database.")
 @click.pass_obj
-def list_(settings: Settings) -> None:
+def list_(settings: Settings, shipped: bool) -> None:
     """List the rating schemes, the one added last first."""
+    from tunneldb.pipeline.rating_file import list_shipped
     from tunneldb.store.rating import list_schemes
 
+    if shipped:
+        schemes = list_shipped()
+        add_to_json(schemes=schemes)
+        print_table(
+            ["scheme", "version", "results", "source"],
+            [(one["name"], one["version"], ", ".join(one["results"]), one["source"]) for one in schemes],
+        )
+        return
     with connect(settings.dsn) as conn:
         rows = list_schemes(conn)
     add_to_json(schemes=rows)

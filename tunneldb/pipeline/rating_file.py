@@ -1,4 +1,4 @@
-"""Files of elements (CSV) and of rating schemes (TOML)."""
+"""Files of elements (CSV) and of rating schemes (TOML), and the schemes that are part of the program."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ AXIS_KEYS = ("kinds", "measure", "above", "from")
 RULE_KEYS = ("text", *AXIS_KEYS, "points", "by", "results")
 MIN_INSPECTED = 0.95
 """Inspected share below which a result is a lower bound, if a scheme does not state another one."""
+SHIPPED = Path(__file__).parents[1] / "schemes"
+"""Folder of the schemes that are part of the program; a file has the name of its scheme."""
 
 
 def read_elements(path: Path) -> list[Element]:
@@ -54,6 +56,20 @@ def stretches_of(length: float, low: float, high: float) -> list[Element]:
     """Return elements of equal length, m, between multiples of it, from one chainage to another."""
     first, last = math.floor(low / length + 1e-9), math.ceil(high / length - 1e-9)
     return [Element(f"{n * length:.10g}", n * length, (n + 1) * length) for n in range(first, last)]
+
+
+def shipped_scheme(name: str) -> Path:
+    """Return the file of a scheme that is part of the program; raise InputError if there is none."""
+    names = sorted(path.stem for path in SHIPPED.glob("*.toml"))
+    if name not in names:
+        raise InputError(f"no scheme {name!r} is part of tunneldb: {', '.join(names)}.{did_you_mean(name, names)}")
+    return SHIPPED / f"{name}.toml"
+
+
+def list_shipped() -> list[dict[str, Any]]:
+    """Return name, version, results and source of the schemes that are part of the program, by name."""
+    found = [read_toml(path, "a rating scheme") for path in sorted(SHIPPED.glob("*.toml"))]
+    return [{key: scheme[key] for key in ("name", "version", "results", "source")} for scheme in found]
 
 
 def read_scheme(path: Path) -> Scheme:
