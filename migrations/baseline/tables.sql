@@ -2228,6 +2228,65 @@ CREATE INDEX sonar_point_scan_id_idx ON tunnel.sonar_point (scan_id);
 CREATE INDEX sonar_point_survey_id_chainage_idx ON tunnel.sonar_point (survey_id, chainage);
 CREATE INDEX sonar_point_survey_id_km_idx ON tunnel.sonar_point (survey_id, km);
 
+CREATE TABLE tunnel.action (
+    id BIGINT GENERATED ALWAYS AS IDENTITY,
+    survey_id INTEGER NOT NULL,
+    finding_id BIGINT,
+    element TEXT,
+    chainage_from DOUBLE PRECISION NOT NULL,
+    chainage_to DOUBLE PRECISION NOT NULL,
+    arc DOUBLE PRECISION,
+    measure TEXT NOT NULL,
+    urgency TEXT DEFAULT 'planned' NOT NULL,
+    responsible TEXT,
+    due DATE,
+    cost NUMERIC(14, 2),
+    currency TEXT,
+    state TEXT DEFAULT 'open' NOT NULL,
+    remark TEXT,
+    added_by TEXT DEFAULT SESSION_USER NOT NULL,
+    added_at TIMESTAMP WITH TIME ZONE DEFAULT clock_timestamp() NOT NULL,
+    changed_by TEXT,
+    changed_at TIMESTAMP WITH TIME ZONE,
+    CONSTRAINT action_pkey PRIMARY KEY (id),
+    CONSTRAINT action_urgency_check CHECK (urgency IN ('immediate', 'urgent', 'planned', 'monitor')),
+    CONSTRAINT action_state_check CHECK (state IN ('open', 'ordered', 'done', 'verified')),
+    CONSTRAINT action_measure_check CHECK (measure <> ''),
+    CONSTRAINT action_measure_at_most_2000_characters_check CHECK (char_length(measure) <= 2000),
+    CONSTRAINT action_element_at_most_200_characters_check CHECK (char_length(element) <= 200),
+    CONSTRAINT action_responsible_at_most_200_characters_check CHECK (char_length(responsible) <= 200),
+    CONSTRAINT action_remark_at_most_10000_characters_check CHECK (char_length(remark) <= 10000),
+    CONSTRAINT action_place_check CHECK (chainage_from >= '-100000000'::float8 AND chainage_from <= '100000000'::float8 AND chainage_to >= '-100000000'::float8 AND chainage_to <= '100000000'::float8 AND arc >= '-100000000'::float8 AND arc <= '100000000'::float8),
+    CONSTRAINT action_order_check CHECK (chainage_from <= chainage_to),
+    CONSTRAINT action_due_check CHECK (due >= '1900-01-01' AND due <= '2199-12-31'),
+    CONSTRAINT action_cost_check CHECK (cost >= 0 AND cost <= 1e12 AND (cost IS NULL) = (currency IS NULL)),
+    CONSTRAINT action_currency_check CHECK (currency ~ '^[A-Z]{3}$'),
+    CONSTRAINT action_survey_id_fkey FOREIGN KEY(survey_id) REFERENCES tunnel.survey (id) ON DELETE CASCADE,
+    CONSTRAINT action_finding_id_fkey FOREIGN KEY(finding_id) REFERENCES tunnel.finding (id) ON DELETE SET NULL
+);
+COMMENT ON TABLE tunnel.action IS 'Actions that inspections demand: measure, urgency, responsible, due date, cost, state';
+COMMENT ON COLUMN tunnel.action.id IS 'Key';
+COMMENT ON COLUMN tunnel.action.survey_id IS 'Survey that the row belongs to';
+COMMENT ON COLUMN tunnel.action.finding_id IS 'Finding that it is about';
+COMMENT ON COLUMN tunnel.action.element IS 'Name of the element that it is about';
+COMMENT ON COLUMN tunnel.action.chainage_from IS 'Chainage of its beginning, m';
+COMMENT ON COLUMN tunnel.action.chainage_to IS 'Chainage of its end, m';
+COMMENT ON COLUMN tunnel.action.arc IS 'Arc of its place, m from the crown; NULL: the whole circumference';
+COMMENT ON COLUMN tunnel.action.measure IS 'What is to be done';
+COMMENT ON COLUMN tunnel.action.urgency IS 'immediate, urgent, planned or monitor (observe only)';
+COMMENT ON COLUMN tunnel.action.responsible IS 'Person or firm that does it';
+COMMENT ON COLUMN tunnel.action.due IS 'Day until which it is to be done';
+COMMENT ON COLUMN tunnel.action.cost IS 'Cost, in currency';
+COMMENT ON COLUMN tunnel.action.currency IS 'Currency of the cost, ISO 4217';
+COMMENT ON COLUMN tunnel.action.state IS 'open, ordered, done or verified';
+COMMENT ON COLUMN tunnel.action.remark IS 'Remark';
+COMMENT ON COLUMN tunnel.action.added_by IS 'Role that added it';
+COMMENT ON COLUMN tunnel.action.added_at IS 'Time when it was added';
+COMMENT ON COLUMN tunnel.action.changed_by IS 'Role that changed it last';
+COMMENT ON COLUMN tunnel.action.changed_at IS 'Time of the last change';
+CREATE INDEX action_finding_id_idx ON tunnel.action (finding_id);
+CREATE INDEX action_survey_id_idx ON tunnel.action (survey_id);
+
 CREATE TABLE tunnel.boundary_region (
     id BIGINT GENERATED ALWAYS AS IDENTITY,
     survey_id INTEGER NOT NULL,

@@ -10,7 +10,7 @@ COMMENT ON VIEW tunnel_api.audit IS
 COMMENT ON COLUMN tunnel_api.audit.at IS 'Time of the edit';
 COMMENT ON COLUMN tunnel_api.audit.who IS 'Role that was logged in';
 COMMENT ON COLUMN tunnel_api.audit.view IS
-    'View of the edited row: finding (leaks, too), spot, axis_vertex, region, photo or learned_model';
+    'View of the edited row: finding (leaks, too), spot, axis_vertex, region, photo, action or learned_model';
 COMMENT ON COLUMN tunnel_api.audit.row_id IS 'Key of the row in that view';
 COMMENT ON COLUMN tunnel_api.audit.action IS 'insert, update or delete';
 COMMENT ON COLUMN tunnel_api.audit.before IS 'Changed columns before the edit, geometry as EWKT; NULL for an insert';

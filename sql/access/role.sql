@@ -1,6 +1,6 @@
 -- Who may do what. Three group roles without login, to be granted to people:
 --   tunnel_viewer     reads the views of tunnel_api and calls its read-only functions
---   tunnel_inspector  and reviews leaks and spots, draws findings and regions, and moves axis vertices, through the views
+--   tunnel_inspector  and reviews leaks and spots, draws findings and regions, moves axis vertices and writes actions, through the views
 --   tunnel_operator   and loads and processes: owns schema tunnel and what lies in it
 -- Runs last, after every function and view, as the database's owner. If the owner may not create roles, it prints what a
 -- superuser has to run, and continues: the owner can do everything without the roles.
@@ -107,6 +107,9 @@ BEGIN
     GRANT INSERT, DELETE, UPDATE (kind, severity, width_mm, review, remark, geom) ON
         tunnel_api.finding_unrolled, tunnel_api.finding_map, tunnel_api.finding_3d TO tunnel_inspector;
     GRANT INSERT, DELETE, UPDATE (path, caption) ON tunnel_api.finding_photo TO tunnel_inspector;
+    GRANT INSERT, DELETE, UPDATE (finding_id, element, chainage_from, chainage_to, arc, measure, urgency, responsible, due, cost,
+                                  currency, state, remark) ON
+        tunnel_api.action, tunnel_api.action_map, tunnel_api.action_unrolled TO tunnel_inspector;
     GRANT EXECUTE ON FUNCTION tunnel_api.finding_split(bigint, geometry), tunnel_api.finding_merge(bigint[]),
         tunnel_api.finding_undo(bigint), tunnel_api.finding_photo_add(bigint, bytea, text) TO tunnel_inspector;
 END

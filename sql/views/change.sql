@@ -20,7 +20,7 @@ COMMENT ON VIEW tunnel_api.change IS
 COMMENT ON COLUMN tunnel_api.change.at IS 'Time of the edit, or end of the run';
 COMMENT ON COLUMN tunnel_api.change.who IS
     'Role that was logged in; for a stage, machine and process; NULL for a stage run by hand';
-COMMENT ON COLUMN tunnel_api.change.what IS 'Edited view (finding, axis_vertex, region, photo or learned_model), or stage';
+COMMENT ON COLUMN tunnel_api.change.what IS 'Edited view (finding, axis_vertex, region, photo, action or learned_model), or stage';
 COMMENT ON COLUMN tunnel_api.change.km IS
     'Kilometre; NULL for a region, for a deleted row, and for a run over the whole survey';
 COMMENT ON COLUMN tunnel_api.change.detail IS 'Edited row and kind of edit, or outcome of the run';

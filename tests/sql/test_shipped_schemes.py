@@ -173,6 +173,6 @@ def test_limits_of_gb_50108_are_those_of_the_classes_of_waterproofing(conn: psyc
     """The scheme and waterproof_class have the same limits of share and patch."""
     scheme = read_scheme(shipped_scheme("gb-50108-2008"))
     known = conn.execute("SELECT wet_ratio, patch_area FROM tunnel_api.waterproof_limit ORDER BY id").fetchall()
-    limits = {rule.measure: rule.limits for rule in scheme.rules}
+    limits = {rule.axis.measure: rule.axis.limits for rule in scheme.rules}
     assert limits["share"] == (known[1][0],)
     assert limits["largest_area"] == (known[1][1], known[2][1])

@@ -181,7 +181,7 @@ def load_audit(conn: psycopg.Connection[Any], survey: int) -> int:
         row=sql.SQL("CASE a.view {} END").format(
             sql.SQL(" ").join(
                 sql.SQL("WHEN {} THEN {}").format(sql.Literal(view), number_of(view, sql.SQL("a.row_id"), others=False))
-                for view in ("finding", "spot", "axis_vertex", "region", "photo", "learned_model")
+                for view in ("finding", "spot", "axis_vertex", "region", "photo", "action", "learned_model")
             )
         ),
         before=_state("before"),

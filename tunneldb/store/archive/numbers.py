@@ -14,7 +14,7 @@ from psycopg import sql
 from tunneldb.store.archive.out import OTHERS, outline_checksum
 from tunneldb.store.archive.tables import SHARED, Table
 
-_AUDITED = ("finding", "spot", "axis_vertex", "region", "photo", "learned_model")
+_AUDITED = ("finding", "spot", "axis_vertex", "region", "photo", "action", "learned_model")
 
 
 def staged(table: str) -> sql.Identifier:
