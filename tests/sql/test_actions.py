@@ -173,8 +173,8 @@ def test_what_became_of_the_leak(conn: psycopg.Connection, leak: dict[str, Any],
             " INSERT INTO tunnel.leak_change (survey_id, old_survey_id, km, state, chainage_from, chainage_to, clock, area_old,"
             " area_old_se, area_new, area_new_se, seen_old, seen_new, old_kinds, new_kinds, old_ids, new_ids, unrolled, map, surface)"
             " SELECT s.id, f.survey_id, 12, %(state)s, f.chainage_from, f.chainage_to, 12, %(before)s, 0, %(after)s, 0, 1,"
-            " CASE WHEN %(state)s = 'unseen' THEN 0 ELSE 1 END, '{leak}', '{}', ARRAY[f.id], '{}', public.ST_Multi(f.unrolled), f.map,"
-            " f.surface"
+            " CASE WHEN %(state)s = 'unseen' THEN 0 ELSE 1 END, '{leak}', '{}', ARRAY[f.id], '{}', public.ST_Multi(f.unrolled), public.ST_Multi(f.map),"
+            " public.ST_Multi(f.surface)"
             " FROM s, tunnel.finding f WHERE f.id = %(id)s",
             {"day": day, "name": NAME, "state": state, "before": before, "after": after, "id": leak["id"]},
         )
