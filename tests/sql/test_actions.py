@@ -48,7 +48,8 @@ def test_an_action_lies_at_its_finding(conn: psycopg.Connection, leak: dict[str,
     assert (row["urgency"], row["state"], row["overdue"], row["finding_kind"]) == ("planned", "open", False, "leak")
     assert row["label"] == leak["label"]
     (away,) = conn.execute(
-        "SELECT public.ST_Distance(a.geom, f.map) FROM tunnel_api.action_map a, tunnel_api.finding f WHERE a.id = %s AND f.id = %s",
+        "SELECT public.ST_Distance(a.geom, f.map) FROM tunnel_api.action_map a JOIN tunnel_api.finding f ON f.id = a.finding_id"
+        " WHERE a.id = %s AND f.id = %s",
         [key, leak["id"]],
     ).fetchone()  # type: ignore[misc]
     assert away < 0.05
@@ -96,7 +97,9 @@ def test_edits_are_in_the_audit(conn: psycopg.Connection, leak: dict[str, Any]) 
     conn.execute("UPDATE tunnel_api.action SET state = 'ordered', responsible = 'Works Ltd' WHERE id = %s", [key])
     conn.execute("UPDATE tunnel_api.action_map SET state = 'done' WHERE id = %s", [key])
     conn.execute("DELETE FROM tunnel_api.action WHERE id = %s", [key])
-    rows = ask(conn, "SELECT action, before, after FROM tunnel_api.audit WHERE view = 'action' AND row_id = %s ORDER BY id", [key])
+    rows = ask(
+        conn, "SELECT action, before, after FROM tunnel_api.audit WHERE view = 'action' AND row_id = %s ORDER BY id", [key]
+    )
     assert [row["action"] for row in rows] == ["insert", "update", "update", "delete"]
     assert rows[0]["after"]["measure"] == "seal the joint"
     assert rows[1]["before"] == {"state": "open"}
@@ -141,7 +144,9 @@ def test_two_people_do_not_overwrite_each_other(
             assert not waiting.done()
         conn.commit()
         if result is None:
-            with pytest.raises(psycopg.errors.SerializationFailure, match="the state of action .* was changed meanwhile to 'ordered'"):
+            with pytest.raises(
+                psycopg.errors.SerializationFailure, match=r"the state of action .* was changed meanwhile to 'ordered'"
+            ):
                 waiting.result()
             return
         waiting.result()
@@ -155,7 +160,10 @@ LATER = [
     ([], "not compared"),
     ([("2026-05-04", "dry", 0.3, 0.0)], "dry since 2026-05-04"),
     ([("2026-05-04", "dry", 0.3, 0.0), ("2028-05-04", "dry", 0.3, 0.0)], "dry since 2026-05-04"),
-    ([("2026-05-04", "dry", 0.3, 0.0), ("2028-05-04", "unseen", 0.3, 0.0)], "dry since 2026-05-04; not inspected on 2028-05-04"),
+    (
+        [("2026-05-04", "dry", 0.3, 0.0), ("2028-05-04", "unseen", 0.3, 0.0)],
+        "dry since 2026-05-04; not inspected on 2028-05-04",
+    ),
     ([("2026-05-04", "dry", 0.3, 0.0), ("2028-05-04", "grown", 0.3, 0.8)], "grown on 2028-05-04: 0.30 to 0.80 m²"),
     ([("2026-05-04", "grown", 0.3, 0.5), ("2028-05-04", "dry", 0.3, 0.0)], "dry since 2028-05-04"),
     ([("2026-05-04", "unseen", 0.3, 0.0)], "not inspected on 2026-05-04"),
@@ -169,11 +177,14 @@ def test_what_became_of_the_leak(conn: psycopg.Connection, leak: dict[str, Any],
     for day, state, before, after in later:
         conn.execute(
             "WITH s AS (INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_kind, platform)"
-            " SELECT tunnel_id, 'demo-' || %(day)s, %(day)s::date, 'none', 'static' FROM tunnel.survey WHERE name = %(name)s RETURNING id)"
+            " SELECT tunnel_id, 'demo-' || %(day)s, %(day)s::date, 'none', 'static' FROM tunnel.survey WHERE name = %(name)s"
+            " RETURNING id)"
             " INSERT INTO tunnel.leak_change (survey_id, old_survey_id, km, state, chainage_from, chainage_to, clock, area_old,"
-            " area_old_se, area_new, area_new_se, seen_old, seen_new, old_kinds, new_kinds, old_ids, new_ids, unrolled, map, surface)"
+            " area_old_se, area_new, area_new_se, seen_old, seen_new, old_kinds, new_kinds, old_ids, new_ids, unrolled,"
+            " map, surface)"
             " SELECT s.id, f.survey_id, 12, %(state)s, f.chainage_from, f.chainage_to, 12, %(before)s, 0, %(after)s, 0, 1,"
-            " CASE WHEN %(state)s = 'unseen' THEN 0 ELSE 1 END, '{leak}', '{}', ARRAY[f.id], '{}', public.ST_Multi(f.unrolled), public.ST_Multi(f.map),"
+            " CASE WHEN %(state)s = 'unseen' THEN 0 ELSE 1 END, '{leak}', '{}', ARRAY[f.id], '{}',"
+            " public.ST_Multi(f.unrolled), public.ST_Multi(f.map),"
             " public.ST_Multi(f.surface)"
             " FROM s, tunnel.finding f WHERE f.id = %(id)s",
             {"day": day, "name": NAME, "state": state, "before": before, "after": after, "id": leak["id"]},

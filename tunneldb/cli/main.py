@@ -74,6 +74,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "findings": ("tunneldb.cli.findings:findings", "List, export or import findings of all kinds, detected or drawn."),
         "spots": ("tunneldb.cli.spots:spots", "List or export spots on the members of a structure."),
         "learn": ("tunneldb.cli.learn:learn", "Adapt leak detection in a tunnel to its reviews."),
+        "actions": ("tunneldb.cli.actions:actions", "List, add, change, write or read the actions that inspections demand."),
         "elements": ("tunneldb.cli.elements:elements", "Add, list or remove the elements of a tunnel that are rated."),
         "rating": ("tunneldb.cli.rating:rating", "Rate the elements of a survey by an owner's scheme."),
         "evaluate": ("tunneldb.cli.evaluate:evaluate", "Compare detected leaks with reference leaks."),

@@ -7,6 +7,7 @@ import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A sheet of a workbook: its name, columns and rows; cells are texts, numbers, truths, moments or empty (None)."""
+    """A sheet of a workbook: its name, columns and rows; cells are texts, numbers, truths, days, moments or empty (None)."""
 
     name: str
     columns: Sequence[Column]
@@ -98,7 +99,9 @@ def _write_cell(page: Worksheet, y: int, x: int, value: Any, form: Format, momen
         page.write_boolean(y, x, value)
     elif isinstance(value, dt.datetime):  # Excel knows no zones
         page.write_datetime(y, x, value.astimezone(dt.UTC).replace(tzinfo=None, microsecond=0), moment)
-    elif isinstance(value, (int, float)):
+    elif isinstance(value, dt.date):
+        page.write_datetime(y, x, value, form)
+    elif isinstance(value, (int, float, Decimal)):
         page.write_number(y, x, value, form)
     else:
         text = str(value)
