@@ -1,5 +1,14 @@
 -- Written from tunneldb/database/models/ by scripts/write_tables.py; do not edit.
 
+CREATE TABLE tunnel.as_of (
+    id BIGINT GENERATED ALWAYS AS IDENTITY,
+    moment TIMESTAMP WITH TIME ZONE NOT NULL,
+    CONSTRAINT as_of_pkey PRIMARY KEY (id)
+);
+COMMENT ON TABLE tunnel.as_of IS 'Empty: a row marks a transaction that shows the past, and a trigger refuses its commit';
+COMMENT ON COLUMN tunnel.as_of.id IS 'Key';
+COMMENT ON COLUMN tunnel.as_of.moment IS 'Moment that is shown';
+
 CREATE TABLE tunnel.feature_list (
     id INTEGER GENERATED ALWAYS AS IDENTITY,
     names TEXT[] NOT NULL,

@@ -16,6 +16,7 @@ BULK = ("point", "image")
 
 EXCLUDED = {
     "alembic_version": "the schema's own",
+    "as_of": "always empty",
     "stage": "made anew by tunneldb init",
     "stage_input": "made anew by tunneldb init",
     "worker": "who serves the queue at the moment",
