@@ -1,20 +1,6 @@
 -- A survey as it was at a moment, from the audit: show_as_of takes back all later edits of its findings, photos, dry regions, spots and
 -- actions. All views and functions then show the survey as it was, in this transaction only: it cannot be committed.
 
-CREATE OR REPLACE FUNCTION tunnel_internal.refuse_past() RETURNS trigger
-LANGUAGE plpgsql VOLATILE PARALLEL UNSAFE SET search_path = pg_catalog, pg_temp AS $$
-BEGIN
-    RAISE EXCEPTION 'a transaction that shows a survey as it was cannot be committed'
-        USING ERRCODE = 'invalid_transaction_termination', HINT = 'Roll it back.';
-END
-$$;
-COMMENT ON FUNCTION tunnel_internal.refuse_past() IS
-    'Trigger of tunnel.as_of: refuse the commit of a transaction that shows the past';
-
-DROP TRIGGER IF EXISTS refuse ON tunnel.as_of;
-CREATE CONSTRAINT TRIGGER refuse AFTER INSERT ON tunnel.as_of DEFERRABLE INITIALLY DEFERRED
-    FOR EACH ROW EXECUTE FUNCTION tunnel_internal.refuse_past();
-
 -- Stages that findings result from. A later run replaced what was there before.
 CREATE OR REPLACE FUNCTION tunnel_internal.runs_since(survey_id int, moment timestamptz)
 RETURNS TABLE (stage text, km int, finished_at timestamptz)
@@ -58,7 +44,6 @@ DECLARE
     was constant jsonb := coalesce(step.before, '{}');
     gone constant text[] := ARRAY(SELECT jsonb_object_keys(coalesce(step.after, '{}')));  -- columns without a value before
     photo tunnel.photo;
-    region tunnel.region;
     action tunnel.action;
     place public.geometry;
 BEGIN

@@ -105,7 +105,7 @@ def test_edits_are_in_the_audit(conn: psycopg.Connection, leak: dict[str, Any]) 
     assert rows[1]["before"] == {"state": "open"}
     assert rows[1]["after"] == {"state": "ordered", "responsible": "Works Ltd"}
     assert rows[3]["before"]["state"] == "done"
-    assert not ask(conn, "SELECT 1 FROM tunnel_api.action")
+    assert not ask(conn, "SELECT 1 FROM tunnel_api.action WHERE id = %s", [key])
 
 
 def test_an_action_outlives_its_drawn_finding(conn: psycopg.Connection, example: str) -> None:

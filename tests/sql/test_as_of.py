@@ -111,7 +111,8 @@ def redraw(conn: psycopg.Connection, chance: random.Random) -> None:
 def draw(conn: psycopg.Connection, chance: random.Random) -> None:
     x = 12310 + 180 * chance.random()
     conn.execute(
-        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, geom) VALUES (%s, 'leak', public.ST_MakeEnvelope(%s, 1, %s, 1.6))",
+        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, geom)"
+        " VALUES (%s, 'leak', public.ST_MakeEnvelope(%s, 1, %s, 1.6))",
         [NAME, x, x + 0.7],
     )
 
@@ -194,8 +195,8 @@ def drop(conn: psycopg.Connection, chance: random.Random) -> None:
 
 
 ACTS: tuple[Act, ...] = (
-    review, review, relabel, grade, redraw, draw, erase, merge, undo, photograph, caption, discard, dry, redry, undry, demand, proceed,
-    drop,
+    review, review, relabel, grade, redraw, draw, erase, merge, undo, photograph, caption, discard, dry, redry, undry, demand,
+    proceed, drop,
 )  # fmt: skip
 
 
@@ -247,7 +248,7 @@ def test_what_a_later_detection_replaced_is_not_shown(conn: psycopg.Connection, 
         [NAME],
     )
     conn.commit()
-    with pytest.raises(psycopg.Error, match="cannot be shown as of .*: stage detect of km 12 ran again on"):
+    with pytest.raises(psycopg.Error, match=r"cannot be shown as of .*: stage detect of km 12 ran again on"):
         conn.execute("SELECT tunnel_api.show_as_of(%s, %s)", [NAME, moment])
 
 

@@ -16,6 +16,7 @@ from support.databases import create_database
 from support.example_clearance import add_clearance
 from support.example_deviation import add_deviation
 from support.example_objects import CORNER, HALF_FLOOR, SPHERES, THINGS, beside, boxed, relief
+from support.example_action import add_action
 from support.example_rating import add_rating
 from support.example_rings import add_rings
 from tunneldb.anomalies.geometries import anomaly_geometries
@@ -159,6 +160,7 @@ def _fill(conn: psycopg.Connection) -> None:
     add_deviation(conn, survey_id)
     add_clearance(conn, survey_id)
     add_rating(conn, survey_id)
+    add_action(conn, survey_id)
     add_rings(conn, survey_id)
     conn.execute(  # through the view, so that the audit has a row
         "INSERT INTO tunnel_api.region (survey_id, kind, geom) VALUES (%s, 'dry', ST_MakeEnvelope(12410, -3, 12414, 0, 0))",
