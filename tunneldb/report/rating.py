@@ -1,0 +1,278 @@
+"""The chapter on ratings: elements of the tunnel in the stretch, rated by the schemes of the owner's template."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import psycopg
+
+from tunneldb.report import data, text
+from tunneldb.report.drawing import step_for, ticks
+from tunneldb.report.owner import RatingRequest
+from tunneldb.report.words import Words
+from tunneldb.store.rating import MEASURES, rate, scheme_rules
+from tunneldb.store.survey import Survey
+
+Row = dict[str, Any]
+
+LISTED_WORST = 20
+"""Number of listed elements, the worst ones."""
+
+UNFOLDED = 100
+"""Number of elements up to which the table of all of them is open, and on paper."""
+
+NAMED = 10
+"""Number of elements up to which a sentence names them."""
+
+MAX_BARS = 1000
+"""Maximum number of bars of a lane of the drawing; with more elements each bar shows the worst of several."""
+
+_STOPS = ("#8fbf9f", "#ecc94b", "#e8833a", "#c0392b", "#6b1230")
+"""Colours from the best result to the worst."""
+
+
+@dataclass(frozen=True)
+class Lane:
+    """Elements of one zone, drawn along the tunnel.
+
+    Attributes
+    ----------
+    label : str
+        Clock positions, as 10–2; empty for elements that go all round.
+    bars : list of (float, float, int)
+        Place and width, in thousandths of the stretch, and level; 0 for elements that are not rated.
+    partial : list of (float, float)
+        Place and width of elements whose result is a lower bound.
+    """
+
+    label: str
+    bars: list[tuple[float, float, int]]
+    partial: list[tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Rating:
+    """Rating of the elements of a stretch by one scheme.
+
+    Attributes
+    ----------
+    number : int
+        Number in the owner's template, from 1.
+    scheme : dict
+        Name, version, source, valid_from, results, min_inspected.
+    elements : str
+        Name of the division into elements.
+    rows : list of dict
+        Columns of ``tunnel_api.rating`` for each element that touches the stretch, in order of their numbers, with
+        ``place`` and ``rule_text``.
+    outside : int
+        Number of elements of the division outside of the stretch.
+    low, high : float
+        The stretch, m.
+    ticks : list of (float, str)
+        Places along the drawing, in thousandths, with their labels.
+    """
+
+    number: int
+    scheme: Row
+    elements: str
+    rows: list[Row]
+    outside: int
+    low: float
+    high: float
+    ticks: list[tuple[float, str]]
+
+    @property
+    def counts(self) -> list[tuple[str, int, int]]:
+        """Each result of the scheme, from the best to the worst, with its level and the number of elements."""
+        return count_results(self.scheme, self.rows)
+
+    @property
+    def unrated(self) -> list[Row]:
+        """Elements that are not rated, because nothing was inspected."""
+        return [row for row in self.rows if row["result"] is None]
+
+    @property
+    def partial(self) -> list[Row]:
+        """Elements whose result is a lower bound."""
+        return [row for row in self.rows if row["result"] is not None and not row["complete"]]
+
+    @property
+    def min_inspected(self) -> str:
+        """Inspected share below which a result is a lower bound, in per cent."""
+        return f"{100 * self.scheme['min_inspected']:.4g} %"
+
+    @property
+    def rated(self) -> int:
+        """Number of elements with a result."""
+        return len(self.rows) - len(self.unrated)
+
+    @property
+    def worst(self) -> Row | None:
+        """Worst result as a row: ``result``, ``level``, ``complete`` if all elements were inspected; None without any."""
+        levels = [row["level"] for row in self.rows if row["level"] is not None]
+        if not levels:
+            return None
+        complete = not self.unrated and not self.partial
+        return {"result": self.scheme["results"][max(levels) - 1], "level": max(levels), "complete": complete}
+
+    @property
+    def reached(self) -> list[Row]:
+        """Elements with a result worse than the best one, the worst first."""
+        return sorted((row for row in self.rows if (row["level"] or 0) > 1), key=lambda row: (-row["level"], row["number"]))
+
+    @property
+    def colours(self) -> list[tuple[str, str]]:
+        """Colour of each result, and of letters on it."""
+        return level_colours(len(self.scheme["results"]))
+
+    @property
+    def lanes(self) -> list[Lane]:
+        """Drawing of the elements, a lane for each zone."""
+        zones: dict[tuple[Any, Any], list[Row]] = {}
+        for row in self.rows:
+            zones.setdefault((row["clock_from"], row["clock_to"]), []).append(row)
+        return [self._lane(zone, rows) for zone, rows in zones.items()]
+
+    @property
+    def merged(self) -> bool:
+        """True if a bar of the drawing shows several elements."""
+        zones = Counter((row["clock_from"], row["clock_to"]) for row in self.rows)
+        return any(count > MAX_BARS for count in zones.values())
+
+    def _lane(self, zone: tuple[Any, Any], rows: Sequence[Row]) -> Lane:
+        scale = 1000.0 / (self.high - self.low)
+        bars = []
+        for row in rows:
+            left = (max(row["chainage_from"], self.low) - self.low) * scale
+            right = (min(row["chainage_to"], self.high) - self.low) * scale
+            bars.append((left, right, row["level"] or 0, row["result"] is not None and not row["complete"]))
+        if len(bars) > MAX_BARS:
+            bars = _merge(bars)
+        bars = _join_unrated(bars)
+        return Lane(
+            "" if zone[0] is None else f"{zone[0]:g}{text.DASH}{zone[1]:g}",
+            [(left, _width(left, right), level) for left, right, level, _ in bars],
+            [(left, right - left) for left, right, _, partial in bars if partial],
+        )
+
+
+def _width(left: float, right: float) -> float:
+    """Return the width of a bar with a gap to the next one, unless it is narrow."""
+    return right - left - (0.6 if right - left > 3.0 else 0.0)
+
+
+def _join_unrated(bars: Sequence[tuple[float, float, int, bool]]) -> list[tuple[float, float, int, bool]]:
+    """Return the bars with neighbours that are not rated as one."""
+    joined: list[tuple[float, float, int, bool]] = []
+    for bar in bars:
+        if joined and not bar[2] and not joined[-1][2] and abs(joined[-1][1] - bar[0]) < 1e-6:
+            bar = (joined.pop()[0], *bar[1:])
+        joined.append(bar)
+    return joined
+
+
+def _merge(bars: Sequence[tuple[float, float, int, bool]]) -> list[tuple[float, float, int, bool]]:
+    """Return bars of equal width with the worst level of those in each; one that is not rated if none of them is."""
+    size = 1000.0 / MAX_BARS
+    merged: dict[int, tuple[float, float, int, bool]] = {}
+    for left, right, level, partial in bars:
+        for n in range(int(left / size), max(int(left / size) + 1, int((right - 1e-9) / size) + 1)):
+            _, _, worst, any_partial = merged.get(n, (0.0, 0.0, 0, False))
+            merged[n] = (n * size, (n + 1) * size, max(worst, level), any_partial or partial)
+    return [merged[n] for n in sorted(merged)]
+
+
+def level_colours(count: int) -> list[tuple[str, str]]:
+    """Return a colour for each of so many results, from the best to the worst, and that of letters on it."""
+    stops = [tuple(int(stop[i : i + 2], 16) for i in (1, 3, 5)) for stop in _STOPS]
+    colours = []
+    for n in range(count):
+        place = n * (len(stops) - 1) / max(count - 1, 1)
+        k = min(int(place), len(stops) - 2)
+        red, green, blue = (round(a + (b - a) * (place - k)) for a, b in zip(stops[k], stops[k + 1], strict=True))
+        light = 0.299 * red + 0.587 * green + 0.114 * blue > 140
+        colours.append((f"#{red:02x}{green:02x}{blue:02x}", "#1c2833" if light else "#ffffff"))
+    return colours
+
+
+def count_results(scheme: Row, rows: Sequence[Row]) -> list[tuple[str, int, int]]:
+    """Return each result of a scheme, from the best to the worst, with its level and the number of elements."""
+    counts = Counter(row["result"] for row in rows)
+    return [(result, level, counts[result]) for level, result in enumerate(scheme["results"], start=1)]
+
+
+def rate_stretch(
+    conn: psycopg.Connection[Any], survey: Survey, elements: str, scheme: Row, low: float, high: float
+) -> tuple[list[Row], int]:
+    """Return the rating of the elements that touch a stretch, m, and the number of the others."""
+    rows = rate(conn, survey.name, elements, scheme["name"], scheme["version"])
+    inside = [row for row in rows if row["chainage_to"] > low and row["chainage_from"] < high]
+    return inside, len(rows) - len(inside)
+
+
+def read_rating(
+    conn: psycopg.Connection[Any], survey: Survey, low: float, high: float, number: int, asked: RatingRequest
+) -> Rating:
+    """Rate the elements of a stretch, m.
+
+    Raises
+    ------
+    UserError
+        If there is no such scheme, or the tunnel has no such elements.
+    """
+    scheme, rules = scheme_rules(conn, asked.scheme, asked.version)
+    rows, outside = rate_stretch(conn, survey, asked.elements, scheme, low, high)
+    texts = {rule["number"]: rule["text"] for rule in rules}
+    places = ticks(low, high, step_for(high - low, 10))
+    ends = [row[end] for row in rows for end in ("chainage_from", "chainage_to")]
+    labels = [text.short(label) for label in data.label_chainages(conn, survey, [*ends, *places])]
+    for n, row in enumerate(rows):
+        row["place"] = f"{labels[2 * n]}{text.DASH}{labels[2 * n + 1]}"
+        row["rule_text"] = texts.get(row["rule"], row["why"])
+    scale = 1000.0 / (high - low)
+    marks = [((place - low) * scale, label) for place, label in zip(places, labels[len(ends) :], strict=True)]
+    return Rating(number, scheme, asked.elements, rows, outside, low, high, marks)
+
+
+def measured(value: float | None, measure: str | None) -> str:
+    """Return a value or a limit of a rule with its unit: a share in per cent, others to 4 significant digits."""
+    if value is None or measure is None:
+        return text.DASH
+    if measure == "share":
+        return f"{100 * value:.4g} %"
+    return f"{value:.4g} {MEASURES.get(measure, '')}".rstrip()
+
+
+def result_text(words: Words, row: Row) -> str:
+    """Return a result in the language of the report; a lower bound is marked."""
+    if row["result"] is None:
+        return words("not rated")
+    return row["result"] if row["complete"] else words("at least {result}", result=row["result"])
+
+
+def name_elements(words: Words, rows: Sequence[Row]) -> str:
+    """Return the number of elements, and their names if they are few."""
+    count = words.count("{count} elements", len(rows))
+    return f"{count} ({', '.join(row['name'] for row in rows)})" if len(rows) <= NAMED else count
+
+
+def headline(words: Words, rating: Rating, template: str | None) -> str:
+    """Return the headline of a rating, in the owner's words if there are any."""
+    names = {"scheme": rating.scheme["name"], "version": rating.scheme["version"]}
+    if rating.worst is None:
+        return words("No result by {scheme} {version}: nothing was inspected.", **names)
+    names["result"] = result_text(words, rating.worst)
+    return template.format(**names) if template else words("Worst result by {scheme} {version}: {result}", **names)
+
+
+def digest_ratings(digest: hashlib._Hash, ratings: Sequence[Rating]) -> None:
+    """Add the reported ratings."""
+    for one in ratings:
+        digest.update(repr((one.scheme["name"], one.scheme["version"], one.elements)).encode())
+        for row in one.rows:
+            digest.update(repr((row["number"], row["name"], row["result"], row["complete"], row["finding_id"])).encode())
