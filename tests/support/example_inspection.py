@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import psycopg
+
 from support.example_change import EARLIER, add_earlier
 from support.example_survey import copy_rows
 
@@ -30,7 +31,8 @@ def add_inspection(conn: psycopg.Connection, survey: str) -> int:
         "INSERT INTO tunnel.finding (survey_id, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons,"
         " confidence, contrast, area, darkening_mean, darkening_max, image_share, unrolled, map, surface, review)"
         " SELECT %s, km, chainage_from, chainage_to, arc_from, arc_to, clock, kind, reasons, confidence, contrast, %s * area,"
-        " darkening_mean, darkening_max, image_share, unrolled, map, surface, 'confirmed' FROM tunnel.finding WHERE id = ANY (%s)",
+        " darkening_mean, darkening_max, image_share, unrolled, map, surface, 'confirmed' FROM tunnel.finding"
+        " WHERE id = ANY (%s)",
         [earlier, SMALLER, list(THEN)],
     )
     return earlier

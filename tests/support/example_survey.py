@@ -129,9 +129,7 @@ def copy_rows(conn: psycopg.Connection, source: str, target: int, tables: tuple[
             sql.SQL(
                 "INSERT INTO tunnel.{table} (survey_id, {names}) SELECT {target}, {names} FROM tunnel.{table}"
                 " WHERE survey_id = (SELECT id FROM tunnel.survey WHERE name = {source})"
-            ).format(
-                table=sql.Identifier(table), names=names, target=sql.Literal(target), source=sql.Literal(source)
-            )
+            ).format(table=sql.Identifier(table), names=names, target=sql.Literal(target), source=sql.Literal(source))
         )
 
 

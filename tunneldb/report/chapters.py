@@ -395,8 +395,8 @@ class Signatures(Chapter):
 ALL: dict[str, type[Chapter]] = {
     chapter.name: chapter
     for chapter in (
-        Summary, Rating, Seen, Classes, Lining, Sections, Leaks, Statistics, Findings, Dry, Structures, Underwater, Clearance, Rings,
-        Change, Deviation, Methods, Reviews, Signatures,
+        Summary, Rating, Seen, Classes, Lining, Sections, Leaks, Statistics, Findings, Dry, Structures, Underwater, Clearance,
+        Rings, Change, Deviation, Methods, Reviews, Signatures,
     )
 }  # fmt: skip
 """All chapters by name, in their default order."""

@@ -277,7 +277,9 @@ def _headline_text(given: _Given, headline: str) -> str | None:
         given.refuse("headline_text", 'needs headline = "rating"')
     names = set(_NAME.findall(value))
     if re.search(r"[{}]", _NAME.sub("", value)) or names - set(HEADLINE_NAMES) or "{result}" not in names:
-        given.refuse("headline_text", f"{value!r} must contain {{result}}, and no other braces than {', '.join(HEADLINE_NAMES)}")
+        given.refuse(
+            "headline_text", f"{value!r} must contain {{result}}, and no other braces than {', '.join(HEADLINE_NAMES)}"
+        )
     return value
 
 

@@ -34,6 +34,8 @@ MAX_BARS = 1000
 _STOPS = ("#8fbf9f", "#ecc94b", "#e8833a", "#c0392b", "#6b1230")
 """Colours from the best result to the worst."""
 
+_LETTERS = ("#000000", "#ffffff")
+
 
 @dataclass(frozen=True)
 class Lane:
@@ -93,7 +95,7 @@ class Rating:
 
     @property
     def unrated(self) -> list[Row]:
-        """Elements that are not rated, because nothing was inspected."""
+        """Elements without a result, because nothing was inspected."""
         return [row for row in self.rows if row["result"] is None]
 
     @property
@@ -119,6 +121,11 @@ class Rating:
             return None
         complete = not self.unrated and not self.partial
         return {"result": self.scheme["results"][max(levels) - 1], "level": max(levels), "complete": complete}
+
+    @property
+    def crossing(self) -> bool:
+        """True if an element goes across an end of the stretch."""
+        return any(row["chainage_from"] < end < row["chainage_to"] for row in self.rows for end in (self.low, self.high))
 
     @property
     def reached(self) -> list[Row]:
@@ -188,16 +195,29 @@ def _merge(bars: Sequence[tuple[float, float, int, bool]]) -> list[tuple[float, 
 
 
 def level_colours(count: int) -> list[tuple[str, str]]:
-    """Return a colour for each of so many results, from the best to the worst, and that of letters on it."""
+    """Return a colour for each of so many results, from the best to the worst, and that of legible letters on it."""
     stops = [tuple(int(stop[i : i + 2], 16) for i in (1, 3, 5)) for stop in _STOPS]
     colours = []
     for n in range(count):
         place = n * (len(stops) - 1) / max(count - 1, 1)
         k = min(int(place), len(stops) - 2)
-        red, green, blue = (round(a + (b - a) * (place - k)) for a, b in zip(stops[k], stops[k + 1], strict=True))
-        light = 0.299 * red + 0.587 * green + 0.114 * blue > 140
-        colours.append((f"#{red:02x}{green:02x}{blue:02x}", "#1c2833" if light else "#ffffff"))
+        parts = [round(a + (b - a) * (place - k)) for a, b in zip(stops[k], stops[k + 1], strict=True)]
+        colour = "#{:02x}{:02x}{:02x}".format(*parts)
+        colours.append((colour, max(_LETTERS, key=lambda letters: _contrast(colour, letters))))
     return colours
+
+
+def _contrast(colour: str, other: str) -> float:
+    """Return the contrast of two colours, by WCAG."""
+    dark, light = sorted((luminance(colour), luminance(other)))
+    return (light + 0.05) / (dark + 0.05)
+
+
+def luminance(colour: str) -> float:
+    """Return the relative luminance of a colour, by WCAG."""
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    red, green, blue = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
 def count_results(scheme: Row, rows: Sequence[Row]) -> list[tuple[str, int, int]]:
