@@ -171,6 +171,27 @@ def test_several_schemes_stand_side_by_side(dsn: str, example: str, tmp_path: Pa
     assert len(re.findall("o’clock</text>", chapter)) == 4
 
 
+def test_schemes_over_the_same_elements_say_where_they_differ(
+    dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    """An element that reaches a limit of one scheme and not of another is listed with both results, and why."""
+    scheme = (EXAMPLES / "rating-example.toml").read_text("utf-8").replace("0.0005", "0.003").replace("0.002,", "0.004,")
+    (tmp_path / "s.toml").write_text(scheme.replace('name = "example"', 'name = "lenient"'), "utf-8")
+    run("rating", "add", tmp_path / "s.toml")
+    chapter = section(report(tmp_path, BLOCKS + BLOCKS.replace("example", "lenient")), "rating")
+    strict, lenient = (rate(conn, NAME, "blocks", scheme, None) for scheme in ("example", "lenient"))
+    known = [a["name"] for a, b in zip(strict, lenient, strict=True) if ((a["level"] or 0) > 1) != ((b["level"] or 0) > 1)]
+    assert known == []
+    assert "No element reaches a limit of one scheme and not of another." in chapter
+    conn.execute("UPDATE tunnel.rating_rule SET limits = ARRAY[9.0, 99, 999] WHERE measure = 'largest_area'")
+    conn.commit()
+    chapter = section(report(tmp_path, BLOCKS + BLOCKS.replace("example", "lenient")), "rating")
+    part = chapter.partition("Where the schemes differ: blocks")[2]
+    assert re.findall(r"<tr><td>(block \d)</td>", part) == ["block 4"]
+    assert "of another: 1." in part
+    assert "share of wet lining: 0.09472 % (0.05 %)" in part
+
+
 @pytest.mark.parametrize(
     ("owner", "said"),
     [
@@ -252,8 +273,8 @@ def test_the_last_inspection_is_compared(dsn: str, example: str, conn: psycopg.C
     assert then["block 4"]["result"] is None, "not inspected then"
     assert pair.states == {"worse": 1, "better": 0, "same": 1, "undecided": 2}
     assert [(old["name"], old["result"], new["result"]) for old, new in pair.worse] == [
-        ("block 1", "A", "C"),
         ("block 3", "A", "C"),
+        ("block 1", "A", "C"),
     ]
     conn.commit()
     text = report(tmp_path, BLOCKS)

@@ -17,7 +17,7 @@ from tunneldb.report.drawing import share_path, step_for, ticks, without_detecti
 from tunneldb.report.facts import Facts
 from tunneldb.report.location import LocationMap, draw_location
 from tunneldb.report.owner import CHAPTERS
-from tunneldb.report.rating import LISTED_WORST, UNFOLDED
+from tunneldb.report.rating import LISTED_WORST, UNFOLDED, Difference, differences
 from tunneldb.report.rings import read_rings
 from tunneldb.report.since import LISTED_WORSE
 from tunneldb.report.strip import LETTERS
@@ -150,6 +150,11 @@ class Rating(_Found):
     def found(self) -> Any:
         """Ratings that the template asks for."""
         return self.facts.ratings
+
+    @property
+    def differences(self) -> list[Difference]:
+        """Schemes that rate the same elements, and where they differ."""
+        return differences(self.facts.ratings)
 
 
 class Seen(_OfLeaks):

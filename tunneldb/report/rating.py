@@ -31,6 +31,9 @@ NAMED = 10
 MAX_BARS = 1000
 """Maximum number of bars of a lane of the drawing; with more elements each bar shows the worst of several."""
 
+NARROW = 3.0
+"""Width of a bar without a gap to the next one, in thousandths of the stretch."""
+
 _STOPS = ("#8fbf9f", "#ecc94b", "#e8833a", "#c0392b", "#6b1230")
 """Colours from the best result to the worst."""
 
@@ -129,8 +132,9 @@ class Rating:
 
     @property
     def reached(self) -> list[Row]:
-        """Elements with a result worse than the best one, the worst first."""
-        return sorted((row for row in self.rows if (row["level"] or 0) > 1), key=lambda row: (-row["level"], row["number"]))
+        """Elements with a result worse than the best one, the worst first: by result, then by value over limit."""
+        worse = (row for row in self.rows if (row["level"] or 0) > 1)
+        return sorted(worse, key=lambda row: (-row["level"], -excess(row), row["number"]))
 
     @property
     def colours(self) -> list[tuple[str, str]]:
@@ -160,7 +164,7 @@ class Rating:
             bars.append((left, right, row["level"] or 0, row["result"] is not None and not row["complete"]))
         if len(bars) > MAX_BARS:
             bars = _merge(bars)
-        bars = _join_unrated(bars)
+        bars = _join(bars)
         return Lane(
             "" if zone[0] is None else f"{zone[0]:g}{text.DASH}{zone[1]:g}",
             [(left, _width(left, right), level) for left, right, level, _ in bars],
@@ -170,15 +174,19 @@ class Rating:
 
 def _width(left: float, right: float) -> float:
     """Return the width of a bar with a gap to the next one, unless it is narrow."""
-    return right - left - (0.6 if right - left > 3.0 else 0.0)
+    return right - left - (0.6 if right - left > NARROW else 0.0)
 
 
-def _join_unrated(bars: Sequence[tuple[float, float, int, bool]]) -> list[tuple[float, float, int, bool]]:
-    """Return the bars with neighbours that are not rated as one."""
+def _join(bars: Sequence[tuple[float, float, int, bool]]) -> list[tuple[float, float, int, bool]]:
+    """Return the bars with equal neighbours as one, if they are narrow or not rated."""
     joined: list[tuple[float, float, int, bool]] = []
     for bar in bars:
-        if joined and not bar[2] and not joined[-1][2] and abs(joined[-1][1] - bar[0]) < 1e-6:
-            bar = (joined.pop()[0], *bar[1:])
+        left, right, level, partial = bar
+        if joined and (not level or right - left < NARROW):
+            start, end, *state = joined[-1]
+            if abs(end - left) < 1e-6 and state == [level, partial]:
+                bar = (start, right, level, partial)
+                joined.pop()
         joined.append(bar)
     return joined
 
@@ -220,6 +228,11 @@ def luminance(colour: str) -> float:
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
+def excess(row: Row) -> float:
+    """Return the value that decided as a multiple of its limit; 0 without a limit."""
+    return float(row["value"] / row["limit_reached"]) if row["limit_reached"] and row["value"] is not None else 0.0
+
+
 def count_results(scheme: Row, rows: Sequence[Row]) -> list[tuple[str, int, int]]:
     """Return each result of a scheme, from the best to the worst, with its level and the number of elements."""
     counts = Counter(row["result"] for row in rows)
@@ -257,6 +270,38 @@ def read_rating(
     scale = 1000.0 / (high - low)
     marks = [((place - low) * scale, label) for place, label in zip(places, labels[len(ends) :], strict=True)]
     return Rating(number, scheme, asked.elements, rows, outside, low, high, marks)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Ratings of the same elements by several schemes.
+
+    Attributes
+    ----------
+    ratings : list of Rating
+    rows : list of list of dict
+        Elements that reach a limit of one scheme and not of another: the row of each rating.
+    """
+
+    ratings: list[Rating]
+    rows: list[list[Row]]
+
+
+def differences(ratings: Sequence[Rating]) -> list[Difference]:
+    """Compare the ratings that have the same elements."""
+    by_elements: dict[str, list[Rating]] = {}
+    for one in ratings:
+        by_elements.setdefault(one.elements, []).append(one)
+    return [
+        Difference(group, [list(rows) for rows in zip(*(one.rows for one in group), strict=True) if _differ(rows)])
+        for group in by_elements.values()
+        if len(group) > 1
+    ]
+
+
+def _differ(rows: Sequence[Row]) -> bool:
+    """Return True if an element reaches a limit of one scheme and not of another."""
+    return len({(row["level"] or 0) > 1 for row in rows}) > 1
 
 
 def measured(value: float | None, measure: str | None) -> str:

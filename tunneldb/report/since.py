@@ -11,7 +11,7 @@ import psycopg
 
 from tunneldb.measures.change.tables import change_rows, summary
 from tunneldb.report.data import read_statistics
-from tunneldb.report.rating import Rating, count_results, rate_stretch
+from tunneldb.report.rating import Rating, count_results, excess, rate_stretch
 from tunneldb.store.survey import Survey, get_survey
 
 Row = dict[str, Any]
@@ -67,7 +67,7 @@ class RatingChange:
             for old, new in zip(self.before, self.now.rows, strict=True)
             if old["level"] is not None and new["level"] is not None and new["level"] > old["level"]
         ]
-        return sorted(pairs, key=lambda pair: (-pair[1]["level"], pair[0]["level"], pair[1]["number"]))
+        return sorted(pairs, key=lambda pair: (-pair[1]["level"], pair[0]["level"], -excess(pair[1]), pair[1]["number"]))
 
 
 @dataclass(frozen=True)
