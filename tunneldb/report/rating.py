@@ -174,7 +174,7 @@ class Rating:
 
 def _width(left: float, right: float) -> float:
     """Return the width of a bar with a gap to the next one, unless it is narrow."""
-    return right - left - (0.6 if right - left > NARROW else 0.0)
+    return right - left - (0.8 if right - left > NARROW else 0.0)
 
 
 def _join(bars: Sequence[tuple[float, float, int, bool]]) -> list[tuple[float, float, int, bool]]:
