@@ -420,7 +420,7 @@ RATED = '[[rating]]\nscheme = "a"\nelements = "b"\n'
         ('[headings]\n"{count} leaks" = "{count}"', "must be a list of 2 texts, the plural forms by 'n != 1', not '{count}'"),
         ('language = "sl"\n[headings]\n"{count} leaks" = ["a", "b"]', "must be a list of 4 texts, the plural forms by"),
         ('[headings]\n"{count} leaks" = ["{count}", 2]', "must be a text, not 2"),
-        ('waterproofing = "RVS 13.03"', "waterproofing: tunneldb has no classes of 'RVS 13.03'; leave it out, or"),
+        ('waterproofing = "RVS 13.03"', "waterproofing: there are no classes of 'RVS 13.03'; leave it out, or"),
         ('headline = "class"', "headline: 'class' is none of facts, rating, waterproofing, none"),
         ('headline = "rating"', "headline: 'rating' needs a table [rating] with scheme and elements"),
         ('headline = "waterproofing"', "headline: 'waterproofing' needs a standard: waterproofing = \"GB 50108-2008\""),

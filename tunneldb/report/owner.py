@@ -232,7 +232,7 @@ def _waterproofing(given: _Given) -> str | None:
     if standard is not None and standard not in STANDARDS:
         given.refuse(
             "waterproofing",
-            f"tunneldb has no classes of {standard!r}; leave it out, or choose {' or '.join(STANDARDS)}; for limits of your own"
+            f"there are no classes of {standard!r}; leave it out, or choose {' or '.join(STANDARDS)}; for limits of your own"
             " write [[rating]]",
         )
     return standard

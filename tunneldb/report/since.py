@@ -53,7 +53,7 @@ class RatingChange:
 
     @property
     def states(self) -> dict[str, int]:
-        """Number of elements that are worse, better, the same, or of which this is not decided."""
+        """Number of elements that are worse, better, the same, or undecided."""
         states = dict.fromkeys(("worse", "better", "same", "undecided"), 0)
         for old, new in zip(self.before, self.now.rows, strict=True):
             states[compare_results(old, new)] += 1
