@@ -87,6 +87,9 @@ CREATE TABLE tunnel.rating_scheme (
     valid_from DATE,
     results TEXT[] NOT NULL,
     min_inspected DOUBLE PRECISION DEFAULT 0.95 NOT NULL,
+    totals DOUBLE PRECISION[],
+    total_results TEXT[],
+    totals_inclusive BOOLEAN DEFAULT true NOT NULL,
     added_at TIMESTAMP WITH TIME ZONE DEFAULT clock_timestamp() NOT NULL,
     CONSTRAINT rating_scheme_pkey PRIMARY KEY (id),
     CONSTRAINT rating_scheme_name_version_key UNIQUE (name, version),
@@ -94,7 +97,8 @@ CREATE TABLE tunnel.rating_scheme (
     CONSTRAINT rating_scheme_version_at_most_100_characters_check CHECK (char_length(version) <= 100),
     CONSTRAINT rating_scheme_source_at_most_1000_characters_check CHECK (char_length(source) <= 1000),
     CONSTRAINT rating_scheme_results_check CHECK (cardinality(results) BETWEEN 2 AND 20),
-    CONSTRAINT rating_scheme_min_inspected_check CHECK (min_inspected >= 0 AND min_inspected <= 1)
+    CONSTRAINT rating_scheme_min_inspected_check CHECK (min_inspected >= 0 AND min_inspected <= 1),
+    CONSTRAINT rating_scheme_totals_check CHECK ((totals IS NULL) = (total_results IS NULL) AND cardinality(totals) >= 1 AND cardinality(totals) <= 20 AND cardinality(totals) = cardinality(total_results))
 );
 COMMENT ON TABLE tunnel.rating_scheme IS 'Schemes by which owners rate elements; a version is never changed';
 COMMENT ON COLUMN tunnel.rating_scheme.id IS 'Key';
@@ -104,6 +108,9 @@ COMMENT ON COLUMN tunnel.rating_scheme.source IS 'Directive or standard with sec
 COMMENT ON COLUMN tunnel.rating_scheme.valid_from IS 'Date from which it is valid';
 COMMENT ON COLUMN tunnel.rating_scheme.results IS 'Results from the best to the worst';
 COMMENT ON COLUMN tunnel.rating_scheme.min_inspected IS 'Inspected share below which a result is a lower bound, 0 to 1';
+COMMENT ON COLUMN tunnel.rating_scheme.totals IS 'Limits of the sum of the rules'' points, ascending; NULL: the worst result of all rules is that of an element';
+COMMENT ON COLUMN tunnel.rating_scheme.total_results IS 'Result at each total';
+COMMENT ON COLUMN tunnel.rating_scheme.totals_inclusive IS 'True if a sum equal to a total reaches it';
 COMMENT ON COLUMN tunnel.rating_scheme.added_at IS 'Time when it was added';
 
 CREATE TABLE tunnel.segmentation_network (
@@ -390,21 +397,36 @@ CREATE TABLE tunnel.rating_rule (
     inclusive BOOLEAN NOT NULL,
     limits DOUBLE PRECISION[] NOT NULL,
     results TEXT[] NOT NULL,
+    points DOUBLE PRECISION[],
+    by_measure TEXT,
+    by_kinds TEXT[],
+    by_inclusive BOOLEAN,
+    by_limits DOUBLE PRECISION[],
     CONSTRAINT rating_rule_pkey PRIMARY KEY (scheme_id, number),
     CONSTRAINT rating_rule_text_at_most_500_characters_check CHECK (char_length(text) <= 500),
-    CONSTRAINT rating_rule_measure_check CHECK (measure IN ('area', 'share', 'largest_area', 'length', 'width_mm', 'severity', 'count')),
-    CONSTRAINT rating_rule_limits_check CHECK (cardinality(limits) >= 1 AND cardinality(limits) <= 20 AND cardinality(limits) = cardinality(results)),
+    CONSTRAINT rating_rule_measure_check CHECK (measure IN ('area', 'share', 'largest_area', 'length', 'density_length', 'width_mm', 'severity', 'count', 'growth')),
+    CONSTRAINT rating_rule_by_measure_check CHECK (by_measure IN ('area', 'share', 'largest_area', 'length', 'density_length', 'width_mm', 'severity', 'count', 'growth')),
+    CONSTRAINT rating_rule_limits_check CHECK (cardinality(limits) >= 1 AND cardinality(limits) <= 20),
+    CONSTRAINT rating_rule_by_check CHECK ((by_measure IS NULL) = (by_kinds IS NULL) AND (by_measure IS NULL) = (by_limits IS NULL) AND (by_measure IS NULL) = (by_inclusive IS NULL) AND cardinality(by_limits) >= 1 AND cardinality(by_limits) <= 20),
+    CONSTRAINT rating_rule_results_check CHECK (cardinality(results) = CASE WHEN points IS NOT NULL THEN 0 WHEN by_measure IS NULL THEN cardinality(limits) ELSE (cardinality(limits) + 1) * (cardinality(by_limits) + 1) END),
+    CONSTRAINT rating_rule_points_check CHECK (by_measure IS NULL OR points IS NULL),
+    CONSTRAINT rating_rule_point_count_check CHECK (cardinality(points) = cardinality(limits)),
     CONSTRAINT rating_rule_scheme_id_fkey FOREIGN KEY(scheme_id) REFERENCES tunnel.rating_scheme (id) ON DELETE CASCADE
 );
-COMMENT ON TABLE tunnel.rating_rule IS 'Rules of rating schemes; the worst result of all rules is that of an element';
+COMMENT ON TABLE tunnel.rating_rule IS 'Rules of rating schemes';
 COMMENT ON COLUMN tunnel.rating_rule.scheme_id IS 'Scheme';
 COMMENT ON COLUMN tunnel.rating_rule.number IS 'Number of the rule, from 1';
 COMMENT ON COLUMN tunnel.rating_rule.text IS 'Rule in the owner''s words';
 COMMENT ON COLUMN tunnel.rating_rule.kinds IS 'Codes of the kinds of findings; empty: all wet ones';
-COMMENT ON COLUMN tunnel.rating_rule.measure IS 'area (m², sum), share (area over the inspected lining), largest_area (m²), length (m, sum), width_mm (greatest), severity (greatest) or count';
+COMMENT ON COLUMN tunnel.rating_rule.measure IS 'area (m², sum), share (area over the inspected lining), largest_area (m²), length (m, sum), density_length (m per m² of inspected lining), width_mm (greatest), severity (greatest), count, or growth (m² of area per year since the earlier inspection)';
 COMMENT ON COLUMN tunnel.rating_rule.inclusive IS 'True if a value equal to a limit reaches it';
 COMMENT ON COLUMN tunnel.rating_rule.limits IS 'Limits in ascending order';
-COMMENT ON COLUMN tunnel.rating_rule.results IS 'Result at each limit';
+COMMENT ON COLUMN tunnel.rating_rule.results IS 'Result at each limit; of a matrix, row by row, one row for each class of the measure, from below the first limit; empty if the rule has points';
+COMMENT ON COLUMN tunnel.rating_rule.points IS 'Points at each limit, of a scheme with totals';
+COMMENT ON COLUMN tunnel.rating_rule.by_measure IS 'Second measure of a matrix, whose classes are its columns';
+COMMENT ON COLUMN tunnel.rating_rule.by_kinds IS 'Kinds of findings of the second measure';
+COMMENT ON COLUMN tunnel.rating_rule.by_inclusive IS 'True if a value equal to a limit of the second measure reaches it';
+COMMENT ON COLUMN tunnel.rating_rule.by_limits IS 'Limits of the second measure in ascending order';
 
 CREATE TABLE tunnel.stage_input (
     stage TEXT NOT NULL,

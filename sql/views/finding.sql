@@ -376,8 +376,8 @@ COMMENT ON COLUMN tunnel_api.dry_region.leaks_area IS 'Area of those leaks, m²'
 COMMENT ON COLUMN tunnel_api.dry_region.leak_ids IS 'Ids of those leaks (finding)';
 COMMENT ON COLUMN tunnel_api.dry_region.geom IS 'Polygon in the unrolled plane (chainage, arc), m';
 
--- Example of an owner's view, by the Specifications for the National Tunnel Inventory (FHWA): severity 1 to 4 as condition states
--- CS1 to CS4, findings without severity as CS2. The liner without findings is in CS1.
+-- Example of an owner's view, in the form of the Specifications for the National Tunnel Inventory (FHWA), without their limits: severity
+-- 1 to 4 as condition states CS1 to CS4, findings without severity as CS2. The liner without findings is in CS1.
 CREATE OR REPLACE VIEW tunnel_api.snti_condition AS
 SELECT s.id::bigint * 10 + q.n AS id, s.id AS survey_id, s.name AS survey, q.element, q.unit,
        q.cs1 + CASE WHEN q.n = 1 THEN greatest(coalesce(i.seen, 0) - q.cs1 - q.cs2 - q.cs3 - q.cs4, 0) ELSE 0 END AS cs1,
@@ -406,7 +406,7 @@ SELECT s.id::bigint * 10 + q.n AS id, s.id AS survey_id, s.name AS survey, q.ele
                 SELECT CASE e.unit WHEN 'm²' THEN g.area WHEN 'each' THEN g.findings ELSE g.length END AS amount) m
          GROUP BY e.n, e.element, e.unit) q;
 COMMENT ON VIEW tunnel_api.snti_condition IS
-    'Example: quantities of elements in the condition states of FHWA''s SNTI, from the severity of counted findings (without severity: CS2). The rest of the inspected liner is in CS1. Owners can write their own view';
+    'Example: quantities of elements in four condition states, as in FHWA''s SNTI, from the severity of counted findings (without severity: CS2). Limits of the SNTI are not applied. The rest of the inspected liner is in CS1. Owners can write their own view';
 COMMENT ON COLUMN tunnel_api.snti_condition.element IS 'liner, cracks, joints, bolts or drips';
 COMMENT ON COLUMN tunnel_api.snti_condition.unit IS 'm², m or each';
 COMMENT ON COLUMN tunnel_api.snti_condition.cs1 IS 'Quantity in condition state 1, good';

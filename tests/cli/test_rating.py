@@ -69,6 +69,33 @@ def test_a_version_is_never_changed(dsn: str, example: str) -> None:
     assert "tunneldb rating remove example 2026-1" in message
 
 
+def test_a_scheme_of_the_program_is_added_by_its_name(dsn: str, example: str) -> None:
+    listed = json.loads(done("rating", "list", "--shipped", "--json").stdout)["schemes"]
+    (scheme,) = [one for one in listed if one["name"] == "gb-50108-2008"]
+    assert "https://" in scheme["source"]
+    assert "gb-50108-2008 1: 4 rules, results 1, 2, 3, 4" in done("rating", "add", "--shipped", "gb-50108-2008").stderr
+    assert scheme["source"] in done("rating", "show", "gb-50108-2008").output
+    assert "≥ 1: 2" in done("rating", "show", "gb-50108-2008").output
+
+
+def test_schemes_of_the_program_are_listed_without_a_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TUNNELDB_DSN", "host=nowhere.invalid")
+    assert "sia-272-2024" in done("rating", "list", "--shipped").output
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "give exactly one of FILE and --shipped NAME"),
+        ([str(EXAMPLE), "--shipped", "gb-50108-2008"], "give exactly one of FILE and --shipped NAME"),
+        (["--shipped", "gb-50108"], "no scheme 'gb-50108' is part of tunneldb: gb-50108-2008, "),
+        (["--shipped", "../schemes/gb-50108-2008"], "no scheme '../schemes/gb-50108-2008' is part of tunneldb"),
+    ],
+)
+def test_a_wrong_choice_of_a_scheme_is_refused(words: list[str], message: str) -> None:
+    assert message in refused("rating", "add", *words)
+
+
 def test_rings_and_zones_become_elements(dsn: str, example: str, conn: psycopg.Connection) -> None:
     done("elements", "add", "demo", "rings", "--rings", NAME, "--zones")
     rows = conn.execute(
@@ -136,7 +163,7 @@ GOOD = EXAMPLE.read_text()
         ("min_inspected = 0.95", "min_inspected = 95", "min_inspected: a number from 0 to 1"),
         ('results = ["0", "1", "2", "3", "4"]', 'results = ["0", "0"]', "results: 2 to 20 different texts"),
         ('source = "Example; no directive"', 'sauce = "x"', "sauce: there is no such key Did you mean 'source'?"),
-        ('from = { "1" = 0.2', 'above = { "1" = 1 }\nfrom = { "1" = 0.2', "rule 3: above: a rule has either above"),
+        ('from = { "1" = 0.2', 'above = { "1" = 1 }\nfrom = { "1" = 0.2', "rule 3: above: there is either above, or from"),
         ("[[rule]]", "[[ruel]]", "ruel: there is no such key"),
         ("name = ", "name == ", "is not TOML"),
     ],

@@ -20,7 +20,7 @@ from tunneldb.report import rating
 from tunneldb.report.owner import Owner, RatingRequest, read_owner
 from tunneldb.report.rating import Rating, level_colours, luminance, read_rating
 from tunneldb.report.since import compare_results, read_since
-from tunneldb.store.rating import rate
+from tunneldb.store.rating import compare_schemes, rate, rating_change
 from tunneldb.store.survey import get_survey
 
 WHOLE = (12300.0, 12500.0)
@@ -174,22 +174,51 @@ def test_several_schemes_stand_side_by_side(dsn: str, example: str, tmp_path: Pa
 def test_schemes_over_the_same_elements_say_where_they_differ(
     dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path
 ) -> None:
-    """An element that reaches a limit of one scheme and not of another is listed with both results, and why."""
-    scheme = (EXAMPLES / "rating-example.toml").read_text("utf-8").replace("0.0005", "0.003").replace("0.002,", "0.004,")
-    (tmp_path / "s.toml").write_text(scheme.replace('name = "example"', 'name = "lenient"'), "utf-8")
-    run("rating", "add", tmp_path / "s.toml")
-    chapter = section(report(tmp_path, BLOCKS + BLOCKS.replace("example", "lenient")), "rating")
-    strict, lenient = (rate(conn, NAME, "blocks", scheme, None) for scheme in ("example", "lenient"))
-    known = [a["name"] for a, b in zip(strict, lenient, strict=True) if ((a["level"] or 0) > 1) != ((b["level"] or 0) > 1)]
-    assert known == []
-    assert "No element reaches a limit of one scheme and not of another." in chapter
-    conn.execute("UPDATE tunnel.rating_rule SET limits = ARRAY[9.0, 99, 999] WHERE measure = 'largest_area'")
-    conn.commit()
-    chapter = section(report(tmp_path, BLOCKS + BLOCKS.replace("example", "lenient")), "rating")
-    part = chapter.partition("Where the schemes differ: blocks")[2]
-    assert re.findall(r"<tr><td>(block \d)</td>", part) == ["block 4"]
-    assert "of another: 1." in part
+    """As the command that compares schemes does, the greatest difference first, with both results and why."""
+    run("rating", "add", EXAMPLES / "rating-example.toml")
+    both = BLOCKS + BLOCKS + 'version = "1"\n'
+    part = section(report(tmp_path, both), "rating").partition("Where the schemes differ: blocks")[2]
+    rows = compare_schemes(conn, NAME, "blocks", ("example", "2026-1"), ("example", "1"))
+    known = sorted((row for row in rows if row["difference"]), key=lambda row: -round(abs(row["difference"]), 9))
+    assert len(known) == 3
+    assert re.findall(r"<tr><td>(block \d)</td>", part) == [row["name"] for row in known]
+    assert "of its scheme: 3." in part
     assert "share of wet lining: 0.09472 % (0.05 %)" in part
+    assert "Largest leak: 0.851 m² (0.5 m²)" in part
+    again = section(report(tmp_path, BLOCKS + BLOCKS), "rating")
+    assert "No element has a different place of the result between the best and the worst of its scheme." in again
+
+
+def test_sums_of_points_and_matrices_say_all_that_decided(
+    dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path
+) -> None:
+    """One value and its limit do not: the chapter has the sentence of SQL."""
+    scheme_row = "INSERT INTO tunnel.rating_scheme (name, version, source, results, totals, total_results) VALUES"
+    rule_row = "INSERT INTO tunnel.rating_rule (scheme_id, number, text, kinds, measure, inclusive, limits, results"
+    conn.execute(f"{scheme_row} ('sums', '1', 'tests', '{{A,B,C}}', '{{2,5}}', '{{B,C}}')")
+    conn.execute(
+        f"{rule_row}, points) SELECT id, 1, 'area', '{{}}', 'area', true, '{{0.5}}', '{{}}', '{{3}}' FROM tunnel.rating_scheme"
+        " WHERE name = 'sums'"
+    )
+    conn.execute(f"{scheme_row} ('matrix', '1', 'tests', '{{A,B,C}}', NULL, NULL)")
+    conn.execute(
+        f"{rule_row}, by_measure, by_kinds, by_inclusive, by_limits) SELECT id, 1, 'area by count', '{{}}', 'area', true,"
+        " '{0.5}', '{A,A,B,C}', 'count', '{}', true, '{2}' FROM tunnel.rating_scheme WHERE name = 'matrix'"
+    )
+    conn.commit()
+    for scheme in ("sums", "matrix"):
+        chapter = section(report(tmp_path, BLOCKS.replace('"example"', f'"{scheme}"')), "rating")
+        known = [row for row in rate(conn, NAME, "blocks", scheme, None) if row["rule"] is not None]
+        assert {row["result"] for row in known} > {"B"} if scheme == "matrix" else {row["result"] for row in known} == {"B"}
+        assert re.findall(r'<td class="why">([^–].*?)</td>', chapter) == [html.escape(row["why"]) for row in known]
+
+
+def test_growth_that_is_not_known_makes_a_lower_bound(dsn: str, example: str, conn: psycopg.Connection, tmp_path: Path) -> None:
+    conn.execute("UPDATE tunnel.rating_rule SET measure = 'growth' WHERE measure = 'share'")
+    conn.commit()
+    chapter = section(report(tmp_path, BLOCKS), "rating")
+    assert "because the inspected share is below 95 %: 1 element (block 1)." in chapter
+    assert "because the growth since the earlier inspection is not known: 3 elements (block 2, block 3, block 4)." in chapter
 
 
 @pytest.mark.parametrize(
@@ -276,6 +305,12 @@ def test_the_last_inspection_is_compared(dsn: str, example: str, conn: psycopg.C
         ("block 3", "A", "C"),
         ("block 1", "A", "C"),
     ]
+    changes = {row["name"]: row for row in rating_change(conn, example, "blocks", "example", None)}
+    assert {row["earlier_survey"] for row in changes.values()} == {EARLIER}
+    for old, new in zip(pair.before, pair.now.rows, strict=True):
+        level = None if old["level"] is None or new["level"] is None else new["level"] - old["level"]
+        assert changes[new["name"]]["change"] == level
+        assert changes[new["name"]]["known"] == (old["complete"] and new["complete"])
     conn.commit()
     text = report(tmp_path, BLOCKS)
     part = text.partition('<h3 id="since">')[2].partition('<dl class="facts">')[0]

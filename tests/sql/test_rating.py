@@ -10,7 +10,7 @@ import pytest
 import shapely
 from psycopg.rows import dict_row
 from support.example_rating import BLOCKS
-from support.example_survey import NAME
+from support.example_survey import NAME, add_later_survey
 
 
 def ask(conn: psycopg.Connection, query: str, values: Any = ()) -> list[dict[str, Any]]:
@@ -172,3 +172,155 @@ def test_wrong_names_are_said(conn: psycopg.Connection, example: str, call: str,
 def test_viewers_may_rate(person: psycopg.Connection, conn: psycopg.Connection, example: str) -> None:
     rows = person.execute("SELECT result FROM tunnel_api.rating(%s, 'zones', 'example')", [NAME]).fetchall()
     assert len(rows) == 4 * BLOCKS
+
+
+def scheme(conn: psycopg.Connection, rules: str, totals: str = "NULL, NULL") -> None:
+    """Add scheme "own" with results A to D and rules: VALUES of (number, text, kinds, measure, inclusive, limits, …)."""
+    conn.execute(
+        "INSERT INTO tunnel.rating_scheme (name, version, source, results, totals, total_results)"
+        f" VALUES ('own', '1', 'of the tests', '{{A,B,C,D}}', {totals})"  # type: ignore[arg-type]
+    )
+    conn.execute(
+        "INSERT INTO tunnel.rating_rule (scheme_id, number, text, kinds, measure, inclusive, limits, results, points,"
+        " by_measure, by_kinds, by_inclusive, by_limits)"
+        f" SELECT s.id, r.* FROM tunnel.rating_scheme s, (VALUES {rules}) AS r WHERE s.name = 'own'"  # type: ignore[arg-type]
+    )
+
+
+def own(conn: psycopg.Connection) -> list[dict[str, Any]]:
+    return ask(conn, "SELECT * FROM tunnel_api.rating(%s, 'blocks', 'own')", [NAME])
+
+
+@pytest.fixture
+def facts(conn: psycopg.Connection, example: str) -> list[dict[str, Any]]:
+    """Findings of each block."""
+    return ask(conn, "SELECT * FROM tunnel_api.element_findings(%s, 'blocks')", [NAME])
+
+
+def test_a_matrix_has_the_result_of_its_cell(conn: psycopg.Connection, facts: list[dict[str, Any]]) -> None:
+    """Rows: largest leak below 0.5 m², below 1, larger; columns: fewer than two leaks, or more."""
+    cells = [["A", "B"], ["B", "C"], ["C", "D"]]
+    flat = ",".join(cell for row in cells for cell in row)
+    scheme(
+        conn,
+        f"(1, 'size and number', '{{leak}}'::text[], 'largest_area', true, '{{0.5,1}}'::float8[], '{{{flat}}}'::text[],"
+        " NULL::float8[], 'count', '{leak}'::text[], true, '{2}'::float8[])",
+    )
+    seen = set()
+    for row, fact in zip(own(conn), facts, strict=True):
+        largest, leaks = fact["largest_leak"] or 0.0, fact["leaks"]
+        expected = cells[(largest >= 0.5) + (largest >= 1)][leaks >= 2]
+        seen.add(expected)
+        assert row["result"] == expected
+        if leaks:
+            assert row["rule"] == 1
+            assert row["why"] == f"size and number: {round(largest, 4):g} and {leaks}"
+            assert row["value"] == pytest.approx(largest)
+    assert len(seen) > 1
+
+
+def test_points_of_rules_are_summed(conn: psycopg.Connection, facts: list[dict[str, Any]]) -> None:
+    """1 point for a leak, 3 for two, 4 for a wet area over 0.6 m²; from 3 points B, from 7 C."""
+    nothing = "NULL::text, NULL::text[], NULL::boolean, NULL::float8[]"
+    scheme(
+        conn,
+        f"(1, 'leaks', '{{leak}}'::text[], 'count', true, '{{1,2}}'::float8[], '{{}}'::text[], '{{1,3}}'::float8[], {nothing}),"
+        f" (2, 'wet area', '{{}}', 'area', false, '{{0.6}}', '{{}}', '{{4}}', {nothing})",
+        "'{3,7}', '{B,C}'",
+    )
+    sums = set()
+    for row, fact in zip(own(conn), facts, strict=True):
+        points = (1 if fact["leaks"] == 1 else 3 if fact["leaks"] else 0) + 4 * (fact["wet_area"] > 0.6)
+        sums.add(points)
+        assert row["result"] == ("C" if points >= 7 else "B" if points >= 3 else "A")
+        if points >= 3:
+            assert (row["value"], row["measure"]) == (points, "sum")
+            assert row["why"].startswith(f"{points} points: ")
+            assert row["rule"] == (2 if fact["wet_area"] > 0.6 else 1)
+    assert len(sums) > 1
+
+
+def test_density_is_length_over_inspected_lining(conn: psycopg.Connection, example: str) -> None:
+    """A crack of 6 m along the tunnel lies in two blocks, with 4 m and 2 m."""
+    conn.execute(
+        "INSERT INTO tunnel_api.finding_unrolled (survey, kind, width_mm, geom)"
+        " VALUES (%s, 'crack', 0.4, 'LINESTRING(12346 1, 12352 1)')",
+        [NAME],
+    )
+    facts = ask(conn, "SELECT * FROM tunnel_api.element_findings(%s, 'blocks')", [NAME])
+    assert [row["crack_length"] for row in facts[:2]] == pytest.approx([4, 2], rel=0.02)
+    nothing = "NULL::float8[], NULL::text, NULL::text[], NULL::boolean, NULL::float8[]"
+    scheme(
+        conn,
+        f"(1, 'cracks', '{{crack}}'::text[], 'density_length', false, '{{0}}'::float8[], '{{D}}'::text[], {nothing})",
+    )
+    for row, fact, length in zip(own(conn)[:2], facts, (4, 2), strict=False):
+        assert row["value"] == pytest.approx(length / (fact["lining_area"] * fact["inspected_share"]), rel=0.02)
+        assert row["result"] == "D"
+
+
+GROWTH = (
+    "(1, 'growth', '{}'::text[], 'growth', true, '{0.01}'::float8[], '{D}'::text[],"
+    " NULL::float8[], NULL::text, NULL::text[], NULL::boolean, NULL::float8[])"
+)
+
+
+def test_growth_is_since_the_earlier_inspection(conn: psycopg.Connection, facts: list[dict[str, Any]]) -> None:
+    """Two years before, the same lining was inspected and was dry: the growth is half of the wet area, m² a year."""
+    scheme(conn, GROWTH)
+    add_later_survey(conn, "demo-2022")
+    conn.execute("UPDATE tunnel.survey SET date = '2022-05-04' WHERE name = 'demo-2022'")
+    for row, fact in zip(own(conn), facts, strict=True):
+        grown = fact["wet_area"] * 365.25 / 731
+        if row["inspected_share"] >= 0.95:
+            assert row["result"] == ("D" if grown >= 0.01 else "A")
+            assert row["complete"]
+            assert row["remark"] is None
+        if row["result"] == "D":
+            assert row["value"] == pytest.approx(grown)
+
+
+def test_growth_is_unknown_without_an_earlier_inspection(conn: psycopg.Connection, facts: list[dict[str, Any]]) -> None:
+    """No element is then called complete; one that the earlier inspection did not see is not, either."""
+    scheme(conn, GROWTH)
+    for row in own(conn):
+        assert (row["result"], row["complete"]) == ("A", False)
+        assert row["remark"].endswith("growth unknown: no earlier inspection")
+    add_later_survey(conn, "demo-2022")
+    conn.execute("UPDATE tunnel.survey SET date = '2022-05-04' WHERE name = 'demo-2022'")
+    conn.execute(
+        "UPDATE tunnel.coverage c SET seen = (SELECT array_agg(CASE WHEN c.step * u.n > 360 THEN u.v ELSE 0 END ORDER BY u.n)"
+        " FROM unnest(c.seen) WITH ORDINALITY AS u (v, n)) WHERE c.survey_id = tunnel_api.survey_id('demo-2022')"
+    )
+    rows = own(conn)
+    assert [row["complete"] for row in rows] == [False, False, True, True]
+    assert rows[0]["rule"] is None, "growth against lining that was not inspected then is no growth"
+    assert "% inspected then" in rows[1]["remark"]
+
+
+def test_the_earlier_inspection_has_its_own_rating(conn: psycopg.Connection, facts: list[dict[str, Any]]) -> None:
+    """A dry tunnel two years before: each block is worse by the levels that it has now."""
+    assert {row["earlier_survey"] for row in change(conn)} == {None}
+    add_later_survey(conn, "demo-2022")
+    conn.execute("UPDATE tunnel.survey SET date = '2022-05-04' WHERE name = 'demo-2022'")
+    for row, now in zip(change(conn), rating(conn), strict=True):
+        assert (row["earlier_survey"], row["earlier_result"]) == ("demo-2022", "A")
+        assert (row["result"], row["why"]) == (now["result"], now["why"])
+        assert row["change"] == now["level"] - 1
+        assert row["known"] is now["complete"]
+
+
+def change(conn: psycopg.Connection) -> list[dict[str, Any]]:
+    return ask(conn, "SELECT * FROM tunnel_api.rating_change(%s, 'blocks', 'example')", [NAME])
+
+
+def test_two_schemes_are_compared_by_place_in_their_scale(conn: psycopg.Connection, facts: list[dict[str, Any]]) -> None:
+    """Scheme own says D to each leak; the example has A to D by share and severity."""
+    nothing = "NULL::float8[], NULL::text, NULL::text[], NULL::boolean, NULL::float8[]"
+    scheme(conn, f"(1, 'any leak', '{{leak}}'::text[], 'count', true, '{{1}}'::float8[], '{{D}}'::text[], {nothing})")
+    rows = ask(conn, "SELECT * FROM tunnel_api.rating_comparison(%s, 'blocks', 'example', 'own')", [NAME])
+    for row, first, fact in zip(rows, rating(conn), facts, strict=True):
+        assert row["result"] == first["result"]
+        assert row["other_result"] == ("D" if fact["leaks"] else "A")
+        expected = ("ABCD".index(row["other_result"]) - "ABCD".index(row["result"])) / 3
+        assert row["difference"] == pytest.approx(expected)

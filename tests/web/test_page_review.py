@@ -11,7 +11,7 @@ from typing import Any
 
 import psycopg
 import pytest
-from playwright.sync_api import BrowserContext, Page, expect
+from playwright.sync_api import BrowserContext, Page, Route, expect
 from support.desk_page import forgive, opened, sign_in, tab
 from support.desk_server import DeskServer
 from support.example_survey import NAME
@@ -309,3 +309,15 @@ def test_a_verdict_survives_a_restart_of_the_server(finding: Page, database: psy
     shows(page, 1, "confirmed")
     expect(page.locator("#alerts")).to_be_empty()
     forgive(page, "ERR_CONNECTION_REFUSED|status of 401|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET")
+
+
+def test_list_asked_for_while_a_finding_is_read_is_read_after_it(page: Page) -> None:
+    """The review was chosen before the finding of a link had come: the list is read, and is not called empty."""
+    held: list[Route] = []
+    page.route("**/api/findings/5", lambda route: held.append(route))
+    with page.expect_request("**/api/findings/5"):
+        page.goto(f"/#/{NAME}/finding/5")
+    expect(tab(page, "Review")).to_contain_text("The list of findings has not been read.")
+    held[0].continue_()
+    expect(page.locator(".pace")).to_contain_text("of 9 reviewed")
+    page.unroute("**/api/findings/5")

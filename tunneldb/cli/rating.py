@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,24 @@ from tunneldb.cli.param_types import FilePath
 from tunneldb.cli.tables import print_table
 from tunneldb.counted import counted
 from tunneldb.database import connect
+from tunneldb.errors import UserError
 from tunneldb.files import replacing
 
 COLUMNS = (
     "number", "name", "chainage_from", "chainage_to", "clock_from", "clock_to", "inspected_share", "findings", "result",
-    "complete", "rule", "measure", "value", "limit_reached", "finding_id", "why",
+    "complete", "rule", "measure", "value", "limit_reached", "finding_id", "why", "remark",
 )  # fmt: skip
-"""Columns of the CSV."""
+"""Columns of a rating as CSV."""
+
+COMPARISON_COLUMNS = (
+    "number", "name", "result", "complete", "other_result", "other_complete", "difference", "why", "other_why",
+)  # fmt: skip
+"""Columns of a comparison of two schemes as CSV."""
+
+CHANGE_COLUMNS = (
+    "number", "name", "earlier_survey", "earlier_date", "earlier_result", "result", "change", "known", "earlier_why", "why",
+)  # fmt: skip
+"""Columns of a change since the earlier inspection as CSV."""
 
 
 @click.group(cls=CommandGroup)
@@ -29,19 +41,28 @@ def rating() -> None:
     """Add, list, show or remove rating schemes, and rate the elements of a survey."""
 
 
-@rating.command(examples=["tunneldb rating add owner-scheme.toml"])
-@click.argument("file", type=FilePath(dir_okay=False))
+@rating.command(examples=["tunneldb rating add owner-scheme.toml", "tunneldb rating add --shipped gb-50108-2008"])
+@click.argument("file", type=FilePath(dir_okay=False), required=False)
+@click.option(
+    "--shipped", metavar="NAME", help="Scheme that is part of tunneldb, instead of FILE (tunneldb rating list --shipped)."
+)
 @click.pass_obj
-def add(settings: Settings, file: Path) -> None:
-    """Add the rating scheme of FILE.
+def add(settings: Settings, file: Path | None, shipped: str | None) -> None:
+    """Add the rating scheme of FILE, or one that is part of tunneldb.
 
     FILE is TOML: name, version, source, results (from the best to the worst), and a [[rule]] for each rule: text,
     measure, kinds, and limits as above = {RESULT = LIMIT} or from = {…}. Measures: area (m²), share (of the inspected
-    lining), largest_area (m²), length (m), width_mm, severity, count. A version is never changed.
+    lining), largest_area (m²), length (m), density_length (m per m² of inspected lining), width_mm, severity, count,
+    growth (m² per year since the earlier inspection). A rule can be a matrix of two measures, and the rules' points can
+    be summed. A version is never changed.
     """
-    from tunneldb.pipeline.rating_file import read_scheme
+    from tunneldb.pipeline.rating_file import read_scheme, shipped_scheme
     from tunneldb.store.rating import save_scheme
 
+    if file is None and shipped is not None:
+        file = shipped_scheme(shipped)
+    elif file is None or shipped is not None:
+        raise UserError("give exactly one of FILE and --shipped NAME")
     scheme = read_scheme(file)
     with connect(settings.dsn) as conn:
         save_scheme(conn, scheme)
@@ -49,12 +70,22 @@ def add(settings: Settings, file: Path) -> None:
     notify(f"{scheme.name} {scheme.version}: {counted(len(scheme.rules), 'rule')}, results {', '.join(scheme.results)}")
 
 
-@rating.command("list", examples=["tunneldb rating list"])
+@rating.command("list", examples=["tunneldb rating list", "tunneldb rating list --shipped"])
+@click.option("--shipped", is_flag=True, help="List the schemes that are part of tunneldb, not those of the database.")
 @click.pass_obj
-def list_(settings: Settings) -> None:
+def list_(settings: Settings, shipped: bool) -> None:
     """List the rating schemes, the one added last first."""
+    from tunneldb.pipeline.rating_file import list_shipped
     from tunneldb.store.rating import list_schemes
 
+    if shipped:
+        schemes = list_shipped()
+        add_to_json(schemes=schemes)
+        print_table(
+            ["scheme", "version", "results", "source"],
+            [(one["name"], one["version"], ", ".join(one["results"]), one["source"]) for one in schemes],
+        )
+        return
     with connect(settings.dsn) as conn:
         rows = list_schemes(conn)
     add_to_json(schemes=rows)
@@ -82,15 +113,12 @@ def show(settings: Settings, scheme: str, version: str | None) -> None:
     notify(f"{found['name']} {found['version']}: {found['source']}")
     print_table(
         ["rule", "text", "kinds", "measure", "limits"],
-        [
-            (
-                rule["number"], rule["text"], ", ".join(rule["kinds"]) or "all wet", rule["measure"],
-                "; ".join(f"{'≥' if rule['inclusive'] else '>'} {limit:g}: {result}" for limit, result in _limits(rule)),
-            )
-            for rule in rules
-        ],
+        [(rule["number"], rule["text"], *_columns(rule)) for rule in rules],
         right=(0,),
-    )  # fmt: skip
+    )
+    if found["totals"]:
+        totals = zip(found["totals"], found["total_results"], strict=True)
+        notify(f"sum of points: {_limits(found['totals_inclusive'], totals)}")
 
 
 @rating.command(examples=["tunneldb rating remove Landesbahn 2026"])
@@ -159,6 +187,100 @@ def apply(settings: Settings, survey: str, element_set: str, scheme: str, versio
     say_written(files)
 
 
+@rating.command(
+    examples=["tunneldb rating compare ringo-2024 --elements rings --scheme Landesbahn --scheme SNTI -o schemes.csv"]
+)
+@click.argument("survey")
+@click.option("--elements", "element_set", required=True, metavar="NAME", help="Division of the tunnel (tunneldb elements).")
+@click.option(
+    "--scheme", "schemes", required=True, multiple=True, metavar="NAME[:VERSION]",
+    help="Two schemes, or two versions of one. [default version: the one added last]",
+)  # fmt: skip
+@output_option("File to write: .csv.")
+@click.pass_obj
+def compare(settings: Settings, survey: str, element_set: str, schemes: tuple[str, ...], output: Path | None) -> None:
+    """Rate the elements of SURVEY by two schemes, and show where and why these differ.
+
+    The table has the elements with the greatest difference first: the place of a result in its scheme, from 0 (best) to
+    1 (worst).
+    """
+    from tunneldb.store.rating import compare_schemes, scheme_rules
+    from tunneldb.store.survey import get_survey
+
+    require_ending(output, "the comparison", (".csv",))
+    if len(schemes) != 2:
+        raise UserError(f"--scheme is given {counted(len(schemes), 'time')}; two schemes are compared")
+    with connect(settings.dsn) as conn:
+        get_survey(conn, survey)
+        found = [scheme_rules(conn, *_named(scheme))[0] for scheme in schemes]
+        rows = compare_schemes(conn, survey, element_set, *((one["name"], one["version"]) for one in found))
+    names = [f"{one['name']} {one['version']}" for one in found]
+    add_to_json(survey=survey, elements=element_set, schemes=names, ratings=rows)
+    files = [] if output is None else write_rows(output, COMPARISON_COLUMNS, rows)
+    differing = [row for row in rows if row["difference"]]
+    print_table(
+        ["element", *names, "difference", "why", "why by the other"],
+        [
+            (
+                row["name"], result_text(row), result_text({"result": row["other_result"], "complete": row["other_complete"]}),
+                number(row["difference"], 2), row["why"] or "", row["other_why"] or "",
+            )
+            for row in sorted(differing, key=lambda row: -abs(row["difference"]))
+        ],
+        right=(3,),
+    )  # fmt: skip
+    unknown = sum(row["difference"] is None for row in rows)
+    notify(
+        f"{counted(len(differing), 'element')} of {len(rows)} rated differently" + (f", {unknown} not rated" if unknown else "")
+    )
+    say_written(files)
+
+
+@rating.command(examples=["tunneldb rating change ringo-2025 --elements rings --scheme Landesbahn -o change.csv"])
+@click.argument("survey")
+@click.option("--elements", "element_set", required=True, metavar="NAME", help="Division of the tunnel (tunneldb elements).")
+@click.option("--scheme", required=True, metavar="NAME", help="Rating scheme.")
+@click.option("--version", metavar="VERSION", help="Version of the scheme. [default: the one added last]")
+@output_option("File to write: .csv.")
+@click.pass_obj
+def change(settings: Settings, survey: str, element_set: str, scheme: str, version: str | None, output: Path | None) -> None:
+    """Rate the elements of SURVEY and of the last earlier inspection of the tunnel by the same scheme.
+
+    The table has the elements that changed, the worse ones first. A change between lower bounds is marked as uncertain.
+    """
+    from tunneldb.store.rating import rating_change, scheme_rules
+    from tunneldb.store.survey import get_survey
+
+    require_ending(output, "the change", (".csv",))
+    with connect(settings.dsn) as conn:
+        get_survey(conn, survey)
+        found, _ = scheme_rules(conn, scheme, version)
+        rows = rating_change(conn, survey, element_set, found["name"], found["version"])
+    earlier = rows[0]["earlier_survey"] if rows else None
+    if earlier is None:
+        raise UserError(f"survey {survey} has no earlier inspection: no older survey of the tunnel with stage detect")
+    add_to_json(
+        survey=survey, elements=element_set, scheme=found["name"], version=found["version"], earlier=earlier, changes=rows
+    )
+    files = [] if output is None else write_rows(output, CHANGE_COLUMNS, rows)
+    changed = sorted((row for row in rows if row["change"]), key=lambda row: -row["change"])
+    print_table(
+        ["element", earlier, survey, "change", "why"],
+        [
+            (
+                row["name"], row["earlier_result"], row["result"],
+                f"{row['change']:+d}" if row["known"] else f"{row['change']:+d}, uncertain", row["why"] or "",
+            )
+            for row in changed
+        ],
+        right=(3,),
+    )  # fmt: skip
+    worse, unknown = sum(row["change"] > 0 for row in changed), sum(row["change"] is None for row in rows)
+    parts = [f"{counted(worse, 'element')} worse", f"{len(changed) - worse} better", f"{unknown} not rated in both"]
+    notify(f"since {earlier} ({rows[0]['earlier_date']}): {', '.join(parts)}")
+    say_written(files)
+
+
 def result_text(row: dict[str, Any]) -> str:
     """Return a result, marked if it is a lower bound."""
     if row["result"] is None:
@@ -166,5 +288,32 @@ def result_text(row: dict[str, Any]) -> str:
     return str(row["result"]) if row["complete"] else f"at least {row['result']}"
 
 
-def _limits(rule: dict[str, Any]) -> list[tuple[float, str]]:
-    return list(zip(rule["limits"], rule["results"], strict=True))
+def _named(scheme: str) -> tuple[str, str | None]:
+    name, _, version = scheme.partition(":")
+    return name, version or None
+
+
+def _columns(rule: dict[str, Any]) -> tuple[str, str, str]:
+    """Return kinds, measure and limits of a rule as text."""
+    kinds = ", ".join(rule["kinds"]) or "all wet"
+    if rule["by_measure"] is None:
+        gives = rule["results"] if rule["points"] is None else [f"{points:g} points" for points in rule["points"]]
+        return kinds, rule["measure"], _limits(rule["inclusive"], zip(rule["limits"], gives, strict=True))
+    width = len(rule["by_limits"]) + 1
+    rows = [rule["results"][n : n + width] for n in range(0, len(rule["results"]), width)]
+    axes = [
+        f"{measure} {'≥' if inclusive else '>'} {', '.join(f'{limit:g}' for limit in limits)}"
+        for measure, inclusive, limits in (
+            (rule["measure"], rule["inclusive"], rule["limits"]),
+            (rule["by_measure"], rule["by_inclusive"], rule["by_limits"]),
+        )
+    ]
+    return (
+        f"{kinds} × {', '.join(rule['by_kinds']) or 'all wet'}",
+        f"{rule['measure']} × {rule['by_measure']}",
+        f"{' × '.join(axes)}: {' | '.join(' '.join(row) for row in rows)}",
+    )
+
+
+def _limits(inclusive: bool, limits: Iterable[tuple[float, str]]) -> str:
+    return "; ".join(f"{'≥' if inclusive else '>'} {limit:g}: {result}" for limit, result in limits)

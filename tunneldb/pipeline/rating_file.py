@@ -1,4 +1,4 @@
-"""Files of elements (CSV) and of rating schemes (TOML)."""
+"""Files of elements (CSV) and of rating schemes (TOML), and the schemes that are part of the program."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ from typing import Any, NoReturn
 
 from tunneldb.csvfile import find_column, read_csv, read_header, read_texts
 from tunneldb.errors import InputError, did_you_mean
-from tunneldb.store.rating import MEASURES, Element, Rule, Scheme
+from tunneldb.store.rating import MEASURES, Element, Limits, Rule, Scheme, Totals
 from tunneldb.tomlfile import read_toml
 
-SCHEME_KEYS = ("name", "version", "source", "valid_from", "results", "min_inspected", "rule")
-RULE_KEYS = ("text", "kinds", "measure", "above", "from")
+SCHEME_KEYS = ("name", "version", "source", "valid_from", "results", "min_inspected", "totals", "rule")
+AXIS_KEYS = ("kinds", "measure", "above", "from")
+RULE_KEYS = ("text", *AXIS_KEYS, "points", "by", "results")
 MIN_INSPECTED = 0.95
 """Inspected share below which a result is a lower bound, if a scheme does not state another one."""
+SHIPPED = Path(__file__).parents[1] / "schemes"
+"""Folder of the schemes that are part of the program; a file has the name of its scheme."""
 
 
 def read_elements(path: Path) -> list[Element]:
@@ -55,6 +58,20 @@ def stretches_of(length: float, low: float, high: float) -> list[Element]:
     return [Element(f"{n * length:.10g}", n * length, (n + 1) * length) for n in range(first, last)]
 
 
+def shipped_scheme(name: str) -> Path:
+    """Return the file of a scheme that is part of the program; raise InputError if there is none."""
+    names = sorted(path.stem for path in SHIPPED.glob("*.toml"))
+    if name not in names:
+        raise InputError(f"no scheme {name!r} is part of tunneldb: {', '.join(names)}.{did_you_mean(name, names)}")
+    return SHIPPED / f"{name}.toml"
+
+
+def list_shipped() -> list[dict[str, Any]]:
+    """Return name, version, results and source of the schemes that are part of the program, by name."""
+    found = [read_toml(path, "a rating scheme") for path in sorted(SHIPPED.glob("*.toml"))]
+    return [{key: scheme[key] for key in ("name", "version", "results", "source")} for scheme in found]
+
+
 def read_scheme(path: Path) -> Scheme:
     """Read a rating scheme.
 
@@ -77,20 +94,56 @@ def read_scheme(path: Path) -> Scheme:
     rules = given.values.get("rule")
     if not isinstance(rules, list) or not rules or not all(isinstance(rule, dict) for rule in rules):
         given.refuse("rule", "the file needs a part [[rule]] for each rule")
+    totals = given.values.get("totals")
+    if totals is not None and not isinstance(totals, dict):
+        given.refuse("totals", "a part [totals] with above or from = {RESULT = SUM, …}")
     return Scheme(
         given.text("name"), given.text("version"), given.text("source"), valid_from, results, float(share),
-        tuple(_rule(_Given(path, f"rule {n}: ", rule), results) for n, rule in enumerate(rules, start=1)),
+        tuple(_rule(_Given(path, f"rule {n}: ", rule), results, totals is not None) for n, rule in enumerate(rules, start=1)),
+        None if totals is None else _totals(_Given(path, "totals: ", totals), results),
     )  # fmt: skip
 
 
-def _rule(given: _Given, results: Sequence[str]) -> Rule:
+def _rule(given: _Given, results: Sequence[str], summed: bool) -> Rule:
+    """Return a rule: limits with results, limits with points (summed), or a matrix of two measures."""
     given.refuse_others(RULE_KEYS)
-    measure = given.text("measure")
-    if measure not in MEASURES:
-        given.refuse("measure", f"{measure!r} is none of {', '.join(MEASURES)}")
-    if ("above" in given.values) == ("from" in given.values):
-        given.refuse("above", "a rule has either above = {RESULT = LIMIT, …}, or from = {…}, whose limits count as reached")
-    key = "above" if "above" in given.values else "from"
+    text = given.text("text")
+    if summed != ("points" in given.values):
+        given.refuse("points", "all rules of a scheme with [totals] have points" if summed else "points need a part [totals]")
+    if "by" in given.values:
+        by = given.values["by"]
+        if summed or not isinstance(by, dict):
+            given.refuse("by", "{measure = …, above or from = […]}, in a scheme without [totals]")
+        columns = _Given(given.path, f"{given.place}by: ", by)
+        columns.refuse_others(AXIS_KEYS)
+        axis, other = _axis(given), _axis(columns)
+        return Rule(text, axis, _cells(given, results, len(axis.limits) + 1, len(other.limits) + 1), by=other)
+    if "results" in given.values:
+        given.refuse("results", "only a rule with by, a matrix, has results")
+    if summed:
+        axis = _axis(given)
+        return Rule(text, axis, (), _numbers(given, "points", len(axis.limits)))
+    inclusive, limits, reached = _limits_of_results(given, results)
+    return Rule(text, Limits(_kinds(given), _measure(given), inclusive, limits), reached)
+
+
+def _totals(given: _Given, results: Sequence[str]) -> Totals:
+    given.refuse_others(("above", "from"))
+    return Totals(*_limits_of_results(given, results))
+
+
+def _axis(given: _Given) -> Limits:
+    """Return a measure whose limits are a list."""
+    key = _limit_key(given)
+    limits = _numbers(given, key, None)
+    if list(limits) != sorted(set(limits)):
+        given.refuse(key, "each limit is greater than the one before it")
+    return Limits(_kinds(given), _measure(given), key == "from", limits)
+
+
+def _limits_of_results(given: _Given, results: Sequence[str]) -> tuple[bool, tuple[float, ...], tuple[str, ...]]:
+    """Return limits that are a table {RESULT = LIMIT}: True if an equal value reaches them, the limits, their results."""
+    key = _limit_key(given)
     limits = given.values[key]
     if not isinstance(limits, dict) or not limits or not all(_is_number(limit) for limit in limits.values()):
         given.refuse(key, "{RESULT = LIMIT, …} with a number for each result")
@@ -102,10 +155,48 @@ def _rule(given: _Given, results: Sequence[str]) -> Rule:
         given.refuse(key, "a worse result needs a higher limit")
     if len({limit for _, limit in ordered}) < len(ordered):
         given.refuse(key, "two results have the same limit")
-    return Rule(
-        given.text("text"), given.texts("kinds") if "kinds" in given.values else (), measure, key == "from",
-        tuple(float(limit) for _, limit in ordered), tuple(result for result, _ in ordered),
-    )  # fmt: skip
+    return key == "from", tuple(float(limit) for _, limit in ordered), tuple(result for result, _ in ordered)
+
+
+def _limit_key(given: _Given) -> str:
+    if ("above" in given.values) == ("from" in given.values):
+        given.refuse("above", "there is either above, or from, whose limits count as reached")
+    return "above" if "above" in given.values else "from"
+
+
+def _measure(given: _Given) -> str:
+    measure = given.text("measure")
+    if measure not in MEASURES:
+        given.refuse("measure", f"{measure!r} is none of {', '.join(MEASURES)}")
+    return measure
+
+
+def _kinds(given: _Given) -> tuple[str, ...]:
+    return given.texts("kinds") if "kinds" in given.values else ()
+
+
+def _numbers(given: _Given, key: str, count: int | None) -> tuple[float, ...]:
+    """Return a list of 1 to 20 numbers, or of as many as are wanted."""
+    values = given.values[key]
+    if (
+        not isinstance(values, list)
+        or not all(_is_number(value) for value in values)
+        or not (1 <= len(values) <= 20 if count is None else len(values) == count)
+    ):
+        given.refuse(key, f"a list of {'1 to 20' if count is None else count} numbers is needed")
+    return tuple(float(value) for value in values)
+
+
+def _cells(given: _Given, results: Sequence[str], rows: int, columns: int) -> tuple[str, ...]:
+    """Return the results of a matrix, row by row."""
+    cells = given.values.get("results")
+    if (
+        not isinstance(cells, list)
+        or len(cells) != rows
+        or not all(isinstance(row, list) and len(row) == columns and all(cell in results for cell in row) for row in cells)
+    ):
+        given.refuse("results", f"{rows} rows of {columns} results are needed, one more than there are limits")
+    return tuple(cell for row in cells for cell in row)
 
 
 def _is_number(value: Any) -> bool:

@@ -112,6 +112,16 @@ class Rating:
         return f"{100 * self.scheme['min_inspected']:.4g} %"
 
     @property
+    def hardly_inspected(self) -> list[Row]:
+        """Elements whose result is a lower bound, because too little of them was inspected."""
+        return [row for row in self.partial if row["inspected_share"] < self.scheme["min_inspected"]]
+
+    @property
+    def growth_unknown(self) -> list[Row]:
+        """Elements whose result is a lower bound, because it is not known what grew since the earlier inspection."""
+        return [row for row in self.partial if row["inspected_share"] >= self.scheme["min_inspected"]]
+
+    @property
     def rated(self) -> int:
         """Number of elements with a result."""
         return len(self.rows) - len(self.unrated)
@@ -260,7 +270,7 @@ def read_rating(
     """
     scheme, rules = scheme_rules(conn, asked.scheme, asked.version)
     rows, outside = rate_stretch(conn, survey, asked.elements, scheme, low, high)
-    texts = {rule["number"]: rule["text"] for rule in rules}
+    texts = {rule["number"]: rule["text"] for rule in rules if rule["by_measure"] is None and not scheme["totals"]}
     places = ticks(low, high, step_for(high - low, 10))
     ends = [row[end] for row in rows for end in ("chainage_from", "chainage_to")]
     labels = [text.short(label) for label in data.label_chainages(conn, survey, [*ends, *places])]
@@ -280,7 +290,8 @@ class Difference:
     ----------
     ratings : list of Rating
     rows : list of list of dict
-        Elements that reach a limit of one scheme and not of another: the row of each rating.
+        Elements with different places of the results in their schemes, from 0 (best) to 1 (worst), the greatest difference
+        first: the row of each rating.
     """
 
     ratings: list[Rating]
@@ -292,20 +303,25 @@ def differences(ratings: Sequence[Rating]) -> list[Difference]:
     by_elements: dict[str, list[Rating]] = {}
     for one in ratings:
         by_elements.setdefault(one.elements, []).append(one)
-    return [
-        Difference(group, [list(rows) for rows in zip(*(one.rows for one in group), strict=True) if _differ(rows)])
-        for group in by_elements.values()
-        if len(group) > 1
-    ]
+    return [_compare(group) for group in by_elements.values() if len(group) > 1]
 
 
-def _differ(rows: Sequence[Row]) -> bool:
-    """Return True if an element reaches a limit of one scheme and not of another."""
-    return len({(row["level"] or 0) > 1 for row in rows}) > 1
+def _compare(ratings: list[Rating]) -> Difference:
+    found = []
+    for rows in zip(*(one.rows for one in ratings), strict=True):
+        places = [
+            (row["level"] - 1) / max(len(one.scheme["results"]) - 1, 1)
+            for row, one in zip(rows, ratings, strict=True)
+            if row["level"] is not None
+        ]
+        spread = max(places, default=0.0) - min(places, default=0.0)
+        if spread > 1e-9:
+            found.append((-round(spread, 9), rows[0]["number"], list(rows)))
+    return Difference(ratings, [rows for *_, rows in sorted(found, key=lambda one: one[:2])])
 
 
 def measured(value: float | None, measure: str | None) -> str:
-    """Return a value or a limit of a rule with its unit: a share in per cent, others to 4 significant digits."""
+    """Return a value or a limit of a rule with its unit, to 4 significant digits; a share in per cent."""
     if value is None or measure is None:
         return text.DASH
     if measure == "share":

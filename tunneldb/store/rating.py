@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, LiteralString
 
 import psycopg
 from psycopg.rows import dict_row
@@ -17,9 +17,11 @@ MEASURES = {
     "share": "",
     "largest_area": "m²",
     "length": "m",
+    "density_length": "m/m²",
     "width_mm": "mm",
     "severity": "",
     "count": "",
+    "growth": "m²/year",
 }
 """Measures of rules, with their units."""
 
@@ -47,13 +49,11 @@ class Element:
 
 
 @dataclass(frozen=True)
-class Rule:
-    """Rule of a scheme.
+class Limits:
+    """Limits of a measure.
 
     Attributes
     ----------
-    text : str
-        Rule in the owner's words.
     kinds : tuple of str
         Codes of the kinds of findings; empty for all wet ones.
     measure : str
@@ -62,13 +62,53 @@ class Rule:
         True if a value equal to a limit reaches it.
     limits : tuple of float
         Limits, ascending.
+    """
+
+    kinds: tuple[str, ...]
+    measure: str
+    inclusive: bool
+    limits: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Rule of a scheme.
+
+    Attributes
+    ----------
+    text : str
+        Rule in the owner's words.
+    axis : Limits
+        Measure and its limits.
+    results : tuple of str
+        Result at each limit; of a matrix row by row, one row for each class of the measure; empty if the rule has points.
+    points : tuple of float or None
+        Points at each limit.
+    by : Limits or None
+        Second measure of a matrix: its columns.
+    """
+
+    text: str
+    axis: Limits
+    results: tuple[str, ...]
+    points: tuple[float, ...] | None = None
+    by: Limits | None = None
+
+
+@dataclass(frozen=True)
+class Totals:
+    """Results of a sum of points.
+
+    Attributes
+    ----------
+    inclusive : bool
+        True if a sum equal to a limit reaches it.
+    limits : tuple of float
+        Limits of the sum, ascending.
     results : tuple of str
         Result at each limit.
     """
 
-    text: str
-    kinds: tuple[str, ...]
-    measure: str
     inclusive: bool
     limits: tuple[float, ...]
     results: tuple[str, ...]
@@ -87,6 +127,8 @@ class Scheme:
     min_inspected : float
         Inspected share below which a result is a lower bound.
     rules : tuple of Rule
+    totals : Totals or None
+        Results of the sum of the rules' points; None: the worst result of all rules is that of an element.
     """
 
     name: str
@@ -96,6 +138,7 @@ class Scheme:
     results: tuple[str, ...]
     min_inspected: float
     rules: tuple[Rule, ...]
+    totals: Totals | None = None
 
 
 def zoned(elements: Sequence[Element]) -> list[Element]:
@@ -174,26 +217,32 @@ def save_scheme(conn: psycopg.Connection[Any], scheme: Scheme) -> None:
     """
     known = {code for (code,) in conn.execute("SELECT k.code FROM tunnel_api.finding_kind k")}
     for number, rule in enumerate(scheme.rules, start=1):
-        for kind in rule.kinds:
+        for kind in (*rule.axis.kinds, *(rule.by.kinds if rule.by else ())):
             if kind not in known:
                 raise UserError(f"rule {number}: there is no kind of finding {kind!r}: {', '.join(sorted(known))}")
     row = conn.execute(
-        "INSERT INTO tunnel.rating_scheme (name, version, source, valid_from, results, min_inspected)"
-        " VALUES (%s, %s, %s, %s, %s, %s) ON CONFLICT DO NOTHING RETURNING id",
-        [scheme.name, scheme.version, scheme.source, scheme.valid_from, list(scheme.results), scheme.min_inspected],
-    ).fetchone()
+        "INSERT INTO tunnel.rating_scheme (name, version, source, valid_from, results, min_inspected, totals, total_results,"
+        " totals_inclusive) VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s) ON CONFLICT DO NOTHING RETURNING id",
+        [
+            scheme.name, scheme.version, scheme.source, scheme.valid_from, list(scheme.results), scheme.min_inspected,
+            list(scheme.totals.limits) if scheme.totals else None, list(scheme.totals.results) if scheme.totals else None,
+            scheme.totals.inclusive if scheme.totals else True,
+        ],
+    ).fetchone()  # fmt: skip
     if row is None:
         raise UserError(
             f"there is version {scheme.version} of {scheme.name}, and a version is never changed: give another version, or"
             f" tunneldb rating remove {scheme.name} {scheme.version}"
         )
     for number, rule in enumerate(scheme.rules, start=1):
+        axis, by = rule.axis, rule.by
         conn.execute(
-            "INSERT INTO tunnel.rating_rule (scheme_id, number, text, kinds, measure, inclusive, limits, results)"
-            " VALUES (%s, %s, %s, %s, %s, %s, %s, %s)",
+            "INSERT INTO tunnel.rating_rule (scheme_id, number, text, kinds, measure, inclusive, limits, results, points,"
+            " by_measure, by_kinds, by_inclusive, by_limits) VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s)",
             [
-                row[0], number, rule.text, list(rule.kinds), rule.measure, rule.inclusive, list(rule.limits),
-                list(rule.results),
+                row[0], number, rule.text, list(axis.kinds), axis.measure, axis.inclusive, list(axis.limits),
+                list(rule.results), None if rule.points is None else list(rule.points), by and by.measure,
+                by and list(by.kinds), by and by.inclusive, by and list(by.limits),
             ],
         )  # fmt: skip
 
@@ -201,7 +250,8 @@ def save_scheme(conn: psycopg.Connection[Any], scheme: Scheme) -> None:
 def list_schemes(conn: psycopg.Connection[Any]) -> list[dict[str, Any]]:
     """Return the schemes, the one added last first."""
     return conn.cursor(row_factory=dict_row).execute(
-        "SELECT s.name, s.version, s.source, s.valid_from, s.results, s.min_inspected, s.rules FROM tunnel_api.rating_scheme s"
+        "SELECT s.name, s.version, s.source, s.valid_from, s.results, s.min_inspected, s.totals, s.total_results,"
+        " s.totals_inclusive, s.rules FROM tunnel_api.rating_scheme s"
         " ORDER BY s.added_at DESC, s.id DESC"
     ).fetchall()  # fmt: skip
 
@@ -212,7 +262,8 @@ def scheme_rules(conn: psycopg.Connection[Any], name: str, version: str | None) 
     if scheme is None:
         raise UserError(f"there is no rating scheme {' '.join(filter(None, (name, version)))!r}: tunneldb rating list")
     rows = conn.cursor(row_factory=dict_row).execute(
-        "SELECT r.number, r.text, r.kinds, r.measure, r.inclusive, r.limits, r.results FROM tunnel_api.rating_rule r"
+        "SELECT r.number, r.text, r.kinds, r.measure, r.inclusive, r.limits, r.results, r.points, r.by_measure, r.by_kinds,"
+        " r.by_inclusive, r.by_limits FROM tunnel_api.rating_rule r"
         " WHERE r.scheme = %s AND r.version = %s ORDER BY r.number",
         [scheme["name"], scheme["version"]],
     )
@@ -236,12 +287,41 @@ def rate(
     UserError
         If there is no such division or scheme.
     """
+    return _read(
+        conn,
+        "SELECT r.number, r.name, r.chainage_from, r.chainage_to, r.clock_from, r.clock_to, r.inspected_share, r.findings,"
+        " r.result, r.level, r.complete, r.rule, r.measure, r.value, r.limit_reached, r.finding_id, r.why, r.remark"
+        " FROM tunnel_api.rating(%s, %s, %s, %s) r",
+        [survey, element_set, scheme, version],
+    )
+
+
+def compare_schemes(
+    conn: psycopg.Connection[Any], survey: str, element_set: str, first: Sequence[str | None], second: Sequence[str | None]
+) -> list[dict[str, Any]]:
+    """Return the ratings by two schemes (name, version) side by side, as the function ``rating_comparison`` does."""
+    return _read(
+        conn,
+        "SELECT r.number, r.name, r.result, r.complete, r.other_result, r.other_complete, r.difference, r.why, r.other_why"
+        " FROM tunnel_api.rating_comparison(%s, %s, %s, %s, %s, %s) r",
+        [survey, element_set, first[0], second[0], first[1], second[1]],
+    )
+
+
+def rating_change(
+    conn: psycopg.Connection[Any], survey: str, element_set: str, scheme: str, version: str | None
+) -> list[dict[str, Any]]:
+    """Return the ratings now and in the last earlier inspection, as the function ``rating_change`` does."""
+    return _read(
+        conn,
+        "SELECT r.number, r.name, r.earlier_survey, r.earlier_date, r.earlier_result, r.result, r.change, r.known,"
+        " r.earlier_why, r.why FROM tunnel_api.rating_change(%s, %s, %s, %s) r",
+        [survey, element_set, scheme, version],
+    )
+
+
+def _read(conn: psycopg.Connection[Any], query: LiteralString, values: Sequence[Any]) -> list[dict[str, Any]]:
     try:
-        return conn.cursor(row_factory=dict_row).execute(
-            "SELECT r.number, r.name, r.chainage_from, r.chainage_to, r.clock_from, r.clock_to, r.inspected_share, r.findings,"
-            " r.result, r.level, r.complete, r.rule, r.measure, r.value, r.limit_reached, r.finding_id, r.why"
-            " FROM tunnel_api.rating(%s, %s, %s, %s) r",
-            [survey, element_set, scheme, version],
-        ).fetchall()  # fmt: skip
+        return conn.cursor(row_factory=dict_row).execute(query, values).fetchall()
     except psycopg.errors.NoDataFound as error:
         raise UserError(f"{error.diag.message_primary}; {error.diag.message_hint}") from None

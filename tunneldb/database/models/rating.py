@@ -69,6 +69,11 @@ class RatingScheme(Base):
         at_most("source", 1000),
         CheckConstraint("cardinality(results) BETWEEN 2 AND 20", name="results"),
         CheckConstraint("min_inspected >= 0 AND min_inspected <= 1", name="min_inspected"),
+        CheckConstraint(
+            "(totals IS NULL) = (total_results IS NULL) AND cardinality(totals) >= 1 AND cardinality(totals) <= 20"
+            " AND cardinality(totals) = cardinality(total_results)",
+            name="totals",
+        ),
         {"comment": "Schemes by which owners rate elements; a version is never changed"},
     )
 
@@ -81,21 +86,42 @@ class RatingScheme(Base):
     min_inspected: Mapped[float] = mapped_column(
         server_default=text("0.95"), comment="Inspected share below which a result is a lower bound, 0 to 1"
     )
+    totals: Mapped[Floats | None] = mapped_column(
+        comment="Limits of the sum of the rules' points, ascending; NULL: the worst result of all rules is that of an element"
+    )
+    total_results: Mapped[list[str] | None] = mapped_column(ARRAY(Text), comment="Result at each total")
+    totals_inclusive: Mapped[bool] = mapped_column(
+        server_default=text("true"), comment="True if a sum equal to a total reaches it"
+    )
     added_at: Mapped[dt.datetime] = mapped_column(server_default=CLOCK, comment="Time when it was added")
 
 
+_MEASURES = ("area", "share", "largest_area", "length", "density_length", "width_mm", "severity", "count", "growth")
+
+
 class RatingRule(Base):
-    """Rule of a scheme: limits of a measure, each with the result of an element that reaches it."""
+    """Rule of a scheme: limits of a measure, with results or points; or a matrix of two measures."""
 
     __tablename__ = "rating_rule"
     __table_args__ = (
         at_most("text", 500),
-        one_of("measure", "area", "share", "largest_area", "length", "width_mm", "severity", "count"),
+        one_of("measure", *_MEASURES),
+        one_of("by_measure", *_MEASURES),
+        CheckConstraint("cardinality(limits) >= 1 AND cardinality(limits) <= 20", name="limits"),
         CheckConstraint(
-            "cardinality(limits) >= 1 AND cardinality(limits) <= 20 AND cardinality(limits) = cardinality(results)",
-            name="limits",
+            "(by_measure IS NULL) = (by_kinds IS NULL) AND (by_measure IS NULL) = (by_limits IS NULL)"
+            " AND (by_measure IS NULL) = (by_inclusive IS NULL)"
+            " AND cardinality(by_limits) >= 1 AND cardinality(by_limits) <= 20",
+            name="by",
         ),
-        {"comment": "Rules of rating schemes; the worst result of all rules is that of an element"},
+        CheckConstraint(
+            "cardinality(results) = CASE WHEN points IS NOT NULL THEN 0 WHEN by_measure IS NULL THEN cardinality(limits)"
+            " ELSE (cardinality(limits) + 1) * (cardinality(by_limits) + 1) END",
+            name="results",
+        ),
+        CheckConstraint("by_measure IS NULL OR points IS NULL", name="points"),
+        CheckConstraint("cardinality(points) = cardinality(limits)", name="point_count"),
+        {"comment": "Rules of rating schemes"},
     )
 
     scheme_id: Mapped[int] = mapped_column(parent("rating_scheme"), primary_key=True, comment="Scheme")
@@ -103,9 +129,21 @@ class RatingRule(Base):
     text: Mapped[str] = mapped_column(comment="Rule in the owner's words")
     kinds: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Codes of the kinds of findings; empty: all wet ones")
     measure: Mapped[str] = mapped_column(
-        comment="area (m², sum), share (area over the inspected lining), largest_area (m²), length (m, sum), width_mm"
-        " (greatest), severity (greatest) or count"
+        comment="area (m², sum), share (area over the inspected lining), largest_area (m²), length (m, sum), density_length"
+        " (m per m² of inspected lining), width_mm (greatest), severity (greatest), count, or growth (m² of area per year since"
+        " the earlier inspection)"
     )
     inclusive: Mapped[bool] = mapped_column(comment="True if a value equal to a limit reaches it")
     limits: Mapped[Floats] = mapped_column(comment="Limits in ascending order")
-    results: Mapped[list[str]] = mapped_column(ARRAY(Text), comment="Result at each limit")
+    results: Mapped[list[str]] = mapped_column(
+        ARRAY(Text),
+        comment="Result at each limit; of a matrix, row by row, one row for each class of the measure, from below the first"
+        " limit; empty if the rule has points",
+    )
+    points: Mapped[Floats | None] = mapped_column(comment="Points at each limit, of a scheme with totals")
+    by_measure: Mapped[str | None] = mapped_column(comment="Second measure of a matrix, whose classes are its columns")
+    by_kinds: Mapped[list[str] | None] = mapped_column(ARRAY(Text), comment="Kinds of findings of the second measure")
+    by_inclusive: Mapped[bool | None] = mapped_column(
+        comment="True if a value equal to a limit of the second measure reaches it"
+    )
+    by_limits: Mapped[Floats | None] = mapped_column(comment="Limits of the second measure in ascending order")

@@ -22,7 +22,7 @@ _RATING = (
     (Column("Lower bound"), "lower_bound"), (Column("Inspected", _SHARE), "inspected_share"),
     (Column("Findings", _WHOLE), "findings"), (Column("Rule", _WHOLE), "rule"), (Column("Measure"), "measure"),
     (Column("Value", "0.0000"), "value"), (Column("Limit"), "limit_reached"), (Column("Finding No.", _WHOLE), "finding_id"),
-    (Column("Why"), "why"),
+    (Column("Why"), "why"), (Column("Remark"), "remark"),
 )  # fmt: skip
 _ELEMENT = (
     (Column("No.", _WHOLE), "number"), (Column("Element"), "name"), (Column("Lining, m²", "0.00"), "lining_area"),

@@ -158,7 +158,7 @@ function show(finding, fit) {
     return;
   }
   mark(finding);
-  if (fit) follow(finding);
+  if (fit) follow(finding, app.turn);
   address();
 }
 
@@ -170,7 +170,11 @@ function mark(finding) {
 }
 
 // Drawing the map takes longer than a verdict: it follows when the reviewer pauses.
-const follow = debounce((finding) => (space.open ? space.follow(finding) : lining.fitFinding(finding)), 250);
+const follow = debounce((finding, turn) => {
+  if (turn !== app.turn) return; // The address leads elsewhere by now.
+  if (space.open) space.follow(finding);
+  else lining.fitFinding(finding);
+}, 250);
 
 const reread = debounce(async () => {
   lining.refresh();

@@ -22,6 +22,7 @@ export class Review {
     this.session = session;
     this.app = app;
     this.busy = false;
+    this.waiting = null;
     this.keysOn = true;
     this.reviewing = false;
     this.typed = false;
@@ -71,6 +72,7 @@ export class Review {
     this.cutouts.setSurvey(survey);
     this.filter.setSurvey(survey, () => this.app.extent());
     this.typed = false;
+    this.waiting = null;
     this.refresh();
   }
 
@@ -90,8 +92,14 @@ export class Review {
     });
   }
 
+  /** Read the list of a selection; if a finding is being read, after it. */
   load(filter) {
     if (!filter) return;
+    if (this.busy) {
+      this.waiting = filter;
+      this.refresh();
+      return;
+    }
     this.act(async () => {
       await this.session.load(this.survey.name, filter);
       if (!this.session.work.current && (await this.session.step(1))) this.shown(true);
@@ -188,6 +196,9 @@ export class Review {
       this.root.removeAttribute('aria-busy');
       this.refresh();
     }
+    const { waiting } = this;
+    this.waiting = null;
+    this.load(waiting);
   }
 
   showConflict({ message, wanted, record }) {
@@ -224,8 +235,7 @@ export class Review {
     const { facts, work } = session;
     this.body.hidden = !facts;
     this.none.hidden = Boolean(facts);
-    this.none.textContent = this.reviewing ? 'No finding is left in this selection. See above the map what was not inspected.'
-      : 'Click a finding on the lining, or open Review to step through them.';
+    this.none.textContent = this.noneText;
     this.progress.max = Math.max(work.findings.length, 1);
     this.progress.value = work.reviewed;
     const capped = work.findings.length >= LIST_LIMIT ? ` The list ends after ${LIST_LIMIT} findings: choose a stretch.` : '';
@@ -248,6 +258,12 @@ export class Review {
       this.facts.replaceChildren(factsOf(facts, survey, survey.severities, this.photos.root, this.app.say));
       this.app.marked(facts);
     }
+  }
+
+  get noneText() {
+    if (!this.reviewing) return 'Click a finding on the lining, or open Review to step through them.';
+    if (!this.session.listed) return 'The list of findings has not been read.';
+    return 'No finding is left in this selection. See above the map what was not inspected.';
   }
 
   /** Show the photos of a finding as they are now; the review that is in progress stays as it is. */
