@@ -252,7 +252,8 @@ def test_density_is_length_over_inspected_lining(conn: psycopg.Connection, examp
     nothing = "NULL::float8[], NULL::text, NULL::text[], NULL::boolean, NULL::float8[]"
     scheme(
         conn,
-        f"(1, 'cracks', '{{crack}}'::text[], 'density_length', false, '{{0}}'::float8[], '{{D}}'::text[], {nothing})",
+        "(1, 'cracks', '{crack}'::text[], 'density_length', false, '{0}'::float8[], '{D}'::text[],"
+        f" {nothing})",
     )
     for row, fact, length in zip(own(conn)[:2], facts, (4, 2), strict=False):
         assert row["value"] == pytest.approx(length / (fact["lining_area"] * fact["inspected_share"]), rel=0.02)
