@@ -111,7 +111,12 @@ def add_later_survey(conn: psycopg.Connection, name: str = "demo-2026") -> None:
         "WHERE name = %s RETURNING id",
         (name, NAME),
     ).fetchone()
-    for table in ("axis_vertex", "segment", "section", "coverage", "image"):
+    copy_rows(conn, NAME, later, ("axis_vertex", "segment", "section", "coverage", "image"))
+
+
+def copy_rows(conn: psycopg.Connection, source: str, target: int, tables: tuple[str, ...]) -> None:
+    """Copy the rows of tables from a survey to another one, without their keys."""
+    for table in tables:
         columns = [
             column
             for (column,) in conn.execute(
@@ -122,9 +127,10 @@ def add_later_survey(conn: psycopg.Connection, name: str = "demo-2026") -> None:
         ]
         names = sql.SQL(", ").join(map(sql.Identifier, columns))
         conn.execute(
-            sql.SQL("INSERT INTO tunnel.{} (survey_id, {}) SELECT {}, {} FROM tunnel.{}").format(
-                sql.Identifier(table), names, sql.Literal(later), names, sql.Identifier(table)
-            )
+            sql.SQL(
+                "INSERT INTO tunnel.{table} (survey_id, {names}) SELECT {target}, {names} FROM tunnel.{table}"
+                " WHERE survey_id = (SELECT id FROM tunnel.survey WHERE name = {source})"
+            ).format(table=sql.Identifier(table), names=names, target=sql.Literal(target), source=sql.Literal(source))
         )
 
 

@@ -68,7 +68,7 @@ PHOTO_SERVER = _PhotoServer()
     "--template",
     type=FilePath(),
     metavar="FILE",
-    help="Owner's template, TOML: logo, client, project, standard, language of the headings, chapters, colours.",
+    help="Owner's template, TOML: logo, client, project, headline, ratings, language of the headings, chapters, colours.",
 )
 @click.option(
     "--photos",
@@ -110,7 +110,8 @@ def report(
     It first states where leaks could be missed: lining not searched, outdated or hardly inspected. It contains the
     scanned and inspected lining, the unrolled lining with its leaks, each leak with picture
     and cross-section, statistics, findings of all kinds with photos, dry regions, parameters and versions, and
-    reviews by person. If members of structures were found, a chapter has the part that could be judged, their spots,
+    reviews by person. With the owner's template it also rates elements of the tunnel. The summary compares with the last
+    inspection. If members of structures were found, a chapter has the part that could be judged, their spots,
     and each member's unrolled faces; for a site that is the report.
 
     The HTML file needs no network. Its table of leaks can be sorted and searched, and it prints on A4. The PDF is its

@@ -27,6 +27,7 @@ from tunneldb.report.lining import Form
 from tunneldb.report.owner import Owner
 from tunneldb.report.photos import Thumbnail
 from tunneldb.report.pictures.load import Source
+from tunneldb.report.rating import headline, measured, name_elements, result_text
 from tunneldb.report.strip import Progress
 from tunneldb.report.structures import read_structures
 from tunneldb.store.catalog import crs_text
@@ -147,11 +148,12 @@ def _template(name: str, owner: Owner) -> jinja2.Template:
     environment.filters |= {
         "percent": text.percent, "number": text.number, "whole": text.whole, "signed": text.signed, "clock": clock_label,
         "when": text.when, "day": owner.words.day, "kilometres": text.kilometres, "size": text.size, "css": text.css,
-        "counters": text.counters,
+        "counters": text.counters, "measured": measured,
     }  # fmt: skip
     environment.globals |= {"_": owner.words, "owner": owner}
     environment.globals |= {"origins": ORIGINS, "severities": SEVERITIES, "uncounted": UNCOUNTED, "said": STATE_WORDS}
     environment.globals |= {"review_colours": REVIEW_COLOURS}
+    environment.globals |= {"headline": headline, "name_elements": name_elements, "result_text": result_text}
     return environment.get_template(name)
 
 
