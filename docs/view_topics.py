@@ -22,6 +22,7 @@ TOPICS = {
     "Clearance": ("clearance", "clearance_layer"),
     "Rings": ("rings",),
     "Elements and ratings": ("rating",),
+    "Alarms": ("alarms",),
     "Structures": ("structures",),
     "Under water": ("sonar", "closed_section"),
     "Stages and queue": ("status", "state", "queue", "remark", "size"),

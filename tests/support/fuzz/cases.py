@@ -90,6 +90,9 @@ OF_WORDS: tuple[str, ...] = (
     "profile add demo {new} {seeds}/profile.csv {stretch}", "profile list demo", "profile remove demo {new}",
     "elements add demo {new} --length 10", "elements list demo", "elements remove demo {new}", "rating list",
     "rating show example", "rating remove {new} 1", "rating apply demo-2024 --elements blocks --scheme example",
+    "alarms add demo {new} --quantity ovality --warning 0.01 --alarm 0.02", "alarms list demo", "alarms remove demo {new}",
+    "alarms add demo {new} --quantity convergence --warning 0.01 --alarm 0.02", "alarms check demo -o {out}.csv",
+    "alarms add demo {new} --quantity growth --step 50 --warning 0.01 --alarm 0.02",
     "deviation demo-2024 -o {out}.csv", "thickness demo-2024 scan-2024", "evenness demo-2024", "compare demo-2024 scan-2024",
     "clearance demo-2024 --gauge {seeds}/profile.csv --track single", "unroll demo-2024 {seeds}/points.csv",
     "ground {seeds}/cloud.las -o {out}.laz", "intensity demo-2024 -o {out}.png", "image demo-2024 -o {out}",
@@ -119,7 +122,7 @@ UNTRIED = {
 """Verbs that are in none of OF_WORDS, and why."""
 
 REFUSED = (
-    "clearance", "compare", "elements remove", "evaluate", "export scan-2024", "findings undo", "ground", "intensity",
+    "alarms remove", "clearance", "compare", "elements remove", "evaluate", "export scan-2024", "findings undo", "ground", "intensity",
     "learn demo-2024", "members demo", "profile remove", "rating remove", "register", "run", "serve", "spheres",
     "survey remove-file", "thickness", "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
 )  # fmt: skip
