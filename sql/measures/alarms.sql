@@ -1,5 +1,5 @@
 -- Limits of series of tunnels, and where the latest survey reaches them. Needs survey_copy (views/survey.sql), survey_ends
--- (geometry/survey_ends.sql), stretch_statistics (leaks/statistics.sql), convergence_at (measures/change.sql) and
+-- (geometry/survey_ends.sql), stretch_leaks and stretch_bands (leaks/stretch_leaks.sql), convergence_at (measures/change.sql) and
 -- earlier_inspection (measures/rating.sql).
 
 CREATE OR REPLACE VIEW tunnel_api.alarm_limit AS
@@ -38,27 +38,100 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.latest_survey(int) IS
 'Key of the latest survey of a tunnel by date, without copies from archives; NULL if there is none';
 
--- The part of a stretch beyond the survey was not inspected.
+CREATE OR REPLACE FUNCTION tunnel_internal.alarm_extent(
+    survey_id int, chainage_from float8, chainage_to float8, OUT low float8, OUT high float8)
+LANGUAGE sql STABLE CALLED ON NULL INPUT PARALLEL SAFE SECURITY DEFINER SET search_path = pg_catalog, pg_temp
+AS $$
+    SELECT greatest($2, least(t.start_chainage, e.chainage_from)),
+           least($3, greatest(t.start_chainage + public.ST_Length(t.alignment), e.chainage_to))
+      FROM tunnel.survey s
+      JOIN tunnel.tunnel t ON t.id = s.tunnel_id
+     CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
+     WHERE s.id = $1 AND t.alignment IS NOT NULL
+$$;
+COMMENT ON FUNCTION tunnel_internal.alarm_extent(int, float8, float8) IS
+'Part of a tunnel to which a limit with these chainages (m) applies: NULL for an end of the tunnel, or of the survey if that reaches farther';
+
+-- Wet areas and shares are those of leak_statistics. The part of a stretch beyond the survey was not inspected.
 CREATE OR REPLACE FUNCTION tunnel_internal.wet_stretches(survey_id int, starts float8[], ends float8[])
 RETURNS TABLE (n int, wet_area float8, undecided_area float8, inspected_share float8)
-LANGUAGE sql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 100 SET search_path = pg_catalog, pg_temp SET jit = off
+LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 1000 SET search_path = pg_catalog, pg_temp
+SET jit = off
+SET enable_nestloop = off  -- the number of rows is unknown at planning
+SET enable_mergejoin = off
 AS $$
-    WITH part AS MATERIALIZED (
-        SELECT p.n, p.low, p.high, greatest(p.low, e.chainage_from) AS first, least(p.high, e.chainage_to) AS last,
-               row_number() OVER (ORDER BY p.n) AS k
-          FROM tunnel_api.survey_ends($1) e
-         CROSS JOIN unnest($2, $3) WITH ORDINALITY AS p (low, high, n)
-         WHERE p.low < e.chainage_to AND p.high > e.chainage_from
-    ), listed AS (
-        SELECT array_agg(p.first ORDER BY p.k) AS starts, array_agg(p.last ORDER BY p.k) AS ends FROM part p
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    given_starts constant float8[] := starts;
+    given_ends constant float8[] := ends;
+    extent record;
+    numbers int[];
+    lows float8[];
+    highs float8[];
+BEGIN
+    SELECT e.* INTO extent FROM tunnel_api.survey_ends(survey_key) e;
+    SELECT array_agg(p.n ORDER BY p.n), array_agg(greatest(p.low, extent.chainage_from) ORDER BY p.n),
+           array_agg(least(p.high, extent.chainage_to) ORDER BY p.n)
+      INTO numbers, lows, highs
+      FROM unnest(given_starts, given_ends) WITH ORDINALITY AS p (low, high, n)
+     WHERE p.low < extent.chainage_to AND p.high > extent.chainage_from;
+    IF numbers IS NULL THEN
+        RETURN;
+    END IF;
+    RETURN QUERY
+    WITH leak AS (
+        SELECT l.n, sum(l.area) AS area FROM tunnel_internal.stretch_leaks(survey_key, lows, highs) l GROUP BY l.n
+    ), first AS (
+        SELECT c.* FROM tunnel_internal.coverage_at(survey_key, lows) c
+    ), last AS (
+        SELECT c.* FROM tunnel_internal.coverage_at(survey_key, highs) c
     )
-    SELECT p.n::int, t.wet_area, t.undecided_area, t.seen_share * (p.last - p.first) / (p.high - p.low)
-      FROM listed l
-     CROSS JOIN LATERAL tunnel_internal.stretch_statistics($1, l.starts, l.ends) t
-      JOIN part p ON p.k = t.n
+    SELECT numbers[f.n], CASE WHEN t.length > f.length THEN coalesce(l.area, 0) ELSE l.area END, b.area,
+           CASE WHEN t.length > f.length
+                THEN (t.seen - f.seen) / nullif(t.lining - f.lining, 0)
+                     * least((t.length - f.length) / (given_ends[numbers[f.n]] - given_starts[numbers[f.n]]), 1)
+                ELSE 0 END
+      FROM first f
+      JOIN last t ON t.n = f.n
+      LEFT JOIN leak l ON l.n = f.n
+      LEFT JOIN tunnel_internal.stretch_bands(survey_key, lows, highs) b ON b.n = f.n;
+END
 $$;
 COMMENT ON FUNCTION tunnel_internal.wet_stretches(int, float8[], float8[]) IS
 'Wet area of stretches of a tunnel in a survey as in leak_statistics, and dark bands that may be wet (m²); NULL where leaks were not searched for. inspected_share: share of the lining of the whole stretch. No row for a stretch outside the survey';
+
+CREATE OR REPLACE FUNCTION tunnel_internal.wet_values(survey_id int, stretch_from float8, stretch_to float8, step float8)
+RETURNS TABLE (chainage_from float8, chainage_to float8, wet_area float8, highest float8, inspected_share float8, earlier_id int,
+    earlier_area float8, earlier_share float8)
+LANGUAGE plpgsql STABLE CALLED ON NULL INPUT PARALLEL SAFE SECURITY DEFINER ROWS 1000 SET search_path = pg_catalog, pg_temp
+SET jit = off
+SET enable_nestloop = off  -- the number of rows is unknown at planning
+SET enable_mergejoin = off
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    earlier_key constant int := tunnel_internal.earlier_inspection(survey_id);
+    length constant float8 := step;
+    extent record;
+    starts float8[];
+    ends float8[];
+BEGIN
+    SELECT e.* INTO extent FROM tunnel_internal.alarm_extent(survey_id, stretch_from, stretch_to) e;
+    SELECT array_agg(greatest(k * length, extent.low) ORDER BY k), array_agg(least((k + 1) * length, extent.high) ORDER BY k)
+      INTO starts, ends
+      FROM generate_series(floor(extent.low / length + 1e-9)::int, ceil(extent.high / length - 1e-9)::int - 1) k;
+    RETURN QUERY
+    SELECT p.low, p.high, n.wet_area, n.wet_area + coalesce(n.undecided_area, 0), coalesce(n.inspected_share, 0), earlier_key,
+           b.wet_area, coalesce(b.inspected_share, 0)
+      FROM unnest(starts, ends) WITH ORDINALITY AS p (low, high, n)
+      LEFT JOIN tunnel_internal.wet_stretches(survey_key, starts, ends) n ON n.n = p.n
+      LEFT JOIN tunnel_internal.wet_stretches(earlier_key, starts, ends) b ON b.n = p.n;
+END
+$$;
+COMMENT ON FUNCTION tunnel_internal.wet_values(int, float8, float8, float8) IS
+'Wet area (m²) and inspected share of stretches between multiples of step (m) in a survey and in the earlier inspection. highest: wet area if undecided dark bands are wet. No row if there is no such part of the tunnel';
 
 CREATE OR REPLACE FUNCTION tunnel_internal.gaps_between(low float8, high float8, starts float8[], ends float8[])
 RETURNS TABLE (chainage_from float8, chainage_to float8)
@@ -82,140 +155,115 @@ $$;
 COMMENT ON FUNCTION tunnel_internal.gaps_between(float8, float8, float8[], float8[]) IS
 'Stretches between two chainages (m) without a place, where one of median length has room';
 
-CREATE OR REPLACE FUNCTION tunnel_internal.alarm_values(limit_id int, survey_id int)
-RETURNS TABLE (chainage_from float8, chainage_to float8, value float8, highest float8, inspected_share float8, previous_id int,
+CREATE OR REPLACE FUNCTION tunnel_internal.ovality_values(survey_id int, stretch_from float8, stretch_to float8)
+RETURNS TABLE (chainage_from float8, chainage_to float8, value float8, inspected_share float8, previous_id int,
     previous_value float8, remark text)
-LANGUAGE plpgsql STABLE STRICT PARALLEL SAFE SECURITY DEFINER ROWS 1000 SET search_path = pg_catalog, pg_temp SET jit = off
+LANGUAGE plpgsql STABLE CALLED ON NULL INPUT PARALLEL SAFE SECURITY DEFINER ROWS 1000 SET search_path = pg_catalog, pg_temp
+SET jit = off
 AS $$
 #variable_conflict use_column
 DECLARE
     survey_key constant int := survey_id;
-    own tunnel.alarm_limit;
-    latest tunnel.survey;
-    earlier tunnel.survey;
-    reference tunnel.survey;
-    low float8;
-    high float8;
+    earlier_key int;
+    extent record;
     starts float8[];
     ends float8[];
-    years float8;
 BEGIN
-    SELECT l.* INTO own FROM tunnel.alarm_limit l WHERE l.id = limit_id;
-    SELECT s.* INTO latest FROM tunnel.survey s WHERE s.id = survey_key;
-    SELECT greatest(own.chainage_from, least(t.start_chainage, e.chainage_from)),
-           least(own.chainage_to, greatest(t.start_chainage + public.ST_Length(t.alignment), e.chainage_to))
-      INTO low, high
-      FROM tunnel.tunnel t LEFT JOIN LATERAL tunnel_api.survey_ends(survey_key) e ON true WHERE t.id = own.tunnel_id;
-    IF low IS NULL OR high IS NULL OR low >= high THEN
-        RETURN;
-    END IF;
+    SELECT e.* INTO extent FROM tunnel_internal.alarm_extent(survey_id, stretch_from, stretch_to) e;
+    SELECT o.id INTO earlier_key
+      FROM tunnel.survey s
+      JOIN tunnel.survey o ON o.tunnel_id = s.tunnel_id AND o.date < s.date
+     WHERE s.id = survey_key AND o.id NOT IN (SELECT c.survey_id FROM tunnel_internal.survey_copy c)
+       AND EXISTS (SELECT FROM tunnel.ring r WHERE r.survey_id = o.id AND r.ovality IS NOT NULL)
+     ORDER BY o.date DESC, o.id LIMIT 1;
+    SELECT array_agg(r.chainage_from ORDER BY r.chainage_from), array_agg(r.chainage_to ORDER BY r.chainage_from)
+      INTO starts, ends
+      FROM tunnel.ring r
+     WHERE r.survey_id = survey_key AND (r.chainage_from + r.chainage_to) / 2 >= extent.low
+       AND (r.chainage_from + r.chainage_to) / 2 < extent.high;
+    RETURN QUERY
+    SELECT r.chainage_from, r.chainage_to, nullif(r.ovality, 'NaN'), coalesce(r.seen_share, 0), earlier_key,
+           CASE WHEN o.chainage_to > m.chainage THEN nullif(o.ovality, 'NaN') END,
+           CASE WHEN r.ovality IS NULL OR r.ovality = 'NaN' THEN 'ovality not measured' END
+      FROM tunnel.ring r
+     CROSS JOIN LATERAL (SELECT (r.chainage_from + r.chainage_to) / 2 AS chainage) m
+      LEFT JOIN LATERAL (SELECT q.chainage_to, q.ovality FROM tunnel.ring q
+                          WHERE q.survey_id = earlier_key AND q.chainage_from <= m.chainage
+                          ORDER BY q.chainage_from DESC LIMIT 1) o ON true
+     WHERE r.survey_id = survey_key AND m.chainage >= extent.low AND m.chainage < extent.high
+    UNION ALL
+    SELECT g.chainage_from, g.chainage_to, NULL, 0, earlier_key, NULL, 'no ring measured'
+      FROM tunnel_internal.gaps_between(extent.low, extent.high, starts, ends) g;
+END
+$$;
+COMMENT ON FUNCTION tunnel_internal.ovality_values(int, float8, float8) IS
+'Ovality of the rings of a survey whose middle lies between two chainages (m), and of the ring there in the last earlier survey with rings; stretches without a ring have no value. remark: reason why the value is unknown';
 
-    IF own.quantity IN ('wet_area', 'growth') THEN
-        SELECT array_agg(greatest(k * own.step, low) ORDER BY k), array_agg(least((k + 1) * own.step, high) ORDER BY k)
-          INTO starts, ends
-          FROM generate_series(floor(low / own.step + 1e-9)::int, ceil(high / own.step - 1e-9)::int - 1) k;
-        SELECT s.* INTO earlier FROM tunnel.survey s WHERE s.id = tunnel_internal.earlier_inspection(survey_key);
-        IF isfinite(latest.date) AND isfinite(earlier.date) THEN
-            years := (latest.date - earlier.date) / 365.25;
-        END IF;
-        RETURN QUERY
-        WITH now AS MATERIALIZED (
-            SELECT w.* FROM tunnel_internal.wet_stretches(survey_key, starts, ends) w
-        ), before AS MATERIALIZED (
-            SELECT w.* FROM tunnel_internal.wet_stretches(earlier.id, starts, ends) w
-        ), pair AS (
-            SELECT p.low, p.high, n.wet_area, n.wet_area + coalesce(n.undecided_area, 0) AS highest,
-                   coalesce(n.inspected_share, 0) AS share, coalesce(b.inspected_share, 0) AS earlier_share,
-                   CASE WHEN b.inspected_share >= own.min_inspected - 1e-9 THEN b.wet_area END AS earlier_area
-              FROM unnest(starts, ends) WITH ORDINALITY AS p (low, high, n)
-              LEFT JOIN now n ON n.n = p.n
-              LEFT JOIN before b ON b.n = p.n
-        )
-        SELECT p.low, p.high, p.wet_area, p.highest, p.share, earlier.id, p.earlier_area, NULL::text
-          FROM pair p WHERE own.quantity = 'wet_area'
-        UNION ALL
-        SELECT p.low, p.high, (p.wet_area - p.earlier_area) / years, (p.highest - p.earlier_area) / years, p.share, earlier.id, NULL,
-               CASE WHEN earlier.id IS NULL THEN 'no earlier inspection'
-                    WHEN p.earlier_area IS NULL
-                    -- never rounded up to the limit
-                    THEN format('%s %% inspected in %s', trunc(100 * p.earlier_share::numeric), earlier.name) END
-          FROM pair p WHERE own.quantity = 'growth'
-        ORDER BY 1;
-        RETURN;
-    END IF;
-
-    IF own.quantity = 'ovality' THEN
-        SELECT s.* INTO earlier FROM tunnel.survey s
-         WHERE s.tunnel_id = own.tunnel_id AND s.date < latest.date
-           AND s.id NOT IN (SELECT c.survey_id FROM tunnel_internal.survey_copy c)
-           AND EXISTS (SELECT FROM tunnel.ring r WHERE r.survey_id = s.id AND r.ovality IS NOT NULL)
-         ORDER BY s.date DESC, s.id LIMIT 1;
-        SELECT array_agg(r.chainage_from ORDER BY r.chainage_from), array_agg(r.chainage_to ORDER BY r.chainage_from)
-          INTO starts, ends
-          FROM tunnel.ring r
-         WHERE r.survey_id = survey_key AND (r.chainage_from + r.chainage_to) / 2 >= low AND (r.chainage_from + r.chainage_to) / 2 < high;
-        RETURN QUERY
-        SELECT r.chainage_from, r.chainage_to, nullif(r.ovality, 'NaN'), nullif(r.ovality, 'NaN'),
-               CASE WHEN r.ovality IS NULL THEN 0 ELSE coalesce(r.seen_share, 0) END, earlier.id,
-               CASE WHEN o.chainage_to > m.chainage THEN nullif(o.ovality, 'NaN') END,
-               CASE WHEN r.ovality IS NULL THEN 'ovality not measured' END
-          FROM tunnel.ring r
-         CROSS JOIN LATERAL (SELECT (r.chainage_from + r.chainage_to) / 2 AS chainage) m
-          LEFT JOIN LATERAL (SELECT q.chainage_to, q.ovality FROM tunnel.ring q
-                              WHERE q.survey_id = earlier.id AND q.chainage_from <= m.chainage
-                              ORDER BY q.chainage_from DESC LIMIT 1) o ON true
-         WHERE r.survey_id = survey_key AND m.chainage >= low AND m.chainage < high
-        UNION ALL
-        SELECT g.chainage_from, g.chainage_to, NULL, NULL, 0, earlier.id, NULL, 'no ring measured'
-          FROM tunnel_internal.gaps_between(low, high, starts, ends) g
-        ORDER BY 1;
-        RETURN;
-    END IF;
-
-    IF own.reference IS NULL THEN
-        SELECT s.* INTO reference FROM tunnel.survey s
-         WHERE s.tunnel_id = own.tunnel_id AND s.id NOT IN (SELECT c.survey_id FROM tunnel_internal.survey_copy c)
-           AND EXISTS (SELECT FROM tunnel.change_section c WHERE c.old_survey_id = s.id AND c.survey_id IN (
-                       SELECT n.id FROM tunnel.survey n WHERE n.tunnel_id = own.tunnel_id AND n.date > s.date))
-         ORDER BY s.date, s.id LIMIT 1;
-    ELSE
-        SELECT s.* INTO reference FROM tunnel.survey s WHERE s.name = own.reference AND s.tunnel_id = own.tunnel_id;
-    END IF;
-    SELECT s.* INTO earlier FROM tunnel.survey s
-     WHERE s.tunnel_id = own.tunnel_id AND s.date < latest.date AND s.date > reference.date
-       AND s.id NOT IN (SELECT c.survey_id FROM tunnel_internal.survey_copy c)
-       AND EXISTS (SELECT FROM tunnel.change_section c WHERE c.old_survey_id = reference.id AND c.survey_id = s.id)
-     ORDER BY s.date DESC, s.id LIMIT 1;
+CREATE OR REPLACE FUNCTION tunnel_internal.convergence_values(
+    survey_id int, stretch_from float8, stretch_to float8, clock_from float8, clock_to float8, reference text)
+RETURNS TABLE (chainage_from float8, chainage_to float8, value float8, inspected_share float8, previous_id int,
+    previous_value float8, remark text)
+LANGUAGE plpgsql STABLE CALLED ON NULL INPUT PARALLEL SAFE SECURITY DEFINER ROWS 1000 SET search_path = pg_catalog, pg_temp
+SET jit = off
+AS $$
+#variable_conflict use_column
+DECLARE
+    survey_key constant int := survey_id;
+    first_clock constant float8 := clock_from;
+    second_clock constant float8 := clock_to;
+    reference_name constant text := reference;
+    since tunnel.survey;
+    earlier_key int;
+    extent record;
+    starts float8[];
+    ends float8[];
+BEGIN
+    SELECT e.* INTO extent FROM tunnel_internal.alarm_extent(survey_id, stretch_from, stretch_to) e;
+    SELECT o.* INTO since
+      FROM tunnel.survey s
+      JOIN tunnel.survey o ON o.tunnel_id = s.tunnel_id
+     WHERE s.id = survey_key AND (o.name = reference_name OR (
+           reference_name IS NULL AND o.id NOT IN (SELECT c.survey_id FROM tunnel_internal.survey_copy c)
+           AND EXISTS (SELECT FROM tunnel.survey n WHERE n.tunnel_id = o.tunnel_id AND n.date > o.date
+                          AND EXISTS (SELECT FROM tunnel.change_section c WHERE c.old_survey_id = o.id AND c.survey_id = n.id))))
+     ORDER BY o.date, o.id LIMIT 1;
+    SELECT o.id INTO earlier_key
+      FROM tunnel.survey s
+      JOIN tunnel.survey o ON o.tunnel_id = s.tunnel_id AND o.date < s.date AND o.date > since.date
+     WHERE s.id = survey_key AND o.id NOT IN (SELECT c.survey_id FROM tunnel_internal.survey_copy c)
+       AND EXISTS (SELECT FROM tunnel.change_section c WHERE c.old_survey_id = since.id AND c.survey_id = o.id)
+     ORDER BY o.date DESC, o.id LIMIT 1;
     SELECT array_agg(c.chainage_from ORDER BY c.chainage_from), array_agg(c.chainage_to ORDER BY c.chainage_from)
       INTO starts, ends
       FROM tunnel.change_section c
-     WHERE c.survey_id = survey_key AND c.old_survey_id = reference.id AND (c.chainage_from + c.chainage_to) / 2 >= low
-       AND (c.chainage_from + c.chainage_to) / 2 < high;
+     WHERE c.survey_id = survey_key AND c.old_survey_id = since.id AND (c.chainage_from + c.chainage_to) / 2 >= extent.low
+       AND (c.chainage_from + c.chainage_to) / 2 < extent.high;
     RETURN QUERY
     WITH place AS MATERIALIZED (
         SELECT p.low, p.high, p.n FROM unnest(starts, ends) WITH ORDINALITY AS p (low, high, n)
     ), chord AS MATERIALIZED (
         SELECT c.* FROM tunnel_internal.convergence_at(
-            reference.id, array_remove(ARRAY[survey_key, earlier.id], NULL),
-            (SELECT array_agg((p.low + p.high) / 2 ORDER BY p.n) FROM place p), own.clock_from, own.clock_to) c
+            since.id, array_remove(ARRAY[survey_key, earlier_key], NULL),
+            (SELECT array_agg((p.low + p.high) / 2 ORDER BY p.n) FROM place p), first_clock, second_clock) c
+    ), pair AS (
+        SELECT c.n, max(c.convergence) FILTER (WHERE c.survey_id = survey_key) AS now,
+               max(c.convergence) FILTER (WHERE c.survey_id = earlier_key) AS before
+          FROM chord c GROUP BY c.n
     )
-    SELECT p.low, p.high, c.convergence, c.convergence, CASE WHEN c.convergence IS NULL THEN 0 ELSE 1 END::float8,
-           coalesce(earlier.id, reference.id), CASE WHEN earlier.id IS NULL THEN 0 ELSE o.convergence END,
-           CASE WHEN c.convergence IS NULL THEN 'an end of the chord was not inspected' END
-      FROM place p
-      LEFT JOIN chord c ON c.n = p.n AND c.survey_id = survey_key
-      LEFT JOIN chord o ON o.n = p.n AND o.survey_id = earlier.id
+    SELECT p.low, p.high, c.now, CASE WHEN c.now IS NULL THEN 0 ELSE 1 END::float8, coalesce(earlier_key, since.id),
+           CASE WHEN earlier_key IS NULL THEN 0 ELSE c.before END,
+           CASE WHEN c.now IS NULL THEN 'an end of the chord was not inspected' END
+      FROM place p LEFT JOIN pair c ON c.n = p.n
     UNION ALL
-    SELECT g.chainage_from, g.chainage_to, NULL, NULL, 0, coalesce(earlier.id, reference.id), NULL,
-           CASE WHEN reference.id IS NOT NULL THEN format('not compared with %s', reference.name)
-                WHEN own.reference IS NOT NULL THEN format('the tunnel has no survey %s', own.reference)
+    SELECT g.chainage_from, g.chainage_to, NULL, 0, coalesce(earlier_key, since.id), NULL,
+           CASE WHEN since.id IS NOT NULL THEN format('not compared with %s', since.name)
+                WHEN reference_name IS NOT NULL THEN format('the tunnel has no survey %s', reference_name)
                 ELSE 'no survey was compared with an earlier one' END
-      FROM tunnel_internal.gaps_between(low, high, starts, ends) g
-    ORDER BY 1;
+      FROM tunnel_internal.gaps_between(extent.low, extent.high, starts, ends) g;
 END
 $$;
-COMMENT ON FUNCTION tunnel_internal.alarm_values(int, int) IS
-'Values of the quantity of a limit in a survey, by ring, stretch or section. highest: value if undecided dark bands are wet. remark: reason why the value is unknown. previous_id: survey with the previous value; of growth, the earlier inspection. No row if the limit applies to no part of the tunnel';
+COMMENT ON FUNCTION tunnel_internal.convergence_values(int, float8, float8, float8, float8, text) IS
+'Convergence (m) between two clock positions in the sections of a survey, whose middle lies between two chainages (m), that were compared with the reference survey, and that of the last earlier survey compared with it, else 0 at the reference; stretches that were not compared have no value. inspected_share: 1 if both ends of the chord were inspected. remark: reason why the value is unknown';
 
 CREATE OR REPLACE FUNCTION tunnel_api.alarms(tunnel text)
 RETURNS TABLE (limit_id int, name text, quantity text, unit text, chainage_from float8, chainage_to float8, label text, survey text,
@@ -230,25 +278,59 @@ DECLARE
 BEGIN
     SELECT s.* INTO latest FROM tunnel.survey s WHERE s.id = tunnel_internal.latest_survey(tunnel_key);
     RETURN QUERY
-    WITH fact AS (
-        SELECT l.id, l.name, l.quantity, l.unit, l.warning, l.alarm, l.min_inspected, v.chainage_from, v.chainage_to, v.value,
-               v.inspected_share, v.previous_id, v.previous_value,
-               CASE WHEN l.quantity = 'convergence' THEN abs(v.value) ELSE v.value END AS size,
-               CASE WHEN latest.id IS NULL THEN 'the tunnel has no survey'
-                    WHEN v.chainage_from IS NULL THEN 'the limit applies to no part of the tunnel'
-                    WHEN v.remark IS NOT NULL THEN v.remark
-                    WHEN v.value IS NULL OR v.inspected_share = 0 THEN 'not inspected'
-                    -- never rounded up to the limit
-                    WHEN v.inspected_share < l.min_inspected - 1e-9
-                    THEN format('%s %% inspected', trunc(100 * v.inspected_share::numeric))
-                    WHEN v.highest >= l.warning AND v.highest > v.value THEN 'dark bands that may be wet' END AS remark
-          FROM tunnel_api.alarm_limit l
-          LEFT JOIN LATERAL tunnel_internal.alarm_values(l.id, latest.id) v ON true
-         WHERE l.tunnel_id = tunnel_key
+    WITH goal AS MATERIALIZED (
+        SELECT l.* FROM tunnel_api.alarm_limit l WHERE l.tunnel_id = tunnel_key
+    ), wet AS MATERIALIZED (  -- once for all limits of the same stretches
+        SELECT w.*, d.ids
+          FROM (SELECT array_agg(g.id) AS ids, g.chainage_from, g.chainage_to, g.step FROM goal g WHERE g.step IS NOT NULL
+                 GROUP BY g.chainage_from, g.chainage_to, g.step) d
+         CROSS JOIN LATERAL tunnel_internal.wet_values(latest.id, d.chainage_from, d.chainage_to, d.step) w
+    ), wet_pair AS (
+        SELECT g.id, g.quantity, g.min_inspected, w.*,
+               CASE WHEN w.earlier_share >= g.min_inspected - 1e-9 THEN w.earlier_area END AS known_area,
+               CASE WHEN isfinite(latest.date) AND isfinite(o.date) THEN (latest.date - o.date) / 365.25 END AS years, o.name AS earlier
+          FROM goal g
+          JOIN wet w ON g.id = ANY (w.ids)
+          LEFT JOIN tunnel.survey o ON o.id = w.earlier_id
+    ), fact AS (
+        SELECT g.id, v.chainage_from, v.chainage_to, v.value, v.value AS highest, v.inspected_share, v.previous_id, v.previous_value,
+               v.remark
+          FROM goal g
+         CROSS JOIN LATERAL tunnel_internal.ovality_values(latest.id, g.chainage_from, g.chainage_to) v
+         WHERE g.quantity = 'ovality'
+        UNION ALL
+        SELECT g.id, v.chainage_from, v.chainage_to, v.value, v.value, v.inspected_share, v.previous_id, v.previous_value, v.remark
+          FROM goal g
+         CROSS JOIN LATERAL tunnel_internal.convergence_values(
+               latest.id, g.chainage_from, g.chainage_to, g.clock_from, g.clock_to, g.reference) v
+         WHERE g.quantity = 'convergence'
+        UNION ALL
+        SELECT w.id, w.chainage_from, w.chainage_to, w.wet_area, w.highest, w.inspected_share, w.earlier_id, w.known_area, NULL
+          FROM wet_pair w WHERE w.quantity = 'wet_area'
+        UNION ALL
+        SELECT w.id, w.chainage_from, w.chainage_to, (w.wet_area - w.known_area) / w.years, (w.highest - w.known_area) / w.years,
+               w.inspected_share, w.earlier_id, NULL,
+               CASE WHEN w.earlier_id IS NULL THEN 'no earlier inspection'
+                    WHEN w.known_area IS NULL THEN format('%s %% inspected in %s', trunc(100 * w.earlier_share::numeric), w.earlier) END
+          FROM wet_pair w WHERE w.quantity = 'growth'
+    ), known AS (
+        SELECT g.id, g.name, g.quantity, g.unit, g.warning, g.alarm, f.chainage_from, f.chainage_to, f.value, f.inspected_share,
+               f.previous_id, f.previous_value, CASE WHEN g.quantity = 'convergence' THEN abs(f.value) ELSE f.value END AS size,
+               nullif(concat_ws('; ',
+                   CASE WHEN latest.id IS NULL THEN 'the tunnel has no survey'
+                        WHEN f.id IS NULL THEN 'the limit applies to no part of the tunnel'
+                        WHEN g.quantity IN ('ovality', 'convergence') AND f.remark IS NOT NULL THEN f.remark
+                        WHEN f.inspected_share > 0 AND f.inspected_share < g.min_inspected - 1e-9
+                        -- never rounded up to the limit
+                        THEN format('%s %% inspected', trunc(100 * f.inspected_share::numeric))
+                        WHEN coalesce(f.inspected_share, 0) = 0 THEN 'not inspected' END,
+                   CASE WHEN g.quantity = 'growth' THEN f.remark END,
+                   CASE WHEN f.highest >= g.warning AND f.highest > f.value THEN 'has dark bands that may be wet' END), '') AS remark
+          FROM goal g LEFT JOIN fact f ON f.id = g.id
     ), graded AS (
-        SELECT f.*, CASE WHEN f.size >= f.alarm THEN 'alarm' WHEN f.size >= f.warning THEN 'warning'
-                         WHEN f.remark IS NOT NULL THEN 'unknown' ELSE 'ok' END AS level
-          FROM fact f
+        SELECT k.*, CASE WHEN k.size >= k.alarm THEN 'alarm' WHEN k.size >= k.warning THEN 'warning'
+                         WHEN k.remark IS NOT NULL OR k.size IS NULL THEN 'unknown' ELSE 'ok' END AS level
+          FROM known k
     )
     SELECT g.id, g.name, g.quantity, g.unit, g.chainage_from, g.chainage_to,
            (SELECT s.label FROM tunnel_api.stationing(tunnel_key, g.chainage_from) s), latest.name, latest.date, g.value,
