@@ -34,13 +34,22 @@ REPEATS = 5
 
 _EARLIER = """
 INSERT INTO tunnel.survey (tunnel_id, name, date, intensity_dimension, intensity_kind, platform)
-SELECT tunnel_id, %(earlier)s, '2022-05-04', intensity_dimension, intensity_kind, platform FROM tunnel.survey WHERE name = %(name)s
+SELECT tunnel_id, %(earlier)s, '2022-05-04', intensity_dimension, intensity_kind, platform
+FROM tunnel.survey WHERE name = %(name)s
 """
 
 _COPY = """
 INSERT INTO tunnel.{0} (survey_id, {1})
 SELECT o.id, {2} FROM tunnel.{0} c JOIN tunnel.survey s ON s.id = c.survey_id, tunnel.survey o
  WHERE s.name = %(name)s AND o.name = %(earlier)s
+"""
+
+_SECTIONS = """
+INSERT INTO tunnel.section (survey_id, km, segment, half, chainage, half_width, angle_step, radius, arc, geom, points, interpolated)
+SELECT o.id, floor(n / 200), n / 2, 25 + 50 * (n %% 2), 5 * n + 2.5, 0.5, 5, c.radius, c.arc, c.geom, c.points, c.interpolated
+FROM tunnel.survey o, generate_series(0, 200 * %(km)s - 1) AS n,
+    LATERAL (SELECT * FROM tunnel.section ORDER BY id LIMIT 1) c
+WHERE o.name = %(earlier)s
 """
 
 _RINGS = """
@@ -54,8 +63,8 @@ FROM tunnel.survey s, generate_series(1, round(1000 * %(km)s / %(ring)s)::int) A
 _CHANGE = """
 INSERT INTO tunnel.change_section (survey_id, old_survey_id, km, chainage_from, chainage_to, seen_old, seen_new, seen_both,
     change_rms, lod, cell, arc_from, change)
-SELECT s.id, o.id, floor(n * %(section)s / 1000), n * %(section)s, (n + 1) * %(section)s, 30, 30, 30, 0.001, 0.002, %(cell)s, -12.6,
-    a.change
+SELECT s.id, o.id, floor(n * %(section)s / 1000), n * %(section)s, (n + 1) * %(section)s, 30, 30, 30, 0.001, 0.002,
+    %(cell)s, -12.6, a.change
 FROM tunnel.survey s, tunnel.survey o, generate_series(0, floor(1000 * %(km)s / %(section)s)::int - 1) AS n,
     LATERAL (SELECT array_agg(0.000001 * (n %% 4000) ORDER BY i)::real[] AS change FROM generate_series(1, 252) AS i) a
 WHERE s.name = %(name)s AND o.name = %(earlier)s
@@ -66,7 +75,7 @@ def make_surveys(conn: psycopg.Connection) -> None:
     """Add an earlier survey with the same findings, rings of both, and their comparison."""
     values = {"name": NAME, "earlier": EARLIER, "km": KILOMETRES, "ring": RING, "section": SECTION, "cell": CELL}
     conn.execute(_EARLIER, values)
-    for table in ("segment", "section", "coverage", "finding"):
+    for table in ("segment", "coverage", "finding"):
         columns = [
             name
             for (name,) in conn.execute(
@@ -77,6 +86,7 @@ def make_surveys(conn: psycopg.Connection) -> None:
         ]
         copied = ", ".join(f"c.{name}" for name in columns)
         conn.execute(_COPY.format(table, ", ".join(columns), copied), values)  # type: ignore[arg-type]
+    conn.execute(_SECTIONS, values)
     conn.execute(_RINGS, values)
     conn.execute(_CHANGE, values)
     conn.commit()
@@ -94,16 +104,21 @@ def main() -> None:
             progress(f"{KILOMETRES} km, two surveys with {FINDINGS:,} findings each")
             make_long_survey(conn)
             make_surveys(conn)
-        for title, (quantity, warning, alarm, *words) in LIMITS.items():
+        for title, limit in LIMITS.items():
             progress(title)
-            tunneldb("alarms", "add", "long", quantity, "--quantity", quantity, "--warning", warning, "--alarm", alarm, *words, dsn=dsn)
+            _add(dsn, *limit)
             rows.append((title, *_timed(dsn)))
-            tunneldb("alarms", "remove", "long", quantity, dsn=dsn)
-        for quantity, warning, alarm, *words in LIMITS.values():
-            tunneldb("alarms", "add", "long", quantity, "--quantity", quantity, "--warning", warning, "--alarm", alarm, *words, dsn=dsn)
+            tunneldb("alarms", "remove", "long", limit[0], dsn=dsn)
+        for limit in LIMITS.values():
+            _add(dsn, *limit)
         rows.append(("all four limits", *_timed(dsn)))
     save("alarms", {title: {"rows": count, "seconds": seconds} for title, count, seconds in rows})
     print_table("alarms", ("limit", "rows", "s"), [(title, f"{count:,}", f"{s:.2f}") for title, count, s in rows])
+
+
+def _add(dsn: str, quantity: str, warning: str, alarm: str, *words: str) -> None:
+    given = ("--quantity", quantity, "--warning", warning, "--alarm", alarm, *words)
+    tunneldb("alarms", "add", "long", quantity, *given, dsn=dsn)
 
 
 def _timed(dsn: str) -> tuple[int, float]:

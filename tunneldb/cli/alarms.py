@@ -185,7 +185,7 @@ def remove(settings: Settings, tunnel: str, name: str) -> None:
 
 
 @alarms.command(
-    examples=["tunneldb alarms check ringo", "tunneldb alarms check ringo -o alarms.csv", "tunneldb -q alarms check ringo --json"],
+    examples=["tunneldb alarms check ringo", "tunneldb alarms check ringo -o alarms.csv"],
     codes=CODES,
 )
 @click.argument("tunnel")

@@ -49,8 +49,8 @@ class AlarmLimit:
 def save_limit(conn: psycopg.Connection[Any], tunnel_id: int, tunnel: str, limit: AlarmLimit) -> None:
     """Add a limit to a tunnel; raise UserError if its name is taken."""
     row = conn.execute(
-        "INSERT INTO tunnel.alarm_limit (tunnel_id, name, quantity, warning, alarm, chainage_from, chainage_to, step, clock_from,"
-        " clock_to, reference, min_inspected) VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s)"
+        "INSERT INTO tunnel.alarm_limit (tunnel_id, name, quantity, warning, alarm, chainage_from, chainage_to, step,"
+        " clock_from, clock_to, reference, min_inspected) VALUES (%s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s, %s)"
         " ON CONFLICT DO NOTHING RETURNING id",
         [
             tunnel_id, limit.name, limit.quantity, limit.warning, limit.alarm, limit.chainage_from, limit.chainage_to,

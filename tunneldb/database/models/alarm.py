@@ -51,7 +51,9 @@ class AlarmLimit(Base):
         comment="Chainage from which it applies, m; NULL: beginning of the tunnel"
     )
     chainage_to: Mapped[float | None] = mapped_column(comment="Chainage up to which it applies, m; NULL: end of the tunnel")
-    step: Mapped[float | None] = mapped_column(comment="Length of the stretches of wet_area and growth, from multiples of it, m")
+    step: Mapped[float | None] = mapped_column(
+        comment="Length of the stretches of wet_area and growth, from multiples of it, m"
+    )
     clock_from: Mapped[float | None] = mapped_column(comment="Clock position of one end of the chord of convergence, hours")
     clock_to: Mapped[float | None] = mapped_column(comment="Clock position of the other end, opposite, hours")
     reference: Mapped[str | None] = mapped_column(
