@@ -45,7 +45,8 @@ SELECT o.id, {2} FROM tunnel.{0} c JOIN tunnel.survey s ON s.id = c.survey_id, t
 """
 
 _SECTIONS = """
-INSERT INTO tunnel.section (survey_id, km, segment, half, chainage, half_width, angle_step, radius, arc, geom, points, interpolated)
+INSERT INTO tunnel.section (survey_id, km, segment, half, chainage, half_width, angle_step, radius, arc, geom, points,
+    interpolated)
 SELECT o.id, floor(n / 200), n / 2, 25 + 50 * (n %% 2), 5 * n + 2.5, 0.5, 5, c.radius, c.arc, c.geom, c.points, c.interpolated
 FROM tunnel.survey o, generate_series(0, 200 * %(km)s - 1) AS n,
     LATERAL (SELECT * FROM tunnel.section ORDER BY id LIMIT 1) c
@@ -85,7 +86,7 @@ def make_surveys(conn: psycopg.Connection) -> None:
             )
         ]
         copied = ", ".join(f"c.{name}" for name in columns)
-        conn.execute(_COPY.format(table, ", ".join(columns), copied), values)  # type: ignore[arg-type]
+        conn.execute(_COPY.format(table, ", ".join(columns), copied), values)
     conn.execute(_SECTIONS, values)
     conn.execute(_RINGS, values)
     conn.execute(_CHANGE, values)
