@@ -47,7 +47,7 @@ AS $$
       FROM tunnel.survey s
       JOIN tunnel.tunnel t ON t.id = s.tunnel_id
      CROSS JOIN LATERAL tunnel_api.survey_ends(s.id) e
-     WHERE s.id = $1 AND t.alignment IS NOT NULL
+     WHERE s.id = $1 AND t.alignment IS NOT NULL AND coalesce(tunnel_internal.in_order($2, $3), true)
 $$;
 COMMENT ON FUNCTION tunnel_internal.alarm_extent(int, float8, float8) IS
 'Part of a tunnel to which a limit with these chainages (m) applies: NULL for an end of the tunnel, or of the survey if that reaches farther';

@@ -90,6 +90,8 @@ OF_WORDS: tuple[str, ...] = (
     "profile add demo {new} {seeds}/profile.csv {stretch}", "profile list demo", "profile remove demo {new}",
     "elements add demo {new} --length 10", "elements list demo", "elements remove demo {new}", "rating list",
     "rating show example", "rating remove {new} 1", "rating apply demo-2024 --elements blocks --scheme example",
+    "rating compare demo-2024 --elements blocks --scheme example --scheme example:1",
+    "rating change demo-2024 --elements blocks --scheme example",
     "alarms add demo {new} --quantity ovality --warning 0.01 --alarm 0.02", "alarms list demo", "alarms remove demo {new}",
     "alarms add demo {new} --quantity convergence --warning 0.01 --alarm 0.02", "alarms check demo -o {out}.csv",
     "alarms add demo {new} --quantity growth --step 50 --warning 0.01 --alarm 0.02",
@@ -123,8 +125,8 @@ UNTRIED = {
 
 REFUSED = (
     "alarms remove", "clearance", "compare", "elements remove", "evaluate", "export scan-2024", "findings undo", "ground",
-    "intensity", "learn demo-2024", "members demo", "profile remove", "rating remove", "register", "run", "serve", "spheres",
-    "survey remove-file", "thickness", "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
+    "intensity", "learn demo-2024", "members demo", "profile remove", "rating change", "rating remove", "register", "run",
+    "serve", "spheres", "survey remove-file", "thickness", "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
 )  # fmt: skip
 """What right commands begin with that the survey made by hand has no rows for: they are to say so in one line."""
 
