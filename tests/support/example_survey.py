@@ -13,6 +13,7 @@ from psycopg.conninfo import make_conninfo
 from shapely.geometry import Polygon, box
 
 from support.databases import create_database
+from support.example_alarm import add_alarms
 from support.example_clearance import add_clearance
 from support.example_deviation import add_deviation
 from support.example_objects import CORNER, HALF_FLOOR, SPHERES, THINGS, beside, boxed, relief
@@ -167,6 +168,7 @@ def _fill(conn: psycopg.Connection) -> None:
     add_clearance(conn, survey_id)
     add_rating(conn, survey_id)
     add_action(conn, survey_id)
+    add_alarms(conn, survey_id)
     add_rings(conn, survey_id)
     conn.execute(  # through the view, so that the audit has a row
         "INSERT INTO tunnel_api.region (survey_id, kind, geom) VALUES (%s, 'dry', ST_MakeEnvelope(12410, -3, 12414, 0, 0))",

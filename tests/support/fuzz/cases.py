@@ -95,6 +95,9 @@ OF_WORDS: tuple[str, ...] = (
     "rating change demo-2024 --elements blocks --scheme example",
     "actions list demo", "actions add demo-2024 --measure seal --from 12+310 --to 12+320", "actions set 1 --state done",
     "actions remove 999", "actions export demo -o {out}.xlsx",
+    "alarms add demo {new} --quantity ovality --warning 0.01 --alarm 0.02", "alarms list demo", "alarms remove demo {new}",
+    "alarms add demo {new} --quantity convergence --warning 0.01 --alarm 0.02", "alarms check demo -o {out}.csv",
+    "alarms add demo {new} --quantity growth --step 50 --warning 0.01 --alarm 0.02",
     "deviation demo-2024 -o {out}.csv", "thickness demo-2024 scan-2024", "evenness demo-2024", "compare demo-2024 scan-2024",
     "clearance demo-2024 --gauge {seeds}/profile.csv --track single", "unroll demo-2024 {seeds}/points.csv",
     "ground {seeds}/cloud.las -o {out}.laz", "intensity demo-2024 -o {out}.png", "image demo-2024 -o {out}",
@@ -125,9 +128,9 @@ UNTRIED = {
 """Verbs that are in none of OF_WORDS, and why."""
 
 REFUSED = (
-    "actions remove", "clearance", "compare", "elements remove", "evaluate", "export scan-2024", "findings undo", "ground", "intensity",
-    "learn demo-2024", "members demo", "profile remove", "rating change", "rating remove", "register", "run", "serve", "spheres",
-    "survey remove-file", "thickness", "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
+    "actions remove", "alarms remove", "clearance", "compare", "elements remove", "evaluate", "export scan-2024", "findings undo",
+    "ground", "intensity", "learn demo-2024", "members demo", "profile remove", "rating change", "rating remove", "register", "run",
+    "serve", "spheres", "survey remove-file", "thickness", "tunnel add {new} {file}", "tunnel find-axis", "tunnel remove",
 )  # fmt: skip
 """What right commands begin with that the survey made by hand has no rows for: they are to say so in one line."""
 

@@ -86,7 +86,7 @@ FREE = "ST_SetSRID('POLYGON((12350 0.5,12350.2 0.5,12350.2 0.7,12350 0.5))'::geo
 ROWS = {
     "region": {"survey": f"'{SURVEY}'", "kind": "'dry'", "geom": FREE},
     "finding_photo": {"finding_id": "1", "path": "'a.jpg'"},
-    "action": {"survey": f"'{SURVEY}'", "finding_id": "1", "measure": "'seal'"},
+    "action": {"survey": f"'{SURVEY}'", "chainage_from": "12310", "chainage_to": "12320", "measure": "'seal'"},
     "finding_kind": {
         "code": "'a' || floor(1e9 * random())::bigint", "label": "'a'", "geometries": "'{polygon}'", "position": "1",
         "wet": "false", "active": "true",

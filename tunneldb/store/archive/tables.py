@@ -23,6 +23,7 @@ EXCLUDED = {
     "incoming": "files that wait to be read, which a batch asks for again",
     "segmentation_network": "files of owners, which have the same numbers in every database",
     "finding_sum": "sums that triggers keep",
+    "alarm_limit": "the owner's for a tunnel in this database, added by command",
     "rating_scheme": "the owner's for all surveys, added from a file",
     "rating_rule": "the owner's for all surveys, added from a file",
     "waterproof": "statistics of kilometres, worked out anew",
